@@ -1,0 +1,173 @@
+"""Direction and distance of a source from the delays of its pulse over an array, and the bounds on their errors.
+
+A wavefront is described by the unit vector u towards its source, its curvature k = 1/R and the time t0 at which it
+passes the array centre; the plane wave is k = 0, no special case. Sensors at q (sonar frame) hear it at
+    t0 + (R |u - k q| - R)/c = t0 + (k |q|^2 - 2 u.q)/(c (1 + |u - k q|)).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.conventions import Floats
+
+RANK_TOLERANCE = 1e-6
+"""Singular values of the sensor positions below this share of the largest count as zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class Wavefront:
+    """A spherical wave over an array; parameters are (along tangent 0, along tangent 1, curvature, time)."""
+
+    direction: Floats  # (xyz) unit vector towards the source
+    curvature: float  # 1/m
+    time: float  # s at the array centre
+    tangents: Floats  # (2, xyz) unit vectors square to the direction and to each other
+    covariance: Floats  # (4, 4) of the parameters, for independent errors of one second at each sensor of weight one
+    by_sound_speed: Floats  # (4,) change of the fitted parameters per m/s of the assumed sound speed
+    residual: Floats  # (sensor,) s
+
+
+def wavefront_delays(position: npt.ArrayLike, direction: npt.ArrayLike, curvature: float, sound_speed: float) -> Floats:
+    """Delays (sensor,) in s, relative to the array centre, of a wave from `direction` at sensors `position` (sensor, xyz)."""
+    q, u = np.asarray(position, float), np.asarray(direction, float)
+    rho = np.linalg.norm(u - curvature * q, axis=-1)
+    return np.asarray((curvature * np.sum(q * q, axis=-1) - 2 * q @ u) / (sound_speed * (1 + rho)))
+
+
+def tangent_plane(direction: npt.ArrayLike) -> Floats:
+    """Two unit vectors (2, xyz) square to a direction: of increasing azimuth and of increasing elevation (y, z at a pole)."""
+    u = np.asarray(direction, float)
+    flat = np.hypot(u[0], u[1])
+    azimuth = np.array([-u[1], u[0], 0.0]) / flat if flat > 0 else np.array([0.0, 1.0, 0.0])
+    return np.stack([azimuth, np.cross(u, azimuth)])
+
+
+def plane_wave(
+    delay: npt.ArrayLike, position: npt.ArrayLike, sound_speed: float, weight: npt.ArrayLike | None = None
+) -> tuple[Floats, float]:
+    """Direction (xyz) and time (s) of the plane wave that fits delays (sensor,) best: the thesis's eq. 6, corrected.
+
+    The sum of SQUARES of tau_i - t0 + u.q_i/c is least, with the intercept t0 among the unknowns; closed form, no
+    search. (As printed, without the square, the sum does not depend on the angles for a symmetric array.) A planar
+    array gives the two components in its plane; the third follows from |u| = 1 with the sign that faces +x, since
+    such an array cannot tell front from back. NaN where the sensors (those of positive weight) lie on one line or in
+    one point, or where the components in the plane exceed 1 (no plane wave is that slow).
+    """
+    t, q = np.asarray(delay, float), np.asarray(position, float)
+    w = np.ones(len(t)) if weight is None else np.asarray(weight, float)
+    total = w.sum()
+    nothing = np.full(3, np.nan), np.nan
+    if not total > 0:
+        return nothing
+    q0, t0 = w @ q / total, w @ t / total
+    root = np.sqrt(w)[:, None]
+    u_, s, axes = np.linalg.svd(root * (q - q0), full_matrices=False)
+    rank = int(np.sum(s > RANK_TOLERANCE * s[0])) if s[0] > 0 else 0
+    if rank < 2:
+        return nothing
+    component = -sound_speed * (u_[:, :rank].T @ (root[:, 0] * (t - t0))) / s[:rank]
+    u = component @ axes[:rank]
+    if rank == 2:
+        normal = np.cross(axes[0], axes[1])
+        rest = 1 - u @ u
+        if rest < 0:
+            return nothing
+        u = u + np.sqrt(rest) * normal * (1.0 if normal[0] >= 0 else -1.0)
+    u = u / np.linalg.norm(u)
+    return u, float(t0 + q0 @ u / sound_speed)
+
+
+def spherical_wave(
+    delay: npt.ArrayLike,
+    position: npt.ArrayLike,
+    sound_speed: float,
+    weight: npt.ArrayLike,
+    start: npt.ArrayLike,
+    curvature: float = 0.0,
+    iterations: int = 20,
+) -> Wavefront | None:
+    """The spherical wave that fits delays (sensor,) best, by Gauss-Newton from direction `start`; None where none does.
+
+    weight (sensor,) >= 0: inverse variances, up to a common factor. Derivatives, with rho = |u - k q|:
+        d/du along a tangent e: -(q.e)/(c rho);  d/dk: (|q|^2 - (u.q)^2)/(c rho (rho + 1 - k u.q)).
+    Fisher matrix and bound follow: `covariance` times the variance of a delay of weight one is the Cramer-Rao bound
+    (physics: independent Gaussian errors; Van Trees 2002, section 8.4).
+    """
+    t, q, w = (np.asarray(a, float) for a in (delay, position, weight))
+    u, k = np.asarray(start, float), float(curvature)
+    size = float(np.sqrt(np.max(np.sum(q * q, axis=1), initial=0.0)))
+    if not (np.all(np.isfinite(u)) and size > 0):
+        return None
+    for _ in range(iterations):
+        tangents = tangent_plane(u)
+        jacobian = wavefront_jacobian(q, u, k, sound_speed, tangents)
+        delays = wavefront_delays(q, u, k, sound_speed)
+        solve = _normal_inverse(jacobian, w)
+        if solve is None:
+            return None
+        covariance, gain = solve
+        step = gain @ (t - delays)
+        u_next = u + step[:2] @ tangents
+        u_next = u_next / np.linalg.norm(u_next)
+        k_next = float(np.clip(k + step[2], -0.5 / size, 0.5 / size))  # sensors stay well inside the sphere
+        moved = np.linalg.norm(u_next - u) + abs(k_next - k) * size
+        if moved < 1e-13:
+            break
+        u, k = u_next, k_next
+    return Wavefront(u, k, float(step[3]), tangents, covariance, gain @ (delays / sound_speed), t - delays - step[3])
+
+
+def wavefront_jacobian(position: Floats, u: Floats, curvature: float, sound_speed: float, tangents: Floats) -> Floats:
+    """Derivatives (sensor, 4) of the delays by the parameters of a `Wavefront`."""
+    across = np.sum(position * position, axis=-1) - (position @ u) ** 2
+    rho = np.linalg.norm(u - curvature * position, axis=-1)
+    bend = across / (rho + 1 - curvature * (position @ u))
+    columns = [-(position @ tangents[0]), -(position @ tangents[1]), bend, sound_speed * rho]
+    return np.asarray(np.stack(columns, axis=-1) / (sound_speed * rho)[:, None])
+
+
+def _normal_inverse(jacobian: Floats, weight: Floats) -> tuple[Floats, Floats] | None:
+    """Inverse of J^T W J and the gain (J^T W J)^-1 J^T W, with columns scaled; None where it is singular."""
+    scale = np.sqrt(weight @ jacobian**2)
+    if not np.all(scale > 0):
+        return None
+    scaled = jacobian / scale
+    normal = (scaled * weight[:, None]).T @ scaled
+    values = np.linalg.eigvalsh(normal)
+    if not values[0] > 1e-13 * values[-1]:
+        return None
+    inverse = np.linalg.inv(normal)
+    gain = inverse @ (scaled * weight[:, None]).T / scale[:, None]
+    return inverse / np.outer(scale, scale), gain
+
+
+def delay_bound(energy_to_noise: npt.ArrayLike, bandwidth: npt.ArrayLike) -> Floats:
+    """Cramer-Rao bound (s) on the standard error of a delay: 1/(2 pi beta d), d^2 = `energy_to_noise` = 2 E/N0.
+
+    bandwidth beta (Hz) is the root mean square frequency of the known pulse, about zero where the carrier phase is
+    known, about the centroid where it is not (`rms_bandwidth`). Source: Van Trees (2002), section 8.2; Kay (1993), 3.11.
+    """
+    return np.asarray(1 / (2 * np.pi * np.asarray(bandwidth, float) * np.sqrt(np.asarray(energy_to_noise, float))))
+
+
+def rms_bandwidth(frequency: npt.ArrayLike, spectrum: npt.ArrayLike, *, centred: bool = False) -> float:
+    """Root mean square frequency (Hz) of a spectrum, about zero or about its centroid: sqrt(int f^2|S|^2/int |S|^2)."""
+    f, power = np.asarray(frequency, float), np.abs(np.asarray(spectrum)) ** 2
+    mean = float(f @ power / power.sum()) if centred else 0.0
+    return float(np.sqrt((f - mean) ** 2 @ power / power.sum()))
+
+
+def direction_bound(
+    position: npt.ArrayLike, delay_error: float, sound_speed: float
+) -> Floats:
+    """Cramer-Rao bound (3, 3) on the covariance of a plane wave's direction from delays of equal error (s).
+
+    Unknown emission time: (c delay_error)^2 times the (pseudo-)inverse of sum (q - mean q)(q - mean q)^T.
+    """
+    q = np.asarray(position, float)
+    spread = q - q.mean(axis=0)
+    return np.asarray((sound_speed * delay_error) ** 2 * np.linalg.pinv(spread.T @ spread, hermitian=True))

@@ -1,0 +1,151 @@
+"""Frames, signs, units and reference levels: stated once, here.
+
+World frame      right-handed, x east, y north, z up; z = 0 is the mean sea surface, water has z < 0; depth = -z.
+Body and sonar   x forward (the acoustic axis), y port, z up. A `Pose` maps body to world; orientations are unit
+                 quaternions, scalar first (w, x, y, z).
+Directions       azimuth = atan2(y, x), port positive; elevation = asin(z), up positive. Pictures are drawn as the
+                 sonar looks: port on the left. Heading is the compass heading: clockwise from north.
+Units            SI and radians inside. Descriptions accept a text with a unit where people write ("50 deg", "25 kHz").
+                 Pressure in Pa; levels in dB re 1 uPa; source level in dB re 1 uPa at 1 m.
+Time dependence  exp(+i 2 pi f t): a delay tau multiplies a spectrum by exp(-i 2 pi f tau). Spectra are `rfft` spectra.
+Instrument       the sample grid, the beam grid and the assumed sound speed belong to the sonar, never to the water.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+from annotated_types import Ge, Gt
+from pydantic import BeforeValidator, GetJsonSchemaHandler, WithJsonSchema
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import core_schema
+
+Floats = npt.NDArray[np.float64]
+"""Float64 array; shapes are given in docstrings and comments as (axis, axis)."""
+
+Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+
+REFERENCE_PRESSURE: Final = 1e-6  # Pa: levels are dB re 1 uPa
+REFERENCE_DISTANCE: Final = 1.0  # m: source levels are at 1 m
+STANDARD_GRAVITY: Final = 9.80665  # m/s2
+ATMOSPHERIC_PRESSURE: Final = 101325.0  # Pa
+
+NO_TARGET: Final = -1
+"""Index of "no target", "no facet": never 0, which is a target."""
+
+UNITS: Final[dict[str, dict[str, float]]] = {
+    "m": {"m": 1.0, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "ft": 0.3048, "in": 0.0254},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
+    "Hz": {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6},
+    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180.0},
+    "m/s": {"m/s": 1.0, "km/h": 1 / 3.6, "kn": 1852.0 / 3600.0},
+    "rad/s": {"rad/s": 1.0, "deg/s": np.pi / 180.0},
+    "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "uPa": 1e-6},
+    "dB": {"dB": 1.0},
+    "kg/m3": {"kg/m3": 1.0},
+    "degC": {"degC": 1.0},
+    "psu": {"psu": 1.0},
+}
+"""Unit texts that each SI unit accepts, and their size in it."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """The SI unit of a number; parses texts such as "25 kHz" into it (BeforeValidator of the types below)."""
+
+    symbol: str
+
+    def parse(self, value: Any) -> Any:
+        """A number in SI units from a number or from a text with a unit; raises ValueError in one clear line."""
+        if isinstance(value, bool):
+            raise ValueError(f"must be a number in {self.symbol}, not {str(value).lower()}")
+        if isinstance(value, np.generic):
+            return value.item()
+        if not isinstance(value, str):
+            return value
+        accepted = UNITS[self.symbol]
+        number, _, symbol = value.strip().partition(" ")
+        symbol = symbol.strip()
+        try:
+            size = float(number)
+        except ValueError:
+            raise ValueError(f"must be a number in {self.symbol}, or a text such as '1 {self.symbol}'") from None
+        if symbol not in accepted:
+            raise ValueError(f"has unit '{symbol}'; use one of {', '.join(accepted)}")
+        return size * accepted[symbol]
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        number = handler(schema)
+        units = "|".join(UNITS[self.symbol])
+        text = {"type": "string", "pattern": rf"^[-+0-9.eE]+ ({units})$"}
+        return {"anyOf": [number, text], "description": f"in {self.symbol}, or a text with a unit"}
+
+
+def _in(symbol: str) -> tuple[Unit, BeforeValidator]:
+    unit = Unit(symbol)
+    return unit, BeforeValidator(unit.parse)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, (bool, str)):
+        raise ValueError("must be a plain number")
+    return value.item() if isinstance(value, np.generic) else value
+
+
+Metres = Annotated[float, *_in("m")]
+Seconds = Annotated[float, *_in("s")]
+Hertz = Annotated[float, *_in("Hz")]
+Radians = Annotated[float, *_in("rad")]
+MetresPerSecond = Annotated[float, *_in("m/s")]
+RadiansPerSecond = Annotated[float, *_in("rad/s")]
+Pascals = Annotated[float, *_in("Pa")]
+Decibels = Annotated[float, *_in("dB")]
+KilogramsPerCubicMetre = Annotated[float, *_in("kg/m3")]
+DegreesCelsius = Annotated[float, *_in("degC")]
+PracticalSalinity = Annotated[float, *_in("psu")]
+Number = Annotated[float, BeforeValidator(_plain), WithJsonSchema({"type": "number"})]
+"""A dimensionless number."""
+
+PositiveMetres = Annotated[Metres, Gt(0)]
+NonNegativeMetres = Annotated[Metres, Ge(0)]
+PositiveSeconds = Annotated[Seconds, Gt(0)]
+PositiveHertz = Annotated[Hertz, Gt(0)]
+PositiveSpeed = Annotated[MetresPerSecond, Gt(0)]
+PositiveRadians = Annotated[Radians, Gt(0)]
+
+Position = tuple[Metres, Metres, Metres]
+"""A point (x, y, z) in metres."""
+
+
+def direction(azimuth: npt.ArrayLike, elevation: npt.ArrayLike) -> Floats:
+    """Unit vector(s) (..., xyz) of azimuth and elevation (rad), broadcast together."""
+    az, el = np.broadcast_arrays(np.asarray(azimuth, float), np.asarray(elevation, float))
+    return np.stack([np.cos(el) * np.cos(az), np.cos(el) * np.sin(az), np.sin(el)], axis=-1)
+
+
+def azimuth_elevation(vector: npt.ArrayLike) -> tuple[Floats, Floats]:
+    """Azimuth and elevation (rad) of vector(s) (..., xyz) of any length, exact near the poles as well."""
+    v = np.asarray(vector, float)
+    return np.arctan2(v[..., 1], v[..., 0]), np.arctan2(v[..., 2], np.hypot(v[..., 0], v[..., 1]))
+
+
+def depth(position: npt.ArrayLike) -> Floats:
+    """Depth below the mean sea surface (m, positive down) of point(s) (..., xyz) in the world."""
+    return -np.asarray(position, float)[..., 2]
+
+
+def level(pressure: npt.ArrayLike) -> Floats:
+    """Level in dB re 1 uPa of a pressure in Pa (-inf for silence)."""
+    with np.errstate(divide="ignore"):
+        return 20.0 * np.log10(np.abs(np.asarray(pressure, float)) / REFERENCE_PRESSURE)
+
+
+def pressure(level_db: npt.ArrayLike) -> Floats:
+    """Pressure in Pa of a level in dB re 1 uPa: the inverse of `level`."""
+    return np.asarray(REFERENCE_PRESSURE * 10.0 ** (np.asarray(level_db, float) / 20.0))

@@ -1,0 +1,161 @@
+"""What a plan costs and what it leaves out: the rows that `sonarsynth plan` prints.
+
+Costs are counts of work times seconds per unit of work, measured on one core of a 2-core AVX-512 machine (`tools/bench
+frame`), scaled by how fast this machine does a fixed set of transforms. Predictions are for one core.
+"""
+
+from __future__ import annotations
+
+import time
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.tracing import Refracted, Straight
+from sonarsynth.world.meshes import mesh_of
+
+if TYPE_CHECKING:
+    from sonarsynth.planning import Omission, Plan, Stage
+
+REFERENCE_TRANSFORM = 1.0e-3
+"""Seconds of `_probe` on the machine where the constants below were measured."""
+
+SECONDS = {
+    "trace facet": 2.0e-6,  # straight rays, lit test, ray casting both ways, scattering law
+    "trace refracted facet": 12e-6,  # eigenrays to the centre and to the probes of the aperture
+    "label beam": 0.6e-6,
+    "synthesise path sensor": 7e-9,
+    "synthesise sensor sample": 12e-9,
+    "noise sensor sample": 10e-9,
+    "locate sensor": 8e-6,
+    "transform sensor sample": 6e-9,
+    "image beam bin": 1.2e-9,
+    "range beam": 60e-6,
+    "write byte": 1.5e-9,
+}
+"""Seconds per unit of work."""
+
+
+@lru_cache(maxsize=1)
+def machine_factor() -> float:
+    """How much slower this machine is than the one where SECONDS was measured (best of five, about 10 ms in all)."""
+    block = np.ones((64, 4096), np.float32)
+    best = np.inf
+    for _ in range(5):
+        began = time.perf_counter()
+        np.fft.rfft(block)
+        best = min(best, time.perf_counter() - began)
+    return float(best / REFERENCE_TRANSFORM)
+
+
+def _facets(plan: Plan) -> int:
+    return sum(len(mesh_of(t.shape).faces) for t in plan.scene.world.targets)
+
+
+def stages(plan: Plan) -> tuple[Stage, ...]:
+    """What each stage will do, why, its error, and what it costs in one frame."""
+    from sonarsynth.planning import Stage
+
+    scene, sizes, factor = plan.scene, plan.sizes, machine_factor()
+    sonar, processing = scene.sonar, scene.processing
+    facets, paths = _facets(plan) * max(sizes["snap"], 1), 0.35 * _facets(plan) * max(sizes["snap"], 1)
+    sensor_samples = sizes["sensor"] * sizes["sample"]
+    beams = sizes["azimuth"] * sizes["elevation"]
+    gate = plan.windows.echo_stop - plan.windows.echo_start
+    bins = (sonar.band.high - sonar.band.low) * gate
+    straight = isinstance(plan.propagation, Straight)
+    rows: list[tuple[str, str, str, str, float, int]] = [
+        (
+            "trace",
+            f"{plan.propagation.kind} rays, {scene.physics.scattering.kind}",
+            "one sound speed everywhere: rays are straight" if straight else "the sound speed varies with depth",
+            "none" if straight else "wavefront expansion: measured, /truth/wavefront_error",
+            facets * SECONDS["trace facet" if straight else "trace refracted facet"],
+            0,
+        ),
+        ("label", "one ray a beam", "always", "none", beams * SECONDS["label beam"], beams * 10 + 4096),
+    ]
+    if plan.products:
+        work = paths * sizes["sensor"] * SECONDS["synthesise path sensor"]
+        work += sensor_samples * SECONDS["synthesise sensor sample"]
+        if scene.world.environment.noise:
+            work += sensor_samples * SECONDS["noise sensor sample"]
+        method = scene.physics.synthesis
+        size = 2 if sonar.converter else 4
+        stored = sensor_samples * size if "signals" in plan.products else 0
+        rows.append(("synthesise", method.kind, "asked for, or needed by the image", method.error, work, stored))
+    if plan.products & {"image", "cloud"}:
+        rows.append(
+            (
+                "locate",
+                processing.locating.kind,
+                "ranging needs the snap",
+                "predicted, /bearings",
+                sizes["sensor"] * SECONDS["locate sensor"],
+                512,
+            )
+        )
+        transform = sizes["sensor"] * gate * sonar.sampling_frequency * SECONDS["transform sensor sample"]
+        image = transform + beams * bins * SECONDS["image beam bin"]
+        stored = 4 * beams if "image" in plan.products else 0
+        beamformer = processing.beamforming
+        rows.append(("beamform", beamformer.kind, "asked for, or needed by the cloud", beamformer.error, image, stored))
+    if "cloud" in plan.products:
+        rows.append(
+            (
+                "range",
+                processing.ranging.kind,
+                "asked for",
+                "predicted, /cloud/range_error",
+                150 * SECONDS["range beam"],
+                28 * beams,
+            )
+        )
+    total = sum(row[5] for row in rows)
+    rows.append(("write", "zarr, blosc-zstd, crc32c", "always", "none", total * SECONDS["write byte"], 0))
+    return tuple(Stage(a, b, c, d, seconds * factor, size) for a, b, c, d, seconds, size in rows)
+
+
+def left_out(plan: Plan) -> tuple[Omission, ...]:
+    """What is not computed, why, and the bound on what that costs."""
+    from sonarsynth.planning import Omission
+
+    scene = plan.scene
+    environment, products = scene.world.environment, plan.products
+    rows = []
+    if isinstance(plan.propagation, Straight):
+        speeds = plan.profile.speed
+        bound = "0: the sound speed is the same everywhere"
+        if not plan.profile.uniform:
+            bound = f"asked for, but the sound speed varies by {np.ptp(speeds):.3g} m/s: angles and delays are biased"
+        rows.append(Omission("refraction", "straight rays", bound))
+    rows.append(
+        Omission(
+            "surface and bed reflections",
+            "the direct family is traced",
+            "not bounded: paths by the surface (up to 0 dB of the direct one, delays from geometry) are absent",
+        )
+    )
+    rows.append(Omission("Doppler", "a frame is one instant", _doppler_bound(plan)))
+    if environment.noise is None:
+        rows.append(Omission("ambient noise", "the scene describes none", "signals are free of noise"))
+    if scene.sonar.converter is None and "signals" in products:
+        rows.append(Omission("converter", "the sonar describes none", "0: pressure is stored as float32"))
+    for name in ("signals", "image", "cloud"):
+        if name not in products:
+            rows.append(Omission(name, "not asked for", "0"))
+    if isinstance(plan.propagation, Refracted):
+        rows.append(Omission("rays to each sensor", "wavefront expansion over the aperture", "/truth/wavefront_error"))
+    return tuple(rows)
+
+
+def _doppler_bound(plan: Plan) -> str:
+    """Delay change over the longest pulse path while the target moves on: v/c of the echo's excess delay."""
+    speed = max(
+        (float(np.linalg.norm(body.velocity)) for body in plan.recipe.frame(0)[1].moment.bodies),
+        default=0.0,
+    )
+    stretch = 2 * speed / float(plan.profile.speed.min())
+    phase = 2 * np.pi * plan.scene.sonar.band.high * stretch * 50e-6
+    return f"time stretch {stretch:.2g}: {phase:.2g} rad over a 50 us pulse at the top of the band"

@@ -1,0 +1,85 @@
+"""Poses and rotations. Quaternions are unit, scalar first (w, x, y, z), and map body to world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.conventions import Floats
+
+
+def quaternion(heading: float, pitch: float = 0.0, roll: float = 0.0) -> Floats:
+    """Unit quaternion (4,) of a body whose x axis points to the compass `heading` (rad, clockwise from north).
+
+    Then pitched nose up and rolled starboard down (rad): body to world = Rz(pi/2 - heading) Ry(-pitch) Rx(roll).
+    """
+    yaw = 0.5 * np.pi - heading
+    about_z = np.array([np.cos(0.5 * yaw), 0.0, 0.0, np.sin(0.5 * yaw)])
+    about_y = np.array([np.cos(0.5 * pitch), 0.0, -np.sin(0.5 * pitch), 0.0])
+    about_x = np.array([np.cos(0.5 * roll), np.sin(0.5 * roll), 0.0, 0.0])
+    return quaternion_product(quaternion_product(about_z, about_y), about_x)
+
+
+def quaternion_product(p: npt.ArrayLike, q: npt.ArrayLike) -> Floats:
+    """Hamilton product p q of quaternions (..., 4): rotate by q first, then by p."""
+    pw, px, py, pz = np.moveaxis(np.asarray(p, float), -1, 0)
+    qw, qx, qy, qz = np.moveaxis(np.asarray(q, float), -1, 0)
+    return np.stack(
+        [
+            pw * qw - px * qx - py * qy - pz * qz,
+            pw * qx + px * qw + py * qz - pz * qy,
+            pw * qy - px * qz + py * qw + pz * qx,
+            pw * qz + px * qy - py * qx + pz * qw,
+        ],
+        axis=-1,
+    )
+
+
+def rotation_matrix(q: npt.ArrayLike) -> Floats:
+    """Rotation matrix (3, 3), body to world, of a unit quaternion (4,)."""
+    w, x, y, z = np.asarray(q, float)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """Where a body is: position (3,) in the world (m) and orientation (4,), a unit quaternion from body to world."""
+
+    position: Floats
+    orientation: Floats
+
+    @property
+    def rotation(self) -> Floats:
+        """Rotation matrix (3, 3), body to world."""
+        return rotation_matrix(self.orientation)
+
+    def to_world(self, points: npt.ArrayLike) -> Floats:
+        """Points (..., 3) of the body in the world."""
+        return np.asarray(points, float) @ self.rotation.T + self.position
+
+    def to_body(self, points: npt.ArrayLike) -> Floats:
+        """Points (..., 3) of the world in the body's frame."""
+        return (np.asarray(points, float) - self.position) @ self.rotation
+
+    def turn_to_world(self, vectors: npt.ArrayLike) -> Floats:
+        """Vectors (..., 3) of the body in world axes (directions: no shift)."""
+        return np.asarray(vectors, float) @ self.rotation.T
+
+    def turn_to_body(self, vectors: npt.ArrayLike) -> Floats:
+        """Vectors (..., 3) of the world in body axes (directions: no shift)."""
+        return np.asarray(vectors, float) @ self.rotation
+
+
+def unit(vectors: npt.ArrayLike) -> Floats:
+    """Vectors (..., 3) scaled to length one; the zero vector gives NaN, never a direction."""
+    v = np.asarray(vectors, float)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return v / np.linalg.norm(v, axis=-1, keepdims=True)

@@ -1,0 +1,177 @@
+"""Ground truth of a frame, from the same arrivals and meshes that made its signals, on the sonar's own grid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from sonarsynth.conventions import NO_TARGET, Floats, azimuth_elevation, direction, level
+from sonarsynth.geometry import Pose
+from sonarsynth.products import LEDGER, Arrivals, Ledger, Paths, Truth
+from sonarsynth.sonar import BeamGrid
+from sonarsynth.world.casting import first_hit, occluded
+from sonarsynth.world.meshes import Mesh
+from sonarsynth.world.moment import Body, Moment, Snap
+
+FAMILIES = ("direct", "surface", "bed", "surface and bed")
+"""Path families of the ledger: by which boundaries the path touched."""
+
+Connect = Callable[[Floats, Floats], Paths]
+"""Rays from (pair, xyz) to (pair, xyz) in the world: a propagation model bound to its water."""
+
+_CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+
+
+def label(
+    moment: Moment, sonar_pose: Pose, beams: BeamGrid, connect: Connect, snap_level: Floats, straight: bool
+) -> Truth:
+    """Truth of a frame.
+
+    moment: the world; sonar_pose: of the array; beams: the grid that beams are labelled on; connect: the propagation
+    model of the frame; snap_level: (snap,) dB re 1 uPa at 1 m; straight: rays are straight, so bodies look as they are.
+    A beam's label is the first surface that a ray launched from the array centre in the beam's direction meets; its
+    range is the distance of that point from the array centre. `label` traces the bent ray by casting a straight one
+    against the bodies as they appear: each vertex moved to (its arrival direction) * (its distance).
+    """
+    seen = [_as_seen(body, sonar_pose, connect, straight) for body in moment.bodies]
+    target, facet, distance = _label_beams(moment.bodies, seen, beams)
+    boxes = [_visible(body, corners, moment.bodies, sonar_pose) for body, corners in zip(moment.bodies, seen, strict=True)]
+    return Truth(
+        sonar_position=sonar_pose.position,
+        sonar_orientation=sonar_pose.orientation,
+        target_position=_rows([b.pose.position for b in moment.bodies], 3),
+        target_orientation=_rows([b.pose.orientation for b in moment.bodies], 4),
+        target_velocity=_rows([b.velocity for b in moment.bodies], 3),
+        box=np.array([_box(b, sonar_pose) for b in moment.bodies]).reshape(-1, 8, 3),
+        image_box=_rows([box for box, _ in boxes], 4),
+        visible_fraction=np.array([fraction for _, fraction in boxes]),
+        snap_position=_rows([s.position for s in moment.snaps], 3),
+        snap_time=np.array([s.time for s in moment.snaps]),
+        snap_level=np.asarray(snap_level, float),
+        beam_target=target,
+        beam_facet=facet,
+        beam_range=distance,
+    )
+
+
+def _rows(rows: list[Floats], width: int) -> Floats:
+    return np.array(rows, float).reshape(-1, width)
+
+
+def _box(body: Body, sonar_pose: Pose) -> Floats:
+    """(8, xyz) corners of the oriented bounding box in the sonar frame."""
+    low, high = body.mesh.box
+    return sonar_pose.to_body(body.pose.to_world(low + _CORNERS * (high - low)))
+
+
+def _as_seen(body: Body, sonar_pose: Pose, connect: Connect, straight: bool) -> Floats:
+    """(vertex, xyz) in the sonar frame: vertices where the array sees them; NaN where no ray arrives (a shadow)."""
+    world = body.pose.to_world(body.mesh.vertices)
+    true = sonar_pose.to_body(world)
+    if straight:
+        return true
+    paths = connect(world, np.broadcast_to(sonar_pose.position, world.shape))
+    pairs, first = np.unique(paths.pair, return_index=True)  # the earliest: paths are sorted by time
+    apparent = np.full_like(true, np.nan)
+    towards = -sonar_pose.turn_to_body(paths.arrival[first])
+    apparent[pairs] = towards * np.linalg.norm(true[pairs], axis=1)[:, None]
+    return apparent
+
+
+def _label_beams(
+    bodies: tuple[Body, ...], seen: list[Floats], beams: BeamGrid
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Target, facet and range (elevation, azimuth) of each beam."""
+    rays = direction(beams.azimuth[None, :], beams.elevation[:, None])
+    shape = rays.shape[:2]
+    target = np.full(shape, NO_TARGET, np.int16)
+    facet = np.full(shape, NO_TARGET, np.int32)
+    nearest = np.full(shape, np.inf)
+    for index, (body, vertices) in enumerate(zip(bodies, seen, strict=True)):
+        faces = body.mesh.faces[np.isfinite(vertices[body.mesh.faces]).all(axis=(1, 2))]
+        if not len(faces):
+            continue
+        rows, columns = _beams_near(vertices[np.unique(faces)], rays)
+        mesh = Mesh(np.nan_to_num(vertices), body.mesh.faces)
+        hit, distance = first_hit(mesh, np.zeros((len(rows), 3)), rays[rows, columns])
+        closer = (hit >= 0) & (distance < nearest[rows, columns])
+        rows, columns = rows[closer], columns[closer]
+        target[rows, columns], facet[rows, columns] = index, hit[closer]
+        nearest[rows, columns] = distance[closer]
+    return target, facet, np.where(np.isfinite(nearest), nearest, np.nan).astype(np.float32)
+
+
+def _beams_near(points: Floats, rays: Floats) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns of the rays inside the cone, about the mean direction of the points, that holds them all."""
+    towards = points / np.linalg.norm(points, axis=1, keepdims=True)
+    axis = towards.mean(axis=0)
+    if np.linalg.norm(axis) < 0.5:  # the array is within the body, or close to it: every ray may hit
+        return np.nonzero(np.ones(rays.shape[:2], bool))
+    axis /= np.linalg.norm(axis)
+    widest = np.arccos(np.clip(towards @ axis, -1, 1)).max()
+    return np.nonzero(np.arccos(np.clip(rays @ axis, -1, 1)) <= widest + 1e-3)
+
+
+def _visible(body: Body, seen: Floats, bodies: tuple[Body, ...], sonar_pose: Pose) -> tuple[Floats, float]:
+    """Azimuth and elevation bounds (4,) of the visible facets, and the visible share of the area that faces the array."""
+    mesh = body.mesh
+    centroid, normal = body.pose.to_world(mesh.centroid), body.pose.turn_to_world(mesh.normal)
+    facing = np.einsum("ij,ij->i", sonar_pose.position - centroid, normal) > 0
+    facing &= np.isfinite(seen[mesh.faces]).all(axis=(1, 2))
+    if not facing.any():
+        return np.full(4, np.nan), 0.0
+    start = centroid[facing] + 1e-6 * mesh.radius * normal[facing]
+    clear = ~occluded(bodies, start, np.broadcast_to(sonar_pose.position, start.shape))
+    visible = np.flatnonzero(facing)[clear]
+    fraction = float(mesh.area[visible].sum() / mesh.area[facing].sum())
+    if not len(visible):
+        return np.full(4, np.nan), 0.0
+    azimuth, elevation = azimuth_elevation(seen[mesh.faces[visible]].reshape(-1, 3))
+    return np.array([azimuth.min(), azimuth.max(), elevation.min(), elevation.max()]), fraction
+
+
+def family(arrivals: Arrivals) -> np.ndarray:
+    """Index into FAMILIES of each arrival (path,)."""
+    return np.asarray((arrivals.surface > 0) + 2 * (arrivals.bottom > 0))
+
+
+def ledger(arrivals: Arrivals, snaps: tuple[Snap, ...], targets: int, snap_level: Floats, error: float) -> Ledger:
+    """Levels (snap, target + 1, family, LEDGER) that add up exactly: powers of the paths of a family are summed.
+
+    Each loss is the ratio of two power sums, with one more factor of the amplitude in the second, so that
+    received = source - loss_out + scattering - loss_in - absorption - boundary whatever the paths. NaN where a family
+    has no path. error: bound (dB) on each level from the approximations of the chain.
+    """
+    shape = (len(snaps), targets + 1, len(FAMILIES))
+    levels = np.full((*shape, len(LEDGER)), np.nan)
+    paths = np.zeros(shape, int)
+    bound = np.full(shape, np.nan)
+    which = np.where(arrivals.direct, targets, arrivals.target)
+    for cell in np.ndindex(shape):
+        mine = arrivals.select((arrivals.snap == cell[0]) & (which == cell[1]) & (family(arrivals) == cell[2]))
+        paths[cell] = len(mine.delay)
+        if paths[cell]:
+            levels[cell] = _add_up(mine, snap_level[cell[0]])
+            bound[cell] = error
+    return Ledger(levels, paths, bound)
+
+
+def _add_up(paths: Arrivals, source_level: float) -> Floats:
+    """One row of the ledger (LEDGER,)."""
+    factors = [
+        paths.scattering,
+        paths.spreading_out,
+        paths.spreading_in,
+        10.0 ** (-paths.absorption / 20.0),
+        paths.boundary,
+    ]
+    sums = [np.sum(np.prod(factors[: n + 1], axis=0) ** 2) for n in range(len(factors))]
+    scattering, out, back, absorption, boundary = np.diff(10.0 * np.log10([1.0, *sums]))
+    received = source_level + 10.0 * np.log10(sums[-1])
+    return np.array([source_level, -out, scattering, -back, -absorption, -boundary, received])
+
+
+def peak_level(pressure_at_1m: Floats) -> float:
+    """Peak level (dB re 1 uPa at 1 m) of a waveform (sample,) in Pa at 1 m."""
+    return float(level(np.abs(pressure_at_1m).max()))

@@ -1,0 +1,178 @@
+"""Results in flight: frozen dataclasses of arrays, shapes in the annotations. The stages meet only here.
+
+Axis names: path (an arrival), sensor, sample, snap, target, elevation, azimuth, xyz, term (polynomial over the aperture).
+Unless said otherwise arrays are float64, positions in m in the sonar frame, times in s on the clock of the frame (0 is
+the instant of the frame; a snap at `Snap.time` is heard a travel time later).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.conventions import Bools, Floats, Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Paths:
+    """Rays that join pairs of points in the water, from a propagation model. World frame.
+
+    A pair may have no path (a shadow zone) or several; paths are sorted by pair, then by travel time.
+    """
+
+    pair: Ints  # (path,) which pair of end points
+    travel_time: Floats  # (path,) s
+    length: Floats  # (path,) m, along the ray
+    departure: Floats  # (path, xyz) unit vector of travel where the ray starts
+    arrival: Floats  # (path, xyz) unit vector of travel where it ends
+    spreading: Floats  # (path,) 1/m: geometric amplitude re 1 m from the source (1/r in isovelocity water)
+    surface: Ints  # (path,) number of surface reflections
+    bottom: Ints  # (path,) number of bed reflections
+    turning: Ints  # (path,) number of turning points
+    flag: Ints  # (path,) 0 good; else why ray theory ends here (tracing.FLAGS)
+
+
+@dataclass(frozen=True, eq=False)
+class Arrivals:
+    """Every path of a frame as it reaches the array: snap to facet to array, and snap to array.
+
+    The wavefront of path e reaches sensor position q (sonar frame) at
+        delay[e] + (|R d - q| - |R|)/sound_speed + delay_terms[e] @ aperture_terms(q)
+    with d = direction[e], R = radius[e], and amplitude
+        amplitude[e] * R/|R d - q| * (1 + amplitude_terms[e] @ aperture_terms(q)).
+    (`acoustics.arrays.aperture_terms`.) In isovelocity water the sphere is exact and delay_terms has no columns.
+    amplitude is the factor on the pressure waveform of the snap at 1 m: the product of the columns below it.
+    """
+
+    delay: Floats  # (path,) s at the array centre, snap time included
+    direction: Floats  # (path, xyz) unit vector from the array centre towards where the path seems to come from
+    radius: Floats  # (path,) m: radius of curvature of the reference sphere
+    delay_terms: Floats  # (path, term) s; (path, 0) where the sphere is exact
+    amplitude_terms: Floats  # (path, term); (path, 0) where R/|R d - q| is exact
+    amplitude: Floats  # (path,) signed: spreading_out * scattering * spreading_in * boundary * 10^(-absorption/20)
+    spreading_out: Floats  # (path,) 1/m: snap to facet (snap to array for the direct path)
+    spreading_in: Floats  # (path,) 1/m: facet to array (1 for the direct path)
+    scattering: Floats  # (path,) m: far-field scattering amplitude f of the facet (1 for the direct path)
+    boundary: Floats  # (path,) signed product of boundary reflection coefficients
+    absorption: Floats  # (path,) dB along the whole path at the centre of the band
+    length: Floats  # (path,) m: whole path
+    snap: Ints  # (path,) index of the snap
+    target: Ints  # (path,) index of the target, -1 for the direct path
+    facet: Ints  # (path,) index of the facet in its target's mesh, -1 for the direct path
+    point: Floats  # (path, xyz) world position of the scattering point (of the snap for the direct path)
+    surface: Ints  # (path,) surface reflections
+    bottom: Ints  # (path,) bed reflections
+    turning: Ints  # (path,) turning points
+    sound_speed: float  # m/s of the water at the array centre
+    wavefront_error: float  # s: largest measured error of the wavefront expansion over the aperture
+
+    def select(self, keep: Bools | Ints) -> Arrivals:
+        """The arrivals picked by a mask or by indices (path,)."""
+        rows = {
+            name: value[keep] if isinstance(value, np.ndarray) else value for name, value in vars(self).items()
+        }
+        return Arrivals(**rows)
+
+    @property
+    def direct(self) -> Bools:
+        """(path,) true for paths that met no target."""
+        return self.target < 0
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """Pressure at each hydrophone, as the converter gives it."""
+
+    pressure: npt.NDArray[np.float32]  # (sensor, sample) Pa; a whole number of `quantum` where a converter is described
+    start: float  # s: time of sample 0
+    sampling_frequency: float  # Hz
+    quantum: float  # Pa of one count; 0 without a converter
+    clipped: int  # samples at full scale
+    outside: int  # arrivals that fell outside the window: counted, never wrapped
+
+
+@dataclass(frozen=True, eq=False)
+class Bearings:
+    """Where the array hears each snap: one row a snap, the loudest direct pulse first; NaN where none was found.
+
+    Standard errors are predicted from the data and the instrument alone (one sigma).
+    """
+
+    time: Floats  # (snap,) s: arrival of the direct pulse at the array centre
+    time_error: Floats  # (snap,) s
+    azimuth: Floats  # (snap,) rad, sonar frame, of the arriving wave
+    azimuth_error: Floats  # (snap,) rad
+    elevation: Floats  # (snap,) rad
+    elevation_error: Floats  # (snap,) rad
+    range_from_depth: Floats  # (snap,) m: where the bearing meets the known depth of the bed
+    range_from_depth_error: Floats  # (snap,) m
+    range_from_curvature: Floats  # (snap,) m: from the curvature of the wavefront
+    range_from_curvature_error: Floats  # (snap,) m
+    position: Floats  # (snap, xyz) m, sonar frame: both ranges weighted by their errors
+    position_covariance: Floats  # (snap, xyz, xyz) m2
+    residual: Floats  # (snap,) s: root mean square residual of the sensor delays
+
+
+@dataclass(frozen=True, eq=False)
+class EnergyImage:
+    """Energy in each steered direction, in the echo window."""
+
+    energy: npt.NDArray[np.float32]  # (elevation, azimuth) Pa2 s, of the mean-pressure beam (a plane wave of p gives int p2 dt)
+    azimuth: Floats  # (azimuth,) rad, ascending
+    elevation: Floats  # (elevation,) rad, ascending
+    start: float  # s: the echo window that was imaged
+    stop: float  # s
+
+
+@dataclass(frozen=True, eq=False)
+class PointCloud:
+    """One organised cloud on the beam grid; NaN where there is no point. Sonar frame."""
+
+    range: npt.NDArray[np.float32]  # (elevation, azimuth) m from the array centre
+    range_error: npt.NDArray[np.float32]  # (elevation, azimuth) m, predicted standard error
+    delay: npt.NDArray[np.float32]  # (elevation, azimuth) s after the direct arrival
+    energy: npt.NDArray[np.float32]  # (elevation, azimuth) Pa2 s of the beam
+    position: npt.NDArray[np.float32]  # (elevation, azimuth, xyz) m
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """Exact ground truth of a frame, from the same arrivals that made the signals."""
+
+    sonar_position: Floats  # (xyz) m, world
+    sonar_orientation: Floats  # (wxyz)
+    target_position: Floats  # (target, xyz) m, world
+    target_orientation: Floats  # (target, wxyz)
+    target_velocity: Floats  # (target, xyz) m/s, world
+    box: Floats  # (target, corner 8, xyz) m: oriented bounding box, sonar frame
+    image_box: Floats  # (target, 4): azimuth min, max, elevation min, max (rad) of the visible part; NaN if unseen
+    visible_fraction: Floats  # (target,) share of the area facing the array that the array sees
+    snap_position: Floats  # (snap, xyz) m, world
+    snap_time: Floats  # (snap,) s
+    snap_level: Floats  # (snap,) dB re 1 uPa at 1 m
+    beam_target: npt.NDArray[np.int16]  # (elevation, azimuth) -1 for none
+    beam_facet: npt.NDArray[np.int32]  # (elevation, azimuth) -1 for none
+    beam_range: npt.NDArray[np.float32]  # (elevation, azimuth) m to the first surface in the beam's direction
+
+
+LEDGER = (
+    "source_level",
+    "transmission_loss_out",
+    "scattering",
+    "transmission_loss_in",
+    "absorption_loss",
+    "boundary_loss",
+    "received_level",
+)
+"""Ledger terms in dB: received = source - loss_out + scattering - loss_in - absorption - boundary."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ledger:
+    """Levels of each (snap, target, family) in dB that add up; powers of a family's paths are summed."""
+
+    level: Floats  # (snap, target + 1, family, LEDGER) dB; the last target row is the direct path; NaN without paths
+    paths: Ints  # (snap, target + 1, family)
+    error_bound: Floats  # (snap, target + 1, family) dB

@@ -1,0 +1,215 @@
+"""render(plan, i): one frame from recipe to labelled data, pure. Labels enter here and nowhere below.
+
+    trace_frame       Scene, Frame -> Arrivals, Truth, Ledger
+    beamform_frame    Arrivals -> Signals, Bearings, EnergyImage
+    range_frame       Signals, Bearings, EnergyImage -> PointCloud, and everything that is stored
+The three are the tasks that the scheduler runs; what nobody asked for is not computed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.acoustics.snap import peak_pressure
+from sonarsynth.conventions import Floats, level
+from sonarsynth.labelling import label, ledger
+from sonarsynth.planning import Plan, plan
+from sonarsynth.products import LEDGER, Arrivals, Bearings, EnergyImage, Ledger, PointCloud, Signals, Truth
+from sonarsynth.randomness import stream
+from sonarsynth.recipe import Recipe
+from sonarsynth.scene import Frame
+from sonarsynth.tracing import Straight
+from sonarsynth.variables import VARIABLES, Variable, attributes, coordinates, variables
+from sonarsynth.world.moment import Snap
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "VARIABLES",
+    "Heard",
+    "Traced",
+    "Values",
+    "Variable",
+    "attributes",
+    "beamform_frame",
+    "coordinates",
+    "range_frame",
+    "render",
+    "trace_frame",
+    "variables",
+]
+
+Values = dict[tuple[str, str], np.ndarray]
+"""(group, name) to the array of one frame, without the frame axis."""
+
+
+@dataclass(frozen=True, eq=False)
+class Traced:
+    """What the trace task gives."""
+
+    frame: Frame
+    arrivals: Arrivals
+    truth: Truth
+    ledger: Ledger
+
+
+@dataclass(frozen=True, eq=False)
+class Heard:
+    """What the beamform task gives; None where no product needs it."""
+
+    signals: Signals | None
+    bearings: Bearings | None
+    image: EnergyImage | None
+
+
+def snap_levels(snaps: tuple[Snap, ...]) -> Floats:
+    """(snap,) peak source level of each snap (dB re 1 uPa at 1 m)."""
+    return np.array([float(level(peak_pressure(s.model))) if s.source_level is None else s.source_level for s in snaps])
+
+
+def trace_frame(plan: Plan, index: int) -> Traced:
+    """Every path of a frame, and its truth."""
+    from sonarsynth.tracing.arrivals import trace
+
+    scene, frame = plan.recipe.frame(index)
+    environment, sonar = scene.world.environment, scene.sonar
+    arrivals = trace(
+        environment,
+        plan.profile,
+        frame.moment,
+        frame.sonar_pose,
+        plan.elements,
+        float(plan.absorption(sonar.band.centre)),
+        plan.propagation,
+        scene.physics.scattering,
+    )
+    levels = snap_levels(frame.moment.snaps)
+    straight = isinstance(plan.propagation, Straight)
+    truth = label(frame.moment, frame.sonar_pose, sonar.beams, plan.connect, levels, straight)
+    phase = 2 * np.pi * sonar.band.high * arrivals.wavefront_error
+    book = ledger(arrivals, frame.moment.snaps, len(frame.moment.bodies), levels, float(-20 * np.log10(np.cos(min(phase, 1.5)))))
+    return Traced(frame, arrivals, truth, book)
+
+
+def beamform_frame(plan: Plan, index: int, traced: Traced) -> Heard:
+    """What the array hears: signals, where the snap is, and the energy image of the echo window."""
+    if not plan.products:
+        return Heard(None, None, None)
+    signals = synthesise(plan, traced)
+    if not plan.products & {"image", "cloud"}:
+        return Heard(signals, None, None)
+    scene, frame = plan.scene, traced.frame
+    processing, sonar = scene.processing, scene.sonar
+    snaps = plan.sizes["snap"]
+    bearings = processing.locating.locate(
+        signals, plan.elements, sonar, frame.sonar_pose, scene.world.environment.depth, snaps
+    )
+    heard = float(bearings.time[0]) if snaps else np.nan
+    start, stop = heard + plan.windows.echo_start, heard + plan.windows.echo_stop
+    if np.isfinite(start):
+        image = processing.beamforming.image(signals, plan.elements, sonar, start, stop)
+    else:  # no direct pulse was found, so there is no clock: an image of nothing, not of an arbitrary window
+        silent = np.full((sonar.beams.elevations, sonar.beams.azimuths), np.nan, np.float32)
+        image = EnergyImage(silent, sonar.beams.azimuth, sonar.beams.elevation, np.nan, np.nan)
+    return Heard(signals, bearings, image)
+
+
+def synthesise(plan: Plan, traced: Traced) -> Signals:
+    """Pressure at each hydrophone: echoes and direct snap, ambient noise, converter."""
+    from sonarsynth.synthesis import add_noise, convert
+
+    scene, frame = plan.scene, traced.frame
+    sonar = scene.sonar
+    signals = scene.physics.synthesis.signals(
+        traced.arrivals,
+        frame.moment.snaps,
+        plan.elements,
+        sonar,
+        plan.absorption,
+        float(plan.windows.start[frame.index]),
+        plan.windows.samples,
+    )
+    noise = scene.world.environment.noise
+    if noise is not None:
+        random = stream(frame.seed, "noise", frame.trajectory, frame.step)
+        signals = add_noise(signals, noise, sonar, plan.elements, random)
+    return signals if sonar.converter is None else convert(signals, sonar.converter)
+
+
+def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
+    """The point cloud, and every stored value of the frame."""
+    values = _truth_values(plan, index, traced)
+    if heard.signals is not None and "signals" in plan.products:
+        values |= _signal_values(plan, heard.signals)
+    if heard.image is None or heard.bearings is None or heard.signals is None:
+        return values
+    values |= _bearing_values(heard.bearings)
+    if "image" in plan.products:
+        values |= _table("/image", energy=heard.image.energy, start=heard.image.start, stop=heard.image.stop)
+    if "cloud" in plan.products:
+        scene = plan.scene
+        cloud = scene.processing.ranging.cloud(
+            heard.signals, heard.image, heard.bearings, plan.elements, scene.sonar, traced.frame.sonar_pose, plan.profile
+        )
+        values |= _cloud_values(cloud)
+    return values
+
+
+def _table(group: str, **columns: object) -> Values:
+    return {(group, name): np.asarray(value) for name, value in columns.items()}
+
+
+def _truth_values(plan: Plan, index: int, traced: Traced) -> Values:
+    frame, truth, book = traced.frame, traced.truth, traced.ledger
+    row = {"trajectory": frame.trajectory, "step": frame.step, "time": frame.time, "split": plan.recipe.split(index)}
+    stored = {name.removeprefix("beam_"): value for name, value in vars(truth).items()}
+    stored["image_box"] = np.rad2deg(truth.image_box)
+    levels = {name: book.level[..., n] for n, name in enumerate(LEDGER)}
+    return (
+        _table("/", **row)
+        | _table("/truth", **stored, wavefront_error=traced.arrivals.wavefront_error)
+        | _table("/ledger", **levels, paths=book.paths, error_bound=book.error_bound)
+    )
+
+
+def _signal_values(plan: Plan, signals: Signals) -> Values:
+    counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
+    pressure = np.rint(signals.pressure / signals.quantum).astype(np.int16) if counts else signals.pressure
+    return _table(
+        "/signals", pressure=pressure, start=signals.start, clipped=signals.clipped, outside=signals.outside
+    )
+
+
+def _bearing_values(bearings: Bearings) -> Values:
+    columns = dict(vars(bearings))
+    for name in ("azimuth", "azimuth_error", "elevation", "elevation_error"):
+        columns[name] = np.rad2deg(columns[name])
+    return _table("/bearings", **columns)
+
+
+def _cloud_values(cloud: PointCloud) -> Values:
+    x, y, z = np.moveaxis(cloud.position, -1, 0)
+    columns = {name: value for name, value in vars(cloud).items() if name != "position"}
+    return _table("/cloud", **columns, x=x, y=y, z=z)
+
+
+def render(recipe: Recipe | Plan, index: int) -> xr.DataTree:
+    """One frame of a recipe as a labelled DataTree: groups and names as in a store, without the frame axis. Pure."""
+    import xarray as xr
+
+    made = plan(recipe) if isinstance(recipe, Recipe) else recipe
+    traced = trace_frame(made, index)
+    values = range_frame(made, index, traced, beamform_frame(made, index, traced))
+    groups: dict[str, xr.Dataset] = {"/": xr.Dataset(attrs=attributes(made))}
+    for (group, name), (dims, array, attrs) in coordinates(made).items():
+        if "frame" not in dims:
+            groups.setdefault(group, xr.Dataset()).coords[name] = (dims, array, attrs)
+    for v in variables(made):
+        attrs = {"units": v.units, "long_name": v.long_name, **dict(v.attributes)}
+        data = values[v.group, v.name]
+        groups.setdefault(v.group, xr.Dataset())[v.name] = (v.dims[1:], data, attrs)
+    return xr.DataTree.from_dict(groups)

@@ -1,0 +1,141 @@
+"""A scene: the world, the sonar in it, when frames are taken, and the methods that simulate and process them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Ge, Le
+from pydantic import Field, field_validator
+
+from sonarsynth.beamforming import Beamformer, FocusedDelayAndSum
+from sonarsynth.conventions import PositiveSeconds, Seconds
+from sonarsynth.description import description
+from sonarsynth.geometry import Pose
+from sonarsynth.ranging import IsovelocityRange, Locator, Ranging, SensorDelays
+from sonarsynth.scattering import MirrorLobe, Scattering
+from sonarsynth.sonar import Sonar
+from sonarsynth.synthesis import KernelDeposit, Synthesis
+from sonarsynth.tracing import AutoTracing, Tracing
+from sonarsynth.world.environment import Environment
+from sonarsynth.world.meshes import mesh_of
+from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.motion import Motion, Still, pose, velocity
+from sonarsynth.world.sources import SnappingShrimp
+from sonarsynth.world.targets import Target
+
+
+@description
+class World:
+    """What there is."""
+
+    environment: Environment
+    targets: tuple[Target, ...] = ()
+    shrimp: tuple[SnappingShrimp, ...] = ()
+
+    @field_validator("targets")
+    @classmethod
+    def _check_names(cls, targets: tuple[Target, ...]) -> tuple[Target, ...]:
+        names = [t.name for t in targets]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"two targets are called '{name}'")
+        return targets
+
+
+@description
+class Trajectory:
+    """When frames are taken, and how the sonar moves."""
+
+    frames: Annotated[int, Ge(1), Le(100_000_000)] = 1
+    interval: PositiveSeconds = 0.1
+    start: Seconds = 0.0
+    sonar: Motion = Still(position=(0.0, 0.0, -5.0), heading=0.5 * np.pi)
+
+    def time(self, step: int) -> float:
+        """Time (s) of a frame since the start of the motions."""
+        return self.start + step * self.interval
+
+
+@description
+class Physics:
+    """How the scene is simulated."""
+
+    tracing: Tracing = Field(default_factory=AutoTracing)
+    scattering: Scattering = Field(default_factory=MirrorLobe)
+    synthesis: Synthesis = Field(default_factory=KernelDeposit)
+
+
+@description
+class EchoWindow:
+    """When the sonar listens for echoes, in seconds after the direct arrival of the snap.
+
+    Left out, the planner takes the shortest window that holds the echoes of every frame.
+    """
+
+    start: Annotated[Seconds, Ge(0)] | None = None
+    stop: PositiveSeconds | None = None
+
+
+@description
+class Processing:
+    """What the sonar does with what it hears."""
+
+    echo_window: EchoWindow = Field(default_factory=EchoWindow)
+    locating: Locator = Field(default_factory=SensorDelays)
+    beamforming: Beamformer = Field(default_factory=FocusedDelayAndSum)
+    ranging: Ranging = Field(default_factory=IsovelocityRange)
+
+
+@description
+class Scene:
+    """World, sonar, trajectory, physics and processing."""
+
+    world: World
+    sonar: Sonar = Field(default_factory=Sonar)
+    trajectory: Trajectory = Field(default_factory=Trajectory)
+    physics: Physics = Field(default_factory=Physics)
+    processing: Processing = Field(default_factory=Processing)
+
+    def moment(self, time: float) -> Moment:
+        """The world at a time (s)."""
+        bodies = tuple(
+            Body(t.name, mesh_of(t.shape), pose(t.motion, time), velocity(t.motion, time)) for t in self.world.targets
+        )
+        bed = -self.world.environment.depth
+        snaps = tuple(
+            Snap(np.array([*s.position[:2], s.position[2] if len(s.position) > 2 else bed + s.height]), t, s.snap, s.source_level)
+            for s in self.world.shrimp
+            for t in s.snap_times
+        )
+        return Moment(time, bodies, snaps)
+
+    def frame(self, step: int, *, index: int | None = None, trajectory: int = 0, seed: int = 0) -> Frame:
+        """Frame `step` of this scene's trajectory."""
+        time = self.trajectory.time(step)
+        return Frame(
+            index=step if index is None else index,
+            trajectory=trajectory,
+            step=step,
+            seed=seed,
+            sonar_pose=pose(self.trajectory.sonar, time),
+            moment=self.moment(time),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One frame: the scene at one instant, and the keys of its random streams."""
+
+    index: int  # in the dataset
+    trajectory: int  # sequence
+    step: int  # within the sequence
+    seed: int
+    sonar_pose: Pose
+    moment: Moment
+
+    @property
+    def time(self) -> float:
+        """s since the start of the trajectory."""
+        return self.moment.time

@@ -1,0 +1,157 @@
+"""How bodies move: pose and velocity at any time. Headings are compass headings (clockwise from north)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import MinLen
+from pydantic import field_validator
+
+from sonarsynth.conventions import Floats, MetresPerSecond, Position, PositiveMetres, PositiveSeconds, Radians, Seconds
+from sonarsynth.description import BY_KIND, description
+from sonarsynth.geometry import Pose, quaternion
+
+
+@description
+class Still:
+    """At rest."""
+
+    kind: Literal["still"] = "still"
+    position: Position
+    heading: Radians = 0.0
+    pitch: Radians = 0.0
+    roll: Radians = 0.0
+
+
+@description
+class Line:
+    """From start to stop at constant velocity over `duration` from time 0, and on at the same velocity."""
+
+    kind: Literal["line"] = "line"
+    start: Position
+    stop: Position
+    duration: PositiveSeconds
+    heading: Radians | None = None
+    """Left out: along the track."""
+    pitch: Radians = 0.0
+    roll: Radians = 0.0
+
+
+@description
+class Waypoint:
+    """A place to be at a time, with a heading."""
+
+    time: Seconds
+    position: Position
+    heading: Radians | None = None
+    """Left out: towards the next waypoint (the last: as before)."""
+
+
+@description
+class Waypoints:
+    """Through waypoints in straight lines; headings turn the short way, evenly. At rest before the first and after the last."""
+
+    kind: Literal["waypoints"] = "waypoints"
+    points: Annotated[tuple[Waypoint, ...], MinLen(2)]
+    pitch: Radians = 0.0
+    roll: Radians = 0.0
+
+    @field_validator("points")
+    @classmethod
+    def _check(cls, points: tuple[Waypoint, ...]) -> tuple[Waypoint, ...]:
+        for i, (a, b) in enumerate(zip(points, points[1:], strict=False), start=1):
+            if b.time <= a.time:
+                raise ValueError(f"waypoint {i} is not later than waypoint {i - 1}")
+        return points
+
+
+@description
+class Circle:
+    """Round a centre in the horizontal plane at constant speed, heading along the track."""
+
+    kind: Literal["circle"] = "circle"
+    centre: Position
+    radius: PositiveMetres
+    speed: MetresPerSecond
+    """Positive is counter-clockwise seen from above."""
+    bearing: Radians = 0.0
+    """Compass bearing from the centre to the body at time 0."""
+    pitch: Radians = 0.0
+    roll: Radians = 0.0
+
+
+Motion = Annotated[Still | Line | Waypoints | Circle, BY_KIND]
+
+
+def pose(motion: Motion, time: float) -> Pose:
+    """Where a body is at a time (s)."""
+    match motion:
+        case Still():
+            return Pose(np.array(motion.position), quaternion(motion.heading, motion.pitch, motion.roll))
+        case Line():
+            position = np.array(motion.start) + velocity(motion, time) * time
+            heading = _course(velocity(motion, time)) if motion.heading is None else motion.heading
+            return Pose(position, quaternion(heading, motion.pitch, motion.roll))
+        case Waypoints():
+            return _pose_on_waypoints(motion, time)
+        case Circle():
+            angle = _angle(motion, time)
+            position = np.array(motion.centre) + motion.radius * np.array([np.cos(angle), np.sin(angle), 0.0])
+            return Pose(position, quaternion(_course(velocity(motion, time)), motion.pitch, motion.roll))
+
+
+def velocity(motion: Motion, time: float) -> Floats:
+    """Velocity (3,) in the world at a time (m/s); at a waypoint, that of the leg that begins."""
+    match motion:
+        case Still():
+            return np.zeros(3)
+        case Line():
+            return (np.array(motion.stop) - np.array(motion.start)) / motion.duration
+        case Waypoints():
+            a, b = _leg(motion, time)
+            if not motion.points[0].time <= time < motion.points[-1].time:
+                return np.zeros(3)
+            return (np.array(b.position) - np.array(a.position)) / (b.time - a.time)
+        case Circle():
+            angle = _angle(motion, time)
+            return motion.speed * np.array([-np.sin(angle), np.cos(angle), 0.0])
+
+
+def _angle(motion: Circle, time: float) -> float:
+    """Polar angle of the body about the centre, from x (rad)."""
+    return 0.5 * np.pi - motion.bearing + motion.speed / motion.radius * time
+
+
+def _course(v: Floats) -> float:
+    """Compass heading of a velocity; 0 (north) at rest or straight up."""
+    return float(np.arctan2(v[0], v[1])) if np.hypot(v[0], v[1]) > 0 else 0.0
+
+
+def _leg(motion: Waypoints, time: float) -> tuple[Waypoint, Waypoint]:
+    times = [p.time for p in motion.points]
+    i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 2))
+    return motion.points[i], motion.points[i + 1]
+
+
+def _heading_at(motion: Waypoints, index: int) -> float:
+    points = motion.points
+    heading = points[index].heading
+    if heading is not None:
+        return heading
+    i = min(index, len(points) - 2)
+    return _course(np.array(points[i + 1].position) - np.array(points[i].position))
+
+
+def _pose_on_waypoints(motion: Waypoints, time: float) -> Pose:
+    a, b = _leg(motion, time)
+    part = float(np.clip((time - a.time) / (b.time - a.time), 0.0, 1.0))
+    position = (1 - part) * np.array(a.position) + part * np.array(b.position)
+    i = motion.points.index(a)
+    start = _heading_at(motion, i)
+    if a.heading is None and b.heading is None:
+        turn = 0.0  # along each leg, turning at the waypoint
+        start = _heading_at(motion, i + 1) if part >= 1.0 else start
+    else:
+        turn = (_heading_at(motion, i + 1) - start + np.pi) % (2 * np.pi) - np.pi
+    return Pose(position, quaternion(start + part * turn, motion.pitch, motion.roll))
