@@ -1,12 +1,14 @@
-"""What targets are made of: a mesh file, or a shape that is generated at any resolution. Body frame: x forward, z up."""
+"""What targets are made of: a mesh file, or a shape generated at any resolution. Body frame: x forward, z up."""
 
 from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from annotated_types import Ge, Gt, Le
+import numpy as np
+from annotated_types import Ge, Le
+from pydantic import ValidationInfo, field_validator
 
-from sonarsynth.conventions import Number, Position, PositiveMetres, Radians
+from sonarsynth.conventions import NonNegativeMetres, Number, Position, PositiveMetres, Radians
 from sonarsynth.description import BY_KIND, description
 
 MAX_FACETS = 20_000_000
@@ -46,12 +48,13 @@ class Sphere:
 
 @description
 class Cylinder:
-    """A solid circular cylinder along x, with flat ends."""
+    """A solid circular cylinder along x, with flat ends, centred on the origin; refined on the true surface."""
 
     kind: Literal["cylinder"] = "cylinder"
     radius: PositiveMetres
     length: PositiveMetres
     edge: PositiveMetres | None = None
+    """Longest edge of a facet; left out: an eighth of the radius."""
 
 
 @description
@@ -60,20 +63,29 @@ class Box:
 
     kind: Literal["box"] = "box"
     size: tuple[PositiveMetres, PositiveMetres, PositiveMetres]
+    """Lengths along x, y and z."""
     edge: PositiveMetres | None = None
-    """Left out: two facets a face."""
+    """Longest edge of a facet; left out: two facets a face."""
 
 
 @description
 class LShape:
-    """Two plates in the shape of an L seen from the side y: one upright in the plane x = 0, one lying forward of its foot."""
+    """Two plates, an L seen from the side: one upright in the plane x = 0, one lying forward of its foot.
+
+    The origin is where their inner faces meet, in the middle of the width: a corner that opens forward and up.
+    """
 
     kind: Literal["l_shape"] = "l_shape"
     height: PositiveMetres
+    """Of the inner face of the upright plate (x = 0, facing forward)."""
     length: PositiveMetres
+    """Of the inner face of the lying plate (z = 0, facing up)."""
     width: PositiveMetres
+    """Of both plates, along y."""
     thickness: PositiveMetres
+    """Of both plates, behind and below the inner faces."""
     edge: PositiveMetres | None = None
+    """Longest edge of a facet; left out: the fewest facets."""
 
 
 @description
@@ -81,29 +93,56 @@ class Remus100:
     """REMUS-100 autonomous underwater vehicle: a Myring hull with four fins, from published dimensions.
 
     Prestero (2001), "Verification of a six-degree of freedom simulation model for the REMUS autonomous underwater
-    vehicle", MIT: Myring parameters and fin geometry.
+    vehicle", MIT: Myring parameters and fin geometry (`world.remus`). The origin is the middle of the hull's length.
     """
 
     kind: Literal["remus100"] = "remus100"
-    edge: PositiveMetres | None = 0.014
+    edge: PositiveMetres = 0.014
     """Longest edge of a facet round the girth and along the hull, refined on the true surface."""
     fins: bool = True
     coarse: bool = False
-    """The thesis's 286 facets, for comparison; edge is ignored."""
+    """As few facets as the thesis's model, 286 (238 without fins), for comparison; edge is ignored."""
 
 
 @description
 class Myring:
-    """A body of revolution along x by Myring (1976): nose of length a, middle of length b, tail of length c, diameter d."""
+    """A body of revolution along x by Myring (1976), centred on the origin; refined on the true surface.
+
+    Nose of length a, r = (d/2) (1 - t^2)^(1/exponent) at t a before the middle; middle of length b and diameter d; tail
+    of length c, a cubic that ends at the tail angle. Offsets cut off the tips and leave flat ends.
+    """
 
     kind: Literal["myring"] = "myring"
     nose: PositiveMetres
-    middle: PositiveMetres
+    middle: NonNegativeMetres
     tail: PositiveMetres
     diameter: PositiveMetres
-    exponent: Annotated[Number, Gt(0), Le(10)] = 2.0
+    exponent: Annotated[Number, Ge(0.5), Le(10)] = 2.0
     tail_angle: Annotated[Radians, Ge(0), Le(1.5)] = 0.436
+    """Half the angle included at the tip of the tail."""
+    nose_offset: NonNegativeMetres = 0.0
+    """Length of the nose that is missing."""
+    tail_offset: NonNegativeMetres = 0.0
+    """Length of the tail that is missing."""
     edge: PositiveMetres | None = None
+    """Longest edge of a facet; left out: a sixteenth of the diameter."""
+
+    @field_validator("tail_angle")
+    @classmethod
+    def _no_bulge(cls, angle: float, info: ValidationInfo) -> float:
+        tail, diameter = info.data.get("tail"), info.data.get("diameter")
+        if tail is not None and diameter is not None and np.tan(angle) > 1.5 * diameter / tail:
+            most = float(np.arctan(1.5 * diameter / tail))
+            raise ValueError(f"would make the tail thicker than the diameter; use {most:.3g} rad at most for this tail")
+        return angle
+
+    @field_validator("nose_offset", "tail_offset")
+    @classmethod
+    def _not_all(cls, offset: float, info: ValidationInfo) -> float:
+        whole = info.data.get(str(info.field_name).removesuffix("_offset"))
+        if whole is not None and offset > 0.99 * whole:
+            raise ValueError(f"leaves nothing of the {whole:g} m of the {str(info.field_name).removesuffix('_offset')}")
+        return offset
 
 
 Shape = Annotated[MeshFile | Sphere | Cylinder | Box | LShape | Remus100 | Myring, BY_KIND]

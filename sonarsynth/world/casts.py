@@ -1,0 +1,122 @@
+"""Sound-speed profiles from their descriptions, a CTD cast in a file among them."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.acoustics.seawater import depth_of_pressure, mackenzie
+from sonarsynth.conventions import Floats
+from sonarsynth.world.cast_files import CastError, Column, Table, read_table
+from sonarsynth.world.environment import (
+    Cast,
+    Isovelocity,
+    Profile,
+    SoundSpeed,
+    Tabulated,
+    TemperatureSalinity,
+)
+
+__all__ = ["CastError", "profile_of"]
+
+PLAUSIBLE = {
+    "depth": (0.0, 12e3, "m"),
+    "pressure": (0.0, 12e3, "dbar"),
+    "temperature": (-5.0, 50.0, "degC"),
+    "salinity": (0.0, 50.0, "psu"),
+    "sound speed": (100.0, 10e3, "m/s"),
+}
+"""A value outside is a mark for "missing" (-9999), a wrong unit or a wrong sign; it is refused."""
+
+
+def profile_of(sound_speed: SoundSpeed) -> Profile:
+    """The profile that rays are traced through: every node of the description as it is, nothing smoothed or thinned.
+
+    A cast is read from its path (relative to the working directory) and kept until the file changes; a cast that was
+    taken on the way up is turned over. Raises `CastError` in one line that names file, line and column.
+    """
+    if isinstance(sound_speed, Cast):
+        path = Path(sound_speed.path)
+        try:
+            status = path.stat()
+        except OSError as error:
+            raise CastError(f"{path}: {(error.strerror or str(error)).lower()}") from None
+        return _profile_of(sound_speed, (status.st_mtime_ns, status.st_size))
+    return _profile_of(sound_speed, None)
+
+
+@lru_cache(maxsize=64)
+def _profile_of(sound_speed: SoundSpeed, stamp: tuple[int, int] | None) -> Profile:
+    match sound_speed:
+        case Isovelocity():
+            return _profile([0.0], [sound_speed.speed])
+        case Tabulated():
+            return _profile(sound_speed.depth, sound_speed.speed)
+        case TemperatureSalinity():
+            depth = sound_speed.depth
+            return _profile(depth, mackenzie(sound_speed.temperature, sound_speed.salinity, depth))
+        case Cast():
+            return _cast_profile(sound_speed, read_table(Path(sound_speed.path)))
+
+
+def _profile(depth: npt.ArrayLike, speed: npt.ArrayLike) -> Profile:
+    nodes = (np.array(depth, float), np.array(speed, float))
+    for node in nodes:
+        node.flags.writeable = False
+    return Profile(*nodes)
+
+
+def _cast_profile(cast: Cast, table: Table) -> Profile:
+    depth = _depth(table)
+    order = slice(None, None, -1) if depth[0] > depth[-1] else slice(None)
+    step = np.diff(depth[order])
+    if np.any(step < 0):
+        rows = range(len(depth))[order]
+        turn = rows[int(np.argmax(step < 0)) + 1]
+        raise CastError(
+            f"{table.path}, line {table.lines[turn]}: the depth {depth[turn]:g} m turns back; "
+            "a cast goes one way, down or up"
+        )
+    return _profile(depth[order], _speed(cast, table, depth)[order])
+
+
+def _depth(table: Table) -> Floats:
+    if (column := table.find("depth")) is not None:
+        return _values(table, column)
+    if (column := table.find("pressure")) is not None:
+        return depth_of_pressure(_values(table, column), 45.0 if table.latitude is None else table.latitude)
+    raise CastError(f"{table.path}, line {table.header}: no column of depth or pressure among {table.names}")
+
+
+def _speed(cast: Cast, table: Table, depth: Floats) -> Floats:
+    own = table.find("sound speed")
+    temperature, salinity = table.find("temperature"), table.find("salinity")
+    if own is not None and cast.quantity != "temperature_salinity":
+        return _values(table, own)
+    if cast.quantity == "sound_speed":
+        raise CastError(f"{table.path}, line {table.header}: no column of sound speed among {table.names}")
+    if temperature is None or salinity is None:
+        what = (
+            "temperature and salinity"
+            if cast.quantity == "temperature_salinity"
+            else "sound speed, or of temperature and salinity,"
+        )
+        raise CastError(f"{table.path}, line {table.header}: no columns of {what} among {table.names}")
+    return mackenzie(_values(table, temperature), _values(table, salinity), depth)
+
+
+def _values(table: Table, column: Column) -> Floats:
+    """The values of a column in our units, each within what is plausible."""
+    values = table.values(column)
+    low, high, unit = PLAUSIBLE[column.quantity]
+    wrong = ~((values >= low) & (values <= high))
+    if np.any(wrong):
+        row = int(np.argmax(wrong))
+        raise CastError(
+            f"{table.path}, line {table.lines[row]}, column '{column.name}': "
+            f"{values[row]:g} {unit} is not a {column.quantity} between {low:g} and {high:g} {unit}"
+        )
+    return values

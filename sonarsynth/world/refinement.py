@@ -1,0 +1,122 @@
+"""Operations on bare triangle meshes (vertices (vertex, xyz), faces (facet, 3)): joining, welding, splitting edges."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.world.shapes import MAX_FACETS
+
+Surface = tuple[Floats, Ints]
+"""Vertices (vertex, xyz) in m and faces (facet, 3), counter-clockwise seen from outside."""
+
+
+class MeshError(ValueError):
+    """A mesh that cannot be used: one line that names it and the reason."""
+
+
+def join(*parts: Surface) -> Surface:
+    """One surface of several, in order."""
+    starts = np.cumsum([0, *(len(v) for v, _ in parts[:-1])])
+    vertices = np.concatenate([v for v, _ in parts])
+    return vertices, np.concatenate([f + start for (_, f), start in zip(parts, starts, strict=True)])
+
+
+def weld(surface: Surface, tolerance: float = 0.0) -> Surface:
+    """Merge vertices that are equal (or in one cell of a grid of `tolerance`, m), and drop those that no facet uses.
+
+    The first of equal vertices stays, and vertices are numbered in the order in which facets use them first. Facets
+    that lose a corner stay, with a repeated index.
+    """
+    vertices, faces = surface
+    used, index = np.unique(faces, return_inverse=True)
+    points = vertices[used] + 0.0  # -0 is 0
+    key = np.round(points / tolerance) + 0.0 if tolerance > 0 else points
+    _, first, same = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    corner = first[same.ravel()][index.ravel()]  # the kept vertex of each corner
+    kept, seen, corner = np.unique(corner, return_index=True, return_inverse=True)
+    order = np.argsort(seen)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return points[kept[order]], rank[corner.ravel()].reshape(-1, 3)
+
+
+def longest_edge(surface: Surface) -> float:
+    """The longest edge of any facet (m)."""
+    corners = surface[0][surface[1]]
+    return float(np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max())
+
+
+def volume(surface: Surface) -> float:
+    """Signed volume (m3): positive for a closed surface with outward normals."""
+    a, b, c = np.moveaxis(surface[0][surface[1]], 1, 0)
+    return float(np.einsum("fi,fi->", a, np.cross(b, c)) / 6.0)
+
+
+def require_possible(area: float, edge: float) -> None:
+    """Raise MeshError where even equilateral facets with that edge (m) would be too many on that area (m2)."""
+    if area > MAX_FACETS * 0.25 * np.sqrt(3.0) * edge**2:
+        raise _too_fine(edge)
+
+
+def _too_fine(edge: float) -> MeshError:
+    return MeshError(f"edges of {edge:g} m would take more than {MAX_FACETS} facets; use a longer edge")
+
+
+def split_long_edges(surface: Surface, edge: float) -> Surface:
+    """Cut facets in two, three or four at the middles of edges longer than `edge` (m), again until none is left.
+
+    Edges are cut for both facets that share them, so a closed surface stays closed; the surface itself stays as it is.
+    Raises MeshError where that would take more than MAX_FACETS facets.
+    """
+    vertices, faces = surface
+    a, b, c = np.moveaxis(vertices[faces], 1, 0)
+    require_possible(0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()), edge)
+    while True:
+        ends, of_facet = sides(faces)
+        length = np.linalg.norm(vertices[ends[:, 0]] - vertices[ends[:, 1]], axis=1)
+        long = length > edge
+        if not long.any():
+            return vertices, faces
+        if len(faces) + np.count_nonzero(long[of_facet]) > MAX_FACETS:
+            raise _too_fine(edge)
+        middle = np.full(len(ends), -1)
+        middle[long] = len(vertices) + np.arange(np.count_nonzero(long))
+        vertices = np.concatenate([vertices, vertices[ends[long]].mean(axis=1)])
+        faces = _cut(vertices, faces, middle[of_facet])
+
+
+def sides(faces: Ints) -> tuple[Ints, npt.NDArray[np.intp]]:
+    """Edges (edge, 2) with ascending ends, and the edge (facet, 3) from each corner to the next."""
+    pairs = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    code = pairs[:, 0] * (int(faces.max()) + 1) + pairs[:, 1]
+    _, first, edge = np.unique(code, return_index=True, return_inverse=True)
+    return pairs[first], edge.reshape(-1, 3)
+
+
+def _cut(vertices: Floats, faces: Ints, middle: Ints) -> Ints:
+    """Facets cut at the middles (facet, 3) of their sides, -1 where a side is whole; in the order of the facets."""
+    cuts = np.count_nonzero(middle >= 0, axis=1)
+    # Turn each facet so that its cut sides come first (the whole side last, the cut side first).
+    turn = np.zeros(len(faces), int)
+    turn[cuts == 1] = np.argmax(middle[cuts == 1] >= 0, axis=1)
+    turn[cuts == 2] = (np.argmin(middle[cuts == 2] >= 0, axis=1) + 1) % 3
+    take = (turn[:, None] + np.arange(3)) % 3
+    (a, b, c), (ab, bc, ca) = (np.take_along_axis(x, take, axis=1).T for x in (faces, middle))
+    pieces = np.full((len(faces), 4, 3), -1)
+    one, two, three = cuts == 1, cuts == 2, cuts == 3
+    pieces[cuts == 0, 0] = np.stack([a, b, c], 1)[cuts == 0]
+    pieces[one, :2] = np.stack([np.stack([a, ab, c], 1), np.stack([ab, b, c], 1)], 1)[one]
+    # Two cuts leave a quadrangle a, ab, bc, c: halve it along its shorter diagonal.
+    short = np.zeros(len(faces), bool)
+    short[two] = np.linalg.norm(vertices[a[two]] - vertices[bc[two]], axis=1) <= np.linalg.norm(
+        vertices[ab[two]] - vertices[c[two]], axis=1
+    )
+    first, second = two & short, two & ~short
+    pieces[two, 0] = np.stack([ab, b, bc], 1)[two]
+    pieces[first, 1:3] = np.stack([np.stack([a, ab, bc], 1), np.stack([a, bc, c], 1)], 1)[first]
+    pieces[second, 1:3] = np.stack([np.stack([a, ab, c], 1), np.stack([ab, bc, c], 1)], 1)[second]
+    corners = [np.stack(corner, 1) for corner in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+    pieces[three] = np.stack(corners, 1)[three]
+    return pieces[pieces[:, :, 0] >= 0]

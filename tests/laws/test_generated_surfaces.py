@@ -1,0 +1,197 @@
+"""Generated surfaces: closed, outward, on the true surface, and converging to it at second order."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from scipy.integrate import quad
+
+from sonarsynth.world.generation import generate
+from sonarsynth.world.meshes import MeshError, mesh_of
+from sonarsynth.world.myring import hull_length, hull_radius
+from sonarsynth.world.refinement import longest_edge, split_long_edges, volume
+from sonarsynth.world.shapes import Box, Cylinder, LShape, Myring, Remus100, Sphere
+
+TORPEDO = {"nose": 0.2, "middle": 0.6, "tail": 0.5, "diameter": 0.2}
+SHAPES = [
+    Sphere(radius=0.25),
+    Sphere(radius=3.0, edge=0.5),
+    Sphere(radius=1.0, edge=9.0),
+    Cylinder(radius=0.1, length=0.4),
+    Cylinder(radius=0.5, length=0.01, edge=0.1),
+    Cylinder(radius=0.02, length=2.0, edge=1.0),
+    Box(size=(1.0, 2.0, 3.0)),
+    Box(size=(1.0, 0.02, 0.3), edge=0.05),
+    LShape(height=1.0, length=2.0, width=0.5, thickness=0.1),
+    LShape(height=1.0, length=0.7, width=0.5, thickness=0.1, edge=0.15),
+    Myring(**TORPEDO),
+    Myring(**TORPEDO, nose_offset=0.05, tail_offset=0.1, edge=0.03),
+    Myring(nose=0.2, middle=0.0, tail=0.5, diameter=0.2, exponent=10.0, tail_angle=0.5),  # blunt
+    Myring(nose=0.2, middle=0.0, tail=0.5, diameter=0.2, exponent=0.5, tail_angle=0.0),  # two cusps
+    Myring(nose=0.01, middle=1.0, tail=0.01, diameter=0.2, edge=0.05),
+    Remus100(fins=False),
+    Remus100(fins=False, coarse=True),
+]
+
+
+def ids(shape):
+    return f"{shape.kind}-{hash(shape) % 1000}"
+
+
+def edges(mesh):
+    """Directed edges, and how often each undirected edge occurs."""
+    ends = np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=2).reshape(-1, 2)
+    return ends, np.unique(np.sort(ends, axis=1), axis=0, return_counts=True)[1]
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=ids)
+def test_a_generated_surface_is_a_closed_outward_sphere_of_good_facets(shape):
+    mesh = mesh_of(shape)
+    ends, counts = edges(mesh)
+    assert np.all(counts == 2)
+    assert len(np.unique(ends, axis=0)) == len(ends)  # neighbours are wound alike
+    assert len(mesh.vertices) - len(counts) + len(mesh.faces) == 2  # Euler
+    assert np.all(np.unique(mesh.faces) == np.arange(len(mesh.vertices)))
+    assert volume((mesh.vertices, mesh.faces)) > 0
+    np.testing.assert_allclose(mesh.area @ mesh.normal, 0.0, atol=1e-12 * mesh.area.sum())
+    assert mesh.area.min() > 0
+    edge = getattr(shape, "edge", None)
+    if edge and not getattr(shape, "coarse", False):
+        assert longest_edge((mesh.vertices, mesh.faces)) <= edge
+
+
+@pytest.mark.parametrize("shape", [s for s in SHAPES if s.kind in ("sphere", "cylinder", "box")], ids=ids)
+def test_facets_of_convex_bodies_look_away_from_the_middle(shape):
+    mesh = mesh_of(shape)
+    out = mesh.centroid.copy()
+    if shape.kind == "cylinder":  # from the axis on the side, along it on the ends
+        out[np.abs(mesh.normal[:, 0]) > 0.9, 1:] = 0
+        out[np.abs(mesh.normal[:, 0]) <= 0.9, 0] = 0
+    assert np.einsum("fi,fi->f", mesh.normal, out).min() > 0
+
+
+@pytest.mark.parametrize(
+    ("shape", "true_volume", "true_area"),
+    [
+        (Sphere(radius=0.5, edge=0.2), np.pi / 6, np.pi),
+        (Cylinder(radius=0.1, length=0.5, edge=0.06), np.pi * 0.005, np.pi * 0.12),
+    ],
+    ids=["sphere", "cylinder"],
+)
+def test_volume_and_area_converge_from_below_at_second_order(shape, true_volume, true_area):
+    errors = []
+    for finer in (1, 2, 4, 8):
+        mesh = mesh_of(type(shape)(**{**vars(shape), "edge": shape.edge / finer}))
+        errors.append([1 - volume((mesh.vertices, mesh.faces)) / true_volume, 1 - mesh.area.sum() / true_area])
+    ratio = np.array(errors[:-1]) / np.array(errors[1:])
+    assert np.min(errors) > 0
+    assert 3.0 < ratio[-1].min() and ratio[-1].max() < 5.2
+    assert np.max(errors[-1]) < 1e-3
+
+
+def test_a_myring_hull_converges_to_its_integrals():
+    hull = Myring(**TORPEDO, nose_offset=0.02, tail_offset=0.05)
+    length = hull_length(hull)
+    joints = [hull.nose - hull.nose_offset, hull.nose - hull.nose_offset + hull.middle]
+    exact = quad(lambda s: np.pi * hull_radius(hull, s) ** 2, 0, length, points=joints, epsabs=1e-13)[0]
+    error = []
+    for edge in (0.04, 0.02, 0.01):
+        mesh = mesh_of(Myring(**{**vars(hull), "edge": edge}))
+        error.append(1 - volume((mesh.vertices, mesh.faces)) / exact)
+        sagitta = float(mesh.notes[0].split()[-2]) * 1e-3
+        assert sagitta == pytest.approx(error[-1] * exact / mesh.area.sum(), rel=0.01)
+    assert 3.0 < error[1] / error[2] < 5.2
+    assert 0 < error[2] < 3e-3
+
+
+@pytest.mark.parametrize("shape", [s for s in SHAPES if s.kind == "myring"], ids=ids)
+def test_vertices_of_a_hull_lie_on_its_true_surface(shape):
+    mesh = mesh_of(shape)
+    x, r = mesh.vertices[:, 0], np.hypot(mesh.vertices[:, 1], mesh.vertices[:, 2])
+    half = 0.5 * hull_length(shape)
+    assert mesh.box[0, 0] == pytest.approx(-half, abs=1e-12)
+    assert mesh.box[1, 0] == pytest.approx(half, abs=1e-12)
+    side = np.abs(x) < half - 1e-6  # not on the flat ends
+    slope = 1e-9 * np.abs(np.gradient(hull_radius(shape, np.linspace(1e-6, 2 * half - 1e-6, 2001)))).max()
+    np.testing.assert_allclose(r[side], hull_radius(shape, half - x[side]), atol=1e-8 + slope)
+
+
+@pytest.mark.parametrize("shape", [Sphere(radius=0.25), Sphere(radius=7.0, edge=1.0)], ids=ids)
+def test_vertices_of_a_sphere_lie_on_it(shape):
+    np.testing.assert_allclose(np.linalg.norm(mesh_of(shape).vertices, axis=1), shape.radius, rtol=1e-15)
+
+
+def test_the_profile_of_the_hull():
+    """Myring (1976) as in Prestero (2001), eq. 2.1 and 2.2, by hand; smooth at both joints, tail at its angle."""
+    hull = Myring(nose=0.191, middle=0.654, tail=0.541, diameter=0.191, tail_angle=0.436)
+    assert hull_length(hull) == pytest.approx(1.386)
+    radius = hull_radius(hull, [0.0, 0.191 / 2, 0.191, 0.5, 0.845, 0.845 + 0.541 / 2, 1.386])
+    middle_of_tail = 0.5 * 0.0955 + 0.541 * np.tan(0.436) / 8
+    np.testing.assert_allclose(
+        radius, [0.0, 0.0955 * np.sqrt(0.75), 0.0955, 0.0955, 0.0955, middle_of_tail, 0.0], atol=1e-12
+    )
+    x = 0.4  # the cubic as printed
+    c, d, tan = 0.541, 0.191, np.tan(0.436)
+    printed = d / 2 - (3 * d / (2 * c**2) - tan / c) * x**2 + (d / c**3 - tan / c**2) * x**3
+    assert hull_radius(hull, 0.845 + x) == pytest.approx(printed, rel=1e-13)
+    assert (hull_radius(hull, 1.386) - hull_radius(hull, 1.386 - 1e-6)) / 1e-6 == pytest.approx(-tan, rel=1e-5)
+    for joint in (0.191, 0.845):
+        assert abs(hull_radius(hull, joint + 1e-5) - hull_radius(hull, joint - 1e-5)) < 1e-8
+    assert np.isnan(hull_radius(hull, [-1e-9, 1.3861])).all()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"tail_angle": 0.6}, "thicker than the diameter; use 0.54 rad at most"),
+        ({"nose_offset": 0.2}, "leaves nothing of the 0.2 m of the nose"),
+        ({"tail_offset": 0.5}, "leaves nothing of the 0.5 m of the tail"),
+        ({"exponent": 0.2}, "greater than or equal to 0.5"),
+    ],
+)
+def test_a_hull_that_cannot_be_is_refused(changes, message):
+    with pytest.raises(ValidationError, match=message):
+        Myring(**TORPEDO, **changes)
+
+
+def test_the_corner_of_an_l_is_at_the_origin():
+    mesh = mesh_of(LShape(height=1.0, length=2.0, width=0.5, thickness=0.1, edge=0.2))
+    np.testing.assert_allclose(mesh.box, [[-0.1, -0.25, -0.1], [2.0, 0.25, 1.0]], atol=1e-15)
+    assert volume((mesh.vertices, mesh.faces)) == pytest.approx(0.5 * 0.1 * (2.1 + 1.0))
+    upright = (np.abs(mesh.centroid[:, 0]) < 1e-12) & (mesh.normal[:, 0] > 0.99)
+    lying = (np.abs(mesh.centroid[:, 2]) < 1e-12) & (mesh.normal[:, 2] > 0.99)
+    assert mesh.area[upright].sum() == pytest.approx(0.5)
+    assert mesh.area[lying].sum() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("edge", [0.5, 0.2, 0.07])
+def test_splitting_edges_changes_neither_surface_nor_closure(edge):
+    surface = generate(LShape(height=1.0, length=2.0, width=0.5, thickness=0.1))[0]
+    mesh = mesh_of(LShape(height=1.0, length=2.0, width=0.5, thickness=0.1, edge=edge))
+    assert longest_edge((mesh.vertices, mesh.faces)) <= edge
+    assert Counter(edges(mesh)[1].tolist()).keys() == {2}
+    assert volume((mesh.vertices, mesh.faces)) == pytest.approx(volume(surface), rel=1e-12)
+    assert mesh.area.sum() == pytest.approx(3.82, rel=1e-12)
+    assert split_long_edges((mesh.vertices, mesh.faces), edge)[1].shape == mesh.faces.shape
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [Sphere(radius=1.0, edge=1e-5), Cylinder(radius=1.0, length=1.0, edge=1e-5), Box(size=(1.0, 1.0, 1.0), edge=1e-5)],
+)
+def test_a_mesh_beyond_all_measure_is_refused_at_once(shape):
+    with pytest.raises(MeshError, match="would take more than 20000000 facets; use a longer edge"):
+        mesh_of(shape)
+
+
+def test_a_mesh_is_always_the_same_and_cannot_be_changed():
+    shape = Remus100(edge=0.05)
+    mesh = mesh_of(shape)
+    assert mesh_of(Remus100(edge=0.05)) is mesh
+    (vertices, faces), _ = generate(shape)
+    np.testing.assert_array_equal(vertices, mesh.vertices)
+    np.testing.assert_array_equal(faces, mesh.faces)
+    for array in (mesh.vertices, mesh.faces, mesh.normal, mesh.area, mesh.centroid, mesh.corners, mesh.box):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0

@@ -1,0 +1,103 @@
+"""Reflection from the sea bed and the surface: published values, limits, and energy."""
+
+import numpy as np
+import pytest
+
+from sonarsynth.acoustics.boundaries import critical_grazing, eckart, pressure_release, rayleigh
+
+GRAZING = np.radians([5, 10, 20, 30, 45, 60, 90])
+SEDIMENTS = {  # APL-UW TR 9407: density ratio, speed ratio, loss tangent; |V| at GRAZING
+    "medium sand": ((1.845, 1.1782, 0.01624), [0.9762, 0.9585, 0.9371, 0.8757, 0.4705, 0.3994, 0.3699]),
+    "fine sand": ((1.451, 1.1073, 0.01602), [0.9606, 0.9268, 0.8565, 0.4736, 0.2925, 0.2513, 0.2328]),
+    "medium silt": ((1.149, 0.9885, 0.00676), [0.3136, 0.1035, 0.0335, 0.0484, 0.0583, 0.0618, 0.0637]),
+}
+
+
+@pytest.mark.parametrize("sediment", SEDIMENTS)
+def test_rayleigh_gives_the_table_of_sediments(sediment):
+    bed, expected = SEDIMENTS[sediment]
+    np.testing.assert_allclose(np.abs(rayleigh(GRAZING, *bed)), expected, rtol=0, atol=5.1e-5)
+
+
+def test_rayleigh_of_the_published_example():
+    got = rayleigh(np.radians([45, 90]), 1200 / 1022.72, 1600 / 1539.087)
+    np.testing.assert_allclose(got.real, [0.1198, 0.0990], rtol=0, atol=5.1e-5)
+    assert np.degrees(critical_grazing(1600 / 1539.087)) == pytest.approx(15.861, abs=6e-4)
+
+
+def test_critical_angles():
+    np.testing.assert_allclose(np.degrees(critical_grazing([1.1782, 1.1073])), [31.92, 25.43], atol=6e-3)
+    assert np.isnan(critical_grazing(0.98))
+
+
+def test_normal_incidence_is_the_contrast_of_impedances():
+    m, ratio = 1.7, 1.2
+    assert rayleigh(np.pi / 2, m, ratio) == pytest.approx((m * ratio - 1) / (m * ratio + 1), rel=1e-14)
+
+
+def test_a_lossless_bed_reflects_everything_below_the_critical_angle():
+    q = np.linspace(0, critical_grazing(1.2), 500)
+    np.testing.assert_allclose(np.abs(rayleigh(q, 1.8, 1.2)), 1.0, rtol=0, atol=1e-14)
+
+
+def test_energy_is_conserved_above_the_critical_angle():
+    q = np.linspace(critical_grazing(1.2) + 1e-3, np.pi / 2, 300)
+    m, n = 1.8, 1 / 1.2
+    v = rayleigh(q, m, 1.2).real
+    sine_below = np.sqrt(1 - (np.cos(q) / n) ** 2)
+    transmitted = (1 + v) ** 2 * n * sine_below / (m * np.sin(q))
+    np.testing.assert_allclose(v**2 + transmitted, 1.0, rtol=0, atol=1e-12)
+
+
+def test_a_lossy_bed_never_gives_energy():
+    q = np.linspace(0, np.pi / 2, 91)[:, None, None, None]
+    density, speed, loss = (
+        np.array([0.5, 1.0, 3.0])[:, None, None],
+        np.array([0.6, 1.0, 2.5])[:, None],
+        [0.0, 0.02, 1.0],
+    )
+    assert np.abs(rayleigh(q, density, speed, loss)).max() <= 1 + 1e-14
+
+
+def test_the_reflection_at_grazing_is_that_of_a_soft_surface():
+    beds = np.array([[1.845, 1.1782, 0.01624], [1.149, 0.9885, 0.00676], [1.845, 1.1782, 0.0]]).T
+    np.testing.assert_allclose(rayleigh(0.0, *beds), -1.0)
+    np.testing.assert_allclose(rayleigh(1e-9, *beds), -1.0, atol=1e-7)
+
+
+def test_a_boundary_of_density_alone_reflects_the_same_at_every_angle():
+    q = np.array([0.0, 1e-12, 1e-3, 0.7, np.pi / 2])
+    np.testing.assert_allclose(rayleigh(q, 1.5, 1.0), 0.2, rtol=1e-12)
+    np.testing.assert_array_equal(rayleigh(q, 1.0, 1.0), 0.0)
+
+
+@pytest.mark.parametrize("loss", [0.0, 1e-12, 0.01624, 0.5])
+@pytest.mark.parametrize("speed", [0.98, 1.1782])
+def test_the_wave_in_the_bed_goes_down_and_dies_away(speed, loss):
+    """exp(+i w t - i k w z) at a depth z in the bed, with w = m sin q (1 - V)/(1 + V): Im w <= 0 and Re w >= 0."""
+    q = np.linspace(0.01, np.pi / 2, 200)
+    v = rayleigh(q, 1.845, speed, loss)
+    w = 1.845 * np.sin(q) * (1 - v) / (1 + v)
+    assert w.imag.max() <= 1e-12
+    assert w.real.min() >= -1e-12
+    assert np.abs(w).min() > 0.01
+    np.testing.assert_allclose(w**2, ((1 - 1j * loss) / speed) ** 2 - np.cos(q) ** 2, atol=1e-12)
+
+
+def test_the_reflection_is_continuous_in_the_loss():
+    np.testing.assert_allclose(
+        rayleigh(GRAZING, 1.845, 1.1782, 1e-14), rayleigh(GRAZING, 1.845, 1.1782, 0.0), atol=1e-12
+    )
+
+
+def test_the_surface_reflects_with_a_change_of_sign():
+    np.testing.assert_array_equal(pressure_release(GRAZING), -np.ones(7))
+
+
+def test_eckart_gives_the_published_losses():
+    """Wind of 2.6 m/s: rms height 0.0053 U^2; 10 degrees grazing, 1500 m/s: 7.4 dB at 25 kHz, 29 dB at 50 kHz."""
+    k = 2 * np.pi * np.array([25e3, 50e3]) / 1500
+    loss = -20 * np.log10(eckart(k, 0.0053 * 2.6**2, np.radians(10)))
+    np.testing.assert_allclose(loss, [7.4, 29.0], rtol=0.03)
+    np.testing.assert_allclose(loss[1], 4 * loss[0], rtol=1e-12)
+    assert eckart(k, 0.0, 1.0).tolist() == [1.0, 1.0]

@@ -1,0 +1,150 @@
+"""Profiles from descriptions and from casts in files."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sonarsynth.acoustics.seawater import OutOfRange, chen_millero, mackenzie
+from sonarsynth.world.casts import CastError, profile_of
+from sonarsynth.world.environment import Cast, Isovelocity, Tabulated, TemperatureSalinity
+
+REAL = Path(__file__).parents[2].parent / "shared" / "data" / "castaway_ctd.csv"
+
+CASTAWAY = """% Device,CC0000000
+% Start latitude,-36.22
+%
+Pressure (Decibar),Depth (Meter),Temperature (Celsius),Conductivity (MicroSiemens per Centimeter),\
+Salinity (Practical Salinity Scale),Sound velocity (Meters per Second)
+0.15,0.149,16.446,45033.875,35.608,1511.860
+5.0,4.97,16.2,45020.0,35.64,1511.30
+20.0,19.88,15.9,45000.0,35.66,1510.60
+"""
+
+
+def written(folder, text, name="cast.csv"):
+    path = folder / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def read(folder, text, **how):
+    return profile_of(Cast(path=str(written(folder, text)), **how))
+
+
+@pytest.mark.skipif(not REAL.exists(), reason="the real cast is not part of the repository")
+def test_a_real_cast_agrees_with_its_instrument():
+    own = profile_of(Cast(path=str(REAL)))
+    ours = profile_of(Cast(path=str(REAL), quantity="temperature_salinity"))
+    assert len(own.depth) == 141
+    np.testing.assert_array_equal(own.depth, ours.depth)
+    assert np.abs(own.speed - ours.speed).max() < 0.2
+    assert own.depth[0] == 0.14918969207604846
+    assert own.speed[0] == 1511.8595379477067
+
+
+def test_a_cast_as_the_instrument_exports_it(tmp_path):
+    profile = read(tmp_path, CASTAWAY)
+    np.testing.assert_array_equal(profile.depth, [0.149, 4.97, 19.88])
+    np.testing.assert_array_equal(profile.speed, [1511.860, 1511.30, 1510.60])
+    ours = read(tmp_path, CASTAWAY, quantity="temperature_salinity")
+    np.testing.assert_array_equal(ours.speed, mackenzie([16.446, 16.2, 15.9], [35.608, 35.64, 35.66], profile.depth))
+    assert not profile.speed.flags.writeable
+
+
+def test_the_simple_profiles():
+    assert profile_of(Isovelocity(speed=1540.0)).uniform
+    assert profile_of(Isovelocity(speed=1540.0)).at(1e4) == 1540.0
+    table = profile_of(Tabulated(depth=(0.0, 5.0, 5.0, 20.0), speed=(1540.0, 1540.0, 1530.0, 1520.0)))
+    np.testing.assert_array_equal(table.depth, [0.0, 5.0, 5.0, 20.0])
+    np.testing.assert_array_equal(table.at([-1.0, 12.5, 99.0]), [1540.0, 1525.0, 1520.0])
+    water = profile_of(TemperatureSalinity(depth=(10.0, 20.0), temperature=(27.0, 25.0), salinity=(35.0, 35.0)))
+    np.testing.assert_allclose(water.speed, [1539.0866, 1534.6204], atol=5.1e-5)
+
+
+def test_cold_water_warns():
+    with pytest.warns(OutOfRange, match="temperature 0.5 degC"):
+        profile_of(TemperatureSalinity(depth=(10.0,), temperature=(0.5,), salinity=(35.0,)))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "depth,sound_speed\n1,1500\n2,1510\n",
+        "# made by hand\nDepth [m];Sound speed [m/s]\n1;1500\n2;1510\n",
+        "depth_m;sound_velocity_m/s\n1,0;1500,0\n2,0;1510,0\n",
+        "depth_m,sound_speed_m_s\n1,1500\n2,1510\n",
+        "Depth (ft),SV (ft/s)\n3.280839895,4921.2598425\n6.56167979,4954.0682415\n",
+        "Sound speed (km/s)\tdepth\n1.5\t1\n1.51\t2\n",
+        "\ufeffdepth,c,remark\r\n1,1500,ok\r\n\r\n2,1510,\r\n",
+        b"depth (m),sound speed (m/s),T (\xb0C)\n1,1500,9\n2,1510,9\n",
+        "depth,sound_speed\n2,1510\n1,1500\n",  # on the way up
+    ],
+)
+def test_tables_with_named_columns_and_units(tmp_path, text):
+    profile = read(tmp_path, text)
+    np.testing.assert_allclose(profile.depth, [1, 2], rtol=1e-9)
+    np.testing.assert_allclose(profile.speed, [1500, 1510], rtol=1e-9)
+
+
+def test_units_of_temperature_and_pressure(tmp_path):
+    text = "P (MPa),Temperature (K),S\n0.1,289.15,35\n0.5,288.15,35.5\n"
+    profile = read(tmp_path, text)
+    np.testing.assert_allclose(profile.depth, [9.92, 49.58], atol=0.01)
+    np.testing.assert_allclose(profile.speed, mackenzie([16, 15], [35, 35.5], profile.depth), rtol=1e-12)
+    np.testing.assert_allclose(profile.speed, chen_millero([16, 15], [35, 35.5], [10, 50]), atol=0.1)
+
+
+def test_the_latitude_of_a_comment_is_used(tmp_path):
+    body = "pressure,sound speed\n100,1500\n1000,1510\n"
+    equator = read(tmp_path, "% Start latitude,0.0\n" + body).depth
+    pole = read(tmp_path, "% latitude: -90\n" + body).depth
+    np.testing.assert_allclose(equator / pole, 9.832 / 9.780, atol=2e-4)
+
+
+def test_a_changed_file_is_read_again(tmp_path):
+    assert read(tmp_path, "depth,c\n1,1500\n").speed[0] == 1500
+    assert read(tmp_path, "depth,c\n1,1500.5\n").speed[0] == 1500.5
+
+
+HEAD = "depth,sound_speed,temperature,salinity\n"
+BAD = {
+    "missing": (None, "no such file or directory"),
+    "empty": ("", "has no rows of numbers"),
+    "names only": (HEAD, "has no rows of numbers"),
+    "numbers only": ("1,1500\n2,1510\n", "line 1: a line of column names must come before the numbers"),
+    "binary": (bytes(range(256)) * 4, "is not a text file"),
+    "nan": (HEAD + "1,1500,9,35\n2,nan,9,35\n", "line 3, column 'sound_speed': the value is missing"),
+    "blank": (HEAD + "1,1500,9,35\n,1500,9,35\n", "line 3, column 'depth': the value is missing"),
+    "text": (HEAD + "1,1500,9,35\n\n2,fast,9,35\n", "line 4, column 'sound_speed': 'fast' is not a number"),
+    "inf": (HEAD + "1,inf,9,35\n", "line 2, column 'sound_speed': 'inf' is not a finite number"),
+    "short row": (HEAD + "1,1500,9,35\n2\n", "line 3, column 'sound_speed': the value is missing"),
+    "flag": (HEAD + "1,-9999,9,35\n", "line 2, column 'sound_speed': -9999 m/s is not a sound speed between 100"),
+    "height": (HEAD + "-1,1500,9,35\n", "line 2, column 'depth': -1 m is not a depth between 0"),
+    "turns back": (HEAD + "1,1500,9,35\n3,1500,9,35\n2,1500,9,35\n4,1500,9,35\n", "line 4: the depth 2 m turns back"),
+    "turns back upward": (HEAD + "4,1500,9,35\n2,1500,9,35\n3,1500,9,35\n1,1500,9,35\n", "turns back; a cast goes one"),
+    "unit": ("depth (fathoms),c\n1,1500\n", "line 1, column 'depth (fathoms)': unit 'fathoms' is not one of m, ft"),
+    "no depth": ("c,temperature\n1500,9\n", "line 1: no column of depth or pressure among 'c', 'temperature'"),
+    "no speed": ("depth,salinity\n1,35\n", "line 1: no columns of sound speed, or of temperature and salinity"),
+    "two depths": ("depth,Depth (m),c\n1,1,1500\n", "line 1: more than one column of depth: 'depth' and 'Depth (m)'"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_a_bad_cast_is_refused_in_one_line(tmp_path, case):
+    text, message = BAD[case]
+    path = tmp_path / "none.csv" if text is None else written(tmp_path, text)
+    with pytest.raises(CastError, match=re.escape(message)) as refused:
+        profile_of(Cast(path=str(path)))
+    assert "\n" not in str(refused.value)
+    assert str(path) in str(refused.value)
+
+
+def test_columns_that_were_asked_for_must_be_there(tmp_path):
+    path = str(written(tmp_path, "depth,c\n1,1500\n"))
+    with pytest.raises(CastError, match="no columns of temperature and salinity among 'depth', 'c'"):
+        profile_of(Cast(path=path, quantity="temperature_salinity"))
+    path = str(written(tmp_path, "depth,temperature,salinity\n1,10,35\n", "other.csv"))
+    with pytest.raises(CastError, match="no column of sound speed"):
+        profile_of(Cast(path=path, quantity="sound_speed"))
