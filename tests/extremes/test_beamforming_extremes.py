@@ -1,0 +1,104 @@
+"""Beamforming where it is hardest: far and near foci, long lattices, wide fans, faint and loud signals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sonarsynth.acoustics.arrays import focus_delay
+from sonarsynth.beamforming import DenseDelayAndSum, FocusedDelayAndSum
+from sonarsynth.beamforming.dense import dense_energies
+from sonarsynth.beamforming.lattice import focused_energies
+from sonarsynth.conventions import direction
+from sonarsynth.products import Signals
+from sonarsynth.sonar import BeamGrid, PlanarLattice, Romanis, Sonar, elements
+
+SPEED = 1540.0
+RATE = 196e3
+ARRAY = PlanarLattice(columns=5, rows=4, pitch=0.02)
+SONAR = Sonar(array=ARRAY, beams=BeamGrid(azimuths=7, elevations=6))
+
+
+def noise(sensors=20, samples=700, amplitude=1.0):
+    pressure = amplitude * np.random.default_rng(2).normal(size=(sensors, samples))
+    return Signals(pressure.astype(np.float32), 0.0, RATE, 0.0, 0, 0)
+
+
+def energies(array, grid, bins=20, low=25e3, spacing=250.0):
+    parts = elements(array)
+    random = np.random.default_rng(4)
+    spectra = (random.normal(size=(parts.count, bins)) + 1j * random.normal(size=(parts.count, bins))).astype(
+        np.complex64
+    )
+    frequencies = low + spacing * np.arange(bins)
+    fast = focused_energies(spectra, parts, parts.gain, frequencies, grid.azimuth, grid.elevation, SPEED, None)
+    beams = direction(grid.azimuth, grid.elevation[:, None]).reshape(-1, 3)
+    delay = focus_delay(parts.position, beams, None, SPEED)
+    return fast, dense_energies(spectra, delay, parts.gain, frequencies).reshape(fast.shape)
+
+
+@pytest.mark.parametrize("method", [FocusedDelayAndSum, DenseDelayAndSum])
+def test_a_far_focus_is_a_plane_wave(method):
+    far = method(focus=1e12).image(noise(), elements(ARRAY), SONAR, 0.001, 0.003).energy
+    plane = method(focus=None).image(noise(), elements(ARRAY), SONAR, 0.001, 0.003).energy
+    np.testing.assert_allclose(far, plane, rtol=1e-6)
+
+
+@pytest.mark.parametrize("method", [FocusedDelayAndSum, DenseDelayAndSum])
+def test_a_focus_within_the_array_gives_numbers(method):
+    image = method(focus=0.001).image(noise(), elements(ARRAY), SONAR, 0.001, 0.003).energy
+    assert np.isfinite(image).all()
+    assert (image > 0).all()
+
+
+def test_a_focus_on_an_element_gives_its_delay():
+    q = np.array([0.0, 0.3, 0.4])
+    assert focus_delay(q[None], q / 0.5, 0.5, SPEED)[0] == pytest.approx(-0.5 / SPEED)
+
+
+@pytest.mark.parametrize("amplitude", [1e-9, 1e9])
+@pytest.mark.parametrize("method", [FocusedDelayAndSum(), DenseDelayAndSum()])
+def test_faint_and_loud_signals(method, amplitude):
+    """From a thousandth of a uPa to 300 dB: no underflow, no overflow."""
+    one = method.image(noise(), elements(ARRAY), SONAR, 0.001, 0.003).energy
+    image = method.image(noise(amplitude=amplitude), elements(ARRAY), SONAR, 0.001, 0.003).energy
+    np.testing.assert_allclose(image.astype(float) / amplitude**2, one, rtol=1e-5)
+
+
+@pytest.mark.parametrize("method", [FocusedDelayAndSum(), DenseDelayAndSum()])
+def test_a_signal_that_is_not_a_number_never_gives_a_number(method):
+    signals = noise()
+    signals.pressure[3, 400] = np.nan
+    assert np.isnan(method.image(signals, elements(ARRAY), SONAR, 0.001, 0.003).energy).all()
+
+
+def test_beams_almost_along_the_array():
+    fast, exact = energies(Romanis(), BeamGrid(azimuth_span=3.14, azimuths=9, elevation_span=3.14, elevations=8))
+    np.testing.assert_allclose(fast, exact, atol=1e-6 * exact.max())
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(300, 1), (1, 301)])
+def test_a_long_line(columns, rows):
+    """150 terms of the recurrence each way, phases at and near whole half turns included."""
+    fast, exact = energies(PlanarLattice(columns=columns, rows=rows, pitch=0.01), BeamGrid(azimuths=9, elevations=9))
+    np.testing.assert_allclose(fast, exact, atol=2e-5 * exact.max())
+
+
+def test_a_pitch_of_many_wavelengths():
+    fast, exact = energies(PlanarLattice(columns=6, rows=5, pitch=0.5), BeamGrid(azimuths=9, elevations=9))
+    np.testing.assert_allclose(fast, exact, atol=2e-6 * exact.max())
+
+
+def test_a_band_far_above_its_bins():
+    """Phases are reduced in float64: 1 GHz loses no more than 25 kHz does."""
+    fast, exact = energies(ARRAY, BeamGrid(azimuths=9, elevations=9), low=1e9)
+    np.testing.assert_allclose(fast, exact, atol=1e-6 * exact.max())
+
+
+def test_whole_turns_between_neighbours():
+    """One bin whose wavelength is the pitch, at the grating lobe: the recurrence has nothing to turn."""
+    parts = elements(PlanarLattice(columns=40, rows=40, pitch=0.1))
+    azimuth = np.array([-0.5, 0.0, 0.5]) * np.pi
+    ones = np.ones((1600, 1), np.complex64)
+    energy = focused_energies(ones, parts, parts.gain / 1600, np.array([15400.0]), azimuth, np.zeros(1), SPEED, None)
+    np.testing.assert_allclose(energy, 1.0, rtol=1e-6)

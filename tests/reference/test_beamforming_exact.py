@@ -1,0 +1,183 @@
+"""The fast kernels against slow, exact computations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf, sqrt
+
+from sonarsynth.acoustics.arrays import (
+    beam_energy,
+    beam_spectra,
+    fast_length,
+    focus_delay,
+    frequency_spacing,
+    gate_samples,
+    gate_taper,
+    gated_spectra,
+)
+from sonarsynth.beamforming.dense import dense_energies
+from sonarsynth.beamforming.lattice import focused_energies
+from sonarsynth.conventions import direction
+from sonarsynth.sonar import BeamGrid, PlanarLattice, Romanis, elements
+
+SPEED = 1540.0
+
+
+def random_spectra(sensors, bins, seed=0):
+    random = np.random.default_rng(seed)
+    return (random.normal(size=(sensors, bins)) + 1j * random.normal(size=(sensors, bins))).astype(np.complex64)
+
+
+def both(array, grid, bins, focus, low=25e3, spacing=250.0, weight=None):
+    """Energies (elevation, azimuth) from the kernel and from the same delays summed in float64."""
+    parts = elements(array)
+    weight = parts.gain if weight is None else weight
+    spectra = random_spectra(parts.count, bins)
+    frequencies = low + spacing * np.arange(bins)
+    fast = focused_energies(spectra, parts, weight, frequencies, grid.azimuth, grid.elevation, SPEED, focus)
+    beams = direction(grid.azimuth, grid.elevation[:, None]).reshape(-1, 3)
+    on_axis = focus_delay(parts.position, np.array([1.0, 0.0, 0.0]), focus, SPEED)
+    delay = on_axis + focus_delay(parts.position, beams, None, SPEED)
+    exact = dense_energies(spectra, delay, weight, frequencies).reshape(fast.shape)
+    return fast, exact
+
+
+@pytest.mark.parametrize("rows", [1, 2, 5, 6])
+@pytest.mark.parametrize("columns", [1, 4, 7])
+@pytest.mark.parametrize(("azimuths", "elevations"), [(1, 2), (2, 1), (7, 4), (4, 9)])
+def test_kernel_equals_direct_sums_for_any_parity(rows, columns, azimuths, elevations):
+    fast, exact = both(
+        PlanarLattice(columns=columns, rows=rows, pitch=0.0495),
+        BeamGrid(azimuths=azimuths, elevations=elevations),
+        37,
+        3.0,
+    )
+    np.testing.assert_allclose(fast, exact, atol=1e-6 * exact.max())
+
+
+@pytest.mark.parametrize("bins", [1, 15, 16, 17, 64, 65, 129, 241])
+def test_kernel_equals_direct_sums_for_any_number_of_bins(bins):
+    fast, exact = both(PlanarLattice(columns=6, rows=5, pitch=0.0495), BeamGrid(azimuths=5, elevations=6), bins, 20.0)
+    np.testing.assert_allclose(fast, exact, atol=1e-6 * exact.max())
+
+
+def test_kernel_equals_direct_sums_for_the_508_elements():
+    fast, exact = both(Romanis(dead=(0, 77, 507)), BeamGrid(azimuths=11, elevations=10), 241, 20.0)
+    np.testing.assert_allclose(fast, exact, atol=1e-6 * exact.max())
+
+
+def test_kernel_takes_masks_without_symmetry_dead_elements_and_weights():
+    mask = ("#..##.#", ".##.#..", "##.....", "...####", "#.#.#.#")
+    array = PlanarLattice(columns=7, rows=5, pitch=0.03, mask=mask, dead=(3,))
+    weight = elements(array).gain * np.random.default_rng(3).uniform(0.2, 1.0, elements(array).count)
+    fast, exact = both(array, BeamGrid(azimuths=8, elevations=5), 50, 2.0, weight=weight)
+    np.testing.assert_allclose(fast, exact, atol=1e-6 * exact.max())
+
+
+def test_same_bits_whoever_asks():
+    """Bins are summed in fixed chunks: a run is repeated exactly, and zeros after the band change nothing."""
+    array, grid = elements(Romanis()), BeamGrid(azimuths=6, elevations=5)
+    spectra = random_spectra(508, 100)
+    frequencies = 25e3 + 250.0 * np.arange(100)
+    first, again = (
+        focused_energies(spectra, array, array.gain, frequencies, grid.azimuth, grid.elevation, SPEED, 20.0)
+        for _ in range(2)
+    )
+    np.testing.assert_array_equal(first, again)
+    part = focused_energies(
+        spectra[:, :64], array, array.gain, frequencies[:64], grid.azimuth, grid.elevation, SPEED, 20.0
+    )
+    rest = focused_energies(
+        spectra[:, 64:], array, array.gain, frequencies[64:], grid.azimuth, grid.elevation, SPEED, 20.0
+    )
+    np.testing.assert_array_equal(part + rest, first)
+
+
+@pytest.mark.parametrize(("radius", "loss"), [(50.0, 0.02), (20.0, 0.16), (10.0, 0.62), (5.0, 2.23)])
+def test_loss_of_the_separable_focus_in_the_corner(radius, loss):
+    """Flat spectrum from 25 to 85 kHz, source at (25, 25) deg at the focus: dB lost in its own beam."""
+    array = elements(Romanis())
+    corner = np.deg2rad([-25.0, 25.0])
+    frequencies = 25e3 + 1e3 * np.arange(61)
+    arrival = focus_delay(array.position, direction(corner[1], corner[1]), radius, SPEED)
+    spectra = np.exp(-2j * np.pi * frequencies * arrival[:, None]).astype(np.complex64)
+    energy = focused_energies(spectra, array, array.gain / 508, frequencies, corner, corner, SPEED, radius)[1, 1] / 61
+    assert -10 * np.log10(energy) == pytest.approx(loss, abs=0.02)
+
+
+def test_beam_spectra_equal_direct_sums_for_any_array():
+    random = np.random.default_rng(5)
+    position = random.uniform(-0.6, 0.6, (40, 3))
+    gain = random.uniform(0.0, 1.0, 40)
+    gain[[3, 9]] = 0.0
+    u = direction(random.uniform(-1, 1, 9), random.uniform(-1, 1, 9))
+    for bins in (1, 16, 100):
+        spectra = random_spectra(40, bins)
+        spectra[3] = np.nan  # dead: not listened to
+        frequencies = 25e3 + 250.0 * np.arange(bins)
+        live = np.flatnonzero(gain)
+        for focus in (None, 4.0):
+            delay = focus_delay(position, u, focus, SPEED)
+            exact = np.einsum(
+                "q,qf,bqf->bf",
+                gain[live] / gain.sum(),
+                spectra[live],
+                np.exp(2j * np.pi * frequencies * delay[:, live, None]),
+            )
+            beams = beam_spectra(spectra, frequencies, position, gain, u, SPEED, focus)
+            assert beams.shape == (9, bins)
+            np.testing.assert_allclose(beams, exact, atol=2e-6 * np.abs(exact).max())
+
+
+def test_beams_and_image_have_the_same_energy():
+    array, grid = elements(Romanis()), BeamGrid(azimuths=3, elevations=3)
+    spectra = random_spectra(508, 70)
+    frequencies = 30e3 + 500.0 * np.arange(70)
+    image = focused_energies(spectra, array, array.gain / 508, frequencies, grid.azimuth, grid.elevation, SPEED, None)
+    u = direction(grid.azimuth, grid.elevation[:, None]).reshape(-1, 3)
+    beams = beam_spectra(spectra, frequencies, array.position, array.gain, u, SPEED, None)
+    scale = beam_energy(np.ones((1, 1), complex), 500.0, 196e3)[0]
+    np.testing.assert_allclose(beam_energy(beams, 500.0, 196e3), scale * image.ravel(), rtol=5e-6)
+
+
+@pytest.mark.parametrize("focus", [0.7, 20.0, 1e7])
+def test_focus_delay_to_the_last_digits(focus):
+    """sqrt(R^2 - 2 R u.q + q^2) - R in 50 digits, from the near field to 10 000 km."""
+    mp.dps = 50
+    q, u = np.array([0.1, -0.55, 0.31]), direction(0.3, -0.2)
+    along = sum(mpf(float(a)) * mpf(float(b)) for a, b in zip(q, u, strict=True))
+    square = sum(mpf(float(a)) ** 2 for a in q)
+    exact = (sqrt(mpf(focus) ** 2 - 2 * mpf(focus) * along + square) - mpf(focus)) / mpf(SPEED)
+    assert focus_delay(q[None], u, focus, SPEED)[0] == pytest.approx(float(exact), rel=4e-16 * 10)
+
+
+def test_spectra_are_those_of_numpy_and_obey_parseval():
+    random = np.random.default_rng(1)
+    pressure = random.normal(size=(3, 900)).astype(np.float32)
+    rate, first, count = 196e3, 57, 731
+    frequencies, spectra = gated_spectra(pressure, rate, first, count, (1e-3, rate))
+    cut = pressure[:, first : first + count] * gate_taper(count, rate)
+    length = fast_length(count)
+    every = np.fft.rfft(cut.astype(float), length, axis=1)
+    inside = slice(1, (length + 1) // 2)
+    np.testing.assert_allclose(spectra, every[:, inside], atol=1e-6 * np.abs(every).max())
+    np.testing.assert_allclose(frequencies, np.fft.rfftfreq(length, 1 / rate)[inside], rtol=1e-14)
+    # All of the energy but the mean's (and that at half the sampling frequency, where there is such a bin).
+    lost = np.abs(every[:, 0]) ** 2 + (np.abs(every[:, -1]) ** 2 if length % 2 == 0 else 0.0)
+    expected = (np.sum(cut.astype(float) ** 2, axis=1) - lost / length) / rate
+    np.testing.assert_allclose(beam_energy(spectra, frequency_spacing(count, rate), rate), expected, rtol=1e-5)
+
+
+def test_band_edges_belong_to_the_band():
+    pressure = np.ones((1, 800), np.float32)
+    frequencies, spectra = gated_spectra(pressure, 200e3, 0, 800, (25e3, 85e3))
+    assert frequencies[0] == pytest.approx(25e3)
+    assert frequencies[-1] == pytest.approx(85e3)
+    assert spectra.shape == (1, 241)
+
+
+def test_gate_holds_the_samples_inside_it():
+    assert gate_samples(0.0, 1.0, 0.0, 10.0, 10) == (0, 10)
+    assert gate_samples(0.31, 0.61, 0.0, 10.0, 10) == (4, 3)
+    assert gate_samples(5.0, 5.5, 4.9, 10.0, 10) == (1, 5)
