@@ -143,7 +143,7 @@ def depth(position: npt.ArrayLike) -> Floats:
 def level(pressure: npt.ArrayLike) -> Floats:
     """Level in dB re 1 uPa of a pressure in Pa (-inf for silence)."""
     with np.errstate(divide="ignore"):
-        return 20.0 * np.log10(np.abs(np.asarray(pressure, float)) / REFERENCE_PRESSURE)
+        return np.asarray(20.0 * np.log10(np.abs(np.asarray(pressure, float)) / REFERENCE_PRESSURE))
 
 
 def pressure(level_db: npt.ArrayLike) -> Floats:

@@ -9,8 +9,7 @@ which is the registry, and `kind:` in YAML is the tag.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar, dataclass_transform
+from typing import Any, TypeVar, cast, dataclass_transform
 
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
@@ -23,11 +22,22 @@ _CONFIG = ConfigDict(extra="forbid", allow_inf_nan=False, validate_default=True,
 T = TypeVar("T")
 
 
+class FieldError(ValueError):
+    """A field that is wrong in its scene: `path` leads to it from the recipe, `message` is one clear line."""
+
+    def __init__(self, path: tuple[str | int, ...], message: str) -> None:
+        super().__init__(f"{'.'.join(map(str, path))}: {message}")
+        self.path = path
+        self.message = message
+
+    def __reduce__(self) -> tuple[type[FieldError], tuple[tuple[str | int, ...], str]]:
+        return type(self), (self.path, self.message)
+
+
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(Field,))
 def description(cls: type[T]) -> type[T]:
     """Make a class a description: keyword arguments only, frozen, hashable, unknown fields refused, no NaN or infinity.
 
     Sequences are tuples. Raises `pydantic.ValidationError` (a ValueError) when a field is wrong.
     """
-    decorate: Callable[[type[T]], type[T]] = dataclass(frozen=True, kw_only=True, config=_CONFIG)
-    return decorate(cls)
+    return cast(type[T], dataclass(frozen=True, kw_only=True, config=_CONFIG)(cls))

@@ -82,4 +82,4 @@ def unit(vectors: npt.ArrayLike) -> Floats:
     """Vectors (..., 3) scaled to length one; the zero vector gives NaN, never a direction."""
     v = np.asarray(vectors, float)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return v / np.linalg.norm(v, axis=-1, keepdims=True)
+        return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sonarsynth.conventions import NO_TARGET, Floats, azimuth_elevation, direction, level
+from sonarsynth.conventions import NO_TARGET, Floats, azimuth_elevation, direction
 from sonarsynth.geometry import Pose
 from sonarsynth.products import LEDGER, Arrivals, Ledger, Paths, Truth
 from sonarsynth.sonar import BeamGrid
@@ -36,7 +36,9 @@ def label(
     """
     seen = [_as_seen(body, sonar_pose, connect, straight) for body in moment.bodies]
     target, facet, distance = _label_beams(moment.bodies, seen, beams)
-    boxes = [_visible(body, corners, moment.bodies, sonar_pose) for body, corners in zip(moment.bodies, seen, strict=True)]
+    boxes = [
+        _visible(body, corners, moment.bodies, sonar_pose) for body, corners in zip(moment.bodies, seen, strict=True)
+    ]
     return Truth(
         sonar_position=sonar_pose.position,
         sonar_orientation=sonar_pose.orientation,
@@ -107,14 +109,16 @@ def _beams_near(points: Floats, rays: Floats) -> tuple[np.ndarray, np.ndarray]:
     towards = points / np.linalg.norm(points, axis=1, keepdims=True)
     axis = towards.mean(axis=0)
     if np.linalg.norm(axis) < 0.5:  # the array is within the body, or close to it: every ray may hit
-        return np.nonzero(np.ones(rays.shape[:2], bool))
+        every = np.indices(rays.shape[:2]).reshape(2, -1)
+        return every[0], every[1]
     axis /= np.linalg.norm(axis)
     widest = np.arccos(np.clip(towards @ axis, -1, 1)).max()
-    return np.nonzero(np.arccos(np.clip(rays @ axis, -1, 1)) <= widest + 1e-3)
+    rows, columns = np.nonzero(np.arccos(np.clip(rays @ axis, -1, 1)) <= widest + 1e-3)
+    return rows, columns
 
 
 def _visible(body: Body, seen: Floats, bodies: tuple[Body, ...], sonar_pose: Pose) -> tuple[Floats, float]:
-    """Azimuth and elevation bounds (4,) of the visible facets, and the visible share of the area that faces the array."""
+    """Azimuth and elevation bounds (4,) of the visible facets, and the seen share of the area that faces the array."""
     mesh = body.mesh
     centroid, normal = body.pose.to_world(mesh.centroid), body.pose.turn_to_world(mesh.normal)
     facing = np.einsum("ij,ij->i", sonar_pose.position - centroid, normal) > 0
@@ -152,7 +156,7 @@ def ledger(arrivals: Arrivals, snaps: tuple[Snap, ...], targets: int, snap_level
         mine = arrivals.select((arrivals.snap == cell[0]) & (which == cell[1]) & (family(arrivals) == cell[2]))
         paths[cell] = len(mine.delay)
         if paths[cell]:
-            levels[cell] = _add_up(mine, snap_level[cell[0]])
+            levels[cell] = _add_up(mine, float(snap_level[cell[0]]))
             bound[cell] = error
     return Ledger(levels, paths, bound)
 
@@ -170,8 +174,3 @@ def _add_up(paths: Arrivals, source_level: float) -> Floats:
     scattering, out, back, absorption, boundary = np.diff(10.0 * np.log10([1.0, *sums]))
     received = source_level + 10.0 * np.log10(sums[-1])
     return np.array([source_level, -out, scattering, -back, -absorption, -boundary, received])
-
-
-def peak_level(pressure_at_1m: Floats) -> float:
-    """Peak level (dB re 1 uPa at 1 m) of a waveform (sample,) in Pa at 1 m."""
-    return float(level(np.abs(pressure_at_1m).max()))

@@ -1,6 +1,6 @@
 """Results in flight: frozen dataclasses of arrays, shapes in the annotations. The stages meet only here.
 
-Axis names: path (an arrival), sensor, sample, snap, target, elevation, azimuth, xyz, term (polynomial over the aperture).
+Axes: path (an arrival), sensor, sample, snap, target, elevation, azimuth, xyz, term (polynomial over the aperture).
 Unless said otherwise arrays are float64, positions in m in the sonar frame, times in s on the clock of the frame (0 is
 the instant of the frame; a snap at `Snap.time` is heard a travel time later).
 """
@@ -8,6 +8,7 @@ the instant of the frame; a snap at `Snap.time` is heard a travel time later).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -70,7 +71,7 @@ class Arrivals:
 
     def select(self, keep: Bools | Ints) -> Arrivals:
         """The arrivals picked by a mask or by indices (path,)."""
-        rows = {
+        rows: dict[str, Any] = {
             name: value[keep] if isinstance(value, np.ndarray) else value for name, value in vars(self).items()
         }
         return Arrivals(**rows)
@@ -119,7 +120,9 @@ class Bearings:
 class EnergyImage:
     """Energy in each steered direction, in the echo window."""
 
-    energy: npt.NDArray[np.float32]  # (elevation, azimuth) Pa2 s, of the mean-pressure beam (a plane wave of p gives int p2 dt)
+    energy: npt.NDArray[
+        np.float32
+    ]  # (elevation, azimuth) Pa2 s, of the mean-pressure beam (a plane wave of p gives int p2 dt)
     azimuth: Floats  # (azimuth,) rad, ascending
     elevation: Floats  # (elevation,) rad, ascending
     start: float  # s: the echo window that was imaged

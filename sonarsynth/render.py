@@ -13,14 +13,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.acoustics.snap import peak_pressure
-from sonarsynth.conventions import Floats, level
+from sonarsynth.acoustics.snap import source_level
+from sonarsynth.conventions import Floats
 from sonarsynth.labelling import label, ledger
 from sonarsynth.planning import Plan, plan
 from sonarsynth.products import LEDGER, Arrivals, Bearings, EnergyImage, Ledger, PointCloud, Signals, Truth
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import Recipe
 from sonarsynth.scene import Frame
+from sonarsynth.synthesis.pulse import bubble
 from sonarsynth.tracing import Straight
 from sonarsynth.variables import VARIABLES, Variable, attributes, coordinates, variables
 from sonarsynth.world.moment import Snap
@@ -68,7 +69,7 @@ class Heard:
 
 def snap_levels(snaps: tuple[Snap, ...]) -> Floats:
     """(snap,) peak source level of each snap (dB re 1 uPa at 1 m)."""
-    return np.array([float(level(peak_pressure(s.model))) if s.source_level is None else s.source_level for s in snaps])
+    return np.array([source_level(bubble(s.model)) if s.source_level is None else s.source_level for s in snaps])
 
 
 def trace_frame(plan: Plan, index: int) -> Traced:
@@ -91,7 +92,9 @@ def trace_frame(plan: Plan, index: int) -> Traced:
     straight = isinstance(plan.propagation, Straight)
     truth = label(frame.moment, frame.sonar_pose, sonar.beams, plan.connect, levels, straight)
     phase = 2 * np.pi * sonar.band.high * arrivals.wavefront_error
-    book = ledger(arrivals, frame.moment.snaps, len(frame.moment.bodies), levels, float(-20 * np.log10(np.cos(min(phase, 1.5)))))
+    book = ledger(
+        arrivals, frame.moment.snaps, len(frame.moment.bodies), levels, float(-20 * np.log10(np.cos(min(phase, 1.5))))
+    )
     return Traced(frame, arrivals, truth, book)
 
 
@@ -110,9 +113,10 @@ def beamform_frame(plan: Plan, index: int, traced: Traced) -> Heard:
     )
     heard = float(bearings.time[0]) if snaps else np.nan
     start, stop = heard + plan.windows.echo_start, heard + plan.windows.echo_stop
-    if np.isfinite(start):
+    end = signals.start + plan.windows.samples / signals.sampling_frequency
+    if signals.start <= start and stop <= end:
         image = processing.beamforming.image(signals, plan.elements, sonar, start, stop)
-    else:  # no direct pulse was found, so there is no clock: an image of nothing, not of an arbitrary window
+    else:  # no direct pulse was found, or an echo was taken for it: no clock, so no image, rather than an arbitrary one
         silent = np.full((sonar.beams.elevations, sonar.beams.azimuths), np.nan, np.float32)
         image = EnergyImage(silent, sonar.beams.azimuth, sonar.beams.elevation, np.nan, np.nan)
     return Heard(signals, bearings, image)
@@ -153,7 +157,13 @@ def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
     if "cloud" in plan.products:
         scene = plan.scene
         cloud = scene.processing.ranging.cloud(
-            heard.signals, heard.image, heard.bearings, plan.elements, scene.sonar, traced.frame.sonar_pose, plan.profile
+            heard.signals,
+            heard.image,
+            heard.bearings,
+            plan.elements,
+            scene.sonar,
+            traced.frame.sonar_pose,
+            plan.profile,
         )
         values |= _cloud_values(cloud)
     return values
@@ -179,9 +189,7 @@ def _truth_values(plan: Plan, index: int, traced: Traced) -> Values:
 def _signal_values(plan: Plan, signals: Signals) -> Values:
     counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
     pressure = np.rint(signals.pressure / signals.quantum).astype(np.int16) if counts else signals.pressure
-    return _table(
-        "/signals", pressure=pressure, start=signals.start, clipped=signals.clipped, outside=signals.outside
-    )
+    return _table("/signals", pressure=pressure, start=signals.start, clipped=signals.clipped, outside=signals.outside)
 
 
 def _bearing_values(bearings: Bearings) -> Values:

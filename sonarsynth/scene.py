@@ -105,7 +105,12 @@ class Scene:
         )
         bed = -self.world.environment.depth
         snaps = tuple(
-            Snap(np.array([*s.position[:2], s.position[2] if len(s.position) > 2 else bed + s.height]), t, s.snap, s.source_level)
+            Snap(
+                np.array([*s.position[:2], s.position[2] if len(s.position) > 2 else bed + s.height]),
+                t,
+                s.snap,
+                s.source_level,
+            )
             for s in self.world.shrimp
             for t in s.snap_times
         )

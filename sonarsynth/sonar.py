@@ -29,7 +29,7 @@ from sonarsynth.conventions import (
 from sonarsynth.description import BY_KIND, description
 
 ROMANIS_ROWS = (4, 10, 14, 18, 20, 20, 22, 22, 24, 24, 24, 26, 26, 26, 26, 24, 24, 24, 22, 22, 20, 20, 18, 14, 10, 4)
-"""Elements in each row of the 508-element disc: the 500-cell corner-centred disc and the octet (9.5, 8.5), (8.5, 9.5)."""
+"""Elements in each row of the 508-element disc: 500 cells centred on a corner, and the octet (9.5, 8.5), (8.5, 9.5)."""
 
 
 @description
@@ -105,10 +105,12 @@ class Elements:
 
     @property
     def count(self) -> int:
+        """Number of elements, dead ones too."""
         return len(self.gain)
 
     @property
     def on_lattice(self) -> bool:
+        """Whether the elements lie on a regular lattice."""
         return self.pitch > 0
 
     @cached_property
@@ -163,6 +165,7 @@ class Band:
 
     @property
     def centre(self) -> float:
+        """Middle of the band (Hz)."""
         return 0.5 * (self.low + self.high)
 
 
@@ -241,7 +244,7 @@ def _symmetric(span: float, count: int) -> Floats:
     """Exactly antisymmetric grid: kernels that use x -> -x rely on it."""
     if count == 1:
         return np.zeros(1)
-    return (2.0 * np.arange(count) - (count - 1)) * (0.5 * span / (count - 1))
+    return np.asarray((2.0 * np.arange(count) - (count - 1)) * (0.5 * span / (count - 1)), float)
 
 
 @description

@@ -1,4 +1,4 @@
-"""The stored schema: every variable with its dimensions, type, units and meaning; the store is laid out from it alone."""
+"""The stored schema: each variable with dimensions, type, units and meaning. The store is laid out from it alone."""
 
 from __future__ import annotations
 
@@ -94,7 +94,9 @@ _CLOUD = _group(
 _BEARINGS = _group(
     "/bearings",
     "bearings",
-    _v("time", _SNAP, "float64", "s", "arrival of the direct pulse at the array centre, after the instant of the frame"),
+    _v(
+        "time", _SNAP, "float64", "s", "arrival of the direct pulse at the array centre, after the instant of the frame"
+    ),
     _v("time_error", _SNAP, "float64", "s", "predicted standard error of time"),
     _v("azimuth", _SNAP, "float64", "degree", "azimuth of the snap as the array hears it, port positive"),
     _v("azimuth_error", _SNAP, "float64", "degree", "predicted standard error of azimuth"),
@@ -114,7 +116,9 @@ _TRUTH = _group(
     _v("sonar_position", ("frame", "xyz"), "float64", "m", "position of the array centre in the world"),
     _v("sonar_orientation", ("frame", "wxyz"), "float64", "1", "unit quaternion from the sonar frame to the world"),
     _v("target_position", (*_TARGET, "xyz"), "float64", "m", "position of the target's origin in the world"),
-    _v("target_orientation", (*_TARGET, "wxyz"), "float64", "1", "unit quaternion from the target's frame to the world"),
+    _v(
+        "target_orientation", (*_TARGET, "wxyz"), "float64", "1", "unit quaternion from the target's frame to the world"
+    ),
     _v("target_velocity", (*_TARGET, "xyz"), "float64", "m s-1", "velocity of the target in the world"),
     _v("box", (*_TARGET, "corner", "xyz"), "float64", "m", "corners of the oriented bounding box, sonar frame"),
     _v("image_box", (*_TARGET, "bound"), "float64", "degree", "bounds of the visible part in azimuth and elevation"),
@@ -147,7 +151,11 @@ def variables(plan: Plan) -> tuple[Variable, ...]:
     chosen = [v for v in VARIABLES if v.product in wanted]
     converter = plan.scene.sonar.converter
     if converter is not None and converter.bits <= 16:
-        counts = {"dtype": "int16", "fill": -(2**15), "attributes": (("scale_factor", converter.quantum),)}
+        counts: dict[str, Any] = {
+            "dtype": "int16",
+            "fill": -(2**15),
+            "attributes": (("scale_factor", converter.quantum),),
+        }
         chosen = [replace(v, **counts) if (v.group, v.name) == ("/signals", "pressure") else v for v in chosen]
     return tuple(chosen)
 
@@ -158,7 +166,9 @@ def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.n
     names = [t.name for t in scene.world.targets]
     static: dict[tuple[str, str], tuple[tuple[str, ...], np.ndarray, dict[str, Any]]] = {}
 
-    def add(groups: str, name: str, dims: tuple[str, ...], values: Any, units: str, long_name: str, **more: Any) -> None:
+    def add(
+        groups: str, name: str, dims: tuple[str, ...], values: Any, units: str, long_name: str, **more: Any
+    ) -> None:
         for group in groups.split():
             static[group, name] = (dims, np.asarray(values), {"units": units, "long_name": long_name, **more})
 
@@ -167,7 +177,9 @@ def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.n
     on_grid = "/truth" + "".join(f" /{p}" for p in ("image", "cloud") if p in plan.products)
     degrees = {"comment": "as the sonar looks"}
     add(on_grid, "azimuth", ("azimuth",), np.rad2deg(beams.azimuth), "degree", "azimuth, port positive", **degrees)
-    add(on_grid, "elevation", ("elevation",), np.rad2deg(beams.elevation), "degree", "elevation, up positive", **degrees)
+    add(
+        on_grid, "elevation", ("elevation",), np.rad2deg(beams.elevation), "degree", "elevation, up positive", **degrees
+    )
     named = "/truth" + (" /bearings" if plan.products & {"image", "cloud"} else "")
     add(named, "xyz", ("xyz",), list("xyz"), "1", "axis")
     add("/truth", "wxyz", ("wxyz",), list("wxyz"), "1", "part of a unit quaternion, scalar first")

@@ -27,7 +27,7 @@ class Check:
 
 def check(tree: xr.DataTree) -> list[Check]:
     """All checks of truth against data, over the frames that were built."""
-    built = np.flatnonzero(np.isfinite(tree["truth/sonar_position"].values[:, 0]))
+    built = np.flatnonzero(np.isfinite(_all(tree, "truth/sonar_position")[:, 0]))
     if not len(built):
         return [Check("frames", "at least one frame built", "none", False, {"frames": 0})]
     checks = [Check("frames", "at least one frame built", f"{len(built)}", True, {"frames": len(built)})]
@@ -45,20 +45,32 @@ def check(tree: xr.DataTree) -> list[Check]:
 
 def ledger_adds_up(tree: xr.DataTree, frames: np.ndarray) -> Check:
     """received = source - loss_out + scattering - loss_in - absorption - boundary for every path family."""
-    book = {name: tree[f"ledger/{name}"].values[frames] for name in LEDGER}
+    book = {name: _all(tree, f"ledger/{name}")[frames] for name in LEDGER}
     total = book["source_level"] + book["scattering"]
     for loss in ("transmission_loss_out", "transmission_loss_in", "absorption_loss", "boundary_loss"):
         total = total - book[loss]
     worst = float(np.nanmax(np.abs(total - book["received_level"]), initial=0.0))
-    return Check("ledger adds up", f"within {LEDGER_TOLERANCE} dB", f"{worst:.2g} dB", worst <= LEDGER_TOLERANCE, {"worst_db": worst})
+    return Check(
+        "ledger adds up",
+        f"within {LEDGER_TOLERANCE} dB",
+        f"{worst:.2g} dB",
+        worst <= LEDGER_TOLERANCE,
+        {"worst_db": worst},
+    )
 
 
 def nothing_outside(tree: xr.DataTree, frames: np.ndarray) -> Check:
     """Arrivals that fell outside the sample window, and samples at full scale."""
-    outside = int(tree["signals/outside"].values[frames].sum())
-    clipped = int(tree["signals/clipped"].values[frames].sum())
+    outside = int(_all(tree, "signals/outside")[frames].sum())
+    clipped = int(_all(tree, "signals/clipped")[frames].sum())
     got = f"{outside} arrivals outside, {clipped} samples clipped"
-    return Check("signals whole", "none outside, none clipped", got, outside + clipped == 0, {"outside": outside, "clipped": clipped})
+    return Check(
+        "signals whole",
+        "none outside, none clipped",
+        got,
+        outside + clipped == 0,
+        {"outside": outside, "clipped": clipped},
+    )
 
 
 def beam_width(tree: xr.DataTree) -> float:
@@ -66,7 +78,7 @@ def beam_width(tree: xr.DataTree) -> float:
 
     Disc: 1.03 lambda / D (first-order; Van Trees 2002, table 4.1).
     """
-    position = tree["signals/position"].values if "signals" in tree.children else None
+    position = _all(tree, "signals/position") if "signals" in tree.children else None
     if position is None:
         return float(np.deg2rad(1.5))
     low, high = tree.attrs["band_low"], tree.attrs["band_high"]
@@ -75,7 +87,7 @@ def beam_width(tree: xr.DataTree) -> float:
 
 
 def _grid_step(tree: xr.DataTree) -> float:
-    return float(np.deg2rad(np.diff(tree["truth/azimuth"].values).mean()))
+    return float(np.deg2rad(np.diff(_all(tree, "truth/azimuth")).mean()))
 
 
 def near_target(tree: xr.DataTree, truth: np.ndarray) -> np.ndarray:
@@ -98,7 +110,17 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
         hits += bool(near_target(tree, truth)[np.unravel_index(np.nanargmax(energy), energy.shape)])
     if not seen:
         return Check("brightest beam on target", "every frame", "no target in view", None, {})
-    return Check("brightest beam on target", "every frame", f"{hits} of {seen} frames", hits == seen, {"hits": hits, "frames": seen})
+    return Check(
+        "brightest beam on target",
+        "every frame",
+        f"{hits} of {seen} frames",
+        hits == seen,
+        {"hits": hits, "frames": seen},
+    )
+
+
+def _all(tree: xr.DataTree, name: str) -> np.ndarray:
+    return np.asarray(tree[name].values)
 
 
 def _frame(tree: xr.DataTree, name: str, index: int) -> np.ndarray:
@@ -125,7 +147,9 @@ def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
             errors.append(float(np.min(each)))
             good += bool(error @ np.linalg.solve(covariance[row], error) <= 14.16)
     if not total:
-        return Check("snap located", "within 3 predicted errors in 95 %", "no snap found", False if len(frames) else None, {})
+        return Check(
+            "snap located", "within 3 predicted errors in 95 %", "no snap found", False if len(frames) else None, {}
+        )
     got = f"{good} of {total}, median error {np.median(errors):.3g} m"
     numbers = {"good": good, "found": total, "median_m": float(np.median(errors))}
     return Check("snap located", "within 3 predicted errors in 95 %", got, good >= 0.95 * total, numbers)
@@ -145,11 +169,24 @@ def range_errors(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
         near += int((points & ~on & near_target(tree, target)).sum())
     error, ratio = np.concatenate(errors), np.concatenate(scaled)
     if not len(error):
-        return [Check("range of points on target", "median under 5 cm", "no points on a target", None, {"off_target": off})]
+        return [
+            Check("range of points on target", "median under 5 cm", "no points on a target", None, {"off_target": off})
+        ]
     median, share = float(np.median(error)), float(np.mean(ratio <= 3))
-    numbers: dict[str, Any] = {"points": len(error), "median_m": median, "share_within_3": share, "beams_on_target": beams}
+    numbers: dict[str, Any] = {
+        "points": len(error),
+        "median_m": median,
+        "share_within_3": share,
+        "beams_on_target": beams,
+    }
     return [
-        Check("range of points on target", "median under 5 cm", f"{100 * median:.2g} cm over {len(error)} points", median < 0.05, numbers),
+        Check(
+            "range of points on target",
+            "median under 5 cm",
+            f"{100 * median:.2g} cm over {len(error)} points",
+            median < 0.05,
+            numbers,
+        ),
         Check("predicted range errors", "90 % within three", f"{100 * share:.3g} %", share >= 0.9, numbers),
         Check(
             "points off target",
@@ -159,4 +196,3 @@ def range_errors(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
             {"off_target": off, "near_outline": near},
         ),
     ]
-

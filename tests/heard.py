@@ -42,7 +42,9 @@ def hear(
     u = u / np.linalg.norm(u, axis=2, keepdims=True)
     spectrum = np.zeros((elements.count, len(f)), complex)
     for k in bins:
-        face = np.sinc(f[k] * elements.face / sound_speed * u[..., 1]) * np.sinc(f[k] * elements.face / sound_speed * u[..., 2])
+        face = np.sinc(f[k] * elements.face / sound_speed * u[..., 1]) * np.sinc(
+            f[k] * elements.face / sound_speed * u[..., 2]
+        )
         spectrum[:, k] = np.sum(face * wave, axis=0) if few else face[:, 0] @ wave
         wave *= turn
     spectrum *= pulse_spectrum(f) * RATE * elements.gain[:, None]
@@ -69,7 +71,9 @@ def add_noise(signals: Signals, noise: float, random) -> Signals:
     return Signals(rough.astype(np.float32), signals.start, RATE, signals.quantum, 0, 0)
 
 
-def hear_echoes(elements: Elements, source, points, amplitude, sound_speed: float = 1540.0) -> tuple[Signals, float, float]:
+def hear_echoes(
+    elements: Elements, source, points, amplitude, sound_speed: float = 1540.0
+) -> tuple[Signals, float, float]:
     """A snap at `source` at time 0 and its echoes from `points` with scattering amplitudes (point,) in m.
 
     Also first and last echo (s) at the array centre.

@@ -139,7 +139,7 @@ def debian_package(library: str) -> str:
 
 
 def install_system_libraries() -> str:
-    """Unpack the Debian packages that Open3D lacks into the environment, without root. Returns what could not be done."""
+    """Unpack what Open3D lacks of the system into the environment, without root. Returns what could not be done."""
     module = open3d_module()
     if module is None:
         return "no wheel for this Python and platform"

@@ -17,6 +17,9 @@ from sonarsynth.conventions import Floats
 RANK_TOLERANCE = 1e-6
 """Singular values of the sensor positions below this share of the largest count as zero."""
 
+SETTLED = 1e-8
+"""A step (rad) after which Gauss-Newton stops: what is left is its square."""
+
 
 @dataclass(frozen=True, eq=False)
 class Wavefront:
@@ -32,18 +35,25 @@ class Wavefront:
 
 
 def wavefront_delays(position: npt.ArrayLike, direction: npt.ArrayLike, curvature: float, sound_speed: float) -> Floats:
-    """Delays (sensor,) in s, relative to the array centre, of a wave from `direction` at sensors `position` (sensor, xyz)."""
+    """Delays (sensor,) in s after the array centre of a wave from `direction` at sensors `position` (sensor, xyz)."""
     q, u = np.asarray(position, float), np.asarray(direction, float)
-    rho = np.linalg.norm(u - curvature * q, axis=-1)
-    return np.asarray((curvature * np.sum(q * q, axis=-1) - 2 * q @ u) / (sound_speed * (1 + rho)))
+    along, square = q @ u, np.sum(q * q, axis=-1)
+    rho = np.sqrt(1 - 2 * curvature * along + curvature**2 * square)
+    return np.asarray((curvature * square - 2 * along) / (sound_speed * (1 + rho)))
 
 
 def tangent_plane(direction: npt.ArrayLike) -> Floats:
-    """Two unit vectors (2, xyz) square to a direction: of increasing azimuth and of increasing elevation (y, z at a pole)."""
+    """Unit vectors (2, xyz) square to a direction: of increasing azimuth and elevation (y first at a pole)."""
     u = np.asarray(direction, float)
     flat = np.hypot(u[0], u[1])
-    azimuth = np.array([-u[1], u[0], 0.0]) / flat if flat > 0 else np.array([0.0, 1.0, 0.0])
-    return np.stack([azimuth, np.cross(u, azimuth)])
+    y, x = (u[1] / flat, u[0] / flat) if flat > 0 else (0.0, 1.0)
+    return np.array([[-y, x, 0.0], [-u[2] * x, -u[2] * y, flat]])
+
+
+def plane_wavefront(direction: Floats, time: float) -> Wavefront:
+    """A plane wave as a `Wavefront` whose errors are not known."""
+    unknown = np.full((4, 4), np.nan)
+    return Wavefront(direction, 0.0, time, tangent_plane(direction), unknown, unknown[0], np.zeros(0))
 
 
 def plane_wave(
@@ -88,11 +98,13 @@ def spherical_wave(
     weight: npt.ArrayLike,
     start: npt.ArrayLike,
     curvature: float = 0.0,
+    curved: bool = True,
     iterations: int = 20,
 ) -> Wavefront | None:
     """The spherical wave that fits delays (sensor,) best, by Gauss-Newton from direction `start`; None where none does.
 
-    weight (sensor,) >= 0: inverse variances, up to a common factor. Derivatives, with rho = |u - k q|:
+    weight (sensor,) >= 0: inverse variances, up to a common factor. Not `curved`: the curvature is held at its start
+    (three sensors cannot tell it), with infinite variance. Derivatives, with rho = |u - k q|:
         d/du along a tangent e: -(q.e)/(c rho);  d/dk: (|q|^2 - (u.q)^2)/(c rho (rho + 1 - k u.q)).
     Fisher matrix and bound follow: `covariance` times the variance of a delay of weight one is the Cramer-Rao bound
     (physics: independent Gaussian errors; Van Trees 2002, section 8.4).
@@ -102,32 +114,43 @@ def spherical_wave(
     size = float(np.sqrt(np.max(np.sum(q * q, axis=1), initial=0.0)))
     if not (np.all(np.isfinite(u)) and size > 0):
         return None
+    used = [0, 1, 2, 3] if curved else [0, 1, 3]
     for _ in range(iterations):
         tangents = tangent_plane(u)
-        jacobian = wavefront_jacobian(q, u, k, sound_speed, tangents)
-        delays = wavefront_delays(q, u, k, sound_speed)
+        jacobian = wavefront_jacobian(q, u, k, sound_speed, tangents)[:, used]
+        late = t - wavefront_delays(q, u, k, sound_speed)
         solve = _normal_inverse(jacobian, w)
         if solve is None:
             return None
-        covariance, gain = solve
-        step = gain @ (t - delays)
-        u_next = u + step[:2] @ tangents
-        u_next = u_next / np.linalg.norm(u_next)
-        k_next = float(np.clip(k + step[2], -0.5 / size, 0.5 / size))  # sensors stay well inside the sphere
-        moved = np.linalg.norm(u_next - u) + abs(k_next - k) * size
-        if moved < 1e-13:
+        covariance, gain = _with_curvature(*solve) if not curved else solve
+        step = gain @ late
+        turned = u + step[:2] @ tangents
+        bent = float(np.clip(k + step[2], -0.5 / size, 2.0 / size))  # no source among the sensors
+        moved = np.linalg.norm(step[:2]) + abs(bent - k) * size
+        u, k = turned / np.linalg.norm(turned), bent
+        if moved < SETTLED:
             break
-        u, k = u_next, k_next
-    return Wavefront(u, k, float(step[3]), tangents, covariance, gain @ (delays / sound_speed), t - delays - step[3])
+    by_speed = gain @ (t - late) / sound_speed
+    return Wavefront(u, k, float(step[3]), tangents, covariance, by_speed, late - jacobian @ step[used])
+
+
+def _with_curvature(covariance: Floats, gain: Floats) -> tuple[Floats, Floats]:
+    """Put back the row of a curvature that was not fitted: of infinite variance."""
+    full = np.insert(np.insert(covariance, 2, 0.0, axis=0), 2, 0.0, axis=1)
+    full[2, 2] = np.inf
+    return full, np.insert(gain, 2, 0.0, axis=0)
 
 
 def wavefront_jacobian(position: Floats, u: Floats, curvature: float, sound_speed: float, tangents: Floats) -> Floats:
     """Derivatives (sensor, 4) of the delays by the parameters of a `Wavefront`."""
-    across = np.sum(position * position, axis=-1) - (position @ u) ** 2
-    rho = np.linalg.norm(u - curvature * position, axis=-1)
-    bend = across / (rho + 1 - curvature * (position @ u))
-    columns = [-(position @ tangents[0]), -(position @ tangents[1]), bend, sound_speed * rho]
-    return np.asarray(np.stack(columns, axis=-1) / (sound_speed * rho)[:, None])
+    along, square = position @ u, np.sum(position * position, axis=-1)
+    rho = np.sqrt(1 - 2 * curvature * along + curvature**2 * square)
+    jacobian = np.empty((len(position), 4))
+    jacobian[:, :2] = position @ -tangents.T
+    jacobian[:, 2] = (square - along**2) / (rho + 1 - curvature * along)
+    jacobian[:, :3] /= (sound_speed * rho)[:, None]
+    jacobian[:, 3] = 1.0
+    return jacobian
 
 
 def _normal_inverse(jacobian: Floats, weight: Floats) -> tuple[Floats, Floats] | None:
@@ -135,21 +158,20 @@ def _normal_inverse(jacobian: Floats, weight: Floats) -> tuple[Floats, Floats] |
     scale = np.sqrt(weight @ jacobian**2)
     if not np.all(scale > 0):
         return None
-    scaled = jacobian / scale
-    normal = (scaled * weight[:, None]).T @ scaled
-    values = np.linalg.eigvalsh(normal)
+    weighted = (jacobian * weight[:, None]).T / scale[:, None]
+    values, vectors = np.linalg.eigh(weighted @ jacobian / scale)
     if not values[0] > 1e-13 * values[-1]:
         return None
-    inverse = np.linalg.inv(normal)
-    gain = inverse @ (scaled * weight[:, None]).T / scale[:, None]
-    return inverse / np.outer(scale, scale), gain
+    inverse = (vectors / values) @ vectors.T
+    return inverse / np.outer(scale, scale), inverse @ weighted / scale[:, None]
 
 
 def delay_bound(energy_to_noise: npt.ArrayLike, bandwidth: npt.ArrayLike) -> Floats:
     """Cramer-Rao bound (s) on the standard error of a delay: 1/(2 pi beta d), d^2 = `energy_to_noise` = 2 E/N0.
 
     bandwidth beta (Hz) is the root mean square frequency of the known pulse, about zero where the carrier phase is
-    known, about the centroid where it is not (`rms_bandwidth`). Source: Van Trees (2002), section 8.2; Kay (1993), 3.11.
+    known, about the centroid where it is not (`rms_bandwidth`). Source: Van Trees (2002), section 8.2; Kay (1993),
+    section 3.11.
     """
     return np.asarray(1 / (2 * np.pi * np.asarray(bandwidth, float) * np.sqrt(np.asarray(energy_to_noise, float))))
 
@@ -161,9 +183,7 @@ def rms_bandwidth(frequency: npt.ArrayLike, spectrum: npt.ArrayLike, *, centred:
     return float(np.sqrt((f - mean) ** 2 @ power / power.sum()))
 
 
-def direction_bound(
-    position: npt.ArrayLike, delay_error: float, sound_speed: float
-) -> Floats:
+def direction_bound(position: npt.ArrayLike, delay_error: float, sound_speed: float) -> Floats:
     """Cramer-Rao bound (3, 3) on the covariance of a plane wave's direction from delays of equal error (s).
 
     Unknown emission time: (c delay_error)^2 times the (pseudo-)inverse of sum (q - mean q)(q - mean q)^T.

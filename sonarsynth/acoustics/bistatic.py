@@ -37,7 +37,7 @@ class BistaticRange:
 
 
 def bistatic_range(excess_path: npt.ArrayLike, beam: npt.ArrayLike, source: npt.ArrayLike) -> BistaticRange:
-    """Range along unit vectors `beam` (..., xyz) at which the path by way of the target is `excess_path` (...) m longer.
+    """Range along unit vectors `beam` (..., xyz) at which the path by the target is `excess_path` (...) m longer.
 
     source (..., xyz) is the position of the source relative to the array, in the frame of the beams (m). With b = |S|
     and h = 1 - cos psi = |u - s|^2/2, from (L^2 - b^2)/(2 (L - b cos psi)) with L = b + x:
@@ -70,7 +70,7 @@ def bistatic_range(excess_path: npt.ArrayLike, beam: npt.ArrayLike, source: npt.
 def excess_path(beam: npt.ArrayLike, range: npt.ArrayLike, source: npt.ArrayLike) -> Floats:
     """Excess path (m) of a target at `range` (...) on `beam` (..., xyz): the inverse of `bistatic_range`.
 
-    |S - T| + r - b, written as r (1 + ((r - 2 b cos psi)/(|S - T| + b))): the difference |S - T| - b without cancellation.
+    |S - T| + r - b, written as r (1 + ((r - 2 b cos psi)/(|S - T| + b))): |S - T| - b without cancellation.
     """
     u, r, position = np.asarray(beam, float), np.asarray(range, float), np.asarray(source, float)
     b = np.linalg.norm(position, axis=-1)

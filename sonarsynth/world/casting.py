@@ -1,15 +1,16 @@
 """Rays cast at meshes: what is hit first, and what is hidden.
 
-Embree is float32. So a ray is cast in the frame of the mesh, from where it enters the bounding sphere, and the facet that
-Embree proposes (with all facets that share a corner with it) is intersected again in float64, which decides; a
-proposal that does not hold is passed over and the ray goes on. Distances are right to about 1e-15 of the ray's length; rays
-that pass a silhouette closer than 1e-6 of the body's size may go either way.
+Embree is float32. So a ray is cast in the frame of the mesh, from where it enters the bounding sphere, and the facet
+that Embree proposes (with all facets that share a corner with it) is intersected again in float64, which decides; a
+proposal that does not hold is passed over and the ray goes on. Distances are right to about 1e-15 of the ray's length;
+rays that pass a silhouette closer than 1e-6 of the body's size may go either way.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from importlib import import_module
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -22,6 +23,9 @@ Backend = Literal["embree", "open3d"]
 OFFSET = 1e-6
 """Of the body's size: how far off a facet, along its normal, a ray starts so as not to meet it."""
 ROUNDS = 8  # proposals tried before the slow exact search
+SLACK = (
+    1e-3  # of the body's size: a hit this much beyond the proposed one is another hit, with others before it perhaps
+)
 
 
 class Caster(Protocol):
@@ -43,17 +47,18 @@ class EmbreeCaster:
         TriangleMesh(self._scene, vertices.astype(np.float32), faces.astype(np.int32))
 
     def nearest(self, origin: Floats, direction: Floats, far: Floats) -> tuple[Ints, Floats]:
+        """As `Caster.nearest`."""
         limit = np.minimum(far, 1e30).astype(np.float32)
         out = self._scene.run(origin.astype(np.float32), direction.astype(np.float32), limit, output=1)
         return out["primID"].astype(np.int64), out["tfar"].astype(float)
 
 
 class Open3DCaster:
-    """Open3D's RaycastingScene on one thread, to check the other against. Raises ImportError in one line without Open3D."""
+    """Open3D's RaycastingScene on one thread, to check the other against. Raises ImportError without Open3D."""
 
     def __init__(self, vertices: Floats, faces: np.ndarray) -> None:
         try:
-            import open3d as o3d
+            o3d: Any = import_module("open3d")
         except (ImportError, OSError) as error:
             reason = str(error).splitlines()[0]
             raise ImportError(f"ray casting by Open3D needs Open3D, which does not load: {reason}") from None
@@ -62,6 +67,7 @@ class Open3DCaster:
         self._scene.add_triangles(self._tensor(vertices.astype(np.float32)), self._tensor(faces.astype(np.uint32)))
 
     def nearest(self, origin: Floats, direction: Floats, far: Floats) -> tuple[Ints, Floats]:
+        """As `Caster.nearest`."""
         rays = np.concatenate([origin, direction], axis=1).astype(np.float32)
         out = self._scene.cast_rays(self._tensor(rays), nthreads=1)
         facet, distance = out["primitive_ids"].numpy().astype(np.int64), out["t_hit"].numpy().astype(float)
@@ -100,9 +106,19 @@ class Shape:
             proposed, at = self.caster.nearest(start + passed[:, None] * heading, heading, limit - passed)
             proposed = np.where((proposed >= 0) & (proposed < len(self.faces)), proposed, -1)
             found, where = np.empty(len(start), np.int64), np.empty(len(start))
-            from_start = np.zeros(len(start))
+            from_start, as_proposed = np.zeros(len(start)), np.fmin(limit, passed + at + SLACK)
             intersections.confirm(
-                start, heading, from_start, limit, proposed, self.corners, self.faces, *self.around, 1.0, found, where
+                start,
+                heading,
+                from_start,
+                as_proposed,
+                proposed,
+                self.corners,
+                self.faces,
+                *self.around,
+                1.0,
+                found,
+                where,
             )
             hit = found >= 0
             facet[open_rays[hit]], distance[open_rays[hit]] = found[hit], where[hit] + entry[open_rays[hit]]
@@ -119,7 +135,7 @@ class Shape:
 
 
 def _through_unit_sphere(origin: Floats, direction: Floats, far: Floats) -> tuple[Floats, Floats]:
-    """Where rays enter and leave a sphere a little over the unit sphere, within [0, far]; entry >= leave: they miss it."""
+    """Where rays enter and leave a sphere a little over the unit sphere, within [0, far]; entry >= leave: a miss."""
     nearest = -np.einsum("ij,ij->i", origin, direction)
     foot = origin + nearest[:, None] * direction
     square = 1.0 + 1e-5 - np.einsum("ij,ij->i", foot, foot)
@@ -146,7 +162,7 @@ def _shape(key: _ByContent, backend: Backend) -> Shape:
     mesh = key.mesh
     if not np.isfinite(mesh.vertices).all():
         raise ValueError("a mesh with vertices that are not finite cannot be cast at")
-    if len(mesh.faces) and not (0 <= mesh.faces.min() and mesh.faces.max() < len(mesh.vertices)):
+    if len(mesh.faces) and not (mesh.faces.min() >= 0 and mesh.faces.max() < len(mesh.vertices)):
         raise ValueError("a mesh with faces that name no vertex cannot be cast at")
     used = mesh.corners.reshape(-1, 3)
     centre = 0.5 * (used.min(axis=0) + used.max(axis=0))
@@ -160,7 +176,7 @@ def _shape(key: _ByContent, backend: Backend) -> Shape:
 
 
 def shape_of(mesh: Mesh, backend: Backend = "embree") -> Shape:
-    """The mesh made ready for casting, kept for the last 16 meshes by their content. Raises ValueError for a corrupt mesh."""
+    """The mesh made ready for casting, kept by content for the last 16. Raises ValueError for a corrupt mesh."""
     return _shape(_ByContent(mesh.digest, mesh), backend)
 
 
@@ -169,8 +185,9 @@ def first_hit(
 ) -> tuple[Ints, Floats]:
     """Facet (ray,) that each ray meets first, and its distance (m); -1 and NaN where it meets none within `far` (m).
 
-    origin, direction: (ray, xyz) in the frame of the mesh; directions of any length. The point hit is origin + distance * unit
-    direction, its normal mesh.normal[facet]. Raises ValueError for rays that are not finite or have no direction.
+    origin, direction: (ray, xyz) in the frame of the mesh; directions of any length. The point hit is origin +
+    distance * unit direction, its normal mesh.normal[facet]. Raises ValueError for rays that are not finite or have no
+    direction.
     """
     o, d = np.asarray(origin, float), np.asarray(direction, float)
     length = np.linalg.norm(d, axis=1)

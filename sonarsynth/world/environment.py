@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated, Literal
 
 import numpy as np
@@ -27,7 +28,7 @@ Depths = Annotated[tuple[NonNegativeMetres, ...], MinLen(1)]
 
 
 def _ascending(depth: tuple[float, ...]) -> tuple[float, ...]:
-    for i, (above, below) in enumerate(zip(depth, depth[1:], strict=False), start=1):
+    for i, (above, below) in enumerate(pairwise(depth), start=1):
         if below < above:
             raise ValueError(f"must not decrease, but entry {i} ({below:g} m) is above entry {i - 1} ({above:g} m)")
     return depth
@@ -94,7 +95,7 @@ SoundSpeed = Annotated[Isovelocity | Tabulated | TemperatureSalinity | Cast, BY_
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """Sound speed (m/s) at node depths (m), piecewise linear, constant beyond the ends: what rays are traced through."""
+    """Sound speed (m/s) at node depths (m), piecewise linear, constant beyond the ends: what rays go through."""
 
     depth: Floats  # (node,) not decreasing
     speed: Floats  # (node,)
@@ -149,7 +150,7 @@ class FlatNoise:
 
 @description
 class WenzNoise:
-    """Gaussian noise, independent between hydrophones, with the spectrum of Coates (1989): turbulence, shipping, wind, thermal."""
+    """Gaussian noise, independent between hydrophones: turbulence, shipping, wind and thermal (Coates 1989)."""
 
     kind: Literal["wenz"] = "wenz"
     shipping: Annotated[Number, Ge(0), Le(1)] = 0.5

@@ -34,15 +34,25 @@ def distance_to_facet(o: Floats, d: Floats, corners: Floats, facet: int, toleran
     along = nx * d[0] + ny * d[1] + nz * d[2]
     if along == 0.0:
         return math.nan
-    return (nx * ax + ny * ay + nz * az) / along
+    return float((nx * ax + ny * ay + nz * az) / along)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def confirm(
-    origin: Floats, direction: Floats, near: Floats, far: Floats, proposed: Ints, corners: Floats, faces: Int32s, first: Ints,
-    around: Ints, size: float, facet: Ints, distance: Floats,
+    origin: Floats,
+    direction: Floats,
+    near: Floats,
+    far: Floats,
+    proposed: Ints,
+    corners: Floats,
+    faces: Int32s,
+    first: Ints,
+    around: Ints,
+    size: float,
+    facet: Ints,
+    distance: Floats,
 ) -> None:
-    """The nearest hit in [near, far] among each proposed facet and all that share a corner with it; -1 and NaN where none.
+    """The nearest hit in [near, far] among each proposed facet and those that share a corner with it; -1, NaN for none.
 
     first, around: facets round each vertex, around[first[v] : first[v + 1]].
     """
@@ -62,7 +72,14 @@ def confirm(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def search(
-    origin: Floats, direction: Floats, near: Floats, far: Floats, corners: Floats, size: float, facet: Ints, distance: Floats
+    origin: Floats,
+    direction: Floats,
+    near: Floats,
+    far: Floats,
+    corners: Floats,
+    size: float,
+    facet: Ints,
+    distance: Floats,
 ) -> None:
     """The nearest hit in [near, far] among all facets: slow and exact."""
     tolerance = EDGE * size * size

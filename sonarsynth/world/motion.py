@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, Literal
 
 import numpy as np
@@ -50,7 +51,7 @@ class Waypoint:
 
 @description
 class Waypoints:
-    """Through waypoints in straight lines; headings turn the short way, evenly. At rest before the first and after the last."""
+    """Straight lines between waypoints; headings turn evenly, the short way. At rest before the first, after the last."""
 
     kind: Literal["waypoints"] = "waypoints"
     points: Annotated[tuple[Waypoint, ...], MinLen(2)]
@@ -60,7 +61,7 @@ class Waypoints:
     @field_validator("points")
     @classmethod
     def _check(cls, points: tuple[Waypoint, ...]) -> tuple[Waypoint, ...]:
-        for i, (a, b) in enumerate(zip(points, points[1:], strict=False), start=1):
+        for i, (a, b) in enumerate(pairwise(points), start=1):
             if b.time <= a.time:
                 raise ValueError(f"waypoint {i} is not later than waypoint {i - 1}")
         return points
@@ -107,15 +108,15 @@ def velocity(motion: Motion, time: float) -> Floats:
         case Still():
             return np.zeros(3)
         case Line():
-            return (np.array(motion.stop) - np.array(motion.start)) / motion.duration
+            return np.asarray((np.array(motion.stop) - np.array(motion.start)) / motion.duration)
         case Waypoints():
             a, b = _leg(motion, time)
             if not motion.points[0].time <= time < motion.points[-1].time:
                 return np.zeros(3)
-            return (np.array(b.position) - np.array(a.position)) / (b.time - a.time)
+            return np.asarray((np.array(b.position) - np.array(a.position)) / (b.time - a.time))
         case Circle():
             angle = _angle(motion, time)
-            return motion.speed * np.array([-np.sin(angle), np.cos(angle), 0.0])
+            return np.asarray(motion.speed * np.array([-np.sin(angle), np.cos(angle), 0.0]))
 
 
 def _angle(motion: Circle, time: float) -> float:

@@ -8,15 +8,12 @@ from __future__ import annotations
 
 import time
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sonarsynth.planning.plans import Omission, Plan, Stage
 from sonarsynth.tracing import Refracted, Straight
 from sonarsynth.world.meshes import mesh_of
-
-if TYPE_CHECKING:
-    from sonarsynth.planning import Omission, Plan, Stage
 
 REFERENCE_TRANSFORM = 1.0e-3
 """Seconds of `_probe` on the machine where the constants below were measured."""
@@ -35,6 +32,14 @@ SECONDS = {
     "write byte": 1.5e-9,
 }
 """Seconds per unit of work."""
+
+ERRORS = {
+    "kernel_deposit": "1e-4 of the peak",
+    "direct_sum": "rounding",
+    "focused": "2e-7 of the peak; 0.16 dB at 25 degree corners at 20 m",
+    "dense": "rounding",
+}
+"""What each method errs by, against the slow exact way (measured: the docstrings of the methods)."""
 
 
 @lru_cache(maxsize=1)
@@ -55,8 +60,6 @@ def _facets(plan: Plan) -> int:
 
 def stages(plan: Plan) -> tuple[Stage, ...]:
     """What each stage will do, why, its error, and what it costs in one frame."""
-    from sonarsynth.planning import Stage
-
     scene, sizes, factor = plan.scene, plan.sizes, machine_factor()
     sonar, processing = scene.sonar, scene.processing
     facets, paths = _facets(plan) * max(sizes["snap"], 1), 0.35 * _facets(plan) * max(sizes["snap"], 1)
@@ -84,7 +87,7 @@ def stages(plan: Plan) -> tuple[Stage, ...]:
         method = scene.physics.synthesis
         size = 2 if sonar.converter else 4
         stored = sensor_samples * size if "signals" in plan.products else 0
-        rows.append(("synthesise", method.kind, "asked for, or needed by the image", method.error, work, stored))
+        rows.append(("synthesise", method.kind, "asked for, or needed by the image", ERRORS[method.kind], work, stored))
     if plan.products & {"image", "cloud"}:
         rows.append(
             (
@@ -100,7 +103,9 @@ def stages(plan: Plan) -> tuple[Stage, ...]:
         image = transform + beams * bins * SECONDS["image beam bin"]
         stored = 4 * beams if "image" in plan.products else 0
         beamformer = processing.beamforming
-        rows.append(("beamform", beamformer.kind, "asked for, or needed by the cloud", beamformer.error, image, stored))
+        rows.append(
+            ("beamform", beamformer.kind, "asked for, or needed by the cloud", ERRORS[beamformer.kind], image, stored)
+        )
     if "cloud" in plan.products:
         rows.append(
             (
@@ -119,8 +124,6 @@ def stages(plan: Plan) -> tuple[Stage, ...]:
 
 def left_out(plan: Plan) -> tuple[Omission, ...]:
     """What is not computed, why, and the bound on what that costs."""
-    from sonarsynth.planning import Omission
-
     scene = plan.scene
     environment, products = scene.world.environment, plan.products
     rows = []

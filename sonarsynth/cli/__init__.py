@@ -1,0 +1,170 @@
+"""The command line. Thin: every command is a call that Python users have too.
+
+Exit status: 0 done, 1 our fault, 2 bad input, 3 finished with frames set aside, 4 store damaged or locked,
+130 interrupted and resumable. Errors are one line on stderr.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from sonarsynth.cli.running import BadOption, run
+from sonarsynth.cli.selecting import frame_numbers, product_names
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="sonarsynth",
+    help="Labelled synthetic datasets of snapping-shrimp passive sonar.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+RecipeFile = Annotated[Path, typer.Argument(help="The recipe, a YAML file.", show_default=False)]
+Store = Annotated[Path, typer.Argument(help="The store, a Zarr folder.", show_default=False)]
+Settings = Annotated[
+    list[str],
+    typer.Option(
+        "--set",
+        metavar="PATH=VALUE",
+        help="Set a field over the recipe, such as scene.trajectory.frames=8. Repeatable.",
+    ),
+]
+Products = Annotated[
+    str, typer.Option(metavar="LIST", help="What to store: any of signals, image, cloud, with commas.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")]
+ALL_PRODUCTS = "signals,image,cloud"
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line and exit with its status."""
+    raise SystemExit(run(app, arguments))
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"sonarsynth {version('sonarsynth')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Labelled synthetic datasets of snapping-shrimp passive sonar: traced, beamformed, ranged, and true."""
+
+
+@app.command()
+def build(
+    recipe: RecipeFile,
+    store: Annotated[Path, typer.Argument(help="Where the dataset goes.", show_default=False)],
+    settings: Settings = [],  # noqa: B006 - typer copies it
+    frames: Annotated[str | None, typer.Option(metavar="A:B", help="Only these frames, such as 0:8 or 0:8,12.")] = None,
+    products: Products = ALL_PRODUCTS,
+    workers: Annotated[
+        int | None, typer.Option(min=0, help="Worker processes; 0: none, in this process. Left out: one a core.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A running Dask scheduler, such as tcp://127.0.0.1:8786.")
+    ] = None,
+    restart: Annotated[
+        bool, typer.Option("--restart", help="Begin anew where the store holds something else.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Build a dataset, or the part of it that is missing. Interrupted, the same command goes on."""
+    from sonarsynth import config, planning, schedule
+    from sonarsynth.cli import printing
+
+    if scheduler is not None and workers is not None:
+        raise BadOption("--workers is for worker processes of our own, --scheduler for those of another: give one")
+    chosen = product_names(products)
+    source = config.read(recipe, settings)
+    made_from = config.recipe_of(source)
+    wanted = frame_numbers(frames, made_from.frames)
+    with config.locating(source):
+        plan = planning.plan(made_from, chosen)
+    with printing.progress() as progress:
+        report = schedule.build(
+            plan, store, frames=wanted, workers=workers, scheduler=scheduler, restart=restart, progress=progress
+        )
+    if as_json:
+        _print_json(report.as_json())
+    else:
+        printing.build_report(report)
+    if not report.ok:
+        raise typer.Exit(3)
+
+
+@app.command()
+def plan(recipe: RecipeFile, settings: Settings = [], products: Products = ALL_PRODUCTS, as_json: Json = False) -> None:  # noqa: B006
+    """Say what each stage will do and why, what is left out and what that costs, predicted time and size."""
+    from sonarsynth import config, planning
+    from sonarsynth.cli import printing
+
+    chosen = product_names(products)
+    source = config.read(recipe, settings)
+    made_from = config.recipe_of(source)
+    with config.locating(source):
+        made = planning.plan(made_from, chosen)
+    if as_json:
+        _print_json(made.as_json())
+    else:
+        printing.plan_report(made)
+
+
+@app.command()
+def verify(store: Store, as_json: Json = False) -> None:
+    """Check a store: every file against its digest, every number read back, ground truth against the data."""
+    from sonarsynth import store as stores
+    from sonarsynth import verification
+    from sonarsynth.cli import printing
+
+    report = stores.verify(store, [verification.check])
+    if as_json:
+        _print_json(report.as_json())
+    else:
+        printing.verify_report(report)
+    if not report.ok:
+        raise typer.Exit(4)
+
+
+@app.command()
+def show(
+    store: Store,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Where the pictures go. Left out: <store>.pictures.")
+    ] = None,
+    frame: Annotated[
+        int | None, typer.Option(min=0, help="The frame of the sheet. Left out: the one with most points.")
+    ] = None,
+    film: Annotated[bool, typer.Option(help="Write the film as well.")] = True,
+) -> None:
+    """Draw a store: a film of the energy image, a sheet with image, point cloud and signals; print a summary."""
+    from sonarsynth.show import show as draw
+
+    for file in draw(store, out, frame=frame, film=film, say=typer.echo):
+        typer.echo(str(file))
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON schema of a recipe, for editors."""
+    from sonarsynth import config
+
+    _print_json(config.schema())
+
+
+def _print_json(value: Any) -> None:
+    typer.echo(json.dumps(value, indent=2))

@@ -1,0 +1,152 @@
+"""What people see: progress, tables and reports."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Final
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from sonarsynth.planning import Plan
+    from sonarsynth.schedule import BuildReport
+    from sonarsynth.schedule import Progress as Report
+    from sonarsynth.store import Report as StoreReport
+
+SECONDS_BETWEEN_LINES: Final = 10.0
+"""Where progress does not go to a terminal, a line this often."""
+
+
+def console(*, stderr: bool = False) -> Console:
+    """A console: as wide as the terminal, or 140 columns where there is none."""
+    there = (sys.stderr if stderr else sys.stdout).isatty()
+    return Console(stderr=stderr, width=None if there else 140, highlight=False, soft_wrap=not there)
+
+
+@contextmanager
+def progress() -> Iterator[Report]:
+    """A callback that shows progress on stderr: a bar on a terminal, else a line now and then."""
+    if not sys.stderr.isatty():
+        yield _Lines()
+        return
+    columns = (SpinnerColumn(), BarColumn(), MofNCompleteColumn(), TextColumn("frames  {task.fields[pace]}"))
+    with Progress(*columns, console=console(stderr=True), transient=True) as bar:
+        task = bar.add_task("frames", total=None, pace="starting workers")
+        began = time.monotonic()
+
+        def update(done: int, total: int, aside: int) -> None:
+            bar.update(task, completed=done + aside, total=total, pace=_pace(done, total, aside, began))
+
+        yield update
+
+
+class _Lines:
+    """Progress as lines."""
+
+    def __init__(self) -> None:
+        self.began = self.said = time.monotonic()
+
+    def __call__(self, done: int, total: int, aside: int) -> None:
+        now = time.monotonic()
+        if now - self.said >= SECONDS_BETWEEN_LINES:
+            self.said = now
+            sys.stderr.write(f"{done + aside} of {total} frames, {_pace(done, total, aside, self.began)}\n")
+            sys.stderr.flush()
+
+
+def _pace(done: int, total: int, aside: int, began: float) -> str:
+    """Frames per second, time left, frames set aside."""
+    finished = done + aside
+    if not finished:
+        return "starting workers"
+    rate = finished / max(time.monotonic() - began, 1e-9)
+    text = f"{rate:.3g} frames/s, {duration((total - finished) / rate)} left"
+    return text + (f", {aside} set aside" if aside else "")
+
+
+def duration(seconds: float) -> str:
+    """A time as people say it."""
+    if seconds < 100:
+        return f"{seconds:.3g} s"
+    minutes, hours = seconds / 60, seconds / 3600
+    return f"{minutes:.3g} min" if minutes < 100 else f"{hours:.3g} h" if hours < 72 else f"{hours / 24:.3g} days"
+
+
+def size(count: float) -> str:
+    """A number of bytes as people say it."""
+    for unit in ("bytes", "kB", "MB", "GB", "TB"):
+        if count < 1000 or unit == "TB":
+            return f"{count:.3g} {unit}"
+        count /= 1000
+    raise AssertionError
+
+
+def build_report(report: BuildReport) -> None:
+    """What a build did, in a few lines."""
+    out = console()
+    if report.written:
+        rate = report.written / report.seconds
+        out.print(
+            f"{report.store}: {report.written} frames written in {duration(report.seconds)} ({rate:.3g} frames/s, "
+            f"{size(report.bytes)}), {report.there} of {report.wanted} were there"
+        )
+        times = ", ".join(f"{stage} {1e3 * s / report.written:.3g} ms" for stage, s in report.stage_cpu.items())
+        where = (
+            f"{report.workers} workers, at most {size(report.worker_peak_bytes)} each"
+            if report.workers
+            else "no workers"
+        )
+        out.print(f"a frame: {times} of one core; {where}, {size(report.client_peak_bytes)} here")
+    elif not report.failures:
+        out.print(f"{report.store}: all {report.wanted} frames are there")
+    for failure in report.failures[:10]:
+        out.print(f"frame {failure.frame} set aside in {failure.stage}: {failure.error}", markup=False)
+    if report.failures:
+        out.print(f"{len(report.failures)} frames set aside; tracebacks in {report.store}.aside.jsonl", markup=False)
+
+
+def plan_report(plan: Plan) -> None:
+    """Stages, what is left out, sizes and predicted cost."""
+    out = console()
+    stages = Table(
+        "stage", "method", "why", "error", "s a frame", "a frame", title=plan.recipe.title, title_justify="left"
+    )
+    for s in plan.stages:
+        stages.add_row(s.stage, s.method, s.why, s.error, f"{s.seconds:.2g}", size(s.bytes))
+    out.print(stages)
+    if plan.left_out:
+        omissions = Table("left out", "why", "costs at most")
+        for o in plan.left_out:
+            omissions.add_row(o.what, o.why, o.bound)
+        out.print(omissions)
+    for warning in plan.warnings:
+        out.print(f"note: {warning}", markup=False)
+    out.print(", ".join(f"{count} {name}" for name, count in plan.sizes.items()))
+    frames = plan.recipe.frames
+    out.print(
+        f"predicted: {duration(plan.predicted_seconds)} of one core for {frames} frames, "
+        f"{size(plan.predicted_bytes)} before compression"
+    )
+
+
+def verify_report(report: StoreReport) -> None:
+    """Damage and checks, one line each."""
+    out = console()
+    out.print(
+        f"{report.store}: {len(report.complete)} of {report.frames} frames, {report.files} files, {size(report.bytes)}",
+        markup=False,
+    )
+    for problem in report.problems[:50]:
+        out.print(f"DAMAGE {problem.where}: {problem.what}", markup=False)
+    if len(report.problems) > 50:
+        out.print(f"and {len(report.problems) - 50} more")
+    for check in report.checks:
+        word = {True: "ok", False: "FAILED", None: "nothing to check"}[check.ok]
+        out.print(f"{word}: {check.name}: {check.got} (expected: {check.expected})", markup=False)
+    if report.ok:
+        out.print("whole and as written")

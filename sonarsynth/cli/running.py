@@ -1,0 +1,82 @@
+"""Running a command: its exit status, and its error as one line."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import tempfile
+import traceback
+from types import FrameType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import typer
+
+OURS, INPUT, STORE, INTERRUPTED = 1, 2, 4, 130
+ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+class BadOption(ValueError):
+    """Options that do not go together, or a text of one that cannot be read."""
+
+
+def run(app: typer.Typer, arguments: list[str] | None = None) -> int:
+    """Run the command line; returns the exit status."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    for name in ONE_THREAD:  # work is spread over processes; read when numpy is imported
+        os.environ.setdefault(name, "1")
+    before = signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        status = app(arguments, prog_name="sonarsynth", standalone_mode=False)
+        return _interrupted() if status == INTERRUPTED else status if isinstance(status, int) else 0
+    except KeyboardInterrupt:
+        return _interrupted()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except Exception as error:
+        if "--debug" in arguments:
+            traceback.print_exc()
+        return _explain(error, "--debug" in arguments)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _interrupted() -> int:
+    return _say("interrupted; the same command goes on from here", INTERRUPTED)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+def _explain(error: Exception, shown: bool) -> int:
+    """Say an error in one line; returns the exit status."""
+    if hasattr(error, "format_message") and hasattr(error, "exit_code"):  # typer's own: wrong usage
+        return _say(error.format_message() or "sonarsynth --help says how", INPUT)
+    from sonarsynth.description import FieldError
+
+    match type(error).__name__:
+        case "Locked" | "Damage":
+            return _say(str(error), STORE)
+        case "RecipeError" | "Mismatch" | "NothingToDraw":
+            return _say(str(error), INPUT)
+    if isinstance(error, (BadOption, FieldError)):
+        return _say(str(error), INPUT)
+    if isinstance(error, OSError) and error.strerror:
+        where = f"{error.filename}: " if error.filename else ""
+        return _say(f"{where}{error.strerror}", OURS)
+    line = f"{type(error).__name__}: {error}"
+    return _say(line if shown else f"{line} (traceback in {_keep_traceback(error)})", OURS)
+
+
+def _keep_traceback(error: Exception) -> str:
+    with tempfile.NamedTemporaryFile("w", prefix="sonarsynth-", suffix=".traceback.txt", delete=False) as file:
+        file.writelines(traceback.format_exception(error))
+        return file.name
+
+
+def _say(message: str, status: int) -> int:
+    sys.stderr.write(f"sonarsynth: {' '.join(message.split())}\n")
+    return status

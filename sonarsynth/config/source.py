@@ -1,0 +1,226 @@
+"""YAML text to plain values that know where they stand: every path into them has a line, or `--set`.
+
+YAML 1.2 (`1e-3` is a number, `no` is a text). Nothing is constructed but texts, numbers, booleans, null, lists and
+mappings; sizes, depth and aliases are bounded, so a file can be wrong but not dangerous.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+
+Where = tuple[str | int, ...]
+"""Path of a value: keys and list indices from the top."""
+
+MAX_BYTES: Final = 2_000_000
+MAX_VALUES: Final = 200_000
+MAX_DEPTH: Final = 64
+SET: Final = "--set"
+_TAG: Final = "tag:yaml.org,2002:"
+
+
+class RecipeError(ValueError):
+    """A recipe that cannot be used; str() is one line: file, line (or --set), field, and what is wrong."""
+
+    def __init__(self, file: str, place: str, field: str, message: str) -> None:
+        self.file, self.place, self.field = file, place, field
+        self.message = " ".join(message.split())
+        head = f"{file}:{place}" if place else file
+        super().__init__(": ".join(part for part in (head, field, self.message) if part))
+
+    def __reduce__(self) -> tuple[type[RecipeError], tuple[str, str, str, str]]:
+        return type(self), (self.file, self.place, self.field, self.message)
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A recipe as read: plain values, and the line (or `--set`) of each of them."""
+
+    name: str
+    """The file, as errors name it."""
+    folder: Path
+    """Where relative paths of the file start."""
+    data: Any
+    places: dict[Where, str]
+
+    def place(self, where: Where) -> str:
+        """Line of a value, or of the nearest one that holds it; `--set` where that set a part of the value."""
+        if any(place == SET and at[: len(where)] == where for at, place in self.places.items()):
+            return SET
+        while where and where not in self.places:
+            where = where[:-1]
+        return self.places.get(where, "1")
+
+    def error(self, where: Where, message: str) -> RecipeError:
+        """The error of the value at a path."""
+        return RecipeError(self.name, self.place(where), dotted(where), message)
+
+
+def dotted(where: Where) -> str:
+    """A path as people write it: scene.world.targets.0.name."""
+    return ".".join(map(str, where))
+
+
+def read_file(path: Path | str) -> Source:
+    """Read a recipe file. Raises RecipeError."""
+    path, name = Path(path), str(path)
+    try:
+        if not path.is_file():
+            raise RecipeError(name, "", "", "no such file" if not path.exists() else "is not a file")
+        with path.open("rb") as file:
+            raw = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise RecipeError(name, "", "", f"cannot be read: {error.strerror}") from None
+    if len(raw) > MAX_BYTES:
+        raise RecipeError(name, "", "", f"is larger than {MAX_BYTES // 1_000_000} MB")
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw[: error.start].count(b"\n") + 1
+        raise RecipeError(name, str(line), "", f"is not UTF-8 text (byte {raw[error.start]:#04x})") from None
+    return read_text(text, name, path.parent.absolute())
+
+
+def read_text(text: str, name: str, folder: Path) -> Source:
+    """Read the text of a recipe. Raises RecipeError."""
+    node = _compose(text, name)
+    if node is None:
+        raise RecipeError(name, "1", "", "is empty")
+    reader = _Reader(name, {})
+    data = reader.value(node, ())
+    if not isinstance(data, dict):
+        raise RecipeError(name, "1", "", "must be a mapping of fields (title, seed, scene, ...)")
+    return Source(name, folder, data, reader.places)
+
+
+def override(source: Source, setting: str) -> Source:
+    """The source with one `path=value` of the command line set. Raises RecipeError."""
+    path, equals, text = setting.partition("=")
+    if not equals or not path.strip():
+        raise RecipeError(source.name, SET, "", f"'{setting}' is not path=value")
+    where: Where = tuple(int(p) if p.isdecimal() else p for p in path.strip().split("."))
+    reader = _Reader(source.name, {}, SET)
+    node = _compose(text, source.name, SET, path.strip())
+    value = None if node is None else reader.value(node, where)
+    places = {w: p for w, p in source.places.items() if w[: len(where)] != where}
+    return Source(
+        source.name,
+        source.folder,
+        _replaced(source, source.data, where, 0, value),
+        places | reader.places | {where: SET},
+    )
+
+
+def _replaced(source: Source, data: Any, where: Where, depth: int, value: Any) -> Any:
+    """`data` with the value at where[depth:] replaced; mappings on the way are made where there are none."""
+    if depth == len(where):
+        return value
+    part = where[depth]
+    if isinstance(data, list):
+        if not isinstance(part, int) or part >= len(data):
+            raise RecipeError(source.name, SET, dotted(where), f"'{part}' is not one of the {len(data)} entries from 0")
+        return [_replaced(source, v, where, depth + 1, value) if i == part else v for i, v in enumerate(data)]
+    if data is None or isinstance(data, dict):
+        data = data or {}
+        key = str(part)
+        return data | {key: _replaced(source, data.get(key), where, depth + 1, value)}
+    raise RecipeError(source.name, SET, dotted(where), f"'{dotted(where[:depth])}' has no fields")
+
+
+def _compose(text: str, name: str, place: str = "", field: str = "") -> Node | None:
+    yaml = YAML(typ="safe", pure=True)
+    try:
+        node: Node | None = yaml.compose(text)
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line = place or str(mark.line + 1 if mark else 1)
+        raise RecipeError(name, line, field, _plain(error)) from None
+    except RecursionError:
+        raise RecipeError(name, place or "1", field, "is nested too deeply") from None
+    except (YAMLError, ValueError) as error:
+        raise RecipeError(name, place or "1", field, f"is not YAML: {getattr(error, 'reason', error)}") from None
+    return node
+
+
+def _plain(error: MarkedYAMLError) -> str:
+    problem = str(error.problem or error.context or "is not YAML")
+    if "'\\t'" in problem:
+        return "tabs cannot indent YAML; use spaces"
+    return f"is not YAML: {problem}"
+
+
+@dataclass
+class _Reader:
+    """Turns nodes into plain values, noting where each stands."""
+
+    name: str
+    places: dict[Where, str]
+    place: str = ""
+
+    def error(self, node: Node, where: Where, message: str) -> RecipeError:
+        return RecipeError(self.name, self.place or str(node.start_mark.line + 1), dotted(where), message)
+
+    def value(self, node: Node, where: Where, at: Node | None = None) -> Any:
+        self.places.setdefault(where, self.place or str((at or node).start_mark.line + 1))
+        if len(self.places) > MAX_VALUES:
+            raise self.error(node, (), f"holds more than {MAX_VALUES} values (aliases are counted)")
+        if len(where) > MAX_DEPTH:
+            raise self.error(node, (), f"is nested deeper than {MAX_DEPTH} levels")
+        if isinstance(node, ScalarNode):
+            return self._scalar(node, where)
+        if isinstance(node, SequenceNode) and str(node.tag) == f"{_TAG}seq":
+            return [self.value(item, (*where, i)) for i, item in enumerate(node.value)]
+        if isinstance(node, MappingNode) and str(node.tag) == f"{_TAG}map":
+            return {key: self.value(v, (*where, key), k) for key, k, v in self._items(node, where)}
+        raise self.error(node, where, f"has the tag {node.tag}; tags are not used in recipes")
+
+    def _items(self, node: MappingNode, where: Where) -> Iterator[tuple[str, Node, Node]]:
+        seen: set[str] = set()
+        for key, value in node.value:
+            if not isinstance(key, ScalarNode):
+                raise self.error(key, where, "a key must be a text")
+            if key.value in seen:
+                raise self.error(key, (*where, key.value), "is given twice")
+            seen.add(key.value)
+            yield str(key.value), key, value
+
+    def _scalar(self, node: ScalarNode, where: Where) -> Any:
+        text, tag = str(node.value), str(node.tag)
+        if not tag.startswith(_TAG):
+            raise self.error(node, where, f"has the tag {tag}; tags are not used in recipes")
+        match tag.removeprefix(_TAG):
+            case "str" | "timestamp" | "merge" | "value":
+                return text
+            case "null":
+                return None
+            case "bool":
+                return text.lower() == "true"
+            case "int":
+                return self._integer(node, where, text)
+            case "float":
+                return self._float(node, where, text)
+        raise self.error(node, where, f"has the tag {tag}; tags are not used in recipes")
+
+    def _integer(self, node: Node, where: Where, text: str) -> int:
+        digits = text.lower().lstrip("+-")
+        base = {"0x": 16, "0o": 8, "0b": 2}.get(digits[:2], 10)
+        try:
+            return int(text, base)
+        except ValueError:
+            raise self.error(node, where, "is not a whole number that can be used") from None
+
+    def _float(self, node: Node, where: Where, text: str) -> float:
+        try:
+            number = float(text.replace("_", ""))
+        except ValueError:  # .inf and .nan, as YAML writes them
+            number = math.nan
+        if not math.isfinite(number):
+            raise self.error(node, where, f"must be a finite number, not {text}")
+        return number

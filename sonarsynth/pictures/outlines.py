@@ -1,0 +1,61 @@
+"""Outlines of meshes as they are seen: exact projections of every facet, joined into one shape."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.conventions import Floats, azimuth_elevation
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+CELLS = 512
+"""An outline is found on a grid of this many cells over the larger side of the shape: it errs by less than a cell."""
+
+
+def view_outline(vertices: npt.ArrayLike, faces: npt.ArrayLike) -> list[Floats]:
+    """Outline of a mesh as seen from the origin along +x: closed lines (point, azimuth and elevation) in rad.
+
+    vertices (vertex, xyz) in m in the sonar frame, faces (facet, 3). The shape is joined in the plane x = 1, where
+    straight edges stay straight. Facets that reach behind the plane x = 0 are left out; no facet gives no lines.
+    """
+    points = np.asarray(vertices, float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        plane = np.where(points[:, :1] > 0.0, points[:, 1:] / points[:, :1], np.nan)
+    lines = union_outline(plane, faces)
+    seen = [np.stack(azimuth_elevation(np.insert(line, 0, 1.0, axis=1)), axis=1) for line in lines]
+    return [np.asarray(line) for line in seen]
+
+
+def union_outline(points: npt.ArrayLike, faces: npt.ArrayLike) -> list[Floats]:
+    """Outline of the union of triangles in a plane: closed lines (point, 2), holes included, in the units of `points`.
+
+    points (vertex, 2), faces (facet, 3). Facets with a NaN corner are left out. Error: one part in `CELLS` of the size.
+    """
+    from contourpy import contour_generator
+
+    corners = np.asarray(points, float)[np.asarray(faces)]
+    corners = corners[np.isfinite(corners).all(axis=(1, 2))]
+    if not len(corners):
+        return []
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    cell = float((high - low).max()) / CELLS
+    if cell <= 0.0:
+        return []
+    size = np.ceil((high - low) / cell).astype(int) + 5  # two empty cells all round: every line closes
+    mask = np.asarray(_painted((corners - low) / cell + 2.0, (int(size[0]), int(size[1]))), float)
+    x, y = (low[axis] + (np.arange(size[axis]) - 2.0) * cell for axis in (0, 1))
+    return [np.asarray(line) for line in contour_generator(x, y, mask).lines(0.5)]
+
+
+def _painted(triangles: Floats, size: tuple[int, int]) -> Image:
+    from PIL import Image, ImageDraw
+
+    canvas = Image.new("L", size)
+    pen = ImageDraw.Draw(canvas)
+    for triangle in triangles.reshape(-1, 6).tolist():
+        pen.polygon(triangle, fill=1)
+    return canvas

@@ -1,0 +1,61 @@
+"""What all pictures share: colours that colour-blind people can tell apart, levels, saving."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.conventions import Floats
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+ENERGY_MAP = "inferno"
+ERROR_MAP = "viridis"
+DYNAMIC_RANGE = 50.0
+"""Levels are drawn from the reference down to this many dB below it."""
+
+OUTLINES = ("#56c8ff", "#ffffff", "#8ff0a4", "#f7a8d8")
+"""Outlines of targets, on the dark colours of the energy map."""
+
+MARKS = ("#0072B2", "#D55E00", "#009E73")
+"""A hit, a far hit, a miss (Okabe and Ito 2008)."""
+
+INK = "#222222"
+PALE = "#8a8a8a"
+
+
+def decibels(energy: npt.ArrayLike, reference: float) -> Floats:
+    """Energy (...) in dB re `reference` (the same unit); -inf for silence, NaN stays NaN."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return 10.0 * np.log10(np.asarray(energy, float) / reference)
+
+
+def figure(width: float, height: float, **layout: Any) -> Figure:
+    """An empty figure (inches) on its own Agg canvas: no window, no state shared with other figures."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    made = Figure(figsize=(width, height), layout="constrained", **layout)
+    FigureCanvasAgg(made)
+    return made
+
+
+def label(axes: Axes, x: str, y: str, title: str = "") -> None:
+    """Name the axes, thin the frame, put the title to the left."""
+    axes.set_xlabel(x, fontsize=9, color=INK)
+    axes.set_ylabel(y, fontsize=9, color=INK)
+    axes.set_title(title, fontsize=10, color=INK, loc="left")
+    axes.tick_params(labelsize=8, colors=INK)
+    for side in axes.spines.values():
+        side.set_color(PALE)
+        side.set_linewidth(0.6)
+
+
+def grid(axes: Axes) -> None:
+    """A faint grid behind the lines."""
+    axes.grid(True, color="#dddddd", linewidth=0.5)
+    axes.set_axisbelow(True)

@@ -1,0 +1,60 @@
+"""What a scene needs: autos made concrete, windows, sizes, predicted cost; what is left out and its bound."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sonarsynth.planning.checks import check_positions, read_inputs
+from sonarsynth.planning.costs import left_out, stages
+from sonarsynth.planning.plans import PRODUCTS, Omission, Plan, Stage, Windows
+from sonarsynth.planning.windows import lay_windows
+from sonarsynth.recipe import Recipe
+from sonarsynth.sonar import elements
+from sonarsynth.tracing import AutoTracing, Refracted, Straight
+from sonarsynth.world.meshes import mesh_of
+
+__all__ = ["PRODUCTS", "Omission", "Plan", "Stage", "Windows", "lay_windows", "plan"]
+
+SHARD_BYTES = 64e6
+"""A shard holds about this much of the largest array, and at most SHARD_FRAMES frames."""
+SHARD_FRAMES = 8
+
+
+def plan(recipe: Recipe, products: frozenset[str] = frozenset(PRODUCTS)) -> Plan:
+    """Resolve a recipe: check the scene at every frame, make every choice, and predict sizes and cost.
+
+    Raises FieldError, naming the field, for a body above the surface or in the bed, a sonar or shrimp out of the
+    water, or a missing or broken mesh or cast. No frame is rendered.
+    """
+    scene = recipe.scene
+    profile = read_inputs(scene)
+    check_positions(scene, recipe)
+    tracing = scene.physics.tracing
+    if isinstance(tracing, AutoTracing):
+        propagation: Straight | Refracted = Straight() if profile.uniform else Refracted()
+    else:
+        propagation = tracing
+    windows = lay_windows(recipe, profile)
+    sizes = _sizes(recipe, windows)
+    frame_bytes = sizes["sensor"] * sizes["sample"] * (2 if scene.sonar.converter else 4)
+    shard = int(np.clip(SHARD_BYTES // max(frame_bytes, 1), 1, SHARD_FRAMES))
+    made = Plan(recipe, products, profile, propagation, windows, sizes=sizes, shard_frames=shard)
+    notes = tuple(f"{t.name}: {note}" for t in scene.world.targets for note in mesh_of(t.shape).notes)
+    return replace(made, stages=stages(made), left_out=left_out(made), warnings=notes)
+
+
+def _sizes(recipe: Recipe, windows: Windows) -> dict[str, int]:
+    scene = recipe.scene
+    beams = scene.sonar.beams
+    snaps = sum(len(s.snap_times) for s in scene.world.shrimp)
+    return {
+        "frame": recipe.frames,
+        "sensor": elements(scene.sonar.array).count,
+        "sample": windows.samples,
+        "elevation": beams.elevations,
+        "azimuth": beams.azimuths,
+        "target": len(scene.world.targets),
+        "snap": snaps,
+    }

@@ -1,0 +1,59 @@
+"""Locating the snap, and ranging its echoes."""
+
+from __future__ import annotations
+
+from typing import Annotated, Protocol
+
+from sonarsynth.description import BY_KIND
+from sonarsynth.geometry import Pose
+from sonarsynth.products import Bearings, EnergyImage, PointCloud, Signals
+from sonarsynth.ranging.isovelocity import IsovelocityRange
+from sonarsynth.ranging.refracted import RefractedRange
+from sonarsynth.ranging.sensor_delays import SensorDelays
+from sonarsynth.sonar import Elements, Sonar
+from sonarsynth.world.environment import Profile
+
+__all__ = [
+    "IsovelocityRange",
+    "LocatingMethod",
+    "Locator",
+    "Ranging",
+    "RangingMethod",
+    "RefractedRange",
+    "SensorDelays",
+]
+
+
+class LocatingMethod(Protocol):
+    """Finds where snaps are from what the array hears."""
+
+    def locate(
+        self, signals: Signals, elements: Elements, sonar: Sonar, sonar_pose: Pose, bed_depth: float, snaps: int
+    ) -> Bearings:
+        """The `snaps` loudest direct pulses, loudest first, one row each; NaN rows for those that were not found.
+
+        bed_depth (m, positive down) is where the snaps are known to be.
+        """
+
+
+class RangingMethod(Protocol):
+    """Places the echoes of an image in space."""
+
+    def cloud(
+        self,
+        signals: Signals,
+        image: EnergyImage,
+        bearings: Bearings,
+        elements: Elements,
+        sonar: Sonar,
+        sonar_pose: Pose,
+        profile: Profile,
+    ) -> PointCloud:
+        """Points on the beam grid from the first snap of `bearings`; NaN where there is none, or none to be trusted.
+
+        profile: the sound speed of the water, for methods that trace rays and were given none of their own.
+        """
+
+
+Locator = Annotated[SensorDelays, BY_KIND]
+Ranging = Annotated[IsovelocityRange | RefractedRange, BY_KIND]

@@ -1,0 +1,91 @@
+"""From echoes to an organised point cloud with predicted errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonarsynth.acoustics.bistatic import bistatic_range
+from sonarsynth.conventions import Floats
+from sonarsynth.products import Bearings, EnergyImage, PointCloud, Signals
+from sonarsynth.ranging.echoes import over_threshold, pick, range_profiles
+from sonarsynth.sonar import Elements, Sonar
+
+SLOPE = 0.7
+"""Standard slope of a surface against the beam: its range changes by this share of the distance across the beam."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Where echoes come from; NaN where there is no answer or an ill-conditioned one. Sonar frame."""
+
+    position: Floats  # (beam, xyz) m
+    range: Floats  # (beam,) m
+    by_path: Floats  # (beam,) dr/dx, x the excess path
+    by_angle: Floats  # (beam,) m/rad
+    by_source: Floats  # (beam, xyz) dr/dS
+
+
+Solve = Callable[[Floats, Floats, Floats], Solution]
+"""Of delays (beam,) after the direct arrival, beams (beam, xyz) and the source position (xyz)."""
+
+
+def isovelocity_solution(delay: Floats, beam: Floats, source: Floats, sound_speed: float) -> Solution:
+    """Closed form; NaN where the target would be too near the line from source to array."""
+    found = bistatic_range(sound_speed * delay, beam, source)
+    r = np.where(found.ill_conditioned, np.nan, found.range)
+    return Solution(r[:, None] * beam, r, found.by_path, found.by_angle, found.by_source)
+
+
+def point_cloud(
+    signals: Signals,
+    image: EnergyImage,
+    bearings: Bearings,
+    elements: Elements,
+    sonar: Sonar,
+    threshold: float,
+    locality: float,
+    focus: float | None,
+    solve: Solve,
+) -> PointCloud:
+    """Echoes of the beams over threshold, placed by `solve`."""
+    shape = image.energy.shape
+    grids = {name: np.full(shape, np.nan, np.float32) for name in ("range", "range_error", "delay", "energy")}
+    position = np.full((*shape, 3), np.nan, np.float32)
+    beams = over_threshold(image, threshold)
+    located = len(bearings.time) > 0 and np.isfinite(bearings.time[0]) and np.isfinite(bearings.position[0]).all()
+    if located and len(beams[0]) > 0:
+        profiles = range_profiles(signals, image, bearings, elements, sonar, beams, focus)
+        echoes = pick(profiles, image, locality)
+        own = np.isfinite(echoes.delay)
+        solution = solve(echoes.delay[own], profiles.direction[own], bearings.position[0])
+        clock = np.hypot(echoes.delay_error, echoes.extent)[own]
+        error = range_error(solution, echoes.delay[own], clock, echoes.angle_error[own], bearings, sonar)
+        good = np.isfinite(solution.range) & (solution.range > 0) & np.isfinite(error)
+        at = profiles.row[own][good], profiles.column[own][good]
+        grids["range"][at] = solution.range[good]
+        grids["range_error"][at] = error[good]
+        grids["delay"][at] = echoes.delay[own][good]
+        grids["energy"][at] = image.energy[at]
+        position[at] = solution.position[good]
+    return PointCloud(position=position, **grids)
+
+
+def range_error(
+    solution: Solution, delay: Floats, delay_error: Floats, angle_error: Floats, bearings: Bearings, sonar: Sonar
+) -> Floats:
+    """Predicted standard error (beam,) in m: beam width, clock, snap position, sound speed.
+
+    The echo comes from `angle_error` beside the beam, where the same delay means another range (dr/dpsi), and where a
+    sloping surface has another range as well (`SLOPE`). delay_error is of the clock and of the depth of the target in
+    the beam: where a beam holds echoes of several delays, its axis may meet the surface of another than the loudest.
+    """
+    c = sonar.assumed_sound_speed
+    beside = np.hypot(solution.by_angle, SLOPE * solution.range) * angle_error
+    clock = solution.by_path * c * delay_error
+    g = solution.by_source
+    snap = np.einsum("bi,ij,bj->b", g, bearings.position_covariance[0], g)
+    speed = solution.by_path * delay * sonar.sound_speed_error
+    return np.asarray(np.sqrt(beside**2 + clock**2 + np.maximum(snap, 0.0) + speed**2))

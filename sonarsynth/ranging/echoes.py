@@ -1,0 +1,212 @@
+"""Echoes in the beams over threshold: when each comes after the direct pulse, and whether it is that beam's own.
+
+The beams are compared with the direct pulse as the same array hears it, so that the snap's own waveform, the filter and
+the clock cancel: what is left is the delay.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.fft import ifft, next_fast_len
+from scipy.ndimage import maximum_filter1d
+
+from sonarsynth.acoustics.arrays import beam_spectra, element_directivity, gate_samples, gated_spectra
+from sonarsynth.acoustics.bearings import wavefront_delays
+from sonarsynth.conventions import Floats, Ints, direction
+from sonarsynth.products import Bearings, EnergyImage, Signals
+from sonarsynth.ranging import pulses
+from sonarsynth.ranging.pulses import Complexes
+from sonarsynth.sonar import Elements, Sonar
+
+MAX_BEAMS = 16384
+"""No more beams are ranged, the loudest of them: a bound on memory where a whole image is loud."""
+OVERSAMPLING = 4
+WHITENING = 0.03
+"""Share of the pulse's largest power density below which the spectrum is no more flattened (-15 dB)."""
+GHOST = 8.0
+"""An echo is a ghost or a side lobe where another beam holds this many dB more at the same delay."""
+NOISE = 16.0
+"""An echo must stand this many dB above the median of its own beam: noise does so once in 10^12 samples."""
+EXTENT = 0.05
+"""Share of a profile's peak above which it is echo: how far that spreads is the depth of the target in the beam."""
+
+
+@dataclass(frozen=True, eq=False)
+class Profiles:
+    """Energy against delay of some beams: the echo with the pulse's waveform taken out."""
+
+    row: Ints  # (beam,) elevation index
+    column: Ints  # (beam,) azimuth index
+    direction: Floats  # (beam, xyz)
+    power: npt.NDArray[np.float32]  # (beam, delay) relative
+    first: float  # s after the direct arrival
+    step: float  # s
+    width: float  # rad: half of the half-power width of a beam
+    resolution: float  # s: 1/(2 pi beta), beta the root mean square bandwidth
+
+
+@dataclass(frozen=True, eq=False)
+class Echoes:
+    """One echo a beam: the peak of its profile. NaN delay where there is none of its own."""
+
+    delay: Floats  # (beam,) s after the direct arrival
+    delay_error: Floats  # (beam,) s
+    angle_error: Floats  # (beam,) rad: how far from the beam the echo may come from
+    extent: Floats  # (beam,) s: root mean square distance from the peak of all echo in the beam
+
+
+def over_threshold(image: EnergyImage, threshold: float) -> tuple[Ints, Ints]:
+    """Rows and columns of the beams within `threshold` dB of the loudest; none in silence or where none was heard."""
+    energy = np.where(np.isfinite(image.energy), image.energy, 0.0)
+    peak = float(energy.max(initial=0.0))
+    if not peak > 0:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    keep = energy >= peak * 10 ** (-threshold / 10)
+    if keep.sum() > MAX_BEAMS:
+        keep &= energy >= np.partition(energy, -MAX_BEAMS, axis=None)[-MAX_BEAMS]
+    row, column = np.nonzero(keep)
+    return row, column
+
+
+def direct_spectrum(
+    signals: Signals, bearings: Bearings, elements: Elements, sonar: Sonar, frequency: Floats
+) -> Complexes:
+    """Spectrum (bin,) in Pa s of the direct pulse at the array centre, without the face, about `bearings.time`."""
+    c, time = sonar.assumed_sound_speed, float(bearings.time[0])
+    u = direction(bearings.azimuth[0], bearings.elevation[0])
+    radius = bearings.range_from_curvature[0]
+    if not np.isfinite(radius):
+        radius = np.linalg.norm(bearings.position[0])
+    curvature = float(1 / radius) if np.isfinite(radius) else 0.0
+    expected = time + wavefront_delays(elements.position, u, curvature, c)
+    aligned = pulses.align(signals, elements, sonar.band, expected, whole=True)
+    return pulses.template_spectrum(pulses.measure(aligned, elements, c, u, curvature, time), frequency)
+
+
+def range_profiles(
+    signals: Signals,
+    image: EnergyImage,
+    bearings: Bearings,
+    elements: Elements,
+    sonar: Sonar,
+    beams: tuple[Ints, Ints],
+    focus: float | None,
+) -> Profiles:
+    """Profiles of the beams (row, column): matched to the direct pulse as this beam would hear it, whitened, tapered.
+
+    With W the direct pulse at the array centre and D the face directivity towards the beam, the profile is the envelope
+    of the inverse transform of B conj(W) D/(|W|^2 + w max|W|^2): all of the band counts alike, which is as sharp as the
+    band allows in delay, and sharper in angle than the snap's own falling spectrum.
+    """
+    rate, c = signals.sampling_frequency, sonar.assumed_sound_speed
+    first, count = gate_samples(image.start, image.stop, signals.start, rate, signals.pressure.shape[1])
+    band = (sonar.band.low, sonar.band.high)
+    f, spectra = gated_spectra(signals.pressure, rate, first, count, band)
+    row, column = beams
+    u = direction(image.azimuth[column], image.elevation[row])
+    wave = direct_spectrum(signals, bearings, elements, sonar, f)
+    density = np.abs(wave) ** 2
+    place = (f - band[0]) / (band[1] - band[0])
+    taper = np.sin(np.pi * np.clip(place, 0.0, 1.0)) ** 2
+    matched = wave.conj() * taper / (density + WHITENING * density.max()) if density.max() > 0 else 0 * wave
+    spacing = f[1] - f[0] if len(f) > 1 else rate / count
+    length = next_fast_len(OVERSAMPLING * len(f))
+    step = 1 / (length * spacing)
+    power = np.empty((len(u), min(int(count / rate / step) + 1, length)), np.float32)
+    for part in range(0, len(u), 512):
+        here = slice(part, part + 512)
+        beam = beam_spectra(spectra, f, elements.position, elements.gain, u[here], c, focus)
+        face = element_directivity(f, u[here, None], elements.face, c)
+        echo = ifft(beam * (face * matched).astype(np.complex64), length, axis=1)[:, : power.shape[1]]
+        power[here] = echo.real**2 + echo.imag**2
+    spread = np.sum(taper**2)
+    centre = f @ taper**2 / spread
+    beta = np.sqrt(max((f - centre) ** 2 @ taper**2 / spread, spacing**2))
+    start = signals.start + first / rate - float(bearings.time[0])
+    return Profiles(row, column, u, power, start, step, _half_width(elements, centre / c), 1 / (2 * np.pi * beta))
+
+
+def _half_width(elements: Elements, wavenumber: float) -> float:
+    """Angle (rad) at which a beam of `wavenumber` (1/m) is down 3 dB, from the second moment of the aperture.
+
+    0.808/(k s), s the root mean square extent in y and z: exact for a uniform disc (2 J1(x)/x at x = 1.616).
+    """
+    live = elements.position[elements.gain != 0][:, 1:]
+    extent = float(np.sqrt(np.mean((live - live.mean(axis=0)) ** 2))) if len(live) else 0.0
+    return min(0.808 / (2 * np.pi * wavenumber * extent), 1.0) if extent > 0 else 1.0
+
+
+def pick(profiles: Profiles, image: EnergyImage, locality: float) -> Echoes:
+    """The peak of every profile, kept where it is the beam's own.
+
+    At the delay of its peak, no beam within a beam width may hold `locality` dB more, or the echo comes from there; and
+    no beam at all `GHOST` dB more, or it comes through a side lobe or a grating lobe; and it must stand out of the
+    noise.
+    """
+    power, count = profiles.power, len(profiles.power)
+    rows = np.arange(count)
+    top = np.clip(power.argmax(axis=1), 1, power.shape[1] - 2)
+    own = power[rows, top]
+    place, _ = pulses.parabola(*(np.sqrt(power[rows, top + i]) for i in (-1, 0, 1)))
+    near = np.maximum(_loudest_near(profiles, image, top), own)
+    anywhere = maximum_filter1d(power.max(axis=0), _about(profiles) * 2 + 1)[top]
+    noise = np.median(power[:, ::OVERSAMPLING], axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        excess = 10 * np.log10(near / own)
+        good = (own > 0) & (excess <= locality) & (own * 10 ** (GHOST / 10) >= anywhere)
+        good &= own >= noise * 10 ** (NOISE / 10)
+        off_beam = profiles.width * np.hypot(np.sqrt(excess / 3), OWN_WIDTH)
+        jitter = profiles.resolution * np.hypot(np.sqrt(0.5 * noise / own), INTERFERENCE)
+    delay = profiles.first + (top + place) * profiles.step
+    return Echoes(np.where(good, delay, np.nan), jitter, off_beam, _extent(profiles, top, own))
+
+
+def _extent(profiles: Profiles, top: Ints, own: npt.NDArray[np.float32]) -> Floats:
+    """Root mean square distance (beam,) in s of a beam's echo from its peak; 0 for one glint, but for its own width."""
+    echo = np.where(profiles.power >= EXTENT * own[:, None], profiles.power, np.float32(0.0))
+    steps = np.arange(echo.shape[1], dtype=np.float32)
+    total = np.maximum(echo.sum(axis=1), np.finfo(np.float32).tiny)
+    mean = echo @ steps / total
+    square = np.einsum("bt,bt->b", echo, (steps - mean[:, None]) ** 2) / total
+    spread = profiles.step * np.sqrt(square + (mean - top) ** 2)
+    return np.asarray(np.sqrt(np.maximum(spread**2 - profiles.resolution**2, 0.0)))
+
+
+OWN_WIDTH = 0.3
+"""Standard angle between a beam and the echo that is loudest in it, in half widths."""
+INTERFERENCE = 0.5
+"""Standard error of a peak's delay where echoes overlap, in units of the resolution."""
+
+
+def _about(profiles: Profiles) -> int:
+    """Steps of delay within which two beams hear the same echo."""
+    return max(round(0.7 * profiles.resolution / profiles.step), 1)
+
+
+def _loudest_near(profiles: Profiles, image: EnergyImage, top: Ints) -> npt.NDArray[np.float32]:
+    """Largest power (beam,), about the delay of each beam's own peak, in the beams within a beam width of it."""
+    rows, columns = image.energy.shape
+    index = np.full((rows, columns), -1)
+    index[profiles.row, profiles.column] = np.arange(len(top))
+    reach = 2 * profiles.width
+    up, across = (_cells(grid, reach) for grid in (image.elevation, image.azimuth))
+    power = maximum_filter1d(profiles.power, 2 * _about(profiles) + 1, axis=1)
+    u = profiles.direction
+    loudest = np.zeros(len(top), np.float32)
+    for i in range(-up, up + 1):
+        for j in range(-across, across + 1):
+            row, column = profiles.row + i, profiles.column + j
+            there = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+            other = index[np.where(there, row, 0), np.where(there, column, 0)]
+            there &= (other >= 0) & (np.linalg.norm(u - u[other], axis=1) <= reach)
+            np.maximum(loudest, power[other, top], out=loudest, where=there)
+    return loudest
+
+
+def _cells(grid: Floats, reach: float) -> int:
+    """Grid cells within `reach` (rad), one at least, where there is more than one."""
+    step = float(grid[1] - grid[0]) if len(grid) > 1 else np.inf
+    return min(max(int(np.ceil(reach / step)), 1), len(grid) - 1)

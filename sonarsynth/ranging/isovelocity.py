@@ -1,0 +1,56 @@
+"""Ranging by the closed form for straight paths."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from annotated_types import Ge, Gt
+
+from sonarsynth.conventions import Decibels, PositiveMetres
+from sonarsynth.description import description
+from sonarsynth.geometry import Pose
+from sonarsynth.products import Bearings, EnergyImage, PointCloud, Signals
+from sonarsynth.sonar import Elements, Sonar
+from sonarsynth.world.environment import Profile
+
+
+@description
+class IsovelocityRange:
+    """Range by the closed form for straight paths at the assumed sound speed, from the delay after the direct arrival.
+
+    For the beams over threshold the peak of the beam's signal is the echo, as in the thesis, after the snap's own
+    waveform has been taken out by means of the direct pulse.
+    """
+
+    kind: Literal["isovelocity"] = "isovelocity"
+    threshold: Annotated[Decibels, Gt(0)] = 12.0
+    """Beams this far below the loudest beam of the image give no point."""
+    locality: Annotated[Decibels, Ge(0)] = 1.0
+    """A beam gives no point where one within a beam width holds this much more at the same delay: the echo is its."""
+    focus: PositiveMetres | None = 20.0
+    """Distance at which the ranged beams are focused; none: plane waves."""
+
+    def cloud(
+        self,
+        signals: Signals,
+        image: EnergyImage,
+        bearings: Bearings,
+        elements: Elements,
+        sonar: Sonar,
+        sonar_pose: Pose,
+        profile: Profile,
+    ) -> PointCloud:
+        """See `RangingMethod`."""
+        from sonarsynth.ranging.clouds import isovelocity_solution, point_cloud
+
+        return point_cloud(
+            signals,
+            image,
+            bearings,
+            elements,
+            sonar,
+            self.threshold,
+            self.locality,
+            self.focus,
+            lambda delay, beam, source: isovelocity_solution(delay, beam, source, sonar.assumed_sound_speed),
+        )

@@ -1,0 +1,40 @@
+"""Locating by time differences over the sensors."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from sonarsynth.description import description
+from sonarsynth.geometry import Pose
+from sonarsynth.products import Bearings, Signals
+from sonarsynth.sonar import Elements, Sonar
+from sonarsynth.world.environment import SoundSpeed
+
+
+@description
+class SensorDelays:
+    """Direction and position from the time differences of the direct pulse over the sensors (Kuselan et al. 2011).
+
+    Equation 6 of the thesis with its square and an intercept, then the sphere that fits the delays best, then the depth
+    of the bed. Delays are measured coherently in the band against the wave that all sensors hear, to about a
+    thousandth of a sample. Standard errors are those of the lags that remain (and no less than the Cramer-Rao bound
+    for the noise), of the assumed sound speed and of the depth of the bed, through the Jacobians.
+    """
+
+    kind: Literal["sensor_delays"] = "sensor_delays"
+    profile: SoundSpeed | None = None
+    """Sound speed to trace the bearing through; left out, paths are straight at the sonar's assumed sound speed."""
+
+    def locate(
+        self, signals: Signals, elements: Elements, sonar: Sonar, sonar_pose: Pose, bed_depth: float, snaps: int
+    ) -> Bearings:
+        """See `LocatingMethod`. An array that cannot locate gives NaN rows (`locating.unlocatable` says why)."""
+        from sonarsynth.ranging.locating import locate
+
+        bend = None
+        if self.profile is not None:
+            from sonarsynth.ranging.refraction import bending
+            from sonarsynth.world.casts import profile_of
+
+            bend = bending(profile_of(self.profile), elements, sonar_pose, sonar.assumed_sound_speed)
+        return locate(signals, elements, sonar, sonar_pose, bed_depth, snaps, bend)

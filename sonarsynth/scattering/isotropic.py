@@ -1,0 +1,25 @@
+"""The same amplitude in every direction: a point scatterer, for tests and calibration."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import Gt
+
+from sonarsynth.acoustics.lobes import lit_and_seen
+from sonarsynth.conventions import Floats, Metres
+from sonarsynth.description import description
+
+
+@description
+class Isotropic:
+    """Every facet that is lit and seen scatters alike, whatever its area."""
+
+    kind: Literal["isotropic"] = "isotropic"
+    strength: Annotated[Metres, Gt(0)] = 1.0
+    """Scattering amplitude of a facet (m): a target strength of 20 log10 of it."""
+
+    def amplitude(self, incident: Floats, scattered: Floats, normal: Floats, area: Floats) -> Floats:
+        """Far-field scattering amplitude (...) in m; arguments as in `ScatteringLaw`."""
+        return np.where(lit_and_seen(incident, scattered, normal), self.strength, 0.0)

@@ -1,0 +1,172 @@
+"""What runs for a frame and for a shard, in whatever process: the same functions without a scheduler and on a cluster.
+
+A task knows the store and the recipe's digest, and finds the recipe in the store: nothing large travels to it. A stage
+that raises gives its failure as its result, so that one bad frame costs only itself.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import time
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from sonarsynth import config, render, store
+from sonarsynth.planning import Plan, plan
+from sonarsynth.store.layout import layout_of
+
+STAGES = ("trace", "beamform", "range")
+"""Tasks of a frame, in order."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is built, small enough to send with every task."""
+
+    path: str  # of the store, absolute
+    digest: str  # of the recipe
+    products: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a frame was set aside."""
+
+    frame: int
+    stage: str
+    error: str  # one line
+    traceback: str
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A stage of a frame: what it made, or the failure of this or an earlier stage; and what all stages so far cost."""
+
+    frame: int
+    made: Any = None
+    failure: Failure | None = None
+    seconds: Mapping[str, float] = field(default_factory=dict)  # by stage, wall clock
+    cpu: Mapping[str, float] = field(default_factory=dict)  # by stage, of the thread
+
+
+@dataclass(frozen=True)
+class Written:
+    """A shard that is in the store."""
+
+    shard: int
+    frames: tuple[int, ...]
+    failures: tuple[Failure, ...]
+    times: tuple[dict[str, Any], ...]  # a row a frame
+    seconds: float  # of writing
+    bytes: int  # of its files
+    peak_bytes: int  # of memory of this process so far
+
+
+def trace(job: Job, frame: int) -> Step:
+    """Task trace-<digest>-<frame>."""
+    return _stage("trace", Step(frame), lambda: render.trace_frame(plan_of(job), frame))
+
+
+def beamform(job: Job, traced: Step) -> Step:
+    """Task beamform-<digest>-<frame>. Gives what it heard together with what was traced."""
+    frame = traced.frame
+    return _stage("beamform", traced, lambda: (traced.made, render.beamform_frame(plan_of(job), frame, traced.made)))
+
+
+def range_(job: Job, heard: Step) -> Step:
+    """Task range-<digest>-<frame>: the values of the frame, in the types of the store."""
+
+    def values() -> render.Values:
+        made = plan_of(job)
+        return layout_of(made).check(render.range_frame(made, heard.frame, *heard.made))
+
+    return _stage("range", heard, values)
+
+
+def render_frame(job: Job, frame: int) -> Step:
+    """All stages of a frame, here and now."""
+    return range_(job, beamform(job, trace(job, frame)))
+
+
+def write(job: Job, shard: int, steps: Sequence[Step]) -> Written:
+    """Task shard-<digest>-<shard>: one whole shard of every array, from the frames that came out well."""
+    start = time.perf_counter()
+    good = {step.frame: step.made for step in steps if step.failure is None}
+    size = 0
+    if good:
+        mark = store.write_shard(job.path, plan_of(job), shard, good)
+        size = sum(max(size, 0) for size, _ in mark.files.values())
+    return Written(
+        shard=shard,
+        frames=tuple(sorted(good)),
+        failures=tuple(step.failure for step in steps if step.failure is not None),
+        times=tuple({"frame": s.frame, "seconds": dict(s.seconds), "cpu": dict(s.cpu)} for s in steps),
+        seconds=time.perf_counter() - start,
+        bytes=size,
+        peak_bytes=peak_memory(),
+    )
+
+
+def plan_of(job: Job) -> Plan:
+    """The plan of a job, from the recipe in its store; made once in a process.
+
+    Raises store.Damage where the recipe, or a file that it names, is not the one to build.
+    """
+    if job not in _plans:
+        text = store.root_attributes(job.path).get("recipe", "")
+        made = plan(config.loads(text, job.path), frozenset(job.products))
+        if made.digest != job.digest:
+            raise store.Damage(f"{job.path}: a file that the recipe names is not the same on this worker")
+        remember(job, made)
+    return _plans[job]
+
+
+def remember(job: Job, made: Plan) -> None:
+    """Keep the plan of a job in this process, in place of the last one."""
+    _plans.clear()
+    _plans[job] = made
+
+
+_plans: dict[Job, Plan] = {}
+
+
+def peak_memory() -> int:
+    """Largest resident memory of this process so far (bytes).
+
+    From /proc where there is one: `ru_maxrss` counts the parent's memory in a process that it started.
+    """
+    try:
+        for line in Path("/proc/self/status").read_text().splitlines():
+            if line.startswith("VmHWM:"):
+                return int(line.split()[1]) * 1024
+    except OSError:
+        pass
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+def _stage(name: str, before: Step, work: Callable[[], Any]) -> Step:
+    if before.failure is not None:
+        return before
+    wall, cpu = time.perf_counter(), time.thread_time()
+    try:
+        made, failure = work(), None
+    except Exception as error:
+        made, failure = None, failure_of(before.frame, name, error)
+    seconds = {**before.seconds, name: time.perf_counter() - wall}
+    return Step(before.frame, made, failure, seconds, {**before.cpu, name: time.thread_time() - cpu})
+
+
+def failure_of(frame: int, stage: str, error: BaseException) -> Failure:
+    """A failure from the exception that was raised."""
+    line = " ".join(f"{type(error).__name__}: {error}".split())
+    return Failure(frame, stage, line, "".join(traceback.format_exception(error)))
+
+
+def append_lines(file: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Add rows to a file of JSON lines."""
+    with file.open("a", encoding="utf-8") as out:
+        out.writelines(json.dumps(row) + "\n" for row in rows)

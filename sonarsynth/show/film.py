@@ -1,0 +1,62 @@
+"""Films: an MP4 where ffmpeg is installed, else a GIF."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.pictures.frames import DEEP, FramePicture, View
+from sonarsynth.pictures.style import ENERGY_MAP, OUTLINES
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+
+def write_film(picture: FramePicture, views: list[View], folder: Path, frames_per_second: float) -> Path:
+    """Draw views one after another into `folder`/film.mp4 or film.gif; returns its path."""
+    from matplotlib.animation import FFMpegWriter
+
+    if FFMpegWriter.isAvailable():
+        path = folder / "film.mp4"
+        maker = FFMpegWriter(fps=frames_per_second)  # type: ignore[arg-type]  # any number
+        try:
+            with maker.saving(picture.figure, str(path), dpi=100):
+                for view in views:
+                    picture.show(view)
+                    maker.grab_frame()
+            return path
+        except (OSError, subprocess.CalledProcessError):  # an ffmpeg without the codec
+            path.unlink(missing_ok=True)
+    return _gif(picture, views, folder / "film.gif", frames_per_second)
+
+
+def _gif(picture: FramePicture, views: list[View], path: Path, frames_per_second: float) -> Path:
+    from PIL import Image
+
+    colours = _palette()
+    frames = []
+    for view in views:
+        picture.show(view)
+        frames.append(Image.fromarray(picture.pixels()).quantize(palette=colours, dither=Image.Dither.NONE))
+    milliseconds = max(20, round(1000 / frames_per_second))
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=milliseconds, loop=0, optimize=False)
+    return path
+
+
+def _palette() -> Image:
+    """256 colours, the same for all frames: the energy map, greys, and the outlines on their background."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_rgb
+    from PIL import Image
+
+    energy = colormaps[ENERGY_MAP](np.linspace(0.0, 1.0, 184))[:, :3]
+    greys = np.repeat(np.linspace(0.0, 1.0, 39)[:, None], 3, axis=1)
+    blend = np.linspace(0.0, 1.0, 8)[:, None]
+    mixed = [(1 - blend) * to_rgb(DEEP) + blend * to_rgb(colour) for colour in OUTLINES]
+    table = np.round(255 * np.concatenate([energy, greys, *mixed, [to_rgb(DEEP)]])).astype(np.uint8)
+    made = Image.new("P", (1, 1))
+    made.putpalette(table.tobytes())
+    return made

@@ -1,0 +1,124 @@
+"""What pictures need of a store, read with plain xarray. Whatever a store does not hold comes back as None."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.geometry import Pose
+from sonarsynth.pictures.frames import Hull
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def opened(store: str | Path) -> xr.DataTree:
+    """The store as a DataTree. Raises ValueError in one line when it is not one."""
+    import xarray as xr
+
+    path = Path(store)
+    if not path.is_dir():
+        raise ValueError(f"{path}: there is no such store")
+    try:
+        tree = xr.open_datatree(path, engine="zarr")
+    except (OSError, ValueError, KeyError) as problem:
+        raise ValueError(f"{path}: not a store that xarray can open ({str(problem).splitlines()[0]})") from None
+    if "truth" not in tree.children or "frame" not in tree["truth"].sizes:
+        raise ValueError(f"{path}: a store has a group /truth with frames; this has none")
+    return tree
+
+
+def read(tree: xr.DataTree, name: str, frame: int | None = None) -> np.ndarray | None:
+    """A variable ("image/energy"), of one frame or whole; None where the store does not hold it."""
+    group, _, variable = name.rpartition("/")
+    try:
+        data = (tree[group] if group else tree).dataset[variable]
+    except KeyError:
+        return None
+    return np.asarray((data if frame is None else data.isel(frame=frame)).values)
+
+
+def needed(tree: xr.DataTree, name: str, frame: int | None = None) -> np.ndarray:
+    """As `read`, for what pictures cannot do without. Raises ValueError."""
+    values = read(tree, name, frame)
+    if values is None:
+        raise ValueError(f"the store has no variable {name}")
+    return values
+
+
+def built(tree: xr.DataTree) -> np.ndarray:
+    """Indices of the frames that were built: the others read as NaN."""
+    return np.flatnonzero(np.isfinite(needed(tree, "truth/sonar_position")[:, 0]))
+
+
+def beam_grid(tree: xr.DataTree) -> tuple[Floats, Floats]:
+    """Azimuth and elevation of the beams (deg, ascending)."""
+    return needed(tree, "truth/azimuth").astype(float), needed(tree, "truth/elevation").astype(float)
+
+
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """One frame of a store; sonar frame, m."""
+
+    index: int
+    time: float  # s since the start of the trajectory
+    sonar: Pose
+    energy: Floats | None  # (elevation, azimuth) Pa2 s; None where there is no image or the frame has none
+    points: Floats  # (elevation, azimuth, xyz) m; NaN where there is no point
+    range_error: Floats  # (elevation, azimuth) m: range less true range on a target; NaN elsewhere
+    point_energy: Floats  # (elevation, azimuth) Pa2 s
+    delay: Floats  # (elevation, azimuth) s after the direct arrival
+    target: np.ndarray  # (elevation, azimuth) true target; -1 for none
+    true_range: Floats  # (elevation, azimuth) m
+    snap: Floats  # (snap, xyz) m, true positions
+    hulls: tuple[Hull, ...]
+
+    @property
+    def found(self) -> np.ndarray:
+        """(elevation, azimuth) true where there is a point."""
+        return np.asarray(np.isfinite(self.points).all(axis=-1))
+
+
+def stored(tree: xr.DataTree, index: int) -> Stored:
+    """One frame as stored. A frame that was not built comes back full of NaN."""
+    target = needed(tree, "truth/target", index)
+    true_range = needed(tree, "truth/range", index).astype(float)
+    nowhere = np.full(target.shape, np.nan)
+    cloud = {name: read(tree, f"cloud/{name}", index) for name in ("x", "y", "z", "range", "energy", "delay")}
+    layers = {name: nowhere if values is None else values.astype(float) for name, values in cloud.items()}
+    energy = read(tree, "image/energy", index)
+    pose = Pose(needed(tree, "truth/sonar_position", index), needed(tree, "truth/sonar_orientation", index))
+    time = read(tree, "time", index)
+    return Stored(
+        index=index,
+        time=float("nan") if time is None else float(time),
+        sonar=pose,
+        energy=None if energy is None or not np.isfinite(energy).any() else energy.astype(float),
+        points=np.stack([layers["x"], layers["y"], layers["z"]], axis=-1),
+        range_error=np.where(target >= 0, layers["range"] - true_range, np.nan),
+        point_energy=layers["energy"],
+        delay=layers["delay"],
+        target=target,
+        true_range=true_range,
+        snap=pose.to_body(needed(tree, "truth/snap_position", index)),
+        hulls=_hulls(tree, index, pose),
+    )
+
+
+def _hulls(tree: xr.DataTree, index: int, sonar: Pose) -> tuple[Hull, ...]:
+    names = read(tree, "truth/target_name")
+    if names is None or not np.isfinite(sonar.position).all():
+        return ()
+    position = needed(tree, "truth/target_position", index)
+    orientation = needed(tree, "truth/target_orientation", index)
+    hulls = []
+    for i, name in enumerate(map(str, names)):
+        vertices, faces = read(tree, f"targets/{name}/vertices"), read(tree, f"targets/{name}/faces")
+        if vertices is not None and faces is not None and np.isfinite(position[i]).all():
+            there = sonar.to_body(Pose(position[i], orientation[i]).to_world(vertices))
+            hulls.append(Hull(name, there, faces.astype(np.int64)))
+    return tuple(hulls)

@@ -1,0 +1,72 @@
+"""A store in a few lines of text."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.show.reading import built, needed, read
+from sonarsynth.verification import brightest_beam_on_target, range_errors, snap_located
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+PRODUCTS = {
+    "signals": "signals/pressure",
+    "image": "image/energy",
+    "cloud": "cloud/range",
+    "bearings": "bearings/position",
+}
+
+
+def summary(tree: xr.DataTree, store: Path) -> str:
+    """What a store holds and how well it agrees with its own truth, over the frames that were built."""
+    frames = built(tree)
+    total = tree["truth"].sizes["frame"]
+    size = sum(path.stat().st_size for path in store.rglob("*") if path.is_file())
+    lines = [
+        f"{store.name}: {tree.attrs.get('title') or 'untitled'}",
+        f"  frames     {len(frames)} of {total} built, {size / 1e6:.1f} MB on disk",
+        *(f"  {name:10s} {_shape(tree, variable)}" for name, variable in PRODUCTS.items()),
+    ]
+    if not len(frames):
+        return "\n".join(lines)
+    return "\n".join([*lines, *_targets(tree, frames), *_agreement(tree, frames)])
+
+
+def _shape(tree: xr.DataTree, name: str) -> str:
+    group, variable = name.split("/")
+    if group not in tree.children or variable not in tree[group].dataset:
+        return "not in this store"
+    data = tree[group].dataset[variable]
+    units = data.attrs.get("units", "")
+    return " x ".join(f"{size} {dim}" for dim, size in data.sizes.items()) + f" ({units})"
+
+
+def _targets(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
+    names = read(tree, "truth/target_name")
+    if names is None or not len(names):
+        return ["  targets    none"]
+    sonar, where = needed(tree, "truth/sonar_position"), needed(tree, "truth/target_position")
+    away = np.linalg.norm(where[frames] - sonar[frames, None], axis=2)
+    seen = (needed(tree, "truth/visible_fraction")[frames] > 0).sum(axis=0)
+    lines = []
+    for i, name in enumerate(map(str, names)):
+        faces = read(tree, f"targets/{name}/faces")
+        facets = f"{len(faces)} facets, " if faces is not None else ""
+        reach = f"{away[:, i].min():.2f} to {away[:, i].max():.2f} m away"
+        lines.append(f"  target     {name}: {facets}{reach}, in sight in {seen[i]} frames")
+    return lines
+
+
+def _agreement(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
+    checks = []
+    if "image" in tree.children:
+        checks.append(brightest_beam_on_target(tree, frames))
+    if "bearings" in tree.children:
+        checks.append(snap_located(tree, frames))
+    if "cloud" in tree.children:
+        checks += range_errors(tree, frames)
+    return [f"  {check.name}: {check.got}" for check in checks]

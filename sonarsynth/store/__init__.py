@@ -1,0 +1,33 @@
+"""The store: one Zarr v3 hierarchy that plain `xarray.open_datatree(path, engine="zarr")` reads.
+
+Laid out whole from the plan, written one whole shard at a time, each shard with a completion mark; resumable, checked.
+"""
+
+from __future__ import annotations
+
+from sonarsynth.store.creating import Mismatch, create, identity, root_attributes
+from sonarsynth.store.layout import Layout, layout_of
+from sonarsynth.store.lock import Locked, beside, lock
+from sonarsynth.store.marks import Damage, Mark
+from sonarsynth.store.verifying import Problem, Report, verify
+from sonarsynth.store.writing import frames_there, missing, write_shard
+
+__all__ = [
+    "Damage",
+    "Layout",
+    "Locked",
+    "Mark",
+    "Mismatch",
+    "Problem",
+    "Report",
+    "beside",
+    "create",
+    "frames_there",
+    "identity",
+    "layout_of",
+    "lock",
+    "missing",
+    "root_attributes",
+    "verify",
+    "write_shard",
+]

@@ -1,0 +1,233 @@
+"""Laying a store out: all of it at once, in a folder beside the place, which is then moved there."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import warnings
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import numpy as np
+import zarr
+from zarr.codecs import BloscCodec, Crc32cCodec
+from zarr.errors import ZarrUserWarning
+
+from sonarsynth.config import dump
+from sonarsynth.render import attributes, coordinates
+from sonarsynth.store.layout import ArrayLayout, Layout, layout_of
+from sonarsynth.store.marks import LAYOUT, MARKS, Damage, Mark, all_files, load_mark, record, records, save_mark
+
+if TYPE_CHECKING:
+    from sonarsynth.planning import Plan
+
+LEVEL: Final = 3
+"""Compression level of zstd."""
+
+
+class Mismatch(ValueError):
+    """The store holds something else than what is to be built; str() is one line."""
+
+
+def create(path: Path | str, plan: Plan, *, restart: bool = False) -> Layout:
+    """Lay the store out, or make ready to go on with the one that is there. Returns its layout.
+
+    Raises Mismatch where the store that is there belongs to another recipe, other products or another version, or is
+    no store of ours; `restart` begins anew instead (and never removes what is not a store of ours). Raises Damage
+    where the store that is there is not as it was laid out.
+    """
+    path, layout = Path(path), layout_of(plan)
+    scratch, old = _hidden(path, "new"), _hidden(path, "old")
+    for leftover in (scratch, old):
+        shutil.rmtree(leftover, ignore_errors=True)
+    if path.is_dir() and not any(path.iterdir()):
+        path.rmdir()
+    there = path.exists()
+    if there:
+        stored = _identity_of(path)
+        if not restart:
+            _compare(path, stored, identity(plan))
+            _check_layout(path)
+            _sweep(path)
+            return layout
+    _lay_out(scratch, plan, layout)
+    save_mark(scratch, Mark(LAYOUT, (), "", records(scratch, sorted(all_files(scratch)))))
+    if there:
+        os.rename(path, old)
+    os.rename(scratch, path)
+    shutil.rmtree(old, ignore_errors=True)
+    return layout
+
+
+def _hidden(path: Path, suffix: str) -> Path:
+    path = Path(os.path.abspath(path))
+    return path.with_name(f".{path.name}.{suffix}")
+
+
+def _check_layout(path: Path) -> None:
+    """Raise Damage where metadata or fixed arrays are not as they were laid out."""
+    mark = load_mark(path, LAYOUT)
+    if mark is None:
+        raise Damage(f"{path}: {MARKS}/{LAYOUT}.json is missing")
+    for name, expected in mark.files.items():
+        try:
+            whole = record(path, name) == expected
+        except OSError:
+            whole = False
+        if not whole:
+            raise Damage(f"{path}: {name} is missing or has changed since the store was laid out")
+
+
+def identity(plan: Plan) -> dict[str, Any]:
+    """What a store is of: two plans with the same identity make the same numbers. Root attributes of the store."""
+    return {
+        "recipe_digest": plan.digest,
+        "products": sorted(plan.products),
+        "shard_frames": plan.shard_frames,
+        "sonarsynth_version": _version(),
+        "recipe": dump(plan.recipe),
+    }
+
+
+def root_attributes(path: Path | str) -> dict[str, Any]:
+    """Root attributes of a store, {} where there is none."""
+    try:
+        with (Path(path) / "zarr.json").open(encoding="utf-8") as file:
+            found = json.load(file)["attributes"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _version() -> str:
+    try:
+        return version("sonarsynth")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _identity_of(path: Path) -> dict[str, Any]:
+    stored = root_attributes(path)
+    if not path.is_dir() or "recipe_digest" not in stored:
+        raise Mismatch(f"{path} exists and is not a store of sonarsynth: choose another place")
+    return stored
+
+
+def _compare(path: Path, stored: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
+    """Raise Mismatch with the first difference between what is there and what is to be built."""
+    if all(stored.get(key) == value for key, value in wanted.items() if key != "recipe"):
+        return
+    old, new = _flat(_plain_recipe(stored)), _flat(_plain_recipe(wanted))
+    differing = [key for key in [*new, *old] if old.get(key) != new.get(key)]
+    if differing:
+        key = differing[0]
+        difference = f"{key} is {old.get(key, 'absent')} there and {new.get(key, 'absent')} now"
+    else:
+        names = {
+            "products": "products",
+            "shard_frames": "frames in a shard",
+            "sonarsynth_version": "version of sonarsynth",
+        }
+        changed = next((key for key in names if stored.get(key) != wanted[key]), None)
+        difference = (
+            "the content of a file that the recipe names has changed"
+            if changed is None
+            else f"{names[changed]}: {stored.get(changed)} there and {wanted[changed]} now"
+        )
+    raise Mismatch(f"{path} was begun differently ({difference}): use --restart to begin anew, or another place")
+
+
+def _plain_recipe(attrs: Mapping[str, Any]) -> Any:
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    try:
+        return YAML(typ="safe", pure=True).load(str(attrs.get("recipe", "")))
+    except (YAMLError, ValueError):
+        return None
+
+
+def _flat(value: Any, where: str = "") -> dict[str, Any]:
+    """Leaves of nested values by dotted path."""
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else None
+    if items is None:
+        return {where: value}
+    return {k: v for key, inner in items for k, v in _flat(inner, f"{where}.{key}" if where else str(key)).items()}
+
+
+def _sweep(path: Path) -> None:
+    """Remove the scratch files that a killed writer left."""
+    for folder, _, names in os.walk(path):
+        for name in names:
+            if name.endswith(".partial"):
+                (Path(folder) / name).unlink(missing_ok=True)
+
+
+def _lay_out(path: Path, plan: Plan, layout: Layout) -> None:
+    static = coordinates(plan)
+    root = zarr.create_group(path, zarr_format=3, attributes={**attributes(plan), **identity(plan)})
+    framed = {a.variable.group for a in layout.arrays}
+    for group in sorted({g for g, _ in static} | framed):
+        extra = sorted(name for g, name in static if g == group and static[g, name][0] != (name,))
+        attrs = {"coordinates": " ".join(extra)} if extra and group in framed else {}
+        if group.strip("/"):
+            root.create_group(group.strip("/"), attributes=attrs)
+        else:
+            root.update_attributes(attrs)
+    for array in layout.arrays:
+        _create_array(root, array)
+    for (group, name), (dims, values, attrs) in static.items():
+        _write_static(root, f"{group}/{name}".strip("/"), dims, values, attrs)
+    with warnings.catch_warnings():
+        # zarr-python: "Consolidated metadata is currently not part in the Zarr format 3 specification". Readers that
+        # do not know it use the metadata of each array; xarray warns without it.
+        warnings.simplefilter("ignore", ZarrUserWarning)
+        zarr.consolidate_metadata(path)
+
+
+def _create_array(root: zarr.Group, array: ArrayLayout) -> None:
+    variable, inner = array.variable, tuple(max(1, n) for n in array.shape[1:])
+    attrs: dict[str, Any] = {"units": variable.units, "long_name": variable.long_name, **dict(variable.attributes)}
+    if variable.standard_name:
+        attrs["standard_name"] = variable.standard_name
+    if "scale_factor" in attrs:  # packed: readers must know the fill value to give NaN
+        attrs["_FillValue"] = int(variable.fill)
+    root.create_array(
+        array.path,
+        shape=array.shape,
+        dtype=array.dtype,
+        chunks=(array.chunk, *inner),
+        shards=(array.shard, *inner) if array.chunk != array.shard else None,
+        compressors=_codecs(array.dtype),
+        fill_value=variable.fill,
+        dimension_names=variable.dims,
+        attributes=attrs,
+        config={"write_empty_chunks": True},  # a file for every shard: one that is missing is a loss, not a fill value
+    )
+
+
+def _write_static(
+    root: zarr.Group, path: str, dims: tuple[str, ...], values: np.ndarray, attrs: dict[str, Any]
+) -> None:
+    text = values.dtype.kind == "U"
+    array = root.create_array(
+        path,
+        shape=values.shape,
+        dtype="str" if text else values.dtype,
+        chunks=tuple(max(1, n) for n in values.shape),
+        compressors=(Crc32cCodec(),) if text else _codecs(values.dtype),
+        dimension_names=dims,
+        attributes=attrs,
+        config={"write_empty_chunks": True},
+    )
+    if values.size:
+        array[...] = values.astype(object) if text else values
+
+
+def _codecs(dtype: np.dtype[Any]) -> tuple[BloscCodec, Crc32cCodec]:
+    """Blosc (zstd) with the bytes, or for packed counts the bits, of the numbers shuffled; then a checksum."""
+    shuffle: Literal["bitshuffle", "shuffle"] = "bitshuffle" if dtype.kind in "iu" else "shuffle"
+    return BloscCodec(cname="zstd", clevel=LEVEL, shuffle=shuffle, typesize=dtype.itemsize), Crc32cCodec()

@@ -1,0 +1,89 @@
+"""Writing whole shards, and knowing which are missing."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import zarr
+
+from sonarsynth.render import Values
+from sonarsynth.store.layout import ArrayLayout, Layout, layout_of
+from sonarsynth.store.marks import Damage, Mark, add_to_digest, drop_mark, load_mark, marked, records, save_mark
+
+if TYPE_CHECKING:
+    from sonarsynth.planning import Plan
+
+
+def write_shard(path: Path | str, plan: Plan, shard: int, frames: Mapping[int, Values]) -> Mark:
+    """Write one whole shard of every array, then its completion mark. Frames not given read as fill values.
+
+    Raises ValueError, before anything is written, where a frame is not of this shard or its values do not fit.
+    """
+    path, layout = Path(path), layout_of(plan)
+    region = layout.region(shard)
+    outside = sorted(set(frames) - set(region))
+    if outside:
+        raise ValueError(f"frame {outside[0]} is not in shard {shard} (frames {region.start} to {region.stop - 1})")
+    checked = {frame: layout.check(values) for frame, values in sorted(frames.items())}
+    drop_mark(path, shard)
+    root = zarr.open_group(path, mode="r+")
+    content = hashlib.sha256()
+    arrays = sorted((a for a in layout.arrays if not a.empty), key=lambda a: a.path)
+    empty = set()
+    for array in arrays:
+        block = layout.block(array, shard, checked)
+        add_to_digest(content, array.path, block)
+        write_region(root, layout, array, region.start, block)
+        if array.is_fill(block):
+            empty.add(array.file(shard))
+    files = records(path, (a.file(shard) for a in arrays), empty=empty)
+    mark = Mark(str(shard), tuple(checked), content.hexdigest(), files)
+    save_mark(path, mark)
+    return mark
+
+
+def write_region(root: zarr.Group, layout: Layout, array: ArrayLayout, start: int, block: np.ndarray) -> None:
+    """Write frames start:start+len(block) of an array. Raises ValueError unless they are exactly one shard."""
+    stop = start + len(block)
+    layout.check_region(start, stop)
+    target = root[array.path]
+    assert isinstance(target, zarr.Array)
+    target[start:stop] = block
+
+
+def missing(path: Path | str, plan: Plan, frames: Iterable[int] | None = None) -> dict[int, tuple[int, ...]]:
+    """Shards to do so that `frames` (left out: all) are in the store, and the frames to render for each.
+
+    A shard is written whole, so one that has some of its frames is rendered again with those and the wanted ones.
+    Raises IndexError for a frame outside the dataset.
+    """
+    path, layout = Path(path), layout_of(plan)
+    wanted: dict[int, set[int]] = {}
+    for frame in range(layout.frames) if frames is None else frames:
+        if not 0 <= frame < layout.frames:
+            raise IndexError(f"frame {frame} is outside 0..{layout.frames - 1}")
+        wanted.setdefault(frame // layout.shard_frames, set()).add(frame)
+    there = set(marked(path))
+    todo = {}
+    for shard, some in sorted(wanted.items()):
+        have = _have(path, shard) if shard in there else set()
+        if not some <= have:
+            todo[shard] = tuple(sorted(some | have))
+    return todo
+
+
+def frames_there(path: Path | str) -> list[int]:
+    """Frames that are complete in the store, by their marks."""
+    return sorted(frame for shard in marked(Path(path)) for frame in _have(Path(path), shard))
+
+
+def _have(path: Path, shard: int) -> set[int]:
+    try:
+        mark = load_mark(path, shard)
+    except Damage:
+        return set()
+    return set() if mark is None else set(mark.frames)

@@ -1,0 +1,44 @@
+"""From arrivals to the pressure at each hydrophone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Protocol
+
+from sonarsynth.conventions import Floats
+from sonarsynth.description import BY_KIND
+from sonarsynth.products import Arrivals, Signals
+from sonarsynth.sonar import Elements, Sonar
+from sonarsynth.synthesis.direct_sum import DirectSum
+from sonarsynth.synthesis.instrument import add_noise, convert
+from sonarsynth.synthesis.kernel_deposit import KernelDeposit
+from sonarsynth.synthesis.pulse import pulse_support
+from sonarsynth.world.moment import Snap
+
+__all__ = ["DirectSum", "KernelDeposit", "SignalSynthesis", "Synthesis", "add_noise", "convert", "pulse_support"]
+
+
+class SignalSynthesis(Protocol):
+    """A method of synthesis."""
+
+    def signals(
+        self,
+        arrivals: Arrivals,
+        snaps: tuple[Snap, ...],
+        elements: Elements,
+        sonar: Sonar,
+        absorption: Callable[[Floats], Floats] | None,
+        start: float,
+        samples: int,
+    ) -> Signals:
+        """Pressure at each hydrophone at `samples` times from `start` (s), without noise and without a converter.
+
+        absorption gives dB/m at frequencies (Hz); its value at the band centre is inside the amplitudes already. Zero
+        paths are silence. Raises ValueError for arrivals that are not finite, have no amplitude or come from a
+        hydrophone itself.
+        """
+        ...
+
+
+Synthesis = Annotated[KernelDeposit | DirectSum, BY_KIND]
+"""The methods of synthesis, by `kind`."""

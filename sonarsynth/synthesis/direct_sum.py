@@ -1,0 +1,91 @@
+"""The slow exact synthesis: the reference that the fast one is measured against."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+
+from sonarsynth.acoustics.arrays import element_directivity
+from sonarsynth.conventions import Floats
+from sonarsynth.description import description
+from sonarsynth.products import Arrivals, Signals
+from sonarsynth.sonar import Elements, Sonar
+from sonarsynth.synthesis.layout import fast_length, layout
+from sonarsynth.synthesis.pulse import pulse_spectrum, pulse_support
+from sonarsynth.synthesis.wavefront import Fronts, delay_and_gain, fronts, reach, towards
+from sonarsynth.world.moment import Snap
+
+
+def relative_absorption(absorption: Callable[[Floats], Floats] | None, frequency: Floats, centre: float) -> Floats:
+    """Absorption at frequencies (bin,) over that at the band centre, less one; zero where none is given."""
+    if absorption is None:
+        return np.zeros_like(frequency)
+    at_centre = float(absorption(np.array([centre]))[0])
+    if not at_centre > 0.0:
+        return np.zeros_like(frequency)
+    return np.asarray(absorption(frequency) / at_centre - 1.0)
+
+
+def exact_spectra(front: Fronts, elements: Elements, frequency: Floats, relative: Floats, origin: float) -> np.ndarray:
+    """Transfer functions (sensor, bin) from the snap at 1 m to each hydrophone, delays counted from `origin` (s)."""
+    total = np.zeros((elements.count, frequency.size), complex)
+    for e in range(front.count):
+        one = front.select(np.array([e]))
+        delay, gain = delay_and_gain(one, elements.position)
+        u, _ = towards(one, elements.position)
+        late = one.delay[0] - origin + delay[0]
+        face = element_directivity(frequency, u[0][:, None, :], elements.face, one.sound_speed)
+        loss = 10.0 ** (-one.loss[0] * relative / 20.0)
+        total += (one.amplitude[0] * gain[0] * elements.gain)[:, None] * (
+            face * loss * np.exp(-2j * np.pi * late[:, None] * frequency)
+        )
+    return total
+
+
+@description
+class DirectSum:
+    """Sum of every path at every hydrophone and frequency, with exact delay, amplitude and directivity, in float64."""
+
+    kind: Literal["direct_sum"] = "direct_sum"
+
+    def signals(
+        self,
+        arrivals: Arrivals,
+        snaps: tuple[Snap, ...],
+        elements: Elements,
+        sonar: Sonar,
+        absorption: Callable[[Floats], Floats] | None,
+        start: float,
+        samples: int,
+    ) -> Signals:
+        """Pressure at each hydrophone; the period of the transform is the window and a pulse at either end."""
+        return exact_signals(arrivals, snaps, elements, sonar, absorption, start, samples)[1]
+
+
+def exact_signals(
+    arrivals: Arrivals,
+    snaps: tuple[Snap, ...],
+    elements: Elements,
+    sonar: Sonar,
+    absorption: Callable[[Floats], Floats] | None,
+    start: float,
+    samples: int,
+) -> tuple[Floats, Signals]:
+    """The signals in float64 (sensor, sample), and as the stage gives them."""
+    fs = sonar.sampling_frequency
+    front = fronts(arrivals, snaps, elements)
+    plan = layout(arrivals, front, snaps, elements, sonar, start, samples)
+    pressure = np.zeros((elements.count, samples))
+    for model in dict.fromkeys(s.model for s in snaps):
+        rows = np.flatnonzero(np.array([s.model == model for s in snaps])[arrivals.snap] & plan.heard)
+        pad = int(np.ceil(sum(pulse_support(model, sonar.antialias)) * fs)) + 2
+        # where a pulse is partly heard at one hydrophone, it is at most this far out at another
+        spread = int(np.ceil(2.0 * reach(front).max(initial=0.0) * fs)) + pad
+        length = fast_length(samples + 2 * spread)
+        frequency, spectrum = pulse_spectrum(model, sonar.antialias, fs, length)
+        relative = relative_absorption(absorption, frequency, sonar.band.centre)
+        transfer = exact_spectra(front.select(rows), elements, frequency, relative, start - spread / fs)
+        pressure += np.fft.irfft(transfer * spectrum, length)[:, spread : spread + samples] * fs
+    return pressure, Signals(pressure.astype(np.float32), start, fs, 0.0, 0, plan.outside)

@@ -1,0 +1,142 @@
+"""Low rank: how many nodes over the aperture, and how many terms of directivity and absorption, a group of paths needs.
+
+A tile is a group of paths from nearly the same direction. Steered to its middle, their field varies slowly over the
+aperture, so it is synthesised at a few Chebyshev nodes and interpolated to the hydrophones; and the directivity of the
+element face, a function of frequency and of the direction of each path, is a polynomial in the small deviation of that
+direction from the tile's middle.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import factorial
+
+import numpy as np
+from scipy.special import jv
+
+from sonarsynth.conventions import Floats
+
+MOST_NODES = 96
+"""Most nodes in one dimension; a tile that needs more is split."""
+
+Colour = tuple[float, ...]
+"""Frequencies, over the highest, that halve each eighth of the pulse's spectrum: what an error at a frequency
+weighs."""
+
+
+def colour(frequency: Floats, spectrum: np.ndarray, highest: float) -> Colour:
+    """Quantiles of the modulus of a spectrum over frequency, over `highest` (Hz), to two digits so that tables are
+    kept."""
+    mass = np.cumsum(np.abs(spectrum))
+    found = np.interp((np.arange(8) + 0.5) / 8.0, mass / mass[-1], frequency / highest)
+    return tuple(float(np.round(v, 2)) for v in found)
+
+
+@lru_cache(maxsize=32)
+def _widest(weights: Colour, tolerance: float) -> Floats:
+    """Largest half range of phase (rad, at the highest frequency) that n = 1, 2, ... Chebyshev nodes interpolate to
+    `tolerance`."""
+    phase = np.concatenate([[0.0], np.geomspace(1e-13, 0.1, 60), np.arange(0.15, 1.1 * MOST_NODES, 0.1)])
+    out = np.zeros(MOST_NODES)
+    for n in range(1, MOST_NODES + 1):
+        argument = phase[:, None] * np.array(weights)
+        # exp(i x t) = sum of 2 i^n J_n(x) T_n(t); interpolation doubles the tail, which falls fast
+        tail = 4.0 * (np.abs(jv(n, argument)) + np.abs(jv(n + 1, argument))).mean(axis=1)
+        good = np.maximum.accumulate(tail) <= tolerance
+        out[n - 1] = phase[np.flatnonzero(good)[-1]]
+    return np.maximum.accumulate(out)
+
+
+def nodes_for(phase: float, weights: Colour, tolerance: float) -> int:
+    """Chebyshev nodes that interpolate waves of phase within +-`phase` (rad); MOST_NODES + 1 where none do."""
+    return int(np.searchsorted(_widest(weights, tolerance), phase)) + 1
+
+
+def chebyshev(count: int) -> Floats:
+    """Chebyshev nodes of the first kind (node,) in (-1, 1)."""
+    return np.asarray(np.cos(np.pi * (np.arange(count) + 0.5) / count))
+
+
+def interpolation(x: Floats, count: int) -> Floats:
+    """Matrix (point, node) from values at `count` Chebyshev nodes to points x (point,) in [-1, 1]."""
+    degree = np.arange(count)
+    at_points = np.cos(np.outer(np.arccos(np.clip(x, -1.0, 1.0)), degree))
+    at_nodes = np.cos(np.outer(np.pi * (degree + 0.5) / count, degree))
+    weight = np.full(count, 2.0 / count)
+    weight[0] = 1.0 / count
+    return np.asarray((at_points * weight) @ at_nodes.T)
+
+
+DEGREES = np.arange(13)
+FACTORIALS = np.array([float(factorial(n)) for n in DEGREES])
+
+
+@lru_cache(maxsize=512)
+def face_terms(deviation: float, weights: Colour) -> Floats:
+    """Bounds (degree,) on the terms of sinc(a + x), |x| <= `deviation` at the highest frequency, weighted by colour.
+
+    The Chebyshev coefficient of exp(2 pi i x s), |s| <= 1/2, is 2 J_n(2 pi x s) <= 2 (pi x s)^n/n!, and its mean over s
+    is taken.
+    """
+    bound = 2.0 * (0.5 * np.pi * deviation) ** DEGREES / (FACTORIALS * (DEGREES + 1))
+    bound[0] = 1.0
+    return np.asarray(bound * (np.array(weights)[:, None] ** DEGREES).mean(axis=0))
+
+
+Term = tuple[int, int, int]
+"""Degrees in the y and z components of direction, and in absorption."""
+
+
+def terms_for(face: tuple[float, float], loss: float, weights: Colour, tolerance: float) -> tuple[Term, ...]:
+    """Terms to keep: deviations of face argument in y and z, and of absorption (Np) are given. Closed: the factors of
+    each are there.
+
+    Deviations are rounded up by at most a tenth, so that choices are kept from frame to frame.
+    """
+    y, z, decay = (float(1.1 ** np.ceil(np.log(v) / np.log(1.1))) if v > 1e-12 else 0.0 for v in (*face, loss))
+    return _terms(y, z, decay, weights, tolerance)
+
+
+@lru_cache(maxsize=1024)
+def _terms(y: float, z: float, loss: float, weights: Colour, tolerance: float) -> tuple[Term, ...]:
+    size = face_terms(y, weights)[:, None, None] * face_terms(z, weights)[:, None] * (loss**DEGREES / FACTORIALS)
+    smallest = np.sort(size, axis=None)
+    least = smallest[np.searchsorted(np.cumsum(smallest), tolerance, side="right")]  # what is left out adds up to less
+    i, j, k = np.indices(size.shape)
+    keep = (size >= least) & (i + j + k < DEGREES.size)
+    keep[0, 0, 0] = True
+    for axis in range(3):  # the factors of each term too
+        keep = np.flip(np.logical_or.accumulate(np.flip(keep, axis), axis), axis)
+    found = [(int(a), int(b), int(c)) for a, b, c in np.argwhere(keep)]
+    return tuple(sorted(found, key=lambda t: (sum(t), t)))
+
+
+@lru_cache(maxsize=256)
+def recipe(terms: tuple[Term, ...]) -> np.ndarray:
+    """How to make each term from earlier ones (term, 3); term 0 is given.
+
+    Columns: which term; times which factor (0 y, 1 z, 2 absorption); and, where it is twice that less another
+    (Chebyshev's recurrence, in y and z), which other, or else -1.
+    """
+    place: dict[tuple[int, ...], int] = {t: n for n, t in enumerate(terms)}
+    out = np.full((len(terms), 3), -1, np.int64)
+    for n, term in enumerate(terms[1:], start=1):
+        axis = next(a for a in range(3) if term[a])
+        one, two = (tuple(d - less * (a == axis) for a, d in enumerate(term)) for less in (1, 2))
+        out[n, :2] = place[one], axis
+        if axis < 2 and term[axis] > 1:
+            out[n, 2] = place[two]
+    return out
+
+
+def sinc_polynomials(middle: Floats, deviation: float | Floats, degree: int) -> Floats:
+    """Chebyshev coefficients (degree + 1, ...) in x, |x| <= 1, of sinc(middle + deviation x).
+
+    middle (...) and deviation broadcast together. Interpolated at Chebyshev nodes: no derivatives of sinc, so nothing
+    is lost near its centre.
+    """
+    x = chebyshev(degree + 1)
+    value = np.sinc(middle + np.multiply.outer(x, deviation * np.ones_like(middle)))
+    weight = np.full((degree + 1, 1), 2.0 / (degree + 1))
+    weight[0] *= 0.5
+    return np.tensordot(weight * np.cos(np.outer(np.arange(degree + 1), np.arccos(x))), value, axes=1)

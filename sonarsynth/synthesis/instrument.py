@@ -1,0 +1,74 @@
+"""What the instrument adds to the sound: noise, and the converter."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.fft import irfft
+
+from sonarsynth.acoustics.noise import power_density, wenz_level
+from sonarsynth.acoustics.spectra import duration, response
+from sonarsynth.conventions import Floats
+from sonarsynth.products import Signals
+from sonarsynth.sonar import Converter, Elements, Sonar
+from sonarsynth.synthesis.layout import fast_length
+from sonarsynth.synthesis.pulse import fir
+from sonarsynth.world.environment import FlatNoise, Noise
+
+QUIETEST = 1e-10
+"""Bins of less noise power than this, relative to the loudest, are left empty."""
+
+
+def noise_density(noise: Noise, frequency: Floats) -> Floats:
+    """One-sided power spectral density (Pa2/Hz) of ambient noise at frequencies (Hz, positive)."""
+    if isinstance(noise, FlatNoise):
+        return power_density(np.full(frequency.shape, noise.level))
+    return power_density(wenz_level(frequency, noise.shipping, noise.wind_speed))
+
+
+def add_noise(
+    signals: Signals, noise: Noise | None, sonar: Sonar, elements: Elements, rng: np.random.Generator
+) -> Signals:
+    """Signals with Gaussian noise, independent between hydrophones, through the anti-alias filter; a dead element stays
+    silent.
+
+    Drawn in the frequency domain over a period longer than the window by the filter's length, so that the ends are not
+    alike.
+    """
+    if noise is None:
+        return signals
+    sensors, samples = signals.pressure.shape
+    fs = signals.sampling_frequency
+    chosen = fir(sonar.antialias)
+    length = fast_length(samples + int(np.ceil(duration(chosen) * fs)))
+    f = np.asarray(np.arange(1, length // 2) * (fs / length), float)
+    power = noise_density(noise, f) * response(f, chosen) ** 2
+    heard = np.flatnonzero(power > QUIETEST * power.max())
+    # half of the power of a bin in each of its real and imaginary parts; irfft divides by the length
+    size = np.sqrt(power[heard] * fs * length) / 2.0
+    spectrum = np.zeros((sensors, length // 2 + 1), np.complex64)
+    low, high = heard[0], heard[-1] + 1
+    drawn = rng.standard_normal((sensors, 2 * (high - low)), dtype=np.float32).view(np.complex64)
+    scale = np.zeros(high - low, np.float32)
+    scale[heard - low] = size
+    spectrum[:, 1 + low : 1 + high] = drawn * scale
+    spectrum *= elements.gain[:, None].astype(np.float32)
+    return replace(signals, pressure=signals.pressure + irfft(spectrum, length, axis=1)[:, :samples])
+
+
+def convert(signals: Signals, converter: Converter | None) -> Signals:
+    """Signals as whole counts times the quantum (float32); samples beyond full scale are clipped, and counted.
+
+    Counts run from -(2^(bits-1) - 1) to 2^(bits-1) - 1: the lowest code is kept free for "no value". Raises ValueError
+    for NaN.
+    """
+    if converter is None:
+        return signals
+    largest = 2 ** (converter.bits - 1) - 1
+    counts = np.rint(signals.pressure / np.float64(converter.quantum))
+    if np.isnan(counts).any():
+        raise ValueError("the signals hold NaN: they cannot be converted")
+    clipped = int(np.count_nonzero(np.abs(counts) > largest))
+    pressure = (np.clip(counts, -largest, largest) * converter.quantum).astype(np.float32)
+    return replace(signals, pressure=pressure, quantum=converter.quantum, clipped=signals.clipped + clipped)

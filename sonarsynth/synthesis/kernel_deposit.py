@@ -1,0 +1,83 @@
+"""The fast synthesis: paths are deposited with a kernel on a fine grid, and everything else is done in the frequency
+domain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+from annotated_types import Ge, Gt, Le, Lt, MultipleOf
+
+from sonarsynth.conventions import Floats, Number
+from sonarsynth.description import description
+from sonarsynth.products import Arrivals, Signals
+from sonarsynth.sonar import Elements, Sonar, stop_frequency
+from sonarsynth.synthesis.deposit import Bins, stretch_pressure
+from sonarsynth.synthesis.direct_sum import relative_absorption
+from sonarsynth.synthesis.layout import layout
+from sonarsynth.synthesis.pulse import pulse_spectrum
+from sonarsynth.synthesis.wavefront import fronts
+from sonarsynth.world.moment import Snap
+
+
+@description
+class KernelDeposit:
+    """Synthesis by a Kaiser-Bessel kernel, Chebyshev nodes over the aperture and polynomial directivity."""
+
+    kind: Literal["kernel_deposit"] = "kernel_deposit"
+    width: Annotated[int, Ge(4), Le(16), MultipleOf(2)] = 6
+    """Samples that a path is spread over."""
+    oversampling: Annotated[Number, Ge(1.2), Le(8)] = 1.5
+    """Rate of the grid over twice the highest frequency."""
+    precision: Literal["float32", "float64"] = "float32"
+    tolerance: Annotated[Number, Gt(0), Lt(0.1)] = 2e-4
+    """Error allowed to each of the other approximations, relative to what a path gives: nodes over the aperture, terms
+    of directivity and of absorption."""
+
+    def signals(
+        self,
+        arrivals: Arrivals,
+        snaps: tuple[Snap, ...],
+        elements: Elements,
+        sonar: Sonar,
+        absorption: Callable[[Floats], Floats] | None,
+        start: float,
+        samples: int,
+    ) -> Signals:
+        """Pressure at each hydrophone from `start` (s): silence, and stretches of it that hold whole pulses."""
+        pressure, outside = self.pressure(arrivals, snaps, elements, sonar, absorption, start, samples)
+        return Signals(pressure.astype(np.float32, copy=False), start, sonar.sampling_frequency, 0.0, 0, outside)
+
+    def pressure(
+        self,
+        arrivals: Arrivals,
+        snaps: tuple[Snap, ...],
+        elements: Elements,
+        sonar: Sonar,
+        absorption: Callable[[Floats], Floats] | None,
+        start: float,
+        samples: int,
+    ) -> tuple[npt.NDArray[Any], int]:
+        """Pressure (sensor, sample) in the precision of the method, and the number of arrivals that the window cuts."""
+        fs = sonar.sampling_frequency
+        front = fronts(arrivals, snaps, elements)
+        plan = layout(arrivals, front, snaps, elements, sonar, start, samples)
+        out = np.zeros((elements.count, samples), self.precision)
+        method = (self.width, self.oversampling, self.precision, self.tolerance)
+        for part in plan.stretches:
+            frequency, spectrum = pulse_spectrum(part.model, sonar.antialias, fs, part.samples)
+            relative = relative_absorption(absorption, frequency, sonar.band.centre)
+            piece = stretch_pressure(
+                front.select(part.paths),
+                elements,
+                Bins(frequency, spectrum, relative, fs / part.samples),
+                start + part.first / fs,
+                part.samples,
+                stop_frequency(sonar.antialias),
+                method,
+            )
+            first, last = max(part.first, 0), min(part.first + part.samples, samples)
+            out[:, first:last] += piece[:, first - part.first : last - part.first]
+        return out, plan.outside

@@ -1,0 +1,158 @@
+"""Compiled loops of the kernel deposit. One thread, fixed order: the same bits on any number of workers.
+
+Arrays are flat with constant offsets and loop bodies are straight lines, because the compiler vectorises only those.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from sonarsynth.synthesis.vectors import add_scaled, cubics
+
+BLOCK = 128
+"""Paths in a block of the packed table."""
+
+ROWS = 7
+"""Rows of the packed table: direction x, y, z; curvature; position (samples); amplitude; absorption (scaled
+deviation)."""
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+def _wavefront(
+    block: Any, node: Any, middle: Any, scale: Any, rate: float, steer: float, level: float, place: Any, value: Any
+) -> None:
+    """Positions (samples) of a block of paths at a node, and rows of value: deviations in y, z and absorption, -,
+    amplitude."""
+    qx, qy, qz = node[0], node[1], node[2]
+    qq = qx * qx + qy * qy + qz * qz
+    uy, uz, sy, sz = middle[0], middle[1], scale[0], scale[1]
+    for i in range(BLOCK):
+        dx, dy, dz, k = block[i], block[BLOCK + i], block[2 * BLOCK + i], block[3 * BLOCK + i]
+        vx, vy, vz = dx - k * qx, dy - k * qy, dz - k * qz
+        n = np.sqrt(vx * vx + vy * vy + vz * vz)
+        near = 1.0 / n
+        place[i] = block[4 * BLOCK + i] - steer + (k * qq - 2.0 * (qx * dx + qy * dy + qz * dz)) / (n + 1.0) * rate
+        value[i] = (vy * near - uy) * sy
+        value[BLOCK + i] = (vz * near - uz) * sz
+        value[2 * BLOCK + i] = block[6 * BLOCK + i]
+        value[4 * BLOCK + i] = block[5 * BLOCK + i] * near / level
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+def _multiply(a: Any, b: Any, out: Any) -> None:
+    for i in range(BLOCK):
+        out[i] = a[i] * b[i]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+def _recur(out: Any, earlier: Any) -> None:
+    for i in range(BLOCK):
+        out[i] = 2.0 * out[i] - earlier[i]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+def _split(place: Any, half: float, rows: int, length: int, begin: Any, row: Any, fraction: Any) -> None:
+    """First sample of the kernel on the circle, row of its table, and place in the row, from -1/2 to 1/2."""
+    for i in range(BLOCK):
+        left = np.floor(place[i] - half)
+        x = (left + 1.0 - (place[i] - half)) * rows
+        r = min(np.floor(x), rows - 1.0)
+        first = left + 1.0
+        begin[i] = int(first - np.floor(first / length) * length)
+        row[i] = int(r)
+        fraction[i] = x - r - 0.5
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+def deposit(
+    table: Any,
+    count: int,
+    nodes: Any,
+    steer: Any,
+    level: Any,
+    middle: Any,
+    scale: Any,
+    late: Any,
+    louder: Any,
+    recipe: Any,
+    taps: Any,
+    half: float,
+    lanes: int,
+    rate: float,
+    length: int,
+    grid: Any,
+) -> None:
+    """Add the kernel of every path at every node, times every term, to grid (node * term * (length + lanes),).
+
+    table: `count` paths in blocks (block * ROWS * BLOCK,), float64. nodes (node, xyz) in m. Of the tile's middle at the
+    nodes, taken off: steer (node,) its delay in samples, level (node,) its gain, middle (node, 2) its direction y, z.
+    scale (2,) is one over the deviation of y and z. late (samples) and louder (node, path) are the wavefront's terms,
+    or empty. recipe (term, 3) makes terms. taps (row * 4 * lane,) is the kernel, a cubic a row, and half its half width
+    in samples. rate is in samples/m; the grid is a circle of `length` samples.
+    """
+    terms, stride = recipe.shape[0], length + lanes
+    rows = taps.size // (4 * lanes)
+    place, fraction = np.empty(BLOCK), np.empty(BLOCK, grid.dtype)
+    begin, row = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
+    value = np.empty((4 + terms) * BLOCK, grid.dtype)
+    for m in range(nodes.shape[0]):
+        for first in range(0, count, BLOCK):
+            size = min(BLOCK, count - first)
+            block = table[first * ROWS : (first + BLOCK) * ROWS]
+            _wavefront(block, nodes[m], middle[m], scale, rate, steer[m], level[m], place, value)
+            if late.size:
+                place[:size] += late[m, first : first + size]
+            if louder.size:
+                value[4 * BLOCK : 4 * BLOCK + size] *= 1.0 + louder[m, first : first + size]
+            for t in range(1, terms):
+                a, b, c = (4 + recipe[t, 0]) * BLOCK, recipe[t, 1] * BLOCK, (4 + t) * BLOCK
+                _multiply(value[a : a + BLOCK], value[b : b + BLOCK], value[c : c + BLOCK])
+                if recipe[t, 2] >= 0:
+                    d = (4 + recipe[t, 2]) * BLOCK
+                    _recur(value[c : c + BLOCK], value[d : d + BLOCK])
+            _split(place, half, rows, length, begin, row, fraction)
+            for i in range(size):
+                for lane in range(0, lanes, 8):
+                    w: Any = cubics(taps, row[i] * 4 * lanes + lane, lanes, fraction[i])  # type: ignore[call-arg]
+                    for t in range(terms):
+                        add_scaled(grid, (m * terms + t) * stride + begin[i] + lane, value[(4 + t) * BLOCK + i], w)
+    for line in range(nodes.shape[0] * terms):  # close the circle
+        for i in range(lanes):
+            grid[line * stride + i] += grid[line * stride + length + i]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+def combine(spectra: Any, factors: Any, out: Any) -> None:
+    """Sum over terms of spectra (node, term, bin) times real factors (node, term, bin) into out (node, bin)."""
+    for m in range(out.shape[0]):
+        for b in range(out.shape[1]):
+            out[m, b] = spectra[m, 0, b] * factors[m, 0, b]
+        for t in range(1, factors.shape[1]):
+            for b in range(out.shape[1]):
+                out[m, b] += spectra[m, t, b] * factors[m, t, b]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+def steer_back(field: Any, delay: Any, gain: Any, out: Any) -> None:
+    """Add gain[s] exp(-2 pi i b delay[s]) field[s, b] to out[s, b], complex numbers as pairs of reals; delay in cycles
+    a bin."""
+    c, s = np.empty(32, field.dtype), np.empty(32, field.dtype)
+    bins = out.shape[1] // 2
+    for q in range(out.shape[0]):
+        turn = np.exp(-2j * np.pi * delay[q])
+        w = 1.0 + 0.0j
+        for j in range(32):
+            c[j], s[j] = w.real, w.imag
+            w *= turn
+        start = complex(gain[q])
+        for first in range(0, bins, 32):
+            re, im = field.dtype.type(start.real), field.dtype.type(start.imag)
+            for j in range(min(32, bins - first)):
+                cr, ci = re * c[j] - im * s[j], re * s[j] + im * c[j]
+                b = 2 * (first + j)
+                out[q, b] += cr * field[q, b] - ci * field[q, b + 1]
+                out[q, b + 1] += cr * field[q, b + 1] + ci * field[q, b]
+            start *= w

@@ -1,0 +1,102 @@
+"""Which arrivals a window holds, and how they fall into short stretches of time that are synthesised one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.products import Arrivals
+from sonarsynth.sonar import Elements, Sonar
+from sonarsynth.synthesis.pulse import pulse_support
+from sonarsynth.synthesis.wavefront import Fronts, delay_and_gain, reach
+from sonarsynth.world.moment import Snap
+from sonarsynth.world.sources import LogarithmicBubble
+
+FAST = (16, 18, 20, 24, 27, 30)
+"""Lengths of stretches are these times powers of two: fast to transform, and few, so that spectra of pulses are
+kept."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Paths of one waveform whose pulses overlap in time, and the samples that hold them."""
+
+    paths: Ints  # (path,) which
+    model: LogarithmicBubble
+    first: int  # sample of the window where it begins; may be negative
+    samples: int  # even
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """What of the arrivals is heard in the window."""
+
+    stretches: tuple[Stretch, ...]
+    heard: Bools  # (path,) some of the pulse is in the window at some hydrophone
+    outside: int  # paths whose pulse is not wholly in the window at every hydrophone
+
+
+def fast_length(samples: int) -> int:
+    """The smallest even length of the list `FAST` times a power of two that holds so many samples."""
+    scale = 2
+    while FAST[-1] * scale < samples:
+        scale *= 2
+    return next(m * scale for m in FAST if m * scale >= samples)
+
+
+def layout(
+    arrivals: Arrivals,
+    front: Fronts,
+    snaps: tuple[Snap, ...],
+    elements: Elements,
+    sonar: Sonar,
+    start: float,
+    samples: int,
+) -> Layout:
+    """Sort arrivals into stretches: direct and echoes apart (they differ by tens of dB), each waveform apart."""
+    if samples < 1:
+        raise ValueError("a window needs at least one sample")
+    fs = sonar.sampling_frequency
+    support = np.array([pulse_support(s.model, sonar.antialias) for s in snaps]).reshape(-1, 2)
+    before, after = support[arrivals.snap].T if front.count else np.zeros((2, 0))
+    early, late = _extent(front, elements, before, after, start, start + (samples - 1) / fs)
+    cut = (early < start) | (late > start + (samples - 1) / fs)
+    heard = (late > start) & (early < start + (samples - 1) / fs)
+    stretches: list[Stretch] = []
+    for model in dict.fromkeys(s.model for s in snaps):
+        same = np.array([s.model == model for s in snaps])[arrivals.snap] & heard
+        for rows in (np.flatnonzero(same & arrivals.direct), np.flatnonzero(same & ~arrivals.direct)):
+            for chosen in _runs(rows, early, late):
+                first = int(np.floor((early[chosen].min() - start) * fs)) - 1
+                last = int(np.ceil((late[chosen].max() - start) * fs)) + 1
+                stretches.append(Stretch(chosen, model, first, fast_length(last - first + 1)))
+    return Layout(tuple(stretches), heard, int(cut.sum()))
+
+
+def _extent(
+    front: Fronts, elements: Elements, before: Floats, after: Floats, start: float, stop: float
+) -> tuple[Floats, Floats]:
+    """When the pulse of each path begins at the first hydrophone and ends at the last: bounds, exact where they leave
+    the window."""
+    spread = reach(front)
+    early, late = front.delay - spread - before, front.delay + spread + after
+    doubtful = np.flatnonzero((early < start) | (late > stop))
+    for rows in np.array_split(doubtful, doubtful.size // 1024 + 1):  # bounds the memory
+        if rows.size:
+            delay, _ = delay_and_gain(front.select(rows), elements.position)
+            early[rows] = front.delay[rows] + delay.min(axis=1) - before[rows]
+            late[rows] = front.delay[rows] + delay.max(axis=1) + after[rows]
+    return early, late
+
+
+def _runs(rows: Ints, early: Floats, late: Floats) -> Iterator[Ints]:
+    """Rows in runs whose pulses overlap in time; each run keeps the order of the arrivals."""
+    if not rows.size:
+        return
+    order = rows[np.argsort(early[rows], kind="stable")]
+    silent = early[order[1:]] > np.maximum.accumulate(late[order])[:-1]
+    for run in np.split(order, np.flatnonzero(silent) + 1):
+        yield np.sort(run)

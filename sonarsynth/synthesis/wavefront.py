@@ -1,0 +1,111 @@
+"""Wavefronts over the aperture: when, how loud and from where each path reaches a point. Stable for plane waves (radius
+inf)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonarsynth.acoustics.arrays import aperture_terms
+from sonarsynth.acoustics.snap import gain_for_level
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.products import Arrivals
+from sonarsynth.sonar import Elements
+from sonarsynth.synthesis.pulse import bubble
+from sonarsynth.world.moment import Snap
+
+
+@dataclass(frozen=True, eq=False)
+class Fronts:
+    """Arrivals as synthesis takes them: curvature for radius, and the level of the snap inside the amplitude."""
+
+    delay: Floats  # (path,) s at the array centre
+    direction: Floats  # (path, xyz)
+    curvature: Floats  # (path,) 1/m: 1/radius, 0 for a plane wave
+    amplitude: Floats  # (path,)
+    loss: Floats  # (path,) dB of absorption at the band centre, inside amplitude
+    delay_terms: Floats  # (path, term) s
+    gain_terms: Floats  # (path, term)
+    sound_speed: float  # m/s
+    aperture: float  # m: scale of the terms
+
+    @property
+    def count(self) -> int:
+        """Number of paths."""
+        return self.delay.size
+
+    def select(self, keep: Ints) -> Fronts:
+        """The paths of these indices."""
+        return Fronts(
+            self.delay[keep],
+            self.direction[keep],
+            self.curvature[keep],
+            self.amplitude[keep],
+            self.loss[keep],
+            self.delay_terms[keep],
+            self.gain_terms[keep],
+            self.sound_speed,
+            self.aperture,
+        )
+
+
+def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements) -> Fronts:
+    """The wavefronts of arrivals; raises ValueError where one cannot be synthesised."""
+    count = arrivals.delay.size
+    for name in ("delay", "direction", "amplitude", "absorption", "delay_terms", "amplitude_terms"):
+        value = getattr(arrivals, name)
+        wrong = ~np.isfinite(value).all(axis=tuple(range(1, value.ndim)))
+        if wrong.any():
+            raise ValueError(f"arrival {np.flatnonzero(wrong)[0]} has {name} that is not a finite number")
+    if count and not (arrivals.amplitude != 0.0).all():
+        raise ValueError(f"arrival {np.flatnonzero(arrivals.amplitude == 0.0)[0]} has no amplitude")
+    if count and not (arrivals.radius > 0.0).all():
+        raise ValueError(f"arrival {np.flatnonzero(~(arrivals.radius > 0.0))[0]} has a radius that is not positive")
+    if count and not (arrivals.snap.min() >= 0 and arrivals.snap.max() < len(snaps)):
+        raise ValueError(f"arrivals name a snap outside 0..{len(snaps) - 1}")
+    near = np.flatnonzero(arrivals.radius <= 1.001 * elements.aperture)
+    away = elements.position - (arrivals.radius[near, None] * arrivals.direction[near])[:, None]
+    touching = (np.linalg.norm(away, axis=2) <= 1e-9 * arrivals.radius[near, None]).any(axis=1)
+    if touching.any():
+        raise ValueError(f"arrival {near[touching][0]} comes from a hydrophone")
+    level = np.array([gain_for_level(bubble(s.model), s.source_level) for s in snaps])
+    return Fronts(
+        delay=arrivals.delay,
+        direction=arrivals.direction,
+        curvature=1.0 / arrivals.radius,
+        amplitude=arrivals.amplitude * level[arrivals.snap] if count else arrivals.amplitude,
+        loss=arrivals.absorption,
+        delay_terms=arrivals.delay_terms,
+        gain_terms=arrivals.amplitude_terms,
+        sound_speed=arrivals.sound_speed,
+        aperture=elements.aperture or 1.0,
+    )
+
+
+def towards(front: Fronts, points: Floats) -> tuple[Floats, Floats]:
+    """Unit vectors u = (R d - q)/|R d - q| (path, point, xyz) and |R d - q|/R (path, point) at points q (point,
+    xyz)."""
+    v = front.direction[:, None, :] - front.curvature[:, None, None] * points
+    n = np.sqrt(np.einsum("epi,epi->ep", v, v))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return v / n[:, :, None], n
+
+
+def delay_and_gain(front: Fronts, points: Floats) -> tuple[Floats, Floats]:
+    """Delay (s) after the array centre, and gain over it, (path, point) each."""
+    _, n = towards(front, points)
+    square = np.einsum("pi,pi->p", points, points)
+    # (|R d - q| - R)/c without the difference of nearly equal numbers
+    path = (front.curvature[:, None] * square - 2.0 * front.direction @ points.T) / (n + 1.0)
+    delay, gain = path / front.sound_speed, 1.0 / n
+    if front.delay_terms.shape[1]:
+        delay = delay + front.delay_terms @ aperture_terms(points, front.aperture).T
+    if front.gain_terms.shape[1]:
+        gain = gain * (1.0 + front.gain_terms @ aperture_terms(points, front.aperture).T)
+    return delay, gain
+
+
+def reach(front: Fronts) -> Floats:
+    """Bound (path,) on how long (s) before or after the array centre a wavefront meets any hydrophone."""
+    return np.asarray(front.aperture / front.sound_speed + np.abs(front.delay_terms).sum(axis=1))

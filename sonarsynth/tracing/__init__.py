@@ -1,0 +1,37 @@
+"""How sound travels: propagation models that join points by rays, and what is traced with them.
+
+`Tracing` is the registry of models; `tracing.arrivals.trace` gives the arrivals of a frame, `tracing.fan.fan` follows
+rays wherever they go.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Protocol
+
+from sonarsynth.acoustics.rays import REASONS
+from sonarsynth.conventions import Floats
+from sonarsynth.description import BY_KIND
+from sonarsynth.products import Paths
+from sonarsynth.tracing.auto import AutoTracing
+from sonarsynth.tracing.refracted import Refracted
+from sonarsynth.tracing.straight import Straight
+from sonarsynth.world.environment import Profile
+
+
+class Propagation(Protocol):
+    """A model of how sound travels between two points."""
+
+    def connect(self, profile: Profile, environment_depth: float, start: Floats, end: Floats) -> Paths:
+        """All paths from start (pair, xyz) to end (pair, xyz) in the world, in water `environment_depth` (m) deep.
+
+        Raises ValueError for points outside the water or not finite.
+        """
+        ...
+
+
+Tracing = Annotated[Straight | Refracted | AutoTracing, BY_KIND]
+
+FLAGS = REASONS
+"""What `Paths.flag` means: 0 good, else why ray theory ends here."""
+
+__all__ = ["FLAGS", "AutoTracing", "Propagation", "Refracted", "Straight", "Tracing"]

@@ -1,0 +1,91 @@
+"""The wavefront of a path over the aperture: a reference sphere and a polynomial for what it leaves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from sonarsynth.acoustics.arrays import aperture_terms
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.products import Paths
+from sonarsynth.sonar import Elements
+
+FITTED = 20
+"""Probe sensors that the polynomials are fitted to."""
+HELD_OUT = 4
+"""Further probes that only measure the error of the fit."""
+BRANCH = 0.05
+"""Largest misfit of a probe to the sphere, in travel times over the aperture: a path farther off is another branch."""
+
+
+@dataclass(frozen=True, eq=False)
+class Probes:
+    """Sensors spread over the aperture, edge first, at which rays are traced exactly."""
+
+    sensor: Ints  # (probe,) the fitted ones first
+    position: Floats  # (probe, xyz) m, sonar frame
+    fitted: int
+    solve: Floats  # (term, fitted): values at the fitted probes to coefficients; the row of the constant term is 0
+    basis: Floats  # (probe, term)
+    aperture: float  # m
+
+    def fit(self, values: Floats) -> Floats:
+        """Coefficients (path, term) of the least-squares polynomial, 0 at the centre, through values (path, probe).
+
+        Values that are NaN (no ray there) are left out.
+        """
+        fitted = values[:, : self.fitted]
+        terms = np.nan_to_num(fitted) @ self.solve.T
+        for i in np.flatnonzero(np.isnan(fitted).any(axis=1)):
+            there = np.isfinite(fitted[i])
+            terms[i, 1:] = np.linalg.lstsq(self.basis[: self.fitted][there, 1:], fitted[i, there], rcond=1e-10)[0]
+        return terms
+
+    def misfit(self, values: Floats, terms: Floats) -> Floats:
+        """Largest |error| (path,) at the probes held out (at all if none were); inf where a ray is missing."""
+        held = slice(self.fitted, None) if len(self.sensor) > self.fitted else slice(None)
+        error = np.abs(values[:, held] - terms @ self.basis[held].T).max(axis=1, initial=0.0)
+        return np.where(np.isnan(values).any(axis=1), np.inf, error)
+
+
+@lru_cache(maxsize=8)
+def probes(elements: Elements) -> Probes:
+    """Probe sensors of an array, each the one farthest from those before it, from the element farthest out."""
+    position = elements.position
+    chosen = [int(np.argmax(np.linalg.norm(position, axis=1)))]
+    nearest = np.full(len(position), np.inf)
+    for _ in range(min(FITTED + HELD_OUT, elements.count) - 1):
+        nearest = np.minimum(nearest, np.linalg.norm(position - position[chosen[-1]], axis=1))
+        chosen.append(int(np.argmax(nearest)))
+    sensor = np.array(chosen)
+    fitted = min(FITTED, len(sensor))
+    scale = elements.aperture or 1.0  # one element at the centre has no aperture, and no terms but 0
+    basis = aperture_terms(position[sensor], scale)
+    solve = np.vstack([np.zeros(fitted), np.linalg.pinv(basis[:fitted, 1:], rcond=1e-10)])
+    return Probes(sensor, position[sensor], fitted, solve, basis, scale)
+
+
+def sphere(direction: Floats, radius: Floats, position: Floats) -> Floats:
+    """Distance (path, probe) from the centre of the reference sphere R d to a position q, less R, without cancellation.
+
+    |R d - q| - R = (q.q - 2 R d.q)/(|R d - q| + R).
+    """
+    source = radius[:, None] * direction
+    square = (position * position).sum(axis=1) - 2.0 * source @ position.T
+    return np.asarray(square / (np.sqrt(radius[:, None] ** 2 + square) + radius[:, None]))
+
+
+def pick_branch(paths: Paths, predicted: Floats, tolerance: float) -> Ints:
+    """Index (row, probe) of the path nearest in time to predicted (row, probe); -1 where none is within tolerance (s).
+
+    Pair n of paths is row n // probes, probe n % probes.
+    """
+    best = np.full(predicted.size, -1)
+    wanted = np.abs(paths.travel_time - predicted.ravel()[paths.pair])
+    order = np.flatnonzero(wanted <= tolerance)
+    if (np.diff(paths.pair) == 0).any():
+        order = order[np.argsort(-wanted[order], kind="stable")]  # the nearest is written last, and stays
+    best[paths.pair[order]] = order
+    return best.reshape(predicted.shape)

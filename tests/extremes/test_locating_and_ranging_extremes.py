@@ -1,0 +1,227 @@
+"""Geometries and arrays that have no answer, or hardly one: NaN or a large error, never a wrong number."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+from sonarsynth.acoustics.bearings import plane_wave, spherical_wave, wavefront_delays
+from sonarsynth.acoustics.bistatic import bistatic_range, excess_path
+from sonarsynth.conventions import direction
+from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.products import EnergyImage
+from sonarsynth.ranging import IsovelocityRange, RefractedRange, SensorDelays
+from sonarsynth.ranging.locating import unlocatable
+from sonarsynth.sonar import BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
+from sonarsynth.world.environment import Profile
+from tests.heard import add_noise, hear_direct, hear_echoes, silence
+
+C = 1540.0
+AHEAD = np.array([1.0, 0.0, 0.0])
+POSE = Pose(np.array([0.0, 0.0, -5.0]), quaternion(np.pi / 2))
+WATER = Profile(np.array([0.0]), np.array([C]))
+
+
+@pytest.mark.parametrize(("off", "slope"), [(1.0, 50.0), (0.1, 5e3), (0.01, 5e5)])
+def test_target_near_the_baseline(off, slope):
+    """Between array and source: dr/dL grows without bound, and says so."""
+    target = np.array([10.0, off, 0.0])
+    beam = target / np.linalg.norm(target)
+    source = np.array([20.0, 0.0, 0.0])
+    found = bistatic_range(excess_path(beam, np.linalg.norm(target), source), beam, source)
+    assert found.by_path == pytest.approx(slope, rel=0.02)
+    assert found.ill_conditioned
+    assert found.range == pytest.approx(np.linalg.norm(target), rel=1e-9)
+
+
+def test_on_the_baseline_every_range_fits_and_none_is_given():
+    found = bistatic_range(0.0, AHEAD, 20.0 * AHEAD)
+    assert np.isnan(found.range)
+    assert found.ill_conditioned
+
+
+def test_no_path_is_shorter_than_the_direct_one():
+    found = bistatic_range(-1e-6, direction(0.4, 0.0), 20.0 * AHEAD)
+    assert np.isnan(found.range)
+    assert found.ill_conditioned
+
+
+def test_target_behind_the_source():
+    """psi = 0 and L > b: r = (L + b)/2."""
+    found = bistatic_range(6.0, AHEAD, 20.0 * AHEAD)
+    assert found.range == pytest.approx(23.0, rel=1e-15)
+    assert found.by_path == pytest.approx(0.5)
+    assert not found.ill_conditioned
+
+
+def test_source_behind_the_array():
+    """psi = pi: r = x/2, whatever the baseline."""
+    assert bistatic_range(6.0, AHEAD, -20.0 * AHEAD).range == pytest.approx(3.0, rel=1e-15)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-3, 1e6, 1e12])
+def test_any_size_of_scene(size):
+    beam, source = direction(0.3, 0.1), size * np.array([9.0, -5.0, -6.0])
+    found = bistatic_range(excess_path(beam, 20.0 * size, source), beam, source)
+    assert found.range == pytest.approx(20.0 * size, rel=1e-12)
+
+
+def test_target_at_the_array_and_at_the_source():
+    source = np.array([9.0, -5.0, -6.0])
+    assert bistatic_range(0.0, AHEAD, source).range == 0.0
+    b = np.linalg.norm(source)
+    towards = source / b
+    assert excess_path(towards, b, source) == pytest.approx(0.0, abs=1e-12)
+    assert np.isnan(bistatic_range(1.0, AHEAD, np.zeros(3)).range)  # no direction to a source at the array
+
+
+def locate(signals, array, depth, snaps=1, **sonar):
+    return SensorDelays().locate(signals, array, Sonar(assumed_sound_speed=C, **sonar), POSE, float(depth), snaps)
+
+
+@pytest.mark.parametrize(
+    ("positions", "reason"),
+    [
+        (((0.0, 0.0, 0.0),), "1 live sensor:"),
+        (((0.0, 0.1, 0.0), (0.0, 0.1, 0.0)), "2 live sensors:"),
+        (((0.0, 0.1, 0.0),) * 5, "one place"),
+        (tuple((0.0, 0.1 * i, 0.0) for i in range(8)), "one line"),
+    ],
+)
+def test_arrays_that_cannot_tell_a_direction(positions, reason):
+    array = elements(PositionTable(positions=positions))
+    found = locate(hear_direct(array, [9.0, -5.0, -6.0]), array, 11.0)
+    assert all(np.isnan(value).all() for value in vars(found).values())
+    assert reason in unlocatable(array)
+    delay = wavefront_delays(array.position, AHEAD, 0.1, C)
+    assert np.isnan(plane_wave(delay, array.position, C)[0]).all()
+    assert spherical_wave(delay, array.position, C, np.ones(len(delay)), AHEAD) is None
+
+
+def test_dead_sensors_can_leave_a_line():
+    array = elements(PlanarLattice(columns=4, rows=2, pitch=0.1, dead=(4, 5, 6, 7)))
+    assert "one line" in unlocatable(array)
+    assert unlocatable(elements(Romanis())) is None
+
+
+def test_three_sensors_tell_the_direction_and_the_depth_the_rest():
+    array = elements(PositionTable(positions=((0.0, 0.4, 0.0), (0.0, -0.3, 0.2), (0.0, -0.1, -0.4))))
+    source = np.array([40.0, -15.0, -20.0])
+    found = locate(hear_direct(array, source), array, 25.0)
+    assert np.linalg.norm(found.position[0] - source) < 0.3
+    assert found.range_from_depth[0] == pytest.approx(np.linalg.norm(source), rel=0.005)
+    assert np.linalg.norm(found.position[0] - source) < 3 * np.sqrt(np.trace(found.position_covariance[0]))
+
+
+def test_silence():
+    array = elements(Romanis())
+    found = locate(silence(array, 0.0, 600), array, 11.0, snaps=2)
+    assert found.time.shape == (2,)
+    assert all(np.isnan(value).all() for value in vars(found).values())
+    assert locate(silence(array, 0.0, 600), array, 11.0, snaps=0).position.shape == (0, 3)
+
+
+def test_noise_alone_is_no_snap():
+    array = elements(Romanis())
+    noise = add_noise(silence(array, 0.0, 1500), 1.0, np.random.default_rng(2))
+    assert np.isnan(locate(noise, array, 11.0).time).all()
+
+
+@pytest.mark.parametrize("vertical", [direction(0.0, -1.2), direction(0.0, -0.5 * np.pi)])
+def test_snap_below(vertical):
+    """To straight down, where azimuth means nothing, its error is large and the position still good."""
+    source = 8.0 * vertical
+    array = elements(Romanis(face=0.0))
+    found = locate(hear_direct(array, source), array, 5.0 - source[2])
+    assert np.linalg.norm(found.position[0] - source) < 3 * np.sqrt(np.trace(found.position_covariance[0]))
+    assert np.linalg.norm(found.position[0] - source) < 0.05
+    assert found.range_from_depth[0] == pytest.approx(8.0, abs=0.05)
+    assert abs(found.elevation[0] - np.arcsin(vertical[2])) < 0.05
+
+
+def test_snap_straight_above():
+    source = np.array([0.5, 0.0, 4.0])
+    array = elements(Romanis(face=0.0))
+    found = locate(hear_direct(array, source), array, 5.0 - source[2])  # a "bed" above the sonar: a shelf
+    assert np.linalg.norm(found.position[0] - source) < 0.02
+
+
+def test_a_nearly_horizontal_bearing_makes_the_depth_useless_and_says_so():
+    source = np.array([20.0, 3.0, -0.05])
+    array = elements(Romanis())
+    found = locate(hear_direct(array, source, noise=1e-4, random=np.random.default_rng(0)), array, 5.06)
+    assert found.range_from_depth_error[0] > 10.0
+    assert abs(found.range_from_depth[0] - np.linalg.norm(source)) < 3 * found.range_from_depth_error[0]
+    assert np.linalg.norm(found.position[0] - source) < 0.1
+
+
+def test_a_bearing_that_never_meets_the_bed_has_no_range_from_depth():
+    source = np.array([20.0, 3.0, 2.0])
+    array = elements(Romanis())
+    found = locate(hear_direct(array, source), array, 25.0)
+    assert np.isnan(found.range_from_depth[0])
+    assert np.isnan(found.range_from_depth_error[0])
+    assert np.linalg.norm(found.position[0] - source) < 0.05  # by curvature
+
+
+def test_depth_and_curvature_that_disagree_are_called_uncertain():
+    source = np.array([12.0, 3.0, -6.0])
+    array = elements(Romanis())
+    signals = hear_direct(array, source)
+    agreed, apart = locate(signals, array, 11.0), locate(signals, array, 13.0)
+    miss = np.linalg.norm(apart.position[0] - source)
+    assert np.trace(apart.position_covariance[0]) > 100 * np.trace(agreed.position_covariance[0])
+    assert miss < 3 * np.sqrt(np.trace(apart.position_covariance[0]))
+
+
+def heard_target(array, target, source):
+    signals, first, last = hear_echoes(array, source, [target], np.array([1.0]))
+    return signals, first - 5e-4, last + 5e-4
+
+
+def cloud_of(method, array, sonar, signals, image, source):
+    found = SensorDelays().locate(signals, array, sonar, POSE, 5.0 - source[2], 1)
+    return method.cloud(signals, image, found, array, sonar, POSE, WATER)
+
+
+@pytest.mark.parametrize("method", [IsovelocityRange(), RefractedRange()])
+def test_clouds_of_nothing(method):
+    array = elements(PlanarLattice(columns=8, rows=8, pitch=0.1))
+    grid = BeamGrid(azimuths=5, elevations=3)
+    sonar = Sonar(assumed_sound_speed=C, beams=grid)
+    signals, start, stop = heard_target(array, [20.0, 1.0, 0.5], np.array([9.0, -5.0, -6.0]))
+    empty = EnergyImage(np.zeros((3, 5), np.float32), grid.azimuth, grid.elevation, start, stop)
+    unheard = EnergyImage(np.full((3, 5), np.nan, np.float32), grid.azimuth, grid.elevation, np.nan, np.nan)
+    full = EnergyImage(np.ones((3, 5), np.float32), grid.azimuth, grid.elevation, start, stop)
+    nobody = silence(array, signals.start, signals.pressure.shape[1])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for heard, image in ((signals, empty), (signals, unheard), (nobody, full), (nobody, empty)):
+            cloud = cloud_of(method, array, sonar, heard, image, np.array([9.0, -5.0, -6.0]))
+            assert cloud.range.shape == (3, 5)
+            assert cloud.position.shape == (3, 5, 3)
+            assert all(np.isnan(value).all() for value in vars(cloud).values())
+
+
+@pytest.mark.parametrize("method", [IsovelocityRange(locality=60.0), RefractedRange(locality=60.0)])
+def test_a_target_on_the_baseline_gives_no_point(method):
+    array = elements(PlanarLattice(columns=12, rows=12, pitch=0.05))
+    source = np.array([18.0, 0.5, -1.0])
+    sonar = Sonar(assumed_sound_speed=C, beams=BeamGrid(azimuths=1, elevations=1, azimuth_span=0.1, elevation_span=0.1))
+    signals, start, stop = heard_target(array, 0.5 * source + [0.0, 0.3, 0.3], source)
+    image = EnergyImage(np.ones((1, 1), np.float32), sonar.beams.azimuth, sonar.beams.elevation, start, stop)
+    assert np.isnan(cloud_of(method, array, sonar, signals, image, source).range).all()
+
+
+def test_one_beam_suffices_for_a_point():
+    array = elements(PlanarLattice(columns=16, rows=16, pitch=0.05))
+    source, target = np.array([9.0, -5.0, -6.0]), np.array([20.0, 0.0, 0.0])
+    sonar = Sonar(assumed_sound_speed=C, beams=BeamGrid(azimuths=1, elevations=1))
+    signals, start, stop = heard_target(array, target, source)
+    image = EnergyImage(np.ones((1, 1), np.float32), sonar.beams.azimuth, sonar.beams.elevation, start, stop)
+    for method in (IsovelocityRange(), RefractedRange()):
+        cloud = cloud_of(method, array, sonar, signals, image, source)
+        assert cloud.range[0, 0] == pytest.approx(20.0, abs=0.01)
+        assert np.allclose(cloud.position[0, 0], target, atol=0.01)

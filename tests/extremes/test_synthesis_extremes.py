@@ -1,0 +1,191 @@
+"""Synthesis where it is stiff: very near, very far, plane, late, crowded, empty, and wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sonarsynth.acoustics import snap
+from sonarsynth.conventions import Floats
+from sonarsynth.products import Arrivals
+from sonarsynth.sonar import Elements, PositionTable, Sonar, elements
+from sonarsynth.synthesis import DirectSum, KernelDeposit, pulse_support
+from sonarsynth.synthesis.direct_sum import exact_signals
+from sonarsynth.world.moment import Snap
+from sonarsynth.world.sources import LogarithmicBubble
+
+MODEL = LogarithmicBubble()
+SNAPS = (Snap(np.zeros(3), 0.0, MODEL, None),)
+SONAR = Sonar()
+C = 1540.0
+GRID = np.linspace(-0.6, 0.6, 4)
+ARRAY = elements(PositionTable(positions=tuple((0.0, float(y), float(z)) for y in GRID for z in GRID), face=49.53e-3))
+METHODS = (DirectSum(), KernelDeposit())
+
+
+def arrivals(delay: Floats, direction: Floats, radius: Floats, amplitude: Floats) -> Arrivals:
+    n = len(delay)
+    one, zero, none = np.ones(n), np.zeros(n, np.int64), np.zeros((n, 0))
+    d = np.asarray(direction, float).reshape(n, 3)
+    return Arrivals(
+        delay=np.asarray(delay, float),
+        direction=d / np.linalg.norm(d, axis=1, keepdims=True),
+        radius=np.asarray(radius, float),
+        delay_terms=none,
+        amplitude_terms=none,
+        amplitude=np.asarray(amplitude, float),
+        spreading_out=one,
+        spreading_in=one,
+        scattering=one,
+        boundary=one,
+        absorption=np.zeros(n),
+        length=one,
+        snap=zero,
+        target=zero,
+        facet=zero,
+        point=np.zeros((n, 3)),
+        surface=zero,
+        bottom=zero,
+        turning=zero,
+        sound_speed=C,
+        wavefront_error=0.0,
+    )
+
+
+def window(of: Arrivals, array: Elements) -> tuple[float, int]:
+    before, after = pulse_support(MODEL, SONAR.antialias)
+    start = float(of.delay.min() - before - array.aperture / C - 1e-5)
+    return start, int((of.delay.max() + after + array.aperture / C - start) * SONAR.sampling_frequency) + 3
+
+
+def error_of(method: KernelDeposit, of: Arrivals, array: Elements) -> float:
+    start, samples = window(of, array)
+    exact, _ = exact_signals(of, SNAPS, array, SONAR, None, start, samples)
+    got = method.signals(of, SNAPS, array, SONAR, None, start, samples).pressure
+    return float(np.abs(got - exact).max() / np.abs(exact).max())
+
+
+@pytest.mark.parametrize("radius", [0.87, 1.0, 3.0, 1e3, 1e8, 1e300, np.inf])
+def test_any_curvature(radius: float) -> None:
+    rng = np.random.default_rng(1)
+    direction = np.array([1.0, 0.2, 0.1]) + 0.05 * rng.standard_normal((20, 3))
+    of = arrivals(rng.uniform(0.01, 0.011, 20), direction, np.full(20, radius), rng.standard_normal(20))
+    assert error_of(KernelDeposit(), of, ARRAY) < 1e-4
+
+
+def test_a_huge_radius_is_a_plane_wave() -> None:
+    of = arrivals([0.01], [[1.0, 0.3, 0.2]], [1e15], [1.0])
+    start, samples = window(of, ARRAY)
+    far, flat = (
+        KernelDeposit().signals(replace(of, radius=np.array([r])), SNAPS, ARRAY, SONAR, None, start, samples).pressure
+        for r in (1e15, np.inf)
+    )
+    np.testing.assert_allclose(far, flat, atol=1e-6 * np.abs(flat).max())
+
+
+@pytest.mark.parametrize("delay", [-50.0, 0.0, 1.0, 1e4])
+def test_any_clock(delay: float) -> None:
+    of = arrivals(delay + np.array([0.0, 3.3e-4]), [[1.0, 0.1, 0.0], [1.0, 0.15, 0.1]], [20.0, 21.0], [1.0, -0.5])
+    assert error_of(KernelDeposit(), of, ARRAY) < (1e-4 if delay < 1e3 else 3e-4)  # 1e4 s is held to 1e-12 s
+
+
+@pytest.mark.parametrize("direction", [(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)])
+def test_along_the_edges_and_from_behind(direction: tuple[float, float, float]) -> None:
+    of = arrivals([0.01], [direction], [5.0], [1.0])
+    assert error_of(KernelDeposit(), of, ARRAY) < 1e-4
+
+
+def test_from_all_sides_at_once() -> None:
+    rng = np.random.default_rng(2)
+    of = arrivals(rng.uniform(0, 2e-3, 40), rng.standard_normal((40, 3)), rng.uniform(2, 50, 40), rng.uniform(1, 2, 40))
+    assert error_of(KernelDeposit(), of, ARRAY) < 1e-4
+
+
+def test_opposite_paths_of_one_tile() -> None:
+    of = arrivals([0.01, 0.01], [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], [np.inf, np.inf], [1.0, 1.0])
+    assert error_of(KernelDeposit(), of, ARRAY) < 1e-4
+
+
+def test_paths_that_are_all_alike() -> None:
+    of = arrivals(np.full(300, 0.01), np.tile([1.0, 0.2, 0.1], (300, 1)), np.full(300, 20.0), np.full(300, 1 / 300))
+    one = arrivals([0.01], [[1.0, 0.2, 0.1]], [20.0], [1.0])
+    start, samples = window(of, ARRAY)
+    many, single = (KernelDeposit().signals(x, SNAPS, ARRAY, SONAR, None, start, samples).pressure for x in (of, one))
+    np.testing.assert_allclose(many, single, atol=1e-5 * np.abs(single).max())
+
+
+def test_one_hydrophone_at_the_centre() -> None:
+    one = elements(PositionTable(positions=((0.0, 0.0, 0.0),), face=49.53e-3))
+    of = arrivals([0.01, 0.0101], [[1.0, 0.3, 0.0], [1.0, 0.0, 0.3]], [1e-3, 10.0], [1.0, 1.0])
+    assert error_of(KernelDeposit(), of, one) < 1e-4
+
+
+def test_levels_from_whisper_to_explosion() -> None:
+    for size in (1e-30, 1e12):
+        of = arrivals([0.01], [[1.0, 0.1, 0.1]], [20.0], [size])
+        assert error_of(KernelDeposit(), of, ARRAY) < 1e-4
+
+
+def test_an_echo_120_db_below_the_direct_snap_keeps_its_accuracy() -> None:
+    of = arrivals([0.01, 0.02], [[1.0, 0.1, 0.1], [1.0, -0.2, 0.0]], [20.0, 25.0], [1.0, 1e-6])
+    of = replace(of, target=np.array([-1, 0]))
+    start, samples = window(of, ARRAY)
+    exact, _ = exact_signals(of, SNAPS, ARRAY, SONAR, None, start, samples)
+    got = KernelDeposit().signals(of, SNAPS, ARRAY, SONAR, None, start, samples).pressure
+    alone, _ = exact_signals(of.select(of.target == 0), SNAPS, ARRAY, SONAR, None, start, samples)
+    late = int((0.018 - start) * SONAR.sampling_frequency)
+    assert np.abs(got - alone)[:, late:].max() < 1e-4 * np.abs(alone).max()
+    assert np.abs(got - exact).max() < 1e-4 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_no_paths_are_silence(method: DirectSum | KernelDeposit) -> None:
+    of = arrivals([], np.zeros((0, 3)), [], [])
+    for snaps in (SNAPS, ()):
+        got = method.signals(of, snaps, ARRAY, SONAR, None, 0.0, 64)
+        assert got.pressure.shape == (16, 64)
+        assert not got.pressure.any()
+        assert got.outside == 0
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"amplitude": np.array([1.0, np.nan])}, "arrival 1 has amplitude that is not a finite number"),
+        ({"amplitude": np.array([0.0, 1.0])}, "arrival 0 has no amplitude"),
+        ({"delay": np.array([0.0, np.inf])}, "arrival 1 has delay"),
+        ({"radius": np.array([1.0, 0.0])}, "arrival 1 has a radius that is not positive"),
+        ({"radius": np.array([np.nan, 2.0])}, "arrival 0 has a radius that is not positive"),
+        ({"snap": np.array([0, 1])}, r"snap outside 0\.\.0"),
+        (
+            {"radius": np.array([0.2, 2.0]), "direction": np.array([[0.0, 0.0, 1.0]] * 2)},
+            "arrival 0 comes from a hydrophone",
+        ),
+    ],
+)
+def test_what_cannot_be_synthesised_is_refused(
+    method: DirectSum | KernelDeposit, change: dict[str, np.ndarray], message: str
+) -> None:
+    array = elements(PositionTable(positions=((0.0, 0.0, 0.2), (0.0, 0.0, -0.2))))
+    of = replace(arrivals([0.0, 1e-4], [[1.0, 0.0, 0.0]] * 2, [2.0, 2.0], [1.0, 1.0]), **change)
+    with pytest.raises(ValueError, match=message):
+        method.signals(of, SNAPS, array, SONAR, None, -0.01, 4000)
+
+
+def test_an_empty_window_is_refused() -> None:
+    with pytest.raises(ValueError, match="at least one sample"):
+        KernelDeposit().signals(arrivals([0.0], [[1.0, 0, 0]], [1.0], [1.0]), SNAPS, ARRAY, SONAR, None, 0.0, 0)
+
+
+def test_a_snap_of_other_scales() -> None:
+    """A bubble ten times slower and one ten times faster: peak, support and spectrum follow."""
+    for factor in (0.1, 10.0):
+        scaled = snap.Bubble(MODEL.a, MODEL.k * factor, MODEL.m / factor, MODEL.q * factor, MODEL.density)
+        same = snap.Bubble(MODEL.a, MODEL.k, MODEL.m, MODEL.q, MODEL.density)
+        assert snap.peak(scaled)[0] == pytest.approx(snap.peak(same)[0] / factor, rel=1e-5)
+        assert snap.peak(scaled)[1] == pytest.approx(snap.peak(same)[1] * factor**2, rel=1e-9)
+        S = snap.spectrum(np.array([1e3, 5e4]) * factor, scaled)
+        np.testing.assert_allclose(S, factor * snap.spectrum(np.array([1e3, 5e4]), same), rtol=1e-9)

@@ -1,0 +1,203 @@
+"""Locating a snap: signs, exactness, and errors that keep their word."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sonarsynth.acoustics.rays import eigenrays, water
+from sonarsynth.conventions import azimuth_elevation, direction
+from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.products import Bearings, Signals
+from sonarsynth.ranging import SensorDelays
+from sonarsynth.sonar import PlanarLattice, Romanis, Sonar, elements
+from sonarsynth.world.environment import Tabulated
+from tests.heard import RATE, hear, hear_direct, silence
+
+C = 1540.0
+ROMANIS = elements(Romanis())
+SMALL_ARRAY = PlanarLattice(columns=12, rows=12, pitch=0.1, face=0.04953)
+SMALL = elements(SMALL_ARRAY)
+AHEAD = Pose(np.array([0.0, 0.0, -5.0]), quaternion(np.pi / 2))
+
+
+def locate(signals, array, source, pose=AHEAD, sonar=None, depth_error=0.0, snaps=1, method=None) -> Bearings:
+    """With the bed where the source is, but for depth_error."""
+    depth = -pose.to_world(np.asarray(source, float))[2] + depth_error
+    method = method or SensorDelays()
+    return method.locate(signals, array, sonar or Sonar(assumed_sound_speed=C), pose, float(depth), snaps)
+
+
+@pytest.mark.parametrize("azimuth", [-0.4, 0.5])
+@pytest.mark.parametrize("elevation", [-0.6, -0.15])
+def test_four_quadrants(azimuth, elevation):
+    """Port is +y and up is +z; upwards the same, where the bed is overhead (a sonar that hangs upside down)."""
+    for turn in (1.0, -1.0):
+        source = 12.0 * direction(azimuth, turn * elevation)
+        pose = Pose(AHEAD.position, quaternion(np.pi / 2, 0.0, 0.0 if turn > 0 else np.pi))
+        found = locate(hear_direct(ROMANIS, source), ROMANIS, source, pose)
+        assert found.azimuth[0] == pytest.approx(azimuth, abs=1e-5)
+        assert found.elevation[0] == pytest.approx(turn * elevation, abs=1e-5)
+        assert np.linalg.norm(found.position[0] - source) < 1e-3
+        assert found.range_from_depth[0] == pytest.approx(12.0, abs=1e-3)
+        assert found.range_from_curvature[0] == pytest.approx(12.0, abs=2e-3)
+        assert found.time[0] == pytest.approx(12.0 / C, abs=3 * found.time_error[0])
+
+
+def test_a_planar_array_hears_what_is_behind_it_in_front():
+    behind, mirrored = np.array([-9.0, 4.0, -3.0]), np.array([9.0, 4.0, -3.0])
+    found = locate(hear_direct(ROMANIS, behind), ROMANIS, mirrored)
+    assert np.linalg.norm(found.position[0] - mirrored) < 1e-3
+
+
+def test_moving_and_turning_everything_changes_nothing():
+    source = np.array([9.0, -5.0, -6.0])
+    signals = hear_direct(ROMANIS, source)
+    turned = Pose(np.array([120.0, -40.0, -9.0]), quaternion(2.0))
+    here, there = locate(signals, ROMANIS, source), locate(signals, ROMANIS, source, turned)
+    for name, value in vars(here).items():
+        assert np.allclose(value, getattr(there, name), rtol=1e-9, atol=1e-12), name
+
+
+def test_a_later_clock_moves_only_the_time():
+    source = np.array([9.0, -5.0, -6.0])
+    signals = hear_direct(ROMANIS, source)
+    here = locate(signals, ROMANIS, source)
+    later = locate(replace(signals, start=signals.start + 1.0), ROMANIS, source)
+    assert later.time[0] - here.time[0] == pytest.approx(1.0, abs=1e-12)
+    assert np.allclose(later.position, here.position, atol=1e-5)
+
+
+def test_dead_sensors_do_not_matter():
+    dead = tuple(range(0, 508, 7))
+    array = elements(Romanis(dead=dead))
+    source = np.array([12.0, 6.0, -5.0])
+    signals = hear_direct(array, source)
+    signals.pressure[list(dead)] = 50.0 * np.random.default_rng(0).standard_normal((len(dead), 1)).astype(np.float32)
+    found = locate(signals, array, source)
+    assert np.linalg.norm(found.position[0] - source) < 1e-3
+
+
+def test_an_echo_close_behind_the_pulse_does_little():
+    """40 dB down and 0.7 ms later, from elsewhere."""
+    source, near = np.array([12.0, 6.0, -5.0]), np.array([4.0, -1.0, -0.5])
+    late = np.linalg.norm(source) / C + 0.7e-3 - np.linalg.norm(near) / C
+    signals = hear(
+        hear_direct(ROMANIS, source), ROMANIS, near, late, 0.01 * np.linalg.norm(near) / np.linalg.norm(source)
+    )
+    found = locate(signals, ROMANIS, source)
+    assert abs(found.elevation[0] - azimuth_elevation(source)[1]) < 1e-4
+    assert np.linalg.norm(found.position[0] - source) < 0.02
+
+
+def test_the_face_of_the_elements_is_known():
+    """Far off the axis the face changes the sign of the upper band, sensor by sensor differently: no bias is left."""
+    source = np.array([6.0, 4.5, -4.0])
+    found = locate(hear_direct(ROMANIS, source), ROMANIS, source)
+    assert np.linalg.norm(found.position[0] - source) < 2e-3
+    assert found.residual[0] < 1e-9
+
+
+def tries(count, noise, speed_error, depth_error):
+    """Errors over predicted errors of many snaps: noise, sound speed and depth off as the instrument fears."""
+    random = np.random.default_rng(11)
+    sonar = Sonar(array=SMALL_ARRAY, assumed_sound_speed=C, sound_speed_error=speed_error, bed_depth_error=depth_error)
+    rows = []
+    for _ in range(count):
+        source = random.uniform(6.0, 25.0) * direction(random.uniform(-0.5, 0.5), random.uniform(-0.7, -0.1))
+        speed = C + speed_error * random.standard_normal()
+        # noise re the pulse on the axis at this distance
+        peak = 20.0 / np.linalg.norm(source)
+        signals = hear_direct(SMALL, source, speed, noise * peak, random, samples=700)
+        off = depth_error * random.standard_normal()
+        b = locate(signals, SMALL, source, sonar=sonar, depth_error=off)
+        azimuth, elevation = azimuth_elevation(source)
+        r = np.linalg.norm(source)
+        rows.append(
+            [
+                (b.azimuth[0] - azimuth) / b.azimuth_error[0],
+                (b.elevation[0] - elevation) / b.elevation_error[0],
+                (b.range_from_depth[0] - r) / b.range_from_depth_error[0],
+                (b.range_from_curvature[0] - r) / b.range_from_curvature_error[0],
+                *((b.position[0] - source) / np.sqrt(np.diag(b.position_covariance[0]))),
+            ]
+        )
+    return np.array(rows)
+
+
+@pytest.mark.parametrize(
+    ("noise", "speed_error", "depth_error"),
+    [(0.0, 1.0, 0.05), (0.003, 0.0, 0.05), (0.01, 1.0, 0.05), (0.001, 0.3, 0.001)],
+)
+def test_errors_are_honest(noise, speed_error, depth_error):
+    """Within three predicted errors in 95 % of cases at least, and not because errors are called huge."""
+    rows = tries(120, noise, speed_error, depth_error)
+    assert np.isfinite(rows).all()
+    assert np.mean(np.abs(rows) < 3, axis=0).min() >= 0.95
+    spread = np.sqrt(np.mean(rows**2, axis=0))
+    assert spread.min() > 0.5
+    assert spread.max() < 1.5
+
+
+def test_without_any_error_the_rest_is_within_the_floor():
+    rows = tries(40, 0.0, 0.0, 1e-9)
+    assert np.abs(rows).max() < 3
+
+
+def test_snaps_are_found_loudest_first():
+    near, far = np.array([8.0, -3.0, -5.0]), np.array([14.0, 6.0, -5.0])
+    start = round(4e-3 * RATE) / RATE
+    signals = hear(silence(ROMANIS, start, 1800), ROMANIS, far, 0.0, 1.0)
+    signals = hear(signals, ROMANIS, near, 1e-3, 1.0)
+    found = locate(signals, ROMANIS, near, snaps=3)
+    assert np.linalg.norm(found.position[0] - near) < 0.01
+    assert np.linalg.norm(found.position[1] - far) < 0.02
+    assert found.time[0] == pytest.approx(1e-3 + np.linalg.norm(near) / C, abs=3e-5)
+    assert np.isnan(found.position[2]).all()
+    assert np.isnan(found.time[2])
+
+
+def test_the_image_of_a_snap_in_the_surface_is_no_snap():
+    source = np.array([9.0, -5.0, -6.0])
+    image = np.array([9.0, -5.0, 16.0])  # the sonar is 5 m down
+    start = round(6e-3 * RATE) / RATE
+    signals = hear(hear(silence(ROMANIS, start, 2400), ROMANIS, source, 0.0, 1.0), ROMANIS, image, 0.0, -1.0)
+    found = locate(signals, ROMANIS, source, snaps=2)
+    assert np.linalg.norm(found.position[0] - source) < 0.01
+    assert np.isnan(found.position[1]).all()
+
+
+def refracted_signals(array, source, pose, profile):
+    """The pulse along rays through a profile; sensors one by one."""
+    sea = water(np.array(profile.depth), np.array(profile.speed), 100.0)
+    sensors = np.vstack([pose.to_world(array.position), pose.position])
+    start = pose.to_world(source)
+    across = sensors[:, :2] - start[:2]
+    rays = eigenrays(sea, np.full(len(sensors), -start[2]), -sensors[:, 2], np.hypot(*across.T))
+    assert len(rays.travel_time) == len(sensors)
+    heading = across[-1] / np.linalg.norm(across[-1])
+    arriving = np.array([*(np.sqrt(1 - rays.end_sine[-1] ** 2) * heading), rays.end_sine[-1]])
+    arrival = rays.travel_time[:-1]
+    first = round((arrival.mean() - 1e-3) * RATE) / RATE
+    total = silence(array, first, 800).pressure
+    for q in range(array.count):
+        alone = replace(array, position=np.zeros((1, 3)), gain=np.ones(1), face=0.0)
+        away = np.linalg.norm(source - array.position[q])
+        unheard = Signals(np.zeros((1, 800), np.float32), first, RATE, 0.0, 0, 0)
+        total[q] = hear(unheard, alone, [away, 0.0, 0.0], arrival[q] - away / C, 1.0).pressure[0]
+    return Signals(total, first, RATE, 0.0, 0, 0), -pose.turn_to_body(arriving)
+
+
+def test_refraction_is_undone_by_the_profile():
+    profile = Tabulated(depth=(0.0, 4.0, 8.0, 20.0), speed=(1546.0, 1545.0, 1537.0, 1535.0))
+    pose = Pose(np.array([3.0, 2.0, -5.0]), quaternion(0.7, 0.05, 0.02))
+    source = np.array([9.0, -5.0, -6.0])
+    array = elements(PlanarLattice(columns=9, rows=9, pitch=0.15, face=0.0))
+    signals, seen = refracted_signals(array, source, pose, profile)
+    straight = locate(signals, array, source, pose)
+    traced = locate(signals, array, source, pose, method=SensorDelays(profile=profile))
+    assert np.linalg.norm(straight.position[0] - source) > 0.03
+    assert np.linalg.norm(traced.position[0] - source) < 1e-3
+    assert np.allclose([traced.azimuth[0], traced.elevation[0]], np.ravel(azimuth_elevation(seen)), atol=1e-5)

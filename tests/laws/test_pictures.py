@@ -1,0 +1,136 @@
+"""Pictures show what is there: outlines against closed forms, port on the left, the filter's edge at its cutoff."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sonarsynth.acoustics.snap import Bubble
+from sonarsynth.acoustics.spectra import Fir
+from sonarsynth.pictures.frames import FramePicture, Hull, View, Window
+from sonarsynth.pictures.outlines import CELLS, union_outline, view_outline
+from sonarsynth.pictures.rays import section_figure, space_figure
+from sonarsynth.pictures.snap import snap_figure
+from sonarsynth.world.sources import LogarithmicBubble
+
+SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+SQUARE_FACES = np.array([[0, 1, 2], [0, 2, 3]])
+
+
+def sphere(centre: list[float], radius: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=radius)
+    return np.asarray(ball.vertices) + centre, np.asarray(ball.faces)
+
+
+def enclosed(line: np.ndarray) -> float:
+    """Area inside a closed line (shoelace formula)."""
+    x, y = line.T
+    return 0.5 * abs(float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])))
+
+
+def test_the_outline_of_a_square_is_the_square() -> None:
+    (line,) = union_outline(SQUARE, SQUARE_FACES)
+    assert np.abs(np.abs(line - 0.5).max(axis=1) - 0.5).max() < 1.0 / CELLS
+    assert np.allclose(line[0], line[-1])
+    assert enclosed(line) == pytest.approx(1.0, rel=4.0 / CELLS)
+
+
+def test_the_outline_does_not_depend_on_how_a_shape_is_cut() -> None:
+    middle = np.vstack([SQUARE, [[0.3, 0.6]]])
+    other = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
+    (one,), (two,) = union_outline(SQUARE, SQUARE_FACES), union_outline(middle, other)
+    assert enclosed(one) == pytest.approx(enclosed(two), rel=1e-9)
+
+
+def test_a_hole_stays_a_hole() -> None:
+    angle = np.linspace(0, 2 * np.pi, 65)[:-1]
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    i = np.arange(64)
+    j = (i + 1) % 64
+    faces = np.concatenate([np.stack([i, j, i + 64], 1), np.stack([j, j + 64, i + 64], 1)])
+    lines = union_outline(np.vstack([ring, 0.5 * ring]), faces)
+    assert sorted(enclosed(line) for line in lines) == pytest.approx([np.pi / 4, np.pi], rel=0.02)
+
+
+@pytest.mark.parametrize("distance", [0.6, 3.0, 500.0])
+def test_a_sphere_is_seen_at_the_angle_whose_sine_is_radius_over_distance(distance: float) -> None:
+    (line,) = view_outline(*sphere([distance, 0.0, 0.0]))
+    off_axis = np.arccos(np.cos(line[:, 0]) * np.cos(line[:, 1]))
+    expected = np.arcsin(0.5 / distance)
+    assert np.abs(off_axis / expected - 1.0).max() < 0.012
+
+
+@pytest.mark.parametrize(("y", "z"), [(2.0, 1.0), (-2.0, 1.0), (2.0, -1.0), (-2.0, -1.0)])
+def test_port_is_positive_azimuth_and_up_positive_elevation(y: float, z: float) -> None:
+    (line,) = view_outline(*sphere([10.0, y, z]))
+    assert np.sign(line.mean(axis=0)).tolist() == [np.sign(y), np.sign(z)]
+    assert line.mean(axis=0) == pytest.approx([np.arctan2(y, 10.0), np.arctan2(z, np.hypot(10.0, y))], abs=2e-3)
+
+
+def test_what_is_behind_the_sonar_has_no_outline() -> None:
+    assert view_outline(*sphere([-5.0, 0.0, 0.0])) == []
+    assert view_outline(np.full((3, 3), np.nan), [[0, 1, 2]]) == []
+    assert view_outline(np.ones((3, 3)), [[0, 1, 2]]) == []  # a point
+
+
+def test_a_bright_beam_to_port_and_up_is_drawn_to_the_left_and_up() -> None:
+    azimuth, elevation = np.linspace(-25.0, 25.0, 21), np.linspace(-20.0, 20.0, 17)
+    level = np.full((17, 21), -np.inf)
+    level[15, 19] = 0.0  # elevation 17.5, azimuth 22.5
+    picture = FramePicture(azimuth, elevation, Window(half=np.ones(3)), "dB")
+    picture.show(View(title="", level=level, points=np.zeros((0, 3)), point_level=np.zeros(0), hulls=()))
+    shot = picture.pixels().astype(int)
+    axes = picture.figure.axes[0]
+    height = shot.shape[0]
+    x, y = axes.transData.transform((22.5, 17.5))
+    left, bottom = axes.transData.transform((0.0, 0.0))
+    assert x < left
+    assert y > bottom
+    assert shot[round(height - y), round(x)].sum() > 600  # the bright end of the map
+    x, y = axes.transData.transform((-22.5, -17.5))
+    assert shot[round(height - y), round(x)].sum() < 60
+
+
+def test_the_cloud_from_above_has_port_on_the_left_and_counts_what_it_does_not_show() -> None:
+    points = np.array([[10.0, 0.5, 0.0], [10.0, -0.5, 0.0], [50.0, 0.0, 0.0]])
+    hull = Hull("ball", *sphere([10.0, 0.0, 0.0]))
+    view = View(title="", level=None, points=points, point_level=np.zeros(3), hulls=(hull,))
+    picture = FramePicture(np.linspace(-5, 5, 5), np.linspace(-5, 5, 5), Window(half=np.ones(3)), "dB")
+    picture.show(view)
+    plan = next(axes for axes in picture.figure.axes if "above" in axes.get_title(loc="left"))
+    assert plan.xaxis_inverted()
+    assert not plan.yaxis_inverted()
+    assert "3 points, 1 of them outside" in [text.get_text() for text in plan.texts]
+
+
+def test_the_filter_is_drawn_with_half_its_response_at_the_cutoff() -> None:
+    b = LogarithmicBubble()
+    drawn = snap_figure(Bubble(b.a, b.k, b.m, b.q, b.density), Fir(0.0, 110e3, 10e3, 80.0), source_level=190.0)
+    waveform, levels, response = drawn.axes
+    frequency, decibels = response.lines[0].get_data()
+    assert np.interp(110.0, frequency, decibels) == pytest.approx(-6.02, abs=0.05)
+    assert waveform.lines[0].get_ydata().max() == pytest.approx(1e-3 * 10 ** (190 / 20) * 1e-6, rel=0.02)
+    both = [line.get_ydata() for line in levels.lines]
+    assert np.allclose(both[1] - both[0], decibels, atol=1e-6)
+
+
+def test_the_section_shows_the_profile_as_it_is() -> None:
+    ray = np.array([[0.0, 0.0, -0.1], [0.3, 0.0, 0.0], [0.6, 0.0, -0.3]])
+    depth, speed = np.array([0.0, 0.1, 0.3]), np.array([1500.0, 1510.0, 1490.0])
+    made = section_figure([ray], [Hull("ball", *sphere([0.5, 0.0, -0.15], 0.05))], depth, speed, bed=0.3)
+    section, profile = made.axes
+    assert np.allclose(section.lines[2].get_xydata(), ray[:, [0, 2]])
+    assert section.get_ylim()[0] < -0.3 < 0.0 < section.get_ylim()[1]
+    assert np.interp(-0.1, *profile.lines[0].get_xydata()[::-1, ::-1].T) == pytest.approx(1510.0)
+
+
+def test_rays_in_space_keep_one_scale_on_all_axes() -> None:
+    rays = [np.array([[0.0, 0.0, 0.0], [6.0, 0.1 * i, -1.0], [1.0, 10.0, 10.0]]) for i in range(3)]
+    made = space_figure(
+        rays, np.array([1.0, 0.5, 0.1]), [], {"array": np.zeros(3), "shrimp": np.array([1.0, 10.0, 10.0])}
+    )
+    axes = made.axes[0]
+    spans = [np.ptp(limits) for limits in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())]
+    assert spans / np.linalg.norm(spans) == pytest.approx(axes._box_aspect / np.linalg.norm(axes._box_aspect), rel=1e-6)

@@ -1,0 +1,105 @@
+"""Laws of the scattering laws: energy, reciprocity, splitting, the mirror direction, the width."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pydantic import TypeAdapter, ValidationError
+
+from sonarsynth.acoustics.lobes import lambert, slope_lobe
+from sonarsynth.conventions import Floats
+from sonarsynth.geometry import unit
+from sonarsynth.scattering import Isotropic, MirrorLobe, Scattering
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def hemisphere(points: int = 500) -> tuple[Floats, Floats]:
+    """Directions over the upper half space and their solid angles (Gauss in the cosine, even in azimuth)."""
+    node, weight = np.polynomial.legendre.leggauss(points)
+    z, w = 0.5 * (node + 1), 0.5 * weight
+    azimuth = (np.arange(2 * points) + 0.5) * np.pi / points
+    s = np.sqrt(1 - z * z)
+    d = np.stack(np.broadcast_arrays(s[:, None] * np.cos(azimuth), s[:, None] * np.sin(azimuth), z[:, None]), axis=-1)
+    return d.reshape(-1, 3), np.repeat(w * np.pi / points, 2 * points)
+
+
+def incoming(angle: float) -> Floats:
+    return np.array([np.sin(angle), 0.0, -np.cos(angle)])
+
+
+@pytest.mark.parametrize(("slope", "low", "high"), [(0.05, 0.9995, 1.0005), (0.1, 0.9985, 1.0005), (0.2, 0.96, 1.005)])
+@pytest.mark.parametrize("angle", [0.0, 0.4, 0.9])
+def test_the_lobe_gives_back_the_power_that_arrives(slope: float, low: float, high: float, angle: float) -> None:
+    out, solid = hemisphere()
+    power = np.sum(slope_lobe(incoming(angle), out, UP, slope) * solid) / np.cos(angle)
+    assert low < power < high
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7, 1.4])
+def test_the_diffuse_floor_gives_back_its_albedo(angle: float) -> None:
+    out, solid = hemisphere(60)
+    assert np.sum(lambert(incoming(angle), out, UP, 0.3) * solid) / np.cos(angle) == pytest.approx(0.3, rel=1e-12)
+
+
+LAWS = [MirrorLobe(), MirrorLobe(width=0.05), MirrorLobe(reflectivity=0.6, diffuse=0.3), Isotropic(strength=0.2)]
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_source_and_receiver_may_change_places(law: MirrorLobe | Isotropic) -> None:
+    rng = np.random.default_rng(0)
+    a, b, n = unit(rng.normal(size=(3, 2000, 3)))
+    there, back = law.amplitude(a, b, n, np.ones(2000)), law.amplitude(-b, -a, n, np.ones(2000))
+    np.testing.assert_allclose(there, back, rtol=1e-9)
+    assert (there > 0).sum() > 100
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_nothing_comes_from_a_facet_that_is_dark_or_turned_away(law: MirrorLobe | Isotropic) -> None:
+    rng = np.random.default_rng(1)
+    a, b, n = unit(rng.normal(size=(3, 2000, 3)))
+    f = law.amplitude(a, b, n, np.ones(2000))
+    dark = (np.sum(a * n, axis=1) >= 0) | (np.sum(b * n, axis=1) <= 0)
+    assert (f[dark] == 0).all()
+    assert (f[~dark] >= 0).all()
+    assert np.isfinite(f).all()
+
+
+def test_powers_of_the_parts_of_a_facet_add_up_to_that_of_the_whole() -> None:
+    law, rng = MirrorLobe(reflectivity=0.8, diffuse=0.2), np.random.default_rng(2)
+    parts = rng.dirichlet(np.ones(7)) * 0.3
+    a, b = incoming(0.3), unit(np.array([0.2, 0.1, 1.0]))
+    whole = law.amplitude(a, b, UP, np.array(0.3)) ** 2
+    assert np.sum(law.amplitude(a, b, UP, parts) ** 2) == pytest.approx(float(whole), rel=1e-14)
+
+
+@pytest.mark.parametrize("width", [1e-6, 0.01, 0.1, 0.35])
+def test_the_lobe_stands_on_the_mirror_direction_and_has_its_width(width: float) -> None:
+    law = MirrorLobe(width=width)
+    delta = np.array([0.0, 0.5, 1.0, 1.5]) * width
+    mirror = np.array([0.0, 0.0, 1.0])
+    out = np.stack([np.sin(delta), np.zeros(4), np.cos(delta)], axis=-1)
+    f = law.amplitude(-mirror, out, UP, np.ones(4))
+    assert (np.diff(f) < 0).all()
+    beta = delta / 2  # the half vector tilts by half the angle
+    exact = np.exp(-(np.tan(beta) ** 2) / (0.5 * width**2)) / np.cos(beta) ** 2
+    np.testing.assert_allclose(f / f[0], exact, rtol=1e-12)
+    np.testing.assert_allclose(f / f[0], np.exp(-(delta**2) / (2 * width**2)), rtol=3 * width**2 + 1e-12)
+    assert f[0] == pytest.approx(1 / np.sqrt(np.pi) / width, rel=1e-12)  # sqrt(1/(8 pi s^2)), s = width/sqrt 8
+
+
+def test_reflectivity_scales_the_lobe() -> None:
+    a, b, area = incoming(0.2), unit(np.array([0.25, 0.0, 1.0])), np.array(2.0)
+    full, part = (MirrorLobe(reflectivity=r).amplitude(a, b, UP, area) for r in (1.0, 0.25))
+    assert part == pytest.approx(0.25 * full, rel=1e-14)
+
+
+def test_more_power_out_than_in_is_refused() -> None:
+    with pytest.raises(ValidationError, match="scatters more power than arrives"):
+        MirrorLobe(reflectivity=0.9, diffuse=0.2)
+
+
+def test_the_registry_tells_laws_apart_by_kind() -> None:
+    adapter = TypeAdapter(Scattering)
+    assert adapter.validate_python({"kind": "mirror_lobe", "width": "5 deg"}) == MirrorLobe(width=np.deg2rad(5.0))
+    assert adapter.validate_python({"kind": "isotropic", "strength": 0.1}) == Isotropic(strength=0.1)

@@ -1,0 +1,372 @@
+"""Signals against closed forms and the slow exact sum, and the laws that they obey."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from sonarsynth.acoustics import spectra
+from sonarsynth.acoustics.arrays import element_directivity
+from sonarsynth.conventions import Floats
+from sonarsynth.products import Arrivals
+from sonarsynth.sonar import BandPass, Elements, LowPass, PositionTable, Romanis, Sonar, elements
+from sonarsynth.synthesis import DirectSum, KernelDeposit, pulse_support
+from sonarsynth.synthesis.direct_sum import exact_signals
+from sonarsynth.synthesis.pulse import bubble, fir
+from sonarsynth.world.moment import Snap
+from sonarsynth.world.sources import LogarithmicBubble
+
+MODEL = LogarithmicBubble()
+SNAPS = (Snap(np.zeros(3), 0.0, MODEL, None),)
+SONAR = Sonar()
+SHARP = Sonar(filter=BandPass(low=35e3, high=75e3, transition=15e3, attenuation=160))  # nothing beyond 98 kHz
+FACES = elements(Romanis())
+C = 1540.0
+
+
+def absorption(frequency: Floats) -> Floats:
+    """dB/m, shaped like sea water's."""
+    return 1e-3 * (0.05 + 35.0 * frequency**2 / (frequency**2 + 60e3**2))
+
+
+def some_of(array: Elements, step: int, face: float | None = None) -> Elements:
+    positions = tuple((float(x), float(y), float(z)) for x, y, z in array.position[::step])
+    return elements(PositionTable(positions=positions, face=array.face if face is None else face))
+
+
+def arrivals(
+    delay: Floats,
+    direction: Floats,
+    radius: Floats,
+    amplitude: Floats,
+    *,
+    loss: Floats | None = None,
+    snap: Floats | None = None,
+    target: Floats | None = None,
+    delay_terms: Floats | None = None,
+    amplitude_terms: Floats | None = None,
+) -> Arrivals:
+    n = len(delay)
+    one, zero = np.ones(n), np.zeros(n, np.int64)
+    return Arrivals(
+        delay=np.asarray(delay, float),
+        direction=np.asarray(direction, float) / np.linalg.norm(direction, axis=1, keepdims=True),
+        radius=np.asarray(radius, float),
+        delay_terms=np.zeros((n, 0)) if delay_terms is None else delay_terms,
+        amplitude_terms=np.zeros((n, 0)) if amplitude_terms is None else amplitude_terms,
+        amplitude=np.asarray(amplitude, float),
+        spreading_out=one,
+        spreading_in=one,
+        scattering=one,
+        boundary=one,
+        absorption=np.zeros(n) if loss is None else loss,
+        length=np.asarray(radius, float),
+        snap=zero if snap is None else np.asarray(snap, np.int64),
+        target=zero if target is None else np.asarray(target, np.int64),
+        facet=zero,
+        point=np.zeros((n, 3)),
+        surface=zero,
+        bottom=zero,
+        turning=zero,
+        sound_speed=C,
+        wavefront_error=0.0,
+    )
+
+
+def target_at(distance: float, count: int, seed: int, *, refracted: bool = False, direct: bool = True) -> Arrivals:
+    """Echoes of points of a body of 1.6 m, some metres off the axis, and the direct snap 50 dB above them."""
+    rng = np.random.default_rng(seed)
+    points = np.array([distance, 0.15 * distance, 0.08 * distance])
+    points = points + rng.uniform(-1, 1, (count, 3)) * [0.3, 0.8, 0.1]
+    source = np.array([0.4 * distance, -0.2 * distance, -0.2 * distance])
+    out = np.linalg.norm(points - source, axis=1)
+    radius = np.linalg.norm(points, axis=1)
+    amplitude = 0.02 * rng.standard_normal(count) / (radius * out)
+    delay, target = (radius + out) / C, np.zeros(count)
+    if direct:
+        r = np.linalg.norm(source)
+        points, radius, amplitude = np.vstack([points, source]), np.append(radius, r), np.append(amplitude, 1 / r)
+        delay, target = np.append(delay, r / C), np.append(target, -1)
+    n = len(delay)
+    return arrivals(
+        delay,
+        points,
+        radius,
+        amplitude,
+        loss=0.018 * delay * C,
+        target=target,
+        delay_terms=rng.uniform(-1, 1, (n, 20)) * 3e-7 if refracted else None,
+        amplitude_terms=rng.uniform(-1, 1, (n, 20)) * 1e-3 if refracted else None,
+    )
+
+
+def window(of: Arrivals, sonar: Sonar, array: Elements) -> tuple[float, int]:
+    """A window that holds all of it."""
+    before, after = pulse_support(MODEL, sonar.antialias)
+    reach = array.aperture / C + 1e-4
+    start = float(of.delay.min() - before - reach)
+    return start, int(np.ceil((of.delay.max() + after + reach - start) * sonar.sampling_frequency)) + 1
+
+
+def error(got: np.ndarray, exact: np.ndarray) -> float:
+    return float(np.abs(got - exact).max() / np.abs(exact).max())
+
+
+# ---- the exact sum against closed forms ------------------------------------------------------------------------------
+
+
+def test_exact_sum_is_the_filtered_snap_at_the_exact_delays() -> None:
+    """Point hydrophones, spherical waves: amplitude R/|R d - q| and delay |R d - q|/c, evaluated in time."""
+    array = some_of(FACES, 100, face=0.0)
+    of = target_at(12.0, 3, 1, direct=False)
+    start, samples = window(of, SHARP, array)
+    got, _ = exact_signals(of, SNAPS, array, SHARP, None, start, samples)
+    expected = np.zeros_like(got)
+    t = start + np.arange(samples) / SHARP.sampling_frequency
+    for e in range(3):
+        source = of.radius[e] * of.direction[e]
+        for s, q in enumerate(array.position):
+            far = np.linalg.norm(source - q)
+            late = of.delay[e] + (far - of.radius[e]) / C
+            near = np.abs(t - late) < 1e-3
+            wave = spectra.filtered_pulse(t[near] - late, bubble(MODEL), fir(SHARP.antialias))
+            expected[s, near] += of.amplitude[e] * of.radius[e] / far * wave
+    assert error(got, expected) < 1e-7
+
+
+def test_exact_sum_with_the_default_filter_leaves_out_what_would_fold() -> None:
+    array = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
+    of = arrivals([0.01], [[1.0, 0.2, 0.0]], [10.0], [1.0])
+    start, samples = window(of, SONAR, array)
+    got, _ = exact_signals(of, SNAPS, array, SONAR, None, start, samples)
+    t = start + np.arange(samples) / SONAR.sampling_frequency - 0.01
+    exact = spectra.filtered_pulse(t, bubble(MODEL), fir(SONAR.antialias))
+    assert 1e-8 < error(got[0], exact) < 2e-5  # 80 dB down and beyond half the sampling frequency
+
+
+def test_element_face_is_the_mean_of_points_over_it() -> None:
+    """A plane wave: the mean over a fine grid of points on the face, to the square of the grid's spacing."""
+    n, face = 24, FACES.face
+    offset = (np.arange(n) + 0.5) / n * face - 0.5 * face
+    points = tuple((0.0, float(y), float(z)) for y in offset for z in offset)
+    of = arrivals([0.01], [[1.0, 0.35, -0.2]], [np.inf], [1.0])
+    one = elements(PositionTable(positions=((0.0, 0.0, 0.0),), face=face))
+    start, samples = window(of, SONAR, one)
+    got, _ = exact_signals(of, SNAPS, one, SONAR, None, start, samples)
+    mean, _ = exact_signals(of, SNAPS, elements(PositionTable(positions=points)), SONAR, None, start, samples)
+    assert error(got[0], mean.mean(axis=0)) < 3e-3
+    assert element_directivity(80e3, of.direction[0], face, C) < 0.7  # so the face does something
+
+
+def test_absorption_is_relative_to_the_band_centre() -> None:
+    """A path of 40 dB at the centre: each frequency is as loud as its own absorption says."""
+    array = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
+    of = arrivals([0.01], [[1.0, 0.0, 0.0]], [10.0], [10 ** (-40 / 20)], loss=np.array([40.0]))
+    start, samples = window(of, SONAR, array)
+    lost, _ = exact_signals(of, SNAPS, array, SONAR, absorption, start, samples)
+    plain, _ = exact_signals(of, SNAPS, array, SONAR, None, start, samples)
+    f = np.fft.rfftfreq(samples, 1 / SONAR.sampling_frequency)
+    inside = (f > 30e3) & (f < 80e3)
+    ratio = np.abs(np.fft.rfft(lost[0]) / np.fft.rfft(plain[0]))[inside]
+    centre = absorption(np.array([SONAR.band.centre]))
+    np.testing.assert_allclose(20 * np.log10(ratio), 40 - 40 * absorption(f[inside]) / centre, atol=2e-3)
+
+
+# ---- the fast synthesis against the exact sum ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("distance", [20.0, 6.0, 2.5])
+@pytest.mark.parametrize("refracted", [False, True])
+def test_kernel_deposit_is_the_exact_sum(distance: float, refracted: bool) -> None:
+    array = some_of(FACES, 16)
+    of = target_at(distance, 60, 2, refracted=refracted, direct=False)
+    start, samples = window(of, SONAR, array)
+    exact, _ = exact_signals(of, SNAPS, array, SONAR, absorption, start, samples)
+    got = KernelDeposit().signals(of, SNAPS, array, SONAR, absorption, start, samples)
+    assert error(got.pressure, exact) < 1e-4
+    assert got.outside == 0
+    assert got.pressure.dtype == np.float32
+
+
+def test_nodes_over_the_aperture_serve_the_whole_array() -> None:
+    """Enough paths that nodes pay: 508 hydrophones interpolated from some tens of points, the direct snap apart."""
+    of = target_at(20.0, 1500, 3)
+    start, samples = window(of, SONAR, FACES)
+    got = KernelDeposit().signals(of, SNAPS, FACES, SONAR, absorption, start, samples)
+    best = KernelDeposit(width=14, precision="float64", tolerance=1e-10)
+    fine = best.signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure
+    late = int((of.delay[of.target == 0].min() - 2.3e-3 - start) * SONAR.sampling_frequency)
+    assert error(got.pressure[:, late:], fine[:, late:]) < 1e-4  # relative to the echo
+    assert error(got.pressure, fine) < 1e-4
+    few = some_of(FACES, 170)
+    exact, _ = exact_signals(of, SNAPS, few, SONAR, absorption, start, samples)
+    assert error(fine[::170], exact) < 2e-7
+
+
+@pytest.mark.parametrize(
+    ("method", "bound"),
+    [
+        (KernelDeposit(width=4, tolerance=1e-3), 3e-3),
+        (KernelDeposit(), 1e-4),
+        (KernelDeposit(width=8, tolerance=1e-5), 5e-6),
+        (KernelDeposit(width=6, oversampling=3.0, tolerance=1e-5), 5e-6),
+        (KernelDeposit(width=14, precision="float64", tolerance=1e-12), 1e-9),
+    ],
+)
+def test_each_knob_buys_its_error(method: KernelDeposit, bound: float) -> None:
+    array = some_of(FACES, 30)
+    of = target_at(8.0, 40, 4, refracted=True, direct=False)
+    start, samples = window(of, SHARP, array)
+    exact, _ = exact_signals(of, SNAPS, array, SHARP, absorption, start, samples)
+    got, _ = method.pressure(of, SNAPS, array, SHARP, absorption, start, samples)
+    assert 1e-14 < error(got, exact) < bound
+
+
+def test_hydrophones_anywhere_and_plane_waves() -> None:
+    rng = np.random.default_rng(5)
+    array = elements(PositionTable(positions=tuple(map(tuple, rng.uniform(-0.4, 0.4, (14, 3)).tolist())), face=0.02))
+    n = 12
+    of = arrivals(rng.uniform(0.01, 0.012, n), rng.standard_normal((n, 3)), np.full(n, np.inf), rng.standard_normal(n))
+    start, samples = window(of, SONAR, array)
+    exact, _ = exact_signals(of, SNAPS, array, SONAR, None, start, samples)
+    got = KernelDeposit().signals(of, SNAPS, array, SONAR, None, start, samples)
+    assert error(got.pressure, exact) < 1e-4
+
+
+def test_several_snaps_of_different_kinds_and_levels() -> None:
+    rng = np.random.default_rng(6)
+    other = LogarithmicBubble(q=-2.5e5)
+    snaps = (*SNAPS, Snap(np.zeros(3), 0.0, MODEL, 180.0), Snap(np.zeros(3), 0.0, other, 190.0))
+    of = target_at(15.0, 30, 7, direct=False)
+    of = arrivals(of.delay, of.direction, of.radius, of.amplitude, snap=rng.integers(0, 3, 30))
+    array = some_of(FACES, 60)
+    start, samples = window(of, SONAR, array)
+    exact, _ = exact_signals(of, snaps, array, SONAR, None, start, samples)
+    got = KernelDeposit().signals(of, snaps, array, SONAR, None, start, samples)
+    assert error(got.pressure, exact) < 1e-4
+    parts = sum(exact_signals(of.select(of.snap == i), snaps, array, SONAR, None, start, samples)[0] for i in range(3))
+    np.testing.assert_allclose(parts, exact, atol=1e-12)
+
+
+def test_low_pass_of_the_thesis() -> None:
+    sonar = Sonar(filter=LowPass(cutoff=110e3), sampling_frequency=250e3)
+    array = some_of(FACES, 60)
+    of = target_at(15.0, 20, 8, direct=False)
+    start, samples = window(of, sonar, array)
+    exact, _ = exact_signals(of, SNAPS, array, sonar, None, start, samples)
+    got = KernelDeposit().signals(of, SNAPS, array, sonar, None, start, samples)
+    assert error(got.pressure, exact) < 1e-4
+
+
+# ---- laws ------------------------------------------------------------------------------------------------------------
+
+METHODS = (DirectSum(), KernelDeposit())
+Run = Callable[[Arrivals, float, int], np.ndarray]
+
+
+def run(method: DirectSum | KernelDeposit, array: Elements) -> Run:
+    def go(of: Arrivals, start: float, samples: int) -> np.ndarray:
+        return method.signals(of, SNAPS, array, SONAR, absorption, start, samples).pressure.astype(float)
+
+    return go
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_doubled_amplitude_doubles_the_pressure_and_sums_add(method: DirectSum | KernelDeposit) -> None:
+    array = some_of(FACES, 60)
+    of = target_at(15.0, 24, 9, direct=False)
+    start, samples = window(of, SONAR, array)
+    go = run(method, array)
+    whole = go(of, start, samples)
+    half = go(of.select(np.arange(24) < 12), start, samples) + go(of.select(np.arange(24) >= 12), start, samples)
+    assert error(half, whole) < 1e-4
+    louder = arrivals(of.delay, of.direction, of.radius, 2 * of.amplitude, loss=of.absorption)
+    assert error(go(louder, start, samples), 2 * whole) < 1e-6
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_delay_of_part_of_a_sample_is_a_ramp_of_phase(method: DirectSum | KernelDeposit) -> None:
+    array = some_of(FACES, 60)
+    of = target_at(15.0, 24, 10, direct=False)
+    start, samples = window(of, SONAR, array)
+    shift = 3.37 / SONAR.sampling_frequency
+    later = arrivals(of.delay + shift, of.direction, of.radius, of.amplitude, loss=of.absorption)
+    go = run(method, array)
+    a, b = (np.fft.rfft(go(x, start, samples + 20), 2 * samples) for x in (of, later))
+    f = np.fft.rfftfreq(2 * samples, 1 / SONAR.sampling_frequency)
+    inside = f < 90e3
+    turned = a * np.exp(-2j * np.pi * f * shift)
+    assert error(b[:, inside], turned[:, inside]) < 1e-4
+    assert error(go(later, start + shift, samples), go(of, start, samples)) < 1e-4  # and time has no origin
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_windows_that_adjoin_hold_what_one_window_holds(method: DirectSum | KernelDeposit) -> None:
+    array = some_of(FACES, 60)
+    of = target_at(15.0, 24, 11)
+    start, samples = window(of, SONAR, array)
+    fs = SONAR.sampling_frequency
+    cut = int((np.median(of.delay) - start) * fs)
+    whole = method.signals(of, SNAPS, array, SONAR, absorption, start, samples)
+    first = method.signals(of, SNAPS, array, SONAR, absorption, start, cut)
+    second = method.signals(of, SNAPS, array, SONAR, absorption, start + cut / fs, samples - cut)
+    assert error(np.hstack([first.pressure, second.pressure]), whole.pressure) < 3e-6
+    assert whole.outside == 0
+    assert first.outside == 24  # every echo begins before the middle one has ended
+    assert second.outside == 25
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_falls_outside_is_counted_and_never_wrapped(method: DirectSum | KernelDeposit) -> None:
+    array = some_of(FACES, 100)
+    of = target_at(15.0, 8, 12, direct=False)
+    start, samples = window(of, SONAR, array)
+    for far in (-1.0, -(samples + 300) / SONAR.sampling_frequency, samples / SONAR.sampling_frequency, 5.0):
+        got = method.signals(of, SNAPS, array, SONAR, absorption, start + far, samples)
+        assert got.outside == 8
+        assert not got.pressure.any()
+
+
+def test_quiet_time_is_exactly_silent() -> None:
+    array = some_of(FACES, 100)
+    of = target_at(15.0, 8, 13)
+    start, samples = window(of, SONAR, array)
+    got = KernelDeposit().signals(of, SNAPS, array, SONAR, absorption, start, samples).pressure
+    silent = (got == 0.0).all(axis=0)
+    before, after = pulse_support(MODEL, SONAR.antialias)
+    t = start + np.arange(samples) / SONAR.sampling_frequency
+    near = ((t > of.delay[:, None] - before - 1e-3) & (t < of.delay[:, None] + after + 1e-3)).any(axis=0)
+    assert (silent | near).mean() > 0.99
+    assert silent.sum() > 0.1 * samples
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_mirrored_paths_give_mirrored_signals(method: DirectSum | KernelDeposit) -> None:
+    """Port and starboard: y -> -y swaps the columns of the array."""
+    positions = ((0.0, 0.3, 0.1), (0.0, -0.3, 0.1), (0.0, 0.5, -0.2), (0.0, -0.5, -0.2))
+    array = elements(PositionTable(positions=positions, face=0.05))
+    of = target_at(15.0, 16, 14, direct=False)
+    other = arrivals(of.delay, of.direction * [1, -1, 1], of.radius, of.amplitude, loss=of.absorption)
+    start, samples = window(of, SONAR, array)
+    go = run(method, array)
+    assert error(go(other, start, samples)[[1, 0, 3, 2]], go(of, start, samples)) < 1e-4
+
+
+def test_dead_elements_give_nothing_and_change_no_other() -> None:
+    of = target_at(20.0, 50, 15)
+    start, samples = window(of, SONAR, FACES)
+    some = elements(Romanis(dead=(0, 200, 507)))
+    alive = KernelDeposit().signals(of, SNAPS, FACES, SONAR, None, start, samples).pressure
+    got = KernelDeposit().signals(of, SNAPS, some, SONAR, None, start, samples).pressure
+    assert not got[[0, 200, 507]].any()
+    rest = some.gain > 0
+    np.testing.assert_array_equal(got[rest], alive[rest])
+
+
+def test_the_same_bits_every_time() -> None:
+    of = target_at(20.0, 300, 16)
+    start, samples = window(of, SONAR, FACES)
+    a, b = (KernelDeposit().signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure for _ in range(2))
+    np.testing.assert_array_equal(a, b)

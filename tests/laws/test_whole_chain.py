@@ -1,0 +1,162 @@
+"""Laws of the chain from scene to signals, image and labels."""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from sonarsynth.acoustics.arrays import element_directivity
+from sonarsynth.acoustics.snap import spectrum
+from sonarsynth.acoustics.spectra import response
+from sonarsynth.conventions import azimuth_elevation
+from sonarsynth.labelling import FAMILIES
+from sonarsynth.planning import plan
+from sonarsynth.products import LEDGER
+from sonarsynth.recipe import Recipe
+from sonarsynth.render import beamform_frame, render, synthesise, trace_frame
+from sonarsynth.sonar import PositionTable
+from sonarsynth.synthesis.pulse import bubble, fir
+from tests.scenes import point_scene, remus
+
+TARGET, SNAP = (20.0, 4.0, -47.0), (15.0, -6.0, -56.0)
+
+
+@lru_cache(maxsize=8)
+def _planned(recipe: Recipe):
+    return plan(recipe)
+
+
+def _one_facet(recipe: Recipe):
+    """Plan, trace of one facet of the point target alone, with the facet's place."""
+    made = _planned(recipe)
+    traced = trace_frame(made, 0)
+    arrivals = traced.arrivals
+    keep = np.flatnonzero(~arrivals.direct)[:1]
+    return made, replace(traced, arrivals=arrivals.select(keep)), arrivals.point[keep][0]
+
+
+def test_a_point_scatterer_gives_the_closed_form() -> None:
+    """Delay, 1/r, 1/r, level and face directivity at each hydrophone, from formulas alone."""
+    made, traced, point = _one_facet(point_scene(TARGET, SNAP))
+    sonar, snap = made.scene.sonar, traced.frame.moment.snaps[0]
+    signals = synthesise(made, traced)
+    samples, rate = made.windows.samples, sonar.sampling_frequency
+    sensors = traced.frame.sonar_pose.to_world(made.elements.position)
+    out, back = np.linalg.norm(point - snap.position), np.linalg.norm(sensors - point, axis=1)
+    arrives = (out + back) / 1500.0 - signals.start
+    look = traced.frame.sonar_pose.turn_to_body(point - sensors) / back[:, None]
+    padded = 4 * samples
+    f = np.fft.rfftfreq(padded, 1 / rate)
+    pulse = spectrum(f, bubble(snap.model)) * response(f, fir(sonar.antialias))
+    closed = np.exp(-2j * np.pi * f * arrives[:, None]) * pulse * 1e-4 / (out * back)[:, None]
+    closed *= element_directivity(f, look[:, None, :], made.elements.face, 1500.0)
+    exact = np.fft.irfft(closed, padded, axis=1)[:, :samples] * rate
+    assert np.abs(signals.pressure - exact).max() <= 1e-4 * np.abs(exact).max()
+
+
+def test_the_image_of_a_point_peaks_at_its_place() -> None:
+    for y in (-6.0, 6.0):
+        for z in (-56.0, -45.0):
+            recipe = point_scene((20.0, y, z), SNAP)
+            made = _planned(recipe)
+            traced = trace_frame(made, 0)
+            image = beamform_frame(made, 0, traced).image
+            row, column = np.unravel_index(np.argmax(image.energy), image.energy.shape)
+            azimuth, elevation = azimuth_elevation(traced.frame.sonar_pose.to_body([20.0, y, z]))
+            half = 0.51 * np.deg2rad(1.0)  # the nearest beam of the grid
+            assert abs(image.azimuth[column] - azimuth) <= half and abs(image.elevation[row] - elevation) <= half
+
+
+def _echo_level(recipe: Recipe) -> float:
+    """Energy level (dB) of an echo: unlike its largest sample, it does not depend on where the samples fall."""
+    made, traced, _ = _one_facet(recipe)
+    return float(10 * np.log10(np.sum(synthesise(made, traced).pressure.astype(float) ** 2)))
+
+
+def test_source_and_hydrophone_may_change_places() -> None:
+    """Reciprocity: one hydrophone without a face hears the same echo when it and the shrimp change places."""
+    point = {"array": PositionTable(positions=((0.0, 0.0, 0.0),)), "beams": {"azimuths": 3, "elevations": 3}}
+    array, snap, target = (0.0, 0.0, -50.0), (15.0, -6.0, -56.0), (20.0, 4.0, -47.0)
+    first = _one_facet(point_scene(target, snap, array, **point))
+    second = _one_facet(point_scene(target, array, snap, **point))
+    # facets of the tiny sphere differ between the two; the one at the same place is compared
+    there = trace_frame(_planned(point_scene(target, array, snap, **point)), 0)
+    match = np.flatnonzero(np.linalg.norm(there.arrivals.point - first[2], axis=1) < 1e-12)
+    match = match[~there.arrivals.direct[match]]
+    one = synthesise(first[0], first[1]).pressure
+    other = synthesise(second[0], replace(there, arrivals=there.arrivals.select(match[:1]))).pressure
+    assert len(match) and np.abs(one).max() == pytest.approx(np.abs(other).max(), rel=1e-4)
+
+
+def test_halving_every_range_raises_an_echo_by_12_db() -> None:
+    point = {"array": PositionTable(positions=((0.0, 0.0, 0.0),)), "beams": {"azimuths": 3, "elevations": 3}}
+    far = _echo_level(point_scene((40.0, 0.0, -50.0), (20.0, -20.0, -50.0), **point))
+    near = _echo_level(point_scene((20.0, 0.0, -50.0), (10.0, -10.0, -50.0), **point))
+    assert near - far == pytest.approx(12.041, abs=0.002)
+
+
+def test_moving_everything_together_changes_nothing() -> None:
+    def moved(v: tuple[float, float, float]) -> tuple[float, float, float]:
+        return (v[1] + 70.0, -v[0] - 30.0, v[2] - 10.0)  # turned clockwise by a quarter and shifted
+
+    here = point_scene(TARGET, SNAP)
+    there = point_scene(moved(TARGET), moved(SNAP), moved((0.0, 0.0, -50.0)), heading=np.pi)
+    one, other = (trace_frame(_planned(r), 0) for r in (here, there))
+    for name in ("delay", "amplitude", "radius"):
+        a, b = getattr(one.arrivals, name)[:1], getattr(other.arrivals, name)[:1]  # the direct path
+        assert b == pytest.approx(a, rel=1e-12)
+    assert other.arrivals.direction[0] == pytest.approx(one.arrivals.direction[0], abs=1e-12)
+    echo = [np.sort(t.arrivals.delay[1:]).mean() for t in (one, other)]
+    assert echo[1] == pytest.approx(echo[0], abs=1e-9)
+
+
+def test_render_is_pure_and_labelled() -> None:
+    recipe = remus()
+    first, second = render(recipe, 1), render(recipe, 1)
+    assert first.identical(second)
+    assert first["signals/pressure"].attrs["units"] == "Pa"
+    for node in first.subtree:
+        for name, variable in node.variables.items():
+            assert "units" in variable.attrs and "long_name" in variable.attrs, (node.path, name)
+
+
+def test_truth_agrees_with_the_arrivals_that_made_the_signals() -> None:
+    """Facets that a beam points at are among those that echo or face away; ranges agree with the arrivals' points."""
+    traced = trace_frame(_planned(remus()), 0)
+    truth, arrivals, pose = traced.truth, traced.arrivals, traced.frame.sonar_pose
+    on = truth.beam_target >= 0
+    assert on.any()
+    for facet, distance in zip(truth.beam_facet[on], truth.beam_range[on], strict=True):
+        mesh, body = traced.frame.moment.bodies[0].mesh, traced.frame.moment.bodies[0]
+        corners = np.linalg.norm(pose.to_body(body.pose.to_world(mesh.corners[facet])), axis=1)
+        assert corners.min() - 0.02 <= distance <= corners.max() + 0.02
+    low_az, high_az, low_el, high_el = truth.image_box[0]
+    echoes = ~arrivals.direct
+    azimuth, elevation = azimuth_elevation(arrivals.direction[echoes])
+    assert low_az <= azimuth.min() and azimuth.max() <= high_az
+    assert low_el <= elevation.min() and elevation.max() <= high_el
+    assert 0.9 < truth.visible_fraction[0] <= 1.0
+
+
+def test_the_ledger_adds_up_and_matches_the_arrivals() -> None:
+    traced = trace_frame(_planned(remus()), 0)
+    terms = dict(zip(LEDGER, np.moveaxis(traced.ledger.level, -1, 0), strict=True))
+    total = terms["source_level"] + terms["scattering"]
+    for loss in ("transmission_loss_out", "transmission_loss_in", "absorption_loss", "boundary_loss"):
+        total = total - terms[loss]
+    filled = np.isfinite(terms["received_level"])
+    assert filled[0, :, FAMILIES.index("direct")].all()
+    assert total[filled] == pytest.approx(terms["received_level"][filled], abs=1e-9)
+    arrivals = traced.arrivals
+    direct = arrivals.amplitude[arrivals.direct][0]
+    distance = np.linalg.norm(traced.truth.snap_position[0] - traced.truth.sonar_position)
+    assert terms["transmission_loss_out"][0, -1, 0] == pytest.approx(20 * np.log10(distance))
+    assert terms["received_level"][0, -1, 0] - terms["source_level"][0, -1, 0] == pytest.approx(20 * np.log10(direct))
+
+
+def test_what_nobody_asked_for_is_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = plan(remus(), frozenset())
+    monkeypatch.setattr("sonarsynth.render.synthesise", lambda *_: pytest.fail("signals were synthesised"))
+    heard = beamform_frame(made, 0, trace_frame(made, 0))
+    assert heard.signals is None and heard.image is None

@@ -1,0 +1,70 @@
+"""A dataset small enough to be built many times: 20 frames of a box, 20 hydrophones, 9 x 11 beams."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sonarsynth import config
+from sonarsynth.planning import Plan, plan
+from sonarsynth.recipe import Recipe
+from sonarsynth.render import Values
+from sonarsynth.store import layout_of
+
+SMALL = """\
+title: small
+seed: 3
+scene:
+  world:
+    environment: {depth: 12 m, sound_speed: {kind: isovelocity, speed: 1540}, noise: {kind: flat, level: 40 dB}}
+    targets:
+      - name: box
+        shape: {kind: box, size: [1, 1, 1], edge: 0.25}
+        motion: {kind: line, start: [10, 0, -5], stop: [10, 1, -5], duration: 1}
+    shrimp:
+      - position: [30, 1]
+  sonar:
+    array: {kind: planar_lattice, columns: 5, rows: 4, pitch: 5 cm}
+    beams: {azimuths: 11, elevations: 9, azimuth_span: 30 deg, elevation_span: 30 deg}
+  trajectory: {frames: 20, interval: 0.1}
+"""
+
+
+@pytest.fixture(scope="session")
+def small_text() -> str:
+    return SMALL
+
+
+@pytest.fixture(scope="session")
+def small() -> Recipe:
+    return config.loads(SMALL)
+
+
+@pytest.fixture(scope="session")
+def small_plan(small: Recipe) -> Plan:
+    return plan(small)
+
+
+@pytest.fixture
+def small_file(tmp_path: Path) -> Path:
+    file = tmp_path / "small.yaml"
+    file.write_text(SMALL)
+    return file
+
+
+@pytest.fixture(scope="session")
+def made_up() -> Callable[[Plan, int], Values]:
+    """Values of a frame that fit a plan's layout, and mean nothing."""
+
+    def values(plan: Plan, frame: int) -> Values:
+        random = np.random.default_rng(frame)
+        made: Values = {}
+        for array in layout_of(plan).arrays:
+            numbers = random.normal(size=array.shape[1:]) * 100
+            made[array.key] = numbers.astype(array.dtype)
+        return made
+
+    return values

@@ -1,0 +1,266 @@
+"""Building: the same arrays whatever the workers, the order and the interruptions; a bad frame costs itself alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zarr
+from distributed import LocalCluster
+
+from sonarsynth import render, store
+from sonarsynth.planning import Plan
+from sonarsynth.recipe import Recipe
+from sonarsynth.schedule import build, cluster, tasks
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory, small: Recipe) -> Path:
+    path = tmp_path_factory.mktemp("reference") / "s.zarr"
+    assert build(small, path, workers=0).ok
+    return path
+
+
+@pytest.fixture(scope="module")
+def here() -> Iterator[str]:
+    """Address of a Dask scheduler whose one worker is a thread of this process."""
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", host="127.0.0.1", dashboard_address=":0"
+    ) as threads:
+        yield threads.scheduler_address
+
+
+def arrays(path: Path) -> dict[str, bytes]:
+    root = zarr.open_group(path, mode="r")
+    return {
+        name: f"{array.dtype} {array.shape}".encode() + contents(np.asarray(array[...]))
+        for name, array in root.members(max_depth=None)
+        if isinstance(array, zarr.Array)
+    }
+
+
+def contents(values: np.ndarray) -> bytes:
+    return str(values.tolist()).encode() if values.dtype.kind in "TO" else values.tobytes()
+
+
+def assert_same(path: Path, reference: Path) -> None:
+    """Same arrays, bit for bit, same contents in every mark, and nothing damaged."""
+    ours, theirs = arrays(path), arrays(reference)
+    assert ours.keys() == theirs.keys()
+    assert [name for name in ours if ours[name] != theirs[name]] == []
+    assert store.verify(path).problems == ()
+
+
+def test_a_dataset_is_whole_and_says_what_it_cost(reference: Path) -> None:
+    report = store.verify(reference)
+    assert report.ok
+    assert report.complete == tuple(range(20))
+    rows = [json.loads(line) for line in store.beside(reference, "times.jsonl").read_text().splitlines()]
+    assert sorted(row["frame"] for row in rows) == list(range(20))
+    assert all(set(row["seconds"]) == set(tasks.STAGES) for row in rows)
+    assert not store.beside(reference, "aside.jsonl").exists()
+
+
+def test_two_worker_processes_make_the_same_arrays(tmp_path: Path, small: Recipe, reference: Path) -> None:
+    report = build(small, tmp_path / "s.zarr", workers=2)
+    assert report.ok
+    assert (report.written, report.workers) == (20, 2)
+    assert report.worker_peak_bytes > 1e7
+    assert_same(tmp_path / "s.zarr", reference)
+
+
+def test_a_worker_of_a_running_scheduler_makes_the_same_arrays(
+    tmp_path: Path, small: Recipe, reference: Path, here: str
+) -> None:
+    seen: list[tuple[int, int, int]] = []
+    report = build(small, tmp_path / "s.zarr", scheduler=here, progress=lambda *counts: seen.append(counts))
+    assert report.ok
+    assert seen[0] == (0, 20, 0)
+    assert seen[-1] == (20, 20, 0)
+    assert_same(tmp_path / "s.zarr", reference)
+
+
+def test_a_part_and_then_the_whole_is_the_whole_at_once(tmp_path: Path, small: Recipe, reference: Path) -> None:
+    path = tmp_path / "s.zarr"
+    part = build(small, path, frames=[*range(5), 17], workers=0)
+    assert (part.written, part.shards, part.wanted, part.frames) == (6, 2, 6, 20)
+    assert store.frames_there(path) == [0, 1, 2, 3, 4, 17]
+    assert np.isnan(zarr.open_array(path / "truth/sonar_position", mode="r")[5:17]).all()
+    again = build(small, path, frames=range(3), workers=0)
+    assert (again.written, again.there) == (0, 3)
+    rest = build(small, path, workers=0)
+    assert (rest.written, rest.shards, rest.there) == (20, 3, 0)
+    assert build(small, path, workers=0).written == 0
+    assert_same(path, reference)
+
+
+@pytest.mark.parametrize("shards", [0, 1, 2])
+def test_an_interrupted_build_goes_on(tmp_path: Path, small: Recipe, reference: Path, shards: int) -> None:
+    def interrupt(done: int, total: int, aside: int) -> None:
+        if done >= 8 * shards:
+            raise KeyboardInterrupt
+
+    path = tmp_path / "s.zarr"
+    with pytest.raises(KeyboardInterrupt):
+        build(small, path, workers=0, progress=interrupt)
+    assert store.frames_there(path) == list(range(8 * shards))
+    assert build(small, path, workers=0).written == 20 - 8 * shards
+    assert_same(path, reference)
+
+
+def test_a_build_that_dies_within_a_shard_goes_on(
+    tmp_path: Path, small: Recipe, reference: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "s.zarr"
+    with monkeypatch.context() as patch:
+        patch.setattr(
+            "sonarsynth.store.writing.save_mark", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left"))
+        )
+        with pytest.raises(OSError, match="No space left"):
+            build(small, path, workers=0)
+    assert store.frames_there(path) == []
+    assert "without a completion mark" in store.verify(path).problems[0].what
+    assert build(small, path, workers=0).written == 20
+    assert_same(path, reference)
+
+
+def test_disk_trouble_on_a_worker_ends_the_build(
+    tmp_path: Path, small: Recipe, here: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "sonarsynth.store.writing.save_mark", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left"))
+    )
+    with pytest.raises(OSError, match="No space left"):
+        build(small, tmp_path / "s.zarr", scheduler=here)
+    assert not store.beside(tmp_path / "s.zarr", "lock").exists()
+
+
+@pytest.mark.parametrize("stage", ["trace_frame", "beamform_frame", "range_frame"])
+@pytest.mark.parametrize("distributed", [False, True])
+def test_frames_that_raise_are_set_aside_and_the_rest_goes_on(
+    tmp_path: Path,
+    small: Recipe,
+    reference: Path,
+    here: str,
+    stage: str,
+    distributed: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    path = tmp_path / "s.zarr"
+    works = getattr(render, stage)
+
+    def fails(made: Plan, index: int, *parts: object) -> object:
+        if index in (3, 16):
+            raise ZeroDivisionError("no\nway")
+        return works(made, index, *parts)
+
+    where = {"scheduler": here} if distributed else {"workers": 0}
+    with monkeypatch.context() as patch:
+        patch.setattr(render, stage, fails)
+        report = build(small, path, **where)
+    assert sorted(f.frame for f in report.failures) == [3, 16]
+    assert {(f.stage, f.error) for f in report.failures} == {(stage.partition("_")[0], "ZeroDivisionError: no way")}
+    assert all("raise ZeroDivisionError" in f.traceback for f in report.failures)
+    assert store.frames_there(path) == [f for f in range(20) if f not in (3, 16)]
+    assert store.verify(path).problems == ()
+    aside = store.beside(path, "aside.jsonl")
+    assert sorted(json.loads(line)["frame"] for line in aside.read_text().splitlines()) == [3, 16]
+    assert build(small, path, workers=0).ok
+    assert not aside.exists()
+    assert_same(path, reference)
+
+
+def test_values_that_do_not_fit_set_their_frame_aside(
+    tmp_path: Path, small: Recipe, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    works = render.range_frame
+    monkeypatch.setattr(render, "range_frame", lambda made, i, *parts: {} if i == 2 else works(made, i, *parts))
+    report = build(small, tmp_path / "s.zarr", workers=0)
+    assert [(f.frame, f.stage) for f in report.failures] == [(2, "range")]
+
+
+def test_a_shard_with_no_good_frame_is_not_marked(
+    tmp_path: Path, small: Recipe, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(render, "trace_frame", lambda made, i: 1 / 0)
+    report = build(small, tmp_path / "s.zarr", frames=range(10), workers=0)
+    assert (report.written, report.shards, len(report.failures)) == (0, 0, 10)
+    assert store.frames_there(tmp_path / "s.zarr") == []
+
+
+def test_a_build_is_refused_while_another_runs(tmp_path: Path, small: Recipe) -> None:
+    with store.lock(tmp_path / "s.zarr"), pytest.raises(store.Locked):
+        build(small, tmp_path / "s.zarr", workers=0)
+    assert not (tmp_path / "s.zarr").exists()
+
+
+def test_products_decide_what_is_stored(tmp_path: Path, small: Recipe, reference: Path) -> None:
+    path = tmp_path / "s.zarr"
+    build(small, path, products=["image"], workers=0)
+    ours, all_of_it = arrays(path), arrays(reference)
+    assert {"image/energy", "truth/target", "ledger/paths", "step"} <= ours.keys()
+    assert not any(name.startswith(("signals/", "cloud/")) for name in ours)
+    assert [name for name in ours if ours[name] != all_of_it[name]] == []
+    with pytest.raises(store.Mismatch, match="products"):
+        build(small, path, workers=0)
+    with pytest.raises(ValueError, match="'film' is not a product"):
+        build(small, path, products=["film"], workers=0)
+
+
+def test_a_restart_begins_anew(tmp_path: Path, small: Recipe, reference: Path) -> None:
+    path = tmp_path / "s.zarr"
+    build(small, path, products=["image"], workers=0)
+    assert build(small, path, workers=0, restart=True).written == 20
+    assert len(store.beside(path, "times.jsonl").read_text().splitlines()) == 20
+    assert_same(path, reference)
+
+
+def test_a_worker_refuses_a_store_of_another_recipe(reference: Path) -> None:
+    job = tasks.Job(str(reference), "0" * 64, ("cloud", "image", "signals"))
+    with pytest.raises(store.Damage, match="is not the same on this worker"):
+        tasks.plan_of(job)
+
+
+class Lost:
+    """A client whose workers are known, and die as told."""
+
+    def __init__(self, workers: list[list[str]]) -> None:
+        self.lives = iter(workers)
+        self.last: list[str] = []
+
+    def nthreads(self) -> dict[str, int]:
+        self.last = next(self.lives, self.last)
+        return dict.fromkeys(self.last, 1)
+
+
+class FakeFuture:
+    """A task that never comes back."""
+
+    cancelled = False
+
+    def cancel(self) -> None:
+        self.cancelled = True
+
+
+def test_shards_of_a_dead_worker_go_to_another_and_after_two_deaths_to_the_end() -> None:
+    builder = cluster._Builder(
+        Lost([["a", "b"], ["b"], ["b"], ["c"], ["c"]]), tasks.Job("", "", ()), lambda written: None
+    )  # type: ignore[arg-type]
+    launched: list[tuple[int, str]] = []
+    futures: list[FakeFuture] = []
+
+    def submit(flight: cluster._Flight) -> FakeFuture:
+        launched.append((flight.shard, flight.worker))
+        futures.append(FakeFuture())
+        futures[-1].add_done_callback = lambda put: None  # type: ignore[attr-defined]
+        return futures[-1]
+
+    builder._submit = submit  # type: ignore[method-assign, assignment]
+    builder._next = lambda: None  # type: ignore[method-assign]
+    suspects = builder._pass([cluster._Flight(0, (0,))])
+    assert launched == [(0, "a"), (0, "b")]
+    assert all(future.cancelled for future in futures)
+    assert [(flight.shard, flight.losses) for flight in suspects] == [(0, 2)]

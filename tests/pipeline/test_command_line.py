@@ -1,0 +1,216 @@
+"""The command line: statuses, one line an error, and answers for programs."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from sonarsynth import render, store
+from sonarsynth.cli import app
+from sonarsynth.cli.running import BadOption, run
+from sonarsynth.cli.selecting import frame_numbers, product_names
+
+HERE = Path(__file__).parents[2]
+
+
+class Answer:
+    """What a command gave: its status, and what it printed."""
+
+    def __init__(self, status: int, out: str, err: str) -> None:
+        self.status, self.out, self.err = status, out, err
+
+
+Command = Callable[..., Answer]
+
+
+@pytest.fixture
+def command(capfd: pytest.CaptureFixture[str]) -> Callable[..., Answer]:
+    def call(*arguments: object) -> Answer:
+        status = run(app, [str(a) for a in arguments])
+        return Answer(status, *capfd.readouterr())
+
+    return call
+
+
+def one_line(answer: Answer) -> str:
+    """The error, which must be all there is."""
+    assert answer.out == ""
+    assert answer.err.endswith("\n")
+    assert answer.err.count("\n") == 1
+    return answer.err.removeprefix("sonarsynth: ").rstrip()
+
+
+def test_build_verify_and_build_again(command: Command, small_file: Path, tmp_path: Path) -> None:
+    path = tmp_path / "s.zarr"
+    built = command("build", small_file, path, "--workers", "0", "--frames", "0:8")
+    assert built.status == 0
+    assert "8 frames written" in built.out
+    verified = command("verify", path, "--json")
+    answer = json.loads(verified.out)
+    assert (answer["frames"], answer["frames_complete"], answer["problems"]) == (20, 8, [])
+    assert verified.status == (0 if answer["ok"] else 4)
+    again = command("build", small_file, path, "--workers", "0", "--frames", "0:8", "--json")
+    assert again.status == 0
+    assert json.loads(again.out)["written"] == 0
+    other = command("build", small_file, path, "--workers", "0", "--set", "seed=4")
+    assert other.status == 2
+    assert "(seed is 3 there and 4 now)" in one_line(other)
+    (path / "image/energy/c/0/0/0").unlink()
+    damaged = command("verify", path)
+    assert damaged.status == 4
+    assert "DAMAGE image/energy/c/0/0/0: the file is missing" in damaged.out
+
+
+def test_frames_set_aside_are_status_3(
+    command: Command, small_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(render, "trace_frame", lambda made, i: 1 / 0)
+    answer = command("build", small_file, tmp_path / "s.zarr", "--workers", "0", "--frames", "3")
+    assert answer.status == 3
+    assert "frame 3 set aside in trace: ZeroDivisionError: division by zero" in answer.out
+
+
+def test_an_interrupted_build_is_status_130(
+    command: Command, small_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(render, "trace_frame", stop)
+    answer = command("build", small_file, tmp_path / "s.zarr", "--workers", "0")
+    assert answer.status == 130
+    assert one_line(answer) == "interrupted; the same command goes on from here"
+
+
+def test_a_store_that_is_locked_or_not_there_is_status_4(command: Command, small_file: Path, tmp_path: Path) -> None:
+    path = tmp_path / "s.zarr"
+    with store.lock(path):
+        locked = command("build", small_file, path, "--workers", "0")
+    assert locked.status == 4
+    assert "s.zarr is being built by process" in one_line(locked)
+    gone = command("verify", path)
+    assert gone.status == 4
+    assert one_line(gone) == f"{path}: no such store"
+
+
+def test_our_own_fault_is_status_1_and_names_the_traceback(
+    command: Command, small_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr("sonarsynth.schedule.build", lambda *_, **__: 1 / 0)
+    answer = command("build", small_file, tmp_path / "s.zarr")
+    assert answer.status == 1
+    found = re.fullmatch(r"ZeroDivisionError: division by zero \(traceback in (.+)\)", one_line(answer))
+    assert found is not None
+    assert "Traceback (most recent call last)" in Path(found[1]).read_text()
+    shown = command("--debug", "build", small_file, tmp_path / "s.zarr")
+    assert shown.status == 1
+    assert "Traceback (most recent call last)" in shown.err
+
+
+def test_a_folder_that_cannot_be_written_is_one_line(command: Command, small_file: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    answer = command("build", small_file, tmp_path / "file" / "s.zarr", "--workers", "0")
+    assert answer.status == 1
+    assert one_line(answer) == f"{tmp_path / 'file'}: File exists"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--frames", "0:21"], "--frames: '0:21' ends past the last frame, 19"),
+        (["--frames", "x"], "--frames: 'x' is no frame and no range such as 0:8"),
+        (["--products", "film"], "--products: 'film' is not one of signals, image, cloud"),
+        (["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "--workers is for worker processes of our own"),
+        (["--workers", "-1"], "Invalid value for '--workers'"),
+        (["--wrokers", "1"], "No such option"),
+        (["--set", "seed=-1"], "small.yaml:--set: seed: must be greater than or equal to 0, not -1"),
+        (["--set", "scene.world.targets.0.motion.start.2=-20"], "small.yaml:--set: scene.world.targets.0.motion"),
+        (["--set", "scene.world.shrimp.0.position=[1, 2, 3]"], "small.yaml:--set: scene.world.shrimp.0.position: "),
+    ],
+)
+def test_bad_input_is_status_2_and_one_line(
+    command: Command, small_file: Path, tmp_path: Path, arguments: list[str], message: str
+) -> None:
+    answer = command("build", small_file, tmp_path / "s.zarr", *arguments)
+    assert answer.status == 2
+    assert message in one_line(answer)
+    assert not (tmp_path / "s.zarr").exists()
+
+
+@pytest.mark.parametrize("of", ["plan", "build"])
+def test_a_target_below_the_bed_at_some_frame_is_named_with_its_line(
+    command: Command, small_file: Path, tmp_path: Path, of: str
+) -> None:
+    small_file.write_text(small_file.read_text().replace("stop: [10, 1, -5]", "stop: [10, 1, -9]"))
+    answer = command(of, small_file, *([tmp_path / "s.zarr"] if of == "build" else []))
+    assert answer.status == 2
+    assert re.search(r"small\.yaml:9: scene\.world\.targets\.0\.motion: .*below the bed at frame \d+", one_line(answer))
+
+
+def test_the_plan_for_people_and_for_programs(command: Command, small_file: Path) -> None:
+    people, programs = command("plan", small_file), command("plan", small_file, "--json")
+    assert people.status == programs.status == 0
+    answer = json.loads(programs.out)
+    assert {"stages", "left_out", "predicted_seconds", "predicted_bytes"} <= answer.keys()
+    assert all({"stage", "method", "why", "error", "seconds", "bytes"} <= row.keys() for row in answer["stages"])
+    assert "predicted:" in people.out
+
+
+def test_the_schema_is_json(command: Command) -> None:
+    answer = command("schema")
+    assert answer.status == 0
+    assert json.loads(answer.out)["title"] == "Recipe"
+
+
+def test_help_names_the_commands_and_loads_nothing_heavy() -> None:
+    code = (
+        "import sys\nfrom sonarsynth.cli import main\n"
+        "try:\n    main(['--help'])\nfinally:\n    print(*sys.modules, file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=HERE)
+    for name in ("build", "plan", "verify", "show", "schema"):
+        assert f" {name} " in done.stdout
+    loaded = {name.partition(".")[0] for name in done.stderr.split()}
+    assert loaded & {"numpy", "pydantic", "zarr", "xarray", "dask", "distributed", "numba", "scipy", "ruamel"} == set()
+
+
+def test_frames_and_products_are_read() -> None:
+    assert frame_numbers(None, 9) is None
+    assert frame_numbers("0:3, 8,7:", 9) == (0, 1, 2, 7, 8)
+    assert frame_numbers(":", 2) == (0, 1)
+    assert product_names("image, cloud") == {"image", "cloud"}
+    for text in ("", "3:3", "9", "-1", "1:2:3", ",", "0:10"):
+        with pytest.raises(BadOption):
+            frame_numbers(text, 9)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_build_that_can_go_on(small_file: Path, tmp_path: Path, number: signal.Signals) -> None:
+    path = tmp_path / "s.zarr"
+    code = (
+        "from sonarsynth import render\nfrom sonarsynth.cli import main\nimport time\n"
+        "whole = render.trace_frame\n"
+        "def slow(made, i):\n    time.sleep(60 if i > 9 else 0)\n    return whole(made, i)\n"
+        f"render.trace_frame = slow\nmain(['build', {str(small_file)!r}, {str(path)!r}, '--workers', '0'])"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(HERE)}
+    building = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True, env=environment)
+    while not (path / ".marks/0.json").exists():
+        assert building.poll() is None
+        time.sleep(0.05)
+    building.send_signal(number)
+    _, err = building.communicate(timeout=10)
+    assert building.returncode == 130
+    assert err.endswith("sonarsynth: interrupted; the same command goes on from here\n")
+    assert not store.beside(path, "lock").exists()
+    assert store.frames_there(path) == list(range(8))

@@ -1,0 +1,152 @@
+"""Whatever is changed in a store is found."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from sonarsynth import store
+from sonarsynth.planning import Plan
+from sonarsynth.render import Values
+from sonarsynth.verification import Check
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory, small_plan: Plan, made_up: Callable[[Plan, int], Values]) -> Path:
+    path = tmp_path_factory.mktemp("whole") / "s.zarr"
+    store.create(path, small_plan)
+    for shard, frames in store.missing(path, small_plan, range(13)).items():
+        store.write_shard(path, small_plan, shard, {frame: made_up(small_plan, frame) for frame in frames})
+    return path
+
+
+@pytest.fixture
+def copy(whole: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(whole, tmp_path / "s.zarr"))
+
+
+def found(path: Path) -> dict[str, str]:
+    report = store.verify(path)
+    assert report.ok is (not report.problems)
+    return {problem.where: problem.what for problem in report.problems}
+
+
+def flip(file: Path, bit: int) -> None:
+    content = bytearray(file.read_bytes())
+    content[bit // 8] ^= 1 << bit % 8
+    file.write_bytes(content)
+
+
+def test_a_whole_store_has_no_problem(whole: Path) -> None:
+    report = store.verify(whole)
+    assert report.ok
+    assert report.complete == tuple(range(13))
+    assert report.frames == 20
+    assert report.bytes == sum(f.stat().st_size for f in whole.rglob("*") if f.is_file() and ".marks" not in f.parts)
+    json.dumps(report.as_json(), allow_nan=False)
+
+
+def test_a_flipped_bit_is_found_wherever_it_is(copy: Path) -> None:
+    random = np.random.default_rng(1)
+    files = sorted(f for f in copy.rglob("*") if f.is_file())
+    chosen = [
+        f
+        for name in ("zarr.json", "signals/pressure/c/1/0/0", "time/c/0", "truth/azimuth/c/0", ".marks/0.json")
+        if (f := copy / name).exists()
+    ]
+    chosen += [files[i] for i in random.choice(len(files), 10, replace=False)]
+    for file in chosen:
+        bit = int(random.integers(8 * file.stat().st_size))
+        flip(file, bit)
+        assert found(copy), f"bit {bit} of {file.relative_to(copy)}"
+        flip(file, bit)
+    assert not found(copy)
+
+
+@pytest.mark.parametrize(
+    ("damage", "where", "what"),
+    [
+        (lambda p: (p / "image/energy/c/0/0/0").unlink(), "image/energy/c/0/0/0", "missing"),
+        (lambda p: (p / "image/energy/c/0/0/0").write_bytes(b""), "image/energy/c/0/0/0", "has 0 bytes"),
+        (
+            lambda p: (p / "image/energy/c/0/0/0").chmod(0o644) or flip(p / "image/energy/c/0/0/0", 99),
+            "image/energy/c/0/0/0",
+            "changed",
+        ),
+        (lambda p: (p / "image/energy/zarr.json").unlink(), "image/energy/zarr.json", "missing"),
+        (lambda p: (p / "targets/box/faces/c/0/0").unlink(), "targets/box/faces/c/0/0", "missing"),
+        (lambda p: (p / ".marks/1.json").unlink(), "shard 1", "without a completion mark"),
+        (lambda p: (p / ".marks/layout.json").unlink(), ".marks/layout.json", "missing"),
+        (lambda p: (p / ".marks/0.json").write_text("{}"), ".marks/0.json", "damaged"),
+        (lambda p: shutil.copy(p / ".marks/0.json", p / ".marks/2.json"), ".marks/2.json", "damaged"),
+        (lambda p: (p / "notes.txt").write_text("hello"), "notes.txt", "does not belong"),
+        (lambda p: (p / ".marks/x").write_text("hello"), ".marks/x", "does not belong"),
+        (
+            lambda p: shutil.copytree(p / "image/energy/c/0", p / "image/energy/c/7"),
+            "shard 7",
+            "without a completion mark",
+        ),
+    ],
+)
+def test_damage_is_named(copy: Path, damage: Callable[[Path], object], where: str, what: str) -> None:
+    damage(copy)
+    assert what in found(copy).get(where, f"not among {found(copy)}")
+
+
+def test_a_truncated_file_is_found(copy: Path) -> None:
+    file = copy / "signals/pressure/c/0/0/0"
+    file.write_bytes(file.read_bytes()[:-1])
+    assert "bytes, not" in found(copy)["signals/pressure/c/0/0/0"]
+
+
+def test_values_that_are_not_finite_are_found(
+    tmp_path: Path, small_plan: Plan, made_up: Callable[[Plan, int], Values]
+) -> None:
+    path = tmp_path / "s.zarr"
+    store.create(path, small_plan)
+    values = {frame: made_up(small_plan, frame) for frame in range(8)}
+    values[3]["/signals", "pressure"][2, 5] = np.nan
+    values[4]["/cloud", "x"][2, 5] = np.nan
+    values[5]["/cloud", "x"][2, 5] = np.inf
+    store.write_shard(path, small_plan, 0, values)
+    assert found(path) == {
+        "signals/pressure, frame 3": "1 values are not finite",
+        "cloud/x, frame 5": "1 values are not finite",
+    }
+
+
+def test_numbers_that_are_not_the_ones_written_are_found_though_files_and_marks_agree(
+    whole: Path, tmp_path: Path
+) -> None:
+    path = Path(shutil.copytree(whole, tmp_path / "s.zarr"))
+    mark = store.marks.load_mark(path, 0)
+    assert mark is not None
+    store.marks.save_mark(path, store.Mark("0", mark.frames, "0" * 64, mark.files))
+    assert found(path) == {"shard 0": "its numbers are not the ones that were written"}
+
+
+def test_checks_of_what_a_store_says_are_run_and_count(whole: Path) -> None:
+    def frames(tree: xr.DataTree) -> list[Check]:
+        count = tree.sizes["frame"]
+        return [Check("frames", "20", str(count), count == 20, {"frames": count}), Check("none", "", "", None, {})]
+
+    def fails(tree: xr.DataTree) -> list[Check]:
+        return [Check("always", "yes", "no", False, {})]
+
+    assert store.verify(whole, [frames]).ok
+    report = store.verify(whole, [frames, fails])
+    assert not report.ok
+    assert [row["ok"] for row in report.as_json()["checks"]] == [True, None, False]
+
+
+def test_no_store_at_all(tmp_path: Path) -> None:
+    with pytest.raises(store.Damage, match="no such store"):
+        store.verify(tmp_path / "none.zarr")
+    (tmp_path / "empty").mkdir()
+    assert ".marks/layout.json" in found(tmp_path / "empty")

@@ -1,0 +1,173 @@
+"""Ray casting against a search through all facets in float64, and against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from sonarsynth.conventions import Floats
+from sonarsynth.geometry import Pose, quaternion, unit
+from sonarsynth.world import casting
+from sonarsynth.world.casting import OFFSET, Backend, first_hit, occluded
+from sonarsynth.world.meshes import Mesh
+from sonarsynth.world.moment import Body
+
+
+def mesh_from(shape: trimesh.Trimesh, scale: float = 1.0) -> Mesh:
+    return Mesh(np.asarray(shape.vertices, float) * scale, np.asarray(shape.faces, np.int32))
+
+
+SPHERE = mesh_from(trimesh.creation.icosphere(subdivisions=3), 0.5)
+RING = mesh_from(trimesh.creation.torus(0.8, 0.3))  # concave
+
+
+def search(mesh: Mesh, origin: Floats, direction: Floats) -> tuple[np.ndarray, Floats]:
+    """Nearest facet and distance by Moeller and Trumbore's formulas over all facets."""
+    facet, distance = np.full(len(origin), -1), np.full(len(origin), np.nan)
+    a, b, c = np.moveaxis(mesh.corners, 1, 0)
+    for i, (o, d) in enumerate(zip(origin, direction, strict=True)):
+        q = np.cross(d, c - a)
+        det = np.sum((b - a) * q, axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u = np.sum((o - a) * q, axis=1) / det
+            r = np.cross(o - a, b - a)
+            v, t = np.sum(d * r, axis=1) / det, np.sum((c - a) * r, axis=1) / det
+            t = np.where((u >= 0) & (v >= 0) & (u + v <= 1) & (t >= 0), t, np.inf)
+        if np.isfinite(t.min()):
+            facet[i], distance[i] = int(np.argmin(t)), t.min()
+    return facet, distance
+
+
+def rays_at(size: float, away: float, count: int, seed: int) -> tuple[Floats, Floats]:
+    """Rays from a sphere of radius `away` towards points within 1.05 of `size`."""
+    rng = np.random.default_rng(seed)
+    origin = away * unit(rng.normal(size=(count, 3)))
+    aim = size * 1.05 * rng.uniform(size=(count, 1)) * unit(rng.normal(size=(count, 3)))
+    return origin, unit(aim - origin)
+
+
+@pytest.mark.parametrize("mesh", [SPHERE, RING])
+@pytest.mark.parametrize("away", [0.1, 1.5, 20.0, 1000.0])
+def test_the_first_facet_and_its_distance(mesh: Mesh, away: float) -> None:
+    origin, direction = rays_at(mesh.radius, away, 400, 0)
+    facet, distance = first_hit(mesh, origin, 3.0 * direction)
+    expected, at = search(mesh, origin, direction)
+    assert (facet == expected).mean() > 0.99  # on an edge either facet will do
+    np.testing.assert_array_equal(facet < 0, expected < 0)
+    np.testing.assert_allclose(distance, at, rtol=1e-13, atol=2e-9 * mesh.radius)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_the_size_of_the_body_does_not_matter(scale: float) -> None:
+    origin, direction = rays_at(0.5, 3.0, 200, 1)
+    facet, distance = first_hit(SPHERE, origin, direction)
+    scaled = Mesh(SPHERE.vertices * scale, SPHERE.faces)
+    facet2, distance2 = first_hit(scaled, origin * scale, direction)
+    np.testing.assert_array_equal(facet, facet2)
+    np.testing.assert_allclose(distance2, distance * scale, rtol=1e-12)
+
+
+def test_rays_end_at_far_and_do_not_look_back() -> None:
+    origin, ahead = np.array([[-2.0, 0.01, 0.02]]), np.array([[1.0, 0.0, 0.0]])
+    facet, distance = first_hit(SPHERE, origin, ahead)
+    assert facet[0] >= 0
+    assert distance[0] == pytest.approx(1.5, abs=5e-3)
+    assert first_hit(SPHERE, origin, ahead, far=1.4)[0][0] == -1
+    assert first_hit(SPHERE, origin, -ahead)[0][0] == -1
+    inside, out = first_hit(SPHERE, np.zeros((1, 3)), ahead)
+    assert inside[0] >= 0
+    assert out[0] == pytest.approx(0.5, abs=5e-3)
+
+
+def place(mesh: Mesh, position: tuple[float, float, float], heading: float = 0.7) -> Body:
+    return Body("body", mesh, Pose(np.array(position), quaternion(heading, 0.2, -0.4)), np.zeros(3))
+
+
+def test_a_convex_body_hides_none_of_the_facets_that_face_away_from_it() -> None:
+    body = place(SPHERE, (1000.0, -500.0, -30.0))
+    centroid, normal = body.pose.to_world(SPHERE.centroid), body.pose.turn_to_world(SPHERE.normal)
+    for eye in np.array([[1000.0, -480.0, -25.0], [1000.0, -499.4, -30.0], [2000.0, 500.0, -30.0]]):
+        facing = np.sum(normal * (eye - centroid), axis=1) > 0
+        start = centroid + OFFSET * SPHERE.radius * normal
+        end = np.broadcast_to(eye, start.shape)
+        hidden = occluded((body,), start, end)
+        assert not hidden[facing].any()
+        assert hidden[~facing].all()
+
+
+def test_a_sphere_hides_what_is_in_its_shadow_and_no_more() -> None:
+    body = place(SPHERE, (0.0, 0.0, -10.0))
+    eye = np.array([5.0, 0.0, -10.0])
+    rng = np.random.default_rng(3)
+    end = np.stack([np.full(2000, -3.0), *rng.uniform(-1.5, 1.5, (2, 2000))], axis=1) + [0, 0, -10.0]
+    start = np.broadcast_to(eye, end.shape)
+    d = unit(end - start)
+    off = np.linalg.norm(np.cross(body.pose.position - start, d), axis=1)  # of the ray from the centre
+    hidden = occluded((body,), start, end)
+    assert hidden[off < 0.49].all()
+    assert not hidden[off > 0.5].any()
+    before = occluded((body,), start, start + 0.9 * (4.5 - 0.0) * d)
+    assert not before.any()
+    assert np.array_equal(occluded((place(SPHERE, (50.0, 0.0, 0.0)), body), end, start), hidden)
+
+
+def test_what_cannot_be_cast_at_is_refused() -> None:
+    bad = Mesh(np.full((3, 3), np.nan), np.array([[0, 1, 2]], np.int32))
+    ray = np.ones((1, 3))
+    with pytest.raises(ValueError, match="not finite"):
+        first_hit(bad, ray, ray)
+    with pytest.raises(ValueError, match="without extent"):
+        first_hit(Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]], np.int32)), ray, ray)
+    with pytest.raises(ValueError, match="finite origin and a direction"):
+        first_hit(SPHERE, ray, 0 * ray)
+    with pytest.raises(ValueError, match="finite ends"):
+        occluded((place(SPHERE, (0, 0, 0)),), ray, np.nan * ray)
+
+
+def test_the_shape_of_a_mesh_is_made_once() -> None:
+    again = Mesh(SPHERE.vertices.copy(), SPHERE.faces.copy())
+    assert casting.shape_of(SPHERE) is casting.shape_of(again)
+
+
+def test_a_wrong_proposal_is_passed_over() -> None:
+    shape = casting.shape_of(RING)
+
+    class Liar:
+        """Proposes facet 0 too early, for three rounds."""
+
+        rounds = 0
+
+        def nearest(self, origin: Floats, direction: Floats, far: Floats) -> tuple[np.ndarray, Floats]:
+            self.rounds += 1
+            if self.rounds <= 3:
+                return np.zeros(len(origin), int), np.full(len(origin), 1e-9)
+            return shape.caster.nearest(origin, direction, far)
+
+    lying = casting.Shape(shape.centre, shape.size, shape.corners, shape.faces, Liar())
+    origin, direction = rays_at(1.0, 3.0, 300, 5)
+    honest, at = shape.cast(origin, direction, np.full(300, np.inf))
+    facet, distance = lying.cast(origin, direction, np.full(300, np.inf))
+    np.testing.assert_array_equal(facet, honest)
+    np.testing.assert_allclose(distance, at, rtol=1e-12)
+
+
+def open3d_loads() -> bool:
+    try:
+        import open3d  # noqa: F401
+    except (ImportError, OSError):
+        return False
+    return True
+
+
+@pytest.mark.parametrize("backend", ["open3d"])
+def test_both_back_ends_agree_or_the_missing_one_says_so_in_a_line(backend: Backend) -> None:
+    origin, direction = rays_at(1.0, 20.0, 500, 6)
+    expected, at = first_hit(RING, origin, direction)
+    if not open3d_loads():
+        with pytest.raises(ImportError, match=r"^ray casting by Open3D needs Open3D, which does not load: .+$"):
+            first_hit(RING, origin, direction, backend=backend)
+        return
+    facet, distance = first_hit(RING, origin, direction, backend=backend)
+    np.testing.assert_array_equal(facet, expected)
+    np.testing.assert_allclose(distance, at, rtol=1e-14)

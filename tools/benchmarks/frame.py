@@ -1,0 +1,167 @@
+"""`tools/bench frame`: one core, stage by stage, against the thesis's loop and Acoular, each with its error. Prints JSON."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.peers import acoular_image, thesis_image
+from sonarsynth import config, planning, render
+from sonarsynth.beamforming import DenseDelayAndSum
+from sonarsynth.products import Arrivals, EnergyImage
+from sonarsynth.synthesis import DirectSum
+from sonarsynth.synthesis.pulse import bubble, fir
+
+RECIPE = Path(__file__).resolve().parents[2] / "configs" / "remus.yaml"
+PATHS = 2000
+THESIS_BEAMS = 12
+
+
+def cpu(function: Callable[[], Any], repeats: int = 7) -> tuple[Any, float]:
+    """Result and median CPU seconds of a call, after one call that compiles and fills caches."""
+    result = function()
+    seconds = []
+    for _ in range(repeats):
+        began = time.process_time()
+        result = function()
+        seconds.append(time.process_time() - began)
+    return result, float(np.median(seconds))
+
+
+def thin(arrivals: Arrivals, paths: int) -> Arrivals:
+    """The direct path and `paths` echoes, evenly taken: the size that the aim is stated for."""
+    echoes = np.flatnonzero(~arrivals.direct)
+    chosen = echoes[np.linspace(0, len(echoes) - 1, min(paths, len(echoes))).astype(int)]
+    return arrivals.select(np.concatenate([np.flatnonzero(arrivals.direct), chosen]))
+
+
+def relative(got: np.ndarray, exact: np.ndarray) -> float:
+    """Largest error over the largest exact value."""
+    return float(np.nanmax(np.abs(got - exact)) / np.nanmax(np.abs(exact)))
+
+
+def scaled(image: np.ndarray, exact: np.ndarray) -> tuple[float, float]:
+    """Error of an image at its best scale, over the peak; and its correlation with the exact one."""
+    scale = float((image * exact).sum() / (image * image).sum())
+    return relative(scale * image, exact), float(np.corrcoef(image.ravel(), exact.ravel())[0, 1])
+
+
+def bench(index: int = 32) -> dict[str, Any]:
+    """Measure one frame of the remus scene."""
+    plan = planning.plan(config.load(RECIPE))
+    scene, sonar = plan.scene, plan.scene.sonar
+    stages: dict[str, dict[str, Any]] = {}
+    full, seconds = cpu(lambda: render.trace_frame(plan, index))
+    stages["trace and label"] = {"ms": 1e3 * seconds, "facets": len(full.frame.moment.bodies[0].mesh.faces)}
+    traced = replace(full, arrivals=thin(full.arrivals, PATHS))
+    signals, seconds = cpu(lambda: render.synthesise(plan, traced))
+    stages["synthesise"] = {"ms": 1e3 * seconds, **synthesis_error(plan, traced)}
+    located, seconds = cpu(
+        lambda: scene.processing.locating.locate(
+            signals, plan.elements, sonar, traced.frame.sonar_pose, scene.world.environment.depth, plan.sizes["snap"]
+        )
+    )
+    true = traced.frame.sonar_pose.to_body(traced.frame.moment.snaps[0].position)
+    stages["locate"] = {"ms": 1e3 * seconds, "error_m": float(np.linalg.norm(located.position[0] - true))}
+    start, stop = (float(located.time[0]) + t for t in (plan.windows.echo_start, plan.windows.echo_stop))
+    beamformer = scene.processing.beamforming
+    image, seconds = cpu(lambda: beamformer.image(signals, plan.elements, sonar, start, stop))
+    dense, dense_seconds = cpu(
+        lambda: DenseDelayAndSum(focus=beamformer.focus).image(signals, plan.elements, sonar, start, stop), 1
+    )
+    image_seconds = seconds
+    stages["beamform"] = {"ms": 1e3 * seconds, "error_of_peak": relative(image.energy, dense.energy)}
+
+    def cloud(of: EnergyImage) -> Any:
+        return scene.processing.ranging.cloud(
+            signals, of, located, plan.elements, sonar, traced.frame.sonar_pose, plan.profile
+        )
+
+    points, seconds = cpu(lambda: cloud(image))
+    difference = points.range - cloud(dense).range
+    stages["range"] = {
+        "ms": 1e3 * seconds,
+        "points": int(np.isfinite(points.range).sum()),
+        "largest_difference_m": float(np.nanmax(np.abs(difference), initial=0.0)),
+    }
+    aimed = sum(stages[name]["ms"] for name in ("synthesise", "beamform", "range"))
+    total = sum(stage["ms"] for stage in stages.values())
+    return {
+        "scene": "configs/remus.yaml",
+        "frame": index,
+        "paths": len(traced.arrivals.delay),
+        "sensors": plan.elements.count,
+        "beams": int(image.energy.size),
+        "window_ms": 1e3 * (stop - start),
+        "stages": stages,
+        "synthesise_beamform_range_ms": aimed,
+        "frames_per_second_one_core": 1e3 / total,
+        "image_stage_peers": peers(plan, traced, signals, image_seconds, dense.energy, dense_seconds, start, stop),
+    }
+
+
+def synthesis_error(plan: planning.Plan, traced: render.Traced) -> dict[str, Any]:
+    """Largest error of the signals over their peak, against the direct sum, on every eighth echo (it takes seconds)."""
+    some = thin(traced.arrivals, PATHS // 8)
+    arguments = (some, traced.frame.moment.snaps, plan.elements, plan.scene.sonar, plan.absorption)
+    window = (float(plan.windows.start[traced.frame.index]), plan.windows.samples)
+    fast = plan.scene.physics.synthesis.signals(*arguments, *window).pressure
+    began = time.process_time()
+    exact = DirectSum().signals(*arguments, *window).pressure
+    seconds = time.process_time() - began
+    echo = slice(int((plan.windows.echo_start) * plan.scene.sonar.sampling_frequency), None)
+    return {
+        "error_of_peak": relative(fast, exact),
+        "error_of_echo_peak": relative(fast[:, echo], exact[:, echo]),
+        "direct_sum_ms_at_this_many_paths": 1e3 * seconds * PATHS / (PATHS // 8),
+    }
+
+
+def peers(
+    plan: planning.Plan,
+    traced: render.Traced,
+    signals: Any,
+    ours: float,
+    exact: np.ndarray,
+    exact_seconds: float,
+    start: float,
+    stop: float,
+) -> dict[str, Any]:
+    """The image by dense steering, by Acoular and by the thesis's loop: time, ratio to ours, error."""
+    sonar = plan.scene.sonar
+    focus = plan.scene.processing.beamforming.focus or 1e6
+    acoular, acoular_seconds = acoular_image(plan, signals, start, stop, focus)
+    acoular_error, acoular_likeness = scaled(acoular, exact)
+    rate = sonar.sampling_frequency
+    lag = np.arange(-int(0.6e-3 * rate), int(0.6e-3 * rate)) / rate
+    from sonarsynth.acoustics.spectra import filtered_pulse
+
+    pulse = filtered_pulse(lag, bubble(traced.frame.moment.snaps[0].model), fir(sonar.antialias))
+    count = exact.size
+    order = np.argsort(exact.ravel())
+    beams = order[np.linspace(0, count - 1, THESIS_BEAMS).astype(int)]
+    thesis, thesis_seconds = thesis_image(plan, traced.arrivals, pulse, rate, beams, sonar.band.centre)
+    thesis_error, thesis_likeness = scaled(thesis, exact.ravel()[beams])
+    thesis_seconds *= count / THESIS_BEAMS
+    return {
+        "ours": {"ms": 1e3 * ours},
+        "dense steering, float64": {"ms": 1e3 * exact_seconds, "ratio": exact_seconds / ours, "error_of_peak": 0.0},
+        "Acoular BeamformerTime": {
+            "ms": 1e3 * acoular_seconds,
+            "ratio": acoular_seconds / ours,
+            "error_of_peak_at_best_scale": acoular_error,
+            "correlation": acoular_likeness,
+        },
+        "thesis loop": {
+            "ms": 1e3 * thesis_seconds,
+            "measured_on_beams": THESIS_BEAMS,
+            "ratio": thesis_seconds / ours,
+            "error_of_peak_at_best_scale": thesis_error,
+            "correlation": thesis_likeness,
+        },
+    }

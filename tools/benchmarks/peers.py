@@ -1,0 +1,68 @@
+"""The peers that the benchmarks measure against: the thesis's imaging loop, and Acoular's BeamformerTime."""
+
+from __future__ import annotations
+
+import time
+import warnings
+
+import numpy as np
+
+from sonarsynth.conventions import direction
+from sonarsynth.planning import Plan
+from sonarsynth.products import Arrivals, Signals
+
+
+def thesis_image(
+    plan: Plan, arrivals: Arrivals, pulse: np.ndarray, rate: float, beams: np.ndarray, frequency: float
+) -> tuple[np.ndarray, float]:
+    """Energy (beam,) of the beams numbered `beams` by the thesis's loop, and its seconds.
+
+    Each beam, each ray: the array factor at one frequency for (arrival direction, steered direction), times the snap
+    scaled by the ray's amplitude and shifted by its delay to the nearest sample; summed; squared and summed. The matrix
+    is as short as the spread of the delays allows, as the thesis has it.
+    """
+    sonar, sensors = plan.scene.sonar, plan.elements
+    grid = sonar.beams
+    look = direction(grid.azimuth[None, :], grid.elevation[:, None]).reshape(-1, 3)[beams]
+    echoes = arrivals.select(~arrivals.direct)
+    shift = np.rint((echoes.delay - echoes.delay.min()) * rate).astype(int)
+    wavenumber = 2 * np.pi * frequency / sonar.assumed_sound_speed
+    energy = np.empty(len(beams))
+    began = time.process_time()
+    for b, u in enumerate(look):
+        total = np.zeros(shift.max() + len(pulse))
+        for ray in range(len(shift)):
+            phase = wavenumber * (sensors.position @ (echoes.direction[ray] - u))
+            factor = abs(np.exp(1j * phase).sum()) / sensors.count
+            total[shift[ray] : shift[ray] + len(pulse)] += factor * echoes.amplitude[ray] * pulse
+        energy[b] = np.sum(total * total) / rate
+    return energy, time.process_time() - began
+
+
+def acoular_image(plan: Plan, signals: Signals, start: float, stop: float, focus: float) -> tuple[np.ndarray, float]:
+    """Energy (elevation, azimuth) by Acoular's BeamformerTime on the echo window of the same signals, and its seconds."""
+    warnings.simplefilter("ignore")
+    import acoular
+
+    acoular.config.global_caching = "none"
+    sonar, grid = plan.scene.sonar, plan.scene.sonar.beams
+    rate = signals.sampling_frequency
+    first, last = (int(round((t - signals.start) * rate)) for t in (start, stop))
+    data = np.ascontiguousarray(signals.pressure[:, first:last].T.astype(float))
+    points = (focus * direction(grid.azimuth[None, :], grid.elevation[:, None])).reshape(-1, 3)
+    steer = acoular.SteeringVector(
+        grid=acoular.ImportGrid(pos=points.T),
+        mics=acoular.MicGeom(pos_total=plan.elements.position.T),
+        env=acoular.Environment(c=sonar.assumed_sound_speed),
+        steer_type="classic",
+    )
+    beamformer = acoular.BeamformerTime(
+        source=acoular.TimeSamples(data=data, sample_freq=rate), steer=steer, weights="none"
+    )
+    list(beamformer.result(1)) if False else None
+    began = time.process_time()
+    energy = np.zeros(len(points))
+    for block in beamformer.result(128):
+        energy += np.sum(np.square(block), axis=0)
+    seconds = time.process_time() - began
+    return (energy / rate).reshape(grid.elevations, grid.azimuths), seconds
