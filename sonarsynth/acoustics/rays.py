@@ -100,12 +100,11 @@ def eigenrays(water: Water, start: Floats, end: Floats, distance: Floats) -> Eig
     if not (np.isfinite(r) & (r >= 0)).all():
         raise ValueError("horizontal distances must be finite and not negative")
     upside_down = -water.depth[::-1].copy(), water.speed[::-1].copy()
-    layers = (water.depth, water.speed, *upside_down, float(water.speed.min()), float(water.speed.max()))
     pairs, rows, first = [], [], 0
     room = len(r) + 64
     while first < len(r):
         pair, out = np.empty(room, np.int64), np.empty((room, kernels.FIELDS))
-        count, reached = kernels.rays_of_pairs(layers, z1, z2, r, first, pair, out)
+        count, reached = kernels.rays_of_pairs(water.depth, water.speed, *upside_down, z1, z2, r, first, pair, out)
         pairs.append(pair[:count])
         rows.append(out[:count])
         room = 2 * room if reached == first else max(64, 2 * (len(r) - reached))

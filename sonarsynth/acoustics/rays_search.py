@@ -123,6 +123,9 @@ def turns(
         if settled or held == len(stack) or high - low <= 1e-14 * high:
             if below != below_high and count < len(roots):
                 guess = low + (high - low) * (distance - x_low) / (x_high - x_low)
+                if n <= 1 and inverse_gradient > 0.0:  # exact where both ends lie in the layer of the turning point
+                    total = distance / inverse_gradient
+                    guess = 0.5 * (total - (d[0] - d[n]) / total)
                 roots[count, 0], roots[count, 1] = refine(
                     low, high, guess, below, fastest, distance, d, k, n, inverse_gradient
                 )

@@ -19,13 +19,21 @@ class IsovelocityRange:
     """Range by the closed form for straight paths at the assumed sound speed, from the delay after the direct arrival.
 
     For the beams over threshold the peak of the beam's signal is the echo, as in the thesis, after the snap's own
-    waveform has been taken out by means of the direct pulse.
+    waveform has been taken out by means of the direct pulse. A glint lights every beam within a beam width and more, so
+    `locality` decides how many of them give a point. Measured on 22 frames of a REMUS-100 hull at 20 m (508 elements,
+    0.5 degree grid; points whose beam meets the hull, and all others; error of range along the beam):
+
+        locality    on    off    median    nine in ten
+        0.5 dB      24     10    2.4 cm         3.6 cm
+        1 dB        31     36    2.6 cm         3.7 cm
+        3 dB        46    100    2.9 cm         6.2 cm
+        60 dB       66    269    3.6 cm          11 cm
     """
 
     kind: Literal["isovelocity"] = "isovelocity"
     threshold: Annotated[Decibels, Gt(0)] = 12.0
     """Beams this far below the loudest beam of the image give no point."""
-    locality: Annotated[Decibels, Ge(0)] = 1.0
+    locality: Annotated[Decibels, Ge(0)] = 3.0
     """A beam gives no point where one within a beam width holds this much more at the same delay: the echo is its."""
     focus: PositiveMetres | None = 20.0
     """Distance at which the ranged beams are focused; none: plane waves."""

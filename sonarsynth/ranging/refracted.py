@@ -21,7 +21,7 @@ class RefractedRange:
     kind: Literal["refracted"] = "refracted"
     threshold: Annotated[Decibels, Gt(0)] = 12.0
     """Beams this far below the loudest beam of the image give no point."""
-    locality: Annotated[Decibels, Ge(0)] = 1.0
+    locality: Annotated[Decibels, Ge(0)] = 3.0
     """A beam gives no point where one within a beam width holds this much more at the same delay: the echo is its."""
     focus: PositiveMetres | None = 20.0
     """Distance at which the ranged beams are focused; none: plane waves."""

@@ -24,7 +24,22 @@ from sonarsynth.world.moment import Snap
 
 @description
 class KernelDeposit:
-    """Synthesis by a Kaiser-Bessel kernel, Chebyshev nodes over the aperture and polynomial directivity."""
+    """Synthesis by a Kaiser-Bessel kernel, Chebyshev nodes over the aperture and polynomial directivity.
+
+    Measured: 508 hydrophones with faces, 2000 echoes of a body of 1.6 m and the direct snap, absorption; largest error
+    over the peak of the echoes, against `DirectSum`, and time of one core (2.6 GHz Zen 4, shared), by distance:
+
+        width  tolerance  precision |  20 m            |  5 m
+        4      2e-3       float32   |  1.3e-3   9.4 ms |  1.4e-3    25 ms
+        6      1e-3       float32   |  9.9e-5   9.9 ms |  2.4e-4    29 ms
+        6      2e-4       float32   |  2.4e-5    12 ms |  3.9e-5    38 ms   (default)
+        6      5e-5       float32   |  2.5e-5    13 ms |  1.7e-5    50 ms
+        8      2e-5       float32   |  1.5e-6    16 ms |  2.2e-6    60 ms
+        8      2e-6       float64   |  4.6e-7    43 ms |  7.9e-7   180 ms
+        DirectSum                   |          150 s   |            80 s
+
+    Point hydrophones take 8 ms and 13 ms. Errors include what the support of the pulse leaves out (1e-7 of its peak).
+    """
 
     kind: Literal["kernel_deposit"] = "kernel_deposit"
     width: Annotated[int, Ge(4), Le(16), MultipleOf(2)] = 6

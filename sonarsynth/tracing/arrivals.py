@@ -19,6 +19,11 @@ from sonarsynth.world.moment import Moment, Snap
 if TYPE_CHECKING:
     from sonarsynth.tracing import Propagation
 
+NEGLIGIBLE = 1e-7
+"""A facet whose amplitude is nowhere on the array above this part of the strongest facet's is left out. All that are
+left out together stay below their number times this. (Their amplitude at the centre may be so much smaller than at the
+edge, 1e-30 in the tail of a lobe, that nothing relative to it has a meaning.)"""
+
 
 def trace(
     environment: Environment,
@@ -105,11 +110,17 @@ def _echoes(
         array.bodies, environment, profile, start, array.clear[row[path]], out.departure[path], out.length[path]
     )
     path = path[~blocked]
+    over_aperture = law.amplitude(
+        incident[path, None, :],
+        array.legs.probe_departure[row[path]],
+        normal[path, None, :],
+        area[path, None],
+    )
+    strongest = np.maximum(over_aperture.max(axis=1, initial=0.0), scattering[path])
+    loud = strongest >= NEGLIGIBLE * strongest.max(initial=0.0)
+    path, over_aperture = path[loud], over_aperture[loud]
     row, scattering = row[path], scattering[path]
     legs = array.legs.select(row)
-    over_aperture = law.amplitude(
-        incident[path, None, :], legs.probe_departure, normal[path, None, :], area[path, None]
-    )
     gain = over_aperture / scattering[:, None] * legs.probe_gain
     gain[(over_aperture == 0).any(axis=1)] = 1.0  # a facet on the limb: all sensors share what the centre sees
     return _assemble(

@@ -11,6 +11,8 @@ from sonarsynth.tracing.refracted import Refracted
 from sonarsynth.tracing.straight import Straight
 from sonarsynth.world.environment import Profile
 
+_STRAIGHT, _REFRACTED = Straight(), Refracted()
+
 
 @description
 class AutoTracing:
@@ -20,5 +22,5 @@ class AutoTracing:
 
     def connect(self, profile: Profile, environment_depth: float, start: Floats, end: Floats) -> Paths:
         """Paths of the model chosen; arguments and errors as in `Propagation`."""
-        model = Straight() if profile.uniform else Refracted()
+        model = _STRAIGHT if profile.uniform else _REFRACTED
         return model.connect(profile, environment_depth, start, end)

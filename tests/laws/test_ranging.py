@@ -169,19 +169,19 @@ def hull_statistics(locality, speed=C):
 
 def test_points_of_a_hull_lie_on_it():
     """1.6 m hull of patches at 20 m: median under 5 cm and nine in ten within three predicted errors."""
-    miss, error, off, near = hull_statistics(1.0)
-    assert len(miss) >= 5
+    miss, error, off, near = hull_statistics(0.5)
+    assert len(miss) >= len(FRAMES)
     assert np.median(np.abs(miss)) < 0.05
     assert np.mean(np.abs(miss) < 3 * error) >= 0.9
     assert np.median(error) < 0.15
-    assert off <= 2 * len(miss)
+    assert off <= len(miss)
     assert np.degrees(near[0].max()) < 4.0  # none is further than the hull is long and a beam is wide
     assert np.degrees(near[1].max()) < 2.0
 
 
 def test_echoes_that_belong_to_another_beam_are_what_is_left_out():
     """Without the check there are many more points, most of them off the hull, and the rest are worse."""
-    miss, _, off, _ = hull_statistics(1.0)
+    miss, _, off, _ = hull_statistics(0.5)
     more, _, more_off, _ = hull_statistics(60.0)
     assert len(more) + more_off > 2 * (len(miss) + off)
     assert np.median(np.abs(more)) > np.median(np.abs(miss))
@@ -189,7 +189,7 @@ def test_echoes_that_belong_to_another_beam_are_what_is_left_out():
 
 
 def test_a_wrong_sound_speed_is_in_the_predicted_error():
-    miss, error, _, _ = hull_statistics(1.0, C + SONAR.sound_speed_error)
+    miss, error, _, _ = hull_statistics(0.5, C + SONAR.sound_speed_error)
     assert np.mean(np.abs(miss) < 3 * error) >= 0.9
 
 
