@@ -35,7 +35,7 @@ def label(
     against the bodies as they appear: each vertex moved to (its arrival direction) * (its distance).
     """
     seen = [_as_seen(body, sonar_pose, connect, straight) for body in moment.bodies]
-    target, facet, distance = _label_beams(moment.bodies, seen, beams)
+    target, facet, distance = _label_beams(moment.bodies, seen, beams, sonar_pose, straight)
     boxes = [
         _visible(body, corners, moment.bodies, sonar_pose) for body, corners in zip(moment.bodies, seen, strict=True)
     ]
@@ -82,7 +82,7 @@ def _as_seen(body: Body, sonar_pose: Pose, connect: Connect, straight: bool) -> 
 
 
 def _label_beams(
-    bodies: tuple[Body, ...], seen: list[Floats], beams: BeamGrid
+    bodies: tuple[Body, ...], seen: list[Floats], beams: BeamGrid, sonar_pose: Pose, straight: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Target, facet and range (elevation, azimuth) of each beam."""
     rays = direction(beams.azimuth[None, :], beams.elevation[:, None])
@@ -95,8 +95,12 @@ def _label_beams(
         if not len(faces):
             continue
         rows, columns = _beams_near(vertices[np.unique(faces)], rays)
-        mesh = Mesh(np.nan_to_num(vertices), body.mesh.faces)
-        hit, distance = first_hit(mesh, np.zeros((len(rows), 3)), rays[rows, columns])
+        look = rays[rows, columns]
+        if straight:  # in the frame of the mesh, which is made ready for casting once
+            origin = np.broadcast_to(body.pose.to_body(sonar_pose.position), look.shape)
+            hit, distance = first_hit(body.mesh, origin, body.pose.turn_to_body(sonar_pose.turn_to_world(look)))
+        else:
+            hit, distance = first_hit(Mesh(np.nan_to_num(vertices), body.mesh.faces), np.zeros_like(look), look)
         closer = (hit >= 0) & (distance < nearest[rows, columns])
         rows, columns = rows[closer], columns[closer]
         target[rows, columns], facet[rows, columns] = index, hit[closer]

@@ -37,9 +37,8 @@ def slope_lobe(incident: Floats, scattered: Floats, normal: Floats, slope: float
     """
     half = [scattered[..., i] - incident[..., i] for i in range(3)]
     up = half[0] * normal[..., 0] + half[1] * normal[..., 1] + half[2] * normal[..., 2]
-    along = [
-        half[i] - up * normal[..., i] for i in range(3)
-    ]  # what is across the normal: no cancellation at the mirror
+    # what is across the normal, so that nothing cancels at the mirror direction
+    along = [half[i] - up * normal[..., i] for i in range(3)]
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         square = (along[0] * along[0] + along[1] * along[1] + along[2] * along[2]) / (up * up)  # tan^2 b
         lobe = np.exp(square * (-0.5 / slope**2)) * ((1.0 + square) ** 2 / (8.0 * np.pi * slope**2))

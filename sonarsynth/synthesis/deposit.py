@@ -69,8 +69,7 @@ def stretch_pressure(
     `KernelDeposit`.
     """
     width, oversampling, dtype, tolerance = method
-    circle = next_fast_len(int(np.ceil(2.0 * highest * oversampling / bins.step)) + width, real=True)
-    circle += circle % 2
+    circle = 2 * int(next_fast_len(int(np.ceil(highest * oversampling / bins.step)) + width, real=True))
     used = min(bins.frequency.size, circle // 2)
     bins = Bins(bins.frequency[:used], bins.spectrum[:used], bins.relative[:used], bins.step)
     grid = kernel(width, circle * bins.step / (2.0 * highest), circle, dtype)

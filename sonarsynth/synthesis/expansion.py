@@ -25,25 +25,32 @@ weighs."""
 
 
 def colour(frequency: Floats, spectrum: np.ndarray, highest: float) -> Colour:
-    """Quantiles of the modulus of a spectrum over frequency, over `highest` (Hz), to two digits so that tables are
-    kept."""
+    """Quantiles of the modulus of a spectrum over frequency, over `highest` (Hz), rounded up to a twentieth."""
     mass = np.cumsum(np.abs(spectrum))
     found = np.interp((np.arange(8) + 0.5) / 8.0, mass / mass[-1], frequency / highest)
-    return tuple(float(np.round(v, 2)) for v in found)
+    return tuple(float(np.ceil(20.0 * v - 1e-6)) / 20.0 for v in found)
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=1)
+def _tails() -> tuple[Floats, Floats]:
+    """Half ranges of phase (rad), and the error (node count - 1, phase) of interpolating a wave at n = 1, 2, ... nodes.
+
+    exp(i x t) is the sum of 2 i^n J_n(x) T_n(t), |t| <= 1; interpolation at most doubles the tail, which falls fast.
+    """
+    phase = np.concatenate([[0.0], np.geomspace(1e-13, 0.1, 120), np.arange(0.15, 1.1 * MOST_NODES, 0.1)])
+    size = np.abs(jv(np.arange(1, MOST_NODES + 2)[:, None], phase))
+    return phase, 4.0 * (size[:-1] + size[1:])
+
+
+@lru_cache(maxsize=256)
 def _widest(weights: Colour, tolerance: float) -> Floats:
-    """Largest half range of phase (rad, at the highest frequency) that n = 1, 2, ... Chebyshev nodes interpolate to
-    `tolerance`."""
-    phase = np.concatenate([[0.0], np.geomspace(1e-13, 0.1, 60), np.arange(0.15, 1.1 * MOST_NODES, 0.1)])
+    """Largest half range of phase (rad, at the highest frequency) that n = 1, 2, ... nodes interpolate."""
+    phase, tails = _tails()
     out = np.zeros(MOST_NODES)
-    for n in range(1, MOST_NODES + 1):
-        argument = phase[:, None] * np.array(weights)
-        # exp(i x t) = sum of 2 i^n J_n(x) T_n(t); interpolation doubles the tail, which falls fast
-        tail = 4.0 * (np.abs(jv(n, argument)) + np.abs(jv(n + 1, argument))).mean(axis=1)
-        good = np.maximum.accumulate(tail) <= tolerance
-        out[n - 1] = phase[np.flatnonzero(good)[-1]]
+    for n, tail in enumerate(tails):
+        mean = np.mean([np.interp(phase * w, phase, tail) for w in weights], axis=0)
+        good = np.maximum.accumulate(mean) <= tolerance
+        out[n] = phase[np.flatnonzero(good)[-1]]
     return np.maximum.accumulate(out)
 
 

@@ -76,9 +76,16 @@ def convert(signals: Signals, converter: Converter | None) -> Signals:
     if converter is None:
         return signals
     largest = 2 ** (converter.bits - 1) - 1
-    counts = np.rint(signals.pressure / np.float64(converter.quantum))
-    if np.isnan(counts).any():
+    exact = np.float32 if converter.bits <= 16 else np.float64  # in which every count and its half are numbers
+    counts = signals.pressure / exact(converter.quantum)
+    np.rint(counts, out=counts)
+    highest, lowest = counts.max(initial=0.0), counts.min(initial=0.0)
+    if np.isnan(highest):
         raise ValueError("the signals hold NaN: they cannot be converted")
-    clipped = int(np.count_nonzero(np.abs(counts) > largest))
-    pressure = (np.clip(counts, -largest, largest) * converter.quantum).astype(np.float32)
+    clipped = 0
+    if max(highest, -lowest) > largest:
+        clipped = int(np.count_nonzero(np.abs(counts) > largest))
+        np.clip(counts, -largest, largest, out=counts)
+    counts *= exact(converter.quantum)
+    pressure = counts.astype(np.float32, copy=False)
     return replace(signals, pressure=pressure, quantum=converter.quantum, clipped=signals.clipped + clipped)

@@ -180,8 +180,8 @@ def test_absorption_is_relative_to_the_band_centre() -> None:
 @pytest.mark.parametrize("distance", [20.0, 6.0, 2.5])
 @pytest.mark.parametrize("refracted", [False, True])
 def test_kernel_deposit_is_the_exact_sum(distance: float, refracted: bool) -> None:
-    array = some_of(FACES, 16)
-    of = target_at(distance, 60, 2, refracted=refracted, direct=False)
+    array = some_of(FACES, 32)
+    of = target_at(distance, 40, 2, refracted=refracted, direct=False)
     start, samples = window(of, SONAR, array)
     exact, _ = exact_signals(of, SNAPS, array, SONAR, absorption, start, samples)
     got = KernelDeposit().signals(of, SNAPS, array, SONAR, absorption, start, samples)
@@ -192,17 +192,13 @@ def test_kernel_deposit_is_the_exact_sum(distance: float, refracted: bool) -> No
 
 def test_nodes_over_the_aperture_serve_the_whole_array() -> None:
     """Enough paths that nodes pay: 508 hydrophones interpolated from some tens of points, the direct snap apart."""
-    of = target_at(20.0, 1500, 3)
+    of = target_at(20.0, 500, 3)
     start, samples = window(of, SONAR, FACES)
-    got = KernelDeposit().signals(of, SNAPS, FACES, SONAR, absorption, start, samples)
-    best = KernelDeposit(width=14, precision="float64", tolerance=1e-10)
-    fine = best.signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure
+    got = KernelDeposit().signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure[::127]
+    exact, _ = exact_signals(of, SNAPS, some_of(FACES, 127), SONAR, absorption, start, samples)
     late = int((of.delay[of.target == 0].min() - 2.3e-3 - start) * SONAR.sampling_frequency)
-    assert error(got.pressure[:, late:], fine[:, late:]) < 1e-4  # relative to the echo
-    assert error(got.pressure, fine) < 1e-4
-    few = some_of(FACES, 170)
-    exact, _ = exact_signals(of, SNAPS, few, SONAR, absorption, start, samples)
-    assert error(fine[::170], exact) < 2e-7
+    assert error(got[:, late:], exact[:, late:]) < 1e-4  # relative to the echo
+    assert error(got, exact) < 1e-4
 
 
 @pytest.mark.parametrize(
@@ -217,7 +213,7 @@ def test_nodes_over_the_aperture_serve_the_whole_array() -> None:
 )
 def test_each_knob_buys_its_error(method: KernelDeposit, bound: float) -> None:
     array = some_of(FACES, 30)
-    of = target_at(8.0, 40, 4, refracted=True, direct=False)
+    of = target_at(8.0, 20, 4, refracted=True, direct=False)
     start, samples = window(of, SHARP, array)
     exact, _ = exact_signals(of, SNAPS, array, SHARP, absorption, start, samples)
     got, _ = method.pressure(of, SNAPS, array, SHARP, absorption, start, samples)
