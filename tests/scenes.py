@@ -64,7 +64,9 @@ def point_scene(
                     sound_speed=Isovelocity(speed=1500.0),
                     absorption=Absorption(formula="none"),
                 ),
-                targets=(Target(name="point", shape=Sphere(radius=0.001), motion=Still(position=target, heading=heading)),),
+                targets=(
+                    Target(name="point", shape=Sphere(radius=0.001), motion=Still(position=target, heading=heading)),
+                ),
                 shrimp=(SnappingShrimp(position=snap),),
             ),
             sonar=Sonar(assumed_sound_speed=1500.0, **sonar),

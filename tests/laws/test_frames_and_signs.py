@@ -112,5 +112,7 @@ def test_headings_of_waypoints_turn_the_short_way() -> None:
 
 def test_streams_depend_on_their_path_alone() -> None:
     assert stream(1, "noise", 2).random() == stream(1, "noise", 2).random()
-    draws = {stream(*key).random() for key in [(1, "noise", 2), (1, "noise", 3), (2, "noise", 2), (1, "noise", "2"), (1,)]}
+    draws = {
+        stream(*key).random() for key in [(1, "noise", 2), (1, "noise", 3), (2, "noise", 2), (1, "noise", "2"), (1,)]
+    }
     assert len(draws) == 5
