@@ -11,6 +11,7 @@ from pydantic import TypeAdapter
 
 from sonarsynth.description import description
 from sonarsynth.scene import Frame, Scene
+from sonarsynth.tracing.ray_request import RayRequest
 from sonarsynth.world.meshes import mesh_of
 
 SPLITS = ("train", "validation", "test")
@@ -26,6 +27,8 @@ class Recipe:
     licence: str = "CC-BY-4.0"
     """Licence of the dataset (not of the software)."""
     scene: Scene
+    rays: RayRequest | None = None
+    """Rays to follow through the scene, for `sonarsynth rays`; they do not change the dataset."""
 
     @property
     def frames(self) -> int:
@@ -51,7 +54,8 @@ class Recipe:
     def digest(self) -> str:
         """SHA-256 of everything in the recipe that decides numbers: descriptions, seed and mesh contents."""
         meshes = {t.name: mesh_of(t.shape).digest for t in self.scene.world.targets}
-        text = json.dumps([self.as_json(), meshes], sort_keys=True)
+        deciding = {name: value for name, value in self.as_json().items() if name != "rays"}
+        text = json.dumps([deciding, meshes], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from sonarsynth.acoustics.snap import source_level
 from sonarsynth.conventions import Floats
+from sonarsynth.description import FieldError
 from sonarsynth.labelling import label, ledger
 from sonarsynth.planning import Plan, plan
 from sonarsynth.products import LEDGER, Arrivals, Bearings, EnergyImage, Ledger, PointCloud, Signals, Truth
@@ -29,6 +30,8 @@ from sonarsynth.world.moment import Snap
 if TYPE_CHECKING:
     import xarray as xr
 
+    from sonarsynth.tracing.fan import RayFan
+
 __all__ = [
     "VARIABLES",
     "Heard",
@@ -38,6 +41,7 @@ __all__ = [
     "attributes",
     "beamform_frame",
     "coordinates",
+    "follow_rays",
     "range_frame",
     "render",
     "trace_frame",
@@ -96,6 +100,30 @@ def trace_frame(plan: Plan, index: int) -> Traced:
         arrivals, frame.moment.snaps, len(frame.moment.bodies), levels, float(-20 * np.log10(np.cos(min(phase, 1.5))))
     )
     return Traced(frame, arrivals, truth, book)
+
+
+def follow_rays(plan: Plan, index: int) -> RayFan:
+    """The rays that the recipe asks for, followed through a frame. Raises FieldError where it asks for none."""
+    from sonarsynth.tracing.fan import fan
+
+    request = plan.recipe.rays
+    if request is None:
+        raise FieldError((), "the recipe asks for no rays: add 'rays:', with directions or a grid")
+    scene, frame = plan.recipe.frame(index)
+    if request.towards_shrimp and not frame.moment.snaps:
+        raise FieldError(("rays", "towards_shrimp"), "the scene has no shrimp")
+    return fan(
+        scene.world.environment,
+        plan.profile,
+        frame.moment.bodies,
+        frame.sonar_pose.position,
+        frame.sonar_pose.turn_to_world(request.rays()),
+        request.duration,
+        request.bounces,
+        towards=frame.moment.snaps[0].position if request.towards_shrimp else None,
+        law=scene.physics.scattering,
+        propagation=plan.propagation,
+    )
 
 
 def beamform_frame(plan: Plan, index: int, traced: Traced) -> Heard:

@@ -159,6 +159,30 @@ def show(
 
 
 @app.command()
+def rays(
+    recipe: RecipeFile,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Where the pictures go. Left out: <recipe>.rays.")
+    ] = None,
+    frame: Annotated[int, typer.Option(min=0, help="The frame whose targets the rays meet.")] = 0,
+    settings: Settings = [],  # noqa: B006
+) -> None:
+    """Follow the rays that a recipe asks for through a frame, and draw them in a section and in space."""
+    from sonarsynth import config, planning
+    from sonarsynth.show.rays import show_rays
+
+    source = config.read(recipe, settings)
+    made_from = config.recipe_of(source)
+    if frame >= made_from.frames:
+        raise BadOption(f"--frame {frame} is outside 0..{made_from.frames - 1}")
+    with config.locating(source):
+        files, line = show_rays(planning.plan(made_from), frame, out or Path(f"{recipe.stem}.rays"))
+    typer.echo(line)
+    for file in files:
+        typer.echo(str(file))
+
+
+@app.command()
 def schema() -> None:
     """Print the JSON schema of a recipe, for editors."""
     from sonarsynth import config

@@ -30,15 +30,15 @@ class KernelDeposit:
     over the peak of the echoes, against `DirectSum`, and time of one core (2.6 GHz Zen 4, shared), by distance:
 
         width  tolerance  precision |  20 m            |  5 m
-        4      2e-3       float32   |  1.3e-3   9.4 ms |  1.4e-3    25 ms
-        6      1e-3       float32   |  9.9e-5   9.9 ms |  2.4e-4    29 ms
+        4      2e-3       float32   |  1.6e-3   9.3 ms |  1.5e-3    24 ms
+        6      1e-3       float32   |  9.9e-5   9.4 ms |  9.7e-5    27 ms
         6      2e-4       float32   |  2.4e-5    12 ms |  3.9e-5    38 ms   (default)
         6      5e-5       float32   |  2.5e-5    13 ms |  1.7e-5    50 ms
-        8      2e-5       float32   |  1.5e-6    16 ms |  2.2e-6    60 ms
-        8      2e-6       float64   |  4.6e-7    43 ms |  7.9e-7   180 ms
+        8      2e-5       float32   |  3.3e-6    15 ms |  2.2e-6    60 ms
+        8      2e-6       float64   |  4.7e-7    46 ms |  8.0e-7   190 ms
         DirectSum                   |          150 s   |            80 s
 
-    Point hydrophones take 8 ms and 13 ms. Errors include what the support of the pulse leaves out (1e-7 of its peak).
+    Point hydrophones take 7 ms and 12 ms. Errors include what the support of the pulse leaves out (1e-7 of its peak).
     """
 
     kind: Literal["kernel_deposit"] = "kernel_deposit"
