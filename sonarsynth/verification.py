@@ -156,7 +156,10 @@ def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
 
 
 def range_errors(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
-    """Range errors of the points on a target, and the count of those off it."""
+    """Range errors of the points on a target, and the count of those off it.
+
+    How large they are depends on the scene (beam width, size of the glints); that they are as predicted does not.
+    """
     errors, scaled, off, near, beams = [], [], 0, 0, 0
     for i in frames:
         found, predicted = _frame(tree, "cloud/range", i), _frame(tree, "cloud/range_error", i)
@@ -169,9 +172,7 @@ def range_errors(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
         near += int((points & ~on & near_target(tree, target)).sum())
     error, ratio = np.concatenate(errors), np.concatenate(scaled)
     if not len(error):
-        return [
-            Check("range of points on target", "median under 5 cm", "no points on a target", None, {"off_target": off})
-        ]
+        return [Check("range of points on target", "reported", "no points on a target", None, {"off_target": off})]
     median, share = float(np.median(error)), float(np.mean(ratio <= 3))
     numbers: dict[str, Any] = {
         "points": len(error),
@@ -182,9 +183,9 @@ def range_errors(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
     return [
         Check(
             "range of points on target",
-            "median under 5 cm",
-            f"{100 * median:.2g} cm over {len(error)} points",
-            median < 0.05,
+            "reported",
+            f"median error {100 * median:.2g} cm over {len(error)} points",
+            True,
             numbers,
         ),
         Check("predicted range errors", "90 % within three", f"{100 * share:.3g} %", share >= 0.9, numbers),

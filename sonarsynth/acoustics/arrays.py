@@ -16,10 +16,13 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Floats, Ints
 
 GATE_TAPER: Final = 1e-4
 """Length (s) of the raised cosine at each end of a gate; a quarter of the gate at most."""
+
+SENSORS_AT_ONCE: Final = 64
+"""Sensors whose gates are transformed together: they stay in the cache."""
 
 
 def aperture_terms(position: npt.ArrayLike, aperture: float) -> Floats:
@@ -131,10 +134,13 @@ def gated_spectra(
         raise ValueError(
             f"a window of {count} samples resolves no frequency in {band[0]:g} to {band[1]:g} Hz: take a longer one"
         )
-    cut = pressure[:, first_sample : first_sample + count] * gate_taper(count, sampling_frequency)
-    spectra = rfft(cut, length, axis=1)[:, lowest : highest + 1]
-    frequencies = np.arange(lowest, highest + 1, dtype=float) * (sampling_frequency / length)
-    return frequencies, np.ascontiguousarray(spectra, np.complex64)
+    taper = gate_taper(count, sampling_frequency)
+    spectra = np.empty((len(pressure), highest + 1 - lowest), np.complex64)
+    for low in range(0, len(pressure), SENSORS_AT_ONCE):
+        some = slice(low, low + SENSORS_AT_ONCE)
+        cut = pressure[some, first_sample : first_sample + count] * taper
+        spectra[some] = rfft(cut, length, axis=1)[:, lowest : highest + 1]
+    return np.arange(lowest, highest + 1, dtype=float) * (sampling_frequency / length), spectra
 
 
 def live_gain(gain: npt.ArrayLike) -> Floats:
@@ -173,6 +179,39 @@ def beam_spectra(
     delay = focus_delay(position, u, focus, sound_speed)
     spacing = float(frequencies[1] - frequencies[0]) if len(frequencies) > 1 else 1.0
     return steered_sums(spectra, delay, weight, float(frequencies[0]), spacing)
+
+
+def lattice_beam_spectra(
+    spectra: npt.NDArray[np.complex64],
+    frequencies: Floats,
+    column: Ints,
+    row: Ints,
+    shape: tuple[int, int],
+    pitch: float,
+    gain: npt.ArrayLike,
+    directions: npt.ArrayLike,
+    sound_speed: float,
+    focus: float | None,
+) -> npt.NDArray[np.complex64]:
+    """As `beam_spectra` for elements of a lattice, focused in every direction as on the axis; several times as fast.
+
+    column, row (sensor,): 0 at port (+y) and at the top (+z), of `shape` (columns, rows) `pitch` (m) apart, centred on
+    the origin in the plane x = 0. The delay of focusing is (sqrt(R^2 + q^2) - R)/c, so that rows and columns separate:
+    off the axis that is not quite a sphere (`beamforming.FocusedDelayAndSum` has a table). Beams of one elevation share
+    the sums over rows. Float32 sums: error 2e-6 of the largest |B|.
+    """
+    from sonarsynth.acoustics.lattice_beams import corners, lattice_sums
+
+    weight = live_gain(gain)
+    places = corners(column, row, *shape, np.flatnonzero(weight), len(weight))
+    y, z = (pitch * np.arange((n + 1) % 2, n, 2) / 2 for n in shape)
+    sensors = np.stack(np.broadcast_arrays(0.0, y[:, None], z), axis=-1)
+    delay = focus_delay(sensors.reshape(-1, 3), np.array([1.0, 0.0, 0.0]), focus, sound_speed).reshape(len(y), len(z))
+    step = np.asarray(directions, float) * (-pitch / sound_speed)
+    spacing = float(frequencies[1] - frequencies[0]) if len(frequencies) > 1 else 1.0
+    odd = shape[1] % 2 == 1, shape[0] % 2 == 1
+    first = float(frequencies[0])
+    return lattice_sums(spectra, places, weight, delay, step[:, 2], step[:, 1], odd, first, spacing)
 
 
 def beam_energy(beams: npt.NDArray[np.complexfloating], spacing: float, sampling_frequency: float) -> Floats:

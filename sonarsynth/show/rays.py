@@ -23,7 +23,7 @@ def show_rays(plan: Plan, index: int, out: Path) -> tuple[list[Path], str]:
     frame = plan.recipe.frame(index)[1]
     count = int(rays.ray.max()) + 1
     lines = [rays.position[rays.ray == n] for n in range(count)]
-    hulls = [Hull(b.name, b.pose.to_world(b.mesh.vertices), b.mesh.faces) for b in frame.moment.bodies]
+    hulls = [Hull(b.name, b.pose.to_world(b.mesh.vertices), b.mesh.faces.astype(int)) for b in frame.moment.bodies]
     ahead = frame.sonar_pose.turn_to_world([1.0, 0.0, 0.0])
     bed = plan.scene.world.environment.depth
     section = section_figure(

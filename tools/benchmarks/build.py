@@ -1,4 +1,4 @@
-"""`tools/bench build`: the whole remus dataset with 1 and 2 workers: frames per second, where time goes, memory, identity."""
+"""`tools/bench build`: the whole remus dataset with 1 and 2 workers: frames per second, memory, identity."""
 
 from __future__ import annotations
 

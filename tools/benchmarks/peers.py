@@ -40,26 +40,32 @@ def thesis_image(
 
 
 def acoular_image(plan: Plan, signals: Signals, start: float, stop: float, focus: float) -> tuple[np.ndarray, float]:
-    """Energy (elevation, azimuth) by Acoular's BeamformerTime on the echo window of the same signals, and its seconds."""
+    """Energy (elevation, azimuth) by Acoular's BeamformerTime on the echo window of the same signals, and its seconds.
+
+    It delays by whole travel times from the grid, so the window is put behind as much silence; it interpolates linearly.
+    """
     warnings.simplefilter("ignore")
     import acoular
 
     acoular.config.global_caching = "none"
     sonar, grid = plan.scene.sonar, plan.scene.sonar.beams
-    rate = signals.sampling_frequency
-    first, last = (int(round((t - signals.start) * rate)) for t in (start, stop))
-    data = np.ascontiguousarray(signals.pressure[:, first:last].T.astype(float))
+    rate, position = signals.sampling_frequency, plan.elements.position
+    first, last = (round((t - signals.start) * rate) for t in (start, stop))
     points = (focus * direction(grid.azimuth[None, :], grid.elevation[:, None])).reshape(-1, 3)
-    steer = acoular.SteeringVector(
-        grid=acoular.ImportGrid(pos=points.T),
-        mics=acoular.MicGeom(pos_total=plan.elements.position.T),
-        env=acoular.Environment(c=sonar.assumed_sound_speed),
-        steer_type="classic",
-    )
+    travel = np.array([np.linalg.norm(points - q, axis=1) for q in position]) / sonar.assumed_sound_speed * rate
+    before, spread = int(travel.min()) - 1, int(np.ceil(np.ptp(travel))) + 3
+    data = np.zeros((before + last - first + spread, len(position)))
+    data[before : before + last - first] = signals.pressure[:, first:last].T
     beamformer = acoular.BeamformerTime(
-        source=acoular.TimeSamples(data=data, sample_freq=rate), steer=steer, weights="none"
+        source=acoular.TimeSamples(data=data, sample_freq=rate),
+        steer=acoular.SteeringVector(
+            grid=acoular.ImportGrid(pos=points.T),
+            mics=acoular.MicGeom(pos_total=position.T),
+            env=acoular.Environment(c=sonar.assumed_sound_speed),
+            steer_type="classic",
+        ),
     )
-    list(beamformer.result(1)) if False else None
+    next(beamformer.result(128))  # compiles
     began = time.process_time()
     energy = np.zeros(len(points))
     for block in beamformer.result(128):

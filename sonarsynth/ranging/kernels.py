@@ -1,0 +1,103 @@
+"""What locating and ranging do to every sensor and every beam, compiled. All in float64, one thread, fixed order."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba as nb
+import numpy as np
+
+
+@nb.njit(cache=True, nogil=True)
+def power_and_peak(pressure: Any, live: Any) -> Any:
+    """Sum of squares over live sensors (sample,) in Pa2, and the largest |pressure| of them; pressure (sensor, sample).
+
+    Squares of float32 are exact in float64.
+    """
+    sensors, samples = pressure.shape
+    power = np.zeros(samples)
+    high = np.zeros(samples, pressure.dtype)
+    for q in range(sensors):
+        if live[q]:
+            for n in range(samples):
+                p = pressure[q, n]
+                power[n] += float(p) * float(p)
+                high[n] = max(high[n], abs(p))
+    return power, float(high.max()) if samples > 0 else 0.0
+
+
+@nb.njit(cache=True, nogil=True)
+def cut_out(pressure: Any, place: Any, half: int, gain: Any) -> Any:
+    """Samples (sensor, 2 half) about `place` (sensor,), counted in samples, times gain and a flat top.
+
+    The window is 1 in its middle three quarters, with raised-cosine flanks, and moves with the place, not with the
+    samples. Zeros beyond the ends of pressure (sensor, sample).
+    """
+    sensors, held = pressure.shape
+    cut = np.zeros((sensors, 2 * half))
+    for q in range(sensors):
+        first = int(np.floor(place[q])) - half
+        for i in range(max(0, -first), min(2 * half, held - first)):
+            into = 4.0 * (1.0 - abs(first + i - place[q]) / half)
+            flat = 1.0 if into >= 1.0 else 0.5 - 0.5 * np.cos(np.pi * max(into, 0.0))
+            cut[q, i] = pressure[q, first + i] * flat * gain[q]
+    return cut
+
+
+@nb.njit(cache=True, nogil=True)
+def turned(spectrum: Any, delay: Any, first: float, spacing: float) -> Any:
+    """spectrum * exp(+i 2 pi f delay): (sensor, bin) at f = first + spacing * bin (Hz), delay (sensor,) s."""
+    sensors, bins = spectrum.shape
+    heard = np.empty((sensors, bins), np.complex128)
+    for q in range(sensors):
+        phasor = np.exp(2j * np.pi * first * delay[q])
+        step = np.exp(2j * np.pi * spacing * delay[q])
+        for k in range(bins):
+            heard[q, k] = spectrum[q, k] * phasor
+            phasor *= step
+    return heard
+
+
+@nb.njit(cache=True, nogil=True)
+def face_responses(across: Any, up: Any, first: float, spacing: float, bins: int) -> Any:
+    """sinc(f across) sinc(f up): (row, bin) at f = first + spacing * bin (Hz); across, up (row,) s: face times sine/c.
+
+    `acoustics.arrays.element_directivity` of many directions at evenly spaced frequencies. The sines follow by turning,
+    which keeps the relative precision of a small one.
+    """
+    response = np.empty((len(across), bins))
+    for i in range(len(across)):
+        y, z = np.pi * across[i], np.pi * up[i]
+        sy, cy, sz, cz = np.sin(first * y), np.cos(first * y), np.sin(first * z), np.cos(first * z)
+        step_y, turn_y, step_z, turn_z = np.sin(spacing * y), np.cos(spacing * y), np.sin(spacing * z), np.cos(spacing * z)
+        for k in range(bins):
+            f = first + k * spacing
+            x, w = f * y, f * z
+            response[i, k] = (sy / x if x != 0.0 else 1.0) * (sz / w if w != 0.0 else 1.0)
+            sy, cy = sy * turn_y + cy * step_y, cy * turn_y - sy * step_y
+            sz, cz = sz * turn_z + cz * step_z, cz * turn_z - sz * step_z
+    return response
+
+
+@nb.njit(cache=True, nogil=True)
+def loudest_near(
+    power: Any, top: Any, about: int, row: Any, column: Any, index: Any, up: int, across: int, beam: Any, reach: float
+) -> Any:
+    """Largest power (beam,) within `about` steps of each beam's own peak, in the beams within `reach` of it.
+
+    power (beam, delay), top (beam,) the steps of the peaks, beam (beam, xyz) unit vectors, reach the largest distance
+    of their ends; row, column (beam,) on the grid and index (elevation, azimuth) the beam there, -1 for none; no beam
+    further than `up` rows and `across` columns is within reach.
+    """
+    rows, columns = index.shape
+    steps = power.shape[1]
+    loudest = np.zeros(len(top), power.dtype)
+    for b in range(len(top)):
+        low, high = max(top[b] - about, 0), min(top[b] + about + 1, steps)
+        for i in range(max(row[b] - up, 0), min(row[b] + up + 1, rows)):
+            for j in range(max(column[b] - across, 0), min(column[b] + across + 1, columns)):
+                other = index[i, j]
+                if other >= 0 and np.sum((beam[b] - beam[other]) ** 2) <= reach * reach:
+                    for t in range(low, high):
+                        loudest[b] = max(loudest[b], power[other, t])
+    return loudest

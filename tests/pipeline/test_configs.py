@@ -1,0 +1,100 @@
+"""The recipes in configs/, each as its users run it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from sonarsynth import config, planning, schedule, verification
+from sonarsynth.planning import Plan
+from sonarsynth.render import follow_rays, render
+from sonarsynth.tracing.fan import EVENTS
+
+ROOT = Path(__file__).resolve().parents[2]
+CONFIGS = ROOT / "configs"
+REAL = ROOT.parent / "shared" / "data"
+needs_real_input = pytest.mark.skipif(not REAL.is_dir(), reason="the real cast and hull lie beside the repository")
+
+
+def _plan(name: str, sets: tuple[str, ...] = ()) -> Plan:
+    return planning.plan(config.load(CONFIGS / name, sets))
+
+
+def _checks(store: Path) -> dict[str, verification.Check]:
+    with xr.open_datatree(store, engine="zarr") as tree:
+        return {c.name: c for c in verification.check(tree.load())}
+
+
+def test_the_thesis_scene_is_imaged_ranged_and_located(tmp_path: Path) -> None:
+    """Every ninth frame of the crossing, from the first to the last, by the numbers that the data set is built for."""
+    made = _plan("remus.yaml")
+    assert made.sizes["frame"] == 64 and made.sizes["sensor"] == 508
+    assert made.sizes["azimuth"] == made.sizes["elevation"] == 101
+    report = schedule.build(made, tmp_path / "remus.zarr", frames=range(0, 64, 9), workers=0)
+    assert report.ok and report.written == 8
+    checks = _checks(tmp_path / "remus.zarr")
+    assert all(check.ok for check in checks.values()), checks
+    assert checks["brightest beam on target"].numbers == {"hits": 8, "frames": 8}
+    ranges = checks["range of points on target"].numbers
+    assert ranges["points"] >= 8 and ranges["median_m"] < 0.05 and ranges["share_within_3"] >= 0.9
+
+
+def test_the_target_crosses_20_m_ahead_9_m_to_the_right() -> None:
+    made = _plan("remus.yaml")
+    places = [
+        frame.sonar_pose.to_body(frame.moment.bodies[0].pose.position)
+        for frame in (made.recipe.frame(0)[1], made.recipe.frame(63)[1])
+    ]
+    assert places[0][0] == pytest.approx(20.0) and places[1][0] == pytest.approx(20.0)
+    assert places[1][1] - places[0][1] == pytest.approx(-9.0)  # starboard, which is drawn on the right
+
+
+def test_three_rays_in_the_tank() -> None:
+    """Figure 14: reflections from surface, bed and cylinder; between them the Snell invariant holds."""
+    rays = follow_rays(_plan("tank.yaml"), 0)
+    events = [EVENTS[e] for e in rays.event]
+    assert set(rays.ray) == {0, 1, 2}
+    assert {"surface", "bed", "facet"} <= set(events)
+    assert rays.position[:, 2].max() <= 1e-12 and rays.position[:, 2].min() >= -0.3 - 1e-12
+    profile = _plan("tank.yaml").profile
+    invariant = np.hypot(*rays.direction[:, :2].T) / profile.at(-rays.position[:, 2])
+    for ray, name in zip(range(3), ("surface", "facet", "bed"), strict=True):
+        mine = rays.ray == ray
+        reflected = np.cumsum(np.array(events)[mine] == "facet")  # a facet turns the ray, and so the invariant
+        for part in range(reflected.max() + 1):
+            values = invariant[mine][reflected == part]
+            assert values == pytest.approx(np.full_like(values, values[0]), rel=1e-12)
+        assert name in np.array(events)[mine]
+
+
+def test_rays_from_the_l_shape_go_on_to_the_shrimp() -> None:
+    """Figure 15: from the first facet to (1, 10, -10), with a coefficient that falls off the mirror direction."""
+    rays = follow_rays(_plan("l_shape.yaml"), 0)
+    arrived = rays.event == EVENTS.index("arrival")
+    assert arrived.sum() > 20
+    assert rays.position[arrived] == pytest.approx(np.broadcast_to([1.0, 10.0, -10.0], (arrived.sum(), 3)), abs=1e-9)
+    coefficient = rays.coefficient[np.isfinite(rays.coefficient)]
+    assert coefficient.min() >= 0 and coefficient.max() <= 1 and np.ptp(coefficient) > 0.3
+
+
+@pytest.mark.parametrize("name", ["tank.yaml", "l_shape.yaml"])
+def test_the_thesis_test_scenes_render(name: str) -> None:
+    tree = render(_plan(name), 0)
+    assert np.isfinite(tree["image/energy"].values).all()
+    truth = tree["truth/target"].values
+    brightest = np.unravel_index(np.argmax(tree["image/energy"].values), truth.shape)
+    assert verification.near_target(tree, truth)[brightest]
+
+
+@needs_real_input
+def test_real_water_and_a_real_hull(tmp_path: Path) -> None:
+    sets = (
+        f"scene.world.environment.sound_speed.path={REAL / 'castaway_ctd.csv'}",
+        f"scene.world.targets.0.shape.path={REAL / 'rexrov.stl'}",
+        "scene.world.targets.0.shape.edge=0.25",
+    )
+    report = schedule.build(_plan("harbour.yaml", sets), tmp_path / "harbour.zarr", frames=range(0, 16, 5), workers=0)
+    assert report.ok
+    checks = _checks(tmp_path / "harbour.zarr")
+    assert all(check.ok for check in checks.values()), checks
