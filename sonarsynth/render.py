@@ -137,7 +137,7 @@ def beamform_frame(plan: Plan, index: int, traced: Traced) -> Heard:
     processing, sonar = scene.processing, scene.sonar
     snaps = plan.sizes["snap"]
     bearings = processing.locating.locate(
-        signals, plan.elements, sonar, frame.sonar_pose, scene.world.environment.depth, snaps
+        signals, plan.elements, sonar, frame.sonar_pose, scene.world.environment.depth, snaps, plan.profile
     )
     heard = float(bearings.time[0]) if snaps else np.nan
     start, stop = heard + plan.windows.echo_start, heard + plan.windows.echo_stop

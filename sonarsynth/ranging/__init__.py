@@ -28,11 +28,19 @@ class LocatingMethod(Protocol):
     """Finds where snaps are from what the array hears."""
 
     def locate(
-        self, signals: Signals, elements: Elements, sonar: Sonar, sonar_pose: Pose, bed_depth: float, snaps: int
+        self,
+        signals: Signals,
+        elements: Elements,
+        sonar: Sonar,
+        sonar_pose: Pose,
+        bed_depth: float,
+        snaps: int,
+        profile: Profile,
     ) -> Bearings:
         """The `snaps` loudest direct pulses, loudest first, one row each; NaN rows for those that were not found.
 
-        bed_depth (m, positive down) is where the snaps are known to be.
+        bed_depth (m, positive down) is where the snaps are known to be; profile the sound speed of the water, as the
+        sonar knows it from a cast: for tracing rays, or for what straight ones may cost.
         """
 
 

@@ -13,11 +13,18 @@ import numpy.typing as npt
 from scipy.fft import ifft, next_fast_len
 from scipy.ndimage import maximum_filter1d
 
-from sonarsynth.acoustics.arrays import beam_spectra, element_directivity, gate_samples, gated_spectra
+from sonarsynth.acoustics.arrays import (
+    beam_spectra,
+    fast_length,
+    frequency_spacing,
+    gate_samples,
+    gated_spectra,
+    lattice_beam_spectra,
+)
 from sonarsynth.acoustics.bearings import wavefront_delays
 from sonarsynth.conventions import Floats, Ints, direction
 from sonarsynth.products import Bearings, EnergyImage, Signals
-from sonarsynth.ranging import pulses
+from sonarsynth.ranging import kernels, pulses
 from sonarsynth.ranging.pulses import Complexes
 from sonarsynth.sonar import Elements, Sonar
 
@@ -71,10 +78,11 @@ def over_threshold(image: EnergyImage, threshold: float) -> tuple[Ints, Ints]:
     return row, column
 
 
-def direct_spectrum(
-    signals: Signals, bearings: Bearings, elements: Elements, sonar: Sonar, frequency: Floats
-) -> Complexes:
-    """Spectrum (bin,) in Pa s of the direct pulse at the array centre, without the face, about `bearings.time`."""
+def direct_spectrum(signals: Signals, bearings: Bearings, elements: Elements, sonar: Sonar, length: int) -> Complexes:
+    """Spectrum (bin,) in Pa s of the direct pulse at the array centre, without the face, about `bearings.time`.
+
+    At the frequencies of an FFT of `length` samples.
+    """
     c, time = sonar.assumed_sound_speed, float(bearings.time[0])
     u = direction(bearings.azimuth[0], bearings.elevation[0])
     radius = bearings.range_from_curvature[0]
@@ -83,7 +91,8 @@ def direct_spectrum(
     curvature = float(1 / radius) if np.isfinite(radius) else 0.0
     expected = time + wavefront_delays(elements.position, u, curvature, c)
     aligned = pulses.align(signals, elements, sonar.band, expected, whole=True)
-    return pulses.template_spectrum(pulses.measure(aligned, elements, c, u, curvature, time), frequency)
+    wave = pulses.waveform(aligned, elements, c, u, curvature, time)
+    return pulses.template_spectrum(wave.template, signals.sampling_frequency, length)
 
 
 def range_profiles(
@@ -105,21 +114,23 @@ def range_profiles(
     first, count = gate_samples(image.start, image.stop, signals.start, rate, signals.pressure.shape[1])
     band = (sonar.band.low, sonar.band.high)
     f, spectra = gated_spectra(signals.pressure, rate, first, count, band)
-    row, column = beams
-    u = direction(image.azimuth[column], image.elevation[row])
-    wave = direct_spectrum(signals, bearings, elements, sonar, f)
+    spacing = frequency_spacing(count, rate)
+    lowest = round(f[0] / spacing)
+    wave = direct_spectrum(signals, bearings, elements, sonar, fast_length(count))[lowest : lowest + len(f)]
     density = np.abs(wave) ** 2
     place = (f - band[0]) / (band[1] - band[0])
     taper = np.sin(np.pi * np.clip(place, 0.0, 1.0)) ** 2
     matched = wave.conj() * taper / (density + WHITENING * density.max()) if density.max() > 0 else 0 * wave
-    spacing = f[1] - f[0] if len(f) > 1 else rate / count
     length = next_fast_len(OVERSAMPLING * len(f))
     step = 1 / (length * spacing)
+    row, column = beams
+    u = direction(image.azimuth[column], image.elevation[row])
     power = np.empty((len(u), min(int(count / rate / step) + 1, length)), np.float32)
     for part in range(0, len(u), 512):
         here = slice(part, part + 512)
-        beam = beam_spectra(spectra, f, elements.position, elements.gain, u[here], c, focus)
-        face = element_directivity(f, u[here, None], elements.face, c)
+        sine = u[here] * (elements.face / c)
+        face = kernels.face_responses(sine[:, 1], sine[:, 2], f[0], spacing, len(f))
+        beam = _beams(spectra, f, elements, u[here], c, focus)
         echo = ifft(beam * (face * matched).astype(np.complex64), length, axis=1)[:, : power.shape[1]]
         power[here] = echo.real**2 + echo.imag**2
     spread = np.sum(taper**2)
@@ -127,6 +138,18 @@ def range_profiles(
     beta = np.sqrt(max((f - centre) ** 2 @ taper**2 / spread, spacing**2))
     start = signals.start + first / rate - float(bearings.time[0])
     return Profiles(row, column, u, power, start, step, _half_width(elements, centre / c), 1 / (2 * np.pi * beta))
+
+
+def _beams(
+    spectra: npt.NDArray[np.complex64], f: Floats, elements: Elements, u: Floats, c: float, focus: float | None
+) -> npt.NDArray[np.complex64]:
+    """Spectra (beam, bin) of beams: by rows and columns on a lattice, sensor by sensor elsewhere."""
+    if not elements.on_lattice:
+        return beam_spectra(spectra, f, elements.position, elements.gain, u, c, focus)
+    shape = elements.columns, elements.rows
+    return lattice_beam_spectra(
+        spectra, f, elements.column, elements.row, shape, elements.pitch, elements.gain, u, c, focus
+    )
 
 
 def _half_width(elements: Elements, wavenumber: float) -> float:
@@ -193,17 +216,20 @@ def _loudest_near(profiles: Profiles, image: EnergyImage, top: Ints) -> npt.NDAr
     index[profiles.row, profiles.column] = np.arange(len(top))
     reach = 2 * profiles.width
     up, across = (_cells(grid, reach) for grid in (image.elevation, image.azimuth))
-    power = maximum_filter1d(profiles.power, 2 * _about(profiles) + 1, axis=1)
-    u = profiles.direction
-    loudest = np.zeros(len(top), np.float32)
-    for i in range(-up, up + 1):
-        for j in range(-across, across + 1):
-            row, column = profiles.row + i, profiles.column + j
-            there = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-            other = index[np.where(there, row, 0), np.where(there, column, 0)]
-            there &= (other >= 0) & (np.linalg.norm(u - u[other], axis=1) <= reach)
-            np.maximum(loudest, power[other, top], out=loudest, where=there)
-    return loudest
+    return np.asarray(
+        kernels.loudest_near(
+            profiles.power,
+            top,
+            _about(profiles),
+            profiles.row,
+            profiles.column,
+            index,
+            up,
+            across,
+            profiles.direction,
+            reach,
+        )
+    )
 
 
 def _cells(grid: Floats, reach: float) -> int:

@@ -31,15 +31,20 @@ def cut_out(pressure: Any, place: Any, half: int, gain: Any) -> Any:
     """Samples (sensor, 2 half) about `place` (sensor,), counted in samples, times gain and a flat top.
 
     The window is 1 in its middle three quarters, with raised-cosine flanks, and moves with the place, not with the
-    samples. Zeros beyond the ends of pressure (sensor, sample).
+    samples: x samples after it opens, its flanks are sin^2(2 pi x/half) on either side. Zeros beyond the ends of
+    pressure (sensor, sample).
     """
     sensors, held = pressure.shape
+    angle = 4 * np.pi / half * np.arange(2 * half)
+    cosine, sine = np.cos(angle), np.sin(angle)
     cut = np.zeros((sensors, 2 * half))
-    for q in range(sensors):
-        first = int(np.floor(place[q])) - half
-        for i in range(max(0, -first), min(2 * half, held - first)):
-            into = 4.0 * (1.0 - abs(first + i - place[q]) / half)
-            flat = 1.0 if into >= 1.0 else 0.5 - 0.5 * np.cos(np.pi * max(into, 0.0))
+    for q in np.flatnonzero(gain):
+        whole = np.floor(place[q])
+        first, part = int(whole) - half, place[q] - whole
+        c, s = np.cos(4 * np.pi / half * part), np.sin(4 * np.pi / half * part)
+        for i in range(max(1, -first), min(2 * half, held - first)):
+            x = i - part
+            flat = 1.0 if 0.25 * half <= x <= 1.75 * half else 0.5 - 0.5 * (cosine[i] * c + sine[i] * s)
             cut[q, i] = pressure[q, first + i] * flat * gain[q]
     return cut
 
@@ -69,7 +74,12 @@ def face_responses(across: Any, up: Any, first: float, spacing: float, bins: int
     for i in range(len(across)):
         y, z = np.pi * across[i], np.pi * up[i]
         sy, cy, sz, cz = np.sin(first * y), np.cos(first * y), np.sin(first * z), np.cos(first * z)
-        step_y, turn_y, step_z, turn_z = np.sin(spacing * y), np.cos(spacing * y), np.sin(spacing * z), np.cos(spacing * z)
+        step_y, turn_y, step_z, turn_z = (
+            np.sin(spacing * y),
+            np.cos(spacing * y),
+            np.sin(spacing * z),
+            np.cos(spacing * z),
+        )
         for k in range(bins):
             f = first + k * spacing
             x, w = f * y, f * z
@@ -77,6 +87,37 @@ def face_responses(across: Any, up: Any, first: float, spacing: float, bins: int
             sy, cy = sy * turn_y + cy * step_y, cy * turn_y - sy * step_y
             sz, cz = sz * turn_z + cz * step_z, cz * turn_z - sz * step_z
     return response
+
+
+@nb.njit(cache=True, nogil=True)
+def template_sums(heard: Any, response: Any) -> Any:
+    """Sums over sensors of response * heard and of response^2: (bin,) each; heard, response (sensor, bin)."""
+    sensors, bins = heard.shape
+    total = np.zeros(bins, np.complex128)
+    power = np.zeros(bins)
+    for q in range(sensors):
+        for k in range(bins):
+            total[k] += response[q, k] * heard[q, k]
+            power[k] += response[q, k] * response[q, k]
+    return total, power
+
+
+@nb.njit(cache=True, nogil=True)
+def lag_sums(heard: Any, response: Any, template: Any, omega: Any) -> Any:
+    """Sums over bins for each sensor (sensor,), with the model M = response * template and the rest R = heard - M:
+
+    omega Im(M conj R), |omega M|^2 and |R|^2; heard, response (sensor, bin); template, omega (bin,).
+    """
+    sensors, bins = heard.shape
+    slope, weight, rest = np.zeros(sensors), np.zeros(sensors), np.zeros(sensors)
+    for q in range(sensors):
+        for k in range(bins):
+            m = response[q, k] * template[k]
+            r = heard[q, k] - m
+            slope[q] += omega[k] * (m.imag * r.real - m.real * r.imag)
+            weight[q] += omega[k] ** 2 * (m.real**2 + m.imag**2)
+            rest[q] += r.real**2 + r.imag**2
+    return slope, weight, rest
 
 
 @nb.njit(cache=True, nogil=True)

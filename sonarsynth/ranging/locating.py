@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Bearings, Signals
 from sonarsynth.ranging import pulses
-from sonarsynth.ranging.placing import Row, as_bearings, place
+from sonarsynth.ranging.placing import Known, Row, as_bearings, place
 from sonarsynth.ranging.pulses import Pulse
 from sonarsynth.sonar import Elements, Sonar
 
@@ -25,6 +26,8 @@ ROUNDS = 3
 """Alignments of the sensors on the wavefront; each improves the last, and the lags left settle the fit."""
 ROBUST_ROUNDS = 4
 """Reweightings that turn outliers out of the first fit."""
+FIRST_STEPS = 3
+"""Steps from the plane wave to the first sphere; a step each after that."""
 MAX_LAG = 0.15
 """A pulse whose lags exceed this share of a period (root mean square, band centre) is not one wavefront."""
 
@@ -32,6 +35,7 @@ Bend = Callable[[Floats], tuple[Floats, Floats]]
 """Of a source position (xyz), sonar frame: delays (sensor,) beyond straight paths (s), and arrival direction (xyz)."""
 
 
+@lru_cache(maxsize=16)
 def unlocatable(elements: Elements) -> str | None:
     """Why an array can locate nothing; None where it can."""
     live = elements.position[elements.gain != 0]
@@ -44,47 +48,50 @@ def unlocatable(elements: Elements) -> str | None:
 
 
 def locate(
-    signals: Signals, elements: Elements, sonar: Sonar, pose: Pose, bed_depth: float, snaps: int, bend: Bend | None
+    signals: Signals,
+    elements: Elements,
+    sonar: Sonar,
+    pose: Pose,
+    bed_depth: float,
+    snaps: int,
+    bend: Bend | None = None,
+    gradient: float = 0.0,
 ) -> Bearings:
-    """The `snaps` loudest direct pulses, loudest first; see `ranging.SensorDelays`."""
+    """The `snaps` loudest direct pulses, loudest first; see `ranging.SensorDelays`.
+
+    Paths bend as `bend` says; without it they are taken for straight, and the errors hold what a `gradient` (1/s) of
+    the sound speed may do.
+    """
     rows: list[Row] = []
     if unlocatable(elements) is None and signals.pressure.shape[1] > 0:
         live = elements.gain != 0
         half = pulses.transit(elements, sonar.assumed_sound_speed) + 2 * pulses.PULSE_HALF
         width = int(2 * half * signals.sampling_frequency) | 1
-        track, quiet = pulses.energy_track(signals, live, width)
+        loud = pulses.loudness(signals, live, width)
+        known = Known(elements, sonar, pose, bed_depth, gradient, pulses.rounding(signals, loud.peak))
+        track = loud.track.copy()
         for _ in range(4 * snaps):
             top = int(track.argmax())
-            if len(rows) == snaps or not track[top] > pulses.QUIET * quiet:
+            if len(rows) == snaps or not track[top] > pulses.QUIET * loud.quiet:
                 break
-            row = _row(signals, elements, sonar, pose, bed_depth, top, half, bend)
+            row = _row(signals, known, signals.start + top / signals.sampling_frequency, half, bend)
             if row is not None:
                 rows.append(row)
             track[max(top - width, 0) : top + width + 1] = 0.0
     return as_bearings(rows, snaps)
 
 
-def _row(
-    signals: Signals,
-    elements: Elements,
-    sonar: Sonar,
-    pose: Pose,
-    bed_depth: float,
-    top: int,
-    half: float,
-    bend: Bend | None,
-) -> Row | None:
-    centre = signals.start + top / signals.sampling_frequency
+def _row(signals: Signals, known: Known, centre: float, half: float, bend: Bend | None) -> Row | None:
+    elements, sonar, pose = known.elements, known.sonar, known.pose
     found = fit_pulse(signals, elements, sonar, centre, half)
     if found is None:
         return None
     wave, pulse = found
-    row = place(wave, pulse, signals, elements, sonar, pose, bed_depth)
+    row = place(wave, pulse, known)
     if bend is not None and np.all(np.isfinite(row.position)):
         for _ in range(3):  # delays beyond straight ones change little with the place: this settles at once
             extra, arrival = bend(row.position)
-            straight = _refit(pulse, wave, elements, sonar, extra)
-            row = place(straight, pulse, signals, elements, sonar, pose, bed_depth, arrival)
+            row = place(_refit(pulse, wave, elements, sonar, extra), pulse, known, arrival)
     height = pose.to_world(row.position)[2]
     reach = 3 * np.sqrt(max(pose.rotation[2] @ row.covariance @ pose.rotation[2], 0.0))
     if height > reach:  # the image of a snap in the surface
@@ -111,7 +118,7 @@ def fit_pulse(
     for _ in range(ROUNDS):
         pulse = pulses.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time)
         delay = wave.time + wavefront_delays(q, wave.direction, wave.curvature, c) + pulse.lag
-        better = fit_wave(delay, q, c, pulse.weight, wave)
+        better = fit_wave(delay, q, c, pulse.weight, wave, 1)
         if better is None:
             return None
         wave = better
@@ -122,11 +129,17 @@ def fit_pulse(
     return wave, pulse
 
 
-def fit_wave(delay: Floats, position: Floats, sound_speed: float, weight: Floats, start: Wavefront) -> Wavefront | None:
-    """Sphere through delays; a plane where there are too few sensors for a sphere."""
-    wave = spherical_wave(delay, position, sound_speed, weight, start.direction, start.curvature)
+def fit_wave(
+    delay: Floats, position: Floats, sound_speed: float, weight: Floats, start: Wavefront, steps: int = 20
+) -> Wavefront | None:
+    """Sphere through delays; a plane where there are too few sensors for a sphere.
+
+    One step (of Gauss and Newton) suffices where `start` is near and the fit is made again on better delays.
+    """
+    u, k = start.direction, start.curvature
+    wave = spherical_wave(delay, position, sound_speed, weight, u, k, iterations=steps)
     if wave is None:
-        wave = spherical_wave(delay, position, sound_speed, weight, start.direction, curved=False)
+        wave = spherical_wave(delay, position, sound_speed, weight, u, curved=False, iterations=steps)
     return wave
 
 
@@ -138,8 +151,8 @@ def _robust_wave(delay: Floats, height: Floats, position: Floats, sound_speed: f
         return None
     wave = plane_wavefront(direction, time)
     weight = loud
-    for _ in range(ROBUST_ROUNDS):
-        better = fit_wave(delay, position, sound_speed, weight, wave)
+    for i in range(ROBUST_ROUNDS):
+        better = fit_wave(delay, position, sound_speed, weight, wave, FIRST_STEPS if i == 0 else 1)
         if better is None:
             return None
         wave = better

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.fft import ifft, irfft, next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
 
-from sonarsynth.acoustics.arrays import element_directivity
 from sonarsynth.acoustics.bearings import wavefront_delays
 from sonarsynth.conventions import Floats
 from sonarsynth.products import Signals
+from sonarsynth.ranging import kernels
 from sonarsynth.sonar import Band, Elements
 
 Complexes = npt.NDArray[np.complex128]
@@ -32,23 +31,36 @@ class Pulse:
 
     frequency: Floats  # (bin,) Hz, evenly spaced
     template: Complexes  # (bin,) Pa s: the wave at the array centre, face directivity removed, time 0 at `time`
-    inside: npt.NDArray[np.bool_]  # (bin,) in band
     time: float  # s at the array centre to which the template refers
     lag: Floats  # (sensor,) s: delay of each sensor after the wavefront
     weight: Floats  # (sensor,) (Pa s/s)^2: sum over bins of |2 pi f M|^2, inverse variance of a lag per noise power
     noise: float  # (Pa s)^2: mean power in a bin of what the model does not explain
 
 
-def energy_track(signals: Signals, live: npt.NDArray[np.bool_], length: int) -> tuple[Floats, float]:
-    """Mean power (Pa2, summed over live sensors) in a sliding window of `length` samples (sample,), and in quiet.
+@dataclass(frozen=True, eq=False)
+class Loudness:
+    """How loud the signals are, all live sensors together."""
+
+    track: Floats  # (sample,) Pa2: mean power, summed over sensors, in a window about the sample
+    quiet: float  # Pa2: the same where nothing is heard
+    peak: float  # Pa: the largest |pressure|
+
+
+def loudness(signals: Signals, live: npt.NDArray[np.bool_], length: int) -> Loudness:
+    """Power in a sliding window of `length` samples, in quiet, and the peak.
 
     The quiet power is the tenth part from below of short means: a snap and its echoes fill no more of the signals.
     """
-    pressure = signals.pressure[live] if not live.all() else signals.pressure
-    power = np.einsum("qn,qn->n", pressure, pressure, dtype=np.float64)
+    power, peak = kernels.power_and_peak(signals.pressure, live)
     track = uniform_filter1d(power, min(length, len(power)), mode="constant")
     quiet = np.percentile(uniform_filter1d(power, min(16, len(power))), 10)
-    return np.asarray(np.maximum(track, 0.0)), float(max(quiet, 0.0))
+    return Loudness(np.maximum(track, 0.0), float(max(quiet, 0.0)), peak)
+
+
+def rounding(signals: Signals, peak: float) -> float:
+    """Mean power in a bin, (Pa s)^2, of what the converter (a count) and single precision (of `peak`, Pa) round off."""
+    step = signals.quantum**2 + (float(np.finfo(np.float32).eps) * peak) ** 2
+    return step / 12 * 2 * PULSE_HALF / signals.sampling_frequency
 
 
 def transit(elements: Elements, sound_speed: float) -> float:
@@ -75,8 +87,7 @@ def envelope_peaks(cut: npt.NDArray[np.float32], rate: float, band: Band) -> tup
     The band is moved to zero frequency and sampled twice as fast as it needs; a parabola finds the top.
     """
     count = next_fast_len(cut.shape[1], real=True)
-    inside = in_band(_frequencies(count, rate), band)
-    base = rfft(cut, count, axis=1)[:, inside]
+    base = rfft(cut, count, axis=1)[:, in_band(_frequencies(count, rate), band)]
     short = next_fast_len(2 * base.shape[1])
     wave = ifft(base, short, axis=1)
     power = wave.real**2 + wave.imag**2
@@ -102,7 +113,6 @@ class Aligned:
     frequency: Floats  # (bin,) Hz, evenly spaced: those of the band, or all up to half the sampling frequency
     spectrum: Complexes  # (sensor, bin) Pa s; 0 for dead sensors
     time: Floats  # (sensor,) s to which the phases refer
-    inside: npt.NDArray[np.bool_]  # (bin,) in band
     spacing: float  # Hz
 
 
@@ -112,19 +122,45 @@ def align(signals: Signals, elements: Elements, band: Band, time: Floats, *, who
     Frequencies of the band, or `whole`: all of them, from which the waveform can be had. The window moves with the
     time, not with the samples, so that every sensor's pulse is cut alike.
     """
-    rate, held = signals.sampling_frequency, signals.pressure.shape[1]
+    rate = signals.sampling_frequency
     half = max(int(PULSE_HALF * rate), 4)
     place = (time - signals.start) * rate
-    first = np.floor(place).astype(np.int64) - half
-    index = first[:, None] + np.arange(2 * half)
-    window = _flat_top((index - place[:, None]) / half)
-    window[(index < 0) | (index >= held)] = 0.0
-    cut = np.take_along_axis(signals.pressure, np.clip(index, 0, held - 1), axis=1) * (window * elements.gain[:, None])
+    cut = kernels.cut_out(signals.pressure, place, half, elements.gain / rate)
     f = _frequencies(2 * half, rate)
-    kept = np.flatnonzero(in_band(f, band) | whole)
-    turns = _phasor((place - first) / rate, f[1], kept)
-    spectrum = rfft(cut, axis=1)[:, kept] * turns / rate
-    return Aligned(f[kept], spectrum, time, in_band(f[kept], band), float(f[1]))
+    kept = slice(None) if whole else in_band(f, band)
+    since = (place - np.floor(place) + half) / rate
+    spectrum = kernels.turned(np.ascontiguousarray(rfft(cut, axis=1)[:, kept]), since, f[kept][0], f[1])
+    return Aligned(f[kept], spectrum, time, float(f[1]))
+
+
+@dataclass(frozen=True, eq=False)
+class Wave:
+    """What a wavefront brings, and what of it each sensor hears."""
+
+    template: Complexes  # (bin,) Pa s: the wave at the array centre, face directivity removed
+    heard: Complexes  # (sensor, bin) Pa s, moved to the centre
+    response: Floats  # (sensor, bin) of a sensor to the wave at the centre
+
+
+def waveform(
+    aligned: Aligned, elements: Elements, sound_speed: float, direction: Floats, curvature: float, time: float
+) -> Wave:
+    """The waveform that a wavefront carries.
+
+    The wave at the centre, W(f), is unknown. Sensor q hears M = W(f) D(f) R/R_q, D the face directivity towards the
+    source, which may well be near zero or negative: W = sum conj(h) P / sum |h|^2 with h = D R/R_q is its maximum
+    likelihood, and sensors and bins that hear little count for little.
+    """
+    first, bins = aligned.frequency[0], len(aligned.frequency)
+    toward = direction - curvature * elements.position
+    distance = np.sqrt(np.sum(toward * toward, axis=1))
+    sine = toward * (elements.face / (sound_speed * distance))[:, None]
+    response = kernels.face_responses(sine[:, 1], sine[:, 2], first, aligned.spacing, bins)
+    response *= (elements.gain / distance)[:, None]
+    shift = time + wavefront_delays(elements.position, direction, curvature, sound_speed) - aligned.time
+    heard = kernels.turned(aligned.spectrum, shift, first, aligned.spacing)
+    total, power = kernels.template_sums(heard, response)
+    return Wave(total / (power + DEAF * elements.count), heard, response)
 
 
 def measure(
@@ -132,66 +168,39 @@ def measure(
 ) -> Pulse:
     """Each sensor's lag on a wavefront, and the waveform that the wavefront carries.
 
-    The wave at the centre, W(f), is unknown. Sensor q hears M = W(f) D(f) R/R_q, D the face directivity towards the
-    source, which may well be near zero or negative: W = sum conj(h) P / sum |h|^2 with h = D R/R_q is its maximum
-    likelihood, and sensors and bins that hear little count for little. The lag of sensor q is the maximum of
-    Re sum_f conj(M) P exp(i 2 pi f lag), by one Newton step: lags are small after alignment, and the caller iterates.
+    The lag of sensor q is the maximum of Re sum_f conj(M) P exp(i 2 pi f lag), M as in `waveform`, by one Newton step:
+    lags are small after alignment, and the caller iterates.
     """
-    f = aligned.frequency
-    toward = direction - curvature * elements.position
-    distance = np.linalg.norm(toward, axis=1)
-    response = element_directivity(f, (toward / distance[:, None])[:, None], elements.face, sound_speed)
-    response = response * (elements.gain / distance)[:, None]
-    shift = time + wavefront_delays(elements.position, direction, curvature, sound_speed) - aligned.time
-    heard = aligned.spectrum * _phasor(shift, aligned.spacing, np.rint(f / aligned.spacing))
-    power = np.sum(response * response, axis=0) + DEAF * elements.count
-    template = np.sum(response * heard, axis=0) / power
-    inside = aligned.inside
-    omega = 2 * np.pi * f[inside]
-    model = response[:, inside] * template[inside]
-    rest = heard[:, inside] - model
-    weight = (model.real**2 + model.imag**2) @ omega**2
-    lag = (model.imag * rest.real - model.real * rest.imag) @ omega / np.where(weight > 0, weight, np.inf)
+    wave = waveform(aligned, elements, sound_speed, direction, curvature, time)
+    omega = 2 * np.pi * aligned.frequency
+    slope, weight, rest = kernels.lag_sums(wave.heard, wave.response, wave.template, omega)
+    lag = slope / np.where(weight > 0, weight, np.inf)
     live = elements.gain != 0
     freedom = max(2 * (np.sum(live) - 1) * len(omega) - np.sum(live), 1)
-    noise = 2 * float(np.sum(rest.real[live] ** 2 + rest.imag[live] ** 2)) / freedom
-    return Pulse(f, template, inside, time, lag, weight, noise)
+    noise = 2 * float(np.sum(rest[live])) / freedom
+    return Pulse(aligned.frequency, wave.template, time, lag, weight, noise)
 
 
-def template_spectrum(pulse: Pulse, frequency: Floats) -> Complexes:
-    """The waveform of the pulse at the array centre, Fourier transformed at other frequencies (bin,), in Pa s.
+def template_spectrum(template: Complexes, rate: float, length: int) -> Complexes:
+    """A template (bin,) in Pa s of all frequencies from 0 to half the rate, at those of an FFT of `length` samples.
 
-    Phases refer to `pulse.time`; the pulse must be of an alignment of all frequencies. It is short, so its spectrum is
-    smooth: its waveform is transformed directly.
+    It is short, so its spectrum is smooth: its waveform is transformed anew, exactly. Time 0 stays where it was.
     """
-    half = len(pulse.frequency) - 1
-    rate = 2 * pulse.frequency[-1]
-    centred = pulse.template * (-1.0) ** np.arange(half + 1)  # time 0 at the middle sample
-    wave = irfft(centred, 2 * half)
-    angle = np.outer(frequency, (np.arange(2 * half) - half) / rate)
-    return np.asarray(np.exp(-2j * np.pi * angle) @ wave, np.complex128)
+    half = len(template) - 1
+    centred = template * (-1.0) ** np.arange(half + 1)  # time 0 at the middle sample
+    wave = np.zeros(length)
+    np.add.at(wave, (np.arange(2 * half) - half) % length, irfft(centred, 2 * half))
+    return np.asarray(rfft(wave), np.complex128)
 
 
 def _frequencies(count: int, rate: float) -> Floats:
     return np.asarray(np.arange(count // 2 + 1) * (rate / count))
 
 
-def in_band(frequency: Floats, band: Band) -> npt.NDArray[np.bool_]:
-    """Which frequencies lie in the band."""
-    return (frequency >= band.low) & (frequency <= band.high)
-
-
-def _phasor(shift: Floats, spacing: float, bins: npt.NDArray[Any]) -> Complexes:
-    """exp(i 2 pi f shift) (sensor, bin) at f = spacing * bins (consecutive), by products of coarse and fine steps."""
-    fine = 8
-    angle = 2j * np.pi * spacing * shift
-    coarse = np.exp(np.outer(angle, bins[0] + np.arange(0, len(bins), fine)))
-    steps = np.exp(np.outer(angle, np.arange(fine)))
-    product = coarse[:, :, None] * steps[:, None, :]
-    return np.asarray(product.reshape(len(shift), -1)[:, : len(bins)])
-
-
-def _flat_top(place: Floats) -> Floats:
-    """Window over place in -1..1: 1 in the middle three quarters, raised-cosine flanks, 0 beyond."""
-    into = np.clip((1 - np.abs(place)) * 4, 0.0, 1.0)
-    return np.asarray(0.5 - 0.5 * np.cos(np.pi * into))
+def in_band(frequency: Floats, band: Band) -> slice:
+    """The bins of ascending frequencies that lie in the band; the nearest one where the band falls between two."""
+    low, high = np.searchsorted(frequency, band.low), np.searchsorted(frequency, band.high, side="right")
+    if low == high:
+        low = np.argmin(np.abs(frequency - band.centre))
+        high = low + 1
+    return slice(int(low), int(high))

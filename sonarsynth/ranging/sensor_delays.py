@@ -8,7 +8,7 @@ from sonarsynth.description import description
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Bearings, Signals
 from sonarsynth.sonar import Elements, Sonar
-from sonarsynth.world.environment import SoundSpeed
+from sonarsynth.world.environment import Profile
 
 
 @description
@@ -18,23 +18,33 @@ class SensorDelays:
     Equation 6 of the thesis with its square and an intercept, then the sphere that fits the delays best, then the depth
     of the bed. Delays are measured coherently in the band against the wave that all sensors hear, to about a
     thousandth of a sample. Standard errors are those of the lags that remain (and no less than the Cramer-Rao bound
-    for the noise), of the assumed sound speed and of the depth of the bed, through the Jacobians.
+    for the noise), of the assumed sound speed, of the depth of the bed, and of the bending of rays where these are
+    taken for straight, through the Jacobians.
     """
 
     kind: Literal["sensor_delays"] = "sensor_delays"
-    profile: SoundSpeed | None = None
-    """Sound speed to trace the bearing through; left out, paths are straight at the sonar's assumed sound speed."""
+    refraction: bool = False
+    """Trace the bearing through the sound-speed profile of the water; otherwise paths are straight, at the sonar's
+    assumed sound speed, and predicted errors hold what a gradient g may do: r g/(2c) in angle, r^2 g/(2c) in place."""
 
     def locate(
-        self, signals: Signals, elements: Elements, sonar: Sonar, sonar_pose: Pose, bed_depth: float, snaps: int
+        self,
+        signals: Signals,
+        elements: Elements,
+        sonar: Sonar,
+        sonar_pose: Pose,
+        bed_depth: float,
+        snaps: int,
+        profile: Profile,
     ) -> Bearings:
         """See `LocatingMethod`. An array that cannot locate gives NaN rows (`locating.unlocatable` says why)."""
         from sonarsynth.ranging.locating import locate
+        from sonarsynth.ranging.placing import mean_gradient
 
-        bend = None
-        if self.profile is not None:
-            from sonarsynth.ranging.refraction import bending
-            from sonarsynth.world.casts import profile_of
+        if not self.refraction:
+            gradient = mean_gradient(profile, -float(sonar_pose.position[2]), bed_depth, elements.aperture)
+            return locate(signals, elements, sonar, sonar_pose, bed_depth, snaps, gradient=gradient)
+        from sonarsynth.ranging.refraction import bending
 
-            bend = bending(profile_of(self.profile), elements, sonar_pose, sonar.assumed_sound_speed)
-        return locate(signals, elements, sonar, sonar_pose, bed_depth, snaps, bend)
+        bend = bending(profile, elements, sonar_pose, sonar.assumed_sound_speed)
+        return locate(signals, elements, sonar, sonar_pose, bed_depth, snaps, bend=bend)

@@ -34,7 +34,7 @@ FORBIDDEN = {
     "a path of one machine": r"(?<![\w./<\"'$}])/(?:home|root|opt|mnt|work|Users)/",
     "an address": r"https?://(?!" + "|".join(map(re.escape, HOSTS)) + ")",
     "an unfinished mark": r"\b(?:TO[D]O|FIX[M]E|XX[X]|HA[C]K)\b",
-    "how it came about": r"\b(?i:ag[e]nts?|s[e]ssions?|h[e]lpers?|iss[u]es?|workt[r]ees?)\b",
+    "how it came about": r"\b(?i:ag[e]nts?|(?<!scope=\")s[e]ssions?|h[e]lpers?|iss[u]es?|workt[r]ees?)\b",
 }
 
 

@@ -78,7 +78,9 @@ def test_target_at_the_array_and_at_the_source():
 
 
 def locate(signals, array, depth, snaps=1, **sonar):
-    return SensorDelays().locate(signals, array, Sonar(assumed_sound_speed=C, **sonar), POSE, float(depth), snaps)
+    return SensorDelays().locate(
+        signals, array, Sonar(assumed_sound_speed=C, **sonar), POSE, float(depth), snaps, WATER
+    )
 
 
 @pytest.mark.parametrize(
@@ -182,7 +184,7 @@ def heard_target(array, target, source):
 
 
 def cloud_of(method, array, sonar, signals, image, source):
-    found = SensorDelays().locate(signals, array, sonar, POSE, 5.0 - source[2], 1)
+    found = SensorDelays().locate(signals, array, sonar, POSE, 5.0 - source[2], 1, WATER)
     return method.cloud(signals, image, found, array, sonar, POSE, WATER)
 
 

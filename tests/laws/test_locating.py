@@ -13,7 +13,7 @@ from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.products import Bearings, Signals
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.sonar import PlanarLattice, Romanis, Sonar, elements
-from sonarsynth.world.environment import Tabulated
+from sonarsynth.world.environment import Profile
 from tests.heard import RATE, hear, hear_direct, silence
 
 C = 1540.0
@@ -21,13 +21,16 @@ ROMANIS = elements(Romanis())
 SMALL_ARRAY = PlanarLattice(columns=12, rows=12, pitch=0.1, face=0.04953)
 SMALL = elements(SMALL_ARRAY)
 AHEAD = Pose(np.array([0.0, 0.0, -5.0]), quaternion(np.pi / 2))
+WATER = Profile(np.array([0.0]), np.array([C]))
 
 
-def locate(signals, array, source, pose=AHEAD, sonar=None, depth_error=0.0, snaps=1, method=None) -> Bearings:
+def locate(
+    signals, array, source, pose=AHEAD, sonar=None, depth_error=0.0, snaps=1, method=None, profile=WATER
+) -> Bearings:
     """With the bed where the source is, but for depth_error."""
     depth = -pose.to_world(np.asarray(source, float))[2] + depth_error
     method = method or SensorDelays()
-    return method.locate(signals, array, sonar or Sonar(assumed_sound_speed=C), pose, float(depth), snaps)
+    return method.locate(signals, array, sonar or Sonar(assumed_sound_speed=C), pose, float(depth), snaps, profile)
 
 
 @pytest.mark.parametrize("azimuth", [-0.4, 0.5])
@@ -171,7 +174,7 @@ def test_the_image_of_a_snap_in_the_surface_is_no_snap():
 
 def refracted_signals(array, source, pose, profile):
     """The pulse along rays through a profile; sensors one by one."""
-    sea = water(np.array(profile.depth), np.array(profile.speed), 100.0)
+    sea = water(profile.depth, profile.speed, 100.0)
     sensors = np.vstack([pose.to_world(array.position), pose.position])
     start = pose.to_world(source)
     across = sensors[:, :2] - start[:2]

@@ -26,7 +26,7 @@ MARGIN = 6e-4  # s before the first and after the last echo
 
 
 def process(signals, first, last, method, source=SNAP, pose=POSE, profile=WATER):
-    found = SensorDelays().locate(signals, ARRAY, SONAR, pose, -pose.to_world(source)[2], 1)
+    found = SensorDelays().locate(signals, ARRAY, SONAR, pose, -pose.to_world(source)[2], 1, WATER)
     image = FocusedDelayAndSum().image(signals, ARRAY, SONAR, first - MARGIN, last + MARGIN)
     return method.cloud(signals, image, found, ARRAY, SONAR, pose, profile), image
 

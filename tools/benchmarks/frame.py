@@ -68,7 +68,13 @@ def bench(index: int = 32) -> dict[str, Any]:
     stages["synthesise"] = {"ms": 1e3 * seconds, **synthesis_error(plan, traced)}
     located, seconds = cpu(
         lambda: scene.processing.locating.locate(
-            signals, plan.elements, sonar, traced.frame.sonar_pose, scene.world.environment.depth, plan.sizes["snap"]
+            signals,
+            plan.elements,
+            sonar,
+            traced.frame.sonar_pose,
+            scene.world.environment.depth,
+            plan.sizes["snap"],
+            plan.profile,
         )
     )
     true = traced.frame.sonar_pose.to_body(traced.frame.moment.snaps[0].position)

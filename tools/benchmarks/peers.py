@@ -42,7 +42,7 @@ def thesis_image(
 def acoular_image(plan: Plan, signals: Signals, start: float, stop: float, focus: float) -> tuple[np.ndarray, float]:
     """Energy (elevation, azimuth) by Acoular's BeamformerTime on the echo window of the same signals, and its seconds.
 
-    It delays by whole travel times from the grid, so the window is put behind as much silence; it interpolates linearly.
+    It delays by whole travel times from the grid, so as much silence goes before the window; linear interpolation.
     """
     warnings.simplefilter("ignore")
     import acoular
