@@ -91,7 +91,8 @@ def _label_beams(
     facet = np.full(shape, NO_TARGET, np.int32)
     nearest = np.full(shape, np.inf)
     for index, (body, vertices) in enumerate(zip(bodies, seen, strict=True)):
-        faces = body.mesh.faces[np.isfinite(vertices[body.mesh.faces]).all(axis=(1, 2))]
+        kept = np.flatnonzero(np.isfinite(vertices[body.mesh.faces]).all(axis=(1, 2)))
+        faces = body.mesh.faces[kept]
         if not len(faces):
             continue
         rows, columns = _beams_near(vertices[np.unique(faces)], rays)
@@ -100,7 +101,8 @@ def _label_beams(
             origin = np.broadcast_to(body.pose.to_body(sonar_pose.position), look.shape)
             hit, distance = first_hit(body.mesh, origin, body.pose.turn_to_body(sonar_pose.turn_to_world(look)))
         else:
-            hit, distance = first_hit(Mesh(np.nan_to_num(vertices), body.mesh.faces), np.zeros_like(look), look)
+            hit, distance = first_hit(Mesh(np.nan_to_num(vertices), faces), np.zeros_like(look), look)
+            hit = np.where(hit >= 0, kept[hit], hit)
         closer = (hit >= 0) & (distance < nearest[rows, columns])
         rows, columns = rows[closer], columns[closer]
         target[rows, columns], facet[rows, columns] = index, hit[closer]
@@ -126,11 +128,11 @@ def _visible(body: Body, seen: Floats, bodies: tuple[Body, ...], sonar_pose: Pos
     mesh = body.mesh
     centroid, normal = body.pose.to_world(mesh.centroid), body.pose.turn_to_world(mesh.normal)
     facing = np.einsum("ij,ij->i", sonar_pose.position - centroid, normal) > 0
-    facing &= np.isfinite(seen[mesh.faces]).all(axis=(1, 2))
     if not facing.any():
         return np.full(4, np.nan), 0.0
     start = centroid[facing] + 1e-6 * mesh.radius * normal[facing]
     clear = ~occluded(bodies, start, np.broadcast_to(sonar_pose.position, start.shape))
+    clear &= np.isfinite(seen[mesh.faces[facing]]).all(axis=(1, 2))
     visible = np.flatnonzero(facing)[clear]
     fraction = float(mesh.area[visible].sum() / mesh.area[facing].sum())
     if not len(visible):

@@ -67,7 +67,8 @@ class Arrivals:
     bottom: Ints  # (path,) bed reflections
     turning: Ints  # (path,) turning points
     sound_speed: float  # m/s of the water at the array centre
-    wavefront_error: float  # s: largest measured error of the wavefront expansion over the aperture
+    wavefront_error: float  # s: largest error of the wavefronts that was measured, at probes spread over the aperture
+    amplitude_error: float = 0.0  # largest error of the amplitudes measured there, relative to the strongest echo
 
     def select(self, keep: Bools | Ints) -> Arrivals:
         """The arrivals picked by a mask or by indices (path,)."""

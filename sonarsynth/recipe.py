@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from pathlib import Path
 from typing import Annotated, Any
 
 from annotated_types import Ge
@@ -52,11 +53,23 @@ class Recipe:
 
     @property
     def digest(self) -> str:
-        """SHA-256 of everything in the recipe that decides numbers: descriptions, seed and mesh contents."""
-        meshes = {t.name: mesh_of(t.shape).digest for t in self.scene.world.targets}
+        """SHA-256 of everything in the recipe that decides numbers: descriptions, seed, and what the files hold.
+
+        Where the files lie does not matter.
+        """
         deciding = {name: value for name, value in self.as_json().items() if name != "rays"}
-        text = json.dumps([deciding, meshes], sort_keys=True)
+        meshes = {t.name: mesh_of(t.shape).digest for t in self.scene.world.targets}
+        text = json.dumps([_by_content(deciding), meshes], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _by_content(value: Any) -> Any:
+    """The same JSON value with the path of each file replaced by the digest of what it holds."""
+    if isinstance(value, dict):
+        path = value.get("path")
+        held = {"path": hashlib.sha256(Path(path).read_bytes()).hexdigest()} if isinstance(path, str) else {}
+        return {name: _by_content(v) for name, v in value.items()} | held
+    return [_by_content(v) for v in value] if isinstance(value, list) else value
 
 
 _ADAPTER: TypeAdapter[Recipe] = TypeAdapter(Recipe)

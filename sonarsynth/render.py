@@ -13,8 +13,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.acoustics.snap import source_level
-from sonarsynth.conventions import Floats
 from sonarsynth.description import FieldError
 from sonarsynth.labelling import label, ledger
 from sonarsynth.planning import Plan, plan
@@ -22,10 +20,9 @@ from sonarsynth.products import LEDGER, Arrivals, Bearings, EnergyImage, Ledger,
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import Recipe
 from sonarsynth.scene import Frame
-from sonarsynth.synthesis.pulse import bubble
+from sonarsynth.synthesis.pulse import snap_levels
 from sonarsynth.tracing import Straight
 from sonarsynth.variables import VARIABLES, Variable, attributes, coordinates, variables
-from sonarsynth.world.moment import Snap
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,6 +49,9 @@ Values = dict[tuple[str, str], np.ndarray]
 """(group, name) to the array of one frame, without the frame axis."""
 
 
+EXPANSION_ERRORS = ("wavefront_error", "amplitude_error")
+
+
 @dataclass(frozen=True, eq=False)
 class Traced:
     """What the trace task gives."""
@@ -69,11 +69,6 @@ class Heard:
     signals: Signals | None
     bearings: Bearings | None
     image: EnergyImage | None
-
-
-def snap_levels(snaps: tuple[Snap, ...]) -> Floats:
-    """(snap,) peak source level of each snap (dB re 1 uPa at 1 m)."""
-    return np.array([source_level(bubble(s.model)) if s.source_level is None else s.source_level for s in snaps])
 
 
 def trace_frame(plan: Plan, index: int) -> Traced:
@@ -95,11 +90,17 @@ def trace_frame(plan: Plan, index: int) -> Traced:
     levels = snap_levels(frame.moment.snaps)
     straight = isinstance(plan.propagation, Straight)
     truth = label(frame.moment, frame.sonar_pose, sonar.beams, plan.connect, levels, straight)
-    phase = 2 * np.pi * sonar.band.high * arrivals.wavefront_error
-    book = ledger(
-        arrivals, frame.moment.snaps, len(frame.moment.bodies), levels, float(-20 * np.log10(np.cos(min(phase, 1.5))))
-    )
+    book = ledger(arrivals, frame.moment.snaps, len(frame.moment.bodies), levels, _expansion_error(plan, arrivals))
     return Traced(frame, arrivals, truth, book)
+
+
+def _expansion_error(plan: Plan, arrivals: Arrivals) -> float:
+    """Error (dB) of a level from expanding wavefronts and amplitudes over the aperture, as measured at its probes.
+
+    A beam of sensors that are up to phi out of phase loses at most 20 log10 cos phi.
+    """
+    phase = min(2 * np.pi * plan.scene.sonar.band.high * arrivals.wavefront_error, 1.5)
+    return float(20 * np.log10((1.0 + arrivals.amplitude_error) / np.cos(phase)))
 
 
 def follow_rays(plan: Plan, index: int) -> RayFan:
@@ -209,7 +210,7 @@ def _truth_values(plan: Plan, index: int, traced: Traced) -> Values:
     levels = {name: book.level[..., n] for n, name in enumerate(LEDGER)}
     return (
         _table("/", **row)
-        | _table("/truth", **stored, wavefront_error=traced.arrivals.wavefront_error)
+        | _table("/truth", **stored, **{name: getattr(traced.arrivals, name) for name in EXPANSION_ERRORS})
         | _table("/ledger", **levels, paths=book.paths, error_bound=book.error_bound)
     )
 
@@ -247,5 +248,7 @@ def render(recipe: Recipe | Plan, index: int) -> xr.DataTree:
     for v in variables(made):
         attrs = {"units": v.units, "long_name": v.long_name, **dict(v.attributes)}
         data = values[v.group, v.name]
+        if "scale_factor" in attrs:
+            data = (data * attrs.pop("scale_factor")).astype(np.float32)
         groups.setdefault(v.group, xr.Dataset())[v.name] = (v.dims[1:], data, attrs)
     return xr.DataTree.from_dict(groups)

@@ -129,7 +129,14 @@ _TRUTH = _group(
     _v("target", _BEAMS, "int16", "1", "target that the beam points at", attributes=_NONE),
     _v("facet", _BEAMS, "int32", "1", "facet that the beam points at", attributes=_NONE),
     _v("range", _BEAMS, "float32", "m", "distance to the first surface in the beam's direction"),
-    _v("wavefront_error", ("frame",), "float64", "s", "largest error of the wavefront expansion over the aperture"),
+    _v(
+        "wavefront_error",
+        ("frame",),
+        "float64",
+        "s",
+        "largest error of wavefronts measured at probes over the aperture",
+    ),
+    _v("amplitude_error", ("frame",), "float64", "1", "the same of amplitudes, relative to the strongest echo"),
 )
 _LEDGER = _group(
     "/ledger",

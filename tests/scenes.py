@@ -25,7 +25,7 @@ def remus(frames: int = 2, **sonar: Any) -> Recipe:
         seed=3,
         scene=Scene(
             world=World(
-                environment=Environment(depth=10.0, sound_speed=Isovelocity(speed=1540.0), density=1000.0),
+                environment=Environment(depth=10.0, sound_speed=Isovelocity(speed=1540.0)),
                 targets=(
                     Target(
                         name="remus",

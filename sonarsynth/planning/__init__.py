@@ -41,7 +41,12 @@ def plan(recipe: Recipe, products: frozenset[str] = frozenset(PRODUCTS)) -> Plan
     frame_bytes = sizes["sensor"] * sizes["sample"] * (2 if scene.sonar.converter else 4)
     shard = int(np.clip(SHARD_BYTES // max(frame_bytes, 1), 1, SHARD_FRAMES))
     made = Plan(recipe, products, profile, propagation, windows, sizes=sizes, shard_frames=shard)
-    notes = tuple(f"{t.name}: {note}" for t in scene.world.targets for note in mesh_of(t.shape).notes)
+    notes: tuple[str, ...] = ()
+    if windows.disturbed:
+        notes += (
+            f"{windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest one",
+        )
+    notes += tuple(f"{t.name}: {note}" for t in scene.world.targets for note in mesh_of(t.shape).notes)
     return replace(made, stages=stages(made), left_out=left_out(made), warnings=notes)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 
 from sonarsynth.conventions import Floats, depth
@@ -11,6 +13,7 @@ from sonarsynth.recipe import Recipe
 from sonarsynth.scene import Frame
 from sonarsynth.sonar import elements
 from sonarsynth.synthesis import pulse_support
+from sonarsynth.synthesis.pulse import snap_levels
 from sonarsynth.world.environment import Profile
 
 MARGIN = 0.1e-3
@@ -24,21 +27,21 @@ ECHO_SUPPORT = 1e-4
 
 
 def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
-    """The sample window and the echo window that hold every direct arrival and echo of every frame.
+    """The sample window, which holds every arrival of every frame, and the echo window of the loudest snap.
 
-    From geometry alone: the delay of each facet's echo along straight lines at the slowness averaged over the depths
-    between its ends, and the support of the filtered snap.
+    The sonar takes the loudest pulse for the start of its clock. From geometry alone: the delay of each facet's echo
+    along straight lines at the slowness averaged over the depths between its ends, and the support of the filtered snap.
     """
     scene = recipe.scene
     sonar = scene.sonar
     across = elements(sonar.array).aperture / profile.speed.min()  # of a wave, from the centre to the edge
     before, after = _support(recipe, SUPPORT) + across
     echo_before, echo_after = _support(recipe, ECHO_SUPPORT) + across
-    spans = np.array([_span(recipe.frame(i)[1], profile) for i in range(recipe.frames)])
-    direct, last_direct, first_echo, last_echo = spans.T
+    spans = [_span(recipe.frame(i)[1], profile) for i in range(recipe.frames)]
+    first_heard, clock, first_echo, last_echo, last_heard = np.array([_times(span) for span in spans]).T
     gate = scene.processing.echo_window
-    earliest = np.nanmin(first_echo - direct, initial=np.inf) - echo_before - MARGIN
-    latest = np.nanmax(last_echo - direct, initial=-np.inf) + echo_after + MARGIN
+    earliest = np.nanmin(first_echo - clock, initial=np.inf) - echo_before - MARGIN
+    latest = np.nanmax(last_echo - clock, initial=-np.inf) + echo_after + MARGIN
     if not (np.isfinite(earliest) and np.isfinite(latest)):  # nothing echoes: listen for a moment after the snap
         earliest, latest = after, after + 2e-3
     start = gate.start if gate.start is not None else max(earliest, after)
@@ -46,11 +49,11 @@ def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
     if stop <= start:
         raise FieldError(("scene", "processing", "echo_window", "stop"), f"must be after start ({start:g} s)")
     rate = sonar.sampling_frequency
-    first = np.floor((direct - before - MARGIN) * rate) / rate
-    whole = np.fmax(last_direct, last_echo) + after + MARGIN  # NaN where nothing echoes
-    last = np.maximum(whole, direct + stop + MARGIN)
+    first = np.floor((first_heard - before - MARGIN) * rate) / rate
+    last = np.maximum(last_heard + after + MARGIN, clock + stop + MARGIN)
     samples = int(np.ceil(np.max(last - first) * rate)) + 1
-    return Windows(first, samples, direct, float(start), float(stop))
+    disturbed = sum(_disturbed(span, start - before, stop + before) for span in spans)
+    return Windows(first, samples, clock, float(start), float(stop), disturbed)
 
 
 def _support(recipe: Recipe, tolerance: float) -> Floats:
@@ -60,26 +63,50 @@ def _support(recipe: Recipe, tolerance: float) -> Floats:
     return np.asarray(np.max(supports or [(0.0, 0.0)], axis=0))
 
 
-def _span(frame: Frame, profile: Profile) -> tuple[float, float, float, float]:
-    """First and last direct arrival, first and last echo (s) of a frame at the array centre; NaN where none."""
+@dataclass(frozen=True)
+class _Span:
+    """When a frame is heard at the array centre (s): the echoes of the loudest snap, and everything."""
+
+    first: float  # first direct arrival of any snap
+    clock: float  # direct arrival of the loudest snap: what the sonar takes for the start
+    first_echo: float  # of the loudest snap; NaN where nothing echoes
+    last_echo: float
+    last: float  # last arrival of any snap
+    others: tuple[tuple[float, float], ...] = field(
+        default=(), compare=False
+    )  # direct arrival, last echo of the others
+
+
+def _times(span: _Span) -> tuple[float, ...]:
+    """The five times of a span."""
+    return (span.first, span.clock, span.first_echo, span.last_echo, span.last)
+
+
+def _span(frame: Frame, profile: Profile) -> _Span:
     array = frame.sonar_pose.position
     snaps = frame.moment.snaps
     if not snaps:
-        return 0.0, 0.0, np.nan, np.nan
-    direct = [s.time + _straight_time(profile, s.position, array) for s in snaps]
-    echoes = [
-        s.time + _straight_time(profile, s.position, points) + _straight_time(profile, points, array)
-        for s in snaps
-        for points in (b.pose.to_world(b.mesh.centroid) for b in frame.moment.bodies)
+        return _Span(0.0, 0.0, np.nan, np.nan, 0.0)
+    points = np.concatenate([np.empty((0, 3)), *(b.pose.to_world(b.mesh.centroid) for b in frame.moment.bodies)])
+    back = _straight_time(profile, points, array)
+    direct = np.array([s.time + float(_straight_time(profile, s.position, array)) for s in snaps])
+    echoes = [s.time + _straight_time(profile, s.position, points) + back for s in snaps]
+    last = np.array([max(d, e.max(initial=-np.inf)) for d, e in zip(direct, echoes, strict=True)])
+    heard = [
+        level - 20 * np.log10(np.linalg.norm(s.position - array))
+        for s, level in zip(snaps, snap_levels(snaps), strict=True)
     ]
-    if not echoes:
-        return float(min(direct)), float(max(direct)), np.nan, np.nan
-    return (
-        float(min(direct)),
-        float(max(direct)),
-        float(min(e.min() for e in echoes)),
-        float(max(e.max() for e in echoes)),
+    loudest = int(np.argmax(heard))
+    mine = echoes[loudest] if len(points) else np.array([np.nan])
+    others = tuple((float(direct[n]), float(last[n])) for n in range(len(snaps)) if n != loudest)
+    return _Span(
+        float(direct.min()), float(direct[loudest]), float(mine.min()), float(mine.max()), float(last.max()), others
     )
+
+
+def _disturbed(span: _Span, start: float, stop: float) -> bool:
+    """Whether sound of another snap than the loudest falls into the echo window, start to stop after its arrival."""
+    return any(first < span.clock + stop and last > span.clock + start for first, last in span.others)
 
 
 def _straight_time(profile: Profile, a: Floats, b: Floats) -> Floats:

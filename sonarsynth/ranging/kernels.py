@@ -21,7 +21,7 @@ def power_and_peak(pressure: Any, live: Any) -> Any:
         if live[q]:
             for n in range(samples):
                 p = pressure[q, n]
-                power[n] += float(p) * float(p)
+                power[n] += np.float64(p) ** 2
                 high[n] = max(high[n], abs(p))
     return power, float(high.max()) if samples > 0 else 0.0
 

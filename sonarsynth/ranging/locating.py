@@ -24,7 +24,7 @@ from sonarsynth.sonar import Elements, Sonar
 
 ROUNDS = 3
 """Alignments of the sensors on the wavefront; each improves the last, and the lags left settle the fit."""
-ROBUST_ROUNDS = 4
+ROBUST_ROUNDS = 3
 """Reweightings that turn outliers out of the first fit."""
 FIRST_STEPS = 3
 """Steps from the plane wave to the first sphere; a step each after that."""
@@ -102,7 +102,7 @@ def _row(signals: Signals, known: Known, centre: float, half: float, bend: Bend 
 def fit_pulse(
     signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float
 ) -> tuple[Wavefront, Pulse] | None:
-    """Wavefront of the pulse about `centre` (s), and the pulse aligned on it; None where there is no single wavefront.
+    """Wavefront of the pulse about `centre` (s), and the pulse as measured last; None where it is no single wavefront.
 
     Envelope peaks of the sensors give eq. 6 in closed form, then the sphere, robustly; then the sensors are aligned
     and their lags measured coherently, until these settle.
@@ -122,8 +122,7 @@ def fit_pulse(
         if better is None:
             return None
         wave = better
-    pulse = pulses.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time)
-    rms = np.sqrt(pulse.weight @ pulse.lag**2 / pulse.weight.sum())
+    rms = np.sqrt(pulse.weight @ wave.residual**2 / pulse.weight.sum())
     if not rms < MAX_LAG / sonar.band.centre:
         return None
     return wave, pulse
@@ -149,23 +148,22 @@ def _robust_wave(delay: Floats, height: Floats, position: Floats, sound_speed: f
     direction, time = plane_wave(delay, position, sound_speed, loud)
     if not np.isfinite(time):
         return None
-    wave = plane_wavefront(direction, time)
-    weight = loud
-    for i in range(ROBUST_ROUNDS):
-        better = fit_wave(delay, position, sound_speed, weight, wave, FIRST_STEPS if i == 0 else 1)
-        if better is None:
+    wave = fit_wave(delay, position, sound_speed, loud, plane_wavefront(direction, time), FIRST_STEPS)
+    for _ in range(ROBUST_ROUNDS):
+        if wave is None:
             return None
-        wave = better
-        order = np.argsort(np.abs(wave.residual))
+        late = np.abs(wave.residual)
+        order = np.argsort(late)
         share = np.cumsum(loud[order])
-        middle = np.abs(wave.residual)[order][np.searchsorted(share, 0.5 * share[-1])]
+        middle = late[order[np.searchsorted(share, 0.5 * share[-1])]]
         scale = max(6 * middle, 1e-7)
-        weight = loud * np.clip(1 - (wave.residual / scale) ** 2, 0.0, 1.0) ** 2
+        weight = loud * np.maximum(1 - (late / scale) ** 2, 0.0) ** 2
+        wave = fit_wave(delay, position, sound_speed, weight, wave, 1)
     return wave
 
 
 def _refit(pulse: Pulse, wave: Wavefront, elements: Elements, sonar: Sonar, extra: Floats) -> Wavefront:
     """The straight wave that is left when the delays `extra` (sensor,) of bending are taken away."""
     q, c = elements.position, sonar.assumed_sound_speed
-    delay = wave.time + wavefront_delays(q, wave.direction, wave.curvature, c) + pulse.lag - extra
+    delay = wave.time + wavefront_delays(q, wave.direction, wave.curvature, c) + wave.residual - extra
     return fit_wave(delay, q, c, pulse.weight, wave) or wave

@@ -119,7 +119,7 @@ def place(wave: Wavefront, pulse: Pulse, known: Known, arrival: Floats | None = 
     seen = u if arrival is None else arrival
     around = spread[0, 0] / max(1 - u[2] ** 2, 1e-300)
     return Row(
-        time=wave.time + offset,
+        time=pulse.time + offset,
         time_error=float(np.hypot(np.sqrt(timing[3, 3]), width)),
         direction=seen,
         angle_error=np.sqrt([around, spread[1, 1]]),

@@ -27,7 +27,7 @@ QUIET = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Pulse:
-    """A pulse over the array, after alignment on a wavefront: its waveform, and who deviates."""
+    """A pulse over the array, compared with a wavefront: its waveform, and who deviates."""
 
     frequency: Floats  # (bin,) Hz, evenly spaced
     template: Complexes  # (bin,) Pa s: the wave at the array centre, face directivity removed, time 0 at `time`
@@ -53,7 +53,8 @@ def loudness(signals: Signals, live: npt.NDArray[np.bool_], length: int) -> Loud
     """
     power, peak = kernels.power_and_peak(signals.pressure, live)
     track = uniform_filter1d(power, min(length, len(power)), mode="constant")
-    quiet = np.percentile(uniform_filter1d(power, min(16, len(power))), 10)
+    tenth = len(power) // 10
+    quiet = np.partition(uniform_filter1d(power, min(16, len(power))), tenth)[tenth]
     return Loudness(np.maximum(track, 0.0), float(max(quiet, 0.0)), peak)
 
 

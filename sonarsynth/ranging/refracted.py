@@ -24,7 +24,8 @@ class RefractedRange:
     locality: Annotated[Decibels, Ge(0)] = 3.0
     """A beam gives no point where one within a beam width holds this much more at the same delay: the echo is its."""
     focus: PositiveMetres | None = 20.0
-    """Distance at which the ranged beams are focused; none: plane waves."""
+    """Distance at which the ranged beams are focused; none: plane waves. On a lattice that is the focus of
+    `FocusedDelayAndSum`, the acoustic axis's in every direction (its table says what that costs); elsewhere exact."""
     profile: SoundSpeed | None = None
     """Sound speed that the sonar believes in; left out: that of the water."""
 

@@ -13,7 +13,7 @@ from sonarsynth.pictures.sheet import Errors, sheet
 from sonarsynth.pictures.style import decibels
 from sonarsynth.show.film import write_film
 from sonarsynth.show.listening import beams
-from sonarsynth.show.reading import Stored, beam_grid, built, opened, stored
+from sonarsynth.show.reading import NothingToDraw, Stored, beam_grid, built, opened, stored
 from sonarsynth.show.summary import summary
 
 if TYPE_CHECKING:
@@ -35,19 +35,20 @@ def show(
     """Draw a store into the folder `out` (left out: `<store>.pictures`), say a summary, return the files written.
 
     film.mp4 (film.gif without ffmpeg): every frame that was built. sheet.png: frame number `frame` (left out: the one
-    with most points on a target). What the store does not hold is left out of the pictures and said. Raises ValueError
-    in one line when there is nothing to draw.
+    with most points on a target). What the store does not hold is left out of the pictures and said. Raises
+    NothingToDraw, a ValueError, where there is no store, or not that frame.
     """
     path = Path(store)
     tree = opened(path)
-    say(summary(tree, path))
     frames = built(tree)
     if not len(frames):
-        raise ValueError(f"{path}: no frame has been built yet")
+        say(summary(tree, path))
+        raise NothingToDraw(f"{path}: no frame has been built yet")
     if frame is not None and frame not in frames:
-        raise ValueError(
+        raise NothingToDraw(
             f"{path}: frame {frame} has not been built; there are {len(frames)}, {frames[0]} to {frames[-1]}"
         )
+    say(summary(tree, path))
     folder = path.with_name(path.name + ".pictures") if out is None else Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     every = -(-len(frames) // LONGEST)

@@ -14,7 +14,7 @@ from sonarsynth.tracing.fan import EVENTS
 
 
 def show_rays(plan: Plan, index: int, out: Path) -> tuple[list[Path], str]:
-    """Write `section.png` and `space.png` of a frame's rays into a folder; returns their paths and a line about the rays.
+    """Write `section.png` and `space.png` of a frame's rays into a folder; their paths, and a line about the rays.
 
     The section is the vertical plane of the sonar's axis. Where rays are sent on to the shrimp, their colour in space
     is their coefficient, and only those that met a target are drawn. Raises FieldError where no rays are asked for.

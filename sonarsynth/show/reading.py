@@ -16,19 +16,23 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+class NothingToDraw(ValueError):
+    """There is no store, or nothing in it to draw; str() is one line."""
+
+
 def opened(store: str | Path) -> xr.DataTree:
-    """The store as a DataTree. Raises ValueError in one line when it is not one."""
+    """The store as a DataTree. Raises NothingToDraw when it is not one."""
     import xarray as xr
 
     path = Path(store)
     if not path.is_dir():
-        raise ValueError(f"{path}: there is no such store")
+        raise NothingToDraw(f"{path}: there is no such store")
     try:
         tree = xr.open_datatree(path, engine="zarr")
     except (OSError, ValueError, KeyError) as problem:
-        raise ValueError(f"{path}: not a store that xarray can open ({str(problem).splitlines()[0]})") from None
+        raise NothingToDraw(f"{path}: not a store that xarray can open ({str(problem).splitlines()[0]})") from None
     if "truth" not in tree.children or "frame" not in tree["truth"].sizes:
-        raise ValueError(f"{path}: a store has a group /truth with frames; this has none")
+        raise NothingToDraw(f"{path}: a store has a group /truth with frames; this has none")
     return tree
 
 
@@ -43,10 +47,10 @@ def read(tree: xr.DataTree, name: str, frame: int | None = None) -> np.ndarray |
 
 
 def needed(tree: xr.DataTree, name: str, frame: int | None = None) -> np.ndarray:
-    """As `read`, for what pictures cannot do without. Raises ValueError."""
+    """As `read`, for what pictures cannot do without. Raises NothingToDraw."""
     values = read(tree, name, frame)
     if values is None:
-        raise ValueError(f"the store has no variable {name}")
+        raise NothingToDraw(f"the store has no variable {name}")
     return values
 
 

@@ -12,6 +12,7 @@ from sonarsynth.acoustics.snap import Bubble, ComplexArray
 from sonarsynth.acoustics.spectra import Fir
 from sonarsynth.conventions import Floats
 from sonarsynth.sonar import Filter, LowPass
+from sonarsynth.world.moment import Snap
 from sonarsynth.world.sources import LogarithmicBubble
 
 
@@ -54,3 +55,8 @@ def pulse_spectrum(
     """
     f = np.asarray(np.arange(samples // 2 + 1) * (sampling_frequency / samples), float)
     return f, _spectrum(model, chosen, sampling_frequency, samples)
+
+
+def snap_levels(heard: tuple[Snap, ...]) -> Floats:
+    """(snap,) peak source level of each snap (dB re 1 uPa at 1 m)."""
+    return np.array([snaps.source_level(bubble(s.model)) if s.source_level is None else s.source_level for s in heard])

@@ -107,7 +107,7 @@ def _reference(middle: Floats, one: bool, front: Fronts) -> Fronts:
         amplitude=np.ones(1),
         loss=middle[4:5],
         delay_terms=middle[None, 5 : 5 + terms],
-        gain_terms=middle[None, 5 + terms : 5 + terms + front.gain_terms.shape[1]],
+        gain_terms=np.zeros((1, front.gain_terms.shape[1])),
         sound_speed=front.sound_speed,
         aperture=front.aperture,
     )
@@ -131,7 +131,11 @@ def _tile(paths: Ints, views: _Views, aim: Aim) -> Tile:
     terms = terms_for(turn, loss * np.log(10.0) / 20.0 * aim.steepest, aim.weights, aim.tolerance)
     if views.near:
         phase = np.full(3, np.inf)
-    x, y, z = (nodes_for(float(p), aim.weights, aim.tolerance) for p in phase)
+    cubic = 2 if views.front.gain_terms.shape[1] else 0  # the amplitude is a cubic on top of the wave
+    x, y, z = (
+        nodes_for(float(p), aim.weights, aim.tolerance) + cubic * (s > 0)
+        for p, s in zip(phase, views.size, strict=True)
+    )
     shape, cost = _cheapest(paths.size, (x, y, z), len(terms), aim)
     return Tile(paths, reference, shape, terms, (float(du[1]), float(du[2]), loss), cost)
 

@@ -56,11 +56,20 @@ def arrivals(
     law: ScatteringLaw,
 ) -> Arrivals:
     """The arrivals of any snaps from legs that are traced already: as `trace`, without tracing the array side again."""
-    parts = []
+    parts = [_silence(legs)]
     for index, snap in enumerate(snaps):
         parts.append(_direct(legs, environment, profile, index, snap, absorption, propagation))
         parts.append(_echoes(legs, environment, profile, index, snap, absorption, propagation, law))
     return _join(parts, float(profile.at(depth(legs.sonar_pose.position))))
+
+
+def _silence(array: ArrayLegs) -> Arrivals:
+    """No arrivals at all: what a frame without a snap has."""
+    none, zero = np.empty(0), np.empty(0, int)
+    return _assemble(
+        array.legs.select(zero), 0, 0.0, 0.0, zero, zero, none, (np.empty((0, 0)), 0.0),
+        spreading_out=none, spreading_in=none, out_time=none, out_length=none, out_turning=zero,
+    )  # fmt: skip
 
 
 def _direct(
@@ -80,7 +89,8 @@ def _direct(
     one, zero = np.ones(len(legs.row)), np.zeros(len(legs.row), int)
     none = np.full(len(legs.row), NO_TARGET)
     return _assemble(
-        legs, index, snap, absorption, none, none, one, _variation(array, legs.probe_gain),
+        legs, index, snap.time, absorption, none, none, one,
+        _variation(array, legs.probe_gain, legs.spreading),
         spreading_out=legs.spreading, spreading_in=one, out_time=0.0 * one, out_length=0.0 * one, out_turning=zero,
     )  # fmt: skip
 
@@ -124,33 +134,41 @@ def _echoes(
     gain = over_aperture / scattering[:, None] * legs.probe_gain
     gain[(over_aperture == 0).any(axis=1)] = 1.0  # a facet on the limb: all sensors share what the centre sees
     return _assemble(
-        legs, index, snap, absorption, array.target[row], array.facet[row], scattering, _variation(array, gain),
+        legs, index, snap.time, absorption, array.target[row], array.facet[row], scattering,
+        _variation(array, gain, scattering * legs.spreading * out.spreading[path]),
         spreading_out=out.spreading[path], spreading_in=legs.spreading,
         out_time=out.travel_time[path], out_length=out.length[path], out_turning=out.turning[path],
     )  # fmt: skip
 
 
-def _variation(array: ArrayLegs, gain: Floats) -> Floats:
-    """Polynomials (path, term) of gain - 1 over the aperture; no columns where the gain is 1 everywhere."""
+def _variation(array: ArrayLegs, gain: Floats, strength: Floats) -> tuple[Floats, float]:
+    """Polynomials (path, term) of gain (path, probe) - 1 over the aperture; no columns where it is 1 everywhere.
+
+    And their largest error at the probes, for paths of that strength (path,), relative to the strongest.
+    """
     if (gain == 1.0).all():
-        return np.empty((len(gain), 0))
-    return probes(array.elements).fit(gain - 1.0)
+        return np.empty((len(gain), 0)), 0.0
+    probe = probes(array.elements)
+    terms = probe.fit(gain - 1.0)
+    loudest = np.nanmax(np.abs(strength)[:, None] * np.abs(gain), initial=0.0)
+    return terms, float((np.abs(strength) * probe.misfit(gain - 1.0, terms)).max(initial=0.0) / max(loudest, 1e-300))
 
 
 def _assemble(
-    legs: Legs, index: int, snap: Snap, absorption: float, target: Ints, facet: Ints, scattering: Floats, variation:
-    Floats, *, spreading_out: Floats, spreading_in: Floats, out_time: Floats, out_length: Floats, out_turning: Ints,
+    legs: Legs, index: int, time: float, absorption: float, target: Ints, facet: Ints, scattering: Floats,
+    variation: tuple[Floats, float], *, spreading_out: Floats, spreading_in: Floats, out_time: Floats,
+    out_length: Floats, out_turning: Ints,
 ) -> Arrivals:  # fmt: skip
     """Arrivals of one snap from both sides of its paths."""
     length = out_length + legs.length
     loss = absorption * length
     zero = np.zeros(len(length), int)
     return Arrivals(
-        delay=snap.time + (out_time + legs.travel_time),
+        delay=time + (out_time + legs.travel_time),
         direction=legs.direction,
         radius=legs.radius,
         delay_terms=legs.delay_terms,
-        amplitude_terms=variation,
+        amplitude_terms=variation[0],
         amplitude=spreading_out * scattering * spreading_in * 10.0 ** (-loss / 20.0),
         spreading_out=spreading_out,
         spreading_in=spreading_in,
@@ -167,13 +185,12 @@ def _assemble(
         turning=out_turning + legs.turning,
         sound_speed=np.nan,
         wavefront_error=float(legs.error.max(initial=0.0)),
+        amplitude_error=variation[1],
     )
 
 
 def _join(parts: list[Arrivals], sound_speed: float) -> Arrivals:
     """Arrivals of all snaps, in order; terms that some of them lack are 0."""
-    if not parts:
-        raise ValueError("a frame without a snap has no arrivals")
     columns = {}
     for name, value in vars(parts[0]).items():
         if isinstance(value, np.ndarray):
@@ -182,5 +199,9 @@ def _join(parts: list[Arrivals], sound_speed: float) -> Arrivals:
                 width = max(a.shape[1] for a in arrays)
                 arrays = [a if a.shape[1] == width else np.zeros((len(a), width)) for a in arrays]
             columns[name] = np.concatenate(arrays)
-    error = max(part.wavefront_error for part in parts)
-    return Arrivals(**columns, sound_speed=sound_speed, wavefront_error=error)
+    return Arrivals(
+        **columns,
+        sound_speed=sound_speed,
+        wavefront_error=max(part.wavefront_error for part in parts),
+        amplitude_error=max(part.amplitude_error for part in parts),
+    )

@@ -44,9 +44,12 @@ class Probes:
         return terms
 
     def misfit(self, values: Floats, terms: Floats) -> Floats:
-        """Largest |error| (path,) at the probes held out (at all if none were); inf where a ray is missing."""
-        held = slice(self.fitted, None) if len(self.sensor) > self.fitted else slice(None)
-        error = np.abs(values[:, held] - terms @ self.basis[held].T).max(axis=1, initial=0.0)
+        """Largest |error| (path,) at the probes, those held out as well; inf where a ray is missing.
+
+        A measurement at 24 places, not a bound: kinks of a profile within the aperture were seen to err twice as much
+        between the probes.
+        """
+        error = np.abs(values - terms @ self.basis.T).max(axis=1, initial=0.0)
         return np.where(np.isnan(values).any(axis=1), np.inf, error)
 
 

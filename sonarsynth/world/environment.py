@@ -14,7 +14,6 @@ from sonarsynth.conventions import (
     Decibels,
     DegreesCelsius,
     Floats,
-    KilogramsPerCubicMetre,
     NonNegativeMetres,
     Number,
     PositiveMetres,
@@ -167,7 +166,6 @@ class Environment:
     depth: PositiveMetres
     """Depth of the bed below the mean surface."""
     sound_speed: SoundSpeed
-    density: Annotated[KilogramsPerCubicMetre, Gt(0)] = 1025.0
     surface: SeaSurface = SeaSurface()
     bed: SeaBed = SeaBed()
     absorption: Absorption = Absorption()

@@ -51,7 +51,7 @@ class Waypoint:
 
 @description
 class Waypoints:
-    """Straight lines between waypoints; headings turn evenly, the short way. At rest before the first, after the last."""
+    """Straight lines between waypoints; headings turn evenly, the short way. At rest before and after."""
 
     kind: Literal["waypoints"] = "waypoints"
     points: Annotated[tuple[Waypoint, ...], MinLen(2)]

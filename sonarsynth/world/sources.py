@@ -26,7 +26,7 @@ class LogarithmicBubble:
     q: Annotated[Number, Lt(0)] = -1.494179079227920e05
     """Collapse time scale, negative (1/s)."""
     density: Annotated[Number, Gt(0)] = 1000.0
-    """Water density (kg/m3) in p = (rho/r) d(R^2 R')/dt."""
+    """Water density (kg/m3) in p = (rho/r) d(R^2 R')/dt; sea water of 1025 makes a snap 0.21 dB louder."""
 
 
 @description

@@ -14,7 +14,7 @@ from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.products import EnergyImage
 from sonarsynth.ranging import IsovelocityRange, RefractedRange, SensorDelays
 from sonarsynth.ranging.locating import unlocatable
-from sonarsynth.sonar import BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
+from sonarsynth.sonar import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
 from sonarsynth.world.environment import Profile
 from tests.heard import add_noise, hear_direct, hear_echoes, silence
 
@@ -227,3 +227,32 @@ def test_one_beam_suffices_for_a_point():
         cloud = cloud_of(method, array, sonar, signals, image, source)
         assert cloud.range[0, 0] == pytest.approx(20.0, abs=0.01)
         assert np.allclose(cloud.position[0, 0], target, atol=0.01)
+
+
+@pytest.mark.parametrize("width", [1.0, 100.0, 2e3])
+def test_a_band_narrower_than_the_bins_of_a_pulse(width):
+    """Within the 3 kHz from bin to bin of what is kept of a pulse: no answer, or one within its error."""
+    array, source = elements(Romanis()), np.array([12.0, 3.0, -6.0])
+    found = locate(hear_direct(array, source), array, 11.0, band=Band(low=39e3, high=39e3 + width))
+    miss = np.linalg.norm(found.position[0] - source)
+    assert not miss > 3 * np.sqrt(np.trace(found.position_covariance[0]))
+
+
+def test_a_snap_so_near_that_plane_waves_mean_nothing():
+    """Less than an aperture and a half away: the sphere is found from a plane wave all the same."""
+    source = np.array([0.9, 0.2, -0.3])
+    array = elements(Romanis(face=0.0))
+    found = locate(hear_direct(array, source), array, 5.3)
+    assert np.linalg.norm(found.position[0] - source) < 2e-3
+
+
+@pytest.mark.parametrize("gradient", [1e-12, 1.0, 50.0])
+def test_gradients_of_any_size_have_finite_errors(gradient):
+    """And a bearing along the bed, where a ray bends most and the depth says nothing."""
+    array, source = elements(Romanis()), np.array([20.0, 3.0, -0.05])
+    profile = Profile(np.array([0.0, 10.0]), C + gradient * np.array([-5.0, 5.0]))
+    found = SensorDelays().locate(
+        hear_direct(array, source), array, Sonar(assumed_sound_speed=C), POSE, 5.05, 1, profile
+    )
+    assert np.isfinite(found.position_covariance).all() and np.isfinite(found.elevation_error).all()
+    assert found.elevation_error[0] >= 0.9 * 0.5 * gradient / C * 20.0

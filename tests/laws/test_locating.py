@@ -7,11 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sonarsynth.acoustics.bearings import tangent_plane
 from sonarsynth.acoustics.rays import eigenrays, water
 from sonarsynth.conventions import azimuth_elevation, direction
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.products import Bearings, Signals
 from sonarsynth.ranging import SensorDelays
+from sonarsynth.ranging.placing import bending_covariance, mean_gradient
+from sonarsynth.ranging.refraction import first_rays
 from sonarsynth.sonar import PlanarLattice, Romanis, Sonar, elements
 from sonarsynth.world.environment import Profile
 from tests.heard import RATE, hear, hear_direct, silence
@@ -194,13 +197,86 @@ def refracted_signals(array, source, pose, profile):
 
 
 def test_refraction_is_undone_by_the_profile():
-    profile = Tabulated(depth=(0.0, 4.0, 8.0, 20.0), speed=(1546.0, 1545.0, 1537.0, 1535.0))
+    profile = Profile(np.array([0.0, 4.0, 8.0, 20.0]), np.array([1546.0, 1545.0, 1537.0, 1535.0]))
     pose = Pose(np.array([3.0, 2.0, -5.0]), quaternion(0.7, 0.05, 0.02))
     source = np.array([9.0, -5.0, -6.0])
     array = elements(PlanarLattice(columns=9, rows=9, pitch=0.15, face=0.0))
     signals, seen = refracted_signals(array, source, pose, profile)
     straight = locate(signals, array, source, pose)
-    traced = locate(signals, array, source, pose, method=SensorDelays(profile=profile))
+    traced = locate(signals, array, source, pose, method=SensorDelays(refraction=True), profile=profile)
     assert np.linalg.norm(straight.position[0] - source) > 0.03
     assert np.linalg.norm(traced.position[0] - source) < 1e-3
     assert np.allclose([traced.azimuth[0], traced.elevation[0]], np.ravel(azimuth_elevation(seen)), atol=1e-5)
+
+
+def bent(random, kind):
+    """A profile of a random gradient of some kind, 20 m deep."""
+    g = random.choice([-1, 1]) * 10 ** random.uniform(-1.5, 0.5)
+    if kind == "gradient":
+        return Profile(np.array([0.0, 40.0]), C + g * (np.array([0.0, 40.0]) - 10))
+    if kind == "layer":
+        z = random.uniform(8.0, 16.0)
+        return Profile(np.array([0.0, z - 1, z + 1, 40.0]), C + 1.5 * g * np.array([-1, -1, 1, 1]))
+    return Profile(np.sort(random.uniform(0.0, 25.0, 6)), random.normal(C, 2.0, 6))
+
+
+@pytest.mark.parametrize("kind", ["gradient", "layer", "rough"])
+def test_errors_of_straight_rays_are_honest_in_bending_water(kind):
+    """No noise, all else known: what is left is the bending, within three predicted errors in nine cases of ten."""
+    random = np.random.default_rng(5)
+    array = elements(PlanarLattice(columns=5, rows=5, pitch=0.25, face=0.0))
+    miss, predicted, scaled, elevations = [], [], [], []
+    for _ in range(24):
+        profile = bent(random, kind)
+        pose = Pose(np.array([0.0, 0.0, -random.uniform(4, 14)]), quaternion(1.0, random.uniform(-0.1, 0.1), 0.2))
+        across, along = random.uniform(-0.4, 0.4), random.uniform(10.0, 30.0)
+        ahead = pose.turn_to_world(np.array([1.0, across, 0.0]))[:2]
+        source = pose.to_body(np.array([*(pose.position[:2] + along * ahead), -20.0]))
+        signals, _ = refracted_signals(array, source, pose, profile)
+        speed = float(profile.at(-pose.position[2]))
+        sonar = Sonar(array=SMALL_ARRAY, assumed_sound_speed=speed, sound_speed_error=0.1, bed_depth_error=0.01)
+        found = locate(signals, array, source, pose, sonar, profile=profile)
+        error = found.position[0] - source
+        miss.append(np.linalg.norm(error))
+        predicted.append(np.sqrt(np.trace(found.position_covariance[0])))
+        scaled.append(np.sqrt(error @ np.linalg.solve(found.position_covariance[0], error)))
+        elevations.append((found.elevation[0] - azimuth_elevation(source)[1]) / found.elevation_error[0])
+    assert np.mean(np.array(scaled) < 3.76) >= 0.9
+    assert np.mean(np.abs(elevations) < 3) >= 0.9
+    assert np.median(predicted) < 8 * np.median(miss)
+
+
+@pytest.mark.parametrize("gradient", [0.02, -0.3, 1.5])
+def test_the_angle_of_bending_is_that_of_the_arc(gradient):
+    """Between ray and chord, in water of one gradient."""
+    depth, snap, array = np.array([0.0, 60.0]), np.array([12.0, 9.0, -20.0]), np.array([0.0, 0.0, -8.0])
+    profile = Profile(depth, C + gradient * (depth - 8.0))
+    ray = first_rays(profile, snap[None], array[None])
+    chord = snap - array
+    distance = np.linalg.norm(chord)
+    u = chord / distance
+    g = mean_gradient(profile, 8.0, 20.0, 1.0)
+    assert g == pytest.approx(abs(gradient), rel=1e-9)
+    covariance = bending_covariance(tangent_plane(u) @ [0, 0, 1], u[2], distance, g, C, 0.6)
+    angle = np.arcsin(np.linalg.norm(np.cross(u, -ray.arrival[0])))
+    assert np.sqrt(np.trace(covariance[:2, :2])) == pytest.approx(angle, rel=0.02)
+
+
+def test_mean_gradients():
+    jump = Profile(np.array([0.0, 10.0, 10.0, 30.0]), np.array([1500.0, 1500.0, 1504.0, 1504.0]))
+    assert mean_gradient(jump, 5.0, 15.0, 1.0) == pytest.approx(0.4)
+    assert mean_gradient(jump, 15.0, 5.0, 1.0) == pytest.approx(0.4)
+    assert mean_gradient(jump, 20.0, 25.0, 1.0) == 0.0
+    slope = Profile(np.array([0.0, 10.0]), np.array([1500.0, 1501.0]))
+    assert mean_gradient(slope, 5.0, 5.0, 1.0) == pytest.approx(0.1)  # at one depth: that of its neighbourhood
+    assert mean_gradient(WATER, 5.0, 15.0, 1.0) == 0.0
+
+
+def test_uniform_water_of_any_speed_changes_nothing():
+    """What the instrument assumes is its own; only gradients are held against straight rays."""
+    source = np.array([9.0, -5.0, -6.0])
+    signals = hear_direct(ROMANIS, source)
+    here = locate(signals, ROMANIS, source)
+    there = locate(signals, ROMANIS, source, profile=Profile(np.array([0.0, 9.0]), np.array([1500.0, 1500.0])))
+    for name, value in vars(here).items():
+        assert np.array_equal(value, getattr(there, name)), name
