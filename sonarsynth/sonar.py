@@ -169,6 +169,10 @@ class Band:
         return 0.5 * (self.low + self.high)
 
 
+Transition = Annotated[PositiveHertz, Ge(100.0)]
+"""A filter rings for several periods of its transition: narrower ones would ring for more than 0.1 s."""
+
+
 @description
 class LowPass:
     """Linear-phase low-pass FIR filter (Kaiser window), zero delay."""
@@ -176,7 +180,7 @@ class LowPass:
     kind: Literal["low_pass"] = "low_pass"
     cutoff: PositiveHertz
     """Where the response is one half (-6 dB)."""
-    transition: PositiveHertz = 10e3
+    transition: Transition = 10e3
     attenuation: Annotated[Decibels, Ge(21), Le(160)] = 80.0
 
 
@@ -187,7 +191,7 @@ class BandPass:
     kind: Literal["band_pass"] = "band_pass"
     low: PositiveHertz
     high: PositiveHertz
-    transition: PositiveHertz = 5e3
+    transition: Transition = 5e3
     attenuation: Annotated[Decibels, Ge(21), Le(160)] = 80.0
 
     @field_validator("high")
@@ -204,7 +208,7 @@ class Converter:
     """Analogue to digital: pressure is stored as a whole number of counts."""
 
     bits: Annotated[int, Ge(2), Le(24)] = 16
-    full_scale: Annotated[Pascals, Gt(0)]
+    full_scale: Annotated[Pascals, Ge(1e-9), Le(1e12)]
     """Largest pressure (Pa): counts run over +-full_scale; louder samples are clipped, and counted."""
 
     @property
@@ -255,11 +259,11 @@ class Sonar:
     band: Band = Band(low=25e3, high=85e3)
     filter: Filter | None = None
     """Anti-alias filter before sampling; left out: a `BandPass` of the band."""
-    sampling_frequency: PositiveHertz = 196e3
+    sampling_frequency: Annotated[PositiveHertz, Le(100e6)] = 196e3
     converter: Converter | None = None
     """Left out: pressure is stored as float32."""
     beams: BeamGrid = BeamGrid()
-    assumed_sound_speed: PositiveSpeed = 1540.0
+    assumed_sound_speed: Annotated[PositiveSpeed, Ge(100.0), Le(10e3)] = 1540.0
     """The sound speed that the sonar uses to steer and to range."""
     sound_speed_error: Annotated[MetresPerSecond, Ge(0)] = 1.0
     """Standard error that the sonar ascribes to it: enters the predicted errors only."""

@@ -9,7 +9,7 @@ import numpy as np
 from sonarsynth.recipe import Recipe
 from sonarsynth.scattering import Isotropic
 from sonarsynth.scene import Physics, Processing, Scene, Trajectory, World
-from sonarsynth.sonar import BandPass, Band, BeamGrid, Romanis, Sonar
+from sonarsynth.sonar import Band, BandPass, BeamGrid, Romanis, Sonar
 from sonarsynth.world.environment import Absorption, Environment, Isovelocity
 from sonarsynth.world.motion import Line, Still
 from sonarsynth.world.shapes import Remus100, Sphere

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
-from sonarsynth.planning.checks import check_positions, read_inputs
+from sonarsynth.planning.checks import check_methods, check_positions, check_windows, read_inputs
 from sonarsynth.planning.costs import left_out, stages
 from sonarsynth.planning.plans import PRODUCTS, Omission, Plan, Stage, Windows
 from sonarsynth.planning.windows import lay_windows
@@ -15,21 +16,26 @@ from sonarsynth.sonar import elements
 from sonarsynth.tracing import AutoTracing, Refracted, Straight
 from sonarsynth.world.meshes import mesh_of
 
-__all__ = ["PRODUCTS", "Omission", "Plan", "Stage", "Windows", "lay_windows", "plan"]
+__all__ = ["PRODUCTS", "Omission", "Plan", "Stage", "Windows", "chosen_products", "lay_windows", "plan"]
 
 SHARD_BYTES = 64e6
 """A shard holds about this much of the largest array, and at most SHARD_FRAMES frames."""
 SHARD_FRAMES = 8
 
 
-def plan(recipe: Recipe, products: frozenset[str] = frozenset(PRODUCTS)) -> Plan:
+def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS) -> Plan:
     """Resolve a recipe: check the scene at every frame, make every choice, and predict sizes and cost.
 
     Raises FieldError, naming the field, for a body above the surface or in the bed, a sonar or shrimp out of the
-    water, or a missing or broken mesh or cast. No frame is rendered.
+    water, a missing or broken mesh or cast, or methods that cannot serve the scene; ValueError for an unknown product.
+    No frame is rendered.
     """
+    if not isinstance(recipe, Recipe):
+        raise TypeError(f"a recipe is planned, not a {type(recipe).__name__}: sonarsynth.load reads one from a file")
+    products = chosen_products(products)
     scene = recipe.scene
     profile = read_inputs(scene)
+    check_methods(scene, products)
     check_positions(scene, recipe)
     tracing = scene.physics.tracing
     if isinstance(tracing, AutoTracing):
@@ -37,6 +43,7 @@ def plan(recipe: Recipe, products: frozenset[str] = frozenset(PRODUCTS)) -> Plan
     else:
         propagation = tracing
     windows = lay_windows(recipe, profile)
+    check_windows(scene, windows)
     sizes = _sizes(recipe, windows)
     frame_bytes = sizes["sensor"] * sizes["sample"] * (2 if scene.sonar.converter else 4)
     shard = int(np.clip(SHARD_BYTES // max(frame_bytes, 1), 1, SHARD_FRAMES))
@@ -48,6 +55,15 @@ def plan(recipe: Recipe, products: frozenset[str] = frozenset(PRODUCTS)) -> Plan
         )
     notes += tuple(f"{t.name}: {note}" for t in scene.world.targets for note in mesh_of(t.shape).notes)
     return replace(made, stages=stages(made), left_out=left_out(made), warnings=notes)
+
+
+def chosen_products(names: Iterable[str]) -> frozenset[str]:
+    """Products by name, one or several. Raises ValueError for a name that is none."""
+    chosen = frozenset([names] if isinstance(names, str) else names)
+    unknown = sorted(chosen - set(PRODUCTS))
+    if unknown:
+        raise ValueError(f"'{unknown[0]}' is not a product; known: {', '.join(PRODUCTS)}")
+    return chosen
 
 
 def _sizes(recipe: Recipe, windows: Windows) -> dict[str, int]:

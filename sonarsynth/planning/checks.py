@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonarsynth.beamforming import FocusedDelayAndSum
 from sonarsynth.conventions import Floats, depth
 from sonarsynth.description import FieldError
+from sonarsynth.planning.plans import Windows
 from sonarsynth.recipe import Recipe
 from sonarsynth.scene import Frame, Scene
 from sonarsynth.sonar import elements
 from sonarsynth.world.casts import profile_of
 from sonarsynth.world.environment import Profile
 from sonarsynth.world.meshes import Mesh, mesh_of
+
+FARTHEST = 1e6
+"""m from the origin: beyond, travel times lose their microseconds."""
+FRAME_BYTES = 2e9
+"""Signals of a frame may take so much memory."""
 
 
 def read_inputs(scene: Scene) -> Profile:
@@ -38,6 +45,10 @@ def check_positions(scene: Scene, recipe: Recipe) -> None:
     bed = scene.world.environment.depth
     for i, shrimp in enumerate(scene.world.shrimp):
         position = shrimp.position
+        if max(map(abs, position)) > FARTHEST:
+            raise FieldError(
+                ("scene", "world", "shrimp", i, "position"), f"is more than {FARTHEST:g} m from the origin"
+            )
         down = -position[2] if len(position) > 2 else bed - shrimp.height
         if not 0 <= down <= bed:
             raise FieldError(
@@ -52,6 +63,34 @@ def check_positions(scene: Scene, recipe: Recipe) -> None:
             _check_depth(path, f"target '{body.name}'", body.pose.to_world(_hull(body.mesh)), bed, frame)
 
 
+def check_methods(scene: Scene, products: frozenset[str]) -> None:
+    """The beamformer must be able to use the array."""
+    fast = isinstance(scene.processing.beamforming, FocusedDelayAndSum)
+    if fast and products & {"image", "cloud"} and not elements(scene.sonar.array).on_lattice:
+        raise FieldError(
+            ("scene", "processing", "beamforming", "kind"),
+            "'focused' needs an array on a lattice; use 'dense' for a table of positions",
+        )
+
+
+def check_windows(scene: Scene, windows: Windows) -> None:
+    """The echo window must hold a period of the band, and the signals of a frame must fit in memory."""
+    path = ("scene", "processing", "echo_window")
+    length, period = windows.echo_stop - windows.echo_start, 1.0 / scene.sonar.band.low
+    if length < period:
+        raise FieldError(
+            path, f"is {length:.3g} s long, less than a period of the lower edge of the band, {period:.3g} s"
+        )
+    sensors = elements(scene.sonar.array).count
+    if 4.0 * sensors * windows.samples > FRAME_BYTES:
+        seconds = windows.samples / scene.sonar.sampling_frequency
+        raise FieldError(
+            path,
+            f"signals of a frame would take {4e-9 * sensors * windows.samples:.3g} GB ({sensors} hydrophones for "
+            f"{seconds:.3g} s): the arrivals are too far apart in time",
+        )
+
+
 def _hull(mesh: Mesh) -> Floats:
     """Vertices that bound the mesh in every direction: all of them up to 20 000, else the corners of its box."""
     if len(mesh.vertices) <= 20_000:
@@ -61,6 +100,8 @@ def _hull(mesh: Mesh) -> Floats:
 
 
 def _check_depth(path: tuple[str | int, ...], what: str, points: Floats, bed: float, frame: Frame) -> None:
+    if not np.abs(points).max() <= FARTHEST:
+        raise FieldError(path, f"{what} is more than {FARTHEST:g} m from the origin at frame {frame.index}")
     shallow, deep = float(depth(points).min()), float(depth(points).max())
     if shallow < 0:
         raise FieldError(path, f"{what} is {-shallow:.3g} m above the surface at frame {frame.index}")

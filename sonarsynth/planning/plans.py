@@ -51,8 +51,6 @@ class Windows:
     direct: Floats  # (frame,) s: predicted direct arrival of the loudest snap at the array centre
     echo_start: float  # s after the direct arrival
     echo_stop: float  # s after the direct arrival
-    first_echo: float  # s after the direct arrival of its snap, over all frames; NaN where nothing can echo
-    last_echo: float  # s
     disturbed: int  # frames in whose echo window other snaps, or their echoes, are heard as well
 
 

@@ -30,7 +30,7 @@ def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
     """The sample window, which holds every arrival of every frame, and the echo window of the loudest snap.
 
     The sonar takes the loudest pulse for the start of its clock. From geometry alone: the delay of each facet's echo
-    along straight lines at the slowness averaged over the depths between its ends, and the support of the filtered snap.
+    along straight lines at the slowness averaged between its ends, and the support of the filtered snap.
     """
     scene = recipe.scene
     sonar = scene.sonar
@@ -40,9 +40,11 @@ def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
     spans = [_span(recipe.frame(i)[1], profile) for i in range(recipe.frames)]
     first_heard, clock, first_echo, last_echo, last_heard = np.array([_times(span) for span in spans]).T
     gate = scene.processing.echo_window
-    earliest = np.nanmin(first_echo - clock, initial=np.inf) - echo_before - MARGIN
-    latest = np.nanmax(last_echo - clock, initial=-np.inf) + echo_after + MARGIN
-    if not (np.isfinite(earliest) and np.isfinite(latest)):  # nothing echoes: listen for a moment after the snap
+    echoes = bool(np.isfinite(first_echo).any())
+    shortest = float(np.nanmin(first_echo - clock)) if echoes else np.nan
+    longest = float(np.nanmax(last_echo - clock)) if echoes else np.nan
+    earliest, latest = shortest - echo_before - MARGIN, longest + echo_after + MARGIN
+    if not np.isfinite(latest - earliest):  # nothing echoes: listen for a moment after the snap
         earliest, latest = after, after + 2e-3
     start = gate.start if gate.start is not None else max(earliest, after)
     stop = gate.stop if gate.stop is not None else max(latest, start + 1e-3)

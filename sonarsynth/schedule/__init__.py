@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from sonarsynth import store
-from sonarsynth.planning import PRODUCTS, Plan, plan
+from sonarsynth.planning import PRODUCTS, Plan, chosen_products, plan
 from sonarsynth.recipe import Recipe
 from sonarsynth.schedule import tasks
 from sonarsynth.schedule.tasks import STAGES, Failure, Job, Written
@@ -86,10 +86,12 @@ def build(
 
     Raises FieldError for a scene that cannot be, IndexError for frames that are not there, store.Mismatch for a store
     of something else, store.Locked while another build runs, store.Damage where the store cannot go on, OSError where
-    it cannot be written. After any of these, and after an interruption, the same call goes on where it ended.
+    it cannot be written, RuntimeError where workers do not start. After any of these, and after an interruption, the same call goes on where it ended.
     """
     began = time.perf_counter()
-    made = what if isinstance(what, Plan) else plan(what, _products(products))
+    if workers is not None and workers < 0:
+        raise ValueError(f"workers must be 0 or more, not {workers}")
+    made = what if isinstance(what, Plan) else plan(what, chosen_products(products))
     path = Path(os.path.abspath(path))
     with store.lock(path):
         store.create(path, made, restart=restart)
@@ -113,14 +115,6 @@ def build(
 def usable_cores() -> int:
     """Cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _products(names: Iterable[str]) -> frozenset[str]:
-    chosen = frozenset(names)
-    unknown = sorted(chosen - set(PRODUCTS))
-    if unknown:
-        raise ValueError(f"'{unknown[0]}' is not a product; known: {', '.join(PRODUCTS)}")
-    return chosen
 
 
 def _run(

@@ -49,15 +49,7 @@ def connected(workers: int, scheduler: str | None = None) -> Iterator[Client]:
         return
     with dask.config.set(_SETTINGS):
         with _interrupts_put_off() as interrupted:
-            cluster = LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                processes=True,
-                host="127.0.0.1",
-                dashboard_address="127.0.0.1:0",
-                silence_logs=logging.CRITICAL,
-                env=ONE_THREAD,
-            )
+            cluster = _local_cluster(workers)
             client = Client(cluster, set_as_default=False)
         try:
             if interrupted:
@@ -67,6 +59,23 @@ def connected(workers: int, scheduler: str | None = None) -> Iterator[Client]:
             with _interrupts_put_off():
                 client.close(timeout=2)
                 cluster.close(timeout=5)
+
+
+def _local_cluster(workers: int) -> LocalCluster:
+    try:
+        return LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            dashboard_address="127.0.0.1:0",
+            silence_logs=logging.CRITICAL,
+            env=ONE_THREAD,
+        )
+    except RuntimeError as error:  # workers import the script that builds, which must not build again
+        raise RuntimeError(
+            'no worker process could start: in a script, build under `if __name__ == "__main__":`, or with workers=0'
+        ) from error
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 import socket
@@ -17,6 +18,8 @@ class Locked(RuntimeError):
 def beside(store: Path | str, suffix: str) -> Path:
     """A file beside a store: `remus.zarr` -> `remus.zarr.lock`."""
     store = Path(os.path.abspath(store))
+    if not store.name:
+        raise OSError(errno.EISDIR, "is no place for a store", str(store))
     return store.with_name(f"{store.name}.{suffix}")
 
 

@@ -143,7 +143,7 @@ class FlatNoise:
     """Gaussian noise, independent between hydrophones, flat over the band."""
 
     kind: Literal["flat"] = "flat"
-    level: Decibels
+    level: Annotated[Decibels, Ge(-200), Le(300)]
     """Spectral level in dB re 1 uPa2/Hz."""
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from annotated_types import Gt, Lt, MinLen
+from annotated_types import Ge, Gt, Le, Lt, MinLen
 
 from sonarsynth.conventions import Decibels, Metres, NonNegativeMetres, Number, Position, Seconds
 from sonarsynth.description import description
@@ -39,7 +39,7 @@ class SnappingShrimp:
     height: NonNegativeMetres = 0.0
     """Height above the bed, where z is left out."""
     snap: LogarithmicBubble = LogarithmicBubble()
-    source_level: Decibels | None = None
+    source_level: Annotated[Decibels, Ge(-200), Le(300)] | None = None
     """Peak source level (dB re 1 uPa at 1 m) to scale the snap to; left out: the snap's own level."""
     snap_times: Annotated[tuple[Seconds, ...], MinLen(1)] = (0.0,)
     """Times of collapse (s) after the instant of each frame."""

@@ -43,5 +43,5 @@ def test_frames_are_numbered_from_0_and_no_others_exist() -> None:
     recipe = remus(frames=3)
     assert [recipe.frame(i)[1].step for i in range(3)] == [0, 1, 2]
     for index in (-1, 3):
-        with pytest.raises(IndexError, match="outside 0..2"):
+        with pytest.raises(IndexError, match=r"outside 0\.\.2"):
             recipe.frame(index)

@@ -89,7 +89,7 @@ def test_edges_are_split_to_size(tmp_path):
     mesh = mesh_of(MeshFile(path=path, edge=0.1))
     assert longest_edge((mesh.vertices, mesh.faces)) <= 0.1
     assert mesh.area.sum() == pytest.approx(body.area.sum(), rel=1e-6)
-    with pytest.raises(MeshError, match="body.stl: edges of 1e-06 m would take more than 20000000 facets"):
+    with pytest.raises(MeshError, match=r"body\.stl: edges of 1e-06 m would take more than 20000000 facets"):
         mesh_of(MeshFile(path=path, edge=1e-6))
 
 
@@ -135,7 +135,7 @@ def test_corners_on_a_line_make_no_facet(tmp_path):
     mesh = mesh_of(MeshFile(path=off(tmp_path / "sliver.off", vertices, [[0, 1, 2], [3, 4, 5]])))
     assert "1 facet without area dropped" in mesh.notes
     assert len(mesh.faces) == 1
-    with pytest.raises(MeshError, match="lines.off: no facet has an area"):
+    with pytest.raises(MeshError, match=r"lines\.off: no facet has an area"):
         mesh_of(MeshFile(path=off(tmp_path / "lines.off", vertices, [[3, 4, 5]])))
 
 

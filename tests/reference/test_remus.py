@@ -1,5 +1,7 @@
 """The REMUS-100 against the figures of Prestero (2001)."""
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -14,7 +16,7 @@ BOUNDS = [0.0, 0.1745, 0.8285, hull_length(HULL)]
 
 
 def over_the_hull(function):
-    return sum(quad(function, a, b)[0] for a, b in zip(BOUNDS, BOUNDS[1:], strict=False))
+    return sum(quad(function, a, b)[0] for a, b in itertools.pairwise(BOUNDS))
 
 
 def test_the_hull_has_the_published_size():
