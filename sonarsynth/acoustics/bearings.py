@@ -111,59 +111,47 @@ def spherical_wave(
     """
     t, q, w = (np.asarray(a, float) for a in (delay, position, weight))
     u, k = np.asarray(start, float), float(curvature)
-    size = float(np.sqrt(np.max(np.sum(q * q, axis=1), initial=0.0)))
+    size = float(np.sqrt(np.einsum("qi,qi->q", q, q).max(initial=0.0)))
     if not (np.all(np.isfinite(u)) and size > 0):
         return None
-    used = [0, 1, 2, 3] if curved else [0, 1, 3]
+    from sonarsynth.acoustics.bearings_kernel import normal_equations
+
     for _ in range(iterations):
         tangents = tangent_plane(u)
-        jacobian = wavefront_jacobian(q, u, k, sound_speed, tangents)[:, used]
-        late = t - wavefront_delays(q, u, k, sound_speed)
-        solve = _normal_inverse(jacobian, w)
-        if solve is None:
+        normal, right, own, late, jacobian = normal_equations(q, t, w, u, k, sound_speed, tangents)
+        inverse = _inverse(normal, curved)
+        if inverse is None:
             return None
-        covariance, gain = _with_curvature(*solve) if not curved else solve
-        step = gain @ late
+        covariance = inverse
+        step = covariance @ right
         turned = u + step[:2] @ tangents
-        bent = float(np.clip(k + step[2], -0.5 / size, 2.0 / size))  # no source among the sensors
-        moved = np.linalg.norm(step[:2]) + abs(bent - k) * size
-        u, k = turned / np.linalg.norm(turned), bent
+        bent = min(max(k + float(step[2]), -0.5 / size), 2.0 / size)  # no source among the sensors
+        moved = np.hypot(step[0], step[1]) + abs(bent - k) * size
+        u, k = turned / np.sqrt(turned @ turned), bent
         if moved < SETTLED:
             break
-    by_speed = gain @ (t - late) / sound_speed
-    return Wavefront(u, k, float(step[3]), tangents, covariance, by_speed, late - jacobian @ step[used])
+    residual = late - jacobian @ step
+    by_speed = covariance @ own / sound_speed
+    if not curved:
+        covariance[2, 2] = np.inf
+    return Wavefront(u, k, float(step[3]), tangents, covariance, by_speed, residual)
 
 
-def _with_curvature(covariance: Floats, gain: Floats) -> tuple[Floats, Floats]:
-    """Put back the row of a curvature that was not fitted: of infinite variance."""
-    full = np.insert(np.insert(covariance, 2, 0.0, axis=0), 2, 0.0, axis=1)
-    full[2, 2] = np.inf
-    return full, np.insert(gain, 2, 0.0, axis=0)
+def _inverse(normal: Floats, curved: bool) -> Floats | None:
+    """Inverse of J^T W J (4, 4), with columns scaled; None where it is singular.
 
-
-def wavefront_jacobian(position: Floats, u: Floats, curvature: float, sound_speed: float, tangents: Floats) -> Floats:
-    """Derivatives (sensor, 4) of the delays by the parameters of a `Wavefront`."""
-    along, square = position @ u, np.sum(position * position, axis=-1)
-    rho = np.sqrt(1 - 2 * curvature * along + curvature**2 * square)
-    jacobian = np.empty((len(position), 4))
-    jacobian[:, :2] = position @ -tangents.T
-    jacobian[:, 2] = (square - along**2) / (rho + 1 - curvature * along)
-    jacobian[:, :3] /= (sound_speed * rho)[:, None]
-    jacobian[:, 3] = 1.0
-    return jacobian
-
-
-def _normal_inverse(jacobian: Floats, weight: Floats) -> tuple[Floats, Floats] | None:
-    """Inverse of J^T W J and the gain (J^T W J)^-1 J^T W, with columns scaled; None where it is singular."""
-    scale = np.sqrt(weight @ jacobian**2)
-    if not np.all(scale > 0):
+    Not `curved`: of all but the curvature, whose row and column are zero.
+    """
+    used = normal if curved else np.delete(np.delete(normal, 2, axis=0), 2, axis=1)
+    scale = np.sqrt(used.diagonal())
+    if not scale.min() > 0:
         return None
-    weighted = (jacobian * weight[:, None]).T / scale[:, None]
-    values, vectors = np.linalg.eigh(weighted @ jacobian / scale)
+    values, vectors = np.linalg.eigh(used / scale / scale[:, None])
     if not values[0] > 1e-13 * values[-1]:
         return None
-    inverse = (vectors / values) @ vectors.T
-    return inverse / np.outer(scale, scale), inverse @ weighted / scale[:, None]
+    vectors = vectors / scale[:, None]
+    inverse = np.asarray((vectors / values) @ vectors.T)
+    return inverse if curved else np.insert(np.insert(inverse, 2, 0.0, axis=0), 2, 0.0, axis=1)
 
 
 def delay_bound(energy_to_noise: npt.ArrayLike, bandwidth: npt.ArrayLike) -> Floats:

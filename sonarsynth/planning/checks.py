@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonarsynth.acoustics.snap import Bubble, onset, source_level
 from sonarsynth.beamforming import FocusedDelayAndSum
 from sonarsynth.conventions import Floats, depth
 from sonarsynth.description import FieldError
@@ -11,12 +12,17 @@ from sonarsynth.planning.plans import Windows
 from sonarsynth.recipe import Recipe
 from sonarsynth.scene import Frame, Scene
 from sonarsynth.sonar import elements
+from sonarsynth.synthesis.pulse import bubble
 from sonarsynth.world.casts import profile_of
 from sonarsynth.world.environment import Profile
 from sonarsynth.world.meshes import Mesh, mesh_of
 
 FARTHEST = 1e6
 """m from the origin: beyond, travel times lose their microseconds."""
+LOUDEST = 300.0
+"""dB re 1 uPa at 1 m: single precision holds the signals of no louder snap everywhere."""
+LONGEST_SNAP = 0.1
+"""s."""
 FRAME_BYTES = 2e9
 """Signals of a frame may take so much memory."""
 
@@ -44,6 +50,7 @@ def check_positions(scene: Scene, recipe: Recipe) -> None:
     """Every body, the array and every shrimp must be in the water at every frame."""
     bed = scene.world.environment.depth
     for i, shrimp in enumerate(scene.world.shrimp):
+        _check_snap(("scene", "world", "shrimp", i, "snap"), bubble(shrimp.snap))
         position = shrimp.position
         if max(map(abs, position)) > FARTHEST:
             raise FieldError(
@@ -97,6 +104,15 @@ def _hull(mesh: Mesh) -> Floats:
         return np.asarray(mesh.vertices)
     low, high = mesh.box
     return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+
+
+def _check_snap(path: tuple[str | int, ...], bubble: Bubble) -> None:
+    duration = -onset(bubble)
+    if not duration <= LONGEST_SNAP:
+        raise FieldError(path, f"grows for {duration:.3g} s; a snap is over in {LONGEST_SNAP:g} s")
+    level = source_level(bubble)
+    if not abs(level) <= LOUDEST:
+        raise FieldError(path, f"makes a source level of {level:.3g} dB re 1 uPa at 1 m; {LOUDEST:g} dB is the most")
 
 
 def _check_depth(path: tuple[str | int, ...], what: str, points: Floats, bed: float, frame: Frame) -> None:

@@ -27,10 +27,11 @@ ECHO_SUPPORT = 1e-4
 
 
 def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
-    """The sample window, which holds every arrival of every frame, and the echo window of the loudest snap.
+    """The sample window, which holds every arrival of every frame, and the echo window.
 
-    The sonar takes the loudest pulse for the start of its clock. From geometry alone: the delay of each facet's echo
-    along straight lines at the slowness averaged between its ends, and the support of the filtered snap.
+    The sonar takes the pulse that it hears best for the start of its clock: the echo window holds the echoes of any
+    snap after its own direct arrival. From geometry alone: the delay of each facet's echo along straight lines at the
+    slowness averaged between its ends, and the support of the filtered snap.
     """
     scene = recipe.scene
     sonar = scene.sonar
@@ -38,11 +39,11 @@ def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
     before, after = _support(recipe, SUPPORT) + across
     echo_before, echo_after = _support(recipe, ECHO_SUPPORT) + across
     spans = [_span(recipe.frame(i)[1], profile) for i in range(recipe.frames)]
-    first_heard, clock, first_echo, last_echo, last_heard = np.array([_times(span) for span in spans]).T
+    first_heard, clock, last_direct, first_echo, last_echo, last_heard = np.array([_times(span) for span in spans]).T
     gate = scene.processing.echo_window
     echoes = bool(np.isfinite(first_echo).any())
-    shortest = float(np.nanmin(first_echo - clock)) if echoes else np.nan
-    longest = float(np.nanmax(last_echo - clock)) if echoes else np.nan
+    shortest = float(np.nanmin(first_echo)) if echoes else np.nan
+    longest = float(np.nanmax(last_echo)) if echoes else np.nan
     earliest, latest = shortest - echo_before - MARGIN, longest + echo_after + MARGIN
     if not np.isfinite(latest - earliest):  # nothing echoes: listen for a moment after the snap
         earliest, latest = after, after + 2e-3
@@ -52,7 +53,7 @@ def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
         raise FieldError(("scene", "processing", "echo_window", "stop"), f"must be after start ({start:g} s)")
     rate = sonar.sampling_frequency
     first = np.floor((first_heard - before - MARGIN) * rate) / rate
-    last = np.maximum(last_heard + after + MARGIN, clock + stop + MARGIN)
+    last = np.maximum(last_heard + after, last_direct + stop) + MARGIN
     samples = int(np.ceil(np.max(last - first) * rate)) + 1
     disturbed = sum(_disturbed(span, start - before, stop + before) for span in spans)
     return Windows(first, samples, clock, float(start), float(stop), disturbed)
@@ -67,11 +68,12 @@ def _support(recipe: Recipe, tolerance: float) -> Floats:
 
 @dataclass(frozen=True)
 class _Span:
-    """When a frame is heard at the array centre (s): the echoes of the loudest snap, and everything."""
+    """When a frame is heard at the array centre (s)."""
 
     first: float  # first direct arrival of any snap
     clock: float  # direct arrival of the loudest snap: what the sonar takes for the start
-    first_echo: float  # of the loudest snap; NaN where nothing echoes
+    last_direct: float  # last direct arrival of any snap
+    first_echo: float  # of any snap, after its own direct arrival; NaN where nothing echoes
     last_echo: float
     last: float  # last arrival of any snap
     others: tuple[tuple[float, float], ...] = field(
@@ -80,29 +82,35 @@ class _Span:
 
 
 def _times(span: _Span) -> tuple[float, ...]:
-    """The five times of a span."""
-    return (span.first, span.clock, span.first_echo, span.last_echo, span.last)
+    """The six times of a span."""
+    return (span.first, span.clock, span.last_direct, span.first_echo, span.last_echo, span.last)
 
 
 def _span(frame: Frame, profile: Profile) -> _Span:
     array = frame.sonar_pose.position
     snaps = frame.moment.snaps
     if not snaps:
-        return _Span(0.0, 0.0, np.nan, np.nan, 0.0)
+        return _Span(0.0, 0.0, 0.0, np.nan, np.nan, 0.0)
     points = np.concatenate([np.empty((0, 3)), *(b.pose.to_world(b.mesh.centroid) for b in frame.moment.bodies)])
     back = _straight_time(profile, points, array)
     direct = np.array([s.time + float(_straight_time(profile, s.position, array)) for s in snaps])
     echoes = [s.time + _straight_time(profile, s.position, points) + back for s in snaps]
     last = np.array([max(d, e.max(initial=-np.inf)) for d, e in zip(direct, echoes, strict=True)])
     heard = [
-        level - 20 * np.log10(np.linalg.norm(s.position - array))
+        level - 20 * np.log10(max(float(np.linalg.norm(s.position - array)), 1e-9))
         for s, level in zip(snaps, snap_levels(snaps), strict=True)
     ]
     loudest = int(np.argmax(heard))
-    mine = echoes[loudest] if len(points) else np.array([np.nan])
+    late = np.array([e - d for e, d in zip(echoes, direct, strict=True)]) if len(points) else np.array([np.nan])
     others = tuple((float(direct[n]), float(last[n])) for n in range(len(snaps)) if n != loudest)
     return _Span(
-        float(direct.min()), float(direct[loudest]), float(mine.min()), float(mine.max()), float(last.max()), others
+        first=float(direct.min()),
+        clock=float(direct[loudest]),
+        last_direct=float(direct.max()),
+        first_echo=float(late.min()),
+        last_echo=float(late.max()),
+        last=float(last.max()),
+        others=others,
     )
 
 
@@ -115,7 +123,8 @@ def _straight_time(profile: Profile, a: Floats, b: Floats) -> Floats:
     """Travel time (...) along straight lines a to b (..., xyz): distance times the mean slowness between them."""
     if profile.uniform:
         return np.asarray(np.linalg.norm(a - b, axis=-1) / profile.speed[0])
-    grid = np.unique(np.concatenate([profile.depth, np.linspace(0.0, max(depth(a).max(), depth(b).max()) + 1.0, 200)]))
+    deepest = max(depth(a).max(initial=0.0), depth(b).max(initial=0.0))
+    grid = np.unique(np.concatenate([profile.depth, np.linspace(0.0, deepest + 1.0, 200)]))
     slowness = 1.0 / profile.at(grid)
     integral = np.concatenate([[0.0], np.cumsum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(grid))])
     za, zb = depth(a), depth(b)
