@@ -49,9 +49,6 @@ Values = dict[tuple[str, str], np.ndarray]
 """(group, name) to the array of one frame, without the frame axis."""
 
 
-EXPANSION_ERRORS = ("wavefront_error", "amplitude_error")
-
-
 @dataclass(frozen=True, eq=False)
 class Traced:
     """What the trace task gives."""
@@ -97,10 +94,18 @@ def trace_frame(plan: Plan, index: int) -> Traced:
 def _expansion_error(plan: Plan, arrivals: Arrivals) -> float:
     """Error (dB) of a level from expanding wavefronts and amplitudes over the aperture, as measured at its probes.
 
-    A beam of sensors that are up to phi out of phase loses at most 20 log10 cos phi.
+    A beam of sensors that are up to phi out of phase loses at most 20 log10 cos phi. NaN where a sensor has no ray.
     """
+    if not np.isfinite([arrivals.wavefront_error, arrivals.amplitude_error]).all():
+        return float("nan")
     phase = min(2 * np.pi * plan.scene.sonar.band.high * arrivals.wavefront_error, 1.5)
     return float(20 * np.log10((1.0 + arrivals.amplitude_error) / np.cos(phase)))
+
+
+def _expansion_errors(arrivals: Arrivals) -> dict[str, float]:
+    """As stored: NaN, not infinite, where a sensor has no ray."""
+    errors = {name: float(getattr(arrivals, name)) for name in ("wavefront_error", "amplitude_error")}
+    return {name: error if np.isfinite(error) else float("nan") for name, error in errors.items()}
 
 
 def follow_rays(plan: Plan, index: int) -> RayFan:
@@ -210,7 +215,7 @@ def _truth_values(plan: Plan, index: int, traced: Traced) -> Values:
     levels = {name: book.level[..., n] for n, name in enumerate(LEDGER)}
     return (
         _table("/", **row)
-        | _table("/truth", **stored, **{name: getattr(traced.arrivals, name) for name in EXPANSION_ERRORS})
+        | _table("/truth", **stored, **_expansion_errors(traced.arrivals))
         | _table("/ledger", **levels, paths=book.paths, error_bound=book.error_bound)
     )
 

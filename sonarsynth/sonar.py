@@ -10,7 +10,7 @@ from functools import cached_property, lru_cache
 from typing import Annotated, Literal
 
 import numpy as np
-from annotated_types import Ge, Gt, Le, Lt, MinLen
+from annotated_types import Ge, Le, Lt, MinLen
 from pydantic import ValidationInfo, field_validator, model_validator
 
 from sonarsynth.conventions import (
@@ -278,9 +278,10 @@ class Sonar:
             return value
         if value < 2 * band.high:
             raise ValueError(f"{value:g} Hz is under twice the band ({band.high:g} Hz)")
-        if chosen is not None and not _passes(chosen, band):
+        chosen = chosen or BandPass(low=band.low, high=band.high)
+        edge = stop_frequency(chosen)
+        if edge <= band.low or (isinstance(chosen, BandPass) and chosen.low - 0.5 * chosen.transition >= band.high):
             raise ValueError(f"nothing to sample: the filter stops the whole band ({band.low:g} to {band.high:g} Hz)")
-        edge = stop_frequency(chosen or BandPass(low=band.low, high=band.high))
         if value < 2 * edge:
             raise ValueError(f"{value:g} Hz is under twice the filter's stop edge ({edge:g} Hz)")
         return value
@@ -291,12 +292,6 @@ class Sonar:
         if self.filter is not None:
             return self.filter
         return BandPass(low=self.band.low, high=self.band.high)
-
-
-def _passes(filter: Filter, band: Band) -> bool:
-    """Whether a filter lets any of a band through."""
-    low, high = (0.0, filter.cutoff) if isinstance(filter, LowPass) else (filter.low, filter.high)
-    return low < band.high and high > band.low
 
 
 def stop_frequency(filter: Filter) -> float:

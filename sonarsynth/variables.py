@@ -134,7 +134,7 @@ _TRUTH = _group(
         ("frame",),
         "float64",
         "s",
-        "largest error of wavefronts measured at probes over the aperture",
+        "largest error of wavefronts measured at probes over the aperture; NaN where one has no ray",
     ),
     _v("amplitude_error", ("frame",), "float64", "1", "the same of amplitudes, relative to the strongest echo"),
 )
@@ -143,7 +143,13 @@ _LEDGER = _group(
     "truth",
     *(_v(name, _CELL, "float64", "dB", name.replace("_", " ")) for name in LEDGER),
     _v("paths", _CELL, "int32", "1", "number of paths"),
-    _v("error_bound", _CELL, "float64", "dB", "bound on the error of each level from the approximations made"),
+    _v(
+        "error_bound",
+        _CELL,
+        "float64",
+        "dB",
+        "bound on the error of each level from the approximations made; NaN without one",
+    ),
 )
 
 VARIABLES: tuple[Variable, ...] = (*_ROOT, *_SIGNALS, *_IMAGE, *_CLOUD, *_BEARINGS, *_TRUTH, *_LEDGER)

@@ -12,6 +12,8 @@ from sonarsynth.geometry import Pose
 from sonarsynth.products import LEDGER
 
 LEDGER_TOLERANCE = 0.1  # dB
+EXPANSION_PHASE = 0.2  # rad: costs a beam 0.09 dB at worst
+EXPANSION_AMPLITUDE = 0.02  # of the strongest echo
 
 INAUDIBLE = 120.0
 """dB under the direct snap: echoes weaker than this are below what a converter, or single precision, holds."""
@@ -37,6 +39,7 @@ def check(tree: xr.DataTree) -> list[Check]:
     checks.append(ledger_adds_up(tree, built))
     if "signals" in tree.children:
         checks.append(nothing_outside(tree, built))
+        checks.append(expansions_hold(tree, built))
     if "image" in tree.children:
         checks.append(brightest_beam_on_target(tree, built))
     if "bearings" in tree.children:
@@ -74,6 +77,16 @@ def nothing_outside(tree: xr.DataTree, frames: np.ndarray) -> Check:
         outside + clipped == 0,
         {"outside": outside, "clipped": clipped},
     )
+
+
+def expansions_hold(tree: xr.DataTree, frames: np.ndarray) -> Check:
+    """Wavefronts and amplitudes are expanded over the aperture; what that errs by, as traced to probes."""
+    phase = 2 * np.pi * float(tree.attrs["band_high"]) * float(_all(tree, "truth/wavefront_error")[frames].max())
+    amplitude = float(_all(tree, "truth/amplitude_error")[frames].max())
+    got = f"{phase:.2g} rad at the top of the band, {100 * amplitude:.2g} % of the strongest echo"
+    good = phase <= EXPANSION_PHASE and amplitude <= EXPANSION_AMPLITUDE
+    expected = f"under {EXPANSION_PHASE} rad and {100 * EXPANSION_AMPLITUDE:g} %"
+    return Check("wavefronts over the aperture", expected, got, good, {"phase_rad": phase, "amplitude": amplitude})
 
 
 def beam_width(tree: xr.DataTree) -> float:
@@ -116,7 +129,10 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
     hits, seen = 0, 0
     for i in frames:
         energy, truth = _frame(tree, "image/energy", i), _frame(tree, "truth/target", i)
-        if not ((truth >= 0).any() and np.isfinite(energy).any() and _echoes_heard(tree, i)):
+        if not ((truth >= 0).any() and _echoes_heard(tree, i)):
+            continue
+        if not np.isfinite(energy).any():  # no clock, no image: a miss, unless no snap could be heard
+            seen += bool(_snaps_heard(tree, i).any())
             continue
         seen += 1
         hits += bool(near_target(tree, truth)[np.unravel_index(np.nanargmax(energy), energy.shape)])
@@ -132,10 +148,19 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
 
 
 def _echoes_heard(tree: xr.DataTree, frame: int) -> bool:
-    """Whether the ledger has an echo less than INAUDIBLE below the direct snap."""
+    """Whether the ledger, where there is one, has an echo less than INAUDIBLE below the direct snap."""
+    if "ledger" not in tree.children:
+        return True
     level = _frame(tree, "ledger/received_level", frame)  # (snap, echo, family), the direct path last
     echo, direct = (np.max(part, initial=-np.inf, where=np.isfinite(part)) for part in (level[:, :-1], level[:, -1:]))
     return bool(echo > direct - INAUDIBLE)
+
+
+def _snaps_heard(tree: xr.DataTree, frame: int) -> np.ndarray:
+    """(snap,) whether the snap reaches the array directly, by the ledger where there is one."""
+    if "ledger" not in tree.children:
+        return np.zeros(0, bool)
+    return np.asarray(_frame(tree, "ledger/paths", frame)[:, -1].sum(axis=1) > 0)
 
 
 def _all(tree: xr.DataTree, name: str) -> np.ndarray:
@@ -157,7 +182,7 @@ def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
         pose = Pose(_frame(tree, "truth/sonar_position", i), _frame(tree, "truth/sonar_orientation", i))
         true = pose.to_body(_frame(tree, "truth/snap_position", i))
         found, covariance = _frame(tree, "bearings/position", i), _frame(tree, "bearings/position_covariance", i)
-        reached = _frame(tree, "ledger/paths", i)[:, -1].sum(axis=1) > 0
+        reached = _snaps_heard(tree, i)
         rows = np.flatnonzero(np.isfinite(found).all(axis=1))
         total += max(len(rows), int(reached.sum()))
         for row in rows:

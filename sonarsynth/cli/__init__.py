@@ -183,6 +183,22 @@ def rays(
 
 
 @app.command()
+def snap(
+    recipe: RecipeFile,
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Where the picture goes.")] = Path("snap.png"),
+    settings: Settings = [],  # noqa: B006
+) -> None:
+    """Draw the snap of a recipe: waveform and spectrum, as made and as heard, and the sonar's filter."""
+    from sonarsynth import config
+    from sonarsynth.show.snaps import show_snap
+
+    source = config.read(recipe, settings)
+    with config.locating(source):
+        show_snap(config.recipe_of(source), out)
+    typer.echo(str(out))
+
+
+@app.command()
 def schema() -> None:
     """Print the JSON schema of a recipe, for editors."""
     from sonarsynth import config

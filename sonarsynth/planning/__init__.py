@@ -53,8 +53,22 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS) -> Plan:
         notes += (
             f"{windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest one",
         )
+    notes += _behind(recipe)
     notes += tuple(f"{t.name}: {note}" for t in scene.world.targets for note in mesh_of(t.shape).notes)
     return replace(made, stages=stages(made), left_out=left_out(made), warnings=notes)
+
+
+def _behind(recipe: Recipe) -> tuple[str, ...]:
+    """Which snaps of the first and last frame come from behind the array."""
+    found = []
+    for step in sorted({0, recipe.frames - 1}):
+        frame = recipe.frame(step)[1]
+        count = sum(bool(frame.sonar_pose.to_body(snap.position)[0] < 0) for snap in frame.moment.snaps)
+        if count:
+            found.append(
+                f"frame {step}: {count} snaps come from behind the array, which takes them for their mirror images"
+            )
+    return tuple(found)
 
 
 def chosen_products(names: Iterable[str]) -> frozenset[str]:

@@ -17,6 +17,8 @@ from sonarsynth.world.casts import profile_of
 from sonarsynth.world.environment import Profile
 from sonarsynth.world.meshes import Mesh, mesh_of
 
+SLOWEST, FASTEST = 100.0, 10e3
+"""m/s."""
 FARTHEST = 1e6
 """m from the origin: beyond, travel times lose their microseconds."""
 LOUDEST = 300.0
@@ -34,6 +36,12 @@ def read_inputs(scene: Scene) -> Profile:
         profile = profile_of(scene.world.environment.sound_speed)
     except (ValueError, OSError) as error:
         raise FieldError((*world, "environment", "sound_speed"), str(error)) from None
+    odd = np.flatnonzero(~((profile.speed >= SLOWEST) & (profile.speed <= FASTEST)))
+    if len(odd):
+        raise FieldError(
+            (*world, "environment", "sound_speed"),
+            f"is {profile.speed[odd[0]]:g} m/s at {profile.depth[odd[0]]:g} m, outside {SLOWEST:g} to {FASTEST:g} m/s",
+        )
     for i, target in enumerate(scene.world.targets):
         try:
             mesh_of(target.shape)
@@ -83,11 +91,9 @@ def check_methods(scene: Scene, products: frozenset[str]) -> None:
 def check_windows(scene: Scene, windows: Windows) -> None:
     """The echo window must hold a period of the band, and the signals of a frame must fit in memory."""
     path = ("scene", "processing", "echo_window")
-    length, period = windows.echo_stop - windows.echo_start, 1.0 / scene.sonar.band.low
+    length, period = windows.echo_stop - windows.echo_start, 1.0 / scene.sonar.band.high
     if length < period:
-        raise FieldError(
-            path, f"is {length:.3g} s long, less than a period of the lower edge of the band, {period:.3g} s"
-        )
+        raise FieldError(path, f"is {length:.3g} s long, less than a period of the highest frequency, {period:.3g} s")
     sensors = elements(scene.sonar.array).count
     if 4.0 * sensors * windows.samples > FRAME_BYTES:
         seconds = windows.samples / scene.sonar.sampling_frequency
@@ -108,6 +114,8 @@ def _hull(mesh: Mesh) -> Floats:
 
 def _check_snap(path: tuple[str | int, ...], bubble: Bubble) -> None:
     duration = -onset(bubble)
+    if not 1.0 / -bubble.q < duration:
+        raise FieldError(path, f"grows for {duration:.3g} s and has no time to collapse: q is too small")
     if not duration <= LONGEST_SNAP:
         raise FieldError(path, f"grows for {duration:.3g} s; a snap is over in {LONGEST_SNAP:g} s")
     level = source_level(bubble)

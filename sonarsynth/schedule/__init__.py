@@ -86,7 +86,8 @@ def build(
 
     Raises FieldError for a scene that cannot be, IndexError for frames that are not there, store.Mismatch for a store
     of something else, store.Locked while another build runs, store.Damage where the store cannot go on, OSError where
-    it cannot be written, RuntimeError where workers do not start. After any of these, and after an interruption, the same call goes on where it ended.
+    it cannot be written, RuntimeError where workers do not start. After any of these, and after an interruption, the
+    same call goes on where it ended.
     """
     began = time.perf_counter()
     if workers is not None and workers < 0:

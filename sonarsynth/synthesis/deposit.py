@@ -21,6 +21,9 @@ from sonarsynth.synthesis.wavefront import Fronts, delay_and_gain, towards
 LARGEST = 1 << 22
 """Most numbers in a deposit grid: nodes are taken in groups of so many."""
 
+TOGETHER = 64
+"""Hydrophones at once."""
+
 
 class Kernel(NamedTuple):
     """A Kaiser-Bessel kernel on the grid that the paths are deposited on."""
@@ -46,32 +49,54 @@ def kernel(width: int, oversampling: float, circle: int, dtype: str) -> Kernel:
 
 
 class Bins(NamedTuple):
-    """Frequencies of a stretch."""
+    """Frequencies of a stretch that count, next to each other."""
 
+    first: int  # number of the first bin
     frequency: Floats  # (bin,) Hz
     spectrum: ComplexArray  # (bin,) of the filtered snap at 1 m
     relative: Floats  # (bin,) absorption over that at the band centre, less one
     step: float  # Hz
 
 
-def stretch_pressure(
+def audible(spectrum: ComplexArray, tolerance: float) -> slice:
+    """The bins of a spectrum without its ends, which hold no more than a fiftieth of `tolerance` of its modulus
+    each."""
+    mass = np.cumsum(np.abs(spectrum))
+    ends = np.searchsorted(mass, np.array([0.02 * tolerance, 1.0 - 0.02 * tolerance]) * mass[-1])
+    return slice(int(ends[0]), min(int(ends[1]) + 1, spectrum.size))
+
+
+class Stage(NamedTuple):
+    """What the tiles of a stretch have in common."""
+
+    aim: Aim
+    bins: Bins
+    origin: float  # s
+    grid: Kernel
+    response: npt.NDArray[Any]  # (2, bin) of the snap, real and imaginary part
+
+
+def add_stretch(
+    out: npt.NDArray[Any],
+    first: int,
+    samples: int,
     front: Fronts,
     elements: Elements,
     bins: Bins,
     origin: float,
-    samples: int,
     highest: float,
     method: tuple[int, float, str, float],
-) -> npt.NDArray[Any]:
-    """Pressure (sensor, sample) of paths in a stretch that begins at `origin` (s) and holds the whole of their pulses.
+) -> None:
+    """Add to out (sensor, sample) the pressure of paths in a stretch that holds the whole of their pulses.
 
+    The stretch begins at `origin` (s) and at sample `first` of out, which may be negative, and has `samples`, even.
     highest (Hz) is the stop edge of the filter; method is width, oversampling, precision and tolerance of
     `KernelDeposit`.
     """
     width, oversampling, dtype, tolerance = method
     circle = 2 * int(next_fast_len(int(np.ceil(highest * oversampling / bins.step)) + width, real=True))
-    used = min(bins.frequency.size, circle // 2)
-    bins = Bins(bins.frequency[:used], bins.spectrum[:used], bins.relative[:used], bins.step)
+    used = min(bins.frequency.size, circle // 2 - bins.first)
+    bins = Bins(bins.first, bins.frequency[:used], bins.spectrum[:used], bins.relative[:used], bins.step)
     grid = kernel(width, circle * bins.step / (2.0 * highest), circle, dtype)
     aim = Aim(
         elements=elements,
@@ -82,35 +107,65 @@ def stretch_pressure(
         bins=used,
         circle=circle,
     )
-    total = np.zeros((elements.count, 2 * used), dtype)
+    response = bins.spectrum * (samples * bins.step)
+    stage = Stage(aim, bins, origin, grid, np.stack([response.real, response.imag]).astype(dtype))
+    spectra = np.zeros((elements.count, samples // 2 + 1), np.result_type(dtype, np.complex64))
+    heard = spectra.view(dtype)[:, 2 * bins.first : 2 * (bins.first + used)]
     for tile in tiles(front, aim):
-        _add_tile(total, tile, front, aim, bins, origin, grid)
-    response = bins.spectrum / kaiser_bessel_transform(np.arange(used) / circle, width, grid.beta)
-    spectra = total.view(np.result_type(dtype, np.complex64))
-    spectra *= (response * (samples * bins.step)).astype(spectra.dtype)
-    return np.asarray(irfft(spectra, samples, axis=1, overwrite_x=True))
+        _add_tile(heard, tile, front.select(tile.paths), stage)
+    begin, end = max(first, 0), min(first + samples, out.shape[1])
+    for rows in _rows(elements.count):
+        piece = irfft(spectra[rows], samples, axis=1, overwrite_x=True)
+        out[rows, begin:end] += piece[:, begin - first : end - first]
 
 
-def _add_tile(
-    total: npt.NDArray[Any], tile: Tile, front: Fronts, aim: Aim, bins: Bins, origin: float, grid: Kernel
-) -> None:
-    """Add the spectra of a tile at the hydrophones to total (sensor, re and im of bins)."""
-    from sonarsynth.synthesis.kernels import combine, steer_back
+def _rows(count: int) -> list[slice]:
+    """Sensors a few at a time: what they need stays in the cache."""
+    return [slice(low, min(low + TOGETHER, count)) for low in range(0, count, TOGETHER)]
 
-    points = tile.nodes(aim.elements)
-    part = front.select(tile.paths)
-    field = np.empty((len(points), bins.frequency.size), np.result_type(total.dtype, np.complex64))
+
+def _add_tile(heard: npt.NDArray[Any], tile: Tile, part: Fronts, stage: Stage) -> None:
+    """Add the spectra of a tile at the hydrophones to heard (sensor, re and im of bins)."""
+    from sonarsynth.synthesis.kernels import steer_back
+
+    elements, bins, dtype = stage.aim.elements, stage.bins, heard.dtype
+    points = tile.nodes(elements)
+    alone = part.count == 1
+    field = _alone(tile, points, stage) if alone else _deposited(tile, part, points, stage)
+    delay, gain = delay_and_gain(tile.reference, elements.position)
+    late = delay[0] + (part.delay[0] - stage.origin if alone else 0.0)
+    gain = gain[0] * elements.gain * (part.amplitude[0] if alone else 1.0)
+    for rows in _rows(elements.count):
+        pairs = field[rows]
+        if tile.shape[0]:
+            pairs = (to_sensors(elements, tile.shape, dtype.name)[rows] @ field.reshape(len(points), -1)).reshape(
+                -1, 2, bins.frequency.size
+            )
+        steer_back(pairs, late[rows] * bins.step, gain[rows], bins.first, heard[rows])
+
+
+def _alone(tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
+    """The field (node, 2, bin) of one path that everything is steered to: that of the snap, through its face."""
+    faces = _faces(tile, points, stage)
+    return np.asarray(faces * _power(tile, stage, np.ones(1)) * stage.response)
+
+
+def _deposited(tile: Tile, part: Fronts, points: Floats, stage: Stage) -> npt.NDArray[Any]:
+    """The field (node, 2, bin) of a tile at its nodes, steered to its reference: real and imaginary part."""
+    from sonarsynth.synthesis.kernels import combine
+
+    bins, grid, dtype = stage.bins, stage.grid, stage.response.dtype
+    last = bins.first + bins.frequency.size
+    blur = kaiser_bessel_transform(np.arange(bins.first, last) / grid.circle, grid.width, grid.beta)
+    power = _power(tile, stage, blur)
+    field = np.empty((len(points), 2, bins.frequency.size), dtype)
     group = max(1, LARGEST // (len(tile.terms) * grid.circle))
     for first in range(0, len(points), group):
         some = points[first : first + group]
-        deposits = _deposits(part, tile, some, bins.step, origin, grid, total.dtype, aim)
+        deposits = _deposits(part, tile, some, stage)
         spectra = rfft(deposits[:, :, : grid.circle], axis=2)
-        combine(spectra, _factors(tile, some, aim, bins, total.dtype), field[first : first + group])
-    pairs = field.view(total.dtype)
-    if tile.shape[0]:
-        pairs = to_sensors(aim.elements, tile.shape, total.dtype.name) @ pairs
-    delay, gain = delay_and_gain(tile.reference, aim.elements.position)
-    steer_back(pairs, delay[0] * bins.step, gain[0] * aim.elements.gain, total)
+        combine(spectra, bins.first, _faces(tile, some, stage), power, stage.response, field[first : first + group])
+    return field
 
 
 @lru_cache(maxsize=64)
@@ -123,18 +178,17 @@ def to_sensors(elements: Elements, shape: tuple[int, int, int], dtype: str) -> n
     return np.asarray((yz if shape[0] == 1 else x[:, :, None, None] * yz[:, None]).reshape(elements.count, -1))
 
 
-def _deposits(
-    part: Fronts, tile: Tile, points: Floats, step: float, origin: float, grid: Kernel, dtype: npt.DTypeLike, aim: Aim
-) -> npt.NDArray[Any]:
+def _deposits(part: Fronts, tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
     """The grid (node, term, sample) of a tile at some points."""
     from sonarsynth.synthesis.kernels import deposit
 
-    rate = grid.circle * step
+    grid, dtype = stage.grid, stage.response.dtype
+    rate = grid.circle * stage.bins.step
     reference = tile.reference
     steer, level = delay_and_gain(reference, points)
     middle, _ = towards(reference, points)
     loss = tile.deviation[2] or 1.0
-    table = _packed(part, (part.delay - origin) * rate, (part.loss - reference.loss) / loss)
+    table = _packed(part, (part.delay - stage.origin) * rate, (part.loss - reference.loss) / loss)
     late = louder = np.zeros((0, 0))
     if part.delay_terms.shape[1]:
         late = (aperture_terms(points, part.aperture) @ part.delay_terms.T) * rate
@@ -175,30 +229,34 @@ def _packed(part: Fronts, position: Floats, loss: Floats) -> Floats:
     return np.ascontiguousarray(rows.reshape(ROWS, blocks, BLOCK).swapaxes(0, 1)).ravel()
 
 
-def _factors(tile: Tile, points: Floats, aim: Aim, bins: Bins, dtype: npt.DTypeLike) -> npt.NDArray[Any]:
-    """Real factor (node, term, bin) of each term's spectrum: polynomials of the face's directivity, times those of
-    absorption."""
-    u, _ = towards(tile.reference, points)
-    loss = 10.0 ** (-tile.reference.loss * bins.relative / 20.0)
-    decay = -np.log(10.0) / 20.0 * tile.deviation[2] * bins.relative
+def _power(tile: Tile, stage: Stage, blur: Floats) -> npt.NDArray[Any]:
+    """Real factor (term, bin) of each term's spectrum: the polynomials of absorption, without the blur (bin,)."""
+    relative = stage.bins.relative
+    loss = 10.0 ** (-tile.reference.loss * relative / 20.0) / blur
+    decay = -np.log(10.0) / 20.0 * tile.deviation[2] * relative
+    degree = np.array(tile.terms)[:, 2]
+    power = np.cumprod(np.concatenate([[loss], decay / np.arange(1, degree.max() + 1)[:, None]]), axis=0)
+    return np.asarray(power.astype(stage.response.dtype)[degree])
+
+
+def _faces(tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
+    """Real factor (node, term, bin) of each term's spectrum: the polynomials of the face's directivity."""
+    f, dtype, face = stage.bins.frequency, stage.response.dtype, stage.aim.elements.face
+    if face == 0.0:
+        return np.broadcast_to(np.ones(1, dtype), (len(points), len(tile.terms), f.size))
     degrees = np.array(tile.terms)
-    power = np.cumprod(np.concatenate([[loss], decay / np.arange(1, degrees[:, 2].max() + 1)[:, None]]), axis=0)
-    power = power.astype(dtype)[degrees[:, 2]]
-    if aim.elements.face == 0.0:
-        return np.broadcast_to(power, (len(points), *power.shape))
-    scale = aim.elements.face / tile.reference.sound_speed
-    top = bins.frequency[-1]
+    u, _ = towards(tile.reference, points)
+    middle, half = 0.5 * (f[-1] + f[0]), 0.5 * (f[-1] - f[0])
+    scale = face / tile.reference.sound_speed
     widest = np.abs(u[0, :, 1:]).max(axis=0) + tile.deviation[:2]
-    # smooth in frequency: a few Chebyshev frequencies do; half the range of phase is half of the largest
-    count = nodes_for(0.5 * np.pi * scale * top * float(widest.sum()), (1.0,), 0.1 * aim.tolerance)
-    f = 0.5 * top * (1.0 + chebyshev(count)) * scale
+    # smooth in frequency: a few Chebyshev frequencies do
+    count = nodes_for(np.pi * scale * half * float(widest.sum()), (1.0,), 0.1 * stage.aim.tolerance)
+    at = (middle + half * chebyshev(count)) * scale
     y, z = (
-        sinc_polynomials(u[0, :, 1 + i, None] * f, tile.deviation[i] * f, int(degrees[:, i].max())) for i in range(2)
+        sinc_polynomials(u[0, :, 1 + i, None] * at, tile.deviation[i] * at, int(degrees[:, i].max())) for i in range(2)
     )
-    face = (y[degrees[:, 0]] * z[degrees[:, 1]]).swapaxes(0, 1).reshape(-1, count).astype(dtype)
-    out = (face @ _to_bins(bins.frequency.size, count, np.dtype(dtype).name)).reshape(len(points), *power.shape)
-    out *= power
-    return np.asarray(out)
+    some = (y[degrees[:, 0]] * z[degrees[:, 1]]).swapaxes(0, 1).reshape(-1, count).astype(dtype)
+    return (some @ _to_bins(f.size, count, dtype.name)).reshape(len(points), len(degrees), f.size)
 
 
 @lru_cache(maxsize=64)

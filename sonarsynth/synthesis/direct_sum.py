@@ -22,10 +22,10 @@ def relative_absorption(absorption: Callable[[Floats], Floats] | None, frequency
     """Absorption at frequencies (bin,) over that at the band centre, less one; zero where none is given."""
     if absorption is None:
         return np.zeros_like(frequency)
-    at_centre = float(absorption(np.array([centre]))[0])
-    if not at_centre > 0.0:
+    at = absorption(np.append(frequency, centre))
+    if not at[-1] > 0.0:
         return np.zeros_like(frequency)
-    return np.asarray(absorption(frequency) / at_centre - 1.0)
+    return np.asarray(at[:-1] / at[-1] - 1.0)
 
 
 def exact_spectra(front: Fronts, elements: Elements, frequency: Floats, relative: Floats, origin: float) -> np.ndarray:

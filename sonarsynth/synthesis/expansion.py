@@ -42,21 +42,30 @@ def _tails() -> tuple[Floats, Floats]:
     return phase, 4.0 * (size[:-1] + size[1:])
 
 
-@lru_cache(maxsize=256)
-def _widest(weights: Colour, tolerance: float) -> Floats:
-    """Largest half range of phase (rad, at the highest frequency) that n = 1, 2, ... nodes interpolate."""
+@lru_cache(maxsize=64)
+def _mean_tails(weights: Colour) -> Floats:
+    """Error (node count - 1, phase) at the phases of `_tails`, mean over the colours; never falls with phase."""
     phase, tails = _tails()
-    out = np.zeros(MOST_NODES)
-    for n, tail in enumerate(tails):
-        mean = np.mean([np.interp(phase * w, phase, tail) for w in weights], axis=0)
-        good = np.maximum.accumulate(mean) <= tolerance
-        out[n] = phase[np.flatnonzero(good)[-1]]
-    return np.maximum.accumulate(out)
+    mean = np.mean([[np.interp(phase * w, phase, tail) for tail in tails] for w in weights], axis=0)
+    return np.maximum.accumulate(mean, axis=1)
 
 
-def nodes_for(phase: float, weights: Colour, tolerance: float) -> int:
-    """Chebyshev nodes that interpolate waves of phase within +-`phase` (rad); MOST_NODES + 1 where none do."""
-    return int(np.searchsorted(_widest(weights, tolerance), phase)) + 1
+def nodes_for(phase: float, weights: Colour, tolerance: float, degrees: tuple[float, ...] = (1.0,)) -> int:
+    """Chebyshev nodes that interpolate waves of phase within +-`phase` (rad); MOST_NODES + 1 where none do.
+
+    The waves may bear an amplitude that is a polynomial: `degrees` bounds its Chebyshev coefficients of degree 0, 1,
+    ... . Times T_d, the coefficient of T_n is half of those that were of T_(n-d) and T_(n+d).
+    """
+    grid, _ = _tails()
+    at = int(np.searchsorted(grid, phase))
+    if at == grid.size or not np.isfinite(degrees).all():
+        return MOST_NODES + 1
+    tail = _mean_tails(weights)[:, at]
+    bound = degrees[0] * tail
+    for d, size in enumerate(degrees[1:], start=1):
+        bound[:d] += 2.0 * size
+        bound[d:] += 0.5 * size * (tail[:-d] + tail[d:])
+    return int(np.argmax(np.append(bound, 0.0) <= tolerance)) + 1
 
 
 def chebyshev(count: int) -> Floats:

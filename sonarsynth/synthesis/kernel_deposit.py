@@ -14,7 +14,7 @@ from sonarsynth.conventions import Floats, Number
 from sonarsynth.description import description
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.sonar import Elements, Sonar, stop_frequency
-from sonarsynth.synthesis.deposit import Bins, stretch_pressure
+from sonarsynth.synthesis.deposit import Bins, add_stretch, audible
 from sonarsynth.synthesis.direct_sum import relative_absorption
 from sonarsynth.synthesis.layout import layout
 from sonarsynth.synthesis.pulse import pulse_spectrum
@@ -83,16 +83,17 @@ class KernelDeposit:
         method = (self.width, self.oversampling, self.precision, self.tolerance)
         for part in plan.stretches:
             frequency, spectrum = pulse_spectrum(part.model, sonar.antialias, fs, part.samples)
-            relative = relative_absorption(absorption, frequency, sonar.band.centre)
-            piece = stretch_pressure(
+            some = audible(spectrum, self.tolerance)
+            relative = relative_absorption(absorption, frequency[some], sonar.band.centre)
+            add_stretch(
+                out,
+                part.first,
+                part.samples,
                 front.select(part.paths),
                 elements,
-                Bins(frequency, spectrum, relative, fs / part.samples),
+                Bins(some.start, frequency[some], spectrum[some], relative, fs / part.samples),
                 start + part.first / fs,
-                part.samples,
                 stop_frequency(sonar.antialias),
                 method,
             )
-            first, last = max(part.first, 0), min(part.first + part.samples, samples)
-            out[:, first:last] += piece[:, first - part.first : last - part.first]
         return out, plan.outside

@@ -48,6 +48,18 @@ def _multiply(a: Any, b: Any, out: Any) -> None:
 
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+def _add(out: Any, more: Any) -> None:
+    for i in range(more.size):
+        out[i] += more[i]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+def _amplify(out: Any, more: Any) -> None:
+    for i in range(more.size):
+        out[i] *= 1.0 + more[i]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
 def _recur(out: Any, earlier: Any) -> None:
     for i in range(BLOCK):
         out[i] = 2.0 * out[i] - earlier[i]
@@ -104,9 +116,9 @@ def deposit(
             block = table[first * ROWS : (first + BLOCK) * ROWS]
             _wavefront(block, nodes[m], middle[m], scale, rate, steer[m], level[m], place, value)
             if late.size:
-                place[:size] += late[m, first : first + size]
+                _add(place, late[m, first : first + size])
             if louder.size:
-                value[4 * BLOCK : 4 * BLOCK + size] *= 1.0 + louder[m, first : first + size]
+                _amplify(value[4 * BLOCK :], louder[m, first : first + size])
             for t in range(1, terms):
                 a, b, c = (4 + recipe[t, 0]) * BLOCK, recipe[t, 1] * BLOCK, (4 + t) * BLOCK
                 _multiply(value[a : a + BLOCK], value[b : b + BLOCK], value[c : c + BLOCK])
@@ -125,34 +137,45 @@ def deposit(
 
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
-def combine(spectra: Any, factors: Any, out: Any) -> None:
-    """Sum over terms of spectra (node, term, bin) times real factors (node, term, bin) into out (node, bin)."""
+def combine(spectra: Any, first: int, factors: Any, power: Any, response: Any, out: Any) -> None:
+    """Sum over terms of spectra (node, term, bin) times real factors (node, term, bin) and power (term, bin).
+
+    Times response (2, bin), real and imaginary part as in out (node, 2, bin). Bins of spectra count from `first`.
+    """
+    bins = out.shape[2]
+    re, im = np.empty(bins, out.dtype), np.empty(bins, out.dtype)
     for m in range(out.shape[0]):
-        for b in range(out.shape[1]):
-            out[m, b] = spectra[m, 0, b] * factors[m, 0, b]
-        for t in range(1, factors.shape[1]):
-            for b in range(out.shape[1]):
-                out[m, b] += spectra[m, t, b] * factors[m, t, b]
+        re[:], im[:] = 0.0, 0.0
+        for t in range(power.shape[0]):
+            for b in range(bins):
+                factor = factors[m, t, b] * power[t, b]
+                re[b] += spectra[m, t, first + b].real * factor
+                im[b] += spectra[m, t, first + b].imag * factor
+        for b in range(bins):
+            out[m, 0, b] = re[b] * response[0, b] - im[b] * response[1, b]
+            out[m, 1, b] = re[b] * response[1, b] + im[b] * response[0, b]
 
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
-def steer_back(field: Any, delay: Any, gain: Any, out: Any) -> None:
-    """Add gain[s] exp(-2 pi i b delay[s]) field[s, b] to out[s, b], complex numbers as pairs of reals; delay in cycles
-    a bin."""
+def steer_back(field: Any, delay: Any, gain: Any, first: int, out: Any) -> None:
+    """Add gain[s] exp(-2 pi i b delay[s]) field[s, :, b] to out[s, b], bins b from `first` on; delay in cycles a bin.
+
+    Field (sensor, 2, bin) is real and imaginary part, out (sensor, 2 * bin) is pairs of them.
+    """
     c, s = np.empty(32, field.dtype), np.empty(32, field.dtype)
-    bins = out.shape[1] // 2
+    bins = field.shape[2]
     for q in range(out.shape[0]):
         turn = np.exp(-2j * np.pi * delay[q])
         w = 1.0 + 0.0j
         for j in range(32):
             c[j], s[j] = w.real, w.imag
             w *= turn
-        start = complex(gain[q])
-        for first in range(0, bins, 32):
+        start = gain[q] * np.exp(-2j * np.pi * (delay[q] * first))
+        for low in range(0, bins, 32):
             re, im = field.dtype.type(start.real), field.dtype.type(start.imag)
-            for j in range(min(32, bins - first)):
+            for j in range(min(32, bins - low)):
                 cr, ci = re * c[j] - im * s[j], re * s[j] + im * c[j]
-                b = 2 * (first + j)
-                out[q, b] += cr * field[q, b] - ci * field[q, b + 1]
-                out[q, b + 1] += cr * field[q, b + 1] + ci * field[q, b]
+                fr, fi = field[q, 0, low + j], field[q, 1, low + j]
+                out[q, 2 * (low + j)] += cr * fr - ci * fi
+                out[q, 2 * (low + j) + 1] += cr * fi + ci * fr
             start *= w

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from sonarsynth.acoustics.arrays import aperture_terms
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.sonar import Elements
-from sonarsynth.synthesis.expansion import MOST_NODES, Colour, Term, chebyshev, nodes_for, terms_for
+from sonarsynth.synthesis.expansion import MOST_NODES, Colour, Term, nodes_for, terms_for
+from sonarsynth.synthesis.variation import box_nodes, degrees, variation
 from sonarsynth.synthesis.wavefront import Fronts
+
+Shape = tuple[int, int, int]
 
 MOST_TERMS = 24
 """A tile that needs more terms is split."""
@@ -35,7 +40,7 @@ class Tile:
 
     paths: Ints  # (path,)
     reference: Fronts  # one front: the middle of the tile
-    shape: tuple[int, int, int]  # nodes along x, y, z; zeros where the hydrophones themselves are the nodes
+    shape: Shape  # nodes along x, y, z; zeros where the hydrophones themselves are the nodes
     terms: tuple[Term, ...]
     deviation: tuple[float, float, float]  # half range of direction y and z, and of absorption (dB)
     cost: float  # ns, predicted
@@ -44,19 +49,25 @@ class Tile:
         """Positions (node, xyz) where the field is synthesised, x slowest."""
         if not self.shape[0]:
             return elements.position
-        low, high = elements.position.min(axis=0), elements.position.max(axis=0)
-        axes = [0.5 * (a + b) + 0.5 * (b - a) * chebyshev(n) for a, b, n in zip(low, high, self.shape, strict=True)]
-        return np.stack([g.ravel() for g in np.meshgrid(*axes, indexing="ij")], axis=1)
+        return box_nodes(elements, self.shape)
 
 
-def _probes(elements: Elements, near: bool) -> Floats:
-    """Where directions differ most (point, xyz): corners and centre of the array's box; near it, all hydrophones."""
-    if near:
-        return elements.position
+class _Probes(NamedTuple):
+    """Where directions are looked at: the corners of the array's box and its centre; near it, all hydrophones."""
+
+    points: Floats  # (point, xyz)
+    corners: Shape  # how many along x, y, z; they come first
+    size: Floats  # (xyz) m: half of the box
+
+
+@lru_cache(maxsize=16)
+def _probes(elements: Elements, near: bool) -> _Probes:
     low, high = elements.position.min(axis=0), elements.position.max(axis=0)
     axes = [np.unique([a, b]) for a, b in zip(low, high, strict=True)]
     corners = np.stack([g.ravel() for g in np.meshgrid(*axes, indexing="ij")], axis=1)
-    return np.concatenate([corners, 0.5 * (low + high)[None]])
+    points = elements.position if near else np.concatenate([corners, 0.5 * (low + high)[None]])
+    x, y, z = (int(a.size) for a in axes)
+    return _Probes(points, (x, y, z), 0.5 * (high - low))
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +75,10 @@ class _Views:
     """What every tile that is tried looks at, computed once: a tile is the smallest and the largest of each column."""
 
     front: Fronts
-    columns: Floats  # (column, path): direction, curvature, absorption, terms; directions, slownesses at the probes
-    probes: Floats  # (point, xyz)
+    columns: Floats  # (column, path): direction, curvature, absorption, delay terms; directions, slownesses at probes
+    amplitude: Floats  # (row, path) of `variation`
+    probes: _Probes
     gradient: Floats  # (xyz, point, term) of the aperture terms; empty where there are none
-    size: Floats  # (xyz) m: half of the box round the hydrophones
     near: bool  # a source is within or about that box, where no nodes can stand for the hydrophones
 
 
@@ -76,10 +87,10 @@ def _views(front: Fronts, elements: Elements) -> _Views:
     probes, gradient = _probes(elements, near), np.zeros((3, 0, 0))
     if front.delay_terms.shape[1]:
         steps = 1e-4 * front.aperture * np.eye(3)
-        sides = [[aperture_terms(probes + way * step, front.aperture) for way in (1, -1)] for step in steps]
+        sides = [[aperture_terms(probes.points + way * step, front.aperture) for way in (1, -1)] for step in steps]
         gradient = np.array([(ahead - behind) / (2e-4 * front.aperture) for ahead, behind in sides])
-    size = 0.5 * np.ptp(elements.position, axis=0)
-    return _Views(front, _columns(front, probes, gradient), probes, gradient, size, near)
+    columns = _columns(front, probes.points, gradient)
+    return _Views(front, columns, variation(front, elements), probes, gradient, near)
 
 
 def _columns(front: Fronts, probes: Floats, gradient: Floats) -> Floats:
@@ -87,7 +98,7 @@ def _columns(front: Fronts, probes: Floats, gradient: Floats) -> Floats:
     directions."""
     v = front.direction.T - front.curvature * probes[:, :, None]  # (point, xyz, path)
     u = v / np.sqrt(v[:, 0] ** 2 + v[:, 1] ** 2 + v[:, 2] ** 2)[:, None]
-    columns = [front.direction.T, front.curvature[None], front.loss[None], front.delay_terms.T, front.gain_terms.T]
+    columns = [front.direction.T, front.curvature[None], front.loss[None], front.delay_terms.T]
     columns.append(u.reshape(-1, front.count))
     if front.delay_terms.shape[1]:
         slope = u - front.sound_speed * np.einsum("et,ipt->pie", front.delay_terms, gradient)
@@ -95,10 +106,10 @@ def _columns(front: Fronts, probes: Floats, gradient: Floats) -> Floats:
     return np.ascontiguousarray(np.concatenate(columns))
 
 
-def _reference(middle: Floats, one: bool, front: Fronts) -> Fronts:
+def _reference(middle: Floats, front: Fronts) -> Fronts:
     """The front in the middle of a tile, from its middle row."""
     norm = np.linalg.norm(middle[:3])
-    direction = middle[:3] if one or norm < 0.1 else middle[:3] / norm
+    direction = middle[:3] if norm < 0.1 else middle[:3] / norm
     terms = front.delay_terms.shape[1]
     return Fronts(
         delay=np.zeros(1),
@@ -113,52 +124,89 @@ def _reference(middle: Floats, one: bool, front: Fronts) -> Fronts:
     )
 
 
-def _tile(paths: Ints, views: _Views, aim: Aim) -> Tile:
-    columns = np.take(views.columns, paths, axis=1)
+class _Extent(NamedTuple):
+    """What decides how a tile is represented, and what that costs."""
+
+    count: float  # paths
+    phase: tuple[float, ...]  # (xyz) rad: half range at the highest frequency, over half of the box
+    drift: tuple[float, ...]  # (xyz) rad, on top of it: the directivity of the reference varies too
+    degrees: tuple[tuple[float, ...], ...]  # (xyz, degree) of the amplitude
+    turn: tuple[float, float]  # half range of the face's argument in y and z at the highest frequency
+    decay: float  # Np: half range of absorption, at the frequency where it differs most from that at the centre
+
+    def half(self) -> _Extent:
+        """The best that halving can give."""
+        y, z = self.turn
+        phase = tuple(0.5 * p for p in self.phase)
+        return _Extent(0.5 * self.count, phase, self.drift, self.degrees, (0.5 * y, 0.5 * z), 0.5 * self.decay)
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """A tile, and why it is as it is."""
+
+    tile: Tile
+    extent: _Extent | None  # None for a path alone
+
+
+def _try(paths: Ints, views: _Views, aim: Aim) -> _Trial:
+    if paths.size == 1:
+        return _Trial(_alone(paths, views.front, aim), None)
+    whole = paths.size == views.front.count
+    columns = views.columns if whole else np.take(views.columns, paths, axis=1)
     low, high = columns.min(axis=1), columns.max(axis=1)
-    reference = _reference(0.5 * (low + high), paths.size == 1, views.front)
-    own = _columns(reference, views.probes, views.gradient)[:, 0]
+    reference = _reference(0.5 * (low + high), views.front)
+    probes = views.probes
+    own = _columns(reference, probes.points, views.gradient)[:, 0]
     far = np.maximum(high - own, own - low)
-    probed = 3 * len(views.probes)
-    at = 5 + views.front.delay_terms.shape[1] + views.front.gain_terms.shape[1]
-    du = far[at : at + probed].reshape(-1, 3).max(axis=0)
+    at, probed = 5 + views.front.delay_terms.shape[1], 3 * len(probes.points)
+    _, dy, dz = far[at : at + probed].reshape(-1, 3).max(axis=0).tolist()
     slope = far[-probed:].reshape(-1, 3).max(axis=0)
-    c, face, loss = reference.sound_speed, aim.elements.face, float(far[4])
-    # the directivity of the reference varies over the aperture too
-    drift = np.pi * aim.highest * face / c * 0.5 * np.ptp(own[at : at + probed].reshape(-1, 3), axis=0)[1:].sum()
-    phase = 2.0 * np.pi * aim.highest / c * slope * views.size + np.where(views.size > 0, drift, 0.0)
-    turn = (face * aim.highest / c * float(du[1]), face * aim.highest / c * float(du[2]))
-    terms = terms_for(turn, loss * np.log(10.0) / 20.0 * aim.steepest, aim.weights, aim.tolerance)
-    if views.near:
-        phase = np.full(3, np.inf)
-    cubic = 2 if views.front.gain_terms.shape[1] else 0  # the amplitude is a cubic on top of the wave
-    x, y, z = (
-        nodes_for(float(p), aim.weights, aim.tolerance) + cubic * (s > 0)
-        for p, s in zip(phase, views.size, strict=True)
+    wave = aim.highest / reference.sound_speed  # 1/m
+    turn, loss = (aim.elements.face * wave * dy, aim.elements.face * wave * dz), float(far[4])
+    phase = np.full(3, np.inf) if views.near else 2.0 * np.pi * wave * slope * probes.size
+    extent = _Extent(
+        count=paths.size,
+        phase=tuple(phase.tolist()),
+        drift=(0.0,) * 3 if views.near else _drift(own[at : at + probed], probes, np.pi * wave * aim.elements.face),
+        degrees=degrees(views.amplitude if whole else np.take(views.amplitude, paths, axis=1)),
+        turn=turn,
+        decay=loss * np.log(10.0) / 20.0 * aim.steepest,
     )
-    shape, cost = _cheapest(paths.size, (x, y, z), len(terms), aim)
-    return Tile(paths, reference, shape, terms, (float(du[1]), float(du[2]), loss), cost)
+    shape, terms, cost = _cheapest(extent, aim)
+    return _Trial(Tile(paths, reference, shape, terms, (dy, dz, loss), cost), extent)
 
 
-def _cheapest(paths: int, shape: tuple[int, int, int], terms: int, aim: Aim) -> tuple[tuple[int, int, int], float]:
-    """Nodes or the hydrophones themselves, and the predicted time (ns) on one core at 3 GHz."""
+def _drift(directions: Floats, probes: _Probes, scale: float) -> tuple[float, ...]:
+    """Half range (xyz) of the argument of the directivity along each axis of the box, the others held."""
+    corner = directions.reshape(-1, 3)[:-1, 1:].reshape(*probes.corners, 2)
+    return tuple(0.5 * scale * float(np.ptp(corner, axis=axis).sum(axis=-1).max()) for axis in range(3))
+
+
+def _cheapest(extent: _Extent, aim: Aim) -> tuple[Shape, tuple[Term, ...], float]:
+    """Nodes or the hydrophones themselves, terms, and the predicted time (ns) on one core at 3 GHz."""
     sensors, bins = aim.elements.count, aim.bins
+    terms = terms_for(extent.turn, extent.decay, aim.weights, aim.tolerance)
+    x, y, z = (
+        nodes_for(p + d, aim.weights, aim.tolerance, a)
+        for p, d, a in zip(extent.phase, extent.drift, extent.degrees, strict=True)
+    )
 
     def work(nodes: int) -> float:
-        per_deposit = 4.0 + 0.8 * terms
-        return nodes * (paths * per_deposit + terms * (1.2 * aim.circle + 1.0 * bins)) + 2.0 * sensors * bins + 2e5
+        per_deposit = 4.0 + 0.8 * len(terms)
+        each = extent.count * per_deposit + len(terms) * (1.2 * aim.circle + 1.0 * bins)
+        return nodes * each + 2.0 * sensors * bins + 2e5
 
-    own = work(sensors)
-    nodes = int(np.prod(shape))
-    by_nodes = work(nodes) + 0.04 * nodes * sensors * bins if max(shape) <= MOST_NODES else np.inf
-    crowded = np.inf if terms > MOST_TERMS else 1.0
-    return (shape, by_nodes * crowded) if by_nodes < own else ((0, 0, 0), own * crowded)
+    own, nodes = work(sensors), x * y * z
+    by_nodes = work(nodes) + 0.04 * nodes * sensors * bins if max(x, y, z) <= MOST_NODES else np.inf
+    crowded = np.inf if len(terms) > MOST_TERMS else 1.0
+    return ((x, y, z), terms, by_nodes * crowded) if by_nodes < own else ((0, 0, 0), terms, own * crowded)
 
 
 def _halves(paths: Ints, views: _Views, aim: Aim) -> tuple[Ints, Ints] | None:
     """Two halves of a tile, cut across its widest extent in phase; None where all paths are alike."""
     front = views.front
-    size = np.append(views.size + aim.elements.face, 0.5 * front.aperture**2)
+    size = np.append(views.probes.size + aim.elements.face, 0.5 * front.aperture**2)
     weight = np.append(2.0 * np.pi * aim.highest / front.sound_speed * size, np.log(10.0) / 20.0 * aim.steepest)
     where = np.take(views.columns[:5], paths, axis=1)
     low, high = where.min(axis=1), where.max(axis=1)
@@ -172,17 +220,29 @@ def _halves(paths: Ints, views: _Views, aim: Aim) -> tuple[Ints, Ints] | None:
 def tiles(front: Fronts, aim: Aim) -> list[Tile]:
     """The tiles of predicted least cost: each is halved while that pays; the first halving may pay only with the
     second."""
+    if front.count == 1:
+        return [_alone(np.arange(1), front, aim)]
     views = _views(front, aim.elements)
-    return _best(_tile(np.arange(front.count), views, aim), views, aim, patient=True)
+    return _best(_try(np.arange(front.count), views, aim), views, aim, patient=True)
 
 
-def _best(tile: Tile, views: _Views, aim: Aim, patient: bool) -> list[Tile]:
-    least = 4e5 + 4.0 * aim.elements.count * aim.bins  # two tiles cost this at least
-    halves = None if tile.cost <= least else _halves(tile.paths, views, aim)
+def _alone(paths: Ints, front: Fronts, aim: Aim) -> Tile:
+    """One path is its own reference: nothing is left to be deposited."""
+    return Tile(
+        paths, front.select(paths), (0, 0, 0), ((0, 0, 0),), (0.0, 0.0, 0.0), 2e5 + 4.0 * aim.elements.count * aim.bins
+    )
+
+
+def _best(trial: _Trial, views: _Views, aim: Aim, patient: bool) -> list[Tile]:
+    tile = trial.tile
+    if trial.extent is None:
+        return [tile]
+    possible = tile.cost == np.inf or 2.0 * _cheapest(trial.extent.half(), aim)[2] < tile.cost
+    halves = _halves(tile.paths, views, aim) if possible else None
     if halves is None:
         return [tile]
-    children = [_tile(half, views, aim) for half in halves]
-    better = sum(t.cost for t in children) < tile.cost
-    if better or patient or tile.cost == np.inf:
-        children = [t for child in children for t in _best(child, views, aim, patient=tile.cost == np.inf)]
-    return children if sum(t.cost for t in children) < tile.cost else [tile]
+    children = [_try(half, views, aim) for half in halves]
+    best = [child.tile for child in children]
+    if sum(t.cost for t in best) < tile.cost or patient or tile.cost == np.inf:
+        best = [t for child in children for t in _best(child, views, aim, patient=tile.cost == np.inf)]
+    return best if sum(t.cost for t in best) < tile.cost else [tile]

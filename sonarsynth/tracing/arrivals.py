@@ -190,7 +190,7 @@ def _assemble(
 
 
 def _join(parts: list[Arrivals], sound_speed: float) -> Arrivals:
-    """Arrivals of all snaps, in order; terms that some of them lack are 0."""
+    """Arrivals of all snaps, in order; terms that some of them lack are 0. What absorption leaves nothing of is out."""
     columns = {}
     for name, value in vars(parts[0]).items():
         if isinstance(value, np.ndarray):
@@ -199,6 +199,9 @@ def _join(parts: list[Arrivals], sound_speed: float) -> Arrivals:
                 width = max(a.shape[1] for a in arrays)
                 arrays = [a if a.shape[1] == width else np.zeros((len(a), width)) for a in arrays]
             columns[name] = np.concatenate(arrays)
+    heard = columns["amplitude"] != 0.0
+    if not heard.all():
+        columns = {name: value[heard] for name, value in columns.items()}
     return Arrivals(
         **columns,
         sound_speed=sound_speed,

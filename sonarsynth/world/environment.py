@@ -133,9 +133,9 @@ class Absorption:
     """Absorption of sound in sea water (Francois and Garrison 1982, or Ainslie and McColm 1998), or none."""
 
     formula: Literal["francois_garrison", "ainslie_mccolm", "none"] = "francois_garrison"
-    temperature: DegreesCelsius = 27.0
-    salinity: Annotated[PracticalSalinity, Ge(0)] = 35.0
-    ph: Number = 8.1
+    temperature: Annotated[DegreesCelsius, Ge(-5), Le(60)] = 27.0
+    salinity: Annotated[PracticalSalinity, Ge(0), Le(100)] = 35.0
+    ph: Annotated[Number, Ge(0), Le(14)] = 8.1
 
 
 @description
@@ -163,7 +163,7 @@ Noise = Annotated[FlatNoise | WenzNoise, BY_KIND]
 class Environment:
     """The water and its boundaries."""
 
-    depth: PositiveMetres
+    depth: Annotated[PositiveMetres, Le(12e3)]
     """Depth of the bed below the mean surface."""
     sound_speed: SoundSpeed
     surface: SeaSurface = SeaSurface()

@@ -11,7 +11,7 @@ from sonarsynth.acoustics.snap import spectrum
 from sonarsynth.acoustics.spectra import response
 from sonarsynth.conventions import azimuth_elevation
 from sonarsynth.labelling import FAMILIES
-from sonarsynth.planning import plan
+from sonarsynth.planning import PRODUCTS, plan
 from sonarsynth.products import LEDGER
 from sonarsynth.recipe import Recipe
 from sonarsynth.render import beamform_frame, render, synthesise, trace_frame
@@ -19,17 +19,18 @@ from sonarsynth.sonar import PositionTable
 from sonarsynth.synthesis.pulse import bubble, fir
 from tests.scenes import point_scene, remus
 
+SIGNALS = frozenset({"signals"})
 TARGET, SNAP = (20.0, 4.0, -47.0), (15.0, -6.0, -56.0)
 
 
 @lru_cache(maxsize=8)
-def _planned(recipe: Recipe):
-    return plan(recipe)
+def _planned(recipe: Recipe, products: frozenset[str] = frozenset(PRODUCTS)):
+    return plan(recipe, products)
 
 
 def _one_facet(recipe: Recipe):
     """Plan, trace of one facet of the point target alone, with the facet's place."""
-    made = _planned(recipe)
+    made = _planned(recipe, SIGNALS)
     traced = trace_frame(made, 0)
     arrivals = traced.arrivals
     keep = np.flatnonzero(~arrivals.direct)[:1]
@@ -81,7 +82,7 @@ def test_source_and_hydrophone_may_change_places() -> None:
     first = _one_facet(point_scene(target, snap, array, **point))
     second = _one_facet(point_scene(target, array, snap, **point))
     # facets of the tiny sphere differ between the two; the one at the same place is compared
-    there = trace_frame(_planned(point_scene(target, array, snap, **point)), 0)
+    there = trace_frame(_planned(point_scene(target, array, snap, **point), SIGNALS), 0)
     match = np.flatnonzero(np.linalg.norm(there.arrivals.point - first[2], axis=1) < 1e-12)
     match = match[~there.arrivals.direct[match]]
     one = synthesise(first[0], first[1]).pressure

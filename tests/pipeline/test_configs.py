@@ -98,3 +98,10 @@ def test_real_water_and_a_real_hull(tmp_path: Path) -> None:
     assert report.ok
     checks = _checks(tmp_path / "harbour.zarr")
     assert all(check.ok for check in checks.values()), checks
+
+
+def test_the_snap_is_drawn(tmp_path: Path) -> None:
+    from sonarsynth.show.snaps import show_snap
+
+    show_snap(config.load(CONFIGS / "remus.yaml"), tmp_path / "pictures" / "snap.png")
+    assert (tmp_path / "pictures" / "snap.png").read_bytes().startswith(b"\x89PNG")

@@ -1,0 +1,188 @@
+"""What cannot be: refused before anything is computed, in one line that names file, line and field; exit status 2."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import sonarsynth
+from sonarsynth import cli, config, render
+from sonarsynth.cli.running import run
+from sonarsynth.recipe import Recipe
+
+Command = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def command(capfd: pytest.CaptureFixture[str]) -> Command:
+    def call(*arguments: object) -> tuple[int, str, str]:
+        status = run(cli.app, [str(a) for a in arguments])
+        out, err = capfd.readouterr()
+        return status, out, err
+
+    return call
+
+
+@pytest.fixture
+def nothing_is_rendered(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise AssertionError("a frame was rendered")
+
+    monkeypatch.setattr(render, "trace_frame", refuse)
+
+
+WATER = "scene.world.environment"
+TARGET = "scene.world.targets.0"
+WRONG = [
+    ("beams: {azimuths", "beams: {azimuth", "14: scene.sonar.beams.azimuth: 'azimuth' is not a field here"),
+    ("speed: 1540", "speed: 0", "5: scene.world.environment.sound_speed.speed: must be greater than 0"),
+    ("kind: isovelocity, speed: 1540", "kind: cast, path: none.csv", f"5: {WATER}.sound_speed.path: no such file"),
+    ("kind: isovelocity, speed: 1540", "kind: cast, path: small.yaml", f"5: {WATER}.sound_speed: "),
+    ("kind: box, size: [1, 1, 1], edge: 0.25", "kind: mesh_file, path: small.yaml", f"8: {TARGET}.shape: "),
+    ("kind: box, size: [1, 1, 1], edge: 0.25", "kind: mesh_file, path: bad.stl", f"8: {TARGET}.shape: "),
+    ("stop: [10, 1, -5]", "stop: [10, 1, 0]", f"9: {TARGET}.motion: target 'box' is "),
+    ("stop: [10, 1, -5]", "stop: [10, 1, -12]", f"9: {TARGET}.motion: target 'box' is "),
+    ("pitch: 5 cm", "pitch: 5 km", "15: scene.trajectory.sonar: the array is "),
+    ("pitch: 5 cm", "pitch: 5 cm, dead: [20]", "13: scene.sonar.array: dead names an element outside 0..19"),
+    (
+        "pitch: 5 cm}",
+        "pitch: 5 cm}\n    sampling_frequency: 100 kHz",
+        "14: scene.sonar.sampling_frequency: 100000 Hz is",
+    ),
+    (
+        "pitch: 5 cm}",
+        "pitch: 5 cm}\n    assumed_sound_speed: 1 m/s",
+        "14: scene.sonar.assumed_sound_speed: must be greater",
+    ),
+    (
+        "pitch: 5 cm}",
+        "pitch: 5 cm}\n    filter: {kind: low_pass, cutoff: 90 kHz, transition: 1 Hz}",
+        "14: scene.sonar.filter.transition: must be greater than or equal to 100",
+    ),
+    (
+        "pitch: 5 cm}",
+        "pitch: 5 cm}\n    filter: {kind: low_pass, cutoff: 9 kHz}",
+        "12: scene.sonar: nothing to sample: the filter stops the whole band",
+    ),
+    (
+        "{kind: planar_lattice, columns: 5, rows: 4, pitch: 5 cm}",
+        "{kind: position_table, positions: [[0, 0, 0], [0, 1, 0], [0, 0, 1]]}",
+        "scene.processing.beamforming.kind: 'focused' needs an array on a lattice",
+    ),
+    ("level: 40 dB", "level: 4000 dB", f"5: {WATER}.noise.level: must be less than or equal to 300"),
+    (
+        "position: [30, 1]",
+        "position: [30, 1]\n        source_level: 1e4",
+        "12: scene.world.shrimp.0.source_level: must be less",
+    ),
+    (
+        "position: [30, 1]",
+        "position: [30, 1]\n        height: 13",
+        "11: scene.world.shrimp.0.position: depth -1 m is outside",
+    ),
+    (
+        "position: [30, 1]",
+        "position: [30, 1]\n        snap_times: []",
+        "12: scene.world.shrimp.0.snap_times: must have at least",
+    ),
+    (
+        "position: [30, 1]",
+        "position: [30, 1]\n        snap_times: [0, 1e5]",
+        "scene.processing.echo_window: signals of a frame",
+    ),
+    ("position: [30, 1]", "position: [1e9, 1]", "11: scene.world.shrimp.0.position: is more than 1e+06 m"),
+    ("depth: 12 m", "depth: 120 km", "5: scene.world.environment.depth: must be less than or equal to 12000"),
+    (
+        "kind: isovelocity, speed: 1540",
+        "kind: temperature_salinity, depth: [0], temperature: [900], salinity: [35]",
+        "5: scene.world.environment.sound_speed: is ",
+    ),
+]
+
+
+@pytest.mark.filterwarnings("ignore::sonarsynth.acoustics.seawater.OutOfRange")
+@pytest.mark.parametrize(("right", "wrong", "message"), WRONG)
+@pytest.mark.usefixtures("nothing_is_rendered")
+def test_it_is_one_line_with_file_line_and_field(
+    command: Command, small_file: Path, right: str, wrong: str, message: str
+) -> None:
+    (small_file.parent / "bad.stl").write_bytes(b"solid nothing\nendsolid nothing\n")
+    text = small_file.read_text()
+    assert right in text
+    small_file.write_text(text.replace(right, wrong))
+    store = small_file.parent / "s.zarr"
+    status, out, err = command("build", small_file, store, "--workers", "0")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"sonarsynth: {small_file}:")
+    assert message in err
+    assert not store.exists()
+
+
+def test_drawing_what_is_not_there(command: Command, small_file: Path, tmp_path: Path) -> None:
+    (tmp_path / "empty.zarr").mkdir()
+    store = tmp_path / "s.zarr"
+    assert command("build", small_file, store, "--workers", "0", "--frames", "0:2")[0] == 0
+    for arguments, message in (
+        ((tmp_path / "none.zarr",), "there is no such store"),
+        ((small_file,), "there is no such store"),
+        ((tmp_path / "empty.zarr",), "not a store that xarray can open"),
+        ((store, "--frame", "7"), "frame 7 has not been built; there are 2, 0 to 1"),
+    ):
+        status, out, err = command("show", *arguments)
+        assert (status, out, err.count("\n")) == (2, "", 1)
+        assert message in err
+    assert not (tmp_path / "s.zarr.pictures").exists()
+
+
+def test_a_store_needs_a_name(command: Command, small_file: Path) -> None:
+    status, out, err = command("build", small_file, "/", "--workers", "0")
+    assert (status, out, err) == (1, "", "sonarsynth: /: is no place for a store\n")
+
+
+def test_calls_that_cannot_be(small: Recipe, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="'film' is not a product; known: signals, image, cloud"):
+        sonarsynth.plan(small, ["film"])
+    with pytest.raises(ValueError, match="'film' is not a product"):
+        sonarsynth.build(small, tmp_path / "s.zarr", workers=0, products="film")
+    with pytest.raises(TypeError, match=r"a recipe is planned, not a str: sonarsynth.load reads one"):
+        sonarsynth.build("small.yaml", tmp_path / "s.zarr", workers=0)
+    with pytest.raises(ValueError, match="workers must be 0 or more, not -1"):
+        sonarsynth.build(small, tmp_path / "s.zarr", workers=-1)
+    with pytest.raises(IndexError, match=r"frame 20 is outside 0\.\.19"):
+        sonarsynth.build(small, tmp_path / "s.zarr", workers=0, frames=[20])
+    assert sonarsynth.plan(small, "image").products == {"image"}
+
+
+def test_a_script_without_a_main_guard_is_told_so(small_file: Path, tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        f"import sonarsynth\nsonarsynth.build(sonarsynth.load({str(small_file)!r}), 's.zarr', workers=1)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, cwd=tmp_path, timeout=60, check=False
+    )
+    assert done.returncode == 1
+    assert done.stderr.endswith(
+        'RuntimeError: no worker process could start: in a script, build under `if __name__ == "__main__":`, '
+        "or with workers=0\n"
+    )
+
+
+def test_the_schema_takes_every_recipe_there_is_and_no_misspelt_one() -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    from ruamel.yaml import YAML
+
+    check = jsonschema.Draft202012Validator(config.schema())
+    check.check_schema(check.schema)
+    files = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
+    assert files
+    for file in files:
+        data = json.loads(json.dumps(YAML(typ="safe", pure=True).load(file)))
+        assert not list(check.iter_errors(data)), file.name
+        data["scene"]["sonar"]["beems"] = {}
+        assert list(check.iter_errors(data)), file.name
