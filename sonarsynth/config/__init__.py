@@ -105,7 +105,7 @@ def _resolved(source: Source, data: Any, where: Where, check: bool) -> Any:
         file = Path(path) if Path(path).is_absolute() else folder / path
         if check:
             _check_file(source, place, path, file)
-        return data | {"path": str(file)}
+        return data | {"path": path if Path(path).is_absolute() else str(file)}
     return {key: _resolved(source, value, (*where, key), check) for key, value in data.items()}
 
 

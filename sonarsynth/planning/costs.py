@@ -15,23 +15,30 @@ from sonarsynth.planning.plans import Omission, Plan, Stage
 from sonarsynth.tracing import Refracted, Straight
 from sonarsynth.world.meshes import mesh_of
 
-REFERENCE_TRANSFORM = 1.0e-3
-"""Seconds of `_probe` on the machine where the constants below were measured."""
+REFERENCE_TRANSFORM = 2.0e-3
+"""Seconds of the transforms in `machine_factor` on the machine where the constants below were measured."""
 
 SECONDS = {
-    "trace facet": 2.0e-6,  # straight rays, lit test, ray casting both ways, scattering law
+    "trace facet": 1.25e-6,  # straight rays, lit and seen, ray casting both ways, scattering law over the aperture
     "trace refracted facet": 12e-6,  # eigenrays to the centre and to the probes of the aperture
-    "label beam": 0.6e-6,
-    "synthesise path sensor": 7e-9,
-    "synthesise sensor sample": 12e-9,
+    "label beam": 0.25e-6,
+    "label facet": 0.28e-6,
+    "label refracted facet": 1.8e-6,
+    "synthesise path sensor": 1.0e-9,
+    "synthesise path sensor steradian": 3.6e-6,  # the wider a target, the more nodes and tiles
+    "synthesise sensor sample": 4.5e-9,
     "noise sensor sample": 10e-9,
     "locate sensor": 8e-6,
-    "transform sensor sample": 6e-9,
+    "transform sensor sample": 1.6e-9,
     "image beam bin": 1.2e-9,
-    "range beam": 60e-6,
-    "write byte": 1.5e-9,
+    "range beam": 70e-6,
+    "write byte": 12e-9,
 }
 """Seconds per unit of work."""
+LIT = 0.22
+"""Share of the facets of a closed body that a snap lights and the array sees."""
+RANGED_BEAMS = 60
+"""Beams over threshold round one glint."""
 
 ERRORS = {
     "kernel_deposit": "1e-4 of the peak",
@@ -58,36 +65,61 @@ def _facets(plan: Plan) -> int:
     return sum(len(mesh_of(t.shape).faces) for t in plan.scene.world.targets)
 
 
+def _solid_angle(plan: Plan) -> float:
+    """Largest solid angle (sr) of the box round a target, seen from the array in the first frame."""
+    frame = plan.recipe.frame(0)[1]
+    angles = [0.0]
+    for body in frame.moment.bodies:
+        sides = np.sort(np.ptp(body.mesh.box, axis=0))
+        distance = max(float(np.linalg.norm(body.pose.position - frame.sonar_pose.position)), float(sides[-1]))
+        angles.append(float(sides[-1] * sides[-2]) / distance**2)
+    return max(angles)
+
+
+def _synthesis(plan: Plan) -> tuple[str, str, str, str, float, int]:
+    """The row of the synthesis, in seconds of the reference machine."""
+    scene, sizes = plan.scene, plan.sizes
+    sensor_samples = sizes["sensor"] * sizes["sample"]
+    paths = LIT * _facets(plan) * max(sizes["snap"], 1)
+    each = SECONDS["synthesise path sensor"] + _solid_angle(plan) * SECONDS["synthesise path sensor steradian"]
+    work = paths * sizes["sensor"] * each + sensor_samples * SECONDS["synthesise sensor sample"]
+    if scene.world.environment.noise:
+        work += sensor_samples * SECONDS["noise sensor sample"]
+    stored = sensor_samples * (2 if scene.sonar.converter else 4) if "signals" in plan.products else 0
+    kind = scene.physics.synthesis.kind
+    return ("synthesise", kind, "asked for, or needed by the image", ERRORS[kind], work, stored)
+
+
 def stages(plan: Plan) -> tuple[Stage, ...]:
     """What each stage will do, why, its error, and what it costs in one frame."""
     scene, sizes, factor = plan.scene, plan.sizes, machine_factor()
     sonar, processing = scene.sonar, scene.processing
-    facets, paths = _facets(plan) * max(sizes["snap"], 1), 0.35 * _facets(plan) * max(sizes["snap"], 1)
-    sensor_samples = sizes["sensor"] * sizes["sample"]
+    facets, snaps = _facets(plan), max(sizes["snap"], 1)
     beams = sizes["azimuth"] * sizes["elevation"]
     gate = plan.windows.echo_stop - plan.windows.echo_start
     bins = (sonar.band.high - sonar.band.low) * gate
     straight = isinstance(plan.propagation, Straight)
+    kind = "" if straight else "refracted "
     rows: list[tuple[str, str, str, str, float, int]] = [
         (
             "trace",
             f"{plan.propagation.kind} rays, {scene.physics.scattering.kind}",
             "one sound speed everywhere: rays are straight" if straight else "the sound speed varies with depth",
-            "none" if straight else "wavefront expansion: measured, /truth/wavefront_error",
-            facets * SECONDS["trace facet" if straight else "trace refracted facet"],
+            "measured: /truth/amplitude_error" + ("" if straight else ", wavefront_error"),
+            facets * snaps * SECONDS[f"trace {kind}facet"],
             0,
         ),
-        ("label", "one ray a beam", "always", "none", beams * SECONDS["label beam"], beams * 10 + 4096),
+        (
+            "label",
+            "one ray a beam",
+            "always",
+            "none",
+            beams * SECONDS["label beam"] + facets * SECONDS[f"label {kind}facet"],
+            beams * 10 + 4096,
+        ),
     ]
     if plan.products:
-        work = paths * sizes["sensor"] * SECONDS["synthesise path sensor"]
-        work += sensor_samples * SECONDS["synthesise sensor sample"]
-        if scene.world.environment.noise:
-            work += sensor_samples * SECONDS["noise sensor sample"]
-        method = scene.physics.synthesis
-        size = 2 if sonar.converter else 4
-        stored = sensor_samples * size if "signals" in plan.products else 0
-        rows.append(("synthesise", method.kind, "asked for, or needed by the image", ERRORS[method.kind], work, stored))
+        rows.append(_synthesis(plan))
     if plan.products & {"image", "cloud"}:
         rows.append(
             (
@@ -113,7 +145,7 @@ def stages(plan: Plan) -> tuple[Stage, ...]:
                 processing.ranging.kind,
                 "asked for",
                 "predicted, /cloud/range_error",
-                150 * SECONDS["range beam"],
+                RANGED_BEAMS * SECONDS["range beam"],
                 28 * beams,
             )
         )
