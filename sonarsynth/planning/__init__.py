@@ -14,13 +14,17 @@ from sonarsynth.planning.windows import lay_windows
 from sonarsynth.recipe import Recipe
 from sonarsynth.sonar import elements
 from sonarsynth.tracing import AutoTracing, Refracted, Straight
-from sonarsynth.world.meshes import mesh_of
+from sonarsynth.world.meshes import Mesh, mesh_of
+from sonarsynth.world.refinement import longest_edge
+from sonarsynth.world.targets import Target
 
 __all__ = ["PRODUCTS", "Omission", "Plan", "Stage", "Windows", "chosen_products", "lay_windows", "plan"]
 
 SHARD_BYTES = 64e6
 """A shard holds about this much of the largest array, and at most SHARD_FRAMES frames."""
 SHARD_FRAMES = 8
+COARSE = 0.1
+"""Facets longer than this (m) are noted: range errors of points are a few centimetres."""
 
 
 def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS) -> Plan:
@@ -54,6 +58,7 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS) -> Plan:
             f"{windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest one",
         )
     notes += _behind(recipe)
+    notes += _coarse(recipe)
     notes += tuple(f"{t.name}: {note}" for t in scene.world.targets for note in mesh_of(t.shape).notes)
     return replace(made, stages=stages(made), left_out=left_out(made), warnings=notes)
 
@@ -78,6 +83,20 @@ def chosen_products(names: Iterable[str]) -> frozenset[str]:
     if unknown:
         raise ValueError(f"'{unknown[0]}' is not a product; known: {', '.join(PRODUCTS)}")
     return chosen
+
+
+def _coarse(recipe: Recipe) -> tuple[str, ...]:
+    """Notes on targets whose echoes come from the middles of facets longer than COARSE."""
+    longest = ((t.name, longest_edge((m.vertices, m.faces.astype(np.int64)))) for t, m in _meshes(recipe))
+    return tuple(
+        f"{name}: facets up to {edge:.2g} m long, each echoing from its middle: set shape.edge to refine"
+        for name, edge in longest
+        if edge > COARSE
+    )
+
+
+def _meshes(recipe: Recipe) -> list[tuple[Target, Mesh]]:
+    return [(t, mesh_of(t.shape)) for t in recipe.scene.world.targets]
 
 
 def _sizes(recipe: Recipe, windows: Windows) -> dict[str, int]:

@@ -54,7 +54,7 @@ def point_cloud(
     shape = image.energy.shape
     grids = {name: np.full(shape, np.nan, np.float32) for name in ("range", "range_error", "delay", "energy")}
     position = np.full((*shape, 3), np.nan, np.float32)
-    beams = over_threshold(image, threshold)
+    beams = over_threshold(image, threshold, float(np.abs(signals.pressure).max(initial=0.0)))
     located = len(bearings.time) > 0 and np.isfinite(bearings.time[0]) and np.isfinite(bearings.position[0]).all()
     if located and len(beams[0]) > 0:
         profiles = range_profiles(signals, image, bearings, elements, sonar, beams, focus)

@@ -40,6 +40,9 @@ NOISE = 16.0
 EXTENT = 0.05
 """Share of a profile's peak above which it is echo: how far that spreads is the depth of the target in the beam."""
 
+RESIDUE = 1e-6
+"""Of the loudest pressure: what single precision and the cut tail of a pulse (1e-7 of its peak) may leave anywhere."""
+
 
 @dataclass(frozen=True, eq=False)
 class Profiles:
@@ -65,11 +68,15 @@ class Echoes:
     extent: Floats  # (beam,) s: root mean square distance from the peak of all echo in the beam
 
 
-def over_threshold(image: EnergyImage, threshold: float) -> tuple[Ints, Ints]:
-    """Rows and columns of the beams within `threshold` dB of the loudest; none in silence or where none was heard."""
+def over_threshold(image: EnergyImage, threshold: float, loudest: float = 0.0) -> tuple[Ints, Ints]:
+    """Rows and columns of the beams within `threshold` dB of the loudest; none in silence or where none was heard.
+
+    loudest: largest pressure (Pa) in the signals. An image no louder than `RESIDUE` of it all through the window is
+    what rounding and the tail of the direct pulse leave, not an echo.
+    """
     energy = np.where(np.isfinite(image.energy), image.energy, 0.0)
     peak = float(energy.max(initial=0.0))
-    if not peak > 0:
+    if not peak > (RESIDUE * loudest) ** 2 * (image.stop - image.start):
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     keep = energy >= peak * 10 ** (-threshold / 10)
     if keep.sum() > MAX_BEAMS:

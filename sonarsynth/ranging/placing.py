@@ -144,10 +144,12 @@ def _fuse(
     if slope * fall > 0:
         row = np.array([*by_angle, -fall])
         innovation = k * fall - slope
-        variance = float(row @ p @ row) + (slope / fall * depth_error) ** 2
+        noise = (max(abs(k), slope / fall) * depth_error) ** 2  # near the horizontal the depth says nothing of k
+        variance = float(row @ p @ row) + noise
         gain = p @ row / variance
         step = gain * innovation
-        p = (p - np.outer(gain, gain) * variance) * max(1.0, innovation**2 / variance)
+        keep = np.eye(3) - np.outer(gain, row)  # Joseph's form: no variance can come out negative
+        p = (keep @ p @ keep.T + np.outer(gain, gain) * noise) * max(1.0, innovation**2 / variance)
     k = k + step[2]
     if not k > 0:
         return np.full(3, np.nan), np.full((3, 3), np.nan)
