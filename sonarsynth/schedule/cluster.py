@@ -32,7 +32,12 @@ ONE_THREAD: Final = dict.fromkeys(
 )
 """Environment of workers: frames run side by side, so a frame runs on one thread (and sums in one order)."""
 
+KEEP_MEMORY: Final = {"MALLOC_TRIM_THRESHOLD_": str(2**28), "MALLOC_MMAP_THRESHOLD_": str(2**28)}
+"""Environment of workers: arrays of a frame are taken from memory that the last frame left. Dask would have it given back
+after every one (64 kB), and the kernel clear it again: half of the time of a frame."""
+
 _SETTINGS: Final = {
+    "distributed.nanny.pre-spawn-environ": ONE_THREAD | KEEP_MEMORY,
     "distributed.scheduler.work-stealing": False,  # a shard stays where it is
     "distributed.scheduler.allowed-failures": 1,  # workers that a task may take with it, less one
     "distributed.worker.memory.target": False,  # no spilling: the window bounds memory
