@@ -18,8 +18,8 @@ from typing import Annotated, Any, Final
 
 import numpy as np
 import numpy.typing as npt
-from annotated_types import Ge, Gt
-from pydantic import BeforeValidator, GetJsonSchemaHandler, WithJsonSchema
+from annotated_types import Ge, Gt, Le
+from pydantic import BeforeValidator, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import core_schema
 
@@ -30,9 +30,8 @@ Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
 REFERENCE_PRESSURE: Final = 1e-6  # Pa: levels are dB re 1 uPa
-REFERENCE_DISTANCE: Final = 1.0  # m: source levels are at 1 m
-STANDARD_GRAVITY: Final = 9.80665  # m/s2
-ATMOSPHERIC_PRESSURE: Final = 101325.0  # Pa
+SLOWEST, FASTEST = 100.0, 10e3
+"""Sound speeds (m/s) outside are not those of water: another unit, or a mark for "missing"."""
 
 NO_TARGET: Final = -1
 """Index of "no target", "no facet": never 0, which is a target."""
@@ -81,15 +80,30 @@ class Unit:
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        number = handler(schema)
+        number = _bounded(handler(schema)) | {"description": f"in {self.symbol}"}
         units = "|".join(UNITS[self.symbol])
-        text = {"type": "string", "pattern": rf"^[-+0-9.eE]+ ({units})$"}
-        return {"anyOf": [number, text], "description": f"in {self.symbol}, or a text with a unit"}
+        text = {"type": "string", "pattern": rf"^[-+0-9.eE]+ ({units})$", "description": "with a unit"}
+        return {"anyOf": [number, text]}
+
+
+_BOUNDS: Final = {"ge": "minimum", "gt": "exclusiveMinimum", "le": "maximum", "lt": "exclusiveMaximum"}
+
+
+def _bounded(number: JsonSchemaValue) -> JsonSchemaValue:
+    """The JSON schema of a number with its bounds in JSON's words: pydantic leaves its own behind a validator."""
+    return {_BOUNDS.get(key, key): value for key, value in number.items()}
 
 
 def _in(symbol: str) -> tuple[Unit, BeforeValidator]:
     unit = Unit(symbol)
     return unit, BeforeValidator(unit.parse)
+
+
+class _PlainSchema:
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        return _bounded(handler(schema))
 
 
 def _plain(value: Any) -> Any:
@@ -109,7 +123,7 @@ Decibels = Annotated[float, *_in("dB")]
 KilogramsPerCubicMetre = Annotated[float, *_in("kg/m3")]
 DegreesCelsius = Annotated[float, *_in("degC")]
 PracticalSalinity = Annotated[float, *_in("psu")]
-Number = Annotated[float, BeforeValidator(_plain), WithJsonSchema({"type": "number"})]
+Number = Annotated[float, BeforeValidator(_plain), _PlainSchema()]
 """A dimensionless number."""
 
 PositiveMetres = Annotated[Metres, Gt(0)]
@@ -118,6 +132,7 @@ PositiveSeconds = Annotated[Seconds, Gt(0)]
 PositiveHertz = Annotated[Hertz, Gt(0)]
 PositiveSpeed = Annotated[MetresPerSecond, Gt(0)]
 PositiveRadians = Annotated[Radians, Gt(0)]
+WaterSoundSpeed = Annotated[PositiveSpeed, Ge(SLOWEST), Le(FASTEST)]
 
 Position = tuple[Metres, Metres, Metres]
 """A point (x, y, z) in metres."""

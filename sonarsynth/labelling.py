@@ -10,7 +10,7 @@ from sonarsynth.conventions import NO_TARGET, Floats, azimuth_elevation, directi
 from sonarsynth.geometry import Pose
 from sonarsynth.products import LEDGER, Arrivals, Ledger, Paths, Truth
 from sonarsynth.sonar import BeamGrid
-from sonarsynth.world.casting import first_hit, occluded
+from sonarsynth.world.casting import OFFSET, first_hit, occluded
 from sonarsynth.world.meshes import Mesh
 from sonarsynth.world.moment import Body, Moment, Snap
 
@@ -130,7 +130,7 @@ def _visible(body: Body, seen: Floats, bodies: tuple[Body, ...], sonar_pose: Pos
     facing = np.einsum("ij,ij->i", sonar_pose.position - centroid, normal) > 0
     if not facing.any():
         return np.full(4, np.nan), 0.0
-    start = centroid[facing] + 1e-6 * mesh.radius * normal[facing]
+    start = centroid[facing] + OFFSET * mesh.radius * normal[facing]
     clear = ~occluded(bodies, start, np.broadcast_to(sonar_pose.position, start.shape))
     clear &= np.isfinite(seen[mesh.faces[facing]]).all(axis=(1, 2))
     visible = np.flatnonzero(facing)[clear]

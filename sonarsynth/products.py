@@ -32,7 +32,7 @@ class Paths:
     surface: Ints  # (path,) number of surface reflections
     bottom: Ints  # (path,) number of bed reflections
     turning: Ints  # (path,) number of turning points
-    flag: Ints  # (path,) 0 good; else why ray theory ends here (tracing.FLAGS)
+    flag: Ints  # (path,) 0 good; else why ray theory ends here (`acoustics.rays.REASONS`)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,9 +121,7 @@ class Bearings:
 class EnergyImage:
     """Energy in each steered direction, in the echo window."""
 
-    energy: npt.NDArray[
-        np.float32
-    ]  # (elevation, azimuth) Pa2 s, of the mean-pressure beam (a plane wave of p gives int p2 dt)
+    energy: npt.NDArray[np.float32]  # (elevation, azimuth) Pa2 s: a plane wave of pressure p gives int p2 dt
     azimuth: Floats  # (azimuth,) rad, ascending
     elevation: Floats  # (elevation,) rad, ascending
     start: float  # s: the echo window that was imaged

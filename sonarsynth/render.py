@@ -1,8 +1,9 @@
 """render(plan, i): one frame from recipe to labelled data, pure. Labels enter here and nowhere below.
 
-    trace_frame       Scene, Frame -> Arrivals, Truth, Ledger
-    beamform_frame    Arrivals -> Signals, Bearings, EnergyImage
-    range_frame       Signals, Bearings, EnergyImage -> PointCloud, and everything that is stored
+    trace_frame       Plan -> Traced: Frame, Arrivals, Truth, Ledger
+    beamform_frame    Traced -> Heard: Signals, Bearings, EnergyImage
+    range_frame       Traced, Heard -> Values: everything that is stored, the PointCloud with it
+
 The three are the tasks that the scheduler runs; what nobody asked for is not computed.
 """
 

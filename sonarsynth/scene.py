@@ -32,7 +32,9 @@ class World:
 
     environment: Environment
     targets: tuple[Target, ...] = ()
+    """Bodies in the water."""
     shrimp: tuple[SnappingShrimp, ...] = ()
+    """What makes the sound."""
 
     @field_validator("targets")
     @classmethod
@@ -49,9 +51,13 @@ class Trajectory:
     """When frames are taken, and how the sonar moves."""
 
     frames: Annotated[int, Ge(1), Le(100_000_000)] = 1
+    """Number of frames."""
     interval: PositiveSeconds = 0.1
+    """Time from one frame to the next."""
     start: Seconds = 0.0
+    """Time of the first frame since the start of the motions."""
     sonar: Motion = Still(position=(0.0, 0.0, -5.0), heading=0.5 * np.pi)
+    """How the sonar moves."""
 
     def time(self, step: int) -> float:
         """Time (s) of a frame since the start of the motions."""
@@ -63,8 +69,11 @@ class Physics:
     """How the scene is simulated."""
 
     tracing: Tracing = Field(default_factory=AutoTracing)
+    """How sound travels."""
     scattering: Scattering = Field(default_factory=MirrorLobe)
+    """How facets scatter it."""
     synthesis: Synthesis = Field(default_factory=KernelDeposit)
+    """How signals are made from arrivals."""
 
 
 @description
@@ -75,7 +84,9 @@ class EchoWindow:
     """
 
     start: Annotated[Seconds, Ge(0)] | None = None
+    """Begin of the window after the direct arrival."""
     stop: PositiveSeconds | None = None
+    """End of the window after the direct arrival."""
 
 
 @description
@@ -84,8 +95,11 @@ class Processing:
 
     echo_window: EchoWindow = Field(default_factory=EchoWindow)
     locating: Locator = Field(default_factory=SensorDelays)
+    """How the snap is located."""
     beamforming: Beamformer = Field(default_factory=FocusedDelayAndSum)
+    """How the energy image is made."""
     ranging: Ranging = Field(default_factory=IsovelocityRange)
+    """How echoes are ranged and placed."""
 
 
 @description

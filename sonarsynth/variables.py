@@ -28,7 +28,6 @@ class Variable:
     units: str  # UDUNITS text; "1" where there is none
     long_name: str
     fill: float | int = float("nan")
-    standard_name: str | None = None
     attributes: tuple[tuple[str, Any], ...] = ()
     product: str = "truth"  # which product of a build it belongs to
 

@@ -68,7 +68,7 @@ def up_to_date() -> bool:
 
 def make_environment() -> None:
     """A virtual environment with pip in it; one that works, and was made here, is kept."""
-    usable = "import pip, sys; sys.exit(sys.version_info < (3, 11))"
+    usable = f"import pip, sys; sys.exit(sys.version_info < {OLDEST})"
     if PYTHON.exists() and made_here() and run(PYTHON, "-c", usable).returncode == 0:
         return
     say(f"making {VENV.name} with Python {sys.version.split()[0]}")

@@ -16,18 +16,12 @@ from typing import Any
 import numba as nb
 import numpy as np
 
-from sonarsynth.acoustics.lanes import LANES, load, load_complex, splat, store, store_complex
-from sonarsynth.acoustics.phasors import ZERO, Spectra, padded_bins, phasors, turned
+from sonarsynth.acoustics.lanes import LANES, load, splat, store, store_complex
+from sonarsynth.acoustics.phasors import ZERO, Spectra, padded_bins, phasors, turned, weighted
 from sonarsynth.conventions import Floats, Ints
 
 TERM = 4 * LANES
 """float32 numbers of one term of a sum: two complex numbers (sum and difference of a pair) of sixteen frequencies."""
-
-
-@nb.njit(cache=True, nogil=True, forceinline=True)
-def _heard(pairs: Any, at: int, weight: float) -> Any:
-    x, y = load_complex(pairs, at)
-    return splat(weight) * x, splat(weight) * y
 
 
 @nb.njit(cache=True, nogil=True, forceinline=True)
@@ -60,8 +54,8 @@ def _focus_and_fold(
             c, s = phasors(delay[n, m], frequency + low * spacing, spacing)
             for side in range(2):
                 up, down = places[n, m, side], places[n, m, 2 + side]
-                x, y = _heard(pairs, 2 * (up * bins + low), weight[up])
-                p, q = _heard(pairs, 2 * (down * bins + low), weight[down])
+                x, y = weighted(pairs, 2 * (up * bins + low), weight[up])
+                p, q = weighted(pairs, 2 * (down * bins + low), weight[down])
                 x, y = turned(x, y, c, s)
                 p, q = turned(p, q, c, s)
                 _store_pair(terms, ((side * columns + n) * rows + m) * TERM, x, y, p, q)
@@ -94,18 +88,6 @@ def _lattice_sums(
                 store_complex(beams, 2 * (beam * bins + low), x, y)
 
 
-def corners(column: Ints, row: Ints, columns: int, rows: int, live: Ints, nobody: int) -> Ints:
-    """(half column, half row, 4) sensors at (+z, +y), (+z, -y), (-z, +y), (-z, -y), from the middle outwards.
-
-    column, row (sensor,) on the lattice, column 0 at +y and row 0 at +z; live: the sensors to be placed; `nobody` where
-    there is none. The middle column and row of an odd number stand on the positive side alone.
-    """
-    places = np.full(((columns + 1) // 2, (rows + 1) // 2, 4), nobody)
-    along_y, along_z = columns - 1 - 2 * column[live], rows - 1 - 2 * row[live]
-    places[np.abs(along_y) // 2, np.abs(along_z) // 2, 2 * (along_z < 0) + (along_y < 0)] = live
-    return places
-
-
 def lattice_sums(
     spectra: Spectra,
     places: Ints,
@@ -119,9 +101,10 @@ def lattice_sums(
 ) -> Spectra:
     """Sum over sensors of weight * spectra * exp(+i 2 pi f (delay + that of the plane wave)): (beam, bin) complex64.
 
-    spectra (sensor, bin) at f = frequency + spacing * bin (Hz); places as by `corners`, with as many as there are
-    sensors for nobody; weight (sensor,); delay (half column, half row) s. rise, across (beam,): what a plane wave is
-    later (s) at the next row up and at the next column to port. odd: whether rows, and columns, are an odd number.
+    spectra (sensor, bin) at f = frequency + spacing * bin (Hz); places as by `lattices.mirrored_sensors`, with as many
+    as there are sensors for nobody; weight (sensor,); delay (half column, half row) s. rise, across (beam,): what a
+    plane wave is later (s) at the next row up and at the next column to port. odd: whether rows, and columns, are an
+    odd number.
     """
     sensors, bins = spectra.shape
     heard = padded_bins(spectra, sensors + 1, LANES)

@@ -76,6 +76,13 @@ def phasors(delay: float, frequency: float, spacing: float) -> Any:
     return turned(c, s, c, s)
 
 
+@nb.njit(cache=True, nogil=True, forceinline=True)
+def weighted(pairs: Any, at: int, weight: float) -> Any:
+    """Real and imaginary parts (lanes) of weight times sixteen complex numbers, pairs of float32 from pairs[at] on."""
+    x, y = load_complex(pairs, at)
+    return splat(weight) * x, splat(weight) * y
+
+
 @nb.njit(cache=True, nogil=True)
 def group_steps(delays: Any, spacing: float, cosines: Any, sines: Any) -> None:
     """Fill cosines, sines (float32) with half phasors of 2 pi delay * 16 spacing: one group of frequencies on.

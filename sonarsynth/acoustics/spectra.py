@@ -1,4 +1,4 @@
-"""Filters, windows and interpolation kernels, and the filtered snap.
+"""Filters and interpolation kernels, and the filtered snap.
 
 The filters are the Kaiser-window FIR filters of `scipy.signal.firwin` and `kaiserord` in the limit of a high design
 rate: their impulse response is a function of time, symmetric and of finite length, so that a filtered snap is finite
@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.fft import fft, ifft
 from scipy.special import i0, i0e
 
 from sonarsynth.acoustics import snap
@@ -140,32 +139,3 @@ def kaiser_bessel_beta(width: float, oversampling: float) -> float:
     5."""
     s = width / oversampling
     return float(np.pi * np.sqrt(max((s * (oversampling - 0.5)) ** 2 - 0.8, 0.25)))
-
-
-def analytic_signal(signal: npt.NDArray[np.floating], axis: int = -1) -> npt.NDArray[np.complexfloating]:
-    """Analytic signal along an axis: its modulus is the envelope. The signal is taken as periodic."""
-    x = np.moveaxis(np.asarray(signal), axis, -1)
-    n = x.shape[-1]
-    spectrum = fft(x, axis=-1)
-    spectrum[..., 1 : (n + 1) // 2] *= 2.0
-    spectrum[..., n // 2 + 1 :] = 0.0
-    return np.moveaxis(ifft(spectrum, axis=-1), -1, axis)
-
-
-def envelope(signal: npt.NDArray[np.floating], axis: int = -1) -> npt.NDArray[np.floating]:
-    """Envelope along an axis: the modulus of the analytic signal."""
-    return np.asarray(np.abs(analytic_signal(signal, axis)))
-
-
-def band_taper(frequency: npt.ArrayLike, low: float, high: float, transition: float) -> Floats:
-    """Raised-cosine band weight: 1/2 at low and at high (Hz), 1 and 0 half a `transition` inside and outside; low = 0:
-    no lower edge."""
-    f = np.abs(np.asarray(frequency, float))
-
-    def rise(distance: Floats) -> Floats:
-        if transition <= 0.0:
-            return np.heaviside(distance, 0.5)
-        return np.asarray(0.5 + 0.5 * np.sin(np.pi * np.clip(distance / transition, -0.5, 0.5)))
-
-    upper = rise(high - f)
-    return upper if low <= 0.0 else upper * rise(f - low)

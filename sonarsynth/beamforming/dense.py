@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.acoustics.arrays import focus_delay
+from sonarsynth.acoustics.beams import first_and_spacing
 from sonarsynth.beamforming.window import Shading, energy_image, weights, window_spectra
 from sonarsynth.conventions import Floats, PositiveMetres, direction
 from sonarsynth.description import description
@@ -25,6 +26,7 @@ class DenseDelayAndSum:
     focus: PositiveMetres | None = 20.0
     """Range at which the array is focused; left out (none), plane waves."""
     shading: Shading = "uniform"
+    """Weights over the aperture: all alike, or falling off towards the rim (lower side lobes, a wider beam)."""
 
     def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
         """Image of the window from start to stop (s)."""
@@ -45,12 +47,12 @@ def dense_energies(
     """
     live = np.flatnonzero(weight)
     heard = (weight[live, None] * spectra[live]).T
-    spacing = frequencies[1] - frequencies[0] if len(frequencies) > 1 else 0.0
+    first, spacing = first_and_spacing(frequencies)
     energy = np.zeros(len(delay))
-    for first in range(0, len(delay), BEAMS_AT_ONCE):
-        block = slice(first, first + BEAMS_AT_ONCE)
+    for start in range(0, len(delay), BEAMS_AT_ONCE):
+        block = slice(start, start + BEAMS_AT_ONCE)
         turn = np.exp(2j * np.pi * spacing * delay[block][:, live])
-        phasor = np.exp(2j * np.pi * frequencies[0] * delay[block][:, live])
+        phasor = np.exp(2j * np.pi * first * delay[block][:, live])
         for spectrum in heard:
             energy[block] += np.abs(phasor @ spectrum) ** 2
             phasor *= turn

@@ -31,6 +31,7 @@ class FocusedDelayAndSum:
     focus: PositiveMetres | None = 20.0
     """Range at which the array is focused; left out (none), plane waves."""
     shading: Shading = "uniform"
+    """Weights over the aperture: all alike, or falling off towards the rim (lower side lobes, a wider beam)."""
 
     def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
         """Image of the window from start to stop (s). Raises ValueError for an array that is not a lattice."""

@@ -21,8 +21,19 @@ from typing import Any
 import numba as nb
 import numpy as np
 
-from sonarsynth.acoustics.lanes import LANES, least, load, load_complex, splat, store, total, with_sign
-from sonarsynth.acoustics.phasors import C0, CHUNK, GROUPS, TWO, ZERO, group_steps, half_phasors, phasors, turned
+from sonarsynth.acoustics.lanes import LANES, least, load, splat, store, total, with_sign
+from sonarsynth.acoustics.phasors import (
+    C0,
+    CHUNK,
+    GROUPS,
+    TWO,
+    ZERO,
+    group_steps,
+    half_phasors,
+    phasors,
+    turned,
+    weighted,
+)
 
 TERM = 8 * LANES
 """float32 numbers of one term of a sum: four complex numbers (Ss Sd Ds Dd, or Ss Ds Sd Dd) of sixteen frequencies."""
@@ -92,12 +103,6 @@ def _add_energies(sums: Any, energies: Any) -> Any:
     return upper_port, upper_starboard, lower_port, lower_starboard
 
 
-@nb.njit(cache=True, nogil=True, forceinline=True)
-def _gather(pairs: Any, at: int, weight: float) -> Any:
-    x, y = load_complex(pairs, at)
-    return splat(weight) * x, splat(weight) * y
-
-
 @nb.njit(cache=True, nogil=True)
 def _focus_and_fold(
     pairs: Any, bins: int, places: Any, weight: Any, delay: Any, frequency: float, spacing: float, low: int, folded: Any
@@ -107,10 +112,10 @@ def _focus_and_fold(
     for n in range(columns):
         for m in range(rows):
             j, k, g, h = places[n, m, 0], places[n, m, 1], places[n, m, 2], places[n, m, 3]
-            x0, y0 = _gather(pairs, 2 * (j * bins + low), weight[j])
-            x1, y1 = _gather(pairs, 2 * (k * bins + low), weight[k])
-            x2, y2 = _gather(pairs, 2 * (g * bins + low), weight[g])
-            x3, y3 = _gather(pairs, 2 * (h * bins + low), weight[h])
+            x0, y0 = weighted(pairs, 2 * (j * bins + low), weight[j])
+            x1, y1 = weighted(pairs, 2 * (k * bins + low), weight[k])
+            x2, y2 = weighted(pairs, 2 * (g * bins + low), weight[g])
+            x3, y3 = weighted(pairs, 2 * (h * bins + low), weight[h])
             c, s = phasors(delay[n, m], frequency + low * spacing, spacing)
             at = (n * rows + m) * TERM
             _store_turned(folded, at, (x0 + x1) + (x2 + x3), (y0 + y1) + (y2 + y3), c, s)

@@ -7,14 +7,9 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.acoustics.arrays import (
-    frequency_spacing,
-    gate_samples,
-    gated_spectra,
-    hann_shading,
-    live_gain,
-    spectrum_energy,
-)
+from sonarsynth.acoustics.arrays import hann_shading, live_gain
+from sonarsynth.acoustics.beams import spectrum_energy
+from sonarsynth.acoustics.gates import frequency_spacing, gate_samples, gated_spectra
 from sonarsynth.conventions import Floats
 from sonarsynth.products import EnergyImage, Signals
 from sonarsynth.sonar import Elements, Sonar

@@ -28,10 +28,9 @@ def frame_numbers(text: str | None, count: int) -> tuple[int, ...] | None:
 
 def product_names(text: str) -> frozenset[str]:
     """Products named with commas. Raises BadOption."""
-    from sonarsynth.planning import PRODUCTS
+    from sonarsynth.planning import chosen_products
 
-    names = frozenset(part.strip() for part in text.split(",") if part.strip())
-    unknown = sorted(names - set(PRODUCTS))
-    if unknown:
-        raise BadOption(f"--products: '{unknown[0]}' is not one of {', '.join(PRODUCTS)}")
-    return names
+    try:
+        return chosen_products(part.strip() for part in text.split(",") if part.strip())
+    except ValueError as error:
+        raise BadOption(f"--products: {error}") from None

@@ -6,7 +6,7 @@ import numpy as np
 
 from sonarsynth.acoustics.snap import Bubble, onset, source_level
 from sonarsynth.beamforming import FocusedDelayAndSum
-from sonarsynth.conventions import Floats, depth
+from sonarsynth.conventions import FASTEST, SLOWEST, Floats, depth
 from sonarsynth.description import FieldError
 from sonarsynth.planning.plans import Windows
 from sonarsynth.recipe import Recipe
@@ -17,8 +17,6 @@ from sonarsynth.world.casts import profile_of
 from sonarsynth.world.environment import Profile
 from sonarsynth.world.meshes import Mesh, mesh_of
 
-SLOWEST, FASTEST = 100.0, 10e3
-"""m/s."""
 FARTHEST = 1e6
 """m from the origin: beyond, travel times lose their microseconds."""
 LOUDEST = 300.0

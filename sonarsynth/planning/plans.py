@@ -48,7 +48,6 @@ class Windows:
 
     start: Floats  # (frame,) s: first sample, a whole number of sampling intervals
     samples: int
-    direct: Floats  # (frame,) s: predicted direct arrival of the loudest snap at the array centre
     echo_start: float  # s after the direct arrival
     echo_stop: float  # s after the direct arrival
     disturbed: int  # frames in whose echo window other snaps, or their echoes, are heard as well
@@ -81,7 +80,7 @@ class Plan:
 
     @cached_property
     def digest(self) -> str:
-        """Identity of the numbers that this plan makes: the recipe's digest and the products."""
+        """Identity of the numbers that this plan makes, whatever the products: the recipe's digest."""
         return self.recipe.digest
 
     def absorption(self, frequency: np.ndarray | float) -> Floats:

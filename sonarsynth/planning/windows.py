@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -39,7 +39,7 @@ def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
     before, after = _support(recipe, SUPPORT) + across
     echo_before, echo_after = _support(recipe, ECHO_SUPPORT) + across
     spans = [_span(recipe.frame(i)[1], profile) for i in range(recipe.frames)]
-    first_heard, clock, last_direct, first_echo, last_echo, last_heard = np.array([_times(span) for span in spans]).T
+    first_heard, last_direct, first_echo, last_echo, last_heard = np.array([_times(span) for span in spans]).T
     gate = scene.processing.echo_window
     echoes = bool(np.isfinite(first_echo).any())
     shortest = float(np.nanmin(first_echo)) if echoes else np.nan
@@ -56,7 +56,7 @@ def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
     last = np.maximum(last_heard + after, last_direct + stop) + MARGIN
     samples = int(np.ceil(np.max(last - first) * rate)) + 1
     disturbed = sum(_disturbed(span, start - before, stop + before) for span in spans)
-    return Windows(first, samples, clock, float(start), float(stop), disturbed)
+    return Windows(first, samples, float(start), float(stop), disturbed)
 
 
 def _support(recipe: Recipe, tolerance: float) -> Floats:
@@ -76,14 +76,12 @@ class _Span:
     first_echo: float  # of any snap, after its own direct arrival; NaN where nothing echoes
     last_echo: float
     last: float  # last arrival of any snap
-    others: tuple[tuple[float, float], ...] = field(
-        default=(), compare=False
-    )  # direct arrival, last echo of the others
+    others: tuple[tuple[float, float], ...] = ()  # direct arrival and last echo of the snaps that are not the loudest
 
 
 def _times(span: _Span) -> tuple[float, ...]:
-    """The six times of a span."""
-    return (span.first, span.clock, span.last_direct, span.first_echo, span.last_echo, span.last)
+    """The times of a span that bound the windows of all frames."""
+    return (span.first, span.last_direct, span.first_echo, span.last_echo, span.last)
 
 
 def _span(frame: Frame, profile: Profile) -> _Span:

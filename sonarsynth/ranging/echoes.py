@@ -13,15 +13,9 @@ import numpy.typing as npt
 from scipy.fft import ifft, next_fast_len
 from scipy.ndimage import maximum_filter1d
 
-from sonarsynth.acoustics.arrays import (
-    beam_spectra,
-    fast_length,
-    frequency_spacing,
-    gate_samples,
-    gated_spectra,
-    lattice_beam_spectra,
-)
+from sonarsynth.acoustics.beams import beam_spectra, lattice_beam_spectra
 from sonarsynth.acoustics.bearings import wavefront_delays
+from sonarsynth.acoustics.gates import fast_length, frequency_spacing, gate_samples, gated_spectra
 from sonarsynth.conventions import Floats, Ints, direction
 from sonarsynth.products import Bearings, EnergyImage, Signals
 from sonarsynth.ranging import kernels, pulses
@@ -30,7 +24,9 @@ from sonarsynth.sonar import Elements, Sonar
 
 MAX_BEAMS = 16384
 """No more beams are ranged, the loudest of them: a bound on memory where a whole image is loud."""
+BEAMS_AT_ONCE = 512
 OVERSAMPLING = 4
+"""Delays of a profile for each that its bandwidth needs."""
 WHITENING = 0.03
 """Share of the pulse's largest power density below which the spectrum is no more flattened (-15 dB)."""
 GHOST = 8.0
@@ -39,7 +35,10 @@ NOISE = 16.0
 """An echo must stand this many dB above the median of its own beam: noise does so once in 10^12 samples."""
 EXTENT = 0.05
 """Share of a profile's peak above which it is echo: how far that spreads is the depth of the target in the beam."""
-
+OWN_WIDTH = 0.3
+"""Standard angle between a beam and the echo that is loudest in it, in half widths."""
+INTERFERENCE = 0.5
+"""Standard error of a peak's delay where echoes overlap, in units of the resolution."""
 RESIDUE = 1e-6
 """Of the loudest pressure: what single precision and the cut tail of a pulse (1e-7 of its peak) may leave anywhere."""
 
@@ -99,7 +98,7 @@ def direct_spectrum(signals: Signals, bearings: Bearings, elements: Elements, so
     expected = time + wavefront_delays(elements.position, u, curvature, c)
     aligned = pulses.align(signals, elements, sonar.band, expected, whole=True)
     wave = pulses.waveform(aligned, elements, c, u, curvature, time)
-    return pulses.template_spectrum(wave.template, signals.sampling_frequency, length)
+    return pulses.template_spectrum(wave.template, length)
 
 
 def range_profiles(
@@ -133,8 +132,8 @@ def range_profiles(
     row, column = beams
     u = direction(image.azimuth[column], image.elevation[row])
     power = np.empty((len(u), min(int(count / rate / step) + 1, length)), np.float32)
-    for part in range(0, len(u), 512):
-        here = slice(part, part + 512)
+    for part in range(0, len(u), BEAMS_AT_ONCE):
+        here = slice(part, part + BEAMS_AT_ONCE)
         sine = u[here] * (elements.face / c)
         face = kernels.face_responses(sine[:, 1], sine[:, 2], f[0], spacing, len(f))
         beam = _beams(spectra, f, elements, u[here], c, focus)
@@ -203,12 +202,6 @@ def _extent(profiles: Profiles, top: Ints, own: npt.NDArray[np.float32]) -> Floa
     square = np.einsum("bt,bt->b", echo, (steps - mean[:, None]) ** 2) / total
     spread = profiles.step * np.sqrt(square + (mean - top) ** 2)
     return np.asarray(np.sqrt(np.maximum(spread**2 - profiles.resolution**2, 0.0)))
-
-
-OWN_WIDTH = 0.3
-"""Standard angle between a beam and the echo that is loudest in it, in half widths."""
-INTERFERENCE = 0.5
-"""Standard error of a peak's delay where echoes overlap, in units of the resolution."""
 
 
 def _about(profiles: Profiles) -> int:

@@ -101,14 +101,14 @@ def place(wave: Wavefront, pulse: Pulse, known: Known, arrival: Floats | None = 
     fall = -known.bed_depth - pose.position[2]  # the snap stands this much above the sonar (negative: below it)
     slope = float(up @ u)
     by_angle = t @ up
-    fused = _fuse(wave, full, up, fall, slope, by_angle, sonar.bed_depth_error)
+    fused = _fuse(wave, full, fall, slope, by_angle, sonar.bed_depth_error)
     straight = full
     for _ in range(2 * (known.gradient > 0)):  # what bending does depends on the distance, and that a little on bending
         distance = float(np.linalg.norm(fused[0]))
         full = straight + bending_covariance(
             by_angle, slope, distance, known.gradient, sonar.assumed_sound_speed, elements.aperture
         )
-        fused = _fuse(wave, full, up, fall, slope, by_angle, sonar.bed_depth_error)
+        fused = _fuse(wave, full, fall, slope, by_angle, sonar.bed_depth_error)
     spread = full[:2, :2]
     with np.errstate(divide="ignore", invalid="ignore"):
         from_depth = fall / slope if slope * fall > 0 else np.nan
@@ -132,12 +132,14 @@ def place(wave: Wavefront, pulse: Pulse, known: Known, arrival: Floats | None = 
 
 
 def _fuse(
-    wave: Wavefront, covariance: Floats, up: Floats, fall: float, slope: float, by_angle: Floats, depth_error: float
+    wave: Wavefront, covariance: Floats, fall: float, slope: float, by_angle: Floats, depth_error: float
 ) -> tuple[Floats, Floats]:
-    """Position and covariance from the wavefront and from the depth: up.u - k fall = 0 within |k| depth_error.
+    """Position and covariance from the wavefront and from the depth: slope - k fall = 0 within |k| depth_error.
 
-    In (tangents, curvature) the condition is linear and the far field is no special case. Where depth and curvature
-    disagree by more than their errors the covariance is scaled up by the disagreement (Birge's ratio).
+    slope is the sine of the bearing's elevation in the world, by_angle (2,) its derivatives along the tangents, fall
+    (m) the height of the snap above the sonar. In (tangents, curvature) the condition is linear and the far field is
+    no special case. Where depth and curvature disagree by more than their errors the covariance is scaled up by the
+    disagreement (Birge's ratio).
     """
     u, k, p = wave.direction, wave.curvature, covariance[:3, :3]
     step = np.zeros(3)

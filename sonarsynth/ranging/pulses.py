@@ -182,8 +182,8 @@ def measure(
     return Pulse(aligned.frequency, wave.template, time, lag, weight, noise)
 
 
-def template_spectrum(template: Complexes, rate: float, length: int) -> Complexes:
-    """A template (bin,) in Pa s of all frequencies from 0 to half the rate, at those of an FFT of `length` samples.
+def template_spectrum(template: Complexes, length: int) -> Complexes:
+    """A template (bin,) in Pa s of all frequencies up to half the sampling frequency, at those of an FFT of `length`.
 
     It is short, so its spectrum is smooth: its waveform is transformed anew, exactly. Time 0 stays where it was.
     """

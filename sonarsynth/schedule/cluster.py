@@ -33,8 +33,8 @@ ONE_THREAD: Final = dict.fromkeys(
 """Environment of workers: frames run side by side, so a frame runs on one thread (and sums in one order)."""
 
 KEEP_MEMORY: Final = {"MALLOC_TRIM_THRESHOLD_": str(2**28), "MALLOC_MMAP_THRESHOLD_": str(2**28)}
-"""Environment of workers: arrays of a frame are taken from memory that the last frame left. Dask would have it given back
-after every one (64 kB), and the kernel clear it again: half of the time of a frame."""
+"""Environment of workers: a frame takes its arrays from memory that the last one left. Dask would give that
+back (from 64 kB up), and the kernel clear it anew: half of the CPU time of a frame."""
 
 _SETTINGS: Final = {
     "distributed.nanny.pre-spawn-environ": ONE_THREAD | KEEP_MEMORY,

@@ -109,7 +109,8 @@ def steer(tree: xr.DataTree, frame: Stored, pressure: Floats, start: float, alon
 
     pressure (sensor, sample) from `start` (s); along (beam, xyz). Focused on the middle of the target.
     """
-    from sonarsynth.acoustics.arrays import beam_spectra, gated_spectra
+    from sonarsynth.acoustics.beams import beam_spectra
+    from sonarsynth.acoustics.gates import gated_spectra
 
     rate = float(needed(tree, "signals/sampling_frequency"))
     band = (float(tree.attrs["band_low"]), float(tree.attrs["band_high"]))

@@ -13,12 +13,13 @@ from sonarsynth.verification import brightest_beam_on_target, range_errors, snap
 if TYPE_CHECKING:
     import xarray as xr
 
-PRODUCTS = {
+VARIABLES = {
     "signals": "signals/pressure",
     "image": "image/energy",
     "cloud": "cloud/range",
     "bearings": "bearings/position",
 }
+"""The variable that stands for each group in a summary."""
 
 
 def summary(tree: xr.DataTree, store: Path) -> str:
@@ -29,7 +30,7 @@ def summary(tree: xr.DataTree, store: Path) -> str:
     lines = [
         f"{store.name}: {tree.attrs.get('title') or 'untitled'}",
         f"  frames     {len(frames)} of {total} built, {size / 1e6:.1f} MB on disk",
-        *(f"  {name:10s} {_shape(tree, variable)}" for name, variable in PRODUCTS.items()),
+        *(f"  {name:10s} {_shape(tree, variable)}" for name, variable in VARIABLES.items()),
     ]
     if not len(frames):
         return "\n".join(lines)

@@ -191,8 +191,6 @@ def _lay_out(path: Path, plan: Plan, layout: Layout) -> None:
 def _create_array(root: zarr.Group, array: ArrayLayout) -> None:
     variable, inner = array.variable, tuple(max(1, n) for n in array.shape[1:])
     attrs: dict[str, Any] = {"units": variable.units, "long_name": variable.long_name, **dict(variable.attributes)}
-    if variable.standard_name:
-        attrs["standard_name"] = variable.standard_name
     if "scale_factor" in attrs:  # packed: readers must know the fill value to give NaN
         attrs["_FillValue"] = int(variable.fill)
     root.create_array(

@@ -14,15 +14,14 @@ from sonarsynth.acoustics.snap import ComplexArray
 from sonarsynth.acoustics.spectra import kaiser_bessel, kaiser_bessel_beta, kaiser_bessel_transform
 from sonarsynth.conventions import Floats
 from sonarsynth.sonar import Elements
-from sonarsynth.synthesis.expansion import chebyshev, colour, interpolation, nodes_for, recipe, sinc_polynomials
+from sonarsynth.synthesis.expansion import colour, recipe, sinc_polynomials
+from sonarsynth.synthesis.interpolating import to_sensors
+from sonarsynth.synthesis.nodes import Axis, chebyshev, interpolation, nodes_for
 from sonarsynth.synthesis.tiles import Aim, Tile, tiles
 from sonarsynth.synthesis.wavefront import Fronts, delay_and_gain, towards
 
-LARGEST = 1 << 22
+LARGEST = 1 << 20
 """Most numbers in a deposit grid: nodes are taken in groups of so many."""
-
-TOGETHER = 64
-"""Hydrophones at once."""
 
 
 class Kernel(NamedTuple):
@@ -59,10 +58,9 @@ class Bins(NamedTuple):
 
 
 def audible(spectrum: ComplexArray, tolerance: float) -> slice:
-    """The bins of a spectrum without its ends, which hold no more than a fiftieth of `tolerance` of its modulus
-    each."""
+    """The bins of a spectrum without its ends, which hold no more than 0.03 `tolerance` of its modulus each."""
     mass = np.cumsum(np.abs(spectrum))
-    ends = np.searchsorted(mass, np.array([0.02 * tolerance, 1.0 - 0.02 * tolerance]) * mass[-1])
+    ends = np.searchsorted(mass, np.array([0.03 * tolerance, 1.0 - 0.03 * tolerance]) * mass[-1])
     return slice(int(ends[0]), min(int(ends[1]) + 1, spectrum.size))
 
 
@@ -86,12 +84,13 @@ def add_stretch(
     origin: float,
     highest: float,
     method: tuple[int, float, str, float],
+    fresh: bool,
 ) -> None:
     """Add to out (sensor, sample) the pressure of paths in a stretch that holds the whole of their pulses.
 
     The stretch begins at `origin` (s) and at sample `first` of out, which may be negative, and has `samples`, even.
     highest (Hz) is the stop edge of the filter; method is width, oversampling, precision and tolerance of
-    `KernelDeposit`.
+    `KernelDeposit`; fresh says that out is silent there.
     """
     width, oversampling, dtype, tolerance = method
     circle = 2 * int(next_fast_len(int(np.ceil(highest * oversampling / bins.step)) + width, real=True))
@@ -114,14 +113,11 @@ def add_stretch(
     for tile in tiles(front, aim):
         _add_tile(heard, tile, front.select(tile.paths), stage)
     begin, end = max(first, 0), min(first + samples, out.shape[1])
-    for rows in _rows(elements.count):
-        piece = irfft(spectra[rows], samples, axis=1, overwrite_x=True)
-        out[rows, begin:end] += piece[:, begin - first : end - first]
-
-
-def _rows(count: int) -> list[slice]:
-    """Sensors a few at a time: what they need stays in the cache."""
-    return [slice(low, min(low + TOGETHER, count)) for low in range(0, count, TOGETHER)]
+    piece = irfft(spectra, samples, axis=1, overwrite_x=True)[:, begin - first : end - first]
+    if fresh:
+        out[:, begin:end] = piece
+    else:
+        out[:, begin:end] += piece
 
 
 def _add_tile(heard: npt.NDArray[Any], tile: Tile, part: Fronts, stage: Stage) -> None:
@@ -135,13 +131,12 @@ def _add_tile(heard: npt.NDArray[Any], tile: Tile, part: Fronts, stage: Stage) -
     delay, gain = delay_and_gain(tile.reference, elements.position)
     late = delay[0] + (part.delay[0] - stage.origin if alone else 0.0)
     gain = gain[0] * elements.gain * (part.amplitude[0] if alone else 1.0)
-    for rows in _rows(elements.count):
-        pairs = field[rows]
-        if tile.shape[0]:
-            pairs = (to_sensors(elements, tile.shape, dtype.name)[rows] @ field.reshape(len(points), -1)).reshape(
-                -1, 2, bins.frequency.size
-            )
-        steer_back(pairs, late[rows] * bins.step, gain[rows], bins.first, heard[rows])
+    onto, column, weight = to_sensors(elements, tile.axes, dtype.name)
+    field = field.reshape(len(points) // weight.shape[1], -1)
+    if onto is not None:
+        field = onto @ field
+    field = field.reshape(len(field), weight.shape[1], -1)
+    steer_back(field, column, weight, late * bins.step, gain, bins.first, heard)
 
 
 def _alone(tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
@@ -166,16 +161,6 @@ def _deposited(tile: Tile, part: Fronts, points: Floats, stage: Stage) -> npt.ND
         spectra = rfft(deposits[:, :, : grid.circle], axis=2)
         combine(spectra, bins.first, _faces(tile, some, stage), power, stage.response, field[first : first + group])
     return field
-
-
-@lru_cache(maxsize=64)
-def to_sensors(elements: Elements, shape: tuple[int, int, int], dtype: str) -> npt.NDArray[Any]:
-    """Interpolation (sensor, node) from the nodes of a tile."""
-    low, high = elements.position.min(axis=0), elements.position.max(axis=0)
-    centred = (elements.position - 0.5 * (low + high)) / np.where(high > low, 0.5 * (high - low), 1.0)
-    x, y, z = (interpolation(centred[:, i], n).astype(dtype) for i, n in enumerate(shape))
-    yz = y[:, :, None] * z[:, None, :]
-    return np.asarray((yz if shape[0] == 1 else x[:, :, None, None] * yz[:, None]).reshape(elements.count, -1))
 
 
 def _deposits(part: Fronts, tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
@@ -245,21 +230,21 @@ def _faces(tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
     if face == 0.0:
         return np.broadcast_to(np.ones(1, dtype), (len(points), len(tile.terms), f.size))
     degrees = np.array(tile.terms)
-    u, _ = towards(tile.reference, points)
+    u = towards(tile.reference, points)[0][0, :, 1:].T
     middle, half = 0.5 * (f[-1] + f[0]), 0.5 * (f[-1] - f[0])
     scale = face / tile.reference.sound_speed
-    widest = np.abs(u[0, :, 1:]).max(axis=0) + tile.deviation[:2]
+    deviation = np.array(tile.deviation[:2])[:, None]
     # smooth in frequency: a few Chebyshev frequencies do
-    count = nodes_for(np.pi * scale * half * float(widest.sum()), (1.0,), 0.1 * stage.aim.tolerance)
-    at = (middle + half * chebyshev(count)) * scale
-    y, z = (
-        sinc_polynomials(u[0, :, 1 + i, None] * at, tile.deviation[i] * at, int(degrees[:, i].max())) for i in range(2)
-    )
-    some = (y[degrees[:, 0]] * z[degrees[:, 1]]).swapaxes(0, 1).reshape(-1, count).astype(dtype)
-    return (some @ _to_bins(f.size, count, dtype.name)).reshape(len(points), len(degrees), f.size)
+    widest = float((np.abs(u) + deviation).max(axis=1).sum())
+    axis = nodes_for(np.pi * scale * half * widest, (1.0,), 0.1 * stage.aim.tolerance)
+    at = (middle + half * chebyshev(axis.nodes)) * scale
+    most = int(degrees[:, :2].max())
+    y, z = sinc_polynomials(u[:, :, None] * at, (deviation * at)[:, None], most).swapaxes(0, 1)
+    some = (y[degrees[:, 0]] * z[degrees[:, 1]]).swapaxes(0, 1).reshape(-1, axis.nodes).astype(dtype)
+    return np.asarray(some @ _to_bins(f.size, axis, dtype.name)).reshape(len(points), len(degrees), f.size)
 
 
 @lru_cache(maxsize=64)
-def _to_bins(bins: int, count: int, dtype: str) -> npt.NDArray[Any]:
-    """Interpolation (node, bin) from Chebyshev frequencies to all bins."""
-    return np.ascontiguousarray(interpolation(np.linspace(-1.0, 1.0, bins), count).T.astype(dtype))
+def _to_bins(bins: int, axis: Axis, dtype: str) -> npt.NDArray[Any]:
+    """Interpolation (node, bin) from nodes over the band to all bins."""
+    return np.ascontiguousarray(interpolation(np.linspace(-1.0, 1.0, bins), axis).T.astype(dtype))

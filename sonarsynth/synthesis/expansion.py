@@ -12,16 +12,9 @@ from functools import lru_cache
 from math import factorial
 
 import numpy as np
-from scipy.special import jv
 
 from sonarsynth.conventions import Floats
-
-MOST_NODES = 96
-"""Most nodes in one dimension; a tile that needs more is split."""
-
-Colour = tuple[float, ...]
-"""Frequencies, over the highest, that halve each eighth of the pulse's spectrum: what an error at a frequency
-weighs."""
+from sonarsynth.synthesis.nodes import Colour, analysis, chebyshev, rounded_up
 
 
 def colour(frequency: Floats, spectrum: np.ndarray, highest: float) -> Colour:
@@ -29,58 +22,6 @@ def colour(frequency: Floats, spectrum: np.ndarray, highest: float) -> Colour:
     mass = np.cumsum(np.abs(spectrum))
     found = np.interp((np.arange(8) + 0.5) / 8.0, mass / mass[-1], frequency / highest)
     return tuple(float(np.ceil(20.0 * v - 1e-6)) / 20.0 for v in found)
-
-
-@lru_cache(maxsize=1)
-def _tails() -> tuple[Floats, Floats]:
-    """Half ranges of phase (rad), and the error (node count - 1, phase) of interpolating a wave at n = 1, 2, ... nodes.
-
-    exp(i x t) is the sum of 2 i^n J_n(x) T_n(t), |t| <= 1; interpolation at most doubles the tail, which falls fast.
-    """
-    phase = np.concatenate([[0.0], np.geomspace(1e-13, 0.1, 120), np.arange(0.15, 1.1 * MOST_NODES, 0.1)])
-    size = np.abs(jv(np.arange(1, MOST_NODES + 2)[:, None], phase))
-    return phase, 4.0 * (size[:-1] + size[1:])
-
-
-@lru_cache(maxsize=64)
-def _mean_tails(weights: Colour) -> Floats:
-    """Error (node count - 1, phase) at the phases of `_tails`, mean over the colours; never falls with phase."""
-    phase, tails = _tails()
-    mean = np.mean([[np.interp(phase * w, phase, tail) for tail in tails] for w in weights], axis=0)
-    return np.maximum.accumulate(mean, axis=1)
-
-
-def nodes_for(phase: float, weights: Colour, tolerance: float, degrees: tuple[float, ...] = (1.0,)) -> int:
-    """Chebyshev nodes that interpolate waves of phase within +-`phase` (rad); MOST_NODES + 1 where none do.
-
-    The waves may bear an amplitude that is a polynomial: `degrees` bounds its Chebyshev coefficients of degree 0, 1,
-    ... . Times T_d, the coefficient of T_n is half of those that were of T_(n-d) and T_(n+d).
-    """
-    grid, _ = _tails()
-    at = int(np.searchsorted(grid, phase))
-    if at == grid.size or not np.isfinite(degrees).all():
-        return MOST_NODES + 1
-    tail = _mean_tails(weights)[:, at]
-    bound = degrees[0] * tail
-    for d, size in enumerate(degrees[1:], start=1):
-        bound[:d] += 2.0 * size
-        bound[d:] += 0.5 * size * (tail[:-d] + tail[d:])
-    return int(np.argmax(np.append(bound, 0.0) <= tolerance)) + 1
-
-
-def chebyshev(count: int) -> Floats:
-    """Chebyshev nodes of the first kind (node,) in (-1, 1)."""
-    return np.asarray(np.cos(np.pi * (np.arange(count) + 0.5) / count))
-
-
-def interpolation(x: Floats, count: int) -> Floats:
-    """Matrix (point, node) from values at `count` Chebyshev nodes to points x (point,) in [-1, 1]."""
-    degree = np.arange(count)
-    at_points = np.cos(np.outer(np.arccos(np.clip(x, -1.0, 1.0)), degree))
-    at_nodes = np.cos(np.outer(np.pi * (degree + 0.5) / count, degree))
-    weight = np.full(count, 2.0 / count)
-    weight[0] = 1.0 / count
-    return np.asarray((at_points * weight) @ at_nodes.T)
 
 
 DEGREES = np.arange(13)
@@ -109,7 +50,7 @@ def terms_for(face: tuple[float, float], loss: float, weights: Colour, tolerance
 
     Deviations are rounded up by at most a tenth, so that choices are kept from frame to frame.
     """
-    y, z, decay = (float(1.1 ** np.ceil(np.log(v) / np.log(1.1))) if v > 1e-12 else 0.0 for v in (*face, loss))
+    y, z, decay = (rounded_up(v) for v in (*face, loss))
     return _terms(y, z, decay, weights, tolerance)
 
 
@@ -151,8 +92,5 @@ def sinc_polynomials(middle: Floats, deviation: float | Floats, degree: int) -> 
     middle (...) and deviation broadcast together. Interpolated at Chebyshev nodes: no derivatives of sinc, so nothing
     is lost near its centre.
     """
-    x = chebyshev(degree + 1)
-    value = np.sinc(middle + np.multiply.outer(x, deviation * np.ones_like(middle)))
-    weight = np.full((degree + 1, 1), 2.0 / (degree + 1))
-    weight[0] *= 0.5
-    return np.tensordot(weight * np.cos(np.outer(np.arange(degree + 1), np.arccos(x))), value, axes=1)
+    value = np.sinc(middle + np.multiply.outer(chebyshev(degree + 1), deviation * np.ones_like(middle)))
+    return np.asarray(analysis(degree + 1) @ value.reshape(degree + 1, -1)).reshape(value.shape)

@@ -15,6 +15,9 @@ from sonarsynth.synthesis.vectors import add_scaled, cubics
 BLOCK = 128
 """Paths in a block of the packed table."""
 
+RUN = 64
+"""Bins that are turned by one table: 4 * 2^4."""
+
 ROWS = 7
 """Rows of the packed table: direction x, y, z; curvature; position (samples); amplitude; absorption (scaled
 deviation)."""
@@ -157,25 +160,53 @@ def combine(spectra: Any, first: int, factors: Any, power: Any, response: Any, o
 
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
-def steer_back(field: Any, delay: Any, gain: Any, first: int, out: Any) -> None:
-    """Add gain[s] exp(-2 pi i b delay[s]) field[s, :, b] to out[s, b], bins b from `first` on; delay in cycles a bin.
+def _turn(real: Any, imaginary: Any, c: Any, s: Any, re: Any, im: Any, out: Any) -> None:
+    for i in range(real.size):
+        cr, ci = re * c[i] - im * s[i], re * s[i] + im * c[i]
+        out[2 * i] += cr * real[i] - ci * imaginary[i]
+        out[2 * i + 1] += cr * imaginary[i] + ci * real[i]
 
-    Field (sensor, 2, bin) is real and imaginary part, out (sensor, 2 * bin) is pairs of them.
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+def _phasors(turn: complex, c: Any, s: Any) -> complex:
+    """Powers 0 to RUN - 1 of turn, real and imaginary part, in four chains that do not wait for each other; power
+    RUN."""
+    quarter = turn
+    for _ in range(4):
+        quarter *= quarter
+    p0, p1, p2, p3 = 1.0 + 0.0j, quarter, quarter * quarter, quarter * quarter * quarter
+    for j in range(RUN // 4):
+        c[j], c[RUN // 4 + j], c[RUN // 2 + j], c[3 * RUN // 4 + j] = p0.real, p1.real, p2.real, p3.real
+        s[j], s[RUN // 4 + j], s[RUN // 2 + j], s[3 * RUN // 4 + j] = p0.imag, p1.imag, p2.imag, p3.imag
+        p0, p1, p2, p3 = p0 * turn, p1 * turn, p2 * turn, p3 * turn
+    return p3
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+def _accumulate(field: Any, weight: float, out: Any) -> None:
+    for i in range(out.size):
+        out[i] += weight * field[i]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+def steer_back(field: Any, column: Any, weight: Any, delay: Any, gain: Any, first: int, out: Any) -> None:
+    """Add the field at each hydrophone, delayed and amplified, to out (sensor, 2 * bin): pairs of real and imaginary
+    part.
+
+    The field at sensor s is sum_n weight[s, n] field[column[s], n]; field (column, node, 2 * bin) has all real parts,
+    then all imaginary ones. Bins count from `first`; delay is in cycles a bin.
     """
-    c, s = np.empty(32, field.dtype), np.empty(32, field.dtype)
-    bins = field.shape[2]
+    c, s = np.empty(RUN, field.dtype), np.empty(RUN, field.dtype)
+    bins = field.shape[2] // 2
+    here = np.empty(2 * bins, field.dtype)
     for q in range(out.shape[0]):
-        turn = np.exp(-2j * np.pi * delay[q])
-        w = 1.0 + 0.0j
-        for j in range(32):
-            c[j], s[j] = w.real, w.imag
-            w *= turn
+        here[:] = 0.0
+        for n in range(weight.shape[1]):
+            _accumulate(field[column[q], n], weight[q, n], here)
+        w = _phasors(np.exp(-2j * np.pi * delay[q]), c, s)
         start = gain[q] * np.exp(-2j * np.pi * (delay[q] * first))
-        for low in range(0, bins, 32):
+        for low in range(0, bins, RUN):
             re, im = field.dtype.type(start.real), field.dtype.type(start.imag)
-            for j in range(min(32, bins - low)):
-                cr, ci = re * c[j] - im * s[j], re * s[j] + im * c[j]
-                fr, fi = field[q, 0, low + j], field[q, 1, low + j]
-                out[q, 2 * (low + j)] += cr * fr - ci * fi
-                out[q, 2 * (low + j) + 1] += cr * fi + ci * fr
+            high = min(low + RUN, bins)
+            _turn(here[low:high], here[bins + low : bins + high], c, s, re, im, out[q, 2 * low : 2 * high])
             start *= w

@@ -11,11 +11,11 @@ import numpy as np
 from sonarsynth.acoustics.arrays import aperture_terms
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.sonar import Elements
-from sonarsynth.synthesis.expansion import MOST_NODES, Colour, Term, nodes_for, terms_for
-from sonarsynth.synthesis.variation import box_nodes, degrees, variation
+from sonarsynth.synthesis.expansion import Term, terms_for
+from sonarsynth.synthesis.interpolating import Axes, box_nodes, columns
+from sonarsynth.synthesis.nodes import MOST_NODES, Colour, nodes_for
+from sonarsynth.synthesis.variation import degrees, variation
 from sonarsynth.synthesis.wavefront import Fronts
-
-Shape = tuple[int, int, int]
 
 MOST_TERMS = 24
 """A tile that needs more terms is split."""
@@ -40,23 +40,24 @@ class Tile:
 
     paths: Ints  # (path,)
     reference: Fronts  # one front: the middle of the tile
-    shape: Shape  # nodes along x, y, z; zeros where the hydrophones themselves are the nodes
+    axes: Axes | None  # nodes along x, y, z; None where the hydrophones themselves are the nodes
     terms: tuple[Term, ...]
     deviation: tuple[float, float, float]  # half range of direction y and z, and of absorption (dB)
     cost: float  # ns, predicted
 
     def nodes(self, elements: Elements) -> Floats:
         """Positions (node, xyz) where the field is synthesised, x slowest."""
-        if not self.shape[0]:
+        if self.axes is None:
             return elements.position
-        return box_nodes(elements, self.shape)
+        x, y, z = self.axes
+        return box_nodes(elements, (x.nodes, y.nodes, z.nodes))
 
 
 class _Probes(NamedTuple):
     """Where directions are looked at: the corners of the array's box and its centre; near it, all hydrophones."""
 
     points: Floats  # (point, xyz)
-    corners: Shape  # how many along x, y, z; they come first
+    corners: tuple[int, int, int]  # how many along x, y, z; they come first
     size: Floats  # (xyz) m: half of the box
 
 
@@ -118,7 +119,7 @@ def _reference(middle: Floats, front: Fronts) -> Fronts:
         amplitude=np.ones(1),
         loss=middle[4:5],
         delay_terms=middle[None, 5 : 5 + terms],
-        gain_terms=np.zeros((1, front.gain_terms.shape[1])),
+        gain_terms=np.zeros((1, 0)),
         sound_speed=front.sound_speed,
         aperture=front.aperture,
     )
@@ -127,7 +128,7 @@ def _reference(middle: Floats, front: Fronts) -> Fronts:
 class _Extent(NamedTuple):
     """What decides how a tile is represented, and what that costs."""
 
-    count: float  # paths
+    paths: float  # how many
     phase: tuple[float, ...]  # (xyz) rad: half range at the highest frequency, over half of the box
     drift: tuple[float, ...]  # (xyz) rad, on top of it: the directivity of the reference varies too
     degrees: tuple[tuple[float, ...], ...]  # (xyz, degree) of the amplitude
@@ -138,7 +139,7 @@ class _Extent(NamedTuple):
         """The best that halving can give."""
         y, z = self.turn
         phase = tuple(0.5 * p for p in self.phase)
-        return _Extent(0.5 * self.count, phase, self.drift, self.degrees, (0.5 * y, 0.5 * z), 0.5 * self.decay)
+        return _Extent(0.5 * self.paths, phase, self.drift, self.degrees, (0.5 * y, 0.5 * z), 0.5 * self.decay)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,24 +167,33 @@ def _try(paths: Ints, views: _Views, aim: Aim) -> _Trial:
     turn, loss = (aim.elements.face * wave * dy, aim.elements.face * wave * dz), float(far[4])
     phase = np.full(3, np.inf) if views.near else 2.0 * np.pi * wave * slope * probes.size
     extent = _Extent(
-        count=paths.size,
+        paths=paths.size,
         phase=tuple(phase.tolist()),
-        drift=(0.0,) * 3 if views.near else _drift(own[at : at + probed], probes, np.pi * wave * aim.elements.face),
+        drift=_drift(reference, aim),
         degrees=degrees(views.amplitude if whole else np.take(views.amplitude, paths, axis=1)),
         turn=turn,
         decay=loss * np.log(10.0) / 20.0 * aim.steepest,
     )
-    shape, terms, cost = _cheapest(extent, aim)
-    return _Trial(Tile(paths, reference, shape, terms, (dy, dz, loss), cost), extent)
+    axes, terms, cost = _cheapest(extent, aim)
+    return _Trial(Tile(paths, reference, axes, terms, (dy, dz, loss), cost), extent)
 
 
-def _drift(directions: Floats, probes: _Probes, scale: float) -> tuple[float, ...]:
-    """Half range (xyz) of the argument of the directivity along each axis of the box, the others held."""
-    corner = directions.reshape(-1, 3)[:-1, 1:].reshape(*probes.corners, 2)
-    return tuple(0.5 * scale * float(np.ptp(corner, axis=axis).sum(axis=-1).max()) for axis in range(3))
+def _drift(front: Fronts, aim: Aim) -> tuple[float, ...]:
+    """Half range (xyz, rad) of the phase that is left over a face, along each axis of the box: du_j/dq_i is
+    -(e_i - u_i u)_j k/n; inf about the source."""
+    _, _, size = _probes(aim.elements, False)
+    k = float(front.curvature[0])
+    nearest = 1.0 - k * float(np.linalg.norm(np.abs(aim.elements.position).max(axis=0)))
+    if not nearest > 0.2:
+        return (np.inf,) * 3
+    scale = np.pi * aim.highest * aim.elements.face / front.sound_speed * k / nearest
+    x, y, z = np.abs(front.direction[0]).tolist()
+    slack = 3.0 * (1.0 - nearest) / nearest  # u itself turns by a third of it
+    change = x * (y + z), 1.0 - y * y + y * z, 1.0 - z * z + y * z
+    return tuple(scale * min(c + slack, 1.21) * s for c, s in zip(change, size.tolist(), strict=True))
 
 
-def _cheapest(extent: _Extent, aim: Aim) -> tuple[Shape, tuple[Term, ...], float]:
+def _cheapest(extent: _Extent, aim: Aim) -> tuple[Axes | None, tuple[Term, ...], float]:
     """Nodes or the hydrophones themselves, terms, and the predicted time (ns) on one core at 3 GHz."""
     sensors, bins = aim.elements.count, aim.bins
     terms = terms_for(extent.turn, extent.decay, aim.weights, aim.tolerance)
@@ -193,14 +203,15 @@ def _cheapest(extent: _Extent, aim: Aim) -> tuple[Shape, tuple[Term, ...], float
     )
 
     def work(nodes: int) -> float:
-        per_deposit = 4.0 + 0.8 * len(terms)
-        each = extent.count * per_deposit + len(terms) * (1.2 * aim.circle + 1.0 * bins)
-        return nodes * each + 2.0 * sensors * bins + 2e5
+        each = extent.paths * (8.0 + 0.6 * len(terms)) + len(terms) * (1.4 * aim.circle + 2.5 * bins)
+        return nodes * each + 2.0 * sensors * bins + 4e5
 
-    own, nodes = work(sensors), x * y * z
-    by_nodes = work(nodes) + 0.04 * nodes * sensors * bins if max(x, y, z) <= MOST_NODES else np.inf
+    own, nodes = work(sensors), x.nodes * y.nodes * z.nodes
+    few = max(x.nodes, y.nodes, z.nodes) <= MOST_NODES
+    onto = 0.03 * nodes * columns(aim.elements)[0].size + 0.3 * z.nodes * sensors
+    by_nodes = work(nodes) + onto * bins if few else np.inf
     crowded = np.inf if len(terms) > MOST_TERMS else 1.0
-    return ((x, y, z), terms, by_nodes * crowded) if by_nodes < own else ((0, 0, 0), terms, own * crowded)
+    return ((x, y, z), terms, by_nodes * crowded) if by_nodes < own else (None, terms, own * crowded)
 
 
 def _halves(paths: Ints, views: _Views, aim: Aim) -> tuple[Ints, Ints] | None:
@@ -227,10 +238,11 @@ def tiles(front: Fronts, aim: Aim) -> list[Tile]:
 
 
 def _alone(paths: Ints, front: Fronts, aim: Aim) -> Tile:
-    """One path is its own reference: nothing is left to be deposited."""
-    return Tile(
-        paths, front.select(paths), (0, 0, 0), ((0, 0, 0),), (0.0, 0.0, 0.0), 2e5 + 4.0 * aim.elements.count * aim.bins
-    )
+    """One path is its own reference: nothing is deposited, and its directivity is all that varies."""
+    reference = front.select(paths)
+    x, y, z = (nodes_for(d, aim.weights, aim.tolerance) for d in _drift(reference, aim))
+    axes = (x, y, z) if 2 * x.nodes * y.nodes * z.nodes < aim.elements.count else None
+    return Tile(paths, reference, axes, ((0, 0, 0),), (0.0, 0.0, 0.0), 2e5 + 4.0 * aim.elements.count * aim.bins)
 
 
 def _best(trial: _Trial, views: _Views, aim: Aim, patient: bool) -> list[Tile]:

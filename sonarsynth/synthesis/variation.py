@@ -12,30 +12,19 @@ import numpy as np
 from sonarsynth.acoustics.arrays import aperture_terms
 from sonarsynth.conventions import Floats
 from sonarsynth.sonar import Elements
-from sonarsynth.synthesis.expansion import chebyshev
+from sonarsynth.synthesis.interpolating import box_nodes
+from sonarsynth.synthesis.nodes import DEGREES, analysis
 from sonarsynth.synthesis.wavefront import Fronts
-
-DEGREE = 3
-"""Of the polynomials of `aperture_terms`."""
-
-
-def box_nodes(elements: Elements, shape: tuple[int, int, int]) -> Floats:
-    """Chebyshev nodes (node, xyz) over the box round the hydrophones, x slowest."""
-    low, high = elements.position.min(axis=0), elements.position.max(axis=0)
-    axes = [0.5 * (a + b) + 0.5 * (b - a) * chebyshev(n) for a, b, n in zip(low, high, shape, strict=True)]
-    return np.stack([g.ravel() for g in np.meshgrid(*axes, indexing="ij")], axis=1)
 
 
 @lru_cache(maxsize=16)
 def _basis(elements: Elements, aperture: float) -> tuple[tuple[int, int, int], Floats, Floats]:
     """Degrees + 1 (xyz), Chebyshev coefficients over the box (degrees, term) of each aperture term, and what makes of
     terms a vector as long as their root mean square over the hydrophones (term, term)."""
-    x, y, z = (DEGREE + 1 if s > 0 else 1 for s in np.ptp(elements.position, axis=0))
+    x, y, z = (DEGREES if s > 0 else 1 for s in np.ptp(elements.position, axis=0))
     value = aperture_terms(box_nodes(elements, (x, y, z)), aperture).reshape(x, y, z, -1)
     for axis, n in enumerate((x, y, z)):
-        degree = np.arange(n)
-        analysis = np.cos(np.outer(degree, np.arccos(chebyshev(n)))) * np.where(degree > 0, 2.0, 1.0)[:, None] / n
-        value = np.moveaxis(np.tensordot(analysis, value, (1, axis)), 0, axis)
+        value = np.moveaxis(np.tensordot(analysis(n), value, (1, axis)), 0, axis)
     heard = np.linalg.qr(aperture_terms(elements.position, aperture), mode="r") / np.sqrt(elements.count)
     return (x, y, z), value.reshape(x * y * z, -1), heard
 
@@ -43,21 +32,22 @@ def _basis(elements: Elements, aperture: float) -> tuple[tuple[int, int, int], F
 def variation(front: Fronts, elements: Elements) -> Floats:
     """Amplitudes of paths over the box round the hydrophones (1 + 3 axes * 4 degrees, path), over the loudest.
 
-    First its root mean square over the hydrophones; then, of each axis, the sizes of the Chebyshev coefficients of degree 0 to 3. No rows
-    where the amplitude is that of the sphere alone.
+    First the root mean square over the hydrophones; then, of each axis, bounds on the Chebyshev coefficients of degree
+    0 to 3. No rows where the amplitude is that of the sphere alone.
     """
     if not front.gain_terms.shape[1]:
         return np.zeros((0, front.count))
     shape, basis, heard = _basis(elements, front.aperture)
     terms = front.gain_terms.T.copy()
     terms[0] += 1.0
-    rows = np.zeros((1 + 3 * (DEGREE + 1), front.count))
+    rows = np.zeros((1 + 3 * DEGREES, front.count))
     rows[0] = np.sqrt(((heard @ terms) ** 2).sum(axis=0))
     size = np.abs(basis @ terms).reshape(*shape, -1)
     for axis, n in enumerate(shape):
         others = tuple(a for a in range(3) if a != axis)
-        rows[1 + axis * (DEGREE + 1) :][:n] = size.sum(axis=others)
-    return rows * (np.abs(front.amplitude) / np.abs(front.amplitude).max())
+        rows[1 + axis * DEGREES :][:n] = size.sum(axis=others)
+    rows *= np.abs(front.amplitude) / np.abs(front.amplitude).max()
+    return rows
 
 
 def degrees(some: Floats) -> tuple[tuple[float, ...], ...]:
@@ -71,4 +61,4 @@ def degrees(some: Floats) -> tuple[tuple[float, ...], ...]:
     if not power[0] > 0.0:
         return ((np.inf,),) * 3
     found = np.maximum(total[1:] / total[0], np.sqrt(power[1:] / power[0]))
-    return tuple(map(tuple, found.reshape(3, DEGREE + 1).tolist()))
+    return tuple(map(tuple, found.reshape(3, DEGREES).tolist()))

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import Annotated, Protocol
 
-from sonarsynth.acoustics.rays import REASONS
 from sonarsynth.conventions import Floats
 from sonarsynth.description import BY_KIND
 from sonarsynth.products import Paths
@@ -31,7 +30,4 @@ class Propagation(Protocol):
 
 Tracing = Annotated[Straight | Refracted | AutoTracing, BY_KIND]
 
-FLAGS = REASONS
-"""What `Paths.flag` means: 0 good, else why ray theory ends here."""
-
-__all__ = ["FLAGS", "AutoTracing", "Propagation", "Refracted", "Straight", "Tracing"]
+__all__ = ["AutoTracing", "Propagation", "Refracted", "Straight", "Tracing"]

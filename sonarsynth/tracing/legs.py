@@ -144,8 +144,8 @@ def hidden(
 ) -> Bools:
     """Whether a body stands in rays (ray, xyz) that leave start in direction departure and end after length (m) at end.
 
-    Straight rays exactly; bent ones by chords that keep within 1 mm of them (1/200 of that where 16 are needed for 0.2
-    m).
+    Straight rays exactly; bent ones by up to 16 chords, which keep within 1 mm of rays that bow by 0.25 m or less, and
+    within 1/256 of the bow of others.
     """
     steepest = 0.0
     if not profile.uniform:

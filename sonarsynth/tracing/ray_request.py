@@ -19,8 +19,10 @@ class RayRequest:
     """(azimuth, elevation) of each ray in the sonar frame; left out: the grid."""
     azimuth_span: Annotated[Radians, Ge(0), Le(2 * np.pi)] = np.deg2rad(50.0)
     azimuths: Annotated[int, Ge(1), Le(1000)] = 11
+    """Rays in a row of the grid."""
     elevation_span: Annotated[Radians, Ge(0), Le(np.pi)] = np.deg2rad(50.0)
     elevations: Annotated[int, Ge(1), Le(1000)] = 11
+    """Rows of the grid."""
     duration: PositiveSeconds = 0.05
     """How long a ray is followed."""
     bounces: Annotated[int, Ge(0), Le(100_000)] = 20

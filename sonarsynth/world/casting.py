@@ -22,10 +22,10 @@ from sonarsynth.world.moment import Body
 Backend = Literal["embree", "open3d"]
 OFFSET = 1e-6
 """Of the body's size: how far off a facet, along its normal, a ray starts so as not to meet it."""
-ROUNDS = 8  # proposals tried before the slow exact search
-SLACK = (
-    1e-3  # of the body's size: a hit this much beyond the proposed one is another hit, with others before it perhaps
-)
+ROUNDS = 8
+"""Proposals tried before the slow exact search."""
+SLACK = 1e-3
+"""Of the body's size: a hit this much beyond the proposed one is another hit, with others before it perhaps."""
 
 
 class Caster(Protocol):
@@ -75,7 +75,7 @@ class Open3DCaster:
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class CastingMesh:
     """A mesh made ready for casting: centred on its box and of unit size."""
 
     centre: Floats  # (xyz) m, in the mesh's frame
@@ -93,7 +93,7 @@ class Shape:
         return first.astype(np.int64), (order // 3).astype(np.int64)
 
     def cast(self, origin: Floats, direction: Floats, far: Floats) -> tuple[Ints, Floats]:
-        """Facet (ray,) and distance of the nearest hit for rays in this shape's frame and unit; -1 and NaN for none."""
+        """Facet (ray,) and distance of the nearest hit for rays in this mesh's frame and unit; -1 and NaN for none."""
         from sonarsynth.world import intersections
 
         facet, distance = np.full(len(origin), NO_TARGET), np.full(len(origin), np.nan)
@@ -158,7 +158,7 @@ class _ByContent:
 
 
 @lru_cache(maxsize=16)
-def _shape(key: _ByContent, backend: Backend) -> Shape:
+def _casting_mesh(key: _ByContent, backend: Backend) -> CastingMesh:
     mesh = key.mesh
     if not np.isfinite(mesh.vertices).all():
         raise ValueError("a mesh with vertices that are not finite cannot be cast at")
@@ -172,12 +172,12 @@ def _shape(key: _ByContent, backend: Backend) -> Shape:
     vertices = (mesh.vertices - centre) / size
     make = EmbreeCaster if backend == "embree" else Open3DCaster
     corners = np.ascontiguousarray((mesh.corners - centre) / size)
-    return Shape(centre, size, corners, mesh.faces.astype(np.int32), make(vertices, mesh.faces))
+    return CastingMesh(centre, size, corners, mesh.faces.astype(np.int32), make(vertices, mesh.faces))
 
 
-def shape_of(mesh: Mesh, backend: Backend = "embree") -> Shape:
+def casting_mesh(mesh: Mesh, backend: Backend = "embree") -> CastingMesh:
     """The mesh made ready for casting, kept by content for the last 16. Raises ValueError for a corrupt mesh."""
-    return _shape(_ByContent(mesh.digest, mesh), backend)
+    return _casting_mesh(_ByContent(mesh.digest, mesh), backend)
 
 
 def first_hit(
@@ -195,10 +195,10 @@ def first_hit(
         raise ValueError("rays need a finite origin and a direction")
     if not len(mesh.faces) or not len(o):
         return np.full(len(o), NO_TARGET), np.full(len(o), np.nan)
-    shape = shape_of(mesh, backend)
-    limit = np.full(len(o), far / shape.size)
-    facet, distance = shape.cast((o - shape.centre) / shape.size, d / length[:, None], limit)
-    return facet, distance * shape.size
+    ready = casting_mesh(mesh, backend)
+    limit = np.full(len(o), far / ready.size)
+    facet, distance = ready.cast((o - ready.centre) / ready.size, d / length[:, None], limit)
+    return facet, distance * ready.size
 
 
 def occluded(bodies: tuple[Body, ...], start: Floats, end: Floats, backend: Backend = "embree") -> Bools:
@@ -214,11 +214,11 @@ def occluded(bodies: tuple[Body, ...], start: Floats, end: Floats, backend: Back
         free = np.flatnonzero(~hidden)
         if not len(body.mesh.faces) or not len(free):
             continue
-        shape = shape_of(body.mesh, backend)
-        o = (body.pose.to_body(a[free]) - shape.centre) / shape.size
-        span = (body.pose.to_body(b[free]) - shape.centre) / shape.size - o
+        ready = casting_mesh(body.mesh, backend)
+        o = (body.pose.to_body(a[free]) - ready.centre) / ready.size
+        span = (body.pose.to_body(b[free]) - ready.centre) / ready.size - o
         length = np.linalg.norm(span, axis=1)
         going = length > 0
-        facet, _ = shape.cast(o[going], span[going] / length[going, None], length[going])
+        facet, _ = ready.cast(o[going], span[going] / length[going, None], length[going])
         hidden[free[going]] = facet >= 0
     return hidden

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.acoustics.seawater import depth_of_pressure, mackenzie
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import FASTEST, SLOWEST, Floats
 from sonarsynth.world.cast_files import CastError, Column, Table, read_table
 from sonarsynth.world.environment import (
     Cast,
@@ -27,7 +27,7 @@ PLAUSIBLE = {
     "pressure": (0.0, 12e3, "dbar"),
     "temperature": (-5.0, 50.0, "degC"),
     "salinity": (0.0, 50.0, "psu"),
-    "sound speed": (100.0, 10e3, "m/s"),
+    "sound speed": (SLOWEST, FASTEST, "m/s"),
 }
 """A value outside is a mark for "missing" (-9999), a wrong unit or a wrong sign; it is refused."""
 

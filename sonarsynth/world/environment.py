@@ -19,10 +19,10 @@ from sonarsynth.conventions import (
     PositiveMetres,
     PositiveSpeed,
     PracticalSalinity,
+    WaterSoundSpeed,
 )
 from sonarsynth.description import BY_KIND, description
 
-Speed = Annotated[PositiveSpeed, Ge(100.0), Le(10e3)]
 Depths = Annotated[tuple[NonNegativeMetres, ...], MinLen(1)]
 
 
@@ -45,7 +45,7 @@ class Isovelocity:
     """The same sound speed everywhere."""
 
     kind: Literal["isovelocity"] = "isovelocity"
-    speed: Speed
+    speed: WaterSoundSpeed
 
 
 @description
@@ -55,7 +55,8 @@ class Tabulated:
     kind: Literal["tabulated"] = "tabulated"
     depth: Depths
     """Depths below the surface (m), not decreasing."""
-    speed: tuple[Speed, ...]
+    speed: tuple[WaterSoundSpeed, ...]
+    """Sound speed at each depth."""
 
     _depth = field_validator("depth")(_ascending)
     _speed = field_validator("speed")(_as_long_as_depth)
@@ -67,8 +68,11 @@ class TemperatureSalinity:
 
     kind: Literal["temperature_salinity"] = "temperature_salinity"
     depth: Depths
+    """Depths below the surface (m), not decreasing."""
     temperature: tuple[DegreesCelsius, ...]
+    """Temperature at each depth."""
     salinity: tuple[Annotated[PracticalSalinity, Ge(0)], ...]
+    """Practical salinity at each depth."""
 
     _depth = field_validator("depth")(_ascending)
     _values = field_validator("temperature", "salinity")(_as_long_as_depth)
@@ -126,6 +130,7 @@ class SeaBed:
     speed_ratio: Annotated[Number, Gt(0)] = 1.1782
     """Sound speed over that of the water at the bed."""
     loss_tangent: Annotated[Number, Ge(0), Le(1)] = 0.01624
+    """Imaginary over real part of the wavenumber in the bed."""
 
 
 @description
@@ -136,6 +141,7 @@ class Absorption:
     temperature: Annotated[DegreesCelsius, Ge(-5), Le(60)] = 27.0
     salinity: Annotated[PracticalSalinity, Ge(0), Le(100)] = 35.0
     ph: Annotated[Number, Ge(0), Le(14)] = 8.1
+    """pH of the water; it matters under some 10 kHz, where boric acid absorbs."""
 
 
 @description
@@ -153,6 +159,7 @@ class WenzNoise:
 
     kind: Literal["wenz"] = "wenz"
     shipping: Annotated[Number, Ge(0), Le(1)] = 0.5
+    """How busy the sea is, from 0 to 1."""
     wind_speed: Annotated[PositiveSpeed, Le(60)] = 5.0
 
 

@@ -31,7 +31,9 @@ class Line:
 
     kind: Literal["line"] = "line"
     start: Position
+    """Where the body is at time 0."""
     stop: Position
+    """Where it is after `duration`."""
     duration: PositiveSeconds
     heading: Radians | None = None
     """Left out: along the track."""
@@ -55,6 +57,7 @@ class Waypoints:
 
     kind: Literal["waypoints"] = "waypoints"
     points: Annotated[tuple[Waypoint, ...], MinLen(2)]
+    """Waypoints in the order of their times."""
     pitch: Radians = 0.0
     roll: Radians = 0.0
 
@@ -73,6 +76,7 @@ class Circle:
 
     kind: Literal["circle"] = "circle"
     centre: Position
+    """Centre of the circle, at the depth of the body."""
     radius: PositiveMetres
     speed: MetresPerSecond
     """Positive is counter-clockwise seen from above."""

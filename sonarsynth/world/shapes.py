@@ -100,6 +100,7 @@ class Remus100:
     edge: PositiveMetres = 0.014
     """Longest edge of a facet round the girth and along the hull, refined on the true surface."""
     fins: bool = True
+    """With its four fins."""
     coarse: bool = False
     """As few facets as the thesis's model, 286 (238 without fins), for comparison; edge is ignored."""
 
@@ -118,6 +119,7 @@ class Myring:
     tail: PositiveMetres
     diameter: PositiveMetres
     exponent: Annotated[Number, Ge(0.5), Le(10)] = 2.0
+    """Of the nose: 2 is an ellipse, more is blunter."""
     tail_angle: Annotated[Radians, Ge(0), Le(1.5)] = 0.436
     """Half the angle included at the tip of the tail."""
     nose_offset: NonNegativeMetres = 0.0

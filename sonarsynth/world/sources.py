@@ -34,6 +34,7 @@ class SnappingShrimp:
     """A shrimp on the bed that snaps at given times."""
 
     name: str = "shrimp"
+    """For people; nothing depends on it."""
     position: tuple[Metres, Metres] | Position
     """(x, y) on the bed, or (x, y, z)."""
     height: NonNegativeMetres = 0.0

@@ -18,5 +18,8 @@ class Target:
     """A body in the water. Its name is a group of the store."""
 
     name: Name
+    """Letters, digits, hyphens and underscores, a letter first."""
     shape: Shape
+    """What it looks like."""
     motion: Motion
+    """Where it is, at any time."""

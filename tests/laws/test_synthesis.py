@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from sonarsynth.products import Arrivals
 from sonarsynth.sonar import BandPass, Elements, LowPass, PositionTable, Romanis, Sonar, elements
 from sonarsynth.synthesis import DirectSum, KernelDeposit, pulse_support
 from sonarsynth.synthesis.direct_sum import exact_signals
+from sonarsynth.synthesis.nodes import chebyshev, interpolation, nodes_for
 from sonarsynth.synthesis.pulse import bubble, fir
 from sonarsynth.world.moment import Snap
 from sonarsynth.world.sources import LogarithmicBubble
@@ -199,6 +201,51 @@ def test_nodes_over_the_aperture_serve_the_whole_array() -> None:
     late = int((of.delay[of.target == 0].min() - 2.3e-3 - start) * SONAR.sampling_frequency)
     assert error(got[:, late:], exact[:, late:]) < 1e-4  # relative to the echo
     assert error(got, exact) < 1e-4
+
+
+@pytest.mark.parametrize("size", [0.1, 1.0, 10.0])
+def test_lobes_that_vary_over_the_aperture(size: float) -> None:
+    """Amplitudes that are cubics of any size, each path its own: from broad lobes to those that miss half the array."""
+    of = target_at(20.0, 400, 17, direct=False)
+    terms = np.random.default_rng(18).uniform(-1, 1, (400, 20)) * size
+    of = replace(of, amplitude_terms=terms)
+    start, samples = window(of, SONAR, FACES)
+    got = KernelDeposit().signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure
+    some = np.append(np.argsort(-np.linalg.norm(FACES.position, axis=1), kind="stable")[:4], 250)  # rim and middle
+    part = elements(PositionTable(positions=tuple(map(tuple, FACES.position[some].tolist())), face=FACES.face))
+    exact, _ = exact_signals(of, SNAPS, part, SONAR, absorption, start, samples)
+    assert error(got[some], exact) < 1e-4
+
+
+def test_one_path_needs_no_deposit() -> None:
+    """Alone in its stretch of time a path is exact but for its directivity between nodes and the ends of the band."""
+    array = some_of(FACES, 20)
+    of = target_at(15.0, 1, 19, refracted=True)
+    start, samples = window(of, SONAR, array)
+    exact, _ = exact_signals(of, SNAPS, array, SONAR, absorption, start, samples)
+    got, _ = KernelDeposit(tolerance=1e-6, precision="float64").pressure(
+        of, SNAPS, array, SONAR, absorption, start, samples
+    )
+    assert 1e-14 < error(got, exact) < 1e-6
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1.5e-4, 1e-6, 1e-11])
+@pytest.mark.parametrize("phase", [0.0, 1e-6, 0.3, 2.0, 9.0, 30.0])
+@pytest.mark.parametrize("degrees", [(1.0,), (1.1, 0.1, 1e-3, 1e-4), (0.5, 2.0, 1.0, 0.3)])
+def test_waves_are_interpolated_to_the_tolerance(tolerance: float, phase: float, degrees: tuple[float, ...]) -> None:
+    """Waves of every phase up to the largest, times the polynomials allowed, at points that are not nodes."""
+    colours = (0.35, 0.4, 0.45, 0.5, 0.6, 0.7, 0.8, 0.9)
+    axis = nodes_for(phase, colours, tolerance, degrees)
+    assert axis.nodes <= nodes_for(phase, colours, tolerance / 10, degrees).nodes
+    x, at = np.linspace(-1, 1, 97), chebyshev(axis.nodes)
+    onto = interpolation(x, axis)
+    assert np.abs(onto).sum(axis=1).max() < 4.0  # no error of the nodes is blown up
+    k = np.multiply.outer(colours, np.linspace(-1, 1, 41) * phase)
+    errors = np.zeros(len(colours))
+    for d, size in enumerate(degrees):
+        here, there = (np.cos(d * np.arccos(y))[:, None, None] * np.exp(1j * np.multiply.outer(y, k)) for y in (x, at))
+        errors += size * np.abs(here - np.tensordot(onto, there, 1)).max(axis=(0, 2))
+    assert errors.mean() < 1.05 * tolerance
 
 
 @pytest.mark.parametrize(

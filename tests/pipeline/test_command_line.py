@@ -129,7 +129,7 @@ def test_a_folder_that_cannot_be_written_is_one_line(command: Command, small_fil
     [
         (["--frames", "0:21"], "--frames: '0:21' ends past the last frame, 19"),
         (["--frames", "x"], "--frames: 'x' is no frame and no range such as 0:8"),
-        (["--products", "film"], "--products: 'film' is not one of signals, image, cloud"),
+        (["--products", "film"], "--products: 'film' is not a product; known: signals, image, cloud"),
         (["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "--workers is for worker processes of our own"),
         (["--workers", "-1"], "Invalid value for '--workers'"),
         (["--wrokers", "1"], "No such option"),

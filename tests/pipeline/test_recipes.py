@@ -188,6 +188,11 @@ def test_the_schema_keeps_units_kinds_and_descriptions() -> None:
     assert named["Environment"]["properties"]["depth"]["description"].startswith("Depth of the bed")
     assert named["Box"]["properties"]["kind"]["const"] == "box"
     assert named["World"]["description"] == "What there is."
+    depth, text = named["Environment"]["properties"]["depth"]["anyOf"]
+    assert (depth["description"], depth["exclusiveMinimum"], depth["maximum"]) == ("in m", 0, 12e3)
+    assert "km" in text["pattern"]
+    acidity = named["Absorption"]["properties"]["ph"]
+    assert (acidity["minimum"], acidity["maximum"]) == (0, 14)
 
 
 numbers = st.floats(-1e3, 1e3, allow_subnormal=False)

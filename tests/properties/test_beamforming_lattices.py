@@ -6,7 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sonarsynth.acoustics.arrays import focus_delay, gate_samples, gate_taper
+from sonarsynth.acoustics.arrays import focus_delay
+from sonarsynth.acoustics.gates import gate_samples, gate_taper
 from sonarsynth.beamforming.dense import dense_energies
 from sonarsynth.beamforming.lattice import focused_energies
 from sonarsynth.conventions import direction

@@ -21,10 +21,11 @@ def test_a_range_and_its_excess_path_are_inverse(az, el, source_az, source_el, r
     beam, source = direction(az, el), b * direction(source_az, source_el)
     x = excess_path(beam, r, source)
     assert x >= -1e-12 * (r + b)
-    found = bistatic_range(max(float(x), 0.0), beam, source)
+    assume(x > 1e-6 * (r + b))  # on the line between array and source every range fits, to rounding
+    found = bistatic_range(x, beam, source)
     assume(not found.ill_conditioned)
     assert abs(found.range - r) < 1e-11 * (r + b)
-    assert 0.5 - 1e-12 <= found.by_path <= 10.0 + 1e-9
+    assert 0.5 - 1e-9 <= found.by_path <= 10.0 + 1e-9
 
 
 def array_in_space(seed):

@@ -6,16 +6,9 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf, sqrt
 
-from sonarsynth.acoustics.arrays import (
-    beam_energy,
-    beam_spectra,
-    fast_length,
-    focus_delay,
-    frequency_spacing,
-    gate_samples,
-    gate_taper,
-    gated_spectra,
-)
+from sonarsynth.acoustics.arrays import focus_delay
+from sonarsynth.acoustics.beams import beam_energy, beam_spectra
+from sonarsynth.acoustics.gates import fast_length, frequency_spacing, gate_samples, gate_taper, gated_spectra
 from sonarsynth.beamforming.dense import dense_energies
 from sonarsynth.beamforming.lattice import focused_energies
 from sonarsynth.conventions import direction

@@ -125,13 +125,13 @@ def test_what_cannot_be_cast_at_is_refused() -> None:
         occluded((place(SPHERE, (0, 0, 0)),), ray, np.nan * ray)
 
 
-def test_the_shape_of_a_mesh_is_made_once() -> None:
+def test_a_mesh_is_made_ready_for_casting_once() -> None:
     again = Mesh(SPHERE.vertices.copy(), SPHERE.faces.copy())
-    assert casting.shape_of(SPHERE) is casting.shape_of(again)
+    assert casting.casting_mesh(SPHERE) is casting.casting_mesh(again)
 
 
 def test_a_wrong_proposal_is_passed_over() -> None:
-    shape = casting.shape_of(RING)
+    ready = casting.casting_mesh(RING)
 
     class Liar:
         """Proposes facet 0 too early, for three rounds."""
@@ -142,11 +142,11 @@ def test_a_wrong_proposal_is_passed_over() -> None:
             self.rounds += 1
             if self.rounds <= 3:
                 return np.zeros(len(origin), int), np.full(len(origin), 1e-9)
-            return shape.caster.nearest(origin, direction, far)
+            return ready.caster.nearest(origin, direction, far)
 
-    lying = casting.Shape(shape.centre, shape.size, shape.corners, shape.faces, Liar())
+    lying = casting.CastingMesh(ready.centre, ready.size, ready.corners, ready.faces, Liar())
     origin, direction = rays_at(1.0, 3.0, 300, 5)
-    honest, at = shape.cast(origin, direction, np.full(300, np.inf))
+    honest, at = ready.cast(origin, direction, np.full(300, np.inf))
     facet, distance = lying.cast(origin, direction, np.full(300, np.inf))
     np.testing.assert_array_equal(facet, honest)
     np.testing.assert_allclose(distance, at, rtol=1e-12)

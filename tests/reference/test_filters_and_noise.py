@@ -82,25 +82,6 @@ def test_kernel_transform_is_its_integral(width: int, oversampling: float) -> No
     assert float(spectra.kaiser_bessel(0.51 * width, width, beta)) == 0.0
 
 
-@pytest.mark.parametrize("samples", [400, 401])
-def test_envelope_of_a_windowed_tone_is_its_window(samples: int) -> None:
-    t = np.arange(samples)
-    window = np.exp(-0.5 * ((t - 200.0) / 30.0) ** 2)
-    wave = np.stack([window * np.cos(0.9 * t + phase) for phase in (0.0, 1.0)])
-    np.testing.assert_allclose(spectra.envelope(wave), np.stack([window, window]), atol=1e-9)
-    np.testing.assert_allclose(spectra.envelope(wave.T, axis=0).T, spectra.envelope(wave), atol=1e-15)
-
-
-def test_tapers_of_adjoining_bands_add_up_to_one() -> None:
-    f = np.linspace(0.0, 120e3, 4001)
-    bands = [(0.0, 30e3), (30e3, 50e3), (50e3, 90e3)]
-    total = sum(spectra.band_taper(f, low, high, 8e3) for low, high in bands)
-    np.testing.assert_allclose(total[f < 85e3], 1.0, atol=1e-14)
-    assert float(spectra.band_taper(30e3, 30e3, 50e3, 8e3)) == pytest.approx(0.5)
-    assert float(spectra.band_taper(25e3, 30e3, 50e3, 8e3)) == 0.0
-    np.testing.assert_array_equal(spectra.band_taper([10.0, 20.0, 30.0], 20.0, 40.0, 0.0), [0.0, 0.5, 1.0])
-
-
 WENZ = {  # kHz: turbulence, shipping, wind, thermal, total
     1: (17, 39.230, 60.925, -15, 60.955),
     10: (-13, 5.922, 46.089, 5, 46.090),

@@ -12,8 +12,9 @@ import numpy as np
 
 from benchmarks.peers import acoular_image, thesis_image
 from sonarsynth import config, planning, render
+from sonarsynth.acoustics.spectra import filtered_pulse
 from sonarsynth.beamforming import DenseDelayAndSum
-from sonarsynth.products import Arrivals, EnergyImage
+from sonarsynth.products import Arrivals, EnergyImage, Signals
 from sonarsynth.synthesis import DirectSum
 from sonarsynth.synthesis.pulse import bubble, fir
 
@@ -81,15 +82,14 @@ def bench(index: int = 32) -> dict[str, Any]:
     stages["locate"] = {"ms": 1e3 * seconds, "error_m": float(np.linalg.norm(located.position[0] - true))}
     start, stop = (float(located.time[0]) + t for t in (plan.windows.echo_start, plan.windows.echo_stop))
     beamformer = scene.processing.beamforming
-    image, seconds = cpu(lambda: beamformer.image(signals, plan.elements, sonar, start, stop))
+    image, image_seconds = cpu(lambda: beamformer.image(signals, plan.elements, sonar, start, stop))
     dense, dense_seconds = cpu(
         lambda: DenseDelayAndSum(focus=beamformer.focus).image(signals, plan.elements, sonar, start, stop), 1
     )
-    image_seconds = seconds
     plane = [method(focus=None) for method in (type(beamformer), DenseDelayAndSum)]
     kernel, check = (method.image(signals, plan.elements, sonar, start, stop).energy for method in plane)
     stages["beamform"] = {
-        "ms": 1e3 * seconds,
+        "ms": 1e3 * image_seconds,
         "error_of_peak_kernel": relative(kernel, check),  # the same plane waves, float64
         "error_of_peak_focus": relative(image.energy, dense.energy),  # separable against spherical focusing
     }
@@ -126,25 +126,26 @@ def bench(index: int = 32) -> dict[str, Any]:
 
 def synthesis_error(plan: planning.Plan, traced: render.Traced) -> dict[str, Any]:
     """Largest error of the signals over their peak, against the direct sum, on every eighth echo (it takes seconds)."""
-    some = thin(traced.arrivals, PATHS // 8)
+    share = 8
+    some = thin(traced.arrivals, PATHS // share)
     arguments = (some, traced.frame.moment.snaps, plan.elements, plan.scene.sonar, plan.absorption)
     window = (float(plan.windows.start[traced.frame.index]), plan.windows.samples)
     fast = plan.scene.physics.synthesis.signals(*arguments, *window).pressure
     began = time.process_time()
     exact = DirectSum().signals(*arguments, *window).pressure
     seconds = time.process_time() - began
-    echo = slice(int((plan.windows.echo_start) * plan.scene.sonar.sampling_frequency), None)
+    echo = slice(int(plan.windows.echo_start * plan.scene.sonar.sampling_frequency), None)
     return {
         "error_of_peak": relative(fast, exact),
         "error_of_echo_peak": relative(fast[:, echo], exact[:, echo]),
-        "direct_sum_ms_at_this_many_paths": 1e3 * seconds * PATHS / (PATHS // 8),
+        "direct_sum_ms_at_this_many_paths": 1e3 * seconds * share,
     }
 
 
 def peers(
     plan: planning.Plan,
     traced: render.Traced,
-    signals: Any,
+    signals: Signals,
     ours: float,
     image: np.ndarray,
     exact: np.ndarray,
@@ -158,8 +159,6 @@ def peers(
     acoular, acoular_seconds = acoular_image(plan, signals, start, stop, focus)
     rate = sonar.sampling_frequency
     lag = np.arange(-int(0.6e-3 * rate), int(0.6e-3 * rate)) / rate
-    from sonarsynth.acoustics.spectra import filtered_pulse
-
     pulse = filtered_pulse(lag, bubble(traced.frame.moment.snaps[0].model), fir(sonar.antialias))
     bright = np.flatnonzero(exact.ravel() >= 0.01 * exact.max())
     beams = bright[np.linspace(0, len(bright) - 1, min(THESIS_BEAMS, len(bright))).astype(int)]

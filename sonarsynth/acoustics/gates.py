@@ -1,0 +1,85 @@
+"""Gates: the stretch of the signals that is looked at, tapered, and its spectra in the band."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.conventions import Floats
+
+GATE_TAPER: Final = 1e-4
+"""Length (s) of the raised cosine at each end of a gate; a quarter of the gate at most."""
+
+SENSORS_AT_ONCE: Final = 64
+"""Sensors whose gates are transformed together: they stay in the cache."""
+
+
+def gate_samples(
+    start: float, stop: float, first_time: float, sampling_frequency: float, samples: int
+) -> tuple[int, int]:
+    """First sample and number of samples of the gate [start, stop] (s); sample 0 of the signals is at `first_time` (s).
+
+    The number depends on the length of the gate alone, so that every frame has the same frequencies. Raises ValueError
+    when the gate holds no sample or reaches outside the signals: what was not recorded is not silence.
+    """
+    length = (stop - start) * sampling_frequency
+    if not (np.isfinite(start) and np.isfinite(length) and length >= 1.0 - 1e-6):
+        raise ValueError(f"window {start:g} to {stop:g} s holds no sample at {sampling_frequency:g} Hz")
+    first, count = int(np.ceil((start - first_time) * sampling_frequency - 1e-6)), int(np.floor(length + 1e-6))
+    if first < 0 or first + count > samples:
+        end = first_time + samples / sampling_frequency
+        raise ValueError(f"window {start:g} to {stop:g} s reaches outside the signals, {first_time:g} to {end:g} s")
+    return first, count
+
+
+def gate_taper(count: int, sampling_frequency: float) -> npt.NDArray[np.float32]:
+    """Weights (count,) of a gate: one, with raised cosines of `GATE_TAPER` at both ends."""
+    length = min(round(GATE_TAPER * sampling_frequency), count // 4)
+    rise = np.sin(0.5 * np.pi * (np.arange(length) + 0.5) / max(length, 1)) ** 2
+    return np.concatenate([rise, np.ones(count - 2 * length), rise[::-1]]).astype(np.float32)
+
+
+def fast_length(count: int) -> int:
+    """Length of the FFT of a gate of `count` samples: the next that is fast."""
+    from scipy.fft import next_fast_len
+
+    return int(next_fast_len(count, real=True))
+
+
+def frequency_spacing(count: int, sampling_frequency: float) -> float:
+    """Distance (Hz) of the frequencies of a gate of `count` samples: those of its FFT, padded to a fast length."""
+    return float(sampling_frequency / fast_length(count))
+
+
+def gated_spectra(
+    pressure: npt.NDArray[np.floating],
+    sampling_frequency: float,
+    first_sample: int,
+    count: int,
+    band: tuple[float, float],
+) -> tuple[Floats, npt.NDArray[np.complex64]]:
+    """Frequencies (bin,) in Hz and rfft spectra (sensor, bin) in Pa of a gate, bins of the band (low, high) only.
+
+    pressure (sensor, sample) Pa. Phases refer to `first_sample`. The gate is tapered (`gate_taper`) and padded with
+    zeros to a fast length (`frequency_spacing`). Raises ValueError when no frequency in band is below half the sampling
+    frequency.
+    """
+    from scipy.fft import rfft
+
+    length = fast_length(count)
+    low, high = (edge * length / sampling_frequency for edge in band)
+    # Nothing is known of the phase at half the sampling frequency, so that bin never counts.
+    lowest, highest = int(np.ceil(low - 1e-9)), min(int(np.floor(high + 1e-9)), (length - 1) // 2)
+    if highest < lowest:
+        raise ValueError(
+            f"a window of {count} samples resolves no frequency in {band[0]:g} to {band[1]:g} Hz: take a longer one"
+        )
+    taper = gate_taper(count, sampling_frequency)
+    spectra = np.empty((len(pressure), highest + 1 - lowest), np.complex64)
+    for low in range(0, len(pressure), SENSORS_AT_ONCE):
+        some = slice(low, low + SENSORS_AT_ONCE)
+        cut = pressure[some, first_sample : first_sample + count] * taper
+        spectra[some] = rfft(cut, length, axis=1)[:, lowest : highest + 1]
+    return np.arange(lowest, highest + 1, dtype=float) * (sampling_frequency / length), spectra
