@@ -54,7 +54,7 @@ def bistatic_range(excess_path: npt.ArrayLike, beam: npt.ArrayLike, source: npt.
         d = np.where(x >= 0, x + b * h, np.nan)
         r = x * (2 * b + x) / (2 * d)
         from_source = unit(r[..., None] * u - position)
-        by_path = (b + x - r) / d
+        by_path = (x * x + 2 * b * h * (b + x)) / (2 * d * d)  # (L - r)/d without its cancellation
         sine = np.linalg.norm(np.cross(u, s), axis=-1)
         return BistaticRange(
             range=r,
