@@ -55,7 +55,7 @@ class Arrivals:
     amplitude: Floats  # (path,) signed: spreading_out * scattering * spreading_in * boundary * 10^(-absorption/20)
     spreading_out: Floats  # (path,) 1/m: snap to facet (snap to array for the direct path)
     spreading_in: Floats  # (path,) 1/m: facet to array (1 for the direct path)
-    scattering: Floats  # (path,) m: far-field scattering amplitude f of the facet (1 for the direct path)
+    scattering: Floats  # (path,) m, signed: far-field amplitude f of the facet (1 for the direct path)
     boundary: Floats  # (path,) signed product of boundary reflection coefficients
     absorption: Floats  # (path,) dB along the whole path at the centre of the band
     length: Floats  # (path,) m: whole path

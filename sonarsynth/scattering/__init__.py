@@ -8,6 +8,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.description import BY_KIND
 from sonarsynth.scattering.isotropic import Isotropic
 from sonarsynth.scattering.mirror_lobe import MirrorLobe
+from sonarsynth.world.meshes import Mesh
 
 
 class ScatteringLaw(Protocol):
@@ -20,6 +21,10 @@ class ScatteringLaw(Protocol):
         (..., xyz); area: m2 (...); broadcast together. 0 where the facet is not lit (n.incident >= 0) or not seen
         (n.scattered <= 0).
         """
+        ...
+
+    def polarity(self, mesh: Mesh) -> Floats:
+        """Sign (facet,) of the echo of each facet: f is the amplitude times it."""
         ...
 
 

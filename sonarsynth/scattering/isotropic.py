@@ -10,6 +10,7 @@ from annotated_types import Gt
 from sonarsynth.acoustics.lobes import lit_and_seen
 from sonarsynth.conventions import Floats, Metres
 from sonarsynth.description import description
+from sonarsynth.world.meshes import Mesh
 
 
 @description
@@ -23,3 +24,7 @@ class Isotropic:
     def amplitude(self, incident: Floats, scattered: Floats, normal: Floats, area: Floats) -> Floats:
         """Far-field scattering amplitude (...) in m; arguments as in `ScatteringLaw`."""
         return np.where(lit_and_seen(incident, scattered, normal), self.strength, 0.0)
+
+    def polarity(self, mesh: Mesh) -> Floats:
+        """Sign (facet,) of the echo of each facet: all alike."""
+        return np.ones(len(mesh.faces))

@@ -11,6 +11,8 @@ from pydantic import ValidationInfo, field_validator
 from sonarsynth.acoustics.lobes import lambert, lit_and_seen, slope_lobe, slope_of_width
 from sonarsynth.conventions import Floats, Number, Radians
 from sonarsynth.description import description
+from sonarsynth.scattering.polarity import random_polarity
+from sonarsynth.world.meshes import Mesh
 
 
 @description
@@ -18,7 +20,9 @@ class MirrorLobe:
     """Sound leaves a facet in a lobe around the mirror direction; the smoother the surface, the narrower the lobe.
 
     |f|^2 = area (reflectivity^2 sigma0 + diffuse floor): powers add by area, so splitting a facet changes no sum of
-    them.
+    them. That is the law of a rough surface, whose echoes have no phase in common: by `phases`, each facet keeps a
+    random sign of its own. With all signs alike, as in the thesis, facets within a wavelength of path add in phase and
+    the level depends on their number: 6 dB for half the edge (measured on a REMUS-100 hull from 9 to 40 mm).
     """
 
     kind: Literal["mirror_lobe"] = "mirror_lobe"
@@ -28,6 +32,9 @@ class MirrorLobe:
     """Pressure reflection coefficient of the surface."""
     diffuse: Annotated[Number, Ge(0), Le(1)] = 0.0
     """Share of the power that is scattered by Lambert's law; with reflectivity squared at most 1."""
+
+    phases: Literal["random", "alike"] = "random"
+    """Whether the echoes of facets have random signs, fixed for each facet of a mesh, or all the same."""
 
     @field_validator("diffuse")
     @classmethod
@@ -45,3 +52,7 @@ class MirrorLobe:
         if self.diffuse > 0:
             power = power + lambert(incident, scattered, normal, self.diffuse)
         return np.where(lit_and_seen(incident, scattered, normal), np.sqrt(area * power), 0.0)
+
+    def polarity(self, mesh: Mesh) -> Floats:
+        """Sign (facet,) of the echo of each facet, by `phases`."""
+        return random_polarity(mesh) if self.phases == "random" else np.ones(len(mesh.faces))

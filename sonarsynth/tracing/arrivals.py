@@ -134,11 +134,18 @@ def _echoes(
     gain = over_aperture / scattering[:, None] * legs.probe_gain
     gain[(over_aperture == 0).any(axis=1)] = 1.0  # a facet on the limb: all sensors share what the centre sees
     return _assemble(
-        legs, index, snap.time, absorption, array.target[row], array.facet[row], scattering,
+        legs, index, snap.time, absorption, array.target[row], array.facet[row], _signs(array, law, row) * scattering,
         _variation(array, gain, scattering * legs.spreading * out.spreading[path]),
         spreading_out=out.spreading[path], spreading_in=legs.spreading,
         out_time=out.travel_time[path], out_length=out.length[path], out_turning=out.turning[path],
     )  # fmt: skip
+
+
+def _signs(array: ArrayLegs, law: ScatteringLaw, row: Ints) -> Floats:
+    """Sign (row,) of the echoes of the facets of some legs."""
+    every = np.concatenate([np.empty(0), *(law.polarity(body.mesh) for body in array.bodies)])
+    first = np.cumsum([0, *(len(body.mesh.faces) for body in array.bodies)])
+    return np.asarray(every[first[array.target[row]] + array.facet[row]])
 
 
 def _variation(array: ArrayLegs, gain: Floats, strength: Floats) -> tuple[Floats, float]:

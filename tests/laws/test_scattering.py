@@ -10,6 +10,8 @@ from sonarsynth.acoustics.lobes import lambert, slope_lobe
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import unit
 from sonarsynth.scattering import Isotropic, MirrorLobe, Scattering
+from sonarsynth.world.meshes import Mesh, mesh_of
+from sonarsynth.world.shapes import Sphere
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -103,3 +105,13 @@ def test_the_registry_tells_laws_apart_by_kind() -> None:
     adapter = TypeAdapter(Scattering)
     assert adapter.validate_python({"kind": "mirror_lobe", "width": "5 deg"}) == MirrorLobe(width=np.deg2rad(5.0))
     assert adapter.validate_python({"kind": "isotropic", "strength": 0.1}) == Isotropic(strength=0.1)
+
+
+def test_signs_of_facets_are_fixed_and_random() -> None:
+    """As many of one as of the other, the same for the same mesh, others for another; alike where asked."""
+    ball = mesh_of(Sphere(radius=1.0, edge=0.05))
+    signs = MirrorLobe().polarity(ball)
+    assert set(signs) == {-1.0, 1.0} and abs(signs.sum()) < 4 * np.sqrt(len(signs))
+    assert (signs == MirrorLobe(width=0.2).polarity(Mesh(ball.vertices, ball.faces))).all()
+    assert (signs != MirrorLobe().polarity(Mesh(2 * ball.vertices, ball.faces))).any()
+    assert (MirrorLobe(phases="alike").polarity(ball) == 1).all()

@@ -15,8 +15,10 @@ from sonarsynth.planning import PRODUCTS, plan
 from sonarsynth.products import LEDGER
 from sonarsynth.recipe import Recipe
 from sonarsynth.render import beamform_frame, render, synthesise, trace_frame
+from sonarsynth.scattering import MirrorLobe
 from sonarsynth.sonar import PositionTable
 from sonarsynth.synthesis.pulse import bubble, fir
+from sonarsynth.world.shapes import Remus100
 from tests.scenes import point_scene, remus
 
 SIGNALS = frozenset({"signals"})
@@ -161,3 +163,23 @@ def test_what_nobody_asked_for_is_not_computed(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("sonarsynth.render.synthesise", lambda *_: pytest.fail("signals were synthesised"))
     heard = beamform_frame(made, 0, trace_frame(made, 0))
     assert heard.signals is None and heard.image is None
+
+
+def _brightest(edge: float, phases: str) -> float:
+    """Mean over frames of the brightest beam (dB) of the small scene with facets of this edge."""
+    recipe = remus(frames=6)
+    target = replace(recipe.scene.world.targets[0], shape=Remus100(edge=edge))
+    scene = replace(
+        recipe.scene,
+        world=replace(recipe.scene.world, targets=(target,)),
+        physics=replace(recipe.scene.physics, scattering=MirrorLobe(width=np.deg2rad(30), phases=phases)),
+    )
+    made = plan(replace(recipe, scene=scene))
+    images = [beamform_frame(made, i, trace_frame(made, i)).image for i in range(6)]
+    return float(np.mean([10 * np.log10(image.energy.max()) for image in images]))
+
+
+def test_levels_do_not_depend_on_the_number_of_facets() -> None:
+    """Powers of facets with random signs add; with all signs alike half the edge, four times the facets, gives 6 dB."""
+    assert abs(_brightest(0.02, "random") - _brightest(0.04, "random")) < 3.0
+    assert _brightest(0.02, "alike") - _brightest(0.04, "alike") == pytest.approx(6.0, abs=1.5)
