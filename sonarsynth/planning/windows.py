@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonarsynth.acoustics.rays import mean_slowness, water
 from sonarsynth.conventions import Floats, depth
 from sonarsynth.description import FieldError
 from sonarsynth.planning.plans import Windows
@@ -38,7 +39,7 @@ def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
     across = elements(sonar.array).aperture / profile.speed.min()  # of a wave, from the centre to the edge
     before, after = _support(recipe, SUPPORT) + across
     echo_before, echo_after = _support(recipe, ECHO_SUPPORT) + across
-    spans = [_span(recipe.frame(i)[1], profile) for i in range(recipe.frames)]
+    spans = [_span(recipe.frame(i)[1], profile, scene.world.environment.depth) for i in range(recipe.frames)]
     first_heard, last_direct, first_echo, last_echo, last_heard = np.array([_times(span) for span in spans]).T
     gate = scene.processing.echo_window
     echoes = bool(np.isfinite(first_echo).any())
@@ -84,15 +85,15 @@ def _times(span: _Span) -> tuple[float, ...]:
     return (span.first, span.last_direct, span.first_echo, span.last_echo, span.last)
 
 
-def _span(frame: Frame, profile: Profile) -> _Span:
+def _span(frame: Frame, profile: Profile, bed: float) -> _Span:
     array = frame.sonar_pose.position
     snaps = frame.moment.snaps
     if not snaps:
         return _Span(0.0, 0.0, 0.0, np.nan, np.nan, 0.0)
     points = np.concatenate([np.empty((0, 3)), *(b.pose.to_world(b.mesh.centroid) for b in frame.moment.bodies)])
-    back = _straight_time(profile, points, array)
-    direct = np.array([s.time + float(_straight_time(profile, s.position, array)) for s in snaps])
-    echoes = [s.time + _straight_time(profile, s.position, points) + back for s in snaps]
+    back = _straight_time(profile, bed, points, array)
+    direct = np.array([s.time + float(_straight_time(profile, bed, s.position, array)) for s in snaps])
+    echoes = [s.time + _straight_time(profile, bed, s.position, points) + back for s in snaps]
     last = np.array([max(d, e.max(initial=-np.inf)) for d, e in zip(direct, echoes, strict=True)])
     heard = [
         level - 20 * np.log10(max(float(np.linalg.norm(s.position - array)), 1e-9))
@@ -117,16 +118,11 @@ def _disturbed(span: _Span, start: float, stop: float) -> bool:
     return any(first < span.clock + stop and last > span.clock + start for first, last in span.others)
 
 
-def _straight_time(profile: Profile, a: Floats, b: Floats) -> Floats:
+def _straight_time(profile: Profile, bed: float, a: Floats, b: Floats) -> Floats:
     """Travel time (...) along straight lines a to b (..., xyz): distance times the mean slowness between them."""
+    distance = np.asarray(np.linalg.norm(a - b, axis=-1))
     if profile.uniform:
-        return np.asarray(np.linalg.norm(a - b, axis=-1) / profile.speed[0])
-    deepest = max(depth(a).max(initial=0.0), depth(b).max(initial=0.0))
-    grid = np.unique(np.concatenate([profile.depth, np.linspace(0.0, deepest + 1.0, 200)]))
-    slowness = 1.0 / profile.at(grid)
-    integral = np.concatenate([[0.0], np.cumsum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(grid))])
-    za, zb = depth(a), depth(b)
-    level_ray = np.abs(za - zb) < 1e-6
-    rise = np.where(level_ray, 1.0, zb - za)
-    mean = (np.interp(zb, grid, integral) - np.interp(za, grid, integral)) / rise
-    return np.asarray(np.linalg.norm(a - b, axis=-1) * np.where(level_ray, 1.0 / profile.at(za), mean))
+        return np.asarray(distance / profile.speed[0])
+    ends = np.broadcast_arrays(depth(a), depth(b))
+    slowness = mean_slowness(water(profile.depth, profile.speed, bed), *(np.atleast_1d(z) for z in ends))
+    return np.asarray(distance * slowness.reshape(distance.shape))

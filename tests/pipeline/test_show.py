@@ -185,7 +185,13 @@ def _tree(frames, groups, size, angle, sensors, vertices, faces) -> xr.DataTree:
         sets["signals"]["gain"] = ("sensor", np.ones(len(sensors)))
         sets["signals"]["sampling_frequency"] = RATE
     sets["targets/hull"] = xr.Dataset({"vertices": (("vertex", "xyz"), vertices), "faces": (("face", "corner"), faces)})
-    sets["/"].attrs = {"title": "An ellipsoid", "band_low": BAND[0], "band_high": BAND[1], "assumed_sound_speed": SPEED}
+    sets["/"].attrs = {
+        "title": "An ellipsoid",
+        "band_low": BAND[0],
+        "band_high": BAND[1],
+        "assumed_sound_speed": SPEED,
+        "aperture_radius": float(np.linalg.norm(sensors, axis=1).max()),
+    }
     return xr.DataTree.from_dict(sets)
 
 
