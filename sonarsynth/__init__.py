@@ -42,13 +42,13 @@ if TYPE_CHECKING:
     from sonarsynth.synthesis import DirectSum, KernelDeposit
     from sonarsynth.tracing import AutoTracing, Refracted, Straight
     from sonarsynth.tracing.ray_request import RayRequest
+    from sonarsynth.world.boundaries import SeaBed, SeaSurface
     from sonarsynth.world.environment import (
         Absorption,
         Cast,
         Environment,
         FlatNoise,
         Isovelocity,
-        SeaBed,
         Tabulated,
         TemperatureSalinity,
         WenzNoise,
@@ -102,6 +102,7 @@ __all__ = [
     "Romanis",
     "Scene",
     "SeaBed",
+    "SeaSurface",
     "SensorDelays",
     "SnappingShrimp",
     "Sonar",
@@ -186,13 +187,16 @@ _HOMES = {
         "Straight",
     ),
     "tracing.ray_request": ("RayRequest",),
+    "world.boundaries": (
+        "SeaBed",
+        "SeaSurface",
+    ),
     "world.environment": (
         "Absorption",
         "Cast",
         "Environment",
         "FlatNoise",
         "Isovelocity",
-        "SeaBed",
         "Tabulated",
         "TemperatureSalinity",
         "WenzNoise",

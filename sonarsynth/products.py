@@ -32,6 +32,9 @@ class Paths:
     surface: Ints  # (path,) number of surface reflections
     bottom: Ints  # (path,) number of bed reflections
     turning: Ints  # (path,) number of turning points
+    caustics: Ints  # (path,) caustics passed
+    surface_grazing: Floats  # (path,) rad: grazing angle at the surface; NaN without a reflection there
+    bottom_grazing: Floats  # (path,) rad: grazing angle at the bed; NaN without a reflection there
     flag: Ints  # (path,) 0 good; else why ray theory ends here (`acoustics.rays.REASONS`)
 
 
@@ -56,7 +59,7 @@ class Arrivals:
     spreading_out: Floats  # (path,) 1/m: snap to facet (snap to array for the direct path)
     spreading_in: Floats  # (path,) 1/m: facet to array (1 for the direct path)
     scattering: Floats  # (path,) m, signed: far-field amplitude f of the facet (1 for the direct path)
-    boundary: Floats  # (path,) signed product of boundary reflection coefficients
+    boundary: Floats  # (path,) product of the moduli of boundary reflection coefficients; their phases are in `phase`
     absorption: Floats  # (path,) dB along the whole path at the centre of the band
     length: Floats  # (path,) m: whole path
     snap: Ints  # (path,) index of the snap
@@ -66,6 +69,10 @@ class Arrivals:
     surface: Ints  # (path,) surface reflections
     bottom: Ints  # (path,) bed reflections
     turning: Ints  # (path,) turning points
+    caustics: Ints  # (path,) caustics passed
+    phase: Floats  # (path,) rad: constant phase of the pulse over frequency, from caustics and lossy reflections
+    blur: Floats  # (path,) s: rough boundaries take exp(-(2 pi f blur)^2/2) off the spectrum, a Gaussian in time
+    stretch: Floats  # (path,) Doppler: the pulse is p((t - delay)/(1 + stretch))
     sound_speed: float  # m/s of the water at the array centre
     wavefront_error: float  # s: largest error of the wavefronts that was measured, at probes spread over the aperture
     amplitude_error: float = 0.0  # largest error of the amplitudes measured there, relative to the strongest echo

@@ -38,6 +38,9 @@ class Refracted:
             surface=none,
             bottom=none,
             turning=np.isfinite(rays.turning_depth).astype(int),
+            caustics=rays.caustics,
+            surface_grazing=np.full(len(none), np.nan),
+            bottom_grazing=np.full(len(none), np.nan),
             flag=rays.flag,
         )
 

@@ -33,4 +33,19 @@ class Straight:
             towards, spreading = span / length[:, None], 1.0 / length
         flag = np.where(length > 0, GOOD, COINCIDENT)
         pair = np.arange(len(length))
-        return Paths(pair, length * slowness, length, towards, towards, spreading, none, none, none, flag)
+        nowhere = np.full(len(length), np.nan)
+        return Paths(
+            pair=pair,
+            travel_time=length * slowness,
+            length=length,
+            departure=towards,
+            arrival=towards,
+            spreading=spreading,
+            surface=none,
+            bottom=none,
+            turning=none,
+            caustics=none,
+            surface_grazing=nowhere,
+            bottom_grazing=nowhere,
+            flag=flag,
+        )

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Annotated, Literal
 
 import numpy as np
-from annotated_types import Ge, Gt, Le, MinLen
+from annotated_types import Ge, Le, MinLen
 from pydantic import ValidationInfo, field_validator
 
 from sonarsynth.conventions import (
@@ -22,6 +22,7 @@ from sonarsynth.conventions import (
     WaterSoundSpeed,
 )
 from sonarsynth.description import BY_KIND, description
+from sonarsynth.world.boundaries import SeaBed, SeaSurface
 
 Depths = Annotated[tuple[NonNegativeMetres, ...], MinLen(1)]
 
@@ -111,26 +112,6 @@ class Profile:
     def at(self, depth: np.ndarray | float) -> Floats:
         """Sound speed (m/s) at depths (m, positive down)."""
         return np.asarray(np.interp(depth, self.depth, self.speed))
-
-
-@description
-class SeaSurface:
-    """The surface: flat, and pressure release (reflection coefficient -1)."""
-
-    kind: Literal["pressure_release"] = "pressure_release"
-
-
-@description
-class SeaBed:
-    """The bed: flat, a fluid half-space (Rayleigh reflection coefficient). Default: medium sand (APL-UW TR 9407)."""
-
-    kind: Literal["fluid"] = "fluid"
-    density_ratio: Annotated[Number, Gt(0)] = 1.845
-    """Density over that of the water."""
-    speed_ratio: Annotated[Number, Gt(0)] = 1.1782
-    """Sound speed over that of the water at the bed."""
-    loss_tangent: Annotated[Number, Ge(0), Le(1)] = 0.01624
-    """Imaginary over real part of the wavenumber in the bed."""
 
 
 @description

@@ -65,6 +65,7 @@ SURFACE = [
     "Romanis",
     "Scene",
     "SeaBed",
+    "SeaSurface",
     "SensorDelays",
     "SnappingShrimp",
     "Sonar",

@@ -49,6 +49,10 @@ def arrivals(delay: Floats, direction: Floats, radius: Floats, amplitude: Floats
         surface=zero,
         bottom=zero,
         turning=zero,
+        caustics=zero,
+        phase=np.zeros(n),
+        blur=np.zeros(n),
+        stretch=np.zeros(n),
         sound_speed=C,
         wavefront_error=0.0,
     )

@@ -72,6 +72,10 @@ def arrivals(
         surface=zero,
         bottom=zero,
         turning=zero,
+        caustics=zero,
+        phase=np.zeros(n),
+        blur=np.zeros(n),
+        stretch=np.zeros(n),
         sound_speed=C,
         wavefront_error=0.0,
     )
