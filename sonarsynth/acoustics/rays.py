@@ -1,8 +1,8 @@
 """Eigenrays in horizontally layered water: the rays that join two points, found completely and to rounding.
 
-The family here is the direct one: no reflection from surface or bed, at most one turning point. Sound speed is linear
-between nodes; two nodes at one depth are a jump, taken as the limit of a thin layer (a ray turns in it where the thin
-layer would turn it). Method: `rays_layers`, `rays_chain`, `rays_search`.
+Sound speed is linear between nodes; two nodes at one depth are a jump, taken as the limit of a thin layer (a ray turns
+in it where the thin layer would turn it). Method: `rays_layers` (one layer), `rays_chain` (sums over layers),
+`rays_families` (which sums), `rays_search` (their roots).
 """
 
 from __future__ import annotations
@@ -50,7 +50,11 @@ class Eigenrays:
     start_speed: Floats  # (ray,) m/s
     end_speed: Floats  # (ray,) m/s
     amplitude: Floats  # (ray,) 1/m: pressure at the end over that at 1 m from the start
-    turning_depth: Floats  # (ray,) m; NaN for a ray that does not turn
+    upper: Floats  # (ray,) m: depth of its upper vertex, a turning depth or 0 at the surface; NaN without one
+    lower: Floats  # (ray,) m: depth of its lower vertex, a turning depth or that of the bed; NaN without one
+    surface: Ints  # (ray,) reflections from the surface
+    bottom: Ints  # (ray,) reflections from the bed
+    turning: Ints  # (ray,) turning points
     caustics: Ints  # (ray,) caustics passed
     flag: Ints  # (ray,) see REASONS
 
@@ -84,12 +88,15 @@ def within(water: Water, depth: Floats, what: str) -> Floats:
     return np.asarray(np.clip(z, 0.0, bed))
 
 
-def eigenrays(water: Water, start: Floats, end: Floats, distance: Floats) -> Eigenrays:
-    """All direct rays from depths start (pair,) to depths end (pair,) at horizontal distances (pair,), in m.
+def eigenrays(
+    water: Water, start: Floats, end: Floats, distance: Floats, vertices: int = 1, reflections: int = 0
+) -> Eigenrays:
+    """All rays from depths start (pair,) to depths end (pair,) at horizontal distances (pair,), in m.
 
-    A pair may have none (a shadow zone), one or several. Travel times are right to about 1e-15 of themselves, the root
-    search is complete (`rays_search`). Raises ValueError for ends outside the water and distances not finite or
-    negative.
+    vertices: most turning points and reflections together; reflections: most from surface and bed together. The default
+    is the direct family. A pair may have no ray (a shadow zone), one or several. Travel times are right to about 1e-15
+    of themselves, and the search is complete (`rays_search`). A ray that turns exactly at an end counts once. Raises
+    ValueError for ends outside the water, distances that are not finite or negative, and negative numbers of vertices.
     """
     from sonarsynth.acoustics import rays_batch as kernels
 
@@ -99,19 +106,22 @@ def eigenrays(water: Water, start: Floats, end: Floats, distance: Floats) -> Eig
     z1, z2, r = (np.ascontiguousarray(a) for a in (z1, z2, r))
     if not (np.isfinite(r) & (r >= 0)).all():
         raise ValueError("horizontal distances must be finite and not negative")
-    upside_down = -water.depth[::-1].copy(), water.speed[::-1].copy()
+    if vertices < 0 or reflections < 0:
+        raise ValueError("the most vertices and reflections of a ray cannot be negative")
     pairs, rows, first = [], [], 0
-    room = len(r) + 64
+    room = (1 + min(2 * vertices, 4)) * len(r) + 64
     while first < len(r):
         pair, out = np.empty(room, np.int64), np.empty((room, kernels.FIELDS))
-        count, reached = kernels.rays_of_pairs(water.depth, water.speed, *upside_down, z1, z2, r, first, pair, out)
+        count, reached = kernels.rays_of_pairs(
+            water.depth, water.speed, z1, z2, r, vertices, min(reflections, vertices), first, pair, out
+        )
         pairs.append(pair[:count])
         rows.append(out[:count])
-        room = 2 * room if reached == first else max(64, 2 * (len(r) - reached))
+        room = 2 * room if reached == first else max(64, 2 * (1 + vertices) * (len(r) - reached))
         first = reached
     pair = np.concatenate([np.empty(0, np.int64), *pairs])
     columns = np.concatenate([np.empty((0, kernels.FIELDS)), *rows]).T.copy()
-    return Eigenrays(pair, *columns[:9], *columns[9:].astype(np.int64))
+    return Eigenrays(pair, *columns[: kernels.SURFACE], *columns[kernels.SURFACE :].astype(np.int64))
 
 
 def mean_slowness(water: Water, start: Floats, end: Floats) -> Floats:

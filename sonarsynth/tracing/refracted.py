@@ -37,7 +37,7 @@ class Refracted:
             spreading=rays.amplitude,
             surface=none,
             bottom=none,
-            turning=np.isfinite(rays.turning_depth).astype(int),
+            turning=rays.turning,
             caustics=rays.caustics,
             surface_grazing=np.full(len(none), np.nan),
             bottom_grazing=np.full(len(none), np.nan),

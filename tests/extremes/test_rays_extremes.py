@@ -38,7 +38,7 @@ def test_ends_at_nearly_one_depth(gap: float) -> None:
 def test_both_ends_on_the_axis_of_a_channel_have_one_arc_above_and_one_below(distance: float) -> None:
     found = one(CHANNEL, 20.0, 20.0, distance)
     assert len(found.pair) == 2
-    assert sorted(np.sign(found.turning_depth - 20.0)) == [-1, 1]
+    assert sorted(np.sign(np.fmax(found.upper, found.lower) - 20.0)) == [-1, 1]
     np.testing.assert_allclose(found.travel_time, distance / 1500.0, rtol=1e-5)
 
 
@@ -67,7 +67,7 @@ def test_a_fast_sheet_without_thickness_turns_flat_rays_back_and_lets_steep_ones
     assert len(one(water, 5.0, 15.0, 5.0).pair) == 1
     assert len(one(water, 5.0, 15.0, 500.0).pair) == 0
     returned = one(water, 5.0, 5.0, 500.0)
-    assert sorted(returned.turning_depth, key=str) == [10.0, pytest.approx(np.nan, nan_ok=True)]
+    assert sorted(np.fmax(returned.upper, returned.lower), key=str) == [10.0, pytest.approx(np.nan, nan_ok=True)]
 
 
 def test_a_very_fine_noisy_profile() -> None:

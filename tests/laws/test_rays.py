@@ -34,7 +34,7 @@ def test_one_layer_has_the_closed_form_whether_or_not_the_ray_turns(gradient: fl
     r = 10 ** rng.uniform(1, 4.3, 3000)
     found = rays.eigenrays(water, z1, z2, r)
     assert np.array_equal(found.pair, np.arange(3000))
-    assert 0 < np.isfinite(found.turning_depth).sum() < 3000
+    assert 0 < np.isfinite(np.fmax(found.upper, found.lower)).sum() < 3000
     time, length = closed_form(water, z1, z2, r)
     np.testing.assert_allclose(found.travel_time, time, rtol=3e-14)
     np.testing.assert_allclose(found.length, length, rtol=1e-9)
@@ -69,7 +69,7 @@ def test_a_path_is_the_same_from_both_ends() -> None:
     z1, z2, r = rng.uniform(0, 20, 400), rng.uniform(0, 20, 400), 10 ** rng.uniform(0, 3, 400)
     there, back = rays.eigenrays(water, z1, z2, r), rays.eigenrays(water, z2, z1, r)
     assert np.array_equal(there.pair, back.pair)
-    for name in ("travel_time", "length", "slowness", "amplitude", "turning_depth"):
+    for name in ("travel_time", "length", "slowness", "amplitude", "upper", "lower"):
         np.testing.assert_allclose(getattr(there, name), getattr(back, name), rtol=1e-12, err_msg=name)
     np.testing.assert_allclose(there.start_sine, -back.end_sine, rtol=1e-9)
     np.testing.assert_allclose(there.end_sine, -back.start_sine, rtol=1e-9)
@@ -84,7 +84,7 @@ def test_snell_and_the_slope_of_the_travel_time() -> None:
     one = [np.bincount(f.pair, minlength=200) == 1 for f in (here, near, far)]
     keep = np.flatnonzero(one[0] & one[1] & one[2])
     here, near, far = (select(f, keep) for f in (here, near, far))
-    same = np.isnan(near.turning_depth) == np.isnan(far.turning_depth)
+    same = np.isnan(np.fmax(near.upper, near.lower)) == np.isnan(np.fmax(far.upper, far.lower))
     for sine, speed in ((here.start_sine, here.start_speed), (here.end_sine, here.end_speed)):
         np.testing.assert_allclose(here.slowness * speed, np.sqrt(1 - sine**2), rtol=1e-12)
     slope = (far.travel_time - near.travel_time) / (2e-5 * r[keep])
@@ -157,8 +157,8 @@ def test_the_last_straight_ray_and_the_first_turning_one_meet() -> None:
     r = limit * (1 + offset)
     found = rays.eigenrays(water, np.full(9, 100.0), np.full(9, 200.0), r)
     assert np.array_equal(found.pair, np.arange(9))
-    assert np.isnan(found.turning_depth[:3]).all()
-    assert np.isfinite(found.turning_depth[6:]).all()
+    assert np.isnan(np.fmax(found.upper, found.lower)[:3]).all()
+    assert np.isfinite(np.fmax(found.upper, found.lower)[6:]).all()
     chord = np.hypot(r, 100.0)
     np.testing.assert_allclose(found.travel_time, 2 / g * np.arcsinh(g * chord / 2 / np.sqrt(c1 * c2)), rtol=1e-14)
     assert np.abs(found.end_sine[[3, 4, 5]]).max() < 1e-6
@@ -179,14 +179,14 @@ def test_a_shadow_zone_has_no_path_and_its_edge_is_where_the_grazing_ray_goes() 
     )  # from 10 m over the surface to 30 m
     found = rays.eigenrays(water, np.full(2, 10.0), np.full(2, 30.0), limit * np.array([1 - 1e-9, 1 + 1e-9]))
     assert list(found.pair) == [0]
-    assert found.turning_depth[0] == pytest.approx(0.0, abs=1e-4)
+    assert np.fmax(found.upper, found.lower)[0] == pytest.approx(0.0, abs=1e-4)
 
 
 def test_the_bed_ends_the_water_that_a_ray_may_turn_in() -> None:
     profile = np.array([0.0, 100.0]), np.array([1500.0, 1520.0])
     vertex = rays.eigenrays(
         rays.water(*profile, 100.0), np.array([40.0]), np.array([40.0]), np.array([400.0])
-    ).turning_depth[0]
+    ).lower[0]
     for bed, paths in ((vertex + 1e-6, 1), (vertex - 1e-6, 0)):
         found = rays.eigenrays(rays.water(*profile, bed), np.array([40.0]), np.array([40.0]), np.array([400.0]))
         assert len(found.pair) == paths
@@ -200,7 +200,7 @@ def test_a_jump_is_the_limit_of_a_thin_layer() -> None:
     thin = rays.eigenrays(rays.water(np.array([0.0, 10.0, 10.0 + 1e-10, 30.0]), jump.speed, 30.0), z1, z2, r)
     assert np.array_equal(sharp.pair, thin.pair)
     np.testing.assert_allclose(sharp.travel_time, thin.travel_time, rtol=1e-11)
-    assert np.isfinite(sharp.turning_depth).sum() > 5
+    assert np.isfinite(np.fmax(sharp.upper, sharp.lower)).sum() > 5
 
 
 def test_splitting_a_layer_changes_nothing() -> None:
@@ -227,7 +227,7 @@ def test_a_ray_followed_arc_by_arc_ends_where_the_eigenray_does() -> None:
     x, z = np.empty((2, len(found.pair), 7))
     angle = -np.arctan2(found.start_sine, found.slowness * found.start_speed)
     rays_march.along(water.depth, water.speed, z1[found.pair], angle, found.slowness, found.length, x, z)
-    assert np.isfinite(found.turning_depth).sum() > 50
+    assert np.isfinite(np.fmax(found.upper, found.lower)).sum() > 50
     np.testing.assert_allclose(x[:, -1], r[found.pair], rtol=1e-8)
     np.testing.assert_allclose(z[:, -1], z2[found.pair], atol=2e-6)
 

@@ -82,7 +82,7 @@ def test_times_lengths_and_slownesses_to_many_digits(layers: int, spread: float,
             found = rays.eigenrays(water, start, end, distance)
             for i, pair in enumerate(found.pair):
                 a, b, r = float(start[pair]), float(end[pair]), mp.mpf(float(distance[pair]))
-                turn = float(found.turning_depth[i])
+                turn = float(np.fmax(found.upper, found.lower)[i])
                 if np.min(np.abs(water.depth - turn), initial=np.inf) < 1e-7:
                     continue  # the turning layer is not certain at 1e-16
                 p = mp.mpf(float(found.slowness[i]))
