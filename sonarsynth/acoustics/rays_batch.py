@@ -8,15 +8,15 @@ import numpy as np
 from numba import njit
 
 from sonarsynth.acoustics.rays_chain import lay, node_above, offsets, speed_at
-from sonarsynth.acoustics.rays_families import COLUMNS, SLOTS, Chain, families_of_pair
+from sonarsynth.acoustics.rays_families import COLUMNS, families_of_pair
 from sonarsynth.acoustics.rays_layers import atanhc
+from sonarsynth.acoustics.rays_reach import Chain, new_chain
 from sonarsynth.acoustics.rays_rows import END_SINE, FIELDS, START_SINE, SURFACE, emit, emit_level, sort_by_time
 from sonarsynth.acoustics.rays_search import straight
 from sonarsynth.conventions import Floats, Ints
 
 __all__ = ["FIELDS", "SURFACE", "mean_slowness", "rays_of_pairs"]
 
-ROOTS = 64  # room for rays that turn in one layer
 SAME_DEPTH = 1e-140  # m: depths that differ by less are equal
 
 
@@ -80,12 +80,7 @@ def rays_of_pairs(
     out: Floats,
 ) -> tuple[int, int]:
     """All rays of the pairs from `first` on, into pair and out: how many, and the pair where the room ended."""
-    room = 2 * len(depth) + 16
-    work = np.empty((5, room))
-    chain = Chain(
-        work[0], work[1], work[2], work[3], work[4],
-        np.zeros(SLOTS, np.int64), np.zeros(SLOTS), np.empty(64), np.empty((ROOTS, 2)),
-    )  # fmt: skip
+    chain = new_chain(len(depth))
     family = np.zeros((2 * vertices, COLUMNS), np.int64)
     slowest, fastest = speed.min(), speed.max()
     steepest = math.sqrt((fastest - slowest) * (fastest + slowest)) / slowest  # tangent of any ray that turns

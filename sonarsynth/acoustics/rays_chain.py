@@ -163,34 +163,34 @@ def bounds(
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def time_and_length(
-    s_m: float,
-    p: float,
-    c: Floats,
-    d: Floats,
-    dz: Floats,
-    crossings: Floats,
-    first: int,
-    last: int,
-    turn_up: float,
-    turn_down: float,
-) -> tuple[float, float]:
-    """Travel time (s) and arc length (m) of a ray along its chain and the half layers that it turns in."""
+def time_of(
+    s_m: float, p: float, c: Floats, d: Floats, dz: Floats, crossings: Floats, first: int, last: int,
+    turn_up: float, turn_down: float,
+) -> float:  # fmt: skip
+    """Travel time (s) of a ray along its chain and the half layers that it turns in."""
     a, b = s_m * s_m, p * p
     s1 = math.sqrt(a + b * d[first])
-    time = length = 0.0
-    if turn_up > 0.0:
-        tangent = s1 / (p * c[first])
-        time += 2.0 * turn_time(tangent, turn_up)
-        length += 2.0 * turn_length(p, tangent, turn_up)
+    time = 2.0 * turn_time(s1 / (p * c[first]), turn_up) if turn_up > 0.0 else 0.0
     for i in range(first, last):
         s2 = math.sqrt(a + b * d[i + 1])
-        if dz[i] > 0.0 and crossings[i] > 0.0:
+        if dz[i] > 0.0:
             time += crossings[i] * layer_time(p, c[i], c[i + 1], s1, s2, dz[i])
+        s1 = s2
+    return time + (2.0 * turn_time(s1 / (p * c[last]), turn_down) if turn_down > 0.0 else 0.0)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def length_of(
+    s_m: float, p: float, c: Floats, d: Floats, dz: Floats, crossings: Floats, first: int, last: int,
+    turn_up: float, turn_down: float,
+) -> float:  # fmt: skip
+    """Arc length (m) of a ray along its chain and the half layers that it turns in."""
+    a, b = s_m * s_m, p * p
+    s1 = math.sqrt(a + b * d[first])
+    length = 2.0 * turn_length(p, s1 / (p * c[first]), turn_up) if turn_up > 0.0 else 0.0
+    for i in range(first, last):
+        s2 = math.sqrt(a + b * d[i + 1])
+        if dz[i] > 0.0:
             length += crossings[i] * layer_length(p, c[i], c[i + 1], s1, s2, dz[i])
         s1 = s2
-    if turn_down > 0.0:
-        tangent = s1 / (p * c[last])
-        time += 2.0 * turn_time(tangent, turn_down)
-        length += 2.0 * turn_length(p, tangent, turn_down)
-    return time, length
+    return length + (2.0 * turn_length(p, s1 / (p * c[last]), turn_down) if turn_down > 0.0 else 0.0)

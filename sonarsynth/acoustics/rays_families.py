@@ -10,11 +10,32 @@ a sum of the same three legs (above, between, below), so the legs are summed onc
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from numba import njit
 
-from sonarsynth.acoustics.rays_chain import GRAZING, lay, leg, offsets, turn
+from sonarsynth.acoustics.rays_chain import GRAZING, leg, offsets, turn
+from sonarsynth.acoustics.rays_reach import (
+    AFTER,
+    DESCENDS,
+    FASTEST,
+    FIRST,
+    GRADIENT_DOWN,
+    GRADIENT_UP,
+    LAST,
+    LOWER_END,
+    ON_BED,
+    ON_SURFACE,
+    SLOWEST,
+    UPPER_END,
+    Z_BOTTOM,
+    Z_DOWN,
+    Z_TOP,
+    Z_UP,
+    Chain,
+    begin,
+    extend_down,
+    extend_up,
+)
 from sonarsynth.acoustics.rays_rows import BOTTOM, END_SINE, LOWER, START_SINE, SURFACE, UPPER, emit
 from sonarsynth.acoustics.rays_search import straight, turns
 from sonarsynth.conventions import Floats, Ints
@@ -24,98 +45,17 @@ UP, DOWN, ABOVE, BETWEEN, BELOW, SHORT, ALIVE = range(7)
 range at the end of the last interval was shorter than asked for; whether it may still have rays."""
 COLUMNS = 7
 
-FIRST, UPPER_END, LOWER_END, LAST, ON_SURFACE, ON_BED, DESCENDS, NODE_UP, NODE_DOWN = range(9)
-"""Columns of Chain.at: nodes of the chain (its first, those at the upper and the lower end, its last); whether it ends
-on surface and bed; whether the start is the upper end; the next nodes of the profile above and below the chain."""
-Z_UP, Z_TOP, Z_BOTTOM, Z_DOWN, GRADIENT_UP, GRADIENT_DOWN, FASTEST, SLOWEST, AFTER = range(9)
-"""Columns of Chain.of: depths (m) of those nodes; inverse gradients (s) of the layers beyond the chain, 0 on a boundary;
-fastest and slowest speed in the chain (m/s), and the speed at which its vertices next change layer."""
-SLOTS = 9
-
-
-class Chain(NamedTuple):
-    """The water between the vertices of a ray, and room to work in."""
-
-    c: Floats  # (node,) m/s
-    d: Floats  # (node,) m2/s2: (c_m - c)(c_m + c), c_m the fastest
-    k: Floats  # (layer,) m2/s: crossings dz (c1 + c2) of one family
-    dz: Floats  # (layer,) m
-    crossings: Floats  # (layer,) of one family
-    at: Ints  # (SLOTS,)
-    of: Floats  # (SLOTS,)
-    stack: Floats
-    roots: Floats  # (root, 2)
-
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def list_families(vertices: int, start_on_top: bool, family: Ints) -> None:
-    """Fill family (2 vertices, COLUMNS): those launched down, then up, with 1, 2, ... vertices."""
-    for n in range(1, vertices + 1):
-        for up in range(2):
-            row = 2 * (n - 1) + up
-            towards = (up == 0) == start_on_top  # launched towards the depth of the other end
-            family[row, UP] = up
-            family[row, DOWN] = (n + 1 + up) % 2
-            family[row, BELOW] = (n + 1 - up) // 2
-            family[row, ABOVE] = n - family[row, BELOW]
-            family[row, BETWEEN] = 2 * (n // 2) + 1 if towards else 2 * ((n - 1) // 2) + 1
-            family[row, SHORT], family[row, ALIVE] = 0, 1
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def begin(depth: Floats, speed: Floats, start: float, end: float, chain: Chain) -> None:
-    """Lay the chain between the two ends."""
-    at, of = chain.at, chain.of
-    top, bottom = min(start, end), max(start, end)
-    at[FIRST] = at[UPPER_END] = len(depth) + 4
-    at[LOWER_END], at[NODE_DOWN] = lay(depth, speed, top, bottom, chain.c, chain.dz, at[UPPER_END])
-    at[LAST] = at[LOWER_END]
-    at[DESCENDS] = start <= end
-    node = at[NODE_DOWN] - 1
-    while node >= 0 and depth[node] > top:
-        node -= 1
-    at[NODE_UP] = node - 1 if node >= 0 and depth[node] == top else node
-    of[Z_UP] = of[Z_TOP] = top
-    of[Z_DOWN] = of[Z_BOTTOM] = bottom
-    of[FASTEST] = of[SLOWEST] = chain.c[at[UPPER_END]]
-    for i in range(at[UPPER_END] + 1, at[LOWER_END] + 1):
-        of[FASTEST], of[SLOWEST] = max(of[FASTEST], chain.c[i]), min(of[SLOWEST], chain.c[i])
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def extend_up(depth: Floats, speed: Floats, chain: Chain) -> int:
-    """Lay the chain on upwards through all that is no faster than its fastest depth: how many layers."""
-    at, of = chain.at, chain.of
-    was, node = at[FIRST], at[NODE_UP]
-    while node >= 0 and speed[node] <= of[FASTEST]:
-        at[FIRST] -= 1
-        chain.dz[at[FIRST]], chain.c[at[FIRST]] = of[Z_UP] - depth[node], speed[node]
-        of[Z_UP], of[SLOWEST] = depth[node], min(of[SLOWEST], speed[node])
-        node -= 1
-    at[NODE_UP], at[ON_SURFACE] = node, node < 0
-    of[GRADIENT_UP] = 0.0
-    if node >= 0:
-        of[AFTER] = min(of[AFTER], speed[node])
-        of[GRADIENT_UP] = (of[Z_UP] - depth[node]) / (speed[node] - chain.c[at[FIRST]])
-    return int(was - at[FIRST])
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def extend_down(depth: Floats, speed: Floats, chain: Chain) -> int:
-    """Lay the chain on downwards through all that is no faster than its fastest depth: how many layers."""
-    at, of = chain.at, chain.of
-    was, node = at[LAST], at[NODE_DOWN]
-    while node < len(depth) and speed[node] <= of[FASTEST]:
-        chain.dz[at[LAST]], chain.c[at[LAST] + 1] = depth[node] - of[Z_DOWN], speed[node]
-        of[Z_DOWN], of[SLOWEST] = depth[node], min(of[SLOWEST], speed[node])
-        at[LAST] += 1
-        node += 1
-    at[NODE_DOWN], at[ON_BED] = node, node == len(depth)
-    of[GRADIENT_DOWN] = 0.0
-    if node < len(depth):
-        of[AFTER] = min(of[AFTER], speed[node])
-        of[GRADIENT_DOWN] = (depth[node] - of[Z_DOWN]) / (speed[node] - chain.c[at[LAST]])
-    return int(at[LAST] - was)
+def family_of(up: int, vertices: int, descends: bool, family: Ints, row: int) -> None:
+    """Fill a row of family (row, COLUMNS): launched up or down, with so many vertices, towards a deeper end or not."""
+    towards = (up == 0) == descends  # launched towards the depth of the other end
+    family[row, UP] = up
+    family[row, DOWN] = (vertices + 1 + up) % 2
+    family[row, BELOW] = (vertices + 1 - up) // 2
+    family[row, ABOVE] = vertices - family[row, BELOW]
+    family[row, BETWEEN] = 2 * (vertices // 2) + 1 if towards else 2 * ((vertices - 1) // 2) + 1
+    family[row, SHORT], family[row, ALIVE] = 0, 1
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -125,12 +65,13 @@ def families_of_pair(
 ) -> int:  # fmt: skip
     """Rays of a pair with a vertex or more, into rows of out: their number, -1 when it is full.
 
-    family: as `list_families` fills it; reflections: most from surface and bed together; steepest: tangent, at the
-    slowest depth of the water, of the steepest ray that turns anywhere.
+    family (2 vertices, COLUMNS): room for their list; reflections: most from surface and bed together; steepest:
+    tangent, at the slowest depth of the water, of the steepest ray that turns anywhere.
     """
     of = chain.of
     begin(depth, speed, start, end, chain)
-    list_families(len(family) // 2, chain.at[DESCENDS] == 1, family)
+    for f in range(len(family)):  # launched down, then up, with 1, 2, ... vertices
+        family_of(f % 2, 1 + f // 2, chain.at[DESCENDS] == 1, family, f)
     fresh, count = True, 0
     while True:
         of[AFTER] = math.inf
@@ -172,6 +113,31 @@ def possible(distance: float, reflections: int, steepest: float, family: Ints, c
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
+def sum_legs(chain: Chain, extent: float) -> None:
+    """Sum the legs of the chain for rays with v = c_m tan(grazing angle) up to `extent`."""
+    at, of, d, sums = chain.at, chain.of, chain.d, chain.sums
+    offsets(chain.c, at[FIRST], at[LAST], of[FASTEST], d)
+    sums[0] = leg(GRAZING, extent, chain.c, chain.dz, d, at[FIRST], at[UPPER_END])
+    sums[1] = leg(GRAZING, extent, chain.c, chain.dz, d, at[UPPER_END], at[LOWER_END])
+    sums[2] = leg(GRAZING, extent, chain.c, chain.dz, d, at[LOWER_END], at[LAST])
+    sums[3] = turn(GRAZING, extent, d[at[FIRST]], of[GRADIENT_UP])
+    sums[4] = turn(GRAZING, extent, d[at[LAST]], of[GRADIENT_DOWN])
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def full(family: Ints, f: int, sums: Floats, column: int) -> float:
+    """A sum over the full layers that a family crosses."""
+    row = family[f]
+    return float(2 * row[ABOVE] * sums[0, column] + row[BETWEEN] * sums[1, column] + 2 * row[BELOW] * sums[2, column])
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def turned(family: Ints, f: int, sums: Floats, column: int) -> float:
+    """A sum over the layers that a family turns in."""
+    return float(family[f, ABOVE] * sums[3, column] + family[f, BELOW] * sums[4, column])
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
 def search(
     distance: float, joined_up: bool, joined_down: bool, fresh: bool, family: Ints, chain: Chain, out: Floats, row: int
 ) -> int:
@@ -179,32 +145,22 @@ def search(
 
     joined_up, joined_down: the range goes on without a jump from that of the interval before.
     """
-    at, of, d = chain.at, chain.of, chain.d
-    offsets(chain.c, at[FIRST], at[LAST], of[FASTEST], d)
+    of, sums = chain.of, chain.sums
     bounded = of[AFTER] < math.inf
     extent = math.sqrt((of[AFTER] - of[FASTEST]) * (of[AFTER] + of[FASTEST])) if bounded else GRAZING
-    upper = leg(GRAZING, extent, chain.c, chain.dz, d, at[FIRST], at[UPPER_END])
-    middle = leg(GRAZING, extent, chain.c, chain.dz, d, at[UPPER_END], at[LOWER_END])
-    lower = leg(GRAZING, extent, chain.c, chain.dz, d, at[LOWER_END], at[LAST])
-    over = turn(GRAZING, extent, d[at[FIRST]], of[GRADIENT_UP])
-    under = turn(GRAZING, extent, d[at[LAST]], of[GRADIENT_DOWN])
+    sum_legs(chain, extent)
     count = 0
     for f in range(len(family)):
         if family[f, ALIVE] == 0:
             continue
-        a, b, e = family[f, ABOVE], family[f, BETWEEN], family[f, BELOW]
-        full1 = 2 * a * upper[0] + b * middle[0] + 2 * e * lower[0]
-        full2 = 2 * a * upper[1] + b * middle[1] + 2 * e * lower[1]
-        turn1, turn2 = a * over[0] + e * under[0], a * over[1] + e * under[1]
-        joined = (a == 0 or joined_up) and (e == 0 or joined_down)
+        full1, full2 = full(family, f, sums, 0), full(family, f, sums, 1)
+        turn1, turn2 = turned(family, f, sums, 0), turned(family, f, sums, 1)
+        joined = (family[f, ABOVE] == 0 or joined_up) and (family[f, BELOW] == 0 or joined_down)
         short = family[f, SHORT] == 1 if joined and not fresh else full1 + turn1 < distance
-        ends_short = full2 + turn2 < distance
-        family[f, SHORT] = ends_short
-        if bounded and short == ends_short:
-            fall_least = 2 * a * upper[2] + b * middle[2] + 2 * e * lower[2]
-            fall_largest = 2 * a * upper[3] + b * middle[3] + 2 * e * lower[3]
-            rises = a * over[2] + e * under[2] > fall_largest
-            falls = a * over[3] + e * under[3] < fall_least
+        family[f, SHORT] = full2 + turn2 < distance
+        if bounded and short == (family[f, SHORT] == 1):
+            rises = turned(family, f, sums, 2) > full(family, f, sums, 3)
+            falls = turned(family, f, sums, 3) < full(family, f, sums, 2)
             if rises or falls or full2 + turn1 > distance or full1 + turn2 < distance:
                 continue
         if bounded or not short:
@@ -213,6 +169,16 @@ def search(
                 return -1
             count += some
     return count
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def weigh(above: int, between: int, below: int, first: int, last: int, chain: Chain) -> None:
+    """How often a family crosses each layer from node first to last, and its weighted chain."""
+    at = chain.at
+    for i in range(first, last):
+        times = 2 * above if i < at[UPPER_END] else (between if i < at[LOWER_END] else 2 * below)
+        chain.crossings[i] = times
+        chain.k[i] = times * chain.dz[i] * (chain.c[i] + chain.c[i + 1])
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -229,23 +195,20 @@ def roots_of(
 ) -> int:
     """Rays of one family into rows of out: their number, -1 when it is full."""
     at, of, roots = chain.at, chain.of, chain.roots
-    above, between, below = family[f, ABOVE], family[f, BETWEEN], family[f, BELOW]
+    above, below = family[f, ABOVE], family[f, BELOW]
     first = at[FIRST] if above else at[UPPER_END]
     last = at[LAST] if below else at[LOWER_END]
-    for i in range(first, last):
-        times = 2 * above if i < at[UPPER_END] else (between if i < at[LOWER_END] else 2 * below)
-        chain.crossings[i] = times
-        chain.k[i] = times * chain.dz[i] * (chain.c[i] + chain.c[i + 1])
-    turn_up, turn_down = above * of[GRADIENT_UP], below * of[GRADIENT_DOWN]
+    weigh(above, family[f, BETWEEN], below, first, last, chain)
+    found = 1
     if bounded:
+        turn_up, turn_down = above * of[GRADIENT_UP], below * of[GRADIENT_DOWN]
         found = turns(
             short, of[FASTEST], extent, distance, chain.d, chain.k, first, last, turn_up, turn_down, chain.stack, roots
         )
+    elif first == last:
+        return 0  # from a boundary to itself
     else:
-        if first == last:
-            return 0  # from a boundary to itself
         _, roots[0, 0], roots[0, 1] = straight(distance, of[FASTEST], chain.d, chain.k, first, last, True)
-        found = 1
     if row + found > len(out):
         return -1
     for i in range(found):

@@ -66,7 +66,7 @@ def refine(
 @njit(cache=True, error_model="numpy", nogil=True)
 def flattest(d: Floats, k: Floats, first: int, last: int) -> float:
     """Range of the flattest ray through a chain: horizontal at its fastest depth."""
-    return bounds(GRAZING, GRAZING, d, k, first, last, 0.0, 0.0)[0]
+    return float(bounds(GRAZING, GRAZING, d, k, first, last, 0.0, 0.0)[0])
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -116,7 +116,7 @@ def first_guess(
         guess = 0.5 * (total - (d[far] - d[near]) / total)
         if low < guess < high:
             return guess
-    return low + (high - low) * (distance - x_low) / (x_high - x_low)
+    return float(low + (high - low) * (distance - x_low) / (x_high - x_low))
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
