@@ -8,14 +8,11 @@ import numpy as np
 
 from sonarsynth.conventions import NO_TARGET, Floats, azimuth_elevation, direction
 from sonarsynth.geometry import Pose
-from sonarsynth.products import LEDGER, Arrivals, Ledger, Paths, Truth
+from sonarsynth.products import FAMILIES, LEDGER, Arrivals, Ledger, Paths, Truth
 from sonarsynth.sonar import BeamGrid
 from sonarsynth.world.casting import OFFSET, first_hit, occluded
 from sonarsynth.world.meshes import Mesh
 from sonarsynth.world.moment import Body, Moment, Snap
-
-FAMILIES = ("direct", "surface", "bed", "surface and bed")
-"""Path families of the ledger: by which boundaries the path touched."""
 
 Connect = Callable[[Floats, Floats], Paths]
 """Rays from (pair, xyz) to (pair, xyz) in the world: a propagation model bound to its water."""
@@ -146,12 +143,15 @@ def family(arrivals: Arrivals) -> np.ndarray:
     return np.asarray((arrivals.surface > 0) + 2 * (arrivals.bottom > 0))
 
 
-def ledger(arrivals: Arrivals, snaps: tuple[Snap, ...], targets: int, snap_level: Floats, error: float) -> Ledger:
+def ledger(
+    arrivals: Arrivals, snaps: tuple[Snap, ...], targets: int, snap_level: Floats, error: float, centre: float
+) -> Ledger:
     """Levels (snap, target + 1, family, LEDGER) that add up exactly: powers of the paths of a family are summed.
 
     Each loss is the ratio of two power sums, with one more factor of the amplitude in the second, so that
     received = source - loss_out + scattering - loss_in - absorption - boundary whatever the paths. NaN where a family
-    has no path. error: bound (dB) on each level from the approximations of the chain.
+    has no path. error: bound (dB) on each level from the approximations of the chain; centre (Hz) of the band, where the
+    loss of rough boundaries counts.
     """
     shape = (len(snaps), targets + 1, len(FAMILIES))
     levels = np.full((*shape, len(LEDGER)), np.nan)
@@ -162,19 +162,19 @@ def ledger(arrivals: Arrivals, snaps: tuple[Snap, ...], targets: int, snap_level
         mine = arrivals.select((arrivals.snap == cell[0]) & (which == cell[1]) & (family(arrivals) == cell[2]))
         paths[cell] = len(mine.delay)
         if paths[cell]:
-            levels[cell] = _add_up(mine, float(snap_level[cell[0]]))
+            levels[cell] = _add_up(mine, float(snap_level[cell[0]]), centre)
             bound[cell] = error
     return Ledger(levels, paths, bound)
 
 
-def _add_up(paths: Arrivals, source_level: float) -> Floats:
+def _add_up(paths: Arrivals, source_level: float, centre: float) -> Floats:
     """One row of the ledger (LEDGER,)."""
     factors = [
         paths.scattering,
         paths.spreading_out,
         paths.spreading_in,
         10.0 ** (-paths.absorption / 20.0),
-        paths.boundary,
+        paths.boundary * np.exp(-0.5 * (2.0 * np.pi * centre * paths.blur) ** 2),
     ]
     sums = [np.sum(np.prod(factors[: n + 1], axis=0) ** 2) for n in range(len(factors))]
     scattering, out, back, absorption, boundary = np.diff(10.0 * np.log10([1.0, *sums]))

@@ -38,6 +38,10 @@ class Paths:
     flag: Ints  # (path,) 0 good; else why ray theory ends here (`acoustics.rays.REASONS`)
 
 
+FAMILIES = ("direct", "surface", "bed", "surface and bed")
+"""Families of paths: by which boundaries they touched."""
+
+
 @dataclass(frozen=True, eq=False)
 class Arrivals:
     """Every path of a frame as it reaches the array: snap to facet to array, and snap to array.
@@ -59,7 +63,7 @@ class Arrivals:
     spreading_out: Floats  # (path,) 1/m: snap to facet (snap to array for the direct path)
     spreading_in: Floats  # (path,) 1/m: facet to array (1 for the direct path)
     scattering: Floats  # (path,) m, signed: far-field amplitude f of the facet (1 for the direct path)
-    boundary: Floats  # (path,) product of the moduli of boundary reflection coefficients; their phases are in `phase`
+    boundary: Floats  # (path,) product of the moduli of reflection coefficients, and -1 for a phase of pi
     absorption: Floats  # (path,) dB along the whole path at the centre of the band
     length: Floats  # (path,) m: whole path
     snap: Ints  # (path,) index of the snap
@@ -70,6 +74,7 @@ class Arrivals:
     bottom: Ints  # (path,) bed reflections
     turning: Ints  # (path,) turning points
     caustics: Ints  # (path,) caustics passed
+    arrives_by: Ints  # (path,) index into FAMILIES: which boundaries it touched last, on its way to the array
     phase: Floats  # (path,) rad: constant phase of the pulse over frequency, from caustics and lossy reflections
     blur: Floats  # (path,) s: rough boundaries take exp(-(2 pi f blur)^2/2) off the spectrum, a Gaussian in time
     stretch: Floats  # (path,) Doppler: the pulse is p((t - delay)/(1 + stretch))

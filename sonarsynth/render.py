@@ -72,9 +72,11 @@ class Heard:
 def trace_frame(plan: Plan, index: int) -> Traced:
     """Every path of a frame, and its truth."""
     from sonarsynth.tracing.arrivals import trace
+    from sonarsynth.tracing.moving import Moving
 
     scene, frame = plan.recipe.frame(index)
     environment, sonar = scene.world.environment, scene.sonar
+    velocities = np.array([body.velocity for body in frame.moment.bodies]).reshape(-1, 3)
     arrivals = trace(
         environment,
         plan.profile,
@@ -84,11 +86,20 @@ def trace_frame(plan: Plan, index: int) -> Traced:
         float(plan.absorption(sonar.band.centre)),
         plan.propagation,
         scene.physics.scattering,
+        band=(sonar.band.low, sonar.band.high),
+        moving=Moving(velocities, frame.sonar_velocity) if scene.physics.doppler else None,
     )
     levels = snap_levels(frame.moment.snaps)
     straight = isinstance(plan.propagation, Straight)
     truth = label(frame.moment, frame.sonar_pose, sonar.beams, plan.connect, levels, straight)
-    book = ledger(arrivals, frame.moment.snaps, len(frame.moment.bodies), levels, _expansion_error(plan, arrivals))
+    book = ledger(
+        arrivals,
+        frame.moment.snaps,
+        len(frame.moment.bodies),
+        levels,
+        _expansion_error(plan, arrivals),
+        sonar.band.centre,
+    )
     return Traced(frame, arrivals, truth, book)
 
 

@@ -10,7 +10,7 @@ from annotated_types import Ge, Le
 from pydantic import Field, field_validator
 
 from sonarsynth.beamforming import Beamformer, FocusedDelayAndSum
-from sonarsynth.conventions import PositiveSeconds, Seconds
+from sonarsynth.conventions import Floats, PositiveSeconds, Seconds
 from sonarsynth.description import description
 from sonarsynth.geometry import Pose
 from sonarsynth.ranging import IsovelocityRange, Locator, Ranging, SensorDelays
@@ -74,6 +74,9 @@ class Physics:
     """How facets scatter it."""
     synthesis: Synthesis = Field(default_factory=KernelDeposit)
     """How signals are made from arrivals."""
+    doppler: bool = True
+    """Whether targets and sonar move while sound is under way; false: all is where it is at the instant of the frame.
+    """
 
 
 @description
@@ -139,6 +142,7 @@ class Scene:
             step=step,
             seed=seed,
             sonar_pose=pose(self.trajectory.sonar, time),
+            sonar_velocity=velocity(self.trajectory.sonar, time),
             moment=self.moment(time),
         )
 
@@ -152,6 +156,7 @@ class Frame:
     step: int  # within the sequence
     seed: int
     sonar_pose: Pose
+    sonar_velocity: Floats  # (xyz) m/s, world
     moment: Moment
 
     @property

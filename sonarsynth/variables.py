@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth.labelling import FAMILIES
 from sonarsynth.planning import Plan
-from sonarsynth.products import LEDGER
+from sonarsynth.products import FAMILIES, LEDGER
 from sonarsynth.recipe import SPLITS
 from sonarsynth.world.meshes import mesh_of
 

@@ -149,20 +149,47 @@ def steps(
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def along(
-    depth: Floats, speed: Floats, z: Floats, phi: Floats, p: Floats, length: Floats, x_out: Floats, z_out: Floats
-) -> None:
-    """Points (ray, point) at even arc lengths of rays between surface and bed: horizontal distance and depth."""
-    points = x_out.shape[1]
+def chords(
+    depth: Floats, speed: Floats, z: Floats, phi: Floats, p: Floats, length: Floats, sagitta: float, nodes: Floats
+) -> int:
+    """Nodes (node, 3) of polylines that keep within `sagitta` (m) of rays of some lengths: ray, distance and depth.
+
+    Rays leave depths z at angles phi and are reflected from surface and bed, where they have a node. Layers are passed
+    without one where the bend is small: a curve of length s whose direction varies by b keeps within s b/4 of its
+    chord. Returns the number of nodes, or -1 where there is no room for them.
+    """
+    count = 0
     for i in range(len(z)):
-        layer, x, at, angle = min(node_above(depth, z[i]), len(depth) - 2), 0.0, z[i], phi[i]
-        x_out[i, 0], z_out[i, 0] = x, at
-        for j in range(1, points):
-            left = length[i] / (points - 1)
-            for _ in range(4 * len(depth) + 8):
-                _, layer, dx, at, angle, done, _ = step(depth, speed, layer, at, angle, p[i], left, np.inf, np.inf)
-                x += dx
-                left -= done
-                if left <= 0.0:
-                    break
-            x_out[i, j], z_out[i, j] = x, at
+        layer, x, at, angle, left = min(node_above(depth, z[i]), len(depth) - 2), 0.0, z[i], phi[i], length[i]
+        run, low, high = 0.0, angle, angle
+        if count == len(nodes):
+            return -1
+        nodes[count, 0], nodes[count, 1], nodes[count, 2] = i, x, at
+        count += 1
+        for _ in range(1_000_000):
+            if not left > 0.0:
+                break
+            was_x, was_z, was_angle, was_run = x, at, angle, run
+            why, layer, dx, at, angle, done, _ = step(
+                depth, speed, layer, at, angle, p[i], left, sagitta, math.inf
+            )
+            x, left, run = x + dx, left - done, run + done
+            low, high = min(low, angle), max(high, angle)
+            bounced = why == SURFACE or why == BED
+            kept = run * (high - low) > 4.0 * sagitta and was_run > 0.0
+            if count + 2 > len(nodes):
+                return -1
+            if kept:  # the chord would be too long: a node before this arc
+                nodes[count, 0], nodes[count, 1], nodes[count, 2] = i, was_x, was_z
+                count += 1
+                run, low, high = done, min(was_angle, angle), max(was_angle, angle)
+            if bounced:
+                nodes[count, 0], nodes[count, 1], nodes[count, 2] = i, x, at
+                count += 1
+                angle = -angle
+                run, low, high = 0.0, angle, angle
+        if count == len(nodes):
+            return -1
+        nodes[count, 0], nodes[count, 1], nodes[count, 2] = i, x, at
+        count += 1
+    return count

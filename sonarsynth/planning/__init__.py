@@ -43,7 +43,7 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS) -> Plan:
     check_positions(scene, recipe)
     tracing = scene.physics.tracing
     if isinstance(tracing, AutoTracing):
-        propagation: Straight | Refracted = Straight() if profile.uniform else Refracted()
+        propagation: Straight | Refracted = tracing.resolve(profile)
     else:
         propagation = tracing
     windows = lay_windows(recipe, profile)

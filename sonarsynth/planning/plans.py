@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -89,8 +89,8 @@ class Plan:
         return absorption_db_per_m(environment.absorption, frequency, 0.5 * environment.depth)
 
     def connect(self, start: Floats, end: Floats) -> Paths:
-        """Rays between pairs of points in this plan's water."""
-        return self.propagation.connect(self.profile, self.scene.world.environment.depth, start, end)
+        """Rays between pairs of points in this plan's water, those of the direct family."""
+        return replace(self.propagation, bounces=0).connect(self.profile, self.scene.world.environment.depth, start, end)
 
     @property
     def predicted_seconds(self) -> float:

@@ -20,8 +20,13 @@ from sonarsynth.world.environment import Profile
 class Propagation(Protocol):
     """A model of how sound travels between two points."""
 
+    @property
+    def bounces(self) -> int:
+        """Most reflections from surface and bed on the way from the snap to the array."""
+        ...
+
     def connect(self, profile: Profile, environment_depth: float, start: Floats, end: Floats) -> Paths:
-        """All paths from start (pair, xyz) to end (pair, xyz) in the world, in water `environment_depth` (m) deep.
+        """All paths with at most `bounces` reflections from start (pair, xyz) to end (pair, xyz) in the world, in water `environment_depth` (m) deep.
 
         Raises ValueError for points outside the water or not finite.
         """

@@ -1,7 +1,8 @@
-"""Every path of a frame: snap to array, and snap to facet to array."""
+"""Every path of a frame: snap to array, and snap to facet to array, each by every family that is asked for."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,18 +12,43 @@ from sonarsynth.geometry import Pose
 from sonarsynth.products import Arrivals
 from sonarsynth.scattering import ScatteringLaw
 from sonarsynth.sonar import Elements
-from sonarsynth.tracing.legs import ArrayLegs, Legs, array_legs, hidden, rays_to_centre, usable, with_wavefronts
+from sonarsynth.tracing.aperture import Fronts, fronts
+from sonarsynth.tracing.legs import Facets, Legs, facets_of, legs_from, may_face, rays_to_centre, usable
+from sonarsynth.tracing.moving import Moving, carried
+from sonarsynth.tracing.paths import Outward, assemble, join, silence
+from sonarsynth.tracing.reflections import reflections
+from sonarsynth.tracing.shadows import hidden
 from sonarsynth.tracing.wavefront import probes
 from sonarsynth.world.environment import Environment, Profile
-from sonarsynth.world.moment import Moment, Snap
+from sonarsynth.world.moment import Body, Moment, Snap
 
 if TYPE_CHECKING:
     from sonarsynth.tracing import Propagation
 
-NEGLIGIBLE = 1e-7
-"""A facet whose amplitude is nowhere on the array above this part of the strongest facet's is left out. All that are
-left out together stay below their number times this. (Their amplitude at the centre may be so much smaller than at the
-edge, 1e-30 in the tail of a lobe, that nothing relative to it has a meaning.)"""
+NEGLIGIBLE = 3e-5
+"""The faintest echoes of a snap are left out, so many that their amplitudes together stay below this part of the
+strongest one's; each counts with the largest that it has anywhere on the array."""
+
+
+@dataclass(frozen=True, eq=False)
+class ArrayLegs:
+    """Every facet that the array sees, with its legs to the array: serves any snap without tracing this side again."""
+
+    legs: Legs  # (leg,) sorted by row
+    fronts: Fronts  # (leg,)
+    facets: Facets  # (facet,) that have a leg; legs.row counts them
+    bodies: tuple[Body, ...]
+    environment: Environment
+    profile: Profile
+    propagation: Propagation
+    sonar_pose: Pose
+    elements: Elements
+    band: tuple[float, float]  # Hz
+
+    @property
+    def centre(self) -> float:
+        """Hz: centre of the band."""
+        return 0.5 * (self.band[0] + self.band[1])
 
 
 def trace(
@@ -34,118 +60,150 @@ def trace(
     absorption: float,
     propagation: Propagation,
     law: ScatteringLaw,
+    *,
+    band: tuple[float, float],
+    moving: Moving | None = None,
 ) -> Arrivals:
-    """The arrivals of a frame, sorted by snap, target, facet and travel time; the direct path of a snap comes first.
+    """The arrivals of a frame, sorted by snap, target, facet and travel time; direct paths of a snap come first.
 
     environment, profile: the water; moment: bodies and snaps; sonar_pose, elements: the array; absorption: dB/m at the
-    centre of the band; propagation: how sound travels; law: how facets scatter. A facet counts where it is lit by the
-    snap and seen by the array centre, with no body in between (all sensors share what the centre sees). Raises
-    ValueError for anything outside the water.
+    centre of the band; propagation: how sound travels, and how many bounces are followed; law: how facets scatter;
+    band: Hz; moving: velocities, where they count. A facet counts where it is lit by the snap and seen by the array
+    centre, with no body in between (all sensors share what the centre sees). Raises ValueError for anything outside the
+    water.
     """
-    legs = array_legs(environment, profile, moment.bodies, sonar_pose, elements, propagation)
-    return arrivals(legs, environment, profile, moment.snaps, absorption, propagation, law)
+    legs = array_legs(environment, profile, moment.bodies, sonar_pose, elements, propagation, band)
+    return arrivals(legs, moment.snaps, absorption, law, moving)
+
+
+def array_legs(
+    environment: Environment,
+    profile: Profile,
+    bodies: tuple[Body, ...],
+    sonar_pose: Pose,
+    elements: Elements,
+    propagation: Propagation,
+    band: tuple[float, float],
+) -> ArrayLegs:
+    """Facet to array, for every facet of every body that leaves a ray for the array that no body hides.
+
+    Raises ValueError for a body or an array that reaches out of the water.
+    """
+    every = facets_of(bodies, environment)
+    every = every.select(may_face(every, sonar_pose.position, propagation.bounces, profile))
+    centre = 0.5 * (band[0] + band[1])
+    legs = legs_from(every, bodies, environment, profile, sonar_pose, propagation, centre)
+    kept, row = np.unique(legs.row, return_inverse=True)
+    legs = legs.numbered(row)
+    facets = every.select(kept)
+    group = facets.target[legs.row]
+    over = fronts(legs, group, environment, profile, sonar_pose, elements, propagation, band)
+    return ArrayLegs(legs, over, facets, bodies, environment, profile, propagation, sonar_pose, elements, band)
 
 
 def arrivals(
-    legs: ArrayLegs,
-    environment: Environment,
-    profile: Profile,
-    snaps: tuple[Snap, ...],
-    absorption: float,
-    propagation: Propagation,
-    law: ScatteringLaw,
+    array: ArrayLegs, snaps: tuple[Snap, ...], absorption: float, law: ScatteringLaw, moving: Moving | None = None
 ) -> Arrivals:
     """The arrivals of any snaps from legs that are traced already: as `trace`, without tracing the array side again."""
-    parts = [_silence(legs)]
+    parts = [silence(array.legs, array.fronts)]
     for index, snap in enumerate(snaps):
-        parts.append(_direct(legs, environment, profile, index, snap, absorption, propagation))
-        parts.append(_echoes(legs, environment, profile, index, snap, absorption, propagation, law))
-    return _join(parts, float(profile.at(depth(legs.sonar_pose.position))))
+        parts.append(_direct(array, index, snap, absorption, moving))
+        parts.append(_echoes(array, index, snap, absorption, law, moving))
+    return join(parts, float(array.profile.at(depth(array.sonar_pose.position))))
 
 
-def _silence(array: ArrayLegs) -> Arrivals:
-    """No arrivals at all: what a frame without a snap has."""
-    none, zero = np.empty(0), np.empty(0, int)
-    return _assemble(
-        array.legs.select(zero), 0, 0.0, 0.0, zero, zero, none, (np.empty((0, 0)), 0.0),
-        spreading_out=none, spreading_in=none, out_time=none, out_length=none, out_turning=zero,
-    )  # fmt: skip
-
-
-def _direct(
-    array: ArrayLegs,
-    environment: Environment,
-    profile: Profile,
-    index: int,
-    snap: Snap,
-    absorption: float,
-    propagation: Propagation,
-) -> Arrivals:
-    """Snap to array, unless a body stands in between."""
-    legs = rays_to_centre(environment, profile, snap.position[None, :], array.sonar_pose, propagation)
-    end = np.broadcast_to(array.sonar_pose.position, legs.point.shape)
-    legs = legs.select(~hidden(array.bodies, environment, profile, legs.point, end, legs.departure, legs.length))
-    legs = with_wavefronts(legs, environment, profile, array.sonar_pose, array.elements, propagation)
-    one, zero = np.ones(len(legs.row)), np.zeros(len(legs.row), int)
-    none = np.full(len(legs.row), NO_TARGET)
-    return _assemble(
-        legs, index, snap.time, absorption, none, none, one,
-        _variation(array, legs.probe_gain, legs.spreading),
-        spreading_out=legs.spreading, spreading_in=one, out_time=0.0 * one, out_length=0.0 * one, out_turning=zero,
-    )  # fmt: skip
+def _direct(array: ArrayLegs, index: int, snap: Snap, absorption: float, moving: Moving | None) -> Arrivals:
+    """Snap to array, where no body stands in between."""
+    environment, profile, sonar_pose = array.environment, array.profile, array.sonar_pose
+    legs = rays_to_centre(environment, profile, snap.position[None, :], sonar_pose, array.propagation, array.centre)
+    end = np.broadcast_to(sonar_pose.position, legs.point.shape)
+    legs = legs.select(
+        ~hidden(array.bodies, environment, profile, legs.point, end, legs.departure, legs.length, legs.bounces > 0)
+    )
+    over = fronts(
+        legs,
+        np.zeros(len(legs.row), int),
+        environment,
+        profile,
+        sonar_pose,
+        array.elements,
+        array.propagation,
+        array.band,
+    )
+    one, none = np.ones(len(legs.row)), np.full(len(legs.row), NO_TARGET)
+    variation = _variation(array, over.probe_gain, legs.spreading)
+    made = assemble(legs, over, Outward.none(len(one)), index, snap.time, absorption, none, none, one, variation)
+    return made if moving is None else carried(made, legs, None, snap, sonar_pose, profile, moving)
 
 
 def _echoes(
-    array: ArrayLegs,
-    environment: Environment,
-    profile: Profile,
-    index: int,
-    snap: Snap,
-    absorption: float,
-    propagation: Propagation,
-    law: ScatteringLaw,
+    array: ArrayLegs, index: int, snap: Snap, absorption: float, law: ScatteringLaw, moving: Moving | None
 ) -> Arrivals:
     """Snap to facet to array, over every facet of the legs that is lit."""
-    row = np.arange(len(array.facet))
-    if profile.uniform:  # rays are straight: leave out early what is not lit
-        row = np.flatnonzero(np.einsum("ij,ij->i", array.normal, array.legs.point - snap.position) < 0)
+    environment, profile, facets = array.environment, array.profile, array.facets
+    most = array.propagation.bounces
+    row = np.flatnonzero(may_face(facets, snap.position, most, profile))
     start = np.broadcast_to(snap.position, (len(row), 3))
-    out = propagation.connect(profile, environment.depth, start, array.legs.point[row])
-    path, row = np.arange(len(out.pair)), row[out.pair]
-    incident, normal, area = out.arrival, array.normal[row], array.area[row]
-    scattering = np.where(usable(out), law.amplitude(incident, array.legs.departure[row], normal, area), 0.0)
-    path = np.flatnonzero(scattering != 0)
-    start = np.broadcast_to(snap.position, (len(path), 3))
-    blocked = hidden(
-        array.bodies, environment, profile, start, array.clear[row[path]], out.departure[path], out.length[path]
-    )
-    path = path[~blocked]
+    paths = array.propagation.connect(profile, environment.depth, start, facets.point[row])
+    facet = row[paths.pair]
+    lit = usable(paths) & (np.einsum("ij,ij->i", facets.normal[facet], paths.arrival) < 0)
+    keep = np.flatnonzero(lit)
+    start = np.broadcast_to(snap.position, (len(keep), 3))
+    met = paths.surface[keep] + paths.bottom[keep] > 0
+    keep = keep[
+        ~hidden(
+            array.bodies, environment, profile, start, facets.clear[facet[keep]], paths.departure[keep],
+            paths.length[keep], met,
+        )
+    ]  # fmt: skip
+    out = Outward.of(paths, reflections(environment, profile, paths, array.centre), facet).select(keep)
+    way, leg = _pairs(out.facet, array.legs.row, len(facets.facet))
+    few = np.flatnonzero(out.bounces[way] + array.legs.bounces[leg] <= most)
+    out, leg = out.select(way[few]), leg[few]
+    normal, area = facets.normal[out.facet], facets.area[out.facet]
+    scattering = law.amplitude(out.arrival, array.legs.departure[leg], normal, area)
     over_aperture = law.amplitude(
-        incident[path, None, :],
-        array.legs.probe_departure[row[path]],
-        normal[path, None, :],
-        area[path, None],
+        out.arrival[:, None, :], array.fronts.probe_departure[leg], normal[:, None, :], area[:, None]
     )
-    strongest = np.maximum(over_aperture.max(axis=1, initial=0.0), scattering[path])
-    loud = strongest >= NEGLIGIBLE * strongest.max(initial=0.0)
-    path, over_aperture = path[loud], over_aperture[loud]
-    row, scattering = row[path], scattering[path]
-    legs = array.legs.select(row)
-    gain = over_aperture / scattering[:, None] * legs.probe_gain
+    factor = array.legs.spreading[leg] * array.legs.boundary[leg] * out.spreading * out.boundary
+    strongest = np.maximum(over_aperture.max(axis=1, initial=0.0), scattering) * factor
+    loud = np.flatnonzero((scattering != 0) & _loud(strongest))
+    out, leg, scattering, over_aperture = out.select(loud), leg[loud], scattering[loud], over_aperture[loud]
+    legs, over = array.legs.select(leg), array.fronts.select(leg)
+    gain = over_aperture / scattering[:, None] * over.probe_gain
     gain[(over_aperture == 0).any(axis=1)] = 1.0  # a facet on the limb: all sensors share what the centre sees
-    return _assemble(
-        legs, index, snap.time, absorption, array.target[row], array.facet[row], _signs(array, law, row) * scattering,
-        _variation(array, gain, scattering * legs.spreading * out.spreading[path]),
-        spreading_out=out.spreading[path], spreading_in=legs.spreading,
-        out_time=out.travel_time[path], out_length=out.length[path], out_turning=out.turning[path],
-    )  # fmt: skip
+    variation = _variation(array, gain, scattering * factor[loud])
+    target, number = facets.target[out.facet], facets.facet[out.facet]
+    signed = _signs(array, law, target, number) * scattering
+    made = assemble(legs, over, out, index, snap.time, absorption, target, number, signed, variation)
+    if moving is None:
+        return made
+    return carried(made, legs, out, snap, array.sonar_pose, profile, moving)
 
 
-def _signs(array: ArrayLegs, law: ScatteringLaw, row: Ints) -> Floats:
-    """Sign (row,) of the echoes of the facets of some legs."""
+def _pairs(facet: Ints, row: Ints, facets: int) -> tuple[Ints, Ints]:
+    """Every pair of a way out to a facet and a leg from it; legs are sorted by facet, the pairs by leg."""
+    begin = np.searchsorted(row, np.arange(facets + 1))
+    count = np.diff(begin)[facet]
+    way = np.repeat(np.arange(len(facet)), count)
+    within = np.arange(len(way)) - np.repeat(np.cumsum(count) - count, count)
+    return way, begin[facet[way]] + within
+
+
+def _loud(strength: Floats) -> np.ndarray:
+    """Which (path,) are kept: all but the faintest, whose sum stays below `NEGLIGIBLE` times the strongest."""
+    order = np.argsort(strength, kind="stable")
+    faint = np.cumsum(strength[order]) <= NEGLIGIBLE * strength.max(initial=0.0)
+    keep = np.ones(len(strength), bool)
+    keep[order[faint]] = False
+    return keep
+
+
+def _signs(array: ArrayLegs, law: ScatteringLaw, target: Ints, facet: Ints) -> Floats:
+    """Sign (path,) of the echoes of facets."""
     every = np.concatenate([np.empty(0), *(law.polarity(body.mesh) for body in array.bodies)])
     first = np.cumsum([0, *(len(body.mesh.faces) for body in array.bodies)])
-    return np.asarray(every[first[array.target[row]] + array.facet[row]])
+    return np.asarray(every[first[target] + facet])
 
 
 def _variation(array: ArrayLegs, gain: Floats, strength: Floats) -> tuple[Floats, float]:
@@ -159,63 +217,3 @@ def _variation(array: ArrayLegs, gain: Floats, strength: Floats) -> tuple[Floats
     terms = probe.fit(gain - 1.0)
     loudest = np.nanmax(np.abs(strength)[:, None] * np.abs(gain), initial=0.0)
     return terms, float((np.abs(strength) * probe.misfit(gain - 1.0, terms)).max(initial=0.0) / max(loudest, 1e-300))
-
-
-def _assemble(
-    legs: Legs, index: int, time: float, absorption: float, target: Ints, facet: Ints, scattering: Floats,
-    variation: tuple[Floats, float], *, spreading_out: Floats, spreading_in: Floats, out_time: Floats,
-    out_length: Floats, out_turning: Ints,
-) -> Arrivals:  # fmt: skip
-    """Arrivals of one snap from both sides of its paths."""
-    length = out_length + legs.length
-    loss = absorption * length
-    zero = np.zeros(len(length), int)
-    return Arrivals(
-        delay=time + (out_time + legs.travel_time),
-        direction=legs.direction,
-        radius=legs.radius,
-        delay_terms=legs.delay_terms,
-        amplitude_terms=variation[0],
-        amplitude=spreading_out * scattering * spreading_in * 10.0 ** (-loss / 20.0),
-        spreading_out=spreading_out,
-        spreading_in=spreading_in,
-        scattering=scattering,
-        boundary=np.ones(len(length)),
-        absorption=loss,
-        length=length,
-        snap=zero + index,
-        target=target,
-        facet=facet,
-        point=legs.point,
-        surface=zero,
-        bottom=zero,
-        turning=out_turning + legs.turning,
-        caustics=zero,
-        phase=np.zeros(len(length)),
-        blur=np.zeros(len(length)),
-        stretch=np.zeros(len(length)),
-        sound_speed=np.nan,
-        wavefront_error=float(legs.error.max(initial=0.0)),
-        amplitude_error=variation[1],
-    )
-
-
-def _join(parts: list[Arrivals], sound_speed: float) -> Arrivals:
-    """Arrivals of all snaps, in order; terms that some of them lack are 0. What absorption leaves nothing of is out."""
-    columns = {}
-    for name, value in vars(parts[0]).items():
-        if isinstance(value, np.ndarray):
-            arrays = [getattr(part, name) for part in parts]
-            if name.endswith("_terms"):
-                width = max(a.shape[1] for a in arrays)
-                arrays = [a if a.shape[1] == width else np.zeros((len(a), width)) for a in arrays]
-            columns[name] = np.concatenate(arrays)
-    heard = columns["amplitude"] != 0.0
-    if not heard.all():
-        columns = {name: value[heard] for name, value in columns.items()}
-    return Arrivals(
-        **columns,
-        sound_speed=sound_speed,
-        wavefront_error=max(part.wavefront_error for part in parts),
-        amplitude_error=max(part.amplitude_error for part in parts),
-    )

@@ -7,11 +7,10 @@ from typing import Literal
 from sonarsynth.conventions import Floats
 from sonarsynth.description import description
 from sonarsynth.products import Paths
+from sonarsynth.tracing.bounces import Bounces
 from sonarsynth.tracing.refracted import Refracted
 from sonarsynth.tracing.straight import Straight
 from sonarsynth.world.environment import Profile
-
-_STRAIGHT, _REFRACTED = Straight(), Refracted()
 
 
 @description
@@ -19,8 +18,13 @@ class AutoTracing:
     """`Straight` where the sound speed is uniform, else `Refracted`."""
 
     kind: Literal["auto"] = "auto"
+    bounces: Bounces = 0
+    """Most reflections from surface and bed on the way from the snap to the array."""
+
+    def resolve(self, profile: Profile) -> Straight | Refracted:
+        """The model chosen."""
+        return Straight(bounces=self.bounces) if profile.uniform else Refracted(bounces=self.bounces)
 
     def connect(self, profile: Profile, environment_depth: float, start: Floats, end: Floats) -> Paths:
         """Paths of the model chosen; arguments and errors as in `Propagation`."""
-        model = _STRAIGHT if profile.uniform else _REFRACTED
-        return model.connect(profile, environment_depth, start, end)
+        return self.resolve(profile).connect(profile, environment_depth, start, end)

@@ -11,7 +11,7 @@ from sonarsynth.acoustics.rays import Water, water, within
 from sonarsynth.conventions import NO_TARGET, Floats, Ints, depth
 from sonarsynth.geometry import unit
 from sonarsynth.scattering import ScatteringLaw
-from sonarsynth.tracing.legs import hidden
+from sonarsynth.tracing.shadows import hidden
 from sonarsynth.tracing.marching import ARRIVAL, END, EVENTS, FACET, LAUNCH, Rays, launch, planes, reflect, step
 from sonarsynth.world.environment import Environment, Profile
 from sonarsynth.world.moment import Body

@@ -1,8 +1,8 @@
-"""Which rays to follow from the array, for pictures and for looking at a scene."""
+"""Which rays to look at: a fan from the array, and the eigenrays of a frame."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Le, MinLen
@@ -12,9 +12,26 @@ from sonarsynth.description import description
 
 
 @description
-class RayRequest:
-    """A fan of rays from the array centre: a list of directions, or a grid over the field of view."""
+class EigenrayRequest:
+    """All rays from each snap to the array centre, and from each snap by each target to the array centre."""
 
+    vertices: Annotated[int, Ge(0), Le(50)] = 2
+    """Most reflections from surface and bed and turning points of a whole path together."""
+    targets: Literal["centre", "nearest", "none"] = "centre"
+    """By way of the middle of each target, of its facet nearest to the array, or of no target."""
+
+
+@description
+class RayRequest:
+    """Rays to look at: eigenrays, and a fan from the array centre, a list of directions or a grid over the field of view.
+
+    A recipe that asks for none is looked at by the eigenrays of its frame.
+    """
+
+    fan: bool = True
+    """Follow the fan that the fields below describe."""
+    eigenrays: EigenrayRequest | None = None
+    """The eigenrays to draw; none if left out."""
     directions: Annotated[tuple[tuple[Radians, Radians], ...], MinLen(1)] | None = None
     """(azimuth, elevation) of each ray in the sonar frame; left out: the grid."""
     azimuth_span: Annotated[Radians, Ge(0), Le(2 * np.pi)] = np.deg2rad(50.0)

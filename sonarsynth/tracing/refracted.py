@@ -7,27 +7,29 @@ from typing import Literal
 import numpy as np
 
 from sonarsynth.acoustics.rays import eigenrays, water
-from sonarsynth.conventions import Floats, depth
+from sonarsynth.conventions import Bools, Floats, depth
 from sonarsynth.description import description
 from sonarsynth.products import Paths
+from sonarsynth.tracing.bounces import Bounces
 from sonarsynth.world.environment import Profile
 
 
 @description
 class Refracted:
-    """All rays of the direct family: no reflection, at most one turning point; exact in a piecewise linear profile."""
+    """All rays with so many reflections and one turning point more at most; exact in a piecewise linear profile."""
 
     kind: Literal["refracted"] = "refracted"
+    bounces: Bounces = 0
+    """Most reflections from surface and bed on the way from the snap to the array."""
 
     def connect(self, profile: Profile, environment_depth: float, start: Floats, end: Floats) -> Paths:
         """None (a shadow zone), one or several paths a pair; arguments and errors as in `Propagation`."""
         layers = water(profile.depth, profile.speed, environment_depth)
         span = np.asarray(end, float)[:, :2] - np.asarray(start, float)[:, :2]
         distance = np.hypot(span[:, 0], span[:, 1])
-        rays = eigenrays(layers, depth(start), depth(end), distance)
+        rays = eigenrays(layers, depth(start), depth(end), distance, self.bounces + 1, self.bounces)
         with np.errstate(invalid="ignore", divide="ignore"):
             ahead = np.where(distance[:, None] > 0, span / distance[:, None], 0.0)[rays.pair]
-        none = np.zeros(len(rays.pair), int)
         return Paths(
             pair=rays.pair,
             travel_time=rays.travel_time,
@@ -35,14 +37,20 @@ class Refracted:
             departure=_direction(ahead, rays.slowness * rays.start_speed, rays.start_sine),
             arrival=_direction(ahead, rays.slowness * rays.end_speed, rays.end_sine),
             spreading=rays.amplitude,
-            surface=none,
-            bottom=none,
+            surface=rays.surface,
+            bottom=rays.bottom,
             turning=rays.turning,
             caustics=rays.caustics,
-            surface_grazing=np.full(len(none), np.nan),
-            bottom_grazing=np.full(len(none), np.nan),
+            surface_grazing=grazing(rays.slowness * layers.speed[0], rays.surface > 0),
+            bottom_grazing=grazing(rays.slowness * layers.speed[-1], rays.bottom > 0),
             flag=rays.flag,
         )
+
+
+def grazing(cosine: Floats, met: Bools) -> Floats:
+    """Grazing angle (path,) in rad at a boundary, from its cosine there p c; NaN for paths that do not meet it."""
+    sine = np.sqrt(np.maximum((1.0 - cosine) * (1.0 + cosine), 0.0))
+    return np.where(met, np.arctan2(sine, cosine), np.nan)
 
 
 def _direction(ahead: Floats, cosine: Floats, sine: Floats) -> Floats:

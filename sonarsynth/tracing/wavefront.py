@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from sonarsynth.acoustics.arrays import aperture_terms
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.products import Paths
 from sonarsynth.sonar import Elements
 
@@ -80,14 +80,14 @@ def sphere(direction: Floats, radius: Floats, position: Floats) -> Floats:
     return np.asarray(square / (np.sqrt(radius[:, None] ** 2 + square) + radius[:, None]))
 
 
-def pick_branch(paths: Paths, predicted: Floats, tolerance: float) -> Ints:
+def pick_branch(paths: Paths, predicted: Floats, tolerance: float, allowed: Bools) -> Ints:
     """Index (row, probe) of the path nearest in time to predicted (row, probe); -1 where none is within tolerance (s).
 
-    Pair n of paths is row n // probes, probe n % probes.
+    Pair n of paths is row n // probes, probe n % probes; allowed: (path,) which count.
     """
     best = np.full(predicted.size, -1)
     wanted = np.abs(paths.travel_time - predicted.ravel()[paths.pair])
-    order = np.flatnonzero(wanted <= tolerance)
+    order = np.flatnonzero((wanted <= tolerance) & allowed)
     if (np.diff(paths.pair) == 0).any():
         order = order[np.argsort(-wanted[order], kind="stable")]  # the nearest is written last, and stays
     best[paths.pair[order]] = order

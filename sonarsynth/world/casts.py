@@ -11,16 +11,21 @@ import numpy.typing as npt
 from sonarsynth.acoustics.seawater import depth_of_pressure, mackenzie
 from sonarsynth.conventions import FASTEST, SLOWEST, Floats
 from sonarsynth.world.cast_files import CastError, Column, Table, read_table
-from sonarsynth.world.environment import (
+from sonarsynth.world.profiles import nearest
+from sonarsynth.world.sound_speed import (
     Cast,
+    Catenary,
     Isovelocity,
+    Linear,
+    Munk,
     Profile,
     SoundSpeed,
     Tabulated,
     TemperatureSalinity,
+    Thermocline,
 )
 
-__all__ = ["CastError", "profile_of"]
+__all__ = ["CastError", "profile_of", "smoothed"]
 
 PLAUSIBLE = {
     "depth": (0.0, 12e3, "m"),
@@ -31,9 +36,11 @@ PLAUSIBLE = {
 }
 """A value outside is a mark for "missing" (-9999), a wrong unit or a wrong sign; it is refused."""
 
+MOST_LAYERS = 100_000
+
 
 def profile_of(sound_speed: SoundSpeed) -> Profile:
-    """The profile that rays are traced through: every node of the description as it is, nothing smoothed or thinned.
+    """The profile that rays are traced through: every node as it is, nothing thinned, nothing smoothed but on request.
 
     A cast is read from its path (relative to the working directory) and kept until the file changes; a cast that was
     taken on the way up is turned over. Raises `CastError` in one line that names file, line and column.
@@ -58,6 +65,8 @@ def _profile_of(sound_speed: SoundSpeed, stamp: tuple[int, int] | None) -> Profi
         case TemperatureSalinity():
             depth = sound_speed.depth
             return _profile(depth, mackenzie(sound_speed.temperature, sound_speed.salinity, depth))
+        case Linear() | Thermocline() | Munk() | Catenary():
+            return _profile(*sound_speed.nodes)
         case Cast():
             return _cast_profile(sound_speed, read_table(Path(sound_speed.path)))
 
@@ -80,7 +89,24 @@ def _cast_profile(cast: Cast, table: Table) -> Profile:
             f"{table.path}, line {table.lines[turn]}: the depth {depth[turn]:g} m turns back; "
             "a cast goes one way, down or up"
         )
-    return _profile(depth[order], _speed(cast, table, depth)[order])
+    profile = _profile(depth[order], _speed(cast, table, depth)[order])
+    return profile if cast.smoothing is None else smoothed(profile, cast.smoothing)
+
+
+def smoothed(profile: Profile, thickness: float) -> Profile:
+    """The profile in even layers of at most a thickness (m), nearest to it in the mean square over its depths.
+
+    A linear profile stays as it is; the mean of any other stays. Noise between the nodes of the profile that is white
+    and much finer than the layers goes down by about the square root of how many nodes there are in a layer. Raises
+    ValueError for more than 100 000 layers.
+    """
+    extent = profile.depth[-1] - profile.depth[0]
+    if extent == 0.0:
+        return profile
+    if extent > MOST_LAYERS * thickness:
+        raise ValueError(f"smoothing: layers of {thickness:g} m over {extent:g} m are more than {MOST_LAYERS}")
+    node = np.linspace(profile.depth[0], profile.depth[-1], int(np.ceil(extent / thickness * (1 - 1e-12))) + 1)
+    return _profile(node, nearest(node, np.union1d(node, profile.depth), profile.at))
 
 
 def _depth(table: Table) -> Floats:

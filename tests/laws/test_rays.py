@@ -184,9 +184,7 @@ def test_a_shadow_zone_has_no_path_and_its_edge_is_where_the_grazing_ray_goes() 
 
 def test_the_bed_ends_the_water_that_a_ray_may_turn_in() -> None:
     profile = np.array([0.0, 100.0]), np.array([1500.0, 1520.0])
-    vertex = rays.eigenrays(
-        rays.water(*profile, 100.0), np.array([40.0]), np.array([40.0]), np.array([400.0])
-    ).lower[0]
+    vertex = rays.eigenrays(rays.water(*profile, 100.0), np.array([40.0]), np.array([40.0]), np.array([400.0])).lower[0]
     for bed, paths in ((vertex + 1e-6, 1), (vertex - 1e-6, 0)):
         found = rays.eigenrays(rays.water(*profile, bed), np.array([40.0]), np.array([40.0]), np.array([400.0]))
         assert len(found.pair) == paths
@@ -224,12 +222,16 @@ def test_a_ray_followed_arc_by_arc_ends_where_the_eigenray_does() -> None:
     water = rays.water(depth, 1500 + 8 * rng.normal(size=9), 100.0)
     z1, z2, r = rng.uniform(0, 100, 800), rng.uniform(0, 100, 800), 10 ** rng.uniform(0, 3.3, 800)
     found = rays.eigenrays(water, z1, z2, r)
-    x, z = np.empty((2, len(found.pair), 7))
+    nodes = np.empty((200 * len(found.pair), 3))
     angle = -np.arctan2(found.start_sine, found.slowness * found.start_speed)
-    rays_march.along(water.depth, water.speed, z1[found.pair], angle, found.slowness, found.length, x, z)
+    count = rays_march.chords(
+        water.depth, water.speed, z1[found.pair], angle, found.slowness, found.length, 1e-3, nodes
+    )
+    last = np.flatnonzero(np.diff(nodes[:count, 0], append=-1))
+    _, x, z = nodes[last].T
     assert np.isfinite(np.fmax(found.upper, found.lower)).sum() > 50
-    np.testing.assert_allclose(x[:, -1], r[found.pair], rtol=1e-8)
-    np.testing.assert_allclose(z[:, -1], z2[found.pair], atol=2e-6)
+    np.testing.assert_allclose(x, r[found.pair], rtol=1e-8)
+    np.testing.assert_allclose(z, z2[found.pair], atol=2e-6)
 
 
 def test_mean_slowness_is_the_integral_of_the_slowness() -> None:

@@ -15,8 +15,7 @@ from sonarsynth.products import Arrivals
 from sonarsynth.scattering import Isotropic, MirrorLobe
 from sonarsynth.sonar import Elements, PositionTable, Romanis, elements
 from sonarsynth.tracing import AutoTracing, Refracted, Straight
-from sonarsynth.tracing.arrivals import arrivals, trace
-from sonarsynth.tracing.legs import array_legs
+from sonarsynth.tracing.arrivals import array_legs, arrivals, trace
 from sonarsynth.tracing.wavefront import probes
 from sonarsynth.world.environment import Environment, Isovelocity, Profile
 from sonarsynth.world.meshes import Mesh
@@ -54,9 +53,18 @@ def run(
     sonar: Pose = SONAR,
     array: Elements = ROMANIS,
     absorption: float = 0.02,
+    bounces: int = 0,
 ) -> Arrivals:
     return trace(
-        ENVIRONMENT, profile, Moment(0.0, bodies, snaps), sonar, array, absorption, AutoTracing(), law or MirrorLobe()
+        ENVIRONMENT,
+        profile,
+        Moment(0.0, bodies, snaps),
+        sonar,
+        array,
+        absorption,
+        AutoTracing(bounces=bounces),
+        law or MirrorLobe(),
+        band=(25e3, 85e3),
     )
 
 
@@ -118,9 +126,9 @@ def test_arrivals_are_sorted_by_snap_target_and_facet() -> None:
 @pytest.mark.parametrize("profile", [UNIFORM, LAYERED])
 def test_legs_of_the_array_side_serve_a_moved_shrimp(profile: Profile) -> None:
     bodies = (body((20.0, 1.0, -11.0)), body((15.0, 0.5, -11.5), name="other"))
-    legs = array_legs(ENVIRONMENT, profile, bodies, SONAR, ROMANIS, AutoTracing())
+    legs = array_legs(ENVIRONMENT, profile, bodies, SONAR, ROMANIS, AutoTracing(), (25e3, 85e3))
     for place in ((3.0, 6.0, -30.0), (10.0, -9.0, -29.0), (25.0, 3.0, -30.0)):
-        again = arrivals(legs, ENVIRONMENT, profile, (snap(place),), 0.02, AutoTracing(), MirrorLobe())
+        again = arrivals(legs, (snap(place),), 0.02, MirrorLobe())
         anew = run(bodies, (snap(place),), profile)
         for name, value in vars(anew).items():
             np.testing.assert_array_equal(getattr(again, name), value, err_msg=name)

@@ -10,7 +10,7 @@ from sonarsynth.acoustics.arrays import element_directivity
 from sonarsynth.acoustics.snap import spectrum
 from sonarsynth.acoustics.spectra import response
 from sonarsynth.conventions import azimuth_elevation
-from sonarsynth.labelling import FAMILIES
+from sonarsynth.products import FAMILIES
 from sonarsynth.planning import PRODUCTS, plan
 from sonarsynth.products import LEDGER
 from sonarsynth.recipe import Recipe

@@ -1,0 +1,225 @@
+"""Legs over the aperture: the wavefront of each leg and where each sensor is seen from, at probe sensors.
+
+In uniform water both follow from the image of the array. In refracting water rays are traced to the probes: those of a
+family from one body vary smoothly with the facet, so that some facets, spread over the body, serve for all of them by
+polynomials over the body; held-out facets measure the error, and where it is too large every facet is traced.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.acoustics.arrays import aperture_terms
+from sonarsynth.acoustics.lobes import dot
+from sonarsynth.acoustics.rays import water
+from sonarsynth.conventions import Bools, Floats, Ints, depth
+from sonarsynth.geometry import Pose
+from sonarsynth.sonar import Elements
+from sonarsynth.tracing.legs import Legs
+from sonarsynth.tracing.reflections import at_boundaries
+from sonarsynth.tracing.wavefront import BRANCH, Probes, pick_branch, probes, sphere
+from sonarsynth.world.environment import Environment, Profile
+
+if TYPE_CHECKING:
+    from sonarsynth.tracing import Propagation
+
+SAMPLES = 96
+"""Facets of a body and family that rays to the probes are traced from where that is enough; a quarter is held out."""
+SMOOTH_TIME = 1e-9
+"""s: largest error of a delay from facet to facet: 5e-4 rad at 85 kHz."""
+SMOOTH_GAIN = 1e-3
+"""Largest relative error of an amplitude from facet to facet."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fronts:
+    """Legs over the aperture."""
+
+    delay_terms: Floats  # (leg, term) s; no columns where all are spheres
+    error: Floats  # (leg, ) s: misfit of the wavefront at the probes, the held-out ones among them
+    probe_departure: Floats  # (leg, probe, xyz) world: where each probe is seen from the point
+    probe_gain: Floats  # (leg, probe): amplitude at the probe over that of the sphere; 1 in uniform water
+
+    def select(self, keep: Bools | Ints) -> Fronts:
+        """The legs picked by a mask or by indices."""
+        return Fronts(**{name: value[keep] for name, value in vars(self).items()})
+
+
+def fronts(
+    legs: Legs,
+    group: Ints,
+    environment: Environment,
+    profile: Profile,
+    sonar_pose: Pose,
+    elements: Elements,
+    propagation: Propagation,
+    band: tuple[float, float],
+) -> Fronts:
+    """Wavefronts of legs. group (leg,): legs of one body; band (Hz).
+
+    The phase of a lossy reflection varies over the aperture: it is taken for a delay, right at the centre of the band,
+    and what that errs by at its edges is in `error`.
+    """
+    probe = probes(elements)
+    towards = _image(legs, probe, sonar_pose)
+    if profile.uniform:
+        left, gain, departure = np.zeros(towards.shape[:2]), np.ones(towards.shape[:2]), towards
+        spread = np.zeros(len(legs.row))
+    else:
+        left, gain, departure, spread = _bent(
+            legs, group, towards, environment, profile, sonar_pose, probe, propagation
+        )
+    shift, loss = _boundaries(legs, departure, environment, profile, band)
+    if shift is not None:
+        centre, half = 0.5 * (band[0] + band[1]), 0.5 * (band[1] - band[0])
+        left, gain = left - shift / (2.0 * np.pi * centre), gain * loss
+        spread = spread + np.abs(shift).max(axis=1, initial=0.0) * half / centre / (2.0 * np.pi * band[1])
+    if profile.uniform and shift is None:
+        return Fronts(np.empty((len(legs.row), 0)), np.zeros(len(legs.row)), departure, gain)
+    terms = probe.fit(left)
+    return Fronts(terms, probe.misfit(left, terms) + spread, departure, gain)
+
+
+def _image(legs: Legs, probe: Probes, sonar_pose: Pose) -> Floats:
+    """Unit vectors (leg, probe, xyz) from each point to the image of each probe, as far as the ray is long."""
+    offset = sonar_pose.turn_to_world(probe.position)
+    mirror = np.where(legs.bounces % 2 == 1, -1.0, 1.0)
+    span = (legs.length[:, None] * legs.departure)[:, None, :] + offset
+    span[:, :, 2] += (mirror - 1.0)[:, None] * offset[:, 2]
+    return np.asarray(span / np.sqrt(dot(span, span))[..., None])
+
+
+def _boundaries(
+    legs: Legs, departure: Floats, environment: Environment, profile: Profile, band: tuple[float, float]
+) -> tuple[Floats | None, Floats]:
+    """Phase (leg, probe) that the reflections to each probe add to those to the centre, and ratio of their moduli."""
+    shift, ratio = np.zeros(departure.shape[:2]), np.ones(departure.shape[:2])
+    some = np.flatnonzero(legs.bounces > 0)
+    if not len(some):
+        return None, ratio
+    p = np.hypot(departure[some, :, 0], departure[some, :, 1]) / profile.at(depth(legs.point[some]))[:, None]
+    surface, bottom = (np.repeat(n[some, None], p.shape[1], axis=1) for n in (legs.surface, legs.bottom))
+    angles = [np.arccos(np.minimum(p * float(profile.at(z)), 1.0)) for z in (0.0, environment.depth)]
+    seen = at_boundaries(environment, profile, angles[0], surface, angles[1], bottom, 0.5 * (band[0] + band[1]))
+    turned = seen.phase - (legs.phase - 0.5 * np.pi * legs.caustics)[some, None]
+    shift[some] = np.mod(turned + np.pi, 2.0 * np.pi) - np.pi
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio[some] = np.where(legs.boundary[some, None] > 0, seen.modulus / legs.boundary[some, None], 1.0)
+    return (shift if np.abs(shift).max() > 1e-12 else None), ratio
+
+
+def _bent(
+    legs: Legs, group: Ints, towards: Floats, environment: Environment, profile: Profile, sonar_pose: Pose,
+    probe: Probes, propagation: Propagation,
+) -> tuple[Floats, Floats, Floats, Floats]:  # fmt: skip
+    """Delay (s) over the sphere's and gain (leg, probe), departure (leg, probe, xyz), error (leg,) in refracting water."""
+    count, sensors = towards.shape[:2]
+    left, gain, departure = np.full((count, sensors), np.nan), np.full((count, sensors), np.nan), towards.copy()
+    error = np.zeros(count)
+    for members in _families(legs, group):
+        chosen = _spread(legs.point[members])
+        alone = len(chosen) == len(members)
+        some = members[chosen]
+        exact = _to_probes(legs.select(some), environment, profile, sonar_pose, probe, propagation)
+        if not alone:
+            offset = exact[2] - towards[some]
+            values = np.concatenate([exact[0], exact[1], offset.reshape(len(some), -1)], axis=1)
+            found, misfit = _over_body(legs.point[members], chosen, values)
+            alone = not (misfit[:sensors].max() <= SMOOTH_TIME and misfit[sensors : 2 * sensors].max() <= SMOOTH_GAIN)
+            if alone:
+                some = members
+                exact = _to_probes(legs.select(members), environment, profile, sonar_pose, probe, propagation)
+            else:
+                left[members], gain[members] = found[:, :sensors], found[:, sensors : 2 * sensors]
+                departure[members] = towards[members] + found[:, 2 * sensors :].reshape(len(members), sensors, 3)
+                error[members] = misfit[:sensors].max()
+        if alone:
+            left[some], gain[some], departure[some] = exact
+    return left, gain, departure, error
+
+
+def _families(legs: Legs, group: Ints) -> list[Ints]:
+    """Indices of the legs of each body and family."""
+    up = legs.departure[:, 2] > 0
+    keys = np.stack([group, legs.surface, legs.bottom, legs.turning, up * (legs.bounces + legs.turning > 0)], axis=1)
+    _, which = np.unique(keys, axis=0, return_inverse=True)
+    order = np.argsort(which.ravel(), kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(which.ravel()[order])) + 1) if len(order) else []
+
+
+def _spread(point: Floats) -> Ints:
+    """Some of many points: the extreme ones along each axis and others spread evenly through their order; else all."""
+    if len(point) <= 2 * SAMPLES:
+        return np.arange(len(point))
+    extreme = np.concatenate([point.argmin(axis=0), point.argmax(axis=0)])
+    golden = np.floor(np.mod(np.arange(SAMPLES) * 0.6180339887498949, 1.0) * len(point)).astype(int)
+    return np.unique(np.concatenate([extreme, golden]))
+
+
+def _over_body(point: Floats, chosen: Ints, values: Floats) -> tuple[Floats, Floats]:
+    """Values (point, column) everywhere from those of the chosen points, by cubics; largest error (column,) held out."""
+    middle = 0.5 * (point.min(axis=0) + point.max(axis=0))
+    half = np.maximum(0.5 * np.ptp(point, axis=0), 1e-9)
+    basis = aperture_terms((point - middle) / half, 1.0)
+    held = np.arange(len(chosen)) % 4 == 3
+    fitted = chosen[~held]
+    if np.isnan(values).any():
+        return np.zeros((len(point), values.shape[1])), np.full(values.shape[1], np.inf)
+    coefficients = np.linalg.lstsq(basis[fitted], values[~held], rcond=1e-10)[0]
+    error = np.abs(basis[chosen[held]] @ coefficients - values[held]).max(axis=0)
+    return basis @ coefficients, error
+
+
+def _to_probes(
+    legs: Legs, environment: Environment, profile: Profile, sonar_pose: Pose, probe: Probes, propagation: Propagation
+) -> tuple[Floats, Floats, Floats]:
+    """Delay over the sphere's (s), gain over it (leg, probe), departure (leg, probe, xyz): rays to every probe."""
+    from sonarsynth.acoustics import rays_continue
+
+    position = sonar_pose.to_world(probe.position)
+    layers = water(profile.depth, profile.speed, environment.depth)
+    count, sensors = len(legs.row), len(position)
+    z, ends = np.clip(depth(legs.point), 0.0, environment.depth), np.clip(depth(position), 0.0, environment.depth)
+    c_start = np.interp(z, layers.depth, layers.speed)
+    level = position[None, :, :2] - legs.point[:, None, :2]
+    distance = np.hypot(level[..., 0], level[..., 1])
+    time, sine, spreading = (np.empty((count, sensors)) for _ in range(3))
+    rays_continue.rays_nearby(
+        layers.depth, layers.speed, z, np.hypot(legs.departure[:, 0], legs.departure[:, 1]) / c_start,
+        (legs.departure[:, 2] > 0).astype(np.int64), legs.bounces + legs.turning, np.arange(sensors), ends, distance,
+        time, sine, spreading,
+    )  # fmt: skip
+    ahead = np.divide(level, distance[..., None], out=np.zeros_like(level), where=distance[..., None] > 0)
+    cosine = np.sqrt(np.maximum((1.0 - sine) * (1.0 + sine), 0.0))
+    departure = np.concatenate([ahead * cosine[..., None], sine[..., None]], axis=2)
+    c = float(profile.at(depth(sonar_pose.position)))
+    farther = sphere(legs.direction, legs.radius, probe.position)
+    predicted = legs.travel_time[:, None] + farther / c
+    lost = np.flatnonzero(np.isnan(time).any(axis=1))
+    if len(lost):
+        some = legs.select(lost)
+        found = _searched(
+            some, position, predicted[lost], BRANCH * probe.aperture / c, environment, profile, propagation
+        )
+        time[lost], spreading[lost] = found[0], found[1]
+        departure[lost] = np.where(np.isnan(found[0])[..., None], some.departure[:, None, :], found[2])
+    expected = legs.spreading[:, None] * legs.radius[:, None] / (legs.radius[:, None] + farther)
+    return time - predicted, spreading / expected, departure
+
+
+def _searched(
+    legs: Legs, position: Floats, predicted: Floats, tolerance: float, environment: Environment, profile: Profile,
+    propagation: Propagation,
+) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    """Time, spreading (leg, probe) and departure of the rays nearest in time among all; NaN where there is none."""
+    count, sensors = predicted.shape
+    start, end = np.repeat(legs.point, sensors, axis=0), np.tile(position, (count, 1))
+    paths = propagation.connect(profile, environment.depth, start, end)
+    same = (paths.surface == legs.surface[paths.pair // sensors]) & (paths.bottom == legs.bottom[paths.pair // sensors])
+    found = pick_branch(paths, predicted, tolerance, same)
+    missing = found < 0
+    time = np.where(missing, np.nan, paths.travel_time[found])
+    return time, np.where(missing, np.nan, paths.spreading[found]), paths.departure[found]

@@ -1,0 +1,43 @@
+"""Straight rays with reflections: each is straight in water mirrored at surface and bed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """A way from one depth to another by surface and bed, unfolded."""
+
+    surface: int
+    bottom: int
+    climb: Floats  # (pair,) m: height that the unfolded ray gains, up positive, so that it starts in its direction
+    turns: float  # -1 where it arrives with the vertical sense opposite to that in which it starts, else 1
+    above: Floats  # (pair,) m that it crosses above the ends, between them and below them
+    between: Floats
+    below: Floats
+
+
+def images(start: Floats, end: Floats, bed: float, bounces: int) -> list[Image]:
+    """All ways from depths start to depths end (pair,) by at most so many reflections; the straight one first."""
+    top, bottom = np.minimum(start, end), np.maximum(start, end)
+    span, found = bottom - top, []
+    for n in range(bounces + 1):
+        for down in (True, False) if n else (True,):
+            below = (n + 1) // 2 if down else n // 2
+            surface = n - below
+            towards = (start <= end) == down  # launched towards the depth of the other end
+            passes = np.where(towards, 2 * (n // 2) + 1, 2 * ((n - 1) // 2) + 1) if n else np.ones(len(top))
+            parts = (2.0 * surface * top, passes * span, 2.0 * below * (bed - bottom))
+            climb = start - end if n == 0 else (-1.0 if down else 1.0) * sum(parts)
+            found.append(Image(surface, below, np.asarray(climb, float), 1.0 - 2.0 * (n % 2), *parts))
+    return found
+
+
+def order(pair: Ints, time: Floats) -> Ints:
+    """Indices that sort paths by pair, then by travel time; paths of one time stay as they are."""
+    return np.lexsort((time, pair))

@@ -1,0 +1,68 @@
+"""Paths between things that move: Doppler, and echoes from where a target is when the sound meets it.
+
+Positions are those at the instant of the frame, t = 0. A path is re-timed by the rates of its travel times, which rays
+give for nothing: a point that moves at v changes the time of a ray that arrives there by v.a/c, of one that leaves by
+-v.d/c. Linear in time over a frame, so sound that leaves the snap at t_s meets the facet at t_1 and the array at t_2:
+
+    t_1 = t_s + T_out + (v.a/c) t_1,    t_2 = t_1 + T_in - (v.d/c) t_1 + (u.b/c) t_2
+
+with a, d, b the directions of travel at facet, facet and array, v and u the velocities of target and array. The pulse is
+longer by dt_2/dt_s. What is left out is second order: the curvature (v t)^2/(2 c r) of the travel times, 7 ns for
+1.4 m/s at 20 m, the same for all facets of a body but for its size over its distance; and the turning of a body.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sonarsynth.acoustics.lobes import dot
+from sonarsynth.conventions import Floats, depth
+from sonarsynth.geometry import Pose
+from sonarsynth.products import Arrivals
+from sonarsynth.tracing.legs import Legs
+from sonarsynth.tracing.paths import Outward
+from sonarsynth.world.environment import Profile
+from sonarsynth.world.moment import Snap
+
+
+@dataclass(frozen=True, eq=False)
+class Moving:
+    """Velocities in a frame."""
+
+    targets: Floats  # (target, xyz) m/s, world
+    sonar: Floats  # (xyz) m/s, world
+
+    @property
+    def still(self) -> bool:
+        """Nothing moves."""
+        return not (self.targets.any() or self.sonar.any())
+
+
+def carried(
+    made: Arrivals, legs: Legs, out: Outward | None, snap: Snap, sonar_pose: Pose, profile: Profile, moving: Moving
+) -> Arrivals:
+    """Arrivals of a snap with what moves taken into account; out: the ways to the facets, None for direct paths."""
+    if moving.still or not len(made.delay):
+        return made
+    c_array = float(profile.at(depth(sonar_pose.position)))
+    of_array = legs.arrival @ moving.sonar / c_array
+    if out is None:
+        velocity, met = np.zeros_like(legs.point), np.zeros(len(made.delay))
+        rate_out = rate_in = met
+        met = met + snap.time
+    else:
+        velocity = moving.targets[made.target]
+        c = profile.at(depth(legs.point))
+        rate_out, rate_in = dot(velocity, out.arrival) / c, -dot(velocity, legs.departure) / c
+        met = (snap.time + out.travel_time) / (1.0 - rate_out)
+    heard = (met * (1.0 + rate_in) + legs.travel_time) / (1.0 - of_array)
+    stretch = (1.0 + rate_in) / ((1.0 - rate_out) * (1.0 - of_array)) - 1.0
+    mirrored = velocity.copy()
+    mirrored[legs.bounces % 2 == 1, 2] *= -1.0
+    # where the target was when the sound met it, from where the array is when it comes; as seen in straight rays
+    moved = sonar_pose.turn_to_body(mirrored * met[:, None] - moving.sonar * heard[:, None])
+    seen = legs.radius[:, None] * legs.direction + moved
+    radius = np.sqrt(dot(seen, seen))
+    return replace(made, delay=heard, stretch=stretch, direction=seen / radius[:, None], radius=radius)

@@ -1,0 +1,126 @@
+"""Arrivals put together from both halves of their paths: out to the facet, and back to the array."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.products import Arrivals, Paths
+from sonarsynth.tracing.aperture import Fronts
+from sonarsynth.tracing.legs import Legs
+from sonarsynth.tracing.reflections import Reflections, as_sign
+
+
+@dataclass(frozen=True, eq=False)
+class Outward:
+    """Ways from a snap to facets."""
+
+    facet: Ints  # (way,) which facet
+    arrival: Floats  # (way, xyz) world
+    travel_time: Floats  # (way,) s
+    length: Floats  # (way,) m
+    spreading: Floats  # (way,) 1/m
+    surface: Ints  # (way,)
+    bottom: Ints  # (way,)
+    turning: Ints  # (way,)
+    caustics: Ints  # (way,)
+    boundary: Floats  # (way,)
+    phase: Floats  # (way,) rad
+    blur: Floats  # (way,) s
+
+    @staticmethod
+    def of(paths: Paths, bounced: Reflections, facet: Ints) -> Outward:
+        """Of paths to facets (path,)."""
+        return Outward(
+            facet, paths.arrival, paths.travel_time, paths.length, paths.spreading, paths.surface, paths.bottom,
+            paths.turning, paths.caustics, bounced.modulus, bounced.phase, bounced.blur,
+        )  # fmt: skip
+
+    @staticmethod
+    def none(count: int) -> Outward:
+        """No way at all, of paths that come straight from the snap; its spreading is that of the leg."""
+        zero, none = np.zeros(count), np.zeros(count, int)
+        return Outward(
+            none, np.zeros((count, 3)), zero, zero, zero + 1.0, none, none, none, none, zero + 1.0, zero, zero
+        )
+
+    def select(self, keep: Bools | Ints) -> Outward:
+        """The ways picked by a mask or by indices."""
+        return Outward(**{name: value[keep] for name, value in vars(self).items()})
+
+    @property
+    def bounces(self) -> Ints:
+        """(way,) reflections from surface and bed."""
+        return np.asarray(self.surface + self.bottom)
+
+
+def assemble(
+    legs: Legs, over: Fronts, out: Outward, index: int, time: float, absorption: float, target: Ints, facet: Ints,
+    scattering: Floats, variation: tuple[Floats, float],
+) -> Arrivals:  # fmt: skip
+    """Arrivals of snap `index` at `time` (s) from both halves of their paths; variation: over the aperture, its error."""
+    length = out.length + legs.length
+    loss = absorption * length
+    sign, phase = as_sign(out.phase + legs.phase)
+    boundary = sign * out.boundary * legs.boundary
+    direct = target < 0
+    first, second = np.where(direct, legs.spreading, out.spreading), np.where(direct, 1.0, legs.spreading)
+    return Arrivals(
+        delay=time + (out.travel_time + legs.travel_time),
+        direction=legs.direction,
+        radius=legs.radius,
+        delay_terms=over.delay_terms,
+        amplitude_terms=variation[0],
+        amplitude=first * scattering * second * boundary * 10.0 ** (-loss / 20.0),
+        spreading_out=first,
+        spreading_in=second,
+        scattering=scattering,
+        boundary=boundary,
+        absorption=loss,
+        length=length,
+        snap=np.full(len(length), index),
+        target=target,
+        facet=facet,
+        point=legs.point,
+        surface=out.surface + legs.surface,
+        bottom=out.bottom + legs.bottom,
+        turning=out.turning + legs.turning,
+        caustics=out.caustics + legs.caustics,
+        arrives_by=np.asarray((legs.surface > 0) + 2 * (legs.bottom > 0)),
+        phase=phase,
+        blur=np.hypot(out.blur, legs.blur),
+        stretch=np.zeros(len(length)),
+        sound_speed=np.nan,
+        wavefront_error=float(over.error.max(initial=0.0)),
+        amplitude_error=variation[1],
+    )
+
+
+def silence(legs: Legs, over: Fronts) -> Arrivals:
+    """No arrivals at all: what a frame without a snap has."""
+    none, zero = np.empty(0), np.empty(0, int)
+    empty = legs.select(zero), over.select(zero), Outward.none(0)
+    return assemble(*empty, 0, 0.0, 0.0, zero, zero, none, (np.empty((0, 0)), 0.0))
+
+
+def join(parts: list[Arrivals], sound_speed: float) -> Arrivals:
+    """Arrivals of all snaps, in order; terms that some of them lack are 0. What absorption leaves nothing of is out."""
+    columns = {}
+    for name, value in vars(parts[0]).items():
+        if isinstance(value, np.ndarray):
+            arrays = [getattr(part, name) for part in parts]
+            if name.endswith("_terms"):
+                width = max(a.shape[1] for a in arrays)
+                arrays = [a if a.shape[1] == width else np.zeros((len(a), width)) for a in arrays]
+            columns[name] = np.concatenate(arrays)
+    heard = columns["amplitude"] != 0.0
+    if not heard.all():
+        columns = {name: value[heard] for name, value in columns.items()}
+    return Arrivals(
+        **columns,
+        sound_speed=sound_speed,
+        wavefront_error=max(part.wavefront_error for part in parts),
+        amplitude_error=max(part.amplitude_error for part in parts),
+    )

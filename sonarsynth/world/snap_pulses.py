@@ -1,0 +1,96 @@
+"""The pulse at 1 m of every described snap: one function, whatever the model."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sonarsynth.acoustics import bubble, bubble_pulse, waveforms
+from sonarsynth.acoustics.bubble import Cavity, Collapse
+from sonarsynth.acoustics.pulses import Pulse
+from sonarsynth.acoustics.snap import Bubble
+from sonarsynth.conventions import Floats
+from sonarsynth.world.recordings import read_recording
+from sonarsynth.world.snaps import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
+from sonarsynth.world.sources import LogarithmicBubble
+
+SnapModel = LogarithmicBubble | KellerMiksis | RecordedSnap | Ricker | Gabor
+
+CUT = 3.0
+"""Standard deviations at which a variation is cut."""
+
+
+class Scales(NamedTuple):
+    """How snaps differ from their model: p(t) becomes gain p(t/width)."""
+
+    gain: Floats  # (snap,)
+    width: Floats  # (snap,)
+
+
+def pulse(model: SnapModel, depth: float, highest: float) -> Pulse:
+    """The pulse (Pa at 1 m) of a snap at a depth (m), for waves up to `highest` (Hz); time 0 is the collapse.
+
+    Raises ValueError in one line where the model has none: a bubble that does not collapse or collapses too fast for
+    its equation, a file that cannot be read.
+    """
+    match model:
+        case LogarithmicBubble():
+            return waveforms.logarithmic(Bubble(model.a, model.k, model.m, model.q, model.density), highest)
+        case KellerMiksis():
+            return bubble_pulse.pulse(collapse(model, depth), highest, model.fade)
+        case RecordedSnap():
+            recording = read_recording(model)
+            return waveforms.recorded(recording.pressure, recording.sampling_frequency, recording.zero, highest)
+        case Ricker():
+            return waveforms.ricker(model.frequency, model.peak, highest)
+        case Gabor():
+            return waveforms.gabor(model.frequency, model.cycles, model.peak, highest)
+
+
+def cavity(model: KellerMiksis, depth: float) -> Cavity:
+    """The bubble of a described snap at its own depth, or else at this one (m), as the equations take it."""
+    where = depth if model.depth is None else model.depth
+    ambient = bubble.ambient_pressure(where, model.density, surface=model.surface_pressure)
+    core = bubble.hard_core(model.radius, model.gas_pressure, ambient, model.core_ratio) if model.core_ratio else 0.0
+    return Cavity(
+        radius=model.radius,
+        gas_pressure=model.gas_pressure,
+        ambient_pressure=ambient,
+        vapour_pressure=model.vapour_pressure,
+        surface_tension=model.surface_tension,
+        viscosity=model.viscosity,
+        density=model.density,
+        sound_speed=model.sound_speed,
+        exponent=model.exponent,
+        core=core,
+    )
+
+
+def collapse(model: KellerMiksis, depth: float) -> Collapse:
+    """The solved bubble of a described snap. Raises ValueError where it does not collapse, or faster than
+    `largest_mach`."""
+    found = bubble.collapse(cavity(model, depth), model.rebounds)
+    if found.flag in {bubble.SETTLED, bubble.SINGULAR}:
+        raise ValueError(f"the bubble has no snap: {found.reason}")
+    if found.mach > model.largest_mach:
+        raise ValueError(
+            f"the wall reaches {found.mach:.3g} times the speed of sound, over largest_mach {model.largest_mach:.3g}: "
+            "first-order theory does not hold; more gas_pressure slows it"
+        )
+    return found
+
+
+def scales(variation: SnapVariation, generator: np.random.Generator, snaps: int) -> Scales:
+    """Gain and width of snaps, from two numbers of the stream each, whatever the variation: one that is 0 changes no
+    other."""
+    from scipy.special import ndtr, ndtri
+
+    edge = float(ndtr(-CUT))
+    normal = ndtri(edge + (1.0 - 2.0 * edge) * generator.random((snaps, 2)))
+    return Scales(10.0 ** (variation.level * normal[:, 0] / 20.0), np.exp(variation.width * normal[:, 1]))
+
+
+def largest_scales(variation: SnapVariation) -> tuple[float, float]:
+    """Bounds on the gain and the width, for laying out windows; the smallest are their inverses."""
+    return float(10.0 ** (CUT * variation.level / 20.0)), float(np.exp(CUT * variation.width))

@@ -1,0 +1,114 @@
+"""Snaps beside the logarithmic bubble: a physical bubble, a recording, and plain test pulses; how snaps vary."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from annotated_types import Ge, Gt, Le
+
+from sonarsynth.conventions import (
+    Decibels,
+    KilogramsPerCubicMetre,
+    NonNegativeMetres,
+    Number,
+    Pascals,
+    PositiveHertz,
+    PositiveMetres,
+    Seconds,
+    WaterSoundSpeed,
+)
+from sonarsynth.description import description
+
+
+@description
+class KellerMiksis:
+    """A bubble of vapour and a little gas that collapses from rest (Keller and Miksis 1980). The defaults, in water of
+    20 degC at 5 m, give 206 dB re 1 uPa at 1 m, peak to peak, below 200 kHz.
+
+    The first collapse is at t = 0. Deeper shrimp snap faster and louder.
+    """
+
+    kind: Literal["keller_miksis"] = "keller_miksis"
+    radius: PositiveMetres = 3.5e-3
+    """Largest radius, at rest."""
+    gas_pressure: Annotated[Pascals, Ge(0)] = 2000.0
+    """Pressure of the gas at the largest radius: less gas, a harder collapse."""
+    depth: NonNegativeMetres | None = None
+    """Depth whose pressure drives the collapse; left out: that of the shrimp."""
+    surface_pressure: Annotated[Pascals, Ge(0)] = 101325.0
+    """Of the air."""
+    vapour_pressure: Annotated[Pascals, Ge(0)] = 2339.0
+    surface_tension: Annotated[Number, Ge(0)] = 0.0725
+    """In N/m."""
+    viscosity: Annotated[Number, Ge(0)] = 1e-3
+    """In Pa s."""
+    density: Annotated[KilogramsPerCubicMetre, Gt(0)] = 998.0
+    sound_speed: WaterSoundSpeed = 1482.0
+    """In the water about the bubble: sets what it radiates, not how that travels."""
+    exponent: Annotated[Number, Ge(1), Le(3)] = 1.4
+    """Polytropic exponent of the gas: 1 is isothermal."""
+    core_ratio: Annotated[Number, Gt(1)] | None = None
+    """Radius of the gas at ambient pressure over that of its hard core (van der Waals): 8.86 argon, 8.5 air. Left out:
+    an ideal gas."""
+    rebounds: Annotated[int, Ge(0), Le(10)] = 1
+    """Collapses that are kept after the first; the pulse ends at the top of the last rebound."""
+    fade: Annotated[Number, Ge(0), Le(1)] = 0.5
+    """Part of the time before the first collapse, and after the last, over which the flow fades in and out."""
+    largest_mach: Annotated[Number, Gt(0)] = 0.5
+    """A bubble whose wall moves faster than this times the speed of sound is refused: the equation is of first order.
+    Below 200 kHz even Mach 0.7 changes little."""
+
+
+@description
+class RecordedSnap:
+    """A recorded waveform: CSV or text (time and pressure, or pressure alone), or WAV."""
+
+    kind: Literal["recorded_snap"] = "recorded_snap"
+    path: str
+    """Relative to the recipe."""
+    distance: PositiveMetres = 1.0
+    """From the snap to the hydrophone that recorded it: the pressure is brought to 1 m as 1/r."""
+    pascals: Annotated[Number, Gt(0)] = 1.0
+    """Pressure (Pa) of the number 1 in the file; the full scale of a WAV of whole numbers is 1."""
+    sampling_frequency: PositiveHertz | None = None
+    """For a file without times; others have their own."""
+    channel: Annotated[int, Ge(0)] = 0
+    """Of a WAV, or the column of pressure after the time, from 0."""
+    time: Seconds | None = None
+    """Time of the collapse, on the file's own clock (a WAV's begins at 0); left out: of the largest pressure."""
+    fade: Annotated[Number, Ge(0), Le(0.5)] = 0.0
+    """Part of the recording that fades in, and that fades out: for one that is not quiet at its ends."""
+
+
+@description
+class Ricker:
+    """A test pulse: the second derivative of a Gaussian, upside down. Its spectrum is exact."""
+
+    kind: Literal["ricker"] = "ricker"
+    frequency: PositiveHertz
+    """Where the spectrum is largest."""
+    peak: Annotated[Pascals, Gt(0)] = 1.0
+    """Pressure at 1 m at t = 0."""
+
+
+@description
+class Gabor:
+    """A test pulse: a tone in a Gaussian. Its spectrum is exact."""
+
+    kind: Literal["gabor"] = "gabor"
+    frequency: PositiveHertz
+    cycles: Annotated[Number, Gt(0), Le(1000)] = 5.0
+    """Of the tone in the Gaussian's width at half its height."""
+    peak: Annotated[Pascals, Gt(0)] = 1.0
+    """Pressure at 1 m at t = 0."""
+
+
+@description
+class SnapVariation:
+    """How one snap differs from the next: normal in level and in the logarithm of the width, independent, cut at three
+    standard deviations."""
+
+    level: Annotated[Decibels, Ge(0), Le(20)] = 0.0
+    """Standard deviation of the level."""
+    width: Annotated[Number, Ge(0), Le(0.5)] = 0.0
+    """Standard deviation of the natural logarithm of the width: 0.1 is about 10 %."""
