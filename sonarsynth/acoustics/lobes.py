@@ -35,14 +35,36 @@ def slope_lobe(incident: Floats, scattered: Floats, normal: Floats, slope: float
     Propag. 16, 449, with unit reflection coefficient. Unit vectors (..., xyz) of propagation, in and away. Reciprocal.
     0 where the half vector points into the surface.
     """
-    half = [scattered[..., i] - incident[..., i] for i in range(3)]
-    up = half[0] * normal[..., 0] + half[1] * normal[..., 1] + half[2] * normal[..., 2]
-    # what is across the normal, so that nothing cancels at the mirror direction
-    along = [half[i] - up * normal[..., i] for i in range(3)]
-    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        square = (along[0] * along[0] + along[1] * along[1] + along[2] * along[2]) / (up * up)  # tan^2 b
-        lobe = np.exp(square * (-0.5 / slope**2)) * ((1.0 + square) ** 2 / (8.0 * np.pi * slope**2))
-    return np.where((up > 0) & (square < 1e100), lobe, 0.0)
+    from sonarsynth.acoustics import lobes_kernels
+
+    (a, b, n), shape = _rows(incident, scattered, normal)
+    out = np.empty(a.shape[:2])
+    lobes_kernels.slope_lobes(a, b, n, slope, out)
+    return out.reshape(shape)
+
+
+def lobe_amplitude(
+    incident: Floats, scattered: Floats, normal: Floats, area: Floats, slope: float, share: float, albedo: float
+) -> Floats:
+    """Amplitude sqrt(area (share sigma0 + albedo/pi cos_i cos_s)) (...) in m of facets lit and seen, 0 of others.
+
+    Unit vectors (..., xyz) and area (...) m2 broadcast; slope as for `slope_lobe`, albedo as for `lambert`.
+    """
+    from sonarsynth.acoustics import lobes_kernels
+
+    (a, b, n), shape = _rows(incident, scattered, normal)
+    size = np.broadcast_to(area, shape).reshape(a.shape[:2])
+    out = np.empty(a.shape[:2])
+    lobes_kernels.amplitudes(a, b, n, size, slope, share, albedo, out)
+    return out.reshape(shape)
+
+
+def _rows(*vectors: Floats) -> tuple[list[Floats], tuple[int, ...]]:
+    """Vectors broadcast to (row, column, xyz), without copies where they have two axes or three, and their shape."""
+    full = np.broadcast_shapes(*(np.shape(v) for v in vectors))
+    columns = full[-2] if len(full) > 2 else 1
+    rows = int(np.prod(full[:-1])) // max(columns, 1)
+    return [np.broadcast_to(v, full).reshape(rows, columns, 3) for v in vectors], full[:-1]
 
 
 def lambert(incident: Floats, scattered: Floats, normal: Floats, albedo: float) -> Floats:

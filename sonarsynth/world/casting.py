@@ -180,6 +180,12 @@ def casting_mesh(mesh: Mesh, backend: Backend = "embree") -> CastingMesh:
     return _casting_mesh(_ByContent(mesh.digest, mesh), backend)
 
 
+def enclosing(body: Body) -> tuple[Floats, float]:
+    """Centre (xyz) in the world and radius (m) of a sphere a little larger than the body."""
+    ready = casting_mesh(body.mesh)
+    return np.asarray(body.pose.to_world(ready.centre)), (1.0 + 1e-5) * ready.size
+
+
 def first_hit(
     mesh: Mesh, origin: Floats, direction: Floats, far: float = np.inf, backend: Backend = "embree"
 ) -> tuple[Ints, Floats]:
@@ -209,12 +215,17 @@ def occluded(bodies: tuple[Body, ...], start: Floats, end: Floats, backend: Back
     a, b = np.asarray(start, float), np.asarray(end, float)
     if not (np.isfinite(a).all() and np.isfinite(b).all()):
         raise ValueError("segments need finite ends")
-    hidden = np.zeros(len(a), bool)
+    from sonarsynth.world import intersections
+
+    hidden, near = np.zeros(len(a), bool), np.empty(len(a), bool)
     for body in bodies:
-        free = np.flatnonzero(~hidden)
-        if not len(body.mesh.faces) or not len(free):
+        if not len(body.mesh.faces):
             continue
         ready = casting_mesh(body.mesh, backend)
+        intersections.pass_near(a, b, *enclosing(body), near)
+        free = np.flatnonzero(near & ~hidden)
+        if not len(free):
+            continue
         o = (body.pose.to_body(a[free]) - ready.centre) / ready.size
         span = (body.pose.to_body(b[free]) - ready.centre) / ready.size - o
         length = np.linalg.norm(span, axis=1)

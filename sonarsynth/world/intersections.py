@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth.conventions import Bools, Floats, Ints
 
 Int32s = npt.NDArray[np.int32]
 EDGE = 1e-14  # of the square of the body's size: rays this close to an edge hit either facet, never neither
@@ -90,3 +90,55 @@ def search(
             t = distance_to_facet(origin[i], direction[i], corners, j, tolerance)
             if near[i] <= t <= far[i] and t < best:
                 best, facet[i], distance[i] = t, j, t
+
+
+@njit(cache=True, nogil=True)
+def pass_near(start: Floats, end: Floats, centre: Floats, radius: float, near: Bools) -> None:
+    """Write whether each segment (segment, xyz) comes within radius (m) of a point (xyz)."""
+    for i in range(len(start)):
+        sx, sy, sz = end[i, 0] - start[i, 0], end[i, 1] - start[i, 1], end[i, 2] - start[i, 2]
+        cx, cy, cz = centre[0] - start[i, 0], centre[1] - start[i, 1], centre[2] - start[i, 2]
+        square = sx * sx + sy * sy + sz * sz
+        part = (cx * sx + cy * sy + cz * sz) / square if square > 0.0 else 0.0
+        part = min(max(part, 0.0), 1.0)
+        dx, dy, dz = cx - part * sx, cy - part * sy, cz - part * sz
+        near[i] = dx * dx + dy * dy + dz * dz <= radius * radius
+
+
+@njit(cache=True, nogil=True)
+def folded_pass_near(
+    start: Floats, end: Floats, up: Bools, bounces: Ints, bed: float, skip: Floats, reach: Floats, centre: Floats,
+    radius: float, near: Bools,
+) -> None:  # fmt: skip
+    """Write whether straight rays from start to end (ray, xyz) with bounces come within radius + reach of a point.
+
+    bounces (ray,): reflections from the surface z = 0 and the bed z = -bed (m); up: launched upwards; skip (ray,): m
+    along the ray from its start that do not count; reach (ray,) m.
+    """
+    for i in range(len(start)):
+        x0, y0, z0 = start[i, 0], start[i, 1], start[i, 2]
+        n, rising = bounces[i], 1.0 if up[i] else -1.0
+        climb = end[i, 2] - z0
+        if n > 0:
+            last_above = (n % 2 == 1) == up[i]
+            climb = (-z0 if up[i] else bed + z0) + (n - 1) * bed + (-end[i, 2] if last_above else bed + end[i, 2])
+        dx, dy = end[i, 0] - x0, end[i, 1] - y0
+        length = math.sqrt(dx * dx + dy * dy + climb * climb)
+        within = (radius + reach[i]) ** 2
+        near[i] = False
+        done, z, sense = 0.0, z0, rising if n > 0 else 1.0
+        for k in range(n + 1):  # piece by piece between boundaries, part: of the whole way
+            edge = 0.0 if sense > 0.0 else -bed
+            part = 1.0 if k == n or climb == 0.0 else min(done + abs(edge - z) / climb, 1.0)
+            z_after = end[i, 2] if k == n else edge
+            first = max(done, min(part, skip[i] / length if length > 0.0 else 1.0))
+            if part > first or (k == n and first == done):
+                along = (first - done) / (part - done) if part > done else 0.0
+                ax, ay, az = x0 + first * dx, y0 + first * dy, z + along * (z_after - z)
+                sx, sy, sz = (part - first) * dx, (part - first) * dy, z_after - az
+                cx, cy, cz = centre[0] - ax, centre[1] - ay, centre[2] - az
+                square = sx * sx + sy * sy + sz * sz
+                t = min(max((cx * sx + cy * sy + cz * sz) / square, 0.0), 1.0) if square > 0.0 else 0.0
+                ex, ey, ez = cx - t * sx, cy - t * sy, cz - t * sz
+                near[i] = near[i] or ex * ex + ey * ey + ez * ez <= within
+            done, z, sense = part, z_after, -sense

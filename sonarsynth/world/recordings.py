@@ -51,7 +51,8 @@ def _recording(snap: RecordedSnap, stamp: tuple[int, int]) -> Recording:
     start, rate, values = (_wav if path.suffix.lower() in {".wav", ".wave"} else _text)(path, snap)
     if not 4 <= values.size <= MOST_SAMPLES:
         raise RecordingError(f"{path}: has {values.size} samples; a snap has 4 to {MOST_SAMPLES}")
-    p = values * (snap.pascals * snap.distance)
+    with np.errstate(over="ignore", invalid="ignore"):
+        p = values * (snap.pascals * snap.distance)
     peak = float(np.abs(p).max())
     if not 0 < peak < np.inf:
         raise RecordingError(f"{path}: " + ("is silent" if peak == 0 else "holds numbers that are not finite"))

@@ -1,0 +1,142 @@
+"""Facets and waves at the ends of what there is: needles, points, no wave, 1e9 wavelengths, far from the origin."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sonarsynth.acoustics.kirchhoff import (
+    circular_plate,
+    divided_exponential,
+    facet_amplitude,
+    lit_sphere,
+    local_grazing,
+    rectangular_plate,
+    shadow_taper,
+    triangle_integral,
+)
+from sonarsynth.acoustics.kirchhoff_kernels import facet_amplitudes, mesh_amplitude
+from sonarsynth.acoustics.kirchhoff_pulse import divided_impulse, facet_echo, snap_waveform
+from sonarsynth.acoustics.modal import Fluid, cylinder_amplitude, sphere_amplitude, sphere_coefficients
+from sonarsynth.acoustics.roughness import coherent_factor, incoherent_power, roughness_parameter
+from sonarsynth.acoustics.snap import Bubble
+from sonarsynth.conventions import Floats
+from sonarsynth.geometry import unit
+from sonarsynth.world.sources import LogarithmicBubble
+
+DOWN, UP = np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 1.0])
+NEEDLE = np.array([[0.0, 0, 0], [1.0, 0, 0], [0.5, 1e-12, 0]])
+POINT, LINE = np.ones((3, 3)), np.array([[0.0, 0, 0], [1.0, 1, 1], [2.0, 2, 2]])
+_b = LogarithmicBubble()
+SNAP = snap_waveform(Bubble(_b.a, _b.k, _b.m, _b.q, _b.density))
+
+
+@pytest.mark.parametrize("k", [0.0, 1e-12, 1.0, 1e3, 1e9])
+def test_what_has_no_area_scatters_nothing(k: float) -> None:
+    rng = np.random.default_rng(0)
+    a, b = unit(rng.normal(size=(2, 50, 3)))
+    for empty in (POINT, LINE):
+        assert abs(facet_amplitude(empty, a, b, k)).max() == 0.0
+        assert abs(triangle_integral(empty, k * (a - b))).max() == 0.0
+        assert abs(mesh_amplitude(empty[None], a[0], b[0], k)).max() == 0.0
+        assert abs(facet_echo(np.linspace(-1e-3, 1e-3, 9), empty, a[0], b[0], SNAP)).max() == 0.0
+    assert abs(facet_amplitude(NEEDLE, a, b, k)).max() <= 1e-12 * k
+
+
+def test_a_needle_is_exact() -> None:
+    """Its integral is that of a line with the weight of its width, a hat: exp(i w/2) (sinc(w/4))^2 of its area."""
+    w = np.array([1e-9, 1.0, 30.0, 4e3])
+    got = triangle_integral(NEEDLE, w[:, None] * np.array([1.0, 0, 0]))
+    np.testing.assert_allclose(got, 0.5e-12 * np.exp(0.5j * w) * np.sinc(w / (4 * np.pi)) ** 2, atol=1e-27)
+
+
+def test_no_wave_gives_the_area_and_no_echo() -> None:
+    corners = np.random.default_rng(1).normal(size=(20, 3, 3))
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    np.testing.assert_allclose(triangle_integral(corners, np.zeros(3)), area, rtol=1e-15)
+    assert abs(facet_amplitude(corners, UP, UP, 300.0)).max() == 0.0  # straight on: no change of direction
+    assert abs(facet_amplitudes(corners, UP, DOWN, [0.0])).max() == 0.0
+
+
+def test_the_integral_never_exceeds_the_area_and_falls_with_the_wave() -> None:
+    rng = np.random.default_rng(2)
+    corners = rng.normal(size=(4000, 3, 3))
+    wave = unit(rng.normal(size=(4000, 3)))
+    area = abs(triangle_integral(corners, np.zeros(3)))
+    for size in 10.0 ** np.arange(-300, 16, 15):
+        got = abs(triangle_integral(corners, size * wave))
+        assert np.isfinite(got).all()
+        assert (got <= area * (1 + 1e-14)).all()
+    assert np.median(abs(triangle_integral(corners, 1e6 * wave)) / area) < 1e-9
+
+
+@pytest.mark.parametrize("distance", [20.0, 1e4])
+def test_a_facet_far_from_the_origin_has_the_same_echo_later(distance: float) -> None:
+    rng = np.random.default_rng(3)
+    corners, k = rng.integers(-64, 64, (30, 3, 3)) / 1024.0, 450.0  # exact when moved
+    a, b = unit(rng.normal(size=(2, 30, 3)))
+    away = np.array([distance, -distance, 0.5 * distance])
+    near, far = facet_amplitude(corners, a, b, k), facet_amplitude(corners + away, a, b, k)
+    np.testing.assert_allclose(abs(far), abs(near), rtol=1e-9, atol=1e-16)
+    phase = np.exp(-1j * k * np.sum((a - b) * away, axis=1))
+    assert abs(far - near * phase).max() < 1e-15 * k * distance * abs(near).max() * 10
+
+
+def test_the_error_grows_smoothly_through_the_mirror_direction() -> None:
+    """No step anywhere between 1e-18 and 1 rad off it: the difference from the mirror falls as the square."""
+    corners = np.array([[0.3, -0.2, 0], [-0.1, 0.4, 0], [-0.2, -0.2, 0]])  # its middle at 0
+    off = 10.0 ** np.arange(-18.0, -1.0, 0.25)
+    towards = np.stack([np.sin(off), 0 * off, np.cos(off)], axis=-1)
+    f = facet_amplitude(corners, DOWN, towards, 100.0)
+    mirror = facet_amplitude(corners, DOWN, UP, 100.0)
+    assert (abs(f / mirror - 1) <= 3e-16 + 1e3 * off**2).all()
+
+
+def test_numbers_that_are_none_stay_none() -> None:
+    assert np.isnan(divided_exponential([0.0, np.nan, 1.0]))
+    assert np.isnan(facet_amplitude(NEEDLE, DOWN, UP, np.nan))
+    assert np.isnan(mesh_amplitude(NEEDLE[None] + np.nan, DOWN, UP, 1.0)).all()
+
+
+def test_single_numbers_do_as_well_as_arrays() -> None:
+    assert divided_exponential(np.zeros(3)) == 0.5
+    assert divided_exponential(np.array([0.0, 1.0, 9.0])).shape == ()
+    assert rectangular_plate((1.0, 1.0), DOWN, UP, 5.0).shape == circular_plate(1.0, DOWN, UP, 5.0).shape == ()
+    assert divided_impulse(np.zeros(3), SNAP).shape == ()
+
+
+def test_spheres_of_no_wave_and_of_very_many() -> None:
+    assert lit_sphere(0.3, 0.0) == 0.0
+    assert lit_sphere(0.3, 1e-9) == pytest.approx(0.5j * 0.09e-9, rel=1e-8)
+    assert abs(lit_sphere(0.3, 1e9)) == pytest.approx(0.15, rel=1e-6)
+    k = 10.0 ** np.arange(-300.0, 3.0, 10.0)
+    for boundary in ("rigid", "soft", Fluid(1e-3, 0.2), Fluid(1e6, 1e3)):
+        a = sphere_coefficients(k, boundary)  # type: ignore[arg-type]
+        assert np.isfinite(a).all()
+        assert (abs(a) <= 1 + 1e-12).all()
+        f = sphere_amplitude(k, np.pi, radius=1.0, sound_speed=2 * np.pi, boundary=boundary)  # type: ignore[arg-type]
+        assert np.isfinite(f).all()
+    assert np.isfinite(cylinder_amplitude(k, 0.3, radius=1.0, length=1.0, sound_speed=2 * np.pi)).all()
+
+
+def test_directions_that_graze_or_oppose() -> None:
+    along = np.array([1.0, 0.0, 0.0])
+    assert shadow_taper(along, along, UP) == 0.0
+    assert shadow_taper(DOWN, DOWN, UP) == 0.0
+    assert shadow_taper(DOWN, UP, UP) == 1.0
+    tilted = unit(np.array([1.0, 0.0, -1e-12]))
+    assert shadow_taper(tilted, tilted * [1, 1, -1], UP) == pytest.approx(1.0)
+    assert local_grazing(UP, UP) == 0.0
+    assert local_grazing(UP, DOWN) == pytest.approx(np.pi / 2)
+
+
+def test_roughness_from_none_to_any() -> None:
+    g = roughness_parameter(1e3, np.array([0.0, 1e-200, 1e-3, 1e300]), DOWN, UP, UP)
+    np.testing.assert_allclose(coherent_factor(g), [1.0, 1.0, np.exp(-2.0), 0.0])
+    power = incoherent_power(g, DOWN, UP, UP, 0.2)
+    assert power[0] == power[1] == 0.0
+    assert power[3] == pytest.approx(1 / (8 * np.pi * 0.04))
+    small: Floats = incoherent_power(1e-9, DOWN, UP, UP, 0.2)
+    assert small == pytest.approx(1e-18 / (8 * np.pi * 0.04), rel=1e-12)
+    with pytest.raises(ValueError, match="slope"):
+        incoherent_power(1.0, DOWN, UP, UP, 0.0)

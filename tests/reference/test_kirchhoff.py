@@ -1,0 +1,283 @@
+"""The Kirchhoff integral over facets against exact arithmetic, plates, closed bodies and exact series."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Literal
+
+import mpmath as mp
+import numpy as np
+import pytest
+from scipy.special import j1
+
+from sonarsynth.acoustics.boundaries import rayleigh
+from sonarsynth.acoustics.facets import kirchhoff_error
+from sonarsynth.acoustics.kirchhoff import (
+    circular_plate,
+    divided_exponential,
+    facet_amplitude,
+    lit_sphere,
+    local_grazing,
+    rectangular_plate,
+    shadow_amplitude,
+    shadow_taper,
+    triangle_integral,
+)
+from sonarsynth.acoustics.kirchhoff_kernels import facet_amplitudes, mesh_amplitude
+from sonarsynth.acoustics.lobes import lit_and_seen
+from sonarsynth.acoustics.modal import cylinder_amplitude, sphere_amplitude
+from sonarsynth.acoustics.roughness import coherent_factor, roughness_parameter
+from sonarsynth.conventions import Floats
+from sonarsynth.geometry import unit
+from sonarsynth.world.generation import sphere
+from sonarsynth.world.meshes import Mesh, mesh_of
+from sonarsynth.world.shapes import Box, Cylinder
+
+C = 1500.0
+
+
+def round_mesh(radius: float, edge: float) -> tuple[Floats, Floats]:
+    """Corners and normals of a sphere of flat facets, blown up to the volume of the sphere."""
+    vertices, faces = sphere(radius, edge)
+    corners = vertices[faces]
+    doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    volume = np.sum(corners.mean(axis=1) * doubled) / 6
+    return corners * (4 / 3 * np.pi * radius**3 / volume) ** (1 / 3), unit(doubled)
+
+
+def exact_difference(phases: Floats) -> complex:
+    """exp[i a, i b, i c] in 120 digits, nodes that are equal moved apart by 1e-40."""
+    with mp.workdps(120):
+        z = [mp.mpc(0, mp.mpf(float(p)) + mp.mpf(10) ** -40 * i) for i, p in enumerate(phases)]
+        return complex(sum(mp.exp(z[i]) / ((z[i] - z[i - 1]) * (z[i] - z[i - 2])) for i in range(3)))
+
+
+@pytest.mark.parametrize("size", 10.0 ** np.arange(-12, 5))
+def test_the_divided_difference_agrees_with_exact_arithmetic(size: float) -> None:
+    rng = np.random.default_rng(int(50 + np.log10(size)))
+    phases = rng.normal(size=(20, 3)) * size
+    phases[::4, 1] = phases[::4, 0]
+    phases[1::4, 2] = phases[1::4, 0] * (1 + 1e-9)
+    phases[2::4] = phases[2::4, :1]
+    exact = np.array([exact_difference(p) for p in phases])
+    assert abs(divided_exponential(phases) - exact).max() < 3e-16
+
+
+@pytest.mark.parametrize("gap", [1.999999, 2.0, 2.000001])
+def test_series_and_differences_meet(gap: float) -> None:
+    for middle in (0.0, 0.3 * gap, gap):
+        phases = np.array([0.0, middle, gap])
+        assert abs(divided_exponential(phases) - exact_difference(phases)) < 2e-16
+
+
+@pytest.mark.parametrize("size", [1e-12, 1e-3, 1.0, 30.0, 1e3])
+def test_triangles_agree_with_exact_arithmetic_whatever_the_angle(size: float) -> None:
+    rng = np.random.default_rng(3)
+    corners = rng.normal(size=(12, 3, 3))
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal = np.cross(first, second)
+    area = 0.5 * np.linalg.norm(normal, axis=1)
+    wave = rng.normal(size=(12, 3))
+    wave[::4] = normal[::4]  # the mirror direction
+    wave[1::4] = np.cross(first[1::4], normal[1::4])  # square to an edge
+    wave[2::4] = normal[2::4] + 1e-8 * first[2::4]
+    wave *= size / np.linalg.norm(wave, axis=1)[:, None]
+    phases = np.einsum("fci,fi->fc", corners - corners[:, :1], wave)
+    exact = np.array([2 * a * exact_difference(p) for a, p in zip(area, phases, strict=True)])
+    got = triangle_integral(corners, wave) * np.exp(-1j * np.sum(corners[:, 0] * wave, axis=1))
+    assert (abs(got - exact) < (1e-15 + 1e-16 * size) * area).all()
+
+
+def test_a_triangle_is_the_sum_of_its_parts() -> None:
+    rng = np.random.default_rng(4)
+    whole = rng.normal(size=(50, 1, 3, 3)) + 3.0
+    share = np.array([[0.3, 0.7, 0], [0, 0.5, 0.5], [0.2, 0, 0.8]])  # a point on each side
+    points = np.concatenate([whole, share @ whole], axis=2)
+    parts = points[:, 0, [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]]
+    wave = rng.normal(size=(50, 1, 3)) * 10.0 ** rng.uniform(-6, 3, (50, 1, 1))
+    area = abs(triangle_integral(whole, np.zeros(3)))
+    together = triangle_integral(parts, wave).sum(axis=1, keepdims=True)
+    assert (abs(together - triangle_integral(whole, wave)) < 1e-12 * area).all()
+    a, b = unit(rng.normal(size=(2, 50, 1, 3)))
+    np.testing.assert_allclose(
+        facet_amplitude(parts, a, b, 400.0).sum(axis=1, keepdims=True), facet_amplitude(whole, a, b, 400.0), atol=1e-10
+    )
+
+
+def test_a_closed_body_gives_the_transform_of_its_volume() -> None:
+    """Divergence theorem: the sum over all facets of (n.w) int exp(-i w.x) dS is -i |w|^2 int exp(-i w.x) dV."""
+    sides = np.array([0.4, 0.7, 0.2])
+    mesh = mesh_of(Box(size=tuple(sides)))
+    a, b = unit(np.random.default_rng(5).normal(size=(2, 20, 1, 3)))
+    k = np.array([0.01, 3.0, 60.0, 400.0])[:, None, None]
+    w = k[..., None] * (a - b)
+    volume = np.prod(sides * np.sinc(w * sides / (2 * np.pi)), axis=-1)
+    exact = -0.25j / np.pi * (1j * np.sum(w * w, axis=-1)) * volume
+    total = facet_amplitude(mesh.corners, a, b, k).sum(axis=-1, keepdims=True)
+    assert (abs(total + exact) < 1e-12 * k).all()
+
+
+DOWN, UP = np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 1.0])
+CORNERS = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]]) * [0.6, 0.25, 1.0]
+PLATE = CORNERS[[[0, 1, 2], [0, 2, 3]]]
+
+
+def test_plates_send_back_area_over_wavelength() -> None:
+    k = np.array([1.0, 100.0, 1e4])
+    assert abs(rectangular_plate((0.6, 0.25), DOWN, UP, k)) == pytest.approx(0.15 * k / (2 * np.pi), rel=1e-14)
+    assert abs(circular_plate(0.3, DOWN, UP, k)) == pytest.approx(np.pi * 0.09 * k / (2 * np.pi), rel=1e-14)
+    mirrored = unit(np.array([0.6, 0.1, -1.0]))
+    assert abs(rectangular_plate((0.6, 0.25), mirrored, mirrored * [1, 1, -1], 100.0)) == pytest.approx(
+        0.15 * 100 / (2 * np.pi) * abs(mirrored[2]), rel=1e-14
+    )
+    assert rectangular_plate((0.6, 0.25), DOWN, UP, 100.0).imag > 0  # i A/lambda: a quarter of a period early
+
+
+def test_two_triangles_are_a_rectangle_and_many_a_disc() -> None:
+    rng = np.random.default_rng(6)
+    a, b = unit(rng.normal(size=(2, 40, 3)))
+    k = 10.0 ** rng.uniform(-2, 3, 40)
+    two = facet_amplitude(PLATE, a[:, None], b[:, None], k[:, None], 0.3 - 0.4j).sum(axis=1)
+    np.testing.assert_allclose(two, rectangular_plate((0.6, 0.25), a, b, k, 0.3 - 0.4j), atol=1e-14 * k.max())
+    sides = 2000
+    angle = 2 * np.pi * np.arange(sides + 1) / sides
+    radius = 0.3 * np.sqrt(2 * np.pi / sides / np.sin(2 * np.pi / sides))  # of the same area
+    rim = radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1)
+    fan = np.stack([0 * rim[1:], rim[:-1], rim[1:]], axis=1)
+    many = facet_amplitude(fan, a[:, None], b[:, None], 100.0).sum(axis=1)
+    np.testing.assert_allclose(many, circular_plate(0.3, a, b, 100.0), atol=1e-5 * 0.09 * 50)
+
+
+def test_plates_have_nulls_where_a_side_spans_whole_wavelengths() -> None:
+    wavelength = 0.1
+    for order, sine in itertools.product((1, 2, 3), (0.0, 0.3)):
+        out = sine + order * wavelength / 0.6
+        a, b = np.array([sine, 0, -np.sqrt(1 - sine**2)]), np.array([out, 0, np.sqrt(1 - out**2)])
+        f = facet_amplitude(PLATE, a, b, 2 * np.pi / wavelength)
+        assert abs(f.sum()) < 1e-14
+        assert abs(f[0]) > 0.01
+    first = 3.8317059702075125 / (2 * np.pi / wavelength * 0.3)  # zero of J1
+    assert abs(circular_plate(0.3, DOWN, np.array([first, 0, np.sqrt(1 - first**2)]), 2 * np.pi / wavelength)) < 1e-14
+
+
+def test_source_and_receiver_may_change_places() -> None:
+    rng = np.random.default_rng(7)
+    a, b = unit(rng.normal(size=(2, 200, 3)))
+    corners, k = rng.normal(size=(200, 3, 3)), 10.0 ** rng.uniform(-3, 3, 200)
+
+    def local(i: Floats, s: Floats) -> np.ndarray:
+        return rayleigh(local_grazing(i, s), 1.8, 1.1, 0.02)
+
+    there, back = facet_amplitude(corners, a, b, k, local(a, b)), facet_amplitude(corners, -b, -a, k, local(-b, -a))
+    np.testing.assert_allclose(there, back, rtol=1e-12, atol=1e-15)
+    assert np.unique(local(a, b).imag).size > 100
+    normal = unit(rng.normal(size=(200, 3)))
+    np.testing.assert_allclose(shadow_taper(a, b, normal), shadow_taper(-b, -a, normal), rtol=1e-13)
+    mirror = a - 2 * np.sum(a * normal, axis=1)[:, None] * normal
+    lit = np.sum(a * normal, axis=1) < 0
+    np.testing.assert_allclose(shadow_taper(a, mirror, normal), lit, atol=1e-13)
+    np.testing.assert_array_equal(shadow_taper(a, b, normal) > 0, lit_and_seen(a, b, normal))
+
+
+def test_the_mirror_angle_of_a_facet_is_that_of_the_half_vector() -> None:
+    grazing = np.array([0.0, 1e-9, 0.3, np.pi / 2])
+    a, b = (np.stack([np.cos(grazing), 0 * grazing, s * np.sin(grazing)], axis=-1) for s in (-1, 1))
+    np.testing.assert_allclose(local_grazing(a, b), grazing, rtol=1e-14)
+
+
+def test_the_compiled_sum_is_the_sum_of_the_facets() -> None:
+    rng = np.random.default_rng(8)
+    corners = rng.normal(size=(300, 1, 3)) + rng.normal(size=(300, 3, 3)) * 10.0 ** rng.uniform(-6, 0, (300, 1, 1))
+    a, b = unit(rng.normal(size=(2, 300, 3)))
+    k = np.array([0.0, 1e-9, 1.0, 360.0, 4e3])
+    weight, height = rng.normal(size=300) * np.exp(1j * rng.normal(size=300)), rng.uniform(0, 0.01, 300)
+    weight[::5] = 0.0
+    normal = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    left = coherent_factor(roughness_parameter(k, height[:, None], a[:, None], b[:, None], normal[:, None]))
+    slow = left * facet_amplitude(corners[:, None], a[:, None], b[:, None], k, weight[:, None])
+    one_by_one = facet_amplitudes(corners, a, b, k, weight, height)
+    np.testing.assert_allclose(one_by_one, slow, atol=1e-11 * abs(slow).max())
+    np.testing.assert_allclose(mesh_amplitude(corners, a, b, k, weight, height), one_by_one.sum(axis=0), rtol=1e-12)
+    assert abs(one_by_one[5]).max() == 0.0 == abs(one_by_one[:, 0]).max()
+    with pytest.raises(ValueError, match="facet, 3, xyz"):
+        mesh_amplitude(corners[0], a, b, k)
+
+
+def test_the_error_of_flat_facets_on_a_sphere_is_of_second_order_and_as_predicted() -> None:
+    radius, frequency = 0.25, np.array([25e3, 50e3, 85e3])
+    k = 2 * np.pi * frequency / C
+    errors = []
+    for edge in (0.03, 0.015, 0.0075):
+        vertices, faces = sphere(radius, edge)
+        corners = vertices[faces]
+        mean_edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean()
+        lit = corners.mean(axis=1)[:, 0] > 0
+        got = mesh_amplitude(corners[lit], np.array([-1.0, 0, 0]), np.array([1.0, 0, 0]), k)
+        errors.append(abs(got / lit_sphere(radius, k) - 1))
+        assert (errors[-1] < 2.0 * kirchhoff_error(mean_edge, C / frequency, radius)).all()
+    assert (np.log2(errors[1] / errors[2]) > 1.7).all()
+    assert (errors[2] < 0.02).all()
+
+
+@pytest.mark.parametrize("boundary", ["rigid", "soft"])
+def test_the_echo_of_a_sphere_of_facets_has_the_strength_of_the_exact_series(
+    boundary: Literal["rigid", "soft"],
+) -> None:
+    """Backscatter, k a from 20 to 60: within 0.4 dB, and nearer the larger the sphere."""
+    ka, angles = np.linspace(20, 60, 81), np.array([1.0, 0, 0])
+    corners, normal = round_mesh(1.0, 0.04)
+    f = mesh_amplitude(corners, -angles, angles, ka, lit_and_seen(-angles, angles, normal))
+    exact = sphere_amplitude(ka, np.pi, radius=1.0, sound_speed=2 * np.pi, boundary=boundary)
+    off = abs(20 * np.log10(abs(f / exact)))
+    assert off.max() < 0.4
+    assert off[ka > 26].max() < 0.3
+    assert off[ka > 40].max() < 0.2
+
+
+@pytest.mark.parametrize("radius", [0.25, 0.5])
+@pytest.mark.parametrize("boundary", ["rigid", "soft"])
+def test_bistatic_strengths_follow_the_exact_series(radius: float, boundary: Literal["rigid", "soft"]) -> None:
+    """25 to 110 kHz, with the taper: within 0.8 dB up to 105 degrees from backscatter. Without, 1 dB off at 90."""
+    frequency = np.linspace(25e3, 110e3, 60)
+    corners, normal = round_mesh(radius, 0.15 * np.sqrt(C / 110e3 * radius))
+    k, towards = 2 * np.pi * frequency / C, np.array([1.0, 0, 0])
+    sign = 1.0 if boundary == "rigid" else -1.0
+    for away, most in ((0.0, 0.3), (30.0, 0.2), (60.0, 0.25), (90.0, 0.7), (105.0, 0.8)):
+        angle = np.pi - np.radians(away)
+        back = np.array([np.cos(angle), np.sin(angle), 0.0])
+        f = mesh_amplitude(corners, towards, back, k, sign * shadow_taper(towards, back, normal))
+        exact = sphere_amplitude(frequency, angle, radius=radius, boundary=boundary)
+        assert abs(20 * np.log10(abs(f / exact))).max() < most
+        assert abs(np.angle(f / exact)).max() < 0.2
+        if away == 90.0:
+            untapered = mesh_amplitude(corners, towards, back, k, sign * lit_and_seen(towards, back, normal))
+            assert abs(20 * np.log10(abs(untapered / exact))).max() > 0.8
+
+
+def test_the_shadow_of_a_sphere_is_that_of_a_disc_and_of_the_exact_series() -> None:
+    k, radius, towards = 2 * np.pi * 50e3 / C, 0.25, np.array([1.0, 0, 0])
+    corners, normal = round_mesh(radius, 0.008)
+    lit = normal @ towards < 0
+    for angle, most in ((0.0, 0.6), (3.0, 0.6), (10.0, 0.5)):
+        on = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle)), 0.0])
+        shadow = shadow_amplitude(corners[lit], towards, on, k).sum()
+        x = k * radius * np.sin(np.radians(angle)) + 1e-9
+        assert abs(shadow / (-0.5j * k * radius**2 * 2 * j1(x) / x) - 1) < 0.1
+        both = shadow + mesh_amplitude(corners[lit], towards, on, [k])[0]
+        exact = sphere_amplitude(50e3, np.radians(angle), radius=radius)
+        assert abs(20 * np.log10(abs(both / exact))) < most
+    assert abs(shadow_amplitude(corners[lit], towards, -towards, k)).max() == 0.0
+    mirror = towards - 2 * (normal[lit] @ towards)[:, None] * normal[lit]
+    assert abs(shadow_amplitude(corners[lit], towards, mirror, k)).max() < 1e-12
+
+
+def test_a_cylinder_of_facets_has_the_target_strength_of_the_exact_series() -> None:
+    mesh: Mesh = mesh_of(Cylinder(radius=0.1, length=0.8, edge=0.006))
+    frequency = np.array([40e3, 75e3, 110e3])
+    side = np.abs(mesh.normal[:, 0]) < 0.5
+    for aspect in (90.0, 88.0):
+        back = np.array([np.cos(np.radians(aspect)), np.sin(np.radians(aspect)), 0.0])
+        weight = side * lit_and_seen(-back, back, mesh.normal)
+        f = mesh_amplitude(mesh.corners, -back, back, 2 * np.pi * frequency / C, weight)
+        exact = cylinder_amplitude(frequency, np.radians(aspect), radius=0.1, length=0.8)
+        assert abs(f / exact - 1).max() < 0.1
