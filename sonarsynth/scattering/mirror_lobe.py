@@ -8,7 +8,7 @@ import numpy as np
 from annotated_types import Ge, Gt, Le
 from pydantic import ValidationInfo, field_validator
 
-from sonarsynth.acoustics.lobes import lambert, lit_and_seen, slope_lobe, slope_of_width
+from sonarsynth.acoustics.lobes import lobe_amplitude, slope_of_width
 from sonarsynth.conventions import Floats, Number, Radians
 from sonarsynth.description import description
 from sonarsynth.scattering.polarity import random_polarity
@@ -48,10 +48,8 @@ class MirrorLobe:
 
     def amplitude(self, incident: Floats, scattered: Floats, normal: Floats, area: Floats) -> Floats:
         """Far-field scattering amplitude (...) in m; arguments as in `ScatteringLaw`."""
-        power = self.reflectivity**2 * slope_lobe(incident, scattered, normal, float(slope_of_width(self.width)))
-        if self.diffuse > 0:
-            power = power + lambert(incident, scattered, normal, self.diffuse)
-        return np.where(lit_and_seen(incident, scattered, normal), np.sqrt(area * power), 0.0)
+        slope = float(slope_of_width(self.width))
+        return lobe_amplitude(incident, scattered, normal, area, slope, self.reflectivity**2, self.diffuse)
 
     def polarity(self, mesh: Mesh) -> Floats:
         """Sign (facet,) of the echo of each facet, by `phases`."""

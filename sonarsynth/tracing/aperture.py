@@ -1,7 +1,7 @@
 """Legs over the aperture: the wavefront of each leg and where each sensor is seen from, at probe sensors.
 
-In uniform water both follow from the image of the array. In refracting water rays are traced to the probes: those of a
-family from one body vary smoothly with the facet, so that some facets, spread over the body, serve for all of them by
+In uniform water both follow from the image of the array, in refracting water from rays to the probes. Those of a family
+from one body vary smoothly with the facet, so that some facets, spread over the body, serve for all of them by
 polynomials over the body; held-out facets measure the error, and where it is too large every facet is traced.
 """
 
@@ -32,6 +32,8 @@ SMOOTH_TIME = 1e-9
 """s: largest error of a delay from facet to facet: 5e-4 rad at 85 kHz."""
 SMOOTH_GAIN = 1e-3
 """Largest relative error of an amplitude from facet to facet."""
+SMOOTH_DIRECTION = 1e-4
+"""Largest error of a direction from facet to facet."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,23 +66,69 @@ def fronts(
     and what that errs by at its edges is in `error`.
     """
     probe = probes(elements)
-    towards = _image(legs, probe, sonar_pose)
+    count, sensors = len(legs.row), len(probe.sensor)
+    made = _Made.room(count, sensors)
+    place = _Place(environment, profile, sonar_pose, probe, propagation, band)
+    for members in _families(legs, group):
+        chosen = members
+        if legs.bounces[members[0]] or not profile.uniform:
+            chosen = members[_spread(legs.point[members])]
+        exact = _exact(legs.select(chosen), place)
+        if len(chosen) < len(members):
+            exact = _over_body(legs.point[members], legs.point[chosen], exact) or _exact(legs.select(members), place)
+        made.put(members, exact)
+    terms = made.terms
+    if profile.uniform and not terms.any():
+        terms = np.empty((count, 0))
+    return Fronts(terms, made.error, made.departure, made.gain)
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Where legs go, and through what."""
+
+    environment: Environment
+    profile: Profile
+    sonar_pose: Pose
+    probe: Probes
+    propagation: Propagation
+    band: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class _Made:
+    """Legs at the probes."""
+
+    terms: Floats  # (leg, term) s: delay over the sphere's
+    gain: Floats  # (leg, probe)
+    departure: Floats  # (leg, probe, xyz)
+    error: Floats  # (leg,) s
+
+    @staticmethod
+    def room(count: int, sensors: int) -> _Made:
+        return _Made(np.zeros((count, 20)), np.ones((count, sensors)), np.zeros((count, sensors, 3)), np.zeros(count))
+
+    def put(self, rows: Ints, made: _Made) -> None:
+        for name, value in vars(made).items():
+            getattr(self, name)[rows] = value
+
+
+def _exact(legs: Legs, place: _Place) -> _Made:
+    """Legs at the probes, each of them traced."""
+    environment, profile, band = place.environment, place.profile, place.band
+    made = _Made.room(len(legs.row), len(place.probe.sensor))
     if profile.uniform:
-        left, gain, departure = np.zeros(towards.shape[:2]), np.ones(towards.shape[:2]), towards
-        spread = np.zeros(len(legs.row))
+        departure, left, gain = _image(legs, place.probe, place.sonar_pose), np.zeros(made.gain.shape), made.gain
+        if not legs.bounces.any():
+            return _Made(made.terms, gain, departure, made.error)
     else:
-        left, gain, departure, spread = _bent(
-            legs, group, towards, environment, profile, sonar_pose, probe, propagation
-        )
+        left, gain, departure = _to_probes(legs, environment, profile, place.sonar_pose, place.probe, place.propagation)
     shift, loss = _boundaries(legs, departure, environment, profile, band)
-    if shift is not None:
-        centre, half = 0.5 * (band[0] + band[1]), 0.5 * (band[1] - band[0])
-        left, gain = left - shift / (2.0 * np.pi * centre), gain * loss
-        spread = spread + np.abs(shift).max(axis=1, initial=0.0) * half / centre / (2.0 * np.pi * band[1])
-    if profile.uniform and shift is None:
-        return Fronts(np.empty((len(legs.row), 0)), np.zeros(len(legs.row)), departure, gain)
-    terms = probe.fit(left)
-    return Fronts(terms, probe.misfit(left, terms) + spread, departure, gain)
+    centre, half = 0.5 * (band[0] + band[1]), 0.5 * (band[1] - band[0])
+    error = np.nan_to_num(np.abs(shift)).max(axis=1, initial=0.0) * half / centre / (2.0 * np.pi * band[1])
+    left = left - shift / (2.0 * np.pi * centre)
+    terms = place.probe.fit(left)
+    return _Made(terms, gain * loss, departure, place.probe.misfit(left, terms) + error)
 
 
 def _image(legs: Legs, probe: Probes, sonar_pose: Pose) -> Floats:
@@ -94,60 +142,31 @@ def _image(legs: Legs, probe: Probes, sonar_pose: Pose) -> Floats:
 
 def _boundaries(
     legs: Legs, departure: Floats, environment: Environment, profile: Profile, band: tuple[float, float]
-) -> tuple[Floats | None, Floats]:
+) -> tuple[Floats, Floats]:
     """Phase (leg, probe) that the reflections to each probe add to those to the centre, and ratio of their moduli."""
     shift, ratio = np.zeros(departure.shape[:2]), np.ones(departure.shape[:2])
     some = np.flatnonzero(legs.bounces > 0)
     if not len(some):
-        return None, ratio
+        return shift, ratio
     p = np.hypot(departure[some, :, 0], departure[some, :, 1]) / profile.at(depth(legs.point[some]))[:, None]
     surface, bottom = (np.repeat(n[some, None], p.shape[1], axis=1) for n in (legs.surface, legs.bottom))
     angles = [np.arccos(np.minimum(p * float(profile.at(z)), 1.0)) for z in (0.0, environment.depth)]
     seen = at_boundaries(environment, profile, angles[0], surface, angles[1], bottom, 0.5 * (band[0] + band[1]))
     turned = seen.phase - (legs.phase - 0.5 * np.pi * legs.caustics)[some, None]
-    shift[some] = np.mod(turned + np.pi, 2.0 * np.pi) - np.pi
+    shift[some] = turned - 2.0 * np.pi * np.rint(turned / (2.0 * np.pi))
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio[some] = np.where(legs.boundary[some, None] > 0, seen.modulus / legs.boundary[some, None], 1.0)
-    return (shift if np.abs(shift).max() > 1e-12 else None), ratio
-
-
-def _bent(
-    legs: Legs, group: Ints, towards: Floats, environment: Environment, profile: Profile, sonar_pose: Pose,
-    probe: Probes, propagation: Propagation,
-) -> tuple[Floats, Floats, Floats, Floats]:  # fmt: skip
-    """Delay (s) over the sphere's and gain (leg, probe), departure (leg, probe, xyz), error (leg,) in refracting water."""
-    count, sensors = towards.shape[:2]
-    left, gain, departure = np.full((count, sensors), np.nan), np.full((count, sensors), np.nan), towards.copy()
-    error = np.zeros(count)
-    for members in _families(legs, group):
-        chosen = _spread(legs.point[members])
-        alone = len(chosen) == len(members)
-        some = members[chosen]
-        exact = _to_probes(legs.select(some), environment, profile, sonar_pose, probe, propagation)
-        if not alone:
-            offset = exact[2] - towards[some]
-            values = np.concatenate([exact[0], exact[1], offset.reshape(len(some), -1)], axis=1)
-            found, misfit = _over_body(legs.point[members], chosen, values)
-            alone = not (misfit[:sensors].max() <= SMOOTH_TIME and misfit[sensors : 2 * sensors].max() <= SMOOTH_GAIN)
-            if alone:
-                some = members
-                exact = _to_probes(legs.select(members), environment, profile, sonar_pose, probe, propagation)
-            else:
-                left[members], gain[members] = found[:, :sensors], found[:, sensors : 2 * sensors]
-                departure[members] = towards[members] + found[:, 2 * sensors :].reshape(len(members), sensors, 3)
-                error[members] = misfit[:sensors].max()
-        if alone:
-            left[some], gain[some], departure[some] = exact
-    return left, gain, departure, error
+    return shift, ratio
 
 
 def _families(legs: Legs, group: Ints) -> list[Ints]:
     """Indices of the legs of each body and family."""
     up = legs.departure[:, 2] > 0
-    keys = np.stack([group, legs.surface, legs.bottom, legs.turning, up * (legs.bounces + legs.turning > 0)], axis=1)
-    _, which = np.unique(keys, axis=0, return_inverse=True)
-    order = np.argsort(which.ravel(), kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(which.ravel()[order])) + 1) if len(order) else []
+    key = group.astype(np.int64)
+    for part in (legs.surface, legs.bottom, legs.turning, up * (legs.bounces + legs.turning > 0)):
+        key = key * (int(part.max(initial=0)) + 1) + part
+    order = np.argsort(key, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(key[order])) + 1) if len(order) else []
 
 
 def _spread(point: Floats) -> Ints:
@@ -159,18 +178,25 @@ def _spread(point: Floats) -> Ints:
     return np.unique(np.concatenate([extreme, golden]))
 
 
-def _over_body(point: Floats, chosen: Ints, values: Floats) -> tuple[Floats, Floats]:
-    """Values (point, column) everywhere from those of the chosen points, by cubics; largest error (column,) held out."""
-    middle = 0.5 * (point.min(axis=0) + point.max(axis=0))
-    half = np.maximum(0.5 * np.ptp(point, axis=0), 1e-9)
-    basis = aperture_terms((point - middle) / half, 1.0)
-    held = np.arange(len(chosen)) % 4 == 3
-    fitted = chosen[~held]
-    if np.isnan(values).any():
-        return np.zeros((len(point), values.shape[1])), np.full(values.shape[1], np.inf)
-    coefficients = np.linalg.lstsq(basis[fitted], values[~held], rcond=1e-10)[0]
-    error = np.abs(basis[chosen[held]] @ coefficients - values[held]).max(axis=0)
-    return basis @ coefficients, error
+def _over_body(point: Floats, sample: Floats, exact: _Made) -> _Made | None:
+    """Legs from points (point, xyz) of a body from those of a sample of them, by cubics; None if they err too much."""
+    middle, half = 0.5 * (point.min(axis=0) + point.max(axis=0)), np.maximum(0.5 * np.ptp(point, axis=0), 1e-9)
+    basis, at = (aperture_terms((x - middle) / half, 1.0) for x in (point, sample))
+    terms, sensors = exact.terms.shape[1], exact.gain.shape[1]
+    values = np.concatenate([exact.terms, exact.gain, exact.departure.reshape(len(sample), -1)], axis=1)
+    if not np.isfinite(values).all():
+        return None
+    held = np.arange(len(sample)) % 4 == 3
+    coefficients = np.linalg.lstsq(at[~held], values[~held], rcond=1e-10)[0]
+    misfit = np.abs(at[held] @ coefficients - values[held]).max(axis=0)
+    late = float(misfit[:terms].sum())  # monomials over the aperture are at most 1
+    gain, departure = misfit[terms : terms + sensors].max(), misfit[terms + sensors :].max()
+    if not (late <= SMOOTH_TIME and gain <= SMOOTH_GAIN and departure <= SMOOTH_DIRECTION):
+        return None
+    found = basis @ coefficients
+    error = np.full(len(point), late + float(exact.error.max()))
+    towards = found[:, terms + sensors :].reshape(len(point), sensors, 3)
+    return _Made(found[:, :terms], found[:, terms : terms + sensors], towards, error)
 
 
 def _to_probes(

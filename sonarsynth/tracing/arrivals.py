@@ -18,7 +18,7 @@ from sonarsynth.tracing.moving import Moving, carried
 from sonarsynth.tracing.paths import Outward, assemble, join, silence
 from sonarsynth.tracing.reflections import reflections
 from sonarsynth.tracing.shadows import hidden
-from sonarsynth.tracing.wavefront import probes
+from sonarsynth.tracing.wavefront import FEW, probes
 from sonarsynth.world.environment import Environment, Profile
 from sonarsynth.world.moment import Body, Moment, Snap
 
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 NEGLIGIBLE = 3e-5
 """The faintest echoes of a snap are left out, so many that their amplitudes together stay below this part of the
 strongest one's; each counts with the largest that it has anywhere on the array."""
+
+ENOUGH = 1e-4
+"""Error of amplitudes over the aperture, of the strongest echo's, at which polynomials of the second degree will do."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +121,7 @@ def _direct(array: ArrayLegs, index: int, snap: Snap, absorption: float, moving:
     legs = rays_to_centre(environment, profile, snap.position[None, :], sonar_pose, array.propagation, array.centre)
     end = np.broadcast_to(sonar_pose.position, legs.point.shape)
     legs = legs.select(
-        ~hidden(array.bodies, environment, profile, legs.point, end, legs.departure, legs.length, legs.bounces > 0)
+        ~hidden(array.bodies, environment, profile, legs.point, end, legs.departure, legs.length, legs.bounces)
     )
     over = fronts(
         legs,
@@ -131,7 +134,7 @@ def _direct(array: ArrayLegs, index: int, snap: Snap, absorption: float, moving:
         array.band,
     )
     one, none = np.ones(len(legs.row)), np.full(len(legs.row), NO_TARGET)
-    variation = _variation(array, over.probe_gain, legs.spreading)
+    variation = _fitted(array, over.probe_gain, legs.spreading, None)
     made = assemble(legs, over, Outward.none(len(one)), index, snap.time, absorption, none, none, one, variation)
     return made if moving is None else carried(made, legs, None, snap, sonar_pose, profile, moving)
 
@@ -140,45 +143,46 @@ def _echoes(
     array: ArrayLegs, index: int, snap: Snap, absorption: float, law: ScatteringLaw, moving: Moving | None
 ) -> Arrivals:
     """Snap to facet to array, over every facet of the legs that is lit."""
-    environment, profile, facets = array.environment, array.profile, array.facets
-    most = array.propagation.bounces
-    row = np.flatnonzero(may_face(facets, snap.position, most, profile))
-    start = np.broadcast_to(snap.position, (len(row), 3))
-    paths = array.propagation.connect(profile, environment.depth, start, facets.point[row])
-    facet = row[paths.pair]
-    lit = usable(paths) & (np.einsum("ij,ij->i", facets.normal[facet], paths.arrival) < 0)
-    keep = np.flatnonzero(lit)
-    start = np.broadcast_to(snap.position, (len(keep), 3))
-    met = paths.surface[keep] + paths.bottom[keep] > 0
-    keep = keep[
-        ~hidden(
-            array.bodies, environment, profile, start, facets.clear[facet[keep]], paths.departure[keep],
-            paths.length[keep], met,
-        )
-    ]  # fmt: skip
-    out = Outward.of(paths, reflections(environment, profile, paths, array.centre), facet).select(keep)
+    facets, most = array.facets, array.propagation.bounces
+    out = _ways(array, snap)
     way, leg = _pairs(out.facet, array.legs.row, len(facets.facet))
     few = np.flatnonzero(out.bounces[way] + array.legs.bounces[leg] <= most)
     out, leg = out.select(way[few]), leg[few]
     normal, area = facets.normal[out.facet], facets.area[out.facet]
     scattering = law.amplitude(out.arrival, array.legs.departure[leg], normal, area)
-    over_aperture = law.amplitude(
-        out.arrival[:, None, :], array.fronts.probe_departure[leg], normal[:, None, :], area[:, None]
+    seen = np.flatnonzero(scattering)
+    out, leg, scattering, normal, area = out.select(seen), leg[seen], scattering[seen], normal[seen], area[seen]
+    few = law.amplitude(
+        out.arrival[:, None, :], array.fronts.probe_departure[:, :FEW][leg], normal[:, None, :], area[:, None]
     )
     factor = array.legs.spreading[leg] * array.legs.boundary[leg] * out.spreading * out.boundary
-    strongest = np.maximum(over_aperture.max(axis=1, initial=0.0), scattering) * factor
-    loud = np.flatnonzero((scattering != 0) & _loud(strongest))
-    out, leg, scattering, over_aperture = out.select(loud), leg[loud], scattering[loud], over_aperture[loud]
-    legs, over = array.legs.select(leg), array.fronts.select(leg)
-    gain = over_aperture / scattering[:, None] * over.probe_gain
-    gain[(over_aperture == 0).any(axis=1)] = 1.0  # a facet on the limb: all sensors share what the centre sees
-    variation = _variation(array, gain, scattering * factor[loud])
+    strongest = np.maximum(few.max(axis=1, initial=0.0), scattering) * factor
+    loud = np.flatnonzero(_loud(strongest))
+    out, leg, scattering = out.select(loud), leg[loud], scattering[loud]
+    variation = _variation(array, law, out, leg, few[loud], scattering, factor[loud])
     target, number = facets.target[out.facet], facets.facet[out.facet]
     signed = _signs(array, law, target, number) * scattering
+    legs, over = array.legs.select(leg), array.fronts.select(leg)
     made = assemble(legs, over, out, index, snap.time, absorption, target, number, signed, variation)
     if moving is None:
         return made
-    return carried(made, legs, out, snap, array.sonar_pose, profile, moving)
+    return carried(made, legs, out, snap, array.sonar_pose, array.profile, moving)
+
+
+def _ways(array: ArrayLegs, snap: Snap) -> Outward:
+    """Ways from a snap to the lit side of facets that no body hides."""
+    environment, profile, facets = array.environment, array.profile, array.facets
+    row = np.flatnonzero(may_face(facets, snap.position, array.propagation.bounces, profile))
+    start = np.broadcast_to(snap.position, (len(row), 3))
+    paths = array.propagation.connect(profile, environment.depth, start, facets.point[row])
+    facet = row[paths.pair]
+    lit = usable(paths) & (np.einsum("ij,ij->i", facets.normal[facet], paths.arrival) < 0)
+    out = Outward.of(paths, reflections(environment, profile, paths, array.centre), facet).select(np.flatnonzero(lit))
+    end = np.broadcast_to(snap.position, out.arrival.shape)
+    blocked = hidden(  # backwards, so that bodies are where a ray begins
+        array.bodies, environment, profile, facets.clear[out.facet], end, -out.arrival, out.length, out.bounces
+    )
+    return out.select(~blocked)
 
 
 def _pairs(facet: Ints, row: Ints, facets: int) -> tuple[Ints, Ints]:
@@ -206,7 +210,33 @@ def _signs(array: ArrayLegs, law: ScatteringLaw, target: Ints, facet: Ints) -> F
     return np.asarray(every[first[target] + facet])
 
 
-def _variation(array: ArrayLegs, gain: Floats, strength: Floats) -> tuple[Floats, float]:
+def _variation(
+    array: ArrayLegs, law: ScatteringLaw, out: Outward, leg: Ints, few: Floats, scattering: Floats, factor: Floats
+) -> tuple[Floats, float]:
+    """Polynomials (path, term) of the amplitude over the aperture, and their error; few: the law at the first probes.
+
+    The second degree serves where it errs by no more than `ENOUGH`.
+    """
+    strength = scattering * factor
+    terms, error = _fitted(array, _gain(few, scattering, array.fronts.probe_gain[:, :FEW][leg]), strength, FEW)
+    if error <= ENOUGH:
+        return terms, error
+    normal, area = array.facets.normal[out.facet], array.facets.area[out.facet]
+    every = law.amplitude(out.arrival[:, None, :], array.fronts.probe_departure[leg], normal[:, None, :], area[:, None])
+    return _fitted(array, _gain(every, scattering, array.fronts.probe_gain[leg]), strength, None)
+
+
+def _gain(over_aperture: Floats, scattering: Floats, probe_gain: Floats) -> Floats:
+    """Amplitude (path, probe) over that of the centre and the sphere; 1 for a facet on the limb of some probe.
+
+    All sensors share what the centre sees.
+    """
+    gain = over_aperture / scattering[:, None] * probe_gain
+    gain[(over_aperture == 0).any(axis=1)] = 1.0
+    return np.asarray(gain)
+
+
+def _fitted(array: ArrayLegs, gain: Floats, strength: Floats, few: int | None) -> tuple[Floats, float]:
     """Polynomials (path, term) of gain (path, probe) - 1 over the aperture; no columns where it is 1 everywhere.
 
     And their largest error at the probes, for paths of that strength (path,), relative to the strongest.
@@ -214,6 +244,11 @@ def _variation(array: ArrayLegs, gain: Floats, strength: Floats) -> tuple[Floats
     if (gain == 1.0).all():
         return np.empty((len(gain), 0)), 0.0
     probe = probes(array.elements)
-    terms = probe.fit(gain - 1.0)
+    left = gain - 1.0
+    if few is None or len(probe.sensor) < FEW:
+        terms = probe.fit(left)
+        error = probe.misfit(left, terms)
+    else:
+        terms, error = probe.fit_few(left)
     loudest = np.nanmax(np.abs(strength)[:, None] * np.abs(gain), initial=0.0)
-    return terms, float((np.abs(strength) * probe.misfit(gain - 1.0, terms)).max(initial=0.0) / max(loudest, 1e-300))
+    return terms, float((np.abs(strength) * error).max(initial=0.0) / max(loudest, 1e-300))

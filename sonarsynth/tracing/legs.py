@@ -11,7 +11,6 @@ from sonarsynth.acoustics.rays import COINCIDENT
 from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Paths
-from sonarsynth.sonar import Elements
 from sonarsynth.tracing.reflections import Reflections, reflections
 from sonarsynth.tracing.shadows import hidden
 from sonarsynth.world.casting import OFFSET
@@ -148,7 +147,7 @@ def legs_from(
     legs = legs.select(seen)
     end = np.broadcast_to(sonar_pose.position, legs.point.shape)
     start = facets.clear[legs.row]
-    return legs.select(~hidden(bodies, environment, profile, start, end, legs.departure, legs.length, legs.bounces > 0))
+    return legs.select(~hidden(bodies, environment, profile, start, end, legs.departure, legs.length, legs.bounces))
 
 
 def may_face(facets: Facets, position: Floats, bounces: int, profile: Profile) -> Bools:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from sonarsynth.acoustics.rays import water
-from sonarsynth.conventions import Bools, Floats, depth
-from sonarsynth.world.casting import occluded
+from sonarsynth.conventions import Bools, Floats, Ints, depth
+from sonarsynth.world.casting import enclosing, occluded
 from sonarsynth.world.environment import Environment, Profile
 from sonarsynth.world.moment import Body
 
@@ -22,31 +22,60 @@ def hidden(
     end: Floats,
     departure: Floats,
     length: Floats,
-    reflected: Bools | None = None,
+    bounces: Ints | None = None,
 ) -> Bools:
     """Whether a body stands in rays (ray, xyz) that leave start in direction departure and end after length (m) at end.
 
-    reflected (ray,): which of them meet surface or bed on the way. Straight rays and reflections in uniform water are
-    exact; bent rays are followed by chords within `BOW`.
+    bounces (ray,): their reflections from surface and bed. Straight rays and reflections in uniform water are exact;
+    bent rays are followed by chords within `BOW`, but only where they may pass a body: no ray is farther from the
+    straight line between its ends, unfolded at its reflections, than its largest curvature allows.
     """
-    if not bodies or not len(start):
-        return np.zeros(len(start), bool)
-    steepest = 0.0
-    if not profile.uniform:
-        thickness = np.diff(profile.depth)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            gradient = np.abs(np.diff(profile.speed)) / thickness
-        steepest = float(np.nanmax(gradient, initial=0.0)) / float(profile.speed.min())
-    broken = steepest * length**2 / 8.0 > BOW
-    if reflected is not None:
-        broken = broken | reflected
     blocked = np.zeros(len(start), bool)
+    if not bodies or not len(start):
+        return blocked
+    times = np.zeros(len(start), np.int64) if bounces is None else bounces
+    bow = _curvature(profile) * length**2 / 8.0
+    broken = (bow > BOW) | (times > 0)
     blocked[~broken] = occluded(bodies, start[~broken], end[~broken])
-    if broken.any():
-        blocked[broken] = _along_chords(
-            bodies, environment, profile, start[broken], end[broken], departure[broken], length[broken]
+    rest = np.flatnonzero(broken)
+    whole, first = _near(bodies, environment, start[rest], end[rest], departure[rest], times[rest], bow[rest])
+    for some, part in ((rest[whole], length[rest[whole]]), (rest[~whole], np.minimum(first, length[rest])[~whole])):
+        leaves = np.flatnonzero(part > 0.0)
+        rows = some[leaves]
+        blocked[rows] = _along_chords(
+            bodies, environment, profile, start[rows], end[rows], departure[rows], part[leaves], length[rows]
         )
     return blocked
+
+
+def _curvature(profile: Profile) -> float:
+    """Largest curvature (1/m) of any ray."""
+    if profile.uniform:
+        return 0.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gradient = np.abs(np.diff(profile.speed)) / np.diff(profile.depth)
+    return float(np.nanmax(gradient, initial=0.0)) / float(profile.speed.min())
+
+
+def _near(
+    bodies: tuple[Body, ...], environment: Environment, start: Floats, end: Floats, departure: Floats, bounces: Ints,
+    bow: Floats,
+) -> tuple[Bools, Floats]:  # fmt: skip
+    """Which rays (ray,) may pass a body far from their start, and how far from it (m) others may still be in one."""
+    from sonarsynth.world import intersections
+
+    far, first = np.zeros(len(start), bool), np.zeros(len(start))
+    for body in bodies:
+        centre, radius = enclosing(body)
+        inside = np.linalg.norm(start - centre, axis=1) <= radius
+        leave = np.where(inside, 2.0 * (radius + bow), 0.0)
+        near = np.empty(len(start), bool)
+        intersections.folded_pass_near(
+            start, end, departure[:, 2] > 0, bounces, environment.depth, leave, bow, centre, radius, near
+        )
+        far |= near
+        first = np.maximum(first, leave)
+    return far, first
 
 
 def _along_chords(
@@ -56,15 +85,19 @@ def _along_chords(
     start: Floats,
     end: Floats,
     departure: Floats,
+    part: Floats,
     length: Floats,
 ) -> Bools:
-    """Whether a body stands in a chord of each ray."""
-    ray, points = chords(environment, profile, start, departure, length)
-    points[np.flatnonzero(np.diff(ray, append=-1))] = end
+    """Whether a body stands in a chord of the first `part` (ray,) m of each ray."""
+    blocked = np.zeros(len(start), bool)
+    if not len(start):
+        return blocked
+    ray, points = chords(environment, profile, start, departure, part)
+    last = np.flatnonzero(np.diff(ray, append=-1))
+    points[last] = np.where((part < length)[:, None], points[last], end)
     points[np.flatnonzero(np.diff(ray, prepend=-1))] = start
     pieces = np.flatnonzero(ray[1:] == ray[:-1])
     found = occluded(bodies, points[pieces], points[pieces + 1])
-    blocked = np.zeros(len(start), bool)
     blocked[ray[pieces[found]]] = True
     return blocked
 

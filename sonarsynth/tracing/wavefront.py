@@ -12,10 +12,12 @@ from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.products import Paths
 from sonarsynth.sonar import Elements
 
-FITTED = 20
-"""Probe sensors that the polynomials are fitted to."""
-HELD_OUT = 4
-"""Further probes that only measure the error of the fit."""
+HELD_OUT = 3
+"""Probes that only measure the error of a fit; those that it is fitted to are as many and as three in ten more."""
+FEW = 9
+"""Probes, the first ones, that a polynomial of the second degree is fitted to and measured at."""
+SECOND_DEGREE = 10
+"""Terms up to the second degree."""
 BRANCH = 0.05
 """Largest misfit of a probe to the sphere, in travel times over the aperture: a path farther off is another branch."""
 
@@ -30,6 +32,7 @@ class Probes:
     solve: Floats  # (term, fitted): values at the fitted probes to coefficients; the row of the constant term is 0
     basis: Floats  # (probe, term)
     aperture: float  # m
+    solve_few: Floats  # (term, probe): as solve, from the first of FEW probes to terms up to the second degree
 
     def fit(self, values: Floats) -> Floats:
         """Coefficients (path, term) of the least-squares polynomial, 0 at the centre, through values (path, probe).
@@ -43,13 +46,19 @@ class Probes:
             terms[i, 1:] = np.linalg.lstsq(self.basis[: self.fitted][there, 1:], fitted[i, there], rcond=1e-10)[0]
         return terms
 
+    def fit_few(self, values: Floats) -> tuple[Floats, Floats]:
+        """Coefficients (path, term) of the second degree through values (path, FEW), and misfit (path,) there."""
+        terms = values[:, : self.solve_few.shape[1]] @ self.solve_few.T
+        return terms, self.misfit(values, terms)
+
     def misfit(self, values: Floats, terms: Floats) -> Floats:
         """Largest |error| (path,) at the probes, those held out as well; inf where a ray is missing.
 
-        A measurement at 24 places, not a bound: kinks of a profile within the aperture were seen to err twice as much
+        A measurement at some places, not a bound: kinks of a profile within the aperture were seen to err twice as much
         between the probes.
         """
-        error = np.abs(values - terms @ self.basis.T).max(axis=1, initial=0.0)
+        basis = self.basis[: values.shape[1], : terms.shape[1]]
+        error = np.abs(values - terms @ basis.T).max(axis=1, initial=0.0)
         return np.where(np.isnan(values).any(axis=1), np.inf, error)
 
 
@@ -57,17 +66,21 @@ class Probes:
 def probes(elements: Elements) -> Probes:
     """Probe sensors of an array, each the one farthest from those before it, from the element farthest out."""
     position = elements.position
+    scale = elements.aperture or 1.0  # one element at the centre has no aperture, and no terms but 0
+    rank = int(np.linalg.matrix_rank(aperture_terms(position, scale)[:, 1:]))
+    wanted = int(np.ceil(1.3 * rank)) + HELD_OUT
     chosen = [int(np.argmax(np.linalg.norm(position, axis=1)))]
     nearest = np.full(len(position), np.inf)
-    for _ in range(min(FITTED + HELD_OUT, elements.count) - 1):
+    for _ in range(min(wanted, elements.count) - 1):
         nearest = np.minimum(nearest, np.linalg.norm(position - position[chosen[-1]], axis=1))
         chosen.append(int(np.argmax(nearest)))
     sensor = np.array(chosen)
-    fitted = min(FITTED, len(sensor))
-    scale = elements.aperture or 1.0  # one element at the centre has no aperture, and no terms but 0
+    fitted = max(len(sensor) - HELD_OUT, min(rank, len(sensor)), 1)
     basis = aperture_terms(position[sensor], scale)
     solve = np.vstack([np.zeros(fitted), np.linalg.pinv(basis[:fitted, 1:], rcond=1e-10)])
-    return Probes(sensor, position[sensor], fitted, solve, basis, scale)
+    few = max(min(FEW, len(sensor)) - HELD_OUT, 1)
+    second = np.linalg.pinv(basis[:few, 1:SECOND_DEGREE], rcond=1e-10)
+    return Probes(sensor, position[sensor], fitted, solve, basis, scale, np.vstack([np.zeros(few), second]))
 
 
 def sphere(direction: Floats, radius: Floats, position: Floats) -> Floats:
