@@ -8,7 +8,7 @@ import numpy as np
 
 from sonarsynth.conventions import NO_TARGET, Floats, azimuth_elevation, direction
 from sonarsynth.geometry import Pose
-from sonarsynth.products import FAMILIES, LEDGER, Arrivals, Ledger, Paths, Truth
+from sonarsynth.products import FAMILIES, LEDGER, Arrivals, Echoes, Ledger, Paths, Truth
 from sonarsynth.sonar import BeamGrid
 from sonarsynth.world.casting import OFFSET, first_hit, occluded
 from sonarsynth.world.meshes import Mesh
@@ -138,6 +138,25 @@ def _visible(body: Body, seen: Floats, bodies: tuple[Body, ...], sonar_pose: Pos
     return np.array([azimuth.min(), azimuth.max(), elevation.min(), elevation.max()]), fraction
 
 
+def echoes(arrivals: Arrivals, targets: int, snap_level: Floats, centre: float) -> Echoes:
+    """Where the echoes come from; snap_level: (snap,) dB re 1 uPa at 1 m; centre: Hz of the band."""
+    shape = (targets, len(FAMILIES))
+    azimuth, elevation, level = np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, np.nan)
+    power = (arrivals.amplitude * _roughness(arrivals, centre)) ** 2 * 10.0 ** (snap_level[arrivals.snap] / 10.0)
+    for cell in np.ndindex(shape):
+        mine = (arrivals.target == cell[0]) & (arrivals.arrives_by == cell[1])
+        total = float(power[mine].sum())
+        if total > 0.0:
+            azimuth[cell], elevation[cell] = azimuth_elevation(power[mine] @ arrivals.direction[mine])
+            level[cell] = 10.0 * np.log10(total)
+    return Echoes(azimuth, elevation, level)
+
+
+def _roughness(paths: Arrivals, centre: float) -> Floats:
+    """What rough boundaries leave of each path (path,) at a frequency (Hz)."""
+    return np.asarray(np.exp(-0.5 * (2.0 * np.pi * centre * paths.blur) ** 2))
+
+
 def family(arrivals: Arrivals) -> np.ndarray:
     """Index into FAMILIES of each arrival (path,)."""
     return np.asarray((arrivals.surface > 0) + 2 * (arrivals.bottom > 0))
@@ -150,8 +169,8 @@ def ledger(
 
     Each loss is the ratio of two power sums, with one more factor of the amplitude in the second, so that
     received = source - loss_out + scattering - loss_in - absorption - boundary whatever the paths. NaN where a family
-    has no path. error: bound (dB) on each level from the approximations of the chain; centre (Hz) of the band, where the
-    loss of rough boundaries counts.
+    has no path. error: bound (dB) on each level from the approximations of the chain; centre (Hz) of the band, at which
+    the loss of rough boundaries counts.
     """
     shape = (len(snaps), targets + 1, len(FAMILIES))
     levels = np.full((*shape, len(LEDGER)), np.nan)
@@ -174,7 +193,7 @@ def _add_up(paths: Arrivals, source_level: float, centre: float) -> Floats:
         paths.spreading_out,
         paths.spreading_in,
         10.0 ** (-paths.absorption / 20.0),
-        paths.boundary * np.exp(-0.5 * (2.0 * np.pi * centre * paths.blur) ** 2),
+        paths.boundary * _roughness(paths, centre),
     ]
     sums = [np.sum(np.prod(factors[: n + 1], axis=0) ** 2) for n in range(len(factors))]
     scattering, out, back, absorption, boundary = np.diff(10.0 * np.log10([1.0, *sums]))

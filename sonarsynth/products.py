@@ -171,6 +171,19 @@ class Truth:
     beam_range: npt.NDArray[np.float32]  # (elevation, azimuth) m to the first surface in the beam's direction
 
 
+@dataclass(frozen=True, eq=False)
+class Echoes:
+    """Where the echoes of each target come from, by the boundaries that they touched on their way to the array.
+
+    What comes by surface or bed is a ghost: the array sees the target mirrored there. Powers of all snaps are summed,
+    directions weighted by power; NaN where no path comes that way.
+    """
+
+    azimuth: Floats  # (target, family) rad, sonar frame
+    elevation: Floats  # (target, family) rad
+    level: Floats  # (target, family) dB re 1 uPa: peak of a snap, echoes of all facets with powers summed
+
+
 LEDGER = (
     "source_level",
     "transmission_loss_out",

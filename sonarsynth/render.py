@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.description import FieldError
-from sonarsynth.labelling import label, ledger
+from sonarsynth.labelling import echoes, label, ledger
 from sonarsynth.planning import Plan, plan
-from sonarsynth.products import LEDGER, Arrivals, Bearings, EnergyImage, Ledger, PointCloud, Signals, Truth
+from sonarsynth.products import LEDGER, Arrivals, Bearings, Echoes, EnergyImage, Ledger, PointCloud, Signals, Truth
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import Recipe
 from sonarsynth.scene import Frame
@@ -58,6 +58,7 @@ class Traced:
     arrivals: Arrivals
     truth: Truth
     ledger: Ledger
+    echoes: Echoes
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +101,8 @@ def trace_frame(plan: Plan, index: int) -> Traced:
         _expansion_error(plan, arrivals),
         sonar.band.centre,
     )
-    return Traced(frame, arrivals, truth, book)
+    heard = echoes(arrivals, len(frame.moment.bodies), levels, sonar.band.centre)
+    return Traced(frame, arrivals, truth, book, heard)
 
 
 def _expansion_error(plan: Plan, arrivals: Arrivals) -> float:
@@ -224,6 +226,9 @@ def _truth_values(plan: Plan, index: int, traced: Traced) -> Values:
     row = {"trajectory": frame.trajectory, "step": frame.step, "time": frame.time, "split": plan.recipe.split(index)}
     stored = {name.removeprefix("beam_"): value for name, value in vars(truth).items()}
     stored["image_box"] = np.rad2deg(truth.image_box)
+    for name in ("azimuth", "elevation"):
+        stored[f"echo_{name}"] = np.rad2deg(getattr(traced.echoes, name))
+    stored["echo_level"] = traced.echoes.level
     levels = {name: book.level[..., n] for n, name in enumerate(LEDGER)}
     return (
         _table("/", **row)

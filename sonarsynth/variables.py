@@ -34,6 +34,7 @@ class Variable:
 _BEAMS = ("frame", "elevation", "azimuth")
 _SNAP = ("frame", "snap")
 _TARGET = ("frame", "target")
+_ECHO = (*_TARGET, "family")
 _CELL = ("frame", "snap", "echo", "family")
 _NONE = (("flag_values", [-1]), ("flag_meanings", "none"))
 
@@ -121,6 +122,9 @@ _TRUTH = _group(
     _v("box", (*_TARGET, "corner", "xyz"), "float64", "m", "corners of the oriented bounding box, sonar frame"),
     _v("image_box", (*_TARGET, "bound"), "float64", "degree", "bounds of the visible part in azimuth and elevation"),
     _v("visible_fraction", _TARGET, "float64", "1", "share of the area facing the array that the array sees"),
+    _v("echo_azimuth", _ECHO, "float64", "degree", "azimuth that the target's echoes come from, weighted by power"),
+    _v("echo_elevation", _ECHO, "float64", "degree", "elevation that they come from: ghosts by surface and bed"),
+    _v("echo_level", _ECHO, "float64", "dB", "peak level of the target's echoes re 1 uPa, powers of facets summed"),
     _v("snap_position", (*_SNAP, "xyz"), "float64", "m", "position of the snap in the world"),
     _v("snap_time", _SNAP, "float64", "s", "time of the snap after the instant of the frame"),
     _v("snap_level", _SNAP, "float64", "dB", "peak source level of the snap re 1 uPa at 1 m"),
@@ -198,7 +202,9 @@ def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.n
     bounds = ["azimuth_min", "azimuth_max", "elevation_min", "elevation_max"]
     add("/truth", "bound", ("bound",), bounds, "1", "which bound of the image box")
     add("/ledger", "echo", ("echo",), [*names, "direct"], "1", "target of the echo; direct: snap to array")
-    add("/ledger", "family", ("family",), list(FAMILIES), "1", "path family")
+    add("/ledger", "family", ("family",), list(FAMILIES), "1", "path family: boundaries touched on the whole way")
+    touched = "boundaries touched on the way from the target to the array"
+    add("/truth", "family", ("family",), list(FAMILIES), "1", touched)
     if "signals" in plan.products:
         _add_sensors(plan, add)
     for target in scene.world.targets:

@@ -90,7 +90,9 @@ class Plan:
 
     def connect(self, start: Floats, end: Floats) -> Paths:
         """Rays between pairs of points in this plan's water, those of the direct family."""
-        return replace(self.propagation, bounces=0).connect(self.profile, self.scene.world.environment.depth, start, end)
+        return replace(self.propagation, bounces=0).connect(
+            self.profile, self.scene.world.environment.depth, start, end
+        )
 
     @property
     def predicted_seconds(self) -> float:

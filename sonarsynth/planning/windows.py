@@ -10,13 +10,16 @@ from sonarsynth.acoustics.rays import mean_slowness, water
 from sonarsynth.conventions import Floats, depth
 from sonarsynth.description import FieldError
 from sonarsynth.planning.plans import Windows
+from sonarsynth.products import Paths
 from sonarsynth.recipe import Recipe
 from sonarsynth.scene import Frame
 from sonarsynth.sonar import elements
 from sonarsynth.synthesis import pulse_support
 from sonarsynth.synthesis.pulse import snap_levels
+from sonarsynth.tracing import Straight
 from sonarsynth.world.environment import Profile
 
+CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 MARGIN = 0.1e-3
 """Seconds added at both ends of every window. Covers what straight rays leave out of an arrival time: under 2 us at
 20 m in a gradient of 4 per second. Arrivals that still fall outside are counted in `/signals/outside`."""
@@ -39,7 +42,9 @@ def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
     across = elements(sonar.array).aperture / profile.speed.min()  # of a wave, from the centre to the edge
     before, after = _support(recipe, SUPPORT) + across
     echo_before, echo_after = _support(recipe, ECHO_SUPPORT) + across
-    spans = [_span(recipe.frame(i)[1], profile, scene.world.environment.depth) for i in range(recipe.frames)]
+    bounces = scene.physics.tracing.bounces
+    depth_of_bed = scene.world.environment.depth
+    spans = [_span(recipe.frame(i)[1], profile, depth_of_bed, bounces) for i in range(recipe.frames)]
     first_heard, last_direct, first_echo, last_echo, last_heard = np.array([_times(span) for span in spans]).T
     gate = scene.processing.echo_window
     echoes = bool(np.isfinite(first_echo).any())
@@ -85,7 +90,7 @@ def _times(span: _Span) -> tuple[float, ...]:
     return (span.first, span.last_direct, span.first_echo, span.last_echo, span.last)
 
 
-def _span(frame: Frame, profile: Profile, bed: float) -> _Span:
+def _span(frame: Frame, profile: Profile, bed: float, bounces: int) -> _Span:
     array = frame.sonar_pose.position
     snaps = frame.moment.snaps
     if not snaps:
@@ -94,23 +99,60 @@ def _span(frame: Frame, profile: Profile, bed: float) -> _Span:
     back = _straight_time(profile, bed, points, array)
     direct = np.array([s.time + float(_straight_time(profile, bed, s.position, array)) for s in snaps])
     echoes = [s.time + _straight_time(profile, bed, s.position, points) + back for s in snaps]
-    last = np.array([max(d, e.max(initial=-np.inf)) for d, e in zip(direct, echoes, strict=True)])
+    late_echo = [e.max(initial=-np.inf) for e in echoes]
+    late_direct = direct
+    if bounces:
+        late_direct, late_echo = _reflected(frame, profile, bed, bounces)
+    last = np.array([max(d, e) for d, e in zip(late_direct, late_echo, strict=True)])
     heard = [
         level - 20 * np.log10(max(float(np.linalg.norm(s.position - array)), 1e-9))
         for s, level in zip(snaps, snap_levels(snaps), strict=True)
     ]
     loudest = int(np.argmax(heard))
     late = np.array([e - d for e, d in zip(echoes, direct, strict=True)]) if len(points) else np.array([np.nan])
+    latest = float(np.max(np.asarray(late_echo) - direct)) if len(points) else np.nan
     others = tuple((float(direct[n]), float(last[n])) for n in range(len(snaps)) if n != loudest)
     return _Span(
         first=float(direct.min()),
         clock=float(direct[loudest]),
         last_direct=float(direct.max()),
         first_echo=float(late.min()),
-        last_echo=float(late.max()),
+        last_echo=latest,
         last=float(last.max()),
         others=others,
     )
+
+
+def _reflected(frame: Frame, profile: Profile, bed: float, bounces: int) -> tuple[Floats, list[float]]:
+    """Last direct arrival and last echo (s) of each snap by so many reflections, from the boxes round the bodies.
+
+    The length of a path by image sources is convex in the point that it meets, so a corner of the box is the farthest.
+    """
+    straight, array = Straight(bounces=bounces), frame.sonar_pose.position
+    low_high = [(b.pose, b.mesh.box) for b in frame.moment.bodies]
+    corners = [p.to_world(low + CORNERS * (high - low)) for p, (low, high) in low_high]
+    points = np.concatenate([np.empty((0, 3)), *corners])
+    points[:, 2] = np.clip(points[:, 2], -bed, 0.0)
+    back = straight.connect(profile, bed, points, np.broadcast_to(array, points.shape))
+    direct, echoes = [], []
+    for snap in frame.moment.snaps:
+        start = snap.position[None, :]
+        direct.append(snap.time + straight.connect(profile, bed, start, array[None, :]).travel_time.max())
+        out = straight.connect(profile, bed, np.broadcast_to(start, points.shape), points)
+        latest = -np.inf
+        for n in range(bounces + 1):
+            first, second = (_latest(paths, k, len(points)) for paths, k in ((out, n), (back, bounces - n)))
+            latest = max(latest, float(np.max(first + second, initial=-np.inf)))
+        echoes.append(snap.time + latest)
+    return np.array(direct), echoes
+
+
+def _latest(paths: Paths, bounces: int, points: int) -> Floats:
+    """Longest travel time (point,) of paths with at most so many reflections."""
+    some = paths.surface + paths.bottom <= bounces
+    out = np.zeros(points)
+    np.maximum.at(out, paths.pair[some], paths.travel_time[some])
+    return out
 
 
 def _disturbed(span: _Span, start: float, stop: float) -> bool:

@@ -48,7 +48,8 @@ class Probes:
 
     def fit_few(self, values: Floats) -> tuple[Floats, Floats]:
         """Coefficients (path, term) of the second degree through values (path, FEW), and misfit (path,) there."""
-        terms = values[:, : self.solve_few.shape[1]] @ self.solve_few.T
+        few = values[:, : self.solve_few.shape[1]] @ self.solve_few.T
+        terms = np.concatenate([few, np.zeros((len(few), self.basis.shape[1] - few.shape[1]))], axis=1)
         return terms, self.misfit(values, terms)
 
     def misfit(self, values: Floats, terms: Floats) -> Floats:

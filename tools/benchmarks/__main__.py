@@ -6,7 +6,7 @@ import json
 import sys
 from importlib import import_module
 
-BENCHMARKS = ("frame", "build")
+BENCHMARKS = ("frame", "build", "rays")
 """Modules beside this one; each has a function `bench`."""
 
 
