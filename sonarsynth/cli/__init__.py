@@ -12,6 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
+from sonarsynth.cli.accuracy import accuracy
 from sonarsynth.cli.running import BadOption, run
 from sonarsynth.cli.selecting import frame_numbers, product_names
 
@@ -158,6 +159,9 @@ def show(
         typer.echo(str(file))
 
 
+app.command()(accuracy)
+
+
 @app.command()
 def rays(
     recipe: RecipeFile,
@@ -167,7 +171,7 @@ def rays(
     frame: Annotated[int, typer.Option(min=0, help="The frame whose targets the rays meet.")] = 0,
     settings: Settings = [],  # noqa: B006
 ) -> None:
-    """Follow the rays that a recipe asks for through a frame, and draw them in a section and in space."""
+    """Draw rays through a frame in a section, in space and as a page: eigenrays, or what the recipe asks for."""
     from sonarsynth import config, planning
     from sonarsynth.show.rays import show_rays
 
@@ -176,8 +180,8 @@ def rays(
     if frame >= made_from.frames:
         raise BadOption(f"--frame {frame} is outside 0..{made_from.frames - 1}")
     with config.locating(source):
-        files, line = show_rays(planning.plan(made_from), frame, out or Path(f"{recipe.stem}.rays"))
-    typer.echo(line)
+        files, table = show_rays(planning.plan(made_from), frame, out or Path(f"{recipe.stem}.rays"))
+    typer.echo(table)
     for file in files:
         typer.echo(str(file))
 

@@ -1,0 +1,67 @@
+"""Moving targets and arrays: against times solved point by point on the moving world."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sonarsynth.tracing.moving import Moving
+from tests.laws.test_traced_families import ARRAY, ONE, SOURCE, C, ball, images, run
+
+
+def heard(emitted: float, centre, v, u, source, array) -> float:
+    """When sound emitted at a time from a source (image) is heard by an array (image), by iteration."""
+    met = emitted
+    for _ in range(100):
+        met = emitted + np.linalg.norm(centre + v * met - source) / C
+    at = met
+    for _ in range(100):
+        at = met + np.linalg.norm(centre + v * met - (array + u * at)) / C
+    return at
+
+
+@pytest.mark.parametrize("v", [(0.0, 0.0, 0.0), (1.4, 0.0, 0.0), (-3.0, 2.0, 0.5), (0.0, -1.4, 0.0)])
+@pytest.mark.parametrize("u", [(0.0, 0.0, 0.0), (2.0, -1.0, 0.3)])
+def test_delays_and_stretches_of_echoes(v, u) -> None:
+    v, u = np.array(v), np.array(u)
+    body = ball()
+    found = run(bodies=(body,), bounces=1, moving=Moving(v[None, :], u))
+    centre = body.pose.to_world(body.mesh.centroid)
+    seen = set()
+    for i in np.flatnonzero(~found.direct)[:400]:
+        options = []
+        for source, s1, b1 in images(SOURCE, 1):
+            for array, s2, b2 in images(ARRAY, 1):
+                if (s1 + s2, b1 + b2) == (found.surface[i], found.bottom[i]) and (s2 > 0) + 2 * (
+                    b2 > 0
+                ) == found.arrives_by[i]:
+                    flip = np.array([1.0, 1.0, -1.0 if s2 + b2 else 1.0])
+                    at, later = (heard(t, centre[found.facet[i]], v, flip * u, source, array) for t in (0.0, 1e-3))
+                    options.append((at, (later - at) / 1e-3 - 1.0))
+        at, stretch = min(options, key=lambda o: abs(o[0] - found.delay[i]))
+        fast = np.linalg.norm(v) + np.linalg.norm(u)
+        assert found.delay[i] == pytest.approx(at, abs=2e-12 + (fast * 0.02) ** 2 / (2 * C * 8.0))
+        assert found.stretch[i] == pytest.approx(stretch, abs=2e-9 + 3e-6 * (fast > 0) * fast)
+        seen.add((found.surface[i], found.bottom[i]))
+    assert len(seen) == 3
+
+
+def test_still_things_change_nothing_and_a_receding_target_stretches_the_pulse() -> None:
+    a, b = run(bounces=1), run(bounces=1, moving=Moving(np.zeros((1, 3)), np.zeros(3)))
+    assert all(np.array_equal(getattr(a, n), getattr(b, n)) for n in ("delay", "direction", "radius", "stretch"))
+    away = run(
+        bodies=(ball((15.0, 0.0, -5.0)),), bounces=0, array=ONE, moving=Moving(np.array([[2.0, 0.0, 0.0]]), np.zeros(3))
+    )
+    echoes = away.stretch[~away.direct]
+    assert (echoes > 0).all() and echoes.max() < 2 * 2.0 / C * 1.01
+    assert away.stretch[away.direct] == pytest.approx(0.0, abs=0)
+
+
+def test_an_echo_comes_from_where_the_target_is_when_the_sound_meets_it() -> None:
+    v = np.array([0.0, 30.0, 0.0])
+    found = run(bounces=0, moving=Moving(v[None, :], np.zeros(3)))
+    still = run(bounces=0)
+    met = np.linalg.norm(still.point - SOURCE, axis=1) / C
+    echo = ~found.direct
+    expected = (still.radius[:, None] * still.direction)[echo] + np.outer(met[echo], [0.0, 30.0, 0.0])
+    np.testing.assert_allclose((found.radius[:, None] * found.direction)[echo], expected, atol=30.0**2 * 2e-5)
