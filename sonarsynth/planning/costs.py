@@ -7,20 +7,23 @@ frame`), scaled by how fast this machine does a fixed set of transforms. Predict
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
 from sonarsynth.planning.plans import Omission, Plan, Stage
 from sonarsynth.tracing import Refracted, Straight
+from sonarsynth.tracing.bounces import MOST_BOUNCES
 from sonarsynth.world.meshes import mesh_of
+from sonarsynth.world.reflection import rms_height
 
 REFERENCE_TRANSFORM = 2.0e-3
 """Seconds of the transforms in `machine_factor` on the machine where the constants below were measured."""
 
 SECONDS = {
     "trace facet": 1.25e-6,  # straight rays, lit and seen, ray casting both ways, scattering law over the aperture
-    "trace refracted facet": 12e-6,  # eigenrays to the centre and to the probes of the aperture
+    "trace refracted facet": 3e-6,  # eigenrays to the centre and to the probes of the aperture
     "label beam": 0.25e-6,
     "label facet": 0.28e-6,
     "label refracted facet": 1.8e-6,
@@ -65,6 +68,12 @@ def _facets(plan: Plan) -> int:
     return sum(len(mesh_of(t.shape).faces) for t in plan.scene.world.targets)
 
 
+def _ways(plan: Plan) -> int:
+    """Pairs of families, out and back, with as many reflections in all as are asked for: 1, 5, 13, 25, ..."""
+    n = plan.propagation.bounces
+    return 2 * n * (n + 1) + 1
+
+
 def _solid_angle(plan: Plan) -> float:
     """Largest solid angle (sr) of the box round a target, seen from the array in the first frame."""
     frame = plan.recipe.frame(0)[1]
@@ -80,7 +89,7 @@ def _synthesis(plan: Plan) -> tuple[str, str, str, str, float, int]:
     """The row of the synthesis, in seconds of the reference machine."""
     scene, sizes = plan.scene, plan.sizes
     sensor_samples = sizes["sensor"] * sizes["sample"]
-    paths = LIT * _facets(plan) * max(sizes["snap"], 1)
+    paths = LIT * _facets(plan) * max(sizes["snap"], 1) * _ways(plan)
     each = SECONDS["synthesise path sensor"] + _solid_angle(plan) * SECONDS["synthesise path sensor steradian"]
     work = paths * sizes["sensor"] * each + sensor_samples * SECONDS["synthesise sensor sample"]
     if scene.world.environment.noise:
@@ -94,7 +103,7 @@ def stages(plan: Plan) -> tuple[Stage, ...]:
     """What each stage will do, why, its error, and what it costs in one frame."""
     scene, sizes, factor = plan.scene, plan.sizes, machine_factor()
     sonar, processing = scene.sonar, scene.processing
-    facets, snaps = _facets(plan), max(sizes["snap"], 1)
+    facets, snaps = _facets(plan) * _ways(plan), max(sizes["snap"], 1)
     beams = sizes["azimuth"] * sizes["elevation"]
     gate = plan.windows.echo_stop - plan.windows.echo_start
     bins = (sonar.band.high - sonar.band.low) * gate
@@ -103,7 +112,7 @@ def stages(plan: Plan) -> tuple[Stage, ...]:
     rows: list[tuple[str, str, str, str, float, int]] = [
         (
             "trace",
-            f"{plan.propagation.kind} rays, {scene.physics.scattering.kind}",
+            f"{plan.propagation.kind} rays, {plan.propagation.bounces} bounces, {scene.physics.scattering.kind}",
             "one sound speed everywhere: rays are straight" if straight else "the sound speed varies with depth",
             "measured: /truth/amplitude_error" + ("" if straight else ", wavefront_error"),
             facets * snaps * SECONDS[f"trace {kind}facet"],
@@ -114,7 +123,7 @@ def stages(plan: Plan) -> tuple[Stage, ...]:
             "one ray a beam",
             "always",
             "none",
-            beams * SECONDS["label beam"] + facets * SECONDS[f"label {kind}facet"],
+            beams * SECONDS["label beam"] + _facets(plan) * SECONDS[f"label {kind}facet"],
             beams * 10 + 4096,
         ),
     ]
@@ -156,7 +165,7 @@ def stages(plan: Plan) -> tuple[Stage, ...]:
 
 def left_out(plan: Plan) -> tuple[Omission, ...]:
     """What is not computed, why, and the bound on what that costs."""
-    scene = plan.scene
+    scene, frame = plan.recipe.frame(0)
     environment, products = scene.world.environment, plan.products
     rows = []
     if isinstance(plan.propagation, Straight):
@@ -165,14 +174,23 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
         if not plan.profile.uniform:
             bound = f"asked for, but the sound speed varies by {np.ptp(speeds):.3g} m/s: angles and delays are biased"
         rows.append(Omission("refraction", "straight rays", bound))
-    rows.append(
-        Omission(
-            "surface and bed reflections",
-            "the direct family is traced",
-            "not bounded: paths by the surface (up to 0 dB of the direct one, delays from geometry) are absent",
+    bounces = plan.propagation.bounces
+    kept = "the direct family" if not bounces else f"paths by at most {bounces} reflections of surface and bed in all"
+    rows.append(Omission("more reflections", f"asked for: {kept}", reflected_bound(plan)))
+    rough = [b for b in (environment.surface, environment.bed) if rms_height(b) > 0.0]
+    if bounces and rough:
+        rows.append(
+            Omission(
+                "scattering by rough boundaries",
+                "reflections are coherent",
+                "the energy that roughness takes from them is scattered, and not simulated",
+            )
         )
-    )
-    rows.append(Omission("Doppler", "a frame is one instant", _doppler_bound(plan)))
+    moving = any(b.velocity.any() for b in frame.moment.bodies) or frame.sonar_velocity.any()
+    if moving and not scene.physics.doppler:
+        rows.append(Omission("Doppler", "not asked for: all is where it is at the instant of the frame", _moved(plan)))
+    elif moving:
+        rows.append(Omission("turning of targets in a frame", "velocities move them", "its rate times travel time"))
     if environment.noise is None:
         rows.append(Omission("ambient noise", "the scene describes none", "signals are free of noise"))
     if scene.sonar.converter is None and "signals" in products:
@@ -185,12 +203,41 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
     return tuple(rows)
 
 
-def _doppler_bound(plan: Plan) -> str:
-    """Delay change over the longest pulse path while the target moves on: v/c of the echo's excess delay."""
-    speed = max(
-        (float(np.linalg.norm(body.velocity)) for body in plan.recipe.frame(0)[1].moment.bodies),
-        default=0.0,
-    )
-    stretch = 2 * speed / float(plan.profile.speed.min())
+def _moved(plan: Plan) -> str:
+    """How far targets and sonar move while sound is under way, and how much longer pulses come out."""
+    frame = plan.recipe.frame(0)[1]
+    fastest = max((float(np.linalg.norm(body.velocity)) for body in frame.moment.bodies), default=0.0)
+    fastest += float(np.linalg.norm(frame.sonar_velocity))
+    stretch = 2 * fastest / float(plan.profile.speed.min())
     phase = 2 * np.pi * plan.scene.sonar.band.high * stretch * 50e-6
-    return f"time stretch {stretch:.2g}: {phase:.2g} rad over a 50 us pulse at the top of the band"
+    metres = fastest * plan.windows.echo_stop
+    return f"echoes {metres:.2g} m off; time stretch {stretch:.2g}, {phase:.2g} rad over 50 us at the top of the band"
+
+
+def reflected_bound(plan: Plan) -> str:
+    """Level of what one reflection more would add in the first frame, over the echoes that are kept."""
+    from sonarsynth.tracing.arrivals import trace
+
+    scene, frame = plan.recipe.frame(0)
+    sonar, bounces = scene.sonar, plan.propagation.bounces
+    if not frame.moment.snaps or bounces >= MOST_BOUNCES:
+        return "not computed"
+    found = trace(
+        scene.world.environment,
+        plan.profile,
+        frame.moment,
+        frame.sonar_pose,
+        plan.elements,
+        float(plan.absorption(sonar.band.centre)),
+        replace(plan.propagation, bounces=bounces + 1),
+        scene.physics.scattering,
+        band=(sonar.band.low, sonar.band.high),
+    )
+    blur = np.exp(-0.5 * (2 * np.pi * sonar.band.centre * found.blur) ** 2)
+    power, more = (found.amplitude * blur) ** 2, found.surface + found.bottom > bounces
+    parts = []
+    for what, some in (("echoes", ~found.direct), ("snap itself", found.direct)):
+        kept, left = float(power[some & ~more].sum()), float(power[some & more].sum())
+        if kept > 0.0 and left > 0.0:
+            parts.append(f"{what} {10 * np.log10(left / kept):+.1f} dB")
+    return "one more would add, re what is kept in frame 0: " + (", ".join(parts) or "nothing")

@@ -6,5 +6,7 @@ from typing import Annotated
 
 from annotated_types import Ge, Le
 
-Bounces = Annotated[int, Ge(0), Le(8)]
+MOST_BOUNCES = 8
+
+Bounces = Annotated[int, Ge(0), Le(MOST_BOUNCES)]
 """Most reflections from surface and bed together; 0: the direct family alone."""
