@@ -95,8 +95,9 @@ def eigenrays(
 
     vertices: most turning points and reflections together; reflections: most from surface and bed together. The default
     is the direct family. A pair may have no ray (a shadow zone), one or several. Travel times are right to about 1e-15
-    of themselves, and the search is complete (`rays_search`). A ray that turns exactly at an end counts once. Raises
-    ValueError for ends outside the water, distances that are not finite or negative, and negative numbers of vertices.
+    of themselves, and the search is complete (`rays_search`). A ray that turns exactly at an end counts once; an end on
+    a jump is on the side of the other end, on the lower one if both are level. Raises ValueError for ends outside the
+    water, distances that are not finite or negative, and negative numbers of vertices.
     """
     from sonarsynth.acoustics import rays_batch as kernels
 

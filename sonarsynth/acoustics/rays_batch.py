@@ -11,7 +11,20 @@ from sonarsynth.acoustics.rays_chain import lay, node_above, offsets, speed_at
 from sonarsynth.acoustics.rays_families import COLUMNS, families_of_pair
 from sonarsynth.acoustics.rays_layers import atanhc
 from sonarsynth.acoustics.rays_reach import Chain, new_chain
-from sonarsynth.acoustics.rays_rows import END_SINE, FIELDS, START_SINE, SURFACE, emit, emit_level, sort_by_time
+from sonarsynth.acoustics.rays_rows import (
+    BOTTOM,
+    END_SINE,
+    FIELDS,
+    LOWER,
+    START_SINE,
+    START_SPEED,
+    SURFACE,
+    TURNING,
+    UPPER,
+    emit,
+    emit_level,
+    sort_by_time,
+)
 from sonarsynth.acoustics.rays_search import straight
 from sonarsynth.conventions import Floats, Ints
 
@@ -39,7 +52,7 @@ def straight_of_pair(
 ) -> int:
     """The ray of a pair without a vertex, if there is one, into a row of out: their number."""
     top, bottom = min(start, end), max(start, end)
-    if bottom - top < SAME_DEPTH:
+    if bottom == top:
         level = level_speed(depth, speed, bottom)
         if distance == 0.0:
             level = speed_at(depth, speed, node_above(depth, bottom), bottom)
@@ -64,6 +77,37 @@ def straight_of_pair(
     out[row, START_SINE] *= sign
     out[row, END_SINE] *= sign
     return 1
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def level_of_pair(
+    depth: Floats, speed: Floats, z: float, distance: float, reflections: int, found: int, out: Floats, row: int
+) -> int:
+    """Rays between two points of one depth that leave it by less than rounding, into rows of out: their number.
+
+    Those along a boundary that are reflected all the way, where there is a level one; those that turn so near that the
+    speed there is, rounded, that of the next node: an arc over R rises by R^2 |g|/(8 c).
+    """
+    if found and (z == 0.0 or z == depth[-1]) and reflections > 0:
+        emit_level(out, row, distance, out[row - 1, START_SPEED])
+        side = UPPER if z == 0.0 else LOWER
+        out[row, side], out[row, SURFACE if z == 0.0 else BOTTOM] = z, 1.0
+        return 1
+    count, j = 0, node_above(depth, z)
+    c = speed_at(depth, speed, j, z)
+    for sense in (-1, 1):
+        near = j + 1 if sense > 0 else (j if depth[j] < z else j - 1)  # the next node that way
+        back = near - sense
+        if found or not 0 <= near < len(depth) or not 0 <= back < len(depth) or depth[near] == depth[back]:
+            continue
+        gradient = (speed[near] - speed[back]) / abs(depth[near] - depth[back])
+        rise = distance * distance * gradient / (8.0 * c)
+        if gradient > 0.0 and c == speed[near] and rise <= abs(depth[near] - z):
+            emit_level(out, row + count, distance, c)
+            out[row + count, LOWER if sense > 0 else UPPER] = z + sense * rise
+            out[row + count, TURNING] = 1.0
+            count += 1
+    return count
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -92,6 +136,10 @@ def rays_of_pairs(
         if abs(z2 - z1) < SAME_DEPTH:
             z2 = z1
         found = straight_of_pair(depth, speed, z1, z2, r, chain, out, count)
+        if count + found + 2 > len(out):
+            return count, i
+        if z1 == z2 and r > 0.0 and vertices > 0:
+            found += level_of_pair(depth, speed, z1, r, reflections, found, out, count + found)
         if vertices > 0 and (reflections > 0 or (r > 0.0 and fastest > slowest and abs(z2 - z1) <= r * steepest)):
             more = families_of_pair(
                 depth, speed, z1, z2, r, reflections, steepest, family, chain, out, count + found

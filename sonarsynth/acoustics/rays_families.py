@@ -217,6 +217,14 @@ def roots_of(
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
+def beyond(s_m: float, p: float, c: float, d: float, inverse_gradient: float) -> float:
+    """How far (m) beyond a node of speed c a ray turns: (1/p - c)/g, with 1/p - c = h^2/(1/p + c)."""
+    if inverse_gradient == 0.0:
+        return 0.0
+    return float((s_m * s_m + p * p * d) / (p * (1.0 + p * c)) * inverse_gradient)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
 def keep(
     family: Ints,
     f: int,
@@ -239,11 +247,9 @@ def keep(
         above * of[GRADIENT_UP], below * of[GRADIENT_DOWN], start, end, turning,
     )  # fmt: skip
     out[row, SURFACE], out[row, BOTTOM] = above * at[ON_SURFACE], below * at[ON_BED]
-    if above:  # 1/p - c = h^2/(1/p + c)
-        rise = (s_m * s_m + p * p * d[first]) / (p * (1.0 + p * c[first]))
-        out[row, UPPER] = of[Z_UP] - rise * of[GRADIENT_UP]
+    if above:
+        out[row, UPPER] = of[Z_UP] - beyond(s_m, p, c[first], d[first], of[GRADIENT_UP])
     if below:
-        rise = (s_m * s_m + p * p * d[last]) / (p * (1.0 + p * c[last]))
-        out[row, LOWER] = of[Z_DOWN] + rise * of[GRADIENT_DOWN]
+        out[row, LOWER] = of[Z_DOWN] + beyond(s_m, p, c[last], d[last], of[GRADIENT_DOWN])
     out[row, START_SINE] *= 1.0 if family[f, UP] else -1.0
     out[row, END_SINE] *= -1.0 if family[f, DOWN] else 1.0

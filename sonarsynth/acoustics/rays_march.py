@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit
 
 from sonarsynth.acoustics.rays_chain import node_above
@@ -170,12 +169,10 @@ def chords(
             if not left > 0.0:
                 break
             was_x, was_z, was_angle, was_run = x, at, angle, run
-            why, layer, dx, at, angle, done, _ = step(
-                depth, speed, layer, at, angle, p[i], left, sagitta, math.inf
-            )
+            why, layer, dx, at, angle, done, _ = step(depth, speed, layer, at, angle, p[i], left, sagitta, math.inf)
             x, left, run = x + dx, left - done, run + done
             low, high = min(low, angle), max(high, angle)
-            bounced = why == SURFACE or why == BED
+            bounced = why in (SURFACE, BED)
             kept = run * (high - low) > 4.0 * sagitta and was_run > 0.0
             if count + 2 > len(nodes):
                 return -1

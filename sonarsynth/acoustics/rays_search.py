@@ -139,6 +139,8 @@ def turns(
     below_start: whether X(0) counts as smaller than the distance (carried over from the interval before, so that a
     root on the edge belongs to one side only).
     """
+    if distance == 0.0:
+        return 0  # a ray that turns goes somewhere
     stack[0] = extent
     held = 1
     low, below, count = GRAZING, below_start, 0

@@ -1,0 +1,350 @@
+"""Eigenrays of all families where things degenerate: an answer, continuous with its neighbours, or a flag."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from sonarsynth.acoustics import rays
+from sonarsynth.conventions import Floats
+from tests.following import families, family, follow, images, nodes, range_only, solve_again, textbook
+
+CHANNEL = rays.water(np.array([0.0, 20.0, 50.0]), np.array([1510.0, 1500.0, 1515.0]), 50.0)
+FALLING = rays.water(np.array([0.0, 100.0]), np.array([1530.0, 1500.0]), 100.0)
+JUMPS = rays.water(np.array([0.0, 15.0, 15.0, 30.0]), np.array([1510.0, 1505.0, 1500.0, 1503.0]), 40.0)
+WATERS = {"channel": CHANNEL, "falling": FALLING, "jumps": JUMPS}
+
+
+def one(
+    water: rays.Water, start: float, end: float, distance: float, vertices: int = 4, hits: int = 4
+) -> rays.Eigenrays:
+    return rays.eigenrays(water, np.array([start]), np.array([end]), np.array([distance]), vertices, hits)
+
+
+def names(found: rays.Eigenrays) -> list[tuple[int, ...]]:
+    return sorted(family(found, i)[1:4] for i in range(len(found.pair)))
+
+
+def check(water: rays.Water, found: rays.Eigenrays, start: float, end: float, distance: float, some: int = 8) -> None:
+    """All is finite and in order; some rays are what they are when followed in many digits."""
+    for name in ("travel_time", "length", "slowness", "start_sine", "end_sine", "amplitude"):
+        assert np.isfinite(getattr(found, name)).all(), name
+    assert (np.diff(found.travel_time) >= 0).all()
+    assert np.isin(found.flag, list(rays.REASONS)).all()
+    above, below = found.surface + found.turning > 0, found.bottom + found.turning > 0
+    assert (np.isfinite(found.upper) | np.isfinite(found.lower))[above | below].all()
+    assert (found.upper[found.surface > 0] == 0).all()
+    assert (found.lower[found.bottom > 0] == water.depth[-1]).all()
+    assert (found.amplitude > 0).all()
+    assert len({(*family(found, i), found.travel_time[i]) for i in range(len(found.pair))}) == len(found.pair)
+    sharp = (found.start_sine != 0) & (found.flag != rays.CAUSTIC) & (found.slowness > 1e-12)
+    for i in np.random.default_rng(0).permutation(np.flatnonzero(sharp))[:some]:
+        with mp.workdps(60):
+            _, visit = solve_again(water, start, end, mp.mpf(distance), found, int(i))
+            assert abs(found.travel_time[i] / visit.sums[1] - 1) < 1e-14
+            assert abs(found.length[i] / visit.sums[2] - 1) < 1e-8
+
+
+@pytest.mark.parametrize("name", WATERS)
+@pytest.mark.parametrize(("start", "end"), [(0.0, 40.0), (12.0, 31.0), (31.0, 12.0), (7.0, 7.0), (40.0, 0.0)])
+def test_straight_up_and_down(name: str, start: float, end: float) -> None:
+    water = WATERS[name]
+    bed = water.depth[-1]
+    found = one(water, start, end, 0.0, 5, 5)
+    whole = float(rays.mean_slowness(water, np.array([0.0]), np.array([bed]))[0]) * bed
+    down = [float(rays.mean_slowness(water, np.array([0.0]), np.array([z]))[0]) * z for z in (start, end)]
+    expected = images(whole, *down, 5)
+    tall = images(bed, start, end, 5)
+    keep = [i for i, row in enumerate(tall) if row[4] > 0]
+    moving = found.length > 0
+    np.testing.assert_allclose(found.travel_time[moving], [expected[i][4] for i in keep], rtol=1e-14)
+    np.testing.assert_allclose(found.length[moving], [tall[i][4] for i in keep], rtol=1e-14)
+    np.testing.assert_array_equal(found.slowness[moving], 0.0)
+    np.testing.assert_array_equal(np.abs(found.start_sine[moving]), 1.0)
+    np.testing.assert_array_equal(found.turning, 0)
+    assert (found.flag[~moving] == rays.COINCIDENT).all()
+    assert np.isfinite(found.amplitude[moving]).all()
+    np.testing.assert_array_equal(found.upper[moving & (found.surface > 0)], 0.0)
+    np.testing.assert_array_equal(found.lower[moving & (found.bottom > 0)], bed)
+
+
+@pytest.mark.parametrize(
+    ("depths", "speeds", "at", "count"),
+    [
+        ([0.0, 20.0, 50.0], [1510.0, 1500.0, 1515.0], 0.0, 7),
+        ([0.0, 20.0, 50.0], [1515.0, 1500.0, 1510.0], 50.0, 7),
+        ([0.0, 15.0, 15.0, 50.0], [1510.0, 1505.0, 1500.0, 1503.0], 15.0, 8),
+    ],
+)
+def test_coincident_ends_on_a_boundary_or_a_jump_take_no_time_to_search(
+    depths: list[float], speeds: list[float], at: float, count: int
+) -> None:
+    """In a process of its own: a search without an end could not be interrupted."""
+    code = (
+        "import numpy as np; from sonarsynth.acoustics import rays\n"
+        f"water = rays.water(np.array({depths}), np.array({speeds}), 50.0)\n"
+        f"found = rays.eigenrays(water, np.array([{at}]), np.array([{at}]), np.array([0.0]), 4, 4)\n"
+        "print(len(found.pair), np.isfinite(found.travel_time).all(), (found.flag == rays.COINCIDENT).sum())"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    rays_found, finite, coincident = run.stdout.split()
+    assert finite == "True"
+    assert int(coincident) in (1, 9 - count)
+    assert int(rays_found) - int(coincident) == count
+
+
+@pytest.mark.parametrize("name", WATERS)
+@pytest.mark.parametrize("distance", [1e-300, 1e-100, 1e-15, 1e-9, 1e-6])
+def test_nearly_straight_up_and_down(name: str, distance: float) -> None:
+    water = WATERS[name]
+    level, near = one(water, 12.0, 31.0, 0.0), one(water, 12.0, 31.0, distance)
+    for field in ("travel_time", "length", "amplitude", "start_sine", "end_sine"):
+        np.testing.assert_allclose(getattr(near, field), getattr(level, field), rtol=1e-9, err_msg=field)
+    np.testing.assert_allclose(near.slowness, distance * near.slowness[0] / distance, rtol=1.0, atol=1e-3 * distance)
+    np.testing.assert_array_equal(near.upper, np.where(near.surface > 0, 0.0, np.nan))
+    np.testing.assert_array_equal(near.lower, np.where(near.bottom > 0, water.depth[-1], np.nan))
+
+
+@pytest.mark.parametrize("gradient", [0.0, *(s * 10.0**k for s in (1, -1) for k in (-13, -11, -9, -6, -3, -1))])
+@pytest.mark.parametrize("depth", [1e-9, 1e-6, 1e-3, 5.0, 10.0 - 1e-3, 10.0 - 1e-6])
+def test_between_two_points_of_one_depth_there_is_always_a_ray(gradient: float, depth: float) -> None:
+    """However little the water bends it, and however near the surface: level, or turning where there is room for it."""
+    water = rays.water(np.array([0.0, 10.0]), np.array([1500.0, 1500.0 + 10 * gradient]), 10.0)
+    for distance in (1e-6, 1e-3, 1.0, 5.0):
+        room = depth if gradient < 0 else 10.0 - depth
+        if distance**2 * abs(gradient) / 12000 < 0.9 * room:
+            found = one(water, depth, depth, distance, 2, 0)
+            assert names(found) == [(0, 0, int(water.speed[0] != water.speed[1]))]
+            assert found.travel_time[0] * 1500 / distance == pytest.approx(1.0, abs=1e-6 + 20 * abs(gradient) / 1500)
+            assert found.amplitude[0] * distance == pytest.approx(1.0, abs=1e-6 + 20 * abs(gradient) / 1500)
+
+
+@pytest.mark.parametrize("depth", [0.0, 10.0])
+def test_on_a_boundary_a_level_ray_has_its_reflection_with_it(depth: float) -> None:
+    """As it has a micrometre away: the two cancel at a pressure-release surface."""
+    water = rays.water(np.array([0.0]), np.array([1500.0]), 10.0)
+    on, off = one(water, depth, depth, 7.0, 2, 2), one(water, abs(depth - 1e-9), abs(depth - 1e-9), 7.0, 2, 2)
+    assert names(on) == names(off)
+    np.testing.assert_allclose(on.travel_time, off.travel_time, rtol=1e-9)
+
+
+@pytest.mark.parametrize("gradient", [s * 10.0**k for s in (1, -1) for k in range(-13, 5)])
+def test_weak_to_violent_gradients(gradient: float) -> None:
+    """A layer of that gradient, at most 20 m/s across, between two others."""
+    thickness = min(10.0, 20.0 / abs(gradient))
+    speed = 1500.0 + np.array([0.0, 0.0, gradient * thickness, gradient * thickness + 1.0])
+    water = rays.water(np.array([0.0, 20.0, 20.0 + thickness, 50.0]), speed, 50.0)
+    for start, end in (
+        (5.0, 45.0),
+        (20.0, 20.0 + thickness),
+        (20.0 + thickness / 3, 20.0 + thickness / 2),
+        (3.0, 20.0),
+    ):
+        for distance in (3.0, 300.0, 3e4):
+            found = one(water, start, end, distance, 3, 3)
+            check(water, found, start, end, distance, 3)
+            if abs(gradient) > 1e-5:
+                fan = families(water, start, end, np.array([distance]), 3, 3)[0]
+                assert sorted(family(found, i) for i in range(len(found.pair))) == sorted(row[0] for row in fan)
+
+
+@pytest.mark.parametrize("thickness", [1e-6, 1e-3, 1.0, 1e3, 1e4])
+@pytest.mark.parametrize("change", [1e-9, 1e-3, -5.0, 30.0])
+def test_layers_of_a_micrometre_to_ten_kilometres(thickness: float, change: float) -> None:
+    top = 2 * thickness
+    depth = np.array([0.0, top, top + thickness, 1.1e4 + 3 * thickness])
+    water = rays.water(depth, np.array([1500.0, 1500.0, 1500.0 + change, 1500.0 + change]), depth[-1])
+    for start, end, r in (
+        (top / 2, top + 1.5 * thickness, 5 * thickness),
+        (top, top + thickness, 1e3),
+        (0.3 * top, 5e3, 1e4),
+    ):
+        check(water, one(water, start, end, r, 3, 3), start, end, r, 3)
+
+
+def test_a_millimetre_of_water() -> None:
+    water = rays.water(np.array([0.0, 4e-4, 6e-4, 1e-3]), np.array([1500.0, 1502.0, 1499.0, 1501.0]), 1e-3)
+    for start, end, distance in ((2e-4, 5e-4, 1e-3), (0.0, 1e-3, 0.02), (5e-4, 5e-4, 1e-5), (1e-4, 9e-4, 0.3)):
+        found = one(water, start, end, distance, 4, 4)
+        check(water, found, start, end, distance)
+        fan = families(water, start, end, np.array([distance]), 4, 4)[0]
+        assert sorted(family(found, i) for i in range(len(found.pair))) == sorted(row[0] for row in fan)
+
+
+def test_a_hundred_kilometres_in_eleven_kilometres_of_water_and_twelve_vertices() -> None:
+    depth = np.array([0.0, 50.0, 200.0, 1000.0, 1300.0, 4000.0, 11000.0])
+    water = rays.water(depth, np.array([1540.0, 1539.0, 1515.0, 1483.0, 1482.0, 1522.0, 1645.0]), 11000.0)
+    for start, end in ((1000.0, 1300.0), (10.0, 4000.0), (0.0, 11000.0)):
+        found = one(water, start, end, 1e5, 12, 12)
+        assert len(found.pair) > 10
+        check(water, found, start, end, 1e5)
+        fan = families(water, start, end, np.array([1e5]), 12, 12)[0]
+        assert sorted(family(found, i) for i in range(len(found.pair))) == sorted(row[0] for row in fan)
+
+
+def test_a_cast_of_a_thousand_noisy_nodes() -> None:
+    rng = np.random.default_rng(1)
+    depth = np.linspace(0, 60, 1001)
+    water = rays.water(depth, 1540 - 0.1 * depth + 0.2 * rng.normal(size=1001), 60.0)
+    start, end, distance = 22.2, 41.7, 150.0
+    found, back = one(water, start, end, distance, 3, 3), one(water, end, start, distance, 3, 3)
+    check(water, found, start, end, distance, 4)
+    np.testing.assert_allclose(found.travel_time, back.travel_time, rtol=1e-13)
+    for surface, bottom in ((0, 0), (1, 0), (0, 1), (1, 2), (2, 1)):  # which no gradient turns back
+        mine = (found.surface == surface) & (found.bottom == bottom)
+        assert mine.sum() >= 1
+    fine = rays.water(np.linspace(0, 60, 41), water.speed[::25], 60.0)  # few enough for a dense fan
+    few = one(fine, start, end, distance, 3, 3)
+    fan = families(fine, start, end, np.array([distance]), 3, 3)[0]
+    assert sorted(family(few, i) for i in range(len(few.pair))) == sorted(row[0] for row in fan)
+
+
+@pytest.mark.parametrize("name", WATERS)
+@pytest.mark.parametrize(
+    ("start", "end"),
+    [(0.0, 22.0), (22.0, 0.0), (0.0, 1e9), (1e9, 1e9), (0.0, 0.0), (22.0, 1e9), (15.0, 33.0), (20.0, 3.0)],
+)
+def test_ends_on_nodes_and_boundaries_are_the_limit_of_ends_beside_them(name: str, start: float, end: float) -> None:
+    water = WATERS[name]
+    a, b = min(start, water.depth[-1]), min(end, water.depth[-1])
+    inwards = [z + (1e-9 if z == 0 else -1e-9) if z in (0.0, water.depth[-1]) else z for z in (a, b)]
+    if a not in (0.0, water.depth[-1]):  # a jump: the side that faces the other end
+        inwards[0] = a + 1e-9 * np.sign(b - a)
+    for distance in (0.1, 30.0, 777.0):
+        on, off = one(water, a, b, distance), one(water, *inwards, distance)
+        assert names(on) == names(off)
+        np.testing.assert_allclose(on.travel_time, off.travel_time, rtol=1e-9, atol=1e-11)
+        sharp = (on.flag != rays.CAUSTIC) & (off.flag != rays.CAUSTIC)
+        np.testing.assert_allclose(on.length[sharp], off.length[sharp], rtol=1e-5)
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-15, 1e-12, 1e-6])
+@pytest.mark.parametrize("distance", [0.0, 1e-6, 1e-3])
+def test_ends_a_micrometre_apart(gap: float, distance: float) -> None:
+    for water in WATERS.values():
+        for depth in (10.0, 20.0, 33.3):
+            found = one(water, depth, depth + gap, distance)
+            far = np.hypot(depth + gap - depth, distance)
+            assert found.travel_time[0] * 1500 == pytest.approx(far, rel=0.03, abs=1e-13)
+            same = found.flag == rays.COINCIDENT
+            assert same.sum() == (far == 0)
+            assert np.isfinite(found.amplitude[~same]).all()
+            hits = found.surface + found.bottom
+            assert [int((hits == k).sum()) for k in (1, 2, 3, 4)] == [2, 2, 2, 2]
+
+
+def test_nodes_named_twice_change_nothing() -> None:
+    once = np.array([0.0, 10.0, 20.0, 50.0]), np.array([1510.0, 1505.0, 1500.0, 1515.0])
+    twice = [np.repeat(v, [1, 2, 3, 1]) for v in once]
+    for start, end, distance in ((3.0, 44.0, 200.0), (10.0, 20.0, 30.0), (20.0, 20.0, 90.0), (0.0, 10.0, 400.0)):
+        a, b = (one(rays.water(*v, 50.0), start, end, distance) for v in (once, twice))
+        assert names(a) == names(b)
+        np.testing.assert_allclose(a.travel_time, b.travel_time, rtol=1e-15)
+        np.testing.assert_allclose(a.amplitude, b.amplitude, rtol=1e-9)
+        np.testing.assert_array_equal(a.flag, b.flag)
+
+
+def reach(water: rays.Water, start: float, end: float, fastest: float, name: tuple[int, int, int, int]) -> float:
+    """Range of the ray of a family (launch sign, surface, bottom, turning) that just does not reach this speed."""
+    with mp.workdps(50):
+        z, c = nodes(water, (start, end), mp.mpf)
+        p = (1 + mp.mpf("1e-40")) / mp.mpf(fastest)
+        visits = follow(z, c, (mp.mpf(start), mp.mpf(end)), p, name[0], 6, 6, textbook)
+        return float(next(v.sums[0] for v in visits if (v.surface, v.bottom, v.turning) == name[1:]))
+
+
+def test_turning_exactly_at_a_node_is_one_ray() -> None:
+    water = rays.water(np.array([0.0, 30.0, 50.0]), np.array([1500.0, 1512.0, 1516.0]), 50.0)
+    r = reach(water, 5.0, 12.0, 1512.0, (-1, 0, 0, 1))
+    for step in (0.0, 1e-15, -1e-15, 1e-12, -1e-12, 1e-9, -1e-9, 1e-6, -1e-6):
+        found = one(water, 5.0, 12.0, r * (1 + step), 1, 0)
+        mine = (found.turning == 1) & (abs(found.lower - 30.0) < 1e-3)
+        assert mine.sum() == 1
+        assert found.lower[mine][0] == pytest.approx(30.0, abs=1e-7 + 1e3 * abs(step))
+
+
+@pytest.mark.parametrize("step", [0.0, 1e-12, 1e-9, 1e-6])
+def test_a_ray_that_just_touches_the_surface_turns_and_reflects(step: float) -> None:
+    """In falling speed it comes farthest of all: short of there one turns and one reflects, beyond there is none."""
+    limit = reach(FALLING, 40.0, 70.0, 1530.0, (1, 0, 0, 1))
+    found, beyond = (one(FALLING, 40.0, 70.0, limit * (1 + s), 1, 1) for s in (-step, step))
+    if step:
+        assert names(found) == [(0, 0, 1), (1, 0, 0)]
+        assert (found.upper < 1e-3).sum() == 2
+        assert len(beyond.pair) == 0
+        close = found.upper < 1e-3
+        np.testing.assert_allclose(found.start_speed[close] * found.slowness[close], 1518.0 / 1530.0, rtol=1e-5)
+    else:
+        assert (found.upper < 1e-3).sum() in (0, 1, 2)
+
+
+@pytest.mark.parametrize("gap", [1e-3, 1e-5, 1e-7])
+def test_the_edge_of_a_shadow(gap: float) -> None:
+    """Speed falls with depth: the ray that touches the surface is the last that comes; beyond, none does."""
+    limit = reach(FALLING, 40.0, 30.0, 1530.0, (1, 0, 0, 1))
+    near, far = (one(FALLING, 40.0, 30.0, limit * (1 + s), 3, 0) for s in (-gap, gap))
+    assert len(near.pair) >= 1
+    assert near.upper[-1] < 20 * gap**0.5
+    assert len(far.pair) == 0
+    lit = one(FALLING, 40.0, 30.0, limit * (1 + gap), 3, 3)
+    assert (lit.bottom > 0).all()
+    assert len(lit.pair) > 0
+
+
+def fold() -> tuple[rays.Water, float, float, float, tuple[int, int, int, int]]:
+    """Rays that turn below a uniform layer over rising speed: their range has a minimum. Water, ends, range, family."""
+    water = rays.water(np.array([0.0, 30.0, 100.0]), np.array([1500.0, 1500.0, 1535.0]), 100.0)
+    start, end, name = 10.0, 18.0, (-1, 0, 0, 1)
+    z, c = nodes(water, (start, end), np.longdouble)
+    low, high = 1 / np.longdouble(1535.0), 1 / np.longdouble(1500.0)
+    for _ in range(12):
+        p = np.linspace(low, high, 403, dtype=np.longdouble)[1:-1]
+        visits = follow(z, c, (np.longdouble(start), np.longdouble(end)), p, -1, 1, 0, range_only)
+        x = next(v.sums for v in visits if v.turning == 1)
+        i = int(np.argmin(x))
+        low, high = p[max(i - 1, 0)], p[min(i + 1, len(p) - 1)]
+    return water, start, end, float(x[i]), name
+
+
+def test_a_fold_has_two_rays_on_one_side_and_none_on_the_other() -> None:
+    water, start, end, limit, _ = fold()
+    steps = 10.0 ** -np.arange(2, 8.0)
+    for step in steps:
+        lit, dark = (one(water, start, end, limit * (1 + s * step), 1, 0) for s in (1, -1))
+        assert (dark.turning > 0).sum() == 0
+        pair = np.flatnonzero(lit.turning > 0)
+        assert len(pair) == 2
+        assert sorted(lit.caustics[pair]) == [0, 1]
+
+
+def test_near_a_fold_amplitudes_grow_as_the_fourth_root_and_are_flagged() -> None:
+    water, start, end, limit, _ = fold()
+    steps = 10.0 ** -np.arange(4, 8.0)
+    found = [one(water, start, end, limit * (1 + s), 1, 0) for s in steps]
+    loud = np.array([f.amplitude[f.turning > 0].mean() for f in found])
+    growth = np.diff(np.log10(loud))
+    np.testing.assert_allclose(growth, 0.25, atol=5e-3)
+    gap = np.array([np.ptp(f.slowness[f.turning > 0]) for f in found])
+    np.testing.assert_allclose(np.diff(np.log10(gap)), -0.5, atol=5e-3)
+    assert (found[-1].flag[found[-1].turning > 0] == rays.CAUSTIC).all()
+    near = one(water, start, end, limit * (1 + 1e-13), 1, 0)
+    assert np.isfinite(near.amplitude).all()
+    exact = one(water, start, end, limit, 1, 0)
+    assert (exact.flag[exact.turning > 0] == rays.CAUSTIC).all()
+
+
+def test_no_vertices_and_no_reflections() -> None:
+    found = rays.eigenrays(CHANNEL, np.array([5.0]), np.array([30.0]), np.array([40.0]), 0, 5)
+    assert names(found) == [(0, 0, 0)]
+    assert len(one(CHANNEL, 5.0, 5.0, 40.0, 0, 0).pair) == 0
+    with pytest.raises(ValueError, match="negative"):
+        one(CHANNEL, 5.0, 5.0, 40.0, -1, 0)
+
+
+def test_nothing_to_trace() -> None:
+    empty: Floats = np.empty(0)
+    assert len(rays.eigenrays(CHANNEL, empty, empty, empty, 3, 3).pair) == 0
