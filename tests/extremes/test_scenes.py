@@ -125,9 +125,6 @@ UNHEARD: dict[str, Recipe] = {
     "a row": scene(sonar={"array": PlanarLattice(columns=16, rows=1, pitch=0.05)}),
     "a column": scene(sonar={"array": PlanarLattice(columns=1, rows=16, pitch=0.05)}),
     "all dead but one": scene(sonar={"array": PlanarLattice(columns=4, rows=4, pitch=0.05, dead=tuple(range(15)))}),
-    "a strong thermocline across the array": scene(
-        environment=layered((0.0, 4.9, 5.1, 12.0), (1540.0, 1540.0, 1450.0, 1450.0))
-    ),
 }
 """Scenes of which the array cannot tell where a snap is, or when."""
 
@@ -165,6 +162,13 @@ def test_a_frame_whose_snap_is_not_found_is_whole_and_says_nothing(which: str) -
     for name in ("image/energy", "image/start", "image/stop", "cloud/range", "bearings/time", "bearings/position"):
         assert np.isnan(tree[name].values).all(), name
     assert np.isfinite(tree["truth"].target_position).all()
+
+
+def test_a_strong_thermocline_across_the_array_is_said_to_be_beyond_the_expansion() -> None:
+    """Some sensors have no ray from the snap: no wavefront over the aperture holds, and its error is NaN in the truth."""
+    _, tree = frame_of(scene(environment=layered((0.0, 4.9, 5.1, 12.0), (1540.0, 1540.0, 1450.0, 1450.0))))
+    assert np.isnan(float(tree["truth"].wavefront_error))
+    assert np.isnan(tree["image"].energy.values).all()
 
 
 def test_the_snap_that_is_heard_best_starts_the_clock() -> None:
