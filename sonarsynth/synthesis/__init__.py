@@ -34,8 +34,8 @@ class SignalSynthesis(Protocol):
         """Pressure at each hydrophone at `samples` times from `start` (s), without noise and without a converter.
 
         absorption gives dB/m at frequencies (Hz); its value at the band centre is inside the amplitudes already. Zero
-        paths are silence. Raises ValueError for arrivals that are not finite, have no amplitude or come from a
-        hydrophone itself.
+        paths are silence. Raises ValueError for arrivals that are not finite, have no amplitude or a negative blur, are
+        stretched by a tenth or more, or come from a hydrophone itself.
         """
         ...
 

@@ -10,11 +10,11 @@ import numpy.typing as npt
 from scipy.fft import irfft, next_fast_len, rfft
 
 from sonarsynth.acoustics.arrays import aperture_terms
-from sonarsynth.acoustics.snap import ComplexArray
 from sonarsynth.acoustics.spectra import kaiser_bessel, kaiser_bessel_beta, kaiser_bessel_transform
 from sonarsynth.conventions import Floats
 from sonarsynth.sonar import Elements
-from sonarsynth.synthesis.expansion import colour, recipe, sinc_polynomials
+from sonarsynth.synthesis.bins import Bins
+from sonarsynth.synthesis.expansion import colour, face_pairs, recipe, sinc_polynomials
 from sonarsynth.synthesis.interpolating import to_sensors
 from sonarsynth.synthesis.nodes import Axis, chebyshev, interpolation, nodes_for
 from sonarsynth.synthesis.tiles import Aim, Tile, tiles
@@ -47,23 +47,6 @@ def kernel(width: int, oversampling: float, circle: int, dtype: str) -> Kernel:
     return Kernel(width, beta, taps.astype(dtype).ravel(), lanes, circle)
 
 
-class Bins(NamedTuple):
-    """Frequencies of a stretch that count, next to each other."""
-
-    first: int  # number of the first bin
-    frequency: Floats  # (bin,) Hz
-    spectrum: ComplexArray  # (bin,) of the filtered snap at 1 m
-    relative: Floats  # (bin,) absorption over that at the band centre, less one
-    step: float  # Hz
-
-
-def audible(spectrum: ComplexArray, tolerance: float) -> slice:
-    """The bins of a spectrum without its ends, which hold no more than 0.03 `tolerance` of its modulus each."""
-    mass = np.cumsum(np.abs(spectrum))
-    ends = np.searchsorted(mass, np.array([0.03 * tolerance, 1.0 - 0.03 * tolerance]) * mass[-1])
-    return slice(int(ends[0]), min(int(ends[1]) + 1, spectrum.size))
-
-
 class Stage(NamedTuple):
     """What the tiles of a stretch have in common."""
 
@@ -71,7 +54,8 @@ class Stage(NamedTuple):
     bins: Bins
     origin: float  # s
     grid: Kernel
-    response: npt.NDArray[Any]  # (2, bin) of the snap, real and imaginary part
+    scale: float  # from spectra to samples
+    dtype: str
 
 
 def add_stretch(
@@ -95,7 +79,7 @@ def add_stretch(
     width, oversampling, dtype, tolerance = method
     circle = 2 * int(next_fast_len(int(np.ceil(highest * oversampling / bins.step)) + width, real=True))
     used = min(bins.frequency.size, circle // 2 - bins.first)
-    bins = Bins(bins.first, bins.frequency[:used], bins.spectrum[:used], bins.relative[:used], bins.step)
+    bins = bins.cut(used)
     grid = kernel(width, circle * bins.step / (2.0 * highest), circle, dtype)
     aim = Aim(
         elements=elements,
@@ -106,8 +90,7 @@ def add_stretch(
         bins=used,
         circle=circle,
     )
-    response = bins.spectrum * (samples * bins.step)
-    stage = Stage(aim, bins, origin, grid, np.stack([response.real, response.imag]).astype(dtype))
+    stage = Stage(aim, bins, origin, grid, samples * bins.step, dtype)
     spectra = np.zeros((elements.count, samples // 2 + 1), np.result_type(dtype, np.complex64))
     heard = spectra.view(dtype)[:, 2 * bins.first : 2 * (bins.first + used)]
     for tile in tiles(front, aim):
@@ -127,7 +110,7 @@ def _add_tile(heard: npt.NDArray[Any], tile: Tile, part: Fronts, stage: Stage) -
     elements, bins, dtype = stage.aim.elements, stage.bins, heard.dtype
     points = tile.nodes(elements)
     alone = part.count == 1
-    field = _alone(tile, points, stage) if alone else _deposited(tile, part, points, stage)
+    field = _alone(tile, part, points, stage) if alone else _deposited(tile, part, points, stage)
     delay, gain = delay_and_gain(tile.reference, elements.position)
     late = delay[0] + (part.delay[0] - stage.origin if alone else 0.0)
     gain = gain[0] * elements.gain * (part.amplitude[0] if alone else 1.0)
@@ -139,49 +122,53 @@ def _add_tile(heard: npt.NDArray[Any], tile: Tile, part: Fronts, stage: Stage) -
     steer_back(field, column, weight, late * bins.step, gain, bins.first, heard)
 
 
-def _alone(tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
+def _alone(tile: Tile, part: Fronts, points: Floats, stage: Stage) -> npt.NDArray[Any]:
     """The field (node, 2, bin) of one path that everything is steered to: that of the snap, through its face."""
     faces = _faces(tile, points, stage)
-    return np.asarray(faces * _power(tile, stage, np.ones(1)) * stage.response)
+    response = _responses(part.modes, stage)
+    return np.asarray(faces * _power(tile, stage, np.ones(1)) * response)
 
 
 def _deposited(tile: Tile, part: Fronts, points: Floats, stage: Stage) -> npt.NDArray[Any]:
     """The field (node, 2, bin) of a tile at its nodes, steered to its reference: real and imaginary part."""
     from sonarsynth.synthesis.kernels import combine
 
-    bins, grid, dtype = stage.bins, stage.grid, stage.response.dtype
+    bins, grid = stage.bins, stage.grid
     last = bins.first + bins.frequency.size
     blur = kaiser_bessel_transform(np.arange(bins.first, last) / grid.circle, grid.width, grid.beta)
     power = _power(tile, stage, blur)
-    field = np.empty((len(points), 2, bins.frequency.size), dtype)
+    mode = np.array(tile.terms)[:, 3]
+    response = _responses(tile.modes.T[: mode.max() + 1], stage)
+    _, place = face_pairs(tile.terms)
+    table = _packed(part, tile, (part.delay - stage.origin) * (grid.circle * bins.step))
+    field = np.empty((len(points), 2, bins.frequency.size), stage.dtype)
     group = max(1, LARGEST // (len(tile.terms) * grid.circle))
     for first in range(0, len(points), group):
         some = points[first : first + group]
-        deposits = _deposits(part, tile, some, stage)
-        spectra = rfft(deposits[:, :, : grid.circle], axis=2)
-        combine(spectra, bins.first, _faces(tile, some, stage), power, stage.response, field[first : first + group])
+        deposits = _deposits(table, part, tile, some, stage)
+        spectra, faces = rfft(deposits[:, :, : grid.circle], axis=2), _faces(tile, some, stage)
+        combine(spectra, bins.first, faces, place, power, response, mode, field[first : first + group])
     return field
 
 
-def _deposits(part: Fronts, tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
+def _deposits(table: Floats, part: Fronts, tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
     """The grid (node, term, sample) of a tile at some points."""
     from sonarsynth.synthesis.kernels import deposit
 
-    grid, dtype = stage.grid, stage.response.dtype
+    grid = stage.grid
     rate = grid.circle * stage.bins.step
     reference = tile.reference
     steer, level = delay_and_gain(reference, points)
     middle, _ = towards(reference, points)
-    loss = tile.deviation[2] or 1.0
-    table = _packed(part, (part.delay - stage.origin) * rate, (part.loss - reference.loss) / loss)
     late = louder = np.zeros((0, 0))
     if part.delay_terms.shape[1]:
         late = (aperture_terms(points, part.aperture) @ part.delay_terms.T) * rate
     if part.gain_terms.shape[1]:
         louder = aperture_terms(points, part.aperture) @ part.gain_terms.T
-    out = np.zeros((len(points), len(tile.terms), grid.circle + grid.lanes), dtype)
+    out = np.zeros((len(points), len(tile.terms), grid.circle + grid.lanes), stage.dtype)
     deposit(
-        table,
+        table.ravel(),
+        table.shape[1],
         part.count,
         points,
         steer[0] * rate,
@@ -201,17 +188,27 @@ def _deposits(part: Fronts, tile: Tile, points: Floats, stage: Stage) -> npt.NDA
     return out
 
 
-def _packed(part: Fronts, position: Floats, loss: Floats) -> Floats:
-    """Paths in blocks of rows, padded with silent ones: the layout that `deposit` reads."""
-    from sonarsynth.synthesis.kernels import BLOCK, ROWS
+def _packed(part: Fronts, tile: Tile, position: Floats) -> Floats:
+    """Paths in blocks of rows (block, row, path), padded with silent ones: what `deposit` reads."""
+    from sonarsynth.synthesis.kernels import BLOCK
 
+    loss = (part.loss - tile.reference.loss) / (tile.deviation[2] or 1.0)
+    modes = part.modes @ tile.modes[:, : max(term[3] for term in tile.terms) + 1]
+    values = (*part.direction.T, part.curvature, position, part.amplitude, loss, *modes.T)
     blocks = -(-part.count // BLOCK)
-    rows = np.zeros((ROWS, blocks * BLOCK))
+    rows = np.zeros((len(values), blocks * BLOCK))
     rows[0] = 1.0
-    values = (*part.direction.T, part.curvature, position, part.amplitude, loss)
     for row, value in zip(rows, values, strict=True):
         row[: part.count] = value
-    return np.ascontiguousarray(rows.reshape(ROWS, blocks, BLOCK).swapaxes(0, 1)).ravel()
+    return np.ascontiguousarray(rows.reshape(len(values), blocks, BLOCK).swapaxes(0, 1))
+
+
+def _responses(weight: Floats, stage: Stage) -> npt.NDArray[Any]:
+    """Spectra (mode, 2, bin) of pulses, real and imaginary part: sums, by weight (mode, mode of all paths), or that of
+    all paths where they have no modes."""
+    bins = stage.bins
+    value = (weight @ bins.modes if len(bins.modes) else bins.spectrum[None]) * stage.scale
+    return np.stack([value.real, value.imag], axis=1).astype(stage.dtype)
 
 
 def _power(tile: Tile, stage: Stage, blur: Floats) -> npt.NDArray[Any]:
@@ -221,15 +218,16 @@ def _power(tile: Tile, stage: Stage, blur: Floats) -> npt.NDArray[Any]:
     decay = -np.log(10.0) / 20.0 * tile.deviation[2] * relative
     degree = np.array(tile.terms)[:, 2]
     power = np.cumprod(np.concatenate([[loss], decay / np.arange(1, degree.max() + 1)[:, None]]), axis=0)
-    return np.asarray(power.astype(stage.response.dtype)[degree])
+    return np.asarray(power.astype(stage.dtype)[degree])
 
 
 def _faces(tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
-    """Real factor (node, term, bin) of each term's spectrum: the polynomials of the face's directivity."""
-    f, dtype, face = stage.bins.frequency, stage.response.dtype, stage.aim.elements.face
+    """Real factor (node, pair, bin) of the spectra of terms, by `face_pairs`: the polynomials of the face's
+    directivity."""
+    f, dtype, face = stage.bins.frequency, stage.dtype, stage.aim.elements.face
     if face == 0.0:
         return np.broadcast_to(np.ones(1, dtype), (len(points), len(tile.terms), f.size))
-    degrees = np.array(tile.terms)
+    degrees, _ = face_pairs(tile.terms)
     u = towards(tile.reference, points)[0][0, :, 1:].T
     middle, half = 0.5 * (f[-1] + f[0]), 0.5 * (f[-1] - f[0])
     scale = face / tile.reference.sound_speed
@@ -238,10 +236,10 @@ def _faces(tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
     widest = float((np.abs(u) + deviation).max(axis=1).sum())
     axis = nodes_for(np.pi * scale * half * widest, (1.0,), 0.1 * stage.aim.tolerance)
     at = (middle + half * chebyshev(axis.nodes)) * scale
-    most = int(degrees[:, :2].max())
+    most = int(degrees.max())
     y, z = sinc_polynomials(u[:, :, None] * at, (deviation * at)[:, None], most).swapaxes(0, 1)
     some = (y[degrees[:, 0]] * z[degrees[:, 1]]).swapaxes(0, 1).reshape(-1, axis.nodes).astype(dtype)
-    return np.asarray(some @ _to_bins(f.size, axis, dtype.name)).reshape(len(points), len(degrees), f.size)
+    return np.asarray(some @ _to_bins(f.size, axis, dtype)).reshape(len(points), len(degrees), f.size)
 
 
 @lru_cache(maxsize=64)

@@ -13,7 +13,7 @@ from sonarsynth.description import description
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.sonar import Elements, Sonar
 from sonarsynth.synthesis.layout import fast_length, layout
-from sonarsynth.synthesis.pulse import pulse_spectrum, pulse_support
+from sonarsynth.synthesis.pulse import pulse_spectrum
 from sonarsynth.synthesis.wavefront import Fronts, delay_and_gain, fronts, reach, towards
 from sonarsynth.world.moment import Snap
 
@@ -29,7 +29,8 @@ def relative_absorption(absorption: Callable[[Floats], Floats] | None, frequency
 
 
 def exact_spectra(front: Fronts, elements: Elements, frequency: Floats, relative: Floats, origin: float) -> np.ndarray:
-    """Transfer functions (sensor, bin) from the snap at 1 m to each hydrophone, delays counted from `origin` (s)."""
+    """Transfer functions (sensor, bin) from the snap at 1 m to each hydrophone, delays counted from `origin` (s); but
+    for Doppler, which is the snap's."""
     total = np.zeros((elements.count, frequency.size), complex)
     for e in range(front.count):
         one = front.select(np.array([e]))
@@ -38,15 +39,17 @@ def exact_spectra(front: Fronts, elements: Elements, frequency: Floats, relative
         late = one.delay[0] - origin + delay[0]
         face = element_directivity(frequency, u[0][:, None, :], elements.face, one.sound_speed)
         loss = 10.0 ** (-one.loss[0] * relative / 20.0)
+        shape = np.exp(1j * one.phase[0] - 0.5 * one.variance[0] * (2.0 * np.pi * frequency) ** 2)
         total += (one.amplitude[0] * gain[0] * elements.gain)[:, None] * (
-            face * loss * np.exp(-2j * np.pi * late[:, None] * frequency)
+            face * loss * shape * np.exp(-2j * np.pi * late[:, None] * frequency)
         )
     return total
 
 
 @description
 class DirectSum:
-    """Sum of every path at every hydrophone and frequency, with exact delay, amplitude and directivity, in float64."""
+    """Sum of every path at every hydrophone and frequency, in float64, with exact delay, amplitude, directivity,
+    phase, blur and Doppler."""
 
     kind: Literal["direct_sum"] = "direct_sum"
 
@@ -80,12 +83,16 @@ def exact_signals(
     pressure = np.zeros((elements.count, samples))
     for model in dict.fromkeys(s.model for s in snaps):
         rows = np.flatnonzero(np.array([s.model == model for s in snaps])[arrivals.snap] & plan.heard)
-        pad = int(np.ceil(sum(pulse_support(model, sonar.antialias)) * fs)) + 2
+        if not rows.size:
+            continue
+        pad = int(np.ceil(plan.support[:, rows].sum(axis=0).max() * fs)) + 2
         # where a pulse is partly heard at one hydrophone, it is at most this far out at another
         spread = int(np.ceil(2.0 * reach(front).max(initial=0.0) * fs)) + pad
         length = fast_length(samples + 2 * spread)
-        frequency, spectrum = pulse_spectrum(model, sonar.antialias, fs, length)
-        relative = relative_absorption(absorption, frequency, sonar.band.centre)
-        transfer = exact_spectra(front.select(rows), elements, frequency, relative, start - spread / fs)
-        pressure += np.fft.irfft(transfer * spectrum, length)[:, spread : spread + samples] * fs
+        for doppler in np.unique(front.doppler[rows]):
+            frequency, spectrum = pulse_spectrum(model, sonar.antialias, fs, length, float(doppler))
+            relative = relative_absorption(absorption, frequency, sonar.band.centre)
+            some = front.select(rows[front.doppler[rows] == doppler])
+            transfer = exact_spectra(some, elements, frequency, relative, start - spread / fs)
+            pressure += np.fft.irfft(transfer * spectrum, length)[:, spread : spread + samples] * fs
     return pressure, Signals(pressure.astype(np.float32), start, fs, 0.0, 0, plan.outside)

@@ -3,12 +3,12 @@
 A tile is a group of paths from nearly the same direction. Steered to its middle, their field varies slowly over the
 aperture, so it is synthesised at a few Chebyshev nodes and interpolated to the hydrophones; and the directivity of the
 element face, a function of frequency and of the direction of each path, is a polynomial in the small deviation of that
-direction from the tile's middle.
+direction from the tile's middle. Where pulses differ in shape there are terms for each mode of it (`shapes`).
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, reduce
 from math import factorial
 
 import numpy as np
@@ -40,45 +40,64 @@ def face_terms(deviation: float, weights: Colour) -> Floats:
     return np.asarray(bound * (np.array(weights)[:, None] ** DEGREES).mean(axis=0))
 
 
-Term = tuple[int, int, int]
-"""Degrees in the y and z components of direction, and in absorption."""
+Term = tuple[int, int, int, int]
+"""Degrees in the y and z components of direction, and in absorption; and which mode of the pulses' shapes."""
+
+PLAIN: tuple[float, ...] = (1.0,)
+"""Sizes of the modes of pulses that are alike."""
 
 
-def terms_for(face: tuple[float, float], loss: float, weights: Colour, tolerance: float) -> tuple[Term, ...]:
-    """Terms to keep: deviations of face argument in y and z, and of absorption (Np) are given. Closed: the factors of
-    each are there.
+def terms_for(
+    face: tuple[float, float], loss: float, weights: Colour, tolerance: float, modes: tuple[float, ...] = PLAIN
+) -> tuple[Term, ...]:
+    """Terms to keep: deviations of face argument in y and z, of absorption (Np), and sizes of modes are given. Closed:
+    the factors of each are there.
 
     Deviations are rounded up by at most a tenth, so that choices are kept from frame to frame.
     """
     y, z, decay = (rounded_up(v) for v in (*face, loss))
-    return _terms(y, z, decay, weights, tolerance)
+    return _terms(y, z, decay, modes, weights, tolerance)
 
 
 @lru_cache(maxsize=1024)
-def _terms(y: float, z: float, loss: float, weights: Colour, tolerance: float) -> tuple[Term, ...]:
-    size = face_terms(y, weights)[:, None, None] * face_terms(z, weights)[:, None] * (loss**DEGREES / FACTORIALS)
+def _terms(
+    y: float, z: float, loss: float, modes: tuple[float, ...], weights: Colour, tolerance: float
+) -> tuple[Term, ...]:
+    sizes = [face_terms(y, weights), face_terms(z, weights), loss**DEGREES / FACTORIALS, np.array(modes)]
+    if len(modes) > 1:  # the product of four is large: without what is nothing
+        sizes = [s[: np.flatnonzero(s >= 1e-3 * tolerance)[-1] + 1] for s in sizes]
+    size = reduce(np.multiply.outer, sizes)
     smallest = np.sort(size, axis=None)
     least = smallest[np.searchsorted(np.cumsum(smallest), tolerance, side="right")]  # what is left out adds up to less
-    i, j, k = np.indices(size.shape)
-    keep = (size >= least) & (i + j + k < DEGREES.size)
-    keep[0, 0, 0] = True
-    for axis in range(3):  # the factors of each term too
+    keep = (size >= least) & (np.indices(size.shape)[:3].sum(axis=0) < DEGREES.size)
+    keep.flat[0] = True
+    for axis in range(4):  # the factors of each term too
         keep = np.flip(np.logical_or.accumulate(np.flip(keep, axis), axis), axis)
-    found = [(int(a), int(b), int(c)) for a, b, c in np.argwhere(keep)]
+    found = [(int(a), int(b), int(c), int(d)) for a, b, c, d in np.argwhere(keep)]
     return tuple(sorted(found, key=lambda t: (sum(t), t)))
 
 
 @lru_cache(maxsize=256)
-def recipe(terms: tuple[Term, ...]) -> np.ndarray:
-    """How to make each term from earlier ones (term, 3); term 0 is given.
+def face_pairs(terms: tuple[Term, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """The different pairs (pair, 2) of degrees in y and z, and which of them each term (term,) has."""
+    pairs = list(dict.fromkeys(term[:2] for term in terms))
+    return np.array(pairs), np.array([pairs.index(term[:2]) for term in terms])
 
-    Columns: which term; times which factor (0 y, 1 z, 2 absorption); and, where it is twice that less another
-    (Chebyshev's recurrence, in y and z), which other, or else -1.
+
+@lru_cache(maxsize=256)
+def recipe(terms: tuple[Term, ...]) -> np.ndarray:
+    """How to make each term from earlier ones (term, 3); -1 is given, the amplitude.
+
+    Columns: which term; times which factor (0 y, 1 z, 2 absorption, 3 and on the modes); and, where it is twice that
+    less another (Chebyshev's recurrence, in y and z), which other, or else -1.
     """
     place: dict[tuple[int, ...], int] = {t: n for n, t in enumerate(terms)}
     out = np.full((len(terms), 3), -1, np.int64)
-    for n, term in enumerate(terms[1:], start=1):
-        axis = next(a for a in range(3) if term[a])
+    for n, term in enumerate(terms):
+        axis = next((a for a in range(3) if term[a]), 3)
+        if axis == 3:
+            out[n, 1] = 3 + term[3]
+            continue
         one, two = (tuple(d - less * (a == axis) for a, d in enumerate(term)) for less in (1, 2))
         out[n, :2] = place[one], axis
         if axis < 2 and term[axis] > 1:

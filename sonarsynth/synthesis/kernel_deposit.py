@@ -14,10 +14,9 @@ from sonarsynth.conventions import Floats, Number
 from sonarsynth.description import description
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.sonar import Elements, Sonar, stop_frequency
-from sonarsynth.synthesis.deposit import Bins, add_stretch, audible
-from sonarsynth.synthesis.direct_sum import relative_absorption
+from sonarsynth.synthesis.bins import bins_of
+from sonarsynth.synthesis.deposit import add_stretch
 from sonarsynth.synthesis.layout import Stretch, layout
-from sonarsynth.synthesis.pulse import pulse_spectrum
 from sonarsynth.synthesis.wavefront import fronts
 from sonarsynth.world.moment import Snap
 
@@ -38,6 +37,14 @@ class KernelDeposit:
         8      2e-5       float32   |  3.3e-6    11 ms |  4.9e-6    58 ms
         8      2e-6       float64   |  5.2e-7    27 ms |  6.2e-7   280 ms
         DirectSum                   |          130 s   |            76 s
+
+    Pulses that differ in shape: 2000 direct echoes and 5000 by surface and bed, all with absorption; largest error, and
+    time over that of the same paths with plain pulses (turn about, on a core that others shared), at 20 m | at 8 m:
+
+        plain                         |  2.1e-5   1          |  4.5e-5   1
+        phases spread by +-1 rad      |  1.6e-5   1.2 - 1.6  |  4.7e-5   1.2
+        and blurs of 0 to 17 us       |  1.7e-5   1.7 - 2.3  |  4.8e-5   1.3
+        and stretches within +-3e-3   |  1.8e-5   1.9 - 2.9  |  4.6e-5   1.5
 
     Point hydrophones take 4.9 ms and 11 ms. The error of echoes of 40 to 250 facets of a REMUS-100, lobes of 3 to 30
     degrees, at 5, 10 and 20 m: at most 7e-5. Errors include what the support of the pulse leaves out (1e-7 of its
@@ -86,16 +93,14 @@ class KernelDeposit:
         method = (self.width, self.oversampling, self.precision, self.tolerance)
         done: list[Stretch] = []
         for part in plan.stretches:
-            frequency, spectrum = pulse_spectrum(part.model, sonar.antialias, fs, part.samples)
-            some = audible(spectrum, self.tolerance)
-            relative = relative_absorption(absorption, frequency[some], sonar.band.centre)
+            paths, bins = bins_of(part, front.select(part.paths), sonar, absorption, self.tolerance)
             add_stretch(
                 out,
                 part.first,
                 part.samples,
-                front.select(part.paths),
+                paths,
                 elements,
-                Bins(some.start, frequency[some], spectrum[some], relative, fs / part.samples),
+                bins,
                 start + part.first / fs,
                 stop_frequency(sonar.antialias),
                 method,

@@ -20,7 +20,7 @@ RUN = 64
 
 ROWS = 7
 """Rows of the packed table: direction x, y, z; curvature; position (samples); amplitude; absorption (scaled
-deviation)."""
+deviation). Weights of the modes may follow."""
 
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
@@ -69,6 +69,22 @@ def _recur(out: Any, earlier: Any) -> None:
 
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+def _expand(value: Any, block: Any, recipe: Any, modes: bool) -> None:
+    """Terms of a block of paths, from row 4 of value on; there is the amplitude, which with modes moves to row 3."""
+    if modes:
+        value[3 * BLOCK : 4 * BLOCK] = value[4 * BLOCK : 5 * BLOCK]
+    for t in range(0 if modes else 1, recipe.shape[0]):
+        a, b, c = (4 + recipe[t, 0]) * BLOCK, recipe[t, 1] * BLOCK, (4 + t) * BLOCK
+        if recipe[t, 1] < 3:
+            _multiply(value[a : a + BLOCK], value[b : b + BLOCK], value[c : c + BLOCK])
+        else:
+            _multiply(value[a : a + BLOCK], block[(ROWS - 3) * BLOCK + b :], value[c : c + BLOCK])
+        if recipe[t, 2] >= 0:
+            d = (4 + recipe[t, 2]) * BLOCK
+            _recur(value[c : c + BLOCK], value[d : d + BLOCK])
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
 def _split(place: Any, half: float, rows: int, length: int, begin: Any, row: Any, fraction: Any) -> None:
     """First sample of the kernel on the circle, row of its table, and place in the row, from -1/2 to 1/2."""
     for i in range(BLOCK):
@@ -84,6 +100,7 @@ def _split(place: Any, half: float, rows: int, length: int, begin: Any, row: Any
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
 def deposit(
     table: Any,
+    rows: int,
     count: int,
     nodes: Any,
     steer: Any,
@@ -102,33 +119,28 @@ def deposit(
 ) -> None:
     """Add the kernel of every path at every node, times every term, to grid (node * term * (length + lanes),).
 
-    table: `count` paths in blocks (block * ROWS * BLOCK,), float64. nodes (node, xyz) in m. Of the tile's middle at the
+    table: `count` paths in blocks (block * rows * BLOCK,), float64. nodes (node, xyz) in m. Of the tile's middle at the
     nodes, taken off: steer (node,) its delay in samples, level (node,) its gain, middle (node, 2) its direction y, z.
     scale (2,) is one over the deviation of y and z. late (samples) and louder (node, path) are the wavefront's terms,
     or empty. recipe (term, 3) makes terms. taps (row * 4 * lane,) is the kernel, a cubic a row, and half its half width
     in samples. rate is in samples/m; the grid is a circle of `length` samples.
     """
     terms, stride = recipe.shape[0], length + lanes
-    rows = taps.size // (4 * lanes)
+    cubes = taps.size // (4 * lanes)
     place, fraction = np.empty(BLOCK), np.empty(BLOCK, grid.dtype)
     begin, row = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
     value = np.empty((4 + terms) * BLOCK, grid.dtype)
     for m in range(nodes.shape[0]):
         for first in range(0, count, BLOCK):
             size = min(BLOCK, count - first)
-            block = table[first * ROWS : (first + BLOCK) * ROWS]
+            block = table[first * rows : (first + BLOCK) * rows]
             _wavefront(block, nodes[m], middle[m], scale, rate, steer[m], level[m], place, value)
             if late.size:
                 _add(place, late[m, first : first + size])
             if louder.size:
                 _amplify(value[4 * BLOCK :], louder[m, first : first + size])
-            for t in range(1, terms):
-                a, b, c = (4 + recipe[t, 0]) * BLOCK, recipe[t, 1] * BLOCK, (4 + t) * BLOCK
-                _multiply(value[a : a + BLOCK], value[b : b + BLOCK], value[c : c + BLOCK])
-                if recipe[t, 2] >= 0:
-                    d = (4 + recipe[t, 2]) * BLOCK
-                    _recur(value[c : c + BLOCK], value[d : d + BLOCK])
-            _split(place, half, rows, length, begin, row, fraction)
+            _expand(value, block, recipe, rows > ROWS)
+            _split(place, half, cubes, length, begin, row, fraction)
             for i in range(size):
                 for lane in range(0, lanes, 8):
                     w: Any = cubics(taps, row[i] * 4 * lanes + lane, lanes, fraction[i])  # type: ignore[call-arg]
@@ -140,23 +152,31 @@ def deposit(
 
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
-def combine(spectra: Any, first: int, factors: Any, power: Any, response: Any, out: Any) -> None:
-    """Sum over terms of spectra (node, term, bin) times real factors (node, term, bin) and power (term, bin).
+def combine(spectra: Any, first: int, factors: Any, place: Any, power: Any, response: Any, mode: Any, out: Any) -> None:
+    """Sum over terms of spectra (node, term, bin) times real factors (node, place of term, bin) and power (term, bin).
 
-    Times response (2, bin), real and imaginary part as in out (node, 2, bin). Bins of spectra count from `first`.
+    Times response (mode, 2, bin) of the mode of each term (term,), real and imaginary part as in out (node, 2, bin).
+    Bins of spectra count from `first`.
     """
     bins = out.shape[2]
     re, im = np.empty(bins, out.dtype), np.empty(bins, out.dtype)
     for m in range(out.shape[0]):
-        re[:], im[:] = 0.0, 0.0
-        for t in range(power.shape[0]):
-            for b in range(bins):
-                factor = factors[m, t, b] * power[t, b]
-                re[b] += spectra[m, t, first + b].real * factor
-                im[b] += spectra[m, t, first + b].imag * factor
-        for b in range(bins):
-            out[m, 0, b] = re[b] * response[0, b] - im[b] * response[1, b]
-            out[m, 1, b] = re[b] * response[1, b] + im[b] * response[0, b]
+        for k in range(response.shape[0]):
+            re[:], im[:] = 0.0, 0.0
+            for t in range(power.shape[0]):
+                if mode[t] == k:
+                    for b in range(bins):
+                        factor = factors[m, place[t], b] * power[t, b]
+                        re[b] += spectra[m, t, first + b].real * factor
+                        im[b] += spectra[m, t, first + b].imag * factor
+            if k == 0:
+                for b in range(bins):
+                    out[m, 0, b] = re[b] * response[k, 0, b] - im[b] * response[k, 1, b]
+                    out[m, 1, b] = re[b] * response[k, 1, b] + im[b] * response[k, 0, b]
+            else:
+                for b in range(bins):
+                    out[m, 0, b] += re[b] * response[k, 0, b] - im[b] * response[k, 1, b]
+                    out[m, 1, b] += re[b] * response[k, 1, b] + im[b] * response[k, 0, b]
 
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy")

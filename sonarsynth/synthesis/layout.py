@@ -10,7 +10,7 @@ import numpy as np
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.products import Arrivals
 from sonarsynth.sonar import Elements, Sonar
-from sonarsynth.synthesis.pulse import pulse_support
+from sonarsynth.synthesis.pulse import FEET, pulse_support, silencing_blur
 from sonarsynth.synthesis.wavefront import Fronts, delay_and_gain, reach
 from sonarsynth.world.moment import Snap
 from sonarsynth.world.sources import LogarithmicBubble
@@ -37,6 +37,7 @@ class Layout:
     stretches: tuple[Stretch, ...]
     heard: Bools  # (path,) some of the pulse is in the window at some hydrophone
     outside: int  # paths whose pulse is not wholly in the window at every hydrophone
+    support: Floats  # (before or after, path) s: how far a pulse reaches from its arrival
 
 
 def fast_length(samples: int) -> int:
@@ -60,20 +61,39 @@ def layout(
     if samples < 1:
         raise ValueError("a window needs at least one sample")
     fs = sonar.sampling_frequency
-    support = np.array([pulse_support(s.model, sonar.antialias) for s in snaps]).reshape(-1, 2)
-    before, after = support[arrivals.snap].T if front.count else np.zeros((2, 0))
+    plain, support, silent = _supports(arrivals, front, snaps, sonar)
+    before, after = support
     early, late = _extent(front, elements, before, after, start, start + (samples - 1) / fs)
-    cut = (early < start) | (late > start + (samples - 1) / fs)
-    heard = (late > start) & (early < start + (samples - 1) / fs)
+    cut = ~silent & ((early < start) | (late > start + (samples - 1) / fs))
+    heard = ~silent & (late > start) & (early < start + (samples - 1) / fs)
     stretches: list[Stretch] = []
     for model in dict.fromkeys(s.model for s in snaps):
         same = np.array([s.model == model for s in snaps])[arrivals.snap] & heard
         for rows in (np.flatnonzero(same & arrivals.direct), np.flatnonzero(same & ~arrivals.direct)):
-            for chosen in _runs(rows, early, late):
+            for chosen in _runs(rows, early + before - plain[0], late - after + plain[1]):
                 first = int(np.floor((early[chosen].min() - start) * fs)) - 1
                 last = int(np.ceil((late[chosen].max() - start) * fs)) + 1
                 stretches.append(Stretch(chosen, model, first, fast_length(last - first + 1)))
-    return Layout(tuple(stretches), heard, int(cut.sum()))
+    return Layout(tuple(stretches), heard, int(cut.sum()), support)
+
+
+def _supports(arrivals: Arrivals, front: Fronts, snaps: tuple[Snap, ...], sonar: Sonar) -> tuple[Floats, Floats, Bools]:
+    """Support (before or after, path) of each pulse in s: in its plain shape, and in its own; and which (path,) are
+    blurred to silence."""
+    if not front.count:
+        return np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0, bool)
+    chosen, blur = sonar.antialias, np.sqrt(front.variance)
+
+    def each(turned: bool) -> Floats:
+        return np.array([pulse_support(s.model, chosen, turned=turned) for s in snaps])[arrivals.snap].T
+
+    plain, silent = each(False), np.zeros(front.count, bool)
+    support = plain
+    if front.phase.any():
+        support = np.where(front.phase != 0.0, each(True), support)
+    if blur.any():
+        silent = blur >= np.array([silencing_blur(s.model, chosen) for s in snaps])[arrivals.snap]
+    return plain, support * (1.0 + np.abs(front.doppler)) + np.where(silent, 0.0, FEET * blur), silent
 
 
 def _extent(
@@ -93,7 +113,7 @@ def _extent(
 
 
 def _runs(rows: Ints, early: Floats, late: Floats) -> Iterator[Ints]:
-    """Rows in runs whose pulses overlap in time; each run keeps the order of the arrivals."""
+    """Rows in runs that overlap in time; each run keeps the order of the arrivals."""
     if not rows.size:
         return
     order = rows[np.argsort(early[rows], kind="stable")]

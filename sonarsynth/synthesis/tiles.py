@@ -11,14 +11,15 @@ import numpy as np
 from sonarsynth.acoustics.arrays import aperture_terms
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.sonar import Elements
-from sonarsynth.synthesis.expansion import Term, terms_for
+from sonarsynth.synthesis.expansion import PLAIN, Term, terms_for
 from sonarsynth.synthesis.interpolating import Axes, box_nodes, columns
 from sonarsynth.synthesis.nodes import MOST_NODES, Colour, nodes_for
+from sonarsynth.synthesis.shapes import main_modes
 from sonarsynth.synthesis.variation import degrees, variation
 from sonarsynth.synthesis.wavefront import Fronts
 
 MOST_TERMS = 24
-"""A tile that needs more terms is split."""
+"""A tile that needs more terms, of one mode of its pulses, is split."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,7 @@ class Tile:
     axes: Axes | None  # nodes along x, y, z; None where the hydrophones themselves are the nodes
     terms: tuple[Term, ...]
     deviation: tuple[float, float, float]  # half range of direction y and z, and of absorption (dB)
+    modes: Floats  # (mode, mode) turn of the modes of all paths to those of the tile; (0, 0) where there are none
     cost: float  # ns, predicted
 
     def nodes(self, elements: Elements) -> Floats:
@@ -122,6 +124,10 @@ def _reference(middle: Floats, front: Fronts) -> Fronts:
         gain_terms=np.zeros((1, 0)),
         sound_speed=front.sound_speed,
         aperture=front.aperture,
+        phase=np.zeros(1),
+        variance=np.zeros(1),
+        doppler=np.zeros(1),
+        modes=np.zeros((1, 0)),
     )
 
 
@@ -134,12 +140,13 @@ class _Extent(NamedTuple):
     degrees: tuple[tuple[float, ...], ...]  # (xyz, degree) of the amplitude
     turn: tuple[float, float]  # half range of the face's argument in y and z at the highest frequency
     decay: float  # Np: half range of absorption, at the frequency where it differs most from that at the centre
+    modes: tuple[float, ...]  # sizes of the modes of the pulses' shapes
 
     def half(self) -> _Extent:
         """The best that halving can give."""
         y, z = self.turn
-        phase = tuple(0.5 * p for p in self.phase)
-        return _Extent(0.5 * self.paths, phase, self.drift, self.degrees, (0.5 * y, 0.5 * z), 0.5 * self.decay)
+        phase, modes = tuple(0.5 * p for p in self.phase), (1.0, *(0.5 * m for m in self.modes[1:]))
+        return _Extent(0.5 * self.paths, phase, self.drift, self.degrees, (0.5 * y, 0.5 * z), 0.5 * self.decay, modes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,6 +173,9 @@ def _try(paths: Ints, views: _Views, aim: Aim) -> _Trial:
     wave = aim.highest / reference.sound_speed  # 1/m
     turn, loss = (aim.elements.face * wave * dy, aim.elements.face * wave * dz), float(far[4])
     phase = np.full(3, np.inf) if views.near else 2.0 * np.pi * wave * slope * probes.size
+    modes, sizes = np.zeros((0, 0)), PLAIN
+    if views.front.modes.shape[1]:
+        modes, sizes = main_modes(views.front.modes[paths], np.abs(views.front.amplitude[paths]))
     extent = _Extent(
         paths=paths.size,
         phase=tuple(phase.tolist()),
@@ -173,9 +183,10 @@ def _try(paths: Ints, views: _Views, aim: Aim) -> _Trial:
         degrees=degrees(views.amplitude if whole else np.take(views.amplitude, paths, axis=1)),
         turn=turn,
         decay=loss * np.log(10.0) / 20.0 * aim.steepest,
+        modes=sizes,
     )
     axes, terms, cost = _cheapest(extent, aim)
-    return _Trial(Tile(paths, reference, axes, terms, (dy, dz, loss), cost), extent)
+    return _Trial(Tile(paths, reference, axes, terms, (dy, dz, loss), modes, cost), extent)
 
 
 def _drift(front: Fronts, aim: Aim) -> tuple[float, ...]:
@@ -196,7 +207,7 @@ def _drift(front: Fronts, aim: Aim) -> tuple[float, ...]:
 def _cheapest(extent: _Extent, aim: Aim) -> tuple[Axes | None, tuple[Term, ...], float]:
     """Nodes or the hydrophones themselves, terms, and the predicted time (ns) on one core at 3 GHz."""
     sensors, bins = aim.elements.count, aim.bins
-    terms = terms_for(extent.turn, extent.decay, aim.weights, aim.tolerance)
+    terms = terms_for(extent.turn, extent.decay, aim.weights, aim.tolerance, extent.modes)
     x, y, z = (
         nodes_for(p + d, aim.weights, aim.tolerance, a)
         for p, d, a in zip(extent.phase, extent.drift, extent.degrees, strict=True)
@@ -210,7 +221,7 @@ def _cheapest(extent: _Extent, aim: Aim) -> tuple[Axes | None, tuple[Term, ...],
     few = max(x.nodes, y.nodes, z.nodes) <= MOST_NODES
     onto = 0.03 * nodes * columns(aim.elements)[0].size + 0.3 * z.nodes * sensors
     by_nodes = work(nodes) + onto * bins if few else np.inf
-    crowded = np.inf if len(terms) > MOST_TERMS else 1.0
+    crowded = np.inf if sum(not term[3] for term in terms) > MOST_TERMS else 1.0
     return ((x, y, z), terms, by_nodes * crowded) if by_nodes < own else (None, terms, own * crowded)
 
 
@@ -242,7 +253,8 @@ def _alone(paths: Ints, front: Fronts, aim: Aim) -> Tile:
     reference = front.select(paths)
     x, y, z = (nodes_for(d, aim.weights, aim.tolerance) for d in _drift(reference, aim))
     axes = (x, y, z) if 2 * x.nodes * y.nodes * z.nodes < aim.elements.count else None
-    return Tile(paths, reference, axes, ((0, 0, 0),), (0.0, 0.0, 0.0), 2e5 + 4.0 * aim.elements.count * aim.bins)
+    cost = 2e5 + 4.0 * aim.elements.count * aim.bins
+    return Tile(paths, reference, axes, ((0, 0, 0, 0),), (0.0, 0.0, 0.0), np.eye(reference.modes.shape[1]), cost)
 
 
 def _best(trial: _Trial, views: _Views, aim: Aim, patient: bool) -> list[Tile]:

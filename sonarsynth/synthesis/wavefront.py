@@ -15,6 +15,15 @@ from sonarsynth.sonar import Elements
 from sonarsynth.synthesis.pulse import bubble
 from sonarsynth.world.moment import Snap
 
+MOST_STRETCH = 0.1
+"""Doppler of 0.1 is a closing speed of 75 m/s: more is an error."""
+
+LONGEST_BLUR = 1.0
+"""A longer blur (s) leaves as little of a snap: nothing."""
+
+FINITE = ("delay", "direction", "amplitude", "absorption", "delay_terms", "amplitude_terms", "phase", "blur", "stretch")
+"""What of the arrivals must be finite."""
+
 
 @dataclass(frozen=True, eq=False)
 class Fronts:
@@ -29,6 +38,10 @@ class Fronts:
     gain_terms: Floats  # (path, term)
     sound_speed: float  # m/s
     aperture: float  # m: scale of the terms
+    phase: Floats  # (path,) rad, -pi/2 to pi/2: whole half turns are signs of the amplitude
+    variance: Floats  # (path,) s2: of the Gaussian that the pulse is blurred with
+    doppler: Floats  # (path,) the pulse lasts 1 + doppler times as long
+    modes: Floats  # (path, mode) weights of the modes of a stretch of time (`shapes`); none as yet
 
     @property
     def count(self) -> int:
@@ -47,13 +60,17 @@ class Fronts:
             self.gain_terms[keep],
             self.sound_speed,
             self.aperture,
+            self.phase[keep],
+            self.variance[keep],
+            self.doppler[keep],
+            self.modes[keep],
         )
 
 
 def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements) -> Fronts:
     """The wavefronts of arrivals; raises ValueError where one cannot be synthesised."""
     count = arrivals.delay.size
-    for name in ("delay", "direction", "amplitude", "absorption", "delay_terms", "amplitude_terms"):
+    for name in FINITE:
         value = getattr(arrivals, name)
         wrong = ~np.isfinite(value).all(axis=tuple(range(1, value.ndim)))
         if wrong.any():
@@ -62,6 +79,11 @@ def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements) -> F
         raise ValueError(f"arrival {np.flatnonzero(arrivals.amplitude == 0.0)[0]} has no amplitude")
     if count and not (arrivals.radius > 0.0).all():
         raise ValueError(f"arrival {np.flatnonzero(~(arrivals.radius > 0.0))[0]} has a radius that is not positive")
+    if (arrivals.blur < 0.0).any():
+        raise ValueError(f"arrival {np.flatnonzero(arrivals.blur < 0.0)[0]} has a negative blur")
+    if (np.abs(arrivals.stretch) >= MOST_STRETCH).any():
+        wrong = np.abs(arrivals.stretch) >= MOST_STRETCH
+        raise ValueError(f"arrival {np.flatnonzero(wrong)[0]} has a stretch that is not within +-{MOST_STRETCH:g}")
     if count and not (arrivals.snap.min() >= 0 and arrivals.snap.max() < len(snaps)):
         raise ValueError(f"arrivals name a snap outside 0..{len(snaps) - 1}")
     near = np.flatnonzero(arrivals.radius <= 1.001 * elements.aperture)
@@ -70,17 +92,33 @@ def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements) -> F
     if touching.any():
         raise ValueError(f"arrival {near[touching][0]} comes from a hydrophone")
     level = np.array([gain_for_level(bubble(s.model), s.source_level) for s in snaps])
+    sign, phase = folded(arrivals.phase)
     return Fronts(
         delay=arrivals.delay,
         direction=arrivals.direction,
         curvature=1.0 / arrivals.radius,
-        amplitude=arrivals.amplitude * level[arrivals.snap] if count else arrivals.amplitude,
+        amplitude=arrivals.amplitude * level[arrivals.snap] * sign if count else arrivals.amplitude,
         loss=arrivals.absorption,
         delay_terms=arrivals.delay_terms,
         gain_terms=arrivals.amplitude_terms,
         sound_speed=arrivals.sound_speed,
         aperture=elements.aperture or 1.0,
+        phase=phase,
+        variance=np.minimum(arrivals.blur, LONGEST_BLUR) ** 2,
+        doppler=arrivals.stretch,
+        modes=np.zeros((count, 0)),
     )
+
+
+def folded(phase: Floats) -> tuple[Floats, Floats]:
+    """Signs (path,) and phases (path,) from -pi/2 to pi/2 that are together phases of any size; what is a whole number
+    of half turns to rounding leaves no phase."""
+    if not phase.any():
+        return np.ones(phase.size), phase
+    cosine, sine = np.cos(phase), np.sin(phase)
+    sign = np.where(cosine < 0.0, -1.0, 1.0)
+    rest = np.arctan2(sign * sine, sign * cosine)
+    return sign, np.where(np.abs(rest) > 2e-16 * (1.0 + np.abs(phase)), rest, 0.0)
 
 
 def towards(front: Fronts, points: Floats) -> tuple[Floats, Floats]:

@@ -10,7 +10,7 @@ import pytest
 from sonarsynth.acoustics import snap
 from sonarsynth.conventions import Floats
 from sonarsynth.products import Arrivals
-from sonarsynth.sonar import Elements, PositionTable, Sonar, elements
+from sonarsynth.sonar import Elements, LowPass, PositionTable, Sonar, elements
 from sonarsynth.synthesis import DirectSum, KernelDeposit, pulse_support
 from sonarsynth.synthesis.direct_sum import exact_signals
 from sonarsynth.world.moment import Snap
@@ -50,6 +50,7 @@ def arrivals(delay: Floats, direction: Floats, radius: Floats, amplitude: Floats
         bottom=zero,
         turning=zero,
         caustics=zero,
+        arrives_by=zero,
         phase=np.zeros(n),
         blur=np.zeros(n),
         stretch=np.zeros(n),
@@ -164,6 +165,11 @@ def test_no_paths_are_silence(method: DirectSum | KernelDeposit) -> None:
         ({"radius": np.array([1.0, 0.0])}, "arrival 1 has a radius that is not positive"),
         ({"radius": np.array([np.nan, 2.0])}, "arrival 0 has a radius that is not positive"),
         ({"snap": np.array([0, 1])}, r"snap outside 0\.\.0"),
+        ({"phase": np.array([0.0, np.nan])}, "arrival 1 has phase that is not a finite number"),
+        ({"blur": np.array([np.inf, 0.0])}, "arrival 0 has blur that is not a finite number"),
+        ({"blur": np.array([0.0, -1e-9])}, "arrival 1 has a negative blur"),
+        ({"stretch": np.array([np.nan, 0.0])}, "arrival 0 has stretch that is not a finite number"),
+        ({"stretch": np.array([0.0, -0.1])}, r"arrival 1 has a stretch that is not within \+-0\.1"),
         (
             {"radius": np.array([0.2, 2.0]), "direction": np.array([[0.0, 0.0, 1.0]] * 2)},
             "arrival 0 comes from a hydrophone",
@@ -177,6 +183,64 @@ def test_what_cannot_be_synthesised_is_refused(
     of = replace(arrivals([0.0, 1e-4], [[1.0, 0.0, 0.0]] * 2, [2.0, 2.0], [1.0, 1.0]), **change)
     with pytest.raises(ValueError, match=message):
         method.signals(of, SNAPS, array, SONAR, None, -0.01, 4000)
+
+
+def shaped(of: Arrivals, phase: object, blur: object, stretch: object) -> Arrivals:
+    some = (np.broadcast_to(np.asarray(x, float), of.delay.shape).copy() for x in (phase, blur, stretch))
+    return replace(of, **dict(zip(("phase", "blur", "stretch"), some, strict=True)))
+
+
+FEW = arrivals(
+    [0.01, 0.0101, 0.0103], [[1.0, 0.1, 0.0], [1.0, 0.15, 0.1], [1.0, -0.1, 0.0]], [20.0] * 3, [1.0, 0.5, -2.0]
+)
+
+
+@pytest.mark.parametrize(
+    ("phase", "blur", "stretch"),
+    [
+        (1e6, 0.0, 0.0),
+        ([0.0, 1e300, -1e6], 0.0, 0.0),
+        ([0.5 * np.pi, -0.5 * np.pi, 0.5 * np.pi - 1e-9], 0.0, 0.0),  # half turns apart
+        ([1e-300, 1e-12, 1e-5], 0.0, 0.0),
+        (0.0, [0.0, 1e-300, 1e-9], 0.0),
+        (0.0, [2e-6, 1e-3, 1e300], 0.0),  # the last ones are silent
+        (0.0, [14e-6, 15e-6, 16e-6], 0.0),  # what is left is 40 dB down, and as exact
+        (0.0, 0.0, [1e-300, -1e-13, 1e-9]),
+        (0.0, 0.0, [0.0999, -0.0999, 0.0]),
+        ([2.0, 1.0, 0.0], [0.0, 4e-6, 15e-6], [1e-3, 1e-3, -0.05]),
+    ],
+)
+def test_any_shape_of_pulse(phase: object, blur: object, stretch: object) -> None:
+    of = shaped(FEW, phase, blur, stretch)
+    assert error_of(KernelDeposit(), of, ARRAY) < 1e-4
+    assert error_of(KernelDeposit(), of.select(np.array([0])), ARRAY) < 1e-4
+
+
+@pytest.mark.parametrize("loss", [(1e-9, 0.0, 0.0), (10.0, 11.0, 14.0), (0.0, 20.0, 40.0)])
+def test_pulses_of_any_shape_and_any_absorption(loss: tuple[float, float, float]) -> None:
+    """Absorption among the modes, and, where it differs by 2 Np over the band, in terms of its own."""
+    of = replace(shaped(FEW, [0.0, 1.0, 2.0], [0.0, 3e-6, 5e-6], 1e-3), absorption=np.array(loss))
+    of = replace(of, amplitude=of.amplitude * 10.0 ** (-of.absorption / 40.0))
+    start, samples = window(of, ARRAY)
+    exact, _ = exact_signals(of, SNAPS, ARRAY, SONAR, lambda f: 1e-6 * f, start, samples)
+    got = KernelDeposit().signals(of, SNAPS, ARRAY, SONAR, lambda f: 1e-6 * f, start, samples).pressure
+    assert np.abs(got - exact).max() < 1e-4 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_huge_blur_is_silence_and_nothing_is_outside(method: DirectSum | KernelDeposit) -> None:
+    got = method.signals(shaped(FEW, 1.0, [1e300, 1.0, 0.1], 0.05), SNAPS, ARRAY, SONAR, None, 0.0, 4000)
+    assert not got.pressure.any()
+    assert got.outside == 0
+
+
+def test_a_low_pass_hears_what_a_wide_range_of_blurs_leaves() -> None:
+    sonar = Sonar(filter=LowPass(cutoff=60e3), sampling_frequency=196e3)
+    of = arrivals(0.05 + 1e-4 * np.arange(12), [[1.0, 0.1, 0.1]] * 12, [20.0] * 12, [1.0] * 12)
+    of = shaped(of, np.arange(12.0), np.append(0.0, np.geomspace(1e-7, 1e-2, 11)), 0.0)
+    exact, _ = exact_signals(of, SNAPS, ARRAY, sonar, None, 0.0, 18000)
+    got = KernelDeposit().signals(of, SNAPS, ARRAY, sonar, None, 0.0, 18000).pressure
+    assert np.abs(got - exact).max() < 1e-4 * np.abs(exact).max()
 
 
 def test_an_empty_window_is_refused() -> None:

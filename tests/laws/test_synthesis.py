@@ -73,6 +73,7 @@ def arrivals(
         bottom=zero,
         turning=zero,
         caustics=zero,
+        arrives_by=zero,
         phase=np.zeros(n),
         blur=np.zeros(n),
         stretch=np.zeros(n),

@@ -1,0 +1,139 @@
+"""The frequencies of a stretch of time that count, and the spectra of its pulses there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from sonarsynth.acoustics.snap import ComplexArray
+from sonarsynth.conventions import Floats
+from sonarsynth.sonar import Sonar
+from sonarsynth.synthesis.direct_sum import relative_absorption
+from sonarsynth.synthesis.layout import Stretch
+from sonarsynth.synthesis.nodes import rounded_up
+from sonarsynth.synthesis.pulse import pulse_spectrum, stretch_sizes, stretched_spectra
+from sonarsynth.synthesis.shapes import blur_exponent, shape_modes, stretched
+from sonarsynth.synthesis.wavefront import Fronts
+
+SHAPES = 0.02
+"""Share of the tolerance that the shapes of the pulses get, beside their terms."""
+
+
+MOST_DECAY = 2.0
+"""Range of absorption (Np) that is among the modes of pulses; a wider one keeps terms."""
+
+
+class Bins(NamedTuple):
+    """Frequencies of a stretch that count, next to each other."""
+
+    first: int  # number of the first bin
+    frequency: Floats  # (bin,) Hz
+    spectrum: ComplexArray  # (bin,) of the filtered snap at 1 m, in the shape that all paths share
+    relative: Floats  # (bin,) absorption over that at the band centre, less one
+    step: float  # Hz
+    modes: ComplexArray  # (mode, bin) spectra that the modes of the paths weigh; none where all share their shape
+
+    def cut(self, count: int) -> Bins:
+        """The first of them."""
+        some = slice(0, count)
+        frequency, spectrum, relative = self.frequency[some], self.spectrum[some], self.relative[some]
+        return self._replace(frequency=frequency, spectrum=spectrum, relative=relative, modes=self.modes[:, some])
+
+
+def audible(spectrum: ComplexArray, tolerance: float) -> slice:
+    """The bins of a spectrum without its ends, which hold no more than 0.03 `tolerance` of its modulus each."""
+    mass = np.cumsum(np.abs(spectrum))
+    ends = np.searchsorted(mass, np.array([0.03 * tolerance, 1.0 - 0.03 * tolerance]) * mass[-1])
+    return slice(int(ends[0]), min(int(ends[1]) + 1, spectrum.size))
+
+
+def bins_of(
+    part: Stretch, front: Fronts, sonar: Sonar, absorption: Callable[[Floats], Floats] | None, tolerance: float
+) -> tuple[Fronts, Bins]:
+    """The paths of a stretch, with the modes of their pulses, and its bins.
+
+    Errors are relative to the least blurred path; paths that are silent beside it are left out.
+    """
+    fs = sonar.sampling_frequency
+    frequency, spectrum = pulse_spectrum(part.model, sonar.antialias, fs, part.samples)
+    widest = rounded_up(float(np.abs(front.doppler).max()), 2.0)
+    series = np.zeros((0, spectrum.size), complex)
+    if widest > 0.0:
+        sizes = np.array(stretch_sizes(part.model, sonar.antialias, widest))
+        left = np.append(np.cumsum(sizes[::-1])[::-1], 0.0)
+        count = int(np.flatnonzero(left <= SHAPES * tolerance)[0])
+        series = stretched_spectra(part.model, sonar.antialias, fs, part.samples, widest, count)
+    if len(series) or front.variance.any() or front.phase.any():
+        front, spectrum, series = _shared(front, frequency, spectrum, series, widest, tolerance)
+    some = audible(spectrum, tolerance)
+    frequency, spectrum, series = frequency[some], spectrum[some], series[:, some]
+    modes = np.zeros((0, spectrum.size), complex)
+    if front.variance.any():
+        front = _loud(front, frequency, spectrum, tolerance)
+    relative = relative_absorption(absorption, frequency, sonar.band.centre)
+    if len(series) or front.variance.any() or front.phase.any():
+        front, spectrum, modes = _with_modes(front, frequency, spectrum, relative, series, widest, tolerance)
+    return front, Bins(some.start, frequency, spectrum, relative, fs / part.samples, modes)
+
+
+def _with_modes(
+    front: Fronts,
+    frequency: Floats,
+    spectrum: ComplexArray,
+    relative: Floats,
+    series: ComplexArray,
+    widest: float,
+    tolerance: float,
+) -> tuple[Fronts, ComplexArray, ComplexArray]:
+    """Paths with modes, the spectrum, and those of the modes. Absorption is among them, unless it differs much."""
+    decay = np.log(10.0) / 20.0 * relative
+    few = float(np.ptp(front.loss) * np.abs(decay).max()) <= MOST_DECAY
+    if few:
+        middle = 0.5 * float(front.loss.min() + front.loss.max())
+        lost = np.exp(-middle * decay)
+        front, spectrum, series = replace(front, loss=front.loss - middle), spectrum * lost, series * lost
+    else:
+        decay = np.zeros(frequency.size)
+    weight, modes = shape_modes(front, frequency, spectrum, decay, series, widest, SHAPES * tolerance)
+    return replace(front, modes=weight, loss=np.zeros(front.count) if few else front.loss), spectrum, modes
+
+
+def _shared(
+    front: Fronts, frequency: Floats, spectrum: ComplexArray, series: ComplexArray, widest: float, tolerance: float
+) -> tuple[Fronts, ComplexArray, ComplexArray]:
+    """Paths without the shape that all share, and the spectrum with it; and the series in Doppler, empty where all
+    share that."""
+    if len(series):
+        low, high = float(front.doppler.min()), float(front.doppler.max())
+        spectrum = (stretched(series, np.array([0.5 * (low + high) / widest])) @ series)[0]
+        # the ends of a smooth series differ most
+        bend = stretched(series, np.array([low, high]) / widest) @ series
+        if np.abs(bend[1] - bend[0]).sum() <= SHAPES * tolerance * np.abs(spectrum).sum():
+            series = series[:0]
+    least = float(front.variance.min())
+    spread = float(front.variance.max()) - least
+    if least > 0.0:
+        soft = np.exp(-least * blur_exponent(frequency))
+        spectrum, series = spectrum * soft, series * soft
+    alike = spread * blur_exponent(frequency)[-1] <= SHAPES * tolerance
+    front = replace(front, variance=np.zeros(front.count) if alike else front.variance - least)
+    phase = float(front.phase[0])
+    if (np.abs(front.phase - phase) <= SHAPES * tolerance).all():
+        turn = np.exp(1j * phase)
+        spectrum, series = spectrum * turn, series * turn
+        front = replace(front, phase=np.zeros(front.count))
+    return front, spectrum, series
+
+
+def _loud(front: Fronts, frequency: Floats, spectrum: ComplexArray, tolerance: float) -> Fronts:
+    """The paths without those that their blur leaves, all together, less than 0.01 `tolerance` of the loudest."""
+    some = slice(None, None, max(1, frequency.size // 128))
+    mass, exponent = np.abs(spectrum[some]), blur_exponent(frequency[some])
+    variance = np.append(0.0, np.geomspace(1e-4 / exponent[-1], 1e3 / exponent[0], 257))
+    level = np.exp(-np.multiply.outer(variance, exponent)) @ mass / mass.sum()
+    loudness = np.abs(front.amplitude) * np.interp(front.variance, variance, level)
+    keep = loudness > 0.01 * tolerance / front.count * loudness.max()
+    return front if keep.all() else front.select(np.flatnonzero(keep))

@@ -1,0 +1,156 @@
+"""How the pulses of paths differ in shape: turned in phase, blurred and stretched.
+
+A pulse of spectrum S, after a phase, a blur of variance v and a Doppler s, has the spectrum
+    exp(i phase) exp(-v g(f)) (1 + s) S((1 + s) f),  g = (2 pi f)^2/2,  f > 0,
+a point on a smooth surface of few dimensions. What all paths share is taken to the spectrum. What differs is expanded
+in modes, sum_k weight[path, k] spectrum[k, bin], and with it the absorption, which may then have no terms of its own:
+first in the cosine and sine of phase, in Chebyshev polynomials of Doppler and in values of exp(-v g) and of what is
+absorbed at some frequencies; then, by singular values, in the fewest that these paths need
+(Eckart and Young, 1936).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from sonarsynth.acoustics.snap import ComplexArray
+from sonarsynth.conventions import Floats
+from sonarsynth.synthesis.nodes import Axis, chebyshev, interpolation, rounded_up
+from sonarsynth.synthesis.wavefront import Fronts
+
+SAMPLES = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 20, 24, 32, 48, 64, 96, 128)
+"""How many frequencies a blur or an absorption may be sampled at."""
+
+
+class Modes(NamedTuple):
+    """Pulses of paths, as a sum: weight @ spectrum. The spectra are orthogonal and of one norm."""
+
+    weight: Floats  # (path, mode)
+    spectrum: ComplexArray  # (mode, bin)
+
+
+class Reduction(NamedTuple):
+    """From weights and spectra to fewer: weight @ onto, back @ spectrum."""
+
+    onto: Floats  # (given, mode)
+    back: Floats  # (mode, given)
+
+
+def blur_exponent(frequency: Floats) -> Floats:
+    """Exponent g(f) (1/s2) of a blur: (2 pi f)^2/2."""
+    return np.asarray(0.5 * (2.0 * np.pi * frequency) ** 2)
+
+
+def stretched(series: ComplexArray, doppler: Floats) -> Floats:
+    """Chebyshev polynomials (path, degree) at doppler (path,), -1 to 1, as many as the series (degree, bin) has."""
+    return np.asarray(np.cos(np.outer(np.arccos(np.clip(doppler, -1.0, 1.0)), np.arange(len(series)))))
+
+
+def reduction(weight: Floats, spectrum: ComplexArray, loudness: Floats, tolerance: float) -> Reduction:
+    """The fewest modes of weight (path, given) @ spectrum (given, bin) times loudness (path,), to `tolerance` of the
+    loudest path and of their root mean square."""
+    some = spectrum[:, :: max(1, spectrum.shape[1] // 128)]
+    u, s, _ = np.linalg.svd(np.concatenate([some.real, some.imag], axis=1), full_matrices=False)
+    heard = np.linalg.qr(loudness[:, None] * weight, mode="r")
+    _, size, v = np.linalg.svd(heard @ (u * s), full_matrices=False)
+    onto = (u * s) @ v.T
+    keep = _sizes(np.abs(loudness[:, None] * (weight @ onto))) > tolerance
+    onto, size = onto[:, keep], size[keep]
+    back = (heard @ onto).T @ heard / size[:, None] ** 2
+    scale = size[0] / np.linalg.norm(loudness)  # makes the weights of the first about 1
+    return Reduction(onto / scale, back * scale)
+
+
+def _sizes(heard: Floats) -> Floats:
+    """Sizes (mode,) over the first, of moduli (path, mode): of root mean squares, and of the largest."""
+    mean, most = np.sqrt(np.einsum("pm,pm->m", heard, heard)), heard.max(axis=0)
+    return np.asarray(np.maximum(mean / mean[0], most / most[0]))
+
+
+def main_modes(weight: Floats, loudness: Floats) -> tuple[Floats, tuple[float, ...]]:
+    """Turn (mode, mode) of orthogonal modes with weights (path, mode) that puts the largest first, and their sizes over
+    that of the first, rounded up by at most a fifth, so that choices are kept from frame to frame."""
+    heard = loudness[:, None] * weight
+    turn = np.linalg.eigh(heard.T @ heard)[1][:, ::-1]  # a turn whatever rounds: sizes are those of what it gives
+    sizes = _sizes(np.abs(heard @ turn))
+    return turn, (1.0, *(min(rounded_up(s, 1.2), 1.0) for s in sizes[1:].tolist()))
+
+
+def shape_modes(
+    front: Fronts,
+    frequency: Floats,
+    spectrum: ComplexArray,
+    decay: Floats,
+    series: ComplexArray,
+    widest: float,
+    tolerance: float,
+) -> Modes:
+    """The modes of pulses: of phase, of blur, of absorption, and of Doppler where there is a series (degree, bin) in
+    Doppler/widest.
+
+    spectrum (bin,) is of the pulse without them; decay (bin,) is in Np for each dB of the paths' loss.
+    """
+    loudness = np.abs(front.amplitude) / np.abs(front.amplitude).max()
+    weight, factor = np.ones((front.count, 1)), np.ones((1, frequency.size))
+    if front.variance.any() or (front.loss.any() and decay.any()):
+        weight, factor = _softened(front, frequency, decay, tolerance)
+        fewer = reduction(weight, factor * spectrum, loudness, tolerance)
+        weight, factor = weight @ fewer.onto, fewer.back @ factor
+    spectra = factor * spectrum
+    if len(series):
+        bend = stretched(series, front.doppler / widest)
+        weight = (weight[:, :, None] * bend[:, None, :]).reshape(front.count, -1)
+        spectra = (factor[:, None, :] * series).reshape(-1, frequency.size)
+    if front.phase.any():
+        turn = front.phase[:, None]
+        weight = np.concatenate([weight * np.cos(turn), weight * np.sin(turn)], axis=1)
+        spectra = np.concatenate([spectra, 1j * spectra])
+    fewer = reduction(weight, spectra, loudness, tolerance)
+    return Modes(weight @ fewer.onto, fewer.back @ spectra)
+
+
+def _softened(front: Fronts, frequency: Floats, decay: Floats, tolerance: float) -> tuple[Floats, Floats]:
+    """What blur and absorption leave at some frequencies (path, given), and their interpolation in the logarithm of
+    frequency (given, bin). Degrees of a product add up."""
+    high, span = float(frequency[-1]), max(float(np.log(frequency[-1] / frequency[0])), 1e-3)
+    place = 2.0 * np.log(frequency / high) / span + 1.0
+    steepest = float(front.variance.max() * blur_exponent(frequency)[-1])
+    rate = CubicSpline(frequency, decay)
+
+    def at(count: int) -> Floats:
+        return np.asarray(high * np.exp(0.5 * span * (chebyshev(count) - 1.0)))
+
+    def lost(loss: Floats, frequency: Floats) -> Floats:
+        return np.asarray(np.exp(-np.multiply.outer(rate(frequency), loss)))
+
+    some = slice(None, None, max(1, frequency.size // 64))
+    ends = np.array([front.loss.min(), front.loss.max()])
+    exact = lost(ends, frequency[some])
+    onto = ((n, interpolation(place[some], Axis(n))) for n in SAMPLES)
+    count = next((n for n, i in onto if np.abs(i @ lost(ends, at(n)) - exact).max() <= tolerance), SAMPLES[-1])
+    if steepest > 0.0:
+        count += _samples(rounded_up(steepest, 1.25), float(np.ceil(10.0 * span)) / 10.0, tolerance) - 1
+    exponent = np.multiply.outer(front.variance, blur_exponent(at(count))) + np.multiply.outer(
+        front.loss, rate(at(count))
+    )
+    return np.exp(-exponent), np.asarray(interpolation(place, Axis(count)).T)
+
+
+@lru_cache(maxsize=256)
+def _samples(steepest: float, span: float, tolerance: float) -> int:
+    """How many frequencies, Chebyshev in the logarithm, `span` between the ends, give every blur up to the exponent
+    `steepest` at the highest."""
+    x = np.linspace(-1.0, 1.0, 257)
+    exponents = np.append(0.0, np.geomspace(min(1e-3, 0.1 / steepest), 1.0, 64)) * steepest
+
+    def blurs(at: Floats) -> Floats:
+        return np.asarray(np.exp(-np.multiply.outer(np.exp(span * (at - 1.0)), exponents)))
+
+    for count in SAMPLES:
+        if np.abs(interpolation(x, Axis(count)) @ blurs(chebyshev(count)) - blurs(x)).max() <= tolerance:
+            return count
+    return SAMPLES[-1]

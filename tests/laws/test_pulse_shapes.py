@@ -1,0 +1,289 @@
+"""Pulses that paths turn in phase, blur and stretch: closed forms, the fast synthesis against the exact one, limits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import hilbert
+
+from sonarsynth.acoustics import spectra
+from sonarsynth.acoustics.snap import Bubble, ComplexArray
+from sonarsynth.conventions import Floats
+from sonarsynth.products import Arrivals
+from sonarsynth.sonar import BandPass, LowPass, PositionTable, Romanis, Sonar, elements
+from sonarsynth.synthesis import DirectSum, KernelDeposit, pulse_support
+from sonarsynth.synthesis.direct_sum import exact_signals
+from sonarsynth.synthesis.pulse import bubble, fir, pulse_spectrum, silencing_blur, stretch_sizes, stretched_spectra
+from sonarsynth.synthesis.shapes import shape_modes
+from sonarsynth.synthesis.wavefront import folded, fronts
+from sonarsynth.world.moment import Snap
+from sonarsynth.world.sources import LogarithmicBubble
+from tests.laws.test_synthesis import absorption, arrivals, error, some_of, target_at
+
+MODEL = LogarithmicBubble()
+SNAPS = (Snap(np.zeros(3), 0.0, MODEL, None),)
+SONAR = Sonar()
+SHARP = Sonar(filter=BandPass(low=35e3, high=75e3, transition=15e3, attenuation=160))  # nothing beyond 98 kHz
+LOW = Sonar(filter=LowPass(cutoff=60e3, attenuation=140), sampling_frequency=250e3)
+FACES = elements(Romanis())
+ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
+METHODS = (DirectSum(), KernelDeposit(precision="float64", width=14, tolerance=1e-9))
+
+
+def shaped(of: Arrivals, seed: int, *, phase: float = 10.0, blur: float = 20e-6, stretch: float = 3e-3) -> Arrivals:
+    """Random shapes, of a few different stretches (each costs the exact sum a spectrum); some paths stay plain."""
+    rng, n = np.random.default_rng(seed), of.delay.size
+    some = rng.random((3, n)) < 0.8
+    return replace(
+        of,
+        phase=np.where(some[0], rng.uniform(-phase, phase, n), 0.0),
+        blur=np.where(some[1], rng.uniform(0.0, blur, n), 0.0),
+        stretch=np.where(some[2], rng.choice(stretch * np.array([-1.0, -0.3, 0.8, 1.0]), n), 0.0),
+    )
+
+
+def window(of: Arrivals, sonar: Sonar, aperture: float, margin: float = 4e-4) -> tuple[float, int]:
+    before, after = pulse_support(MODEL, sonar.antialias, turned=True)
+    start = float(of.delay.min() - before - aperture / of.sound_speed - margin)
+    stop = float(of.delay.max() + after + aperture / of.sound_speed + margin)
+    return start, int((stop - start) * sonar.sampling_frequency) + 1
+
+
+def alone(sonar: Sonar, phase: float = 0.0, blur: float = 0.0, stretch: float = 0.0) -> tuple[Floats, Floats]:
+    """Times after the collapse (sample,) and the exact pressure (sample,) of one path at one hydrophone."""
+    of = arrivals([0.05], [[1.0, 0.0, 0.0]], [10.0], [1.0])
+    of = replace(of, phase=np.array([phase]), blur=np.array([blur]), stretch=np.array([stretch]))
+    start, samples = window(of, sonar, 0.0, 6e-3)
+    got, signals = exact_signals(of, SNAPS, ONE, sonar, None, start, samples)
+    assert signals.outside == 0
+    return start + np.arange(samples) / sonar.sampling_frequency - 0.05, got[0]
+
+
+# ---- the exact sum against closed forms ------------------------------------------------------------------------------
+
+
+def test_a_quarter_turn_is_less_the_hilbert_transform() -> None:
+    """exp(+i phase) at positive frequencies; Hilbert's transform has -i there."""
+    _, plain = alone(SHARP)
+    _, turned = alone(SHARP, phase=0.5 * np.pi)
+    assert error(turned, -np.imag(hilbert(plain))) < 1e-6
+    _, between = alone(SHARP, phase=-0.7)
+    assert error(between, np.cos(0.7) * plain - np.sin(0.7) * turned) < 1e-11
+
+
+def test_a_blur_is_a_gaussian_in_time() -> None:
+    """Convolved in time with the Gaussian of that standard deviation, by Gauss-Hermite quadrature."""
+    blur = 7e-6
+    t, got = alone(SHARP, blur=blur)
+    near = np.abs(t) < 3e-4
+    x, w = np.polynomial.hermite_e.hermegauss(24)
+    delayed = [spectra.filtered_pulse(t[near] - blur * late, bubble(MODEL), fir(SHARP.antialias)) for late in x]
+    expected = w @ delayed / w.sum()
+    assert error(got[near], expected) < 1e-8
+
+
+@pytest.mark.parametrize("stretch", [3e-3, -3e-2])
+def test_a_stretched_snap_is_that_of_a_slower_bubble(stretch: float) -> None:
+    """p(t/(1 + s)) is (1 + s)^2 times the pressure of the bubble that lives 1 + s times as long; then the filter."""
+    t, got = alone(SHARP, stretch=stretch)
+    one = bubble(MODEL)
+    longer = 1.0 + stretch
+    slower = Bubble(one.a, one.k / longer, one.m * longer, one.q / longer, one.density)
+    near = np.abs(t) < 3e-4
+    expected = longer**2 * spectra.filtered_pulse(t[near], slower, fir(SHARP.antialias))
+    assert error(got[near], expected) < 1e-7
+
+
+@pytest.mark.parametrize("sonar", [SHARP, LOW])
+def test_a_turned_pulse_is_over_after_its_support(sonar: Sonar) -> None:
+    before, after = pulse_support(MODEL, sonar.antialias, turned=True)
+    for phase in (0.5 * np.pi, 0.9):
+        t, got = alone(sonar, phase=phase)
+        size = np.abs(got) / np.abs(got).max()
+        assert size[(t < -before) | (t > after)].max() < 2e-7  # of its peak, which the envelope's may be above
+    assert size[(t < -0.7 * before) | (t > 0.7 * after)].max() > 2e-7  # and not long before
+    plain = pulse_support(MODEL, sonar.antialias)
+    assert before >= plain[0]
+    assert after >= plain[1]
+
+
+# ---- the fast synthesis against the exact sum ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("method", "bound"),
+    [(KernelDeposit(), 1e-4), (KernelDeposit(width=14, precision="float64", tolerance=1e-11), 1e-8)],
+)
+def test_kernel_deposit_is_the_exact_sum(method: KernelDeposit, bound: float) -> None:
+    """All at once: phase, blur and stretch of any size, refracted fronts, several snaps of different kinds."""
+    snaps = (*SNAPS, Snap(np.zeros(3), 0.0, LogarithmicBubble(q=-2.5e5), 190.0))
+    array = some_of(FACES, 60)
+    of = shaped(target_at(8.0, 9, 2, refracted=True, direct=False), 3)
+    of = replace(of, snap=np.random.default_rng(4).integers(0, 2, of.delay.size))
+    start, samples = window(of, SHARP, array.aperture)
+    exact, _ = exact_signals(of, snaps, array, SHARP, absorption, start, samples)
+    got, outside = method.pressure(of, snaps, array, SHARP, absorption, start, samples)
+    assert outside == 0
+    assert 1e-14 < error(got, exact) < bound
+
+
+@pytest.mark.parametrize(("phase", "blur"), [(1.0, 0.0), (0.0, 20e-6), (10.0, 20e-6)])
+def test_many_shapes_over_the_whole_array(phase: float, blur: float) -> None:
+    """Enough paths that nodes pay, in tiles of many modes; looked at where the rim and the middle are."""
+    of = shaped(target_at(20.0, 300, 5, direct=False), 6, phase=phase, blur=blur, stretch=0.0)
+    some = np.append(np.argsort(-np.linalg.norm(FACES.position, axis=1), kind="stable")[:2], 250)
+    part = elements(PositionTable(positions=tuple(map(tuple, FACES.position[some].tolist())), face=FACES.face))
+    start, samples = window(of, SONAR, FACES.aperture)
+    exact, _ = exact_signals(of, SNAPS, part, SONAR, absorption, start, samples)
+    got = KernelDeposit().signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure
+    assert error(got[some], exact) < 1e-4
+
+
+def test_one_odd_path_among_many_is_not_lost() -> None:
+    """Modes are chosen for the loudest path too, not for the mean alone: a phase of one path in a thousand is kept."""
+    of = target_at(20.0, 1000, 7, direct=False)
+    of = replace(of, phase=np.where(np.arange(1000) == 500, 0.02, 0.0), amplitude=np.full(1000, 1e-4))
+    start, samples = window(of, SONAR, FACES.aperture)
+    plain = replace(of, phase=np.zeros(1000))
+    got, without = (KernelDeposit().pressure(x, SNAPS, FACES, SONAR, None, start, samples)[0] for x in (of, plain))
+    odd = of.select(np.array([500]))
+    parts = (
+        DirectSum().signals(x, SNAPS, FACES, SONAR, None, start, samples).pressure
+        for x in (odd, replace(odd, phase=np.zeros(1)))
+    )
+    turned, straight = parts
+    assert np.abs(turned - straight).max() > 0.015 * np.abs(straight).max()
+    assert np.abs(got - without - (turned - straight)).max() < 1e-2 * np.abs(straight).max()
+
+
+# ---- laws ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_half_turns_are_signs_and_nothing_is_nothing(method: DirectSum | KernelDeposit) -> None:
+    array = some_of(FACES, 100)
+    of = target_at(15.0, 12, 8, direct=False)
+    start, samples = window(of, SHARP, array.aperture)
+    turns = np.random.default_rng(9).integers(-9, 9, 12)
+    half = replace(of, phase=np.pi * turns)
+    signed = replace(of, amplitude=of.amplitude * (-1.0) ** turns)
+    got, expected = (method.signals(x, SNAPS, array, SHARP, None, start, samples).pressure for x in (half, signed))
+    np.testing.assert_array_equal(got, expected)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_turn_keeps_the_energy_and_turns_add_up(method: DirectSum | KernelDeposit) -> None:
+    of = arrivals([0.05, 0.0501], [[1.0, 0.0, 0.0], [1.0, 0.1, 0.0]], [10.0, 11.0], [1.0, 0.4])
+    start, samples = window(of, SHARP, 0.0, 2e-3)
+
+    def heard(*phase: float) -> Floats:
+        turned = replace(of, phase=np.array(phase))
+        return method.signals(turned, SNAPS, ONE, SHARP, None, start, samples).pressure[0].astype(float)
+
+    plain, quarter = heard(0.0, 0.0), heard(0.5 * np.pi, 0.5 * np.pi)
+    for angle in (0.3, 1.0, 2.5):
+        turned = heard(angle, angle)
+        assert (turned**2).sum() == pytest.approx((plain**2).sum(), rel=1e-5)
+        assert error(turned, np.cos(angle) * plain + np.sin(angle) * quarter) < 1e-6
+        alike = heard(angle, angle + 1e-3)  # two modes, where they were of one shape
+        assert error(alike, turned) < 1e-3
+    assert error(heard(0.3, 0.3 + 2.0 * np.pi), heard(0.3, 0.3)) < 1e-6
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_blurs_add_by_squares_and_end_in_silence(method: DirectSum | KernelDeposit) -> None:
+    of = arrivals([0.05, 0.0502], [[1.0, 0.0, 0.0], [1.0, 0.1, 0.0]], [10.0, 11.0], [1.0, 0.4])
+    start, samples = window(of, SHARP, 0.0, 2e-3)
+
+    def heard(*blur: float) -> Floats:
+        soft = replace(of, blur=np.array(blur))
+        got = method.signals(soft, SNAPS, ONE, SHARP, None, start, samples)
+        assert got.outside == 0
+        return got.pressure[0].astype(float)
+
+    plain, soft = heard(0.0, 0.0), heard(3e-6, 3e-6)
+    f = np.fft.rfftfreq(samples, 1.0 / SHARP.sampling_frequency)
+    once = np.fft.irfft(np.fft.rfft(plain) * np.exp(-0.5 * (2 * np.pi * f * 3e-6) ** 2), samples)
+    twice = np.fft.irfft(np.fft.rfft(soft) * np.exp(-0.5 * (2 * np.pi * f * 4e-6) ** 2), samples)
+    assert error(soft, once) < 1e-6
+    assert error(heard(5e-6, 5e-6), twice) < 1e-6
+    silent = silencing_blur(MODEL, SHARP.antialias)
+    assert not heard(1.01 * silent, 10.0 * silent).any()
+    assert 0.0 < np.abs(heard(0.98 * silent, 0.98 * silent)).max() < 1e-6 * np.abs(plain).max()
+
+
+def test_shared_shapes_cost_no_modes() -> None:
+    """Where all paths have one shape, what is deposited is what plain pulses deposit: only their spectrum differs."""
+    of = target_at(15.0, 6, 10, direct=False)
+    start, samples = window(of, SHARP, 0.0, 1e-3)
+    once = replace(of, phase=np.full(6, 0.8), blur=np.full(6, 4e-6), stretch=np.full(6, 2e-3))
+    exact, _ = exact_signals(once, SNAPS, ONE, SHARP, None, start, samples)
+    got, _ = KernelDeposit(width=14, precision="float64", tolerance=1e-10).pressure(
+        once, SNAPS, ONE, SHARP, None, start, samples
+    )
+    assert error(got, exact) < 1e-8
+
+
+# ---- the modes -------------------------------------------------------------------------------------------------------
+
+
+def pulses(phase: Floats, blur: Floats, stretch: Floats, f: Floats, samples: int) -> ComplexArray:
+    """The spectra (path, bin) that the definition gives."""
+    rate, chosen = SHARP.sampling_frequency, SHARP.antialias
+    S = [pulse_spectrum(MODEL, chosen, rate, samples, float(s))[1][: f.size] for s in stretch]
+    return np.exp(1j * phase[:, None] - 0.5 * (2 * np.pi * np.multiply.outer(blur, f)) ** 2) * S
+
+
+@pytest.mark.parametrize(("tolerance", "most"), [(1e-3, 10), (1e-6, 22)])
+def test_modes_are_the_definition(tolerance: float, most: int) -> None:
+    rng, samples, n = np.random.default_rng(11), 384, 60
+    f, spectrum = pulse_spectrum(MODEL, SHARP.antialias, SHARP.sampling_frequency, samples)
+    some = slice(40, 170)
+    of = target_at(15.0, n, 12, direct=False)
+    of = replace(
+        of,
+        amplitude=np.ones(n),
+        phase=rng.uniform(-1.5, 1.5, n),
+        blur=rng.uniform(0.0, 10e-6, n),
+        stretch=rng.uniform(-1e-3, 1e-3, n),
+    )
+    series = stretched_spectra(MODEL, SHARP.antialias, SHARP.sampling_frequency, samples, 2.0**-9, 4)
+    front = fronts(of, SNAPS, ONE)
+    front = replace(front, loss=front.loss - front.loss.mean())
+    decay = absorption(f)
+    modes = shape_modes(front, f[some], spectrum[some], decay[some], series[:, some], 2.0**-9, tolerance)
+    exact = (pulses(of.phase, of.blur, of.stretch, f, samples) * np.exp(-np.multiply.outer(front.loss, decay)))[:, some]
+    apart = np.abs(modes.weight @ modes.spectrum - exact)
+    assert apart.mean(axis=1).max() < 3.0 * tolerance * np.abs(exact).mean(axis=1).max()
+    assert modes.weight.shape[1] <= most
+
+
+def test_phases_alone_are_two_modes() -> None:
+    f, spectrum = pulse_spectrum(MODEL, SHARP.antialias, SHARP.sampling_frequency, 384)
+    of = shaped(target_at(15.0, 50, 13, direct=False), 14, blur=0.0, stretch=0.0)
+    none, front = np.zeros((0, 130), complex), fronts(of, SNAPS, ONE)
+    modes = shape_modes(front, f[40:170], spectrum[40:170], np.zeros(130), none, 0.0, 1e-9)
+    assert modes.weight.shape == (50, 2)
+
+
+@pytest.mark.parametrize("widest", [1e-6, 1e-3, 0.1])
+def test_a_series_in_doppler_is_the_stretched_snap(widest: float) -> None:
+    rate, samples = SONAR.sampling_frequency, 384
+    series = stretched_spectra(MODEL, SONAR.antialias, rate, samples, widest, 7)
+    x = np.array([-1.0, 0.37, 1.0])
+    got = np.cos(np.outer(np.arccos(x), np.arange(7))) @ series
+    left = sum(stretch_sizes(MODEL, SONAR.antialias, widest)[7:])
+    for row, at in zip(got, x, strict=True):
+        _, exact = pulse_spectrum(MODEL, SONAR.antialias, rate, samples, float(widest * at))
+        assert np.abs(row - exact).sum() < (2.0 * left + 1e-11) * np.abs(exact).sum()
+
+
+def test_phases_fold_to_a_quarter_turn_either_side() -> None:
+    phase = np.concatenate([np.linspace(-20.0, 20.0, 401), np.pi * np.arange(-5, 6), [1e6, -1e9]])
+    sign, rest = folded(phase)
+    apart = np.abs(sign * np.exp(1j * rest) - np.exp(1j * phase))
+    assert (apart <= 4e-16 * (1.0 + np.abs(phase))).all()
+    assert (np.abs(rest) <= 0.5 * np.pi).all()
+    assert not rest[401:412].any()
