@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonarsynth.acoustics.rays import mean_slowness, water
-from sonarsynth.conventions import Floats, depth
+from sonarsynth.conventions import SLOWEST, Floats, depth
 from sonarsynth.description import FieldError
 from sonarsynth.planning.plans import Windows
 from sonarsynth.products import Paths
@@ -15,9 +15,10 @@ from sonarsynth.recipe import Recipe
 from sonarsynth.scene import Frame
 from sonarsynth.sonar import elements
 from sonarsynth.synthesis import pulse_support
-from sonarsynth.synthesis.pulse import snap_levels
+from sonarsynth.synthesis.pulse import FEET, snap_levels
 from sonarsynth.tracing import Straight
 from sonarsynth.world.environment import Profile
+from sonarsynth.world.reflection import rms_height
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 MARGIN = 0.1e-3
@@ -40,8 +41,8 @@ def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
     scene = recipe.scene
     sonar = scene.sonar
     across = elements(sonar.array).aperture / profile.speed.min()  # of a wave, from the centre to the edge
-    before, after = _support(recipe, SUPPORT) + across
-    echo_before, echo_after = _support(recipe, ECHO_SUPPORT) + across
+    before, after = _support(recipe, SUPPORT, profile.uniform) + across
+    echo_before, echo_after = _support(recipe, ECHO_SUPPORT, profile.uniform) + across
     bounces = scene.physics.tracing.bounces
     depth_of_bed = scene.world.environment.depth
     spans = [_span(recipe.frame(i)[1], profile, depth_of_bed, bounces) for i in range(recipe.frames)]
@@ -65,11 +66,16 @@ def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
     return Windows(first, samples, float(start), float(stop), disturbed)
 
 
-def _support(recipe: Recipe, tolerance: float) -> Floats:
+def _support(recipe: Recipe, tolerance: float, uniform: bool) -> Floats:
     """Longest time (s) before and after its collapse that any filtered snap exceeds `tolerance` of its peak."""
-    chosen = recipe.scene.sonar.antialias
-    supports = [pulse_support(s.snap, chosen, tolerance) for s in recipe.scene.world.shrimp]
-    return np.asarray(np.max(supports or [(0.0, 0.0)], axis=0))
+    scene = recipe.scene
+    environment, bounces = scene.world.environment, scene.physics.tracing.bounces
+    turned = bounces > 0 or not uniform  # lossy reflections and caustics turn the phase
+    chosen = scene.sonar.antialias
+    supports = [pulse_support(s.snap, chosen, tolerance, turned=turned) for s in scene.world.shrimp]
+    roughest = max(rms_height(environment.surface), rms_height(environment.bed))
+    blurred = FEET * 2.0 * roughest / SLOWEST * np.sqrt(bounces)  # at the steepest grazing angle
+    return np.asarray(np.max(supports or [(0.0, 0.0)], axis=0)) + blurred
 
 
 @dataclass(frozen=True)

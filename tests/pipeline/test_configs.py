@@ -94,7 +94,7 @@ def test_real_water_and_a_real_hull(tmp_path: Path) -> None:
     sets = (
         f"scene.world.environment.sound_speed.path={REAL / 'castaway_ctd.csv'}",
         f"scene.world.targets.0.shape.path={REAL / 'rexrov.stl'}",
-        "scene.world.targets.0.shape.edge=0.25",
+        "scene.world.targets.0.shape.edge=0.2",
     )
     report = schedule.build(_plan("harbour.yaml", sets), tmp_path / "harbour.zarr", frames=range(0, 16, 5), workers=0)
     assert report.ok
