@@ -157,7 +157,7 @@ class Approach:
 def munk_approach(quick: bool) -> Approach:
     """The canonical profile, joined over 50 or 100 km."""
     ends = np.array([310.0, 800.0, 1310.0, 2000.0])
-    tolerances = (1e-4, 1e-5) if quick else (1e-3, 1e-4, 1e-5, 1e-6)
+    tolerances = (1e-4, 1e-5) if quick else (1e-4, 1e-5, 1e-6)
     return Approach(
         "Munk, over the layers' tolerance", 1000.0, ends, 5e4 if quick else 1e5, 12, munk_layers, tolerances
     )
