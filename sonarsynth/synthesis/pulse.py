@@ -8,13 +8,15 @@ from math import inf
 import numpy as np
 from scipy.fft import ifft, irfft, rfft
 
+from sonarsynth.acoustics import pulses, spectra
 from sonarsynth.acoustics import snap as snaps
-from sonarsynth.acoustics import spectra
+from sonarsynth.acoustics.pulses import Pulse
 from sonarsynth.acoustics.snap import Bubble, ComplexArray
 from sonarsynth.acoustics.spectra import Fir
+from sonarsynth.acoustics.waveforms import logarithmic
 from sonarsynth.conventions import Floats
 from sonarsynth.sonar import Filter, LowPass, stop_frequency
-from sonarsynth.synthesis.nodes import analysis, chebyshev
+from sonarsynth.synthesis.nodes import analysis, chebyshev, rounded_up
 from sonarsynth.world.moment import Snap
 from sonarsynth.world.sources import LogarithmicBubble
 
@@ -107,12 +109,23 @@ def _bins(sampling_frequency: float, samples: int) -> Floats:
     return np.asarray(np.arange(samples // 2 + 1) * (sampling_frequency / samples), float)
 
 
+@lru_cache(maxsize=16)
+def _pulse(model: LogarithmicBubble, highest: float) -> Pulse:
+    return logarithmic(bubble(model), highest)
+
+
+def _snap_spectrum(model: LogarithmicBubble, longer: float, frequency: Floats) -> ComplexArray:
+    """Spectrum of the snap, unfiltered, at `longer` times evenly spaced frequencies (bin,)."""
+    octave = rounded_up(1.2 * float(frequency[-1]), 2.0)  # few pulses serve all frequencies
+    return pulses.spectrum(longer * frequency, _pulse(model, octave))
+
+
 @lru_cache(maxsize=64)
 def _spectrum(
     model: LogarithmicBubble, chosen: Filter, sampling_frequency: float, samples: int, doppler: float
 ) -> ComplexArray:
     f, longer = _bins(sampling_frequency, samples), 1.0 + doppler
-    value = snaps.spectrum(longer * f, bubble(model)) * _response(chosen, sampling_frequency, samples) * longer
+    value = _snap_spectrum(model, longer, f) * _response(chosen, sampling_frequency, samples) * longer
     value[2 * f >= sampling_frequency] = 0.0
     value.setflags(write=False)
     return value
@@ -148,7 +161,7 @@ def stretch_sizes(model: LogarithmicBubble, chosen: Filter, widest: float) -> tu
     f = np.linspace(0.0, stop_frequency(chosen), 97)
     filtered = spectra.response(f, fir(chosen))
     at = 1.0 + widest * chebyshev(16)
-    value = analysis(16) @ [snaps.spectrum(x * f, bubble(model)) * x * filtered for x in at]
+    value = analysis(16) @ [_snap_spectrum(model, float(x), f) * x * filtered for x in at]
     sizes = np.abs(value).sum(axis=1)
     return tuple((sizes / sizes[0]).tolist()) if sizes[0] > 0.0 else (1.0, inf)
 
