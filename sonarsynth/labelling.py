@@ -173,29 +173,23 @@ def ledger(
     the loss of rough boundaries counts.
     """
     shape = (len(snaps), targets + 1, len(FAMILIES))
-    levels = np.full((*shape, len(LEDGER)), np.nan)
-    paths = np.zeros(shape, int)
-    bound = np.full(shape, np.nan)
     which = np.where(arrivals.direct, targets, arrivals.target)
-    for cell in np.ndindex(shape):
-        mine = arrivals.select((arrivals.snap == cell[0]) & (which == cell[1]) & (family(arrivals) == cell[2]))
-        paths[cell] = len(mine.delay)
-        if paths[cell]:
-            levels[cell] = _add_up(mine, float(snap_level[cell[0]]), centre)
-            bound[cell] = error
-    return Ledger(levels, paths, bound)
-
-
-def _add_up(paths: Arrivals, source_level: float, centre: float) -> Floats:
-    """One row of the ledger (LEDGER,)."""
+    cell = np.ravel_multi_index((arrivals.snap, which, family(arrivals)), shape)
+    paths = np.bincount(cell, minlength=int(np.prod(shape)))
     factors = [
-        paths.scattering,
-        paths.spreading_out,
-        paths.spreading_in,
-        10.0 ** (-paths.absorption / 20.0),
-        paths.boundary * _roughness(paths, centre),
+        arrivals.scattering,
+        arrivals.spreading_out,
+        arrivals.spreading_in,
+        10.0 ** (-arrivals.absorption / 20.0),
+        arrivals.boundary * _roughness(arrivals, centre),
     ]
-    sums = [np.sum(np.prod(factors[: n + 1], axis=0) ** 2) for n in range(len(factors))]
-    scattering, out, back, absorption, boundary = np.diff(10.0 * np.log10([1.0, *sums]))
-    received = source_level + 10.0 * np.log10(sums[-1])
-    return np.array([source_level, -out, scattering, -back, -absorption, -boundary, received])
+    powers = np.cumprod(factors, axis=0) ** 2
+    sums = np.array([np.bincount(cell, power, len(paths)) for power in powers])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scattering, out, back, absorption, boundary = np.diff(10.0 * np.log10(sums), axis=0, prepend=0.0)
+        source = np.repeat(np.asarray(snap_level, float), shape[1] * shape[2])
+        received = source + 10.0 * np.log10(sums[-1])
+    levels = np.stack([source, -out, scattering, -back, -absorption, -boundary, received], axis=-1)
+    levels[paths == 0] = np.nan
+    bound = np.where(paths > 0, error, np.nan)
+    return Ledger(levels.reshape(*shape, len(LEDGER)), paths.reshape(shape), bound.reshape(shape))

@@ -26,7 +26,9 @@ class Propagation(Protocol):
         ...
 
     def connect(self, profile: Profile, environment_depth: float, start: Floats, end: Floats) -> Paths:
-        """All paths with at most `bounces` reflections from start (pair, xyz) to end (pair, xyz) in the world, in water `environment_depth` (m) deep.
+        """All paths with at most `bounces` reflections from start (pair, xyz) to end (pair, xyz) in the world.
+
+        environment_depth: depth of the bed in m.
 
         Raises ValueError for points outside the water or not finite.
         """

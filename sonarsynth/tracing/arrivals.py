@@ -25,9 +25,9 @@ from sonarsynth.world.moment import Body, Moment, Snap
 if TYPE_CHECKING:
     from sonarsynth.tracing import Propagation
 
-NEGLIGIBLE = 3e-5
-"""The faintest echoes of a snap are left out, so many that their amplitudes together stay below this part of the
-strongest one's; each counts with the largest that it has anywhere on the array."""
+NEGLIGIBLE = 1e-7
+"""The faintest echoes of a snap are left out, so many that their powers together stay below this part of the power of
+all (70 dB); each counts with the largest amplitude that it has anywhere on the array."""
 
 ENOUGH = 1e-4
 """Error of amplitudes over the aperture, of the strongest echo's, at which polynomials of the second degree will do."""
@@ -182,7 +182,7 @@ def _ways(array: ArrayLegs, snap: Snap) -> Outward:
     blocked = hidden(  # backwards, so that bodies are where a ray begins
         array.bodies, environment, profile, facets.clear[out.facet], end, -out.arrival, out.length, out.bounces
     )
-    return out.select(~blocked)
+    return out.select(~blocked).merged()
 
 
 def _pairs(facet: Ints, row: Ints, facets: int) -> tuple[Ints, Ints]:
@@ -195,9 +195,11 @@ def _pairs(facet: Ints, row: Ints, facets: int) -> tuple[Ints, Ints]:
 
 
 def _loud(strength: Floats) -> np.ndarray:
-    """Which (path,) are kept: all but the faintest, whose sum stays below `NEGLIGIBLE` times the strongest."""
-    order = np.argsort(strength, kind="stable")
-    faint = np.cumsum(strength[order]) <= NEGLIGIBLE * strength.max(initial=0.0)
+    """Which (path,) are kept: all but the faintest, whose powers stay below `NEGLIGIBLE` times that of all."""
+    loudest = strength.max(initial=0.0)
+    power = (strength / (loudest or 1.0)) ** 2  # amplitudes may be so small that their squares are nothing
+    order = np.argsort(power, kind="stable")
+    faint = np.cumsum(power[order]) <= NEGLIGIBLE * power.sum()
     keep = np.ones(len(strength), bool)
     keep[order[faint]] = False
     return keep

@@ -6,8 +6,8 @@ give for nothing: a point that moves at v changes the time of a ray that arrives
 
     t_1 = t_s + T_out + (v.a/c) t_1,    t_2 = t_1 + T_in - (v.d/c) t_1 + (u.b/c) t_2
 
-with a, d, b the directions of travel at facet, facet and array, v and u the velocities of target and array. The pulse is
-longer by dt_2/dt_s. What is left out is second order: the curvature (v t)^2/(2 c r) of the travel times, 7 ns for
+with a, d, b the directions of travel at facet, facet and array, v and u the velocities of target and array. The pulse
+is longer by dt_2/dt_s. What is left out is second order: the curvature (v t)^2/(2 c r) of the travel times, 7 ns for
 1.4 m/s at 20 m, the same for all facets of a body but for its size over its distance; and the turning of a body.
 """
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from sonarsynth.products import Arrivals, Paths
 from sonarsynth.tracing.aperture import Fronts
 from sonarsynth.tracing.legs import Legs
 from sonarsynth.tracing.reflections import Reflections, as_sign
+
+TOGETHER = 1e-12
+"""s: ways to a facet whose travel times differ by less are one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +53,19 @@ class Outward:
         """The ways picked by a mask or by indices."""
         return Outward(**{name: value[keep] for name, value in vars(self).items()})
 
+    def merged(self) -> Outward:
+        """The ways with those that coincide added up: from a snap on the bed, say, and its image there."""
+        first = np.ones(len(self.facet), bool)
+        same = (np.diff(self.facet) == 0) & (np.abs(np.diff(self.travel_time)) < TOGETHER)
+        first[1:] = ~(same & (np.diff(self.blur) == 0) & (np.abs(np.diff(self.arrival, axis=0)) < 1e-9).all(axis=1))
+        if first.all():
+            return self
+        number = np.cumsum(first) - 1
+        value = np.zeros(number[-1] + 1, complex)
+        np.add.at(value, number, self.spreading * self.boundary * np.exp(1j * self.phase))
+        kept = self.select(first)
+        return replace(kept, boundary=np.abs(value) / kept.spreading, phase=np.angle(value + 0.0))
+
     @property
     def bounces(self) -> Ints:
         """(way,) reflections from surface and bed."""
@@ -60,7 +76,7 @@ def assemble(
     legs: Legs, over: Fronts, out: Outward, index: int, time: float, absorption: float, target: Ints, facet: Ints,
     scattering: Floats, variation: tuple[Floats, float],
 ) -> Arrivals:  # fmt: skip
-    """Arrivals of snap `index` at `time` (s) from both halves of their paths; variation: over the aperture, its error."""
+    """Arrivals of snap `index` at `time` (s) from both halves of their paths; variation: its terms and error."""
     length = out.length + legs.length
     loss = absorption * length
     sign, phase = as_sign(out.phase + legs.phase)
