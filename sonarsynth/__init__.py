@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from sonarsynth.config import RecipeError, dump, load, loads, schema
     from sonarsynth.description import FieldError
     from sonarsynth.planning import Plan, plan
-    from sonarsynth.ranging import IsovelocityRange, RefractedRange, SensorDelays
+    from sonarsynth.ranging import IsovelocityRange, RefractedRange, SensorDelays, WavefrontCancelling
     from sonarsynth.recipe import Recipe
     from sonarsynth.scattering import Isotropic, MirrorLobe
     from sonarsynth.scene import EchoWindow, Physics, Processing, Scene, Trajectory, World
@@ -136,6 +136,7 @@ __all__ = [
     "TemperatureSalinity",
     "Thermocline",
     "Trajectory",
+    "WavefrontCancelling",
     "Waypoint",
     "Waypoints",
     "WenzNoise",
@@ -172,6 +173,7 @@ _HOMES = {
         "IsovelocityRange",
         "RefractedRange",
         "SensorDelays",
+        "WavefrontCancelling",
     ),
     "recipe": ("Recipe",),
     "scattering": (

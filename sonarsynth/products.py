@@ -99,7 +99,7 @@ class Arrivals:
 class Signals:
     """Pressure at each hydrophone, as the converter gives it."""
 
-    pressure: npt.NDArray[np.float32]  # (sensor, sample) Pa; a whole number of `quantum` where a converter is described
+    pressure: npt.NDArray[np.float32]  # (sensor, sample) Pa; as converted, a whole number of `quantum` where there is one
     start: float  # s: time of sample 0
     sampling_frequency: float  # Hz
     quantum: float  # Pa of one count; 0 without a converter

@@ -68,6 +68,7 @@ class Heard:
     signals: Signals | None
     bearings: Bearings | None
     image: EnergyImage | None
+    imaged: Signals | None = None  # what the image was made of: without the snap's own reflections, where these go
 
 
 def trace_frame(plan: Plan, index: int) -> Traced:
@@ -162,12 +163,17 @@ def beamform_frame(plan: Plan, index: int, traced: Traced) -> Heard:
     heard = float(bearings.time[0]) if snaps else np.nan
     start, stop = heard + plan.windows.echo_start, heard + plan.windows.echo_stop
     end = signals.start + plan.windows.samples / signals.sampling_frequency
+    imaged = signals
     if signals.start <= start and stop <= end:
-        image = processing.beamforming.image(signals, plan.elements, sonar, start, stop)
+        if processing.cancelling is not None:
+            bed = scene.world.environment.depth
+            pose = frame.sonar_pose
+            imaged = processing.cancelling.cancel(signals, bearings, plan.elements, sonar, pose, bed, (start, stop))
+        image = processing.beamforming.image(imaged, plan.elements, sonar, start, stop)
     else:  # no direct pulse was found, or an echo was taken for it: no clock, so no image, rather than an arbitrary one
         silent = np.full((sonar.beams.elevations, sonar.beams.azimuths), np.nan, np.float32)
         image = EnergyImage(silent, sonar.beams.azimuth, sonar.beams.elevation, np.nan, np.nan)
-    return Heard(signals, bearings, image)
+    return Heard(signals, bearings, image, imaged)
 
 
 def synthesise(plan: Plan, traced: Traced) -> Signals:
@@ -197,7 +203,7 @@ def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
     values = _truth_values(plan, index, traced)
     if heard.signals is not None and "signals" in plan.products:
         values |= _signal_values(plan, heard.signals)
-    if heard.image is None or heard.bearings is None or heard.signals is None:
+    if heard.image is None or heard.bearings is None or heard.imaged is None:
         return values
     values |= _bearing_values(heard.bearings)
     if "image" in plan.products:
@@ -205,7 +211,7 @@ def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
     if "cloud" in plan.products:
         scene = plan.scene
         cloud = scene.processing.ranging.cloud(
-            heard.signals,
+            heard.imaged,
             heard.image,
             heard.bearings,
             plan.elements,

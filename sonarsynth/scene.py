@@ -13,7 +13,7 @@ from sonarsynth.beamforming import Beamformer, FocusedDelayAndSum
 from sonarsynth.conventions import Floats, PositiveSeconds, Seconds
 from sonarsynth.description import description
 from sonarsynth.geometry import Pose
-from sonarsynth.ranging import IsovelocityRange, Locator, Ranging, SensorDelays
+from sonarsynth.ranging import Cancelling, IsovelocityRange, Locator, Ranging, SensorDelays
 from sonarsynth.scattering import MirrorLobe, Scattering
 from sonarsynth.sonar import Sonar
 from sonarsynth.synthesis import KernelDeposit, Synthesis
@@ -99,6 +99,8 @@ class Processing:
     echo_window: EchoWindow = Field(default_factory=EchoWindow)
     locating: Locator = Field(default_factory=SensorDelays)
     """How the snap is located."""
+    cancelling: Cancelling | None = None
+    """How the snap's own reflections are taken out of the signals before imaging; left out: they stay in."""
     beamforming: Beamformer = Field(default_factory=FocusedDelayAndSum)
     """How the energy image is made."""
     ranging: Ranging = Field(default_factory=IsovelocityRange)

@@ -1,4 +1,4 @@
-"""Locating the snap, and ranging its echoes."""
+"""Locating the snap, cancelling its reflections, and ranging its echoes."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Annotated, Protocol
 from sonarsynth.description import BY_KIND
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Bearings, EnergyImage, PointCloud, Signals
+from sonarsynth.ranging.cancelling import WavefrontCancelling
 from sonarsynth.ranging.isovelocity import IsovelocityRange
 from sonarsynth.ranging.refracted import RefractedRange
 from sonarsynth.ranging.sensor_delays import SensorDelays
@@ -14,6 +15,8 @@ from sonarsynth.sonar import Elements, Sonar
 from sonarsynth.world.environment import Profile
 
 __all__ = [
+    "Cancelling",
+    "CancellingMethod",
     "IsovelocityRange",
     "LocatingMethod",
     "Locator",
@@ -21,6 +24,7 @@ __all__ = [
     "RangingMethod",
     "RefractedRange",
     "SensorDelays",
+    "WavefrontCancelling",
 ]
 
 
@@ -44,6 +48,26 @@ class LocatingMethod(Protocol):
         """
 
 
+class CancellingMethod(Protocol):
+    """Takes what reaches the array by surface and bed without an echo out of what it hears."""
+
+    def cancel(
+        self,
+        signals: Signals,
+        bearings: Bearings,
+        elements: Elements,
+        sonar: Sonar,
+        sonar_pose: Pose,
+        bed_depth: float,
+        window: tuple[float, float],
+    ) -> Signals:
+        """The signals without the reflections of the located snaps in the echo window (start, stop), in s.
+
+        The same object where nothing is taken out; `quantum` stays that of the converter, though pressures are no
+        whole multiples of it where something is. bed_depth in m, positive down.
+        """
+
+
 class RangingMethod(Protocol):
     """Places the echoes of an image in space."""
 
@@ -64,4 +88,5 @@ class RangingMethod(Protocol):
 
 
 Locator = Annotated[SensorDelays, BY_KIND]
+Cancelling = Annotated[WavefrontCancelling, BY_KIND]
 Ranging = Annotated[IsovelocityRange | RefractedRange, BY_KIND]

@@ -63,7 +63,8 @@ class Outward:
         number = np.cumsum(first) - 1
         value = np.zeros(number[-1] + 1, complex)
         np.add.at(value, number, self.spreading * self.boundary * np.exp(1j * self.phase))
-        kept = self.select(first)
+        order = np.lexsort((self.bounces, number))
+        kept = self.select(order[np.flatnonzero(np.diff(number[order], prepend=-1))])  # by the fewest bounces
         return replace(kept, boundary=np.abs(value) / kept.spreading, phase=np.angle(value + 0.0))
 
     @property

@@ -86,6 +86,7 @@ SURFACE = [
     "TemperatureSalinity",
     "Thermocline",
     "Trajectory",
+    "WavefrontCancelling",
     "Waypoint",
     "Waypoints",
     "WenzNoise",

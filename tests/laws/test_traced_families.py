@@ -190,3 +190,27 @@ def test_the_echo_of_a_ghost_comes_from_the_mirrored_place() -> None:
     towards = SONAR.turn_to_world(ghosts.direction)
     mirrored = np.array([15.0, 1.0, 6.0]) - ARRAY
     assert (towards @ mirrored / np.linalg.norm(mirrored) > np.cos(0.3 / 15)).all()
+
+
+def test_a_snap_on_the_bed_and_its_image_there_are_one() -> None:
+    """Of one strength to a snap a hair above the bed, whose two ways add up when they come together."""
+    fluid = SeaBed(reflection=FluidHalfSpace(density_ratio=1.8, speed_ratio=1.15, loss_tangent=0.02))
+    environment = Environment(depth=BED, sound_speed=Isovelocity(speed=C), bed=fluid)
+    totals = []
+    for height in (0.0, 1e-7):
+        snaps = (Snap(np.array([6.0, 5.0, -BED + height]), 0.0, LogarithmicBubble(), None),)
+        found = trace(
+            environment, UNIFORM, Moment(0.0, (ball(),), snaps), SONAR, ONE, 0.0, AutoTracing(bounces=2),
+            Isotropic(strength=1.0), band=BAND,
+        )  # fmt: skip
+        echo = found.select(~found.direct)
+        value = np.zeros((320, 4), complex)
+        np.add.at(value, (echo.facet, echo.arrives_by), echo.amplitude * np.exp(1j * echo.phase))
+        totals.append(value)
+        if height == 0.0:
+            assert (echo.surface + echo.bottom == 0).any()
+            fewer = len(echo.delay)
+        else:
+            assert fewer < len(echo.delay)
+    direct = [total[:, 0] for total in totals]
+    np.testing.assert_allclose(direct[0], direct[1], rtol=1e-4, atol=1e-7)
