@@ -42,6 +42,27 @@ def test_the_thesis_scene_is_imaged_ranged_and_located(tmp_path: Path) -> None:
     assert ranges["points"] >= 8 and ranges["median_m"] < 0.05 and ranges["share_within_3"] >= 0.9
 
 
+def test_ghosts_by_surface_and_bed_are_imaged_where_the_truth_says(tmp_path: Path) -> None:
+    """Three frames of the crossing over a thermocline, with every path of up to two bounces."""
+    made = _plan("thermocline.yaml")
+    assert made.sizes["frame"] == 64 and made.sizes["elevation"] == 129
+    assert schedule.build(made, tmp_path / "ghosts.zarr", frames=(9, 36, 63), workers=0).ok
+    checks = _checks(tmp_path / "ghosts.zarr")
+    assert all(check.ok for name, check in checks.items() if name not in REPORTED), checks
+    assert checks["brightest beam on target"].numbers == {"hits": 3, "frames": 3}
+    with xr.open_datatree(tmp_path / "ghosts.zarr", engine="zarr") as tree:
+        for frame in (9, 36, 63):
+            energy, truth = tree["image/energy"][frame], tree["truth"].dataset.isel(frame=frame, target=0)
+            for family in ("surface", "bed"):
+                echo = truth.sel(family=family)
+                elevation, azimuth = echo.echo_elevation.item(), echo.echo_azimuth.item()
+                near = {"elevation": slice(elevation - 5, elevation + 5), "azimuth": slice(azimuth - 5, azimuth + 5)}
+                peak = energy.sel(near).where(lambda e: e == e.max(), drop=True)
+                assert abs(peak.elevation.item() - elevation) < 1.5
+                assert abs(peak.azimuth.item() - azimuth) < 3.0  # the hull is up to 3.6 degrees long
+                assert 10 * np.log10(peak.item() / energy.median().item()) > 15.0
+
+
 def test_the_target_crosses_20_m_ahead_9_m_to_the_right() -> None:
     made = _plan("remus.yaml")
     places = [
