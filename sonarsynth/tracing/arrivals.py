@@ -93,7 +93,7 @@ def array_legs(
     Raises ValueError for a body or an array that reaches out of the water.
     """
     every = facets_of(bodies, environment)
-    every = every.select(may_face(every, sonar_pose.position, propagation.bounces, profile))
+    every = every.select(may_face(every, sonar_pose.position, propagation.bounces, profile, environment.depth))
     centre = 0.5 * (band[0] + band[1])
     legs = legs_from(every, bodies, environment, profile, sonar_pose, propagation, centre)
     kept, row = np.unique(legs.row, return_inverse=True)
@@ -172,7 +172,7 @@ def _echoes(
 def _ways(array: ArrayLegs, snap: Snap) -> Outward:
     """Ways from a snap to the lit side of facets that no body hides."""
     environment, profile, facets = array.environment, array.profile, array.facets
-    row = np.flatnonzero(may_face(facets, snap.position, array.propagation.bounces, profile))
+    row = np.flatnonzero(may_face(facets, snap.position, array.propagation.bounces, profile, environment.depth))
     start = np.broadcast_to(snap.position, (len(row), 3))
     paths = array.propagation.connect(profile, environment.depth, start, facets.point[row])
     facet = row[paths.pair]

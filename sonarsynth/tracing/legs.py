@@ -150,8 +150,18 @@ def legs_from(
     return legs.select(~hidden(bodies, environment, profile, start, end, legs.departure, legs.length, legs.bounces))
 
 
-def may_face(facets: Facets, position: Floats, bounces: int, profile: Profile) -> Bools:
-    """(facet,) which may face a point: in uniform water without reflections those that do, else all (rays decide)."""
-    if bounces or not profile.uniform:
-        return np.ones(len(facets.facet), bool)
-    return np.asarray(np.einsum("ij,ij->i", facets.normal, position - facets.point) > 0)
+def may_face(facets: Facets, position: Floats, bounces: int, profile: Profile, bed: float) -> Bools:
+    """(facet,) which may have a ray to a point (xyz) on their outer side; exactly so in uniform water, unreflected.
+
+    A ray rises and falls by (bounces + 2) bed depths at most over its distance, so somewhere it has that slope or less,
+    and by Snell's law its cosine is nowhere less than there times the ratio of the extreme sound speeds.
+    """
+    if not bounces and profile.uniform:
+        return np.asarray(np.einsum("ij,ij->i", facets.normal, position - facets.point) > 0)
+    level = position[:2] - facets.point[:, :2]
+    distance = np.hypot(level[:, 0], level[:, 1])
+    flattest = distance / np.hypot(distance, (bounces + 2) * bed)
+    cosine = flattest * profile.speed.min() / profile.speed.max()
+    ahead = np.einsum("ij,ij->i", facets.normal[:, :2], level) / np.maximum(distance, 1e-300)
+    steepest = np.abs(facets.normal[:, 2]) * np.sqrt((1.0 - cosine) * (1.0 + cosine))
+    return np.asarray((ahead >= -1e-9) | (ahead * cosine + steepest > -1e-9))
