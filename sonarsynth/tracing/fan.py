@@ -11,8 +11,8 @@ from sonarsynth.acoustics.rays import Water, water, within
 from sonarsynth.conventions import NO_TARGET, Floats, Ints, depth
 from sonarsynth.geometry import unit
 from sonarsynth.scattering import ScatteringLaw
-from sonarsynth.tracing.shadows import hidden
 from sonarsynth.tracing.marching import ARRIVAL, END, EVENTS, FACET, LAUNCH, Rays, launch, planes, reflect, step
+from sonarsynth.tracing.shadows import hidden
 from sonarsynth.world.environment import Environment, Profile
 from sonarsynth.world.moment import Body
 

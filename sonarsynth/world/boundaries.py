@@ -1,4 +1,5 @@
-"""The boundaries of the water: surface and bed, flat on average. What each is made of, and how rough it is.
+"""The boundaries of the water: surface and bed, flat on average. What each is made of, and how rough it is. One that is
+not flat, a slope or a reef, is a target with a mesh.
 
 Roughness takes from the mirror echo what it scatters elsewhere (Eckart 1953), frequency by frequency. That energy is
 not lost in the sea: it comes as many small echoes from around the mirror point. These are not simulated, so a rough
