@@ -14,6 +14,9 @@ from sonarsynth.world.casting import OFFSET, first_hit, occluded
 from sonarsynth.world.meshes import Mesh
 from sonarsynth.world.moment import Body, Moment, Snap
 
+ONE_SIDE = 0.95
+"""Length of the mean direction of echoes, weighted by power, from which on they count as coming from one side."""
+
 Connect = Callable[[Floats, Floats], Paths]
 """Rays from (pair, xyz) to (pair, xyz) in the world: a propagation model bound to its water."""
 
@@ -147,8 +150,10 @@ def echoes(arrivals: Arrivals, targets: int, snap_level: Floats, centre: float) 
         mine = (arrivals.target == cell[0]) & (arrivals.arrives_by == cell[1])
         total = float(power[mine].sum())
         if total > 0.0:
-            azimuth[cell], elevation[cell] = azimuth_elevation(power[mine] @ arrivals.direction[mine])
             level[cell] = 10.0 * np.log10(total)
+            mean = power[mine] @ arrivals.direction[mine] / total
+            if np.linalg.norm(mean) > ONE_SIDE:
+                azimuth[cell], elevation[cell] = azimuth_elevation(mean)
     return Echoes(azimuth, elevation, level)
 
 

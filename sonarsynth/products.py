@@ -99,7 +99,9 @@ class Arrivals:
 class Signals:
     """Pressure at each hydrophone, as the converter gives it."""
 
-    pressure: npt.NDArray[np.float32]  # (sensor, sample) Pa; as converted, a whole number of `quantum` where there is one
+    pressure: npt.NDArray[
+        np.float32
+    ]  # (sensor, sample) Pa; as converted, a whole number of `quantum` where there is one
     start: float  # s: time of sample 0
     sampling_frequency: float  # Hz
     quantum: float  # Pa of one count; 0 without a converter
@@ -176,7 +178,8 @@ class Echoes:
     """Where the echoes of each target come from, by the boundaries that they touched on their way to the array.
 
     What comes by surface or bed is a ghost: the array sees the target mirrored there. Powers of all snaps are summed,
-    directions weighted by power; NaN where no path comes that way.
+    directions weighted by power; NaN where no path comes that way,
+    directions also where echoes come from several sides, as by surface and bed both from above and from below.
     """
 
     azimuth: Floats  # (target, family) rad, sonar frame

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.pictures.ghosts import Ghost, GhostMarks
 from sonarsynth.pictures.outlines import union_outline, view_outline
-from sonarsynth.pictures.style import DYNAMIC_RANGE, ENERGY_MAP, INK, OUTLINES, figure, label
+from sonarsynth.pictures.style import BACKDROP, DYNAMIC_RANGE, ENERGY_MAP, INK, OUTLINES, figure, label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,9 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.text import Text
 
     from sonarsynth.conventions import Ints
-
-DEEP = "#12111c"
-"""Background of clouds: the darkest colour of the energy map, a little lifted."""
 
 ABSENT = "#9b9b9b"
 """Beams without a number."""
@@ -49,6 +47,7 @@ class View:
     points: Floats  # (point, xyz) m, sonar frame
     point_level: Floats  # (point,) dB re the same
     hulls: tuple[Hull, ...]
+    ghosts: tuple[Ghost, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +90,7 @@ class FramePicture:
         sky = self.figure.add_subplot(parts[:, 0])
         self._image: AxesImage = image_axes(sky, azimuth, elevation)
         self._outlines: PolyCollection = outline_artist(sky)
+        self._ghosts = GhostMarks(sky)
         bar = self.figure.colorbar(self._image, ax=sky, shrink=0.82, pad=0.02, extend="min")
         bar.set_label(unit, fontsize=9, color=INK)
         bar.ax.tick_params(labelsize=8)
@@ -108,13 +108,14 @@ class FramePicture:
             self._image.set_data(np.ma.masked_invalid(clipped(view.level))[:, ::-1])
         elif shape is not None:
             self._image.set_data(np.ma.masked_all(shape.shape))
-        set_outlines(self._outlines, view.hulls)
+        outlines = set_outlines(self._outlines, view.hulls)
         for panel in self._clouds:
             panel.show(view, self.window)
         if not self._laid_out:  # arrange once: axes that move from frame to frame are hard to watch
             self.figure.canvas.draw()
             self.figure.set_layout_engine("none")
             self._laid_out = True
+        self._ghosts.show(view.ghosts, outlines)
 
     def pixels(self) -> np.ndarray:
         """The figure as drawn: (row, column, rgb) uint8."""
@@ -135,7 +136,7 @@ class CloudPanel:
 
         names = ("forward, x (m)", "port, y (m)", "up, z (m)")
         self.axes, self.plane = axes, plane
-        axes.set_facecolor(DEEP)
+        axes.set_facecolor(BACKDROP)
         axes.set_aspect("equal", adjustable="box")
         label(axes, names[plane[0]], names[plane[1]], f"point cloud {name}")
         self._hulls: PolyCollection = PolyCollection([], linewidths=1.0)
@@ -206,15 +207,17 @@ def outline_artist(axes: Axes) -> PolyCollection:
     return artist
 
 
-def set_outlines(artist: PolyCollection, hulls: tuple[Hull, ...]) -> None:
-    """Draw the outlines of targets as the sonar sees them (deg)."""
-    lines, colours = [], []
+def set_outlines(artist: PolyCollection, hulls: tuple[Hull, ...]) -> list[Floats]:
+    """Draw the outlines of targets as the sonar sees them; returns them: lines (point, azimuth and elevation), deg."""
+    lines: list[Floats] = []
+    colours: list[str] = []
     for i, hull in enumerate(hulls):
         seen = view_outline(hull.vertices, hull.faces)
-        lines += [np.rad2deg(line) for line in seen]
+        lines += [np.asarray(np.rad2deg(line)) for line in seen]
         colours += [OUTLINES[i % len(OUTLINES)]] * len(seen)
     artist.set_verts(lines)
     artist.set_edgecolor(colours)
+    return lines
 
 
 def fill_hulls(artist: PolyCollection, hulls: tuple[Hull, ...], plane: tuple[int, int]) -> None:

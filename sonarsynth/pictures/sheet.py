@@ -9,6 +9,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.pictures.frames import View, Window, clipped, image_axes, outline_artist, set_outlines
+from sonarsynth.pictures.ghosts import GhostMarks
 from sonarsynth.pictures.style import ERROR_MAP, INK, MARKS, OUTLINES, PALE, figure, grid, label
 
 if TYPE_CHECKING:
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
 
 WORST_SHOWN = 10.0
 """Range errors (cm) are coloured up to this."""
+
+BADGES = 22.0
+"""Points around a target that the numbers of its beams take: labels of ghosts stay off."""
 
 LEAD = 1.0e-3
 """Signals are drawn from this long (s) before the first echo to this long after the last."""
@@ -55,7 +59,7 @@ def sheet(
     image = image_axes(sky, azimuth, elevation)
     if view.level is not None:
         image.set_data(np.ma.masked_invalid(clipped(view.level))[:, ::-1])
-    set_outlines(outline_artist(sky), view.hulls)
+    outlines = set_outlines(outline_artist(sky), view.hulls)
     bar = made.colorbar(image, ax=sky, shrink=0.82, pad=0.02, extend="min")
     bar.set_label(unit, fontsize=9, color=INK)
     bar.ax.tick_params(labelsize=8)
@@ -64,6 +68,8 @@ def sheet(
     if beams:
         below = rows[1].subgridspec(1, len(beams))
         draw_beams([made.add_subplot(below[i]) for i in range(len(beams))], beams)
+    made.draw_without_rendering()  # the axes find their place
+    GhostMarks(sky).show(view.ghosts, outlines, BADGES if beams else 0.0)
     return made
 
 

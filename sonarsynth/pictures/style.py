@@ -21,6 +21,9 @@ DYNAMIC_RANGE = 50.0
 OUTLINES = ("#56c8ff", "#ffffff", "#8ff0a4", "#f7a8d8")
 """Outlines of targets, on the dark colours of the energy map."""
 
+BACKDROP = "#12111c"
+"""Background of clouds and rim of labels: the darkest colour of the energy map, a little lifted."""
+
 MARKS = ("#0072B2", "#D55E00", "#009E73")
 """A hit, a far hit, a miss (Okabe and Ito 2008)."""
 

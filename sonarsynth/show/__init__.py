@@ -90,6 +90,7 @@ def _view(tree: xr.DataTree, frame: Stored, reference: float) -> View:
         points=frame.points[found],
         point_level=decibels(frame.point_energy[found], reference),
         hulls=frame.hulls,
+        ghosts=frame.ghosts,
     )
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.pictures.frames import DEEP, FramePicture, View
-from sonarsynth.pictures.style import ENERGY_MAP, OUTLINES
+from sonarsynth.pictures.frames import FramePicture, View
+from sonarsynth.pictures.style import BACKDROP, ENERGY_MAP, OUTLINES
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -55,8 +55,8 @@ def _palette() -> Image:
     energy = colormaps[ENERGY_MAP](np.linspace(0.0, 1.0, 184))[:, :3]
     greys = np.repeat(np.linspace(0.0, 1.0, 39)[:, None], 3, axis=1)
     blend = np.linspace(0.0, 1.0, 8)[:, None]
-    mixed = [(1 - blend) * to_rgb(DEEP) + blend * to_rgb(colour) for colour in OUTLINES]
-    table = np.round(255 * np.concatenate([energy, greys, *mixed, [to_rgb(DEEP)]])).astype(np.uint8)
+    mixed = [(1 - blend) * to_rgb(BACKDROP) + blend * to_rgb(colour) for colour in OUTLINES]
+    table = np.round(255 * np.concatenate([energy, greys, *mixed, [to_rgb(BACKDROP)]])).astype(np.uint8)
     made = Image.new("P", (1, 1))
     made.putpalette(table.tobytes())
     return made

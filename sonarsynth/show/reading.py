@@ -8,12 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Floats, direction
 from sonarsynth.geometry import Pose
 from sonarsynth.pictures.frames import Hull
+from sonarsynth.pictures.ghosts import Ghost
 
 if TYPE_CHECKING:
     import xarray as xr
+
+FAINTEST = 40.0
+"""Ghosts this many dB under the direct echo of their target are not drawn."""
 
 
 class NothingToDraw(ValueError):
@@ -80,6 +84,7 @@ class Stored:
     true_range: Floats  # (elevation, azimuth) m
     snap: Floats  # (snap, xyz) m, true positions
     hulls: tuple[Hull, ...]
+    ghosts: tuple[Ghost, ...]
 
     @property
     def found(self) -> np.ndarray:
@@ -110,7 +115,55 @@ def stored(tree: xr.DataTree, index: int) -> Stored:
         true_range=true_range,
         snap=pose.to_body(needed(tree, "truth/snap_position", index)),
         hulls=_hulls(tree, index, pose),
+        ghosts=ghosts(tree, index),
     )
+
+
+def echo_levels(tree: xr.DataTree, frame: int) -> tuple[Floats, list[str]] | None:
+    """Levels (target, family) in dB re the direct echo of each target, and the families; None where none are stored.
+
+    A target without a direct echo: re its strongest.
+    """
+    level, families = read(tree, "truth/echo_level", frame), read(tree, "truth/family")
+    if level is None or families is None:
+        return None
+    names = [str(name) for name in families]
+    direct = level[:, names.index("direct")]
+    strongest = np.max(level, axis=1, initial=-np.inf, where=np.isfinite(level))
+    return level - np.where(np.isfinite(direct), direct, strongest)[:, None], names
+
+
+def ghosts(tree: xr.DataTree, frame: int) -> tuple[Ghost, ...]:
+    """Ghosts of all targets that are less than `FAINTEST` under the direct echo; none in a store without echoes."""
+    found = echo_levels(tree, frame)
+    azimuth, elevation = (read(tree, f"truth/echo_{name}", frame) for name in ("azimuth", "elevation"))
+    targets = read(tree, "truth/target_name")
+    if found is None or azimuth is None or elevation is None or targets is None:
+        return ()
+    level, families = found
+    drawn = []
+    for target, family in np.argwhere(level > -FAINTEST):
+        if families[family] != "direct" and not _blended(azimuth[target], elevation[target], families, int(family)):
+            whose = f"{targets[target]}: " if len(targets) > 1 else ""
+            where = float(azimuth[target, family]), float(elevation[target, family])
+            drawn.append(Ghost(f"{whose}{families[family]} ghost", int(target), *where, float(level[target, family])))
+    return tuple(drawn)
+
+
+def _blended(azimuth: Floats, elevation: Floats, families: list[str], family: int) -> bool:
+    """True where a direction (deg) is none, or the mean of several that lie apart, where there is nothing to see.
+
+    Echoes by surface and bed come from above (the bed first) and from below (the surface first). Each of the two lies
+    farther from the direct echo than the ghosts by one boundary do; their mean lies between them.
+    """
+    towards = direction(np.deg2rad(azimuth), np.deg2rad(elevation))
+    if not np.isfinite(towards[family]).all():
+        return True
+    if " and " not in families[family]:
+        return False
+    once = [i for i, name in enumerate(families) if name != "direct" and " and " not in name]
+    near = towards @ towards[families.index("direct")]
+    return bool((near[once] <= near[family]).any())
 
 
 def _hulls(tree: xr.DataTree, index: int, sonar: Pose) -> tuple[Hull, ...]:

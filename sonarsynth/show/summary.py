@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.show.reading import built, needed, read
+from sonarsynth.show.reading import built, echo_levels, needed, read
 from sonarsynth.verification import brightest_beam_on_target, range_errors, snap_located
 
 if TYPE_CHECKING:
@@ -59,6 +59,25 @@ def _targets(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
         facets = f"{len(faces)} facets, " if faces is not None else ""
         reach = f"{away[:, i].min():.2f} to {away[:, i].max():.2f} m away"
         lines.append(f"  target     {name}: {facets}{reach}, in sight in {seen[i]} frames")
+    return [*lines, *_ghosts(tree, frames, list(map(str, names)))]
+
+
+def _ghosts(tree: xr.DataTree, frames: np.ndarray, names: list[str]) -> list[str]:
+    """Levels of each target's echoes by the boundaries they touched on their way to the array, medians over frames."""
+    found = [levels for frame in frames if (levels := echo_levels(tree, int(frame))) is not None]
+    if not found:
+        return []
+    families, each = found[0][1], np.array([level for level, _ in found])  # (frame, target, family)
+    lines = []
+    for i, name in enumerate(names):
+        heard = [
+            f"{family} {np.nanmedian(each[:, i, k]):+.1f} dB"
+            for k, family in enumerate(families)
+            if family != "direct" and np.isfinite(each[:, i, k]).any()
+        ]
+        seen = np.isfinite(each[:, i, families.index("direct")]).any()
+        if heard:
+            lines.append(f"  ghosts     {name}: {', '.join(heard)} re its {'direct' if seen else 'strongest'} echo")
     return lines
 
 
