@@ -45,7 +45,7 @@ class WavefrontCancelling:
     """Reflections up to so many at surface and bed are looked for."""
     search: Annotated[PositiveRadians, Le(0.5)] = 0.03
     """How far from where straight paths lead an arrival is looked for."""
-    excess: Annotated[Decibels, Ge(6)] = 15.0
+    excess: Annotated[Decibels, Ge(6)] = 8.0
     """An arrival is cancelled if, in the better half of the band, a beam on it stands so far above all else in its
     window. Echoes and noise reach 5 dB there (240 searches)."""
     weakest: Annotated[Decibels, Ge(0)] = 40.0
