@@ -81,6 +81,8 @@ def within(water: Water, depth: Floats, what: str) -> Floats:
     """Depths, those within rounding of surface or bed put on it; raises ValueError naming the first one outside."""
     z = np.asarray(depth, float)
     bed = water.depth[-1]
+    if z.size and 0.0 <= z.min() and z.max() <= bed:
+        return z
     wrong = ~((z >= -TOLERANCE) & (z <= bed + TOLERANCE))
     if wrong.any():
         i = int(np.argmax(wrong))
@@ -105,7 +107,7 @@ def eigenrays(
         within(water, start, "start"), within(water, end, "end"), np.asarray(distance, float)
     )
     z1, z2, r = (np.ascontiguousarray(a) for a in (z1, z2, r))
-    if not (np.isfinite(r) & (r >= 0)).all():
+    if r.size and not 0.0 <= r.min() <= r.max() < np.inf:
         raise ValueError("horizontal distances must be finite and not negative")
     if vertices < 0 or reflections < 0:
         raise ValueError("the most vertices and reflections of a ray cannot be negative")
@@ -120,8 +122,8 @@ def eigenrays(
         rows.append(out[:count])
         room = 2 * room if reached == first else max(64, 2 * (1 + vertices) * (len(r) - reached))
         first = reached
-    pair = np.concatenate([np.empty(0, np.int64), *pairs])
-    columns = np.concatenate([np.empty((0, kernels.FIELDS)), *rows]).T.copy()
+    pair = pairs[0] if len(pairs) == 1 else np.concatenate([np.empty(0, np.int64), *pairs])
+    columns = (rows[0] if len(rows) == 1 else np.concatenate([np.empty((0, kernels.FIELDS)), *rows])).T.copy()
     return Eigenrays(pair, *columns[: kernels.SURFACE], *columns[kernels.SURFACE :].astype(np.int64))
 
 
