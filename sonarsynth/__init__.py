@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from sonarsynth.synthesis import DirectSum, KernelDeposit
     from sonarsynth.tracing import AutoTracing, Refracted, Straight
     from sonarsynth.tracing.eigenrays import RayArrivals, eigenrays, eigenrays_between
-    from sonarsynth.tracing.ray_request import RayRequest
+    from sonarsynth.tracing.ray_request import EigenrayRequest, RayRequest
     from sonarsynth.world.boundaries import (
         FluidHalfSpace,
         PressureRelease,
@@ -87,6 +87,7 @@ __all__ = [
     "DenseDelayAndSum",
     "DirectSum",
     "EchoWindow",
+    "EigenrayRequest",
     "Environment",
     "FieldError",
     "FlatNoise",
@@ -218,7 +219,7 @@ _HOMES = {
         "eigenrays",
         "eigenrays_between",
     ),
-    "tracing.ray_request": ("RayRequest",),
+    "tracing.ray_request": ("EigenrayRequest", "RayRequest"),
     "world.boundaries": (
         "FluidHalfSpace",
         "PressureRelease",

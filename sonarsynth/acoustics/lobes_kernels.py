@@ -18,7 +18,7 @@ def slope_lobe(incident: Floats, scattered: Floats, normal: Floats, slope: float
     square = (ax * ax + ay * ay + az * az) / (up * up)  # tan^2 of the tilt of the half vector
     if not (up > 0.0 and square < 1e100):
         return 0.0
-    return math.exp(square * (-0.5 / slope**2)) * ((1.0 + square) ** 2 / (8.0 * math.pi * slope**2))
+    return float(math.exp(square * (-0.5 / slope**2)) * ((1.0 + square) ** 2 / (8.0 * math.pi * slope**2)))
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

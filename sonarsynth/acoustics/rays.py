@@ -81,7 +81,7 @@ def within(water: Water, depth: Floats, what: str) -> Floats:
     """Depths, those within rounding of surface or bed put on it; raises ValueError naming the first one outside."""
     z = np.asarray(depth, float)
     bed = water.depth[-1]
-    if z.size and 0.0 <= z.min() and z.max() <= bed:
+    if z.size and z.min() >= 0.0 and z.max() <= bed:
         return z
     wrong = ~((z >= -TOLERANCE) & (z <= bed + TOLERANCE))
     if wrong.any():

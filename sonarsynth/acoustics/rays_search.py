@@ -115,7 +115,7 @@ def first_guess(
         total = distance / (turn_up + turn_down)
         guess = 0.5 * (total - (d[far] - d[near]) / total)
         if low < guess < high:
-            return guess
+            return float(guess)
     return float(low + (high - low) * (distance - x_low) / (x_high - x_low))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from sonarsynth.recipe import Recipe
 from sonarsynth.scene import Frame
 from sonarsynth.sonar import elements
 from sonarsynth.synthesis import pulse_support
-from sonarsynth.synthesis.pulse import FEET, snap_levels
+from sonarsynth.synthesis.pulse import FEET, silencing_blur, snap_levels
 from sonarsynth.tracing import Straight
 from sonarsynth.world.environment import Profile
 from sonarsynth.world.reflection import rms_height
@@ -43,9 +43,7 @@ def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
     across = elements(sonar.array).aperture / profile.speed.min()  # of a wave, from the centre to the edge
     before, after = _support(recipe, SUPPORT, profile.uniform) + across
     echo_before, echo_after = _support(recipe, ECHO_SUPPORT, profile.uniform) + across
-    bounces = scene.physics.tracing.bounces
-    depth_of_bed = scene.world.environment.depth
-    spans = [_span(recipe.frame(i)[1], profile, depth_of_bed, bounces) for i in range(recipe.frames)]
+    spans = _spans(recipe, profile)
     first_heard, last_direct, first_echo, last_echo, last_heard = np.array([_times(span) for span in spans]).T
     gate = scene.processing.echo_window
     echoes = bool(np.isfinite(first_echo).any())
@@ -69,13 +67,44 @@ def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
 def _support(recipe: Recipe, tolerance: float, uniform: bool) -> Floats:
     """Longest time (s) before and after its collapse that any filtered snap exceeds `tolerance` of its peak."""
     scene = recipe.scene
-    environment, bounces = scene.world.environment, scene.physics.tracing.bounces
-    turned = bounces > 0 or not uniform  # lossy reflections and caustics turn the phase
+    turned = scene.physics.tracing.bounces > 0 or not uniform  # lossy reflections and caustics turn the phase
     chosen = scene.sonar.antialias
     supports = [pulse_support(s.snap, chosen, tolerance, turned=turned) for s in scene.world.shrimp]
+    return np.asarray(np.max(supports or [(0.0, 0.0)], axis=0))
+
+
+def _blurred(recipe: Recipe) -> float:
+    """By how much (s) rough boundaries lengthen the pulses that they reflect: those that they leave anything of."""
+    scene = recipe.scene
+    environment, bounces = scene.world.environment, scene.physics.tracing.bounces
+    if not bounces:
+        return 0.0
     roughest = max(rms_height(environment.surface), rms_height(environment.bed))
-    blurred = FEET * 2.0 * roughest / SLOWEST * np.sqrt(bounces)  # at the steepest grazing angle
-    return np.asarray(np.max(supports or [(0.0, 0.0)], axis=0)) + blurred
+    blur = 2.0 * roughest / SLOWEST * np.sqrt(bounces)  # at the steepest grazing angle
+    silent = max((silencing_blur(s.snap, scene.sonar.antialias) for s in scene.world.shrimp), default=0.0)
+    return float(FEET * min(blur, silent))
+
+
+def _slack(doppler: bool, frame: Frame, span: _Span, profile: Profile) -> float:
+    """By how much (s) arrivals may come before or after what straight lines between things at rest say.
+
+    What moves at v changes the travel time of each leg at v/c. A ray between two points r apart, in a sound speed that
+    changes by g a metre at most, is faster by r^3 g^2/(24 c^3), and no faster or slower than the extreme speeds let it
+    be.
+    """
+    slowest = float(profile.speed.min())
+    latest = max(abs(span.last), abs(span.first))
+    moved = 0.0
+    if doppler:
+        fastest = max((float(np.linalg.norm(b.velocity)) for b in frame.moment.bodies), default=0.0)
+        moved = 2.0 * (fastest + float(np.linalg.norm(frame.sonar_velocity))) * latest / slowest
+    if profile.uniform:
+        return moved
+    way = slowest * (span.last - min((s.time for s in frame.moment.snaps), default=0.0))  # m, of all legs together
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gradient = float(np.nanmax(np.abs(np.diff(profile.speed)) / np.diff(profile.depth), initial=0.0))
+    bent = way**3 * gradient**2 / (24.0 * slowest**3)
+    return moved + min(bent, way / slowest - way / float(profile.speed.max()))
 
 
 @dataclass(frozen=True)
@@ -89,6 +118,27 @@ class _Span:
     last_echo: float
     last: float  # last arrival of any snap
     others: tuple[tuple[float, float], ...] = ()  # direct arrival and last echo of the snaps that are not the loudest
+
+
+def _spans(recipe: Recipe, profile: Profile) -> list[_Span]:
+    """When each frame is heard, with what straight lines between things at rest leave out."""
+    bounces, bed = recipe.scene.physics.tracing.bounces, recipe.scene.world.environment.depth
+    blurred, spans = _blurred(recipe), []
+    for index in range(recipe.frames):
+        frame = recipe.frame(index)[1]
+        span = _span(frame, profile, bed, bounces)
+        slack = _slack(recipe.scene.physics.doppler, frame, span, profile)
+        spans.append(
+            replace(
+                span,
+                first=span.first - slack,
+                last_direct=span.last_direct + slack,
+                first_echo=span.first_echo - 2.0 * slack,  # the direct arrival may err, and the echo
+                last_echo=span.last_echo + 2.0 * slack + blurred,
+                last=span.last + slack + blurred,
+            )
+        )
+    return spans
 
 
 def _times(span: _Span) -> tuple[float, ...]:

@@ -25,6 +25,11 @@ class Propagation(Protocol):
         """Most reflections from surface and bed on the way from the snap to the array."""
         ...
 
+    @property
+    def bends(self) -> bool:
+        """Whether rays bend where the sound speed varies."""
+        ...
+
     def connect(self, profile: Profile, environment_depth: float, start: Floats, end: Floats) -> Paths:
         """All paths with at most `bounces` reflections from start (pair, xyz) to end (pair, xyz) in the world.
 

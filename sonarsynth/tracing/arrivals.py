@@ -49,6 +49,11 @@ class ArrayLegs:
     band: tuple[float, float]  # Hz
 
     @property
+    def bending(self) -> Profile:
+        """What bends the rays: the profile, or for straight rays the speed at the array everywhere."""
+        return bending(self.profile, self.propagation, self.sonar_pose)
+
+    @property
     def centre(self) -> float:
         """Hz: centre of the band."""
         return 0.5 * (self.band[0] + self.band[1])
@@ -95,13 +100,21 @@ def array_legs(
     every = facets_of(bodies, environment)
     every = every.select(may_face(every, sonar_pose.position, propagation.bounces, profile, environment.depth))
     centre = 0.5 * (band[0] + band[1])
-    legs = legs_from(every, bodies, environment, profile, sonar_pose, propagation, centre)
+    bent = bending(profile, propagation, sonar_pose)
+    legs = legs_from(every, bodies, environment, profile, bent, sonar_pose, propagation, centre)
     kept, row = np.unique(legs.row, return_inverse=True)
     legs = legs.numbered(row)
     facets = every.select(kept)
     group = facets.target[legs.row]
-    over = fronts(legs, group, environment, profile, sonar_pose, elements, propagation, band)
+    over = fronts(legs, group, environment, bent, sonar_pose, elements, propagation, band)
     return ArrayLegs(legs, over, facets, bodies, environment, profile, propagation, sonar_pose, elements, band)
+
+
+def bending(profile: Profile, propagation: Propagation, sonar_pose: Pose) -> Profile:
+    """What bends the rays of a model: the profile, or for straight rays the speed at the array everywhere."""
+    if propagation.bends:
+        return profile
+    return Profile(profile.depth, np.full(len(profile.depth), float(profile.at(depth(sonar_pose.position)))))
 
 
 def arrivals(
@@ -121,13 +134,16 @@ def _direct(array: ArrayLegs, index: int, snap: Snap, absorption: float, moving:
     legs = rays_to_centre(environment, profile, snap.position[None, :], sonar_pose, array.propagation, array.centre)
     end = np.broadcast_to(sonar_pose.position, legs.point.shape)
     legs = legs.select(
-        ~hidden(array.bodies, environment, profile, legs.point, end, legs.departure, legs.length, legs.bounces)
-    )
+        ~hidden(
+            array.bodies, environment, array.bending, legs.point, end, legs.departure, legs.length, legs.bounces,
+            legs.turning,
+        )
+    )  # fmt: skip
     over = fronts(
         legs,
         np.zeros(len(legs.row), int),
         environment,
-        profile,
+        array.bending,
         sonar_pose,
         array.elements,
         array.propagation,
@@ -136,7 +152,11 @@ def _direct(array: ArrayLegs, index: int, snap: Snap, absorption: float, moving:
     one, none = np.ones(len(legs.row)), np.full(len(legs.row), NO_TARGET)
     variation = _fitted(array, over.probe_gain, legs.spreading, None)
     made = assemble(legs, over, Outward.none(len(one)), index, snap.time, absorption, none, none, one, variation)
-    return made if moving is None else carried(made, legs, None, snap, sonar_pose, profile, moving)
+    return (
+        made
+        if moving is None
+        else carried(made, legs, None, snap, sonar_pose, profile, moving, array.elements.aperture)
+    )
 
 
 def _echoes(
@@ -146,8 +166,8 @@ def _echoes(
     facets, most = array.facets, array.propagation.bounces
     out = _ways(array, snap)
     way, leg = _pairs(out.facet, array.legs.row, len(facets.facet))
-    few = np.flatnonzero(out.bounces[way] + array.legs.bounces[leg] <= most)
-    out, leg = out.select(way[few]), leg[few]
+    kept = np.flatnonzero(out.bounces[way] + array.legs.bounces[leg] <= most)
+    out, leg = out.select(way[kept]), leg[kept]
     normal, area = facets.normal[out.facet], facets.area[out.facet]
     scattering = law.amplitude(out.arrival, array.legs.departure[leg], normal, area)
     seen = np.flatnonzero(scattering)
@@ -166,7 +186,7 @@ def _echoes(
     made = assemble(legs, over, out, index, snap.time, absorption, target, number, signed, variation)
     if moving is None:
         return made
-    return carried(made, legs, out, snap, array.sonar_pose, array.profile, moving)
+    return carried(made, legs, out, snap, array.sonar_pose, array.profile, moving, array.elements.aperture)
 
 
 def _ways(array: ArrayLegs, snap: Snap) -> Outward:
@@ -180,8 +200,9 @@ def _ways(array: ArrayLegs, snap: Snap) -> Outward:
     out = Outward.of(paths, reflections(environment, profile, paths, array.centre), facet).select(np.flatnonzero(lit))
     end = np.broadcast_to(snap.position, out.arrival.shape)
     blocked = hidden(  # backwards, so that bodies are where a ray begins
-        array.bodies, environment, profile, facets.clear[out.facet], end, -out.arrival, out.length, out.bounces
-    )
+        array.bodies, environment, array.bending, facets.clear[out.facet], end, -out.arrival, out.length, out.bounces,
+        out.turning,
+    )  # fmt: skip
     return out.select(~blocked).merged()
 
 

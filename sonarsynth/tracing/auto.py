@@ -21,6 +21,11 @@ class AutoTracing:
     bounces: Bounces = 0
     """Most reflections from surface and bed on the way from the snap to the array."""
 
+    @property
+    def bends(self) -> bool:
+        """Whether rays bend where the sound speed varies."""
+        return True
+
     def resolve(self, profile: Profile) -> Straight | Refracted:
         """The model chosen."""
         return Straight(bounces=self.bounces) if profile.uniform else Refracted(bounces=self.bounces)

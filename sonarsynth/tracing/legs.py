@@ -137,6 +137,7 @@ def legs_from(
     bodies: tuple[Body, ...],
     environment: Environment,
     profile: Profile,
+    bending: Profile,
     sonar_pose: Pose,
     propagation: Propagation,
     centre: float,
@@ -147,7 +148,9 @@ def legs_from(
     legs = legs.select(seen)
     end = np.broadcast_to(sonar_pose.position, legs.point.shape)
     start = facets.clear[legs.row]
-    return legs.select(~hidden(bodies, environment, profile, start, end, legs.departure, legs.length, legs.bounces))
+    return legs.select(
+        ~hidden(bodies, environment, bending, start, end, legs.departure, legs.length, legs.bounces, legs.turning)
+    )
 
 
 def may_face(facets: Facets, position: Floats, bounces: int, profile: Profile, bed: float) -> Bools:

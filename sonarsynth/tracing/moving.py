@@ -8,7 +8,8 @@ give for nothing: a point that moves at v changes the time of a ray that arrives
 
 with a, d, b the directions of travel at facet, facet and array, v and u the velocities of target and array. The pulse
 is longer by dt_2/dt_s. What is left out is second order: the curvature (v t)^2/(2 c r) of the travel times, 7 ns for
-1.4 m/s at 20 m, the same for all facets of a body but for its size over its distance; and the turning of a body.
+1.4 m/s at 20 m, the same for all facets of a body but for its size over its distance; of a moving array, u/c of the
+curvature of the wavefront, as much; and the turning of a body.
 """
 
 from __future__ import annotations
@@ -26,6 +27,9 @@ from sonarsynth.tracing.paths import Outward
 from sonarsynth.world.environment import Profile
 from sonarsynth.world.moment import Snap
 
+TERMS = 20
+"""Terms over the aperture (`acoustics.arrays.aperture_terms`)."""
+
 
 @dataclass(frozen=True, eq=False)
 class Moving:
@@ -41,9 +45,14 @@ class Moving:
 
 
 def carried(
-    made: Arrivals, legs: Legs, out: Outward | None, snap: Snap, sonar_pose: Pose, profile: Profile, moving: Moving
-) -> Arrivals:
-    """Arrivals of a snap with what moves taken into account; out: the ways to the facets, None for direct paths."""
+    made: Arrivals, legs: Legs, out: Outward | None, snap: Snap, sonar_pose: Pose, profile: Profile, moving: Moving,
+    aperture: float,
+) -> Arrivals:  # fmt: skip
+    """Arrivals of a snap with what moves taken into account; out: the ways to the facets, None for direct paths.
+
+    An array that moves meets a wavefront later, or sooner, the farther it has still to go: delays over the aperture (m)
+    are longer by u.b/c, which goes into their linear terms.
+    """
     if moving.still or not len(made.delay):
         return made
     c_array = float(profile.at(depth(sonar_pose.position)))
@@ -65,4 +74,8 @@ def carried(
     moved = sonar_pose.turn_to_body(mirrored * met[:, None] - moving.sonar * heard[:, None])
     seen = legs.radius[:, None] * legs.direction + moved
     radius = np.sqrt(dot(seen, seen))
-    return replace(made, delay=heard, stretch=stretch, direction=seen / radius[:, None], radius=radius)
+    direction, terms = seen / radius[:, None], made.delay_terms
+    if moving.sonar.any() and aperture > 0.0:
+        terms = terms.copy() if terms.shape[1] else np.zeros((len(heard), TERMS))
+        terms[:, 1:4] -= (of_array / (1.0 - of_array) * aperture / c_array)[:, None] * direction
+    return replace(made, delay=heard, stretch=stretch, direction=direction, radius=radius, delay_terms=terms)

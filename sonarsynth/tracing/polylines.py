@@ -19,6 +19,8 @@ __all__ = ["Polylines", "polylines"]
 
 TINY = 1e-300
 """Least h^2 (m2/s2): keeps 0/0 out of the limit of a horizontal ray."""
+LEAST = 1e-9
+"""Tangent at the fastest depth from which Newton starts where the sines of the ends leave nothing of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +49,10 @@ def polylines(
     span = p2[:, :2] - p1[:, :2]
     distance = np.hypot(span[:, 0], span[:, 1])
     ahead = np.divide(span, distance[:, None], out=np.zeros_like(span), where=distance[:, None] > 0)
-    made = [_Points(*[np.empty(0)] * 5, np.empty(0, int))]
-    for i in range(len(p1)):
-        made.append(_points(layers, rays, i, z1[i], z2[i], distance[i], spacing, sagitta))
-    ray = np.repeat(np.arange(len(p1)), [len(m.x) for m in made[1:]])
+    none = np.empty(0)
+    made = [_points(layers, rays, i, z1[i], z2[i], distance[i], spacing, sagitta) for i in range(len(p1))]
+    ray = np.repeat(np.arange(len(p1)), [len(m.x) for m in made])
+    made.append(_Points(none, none, none, none, none, np.empty(0, int)))
     x, z, phi, time, length, event = (np.concatenate([getattr(m, f.name) for m in made]) for f in fields(_Points))
     position = np.column_stack([p1[ray, :2] + x[:, None] * ahead[ray], -z])
     direction = np.column_stack([np.cos(phi)[:, None] * ahead[ray], -np.sin(phi)])
@@ -89,11 +91,11 @@ def _points(
 ) -> _Points:
     """The points of eigenray i, whose ends are at depths z1 and z2."""
     stops, events, sense = _stops(rays, i, z1, z2, float(layers.depth[-1]))
-    if z1 == z2 and len(events) == 1:  # level, or coincident ends
-        x = np.linspace(0.0, distance, 1 + max(1, int(np.ceil(distance / spacing))))
+    if min(stops) == max(stops):  # level, also along a boundary, or coincident ends
+        x = np.linspace(0.0, distance, max(len(stops), 1 + int(np.ceil(distance / spacing))))
         level = np.full(len(x), rays.start_sine[i])
-        ends = np.array([LAUNCH, *[ON] * (len(x) - 2), ARRIVAL])
-        return _Points(x, np.full(len(x), z1), level, x / rays.start_speed[i], x, ends)
+        what = np.array([LAUNCH, *events[:-1], *[ON] * (len(x) - len(stops)), ARRIVAL])
+        return _Points(x, np.full(len(x), z1), level, x / rays.start_speed[i], x, what)
     arcs = _arcs(layers, stops, events, sense, float(rays.start_speed[i]), float(rays.end_speed[i]))
     p, sine, dx = _closed(arcs, rays, i, distance)
     made = _along(arcs, p, sine, dx, spacing, sagitta)
@@ -133,8 +135,8 @@ def _arcs(layers: Water, stops: list[float], events: list[int], sense: float, c_
             rows.append((*_span(layers, j, a, b, sense), sense, starts_level, level, event if last else ON))
         sense = -sense
     z1, z2, c1, c2, rise, gradient, senses, starts, ends, what = np.array(rows, float).T
-    z, c, turns = (np.column_stack(pair) for pair in ((z1, z2), (c1, c2), (starts > 0, ends > 0)))
-    return _Arcs(z, c, rise, gradient, senses, turns, what.astype(int))
+    turns = np.column_stack([starts > 0, ends > 0])
+    return _Arcs(np.column_stack([z1, z2]), np.column_stack([c1, c2]), rise, gradient, senses, turns, what.astype(int))
 
 
 def _layers_between(layers: Water, a: float, b: float, sense: float) -> list[int]:
@@ -177,7 +179,8 @@ def _closed(arcs: _Arcs, rays: Eigenrays, i: int, distance: float) -> tuple[floa
     c, sine = max((rays.start_speed[i], rays.start_sine[i]), (rays.end_speed[i], rays.end_sine[i]))
     fastest = float(max(c, arcs.c[~arcs.turns].max(initial=0.0)))
     offset = (fastest - arcs.c) * (fastest + arcs.c)
-    v = float(np.sqrt(max((sine / p) ** 2 - (fastest - c) * (fastest + c), 0.0)))
+    square = (sine / p) ** 2 - (fastest - c) * (fastest + c)
+    v = float(np.sqrt(max(square, (LEAST * fastest) ** 2)))
     h, dx, slope = _extents(arcs, offset, v)
     for _ in range(4):
         left = dx.sum() - distance
@@ -235,17 +238,17 @@ def _lengths(arcs: _Arcs, p: float, sine: Floats) -> Floats:
     tangent = p * (arcs.c[:, 1] - arcs.c[:, 0]) / total
     across = 2.0 * thickness / total * _over(np.arctan(tangent), tangent)
     if p == 0.0:
-        return across
+        return np.asarray(across)
     level = arcs.turns.any(axis=1)
     outside = np.where(arcs.turns[:, 0], arcs.c[:, 1], arcs.c[:, 0])
-    return np.where(level, np.arctan2(total, p * outside) * arcs.rise / p, across)
+    return np.asarray(np.where(level, np.arctan2(total, p * outside) * arcs.rise / p, across))
 
 
 def _chord_time(chord: Floats, c1: Floats, c2: Floats, gradient: Floats) -> Floats:
     """Travel time (s) along arcs over chords (m); as `acoustics.rays_layers.chord_time`."""
     mean = np.sqrt(c1 * c2)
     x = 0.5 * gradient * chord / mean
-    return chord / mean * _over(np.arcsinh(x), x)
+    return np.asarray(chord / mean * _over(np.arcsinh(x), x))
 
 
 def _over(value: Floats, x: Floats) -> Floats:

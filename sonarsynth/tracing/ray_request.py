@@ -23,7 +23,7 @@ class EigenrayRequest:
 
 @description
 class RayRequest:
-    """Rays to look at: eigenrays; a fan from the array centre, in listed directions or on a grid over the field of view.
+    """Rays to look at: eigenrays; a fan from the array centre, in given directions or on a grid over the field of view.
 
     A recipe that asks for none is looked at by the eigenrays of its frame.
     """

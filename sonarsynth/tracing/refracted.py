@@ -22,6 +22,11 @@ class Refracted:
     bounces: Bounces = 0
     """Most reflections from surface and bed on the way from the snap to the array."""
 
+    @property
+    def bends(self) -> bool:
+        """Whether rays bend where the sound speed varies."""
+        return True
+
     def connect(self, profile: Profile, environment_depth: float, start: Floats, end: Floats) -> Paths:
         """None (a shadow zone), one or several paths a pair; arguments and errors as in `Propagation`."""
         layers = water(profile.depth, profile.speed, environment_depth)

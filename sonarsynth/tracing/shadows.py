@@ -23,12 +23,14 @@ def hidden(
     departure: Floats,
     length: Floats,
     bounces: Ints | None = None,
+    turning: Ints | None = None,
 ) -> Bools:
     """Whether a body stands in rays (ray, xyz) that leave start in direction departure and end after length (m) at end.
 
-    bounces (ray,): their reflections from surface and bed. Straight rays and reflections in uniform water are exact;
-    bent rays are followed by chords within `BOW`, but only where they may pass a body: no ray is farther from the
-    straight line between its ends, unfolded at its reflections, than its largest curvature allows.
+    bounces, turning (ray,): their reflections from surface and bed, and turning points. Straight rays and reflections
+    in uniform water are exact; bent rays are followed by chords within `BOW`, but only where they may pass a body: no
+    ray is farther from the straight line between its ends, unfolded at its reflections, than its largest curvature
+    allows.
     """
     blocked = np.zeros(len(start), bool)
     if not bodies or not len(start):
@@ -39,6 +41,8 @@ def hidden(
     blocked[~broken] = occluded(bodies, start[~broken], end[~broken])
     rest = np.flatnonzero(broken)
     whole, first = _near(bodies, environment, start[rest], end[rest], departure[rest], times[rest], bow[rest])
+    if turning is not None:
+        whole |= (times[rest] > 0) & (turning[rest] > 0)  # which boundary comes first, a turn may have changed
     for some, part in ((rest[whole], length[rest[whole]]), (rest[~whole], np.minimum(first, length[rest])[~whole])):
         leaves = np.flatnonzero(part > 0.0)
         rows = some[leaves]

@@ -23,6 +23,11 @@ class Straight:
     bounces: Bounces = 0
     """Most reflections from surface and bed on the way from the snap to the array."""
 
+    @property
+    def bends(self) -> bool:
+        """Whether rays bend where the sound speed varies."""
+        return False
+
     def connect(self, profile: Profile, environment_depth: float, start: Floats, end: Floats) -> Paths:
         """One path a pair and family, 1/r; arguments and errors as in `Propagation`. Coincident ends are flagged."""
         layers = water(profile.depth, profile.speed, environment_depth)

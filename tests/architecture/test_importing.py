@@ -37,6 +37,7 @@ SURFACE = [
     "DenseDelayAndSum",
     "DirectSum",
     "EchoWindow",
+    "EigenrayRequest",
     "Environment",
     "FieldError",
     "FlatNoise",

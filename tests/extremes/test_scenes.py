@@ -165,7 +165,7 @@ def test_a_frame_whose_snap_is_not_found_is_whole_and_says_nothing(which: str) -
 
 
 def test_a_strong_thermocline_across_the_array_is_said_to_be_beyond_the_expansion() -> None:
-    """Some sensors have no ray from the snap: no wavefront over the aperture holds, and its error is NaN in the truth."""
+    """Some sensors have no ray from the snap: no wavefront over the aperture holds, and its error is NaN."""
     _, tree = frame_of(scene(environment=layered((0.0, 4.9, 5.1, 12.0), (1540.0, 1540.0, 1450.0, 1450.0))))
     assert np.isnan(float(tree["truth"].wavefront_error))
     assert np.isnan(tree["image"].energy.values).all()

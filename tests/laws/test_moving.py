@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sonarsynth.acoustics.arrays import aperture_terms
 from sonarsynth.tracing.moving import Moving
-from tests.laws.test_traced_families import ARRAY, ONE, SOURCE, C, ball, images, run
+from tests.laws.test_traced_families import ARRAY, ONE, ROMANIS, SONAR, SOURCE, C, ball, images, run
 
 
 def heard(emitted: float, centre, v, u, source, array) -> float:
@@ -65,3 +66,18 @@ def test_an_echo_comes_from_where_the_target_is_when_the_sound_meets_it() -> Non
     echo = ~found.direct
     expected = (still.radius[:, None] * still.direction)[echo] + np.outer(met[echo], [0.0, 30.0, 0.0])
     np.testing.assert_allclose((found.radius[:, None] * found.direction)[echo], expected, atol=30.0**2 * 2e-5)
+
+
+def test_a_moving_array_meets_the_wavefront_at_every_sensor_when_it_is_there() -> None:
+    u, q = np.array([1.5, -0.5, 0.2]), ROMANIS.position
+    found = run(bodies=(), bounces=1, array=ROMANIS, moving=Moving(np.zeros((0, 3)), u))
+    far = np.linalg.norm(found.radius[:, None, None] * found.direction[:, None, :] - q, axis=-1)
+    terms = found.delay_terms @ aperture_terms(q, ROMANIS.aperture).T
+    late = found.delay[:, None] + (far - found.radius[:, None]) / found.sound_speed + terms
+    places = {(s, b): source for source, s, b in images(SOURCE, 1)}
+    for i in range(len(late)):
+        source = places[found.surface[i], found.bottom[i]]
+        at = late[i].copy()
+        for _ in range(50):
+            at = np.linalg.norm(SONAR.to_world(q) + u * at[:, None] - source, axis=1) / C
+        assert abs(late[i] - at).max() < 2e-8  # second order; without the linear terms it is 3e-7

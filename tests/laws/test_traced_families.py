@@ -214,3 +214,30 @@ def test_a_snap_on_the_bed_and_its_image_there_are_one() -> None:
             assert fewer < len(echo.delay)
     direct = [total[:, 0] for total in totals]
     np.testing.assert_allclose(direct[0], direct[1], rtol=1e-4, atol=1e-7)
+
+
+def test_a_body_at_the_foot_of_a_ray_that_turns_and_then_meets_the_bed_hides_it_both_ways() -> None:
+    """Launched upwards, it turns: the bed is the first boundary that it meets."""
+    falling = Profile(np.array([0.0, 20.0]), np.array([1520.0, 1500.0]))
+    environment = Environment(depth=20.0, sound_speed=Isovelocity(speed=1510.0), bed=SeaBed(reflection=Rigid()))
+    ends = np.array([[0.0, 0.0, -10.0], [360.0, 0.0, -10.0]])
+    foot = ball((232.958, 0.0, -19.65))
+    for source, array in (ends, ends[::-1]):
+        snaps, pose = (Snap(source, 0.0, LogarithmicBubble(), None),), Pose(array, quaternion(0.5 * np.pi))
+        kept = [
+            trace(
+                environment, falling, Moment(0.0, bodies, snaps), pose, ONE, 0.0, Refracted(bounces=1),
+                Isotropic(strength=1.0), band=BAND,
+            )
+            for bodies in ((), (foot,))
+        ]  # fmt: skip
+        by_bed = [int((a.bottom[a.direct] == 1).sum()) for a in kept]
+        assert by_bed == [2, 1]
+
+
+def test_straight_rays_are_straight_in_any_water() -> None:
+    falling = Profile(np.array([0.0, BED]), np.array([1530.0, 1500.0]))
+    middle = 0.5 * (SOURCE + ARRAY)
+    found = run(bodies=(ball(tuple(middle), 0.05),), profile=falling, bounces=0, tracing=Straight())
+    assert not found.direct.any()
+    assert run(bodies=(), profile=falling, array=ROMANIS, tracing=Straight(bounces=1)).wavefront_error == 0.0

@@ -10,9 +10,8 @@ from sonarsynth.acoustics.arrays import element_directivity
 from sonarsynth.acoustics.snap import spectrum
 from sonarsynth.acoustics.spectra import response
 from sonarsynth.conventions import azimuth_elevation
-from sonarsynth.products import FAMILIES
 from sonarsynth.planning import PRODUCTS, plan
-from sonarsynth.products import LEDGER
+from sonarsynth.products import FAMILIES, LEDGER
 from sonarsynth.recipe import Recipe
 from sonarsynth.render import beamform_frame, render, synthesise, trace_frame
 from sonarsynth.scattering import MirrorLobe
