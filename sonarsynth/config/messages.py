@@ -20,7 +20,10 @@ def explain(error: ValidationError, root: type, source: Source) -> RecipeError:
         where = _where(details, source.data)
         where, message = _message(details, where, root, source.data)
         found.setdefault(where, message)
+    guessed = [item for item in found.items() if "did you mean" in item[1]]  # a misspelt field explains a missing one
     where, message = next(iter(found.items()))
+    if guessed and message == "is required":
+        where, message = guessed[0]
     more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
     return source.error(where, message + more)
 

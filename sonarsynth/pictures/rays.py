@@ -133,9 +133,11 @@ def _water(axes: Axes, bed: float) -> None:
 
 
 def _profile(axes: Axes, depth: Floats, speed: Floats, bed: float) -> None:
-    every = np.concatenate([[0.0], depth, [bed]])
+    inside = (depth > 0.0) & (depth < bed)
+    ends = np.interp([0.0, bed], depth, speed)
     grid(axes)
-    axes.plot(np.interp(every, depth, speed), -every, color=INK, linewidth=1.2)
+    axes.plot([ends[0], *speed[inside], ends[1]], [0.0, *-depth[inside], -bed], color=INK, linewidth=1.2)
+    axes.ticklabel_format(axis="x", useOffset=False)
     label(axes, "sound speed (m/s)", "z (m)", "profile")
     axes.locator_params(axis="x", nbins=4)
 

@@ -57,6 +57,9 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS) -> Plan:
         notes += (
             f"{windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest one",
         )
+    cancelled = scene.processing.cancelling is not None
+    if made.propagation.bounces and not cancelled and products & {"image", "cloud"} and sizes["snap"]:
+        notes += ("the snap's own reflections enter the image: processing.cancelling takes them out before",)
     notes += _behind(recipe)
     notes += _coarse(recipe)
     notes += tuple(f"{t.name}: {note}" for t in scene.world.targets for note in mesh_of(t.shape).notes)

@@ -13,12 +13,15 @@ from sonarsynth.recipe import Recipe
 from sonarsynth.scene import Frame, Scene
 from sonarsynth.sonar import elements
 from sonarsynth.synthesis.pulse import bubble
+from sonarsynth.world.casting import inside
 from sonarsynth.world.casts import profile_of
 from sonarsynth.world.environment import Profile
 from sonarsynth.world.meshes import Mesh, mesh_of
 
 FARTHEST = 1e6
 """m from the origin: beyond, travel times lose their microseconds."""
+CLOSEST = 1e-3
+"""m: a snap no nearer to the centre of the array."""
 LOUDEST = 300.0
 """dB re 1 uPa at 1 m: single precision holds the signals of no louder snap everywhere."""
 LONGEST_SNAP = 0.1
@@ -65,7 +68,8 @@ def check_positions(scene: Scene, recipe: Recipe) -> None:
         down = -position[2] if len(position) > 2 else bed - shrimp.height
         if not 0 <= down <= bed:
             raise FieldError(
-                ("scene", "world", "shrimp", i, "position"), f"depth {down:g} m is outside the water (0 to {bed:g} m)"
+                ("scene", "world", "shrimp", i, "position"),
+                f"depth {down:.12g} m is outside the water (0 to {bed:g} m)",
             )
     reach = elements(scene.sonar.array).position
     for step in range(recipe.frames):
@@ -74,6 +78,19 @@ def check_positions(scene: Scene, recipe: Recipe) -> None:
         for i, body in enumerate(frame.moment.bodies):
             path = ("scene", "world", "targets", i, "motion")
             _check_depth(path, f"target '{body.name}'", body.pose.to_world(_hull(body.mesh)), bed, frame)
+        _check_snaps(scene, frame)
+
+
+def _check_snaps(scene: Scene, frame: Frame) -> None:
+    """No shrimp is at the centre of the array, or inside a target."""
+    owners = [i for i, shrimp in enumerate(scene.world.shrimp) for _ in shrimp.snap_times]
+    for owner, snap in zip(owners, frame.moment.snaps, strict=True):
+        path = ("scene", "world", "shrimp", owner, "position")
+        if np.linalg.norm(snap.position - frame.sonar_pose.position) < CLOSEST:
+            raise FieldError(path, f"is at the centre of the array at frame {frame.index}")
+        for body in frame.moment.bodies:
+            if inside(body, snap.position):
+                raise FieldError(path, f"is inside target '{body.name}' at frame {frame.index}")
 
 
 def check_methods(scene: Scene, products: frozenset[str]) -> None:

@@ -28,6 +28,7 @@ from sonarsynth.tracing.ray_request import EigenrayRequest
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+LONGEST_TABLE = 100
 HEADINGS = (
     "joins",
     "family",
@@ -96,7 +97,7 @@ def table(lines: Sequence[RayLine]) -> str:
     found = [line for line in lines if line.family != FAN]
     fan = [line for line in lines if line.family == FAN]
     rows: list[tuple[str, ...]] = [HEADINGS] if found else []
-    for line in found:
+    for line in found[:LONGEST_TABLE]:
         ends = np.rad2deg(line.elevation[[0, -1]])
         numbers = [1e3 * line.time[-1], *ends, line.length[-1], line.transmission_loss]
         texts = [f"{number:.{digits}f}" for number, digits in zip(numbers, (4, 3, 3, 3, 1), strict=True)]
@@ -104,8 +105,11 @@ def table(lines: Sequence[RayLine]) -> str:
         rows.append((line.name, line.family, line.vertices, *texts, str(line.caustics), flags))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     texts = ["  ".join(_aligned(row, widths)).rstrip() for row in rows]
+    if len(found) > LONGEST_TABLE:
+        texts.append(f"... and {len(found) - LONGEST_TABLE} more, in rays.json")
     if found:
         texts.append("vertices: S surface, B bed, T turning point, X target; angles of travel, up positive")
+        texts.append("how many vertices at most is for the recipe to say: rays.eigenrays.vertices")
         texts.append("TL at the centre of the band; of an echo: both ways, off a target of 0 dB")
     if fan:
         met = Counter(event for line in fan for event in line.event)

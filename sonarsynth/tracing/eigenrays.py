@@ -14,6 +14,9 @@ from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.world.casts import profile_of
 from sonarsynth.world.sound_speed import SoundSpeed, reaches
 
+MOST_VERTICES = 1000
+FARTHEST = 1e9
+"""m."""
 ROWS = 20
 """Rays that are printed; the rest is counted."""
 COLUMNS = " pair      time/s  launch/deg  arrival/deg  surface  bottom  turning  caustics  loss/dB"
@@ -67,7 +70,7 @@ class RayArrivals:
         for i in range(min(len(self), ROWS)):
             reason = kernel.REASONS[int(self.flag[i])].partition(":")[0] if self.flag[i] != kernel.GOOD else ""
             row = (
-                f"{self.pair[i]:5d} {self.travel_time[i]:11.7g} {np.rad2deg(self.launch_angle[i]):11.4f}"
+                f"{self.pair[i]:5d} {self.travel_time[i]:11.7f} {np.rad2deg(self.launch_angle[i]):11.4f}"
                 f" {np.rad2deg(self.arrival_angle[i]):12.4f} {self.surface[i]:8d} {self.bottom[i]:7d}"
                 f" {self.turning[i]:8d} {self.caustics[i]:9d} {loss[i]:8.2f}  {reason}"
             )
@@ -101,9 +104,9 @@ def eigenrays(
     >>> ss.eigenrays(ss.Isovelocity(speed=1500.0), 20.0, 5.0, 10.0, 100.0, vertices=1)
     3 rays
      pair      time/s  launch/deg  arrival/deg  surface  bottom  turning  caustics  loss/dB
-        0  0.06674995      2.8624       2.8624        0       0        0         0    40.01
-        0  0.06741249     -8.5308       8.5308        1       0        0         0    40.10
-        0  0.06871843     14.0362     -14.0362        0       1        0         0    40.26
+        0   0.0667499      2.8624       2.8624        0       0        0         0    40.01
+        0   0.0674125     -8.5308       8.5308        1       0        0         0    40.10
+        0   0.0687184     14.0362     -14.0362        0       1        0         0    40.26
     """
     names = ("seabed_depth", "source_depth", "receiver_depth", "horizontal_range")
     values = (seabed_depth, source_depth, receiver_depth, horizontal_range)
@@ -132,8 +135,10 @@ def eigenrays_between(
     for name, position in (("source", start), ("receiver", end)):
         if position.shape[-1:] != (3,):
             raise ValueError(f"{name} must be positions (..., xyz), but its shape is {position.shape}")
-        if not np.isfinite(position).all():
-            raise ValueError(f"{name} must be finite, but not all of it is")
+        wrong = ~np.isfinite(position).all(axis=-1)
+        if wrong.any():
+            at = f" {int(np.argmax(wrong))}" if wrong.size > 1 else ""
+            raise ValueError(f"{name}{at} must be finite, but is {position.reshape(-1, 3)[int(np.argmax(wrong))]}")
     names = ("seabed_depth", "source", "receiver")
     bed = _numbers("seabed_depth", seabed_depth)
     beds, from_row, to_row = _together(names, [bed, _rows(start), _rows(end)])
@@ -164,8 +169,8 @@ def _find(
         most = operator.index(vertices)
     except TypeError:
         raise ValueError(f"vertices must be a whole number, not {vertices!r}") from None
-    if most < 0:
-        raise ValueError(f"vertices must not be negative, but is {most}")
+    if not 0 <= most <= MOST_VERTICES:
+        raise ValueError(f"vertices must lie between 0 and {MOST_VERTICES}, but is {most}")
     _check(names, bed, start, end, distance)
     profile = profile_of(sound_speed)
     parts, pairs = [], []
@@ -245,5 +250,6 @@ def _check(names: tuple[str, ...], bed: Floats, start: Floats, end: Floats, dist
     first(bed <= 0.0, names[0], bed, "must be positive, but is {value:g} m")
     for name, values in ((names[1], start), (names[2], end)):
         wrong = (values < -kernel.TOLERANCE) | (values > bed + kernel.TOLERANCE)
-        first(wrong, name, values, "at {value:g} m depth is not in the water, which is {bed:g} m deep")
+        first(wrong, name, values, "at {value:.12g} m depth is not in the water, which is {bed:.12g} m deep")
     first(distance < 0.0, names[3], distance, "must not be negative, but is {value:g} m")
+    first(distance > FARTHEST, names[3], distance, f"must be at most {FARTHEST:g} m, but is {{value:g}} m")

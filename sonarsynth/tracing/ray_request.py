@@ -15,7 +15,7 @@ from sonarsynth.description import description
 class EigenrayRequest:
     """All rays from each snap to the array centre, and from each snap by each target to the array centre."""
 
-    vertices: Annotated[int, Ge(0), Le(50)] = 2
+    vertices: Annotated[int, Ge(0), Le(12)] = 2
     """Most reflections from surface and bed and turning points of a whole path together."""
     targets: Literal["centre", "nearest", "none"] = "centre"
     """By way of the middle of each target, of its facet nearest to the array, or of no target."""
@@ -35,10 +35,10 @@ class RayRequest:
     directions: Annotated[tuple[tuple[Radians, Radians], ...], MinLen(1)] | None = None
     """(azimuth, elevation) of each ray in the sonar frame; left out: the grid."""
     azimuth_span: Annotated[Radians, Ge(0), Le(2 * np.pi)] = np.deg2rad(50.0)
-    azimuths: Annotated[int, Ge(1), Le(1000)] = 11
+    azimuths: Annotated[int, Ge(1), Le(100)] = 11
     """Rays in a row of the grid."""
     elevation_span: Annotated[Radians, Ge(0), Le(np.pi)] = np.deg2rad(50.0)
-    elevations: Annotated[int, Ge(1), Le(1000)] = 11
+    elevations: Annotated[int, Ge(1), Le(100)] = 11
     """Rows of the grid."""
     duration: PositiveSeconds = 0.05
     """How long a ray is followed."""

@@ -186,6 +186,16 @@ def enclosing(body: Body) -> tuple[Floats, float]:
     return np.asarray(body.pose.to_world(ready.centre)), (1.0 + 1e-5) * ready.size
 
 
+def inside(body: Body, point: Floats) -> bool:
+    """Whether a point (xyz) of the world is inside a closed body: the facet above it shows its inner side."""
+    centre, radius = enclosing(body)
+    if not len(body.mesh.faces) or np.linalg.norm(point - centre) > radius:
+        return False
+    up = np.array([[1e-3, 2e-3, 1.0]])  # off the edges of boxes
+    facet, _ = first_hit(body.mesh, body.pose.to_body(point[None]), body.pose.turn_to_body(up))
+    return bool(facet[0] >= 0 and body.mesh.normal[facet[0]] @ body.pose.turn_to_body(up)[0] > 0.0)
+
+
 def first_hit(
     mesh: Mesh, origin: Floats, direction: Floats, far: float = np.inf, backend: Backend = "embree"
 ) -> tuple[Ints, Floats]:

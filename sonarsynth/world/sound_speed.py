@@ -70,9 +70,9 @@ class TemperatureSalinity:
     kind: Literal["temperature_salinity"] = "temperature_salinity"
     depth: Depths
     """Depths below the surface (m), not decreasing."""
-    temperature: tuple[DegreesCelsius, ...]
+    temperature: tuple[Annotated[DegreesCelsius, Ge(-5), Le(60)], ...]
     """Temperature at each depth."""
-    salinity: tuple[Annotated[PracticalSalinity, Ge(0)], ...]
+    salinity: tuple[Annotated[PracticalSalinity, Ge(0), Le(100)], ...]
     """Practical salinity at each depth."""
 
     _depth = field_validator("depth")(_ascending)

@@ -116,7 +116,6 @@ UNHEARD: dict[str, Recipe] = {
     "no shrimp, refracted": scene(snaps=(), environment=layered((0.0, 12.0), (1540.0, 1500.0))),
     "the direct path is blocked": scene((ball((7.0, -2.0, -8.5), 0.8),)),
     "a target before the snap": scene((ball((7.0, 0.0, -5.0)),), (shrimp(14.0, 0.0, -5.0),)),
-    "a snap within a target": scene(snaps=(shrimp(10.0, 1.0, -5.0),)),
     "a snap that absorption leaves nothing of": scene(snaps=(shrimp(9e5, 0.0),)),
     "less than a count of the converter": scene(sonar={"converter": Converter(bits=8, full_scale=1e5)}),
     "louder noise": scene(environment={"noise": FlatNoise(level=150.0)}),
@@ -249,6 +248,8 @@ REFUSED = [
         scene(sonar={"array": PlanarLattice(columns=2, rows=2, pitch=0.1, dead=(4,))}),
         "scene.sonar.array: dead names an element outside 0..3",
     ),
+    (scene(snaps=(shrimp(10.0, 1.0, -5.0),)), "scene.world.shrimp.0.position: is inside target 'ball' at frame 0"),
+    (scene(snaps=(shrimp(0.0, 0.0, -5.0),)), "scene.world.shrimp.0.position: is at the centre of the array"),
     (
         scene((Target(name="wall", shape=Box(size=(2, 1000, 2), edge=0.01), motion=Still(position=(10, 0, -5))),)),
         "scene.world.targets.0.shape: edges of 0.01 m would take more than",

@@ -100,7 +100,7 @@ WRONG = [
     (
         "kind: isovelocity, speed: 1540",
         "kind: temperature_salinity, depth: [0], temperature: [900], salinity: [35]",
-        "5: scene.world.environment.sound_speed: is ",
+        "5: scene.world.environment.sound_speed.temperature",
     ),
 ]
 

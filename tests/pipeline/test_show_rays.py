@@ -85,7 +85,7 @@ def test_without_a_request_the_eigenrays_of_the_frame_are_drawn(shown: tuple[dic
     assert sorted(ray["vertices"] for ray in heard) == ["-", "B", "B-S", "S", "S-B"]
     echoes = [ray["vertices"] for ray in value["rays"] if ray["name"] == "snap 0 to box to array"]
     assert len(echoes) == len(set(echoes)) == 13  # every way to share at most two reflections between the two legs
-    assert len(text.splitlines()) == 1 + 5 + 13 + 2
+    assert len(text.splitlines()) == 1 + 5 + 13 + 3
 
 
 def test_paths_times_and_angles_are_those_of_image_sources(shown: tuple[dict[str, Path], str, Any]) -> None:
