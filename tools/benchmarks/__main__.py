@@ -1,4 +1,4 @@
-"""Benchmarks against peers and against the slow exact way, as JSON: `tools/bench frame`, `tools/bench build`."""
+"""Benchmarks against peers and against the slow exact way, as JSON: `tools/bench frame` and others."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 import sys
 from importlib import import_module
 
-BENCHMARKS = ("frame", "build", "rays")
+BENCHMARKS = ("frame", "build", "rays", "reflections")
 """Modules beside this one; each has a function `bench`."""
 
 
