@@ -13,6 +13,7 @@ from sonarsynth.beamforming import Beamformer, FocusedDelayAndSum
 from sonarsynth.conventions import Floats, PositiveSeconds, Seconds
 from sonarsynth.description import description
 from sonarsynth.geometry import Pose
+from sonarsynth.randomness import stream
 from sonarsynth.ranging import Cancelling, IsovelocityRange, Locator, Ranging, SensorDelays
 from sonarsynth.scattering import MirrorLobe, Scattering
 from sonarsynth.sonar import Sonar
@@ -20,8 +21,9 @@ from sonarsynth.synthesis import KernelDeposit, Synthesis
 from sonarsynth.tracing import AutoTracing, Tracing
 from sonarsynth.world.environment import Environment
 from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.moment import Body, Moment, Snap, snaps_of
 from sonarsynth.world.motion import Motion, Still, pose, velocity
+from sonarsynth.world.snap_pulses import scales
 from sonarsynth.world.sources import SnappingShrimp
 from sonarsynth.world.targets import Target
 
@@ -117,23 +119,17 @@ class Scene:
     physics: Physics = Field(default_factory=Physics)
     processing: Processing = Field(default_factory=Processing)
 
-    def moment(self, time: float) -> Moment:
-        """The world at a time (s)."""
+    def moment(self, time: float, *, trajectory: int = 0, step: int = 0, seed: int = 0) -> Moment:
+        """The world at a time (s), with the snaps that a frame of this trajectory, step and seed draws."""
         bodies = tuple(
             Body(t.name, mesh_of(t.shape), pose(t.motion, time), velocity(t.motion, time)) for t in self.world.targets
         )
-        bed = -self.world.environment.depth
-        snaps = tuple(
-            Snap(
-                np.array([*s.position[:2], s.position[2] if len(s.position) > 2 else bed + s.height]),
-                t,
-                s.snap,
-                s.source_level,
-            )
-            for s in self.world.shrimp
-            for t in s.snap_times
-        )
-        return Moment(time, bodies, snaps)
+        bed = self.world.environment.depth
+        snaps: list[Snap] = []
+        for i, shrimp in enumerate(self.world.shrimp):
+            drawn = scales(shrimp.variation, stream(seed, "snap", trajectory, step, i), len(shrimp.snap_times))
+            snaps += snaps_of(shrimp, bed, drawn)
+        return Moment(time, bodies, tuple(snaps))
 
     def frame(self, step: int, *, index: int | None = None, trajectory: int = 0, seed: int = 0) -> Frame:
         """Frame `step` of this scene's trajectory."""
@@ -145,7 +141,7 @@ class Scene:
             seed=seed,
             sonar_pose=pose(self.trajectory.sonar, time),
             sonar_velocity=velocity(self.trajectory.sonar, time),
-            moment=self.moment(time),
+            moment=self.moment(time, trajectory=trajectory, step=step, seed=seed),
         )
 
 

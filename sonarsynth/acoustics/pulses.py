@@ -93,7 +93,8 @@ def _waveform(pulse: Pulse, fir: Fir, steps: int) -> tuple[Floats, Floats]:
     h = impulse_response(lag, fir)
     p = np.zeros(time.size)
     for part in _parts(time, pulse.time.size):
-        p[part] = np.interp(time[part, None] - pulse.time, lag, h, left=0.0, right=0.0) @ pulse.strength
+        near = slice(*np.searchsorted(pulse.time, [time[part][0] - half, time[part][-1] + half]))
+        p[part] = np.interp(time[part, None] - pulse.time[near], lag, h, left=0.0, right=0.0) @ pulse.strength[near]
     return time, p
 
 

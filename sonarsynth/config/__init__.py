@@ -24,11 +24,12 @@ from sonarsynth.description import FieldError
 from sonarsynth.recipe import Recipe
 from sonarsynth.world.environment import Cast
 from sonarsynth.world.shapes import MeshFile
+from sonarsynth.world.snaps import RecordedSnap
 
 __all__ = ["RecipeError", "Source", "dump", "load", "loads", "locating", "read", "recipe_of", "schema"]
 
 _ADAPTER: Final[TypeAdapter[Recipe]] = TypeAdapter(Recipe)
-_FILE_KINDS: Final = {MeshFile.kind, Cast.kind}
+_FILE_KINDS: Final = {MeshFile.kind, Cast.kind, RecordedSnap.kind}
 """Descriptions whose `path` names a file."""
 
 

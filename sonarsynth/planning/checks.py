@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonarsynth.acoustics.snap import Bubble, onset, source_level
+from sonarsynth.acoustics.snap import onset
 from sonarsynth.beamforming import FocusedDelayAndSum
-from sonarsynth.conventions import FASTEST, SLOWEST, Floats, depth
+from sonarsynth.conventions import FASTEST, REFERENCE_PRESSURE, SLOWEST, Floats, depth
 from sonarsynth.description import FieldError
 from sonarsynth.planning.plans import Windows
 from sonarsynth.recipe import Recipe
 from sonarsynth.scene import Frame, Scene
-from sonarsynth.sonar import elements
-from sonarsynth.synthesis.pulse import bubble
+from sonarsynth.sonar import Sonar, elements
+from sonarsynth.synthesis.pulse import bubble, heard_part
 from sonarsynth.world.casting import inside
 from sonarsynth.world.casts import profile_of
 from sonarsynth.world.environment import Profile
 from sonarsynth.world.meshes import Mesh, mesh_of
+from sonarsynth.world.moment import model_of
+from sonarsynth.world.snap_pulses import largest_scales, pulse, waveform
+from sonarsynth.world.sources import LogarithmicBubble, SnappingShrimp
 
 FARTHEST = 1e6
 """m from the origin: beyond, travel times lose their microseconds."""
@@ -26,6 +29,8 @@ LOUDEST = 300.0
 """dB re 1 uPa at 1 m: single precision holds the signals of no louder snap everywhere."""
 LONGEST_SNAP = 0.1
 """s."""
+FAINTEST = 1e-9
+"""Part of a snap that the filter must let pass: what rounding makes of nothing is less."""
 FRAME_BYTES = 2e9
 """Signals of a frame may take so much memory."""
 
@@ -59,7 +64,6 @@ def check_positions(scene: Scene, recipe: Recipe) -> None:
     """Every body, the array and every shrimp must be in the water at every frame."""
     bed = scene.world.environment.depth
     for i, shrimp in enumerate(scene.world.shrimp):
-        _check_snap(("scene", "world", "shrimp", i, "snap"), bubble(shrimp.snap))
         position = shrimp.position
         if max(map(abs, position)) > FARTHEST:
             raise FieldError(
@@ -71,6 +75,10 @@ def check_positions(scene: Scene, recipe: Recipe) -> None:
                 ("scene", "world", "shrimp", i, "position"),
                 f"depth {down:.12g} m is outside the water (0 to {bed:g} m)",
             )
+        try:
+            _check_snap(shrimp, bed, scene.sonar)
+        except ValueError as error:
+            raise FieldError(("scene", "world", "shrimp", i, "snap"), str(error)) from None
     reach = elements(scene.sonar.array).position
     for step in range(recipe.frames):
         _, frame = recipe.frame(step)
@@ -127,15 +135,26 @@ def _hull(mesh: Mesh) -> Floats:
     return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
 
 
-def _check_snap(path: tuple[str | int, ...], bubble: Bubble) -> None:
-    duration = -onset(bubble)
-    if not 1.0 / -bubble.q < duration:
-        raise FieldError(path, f"grows for {duration:.3g} s and has no time to collapse: q is too small")
-    if not duration <= LONGEST_SNAP:
-        raise FieldError(path, f"grows for {duration:.3g} s; a snap is over in {LONGEST_SNAP:g} s")
-    level = source_level(bubble)
+def _check_snap(shrimp: SnappingShrimp, bed: float, sonar: Sonar) -> None:
+    """Whether the snap can be made, is short, neither too loud nor out of the sonar's band; else ValueError."""
+    model = model_of(shrimp, bed)
+    gain, longest = largest_scales(shrimp.variation)
+    if isinstance(model, LogarithmicBubble):
+        duration = -onset(bubble(model))
+        if not 1.0 / -model.q < duration:
+            raise ValueError(f"grows for {duration:.3g} s and has no time to collapse: q is too small")
+        if not longest * duration <= LONGEST_SNAP:
+            raise ValueError(f"grows for {longest * duration:.3g} s; a snap is over in {LONGEST_SNAP:g} s")
+    made = pulse(model, 0.0, 0.0)
+    if not longest * (made.end - made.start) <= LONGEST_SNAP:
+        raise ValueError(f"lasts {longest * (made.end - made.start):.3g} s; a snap is over in {LONGEST_SNAP:g} s")
+    level = float(20.0 * np.log10(gain * made.peak / REFERENCE_PRESSURE))
     if not abs(level) <= LOUDEST:
-        raise FieldError(path, f"makes a source level of {level:.3g} dB re 1 uPa at 1 m; {LOUDEST:g} dB is the most")
+        raise ValueError(f"makes a source level of {level:.3g} dB re 1 uPa at 1 m; {LOUDEST:g} dB is the most")
+    for width in {longest, 1.0 / longest}:
+        part = heard_part(waveform(model, width), sonar.antialias)
+        if not part >= FAINTEST:
+            raise ValueError(f"is not heard: the sonar's filter lets {part:.1g} of it pass")
 
 
 def _check_depth(path: tuple[str | int, ...], what: str, points: Floats, bed: float, frame: Frame) -> None:

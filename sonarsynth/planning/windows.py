@@ -12,13 +12,15 @@ from sonarsynth.description import FieldError
 from sonarsynth.planning.plans import Windows
 from sonarsynth.products import Paths
 from sonarsynth.recipe import Recipe
-from sonarsynth.scene import Frame
+from sonarsynth.scene import Frame, Scene
 from sonarsynth.sonar import elements
 from sonarsynth.synthesis import pulse_support
-from sonarsynth.synthesis.pulse import FEET, silencing_blur, snap_levels
+from sonarsynth.synthesis.pulse import FEET, at_longest, silencing_blur, snap_levels
 from sonarsynth.tracing import Straight
 from sonarsynth.world.environment import Profile
+from sonarsynth.world.moment import model_of
 from sonarsynth.world.reflection import rms_height
+from sonarsynth.world.snap_pulses import Waveform, largest_scales, waveform
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 MARGIN = 0.1e-3
@@ -69,7 +71,7 @@ def _support(recipe: Recipe, tolerance: float, uniform: bool) -> Floats:
     scene = recipe.scene
     turned = scene.physics.tracing.bounces > 0 or not uniform  # lossy reflections and caustics turn the phase
     chosen = scene.sonar.antialias
-    supports = [pulse_support(s.snap, chosen, tolerance, turned=turned) for s in scene.world.shrimp]
+    supports = [pulse_support(w, chosen, tolerance, turned=turned) for w in extreme_waveforms(scene)]
     return np.asarray(np.max(supports or [(0.0, 0.0)], axis=0))
 
 
@@ -81,7 +83,7 @@ def _blurred(recipe: Recipe) -> float:
         return 0.0
     roughest = max(rms_height(environment.surface), rms_height(environment.bed))
     blur = 2.0 * roughest / SLOWEST * np.sqrt(bounces)  # at the steepest grazing angle
-    silent = max((silencing_blur(s.snap, scene.sonar.antialias) for s in scene.world.shrimp), default=0.0)
+    silent = max((silencing_blur(w, scene.sonar.antialias) for w in extreme_waveforms(scene)), default=0.0)
     return float(FEET * min(blur, silent))
 
 
@@ -105,6 +107,15 @@ def _slack(doppler: bool, frame: Frame, span: _Span, profile: Profile) -> float:
         gradient = float(np.nanmax(np.abs(np.diff(profile.speed)) / np.diff(profile.depth), initial=0.0))
     bent = way**3 * gradient**2 / (24.0 * slowest**3)
     return moved + min(bent, way / slowest - way / float(profile.speed.max()))
+
+
+def extreme_waveforms(scene: Scene) -> list[Waveform]:
+    """What each shrimp may sound like at the most: as its model, as long as it may become, and as short."""
+    found = []
+    for shrimp in scene.world.shrimp:
+        model, longest = model_of(shrimp, scene.world.environment.depth), largest_scales(shrimp.variation)[1]
+        found += [at_longest(waveform(model, width)) for width in sorted({1.0, longest, 1.0 / longest})]
+    return found
 
 
 @dataclass(frozen=True)

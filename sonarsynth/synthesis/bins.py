@@ -58,14 +58,14 @@ def bins_of(
     Errors are relative to the least blurred path; paths that are silent beside it are left out.
     """
     fs = sonar.sampling_frequency
-    frequency, spectrum = pulse_spectrum(part.model, sonar.antialias, fs, part.samples)
+    frequency, spectrum = pulse_spectrum(part.waveform, sonar.antialias, fs, part.samples)
     widest = rounded_up(float(np.abs(front.doppler).max()), 2.0)
     series = np.zeros((0, spectrum.size), complex)
     if widest > 0.0:
-        sizes = np.array(stretch_sizes(part.model, sonar.antialias, widest))
+        sizes = np.array(stretch_sizes(part.waveform, sonar.antialias, widest))
         left = np.append(np.cumsum(sizes[::-1])[::-1], 0.0)
         count = int(np.flatnonzero(left <= SHAPES * tolerance)[0])
-        series = stretched_spectra(part.model, sonar.antialias, fs, part.samples, widest, count)
+        series = stretched_spectra(part.waveform, sonar.antialias, fs, part.samples, widest, count)
     if len(series) or front.variance.any() or front.phase.any():
         front, spectrum, series = _shared(front, frequency, spectrum, series, widest, tolerance)
     some = audible(spectrum, tolerance)

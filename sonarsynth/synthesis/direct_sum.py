@@ -81,8 +81,9 @@ def exact_signals(
     front = fronts(arrivals, snaps, elements)
     plan = layout(arrivals, front, snaps, elements, sonar, start, samples)
     pressure = np.zeros((elements.count, samples))
-    for model in dict.fromkeys(s.model for s in snaps):
-        rows = np.flatnonzero(np.array([s.model == model for s in snaps])[arrivals.snap] & plan.heard)
+    waveforms = [s.waveform for s in snaps]
+    for waveform in dict.fromkeys(waveforms):
+        rows = np.flatnonzero(np.array([w == waveform for w in waveforms])[arrivals.snap] & plan.heard)
         if not rows.size:
             continue
         pad = int(np.ceil(plan.support[:, rows].sum(axis=0).max() * fs)) + 2
@@ -90,7 +91,7 @@ def exact_signals(
         spread = int(np.ceil(2.0 * reach(front).max(initial=0.0) * fs)) + pad
         length = fast_length(samples + 2 * spread)
         for doppler in np.unique(front.doppler[rows]):
-            frequency, spectrum = pulse_spectrum(model, sonar.antialias, fs, length, float(doppler))
+            frequency, spectrum = pulse_spectrum(waveform, sonar.antialias, fs, length, float(doppler))
             relative = relative_absorption(absorption, frequency, sonar.band.centre)
             some = front.select(rows[front.doppler[rows] == doppler])
             transfer = exact_spectra(some, elements, frequency, relative, start - spread / fs)

@@ -10,10 +10,10 @@ import numpy as np
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.products import Arrivals
 from sonarsynth.sonar import Elements, Sonar
-from sonarsynth.synthesis.pulse import FEET, pulse_support, silencing_blur
+from sonarsynth.synthesis.pulse import FEET, at_longest, pulse_support, silencing_blur
 from sonarsynth.synthesis.wavefront import Fronts, delay_and_gain, reach
 from sonarsynth.world.moment import Snap
-from sonarsynth.world.sources import LogarithmicBubble
+from sonarsynth.world.snap_pulses import Waveform
 
 FAST = (16, 18, 20, 24, 27, 30)
 """Lengths of stretches are these times powers of two: fast to transform, and few, so that spectra of pulses are
@@ -25,7 +25,7 @@ class Stretch:
     """Paths of one waveform whose pulses overlap in time, and the samples that hold them."""
 
     paths: Ints  # (path,) which
-    model: LogarithmicBubble
+    waveform: Waveform
     first: int  # sample of the window where it begins; may be negative
     samples: int  # even
 
@@ -67,13 +67,14 @@ def layout(
     cut = ~silent & ((early < start) | (late > start + (samples - 1) / fs))
     heard = ~silent & (late > start) & (early < start + (samples - 1) / fs)
     stretches: list[Stretch] = []
-    for model in dict.fromkeys(s.model for s in snaps):
-        same = np.array([s.model == model for s in snaps])[arrivals.snap] & heard
+    waveforms = [s.waveform for s in snaps]
+    for waveform in dict.fromkeys(waveforms):
+        same = np.array([w == waveform for w in waveforms])[arrivals.snap] & heard
         for rows in (np.flatnonzero(same & arrivals.direct), np.flatnonzero(same & ~arrivals.direct)):
             for chosen in _runs(rows, early + before - plain[0], late - after + plain[1]):
                 first = int(np.floor((early[chosen].min() - start) * fs)) - 1
                 last = int(np.ceil((late[chosen].max() - start) * fs)) + 1
-                stretches.append(Stretch(chosen, model, first, fast_length(last - first + 1)))
+                stretches.append(Stretch(chosen, waveform, first, fast_length(last - first + 1)))
     return Layout(tuple(stretches), heard, int(cut.sum()), support)
 
 
@@ -83,16 +84,17 @@ def _supports(arrivals: Arrivals, front: Fronts, snaps: tuple[Snap, ...], sonar:
     if not front.count:
         return np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0, bool)
     chosen, blur = sonar.antialias, np.sqrt(front.variance)
+    longest = [at_longest(s.waveform) for s in snaps]
 
     def each(turned: bool) -> Floats:
-        return np.array([pulse_support(s.model, chosen, turned=turned) for s in snaps])[arrivals.snap].T
+        return np.array([pulse_support(w, chosen, turned=turned) for w in longest])[arrivals.snap].T
 
     plain, silent = each(False), np.zeros(front.count, bool)
     support = plain
     if front.phase.any():
         support = np.where(front.phase != 0.0, each(True), support)
     if blur.any():
-        silent = blur >= np.array([silencing_blur(s.model, chosen) for s in snaps])[arrivals.snap]
+        silent = blur >= np.array([silencing_blur(w, chosen) for w in longest])[arrivals.snap]
     return plain, support * (1.0 + np.abs(front.doppler)) + np.where(silent, 0.0, FEET * blur), silent
 
 

@@ -9,16 +9,20 @@ import numpy as np
 from scipy.fft import ifft, irfft, rfft
 
 from sonarsynth.acoustics import pulses, spectra
-from sonarsynth.acoustics import snap as snaps
 from sonarsynth.acoustics.pulses import Pulse
 from sonarsynth.acoustics.snap import Bubble, ComplexArray
 from sonarsynth.acoustics.spectra import Fir
-from sonarsynth.acoustics.waveforms import logarithmic
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
 from sonarsynth.sonar import Filter, LowPass, stop_frequency
 from sonarsynth.synthesis.nodes import analysis, chebyshev, rounded_up
 from sonarsynth.world.moment import Snap
-from sonarsynth.world.sources import LogarithmicBubble
+from sonarsynth.world.recordings import Stamp
+from sonarsynth.world.snap_pulses import Waveform, pulse
+from sonarsynth.world.snaps import KellerMiksis
+from sonarsynth.world.sources import LogarithmicBubble, SnapModel
+
+LONGEST_TAIL = 0.02
+"""s: the tails of turned pulses are cut there, unless the pulse itself is longer."""
 
 FEET = float(np.sqrt(-2.0 * np.log(spectra.SUPPORT_TOLERANCE)))
 """A Gaussian blur makes the support of a pulse longer at both ends by so many of its standard deviations."""
@@ -37,7 +41,7 @@ def fir(chosen: Filter) -> Fir:
 
 
 def pulse_support(
-    model: LogarithmicBubble,
+    waveform: Waveform,
     chosen: Filter,
     tolerance: float = spectra.SUPPORT_TOLERANCE,
     *,
@@ -46,49 +50,76 @@ def pulse_support(
     """How long (s) before and after its collapse the filtered snap exceeds `tolerance` of its peak: for laying out
     windows.
 
-    turned: at any constant phase. Such a pulse never ends: it falls as 1/t^3, because the snap has no net impulse, nor
-    the impulse a net integral.
+    turned: at any constant phase. Such a pulse never ends. It falls as 1/t^3 where the snap has no net impulse, nor the
+    impulse a net integral, as the logarithmic bubble; as 1/t^2 or 1/t (Keller-Miksis, recordings) it may be cut at
+    LONGEST_TAIL: `cut_tail` says what is left there.
     """
-    before, after = spectra.pulse_support(bubble(model), fir(chosen), tolerance)
+    plain = _plain_support(waveform, chosen, tolerance)
     if not turned:
-        return before, after
-    early, late = _turned_support(model, chosen, tolerance)
-    return max(before, early), max(after, late)
+        return plain
+    early, late, _ = _turned_support(waveform, chosen, tolerance)
+    return max(plain[0], early), max(plain[1], late)
 
 
-def _tapered(model: LogarithmicBubble, chosen: Filter, window: float) -> tuple[Floats, ComplexArray]:
+def cut_tail(waveform: Waveform, chosen: Filter, tolerance: float = spectra.SUPPORT_TOLERANCE) -> float:
+    """What a turned snap may be outside of its support, relative to its peak: `tolerance`, or more where it is cut."""
+    return max(_turned_support(waveform, chosen, tolerance)[2], tolerance)
+
+
+def at_longest(waveform: Waveform) -> Waveform:
+    """The waveform a little longer, of one of few widths, so that supports are bounds, and kept."""
+    return waveform._replace(width=rounded_up(waveform.width, 1.02))
+
+
+@lru_cache(maxsize=64)
+def _plain_support(waveform: Waveform, chosen: Filter, tolerance: float) -> tuple[float, float]:
+    if isinstance(waveform.model, LogarithmicBubble):
+        a, k, m, q, density = bubble(waveform.model)
+        longer = waveform.width
+        return spectra.pulse_support(Bubble(a, k / longer, m * longer, q / longer, density), fir(chosen), tolerance)
+    return pulses.support(_pulse(waveform, pulses.reach(fir(chosen))), fir(chosen), tolerance)
+
+
+def _tapered(waveform: Waveform, chosen: Filter, window: float) -> tuple[Floats, ComplexArray]:
     """Frequencies (bin,) from 0 to twice the stop edge in steps of 1/window, and the spectrum of the filtered snap,
     faded out from the stop edge on: cut there it would ring."""
     stop = stop_frequency(chosen)
     f = np.asarray(np.arange(2 * int(np.ceil(stop * window)) + 1) / window)
     fade = np.cos(0.5 * np.pi * np.clip(f / stop - 1.0, 0.0, 1.0)) ** 2
-    return f, snaps.spectrum(f, bubble(model)) * spectra.response(f, fir(chosen)) * fade
+    return f, _snap_spectrum(waveform, 1.0, f) * spectra.response(f, fir(chosen)) * fade
 
 
 @lru_cache(maxsize=64)
-def _turned_support(model: LogarithmicBubble, chosen: Filter, tolerance: float) -> tuple[float, float]:
-    """As `pulse_support`, of the envelope: the modulus of the pulse and i times its Hilbert transform."""
-    window = 2.0 * sum(spectra.pulse_support(bubble(model), fir(chosen), tolerance))
-    f, value = _tapered(model, chosen, window)
+def _turned_support(waveform: Waveform, chosen: Filter, tolerance: float) -> tuple[float, float, float]:
+    """As `pulse_support`, of the envelope: the modulus of the pulse and i times its Hilbert transform; and what is
+    left of it outside."""
+    plain = sum(_plain_support(waveform, chosen, tolerance))
+    window = 2.0 * plain
+    f, value = _tapered(waveform, chosen, window)
     samples = 2 * (f.size - 1)
-    pulse = np.fft.fftshift(irfft(value, samples))
+    wave = np.fft.fftshift(irfft(value, samples))
     for _ in range(7):
-        padding, step = pulse.size // 2, window / samples
-        pulse = np.pad(pulse, padding)  # a wider window, in which less of the tails is folded
-        half = np.zeros(pulse.size, complex)
-        half[: pulse.size // 2 + 1] = rfft(pulse)
+        padding, step = wave.size // 2, window / samples
+        wave = np.pad(wave, padding)  # a wider window, in which less of the tails is folded
+        half = np.zeros(wave.size, complex)
+        half[: wave.size // 2 + 1] = rfft(wave)
         envelope = np.abs(ifft(half))
-        loud = (np.flatnonzero(envelope > tolerance * envelope.max()) - pulse.size // 2) * step
-        if max(-loud[0], loud[-1]) < 0.25 * pulse.size * step:
+        envelope /= envelope.max()
+        loud = (np.flatnonzero(envelope > tolerance) - wave.size // 2) * step
+        if max(-loud[0], loud[-1]) < 0.25 * wave.size * step:
             break
-    return max(float(step - loud[0]), 0.0), max(float(loud[-1] + step), 0.0)
+    longest = max(LONGEST_TAIL, plain)
+    time = (np.arange(wave.size) - wave.size // 2) * step
+    left = float(envelope[np.abs(time) >= longest].max(initial=0.0))
+    before, after = (min(max(float(end), 0.0), longest) for end in (step - loud[0], loud[-1] + step))
+    return before, after, left
 
 
 @lru_cache(maxsize=64)
-def silencing_blur(model: LogarithmicBubble, chosen: Filter, tolerance: float = spectra.SUPPORT_TOLERANCE) -> float:
+def silencing_blur(waveform: Waveform, chosen: Filter, tolerance: float = spectra.SUPPORT_TOLERANCE) -> float:
     """The blur (s) that leaves no more than `tolerance` of the modulus of the filtered snap's spectrum."""
-    window = 4.0 * sum(spectra.pulse_support(bubble(model), fir(chosen), tolerance))
-    f, value = _tapered(model, chosen, window)
+    window = 4.0 * sum(_plain_support(waveform, chosen, tolerance))
+    f, value = _tapered(waveform, chosen, window)
     mass = np.abs(value) / np.abs(value).sum()
     low, high = 0.0, 1e3 / f[1]
     while high > 1.01 * low and high > 1e-12:
@@ -109,30 +140,37 @@ def _bins(sampling_frequency: float, samples: int) -> Floats:
     return np.asarray(np.arange(samples // 2 + 1) * (sampling_frequency / samples), float)
 
 
-@lru_cache(maxsize=16)
-def _pulse(model: LogarithmicBubble, highest: float) -> Pulse:
-    return logarithmic(bubble(model), highest)
+@lru_cache(maxsize=32)
+def _made(model: SnapModel, stamp: Stamp | None, highest: float) -> Pulse:
+    if isinstance(model, KellerMiksis) and model.depth is None:
+        raise ValueError("a keller_miksis snap needs the depth of its shrimp")
+    return pulse(model, 0.0, highest)
 
 
-def _snap_spectrum(model: LogarithmicBubble, longer: float, frequency: Floats) -> ComplexArray:
+def _pulse(waveform: Waveform, highest: float) -> Pulse:
+    """The pulse for waves up to `highest` (Hz), or somewhat more: few pulses serve all frequencies and widths."""
+    made = _made(waveform.model, waveform.stamp, rounded_up(waveform.width * highest, 2.0))
+    return made if waveform.width == 1.0 else pulses.scaled(made, 1.0, waveform.width)
+
+
+def _snap_spectrum(waveform: Waveform, longer: float, frequency: Floats) -> ComplexArray:
     """Spectrum of the snap, unfiltered, at `longer` times evenly spaced frequencies (bin,)."""
-    octave = rounded_up(1.2 * float(frequency[-1]), 2.0)  # few pulses serve all frequencies
-    return pulses.spectrum(longer * frequency, _pulse(model, octave))
+    return pulses.spectrum(longer * frequency, _pulse(waveform, 1.2 * float(frequency[-1])))
 
 
 @lru_cache(maxsize=64)
 def _spectrum(
-    model: LogarithmicBubble, chosen: Filter, sampling_frequency: float, samples: int, doppler: float
+    waveform: Waveform, chosen: Filter, sampling_frequency: float, samples: int, doppler: float
 ) -> ComplexArray:
     f, longer = _bins(sampling_frequency, samples), 1.0 + doppler
-    value = _snap_spectrum(model, longer, f) * _response(chosen, sampling_frequency, samples) * longer
+    value = _snap_spectrum(waveform, longer, f) * _response(chosen, sampling_frequency, samples) * longer
     value[2 * f >= sampling_frequency] = 0.0
     value.setflags(write=False)
     return value
 
 
 def pulse_spectrum(
-    model: LogarithmicBubble, chosen: Filter, sampling_frequency: float, samples: int, doppler: float = 0.0
+    waveform: Waveform, chosen: Filter, sampling_frequency: float, samples: int, doppler: float = 0.0
 ) -> tuple[Floats, ComplexArray]:
     """Frequencies (bin,) in Hz and spectrum (bin,) in Pa s of the filtered snap at 1 m, at the `rfft` bins of a sample
     grid.
@@ -140,32 +178,57 @@ def pulse_spectrum(
     What the filter leaves at and above half the sampling frequency (under its attenuation) is left out, not folded.
     doppler stretches the snap, p(t/(1 + doppler)), before the filter, which is the receiver's and keeps its band.
     """
-    value = _spectrum(model, chosen, sampling_frequency, samples, doppler)
+    value = _spectrum(waveform, chosen, sampling_frequency, samples, doppler)
     return _bins(sampling_frequency, samples), value
 
 
 @lru_cache(maxsize=16)
 def stretched_spectra(
-    model: LogarithmicBubble, chosen: Filter, sampling_frequency: float, samples: int, widest: float, count: int
+    waveform: Waveform, chosen: Filter, sampling_frequency: float, samples: int, widest: float, count: int
 ) -> ComplexArray:
     """Chebyshev coefficients (degree < count, bin) of `pulse_spectrum` in doppler/widest, from -1 to 1."""
     at = widest * chebyshev(count)
-    value = analysis(count) @ [pulse_spectrum(model, chosen, sampling_frequency, samples, float(d))[1] for d in at]
+    value = analysis(count) @ [pulse_spectrum(waveform, chosen, sampling_frequency, samples, float(d))[1] for d in at]
     value.setflags(write=False)
     return np.asarray(value)
 
 
 @lru_cache(maxsize=64)
-def stretch_sizes(model: LogarithmicBubble, chosen: Filter, widest: float) -> tuple[float, ...]:
+def stretch_sizes(waveform: Waveform, chosen: Filter, widest: float) -> tuple[float, ...]:
     """Mean moduli of the coefficients (degree < 16,) of `stretched_spectra` over frequency, over that of the first."""
     f = np.linspace(0.0, stop_frequency(chosen), 97)
     filtered = spectra.response(f, fir(chosen))
     at = 1.0 + widest * chebyshev(16)
-    value = analysis(16) @ [_snap_spectrum(model, float(x), f) * x * filtered for x in at]
+    value = analysis(16) @ [_snap_spectrum(waveform, float(x), f) * x * filtered for x in at]
     sizes = np.abs(value).sum(axis=1)
     return tuple((sizes / sizes[0]).tolist()) if sizes[0] > 0.0 else (1.0, inf)
 
 
+def heard_part(waveform: Waveform, chosen: Filter) -> float:
+    """Largest modulus of the filtered snap's spectrum over that of the snap, up to the stop band; 0 for one that has
+    nothing there."""
+    f = np.linspace(0.0, stop_frequency(chosen), 513)
+    made = _pulse(waveform, 1.2 * float(f[-1]))
+    whole = np.abs(made.strength).sum()  # bounds its spectrum
+    passed = np.abs(pulses.spectrum(f, made) * spectra.response(f, fir(chosen))).max()
+    return float(passed / whole) if whole > 0.0 else 0.0
+
+
+def _peak(waveform: Waveform) -> float:
+    """Largest pressure (Pa) at 1 m before any filter."""
+    return _made(waveform.model, waveform.stamp, 0.0).peak
+
+
 def snap_levels(heard: tuple[Snap, ...]) -> Floats:
-    """(snap,) peak source level of each snap (dB re 1 uPa at 1 m)."""
-    return np.array([snaps.source_level(bubble(s.model)) if s.source_level is None else s.source_level for s in heard])
+    """(snap,) peak source level of each snap (dB re 1 uPa at 1 m) before any filter."""
+    with np.errstate(divide="ignore"):
+        own = [20.0 * np.log10(_peak(s.waveform) / REFERENCE_PRESSURE) for s in heard]
+    level = [o if s.source_level is None else s.source_level for s, o in zip(heard, own, strict=True)]
+    return np.array([v + 20.0 * np.log10(s.gain) for s, v in zip(heard, level, strict=True)])
+
+
+def snap_gains(heard: tuple[Snap, ...]) -> Floats:
+    """(snap,) factor on the pulse of each snap's waveform."""
+    return np.array(
+        [s.gain * pulses.gain_for_level(_made(s.model, s.waveform.stamp, 0.0), s.source_level) for s in heard]
+    )

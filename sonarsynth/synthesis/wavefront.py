@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonarsynth.acoustics.arrays import aperture_terms
-from sonarsynth.acoustics.snap import gain_for_level
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.products import Arrivals
 from sonarsynth.sonar import Elements
-from sonarsynth.synthesis.pulse import bubble
+from sonarsynth.synthesis.pulse import snap_gains
 from sonarsynth.world.moment import Snap
 
 MOST_STRETCH = 0.1
@@ -91,13 +90,13 @@ def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements) -> F
     touching = (np.linalg.norm(away, axis=2) <= 1e-9 * arrivals.radius[near, None]).any(axis=1)
     if touching.any():
         raise ValueError(f"arrival {near[touching][0]} comes from a hydrophone")
-    level = np.array([gain_for_level(bubble(s.model), s.source_level) for s in snaps])
+    gain = snap_gains(snaps)
     sign, phase = folded(arrivals.phase)
     return Fronts(
         delay=arrivals.delay,
         direction=arrivals.direction,
         curvature=1.0 / arrivals.radius,
-        amplitude=arrivals.amplitude * level[arrivals.snap] * sign if count else arrivals.amplitude,
+        amplitude=arrivals.amplitude * gain[arrivals.snap] * sign if count else arrivals.amplitude,
         loss=arrivals.absorption,
         delay_terms=arrivals.delay_terms,
         gain_terms=arrivals.amplitude_terms,

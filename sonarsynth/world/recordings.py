@@ -16,6 +16,8 @@ from sonarsynth.world.snaps import RecordedSnap
 MOST_SAMPLES = 1 << 18
 """A longer file is a recording of the sea, not of a snap."""
 
+Stamp = tuple[int, int]
+
 QUIET = 1e-2
 """What a recording may be at its ends, relative to its peak: a step there is heard at all frequencies."""
 
@@ -38,15 +40,20 @@ def read_recording(snap: RecordedSnap) -> Recording:
 
     Raises RecordingError in one line that names the file, and the line and column where there is one.
     """
+    return _recording(snap, stamp(snap))
+
+
+def stamp(snap: RecordedSnap) -> Stamp:
+    """What changes when the file does: when it was written, and its size. Raises RecordingError without a file."""
     try:
         status = Path(snap.path).stat()
     except OSError as error:
         raise RecordingError(f"{snap.path}: {(error.strerror or str(error)).lower()}") from None
-    return _recording(snap, (status.st_mtime_ns, status.st_size))
+    return status.st_mtime_ns, status.st_size
 
 
 @lru_cache(maxsize=32)
-def _recording(snap: RecordedSnap, stamp: tuple[int, int]) -> Recording:
+def _recording(snap: RecordedSnap, changed: Stamp) -> Recording:
     path = Path(snap.path)
     start, rate, values = (_wav if path.suffix.lower() in {".wav", ".wave"} else _text)(path, snap)
     if not 4 <= values.size <= MOST_SAMPLES:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,14 +12,20 @@ from sonarsynth.acoustics.bubble import Cavity, Collapse
 from sonarsynth.acoustics.pulses import Pulse
 from sonarsynth.acoustics.snap import Bubble
 from sonarsynth.conventions import Floats
-from sonarsynth.world.recordings import read_recording
+from sonarsynth.world.recordings import Stamp, read_recording, stamp
 from sonarsynth.world.snaps import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
-from sonarsynth.world.sources import LogarithmicBubble
-
-SnapModel = LogarithmicBubble | KellerMiksis | RecordedSnap | Ricker | Gabor
+from sonarsynth.world.sources import LogarithmicBubble, SnapModel
 
 CUT = 3.0
 """Standard deviations at which a variation is cut."""
+
+
+class Waveform(NamedTuple):
+    """What snaps that sound alike have in common: the key of all that is kept of a pulse."""
+
+    model: SnapModel  # a bubble at its depth
+    width: float  # p(t/width)
+    stamp: Stamp | None  # of the file that it comes from
 
 
 class Scales(NamedTuple):
@@ -26,6 +33,18 @@ class Scales(NamedTuple):
 
     gain: Floats  # (snap,)
     width: Floats  # (snap,)
+
+
+def waveform(model: SnapModel, width: float = 1.0) -> Waveform:
+    """The waveform of a described snap that lasts `width` times as long. Raises ValueError for a file that is gone."""
+    return Waveform(model, width, stamp(model) if isinstance(model, RecordedSnap) else None)
+
+
+def at_depth(model: SnapModel, depth: float) -> SnapModel:
+    """The snap of a shrimp at this depth (m), if it has none of its own."""
+    if isinstance(model, KellerMiksis) and model.depth is None:
+        return replace(model, depth=max(depth, 0.0))
+    return model
 
 
 def pulse(model: SnapModel, depth: float, highest: float) -> Pulse:

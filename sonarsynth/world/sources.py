@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 from annotated_types import Ge, Gt, Le, Lt, MinLen
 
 from sonarsynth.conventions import Decibels, Metres, NonNegativeMetres, Number, Position, Seconds
-from sonarsynth.description import description
+from sonarsynth.description import BY_KIND, description
+from sonarsynth.world.snaps import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
 
 
 @description
@@ -29,6 +30,10 @@ class LogarithmicBubble:
     """Water density (kg/m3) in p = (rho/r) d(R^2 R')/dt; sea water of 1025 makes a snap 0.21 dB louder."""
 
 
+SnapModel = Annotated[LogarithmicBubble | KellerMiksis | RecordedSnap | Ricker | Gabor, BY_KIND]
+"""The models of a snap, by `kind`."""
+
+
 @description
 class SnappingShrimp:
     """A shrimp on the bed that snaps at given times."""
@@ -39,8 +44,12 @@ class SnappingShrimp:
     """(x, y) on the bed, or (x, y, z)."""
     height: NonNegativeMetres = 0.0
     """Height above the bed, where z is left out."""
-    snap: LogarithmicBubble = LogarithmicBubble()
+    snap: SnapModel = LogarithmicBubble()
+    """What a snap sounds like at 1 m."""
     source_level: Annotated[Decibels, Ge(-200), Le(300)] | None = None
-    """Peak source level (dB re 1 uPa at 1 m) to scale the snap to; left out: the snap's own level."""
+    """Peak source level (dB re 1 uPa at 1 m, before any filter) to scale the snap to; left out: the snap's own level.
+    """
+    variation: SnapVariation = SnapVariation()
+    """How its snaps differ; left out: they do not."""
     snap_times: Annotated[tuple[Seconds, ...], MinLen(1)] = (0.0,)
     """Times of collapse (s) after the instant of each frame."""

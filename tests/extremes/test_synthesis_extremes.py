@@ -14,6 +14,7 @@ from sonarsynth.sonar import Elements, LowPass, PositionTable, Sonar, elements
 from sonarsynth.synthesis import DirectSum, KernelDeposit, pulse_support
 from sonarsynth.synthesis.direct_sum import exact_signals
 from sonarsynth.world.moment import Snap
+from sonarsynth.world.snap_pulses import waveform
 from sonarsynth.world.sources import LogarithmicBubble
 
 MODEL = LogarithmicBubble()
@@ -60,7 +61,7 @@ def arrivals(delay: Floats, direction: Floats, radius: Floats, amplitude: Floats
 
 
 def window(of: Arrivals, array: Elements) -> tuple[float, int]:
-    before, after = pulse_support(MODEL, SONAR.antialias)
+    before, after = pulse_support(waveform(MODEL), SONAR.antialias)
     start = float(of.delay.min() - before - array.aperture / C - 1e-5)
     return start, int((of.delay.max() + after + array.aperture / C - start) * SONAR.sampling_frequency) + 3
 

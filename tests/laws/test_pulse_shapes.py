@@ -19,6 +19,7 @@ from sonarsynth.synthesis.pulse import bubble, fir, pulse_spectrum, silencing_bl
 from sonarsynth.synthesis.shapes import shape_modes
 from sonarsynth.synthesis.wavefront import folded, fronts
 from sonarsynth.world.moment import Snap
+from sonarsynth.world.snap_pulses import waveform
 from sonarsynth.world.sources import LogarithmicBubble
 from tests.laws.test_synthesis import absorption, arrivals, error, some_of, target_at
 
@@ -45,7 +46,7 @@ def shaped(of: Arrivals, seed: int, *, phase: float = 10.0, blur: float = 20e-6,
 
 
 def window(of: Arrivals, sonar: Sonar, aperture: float, margin: float = 4e-4) -> tuple[float, int]:
-    before, after = pulse_support(MODEL, sonar.antialias, turned=True)
+    before, after = pulse_support(waveform(MODEL), sonar.antialias, turned=True)
     start = float(of.delay.min() - before - aperture / of.sound_speed - margin)
     stop = float(of.delay.max() + after + aperture / of.sound_speed + margin)
     return start, int((stop - start) * sonar.sampling_frequency) + 1
@@ -98,13 +99,13 @@ def test_a_stretched_snap_is_that_of_a_slower_bubble(stretch: float) -> None:
 
 @pytest.mark.parametrize("sonar", [SHARP, LOW])
 def test_a_turned_pulse_is_over_after_its_support(sonar: Sonar) -> None:
-    before, after = pulse_support(MODEL, sonar.antialias, turned=True)
+    before, after = pulse_support(waveform(MODEL), sonar.antialias, turned=True)
     for phase in (0.5 * np.pi, 0.9):
         t, got = alone(sonar, phase=phase)
         size = np.abs(got) / np.abs(got).max()
         assert size[(t < -before) | (t > after)].max() < 2e-7  # of its peak, which the envelope's may be above
     assert size[(t < -0.7 * before) | (t > 0.7 * after)].max() > 2e-7  # and not long before
-    plain = pulse_support(MODEL, sonar.antialias)
+    plain = pulse_support(waveform(MODEL), sonar.antialias)
     assert before >= plain[0]
     assert after >= plain[1]
 
@@ -209,7 +210,7 @@ def test_blurs_add_by_squares_and_end_in_silence(method: DirectSum | KernelDepos
     twice = np.fft.irfft(np.fft.rfft(soft) * np.exp(-0.5 * (2 * np.pi * f * 4e-6) ** 2), samples)
     assert error(soft, once) < 1e-6
     assert error(heard(5e-6, 5e-6), twice) < 1e-6
-    silent = silencing_blur(MODEL, SHARP.antialias)
+    silent = silencing_blur(waveform(MODEL), SHARP.antialias)
     assert not heard(1.01 * silent, 10.0 * silent).any()
     assert 0.0 < np.abs(heard(0.98 * silent, 0.98 * silent)).max() < 1e-6 * np.abs(plain).max()
 
@@ -232,14 +233,14 @@ def test_shared_shapes_cost_no_modes() -> None:
 def pulses(phase: Floats, blur: Floats, stretch: Floats, f: Floats, samples: int) -> ComplexArray:
     """The spectra (path, bin) that the definition gives."""
     rate, chosen = SHARP.sampling_frequency, SHARP.antialias
-    S = [pulse_spectrum(MODEL, chosen, rate, samples, float(s))[1][: f.size] for s in stretch]
+    S = [pulse_spectrum(waveform(MODEL), chosen, rate, samples, float(s))[1][: f.size] for s in stretch]
     return np.exp(1j * phase[:, None] - 0.5 * (2 * np.pi * np.multiply.outer(blur, f)) ** 2) * S
 
 
 @pytest.mark.parametrize(("tolerance", "most"), [(1e-3, 10), (1e-6, 22)])
 def test_modes_are_the_definition(tolerance: float, most: int) -> None:
     rng, samples, n = np.random.default_rng(11), 384, 60
-    f, spectrum = pulse_spectrum(MODEL, SHARP.antialias, SHARP.sampling_frequency, samples)
+    f, spectrum = pulse_spectrum(waveform(MODEL), SHARP.antialias, SHARP.sampling_frequency, samples)
     some = slice(40, 170)
     of = target_at(15.0, n, 12, direct=False)
     of = replace(
@@ -249,7 +250,7 @@ def test_modes_are_the_definition(tolerance: float, most: int) -> None:
         blur=rng.uniform(0.0, 10e-6, n),
         stretch=rng.uniform(-1e-3, 1e-3, n),
     )
-    series = stretched_spectra(MODEL, SHARP.antialias, SHARP.sampling_frequency, samples, 2.0**-9, 4)
+    series = stretched_spectra(waveform(MODEL), SHARP.antialias, SHARP.sampling_frequency, samples, 2.0**-9, 4)
     front = fronts(of, SNAPS, ONE)
     front = replace(front, loss=front.loss - front.loss.mean())
     decay = absorption(f)
@@ -261,7 +262,7 @@ def test_modes_are_the_definition(tolerance: float, most: int) -> None:
 
 
 def test_phases_alone_are_two_modes() -> None:
-    f, spectrum = pulse_spectrum(MODEL, SHARP.antialias, SHARP.sampling_frequency, 384)
+    f, spectrum = pulse_spectrum(waveform(MODEL), SHARP.antialias, SHARP.sampling_frequency, 384)
     of = shaped(target_at(15.0, 50, 13, direct=False), 14, blur=0.0, stretch=0.0)
     none, front = np.zeros((0, 130), complex), fronts(of, SNAPS, ONE)
     modes = shape_modes(front, f[40:170], spectrum[40:170], np.zeros(130), none, 0.0, 1e-9)
@@ -271,12 +272,12 @@ def test_phases_alone_are_two_modes() -> None:
 @pytest.mark.parametrize("widest", [1e-6, 1e-3, 0.1])
 def test_a_series_in_doppler_is_the_stretched_snap(widest: float) -> None:
     rate, samples = SONAR.sampling_frequency, 384
-    series = stretched_spectra(MODEL, SONAR.antialias, rate, samples, widest, 7)
+    series = stretched_spectra(waveform(MODEL), SONAR.antialias, rate, samples, widest, 7)
     x = np.array([-1.0, 0.37, 1.0])
     got = np.cos(np.outer(np.arccos(x), np.arange(7))) @ series
-    left = sum(stretch_sizes(MODEL, SONAR.antialias, widest)[7:])
+    left = sum(stretch_sizes(waveform(MODEL), SONAR.antialias, widest)[7:])
     for row, at in zip(got, x, strict=True):
-        _, exact = pulse_spectrum(MODEL, SONAR.antialias, rate, samples, float(widest * at))
+        _, exact = pulse_spectrum(waveform(MODEL), SONAR.antialias, rate, samples, float(widest * at))
         assert np.abs(row - exact).sum() < (2.0 * left + 1e-11) * np.abs(exact).sum()
 
 

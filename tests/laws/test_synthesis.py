@@ -18,6 +18,7 @@ from sonarsynth.synthesis.direct_sum import exact_signals
 from sonarsynth.synthesis.nodes import chebyshev, interpolation, nodes_for
 from sonarsynth.synthesis.pulse import bubble, fir
 from sonarsynth.world.moment import Snap
+from sonarsynth.world.snap_pulses import waveform
 from sonarsynth.world.sources import LogarithmicBubble
 
 MODEL = LogarithmicBubble()
@@ -111,7 +112,7 @@ def target_at(distance: float, count: int, seed: int, *, refracted: bool = False
 
 def window(of: Arrivals, sonar: Sonar, array: Elements) -> tuple[float, int]:
     """A window that holds all of it."""
-    before, after = pulse_support(MODEL, sonar.antialias)
+    before, after = pulse_support(waveform(MODEL), sonar.antialias)
     reach = array.aperture / C + 1e-4
     start = float(of.delay.min() - before - reach)
     return start, int(np.ceil((of.delay.max() + after + reach - start) * sonar.sampling_frequency)) + 1
@@ -383,7 +384,7 @@ def test_quiet_time_is_exactly_silent() -> None:
     start, samples = window(of, SONAR, array)
     got = KernelDeposit().signals(of, SNAPS, array, SONAR, absorption, start, samples).pressure
     silent = (got == 0.0).all(axis=0)
-    before, after = pulse_support(MODEL, SONAR.antialias)
+    before, after = pulse_support(waveform(MODEL), SONAR.antialias)
     t = start + np.arange(samples) / SONAR.sampling_frequency
     near = ((t > of.delay[:, None] - before - 1e-3) & (t < of.delay[:, None] + after + 1e-3)).any(axis=0)
     assert (silent | near).mean() > 0.99
