@@ -68,6 +68,7 @@ if TYPE_CHECKING:
     )
     from sonarsynth.world.motion import Circle, Line, Still, Waypoint, Waypoints
     from sonarsynth.world.shapes import Box, Cylinder, LShape, MeshFile, Myring, Remus100, Sphere
+    from sonarsynth.world.snaps import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
     from sonarsynth.world.sources import LogarithmicBubble, SnappingShrimp
     from sonarsynth.world.targets import Target
 
@@ -93,9 +94,11 @@ __all__ = [
     "FlatNoise",
     "FluidHalfSpace",
     "FocusedDelayAndSum",
+    "Gabor",
     "Isotropic",
     "Isovelocity",
     "IsovelocityRange",
+    "KellerMiksis",
     "KernelDeposit",
     "LShape",
     "Line",
@@ -116,10 +119,12 @@ __all__ = [
     "RayRequest",
     "Recipe",
     "RecipeError",
+    "RecordedSnap",
     "ReflectionTable",
     "Refracted",
     "RefractedRange",
     "Remus100",
+    "Ricker",
     "Rigid",
     "Romanis",
     "Scene",
@@ -127,6 +132,7 @@ __all__ = [
     "SeaSurface",
     "Sediment",
     "SensorDelays",
+    "SnapVariation",
     "SnappingShrimp",
     "Sonar",
     "Sphere",
@@ -258,6 +264,13 @@ _HOMES = {
         "Myring",
         "Remus100",
         "Sphere",
+    ),
+    "world.snaps": (
+        "Gabor",
+        "KellerMiksis",
+        "RecordedSnap",
+        "Ricker",
+        "SnapVariation",
     ),
     "world.sources": (
         "LogarithmicBubble",

@@ -6,41 +6,53 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.acoustics.snap import Bubble, gain_for_level, pressure, spectrum
-from sonarsynth.acoustics.spectra import Fir, filtered_pulse, response
+from sonarsynth.acoustics.pulses import Pulse, filtered, gain_for_level, reach, spectrum
+from sonarsynth.acoustics.spectra import Fir, response
 from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
 from sonarsynth.pictures.style import INK, MARKS, figure, grid, label
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+AS_MADE = Fir(0.0, 1e6, 0.2e6, 80.0)
+"""The snap itself is drawn below 1.1 MHz: there is no more in a picture of a millisecond."""
+
+AROUND = 0.1e-3
+"""s of silence that is drawn either side."""
 
 LOWEST_RESPONSE = -120.0
 """The filter is drawn down to this (dB)."""
 
 
 def snap_figure(
-    bubble: Bubble,
+    pulse: Callable[[float], Pulse],
     fir: Fir,
     source_level: float | None = None,
     *,
-    before: float = 0.8e-3,
-    after: float = 0.2e-3,
+    before: float | None = None,
+    after: float | None = None,
     highest: float = 200e3,
 ) -> Figure:
     """The snap at 1 m, scaled to `source_level` (dB re 1 uPa at 1 m peak; None: its own), before and after the filter.
 
-    Drawn from `before` to `after` the collapse (s), and up to `highest` (Hz).
+    pulse: gives it for waves up to a frequency (Hz). Drawn from `before` to `after` the collapse (s; None: all of it,
+    and 0.1 ms more), and up to `highest` (Hz).
     """
-    gain = gain_for_level(bubble, source_level)
-    time = np.linspace(-before, after, 4001)
+    fine, heard = pulse(reach(AS_MADE)), pulse(max(reach(fir), highest))
+    gain = gain_for_level(fine, source_level)
+    time = np.linspace(
+        fine.start - AROUND if before is None else -before, fine.end + AROUND if after is None else after, 4001
+    )
     frequency = np.linspace(highest / 800, highest, 800)
     passed = response(frequency, fir)
-    density = gain * spectrum(frequency, bubble)
+    density = gain * spectrum(frequency, heard)
     made = figure(12.0, 3.8, dpi=110)
     parts = made.add_gridspec(1, 3)
     panels = [made.add_subplot(parts[i]) for i in range(3)]
-    _waveforms(panels[0], time, gain * pressure(time, bubble), gain * filtered_pulse(time, bubble, fir))
+    _waveforms(panels[0], time, gain * filtered(time, fine, AS_MADE), gain * filtered(time, heard, fir))
     _levels(panels[1], frequency, _energy_level(density), _energy_level(density * passed))
     _response(panels[2], frequency, passed)
     return made

@@ -10,9 +10,10 @@ import numpy as np
 from sonarsynth.planning.checks import check_methods, check_positions, check_windows, read_inputs
 from sonarsynth.planning.costs import left_out, stages
 from sonarsynth.planning.plans import PRODUCTS, Omission, Plan, Stage, Windows
-from sonarsynth.planning.windows import lay_windows
+from sonarsynth.planning.windows import SUPPORT, extreme_waveforms, lay_windows
 from sonarsynth.recipe import Recipe
 from sonarsynth.sonar import elements
+from sonarsynth.synthesis.pulse import LONGEST_TAIL, cut_tail
 from sonarsynth.tracing import AutoTracing, Refracted, Straight
 from sonarsynth.world.meshes import Mesh, mesh_of
 from sonarsynth.world.refinement import longest_edge
@@ -60,10 +61,25 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS) -> Plan:
     cancelled = scene.processing.cancelling is not None
     if made.propagation.bounces and not cancelled and products & {"image", "cloud"} and sizes["snap"]:
         notes += ("the snap's own reflections enter the image: processing.cancelling takes them out before",)
+    notes += _cut(recipe, profile.uniform)
     notes += _behind(recipe)
     notes += _coarse(recipe)
     notes += tuple(f"{t.name}: {note}" for t in scene.world.targets for note in mesh_of(t.shape).notes)
     return replace(made, stages=stages(made), left_out=left_out(made), warnings=notes)
+
+
+def _cut(recipe: Recipe, uniform: bool) -> tuple[str, ...]:
+    """Which snaps fall so slowly, once a path turns their phase, that the windows cut them."""
+    scene = recipe.scene
+    if uniform and not scene.physics.tracing.bounces:
+        return ()
+    tails = [cut_tail(w, scene.sonar.antialias, SUPPORT) for w in extreme_waveforms(scene)]
+    if max(tails, default=0.0) <= 10.0 * SUPPORT:
+        return ()
+    return (
+        f"turned in phase by a path, a snap falls off slowly: it is cut {LONGEST_TAIL:g} s from its collapse, at "
+        f"{max(tails):.1g} of its peak (no net impulse, or a filter without the lowest frequencies, helps)",
+    )
 
 
 def _behind(recipe: Recipe) -> tuple[str, ...]:

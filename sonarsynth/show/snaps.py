@@ -7,14 +7,24 @@ from pathlib import Path
 from sonarsynth.description import FieldError
 from sonarsynth.pictures.snap import snap_figure
 from sonarsynth.recipe import Recipe
-from sonarsynth.synthesis.pulse import bubble, fir
+from sonarsynth.synthesis.pulse import fir
+from sonarsynth.world.moment import model_of
+from sonarsynth.world.snap_pulses import pulse
 
 
 def show_snap(recipe: Recipe, out: Path) -> None:
-    """Write the picture of the first shrimp's snap through the sonar's filter. Raises FieldError without a shrimp."""
+    """Write the picture of the first shrimp's snap, unvaried, through the sonar's filter.
+
+    Raises FieldError without a shrimp, or where its snap cannot be made.
+    """
     shrimp = recipe.scene.world.shrimp
     if not shrimp:
         raise FieldError(("scene", "world", "shrimp"), "is empty: there is no snap to draw")
-    figure = snap_figure(bubble(shrimp[0].snap), fir(recipe.scene.sonar.antialias), shrimp[0].source_level)
+    try:
+        model = model_of(shrimp[0], recipe.scene.world.environment.depth)
+        chosen = fir(recipe.scene.sonar.antialias)
+        figure = snap_figure(lambda highest: pulse(model, 0.0, highest), chosen, shrimp[0].source_level)
+    except ValueError as error:
+        raise FieldError(("scene", "world", "shrimp", 0, "snap"), str(error)) from None
     out.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(out)

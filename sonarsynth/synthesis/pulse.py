@@ -22,7 +22,10 @@ from sonarsynth.world.snaps import KellerMiksis
 from sonarsynth.world.sources import LogarithmicBubble, SnapModel
 
 LONGEST_TAIL = 0.02
-"""s: the tails of turned pulses are cut there, unless the pulse itself is longer."""
+"""s, times the width: the tails of turned pulses are cut there, unless the pulse itself is longer."""
+
+MOST_SAMPLES = 1 << 23
+"""Samples of a pulse whose tails are looked at."""
 
 FEET = float(np.sqrt(-2.0 * np.log(spectra.SUPPORT_TOLERANCE)))
 """A Gaussian blur makes the support of a pulse longer at both ends by so many of its standard deviations."""
@@ -98,17 +101,19 @@ def _turned_support(waveform: Waveform, chosen: Filter, tolerance: float) -> tup
     f, value = _tapered(waveform, chosen, window)
     samples = 2 * (f.size - 1)
     wave = np.fft.fftshift(irfft(value, samples))
-    for _ in range(7):
+    longest = max(LONGEST_TAIL * waveform.width, plain)
+    while True:
         padding, step = wave.size // 2, window / samples
         wave = np.pad(wave, padding)  # a wider window, in which less of the tails is folded
         half = np.zeros(wave.size, complex)
         half[: wave.size // 2 + 1] = rfft(wave)
+        half[0] *= 0.5  # no frequency is neither positive nor negative
         envelope = np.abs(ifft(half))
         envelope /= envelope.max()
         loud = (np.flatnonzero(envelope > tolerance) - wave.size // 2) * step
-        if max(-loud[0], loud[-1]) < 0.25 * wave.size * step:
+        quarter = 0.25 * wave.size * step
+        if max(-loud[0], loud[-1]) < quarter or longest < quarter or wave.size > MOST_SAMPLES:
             break
-    longest = max(LONGEST_TAIL, plain)
     time = (np.arange(wave.size) - wave.size // 2) * step
     left = float(envelope[np.abs(time) >= longest].max(initial=0.0))
     before, after = (min(max(float(end), 0.0), longest) for end in (step - loud[0], loud[-1] + step))

@@ -116,8 +116,11 @@ def shape_modes(
 def _softened(front: Fronts, frequency: Floats, decay: Floats, tolerance: float) -> tuple[Floats, Floats]:
     """What blur and absorption leave at some frequencies (path, given), and their interpolation in the logarithm of
     frequency (given, bin). Degrees of a product add up."""
-    high, span = float(frequency[-1]), max(float(np.log(frequency[-1] / frequency[0])), 1e-3)
-    place = 2.0 * np.log(frequency / high) / span + 1.0
+    low, high = float(frequency[0]), float(frequency[-1])
+    low = low if low > 0.0 else 0.1 * float(frequency[min(1, frequency.size - 1)]) or 1.0  # 0 Hz has no logarithm
+    high = max(high, low)
+    span = max(float(np.log(high / low)), 1e-3)
+    place = 2.0 * np.log(np.maximum(frequency, low) / high) / span + 1.0
     steepest = float(front.variance.max() * blur_exponent(frequency)[-1])
     rate = CubicSpline(frequency, decay)
 

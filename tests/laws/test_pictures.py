@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.snap import Bubble
 from sonarsynth.acoustics.spectra import Fir
 from sonarsynth.pictures.frames import FramePicture, Hull, View, Window
 from sonarsynth.pictures.outlines import CELLS, union_outline, view_outline
 from sonarsynth.pictures.rays import section_figure, space_figure
 from sonarsynth.pictures.snap import snap_figure
+from sonarsynth.world.snap_pulses import pulse
 from sonarsynth.world.sources import LogarithmicBubble
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -107,7 +107,7 @@ def test_the_cloud_from_above_has_port_on_the_left_and_counts_what_it_does_not_s
 
 def test_the_filter_is_drawn_with_half_its_response_at_the_cutoff() -> None:
     b = LogarithmicBubble()
-    drawn = snap_figure(Bubble(b.a, b.k, b.m, b.q, b.density), Fir(0.0, 110e3, 10e3, 80.0), source_level=190.0)
+    drawn = snap_figure(lambda highest: pulse(b, 0.0, highest), Fir(0.0, 110e3, 10e3, 80.0), source_level=190.0)
     waveform, levels, response = drawn.axes
     frequency, decibels = response.lines[0].get_data()
     assert np.interp(110.0, frequency, decibels) == pytest.approx(-6.02, abs=0.05)
