@@ -1,0 +1,138 @@
+"""Every model of a snap through a whole frame, from YAML to a store that verifies; and those that cannot be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.random import default_rng
+from ruamel.yaml import YAML
+
+from sonarsynth import config, schedule
+from sonarsynth.description import FieldError
+from sonarsynth.planning import plan
+from sonarsynth.recipe import Recipe
+from sonarsynth.render import render
+from sonarsynth.show.snaps import show_snap
+from sonarsynth.store import verify
+from sonarsynth.world.snaps import RecordedSnap
+
+TEXT = """\
+seed: 3
+scene:
+  world:
+    environment: {depth: 10 m, sound_speed: {kind: isovelocity, speed: 1540}}
+    targets:
+      - name: ball
+        shape: {kind: sphere, radius: 0.3, edge: 0.05}
+        motion: {kind: line, start: [18, 3, -5], stop: [18, -3, -5], duration: 0.1}
+    shrimp:
+      - position: [14, -5]
+        snap: SNAP
+        variation: {level: 2 dB, width: 0.05}
+  sonar:
+    beams: {azimuths: 61, elevations: 21, elevation_span: 10 deg}
+  trajectory: {frames: 2, interval: 0.1}
+"""
+SNAPS = {
+    "logarithmic_bubble": "{kind: logarithmic_bubble}",
+    "keller_miksis": "{kind: keller_miksis, gas_pressure: 3 kPa}",
+    "recorded_snap": "{kind: recorded_snap, path: sounds/snap.csv, distance: 2 m}",
+    "ricker": "{kind: ricker, frequency: 50 kHz, peak: 3 kPa}",
+    "gabor": "{kind: gabor, frequency: 55 kHz, cycles: 3, peak: 3 kPa}",
+}
+EVERY = pytest.mark.parametrize("kind", SNAPS)
+
+
+def recipe_with(folder: Path, snap: str, *, more: str = "", loudness: float = 3e3) -> Recipe:
+    (folder / "sounds").mkdir(parents=True, exist_ok=True)
+    time = np.arange(-100, 200) / 500e3
+    wave = loudness * np.exp(-np.maximum(time, 0.0) / 40e-6) * np.sin(2 * np.pi * 45e3 * np.maximum(time, 0.0))
+    table = np.c_[1e6 * time, wave + 1e-3 * default_rng(1).standard_normal(300)]
+    np.savetxt(folder / "sounds" / "snap.csv", table, delimiter=",", header="time (us),pressure (Pa)", comments="")
+    (folder / "recipe.yaml").write_text(TEXT.replace("SNAP", snap) + more)
+    return config.load(folder / "recipe.yaml")
+
+
+@EVERY
+def test_a_dataset_with_each_model_verifies(tmp_path: Path, kind: str) -> None:
+    """The image is brightest on the target, its ranges are right and the snap is where it is heard."""
+    recipe = recipe_with(tmp_path, SNAPS[kind])
+    assert recipe.scene.world.shrimp[0].snap.kind == kind
+    assert config.loads(config.dump(recipe)) == recipe
+    assert schedule.build(plan(recipe), tmp_path / "s.zarr", workers=0).ok
+    report = verify(tmp_path / "s.zarr")
+    assert report.ok, report
+
+
+def test_a_frame_is_the_same_whatever_was_rendered_before(tmp_path: Path) -> None:
+    recipe = recipe_with(tmp_path, SNAPS["keller_miksis"])
+    made = plan(recipe)
+    last = render(made, 1)
+    first = render(made, 0)
+    assert render(plan(recipe), 0).identical(first)
+    assert render(plan(recipe), 1).identical(last)
+    levels = [float(np.squeeze(tree["truth/snap_level"].values)) for tree in (first, last)]
+    assert levels[0] != levels[1]
+
+
+def test_the_snap_of_each_model_is_drawn(tmp_path: Path) -> None:
+    for kind, snap in SNAPS.items():
+        show_snap(recipe_with(tmp_path, snap), tmp_path / f"{kind}.png")
+        assert (tmp_path / f"{kind}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_recording_lies_beside_its_recipe_and_what_it_holds_counts(tmp_path: Path) -> None:
+    first, same, other = (
+        recipe_with(tmp_path / name, SNAPS["recorded_snap"], loudness=peak)
+        for name, peak in (("a", 3e3), ("b", 3e3), ("c", 4e3))
+    )
+    snap = first.scene.world.shrimp[0].snap
+    assert isinstance(snap, RecordedSnap) and Path(snap.path) == tmp_path / "a" / "sounds" / "snap.csv"
+    assert first.digest == same.digest != other.digest
+
+
+def test_slow_tails_are_among_the_warnings(tmp_path: Path) -> None:
+    low = "  physics: {tracing: {kind: straight, bounces: 1}}\n"
+    text = "{kind: gabor, frequency: 50 kHz, cycles: 0.3}"
+    recipe = recipe_with(tmp_path, text, more=low)
+    sets = ("scene.sonar.filter={kind: low_pass, cutoff: 80 kHz}",)
+    assert not any("falls off slowly" in note for note in plan(recipe).warnings)
+    loud = config.load(tmp_path / "recipe.yaml", sets)
+    assert any("falls off slowly: it is cut 0.02 s" in note for note in plan(loud).warnings)
+
+
+WRONG = [
+    ("{kind: keller_miksis, gas_pressure: 50}", r"11: scene\.world\.shrimp\.0\.snap: the wall reaches .* largest_mach"),
+    ("{kind: keller_miksis, gas_pressure: 0}", r"11: scene\.world\.shrimp\.0\.snap: "),
+    ("{kind: keller_miksis, viscosity: 100}", r"11: scene\.world\.shrimp\.0\.snap: the bubble has no snap: .*settles"),
+    ("{kind: keller_miksis, radius: 3 m}", r"11: scene\.world\.shrimp\.0\.snap: lasts"),
+    ("{kind: recorded_snap, path: none.csv}", r"11: scene\.world\.shrimp\.0\.snap\.path: no such file: none\.csv"),
+    ("{kind: recorded_snap, path: recipe.yaml}", r"11: scene\.world\.shrimp\.0\.snap: .*recipe\.yaml"),
+    ("{kind: gabor, frequency: 500 kHz}", r"11: scene\.world\.shrimp\.0\.snap: is not heard"),
+    ("{kind: gabor, frequency: 50 kHz, peak: 1e300}", r"11: scene\.world\.shrimp\.0\.snap: makes a source level of"),
+    ("{kind: gabor, frequency: 50, cycles: 100}", r"11: scene\.world\.shrimp\.0\.snap: lasts .* a snap is over in"),
+    ("{kind: richter, frequency: 50}", r"11: scene\.world\.shrimp\.0\.snap\.kind: 'richter' is not a kind.*'ricker'"),
+]
+
+
+@pytest.mark.parametrize(("snap", "message"), WRONG, ids=[s for s, _ in WRONG])
+def test_snaps_that_cannot_be_are_refused_in_one_line(tmp_path: Path, snap: str, message: str) -> None:
+    with pytest.raises(ValueError, match=message) as caught:  # noqa: PT012
+        recipe_with(tmp_path, snap)
+        source = config.read(tmp_path / "recipe.yaml")
+        with config.locating(source):
+            plan(config.recipe_of(source))
+    assert isinstance(caught.value, (config.RecipeError, FieldError))
+    assert "\n" not in str(caught.value)
+
+
+def test_the_schema_knows_every_kind() -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    check = jsonschema.Draft202012Validator(config.schema())
+    for snap in SNAPS.values():
+        data = YAML(typ="safe", pure=True).load(TEXT.replace("SNAP", snap))
+        assert not list(check.iter_errors(data))
+    data["scene"]["world"]["shrimp"][0]["snap"]["kinds"] = 1
+    assert list(check.iter_errors(data))
