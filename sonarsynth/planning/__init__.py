@@ -32,7 +32,8 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS) -> Plan:
     """Resolve a recipe: check the scene at every frame, make every choice, and predict sizes and cost.
 
     Raises FieldError, naming the field, for a body above the surface or in the bed, a sonar or shrimp out of the
-    water, a missing or broken mesh or cast, or methods that cannot serve the scene; ValueError for an unknown product.
+    water, a snap that cannot be made, a missing or broken file, or methods that cannot serve the scene; ValueError for an
+    unknown product.
     No frame is rendered.
     """
     if not isinstance(recipe, Recipe):

@@ -132,7 +132,10 @@ def _loud(front: Fronts, frequency: Floats, spectrum: ComplexArray, tolerance: f
     """The paths without those that their blur leaves, all together, less than 0.01 `tolerance` of the loudest."""
     some = slice(None, None, max(1, frequency.size // 128))
     mass, exponent = np.abs(spectrum[some]), blur_exponent(frequency[some])
-    variance = np.append(0.0, np.geomspace(1e-4 / exponent[-1], 1e3 / exponent[0], 257))
+    blurred = exponent[exponent > 0.0]  # 0 Hz is not
+    if not blurred.size:
+        return front
+    variance = np.append(0.0, np.geomspace(1e-4 / blurred[-1], 1e3 / blurred[0], 257))
     level = np.exp(-np.multiply.outer(variance, exponent)) @ mass / mass.sum()
     loudness = np.abs(front.amplitude) * np.interp(front.variance, variance, level)
     keep = loudness > 0.01 * tolerance / front.count * loudness.max()
