@@ -32,9 +32,8 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS) -> Plan:
     """Resolve a recipe: check the scene at every frame, make every choice, and predict sizes and cost.
 
     Raises FieldError, naming the field, for a body above the surface or in the bed, a sonar or shrimp out of the
-    water, a snap that cannot be made, a missing or broken file, or methods that cannot serve the scene; ValueError for an
-    unknown product.
-    No frame is rendered.
+    water, a snap that cannot be made, a missing or broken file, or methods that cannot serve the scene; ValueError for
+    an unknown product. No frame is rendered.
     """
     if not isinstance(recipe, Recipe):
         raise TypeError(f"a recipe is planned, not a {type(recipe).__name__}: sonarsynth.load reads one from a file")

@@ -14,7 +14,7 @@ from sonarsynth.sonar import Sonar
 from sonarsynth.synthesis.direct_sum import relative_absorption
 from sonarsynth.synthesis.layout import Stretch
 from sonarsynth.synthesis.nodes import rounded_up
-from sonarsynth.synthesis.pulse import pulse_spectrum, stretch_sizes, stretched_spectra
+from sonarsynth.synthesis.pulse import at_longest, pulse_spectrum, stretch_sizes, stretched_spectra
 from sonarsynth.synthesis.shapes import blur_exponent, shape_modes, stretched
 from sonarsynth.synthesis.wavefront import Fronts
 
@@ -62,7 +62,7 @@ def bins_of(
     widest = rounded_up(float(np.abs(front.doppler).max()), 2.0)
     series = np.zeros((0, spectrum.size), complex)
     if widest > 0.0:
-        sizes = np.array(stretch_sizes(part.waveform, sonar.antialias, widest))
+        sizes = np.array(stretch_sizes(at_longest(part.waveform), sonar.antialias, widest))
         left = np.append(np.cumsum(sizes[::-1])[::-1], 0.0)
         count = int(np.flatnonzero(left <= SHAPES * tolerance)[0])
         series = stretched_spectra(part.waveform, sonar.antialias, fs, part.samples, widest, count)

@@ -71,7 +71,7 @@ def cut_tail(waveform: Waveform, chosen: Filter, tolerance: float = spectra.SUPP
 
 def at_longest(waveform: Waveform) -> Waveform:
     """The waveform a little longer, of one of few widths, so that supports are bounds, and kept."""
-    return waveform._replace(width=rounded_up(waveform.width, 1.02))
+    return waveform._replace(width=rounded_up(waveform.width, 1.05))
 
 
 @lru_cache(maxsize=64)
