@@ -29,6 +29,8 @@ MARGIN = 0.1e-3
 
 SUPPORT = 1e-7
 """The sample window holds every pulse down to this part of its peak; so long after the direct one begin the echoes."""
+TAIL = 1e-3
+"""s after the direct pulse in its plain shape: echoes are heard from then on, though a turned one has a longer tail."""
 ECHO_SUPPORT = 1e-4
 """The echo window holds every echo down to this part of its peak: its feet, under -80 dB, are cut."""
 
@@ -43,8 +45,9 @@ def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
     scene = recipe.scene
     sonar = scene.sonar
     across = elements(sonar.array).aperture / profile.speed.min()  # of a wave, from the centre to the edge
-    before, after = _support(recipe, SUPPORT, profile.uniform) + across
-    echo_before, echo_after = _support(recipe, ECHO_SUPPORT, profile.uniform) + across
+    turned = scene.physics.tracing.bounces > 0 or not profile.uniform  # lossy reflections and caustics turn the phase
+    before, after = _support(recipe, SUPPORT, turned=turned) + across
+    echo_before, echo_after = _support(recipe, ECHO_SUPPORT, turned=turned) + across
     spans = _spans(recipe, profile)
     first_heard, last_direct, first_echo, last_echo, last_heard = np.array([_times(span) for span in spans]).T
     gate = scene.processing.echo_window
@@ -54,7 +57,9 @@ def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
     earliest, latest = shortest - echo_before - MARGIN, longest + echo_after + MARGIN
     if not np.isfinite(latest - earliest):  # nothing echoes: listen for a moment after the snap
         earliest, latest = after, after + 2e-3
-    start = gate.start if gate.start is not None else max(earliest, after)
+    plain = _support(recipe, SUPPORT, turned=False)[1]
+    clear = min(after, plain + across + TAIL)  # a turned pulse may never end: what echoes meanwhile must be heard
+    start = gate.start if gate.start is not None else max(earliest, clear)
     stop = gate.stop if gate.stop is not None else max(latest, start + 1e-3)
     if stop <= start:
         raise FieldError(("scene", "processing", "echo_window", "stop"), f"must be after start ({start:g} s)")
@@ -66,10 +71,9 @@ def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
     return Windows(first, samples, float(start), float(stop), disturbed)
 
 
-def _support(recipe: Recipe, tolerance: float, uniform: bool) -> Floats:
+def _support(recipe: Recipe, tolerance: float, *, turned: bool) -> Floats:
     """Longest time (s) before and after its collapse that any filtered snap exceeds `tolerance` of its peak."""
     scene = recipe.scene
-    turned = scene.physics.tracing.bounces > 0 or not uniform  # lossy reflections and caustics turn the phase
     chosen = scene.sonar.antialias
     supports = [pulse_support(w, chosen, tolerance, turned=turned) for w in extreme_waveforms(scene)]
     return np.asarray(np.max(supports or [(0.0, 0.0)], axis=0))
