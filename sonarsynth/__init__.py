@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from sonarsynth.planning import Plan, plan
     from sonarsynth.ranging import IsovelocityRange, RefractedRange, SensorDelays, WavefrontCancelling
     from sonarsynth.recipe import Recipe
-    from sonarsynth.scattering import Isotropic, MirrorLobe
+    from sonarsynth.scattering import Isotropic, Kirchhoff, MirrorLobe, PartlyReflecting
+    from sonarsynth.scattering.strength import target_strength
     from sonarsynth.scene import EchoWindow, Physics, Processing, Scene, Trajectory, World
     from sonarsynth.schedule import BuildReport, build
     from sonarsynth.sonar import (
@@ -100,6 +101,7 @@ __all__ = [
     "IsovelocityRange",
     "KellerMiksis",
     "KernelDeposit",
+    "Kirchhoff",
     "LShape",
     "Line",
     "Linear",
@@ -109,6 +111,7 @@ __all__ = [
     "MirrorLobe",
     "Munk",
     "Myring",
+    "PartlyReflecting",
     "Physics",
     "Plan",
     "PlanarLattice",
@@ -156,6 +159,7 @@ __all__ = [
     "loads",
     "plan",
     "schema",
+    "target_strength",
     "verify",
 ]
 
@@ -185,8 +189,11 @@ _HOMES = {
     "recipe": ("Recipe",),
     "scattering": (
         "Isotropic",
+        "Kirchhoff",
         "MirrorLobe",
+        "PartlyReflecting",
     ),
+    "scattering.strength": ("target_strength",),
     "scene": (
         "EchoWindow",
         "Physics",

@@ -15,6 +15,7 @@ import typer
 from sonarsynth.cli.accuracy import accuracy
 from sonarsynth.cli.running import BadOption, run
 from sonarsynth.cli.selecting import frame_numbers, product_names
+from sonarsynth.cli.target_strength import target_strength
 
 __all__ = ["app", "main"]
 
@@ -160,6 +161,7 @@ def show(
 
 
 app.command()(accuracy)
+app.command("target-strength")(target_strength)
 
 
 @app.command()

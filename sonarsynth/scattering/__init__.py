@@ -7,6 +7,7 @@ from typing import Annotated, Protocol
 from sonarsynth.conventions import Floats
 from sonarsynth.description import BY_KIND
 from sonarsynth.scattering.isotropic import Isotropic
+from sonarsynth.scattering.kirchhoff import Kirchhoff, PartlyReflecting
 from sonarsynth.scattering.mirror_lobe import MirrorLobe
 from sonarsynth.world.meshes import Mesh
 
@@ -29,5 +30,9 @@ class ScatteringLaw(Protocol):
 
 
 Scattering = Annotated[MirrorLobe | Isotropic, BY_KIND]
+"""Laws of echoes in a frame."""
 
-__all__ = ["Isotropic", "MirrorLobe", "Scattering", "ScatteringLaw"]
+StrengthLaw = Annotated[Kirchhoff | MirrorLobe | Isotropic, BY_KIND]
+"""Laws of target strength."""
+
+__all__ = ["Isotropic", "Kirchhoff", "MirrorLobe", "PartlyReflecting", "Scattering", "ScatteringLaw", "StrengthLaw"]

@@ -49,6 +49,7 @@ SURFACE = [
     "IsovelocityRange",
     "KellerMiksis",
     "KernelDeposit",
+    "Kirchhoff",
     "LShape",
     "Line",
     "Linear",
@@ -58,6 +59,7 @@ SURFACE = [
     "MirrorLobe",
     "Munk",
     "Myring",
+    "PartlyReflecting",
     "Physics",
     "Plan",
     "PlanarLattice",
@@ -105,6 +107,7 @@ SURFACE = [
     "loads",
     "plan",
     "schema",
+    "target_strength",
     "verify",
 ]
 

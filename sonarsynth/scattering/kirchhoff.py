@@ -1,0 +1,103 @@
+"""The Kirchhoff integral as a law: each flat facet scatters coherently, as its plane-wave coefficient says."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import Ge, Gt, Le
+
+from sonarsynth.acoustics.boundaries import rayleigh
+from sonarsynth.acoustics.kirchhoff import local_grazing, shadow_taper
+from sonarsynth.acoustics.lobes import lit_and_seen
+from sonarsynth.acoustics.roughness import incoherent_power, roughness_parameter
+from sonarsynth.conventions import Bools, Floats, NonNegativeMetres, Number
+from sonarsynth.description import description
+
+
+@description
+class PartlyReflecting:
+    """The surface of a fluid body so thick that nothing returns from inside: Rayleigh's coefficient at each angle."""
+
+    kind: Literal["partly_reflecting"] = "partly_reflecting"
+    density_ratio: Annotated[Number, Gt(0)]
+    """Density over that of the water."""
+    speed_ratio: Annotated[Number, Gt(0)]
+    """Sound speed over that of the water."""
+    loss_tangent: Annotated[Number, Ge(0)] = 0.0
+    """Imaginary over real part of the wavenumber in the body."""
+
+
+@description
+class Kirchhoff:
+    """Facets scatter as pieces of plane mirrors, exact for each of them, and add with their phases.
+
+    |f|^2 = |sum of facets exp(-g^2/2)|^2 + sum of area times the lobe of the slopes, the second for rough surfaces.
+    Good where the body is large against the wavelength; no waves that creep round it, no second bounce. Only echoes:
+    what cancels the direct wave in the shadow behind the body is left out. Rigid spheres of 0.25 m, 25 to 110 kHz,
+    against the exact series: within 0.3 dB at backscatter, 0.7 dB at 90 and 105 degrees off it, 2.5 dB at 120.
+    """
+
+    kind: Literal["kirchhoff"] = "kirchhoff"
+    surface: Literal["rigid", "soft"] | PartlyReflecting = "rigid"
+    """Reflection coefficient 1, -1, or by density and sound speed."""
+    edges: Literal["auto", "smooth", "sharp"] = "auto"
+    """Where the lit and seen part ends. Smooth: the body goes on in a curve, and the echo is tapered to 0 (it differs
+    from sharp off backscatter only). Sharp: it ends in an edge, as a plate does. Auto: sharp for facets that lie in a
+    plane with their neighbours, smooth for others."""
+    roughness: NonNegativeMetres = 0.0
+    """Rms height of the surface about the facets."""
+    slope: Annotated[Number, Gt(0), Le(0.5)] = 0.1
+    """Rms slope per axis of a rough surface: how wide the incoherent part spreads. Nothing where roughness is 0."""
+
+    def reflection(self, incident: Floats, scattered: Floats) -> complex:
+        """Plane-wave coefficient of the facets that would mirror one unit vector (xyz) of propagation into the other.
+
+        It stands for that of all facets, which keeps the law reciprocal.
+        """
+        match self.surface:
+            case "rigid":
+                return 1.0 + 0.0j
+            case "soft":
+                return -1.0 + 0.0j
+            case PartlyReflecting(density_ratio=m, speed_ratio=n, loss_tangent=loss):
+                return complex(rayleigh(local_grazing(incident, scattered), m, n, loss))
+
+    def lit(self, incident: Floats, scattered: Floats, normal: Floats, curved: Bools) -> Floats:
+        """Factor (facet,) on the amplitude of facets with normals (facet, xyz), 0 where a facet is not lit or not seen.
+
+        curved (facet,): whether the surface there is, for `edges` auto.
+        """
+        sharp = np.where(lit_and_seen(incident, scattered, normal), 1.0, 0.0)
+        if self.edges == "sharp":
+            return sharp
+        taper = shadow_taper(incident, scattered, normal)
+        return taper if self.edges == "smooth" else np.where(curved, taper, sharp)
+
+    def cross_section(
+        self,
+        corners: Floats,
+        normal: Floats,
+        area: Floats,
+        curved: Bools,
+        incident: Floats,
+        scattered: Floats,
+        wavenumber: Floats,
+    ) -> Floats:
+        """Power |f|^2 (frequency,) in m2 of unhidden facets, for unit vectors (xyz) of propagation, in and away.
+
+        corners (facet, 3, xyz) m, counter-clockwise from outside, with normal (facet, xyz), area (facet,) m2 and
+        whether the surface is curved there (facet,); wavenumber (frequency,) rad/m.
+        """
+        from sonarsynth.acoustics.kirchhoff_kernels import mesh_amplitude
+
+        coefficient = self.reflection(incident, scattered)
+        factor = self.lit(incident, scattered, normal, curved)
+        weight = coefficient * factor
+        power = np.abs(mesh_amplitude(corners, incident, scattered, wavenumber, weight, self.roughness)) ** 2
+        if self.roughness > 0:
+            on = np.flatnonzero(factor > 0)
+            g = roughness_parameter(wavenumber[:, None], self.roughness, incident, scattered, normal[on])
+            lobe = incoherent_power(g, incident, scattered, normal[on], self.slope, coefficient)
+            power = power + lobe @ area[on]
+        return np.asarray(power)
