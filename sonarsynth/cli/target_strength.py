@@ -7,13 +7,12 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
-import numpy as np
 import typer
 
 from sonarsynth.cli.running import BadOption
-from sonarsynth.conventions import FASTEST, SLOWEST, Floats
 
 if TYPE_CHECKING:
+    from sonarsynth.conventions import Floats
     from sonarsynth.world.shapes import Shape
 
 MOST: Final = 100_000
@@ -40,6 +39,9 @@ def target_strength(
     as_json: Annotated[bool, typer.Option("--json", help="Print the table as JSON.")] = False,
 ) -> None:
     """Backscattered target strength over aspect and frequency, in dB re 1 m2: a table (CSV) and a polar picture."""
+    import numpy as np
+
+    from sonarsynth.conventions import FASTEST, SLOWEST
     from sonarsynth.scattering import StrengthLaw
     from sonarsynth.show.strength import strength_table, write_strength
 
@@ -99,6 +101,8 @@ def _described(text: str, name: str, kind: Any) -> Any:
 
 def _values(text: str, option: str) -> Floats:
     """Numbers of a text "a:b:step", both ends included, or of a single one. Raises BadOption."""
+    import numpy as np
+
     try:
         parts = [float(part) for part in text.split(":")]
     except ValueError:
