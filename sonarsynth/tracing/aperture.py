@@ -26,6 +26,8 @@ from sonarsynth.world.environment import Environment, Profile
 if TYPE_CHECKING:
     from sonarsynth.tracing import Propagation
 
+TERMS = 20
+"""Terms over the aperture (`acoustics.arrays.aperture_terms`)."""
 SAMPLES = 96
 """Facets of a body and family that rays to the probes are traced from where that is enough; a quarter is held out."""
 SMOOTH_TIME = 1e-9
@@ -41,7 +43,7 @@ class Fronts:
     """Legs over the aperture."""
 
     delay_terms: Floats  # (leg, term) s; no columns where all are spheres
-    error: Floats  # (leg, ) s: misfit of the wavefront at the probes, the held-out ones among them
+    error: Floats  # (leg,) s: misfit of the wavefront at the probes, the held-out ones among them
     probe_departure: Floats  # (leg, probe, xyz) world: where each probe is seen from the point
     probe_gain: Floats  # (leg, probe): amplitude at the probe over that of the sphere; 1 in uniform water
 
@@ -106,7 +108,9 @@ class _Made:
 
     @staticmethod
     def room(count: int, sensors: int) -> _Made:
-        return _Made(np.zeros((count, 20)), np.ones((count, sensors)), np.zeros((count, sensors, 3)), np.zeros(count))
+        return _Made(
+            np.zeros((count, TERMS)), np.ones((count, sensors)), np.zeros((count, sensors, 3)), np.zeros(count)
+        )
 
     def put(self, rows: Ints, made: _Made) -> None:
         for name, value in vars(made).items():

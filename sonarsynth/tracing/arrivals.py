@@ -72,7 +72,7 @@ def trace(
     band: tuple[float, float],
     moving: Moving | None = None,
 ) -> Arrivals:
-    """The arrivals of a frame, sorted by snap, target, facet and travel time; direct paths of a snap come first.
+    """The arrivals of a frame, sorted by snap, target and facet; those that met no target come first of a snap.
 
     environment, profile: the water; moment: bodies and snaps; sonar_pose, elements: the array; absorption: dB/m at the
     centre of the band; propagation: how sound travels, and how many bounces are followed; law: how facets scatter;
@@ -152,11 +152,9 @@ def _direct(array: ArrayLegs, index: int, snap: Snap, absorption: float, moving:
     one, none = np.ones(len(legs.row)), np.full(len(legs.row), NO_TARGET)
     variation = _fitted(array, over.probe_gain, legs.spreading, None)
     made = assemble(legs, over, Outward.none(len(one)), index, snap.time, absorption, none, none, one, variation)
-    return (
-        made
-        if moving is None
-        else carried(made, legs, None, snap, sonar_pose, profile, moving, array.elements.aperture)
-    )
+    if moving is None:
+        return made
+    return carried(made, legs, None, snap, sonar_pose, profile, moving, array.elements.aperture)
 
 
 def _echoes(

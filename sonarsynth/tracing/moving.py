@@ -22,13 +22,11 @@ from sonarsynth.acoustics.lobes import dot
 from sonarsynth.conventions import Floats, depth
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Arrivals
+from sonarsynth.tracing.aperture import TERMS
 from sonarsynth.tracing.legs import Legs
 from sonarsynth.tracing.paths import Outward
 from sonarsynth.world.environment import Profile
 from sonarsynth.world.moment import Snap
-
-TERMS = 20
-"""Terms over the aperture (`acoustics.arrays.aperture_terms`)."""
 
 
 @dataclass(frozen=True, eq=False)
