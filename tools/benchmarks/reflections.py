@@ -11,7 +11,7 @@ from sonarsynth import config
 from sonarsynth.planning import Plan, plan
 from sonarsynth.render import beamform_frame, range_frame, synthesise, trace_frame
 
-RECIPE, FRAMES, SEEN = "configs/thermocline.yaml", (12, 24, 36, 48), (10, 20)
+RECIPE, FRAMES, SEEN = "configs/thermocline.yaml", (12, 24, 36, 48, 54), (10, 15, 20, 30, 40, 50)
 DIRECT = ["scene.physics.tracing={kind: auto, bounces: 0}", "scene.processing.cancelling=null"]
 
 
@@ -24,10 +24,10 @@ def seconds(work: Callable[[], Any]) -> tuple[float, Any]:
 def frame(made: Plan, index: int) -> dict[str, float]:
     """Milliseconds of each stage of one frame; beamform holds synthesis, locating, cancelling and imaging."""
     trace, traced = seconds(lambda: trace_frame(made, index))
-    synthesis, _ = seconds(lambda: synthesise(made, traced))
     beamform, heard = seconds(lambda: beamform_frame(made, index, traced))
     ranging, _ = seconds(lambda: range_frame(made, index, traced, heard))
-    found = {"trace_and_label": trace, "synthesise": synthesis, "beamform": beamform, "range": ranging}
+    synthesis, _ = seconds(lambda: synthesise(made, traced))
+    found = {"trace_and_label": trace, "synthesise_again": synthesis, "beamform": beamform, "range": ranging}
     total = trace + beamform + ranging
     return {f"{name}_ms": 1e3 * s for name, s in (found | {"frame": total}).items()} | {
         "paths": float(len(traced.arrivals.delay))
