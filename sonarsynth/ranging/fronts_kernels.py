@@ -7,6 +7,8 @@ from typing import Any
 import numba as nb
 import numpy as np
 
+from sonarsynth.ranging.kernels import template_sums
+
 
 @nb.njit(cache=True, error_model="numpy", nogil=True)
 def tilted_energies(heard: Any, response: Any, late: Any, first: float, spacing: float, steps: int) -> Any:
@@ -64,12 +66,7 @@ def shares(heard: Any, response: Any) -> Any:
 def explained(heard: Any, response: Any) -> Any:
     """What the best common wave makes each sensor hear (sensor, bin): an orthogonal projection, bin by bin."""
     sensors, bins = heard.shape
-    total = np.zeros(bins, np.complex128)
-    power = np.zeros(bins)
-    for q in range(sensors):
-        for k in range(bins):
-            total[k] += response[q, k] * heard[q, k]
-            power[k] += response[q, k] * response[q, k]
+    total, power = template_sums(heard, response)
     for k in range(bins):
         total[k] = total[k] / power[k] if power[k] > 0 else 0.0
     part = np.empty((sensors, bins), np.complex128)
