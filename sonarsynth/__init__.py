@@ -71,7 +71,7 @@ if TYPE_CHECKING:
     from sonarsynth.world.shapes import Box, Cylinder, LShape, MeshFile, Myring, Remus100, Sphere
     from sonarsynth.world.snaps import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
     from sonarsynth.world.sources import LogarithmicBubble, SnappingShrimp
-    from sonarsynth.world.targets import Target
+    from sonarsynth.scattering.targets import Target
 
 __all__ = [
     "Absorption",
@@ -283,7 +283,7 @@ _HOMES = {
         "LogarithmicBubble",
         "SnappingShrimp",
     ),
-    "world.targets": ("Target",),
+    "scattering.targets": ("Target",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 

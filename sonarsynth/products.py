@@ -51,7 +51,9 @@ class Arrivals:
     with d = direction[e], R = radius[e], and amplitude
         amplitude[e] * R/|R d - q| * (1 + amplitude_terms[e] @ aperture_terms(q)).
     (`acoustics.arrays.aperture_terms`.) In isovelocity water the sphere is exact and delay_terms has no columns.
-    amplitude is the factor on the pressure waveform of the snap at 1 m: the product of the columns below it.
+    amplitude is the factor on the pressure waveform of the snap at 1 m: the product of the columns below it. Facets
+    change the waveform: its spectrum is multiplied by `acoustics.facet_pulses.facet_response` of the last four columns,
+    whose modulus is 1 at `centre` for a coherent facet that is small.
     """
 
     delay: Floats  # (path,) s at the array centre, snap time included
@@ -78,6 +80,11 @@ class Arrivals:
     phase: Floats  # (path,) rad: constant phase of the pulse over frequency, from caustics and lossy reflections
     blur: Floats  # (path,) s: rough boundaries take exp(-(2 pi f blur)^2/2) off the spectrum, a Gaussian in time
     stretch: Floats  # (path,) Doppler: the pulse is p((t - delay)/(1 + stretch))
+    coherent: Bools  # (path,) the echo of a smooth facet: differentiated, i f/centre; phases count in sums of paths
+    corners: Floats  # (path, 3) s: delays of the facet's corners about `delay`, over which the pulse is a mean; 0: a point
+    rough_share: Floats  # (path,) w and
+    rough_delay: Floats  # (path,) s: incoherent echo of a rough facet, sqrt(1 - w exp(-(2 pi f rough_delay)^2)); w 0: 1
+    centre: float  # Hz: centre of the band, where amplitudes hold
     sound_speed: float  # m/s of the water at the array centre
     wavefront_error: float  # s: largest error of the wavefronts that was measured, at probes spread over the aperture
     amplitude_error: float = 0.0  # largest error of the amplitudes measured there, relative to the strongest echo

@@ -13,7 +13,6 @@ from pydantic import TypeAdapter
 from sonarsynth.description import description
 from sonarsynth.scene import Frame, Scene
 from sonarsynth.tracing.ray_request import RayRequest
-from sonarsynth.world.meshes import mesh_of
 
 SPLITS = ("train", "validation", "test")
 """Names of the splits, in the order of their numbers in the store."""
@@ -58,7 +57,7 @@ class Recipe:
         Where the files lie does not matter.
         """
         deciding = {name: value for name, value in self.as_json().items() if name != "rays"}
-        meshes = {t.name: mesh_of(t.shape).digest for t in self.scene.world.targets}
+        meshes = {t.name: mesh.digest for t, mesh in zip(self.scene.world.targets, self.scene.meshes, strict=True)}
         text = json.dumps([_by_content(deciding), meshes], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 

@@ -87,7 +87,7 @@ def trace_frame(plan: Plan, index: int) -> Traced:
         plan.elements,
         float(plan.absorption(sonar.band.centre)),
         plan.propagation,
-        scene.physics.scattering,
+        scene.laws,
         band=(sonar.band.low, sonar.band.high),
         moving=Moving(velocities, frame.sonar_velocity) if scene.physics.doppler else None,
     )
@@ -142,7 +142,8 @@ def follow_rays(plan: Plan, index: int) -> RayFan:
         request.duration,
         request.bounces,
         towards=frame.moment.snaps[0].position if request.towards_shrimp else None,
-        law=scene.physics.scattering,
+        laws=scene.laws,
+        centre=scene.sonar.band.centre,
         propagation=plan.propagation,
     )
 

@@ -16,16 +16,16 @@ from sonarsynth.geometry import Pose
 from sonarsynth.randomness import stream
 from sonarsynth.ranging import Cancelling, IsovelocityRange, Locator, Ranging, SensorDelays
 from sonarsynth.scattering import MirrorLobe, Scattering
+from sonarsynth.scattering.targets import Target, mesh_for
 from sonarsynth.sonar import Sonar
 from sonarsynth.synthesis import KernelDeposit, Synthesis
 from sonarsynth.tracing import AutoTracing, Tracing
 from sonarsynth.world.environment import Environment
-from sonarsynth.world.meshes import mesh_of
+from sonarsynth.world.meshes import Mesh
 from sonarsynth.world.moment import Body, Moment, Snap, snaps_of
 from sonarsynth.world.motion import Motion, Still, pose, velocity
 from sonarsynth.world.snap_pulses import scales
 from sonarsynth.world.sources import SnappingShrimp
-from sonarsynth.world.targets import Target
 
 
 @description
@@ -73,7 +73,7 @@ class Physics:
     tracing: Tracing = Field(default_factory=AutoTracing)
     """How sound travels."""
     scattering: Scattering = Field(default_factory=MirrorLobe)
-    """How facets scatter it."""
+    """How facets scatter it, of targets that do not say so themselves."""
     synthesis: Synthesis = Field(default_factory=KernelDeposit)
     """How signals are made from arrivals."""
     doppler: bool = True
@@ -119,11 +119,21 @@ class Scene:
     physics: Physics = Field(default_factory=Physics)
     processing: Processing = Field(default_factory=Processing)
 
+    @property
+    def laws(self) -> tuple[Scattering, ...]:
+        """How each target scatters."""
+        return tuple(t.scattering or self.physics.scattering for t in self.world.targets)
+
+    @property
+    def meshes(self) -> tuple[Mesh, ...]:
+        """What each target is traced with: kept by content, so that asking again costs nothing."""
+        pairs = zip(self.world.targets, self.laws, strict=True)
+        return tuple(mesh_for(t.shape, law, self.sonar.shortest_wavelength) for t, law in pairs)
+
     def moment(self, time: float, *, trajectory: int = 0, step: int = 0, seed: int = 0) -> Moment:
         """The world at a time (s), with the snaps that a frame of this trajectory, step and seed draws."""
-        bodies = tuple(
-            Body(t.name, mesh_of(t.shape), pose(t.motion, time), velocity(t.motion, time)) for t in self.world.targets
-        )
+        placed = zip(self.world.targets, self.meshes, strict=True)
+        bodies = tuple(Body(t.name, mesh, pose(t.motion, time), velocity(t.motion, time)) for t, mesh in placed)
         bed = self.world.environment.depth
         snaps: list[Snap] = []
         for i, shrimp in enumerate(self.world.shrimp):

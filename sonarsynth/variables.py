@@ -10,7 +10,6 @@ import numpy as np
 from sonarsynth.planning import Plan
 from sonarsynth.products import FAMILIES, LEDGER
 from sonarsynth.recipe import SPLITS
-from sonarsynth.world.meshes import mesh_of
 
 FORMAT_VERSION = "1"
 """Version of the layout of a store."""
@@ -207,8 +206,7 @@ def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.n
     add("/truth", "family", ("family",), list(FAMILIES), "1", touched)
     if "signals" in plan.products:
         _add_sensors(plan, add)
-    for target in scene.world.targets:
-        mesh = mesh_of(target.shape)
+    for target, mesh in zip(scene.world.targets, scene.meshes, strict=True):
         group = f"/targets/{target.name}"
         add(group, "vertices", ("vertex", "xyz"), mesh.vertices, "m", "vertices in the target's frame")
         add(group, "faces", ("face", "corner"), mesh.faces, "1", "vertex indices of each facet, outward")

@@ -14,7 +14,7 @@ from sonarsynth.world.environment import Absorption, Environment, Isovelocity
 from sonarsynth.world.motion import Line, Still
 from sonarsynth.world.shapes import Remus100, Sphere
 from sonarsynth.world.sources import SnappingShrimp
-from sonarsynth.world.targets import Target
+from sonarsynth.scattering.targets import Target
 
 
 def remus(frames: int = 2, **sonar: Any) -> Recipe:

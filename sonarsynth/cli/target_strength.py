@@ -42,10 +42,10 @@ def target_strength(
     import numpy as np
 
     from sonarsynth.conventions import FASTEST, SLOWEST
-    from sonarsynth.scattering import StrengthLaw
+    from sonarsynth.scattering import Scattering
     from sonarsynth.show.strength import strength_table, write_strength
 
-    law = _described(scattering, "--scattering", StrengthLaw)
+    law = _described(scattering, "--scattering", Scattering)
     shape = _shape(body, unit)
     f, degrees = _values(frequency, "--frequency"), _values(aspect, "--aspect")
     if not f.min() > 0:

@@ -12,12 +12,12 @@ from sonarsynth.planning.costs import left_out, stages
 from sonarsynth.planning.plans import PRODUCTS, Omission, Plan, Stage, Windows
 from sonarsynth.planning.windows import SUPPORT, extreme_waveforms, lay_windows
 from sonarsynth.recipe import Recipe
+from sonarsynth.scattering.targets import Target
 from sonarsynth.sonar import elements
 from sonarsynth.synthesis.pulse import LONGEST_TAIL, cut_tail
 from sonarsynth.tracing import AutoTracing, Refracted, Straight
-from sonarsynth.world.meshes import Mesh, mesh_of
+from sonarsynth.world.meshes import Mesh
 from sonarsynth.world.refinement import longest_edge
-from sonarsynth.world.targets import Target
 
 __all__ = ["PRODUCTS", "Omission", "Plan", "Stage", "Windows", "chosen_products", "lay_windows", "plan"]
 
@@ -64,7 +64,7 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS) -> Plan:
     notes += _cut(recipe, profile.uniform)
     notes += _behind(recipe)
     notes += _coarse(recipe)
-    notes += tuple(f"{t.name}: {note}" for t in scene.world.targets for note in mesh_of(t.shape).notes)
+    notes += tuple(f"{t.name}: {note}" for t, mesh in _meshes(recipe) for note in mesh.notes)
     return replace(made, stages=stages(made), left_out=left_out(made), warnings=notes)
 
 
@@ -115,7 +115,7 @@ def _coarse(recipe: Recipe) -> tuple[str, ...]:
 
 
 def _meshes(recipe: Recipe) -> list[tuple[Target, Mesh]]:
-    return [(t, mesh_of(t.shape)) for t in recipe.scene.world.targets]
+    return list(zip(recipe.scene.world.targets, recipe.scene.meshes, strict=True))
 
 
 def _sizes(recipe: Recipe, windows: Windows) -> dict[str, int]:

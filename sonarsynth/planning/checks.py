@@ -10,13 +10,14 @@ from sonarsynth.conventions import FASTEST, REFERENCE_PRESSURE, SLOWEST, Floats,
 from sonarsynth.description import FieldError
 from sonarsynth.planning.plans import Windows
 from sonarsynth.recipe import Recipe
+from sonarsynth.scattering.targets import mesh_for
 from sonarsynth.scene import Frame, Scene
 from sonarsynth.sonar import Sonar, elements
 from sonarsynth.synthesis.pulse import bubble, heard_part
 from sonarsynth.world.casting import inside
 from sonarsynth.world.casts import profile_of
 from sonarsynth.world.environment import Profile
-from sonarsynth.world.meshes import Mesh, mesh_of
+from sonarsynth.world.meshes import Mesh
 from sonarsynth.world.moment import model_of
 from sonarsynth.world.snap_pulses import largest_scales, pulse, waveform
 from sonarsynth.world.sources import LogarithmicBubble, SnappingShrimp
@@ -48,9 +49,9 @@ def read_inputs(scene: Scene) -> Profile:
             (*world, "environment", "sound_speed"),
             f"is {profile.speed[odd[0]]:g} m/s at {profile.depth[odd[0]]:g} m, outside {SLOWEST:g} to {FASTEST:g} m/s",
         )
-    for i, target in enumerate(scene.world.targets):
+    for i, (target, law) in enumerate(zip(scene.world.targets, scene.laws, strict=True)):
         try:
-            mesh_of(target.shape)
+            mesh_for(target.shape, law, scene.sonar.shortest_wavelength)
         except (ValueError, OSError) as error:
             raise FieldError((*world, "targets", i, "shape"), str(error)) from None
     try:

@@ -15,7 +15,6 @@ import numpy as np
 from sonarsynth.planning.plans import Omission, Plan, Stage
 from sonarsynth.tracing import Refracted, Straight
 from sonarsynth.tracing.bounces import MOST_BOUNCES
-from sonarsynth.world.meshes import mesh_of
 from sonarsynth.world.reflection import rms_height
 
 REFERENCE_TRANSFORM = 2.0e-3
@@ -65,7 +64,7 @@ def machine_factor() -> float:
 
 
 def _facets(plan: Plan) -> int:
-    return sum(len(mesh_of(t.shape).faces) for t in plan.scene.world.targets)
+    return sum(len(mesh.faces) for mesh in plan.scene.meshes)
 
 
 def _ways(plan: Plan) -> int:
@@ -109,10 +108,11 @@ def stages(plan: Plan) -> tuple[Stage, ...]:
     bins = (sonar.band.high - sonar.band.low) * gate
     straight = isinstance(plan.propagation, Straight)
     kind = "" if straight else "refracted "
+    laws = ", ".join(dict.fromkeys(law.kind for law in scene.laws))
     rows: list[tuple[str, str, str, str, float, int]] = [
         (
             "trace",
-            f"{plan.propagation.kind} rays, {plan.propagation.bounces} bounces, {scene.physics.scattering.kind}",
+            f"{plan.propagation.kind} rays, {plan.propagation.bounces} bounces, {laws}",
             "one sound speed everywhere: rays are straight" if straight else "the sound speed varies with depth",
             "measured: /truth/amplitude_error" + ("" if straight else ", wavefront_error"),
             facets * snaps * SECONDS[f"trace {kind}facet"],
@@ -230,7 +230,7 @@ def reflected_bound(plan: Plan) -> str:
         plan.elements,
         float(plan.absorption(sonar.band.centre)),
         replace(plan.propagation, bounces=bounces + 1),
-        scene.physics.scattering,
+        scene.laws,
         band=(sonar.band.low, sonar.band.high),
     )
     blur = np.exp(-0.5 * (2 * np.pi * sonar.band.centre * found.blur) ** 2)

@@ -10,6 +10,7 @@ from annotated_types import Gt
 from sonarsynth.acoustics.lobes import lit_and_seen
 from sonarsynth.conventions import Floats, Metres
 from sonarsynth.description import description
+from sonarsynth.scattering.parts import Part, Plain
 from sonarsynth.world.meshes import Mesh
 
 
@@ -20,6 +21,11 @@ class Isotropic:
     kind: Literal["isotropic"] = "isotropic"
     strength: Annotated[Metres, Gt(0)] = 1.0
     """Scattering amplitude of a facet (m): a target strength of 20 log10 of it."""
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Of an echo: one, in the shape of the snap."""
+        return (Plain(self),)
 
     def amplitude(self, incident: Floats, scattered: Floats, normal: Floats, area: Floats) -> Floats:
         """Far-field scattering amplitude (...) in m; arguments as in `ScatteringLaw`."""

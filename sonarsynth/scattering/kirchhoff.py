@@ -13,6 +13,7 @@ from sonarsynth.acoustics.lobes import lit_and_seen
 from sonarsynth.acoustics.roughness import incoherent_power, roughness_parameter
 from sonarsynth.conventions import Bools, Floats, NonNegativeMetres, Number
 from sonarsynth.description import description
+from sonarsynth.scattering.parts import Part, Rough, Smooth
 
 
 @description
@@ -49,6 +50,16 @@ class Kirchhoff:
     """Rms height of the surface about the facets."""
     slope: Annotated[Number, Gt(0), Le(0.5)] = 0.1
     """Rms slope per axis of a rough surface: how wide the incoherent part spreads. Nothing where roughness is 0."""
+    diffuse: Annotated[Number, Ge(0), Le(1)] = 0.0
+    """Share of the returned power that is scattered by Lambert's law instead."""
+    mesh_error: Annotated[Number, Ge(0.005), Le(1)] = 0.05
+    """In frames, shapes are meshed as finely as makes the expected error of the echo this (0.05: 0.4 dB)."""
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Of an echo: the coherent one, and what a rough or diffuse surface scatters."""
+        rough = self.roughness > 0 or self.diffuse > 0
+        return (*((Smooth(self),) if self.diffuse < 1 else ()), *((Rough(self),) if rough else ()))
 
     def reflection(self, incident: Floats, scattered: Floats) -> complex:
         """Plane-wave coefficient of the facets that would mirror one unit vector (xyz) of propagation into the other.
@@ -93,11 +104,12 @@ class Kirchhoff:
 
         coefficient = self.reflection(incident, scattered)
         factor = self.lit(incident, scattered, normal, curved)
-        weight = coefficient * factor
+        weight = coefficient * np.sqrt(1.0 - self.diffuse) * factor
         power = np.abs(mesh_amplitude(corners, incident, scattered, wavenumber, weight, self.roughness)) ** 2
-        if self.roughness > 0:
+        if self.roughness > 0 or self.diffuse > 0:
             on = np.flatnonzero(factor > 0)
             g = roughness_parameter(wavenumber[:, None], self.roughness, incident, scattered, normal[on])
-            lobe = incoherent_power(g, incident, scattered, normal[on], self.slope, coefficient)
-            power = power + lobe @ area[on]
+            left = coefficient * np.sqrt(1.0 - self.diffuse)
+            albedo = np.abs(coefficient) ** 2 * self.diffuse
+            power = power + incoherent_power(g, incident, scattered, normal[on], self.slope, left, albedo) @ area[on]
         return np.asarray(power)

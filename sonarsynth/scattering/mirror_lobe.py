@@ -11,6 +11,7 @@ from pydantic import ValidationInfo, field_validator
 from sonarsynth.acoustics.lobes import lobe_amplitude, slope_of_width
 from sonarsynth.conventions import Floats, Number, Radians
 from sonarsynth.description import description
+from sonarsynth.scattering.parts import Part, Plain
 from sonarsynth.scattering.polarity import random_polarity
 from sonarsynth.world.meshes import Mesh
 
@@ -45,6 +46,11 @@ class MirrorLobe:
                 f"with reflectivity {reflectivity:g} scatters more power than arrives: at most {1 - reflectivity**2:g}"
             )
         return value
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Of an echo: one, in the shape of the snap."""
+        return (Plain(self),)
 
     def amplitude(self, incident: Floats, scattered: Floats, normal: Floats, area: Floats) -> Floats:
         """Far-field scattering amplitude (...) in m; arguments as in `ScatteringLaw`."""

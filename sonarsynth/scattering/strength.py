@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import FASTEST, SLOWEST, Bools, Floats
-from sonarsynth.scattering import StrengthLaw
+from sonarsynth.scattering import Scattering
 from sonarsynth.scattering.fineness import checked, convex, fine_mesh
 from sonarsynth.scattering.kirchhoff import Kirchhoff
+from sonarsynth.scattering.targets import Target
 from sonarsynth.world.meshes import Mesh, mesh_of
 from sonarsynth.world.shapes import Box, Cylinder, LShape, MeshFile, Myring, Remus100, Shape, Sphere
-from sonarsynth.world.targets import Target
 
 SHAPES: Final = (MeshFile, Sphere, Cylinder, Box, LShape, Remus100, Myring)
 
@@ -24,7 +24,7 @@ def target_strength(
     incident: npt.ArrayLike,
     scattered: npt.ArrayLike,
     sound_speed: npt.ArrayLike = 1500.0,
-    scattering: StrengthLaw | None = None,
+    scattering: Scattering | None = None,
 ) -> Floats:
     """Target strength (...) in dB re 1 m2: 20 log10 of the far-field amplitude in m (pressure f/r for unit pressure).
 
@@ -62,7 +62,7 @@ def target_strength(
 class _Body:
     """A mesh, its law, and what each direction sees of it."""
 
-    def __init__(self, target: Mesh | Shape | Target, law: StrengthLaw, wavelength: float) -> None:
+    def __init__(self, target: Mesh | Shape | Target, law: Scattering, wavelength: float) -> None:
         from sonarsynth.world.curvature import curvature_radius
 
         shape = target.shape if isinstance(target, Target) else target

@@ -1,4 +1,4 @@
-"""Targets: a named shape that moves."""
+"""Targets: a named shape of some material that moves."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from typing import Annotated
 from pydantic import StringConstraints
 
 from sonarsynth.description import description
+from sonarsynth.scattering import Kirchhoff, Scattering
+from sonarsynth.world.meshes import Mesh, mesh_of
 from sonarsynth.world.motion import Motion
 from sonarsynth.world.shapes import Shape
 
@@ -23,3 +25,15 @@ class Target:
     """What it looks like."""
     motion: Motion
     """Where it is, at any time."""
+    scattering: Scattering | None = None
+    """How its facets scatter, by what it is made of; left out: as `scene.physics.scattering` says."""
+
+
+def mesh_for(shape: Shape, law: Scattering, wavelength: float) -> Mesh:
+    """The mesh that a shape is traced with: as described, or fine enough for a law that sums phases, at the shortest
+    wavelength (m) of the band. Raises MeshError as `mesh_of`."""
+    if not isinstance(law, Kirchhoff):
+        return mesh_of(shape)
+    from sonarsynth.scattering.fineness import frame_mesh
+
+    return frame_mesh(shape, wavelength, law.mesh_error)

@@ -11,7 +11,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.pictures.strength import strength_figure
-from sonarsynth.scattering import StrengthLaw
+from sonarsynth.scattering import Scattering
 from sonarsynth.scattering.strength import target_strength
 from sonarsynth.world.shapes import Shape
 
@@ -48,7 +48,7 @@ class StrengthTable:
 
 
 def strength_table(
-    shape: Shape, frequency: Floats, aspect: Floats, sound_speed: float, law: StrengthLaw
+    shape: Shape, frequency: Floats, aspect: Floats, sound_speed: float, law: Scattering
 ) -> StrengthTable:
     """Backscatter of a shape at frequencies (frequency,) Hz and aspects (aspect,) rad. Raises as `target_strength`."""
     towards = np.stack([np.cos(aspect), np.sin(aspect), np.zeros(len(aspect))], axis=-1)[:, None]

@@ -189,6 +189,11 @@ class Sonar:
             return self.filter
         return BandPass(low=self.band.low, high=self.band.high)
 
+    @property
+    def shortest_wavelength(self) -> float:
+        """In the band, by the assumed sound speed (m)."""
+        return self.assumed_sound_speed / self.band.high
+
 
 def stop_frequency(filter: Filter) -> float:
     """Where the stop band begins (Hz)."""

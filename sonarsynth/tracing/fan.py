@@ -11,7 +11,9 @@ from sonarsynth.acoustics.rays import Water, water, within
 from sonarsynth.conventions import NO_TARGET, Floats, Ints, depth
 from sonarsynth.geometry import unit
 from sonarsynth.scattering import ScatteringLaw
-from sonarsynth.tracing.marching import ARRIVAL, END, EVENTS, FACET, LAUNCH, Rays, launch, planes, reflect, step
+from sonarsynth.scattering.parts import size_at
+from sonarsynth.scattering.patches import patches
+from sonarsynth.tracing.marching import ARRIVAL, END, EVENTS, FACET, LAUNCH, Rays, launch, reflect, step
 from sonarsynth.tracing.shadows import hidden
 from sonarsynth.world.environment import Environment, Profile
 from sonarsynth.world.moment import Body
@@ -49,16 +51,17 @@ def fan(
     spacing: float = np.inf,
     sagitta: float = 1e-4,
     towards: Floats | None = None,
-    law: ScatteringLaw | None = None,
+    laws: tuple[ScatteringLaw, ...] = (),
     propagation: Propagation | None = None,
+    centre: float | None = None,
 ) -> RayFan:
     """Rays from origin (xyz) in directions (ray, xyz), for duration (s) or until reflection number bounces + 1.
 
     spacing: largest distance (m) between points of a polyline; sagitta: largest distance (m) of an arc from its chord:
-    a facet that a ray grazes by less may be missed. Angles of reflection are those of incidence. With towards (xyz),
-    law and propagation, a ray is sent on from the first facet it meets straight to that point (the thesis's second
-    form), by its earliest path, with the coefficient of the law. Raises ValueError for an origin outside the water, or
-    without a finite duration.
+    a facet that a ray grazes by less may be missed. Angles of reflection are those of incidence. With towards
+    (xyz), laws (of each body), propagation and the centre of a band (Hz), a ray is sent on from the first facet that it
+    meets straight to that point (the thesis's second form), by its earliest path, with the coefficient of the law.
+    Raises ValueError for an origin outside the water, or without a finite duration.
     """
     if not (np.isfinite(duration) and duration >= 0):
         raise ValueError("a fan of rays needs a finite duration")
@@ -72,10 +75,12 @@ def fan(
     points += _follow(layers, bodies, rays, bounces, spacing, sagitta, None if towards is None else landed)
     coefficient = np.full(len(start), np.nan)
     if towards is not None:
-        if law is None or propagation is None:
-            raise ValueError("sending rays on towards a point needs a scattering law and a propagation model")
+        if len(laws) != len(bodies) or propagation is None or centre is None:
+            raise ValueError("sending rays on towards a point needs scattering laws, a propagation model, a frequency")
         for group in landed:
-            onward = _send_on(environment, profile, layers, bodies, group, towards, law, propagation, coefficient)
+            onward = _send_on(
+                environment, profile, layers, bodies, group, towards, laws, propagation, centre, coefficient
+            )
             points += _follow(layers, (), onward, 0, spacing, sagitta, None, ARRIVAL)
     columns = {f.name: np.concatenate(c) for f, c in zip(fields(RayFan), zip(*points, strict=True), strict=False)}
     order = np.argsort(columns["ray"], kind="stable")
@@ -132,8 +137,9 @@ def _send_on(
     bodies: tuple[Body, ...],
     landed: _Landed,
     towards: Floats,
-    law: ScatteringLaw,
+    laws: tuple[ScatteringLaw, ...],
     propagation: Propagation,
+    centre: float,
     coefficient: Floats,
 ) -> Rays:
     """Rays about to leave the facets where they landed for a point; writes their coefficients (ray,)."""
@@ -142,11 +148,17 @@ def _send_on(
     paths = propagation.connect(profile, environment.depth, rays.clear, end)
     row, first = np.unique(paths.pair, return_index=True)  # the earliest: paths are sorted by time
     going, time = paths.departure[first], paths.travel_time[first]
-    _, normal = planes(bodies, landed.target[row], landed.facet[row])
-    area = np.array([bodies[t].mesh.area[f] for t, f in zip(landed.target[row], landed.facet[row], strict=True)])
-    mirror = law.amplitude(landed.incident[row], rays.direction[row], normal, area)
-    lobe = law.amplitude(landed.incident[row], going, normal, area)
-    strength = np.divide(lobe, mirror, out=np.zeros_like(lobe), where=mirror > 0)
+    strength = np.zeros(len(row))
+    for number, (body, law) in enumerate(zip(bodies, laws, strict=True)):
+        mine = np.flatnonzero(landed.target[row] == number)
+        on = row[mine]
+        patch = patches(body.mesh).select(landed.facet[on])
+        c = profile.at(depth(rays.position[on]))
+        incident, mirrored, away = (
+            body.pose.turn_to_body(v) for v in (landed.incident[on], rays.direction[on], going[mine])
+        )
+        lobe, mirror = (size_at(law, incident, v, patch, centre, c) for v in (away, mirrored))
+        strength[mine] = np.divide(lobe, mirror, out=np.zeros_like(lobe), where=mirror > 0)
     strength[hidden(bodies, environment, profile, rays.clear[row], end[row], going, paths.length[first])] = 0.0
     coefficient[rays.ray] = 0.0
     coefficient[rays.ray[row]] = strength

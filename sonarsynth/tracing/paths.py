@@ -8,6 +8,7 @@ import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.products import Arrivals, Paths
+from sonarsynth.scattering.patches import Pulses
 from sonarsynth.tracing.aperture import Fronts
 from sonarsynth.tracing.legs import Legs
 from sonarsynth.tracing.reflections import Reflections, as_sign
@@ -75,12 +76,13 @@ class Outward:
 
 def assemble(
     legs: Legs, over: Fronts, out: Outward, index: int, time: float, absorption: float, target: Ints, facet: Ints,
-    scattering: Floats, variation: tuple[Floats, float],
+    scattering: Floats, variation: tuple[Floats, float], pulses: Pulses,
 ) -> Arrivals:  # fmt: skip
-    """Arrivals of snap `index` at `time` (s) from both halves of their paths; variation: its terms and error."""
+    """Arrivals of snap `index` at `time` (s) from both halves of their paths; variation: its terms and error;
+    pulses: what facets make of the snap."""
     length = out.length + legs.length
     loss = absorption * length
-    sign, phase = as_sign(out.phase + legs.phase)
+    sign, phase = as_sign(out.phase + legs.phase + pulses.phase)
     boundary = sign * out.boundary * legs.boundary
     direct = target < 0
     first, second = np.where(direct, legs.spreading, out.spreading), np.where(direct, 1.0, legs.spreading)
@@ -107,8 +109,13 @@ def assemble(
         caustics=out.caustics + legs.caustics,
         arrives_by=np.asarray((legs.surface > 0) + 2 * (legs.bottom > 0)),
         phase=phase,
-        blur=np.hypot(out.blur, legs.blur),
+        blur=np.hypot(np.hypot(out.blur, legs.blur), pulses.blur),
         stretch=np.zeros(len(length)),
+        coherent=pulses.coherent,
+        corners=pulses.corners,
+        rough_share=pulses.rough_share,
+        rough_delay=pulses.rough_delay,
+        centre=np.nan,
         sound_speed=np.nan,
         wavefront_error=float(over.error.max(initial=0.0)),
         amplitude_error=variation[1],
@@ -119,11 +126,14 @@ def silence(legs: Legs, over: Fronts) -> Arrivals:
     """No arrivals at all: what a frame without a snap has."""
     none, zero = np.empty(0), np.empty(0, int)
     empty = legs.select(zero), over.select(zero), Outward.none(0)
-    return assemble(*empty, 0, 0.0, 0.0, zero, zero, none, (np.empty((0, 0)), 0.0))
+    return assemble(*empty, 0, 0.0, 0.0, zero, zero, none, (np.empty((0, 0)), 0.0), Pulses.plain(0))
 
 
-def join(parts: list[Arrivals], sound_speed: float) -> Arrivals:
-    """Arrivals of all snaps, in order; terms that some of them lack are 0. What absorption leaves nothing of is out."""
+def join(parts: list[Arrivals], sound_speed: float, centre: float) -> Arrivals:
+    """Arrivals of all snaps, in order, at the centre of a band (Hz); terms that some of them lack are 0.
+
+    What absorption leaves nothing of is out.
+    """
     columns = {}
     for name, value in vars(parts[0]).items():
         if isinstance(value, np.ndarray):
@@ -137,6 +147,7 @@ def join(parts: list[Arrivals], sound_speed: float) -> Arrivals:
         columns = {name: value[heard] for name, value in columns.items()}
     return Arrivals(
         **columns,
+        centre=centre,
         sound_speed=sound_speed,
         wavefront_error=max(part.wavefront_error for part in parts),
         amplitude_error=max(part.amplitude_error for part in parts),

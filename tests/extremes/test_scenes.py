@@ -23,7 +23,7 @@ from sonarsynth.world.environment import Environment, FlatNoise, Isovelocity, Ta
 from sonarsynth.world.motion import Circle, Still
 from sonarsynth.world.shapes import Box, Sphere
 from sonarsynth.world.sources import LogarithmicBubble, SnappingShrimp
-from sonarsynth.world.targets import Target
+from sonarsynth.scattering.targets import Target
 
 LATTICE = PlanarLattice(columns=12, rows=12, pitch=0.05)
 BEAMS = BeamGrid(azimuths=11, elevations=11)

@@ -18,7 +18,7 @@ from sonarsynth.world.environment import Environment, Isovelocity, Tabulated
 from sonarsynth.world.motion import Line, Still
 from sonarsynth.world.shapes import Sphere
 from sonarsynth.world.sources import SnappingShrimp
-from sonarsynth.world.targets import Target
+from sonarsynth.scattering.targets import Target
 
 UNIFORM = Isovelocity(speed=1530.0)
 BENDING = Tabulated(depth=(0.0, 60.0), speed=(1540.0, 1500.0))

@@ -140,7 +140,7 @@ def test_rays_that_meet_the_l_shape_are_sent_on_to_the_shrimp_with_the_lobes_coe
     ):
         found = fan(
             water, profile, (l_shape(),), np.array([0.0, 0.0, -9.0]), aims, 0.03,
-            towards=shrimp, law=law, propagation=AutoTracing(),
+            towards=shrimp, laws=(law,), propagation=AutoTracing(), centre=55e3,
         )  # fmt: skip
         arrived, hit = at(found, "arrival"), at(found, "facet")
         assert len(arrived) > 10
@@ -192,5 +192,5 @@ def test_a_fan_without_an_end_or_outside_the_water_is_refused() -> None:
         fan(TANK, TANK_PROFILE, (), np.zeros(3), downward(3.0), np.inf)
     with pytest.raises(ValueError, match="not in the water"):
         fan(TANK, TANK_PROFILE, (), np.array([0.0, 0.0, -1.0]), downward(3.0), 1.0)
-    with pytest.raises(ValueError, match="law and a propagation"):
+    with pytest.raises(ValueError, match="laws, a propagation"):
         fan(TANK, TANK_PROFILE, (), np.array([0.0, 0.0, -0.1]), downward(3.0), 1e-3, towards=np.zeros(3))

@@ -78,6 +78,11 @@ def arrivals(
         phase=np.zeros(n),
         blur=np.zeros(n),
         stretch=np.zeros(n),
+        coherent=np.zeros(n, bool),
+        corners=np.zeros((n, 3)),
+        rough_share=np.zeros(n),
+        rough_delay=np.zeros(n),
+        centre=55e3,
         sound_speed=C,
         wavefront_error=0.0,
     )

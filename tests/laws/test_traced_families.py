@@ -42,7 +42,8 @@ def run(bodies=None, profile=UNIFORM, environment=RIGID, bounces=2, law=None, ar
     bodies = (ball(),) if bodies is None else bodies
     tracing = more.pop("tracing", AutoTracing(bounces=bounces))
     return trace(
-        environment, profile, Moment(0.0, bodies, snaps), SONAR, array, 0.0, tracing, law or Isotropic(strength=1.0),
+        environment, profile, Moment(0.0, bodies, snaps), SONAR, array, 0.0, tracing,
+        (law or Isotropic(strength=1.0),) * len(bodies),
         band=BAND, **more,
     )  # fmt: skip
 
@@ -201,7 +202,7 @@ def test_a_snap_on_the_bed_and_its_image_there_are_one() -> None:
         snaps = (Snap(np.array([6.0, 5.0, -BED + height]), 0.0, LogarithmicBubble(), None),)
         found = trace(
             environment, UNIFORM, Moment(0.0, (ball(),), snaps), SONAR, ONE, 0.0, AutoTracing(bounces=2),
-            Isotropic(strength=1.0), band=BAND,
+            (Isotropic(strength=1.0),), band=BAND,
         )  # fmt: skip
         echo = found.select(~found.direct)
         value = np.zeros((320, 4), complex)
@@ -227,7 +228,7 @@ def test_a_body_at_the_foot_of_a_ray_that_turns_and_then_meets_the_bed_hides_it_
         kept = [
             trace(
                 environment, falling, Moment(0.0, bodies, snaps), pose, ONE, 0.0, Refracted(bounces=1),
-                Isotropic(strength=1.0), band=BAND,
+                (Isotropic(strength=1.0),) * len(bodies), band=BAND,
             )
             for bodies in ((), (foot,))
         ]  # fmt: skip

@@ -63,7 +63,7 @@ def run(
         array,
         absorption,
         AutoTracing(bounces=bounces),
-        law or MirrorLobe(),
+        (law or MirrorLobe(),) * len(bodies),
         band=(25e3, 85e3),
     )
 
@@ -128,7 +128,7 @@ def test_legs_of_the_array_side_serve_a_moved_shrimp(profile: Profile) -> None:
     bodies = (body((20.0, 1.0, -11.0)), body((15.0, 0.5, -11.5), name="other"))
     legs = array_legs(ENVIRONMENT, profile, bodies, SONAR, ROMANIS, AutoTracing(), (25e3, 85e3))
     for place in ((3.0, 6.0, -30.0), (10.0, -9.0, -29.0), (25.0, 3.0, -30.0)):
-        again = arrivals(legs, (snap(place),), 0.02, MirrorLobe())
+        again = arrivals(legs, (snap(place),), 0.02, (MirrorLobe(),) * 2)
         anew = run(bodies, (snap(place),), profile)
         for name, value in vars(anew).items():
             np.testing.assert_array_equal(getattr(again, name), value, err_msg=name)

@@ -17,7 +17,7 @@ from sonarsynth.sonar import Band, BandPass, BeamGrid, Converter, LowPass, Plana
 from sonarsynth.world import environment as water
 from sonarsynth.world import motion, shapes
 from sonarsynth.world.sources import SnappingShrimp
-from sonarsynth.world.targets import Target
+from sonarsynth.scattering.targets import Target
 
 WRONG = [
     ("beams:", "beems:", "14: scene.sonar.beems: 'beems' is not a field here; did you mean 'beams'?"),

@@ -27,7 +27,7 @@ from sonarsynth.world.environment import Absorption, Environment, Isovelocity, T
 from sonarsynth.world.motion import Still
 from sonarsynth.world.shapes import Box
 from sonarsynth.world.sources import SnappingShrimp
-from sonarsynth.world.targets import Target
+from sonarsynth.scattering.targets import Target
 
 SNAP, ARRAY, TARGET = np.array([30.0, 10.0, -14.0]), np.array([0.0, 0.0, -6.0]), np.array([40.0, -8.0, -9.0])
 BED = FluidHalfSpace(density_ratio=1.9, speed_ratio=1.15, loss_tangent=0.01)

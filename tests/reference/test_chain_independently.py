@@ -17,7 +17,7 @@ from sonarsynth.world.environment import Absorption, Environment, Tabulated
 from sonarsynth.world.motion import Still
 from sonarsynth.world.shapes import Sphere
 from sonarsynth.world.sources import SnappingShrimp
-from sonarsynth.world.targets import Target
+from sonarsynth.scattering.targets import Target
 from tests.scenes import remus
 
 MOUNT = {"heading": np.deg2rad(88), "pitch": np.deg2rad(10), "roll": np.deg2rad(20)}

@@ -1,0 +1,154 @@
+"""The parts of an echo: what a law sends back with its phase, and what without, as paths of their own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from sonarsynth.acoustics.boundaries import rayleigh
+from sonarsynth.acoustics.facet_pulses import facet_response
+from sonarsynth.acoustics.kirchhoff import local_grazing
+from sonarsynth.acoustics.lobes import dot, lambert, lit_and_seen, slope_lobe
+from sonarsynth.conventions import Floats
+from sonarsynth.scattering.patches import Patches, Pulses
+from sonarsynth.scattering.polarity import random_polarity
+from sonarsynth.world.meshes import Mesh
+
+if TYPE_CHECKING:
+    from sonarsynth.scattering import ScatteringLaw
+    from sonarsynth.scattering.isotropic import Isotropic
+    from sonarsynth.scattering.kirchhoff import Kirchhoff
+    from sonarsynth.scattering.mirror_lobe import MirrorLobe
+
+
+class Part(Protocol):
+    """One part of the echo of a facet.
+
+    Directions are unit vectors of propagation (..., xyz) in the frame of the body, in and away.
+    """
+
+    def amplitude(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
+        """Far-field amplitude (...) in m at a wavenumber (...) (rad/m), but for `pulses`; never negative.
+
+        0 where a facet is not lit, or not seen.
+        """
+        ...
+
+    def pulses(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Pulses:
+        """What it makes of the pulse, for directions (path, xyz) and sound speeds (path,) in m/s."""
+        ...
+
+    def polarity(self, mesh: Mesh) -> Floats:
+        """Sign (facet,) of the echo of each facet: f is the amplitude times it."""
+        ...
+
+
+@dataclass(frozen=True)
+class Plain:
+    """A law that repeats the pulse."""
+
+    law: MirrorLobe | Isotropic
+
+    def amplitude(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
+        """As `Part.amplitude`: the same at all wavenumbers."""
+        return self.law.amplitude(incident, scattered, patch.normal, patch.area)
+
+    def pulses(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Pulses:
+        """As `Part.pulses`: none."""
+        return Pulses.plain(len(incident))
+
+    def polarity(self, mesh: Mesh) -> Floats:
+        """As the law says."""
+        return self.law.polarity(mesh)
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """The coherent part of a Kirchhoff facet: it mirrors as far as it is large, and the phases of facets add up.
+
+    f = V (i k/4 pi) A n.(ks - ki) 2 exp[corners] exp(-g^2/2) (`acoustics.kirchhoff`, `acoustics.roughness`).
+    """
+
+    law: Kirchhoff
+
+    def amplitude(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
+        """As `Part.amplitude`: |V| k A n.(ks - ki)/(4 pi), by the factor `Kirchhoff.lit`."""
+        across = dot(patch.normal, scattered - incident)
+        lit = self.law.lit(incident, scattered, patch.normal, patch.curved)
+        mirrored = np.abs(reflection(self.law, incident, scattered)) * np.sqrt(1.0 - self.law.diffuse)
+        return np.where(lit > 0.0, lit * mirrored * wavenumber * patch.area * across / (4.0 * np.pi), 0.0)
+
+    def pulses(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Pulses:
+        """As `Part.pulses`: differentiated, and a mean over the facet; blurred by roughness."""
+        count, zero = len(incident), np.zeros(len(incident))
+        corners = dot(patch.corners, (incident - scattered)[:, None, :]) / sound_speed[:, None]
+        phase = np.angle(reflection(self.law, incident, scattered) + 0.0 * zero)
+        blur = self.law.roughness * np.abs(dot(patch.normal, scattered - incident)) / sound_speed
+        return Pulses(np.ones(count, bool), corners, zero, zero, zero, phase, blur)
+
+    def polarity(self, mesh: Mesh) -> Floats:
+        """All alike: the sign is the reflection coefficient's."""
+        return np.ones(len(mesh.faces))
+
+
+@dataclass(frozen=True)
+class Rough:
+    """The incoherent part of a Kirchhoff facet: the lobe of the slopes and Lambert's floor (`acoustics.roughness`).
+
+    It comes from one point of the facet, with one sign, both drawn once for each facet of a mesh.
+    """
+
+    law: Kirchhoff
+
+    def _powers(self, incident: Floats, scattered: Floats, patch: Patches) -> tuple[Floats, Floats]:
+        """Cross-sections per area (...) (1/sr) of the lobe, where heights are large, and of the floor."""
+        on = lit_and_seen(incident, scattered, patch.normal)
+        returned = np.where(on, np.abs(reflection(self.law, incident, scattered)) ** 2, 0.0)
+        lobe = slope_lobe(incident, scattered, patch.normal, self.law.slope) if self.law.roughness > 0 else 0.0
+        floor = lambert(incident, scattered, patch.normal, self.law.diffuse)
+        return np.asarray(returned * (1.0 - self.law.diffuse) * lobe), np.asarray(returned * floor)
+
+    def amplitude(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
+        """As `Part.amplitude`: root of the area times lobe and floor."""
+        lobe, floor = self._powers(incident, scattered, patch)
+        return np.sqrt(patch.area * (lobe + floor))
+
+    def pulses(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Pulses:
+        """As `Part.pulses`: without the share of the power that is coherent still."""
+        count, zero = len(incident), np.zeros(len(incident))
+        lobe, floor = self._powers(incident, scattered, patch)
+        share = lobe / np.where(lobe + floor > 0.0, lobe + floor, 1.0)
+        delay = self.law.roughness * np.abs(dot(patch.normal, scattered - incident)) / sound_speed
+        late = dot(patch.spot, incident - scattered) / sound_speed
+        return Pulses(np.zeros(count, bool), np.zeros((count, 3)), share, delay, late, zero, zero)
+
+    def polarity(self, mesh: Mesh) -> Floats:
+        """At random."""
+        return random_polarity(mesh)
+
+
+def reflection(law: Kirchhoff, incident: Floats, scattered: Floats) -> np.ndarray:
+    """Plane-wave coefficient V (...) of facets that would mirror one way into the other: reciprocal."""
+    surface = law.surface
+    if isinstance(surface, str):
+        return np.asarray(1.0 + 0.0j if surface == "rigid" else -1.0 + 0.0j)
+    grazing = local_grazing(incident, scattered)
+    return rayleigh(grazing, surface.density_ratio, surface.speed_ratio, surface.loss_tangent)
+
+
+def size_at(
+    law: ScatteringLaw, incident: Floats, scattered: Floats, patch: Patches, frequency: float, sound_speed: Floats
+) -> Floats:
+    """|f| (path,) in m of facets at a frequency (Hz): powers of the parts of a law summed.
+
+    Directions (path, xyz) in the frame of the body; sound_speed (path,) in m/s at the facets.
+    """
+    power = np.zeros(len(incident))
+    for part in law.parts:
+        pulse = part.pulses(incident, scattered, patch, sound_speed)
+        amplitude = part.amplitude(incident, scattered, patch, 2.0 * np.pi * frequency / sound_speed)
+        response = facet_response(np.array([frequency]), *pulse[:4], frequency)[:, 0]
+        power += np.abs(amplitude * response * np.exp(-0.5 * (2.0 * np.pi * frequency * pulse.blur) ** 2)) ** 2
+    return np.sqrt(power)

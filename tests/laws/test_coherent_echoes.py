@@ -1,0 +1,202 @@
+"""Echoes of smooth and rough facets in a frame: against exact series, and by their laws."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import eval_legendre, spherical_jn, spherical_yn
+
+from sonarsynth.acoustics.facet_pulses import facet_response
+from sonarsynth.conventions import Floats
+from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.products import Arrivals
+from sonarsynth.scattering import Isotropic, Kirchhoff, MirrorLobe, PartlyReflecting
+from sonarsynth.sonar import Romanis, elements
+from sonarsynth.tracing import AutoTracing
+from sonarsynth.tracing.arrivals import trace
+from sonarsynth.world.environment import Absorption, Environment, Isovelocity, Profile
+from sonarsynth.world.meshes import Mesh, mesh_of
+from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.shapes import Box, Sphere
+from sonarsynth.world.sources import LogarithmicBubble
+
+C = 1500.0
+BED = 30.0
+WATER = Environment(depth=BED, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"))
+PROFILE = Profile(np.array([0.0]), np.array([C]))
+ARRAY = np.array([0.0, 0.0, -15.0])
+EAST = quaternion(0.5 * np.pi)
+ROMANIS = elements(Romanis())
+F = np.linspace(25e3, 85e3, 7)
+
+
+def body(mesh: Mesh, place: Floats, name: str = "body", turned: float = 0.5 * np.pi) -> Body:
+    return Body(name, mesh, Pose(np.array(place, float), quaternion(turned)), np.zeros(3))
+
+
+def echo(bodies: tuple[Body, ...], source: Floats, laws: tuple[object, ...], bounces: int = 0) -> Arrivals:
+    snaps = (Snap(np.array(source, float), 0.0, LogarithmicBubble(), None),)
+    found = trace(
+        WATER, PROFILE, Moment(0.0, bodies, snaps), Pose(ARRAY, EAST), ROMANIS, 0.0, AutoTracing(bounces=bounces),
+        laws, band=(25e3, 85e3),
+    )  # fmt: skip
+    return found.select(~found.direct)
+
+
+def transfer(found: Arrivals) -> Floats:
+    """Pressure (frequency,) at the array centre for a snap of unit spectrum at 1 m."""
+    shape = facet_response(F, found.coherent, found.corners, found.rough_share, found.rough_delay, found.centre)
+    phase = found.phase[:, None] - 2.0 * np.pi * found.delay[:, None] * F
+    left = np.exp(-0.5 * np.multiply.outer(found.blur, 2.0 * np.pi * F) ** 2)
+    return (found.amplitude[:, None] * shape * left * np.exp(1j * phase)).sum(axis=0)
+
+
+def exact_sphere(radius: float, out: float, back: float, cosine: float, rigid: bool = True) -> Floats:
+    """Echo (frequency,) of a point source from a sphere at a point receiver, by its series of spherical waves.
+
+    i k sum (2n+1) A_n h_n(k d1) h_n(k d2) P_n(cos), Morse and Ingard (1968), section 8.2, conjugated.
+    """
+    total = []
+    for k in 2.0 * np.pi * F / C:
+        n = np.arange(int(k * radius + 4.05 * (k * radius) ** (1 / 3) + 20))
+        h = [spherical_jn(n, x) + 1j * spherical_yn(n, x) for x in (k * out, k * back)]
+        j = spherical_jn(n, k * radius, rigid)
+        a = -j / (j + 1j * spherical_yn(n, k * radius, rigid))
+        total.append(np.conj(1j * k * np.sum((2 * n + 1) * a * h[0] * h[1] * eval_legendre(n, cosine))))
+    return np.array(total)
+
+
+@pytest.mark.parametrize("angle", [0.0, 60.0, 100.0])
+@pytest.mark.parametrize("surface", ["rigid", "soft"])
+def test_a_sphere_near_by_echoes_as_its_series_says_in_level_and_phase(angle: float, surface: str) -> None:
+    radius, centre = 0.25, ARRAY + [10.0, 0.0, 0.0]
+    mesh = mesh_of(Sphere(radius=radius, edge=0.1 * np.sqrt(C / 85e3 * radius)))
+    turn = np.deg2rad(angle)
+    source = centre + 12.0 * np.array([-np.cos(turn), np.sin(turn), 0.0])
+    found = transfer(echo((body(mesh, centre),), source, (Kirchhoff(surface=surface),)))
+    ratio = found / exact_sphere(radius, 12.0, 10.0, np.cos(turn), surface == "rigid")
+    assert np.abs(20.0 * np.log10(np.abs(ratio))).max() < 0.5
+    assert np.abs(np.angle(ratio)).max() < 0.2
+
+
+def test_facets_cut_into_parts_echo_the_same() -> None:
+    """A panel of 30 cm near its mirror direction, cut to 1.6 and to 0.8 cm: what differs is the distances to parts."""
+    levels = []
+    for edge in (0.016, 0.008):
+        panel = mesh_of(Box(size=(0.3, 0.3, 0.3), edge=edge))
+        found = echo(
+            (body(panel, ARRAY + [12.0, 0.0, 0.0], turned=0.45 * np.pi),), ARRAY + [1.0, 3.0, 0.5], (Kirchhoff(),)
+        )
+        levels.append(transfer(found))
+    assert np.abs(levels[0] - levels[1]).max() < 2e-3 * np.abs(levels[1]).max()
+
+
+def test_roughness_takes_from_the_coherent_echo_what_it_scatters() -> None:
+    """Eckart's factor on a panel in mirror position, and by power the lobe of the rest."""
+    panel, source = mesh_of(Box(size=(0.4, 0.4, 0.4), edge=0.02)), ARRAY + [0.0, 0.0, 2.0]
+    place = (body(panel, ARRAY + [10.0, 0.0, 1.0]),)
+    smooth = transfer(echo(place, source, (Kirchhoff(),)))
+    height = 0.003
+    found = echo(place, source, (Kirchhoff(roughness=height, slope=0.2),))
+    left = transfer(found.select(found.coherent)) / smooth
+    cosine = (10.0 - 0.2) / np.hypot(10.0 - 0.2, 1.0)
+    np.testing.assert_allclose(left, np.exp(-0.5 * (2.0 * np.pi * F / C * height * 2.0 * cosine) ** 2), rtol=2e-2)
+    rough = found.select(~found.coherent)
+    shape = facet_response(F, rough.coherent, rough.corners, rough.rough_share, rough.rough_delay, rough.centre)
+    np.testing.assert_allclose(np.abs(shape[0]) ** 2, 1.0 - np.abs(left) ** 2, atol=2e-3)
+    power = ((rough.scattering**2) * np.abs(shape[:, -1]) ** 2).sum()
+    assert power == pytest.approx(0.4**2 / (8.0 * np.pi * 0.2**2), rel=0.05)  # sigma0 at its peak
+
+
+def test_incoherent_echoes_have_no_common_phase() -> None:
+    """Mean power of the sum over frequencies is the sum of powers, within the scatter of some tens of draws."""
+    ball = mesh_of(Sphere(radius=0.5, edge=0.03))
+    found = echo(
+        (body(ball, ARRAY + [10.0, 0.0, 1.0]),), ARRAY + [0.0, 0.0, 2.0], (Kirchhoff(roughness=0.02, slope=0.5),)
+    )
+    rough = found.select(~found.coherent)
+    power = (rough.amplitude**2).sum()
+    frequency = np.linspace(25e3, 85e3, 400)
+    total = rough.amplitude @ np.exp(-2j * np.pi * np.multiply.outer(rough.delay, frequency))
+    assert 0.6 < np.mean(np.abs(total) ** 2) / power < 1.7
+
+
+def test_a_body_of_water_is_not_heard_and_a_dense_one_is_rigid() -> None:
+    mesh, place, source = mesh_of(Sphere(radius=0.2, edge=0.012)), ARRAY + [10.0, 0.0, 0.0], ARRAY + [2.0, 5.0, 1.0]
+
+    def by(surface: object) -> Floats:
+        return transfer(echo((body(mesh, place),), source, (Kirchhoff(surface=surface),)))
+
+    rigid = by("rigid")
+    heavy = by(PartlyReflecting(density_ratio=1e6, speed_ratio=1.0))
+    np.testing.assert_allclose(heavy, rigid, rtol=1e-5)
+    np.testing.assert_allclose(by("soft"), -rigid, rtol=1e-12)
+    same = echo(
+        (body(mesh, place),), source, (Kirchhoff(surface=PartlyReflecting(density_ratio=1.0, speed_ratio=1.0)),)
+    )
+    assert not len(same.delay)
+    like = by(PartlyReflecting(density_ratio=1.1, speed_ratio=1.0))
+    np.testing.assert_allclose(like, 0.1 / 2.1 * rigid, rtol=1e-9)
+
+
+def test_source_and_array_exchanged_hear_the_same() -> None:
+    mesh = mesh_of(Sphere(radius=0.2, edge=0.015))
+    place, source = ARRAY + [9.0, 2.0, 1.0], ARRAY + [3.0, -6.0, -2.0]
+    law = Kirchhoff(surface=PartlyReflecting(density_ratio=2.0, speed_ratio=1.3), roughness=0.001)
+    there = echo((body(mesh, place),), source, (law,))
+    snaps = (Snap(ARRAY, 0.0, LogarithmicBubble(), None),)
+    back = trace(
+        WATER, PROFILE, Moment(0.0, (body(mesh, place),), snaps), Pose(source, EAST), ROMANIS, 0.0, AutoTracing(),
+        (law,), band=(25e3, 85e3),
+    )  # fmt: skip
+    back = back.select(~back.direct)
+    for part in (True, False):
+        one, other = (a.select(a.coherent == part) for a in (there, back))
+        np.testing.assert_allclose(transfer(one), transfer(other), rtol=1e-5)  # but for the faintest
+
+
+def test_each_target_has_its_law_and_hides_what_is_behind_it() -> None:
+    ball = mesh_of(Sphere(radius=0.3, edge=0.02))
+    near, far = body(ball, ARRAY + [8.0, 0.3, 0.0], "near"), body(ball, ARRAY + [12.0, 0.0, 0.0], "far")
+    source = ARRAY + [0.0, 0.0, 1.0]
+    laws = (Isotropic(strength=1e-3), Kirchhoff(roughness=0.01))
+    both = echo((near, far), source, laws)
+    assert not both.coherent[both.target == 0].any()
+    assert both.coherent[both.target == 1].any() and not both.coherent[both.target == 1].all()
+    alone = echo((far,), source, laws[1:])
+    seen, free = set(both.facet[both.target == 1].tolist()), set(alone.facet.tolist())
+    assert seen < free and len(seen) < 0.9 * len(free)
+    # those that are left are as if they were alone
+    one = both.select((both.target == 1) & both.coherent)
+    other = alone.select(alone.coherent & np.isin(alone.facet, one.facet))
+    one = one.select(np.isin(one.facet, other.facet))
+    np.testing.assert_allclose(one.amplitude, other.amplitude, rtol=1e-12)
+    np.testing.assert_allclose(one.delay, other.delay, rtol=1e-14)
+
+
+@pytest.mark.parametrize("height", [0.3, 0.3 - 1e-12])
+def test_a_ball_that_lies_on_the_bed_echoes(height: float) -> None:
+    ball = mesh_of(Sphere(radius=0.3, edge=0.02))
+    lying = body(ball, np.array([10.0, 0.0, height - BED + 1e-12]))
+    found = echo((lying,), ARRAY + [0.0, 3.0, 0.0], (Kirchhoff(),), bounces=1)
+    assert np.isfinite(found.amplitude).all() and len(found.delay) > 1000
+    up = echo(
+        (replace(lying, pose=Pose(lying.pose.position + [0.0, 0.0, 1e-3], EAST)),),
+        ARRAY + [0.0, 3.0, 0.0],
+        (Kirchhoff(),),
+    )
+    direct = found.select((found.surface == 0) & (found.bottom == 0))
+    np.testing.assert_allclose(np.abs(transfer(direct)), np.abs(transfer(up)), rtol=0.02)
+
+
+def test_a_lobe_is_as_it_was_beside_a_coherent_target() -> None:
+    ball = mesh_of(Sphere(radius=0.3, edge=0.03))
+    one, two = body(ball, ARRAY + [10.0, 2.0, 0.0], "one"), body(ball, ARRAY + [10.0, -2.0, 0.0], "two")
+    source = ARRAY + [0.0, 0.0, 1.0]
+    mixed = echo((one, two), source, (MirrorLobe(), Kirchhoff()))
+    alone = echo((one,), source, (MirrorLobe(),))
+    kept = mixed.select(mixed.target == 0)
+    shared = np.isin(kept.facet, alone.facet)
+    np.testing.assert_allclose(kept.amplitude[shared], alone.amplitude, rtol=1e-12)
