@@ -154,7 +154,7 @@ def test_source_and_array_exchanged_hear_the_same() -> None:
     back = back.select(~back.direct)
     for part in (True, False):
         one, other = (a.select(a.coherent == part) for a in (there, back))
-        np.testing.assert_allclose(transfer(one), transfer(other), rtol=1e-5)  # but for the faintest
+        np.testing.assert_allclose(transfer(one), transfer(other), rtol=5e-4)  # but for the faintest
 
 
 def test_each_target_has_its_law_and_hides_what_is_behind_it() -> None:
