@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from sonarsynth.acoustics import ranges
 from sonarsynth.conventions import Floats
 
 Complexes = npt.NDArray[np.complex128]
@@ -42,7 +43,8 @@ SEDIMENTS: Final = MappingProxyType(
         "clay": (1.145, 0.9800, 0.00148),
     }
 )
-"""Density ratio, speed ratio (to the water above) and loss tangent: APL-UW TR 9407 (1994), section IV, table 2."""
+"""Density ratio, speed ratio (to the water above) and loss tangent: APL-UW TR 9407 (1994), section IV, table 2; for 10
+to 100 kHz (`ranges.APL_SEDIMENTS`)."""
 
 GRAVITY: Final = 9.81  # m/s2
 PHILLIPS, DECAY = 8.1e-3, 0.74  # alpha and beta of the spectrum of Pierson and Moskowitz (1964)
@@ -59,7 +61,8 @@ def rayleigh(
 
     so that the wave in the bed dies away from the boundary. n^2 - cos^2 q is taken as (n^2 - 1) + sin^2 q, which keeps
     its digits near grazing; V(0) = -1 for every bed but one of density alone (n = 1), where
-    V = (m - 1)/(m + 1) at every angle. Arguments broadcast.
+    V = (m - 1)/(m + 1) at every angle. Arguments broadcast. Exact for fluids; a bed that carries shear waves, as rock
+    does, takes part of the sound away in them, which is left out (`ranges.FLUID_BED`).
     Source: Rayleigh; Brekhovskikh and Lysanov (2003), Fundamentals of Ocean Acoustics, section 3.1 (conjugated).
     """
     sine = np.abs(np.sin(np.asarray(grazing, float)))
@@ -87,7 +90,8 @@ def pressure_release(grazing: npt.ArrayLike) -> Complexes:
 def eckart(wavenumber: npt.ArrayLike, rms_height: npt.ArrayLike, grazing: npt.ArrayLike) -> Floats:
     """Coherent part of the reflection from a rough boundary over that of the flat one: exp(-g^2/2), g = 2 k h sin q.
 
-    wavenumber k (rad/m), rms height h (m), grazing angle q (rad). The rest of the energy is scattered, not lost.
+    wavenumber k (rad/m), rms height h (m), grazing angle q (rad). The rest of the energy is scattered, not lost. For
+    heights of normal distribution and slopes gentler than q, so that nothing lies in shadow.
     Source: Eckart (1953), JASA 25, 566.
     """
     k, h, q = (np.asarray(x, float) for x in (wavenumber, rms_height, grazing))
@@ -108,9 +112,10 @@ def wind_wave_height(wind_speed: npt.ArrayLike) -> Floats:
     """Rms height (m) of a fully developed sea under wind (m/s at 19.5 m): U^2/(2 g) sqrt(alpha/beta) = 0.00533 U^2.
 
     A quarter of the significant wave height. Source: Pierson and Moskowitz (1964), JGR 69, 5181, their spectrum
-    integrated; measured between 10 and 21 m/s, and a young sea or a short fetch is lower.
+    integrated; measured between 10 and 21 m/s, and warns outside but for a calm. A young sea or a short fetch is lower.
     """
     u = np.asarray(wind_speed, float)
+    ranges.PIERSON_MOSKOWITZ.check(wind_speed=np.where(u == 0.0, np.nan, u))
     return np.asarray(u**2 / (2.0 * GRAVITY) * np.sqrt(PHILLIPS / DECAY))
 
 
@@ -119,9 +124,11 @@ def bubble_loss(wind_speed: npt.ArrayLike, frequency: npt.ArrayLike, grazing: np
 
     1.26e-3 U^1.57 f^0.85/sin q with wind U (m/s at 10 m) of 6 m/s or more and f in kHz; below, exp(1.2 (U - 6)) times
     the loss at 6 m/s. This is the loss of energy: coherent and scattered echo together.
-    Source: APL-UW TR 9407 (1994), II-21; a handbook for 10 to 100 kHz. Arguments broadcast; frequency in Hz.
+    Source: APL-UW TR 9407 (1994), II-21; a handbook for 10 to 100 kHz, and warns outside. Arguments broadcast;
+    frequency in Hz.
     """
     u, f, q = (np.asarray(x, float) for x in (wind_speed, frequency, grazing))
+    ranges.BUBBLE_LOSS.check(frequency=f)
     at_normal = 1.26e-3 * np.maximum(u, 6.0) ** 1.57 * (f / 1e3) ** 0.85 * np.exp(1.2 * np.minimum(u - 6.0, 0.0))
     with np.errstate(divide="ignore"):
         return np.asarray(at_normal / np.abs(np.sin(q)))

@@ -104,6 +104,8 @@ def build_report(report: BuildReport) -> None:
         out.print(f"a frame: {times} of one core; {where}, {size(report.client_peak_bytes)} here")
     elif not report.failures:
         out.print(f"{report.store}: all {report.wanted} frames are there")
+    for note in report.notes:
+        out.print(f"note: {note}", markup=False)
     for failure in report.failures[:10]:
         out.print(f"frame {failure.frame} set aside in {failure.stage}: {failure.error}", markup=False)
     if report.failures:

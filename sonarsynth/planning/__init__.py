@@ -10,6 +10,7 @@ import numpy as np
 from sonarsynth.planning.checks import check_methods, check_positions, check_windows, read_inputs
 from sonarsynth.planning.costs import left_out, stages
 from sonarsynth.planning.plans import PRODUCTS, Omission, Plan, Stage, Windows
+from sonarsynth.planning.validity import validity
 from sonarsynth.planning.windows import SUPPORT, extreme_waveforms, lay_windows
 from sonarsynth.recipe import Recipe
 from sonarsynth.scattering.targets import Target
@@ -61,6 +62,7 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS) -> Plan:
     cancelled = scene.processing.cancelling is not None
     if made.propagation.bounces and not cancelled and products & {"image", "cloud"} and sizes["snap"]:
         notes += ("the snap's own reflections enter the image: processing.cancelling takes them out before",)
+    notes += validity(scene, profile)
     notes += _cut(recipe, profile.uniform)
     notes += _behind(recipe)
     notes += _coarse(recipe)

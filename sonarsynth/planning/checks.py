@@ -41,7 +41,7 @@ def read_inputs(scene: Scene) -> Profile:
     world = ("scene", "world")
     try:
         profile = profile_of(scene.world.environment.sound_speed)
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, ImportError) as error:
         raise FieldError((*world, "environment", "sound_speed"), str(error)) from None
     odd = np.flatnonzero(~((profile.speed >= SLOWEST) & (profile.speed <= FASTEST)))
     if len(odd):

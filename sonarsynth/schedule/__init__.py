@@ -41,6 +41,7 @@ class BuildReport:
     worker_peak_bytes: int = 0  # largest of any worker
     client_peak_bytes: int = 0
     failures: list[Failure] = field(default_factory=list)
+    notes: tuple[str, ...] = ()  # what the plan warns of
 
     @property
     def ok(self) -> bool:
@@ -100,7 +101,7 @@ def build(
         todo = store.missing(path, made, chosen)
         lacking = {frame for some in todo.values() for frame in some}
         there = sum(frame not in lacking for frame in chosen)
-        report = BuildReport(str(path), made.recipe.frames, len(chosen), there)
+        report = BuildReport(str(path), made.recipe.frames, len(chosen), there, notes=made.warnings)
         _tidy(path, lacking, restart)
         done = _counter(path, report, len(lacking), progress)
         job = Job(str(path), made.digest, tuple(sorted(made.products)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+import warnings
 from dataclasses import dataclass
 from typing import get_args
 
@@ -10,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.acoustics import rays as kernel
+from sonarsynth.acoustics.ranges import OutOfRange
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.world.casts import profile_of
 from sonarsynth.world.sound_speed import SoundSpeed, reaches
@@ -173,6 +175,8 @@ def _find(
         raise ValueError(f"vertices must lie between 0 and {MOST_VERTICES}, but is {most}")
     _check(names, bed, start, end, distance)
     profile = profile_of(sound_speed)
+    for note in profile.notes:
+        warnings.warn(note, OutOfRange, stacklevel=2)
     parts, pairs = [], []
     for depth in np.unique(bed) if len(bed) else []:
         reaches(sound_speed, float(depth))

@@ -42,7 +42,9 @@ UNITS: dict[str, dict[tuple[str, ...], tuple[float, float]]] = {
 }
 """Units in lower case, with the factor and the offset that bring them to m, dbar, degC, psu and m/s."""
 
-LATITUDE = re.compile(r"[%#]\s*(?:start\s+)?latitude\s*[,;:=]\s*([-+.\d]+)", re.IGNORECASE)
+PLACE = r"[%#]\s*(?:start\s+)?{}\s*[,;:=]\s*([-+.\d]+)"
+LATITUDE = re.compile(PLACE.format("latitude"), re.IGNORECASE)
+LONGITUDE = re.compile(PLACE.format("longitude"), re.IGNORECASE)
 MISSING = ("", "nan", "na", "null", "none")
 MAX_ROWS = 1_000_000
 
@@ -73,6 +75,7 @@ class Table:
     lines: list[int]
     decimal_comma: bool
     latitude: float | None  # degrees, where a comment gives it
+    longitude: float | None  # likewise
 
     @property
     def names(self) -> str:
@@ -138,7 +141,7 @@ def read_table(path: Path) -> Table:
         raise CastError(f"{path}, line {header}: a line of column names must come before the numbers")
     rows = [_cells(path, i, line, separator) for i, line in written[1:]]
     lines = [i for i, _ in written[1:]]
-    return Table(path, header, columns, rows, lines, separator == ";", _latitude(numbered))
+    return Table(path, header, columns, rows, lines, separator == ";", *_place(numbered))
 
 
 def _cells(path: Path, line: int, text: str, separator: str) -> list[str]:
@@ -148,12 +151,13 @@ def _cells(path: Path, line: int, text: str, separator: str) -> list[str]:
         raise CastError(f"{path}, line {line}: {error}") from None
 
 
-def _latitude(numbered: list[tuple[int, str]]) -> float | None:
-    """The latitude that a comment gives ('% Start latitude,-36.2'), if it is one."""
-    for _, line in numbered:
-        if (found := LATITUDE.match(line.strip())) and _is_number(found[1]) and abs(float(found[1])) <= 90:
-            return float(found[1])
-    return None
+def _place(numbered: list[tuple[int, str]]) -> tuple[float | None, float | None]:
+    """Latitude and longitude that comments give ('% Start latitude,-36.2'), each if it is one."""
+    found: list[float | None] = []
+    for pattern, most in ((LATITUDE, 90.0), (LONGITUDE, 360.0)):
+        given = [m[1] for _, line in numbered if (m := pattern.match(line.strip())) and _is_number(m[1])]
+        found.append(next((float(text) for text in given if abs(float(text)) <= most), None))
+    return found[0], found[1]
 
 
 def _is_number(cell: str) -> bool:

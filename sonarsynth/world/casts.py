@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.acoustics.seawater import depth_of_pressure, mackenzie
+from sonarsynth.acoustics.ranges import noted
+from sonarsynth.acoustics.seawater import depth_of_pressure
 from sonarsynth.conventions import FASTEST, SLOWEST, Floats
 from sonarsynth.world.cast_files import CastError, Column, Table, read_table
+from sonarsynth.world.hydrography import another_unit, sea_water_speed
 from sonarsynth.world.profiles import nearest
 from sonarsynth.world.sound_speed import (
     Cast,
@@ -26,6 +28,9 @@ from sonarsynth.world.sound_speed import (
 )
 
 __all__ = ["CastError", "profile_of", "smoothed"]
+
+LATITUDE = 45.0
+"""Degrees, where nothing says."""
 
 PLAUSIBLE = {
     "depth": (0.0, 12e3, "m"),
@@ -43,7 +48,8 @@ def profile_of(sound_speed: SoundSpeed) -> Profile:
     """The profile that rays are traced through: every node as it is, nothing thinned, nothing smoothed but on request.
 
     A cast is read from its path (relative to the working directory) and kept until the file changes; a cast that was
-    taken on the way up is turned over. Raises `CastError` in one line that names file, line and column.
+    taken on the way up is turned over. Formulas out of their range are in the profile's notes: nothing warns. Raises
+    `CastError` in one line that names file, line and column, ImportError where a formula needs what is not installed.
     """
     if isinstance(sound_speed, Cast):
         path = Path(sound_speed.path)
@@ -63,23 +69,33 @@ def _profile_of(sound_speed: SoundSpeed, stamp: tuple[int, int] | None) -> Profi
         case Tabulated():
             return _profile(sound_speed.depth, sound_speed.speed)
         case TemperatureSalinity():
-            depth = sound_speed.depth
-            return _profile(depth, mackenzie(sound_speed.temperature, sound_speed.salinity, depth))
+            water = (sound_speed.temperature, sound_speed.salinity, sound_speed.depth)
+            return _profile(sound_speed.depth, *sea_water_speed(sound_speed.formula, *water, *_place(sound_speed)))
         case Linear() | Thermocline() | Munk() | Catenary():
             return _profile(*sound_speed.nodes)
         case Cast():
             return _cast_profile(sound_speed, read_table(Path(sound_speed.path)))
 
 
-def _profile(depth: npt.ArrayLike, speed: npt.ArrayLike) -> Profile:
+def _profile(depth: npt.ArrayLike, speed: npt.ArrayLike, notes: tuple[str, ...] = ()) -> Profile:
     nodes = (np.array(depth, float), np.array(speed, float))
     for node in nodes:
         node.flags.writeable = False
-    return Profile(*nodes)
+    return Profile(*nodes, notes)
+
+
+def _place(where: TemperatureSalinity | Cast, table: Table | None = None) -> tuple[float, float | None]:
+    """Latitude and longitude in degrees, as they are written, else as the file says, else 45 degrees and None."""
+    latitude, longitude = (None, None) if table is None else (table.latitude, table.longitude)
+    latitude = latitude if where.latitude is None else float(np.degrees(where.latitude))
+    longitude = longitude if where.longitude is None else float(np.degrees(where.longitude))
+    return LATITUDE if latitude is None else latitude, longitude
 
 
 def _cast_profile(cast: Cast, table: Table) -> Profile:
-    depth = _depth(table)
+    place = _place(cast, table)
+    with noted() as notes:
+        depth = _depth(table, place[0])
     order = slice(None, None, -1) if depth[0] > depth[-1] else slice(None)
     step = np.diff(depth[order])
     if np.any(step < 0):
@@ -89,7 +105,8 @@ def _cast_profile(cast: Cast, table: Table) -> Profile:
             f"{table.path}, line {table.lines[turn]}: the depth {depth[turn]:g} m turns back; "
             "a cast goes one way, down or up"
         )
-    profile = _profile(depth[order], _speed(cast, table, depth)[order])
+    speed, more = _speed(cast, table, depth, place)
+    profile = _profile(depth[order], speed[order], (*notes, *more))
     return profile if cast.smoothing is None else smoothed(profile, cast.smoothing)
 
 
@@ -106,22 +123,25 @@ def smoothed(profile: Profile, thickness: float) -> Profile:
     if extent > MOST_LAYERS * thickness:
         raise ValueError(f"smoothing: layers of {thickness:g} m over {extent:g} m are more than {MOST_LAYERS}")
     node = np.linspace(profile.depth[0], profile.depth[-1], int(np.ceil(extent / thickness * (1 - 1e-12))) + 1)
-    return _profile(node, nearest(node, np.union1d(node, profile.depth), profile.at))
+    return _profile(node, nearest(node, np.union1d(node, profile.depth), profile.at), profile.notes)
 
 
-def _depth(table: Table) -> Floats:
+def _depth(table: Table, latitude: float) -> Floats:
     if (column := table.find("depth")) is not None:
         return _values(table, column)
     if (column := table.find("pressure")) is not None:
-        return depth_of_pressure(_values(table, column), 45.0 if table.latitude is None else table.latitude)
+        return depth_of_pressure(_values(table, column), latitude)
     raise CastError(f"{table.path}, line {table.header}: no column of depth or pressure among {table.names}")
 
 
-def _speed(cast: Cast, table: Table, depth: Floats) -> Floats:
+def _speed(
+    cast: Cast, table: Table, depth: Floats, place: tuple[float, float | None]
+) -> tuple[Floats, tuple[str, ...]]:
     own = table.find("sound speed")
     temperature, salinity = table.find("temperature"), table.find("salinity")
     if own is not None and cast.quantity != "temperature_salinity":
-        return _values(table, own)
+        unused = f"formula {cast.formula} is not used: the file has a sound speed, '{own.name}', of its own"
+        return _values(table, own), (unused,) if cast.formula != "mackenzie" else ()
     if cast.quantity == "sound_speed":
         raise CastError(f"{table.path}, line {table.header}: no column of sound speed among {table.names}")
     if temperature is None or salinity is None:
@@ -131,7 +151,7 @@ def _speed(cast: Cast, table: Table, depth: Floats) -> Floats:
             else "sound speed, or of temperature and salinity,"
         )
         raise CastError(f"{table.path}, line {table.header}: no columns of {what} among {table.names}")
-    return mackenzie(_values(table, temperature), _values(table, salinity), depth)
+    return sea_water_speed(cast.formula, _values(table, temperature), _values(table, salinity), depth, *place)
 
 
 def _values(table: Table, column: Column) -> Floats:
@@ -144,5 +164,6 @@ def _values(table: Table, column: Column) -> Floats:
         raise CastError(
             f"{table.path}, line {table.lines[row]}, column '{column.name}': "
             f"{values[row]:g} {unit} is not a {column.quantity} between {low:g} and {high:g} {unit}"
+            + (another_unit(float(values[row])) if column.quantity == "temperature" else "")
         )
     return values

@@ -7,16 +7,10 @@ from typing import Annotated, Literal
 from annotated_types import Ge, Le
 from pydantic import model_validator
 
-from sonarsynth.conventions import (
-    Decibels,
-    DegreesCelsius,
-    Number,
-    PositiveMetres,
-    PositiveSpeed,
-    PracticalSalinity,
-)
+from sonarsynth.conventions import Decibels, Number, PositiveMetres, PositiveSpeed
 from sonarsynth.description import BY_KIND, description
 from sonarsynth.world.boundaries import SeaBed, SeaSurface
+from sonarsynth.world.hydrography import WaterSalinity, WaterTemperature
 from sonarsynth.world.sound_speed import (
     Cast,
     Catenary,
@@ -55,8 +49,8 @@ class Absorption:
     """Absorption of sound in sea water (Francois and Garrison 1982, or Ainslie and McColm 1998), or none."""
 
     formula: Literal["francois_garrison", "ainslie_mccolm", "none"] = "francois_garrison"
-    temperature: Annotated[DegreesCelsius, Ge(-5), Le(60)] = 27.0
-    salinity: Annotated[PracticalSalinity, Ge(0), Le(100)] = 35.0
+    temperature: WaterTemperature = 27.0
+    salinity: WaterSalinity = 35.0
     ph: Annotated[Number, Ge(0), Le(14)] = 8.1
     """pH of the water; it matters under some 10 kHz, where boric acid absorbs."""
 

@@ -2,6 +2,7 @@
 
 Coefficients are for f > 0 in time dependence exp(+i 2 pi f t) and the same at every frequency (absorption in the bed
 goes with frequency, so its loss tangent is a number). Roughness is what depends on frequency: exp(-(2 pi f blur)^2/2).
+Formulas out of their range do not warn here, frame after frame: `boundary_notes` say it once.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.acoustics import boundaries
+from sonarsynth.acoustics import boundaries, ranges
 from sonarsynth.acoustics.boundaries import Complexes
 from sonarsynth.conventions import Floats
 from sonarsynth.world.boundaries import (
@@ -68,14 +69,16 @@ def coefficient(boundary: SeaSurface | SeaBed, grazing: npt.ArrayLike, frequency
     if isinstance(boundary, SeaSurface) and boundary.bubbles and boundary.wind_speed is not None:
         if frequency is None:
             raise ValueError("the loss in bubbles needs a frequency")
-        value = value * 10.0 ** (-boundaries.bubble_loss(boundary.wind_speed, frequency, q) / 20.0)
+        with ranges.noted():
+            value = value * 10.0 ** (-boundaries.bubble_loss(boundary.wind_speed, frequency, q) / 20.0)
     return np.asarray(np.where(none, 1.0 + 0j, value))
 
 
 def rms_height(boundary: SeaSurface | SeaBed) -> float:
     """Root-mean-square height (m) of a boundary, as written or as the wind makes it."""
     if isinstance(boundary, SeaSurface) and boundary.wind_speed is not None:
-        return float(boundaries.wind_wave_height(boundary.wind_speed))
+        with ranges.noted():
+            return float(boundaries.wind_wave_height(boundary.wind_speed))
     return boundary.rms_height
 
 
@@ -86,6 +89,28 @@ def blur(boundary: SeaSurface | SeaBed, grazing: npt.ArrayLike, sound_speed: npt
     """
     q = np.nan_to_num(np.asarray(grazing, float), nan=0.0)
     return boundaries.roughness_blur(rms_height(boundary), q, sound_speed)
+
+
+def boundary_notes(boundary: SeaSurface | SeaBed, low: float, high: float) -> tuple[tuple[str, str], ...]:
+    """Field and line for each formula of a boundary that is used outside its range, in a band low to high (Hz)."""
+    notes: list[tuple[str, str]] = []
+    reflection = boundary.reflection
+    with ranges.noted() as found:
+        if isinstance(reflection, Sediment):
+            ranges.APL_SEDIMENTS.check(frequency=[low, high])
+            ranges.FLUID_BED.check(speed_ratio=boundaries.SEDIMENTS[reflection.name][1])
+        elif isinstance(reflection, FluidHalfSpace):
+            ranges.FLUID_BED.check(speed_ratio=reflection.speed_ratio)
+    notes += [("reflection", line) for line in found]
+    if isinstance(boundary, SeaSurface) and boundary.wind_speed is not None:
+        with ranges.noted() as found:
+            boundaries.wind_wave_height(boundary.wind_speed)
+        notes += [("wind_speed", line) for line in found]
+        if boundary.bubbles:
+            with ranges.noted() as found:
+                boundaries.bubble_loss(boundary.wind_speed, 0.5 * (low + high), 0.5 * np.pi)
+            notes += [("bubbles", line) for line in found]
+    return tuple(notes)
 
 
 def _smooth(reflection: Reflection, grazing: Floats) -> Complexes:

@@ -208,7 +208,7 @@ def test_wind_raises_the_waves_of_the_fully_developed_spectrum() -> None:
     variance = np.sum(0.5 * (spectrum[1:] + spectrum[:-1]) * np.diff(w))
     assert rms_height(SeaSurface(wind_speed=u)) == pytest.approx(np.sqrt(variance), rel=1e-5)
     assert rms_height(SeaSurface(wind_speed=0.0)) == 0.0
-    assert wind_wave_height(2 * u) == pytest.approx(4 * wind_wave_height(u), rel=1e-14)
+    assert wind_wave_height(1.5 * u) == pytest.approx(2.25 * wind_wave_height(u), rel=1e-14)
     expected = roughness_blur(np.sqrt(variance), 0.3, 1500.0)
     assert blur(SeaSurface(wind_speed=u), 0.3, 1500.0) == pytest.approx(expected, rel=1e-5)
 

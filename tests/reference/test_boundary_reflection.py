@@ -3,7 +3,18 @@
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.boundaries import critical_grazing, eckart, pressure_release, rayleigh
+from sonarsynth.acoustics.boundaries import (
+    SEDIMENTS as HANDBOOK,
+)
+from sonarsynth.acoustics.boundaries import (
+    bubble_loss,
+    critical_grazing,
+    eckart,
+    pressure_release,
+    rayleigh,
+    wind_wave_height,
+)
+from sonarsynth.acoustics.ranges import OutOfRange
 
 GRAZING = np.radians([5, 10, 20, 30, 45, 60, 90])
 SEDIMENTS = {  # APL-UW TR 9407: density ratio, speed ratio, loss tangent; |V| at GRAZING
@@ -101,3 +112,33 @@ def test_eckart_gives_the_published_losses():
     np.testing.assert_allclose(loss, [7.4, 29.0], rtol=0.03)
     np.testing.assert_allclose(loss[1], 4 * loss[0], rtol=1e-12)
     assert eckart(k, 0.0, 1.0).tolist() == [1.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("name", "published"),
+    [
+        ("coarse sand", (2.231, 1.2503, 0.01638)),
+        ("medium sand", (1.845, 1.1782, 0.01624)),
+        ("fine sand", (1.451, 1.1073, 0.01602)),
+        ("very fine sand", (1.268, 1.0568, 0.01875)),
+        ("coarse silt", (1.195, 1.0179, 0.02158)),
+        ("medium silt", (1.149, 0.9885, 0.00676)),
+        ("clay", (1.145, 0.98, 0.00148)),
+        ("rock", (2.5, 2.5, 0.01374)),
+    ],
+)
+def test_the_handbook_has_its_numbers(name, published):
+    assert HANDBOOK[name] == published
+
+
+@pytest.mark.parametrize("wind", [0.5, 5.0, 25.0])
+def test_waves_warn_outside_the_winds_that_were_measured(wind):
+    with pytest.warns(OutOfRange, match=f"wind speed {wind:g} m/s is outside 10 to 21 m/s"):
+        assert wind_wave_height(wind) == pytest.approx(0.00533 * wind**2, rel=1e-3)
+    assert wind_wave_height([0.0, 10.0, 21.0])[0] == 0.0
+
+
+@pytest.mark.parametrize("frequency", [1e3, 200e3])
+def test_bubbles_warn_outside_the_frequencies_of_the_handbook(frequency):
+    with pytest.warns(OutOfRange, match="kHz is outside 10 to 100 kHz"):
+        bubble_loss(8.0, frequency, 0.3)

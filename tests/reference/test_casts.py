@@ -1,12 +1,13 @@
 """Profiles from descriptions and from casts in files."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.seawater import OutOfRange, chen_millero, mackenzie
+from sonarsynth.acoustics.seawater import chen_millero, del_grosso, mackenzie, medwin, pressure_of_depth, teos10
 from sonarsynth.world.casts import CastError, profile_of
 from sonarsynth.world.environment import Cast, Isovelocity, Tabulated, TemperatureSalinity
 
@@ -63,9 +64,52 @@ def test_the_simple_profiles():
     np.testing.assert_allclose(water.speed, [1539.0866, 1534.6204], atol=5.1e-5)
 
 
-def test_cold_water_warns():
-    with pytest.warns(OutOfRange, match="temperature 0.5 degC"):
-        profile_of(TemperatureSalinity(depth=(10.0,), temperature=(0.5,), salinity=(35.0,)))
+def test_cold_water_has_a_note_and_no_warning():
+    cold = TemperatureSalinity(depth=(10.0,), temperature=(0.5,), salinity=(35.0,))
+    for _ in range(2):  # the profile is kept, and the note with it
+        (note,) = profile_of(cold).notes
+        assert note.startswith("Mackenzie (1981): temperature 0.5 degC is outside 2 to 30 degC; medwin, chen_millero, ")
+    assert profile_of(replace(cold, formula="chen_millero")).notes == ()
+
+
+FORMULAS = {
+    "mackenzie": lambda t, s, z: mackenzie(t, s, z),
+    "medwin": lambda t, s, z: medwin(t, s, z),
+    "chen_millero": lambda t, s, z: chen_millero(1.00024 * t, s, pressure_of_depth(z, 1.3)),
+    "del_grosso": lambda t, s, z: del_grosso(t, s, pressure_of_depth(z, 1.3)),
+    "teos10": lambda t, s, z: teos10(t, s, z, 1.3, 103.8),
+}
+
+
+@pytest.mark.parametrize("formula", FORMULAS)
+def test_each_formula_by_description_and_by_cast(tmp_path, formula):
+    if formula == "teos10":
+        pytest.importorskip("gsw")
+    z, t, s = np.array([0.0, 10.0, 80.0]), np.array([29.0, 28.0, 20.0]), np.array([33.0, 33.5, 35.0])
+    expected = FORMULAS[formula](t, s, z)
+    place = {"latitude": np.radians(1.3), "longitude": np.radians(103.8)}
+    described = TemperatureSalinity(depth=tuple(z), temperature=tuple(t), salinity=tuple(s), formula=formula, **place)
+    np.testing.assert_allclose(profile_of(described).speed, expected, rtol=1e-14)
+    rows = "depth,temperature,salinity\n" + "\n".join(f"{a},{b},{c}" for a, b, c in zip(z, t, s, strict=True))
+    np.testing.assert_allclose(read(tmp_path, rows, formula=formula, **place).speed, expected, rtol=1e-14)
+    commented = "% Start latitude,1.3\n% Start longitude,103.8\n" + rows
+    np.testing.assert_allclose(read(tmp_path, commented, formula=formula).speed, expected, rtol=1e-14)
+
+
+def test_a_formula_that_a_cast_does_not_need_is_noted(tmp_path):
+    text = "depth,sound speed,temperature,salinity\n1,1500,15,35\n"
+    assert read(tmp_path, text).notes == ()
+    (note,) = read(tmp_path, text, formula="medwin").notes
+    assert note == "formula medwin is not used: the file has a sound speed, 'sound speed', of its own"
+    used = read(tmp_path, text, formula="medwin", quantity="temperature_salinity")
+    assert used.notes == ()
+    np.testing.assert_array_equal(used.speed, [medwin(15.0, 35.0, 1.0)])
+
+
+def test_notes_of_a_cast_outlast_its_smoothing(tmp_path):
+    profile = read(tmp_path, "depth,temperature,salinity\n1,10,5\n9,10,5\n", smoothing=2.0)
+    assert len(profile.depth) == 5
+    assert profile.notes[0].startswith("Mackenzie (1981): salinity 5 psu is outside 25 to 40 psu; medwin")
 
 
 @pytest.mark.parametrize(
@@ -121,6 +165,8 @@ BAD = {
     "inf": (HEAD + "1,inf,9,35\n", "line 2, column 'sound_speed': 'inf' is not a finite number"),
     "short row": (HEAD + "1,1500,9,35\n2\n", "line 3, column 'sound_speed': the value is missing"),
     "flag": (HEAD + "1,-9999,9,35\n", "line 2, column 'sound_speed': -9999 m/s is not a sound speed between 100"),
+    "kelvin": ("depth,temperature,salinity\n1,289,35\n", "289 degC is not a temperature between -5 and 50 degC (15.85"),
+    "fahrenheit": ("depth,temperature,salinity\n1,68,35\n", "-5 and 50 degC (20 degC if it is in degrees Fahrenheit)"),
     "height": (HEAD + "-1,1500,9,35\n", "line 2, column 'depth': -1 m is not a depth between 0"),
     "turns back": (HEAD + "1,1500,9,35\n3,1500,9,35\n2,1500,9,35\n4,1500,9,35\n", "line 4: the depth 2 m turns back"),
     "turns back upward": (HEAD + "4,1500,9,35\n2,1500,9,35\n3,1500,9,35\n1,1500,9,35\n", "turns back; a cast goes one"),
