@@ -21,12 +21,36 @@ def facet_response(
 
     coherent, rough_share, rough_delay (path,) and corners (path, 3) in s as in `products.Arrivals`; centre f_c (Hz).
     """
-    omega = 2.0 * np.pi * frequency
-    delay = corners[:, None, :]
-    mean = 2.0 * divided_exponential(-omega[:, None] * delay) if corners.any() else np.ones((len(corners), 1), complex)
     slope = np.where(coherent[:, None], 1j * frequency / centre, 1.0)
-    g = np.multiply.outer(rough_delay, omega)
-    share = rough_share[:, None]
+    return np.asarray(facet_mean(frequency, corners) * slope * rough_factor(frequency, rough_share, rough_delay))
+
+
+def facet_mean(frequency: Floats, corners: Floats) -> Complexes:
+    """Mean (path, bin) of the delays of facets, exp(-i 2 pi f t), between those of their corners (path, 3) (s)."""
+    if not corners.any():
+        return np.ones((len(corners), 1), complex)
+    return 2.0 * divided_exponential(-2.0 * np.pi * frequency[:, None] * corners[:, None, :])
+
+
+def rough_factor(frequency: Floats, share: Floats, delay: Floats) -> Floats:
+    """What rough facets send without phase in common (path, bin), sqrt(1 - w exp(-g^2)): share w and delay (s)
+    (path,)."""
+    g = 2.0 * np.pi * np.multiply.outer(delay, frequency)
     with np.errstate(over="ignore"):
-        left = np.sqrt((1.0 - share) - share * np.expm1(-g * g))
-    return np.asarray(mean * slope * left)
+        return np.asarray(np.sqrt((1.0 - share[:, None]) - share[:, None] * np.expm1(-g * g)))
+
+
+def mean_powers(corners: Floats, scale: float, count: int) -> Floats:
+    """Means over facets of powers of the delay over `scale` (s), (t/scale)^j, j < count: (power, path).
+
+    With corners (path, 3) (s) whose sum is 0, 2 exp[-i w t_0, t_1, t_2] = sum_j (-i w scale)^j mean_j/j!; mean_j =
+    2 j! h_j/((j+2)! scale^j), h_0 = 1, h_1 = 0, h_j = -e2 h_(j-2) + e3 h_(j-3) as in `kirchhoff.divided_exponential`.
+    """
+    a, b, c = np.ascontiguousarray((corners / scale).T)
+    e2, e3 = a * (b + c) + b * c, a * b * c
+    h = np.zeros((max(count, 3), a.size))
+    h[0], h[2] = 1.0, -e2
+    for j in range(3, count):
+        h[j] = e3 * h[j - 3] - e2 * h[j - 2]
+    degree = np.arange(len(h))
+    return np.asarray((h * (2.0 / ((degree + 1.0) * (degree + 2.0)))[:, None])[:count])

@@ -13,6 +13,9 @@ from sonarsynth.conventions import Floats
 Complexes = npt.NDArray[np.complex128]
 
 SPREAD = 2.0  # rad: phases closer together than this go by the series
+WIDER = 6.0  # rad: the same for MANY wavenumbers, which share its terms; errors stay under 1e-15 of the area
+MANY = 4
+ROOM = 24  # pairs of terms, of which it takes 17 at most
 
 
 def mesh_amplitude(
@@ -77,10 +80,10 @@ def _prepared(
 def _add(
     out: Complexes, corners: Floats, incident: Floats, scattered: Floats, k: Floats, weight: Complexes, height: Floats
 ) -> None:
-    row = np.empty(k.size, np.complex128)
+    row, room, pace = np.empty(k.size, np.complex128), np.empty((2, ROOM)), spacing(k)
     for facet in range(len(corners)):
         if weight[facet] != 0.0:
-            _facet(row, corners[facet], incident[facet], scattered[facet], k, weight[facet], height[facet])
+            _facet(row, corners[facet], incident[facet], scattered[facet], k, weight[facet], height[facet], room, pace)
             out += row
 
 
@@ -88,39 +91,129 @@ def _add(
 def _each(
     out: Complexes, corners: Floats, incident: Floats, scattered: Floats, k: Floats, weight: Complexes, height: Floats
 ) -> None:
-    for facet in range(len(corners)):
-        if weight[facet] != 0.0:
-            _facet(out[facet], corners[facet], incident[facet], scattered[facet], k, weight[facet], height[facet])
+    room, pace = np.empty((2, ROOM)), spacing(k)
+    for at in range(len(corners)):
+        if weight[at] != 0.0:
+            _facet(out[at], corners[at], incident[at], scattered[at], k, weight[at], height[at], room, pace)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _facet(
-    out: Complexes, v: Floats, incident: Floats, scattered: Floats, k: Floats, weight: complex, height: float
+    out: Complexes,
+    v: Floats,
+    incident: Floats,
+    scattered: Floats,
+    k: Floats,
+    weight: complex,
+    height: float,
+    room: Floats,
+    pace: float,
 ) -> None:
     """Amplitudes (frequency,) of one facet: -(i/2 pi) V (N.u) k exp[-i k u.v], N its vector area, u = ki - ks."""
     ux, uy, uz = incident[0] - scattered[0], incident[1] - scattered[1], incident[2] - scattered[2]
+    nx, ny, nz = half_means(out, v, ux, uy, uz, k, room, pace)
+    across = nx * ux + ny * uy + nz * uz
+    size = math.sqrt(nx * nx + ny * ny + nz * nz)
+    decay = 0.5 * (height * across / size) ** 2 if height > 0.0 and size > 0.0 else 0.0
+    factor = weight * complex(0.0, -across / (4.0 * math.pi))
+    for i in range(k.size):
+        out[i] *= factor * (k[i] * math.exp(-decay * k[i] * k[i]) if decay > 0.0 else k[i])
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def spacing(k: Floats) -> float:
+    """Step of equally spaced wavenumbers, within rounding errors; NaN of others."""
+    if k.size < 3:
+        return math.nan
+    step: float = (k[-1] - k[0]) / (k.size - 1)
+    for i in range(k.size):
+        if abs(k[i] - (k[0] + i * step)) > 1e-15 * abs(k[-1]):
+            return math.nan
+    return step
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def half_means(
+    out: Complexes, v: Floats, ux: float, uy: float, uz: float, k: Floats, room: Floats, pace: float
+) -> tuple[float, float, float]:
+    """Half the mean (frequency,) of exp(-i k u.x) over one facet into `out`; returns twice its vector area.
+
+    Many wavenumbers share the terms of a power series (in `room`) as far as phases are within WIDER. Equally spaced
+    ones (`pace`, else NaN) turn the phase of the middle by one rotation each, and every 16th anew.
+    """
     ax, ay, az = v[1, 0] - v[0, 0], v[1, 1] - v[0, 1], v[1, 2] - v[0, 2]
     bx, by, bz = v[2, 0] - v[0, 0], v[2, 1] - v[0, 1], v[2, 2] - v[0, 2]
-    nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx  # twice the area
-    across = nx * ux + ny * uy + nz * uz
     first, second = ax * ux + ay * uy + az * uz, bx * ux + by * uy + bz * uz  # m of path, from the first corner
     third = (first + second) / 3.0
     x, y, z = third, third - first, third - second  # minus the path about the middle: phases are -k of the path
     low, high = min(x, y), max(x, y)
     a, c = min(low, z), max(high, z)
     b = max(low, min(high, z))
-    middle = v[0, 0] * ux + v[0, 1] * uy + v[0, 2] * uz + third
-    size = math.sqrt(nx * nx + ny * ny + nz * nz)
-    decay = 0.5 * (height * across / size) ** 2 if height > 0.0 and size > 0.0 else 0.0
-    factor = weight * complex(0.0, -across / (4.0 * math.pi))
-    for i in range(k.size):
-        angle = -k[i] * middle
-        value = _divided(k[i] * a, k[i] * b, k[i] * c)
-        out[i] = factor * (k[i] * math.exp(-decay * k[i] * k[i])) * value * complex(math.cos(angle), math.sin(angle))
+    limit = WIDER / max(c - a, 1e-300)  # rad/m: of the series
+    if k.size < MANY or limit < k[0]:
+        for i in range(k.size):
+            out[i] = divided(k[i] * a, k[i] * b, k[i] * c)
+    else:
+        _powers(out, a, b, c, limit, k, room)
+    _turned(out, v[0, 0] * ux + v[0, 1] * uy + v[0, 2] * uz + third, k, pace)
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _divided(a: float, b: float, c: float) -> complex:
+def _turned(out: Complexes, path: float, k: Floats, pace: float) -> None:
+    """Multiplies `out` (frequency,) by exp(-i k path)."""
+    even = not math.isnan(pace)
+    turn = complex(math.cos(pace * path), -math.sin(pace * path)) if even else 0.0j
+    phase = 0.0j
+    for i in range(k.size):
+        if even and i % 16 != 0:
+            phase *= turn
+        else:
+            phase = complex(math.cos(k[i] * path), -math.sin(k[i] * path))
+        out[i] *= phase
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _powers(out: Complexes, a: float, b: float, c: float, limit: float, k: Floats, room: Floats) -> None:
+    """`divided` of k times paths a <= b <= c (m): one series in k up to the `limit`."""
+    scale = min(k.max(), limit)
+    terms = _series(room, scale * a, scale * b, scale * c)
+    for i in range(k.size):
+        if k[i] <= scale:
+            q = k[i] / scale if scale > 0.0 else 0.0
+            square = q * q
+            re, im = room[0, terms], room[1, terms]
+            for j in range(terms - 1, -1, -1):
+                re = re * square + room[0, j]
+                im = im * square + room[1, j]
+            out[i] = complex(re, im * q)
+        else:
+            out[i] = divided(k[i] * a, k[i] * b, k[i] * c)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _series(room: Floats, a: float, b: float, c: float) -> int:
+    """Terms (even or odd, j) of `divided` of q times the phases a <= b <= c: sum_j of q^(2j) (even + i q odd).
+
+    Returns the last j: |h_j|/(j+2)! is at most (2 gap/3)^j/(2 j!).
+    """
+    largest = 2.0 / 3.0 * (c - a)
+    e2, e3 = a * (b + c) + b * c, a * b * c
+    even, odd, before = 1.0, 0.0, 0.0  # s_j, s_(j+1), s_(j-1): h_j with the signs of i^j
+    room[0, 0], room[1, 0] = 0.5, 0.0
+    weight, bound, j, order = 0.5, 0.5, 0, 0.0
+    while bound > 1e-17:
+        j += 1
+        order += 2.0
+        even, odd, before = e2 * even + e3 * before, e2 * odd - e3 * even, odd
+        weight /= (order + 1.0) * (order + 2.0)
+        room[0, j], room[1, j] = even * weight, odd * weight / (order + 3.0)
+        bound *= largest * largest / ((order - 1.0) * order)
+    return j
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def divided(a: float, b: float, c: float) -> complex:
     """`kirchhoff.divided_exponential` of phases a <= b <= c with mean 0."""
     gap = c - a
     if gap >= SPREAD:
@@ -130,7 +223,7 @@ def _divided(a: float, b: float, c: float) -> complex:
         im = late * math.sin(p) - early * math.sin(q)
         return complex(im / gap, -re / gap)
     e2, e3 = a * (b + c) + b * c, a * b * c
-    even, odd, before = 1.0, 0.0, 0.0  # s_j, s_(j+1), s_(j-1): h_j with the signs of i^j
+    even, odd, before = 1.0, 0.0, 0.0  # as in `_series`
     re, im = 0.5, 0.0
     weight, bound, j = 0.5, 0.5, 0.0
     while bound > 1e-17:
@@ -139,7 +232,7 @@ def _divided(a: float, b: float, c: float) -> complex:
         weight /= (j + 1.0) * (j + 2.0)
         re += even * weight
         im += odd * weight / (j + 3.0)
-        bound *= gap * gap / ((j - 1.0) * j)  # |h_j|/(j+2)! is at most (2 gap/3)^j/(2 j!)
+        bound *= gap * gap / ((j - 1.0) * j)
     return complex(re, im)
 
 

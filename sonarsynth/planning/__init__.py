@@ -107,8 +107,9 @@ def chosen_products(names: Iterable[str]) -> frozenset[str]:
 
 
 def _coarse(recipe: Recipe) -> tuple[str, ...]:
-    """Notes on targets whose echoes come from the middles of facets longer than COARSE."""
-    longest = ((t.name, longest_edge((m.vertices, m.faces.astype(np.int64)))) for t, m in _meshes(recipe))
+    """Notes on targets whose echoes come from the middles of facets longer than COARSE: not of coherent facets."""
+    plain = [pair for pair, law in zip(_meshes(recipe), recipe.scene.laws, strict=True) if law.kind != "kirchhoff"]
+    longest = ((t.name, longest_edge((m.vertices, m.faces.astype(np.int64)))) for t, m in plain)
     return tuple(
         f"{name}: facets up to {edge:.2g} m long, each echoing from its middle: set shape.edge to refine"
         for name, edge in longest

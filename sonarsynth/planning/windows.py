@@ -12,6 +12,7 @@ from sonarsynth.description import FieldError
 from sonarsynth.planning.plans import Windows
 from sonarsynth.products import Paths
 from sonarsynth.recipe import Recipe
+from sonarsynth.scattering import Kirchhoff, PartlyReflecting
 from sonarsynth.scene import Frame, Scene
 from sonarsynth.sonar import elements
 from sonarsynth.synthesis import pulse_support
@@ -45,7 +46,10 @@ def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
     scene = recipe.scene
     sonar = scene.sonar
     across = elements(sonar.array).aperture / profile.speed.min()  # of a wave, from the centre to the edge
-    turned = scene.physics.tracing.bounces > 0 or not profile.uniform  # lossy reflections and caustics turn the phase
+    lossy = any(isinstance(law, Kirchhoff) and isinstance(law.surface, PartlyReflecting) for law in scene.laws)
+    turned = (
+        lossy or scene.physics.tracing.bounces > 0 or not profile.uniform
+    )  # reflections and caustics turn the phase
     before, after = _support(recipe, SUPPORT, turned=turned) + across
     echo_before, echo_after = _support(recipe, ECHO_SUPPORT, turned=turned) + across
     spans = _spans(recipe, profile)
@@ -72,21 +76,35 @@ def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
 
 
 def _support(recipe: Recipe, tolerance: float, *, turned: bool) -> Floats:
-    """Longest time (s) before and after its collapse that any filtered snap exceeds `tolerance` of its peak."""
+    """Longest time (s) before and after its collapse that any filtered snap exceeds `tolerance` of its peak, and the
+    echo of any facet."""
     scene = recipe.scene
-    chosen = scene.sonar.antialias
-    supports = [pulse_support(w, chosen, tolerance, turned=turned) for w in extreme_waveforms(scene)]
-    return np.asarray(np.max(supports or [(0.0, 0.0)], axis=0))
+    chosen, waveforms = scene.sonar.antialias, extreme_waveforms(scene)
+    supports = [(0.0, 0.0), *(pulse_support(w, chosen, tolerance, turned=turned) for w in waveforms)]
+    for law, mesh in zip(scene.laws, scene.meshes, strict=True):
+        if isinstance(law, Kirchhoff):
+            smooth = [pulse_support(w, chosen, tolerance, turned=turned, sloped=True) for w in waveforms]
+            rough = [
+                pulse_support(w, chosen, tolerance, turned=turned, rough=2.0 * law.roughness / SLOWEST)
+                for w in waveforms
+                if law.roughness > 0
+            ]
+            apart = np.linalg.norm(mesh.corners - mesh.centroid[:, None, :], axis=-1).max()  # m
+            corner = 2.0 * float(apart) / SLOWEST
+            supports += [(before + corner, after + corner) for before, after in smooth + rough]
+    return np.asarray(np.max(supports, axis=0))
 
 
 def _blurred(recipe: Recipe) -> float:
-    """By how much (s) rough boundaries lengthen the pulses that they reflect: those that they leave anything of."""
+    """By how much (s) rough boundaries and bodies lengthen the pulses that they reflect and leave anything of."""
     scene = recipe.scene
     environment, bounces = scene.world.environment, scene.physics.tracing.bounces
-    if not bounces:
-        return 0.0
+    heights = [law.roughness for law in scene.laws if isinstance(law, Kirchhoff)]
     roughest = max(rms_height(environment.surface), rms_height(environment.bed))
-    blur = 2.0 * roughest / SLOWEST * np.sqrt(bounces)  # at the steepest grazing angle
+    most = np.hypot(max(heights, default=0.0), roughest * np.sqrt(bounces))
+    if not most > 0.0:
+        return 0.0
+    blur = 2.0 * most / SLOWEST  # at the steepest grazing angle
     silent = max((silencing_blur(w, scene.sonar.antialias) for w in extreme_waveforms(scene)), default=0.0)
     return float(FEET * min(blur, silent))
 

@@ -8,6 +8,7 @@ from pydantic import StringConstraints
 
 from sonarsynth.description import description
 from sonarsynth.scattering import Kirchhoff, Scattering
+from sonarsynth.scattering.fineness import frame_mesh
 from sonarsynth.world.meshes import Mesh, mesh_of
 from sonarsynth.world.motion import Motion
 from sonarsynth.world.shapes import Shape
@@ -32,8 +33,4 @@ class Target:
 def mesh_for(shape: Shape, law: Scattering, wavelength: float) -> Mesh:
     """The mesh that a shape is traced with: as described, or fine enough for a law that sums phases, at the shortest
     wavelength (m) of the band. Raises MeshError as `mesh_of`."""
-    if not isinstance(law, Kirchhoff):
-        return mesh_of(shape)
-    from sonarsynth.scattering.fineness import frame_mesh
-
-    return frame_mesh(shape, wavelength, law.mesh_error)
+    return frame_mesh(shape, wavelength, law.mesh_error) if isinstance(law, Kirchhoff) else mesh_of(shape)

@@ -35,7 +35,7 @@ class SignalSynthesis(Protocol):
 
         absorption gives dB/m at frequencies (Hz); its value at the band centre is inside the amplitudes already. Zero
         paths are silence. Raises ValueError for arrivals that are not finite, have no amplitude or a negative blur, are
-        stretched by a tenth or more, or come from a hydrophone itself.
+        stretched by a tenth or more, or come from a hydrophone itself or from what is no facet, or too large a one.
         """
         ...
 

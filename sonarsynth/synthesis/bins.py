@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sonarsynth.acoustics.facet_pulses import facet_mean, rough_factor
 from sonarsynth.acoustics.snap import ComplexArray
 from sonarsynth.conventions import Floats
 from sonarsynth.sonar import Sonar
@@ -15,7 +16,7 @@ from sonarsynth.synthesis.direct_sum import relative_absorption
 from sonarsynth.synthesis.layout import Stretch
 from sonarsynth.synthesis.nodes import rounded_up
 from sonarsynth.synthesis.pulse import at_longest, pulse_spectrum, stretch_sizes, stretched_spectra
-from sonarsynth.synthesis.shapes import blur_exponent, shape_modes, stretched
+from sonarsynth.synthesis.shapes import MOST_PHASE, blur_exponent, shape_modes, stretched
 from sonarsynth.synthesis.wavefront import Fronts
 
 SHAPES = 0.02
@@ -55,18 +56,21 @@ def bins_of(
 ) -> tuple[Fronts, Bins]:
     """The paths of a stretch, with the modes of their pulses, and its bins.
 
-    Errors are relative to the least blurred path; paths that are silent beside it are left out.
+    Errors are relative to the least blurred path; paths that are silent beside it are left out. Raises ValueError for
+    facets with corners more than `MOST_PHASE` from their middle.
     """
     fs = sonar.sampling_frequency
     frequency, spectrum = pulse_spectrum(part.waveform, sonar.antialias, fs, part.samples)
+    slope = np.asarray(1j * frequency / front.centre if part.coherent else 1.0)
+    spectrum = spectrum * slope
     widest = rounded_up(float(np.abs(front.doppler).max()), 2.0)
     series = np.zeros((0, spectrum.size), complex)
     if widest > 0.0:
-        sizes = np.array(stretch_sizes(at_longest(part.waveform), sonar.antialias, widest))
+        sizes = np.array(stretch_sizes(at_longest(part.waveform), sonar.antialias, widest, part.coherent))
         left = np.append(np.cumsum(sizes[::-1])[::-1], 0.0)
         count = int(np.flatnonzero(left <= SHAPES * tolerance)[0])
-        series = stretched_spectra(part.waveform, sonar.antialias, fs, part.samples, widest, count)
-    if len(series) or front.variance.any() or front.phase.any():
+        series = slope * stretched_spectra(part.waveform, sonar.antialias, fs, part.samples, widest, count)
+    if len(series) or _shaped(front):
         front, spectrum, series = _shared(front, frequency, spectrum, series, widest, tolerance)
     some = audible(spectrum, tolerance)
     frequency, spectrum, series = frequency[some], spectrum[some], series[:, some]
@@ -74,9 +78,27 @@ def bins_of(
     if front.variance.any():
         front = _loud(front, frequency, spectrum, tolerance)
     relative = relative_absorption(absorption, frequency, sonar.band.centre)
-    if len(series) or front.variance.any() or front.phase.any():
+    if front.corners.any():
+        _check_corners(front, float(frequency[-1]))
+    if len(series) or _shaped(front):
         front, spectrum, modes = _with_modes(front, frequency, spectrum, relative, series, widest, tolerance)
     return front, Bins(some.start, frequency, spectrum, relative, fs / part.samples, modes)
+
+
+def _shaped(front: Fronts) -> bool:
+    """Whether pulses have shapes, beside Doppler."""
+    return bool(front.variance.any() or front.phase.any() or front.corners.any() or front.rough_share.any())
+
+
+def _check_corners(front: Fronts, highest: float) -> None:
+    """Raise ValueError where a facet is too large for the series in its corners."""
+    longest = MOST_PHASE / (2.0 * np.pi * highest)
+    far = np.abs(front.corners).max()
+    if far > longest:
+        raise ValueError(
+            f"facets up to {1e6 * far:.3g} us from middle to corner are too large for synthesis in modes up to "
+            f"{highest:.6g} Hz, which takes {1e6 * longest:.3g} us: split them, or use direct_sum"
+        )
 
 
 def _with_modes(
@@ -98,6 +120,8 @@ def _with_modes(
     else:
         decay = np.zeros(frequency.size)
     weight, modes = shape_modes(front, frequency, spectrum, decay, series, widest, SHAPES * tolerance)
+    if front.corners.any() or front.rough_share.any():
+        spectrum = modes[0]  # what paths mostly send: the colour of the errors
     return replace(front, modes=weight, loss=np.zeros(front.count) if few else front.loss), spectrum, modes
 
 
@@ -125,7 +149,22 @@ def _shared(
         turn = np.exp(1j * phase)
         spectrum, series = spectrum * turn, series * turn
         front = replace(front, phase=np.zeros(front.count))
+    if front.corners.any() or front.rough_share.any():
+        front, facet = _shared_facet(front, frequency)
+        spectrum, series = spectrum * facet, series * facet
     return front, spectrum, series
+
+
+def _shared_facet(front: Fronts, frequency: Floats) -> tuple[Fronts, ComplexArray]:
+    """Paths without what all facets do alike to the pulse, and that (bin,)."""
+    one, facet = front.select(np.arange(1)), np.ones(frequency.size, complex)
+    if (front.corners == one.corners).all():
+        facet = facet * facet_mean(frequency, one.corners)[0]
+        front = replace(front, corners=np.zeros((front.count, 3)))
+    if not (np.ptp(front.rough_share) or np.ptp(front.rough_delay)):
+        facet = facet * rough_factor(frequency, one.rough_share, one.rough_delay)[0]
+        front = replace(front, rough_share=np.zeros(front.count))
+    return front, facet
 
 
 def _loud(front: Fronts, frequency: Floats, spectrum: ComplexArray, tolerance: float) -> Fronts:

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from sonarsynth.acoustics.arrays import element_directivity
+from sonarsynth.acoustics.facet_pulses import facet_response
 from sonarsynth.conventions import Floats
 from sonarsynth.description import description
 from sonarsynth.products import Arrivals, Signals
@@ -31,6 +32,7 @@ def relative_absorption(absorption: Callable[[Floats], Floats] | None, frequency
 def exact_spectra(front: Fronts, elements: Elements, frequency: Floats, relative: Floats, origin: float) -> np.ndarray:
     """Transfer functions (sensor, bin) from the snap at 1 m to each hydrophone, delays counted from `origin` (s); but
     for Doppler, which is the snap's."""
+    facets = bool(front.coherent.any() or front.corners.any() or front.rough_share.any())
     total = np.zeros((elements.count, frequency.size), complex)
     for e in range(front.count):
         one = front.select(np.array([e]))
@@ -40,6 +42,10 @@ def exact_spectra(front: Fronts, elements: Elements, frequency: Floats, relative
         face = element_directivity(frequency, u[0][:, None, :], elements.face, one.sound_speed)
         loss = 10.0 ** (-one.loss[0] * relative / 20.0)
         shape = np.exp(1j * one.phase[0] - 0.5 * one.variance[0] * (2.0 * np.pi * frequency) ** 2)
+        if facets:
+            shape = shape * facet_response(
+                frequency, one.coherent, one.corners, one.rough_share, one.rough_delay, one.centre
+            )
         total += (one.amplitude[0] * gain[0] * elements.gain)[:, None] * (
             face * loss * shape * np.exp(-2j * np.pi * late[:, None] * frequency)
         )
@@ -49,7 +55,7 @@ def exact_spectra(front: Fronts, elements: Elements, frequency: Floats, relative
 @description
 class DirectSum:
     """Sum of every path at every hydrophone and frequency, in float64, with exact delay, amplitude, directivity,
-    phase, blur and Doppler."""
+    phase, blur, Doppler and mean over its facet."""
 
     kind: Literal["direct_sum"] = "direct_sum"
 

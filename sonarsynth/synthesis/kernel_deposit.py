@@ -46,6 +46,14 @@ class KernelDeposit:
         and blurs of 0 to 17 us       |  1.7e-5   1.7 - 2.3  |  4.8e-5   1.3
         and stretches within +-3e-3   |  1.8e-5   1.9 - 2.9  |  4.6e-5   1.5
 
+    Pulses that facets reshape: 18 000 facets of 7 mm of a body of 1.6 m by 0.2 m at 20 m, with absorption; largest
+    error over the peak of the echo, which is a hundredth of the sum of those of the coherent facets:
+
+        plain                                     |  4.5e-5   20 ms
+        smooth: differentiated, mean over corners |  1.7e-5   38 ms
+        and blurs of 1 to 2 us                    |  1.9e-5   49 ms
+        rough: what is missing from that          |  6.6e-5   37 ms
+
     Point hydrophones take 4.9 ms and 11 ms. The error of echoes of 40 to 250 facets of a REMUS-100, lobes of 3 to 30
     degrees, at 5, 10 and 20 m: at most 7e-5. Errors include what the support of the pulse leaves out (1e-7 of its
     peak).

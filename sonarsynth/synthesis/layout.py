@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonarsynth.acoustics.facet_pulses import rough_factor
+from sonarsynth.acoustics.spectra import SUPPORT_TOLERANCE
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.products import Arrivals
-from sonarsynth.sonar import Elements, Sonar
-from sonarsynth.synthesis.pulse import FEET, at_longest, pulse_support, silencing_blur
+from sonarsynth.sonar import Elements, Sonar, stop_frequency
+from sonarsynth.synthesis.pulse import FEET, Reshaped, at_longest, silencing_blur, support_of
 from sonarsynth.synthesis.wavefront import Fronts, delay_and_gain, reach
 from sonarsynth.world.moment import Snap
 from sonarsynth.world.snap_pulses import Waveform
@@ -26,6 +28,7 @@ class Stretch:
 
     paths: Ints  # (path,) which
     waveform: Waveform
+    coherent: bool  # all pulses are differentiated, or none
     first: int  # sample of the window where it begins; may be negative
     samples: int  # even
 
@@ -57,7 +60,8 @@ def layout(
     start: float,
     samples: int,
 ) -> Layout:
-    """Sort arrivals into stretches: direct and echoes apart (they differ by tens of dB), each waveform apart."""
+    """Sort arrivals into stretches: direct and echoes apart (they differ by tens of dB), each waveform apart, and
+    coherent echoes, whose pulses are differentiated."""
     if samples < 1:
         raise ValueError("a window needs at least one sample")
     fs = sonar.sampling_frequency
@@ -70,32 +74,45 @@ def layout(
     waveforms = [s.waveform for s in snaps]
     for waveform in dict.fromkeys(waveforms):
         same = np.array([w == waveform for w in waveforms])[arrivals.snap] & heard
-        for rows in (np.flatnonzero(same & arrivals.direct), np.flatnonzero(same & ~arrivals.direct)):
+        for coherent, direct in ((False, True), (False, False), (True, True), (True, False)):
+            rows = np.flatnonzero(same & (front.coherent == coherent) & (arrivals.direct == direct))
             for chosen in _runs(rows, early + before - plain[0], late - after + plain[1]):
                 first = int(np.floor((early[chosen].min() - start) * fs)) - 1
                 last = int(np.ceil((late[chosen].max() - start) * fs)) + 1
-                stretches.append(Stretch(chosen, waveform, first, fast_length(last - first + 1)))
+                stretches.append(Stretch(chosen, waveform, coherent, first, fast_length(last - first + 1)))
     return Layout(tuple(stretches), heard, int(cut.sum()), support)
 
 
 def _supports(arrivals: Arrivals, front: Fronts, snaps: tuple[Snap, ...], sonar: Sonar) -> tuple[Floats, Floats, Bools]:
-    """Support (before or after, path) of each pulse in s: in its plain shape, and in its own; and which (path,) are
-    blurred to silence."""
+    """Support (before or after, path) of each pulse in s: in its plain shape or its slope's, and in its own; and which
+    (path,) are silent, blurred or from a facet that is not rough."""
     if not front.count:
         return np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0, bool)
-    chosen, blur = sonar.antialias, np.sqrt(front.variance)
+    chosen, blur, rough = sonar.antialias, np.sqrt(front.variance), front.rough_share > 0.0
     longest = [at_longest(s.waveform) for s in snaps]
+    roughest = float(front.rough_delay[rough].max(initial=0.0))
 
-    def each(turned: bool) -> Floats:
-        return np.array([pulse_support(w, chosen, turned=turned) for w in longest])[arrivals.snap].T
+    def each(turned: Bools, rough: Bools) -> Floats:
+        out, kinds = np.empty((2, front.count)), front.coherent + 2 * turned + 4 * rough
+        for kind in range(8):
+            rows = kinds == kind
+            if rows.any():
+                shape = Reshaped(turned=kind & 2 > 0, sloped=kind % 2 == 1, rough=roughest * (kind >= 4))
+                out[:, rows] = np.array([support_of(w, chosen, shape) for w in longest])[arrivals.snap[rows]].T
+        return out
 
-    plain, silent = each(False), np.zeros(front.count, bool)
-    support = plain
-    if front.phase.any():
-        support = np.where(front.phase != 0.0, each(True), support)
+    none, silent = np.zeros(front.count, bool), np.zeros(front.count, bool)
+    plain = each(none, none)
+    support = each(front.phase != 0.0, rough) if front.phase.any() or roughest else plain
     if blur.any():
         silent = blur >= np.array([silencing_blur(w, chosen) for w in longest])[arrivals.snap]
-    return plain, support * (1.0 + np.abs(front.doppler)) + np.where(silent, 0.0, FEET * blur), silent
+    if rough.any():
+        highest = np.array([stop_frequency(chosen)])
+        left = rough_factor(highest, front.rough_share, front.rough_delay)[:, 0]
+        silent |= left <= SUPPORT_TOLERANCE
+    a, b, c = front.corners.T
+    wide = np.stack([-np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)])
+    return plain, support * (1.0 + np.abs(front.doppler)) + np.where(silent, 0.0, FEET * blur) + wide, silent
 
 
 def _extent(

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from functools import lru_cache
 from math import inf
+from typing import NamedTuple
 
 import numpy as np
 from scipy.fft import ifft, irfft, rfft
 
 from sonarsynth.acoustics import pulses, spectra
+from sonarsynth.acoustics.facet_pulses import rough_factor
 from sonarsynth.acoustics.pulses import Pulse
 from sonarsynth.acoustics.snap import Bubble, ComplexArray
 from sonarsynth.acoustics.spectra import Fir
@@ -43,30 +45,54 @@ def fir(chosen: Filter) -> Fir:
     return Fir(low, high, chosen.transition, chosen.attenuation)
 
 
+class Reshaped(NamedTuple):
+    """What paths do to a pulse that changes how long it lasts, beside making it longer."""
+
+    turned: bool = False  # at any constant phase
+    sloped: bool = False  # differentiated
+    rough: float = 0.0  # s: by `facet_pulses.rough_factor` with a share of 1 and this delay; 0: not
+
+
 def pulse_support(
     waveform: Waveform,
     chosen: Filter,
     tolerance: float = spectra.SUPPORT_TOLERANCE,
     *,
     turned: bool = False,
+    sloped: bool = False,
+    rough: float = 0.0,
 ) -> tuple[float, float]:
     """How long (s) before and after its collapse the filtered snap exceeds `tolerance` of its peak: for laying out
     windows.
 
     turned: at any constant phase. Such a pulse never ends. It falls as 1/t^3 where the snap has no net impulse, nor the
     impulse a net integral, as the logarithmic bubble; as 1/t^2 or 1/t (Keller-Miksis, recordings) it may be cut at
-    LONGEST_TAIL: `cut_tail` says what is left there.
+    LONGEST_TAIL: `cut_tail` says what is left there. sloped: differentiated, as a smooth facet does. rough: from rough
+    facets with a `rough_delay` (s) up to this, of any share. Facets make it longer by their corners, at both ends.
     """
-    plain = _plain_support(waveform, chosen, tolerance)
-    if not turned:
-        return plain
-    early, late, _ = _turned_support(waveform, chosen, tolerance)
-    return max(plain[0], early), max(plain[1], late)
+    return support_of(waveform, chosen, Reshaped(turned, sloped, rough), tolerance)
+
+
+def support_of(
+    waveform: Waveform, chosen: Filter, shape: Reshaped, tolerance: float = spectra.SUPPORT_TOLERANCE
+) -> tuple[float, float]:
+    """As `pulse_support`."""
+    turned, sloped, rough = shape
+    supports = [] if sloped else [_plain_support(waveform, chosen, tolerance)]
+    if turned or sloped:
+        supports.append(_shaped_support(waveform, chosen, tolerance, Reshaped(turned, sloped))[:2])
+    # a rough one lasts longest where what is missing has just not fallen silent: looked for within a factor of two
+    shortest = 1e-11  # shorter ones are quieter only
+    longest = rounded_up(max(min(rough, silencing_blur(waveform, chosen)), shortest), 2.0) if rough > 0.0 else 0.0
+    for delay in [longest / 2.0**n for n in range(4)] if rough > 0.0 else []:
+        supports.append(_shaped_support(waveform, chosen, tolerance, Reshaped(turned, sloped, delay))[:2])
+    before, after = zip(*supports, strict=True)
+    return max(before), max(after)
 
 
 def cut_tail(waveform: Waveform, chosen: Filter, tolerance: float = spectra.SUPPORT_TOLERANCE) -> float:
     """What a turned snap may be outside of its support, relative to its peak: `tolerance`, or more where it is cut."""
-    return max(_turned_support(waveform, chosen, tolerance)[2], tolerance)
+    return max(_shaped_support(waveform, chosen, tolerance, Reshaped(turned=True))[2], tolerance)
 
 
 def at_longest(waveform: Waveform) -> Waveform:
@@ -92,10 +118,12 @@ def _tapered(waveform: Waveform, chosen: Filter, window: float) -> tuple[Floats,
     return f, _snap_spectrum(waveform, 1.0, f) * spectra.response(f, fir(chosen)) * fade
 
 
-@lru_cache(maxsize=64)
-def _turned_support(waveform: Waveform, chosen: Filter, tolerance: float) -> tuple[float, float, float]:
-    """As `pulse_support`, of the envelope: the modulus of the pulse and i times its Hilbert transform; and what is
-    left of it outside."""
+@lru_cache(maxsize=256)
+def _shaped_support(
+    waveform: Waveform, chosen: Filter, tolerance: float, shape: Reshaped
+) -> tuple[float, float, float]:
+    """As `pulse_support`, of one shape; and what is left of it outside. At any phase, that is of the envelope: the
+    modulus of the pulse and i times its Hilbert transform."""
     plain = sum(_plain_support(waveform, chosen, tolerance))
     window = 2.0 * plain
     f, value = _tapered(waveform, chosen, window)
@@ -105,10 +133,7 @@ def _turned_support(waveform: Waveform, chosen: Filter, tolerance: float) -> tup
     while True:
         padding, step = wave.size // 2, window / samples
         wave = np.pad(wave, padding)  # a wider window, in which less of the tails is folded
-        half = np.zeros(wave.size, complex)
-        half[: wave.size // 2 + 1] = rfft(wave)
-        half[0] *= 0.5  # no frequency is neither positive nor negative
-        envelope = np.abs(ifft(half))
+        envelope = _shaped(wave, step, shape)
         envelope /= envelope.max()
         loud = (np.flatnonzero(envelope > tolerance) - wave.size // 2) * step
         quarter = 0.25 * wave.size * step
@@ -118,6 +143,22 @@ def _turned_support(waveform: Waveform, chosen: Filter, tolerance: float) -> tup
     left = float(envelope[np.abs(time) >= longest].max(initial=0.0))
     before, after = (min(max(float(end), 0.0), longest) for end in (step - loud[0], loud[-1] + step))
     return before, after, left
+
+
+def _shaped(wave: Floats, step: float, shape: Reshaped) -> Floats:
+    """Modulus (sample,) of a wave in that shape; half of its envelope, if it may be turned."""
+    spectrum = rfft(wave)
+    f = np.arange(spectrum.size) / (wave.size * step)
+    if shape.sloped:
+        spectrum = spectrum * (1j * f)
+    if shape.rough > 0.0:
+        spectrum = spectrum * rough_factor(f, np.ones(1), np.array([shape.rough]))[0]
+    if not shape.turned:
+        return np.asarray(np.abs(irfft(spectrum, wave.size)))
+    half = np.zeros(wave.size, complex)
+    half[: wave.size // 2 + 1] = spectrum
+    half[0] *= 0.5  # no frequency is neither positive nor negative
+    return np.asarray(np.abs(ifft(half)))
 
 
 @lru_cache(maxsize=64)
@@ -199,10 +240,11 @@ def stretched_spectra(
 
 
 @lru_cache(maxsize=64)
-def stretch_sizes(waveform: Waveform, chosen: Filter, widest: float) -> tuple[float, ...]:
-    """Mean moduli of the coefficients (degree < 16,) of `stretched_spectra` over frequency, over that of the first."""
+def stretch_sizes(waveform: Waveform, chosen: Filter, widest: float, sloped: bool = False) -> tuple[float, ...]:
+    """Mean moduli of the coefficients (degree < 16,) of `stretched_spectra` over frequency, over that of the first;
+    of the differentiated snap, if it is sloped."""
     f = np.linspace(0.0, stop_frequency(chosen), 97)
-    filtered = spectra.response(f, fir(chosen))
+    filtered = spectra.response(f, fir(chosen)) * (f if sloped else 1.0)
     at = 1.0 + widest * chebyshev(16)
     value = analysis(16) @ [_snap_spectrum(waveform, float(x), f) * x * filtered for x in at]
     sizes = np.abs(value).sum(axis=1)

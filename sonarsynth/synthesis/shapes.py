@@ -1,12 +1,13 @@
-"""How the pulses of paths differ in shape: turned in phase, blurred and stretched.
+"""How the pulses of paths differ in shape: turned in phase, blurred, stretched, and as facets change them.
 
 A pulse of spectrum S, after a phase, a blur of variance v and a Doppler s, has the spectrum
     exp(i phase) exp(-v g(f)) (1 + s) S((1 + s) f),  g = (2 pi f)^2/2,  f > 0,
-a point on a smooth surface of few dimensions. What all paths share is taken to the spectrum. What differs is expanded
-in modes, sum_k weight[path, k] spectrum[k, bin], and with it the absorption, which may then have no terms of its own:
-first in the cosine and sine of phase, in Chebyshev polynomials of Doppler and in values of exp(-v g) and of what is
-absorbed at some frequencies; then, by singular values, in the fewest that these paths need
-(Eckart and Young, 1936).
+times what its facet does (`acoustics.facet_pulses`), a point on a smooth surface of few dimensions. What all paths
+share is taken to the spectrum. What differs is expanded in modes, sum_k weight[path, k] spectrum[k, bin], and with it
+the absorption, which may then have no terms of its own: first in the cosine and sine of phase, in Chebyshev polynomials
+of Doppler, in mean powers of the delays over a facet, and in values of exp(-v g), of what is absorbed and of what a
+rough facet sends at some frequencies; then, by singular values, in the fewest that these paths need (Eckart and Young,
+1936).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from sonarsynth.acoustics.facet_pulses import mean_powers, rough_factor
 from sonarsynth.acoustics.snap import ComplexArray
 from sonarsynth.conventions import Floats
 from sonarsynth.synthesis.nodes import Axis, chebyshev, interpolation, rounded_up
@@ -24,6 +26,12 @@ from sonarsynth.synthesis.wavefront import Fronts
 
 SAMPLES = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 20, 24, 32, 48, 64, 96, 128)
 """How many frequencies a blur or an absorption may be sampled at."""
+
+MOST_PHASE = 12.0
+"""rad: facets with corners further than this from their middle, at the highest frequency, have no series in them."""
+
+MOST_POWERS = 80
+"""Powers of the phase over a facet that may be needed, and some more."""
 
 
 class Modes(NamedTuple):
@@ -55,28 +63,29 @@ def reduction(weight: Floats, spectrum: ComplexArray, loudness: Floats, toleranc
     loudest path and of their root mean square."""
     some = spectrum[:, :: max(1, spectrum.shape[1] // 128)]
     u, s, _ = np.linalg.svd(np.concatenate([some.real, some.imag], axis=1), full_matrices=False)
-    heard = np.linalg.qr(loudness[:, None] * weight, mode="r")
-    _, size, v = np.linalg.svd(heard @ (u * s), full_matrices=False)
+    loud = np.multiply(weight.T, loudness, order="C")
+    heard = np.linalg.qr(loud.T, mode="r")
+    left, size, v = np.linalg.svd(heard @ (u * s), full_matrices=False)
     onto = (u * s) @ v.T
-    keep = _sizes(np.abs(loudness[:, None] * (weight @ onto))) > tolerance
+    keep = _sizes(np.abs(onto.T @ loud)) > tolerance
     onto, size = onto[:, keep], size[keep]
-    back = (heard @ onto).T @ heard / size[:, None] ** 2
+    back = left[:, keep].T @ heard / size[:, None]
     scale = size[0] / np.linalg.norm(loudness)  # makes the weights of the first about 1
     return Reduction(onto / scale, back * scale)
 
 
 def _sizes(heard: Floats) -> Floats:
-    """Sizes (mode,) over the first, of moduli (path, mode): of root mean squares, and of the largest."""
-    mean, most = np.sqrt(np.einsum("pm,pm->m", heard, heard)), heard.max(axis=0)
+    """Sizes (mode,) over the first, of moduli (mode, path): of root mean squares, and of the largest."""
+    mean, most = np.sqrt(np.einsum("mp,mp->m", heard, heard)), heard.max(axis=1)
     return np.asarray(np.maximum(mean / mean[0], most / most[0]))
 
 
 def main_modes(weight: Floats, loudness: Floats) -> tuple[Floats, tuple[float, ...]]:
     """Turn (mode, mode) of orthogonal modes with weights (path, mode) that puts the largest first, and their sizes over
     that of the first, rounded up by at most a fifth, so that choices are kept from frame to frame."""
-    heard = loudness[:, None] * weight
-    turn = np.linalg.eigh(heard.T @ heard)[1][:, ::-1]  # a turn whatever rounds: sizes are those of what it gives
-    sizes = _sizes(np.abs(heard @ turn))
+    heard = np.multiply(weight.T, loudness, order="C")
+    turn = np.linalg.eigh(heard @ heard.T)[1][:, ::-1]  # a turn whatever rounds: sizes are those of what it gives
+    sizes = _sizes(np.abs(turn.T @ heard))
     return turn, (1.0, *(min(rounded_up(s, 1.2), 1.0) for s in sizes[1:].tolist()))
 
 
@@ -89,17 +98,24 @@ def shape_modes(
     widest: float,
     tolerance: float,
 ) -> Modes:
-    """The modes of pulses: of phase, of blur, of absorption, and of Doppler where there is a series (degree, bin) in
-    Doppler/widest.
+    """The modes of pulses: of phase, of blur, of absorption, of facets, and of Doppler where there is a series (degree,
+    bin) in Doppler/widest.
 
     spectrum (bin,) is of the pulse without them; decay (bin,) is in Np for each dB of the paths' loss.
     """
     loudness = np.abs(front.amplitude) / np.abs(front.amplitude).max()
-    weight, factor = np.ones((front.count, 1)), np.ones((1, frequency.size))
-    if front.variance.any() or (front.loss.any() and decay.any()):
+    weight: Floats = np.ones((front.count, 1))
+    factor: Floats | ComplexArray = np.ones((1, frequency.size))
+    if front.variance.any() or (front.loss.any() and decay.any()) or front.rough_share.any():
         weight, factor = _softened(front, frequency, decay, tolerance)
         fewer = reduction(weight, factor * spectrum, loudness, tolerance)
         weight, factor = weight @ fewer.onto, fewer.back @ factor
+    if front.corners.any():
+        powers, waves = _powers(front.corners, frequency, spectrum, tolerance)
+        fewer = reduction(powers, waves * spectrum, loudness, tolerance)
+        powers, waves = powers @ fewer.onto, fewer.back @ waves
+        weight = (weight[:, :, None] * powers[:, None, :]).reshape(front.count, -1)
+        factor = (factor[:, None, :] * waves).reshape(-1, frequency.size)
     spectra = factor * spectrum
     if len(series):
         bend = stretched(series, front.doppler / widest)
@@ -113,9 +129,24 @@ def shape_modes(
     return Modes(weight @ fewer.onto, fewer.back @ spectra)
 
 
+def _powers(
+    corners: Floats, frequency: Floats, spectrum: ComplexArray, tolerance: float
+) -> tuple[Floats, ComplexArray]:
+    """The mean of a wave over facets with corners (path, 3): powers of the delay (path, given), and of the frequency
+    (given, bin)."""
+    scale = float(np.abs(corners).max())
+    phase, mass = -2j * np.pi * scale * frequency, np.abs(spectrum) / np.abs(spectrum).sum()
+    ratio = phase / np.arange(1, MOST_POWERS)[:, None]
+    waves = np.cumprod(np.concatenate([np.ones((1, frequency.size)), ratio]), axis=0)  # (-i w scale)^j/j!
+    left = np.cumsum((np.abs(waves) @ mass)[::-1])[::-1]
+    count = max(3, int(np.argmax(np.append(left, 0.0) <= tolerance)))
+    some = np.append(0, np.arange(2, count))  # the mean of the first power is 0
+    return mean_powers(corners, scale, count).T[:, some], waves[some]
+
+
 def _softened(front: Fronts, frequency: Floats, decay: Floats, tolerance: float) -> tuple[Floats, Floats]:
-    """What blur and absorption leave at some frequencies (path, given), and their interpolation in the logarithm of
-    frequency (given, bin). Degrees of a product add up."""
+    """What blur, absorption and rough facets leave at some frequencies (path, given), and their interpolation in the
+    logarithm of frequency (given, bin). Degrees of a product add up."""
     low, high = float(frequency[0]), float(frequency[-1])
     low = low if low > 0.0 else 0.1 * float(frequency[min(1, frequency.size - 1)]) or 1.0  # 0 Hz has no logarithm
     high = max(high, low)
@@ -135,12 +166,18 @@ def _softened(front: Fronts, frequency: Floats, decay: Floats, tolerance: float)
     exact = lost(ends, frequency[some])
     onto = ((n, interpolation(place[some], Axis(n))) for n in SAMPLES)
     count = next((n for n, i in onto if np.abs(i @ lost(ends, at(n)) - exact).max() <= tolerance), SAMPLES[-1])
+    if front.rough_share.any():
+        roughest = 2.0 * np.pi * high * float(front.rough_delay.max())
+        count += _rough_samples(rounded_up(roughest, 1.25), float(np.ceil(10.0 * span)) / 10.0, tolerance) - 1
     if steepest > 0.0:
         count += _samples(rounded_up(steepest, 1.25), float(np.ceil(10.0 * span)) / 10.0, tolerance) - 1
     exponent = np.multiply.outer(front.variance, blur_exponent(at(count))) + np.multiply.outer(
         front.loss, rate(at(count))
     )
-    return np.exp(-exponent), np.asarray(interpolation(place, Axis(count)).T)
+    left = np.exp(-exponent)
+    if front.rough_share.any():
+        left *= rough_factor(at(count), front.rough_share, front.rough_delay)
+    return left, np.asarray(interpolation(place, Axis(count)).T)
 
 
 @lru_cache(maxsize=256)
@@ -155,5 +192,25 @@ def _samples(steepest: float, span: float, tolerance: float) -> int:
 
     for count in SAMPLES:
         if np.abs(interpolation(x, Axis(count)) @ blurs(chebyshev(count)) - blurs(x)).max() <= tolerance:
+            return count
+    return SAMPLES[-1]
+
+
+@lru_cache(maxsize=256)
+def _rough_samples(roughest: float, span: float, tolerance: float) -> int:
+    """How many frequencies, Chebyshev in the logarithm, `span` between the ends, give what rough facets of any share
+    send, with g up to `roughest` at the highest."""
+    x = np.linspace(-1.0, 1.0, 257)
+    shares = 1.0 - np.append(0.0, np.geomspace(1e-6, 0.9, 16))
+    delays = np.geomspace(min(1e-3, 0.1 * roughest), roughest, 48) / (2.0 * np.pi) if roughest > 0.0 else np.zeros(1)
+    share, delay = (g.ravel() for g in np.meshgrid(shares, delays))
+
+    def left(at: Floats) -> Floats:
+        return rough_factor(np.exp(span * (at - 1.0)), share, delay).T
+
+    exact = left(x)
+    size = np.maximum(exact.max(axis=0), 1e-300)
+    for count in SAMPLES:
+        if (np.abs(interpolation(x, Axis(count)) @ left(chebyshev(count)) - exact) / size).max() <= tolerance:
             return count
     return SAMPLES[-1]

@@ -127,7 +127,12 @@ def _reference(middle: Floats, front: Fronts) -> Fronts:
         phase=np.zeros(1),
         variance=np.zeros(1),
         doppler=np.zeros(1),
+        coherent=np.zeros(1, bool),
+        corners=np.zeros((1, 3)),
+        rough_share=np.zeros(1),
+        rough_delay=np.zeros(1),
         modes=np.zeros((1, 0)),
+        centre=front.centre,
     )
 
 

@@ -4,11 +4,12 @@ inf)."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from sonarsynth.acoustics.arrays import aperture_terms
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.products import Arrivals
 from sonarsynth.sonar import Elements
 from sonarsynth.synthesis.pulse import snap_gains
@@ -20,7 +21,13 @@ MOST_STRETCH = 0.1
 LONGEST_BLUR = 1.0
 """A longer blur (s) leaves as little of a snap: nothing."""
 
-FINITE = ("delay", "direction", "amplitude", "absorption", "delay_terms", "amplitude_terms", "phase", "blur", "stretch")
+LONGEST_CORNER = 0.01
+"""The corners of a facet are closer to its arrival than this (s): 7 m, there and back."""
+
+FINITE = (
+    *("delay", "direction", "amplitude", "absorption", "delay_terms", "amplitude_terms", "phase", "blur", "stretch"),
+    *("corners", "rough_share", "rough_delay"),
+)
 """What of the arrivals must be finite."""
 
 
@@ -28,7 +35,7 @@ FINITE = ("delay", "direction", "amplitude", "absorption", "delay_terms", "ampli
 class Fronts:
     """Arrivals as synthesis takes them: curvature for radius, and the level of the snap inside the amplitude."""
 
-    delay: Floats  # (path,) s at the array centre
+    delay: Floats  # (path,) s at the array centre, of the middle of a facet's corners
     direction: Floats  # (path, xyz)
     curvature: Floats  # (path,) 1/m: 1/radius, 0 for a plane wave
     amplitude: Floats  # (path,)
@@ -40,7 +47,12 @@ class Fronts:
     phase: Floats  # (path,) rad, -pi/2 to pi/2: whole half turns are signs of the amplitude
     variance: Floats  # (path,) s2: of the Gaussian that the pulse is blurred with
     doppler: Floats  # (path,) the pulse lasts 1 + doppler times as long
+    coherent: Bools  # (path,) the pulse is differentiated, i f/centre
+    corners: Floats  # (path, 3) s: delays over which the pulse is a mean; their sum is 0
+    rough_share: Floats  # (path,) and
+    rough_delay: Floats  # (path,) s: of `facet_pulses.rough_factor`
     modes: Floats  # (path, mode) weights of the modes of a stretch of time (`shapes`); none as yet
+    centre: float  # Hz, where the amplitudes hold
 
     @property
     def count(self) -> int:
@@ -49,21 +61,10 @@ class Fronts:
 
     def select(self, keep: Ints) -> Fronts:
         """The paths of these indices."""
-        return Fronts(
-            self.delay[keep],
-            self.direction[keep],
-            self.curvature[keep],
-            self.amplitude[keep],
-            self.loss[keep],
-            self.delay_terms[keep],
-            self.gain_terms[keep],
-            self.sound_speed,
-            self.aperture,
-            self.phase[keep],
-            self.variance[keep],
-            self.doppler[keep],
-            self.modes[keep],
-        )
+        rows: dict[str, Any] = {
+            name: value[keep] if isinstance(value, np.ndarray) else value for name, value in vars(self).items()
+        }
+        return Fronts(**rows)
 
 
 def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements) -> Fronts:
@@ -71,18 +72,14 @@ def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements) -> F
     count = arrivals.delay.size
     for name in FINITE:
         value = getattr(arrivals, name)
-        wrong = ~np.isfinite(value).all(axis=tuple(range(1, value.ndim)))
-        if wrong.any():
+        if not np.isfinite(value).all():
+            wrong = ~np.isfinite(value).all(axis=tuple(range(1, value.ndim)))
             raise ValueError(f"arrival {np.flatnonzero(wrong)[0]} has {name} that is not a finite number")
     if count and not (arrivals.amplitude != 0.0).all():
         raise ValueError(f"arrival {np.flatnonzero(arrivals.amplitude == 0.0)[0]} has no amplitude")
     if count and not (arrivals.radius > 0.0).all():
         raise ValueError(f"arrival {np.flatnonzero(~(arrivals.radius > 0.0))[0]} has a radius that is not positive")
-    if (arrivals.blur < 0.0).any():
-        raise ValueError(f"arrival {np.flatnonzero(arrivals.blur < 0.0)[0]} has a negative blur")
-    if (np.abs(arrivals.stretch) >= MOST_STRETCH).any():
-        wrong = np.abs(arrivals.stretch) >= MOST_STRETCH
-        raise ValueError(f"arrival {np.flatnonzero(wrong)[0]} has a stretch that is not within +-{MOST_STRETCH:g}")
+    _check_shapes(arrivals)
     if count and not (arrivals.snap.min() >= 0 and arrivals.snap.max() < len(snaps)):
         raise ValueError(f"arrivals name a snap outside 0..{len(snaps) - 1}")
     near = np.flatnonzero(arrivals.radius <= 1.001 * elements.aperture)
@@ -92,8 +89,9 @@ def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements) -> F
         raise ValueError(f"arrival {near[touching][0]} comes from a hydrophone")
     gain = snap_gains(snaps)
     sign, phase = folded(arrivals.phase)
+    delay, corners = _centred(arrivals)
     return Fronts(
-        delay=arrivals.delay,
+        delay=delay,
         direction=arrivals.direction,
         curvature=1.0 / arrivals.radius,
         amplitude=arrivals.amplitude * gain[arrivals.snap] * sign if count else arrivals.amplitude,
@@ -105,8 +103,36 @@ def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements) -> F
         phase=phase,
         variance=np.minimum(arrivals.blur, LONGEST_BLUR) ** 2,
         doppler=arrivals.stretch,
+        coherent=arrivals.coherent,
+        corners=corners,
+        rough_share=arrivals.rough_share,
+        rough_delay=np.minimum(arrivals.rough_delay, LONGEST_BLUR),
         modes=np.zeros((count, 0)),
+        centre=arrivals.centre,
     )
+
+
+def _centred(arrivals: Arrivals) -> tuple[Floats, Floats]:
+    """Delays (path,) of the middle of facets, and those (path, 3) of their corners about it."""
+    if not arrivals.corners.any():
+        return arrivals.delay, arrivals.corners
+    middle = np.einsum("pc->p", arrivals.corners) / 3.0
+    return arrivals.delay + middle, arrivals.corners - middle[:, None]
+
+
+def _check_shapes(arrivals: Arrivals) -> None:
+    """Raise ValueError for a path whose pulse has no shape."""
+    for wrong, what in (
+        (arrivals.blur < 0.0, "a negative blur"),
+        (np.abs(arrivals.stretch) >= MOST_STRETCH, f"a stretch that is not within +-{MOST_STRETCH:g}"),
+        (np.abs(arrivals.corners.T) >= LONGEST_CORNER, f"corners that are not within {LONGEST_CORNER:g} s"),
+        ((arrivals.rough_share < 0.0) | (arrivals.rough_share > 1.0), "a rough_share that is not from 0 to 1"),
+        (arrivals.rough_delay < 0.0, "a negative rough_delay"),
+    ):
+        if wrong.any():
+            raise ValueError(f"arrival {np.flatnonzero(wrong)[0] % wrong.shape[-1]} has {what}")
+    if arrivals.coherent.any() and not 0.0 < arrivals.centre < np.inf:
+        raise ValueError("coherent arrivals need the centre of their band, above 0 Hz")
 
 
 def folded(phase: Floats) -> tuple[Floats, Floats]:

@@ -7,8 +7,9 @@ from itertools import pairwise
 import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
+from sonarsynth.world.blocks import blocks
 from sonarsynth.world.myring import hull_meridian
-from sonarsynth.world.refinement import Surface, require_possible, split_long_edges, volume
+from sonarsynth.world.refinement import Surface, join, require_possible, split_long_edges, volume
 from sonarsynth.world.remus import HULL, remus100
 from sonarsynth.world.revolution import Arc, enclosed_volume, line, revolve
 from sonarsynth.world.shapes import Box, Cylinder, LShape, MeshFile, Myring, Remus100, Shape, Sphere
@@ -17,34 +18,38 @@ DEFAULT = 8.0
 """Edges of curved shapes, where left out: the radius over this."""
 
 
-def generate(shape: Shape) -> tuple[Surface, tuple[str, ...]]:
-    """Surface and notes of a generated shape; raises MeshError where it would take too many facets."""
+def generate(shape: Shape, edge: float = np.inf, sagitta: float = np.inf) -> tuple[Surface, tuple[str, ...]]:
+    """Surface and notes of a generated shape; raises MeshError where it would take too many facets.
+
+    edge, sagitta (m): no edge longer than that, and a mean distance from the true surface of about that at most, where
+    the shape's own edge is not finer. Long thin facets serve where a body is flat along one direction.
+    """
     match shape:
         case Sphere():
-            surface = sphere(shape.radius, shape.edge or shape.radius / DEFAULT)
+            finest = min(edge, 1.15 * np.sqrt(8.0 * shape.radius * sagitta))  # the longest edge is 1.15 times the mean
+            surface = sphere(shape.radius, min(shape.edge or shape.radius / DEFAULT, finest))
             return surface, _inscribed(surface, 4 / 3 * np.pi * shape.radius**3)
         case Cylinder():
             meridian = _cylinder(shape)
-            surface = revolve(meridian, shape.edge or shape.radius / DEFAULT)
+            surface = revolve(meridian, min(shape.edge or shape.radius / DEFAULT, edge), sagitta)
             return surface, _inscribed(surface, np.pi * shape.radius**2 * shape.length)
         case Myring():
             meridian = hull_meridian(shape)
-            surface = revolve(meridian, shape.edge or 0.5 * shape.diameter / DEFAULT)
+            surface = revolve(meridian, min(shape.edge or 0.5 * shape.diameter / DEFAULT, edge), sagitta)
             return surface, _inscribed(surface, enclosed_volume(meridian))
         case Remus100():
-            surface = remus100(shape)
-            bare = surface if not shape.fins else remus100(_bare(shape))
-            return surface, _inscribed(bare, enclosed_volume(hull_meridian(HULL)))
+            hull, fins = remus100(shape, edge, sagitta)
+            return join(hull, *fins), _inscribed(hull, enclosed_volume(hull_meridian(HULL)))
         case Box():
-            return _refined(box(shape), shape.edge), ()
+            return (_refined(box(shape), shape.edge) if _finer(shape.edge, edge) else _box(shape, edge)), ()
         case LShape():
-            return _refined(l_shape(shape), shape.edge), ()
+            return (_refined(l_shape(shape), shape.edge) if _finer(shape.edge, edge) else _l_shape(shape, edge)), ()
         case MeshFile():
             raise TypeError("a mesh file is read, not generated")
 
 
-def _bare(shape: Remus100) -> Remus100:
-    return Remus100(edge=shape.edge, coarse=shape.coarse, fins=False)
+def _finer(own: float | None, edge: float) -> bool:
+    return (np.inf if own is None else own) <= edge
 
 
 def _inscribed(surface: Surface, true_volume: float) -> tuple[str, ...]:
@@ -129,6 +134,17 @@ def l_shape(shape: LShape) -> Surface:
     sides = [(j, i, i + 6, j + 6) for i, j in edges]
     starboard, port = [(0, 1, 2, 3), (0, 3, 4, 5)], [(9, 8, 7, 6), (11, 10, 9, 6)]
     return np.array(points), _halved([*starboard, *port, *sides])
+
+
+def _box(shape: Box, edge: float) -> Surface:
+    half = [0.5 * length for length in shape.size]
+    return blocks([(-h, h) for h in half], np.ones((1, 1, 1), bool), edge)
+
+
+def _l_shape(shape: LShape, edge: float) -> Surface:
+    t, half = shape.thickness, 0.5 * shape.width
+    solid = np.array([[[True, True]], [[True, False]]])  # (x, y, z): foot, upright plate above it, lying plate forward
+    return blocks([(-t, 0.0, shape.length), (-half, half), (-t, 0.0, shape.height)], solid, edge)
 
 
 def _halved(quads: list[tuple[int, int, int, int]]) -> Ints:

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import UNITS, Floats
+from sonarsynth.conventions import UNITS, Bools, Floats
 from sonarsynth.world.generation import generate
-from sonarsynth.world.refinement import MeshError, Surface, split_long_edges
-from sonarsynth.world.shapes import MeshFile, Shape
+from sonarsynth.world.refinement import MeshError, Surface, halve_longest_edges, split_long_edges
+from sonarsynth.world.shapes import Cylinder, MeshFile, Myring, Remus100, Shape
 
-__all__ = ["Mesh", "MeshError", "mesh_of"]
+__all__ = ["Mesh", "MeshError", "file_stamp", "mesh_of", "refined_mesh"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +25,7 @@ class Mesh:
     vertices: Floats  # (vertex, xyz) m
     faces: npt.NDArray[np.int32]  # (facet, 3)
     notes: tuple[str, ...] = ()  # what was repaired on reading, or how fine the surface is; one line each
+    flat: Bools | None = None  # (facet,) known to be flat in the body itself, so that no finer mesh is nearer to it
 
     @cached_property
     def corners(self) -> Floats:
@@ -81,28 +82,54 @@ def mesh_of(shape: Shape) -> Mesh:
     A file (its path relative to the working directory) is kept until it changes. Raises `MeshError`, a ValueError in
     one line that names the file and the reason; what was repaired is said in `Mesh.notes`.
     """
-    if not isinstance(shape, MeshFile):
-        return _mesh_of(shape, None)
-    try:
-        status = Path(shape.path).stat()
-    except OSError as error:
-        raise MeshError(f"{shape.path}: {(error.strerror or str(error)).lower()}") from None
-    return _mesh_of(shape, (status.st_mtime_ns, status.st_size))
+    return _mesh_of(shape, file_stamp(shape))
 
 
 @lru_cache(maxsize=32)
 def _mesh_of(shape: Shape, stamp: tuple[int, int] | None) -> Mesh:
-    (vertices, numbers), notes = _read(shape) if isinstance(shape, MeshFile) else generate(shape)
+    return refined_mesh(shape)
+
+
+def file_stamp(shape: Shape) -> tuple[int, int] | None:
+    """When the file of a shape was changed (ns) and its size, for caches; None for other shapes. Raises MeshError."""
+    if not isinstance(shape, MeshFile):
+        return None
+    try:
+        status = Path(shape.path).stat()
+    except OSError as error:
+        raise MeshError(f"{shape.path}: {(error.strerror or str(error)).lower()}") from None
+    return status.st_mtime_ns, status.st_size
+
+
+def refined_mesh(shape: Shape, edge: float = np.inf, sagitta: float = np.inf) -> Mesh:
+    """The mesh of a shape, made anew, with no edge longer than `edge` (m), nor than the shape's own.
+
+    Analytic shapes, and files that stand for a curved surface (`MeshFile.smooth`), are refined on that surface, until
+    facets are no farther from it, on average, than about `sagitta` (m). The flat facets of other files, of boxes and
+    L-shapes are cut in their planes, which changes nothing but the length of their edges; a coarse REMUS too.
+    Raises MeshError as `mesh_of`.
+    """
+    if isinstance(shape, MeshFile):
+        (vertices, numbers), notes = _read(shape, edge, sagitta)
+    else:
+        (vertices, numbers), notes = generate(shape, edge, sagitta)
+        if isinstance(shape, Remus100) and shape.coarse and edge < np.inf:
+            vertices, numbers = halve_longest_edges((vertices, numbers), edge)
     faces = np.ascontiguousarray(numbers, np.int32)
+    flat = None
+    if isinstance(shape, (Cylinder, Myring, Remus100)):  # their ends
+        flat = np.ptp(vertices[faces, 0], axis=1) == 0
+        flat.flags.writeable = False
     faces.flags.writeable = False
-    return Mesh(_fixed(np.ascontiguousarray(vertices, np.float64)), faces, notes)
+    return Mesh(_fixed(np.ascontiguousarray(vertices, np.float64)), faces, notes, flat)
 
 
-def _read(shape: MeshFile) -> tuple[Surface, tuple[str, ...]]:
+def _read(shape: MeshFile, edge: float, sagitta: float) -> tuple[Surface, tuple[str, ...]]:
     from scipy.spatial.transform import Rotation
 
     from sonarsynth.world.mesh_files import read_surface
     from sonarsynth.world.mesh_repair import check, repair
+    from sonarsynth.world.smoothing import curved
 
     path = Path(shape.path)
     vertices, faces = read_surface(path)
@@ -111,9 +138,12 @@ def _read(shape: MeshFile) -> tuple[Surface, tuple[str, ...]]:
         placed = (vertices * UNITS["m"][shape.unit]) @ turn.T + np.array(shape.offset)
     check((placed, faces), shape.path)
     surface, notes = repair((placed, faces), shape.path, shares_vertices=path.suffix.lower() != ".stl")
-    if shape.edge is None:
+    longest = min(edge, np.inf if shape.edge is None else shape.edge)
+    if np.isinf(longest) and not (shape.smooth and np.isfinite(sagitta)):
         return surface, notes
     try:
-        return split_long_edges(surface, shape.edge), notes
+        if shape.smooth:
+            return curved(surface, longest, sagitta, shape.crease), notes
+        return (halve_longest_edges if edge < np.inf else split_long_edges)(surface, longest), notes
     except MeshError as error:
         raise MeshError(f"{shape.path}: {error}") from None

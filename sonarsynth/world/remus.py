@@ -46,11 +46,15 @@ THICKNESS: Final = 0.12  # of the chord
 ROLLS: Final = (0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi)  # up, starboard, down, port
 
 
-def remus100(shape: Remus100) -> Surface:
-    """The mesh of the vehicle: hull from nose to tail, then the fins up, starboard, down, port."""
-    hull = _coarse_hull() if shape.coarse else revolve(hull_meridian(HULL), shape.edge)
-    fin = _coarse_fin() if shape.coarse else _fin(shape.edge)
-    return join(hull, *(_rolled(fin, roll) for roll in ROLLS)) if shape.fins else hull
+def remus100(shape: Remus100, edge: float = np.inf, sagitta: float = np.inf) -> tuple[Surface, tuple[Surface, ...]]:
+    """The hull from nose to tail, and the fins up, starboard, down, port (none where the shape has none).
+
+    edge, sagitta (m) as in `generation.generate`; a coarse shape is always the same.
+    """
+    finest = min(shape.edge, edge)
+    hull = _coarse_hull() if shape.coarse else revolve(hull_meridian(HULL), finest, sagitta)
+    fin = _coarse_fin() if shape.coarse else _fin(finest, sagitta)
+    return hull, tuple(_rolled(fin, roll) for roll in ROLLS) if shape.fins else ()
 
 
 def naca0012(chordwise: Floats) -> Floats:
@@ -66,12 +70,12 @@ def _chord(height: Floats) -> Floats:
     return np.asarray(ROOT_CHORD * (1.0 - (1.0 - FIN_TAPER) * out))
 
 
-def _fin(edge: float) -> Surface:
+def _fin(edge: float, sagitta: float) -> Surface:
     """The upper fin, with vertices on the true section and no edge longer than edge."""
     target = min(edge, 0.3 * ROOT_CHORD)
     require_possible(2.0 * FIN_AREA, edge)
     for _ in range(40):
-        surface = _loft(*_fin_grid(target))
+        surface = _loft(*_fin_grid(target, sagitta))
         longest = longest_edge(surface)
         if longest <= edge:
             return surface
@@ -79,13 +83,19 @@ def _fin(edge: float) -> Surface:
     raise AssertionError("a finer grid has shorter edges")
 
 
-def _fin_grid(step: float) -> tuple[Floats, Floats, int]:
+def _fin_grid(step: float, sagitta: float) -> tuple[Floats, Floats, int]:
     """Chordwise places (0 to 1), heights (m), and facets across the thickness of the flat ends."""
     fine = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 2049))
-    length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(fine), np.diff(naca0012(fine))))])
-    chordwise = np.interp(
-        np.linspace(0, length[-1], 1 + int(np.ceil(length[-1] * ROOT_CHORD / (0.8 * step)))), length, fine
-    )
+    half = naca0012(fine)
+    length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(fine), np.diff(half)))])  # in chords
+    number, steps = length[-1] * ROOT_CHORD / (0.8 * step), length
+    if np.isfinite(sagitta):  # two facets on a chord w are at the mean distance w^2/(12 R) from the section
+        turn = np.abs(np.diff(np.arctan2(np.diff(half), np.diff(fine))))
+        bent = np.interp(length, length[1:-1], turn / (0.5 * (length[2:] - length[:-2])))  # 1/R, per chord
+        pace = np.maximum(ROOT_CHORD / (0.8 * step), np.sqrt(ROOT_CHORD * bent / (12.0 * sagitta)))
+        steps = np.concatenate([[0.0], np.cumsum(np.diff(length) * 0.5 * (pace[1:] + pace[:-1]))])
+        number = steps[-1]
+    chordwise = np.interp(np.linspace(0, steps[-1], 1 + int(np.ceil(number))), steps, fine)
     root = FIN_HEIGHT - FIN_SPAN
     inside = np.linspace(FIN_FOOT, root, 1 + int(np.ceil((root - FIN_FOOT) / (0.6 * step))))
     outside = np.linspace(root, FIN_HEIGHT, 1 + int(np.ceil(FIN_SPAN / (0.6 * step))))

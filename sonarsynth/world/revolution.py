@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -42,8 +43,11 @@ def enclosed_volume(meridian: Sequence[Arc]) -> float:
     return total
 
 
-def revolve(meridian: Sequence[Arc], edge: float) -> Surface:
+def revolve(meridian: Sequence[Arc], edge: float, sagitta: float = np.inf) -> Surface:
     """A closed mesh of the body, with vertices on the true surface and no edge longer than `edge` (m).
+
+    sagitta (m): the mean distance of facets from the true surface is about that at most, across each principal
+    direction; facets are then long along the direction in which the body is flat.
 
     The meridian runs from the foremost point to the aftmost one, on the axis at both ends (r = 0). Rings of vertices
     are staggered by half a step, which makes nearly equilateral facets; a ring has half as many vertices as its
@@ -54,7 +58,7 @@ def revolve(meridian: Sequence[Arc], edge: float) -> Surface:
     area = sum(2 * np.pi * float(np.trapezoid(r, s)) for _, r, s in (arc.along() for arc in meridian))
     require_possible(area, target)
     for _ in range(40):
-        surface = rings(*_stations(meridian, target, greatest))
+        surface = rings(*_stations(meridian, target, sagitta))
         longest = longest_edge(surface)
         if longest <= edge:
             return surface
@@ -62,41 +66,68 @@ def revolve(meridian: Sequence[Arc], edge: float) -> Surface:
     raise MeshError(f"no mesh with edges of {edge:g} m was found; use a longer edge")
 
 
-def _stations(meridian: Sequence[Arc], edge: float, greatest: float) -> tuple[Floats, Floats, Ints]:
+def _stations(meridian: Sequence[Arc], edge: float, sagitta: float) -> tuple[Floats, Floats, Ints]:
     """x, r and the number of vertices of each ring (1 on the axis)."""
-    needed = max(FEWEST, _round_the_girth(greatest, edge))
+    limits = [_limits(arc, edge, sagitta) for arc in meridian]
+    for (_, before), (_, after) in pairwise(limits):
+        before[-1] = after[0] = min(before[-1], after[0])  # they share a ring
+    round_all = [_round_the_girth(a.along()[1], girth) for a, (_, girth) in zip(meridian, limits, strict=True)]
+    needed = max(FEWEST, *round_all)
     halvings = int(np.log2(needed / FEWEST))
     smallest = -(-needed // 2**halvings)
-    x_parts, r_parts = [], []
-    for i, arc in enumerate(meridian):
+    x_parts, r_parts, count_parts = [], [], []
+    for i, (arc, (step, girth)) in enumerate(zip(meridian, limits, strict=True)):
         x, r, s = arc.along()
-        count = _vertices(r, edge, smallest, halvings)
+        count = _vertices(r, girth, smallest, halvings)
         chord = 2.0 * r * np.sin(0.5 * np.pi / count)  # to the neighbour ring, staggered by half a step
-        pace = 1.0 / np.sqrt(np.maximum(edge**2 - chord**2, (0.5 * edge) ** 2))
+        pace = 1.0 / np.minimum(step, np.sqrt(np.maximum(edge**2 - chord**2, (0.5 * edge) ** 2)))
         steps = np.concatenate([[0.0], np.cumsum(np.diff(s) * 0.5 * (pace[1:] + pace[:-1]))])
         number = max(1, int(np.ceil(steps[-1] - 1e-9)))
         at = np.interp(np.linspace(0.0, steps[-1], number + 1), steps, arc.samples)[int(i > 0) :]
         points = arc.point(at)
         x_parts.append(points[0])
         r_parts.append(points[1])
-    x, r = np.concatenate(x_parts), np.concatenate(r_parts)
-    count = _vertices(r, edge, smallest, halvings)
+        count_parts.append(_vertices(points[1], np.interp(at, arc.samples, girth), smallest, halvings))
+    x, r, count = np.concatenate(x_parts), np.concatenate(r_parts), np.concatenate(count_parts)
     count[[0, -1]] = 1
     r[[0, -1]] = 0.0
     return x, r, count
 
 
-def _round_the_girth(radius: float, edge: float) -> int:
-    """Fewest vertices of a ring whose chords are no longer than edge."""
-    return int(np.ceil(np.pi / np.arcsin(min(1.0, 0.5 * edge / radius)) - 1e-9))
+def _limits(arc: Arc, edge: float, sagitta: float) -> tuple[Floats, Floats]:
+    """Longest step along the meridian and longest chord round the girth (m) at the samples of an arc.
+
+    The mean distance of a facet of height h on a chord w is h^2/(12 R) + w^2/(16 r') from a surface with the radii of
+    curvature R along the meridian and r' = r/cos(slope) across it. The height takes half of what is allowed at most.
+    """
+    x, r, s = arc.along()
+    whole = np.full(len(s), np.inf)
+    if np.isinf(sagitta):
+        return whole, np.full(len(s), edge)
+    slope = np.unwrap(np.arctan2(np.diff(r), np.diff(x)))
+    bent = np.abs(np.diff(slope)) / (0.5 * (s[2:] - s[:-2]))  # 1/m
+    bent = np.concatenate([bent[:1], bent, bent[-1:]])
+    lean = np.abs(np.cos(slope))
+    lean = np.minimum(np.append(lean, lean[-1]), np.append(lean[:1], lean))
+    with np.errstate(divide="ignore"):
+        step = np.minimum(np.sqrt(6.0 * sagitta / bent), edge)
+        left = sagitta - step**2 * bent / 12.0
+        girth = np.minimum(4.0 * np.sqrt(left * r / lean), edge)
+    return step, np.where(r > 0, girth, edge)
 
 
-def _vertices(radius: Floats, edge: float, smallest: int, halvings: int) -> Ints:
-    """Vertices of rings: smallest times a power of two, the fewest whose chords are no longer than edge."""
+def _round_the_girth(radius: Floats, chord: Floats) -> int:
+    """Fewest vertices of rings of which none has a longer chord than it may (m)."""
+    share = float(np.max(radius / chord))
+    return int(np.ceil(np.pi / np.arcsin(min(1.0, 0.5 / share)) - 1e-9)) if share > 0.5 else 2
+
+
+def _vertices(radius: Floats, chord: Floats, smallest: int, halvings: int) -> Ints:
+    """Vertices of rings: smallest times a power of two, the fewest whose chords are no longer than they may (m)."""
     choices = smallest * 2 ** np.arange(halvings + 1)
-    reach = 0.5 * edge / np.sin(np.pi / choices)  # the largest radius that each choice serves
+    reach = 0.5 / np.sin(np.pi / choices)  # the largest radius over chord that each choice serves
     reach[-1] = np.inf
-    return np.asarray(choices[np.searchsorted(reach, radius * (1 - 1e-12))])
+    return np.asarray(choices[np.searchsorted(reach, radius / chord * (1 - 1e-12))])
 
 
 def rings(x: Floats, radius: Floats, count: Ints) -> Surface:

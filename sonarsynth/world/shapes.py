@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
-from annotated_types import Ge, Le
+from annotated_types import Ge, Gt, Le, Lt
 from pydantic import ValidationInfo, field_validator
 
 from sonarsynth.conventions import NonNegativeMetres, Number, Position, PositiveMetres, Radians
@@ -33,7 +33,13 @@ class MeshFile:
     roll: Radians = 0.0
     """Turn about x, first."""
     edge: PositiveMetres | None = None
-    """Subdivide flat facets until no edge is longer; the surface stays as it is."""
+    """Subdivide facets until no edge is longer; unless smooth, they are cut in their planes, and the surface stays as
+    it is."""
+    smooth: bool = False
+    """The file stands for a curved surface: facets that are too long are cut along curves through their corners, with
+    smooth normals. For Kirchhoff scattering, too long is what the wavelength says."""
+    crease: Annotated[Radians, Gt(0), Lt(np.pi)] = float(np.radians(40.0))
+    """Edges that turn by more stay sharp. Nothing where not smooth."""
 
 
 @description

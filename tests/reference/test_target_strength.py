@@ -35,20 +35,23 @@ def turned(incident: np.ndarray, degrees: float) -> np.ndarray:
 @pytest.mark.parametrize("surface", ["rigid", "soft"])
 @pytest.mark.parametrize("radius", [0.25, 0.5])
 def test_spheres_return_what_the_exact_series_says(radius: float, surface: str) -> None:
-    incident = np.concatenate([[[1.0, 0.0, 0.0], [0.0, 0.0, -1.0]], directions(4)])[:, None]
-    law = ss.Kirchhoff(surface=surface)
-    got = ss.target_strength(ss.Sphere(radius=radius), BAND, incident, -incident, 1500.0, law)
-    exact = 20 * np.log10(np.abs(sphere_amplitude(BAND, np.pi, radius=radius, boundary=surface)))
-    assert got.shape == (6, BAND.size)
-    assert np.abs(got - exact).max() < 0.3
+    incident = np.concatenate([[[1.0, 0.0, 0.0], [0.0, 0.0, -1.0]], directions(1)])[:, None]
+    law, band = ss.Kirchhoff(surface=surface), BAND[::2]
+    got = ss.target_strength(ss.Sphere(radius=radius), band, incident, -incident, 1500.0, law)
+    exact = 20 * np.log10(np.abs(sphere_amplitude(band, np.pi, radius=radius, boundary=surface)))
+    assert got.shape == (3, band.size)
+    assert np.abs(got - exact).max() < 0.15
 
 
-@pytest.mark.parametrize(("degrees", "allowed"), [(30.0, 0.3), (60.0, 0.3), (90.0, 0.75), (105.0, 0.75)])
+@pytest.mark.parametrize(
+    ("degrees", "allowed"),
+    [(30.0, 0.2), (60.0, 0.2), (90.0, 0.2), (105.0, 0.2), (115.0, 0.3), (120.0, 0.3), (150.0, 0.4), (180.0, 0.4)],
+)
 def test_spheres_scatter_sideways_as_the_exact_series_says(degrees: float, allowed: float) -> None:
-    incident = directions(3)
+    incident, band = directions(2), BAND[::2]
     out = turned(incident, degrees)
-    got = ss.target_strength(ss.Sphere(radius=0.25), BAND, incident[:, None], out[:, None])
-    exact = 20 * np.log10(np.abs(sphere_amplitude(BAND, np.radians(180 - degrees), radius=0.25)))
+    got = ss.target_strength(ss.Sphere(radius=0.25), band, incident[:, None], out[:, None])
+    exact = 20 * np.log10(np.abs(sphere_amplitude(band, np.radians(180 - degrees), radius=0.25)))
     assert np.abs(got - exact).max() < allowed
 
 
@@ -58,9 +61,26 @@ def test_without_the_taper_a_sphere_has_an_edge_that_it_does_not_have() -> None:
     exact = 20 * np.log10(np.abs(sphere_amplitude(BAND, 0.5 * np.pi, radius=0.25)))
     error = [
         np.abs(ss.target_strength(ss.Sphere(radius=0.25), BAND, incident[:, None], out[:, None], 1500.0, law) - exact)
-        for law in (ss.Kirchhoff(), ss.Kirchhoff(edges="sharp"))
+        for law in (ss.Kirchhoff(edges="smooth"), ss.Kirchhoff(edges="sharp"))
     ]
+    assert error[0].max() < 0.75
     assert error[0].max() < 0.7 * error[1].max()
+
+
+def test_only_closed_convex_bodies_without_creases_have_their_shadow() -> None:
+    """Straight ahead: of a sphere as the exact series says; nothing of half of it, of a lens, or where tapered."""
+    ball = mesh_of(ss.Sphere(radius=0.25, edge=0.02))
+    ahead = ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0))
+    whole = ss.target_strength(ball, 30e3, *ahead)
+    assert whole == pytest.approx(20 * np.log10(abs(sphere_amplitude(30e3, 0.0, radius=0.25))), abs=0.1)
+    top = Mesh(ball.vertices, ball.faces[ball.centroid[:, 2] > 0])
+    lens = joined(
+        Mesh(ball.vertices - [0, 0, 0.2], ball.faces[ball.centroid[:, 2] > 0.2]),
+        Mesh(ball.vertices + [0, 0, 0.2], ball.faces[ball.centroid[:, 2] < -0.2]),
+    )
+    for other in (top, lens, ss.Box(size=(0.5, 0.5, 0.5)), ss.Cylinder(radius=0.2, length=0.5)):
+        assert ss.target_strength(other, 30e3, *ahead) == -np.inf
+    assert ss.target_strength(ball, 30e3, *ahead, 1500.0, ss.Kirchhoff(edges="smooth")) == -np.inf
 
 
 def test_the_example_of_the_documentation() -> None:
@@ -141,11 +161,13 @@ def test_source_and_receiver_may_be_exchanged(shape: ss.Remus100 | ss.LShape, la
 
 
 def test_a_half_space_of_known_contrast_reflects_its_share() -> None:
-    sphere = ss.Sphere(radius=0.25)
-    rigid = ss.target_strength(sphere, BAND, (1, 0, 0), (-1, 0, 0))
-    law = ss.Kirchhoff(surface=ss.PartlyReflecting(density_ratio=2.0, speed_ratio=1.5))
-    share = ss.target_strength(sphere, BAND, (1, 0, 0), (-1, 0, 0), 1500.0, law) - rigid
-    np.testing.assert_allclose(share, 20 * np.log10((2.0 * 1.5 - 1) / (2.0 * 1.5 + 1)), atol=1e-9)
+    sphere, sand = ss.Sphere(radius=0.25), ss.PartlyReflecting(density_ratio=2.0, speed_ratio=1.5)
+    for edges, allowed in (("smooth", 1e-9), ("auto", 0.15)):
+        rigid, partly = (
+            ss.target_strength(sphere, BAND, (1, 0, 0), (-1, 0, 0), 1500.0, ss.Kirchhoff(surface=surface, edges=edges))
+            for surface in ("rigid", sand)
+        )
+        np.testing.assert_allclose(partly - rigid, 20 * np.log10((2.0 * 1.5 - 1) / (2.0 * 1.5 + 1)), atol=allowed)
 
 
 def test_a_rough_plate_loses_its_coherent_echo_and_keeps_a_lobe() -> None:
