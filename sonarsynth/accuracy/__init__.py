@@ -11,7 +11,38 @@ from typing import Final
 from sonarsynth.accuracy.rays import ray_accuracy
 from sonarsynth.accuracy.rows import Row
 
-REFERENCES: Final[dict[str, Callable[[bool], list[Row]]]] = {"rays": ray_accuracy}
+
+def _sphere(quick: bool) -> list[Row]:
+    from sonarsynth.accuracy.sphere import sphere_accuracy
+
+    return sphere_accuracy(quick)
+
+
+def _cylinder(quick: bool) -> list[Row]:
+    from sonarsynth.accuracy.cylinder import cylinder_accuracy
+
+    return cylinder_accuracy(quick)
+
+
+def _plate(quick: bool) -> list[Row]:
+    from sonarsynth.accuracy.plate import plate_accuracy
+
+    return plate_accuracy(quick)
+
+
+def _bubble(quick: bool) -> list[Row]:
+    from sonarsynth.accuracy.bubbles import bubble_accuracy
+
+    return bubble_accuracy(quick)
+
+
+REFERENCES: Final[dict[str, Callable[[bool], list[Row]]]] = {
+    "rays": ray_accuracy,
+    "sphere": _sphere,
+    "cylinder": _cylinder,
+    "plate": _plate,
+    "bubble": _bubble,
+}
 """Rows of each reference; the argument is whether to be quick about it."""
 
 __all__ = ["REFERENCES", "Row", "ray_accuracy"]

@@ -35,6 +35,7 @@ MANY_DIGITS, INTEGRATED, FAN = "50 digits", "DOP853 through the layers", "a dens
 SMOOTH = "DOP853, smooth profile"
 REPEATS = 5
 BATCH = 2e-3  # s: a search is timed on at least so much
+COST = "us a ray"  # CPU time of one core for one ray, in the complete search of the whole case
 
 
 def ray_accuracy(quick: bool = False) -> list[Row]:
@@ -71,9 +72,14 @@ def search(case: Case) -> tuple[Eigenrays, float]:
 
 def _rows(case: Case, reference: str, cost: float, found: Rays, exact: Rays, trusted: Bools) -> Iterator[Row]:
     """One row a quantity of matched rays."""
-    size = len(case.start), len(found.pair)
+    counts = _counts(case, len(found.pair))
     for quantity, (unit, got, bound) in errors(found, exact, trusted, case.bounds).items():
-        yield Row(case.name, reference, quantity, unit, bound, got, cost, *size)
+        yield Row(case.name, reference, quantity, unit, bound, got, cost, COST, counts)
+
+
+def _counts(case: Case, rays: int) -> dict[str, int]:
+    """Pairs of ends that were searched, and rays that were compared."""
+    return {"pairs": len(case.start), "rays": rays}
 
 
 def _trusted(found: Eigenrays) -> Bools:
@@ -85,7 +91,7 @@ def _trusted(found: Eigenrays) -> Bools:
 def _complete(case: Case, reference: str, cost: float, found: Rays, exact: Rays, trusted: Bools) -> Iterator[Row]:
     """Rows of a reference that gives every ray."""
     wrong = miscounted(found, Counter(exact.families))
-    yield Row(case.name, reference, "count", "rays", 0.0, float(wrong), cost, len(case.start), len(found.pair))
+    yield Row(case.name, reference, "count", "rays", 0.0, float(wrong), cost, COST, _counts(case, len(found.pair)))
     i, j = matched(found, exact)
     yield from _rows(case, reference, cost, found.select(i), exact.select(j), trusted[i])
 
@@ -118,12 +124,12 @@ def _counted(case: Case, reference: str, refine: Callable[[Case, Eigenrays, Rays
     ends = (case.start, case.end, case.distance)
     counts = count_rays(case.depth, case.speed, *ends, case.vertices, case.reflections)
     wrong = miscounted(rays, counts)
-    yield Row(case.name, FAN, "count", "rays", 0.0, float(wrong), cost, len(case.start), len(rays.pair))
+    yield Row(case.name, FAN, "count", "rays", 0.0, float(wrong), cost, COST, _counts(case, len(rays.pair)))
     keep = _thinned(case, rays)
     some, trusted = rays.select(keep), _trusted(found)[keep]
     exact = refine(case, found, some, keep)
     other = sum(a != b for a, b in zip(some.families, exact.families, strict=True))
-    yield Row(case.name, reference, "family", "wrong", 0.0, float(other), cost, len(case.start), len(keep))
+    yield Row(case.name, reference, "family", "wrong", 0.0, float(other), cost, COST, _counts(case, len(keep)))
     yield from _rows(case, reference, cost, some, exact, trusted)
 
 
@@ -156,9 +162,9 @@ def _smooth(quick: bool) -> Iterator[Row]:
         case = approach.case(tolerance)
         found, cost = search(case)
         i, j = nearest(rays_of(found), exact)
-        size = len(case.start), len(exact.pair)
+        counts = _counts(case, len(exact.pair))
         missed = float(len(exact.pair) - len(j))
-        yield Row(case.name, SMOOTH, "missed", "rays", 0.0, missed, cost, *size, approach.name)
+        yield Row(case.name, SMOOTH, "missed", "rays", 0.0, missed, cost, COST, counts, approach.name)
         error = np.abs(found.travel_time[i] - exact.travel_time[j])
         got, bound = worst(error, tolerance * np.maximum(1, exact.turning[j]))
-        yield Row(case.name, SMOOTH, "time", "s", bound, got, cost, *size, approach.name)
+        yield Row(case.name, SMOOTH, "time", "s", bound, got, cost, COST, counts, approach.name)

@@ -3,33 +3,98 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final
 
 from sonarsynth.accuracy.rows import Row
 from sonarsynth.pictures.accuracy import Line, Mark, error_and_time_figure
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from sonarsynth.pictures.accuracy_bodies import Trade
+
+RELATIVE: Final = "relative error at 110 kHz, rms over ways"
+
 
 def as_json(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """The rows, for programs: case, quantity, expected (the bound), got (the error), ok, microseconds and more."""
+    """The rows, for programs: case, quantity, expected (the bound), got (the error), ok, cost and more."""
     return [row.as_json() for row in rows]
 
 
 def write(rows: Sequence[Row], out: Path, name: str) -> list[Path]:
-    """Write <name>.json and, where times were checked, <name>.png into a folder; their paths."""
+    """Write <name>.json and, where there is something to draw, <name>.png into a folder; their paths."""
     out.mkdir(parents=True, exist_ok=True)
-    files = [out / f"{name}.json"]
+    files = [out / f"{name}.json", out / f"{name}.png"]
     files[0].write_text(json.dumps(as_json(rows), indent=2) + "\n")
-    times = [row for row in rows if row.quantity == "time"]
-    if times:
-        marks = [Mark(r.case, r.reference, r.microseconds, r.got) for r in times if r.knob is None]
-        knobs = dict.fromkeys(r.knob for r in times if r.knob is not None)
-        lines = [_line(knob, [r for r in times if r.knob == knob]) for knob in knobs]
-        files.append(out / f"{name}.png")
-        error_and_time_figure(marks, lines).savefig(files[1])
+    picture = PICTURES[name](rows)
+    if picture is None:
+        return files[:1]
+    picture.savefig(files[1])
     return files
 
 
-def _line(name: str, rows: Sequence[Row]) -> Line:
-    return Line(name, tuple(r.microseconds for r in rows), tuple(r.got for r in rows))
+def _rays(rows: Sequence[Row]) -> Figure | None:
+    times = [row for row in rows if row.quantity == "time"]
+    marks = [Mark(r.case, r.reference, r.cost, r.got) for r in times if r.knob is None]
+    lines = [Line(knob, tuple(r.cost for r in of), tuple(r.got for r in of)) for knob, of in _knobs(times).items()]
+    return error_and_time_figure(marks, lines) if times else None
+
+
+def _knobs(rows: Sequence[Row]) -> dict[str, list[Row]]:
+    """The rows of each trade of error for time."""
+    names = dict.fromkeys(row.knob for row in rows if row.knob is not None)
+    return {name: [row for row in rows if row.knob == name] for name in names}
+
+
+def _trades(rows: Sequence[Row], quantity: str) -> list[Trade]:
+    """Those of one quantity."""
+    from sonarsynth.pictures.accuracy_bodies import Trade
+
+    made = []
+    for name, of in _knobs([row for row in rows if row.quantity == quantity]).items():
+        columns = [r.counts["facets"] for r in of], [r.cost for r in of], [r.got for r in of], [r.expected for r in of]
+        made.append(Trade(name, *columns))
+    return made
+
+
+def _sphere(rows: Sequence[Row]) -> Figure:
+    from sonarsynth.accuracy.curves import sphere_panels
+    from sonarsynth.pictures.accuracy_bodies import bodies_figure
+
+    trades = {RELATIVE: _trades(rows, "amplitude"), "error of the level, largest (dB)": _trades(rows, "level")}
+    return bodies_figure("Spheres of facets against exact computations", trades, sphere_panels())
+
+
+def _cylinder(rows: Sequence[Row]) -> Figure:
+    from sonarsynth.accuracy.curves import cylinder_panels
+    from sonarsynth.pictures.accuracy_bodies import bodies_figure
+
+    trades = {RELATIVE: _trades(rows, "amplitude")}
+    return bodies_figure("Cylinders of facets against exact computations", trades, cylinder_panels())
+
+
+def _plate(rows: Sequence[Row]) -> Figure:
+    from sonarsynth.accuracy.curves import plate_panels
+    from sonarsynth.pictures.accuracy_bodies import bodies_figure
+
+    trades = {"error over area/wavelength, largest": _trades(rows, "amplitude")}
+    return bodies_figure("Flat plates: facets, however cut, against closed forms", trades, plate_panels())
+
+
+def _bubble(rows: Sequence[Row]) -> Figure | None:
+    from sonarsynth.accuracy.bubbles_solvers import solver_picture
+
+    drawn: Figure | None = solver_picture(rows)
+    return drawn
+
+
+PICTURES: Final[dict[str, Callable[[Sequence[Row]], Figure | None]]] = {
+    "rays": _rays,
+    "sphere": _sphere,
+    "cylinder": _cylinder,
+    "plate": _plate,
+    "bubble": _bubble,
+}
+"""Picture of the rows of each reference; None where there is nothing to draw."""

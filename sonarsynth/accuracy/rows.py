@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from math import isnan
 from typing import Any
@@ -20,14 +21,16 @@ class Row:
     """Bound of the error, in `unit`: at the place where the error is largest against its bound."""
     got: float
     """The error there."""
-    microseconds: float
-    """CPU time of one core for one ray, in the complete search of the whole case."""
-    pairs: int
-    """Pairs of ends that were searched."""
-    rays: int
-    """Rays that were compared."""
+    cost: float
+    """CPU time of one core, in `cost_unit`."""
+    cost_unit: str
+    """Of what, too: "us a ray", "ms an aspect"."""
+    counts: Mapping[str, int]
+    """How much of it there was, each number with its name: {"pairs": 60, "rays": 540}, {"facets": 20480}."""
     knob: str | None = None
     """Name of the trade of error for time that the case is one point of."""
+    note: str = ""
+    """What the bound is, where it is not the one that is aimed at; one line."""
 
     @property
     def ok(self) -> bool:
@@ -35,5 +38,5 @@ class Row:
         return self.got <= self.expected
 
     def as_json(self) -> dict[str, Any]:
-        """The row with its verdict, for programs; an error that is not a number is None."""
-        return asdict(self) | {"got": None if isnan(self.got) else self.got, "ok": self.ok}
+        """The row with its verdict, for programs: counts by their names; an error that is not a number is None."""
+        return asdict(self) | dict(self.counts) | {"got": None if isnan(self.got) else self.got, "ok": self.ok}

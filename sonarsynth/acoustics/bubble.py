@@ -11,7 +11,7 @@ from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import DOP853, LSODA, OdeSolution, Radau
+from scipy.integrate import BDF, DOP853, LSODA, RK45, OdeSolution, Radau
 from scipy.optimize import brentq
 from scipy.special import boxcox
 
@@ -46,7 +46,8 @@ POINT: Final = -40.0
 MOST_STEPS: Final = 20_000
 """Steps from turn to turn of the wall after which a bubble is given up (25 are usual)."""
 
-METHODS: Final = {"DOP853": DOP853, "LSODA": LSODA, "Radau": Radau}
+Method = Literal["DOP853", "RK45", "LSODA", "Radau", "BDF"]
+METHODS: Final = {"DOP853": DOP853, "RK45": RK45, "LSODA": LSODA, "Radau": Radau, "BDF": BDF}
 
 
 class Turn(NamedTuple):
@@ -69,6 +70,7 @@ class Collapse:
     steps: Floats  # (step + 1,) s of the stretched clock
     clock: Floats  # (step + 1,) s from the first collapse
     state: OdeSolution  # of the stretched clock: (q, W, t/T from rest)
+    evaluations: int  # of the equation, to solve it
 
     @property
     def reason(self) -> str:
@@ -96,7 +98,7 @@ def collapse(
     cavity: Cavity,
     rebounds: int = 0,
     tolerance: float = 1e-10,
-    method: Literal["DOP853", "LSODA", "Radau"] = "DOP853",
+    method: Method = "DOP853",
 ) -> Collapse:
     """The bubble from rest through its first collapse to the top of its rebound, and through so many collapses more.
 
@@ -116,7 +118,7 @@ def collapse(
         steps, pieces, turns = _march(solver, 2 * (rebounds + 1), n, 30.0 * tolerance)
         state = OdeSolution(steps, pieces)
         steps[-1] = turns[-1] if len(turns) == 2 * (rebounds + 1) else steps[-1]
-        return _solved(cavity, n, np.array(steps), turns, state)
+        return _solved(cavity, n, np.array(steps), turns, state, int(solver.nfev))
 
 
 def _march(solver: Any, wanted: int, n: Numbers, still: float) -> tuple[list[float], list[Any], list[float]]:
@@ -143,7 +145,9 @@ def _root(piece: Any, low: float, high: float) -> float:
     return float(brentq(lambda s: float(piece(s)[1]), low, high, xtol=1e-15, rtol=1e-15))
 
 
-def _solved(cavity: Cavity, n: Numbers, steps: Floats, turns: list[float], state: OdeSolution) -> Collapse:
+def _solved(
+    cavity: Cavity, n: Numbers, steps: Floats, turns: list[float], state: OdeSolution, evaluations: int
+) -> Collapse:
     singular = state(steps[-1])[0] <= POINT
     at = np.append(turns, steps[-1]) if singular else np.array(turns)
     stood = [(n.time * float(tau), cavity.radius * float(ratio(q, n))) for q, _, tau in state(at).T] if at.size else []
@@ -163,6 +167,7 @@ def _solved(cavity: Cavity, n: Numbers, steps: Floats, turns: list[float], state
         steps,
         n.time * state(steps)[2] - zero,
         state,
+        evaluations,
     )
 
 

@@ -12,11 +12,15 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from sonarsynth.acoustics.bubble import SETTLED, SINGULAR, Collapse, Motion, moving, stretched
-from sonarsynth.acoustics.pulses import Pulse
+from sonarsynth.acoustics.pulses import Pulse, filtered, reach
+from sonarsynth.acoustics.spectra import Fir
 from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
 
 NODES, PERIODS = 12, 1.5
 """Gauss-Legendre nodes of a panel, and the most periods of the highest wave in one."""
+
+TRANSITION, ATTENUATION = 0.2, 80.0
+"""Of the low pass of `peak_below`: width over its corner frequency, and dB."""
 
 
 def _pressure(s: float, found: Collapse) -> float:
@@ -102,3 +106,22 @@ def pulse(found: Collapse, highest: float, fade: float = 0.5) -> Pulse:
     moved = moving((middle[:, None] + half[:, None] * node).ravel(), found)
     strength = (half[:, None] * weight).ravel() * moved.rate * _gate(moved, begins, ends)
     return Pulse(moved.time, strength, start, end, peak(found)[1])
+
+
+@lru_cache(maxsize=256)
+def peak_below(found: Collapse, frequency: float, fade: float = 0.5) -> float:
+    """Largest pressure (Pa) at 1 m of the first collapse below a frequency (Hz): behind a low pass that is at half
+    there, to 1e-4.
+
+    It hardly depends on the gas, and is finite for a bubble that becomes a point: what an instrument hears of a peak
+    that lasts nanoseconds. Raises ValueError for a bubble that settles.
+    """
+    low_pass = Fir(0.0, frequency, TRANSITION * frequency, ATTENUATION)
+    made = pulse(found, reach(low_pass), fade)
+
+    def heard(time: Floats) -> Floats:
+        return filtered(time, made, low_pass)
+
+    time, step = peak(found)[0] + np.linspace(-1.0, 1.0, 33) / frequency, 1.0 / (16.0 * frequency)
+    around = time[np.argmax(heard(time))] + np.linspace(-step, step, 33)
+    return float(heard(around).max())

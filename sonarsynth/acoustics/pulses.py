@@ -31,7 +31,7 @@ class Pulse:
     strength: Floats  # (node,) Pa s
     start: float  # s: it is nothing before
     end: float  # s: nor after
-    peak: float  # Pa, largest pressure before any filter; infinite for a singular bubble
+    peak: float  # Pa, what a source level is of: the largest pressure, before any filter or behind the model's own
 
 
 class Levels(NamedTuple):
@@ -129,7 +129,7 @@ def scaled(pulse: Pulse, gain: float, width: float) -> Pulse:
 
 
 def gain_for_level(pulse: Pulse, level: float | None) -> float:
-    """Factor that gives the unfiltered peak a source level (dB re 1 uPa at 1 m); 1 for None.
+    """Factor that gives the peak a source level (dB re 1 uPa at 1 m); 1 for None.
 
     Raises ValueError where the peak is infinite.
     """

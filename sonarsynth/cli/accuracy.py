@@ -14,11 +14,14 @@ from sonarsynth.cli.running import BadOption
 if TYPE_CHECKING:
     from sonarsynth.accuracy import Row
 
+HELP = (
+    "What is checked: rays, the search for eigenrays; sphere, cylinder or plate, their echoes by flat facets; "
+    "bubble, the collapse that a snap comes from."
+)
+
 
 def accuracy(
-    reference: Annotated[
-        str, typer.Option(metavar="NAME", help="What is checked: rays, the search for eigenrays.")
-    ] = "rays",
+    reference: Annotated[str, typer.Option(metavar="NAME", help=HELP)] = "rays",
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where rows and picture go.")] = Path("accuracy"),
     as_json: Annotated[bool, typer.Option("--json", help="Print the rows as JSON.")] = False,
 ) -> None:
@@ -45,23 +48,30 @@ def accuracy(
 
 
 def _table(rows: list[Row]) -> None:
-    """One line a row; case and reference where they change."""
+    """One line a row; case and reference where they change; notes below."""
     from sonarsynth.cli.printing import console
 
-    right = ("allowed", "error", "us a ray", "pairs", "rays")
-    table = Table("case", "against", "quantity", "unit")
-    for name in right:
-        table.add_column(name, justify="right")
-    table.add_column("")
+    counted = list(dict.fromkeys(name for row in rows for name in row.counts))
+    table = Table()
+    for name, least in (("case", 18), ("against", 12), ("quantity", 14), ("unit", 4)):
+        table.add_column(name, min_width=least)
+    for name in ("allowed", "error", "cost", *counted):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("", no_wrap=True)
     before = ("", "")
+    notes = list(dict.fromkeys(row.note for row in rows if row.note))
     for row in rows:
         named = (row.case, row.reference)
         if named[0] != before[0]:
             table.add_section()
         case, against = ("" if a == b else a for a, b in zip(named, before, strict=True))
         before = named
-        numbers = (f"{row.expected:.2g}", f"{row.got:.2g}", f"{row.microseconds:.3g}", str(row.pairs), str(row.rays))
-        table.add_row(case, against, row.quantity, row.unit, *numbers, "ok" if row.ok else "FAILED")
+        numbers = (f"{row.expected:.2g}", f"{row.got:.2g}", f"{row.cost:.3g} {row.cost_unit}")
+        counts = (str(row.counts.get(name, "")) for name in counted)
+        verdict = ("ok" if row.ok else "FAILED") + (f" ({notes.index(row.note) + 1})" if row.note else "")
+        table.add_row(case, against, row.quantity, row.unit, *numbers, *counts, verdict)
     console().print(table)
+    for number, note in enumerate(notes, 1):
+        console().print(f"({number}) {note}")
     failed = sum(not row.ok for row in rows)
     console().print(f"{len(rows)} rows, {failed} failed" if failed else f"{len(rows)} rows, all within their bounds")

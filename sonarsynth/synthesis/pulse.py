@@ -262,12 +262,12 @@ def heard_part(waveform: Waveform, chosen: Filter) -> float:
 
 
 def _peak(waveform: Waveform) -> float:
-    """Largest pressure (Pa) at 1 m before any filter."""
+    """Largest pressure (Pa) at 1 m, as the model's level is taken."""
     return _made(waveform.model, waveform.stamp, 0.0).peak
 
 
 def snap_levels(heard: tuple[Snap, ...]) -> Floats:
-    """(snap,) peak source level of each snap (dB re 1 uPa at 1 m) before any filter."""
+    """(snap,) peak source level of each snap (dB re 1 uPa at 1 m), as its model's level is taken."""
     with np.errstate(divide="ignore"):
         own = [20.0 * np.log10(_peak(s.waveform) / REFERENCE_PRESSURE) for s in heard]
     level = [o if s.source_level is None else s.source_level for s, o in zip(heard, own, strict=True)]

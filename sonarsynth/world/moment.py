@@ -30,7 +30,7 @@ class Snap:
     position: Floats  # (xyz) m, world
     time: float  # s of the collapse on the clock of the frame
     model: SnapModel  # a bubble at its depth
-    source_level: float | None  # dB re 1 uPa at 1 m peak of the model, before any filter; None: its own
+    source_level: float | None  # dB re 1 uPa at 1 m peak of the model (see `level_below`); None: its own
     gain: float = 1.0
     width: float = 1.0
 

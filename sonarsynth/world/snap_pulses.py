@@ -50,6 +50,8 @@ def at_depth(model: SnapModel, depth: float) -> SnapModel:
 def pulse(model: SnapModel, depth: float, highest: float) -> Pulse:
     """The pulse (Pa at 1 m) of a snap at a depth (m), for waves up to `highest` (Hz); time 0 is the collapse.
 
+    Its `peak` is what a source level is of: the largest pressure before any filter, or behind that of `level_below`.
+
     Raises ValueError in one line where the model has none: a bubble that does not collapse or collapses too fast for
     its equation, a file that cannot be read.
     """
@@ -57,7 +59,7 @@ def pulse(model: SnapModel, depth: float, highest: float) -> Pulse:
         case LogarithmicBubble():
             return waveforms.logarithmic(Bubble(model.a, model.k, model.m, model.q, model.density), highest)
         case KellerMiksis():
-            return bubble_pulse.pulse(collapse(model, depth), highest, model.fade)
+            return _keller_miksis(model, depth, highest)
         case RecordedSnap():
             recording = read_recording(model)
             return waveforms.recorded(recording.pressure, recording.sampling_frequency, recording.zero, highest)
@@ -65,6 +67,14 @@ def pulse(model: SnapModel, depth: float, highest: float) -> Pulse:
             return waveforms.ricker(model.frequency, model.peak, highest)
         case Gabor():
             return waveforms.gabor(model.frequency, model.cycles, model.peak, highest)
+
+
+def _keller_miksis(model: KellerMiksis, depth: float, highest: float) -> Pulse:
+    found = collapse(model, depth)
+    made = bubble_pulse.pulse(found, highest, model.fade)
+    if model.level_below is None:
+        return made
+    return replace(made, peak=bubble_pulse.peak_below(found, model.level_below, model.fade))
 
 
 def cavity(model: KellerMiksis, depth: float) -> Cavity:

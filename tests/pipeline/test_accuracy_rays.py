@@ -45,7 +45,7 @@ def test_the_search_is_within_every_bound(rows: list[Row]) -> None:
         row.case for row in rows
     }
     assert {"count", "family", "time", "angle", "amplitude", "caustics"} <= {row.quantity for row in rows}
-    assert all(row.rays > 0 and row.microseconds > 0 for row in rows)
+    assert all(row.counts["rays"] > 0 and row.cost > 0 and row.cost_unit == "us a ray" for row in rows)
 
 
 @pytest.mark.parametrize(("slope", "bed", "farthest"), [(0.0163, 4e3, 6e4), (-4.3, 20.0, 300.0), (1e-6, 100.0, 1e4)])
@@ -133,9 +133,9 @@ def test_rows_and_picture_are_written(rows: list[Row], tmp_path: Path) -> None:
     assert [file.name for file in files] == ["rays.json", "rays.png"]
     answer = json.loads(files[0].read_text())
     assert len(answer) == len(rows)
-    assert {"case", "quantity", "expected", "got", "ok", "microseconds", "pairs", "rays"} <= set(answer[0])
+    assert {"case", "quantity", "expected", "got", "ok", "cost", "cost_unit", "pairs", "rays"} <= set(answer[0])
     assert files[1].stat().st_size > 10_000
-    lost = Row("a", "b", "time", "s", 1e-13, float("nan"), 1.0, 1, 1)
+    lost = Row("a", "b", "time", "s", 1e-13, float("nan"), 1.0, "us a ray", {"pairs": 1, "rays": 1})
     assert not lost.ok
     assert lost.as_json()["got"] is None
 
@@ -143,7 +143,7 @@ def test_rows_and_picture_are_written(rows: list[Row], tmp_path: Path) -> None:
 def test_the_command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     app = typer.Typer()
     app.command()(accuracy)
-    good = Row("a case", "a reference", "time", "s", 1e-13, 1e-15, 0.7, 3, 9)
+    good = Row("a case", "a reference", "time", "s", 1e-13, 1e-15, 0.7, "us a ray", {"pairs": 3, "rays": 9})
     monkeypatch.setitem(REFERENCES, "rays", lambda quick: [good])
     assert run(app, ["--reference", "rays", "--out", str(tmp_path)]) == 0
     out = capfd.readouterr().out
@@ -154,7 +154,7 @@ def test_the_command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pyt
     assert run(app, ["--json", "--out", str(tmp_path)]) == 1
     assert [row["ok"] for row in json.loads(capfd.readouterr().out)] == [True, False]
     assert run(app, ["--reference", "nothing", "--out", str(tmp_path)]) == 2
-    assert capfd.readouterr().err == "sonarsynth: --reference nothing is none of rays\n"
+    assert capfd.readouterr().err == f"sonarsynth: --reference nothing is none of {', '.join(REFERENCES)}\n"
 
 
 def test_without_mpmath_one_line_says_how_to_get_it(

@@ -169,12 +169,12 @@ def test_derivatives_are_those_of_the_radius() -> None:
     assert bubble.pressure(t, found) == pytest.approx(998.0 * (flow[0] - flow[1]) / (2 * h), rel=1e-4)
 
 
-@pytest.mark.parametrize("method", ["LSODA", "Radau"])
+@pytest.mark.parametrize("method", ["RK45", "LSODA", "Radau", "BDF"])
 def test_other_solvers_agree(method: str) -> None:
     reference = bubble.collapse(cavity(100.0), tolerance=1e-12)
     found = bubble.collapse(cavity(100.0), tolerance=1e-8, method=method)  # type: ignore[arg-type]
     assert found.minimum_radius == pytest.approx(reference.minimum_radius, rel=1e-6)
-    assert found.collapse_time == pytest.approx(reference.collapse_time, rel=1e-8)
+    assert found.collapse_time == pytest.approx(reference.collapse_time, rel=1e-7 if method == "BDF" else 1e-8)
 
 
 LEVELS = """

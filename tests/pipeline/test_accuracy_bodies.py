@@ -1,0 +1,205 @@
+"""The accuracy of echoes by facets: rows within their bounds, references that agree, wrong figures seen, pictures."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import mpmath as mp
+import numpy as np
+import pytest
+import typer
+from scipy.integrate import quad
+from scipy.special import j1
+
+from sonarsynth.accuracy import REFERENCES, Row
+from sonarsynth.accuracy.bodies import BAND, SOUND_SPEED, Point, order, trade_rows, wavenumber
+from sonarsynth.accuracy.plate import DOWN, SIDES, UP, echoes, points_echo, polygon, rectangle, split, tiles
+from sonarsynth.accuracy.references.cylinder_integral import lit_cylinder
+from sonarsynth.accuracy.references.front_echo import front_echo
+from sonarsynth.accuracy.references.triangles import exact_triangle
+from sonarsynth.accuracy.report import PICTURES, write
+from sonarsynth.accuracy.triangles import triangle_rows
+from sonarsynth.acoustics.modal import Fluid, cylinder_amplitude, sphere_amplitude
+from sonarsynth.cli.accuracy import HELP, accuracy
+from sonarsynth.cli.running import run
+from sonarsynth.pictures.accuracy_bodies import Curve, Panel, Trade, bodies_figure
+
+BODIES = ("sphere", "cylinder", "plate")
+PART: Mapping[str, set[str]] = {
+    "sphere": {"at the mirror angle", "square to an edge", "amplitude", "level", "order less 2", "error as expected"}
+    | {"backscatter", "bistatic, 0 to 60 deg", "bistatic, 105 to 120 deg", "front, 0 to 60 deg", "left out"},
+    "cylinder": {"amplitude", "order less 2", "error as expected", "broadside", "side, 90 to 45 deg"},
+    "plate": {"amplitude", "straight back", "nulls", "null"},
+}
+
+
+@pytest.fixture(scope="module")
+def rows() -> dict[str, list[Row]]:
+    return {name: REFERENCES[name](True) for name in BODIES}
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_echoes_of_facets_are_within_every_bound(rows: dict[str, list[Row]], name: str) -> None:
+    of = rows[name]
+    assert [row for row in of if not row.ok] == []
+    assert PART[name] <= {row.quantity for row in of}
+    assert all(row.cost > 0 and row.counts["facets"] > 0 and row.counts["values"] > 0 for row in of)
+    for knob in {row.knob for row in of if row.knob}:
+        trade = [row for row in of if row.knob == knob]
+        assert len(trade) >= 3
+        facets = [row.counts["facets"] for row in trade]
+        assert facets == sorted(facets)
+
+
+def test_facets_get_better_as_they_get_smaller(rows: dict[str, list[Row]]) -> None:
+    for name, body in (("sphere", "rigid sphere, 0.25 m"), ("cylinder", "rigid cylinder, 0.1 by 0.8 m, broadside")):
+        errors = [row.got for row in rows[name] if row.knob == body]
+        assert errors == sorted(errors, reverse=True)
+        assert errors[0] > 4 * errors[-1] > 0
+
+
+def test_triangles_of_many_digits_are_those_of_closed_forms() -> None:
+    corners = np.array([[0.0, 0, 0], [2, 0, 0], [0, 3, 0]])
+    assert exact_triangle(corners, np.zeros(3)) == (pytest.approx(3.0, abs=1e-15), 3.0)
+    for a in (1e-9, 0.7, 40.0):  # along x: int_0^2 3 (1 - x/2) exp(i a x) dx
+        with mp.workdps(40):
+            b = mp.mpf(a)
+            closed = complex(3 * (1j / b + (1 - mp.exp(2j * b)) / (2 * b * b)))
+        assert abs(exact_triangle(corners, np.array([a, 0.0, 5.0]))[0] - closed) < 1e-15
+    wave, middle = np.array([3.0, -7.0, 2.0]), corners.mean(axis=0)
+    parts = [np.array([corners[i], corners[i - 2], middle]) for i in range(3)]
+    assert abs(sum(exact_triangle(part, wave)[0] for part in parts) - exact_triangle(corners, wave)[0]) < 1e-15
+
+
+def test_the_integral_over_a_cylinder_is_that_of_quadrature_and_near_the_series() -> None:
+    a, length = 0.1, 0.8
+    for k in (5.0, 104.7, 460.0):
+        for aspect in (0.3, 1.2, 0.5 * np.pi):
+            x = 2 * k * a * np.sin(aspect)
+            around = [
+                quad(lambda q, g=g, x=x: np.cos(q) * g(x * np.cos(q)), 0, np.pi / 2, limit=400)[0]
+                for g in (np.cos, np.sin)
+            ]
+            side = a * np.sin(aspect) * length * np.sinc(k * length * np.cos(aspect) / np.pi) * 2 * complex(*around)
+            end = np.pi * a * a * np.cos(aspect) * 2 * j1(x) / x * np.exp(1j * k * length * np.cos(aspect))
+            exact = 0.5j * k / np.pi * (side + end)
+            assert abs(lit_cylinder(aspect, k, a, length) - exact) < 1e-9 * abs(0.5 * k / np.pi * a * length)
+    k = wavenumber(BAND)
+    assert np.abs(lit_cylinder(0.0, k, a, length)) == pytest.approx(np.pi * a * a * BAND / SOUND_SPEED)
+    series = cylinder_amplitude(BAND, 0.5 * np.pi, radius=a, length=length)
+    assert np.abs(lit_cylinder(0.5 * np.pi, k, a, length) / series - 1).max() < 0.06
+
+
+@pytest.mark.parametrize("away", [0.0, 0.8])
+def test_the_front_echo_of_a_sphere_as_heavy_as_can_be_is_that_of_a_rigid_one(away: float) -> None:
+    front = front_echo(BAND, away, 0.25, Fluid(1e9, 1.0), SOUND_SPEED)
+    whole = sphere_amplitude(BAND, np.pi - away, radius=0.25)
+    assert np.abs(front / whole - 1).max() < 0.03
+    through = front_echo(BAND, away, 0.25, Fluid(1.0, 1.0), SOUND_SPEED)
+    assert np.abs(through).max() < 1e-9
+
+
+def test_plates_are_cut_without_loss_and_points_become_facets() -> None:
+    rng = np.random.default_rng(1)
+    pieces = split(split(rectangle(), rng), rng)
+    assert len(pieces) == 18
+    for corners in (pieces, tiles(5)):
+        doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        assert (doubled[:, 2] > 0).all()
+        assert doubled[:, 2].sum() == pytest.approx(2 * np.prod(SIDES), rel=1e-13)
+    assert 0.5 * np.cross(*np.moveaxis(polygon(6)[:, 1:], 1, 0))[:, 2].sum() == pytest.approx(1.5 * 3**0.5 * 0.09)
+    into, out = DOWN[None], np.array([[0.3, 0.4, np.sqrt(0.75)]])
+    whole = echoes(rectangle(), into, out, BAND)
+    off = [np.abs(points_echo(tiles(n), into, out, BAND) - whole).max() for n in (40, 80, 160)]
+    assert off[0] > 3.5 * off[1] > 12 * off[2] > 0
+    np.testing.assert_allclose(
+        points_echo(rectangle(), into, UP[None], BAND), echoes(rectangle(), into, UP[None], BAND)
+    )
+
+
+def points(power: float, factor: float) -> list[Point]:
+    edges = np.array([0.04, 0.02, 0.01])
+    rise = BAND / BAND[-1]
+    return [
+        Point(100, e, 1.0, np.full((4, 1), factor * (e / 0.1) ** power) * rise, (e / 0.1) ** 2 * rise) for e in edges
+    ]
+
+
+def test_what_is_wrong_is_seen() -> None:
+    assert order(points(1.7, 1.0)) == pytest.approx(1.7)
+    for power, factor, wrong in (
+        (2.0, 1.0, set()),
+        (2.0, 0.4, {"error as expected"}),
+        (2.0, 3.0, {"amplitude", "error as expected"}),
+        (1.7, 1.0, {"order less 2"}),
+    ):
+        assert {row.quantity for row in trade_rows("a", "b", points(power, factor)) if not row.ok} == wrong
+
+
+def test_a_wrong_integral_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    from sonarsynth.acoustics.kirchhoff import triangle_integral
+
+    monkeypatch.setattr(
+        "sonarsynth.accuracy.triangles.triangle_integral", lambda x, w: triangle_integral(x, w) * (1 + 1e-11)
+    )
+    assert not any(row.ok for row in triangle_rows(True) if row.quantity == "1e-8 off the mirror angle")
+
+
+def test_a_picture_shows_every_trade_and_curve() -> None:
+    x = np.linspace(0.0, 1.0, 5)
+    trade = Trade("a body", [10, 100], [0.1, 1.0], [1e-2, 0.0], [1e-1, 1e-3])
+    panels = [
+        Panel("over x", "x", "dB", (Curve("exact", x, x, "exact", 0), Curve("facets", x, x, "facets", 1)), -1.0, 2.0)
+    ]
+    made = bodies_figure("bodies", {"an error": [trade], "another": [trade]}, panels)
+    assert len(made.axes) == 6
+    assert [axes.get_ylabel() for axes in made.axes[:5]] == ["an error", "an error", "another", "another", "dB"]
+    np.testing.assert_array_equal(made.axes[0].lines[0].get_xydata(), [[10, 1e-2], [100, 1e-17]])
+    np.testing.assert_array_equal(made.axes[1].lines[0].get_xdata(), trade.milliseconds)
+    assert [line.get_label() for line in made.axes[4].lines] == ["exact", "facets"]
+
+
+def test_rows_and_picture_are_written(rows: dict[str, list[Row]], tmp_path: Path) -> None:
+    files = write(rows["plate"], tmp_path, "plate")
+    assert [file.name for file in files] == ["plate.json", "plate.png"]
+    answer = json.loads(files[0].read_text())
+    assert {"case", "quantity", "expected", "got", "ok", "cost", "cost_unit", "facets", "knob"} <= set(answer[0])
+    assert files[1].stat().st_size > 30_000
+    assert set(PICTURES) == set(REFERENCES)
+
+
+def test_the_command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    app = typer.Typer()
+    app.command()(accuracy)
+    good = Row("a case", "a reference", "level", "dB", 0.3, 0.1, 2.0, "ms an aspect", {"facets": 9}, note="a note")
+    bad = replace(good, got=0.4, counts={"facets": 9, "values": 7}, note="")
+    for name in BODIES:
+        assert name in HELP
+        monkeypatch.setitem(PICTURES, name, lambda rows: None)
+        monkeypatch.setitem(REFERENCES, name, lambda quick: [good, bad])
+        assert run(app, ["--reference", name, "--out", str(tmp_path)]) == 1
+        out = capfd.readouterr().out
+        assert "ok (1)" in out
+        assert "(1) a note" in out
+        assert "2 ms an aspect" in out
+        assert "2 rows, 1 failed" in out
+        assert str(tmp_path / f"{name}.json") in out
+        assert f"{name}.png" not in out
+        monkeypatch.setitem(REFERENCES, name, lambda quick: [good])
+        assert run(app, ["--reference", name, "--out", str(tmp_path), "--json"]) == 0
+        assert json.loads(capfd.readouterr().out)[0]["facets"] == 9
+
+
+def test_without_mpmath_one_line_says_how_to_get_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    app = typer.Typer()
+    app.command()(accuracy)
+    monkeypatch.setattr("sonarsynth.accuracy.triangles.find_spec", lambda name: None)
+    assert run(app, ["--reference", "sphere", "--out", str(tmp_path)]) == 2
+    said = capfd.readouterr().err
+    assert said.count("\n") == 1
+    assert "pip install 'sonarsynth[accuracy]'" in said
