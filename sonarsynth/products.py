@@ -80,10 +80,10 @@ class Arrivals:
     phase: Floats  # (path,) rad: constant phase of the pulse over frequency, from caustics and lossy reflections
     blur: Floats  # (path,) s: rough boundaries take exp(-(2 pi f blur)^2/2) off the spectrum, a Gaussian in time
     stretch: Floats  # (path,) Doppler: the pulse is p((t - delay)/(1 + stretch))
-    coherent: Bools  # (path,) the echo of a smooth facet: differentiated, i f/centre; phases count in sums of paths
-    corners: Floats  # (path, 3) s: delays of the facet's corners about `delay`, over which the pulse is a mean; 0: a point
-    rough_share: Floats  # (path,) w and
-    rough_delay: Floats  # (path,) s: incoherent echo of a rough facet, sqrt(1 - w exp(-(2 pi f rough_delay)^2)); w 0: 1
+    coherent: Bools  # (path,) of a smooth facet, or its shadow: differentiated, i f/centre; phases count in sums
+    corners: Floats  # (path, 3) s: of the facet about `delay`, a mean over it; 0: a point
+    rough_share: Floats  # (path,) w: of the power that is coherent where it is smooth
+    rough_delay: Floats  # (path,) s: a rough facet sends sqrt(1 - w exp(-(2 pi f rough_delay)^2)); w = 0: all
     centre: float  # Hz: centre of the band, where amplitudes hold
     sound_speed: float  # m/s of the water at the array centre
     wavefront_error: float  # s: largest error of the wavefronts that was measured, at probes spread over the aperture
@@ -184,14 +184,15 @@ class Truth:
 class Echoes:
     """Where the echoes of each target come from, by the boundaries that they touched on their way to the array.
 
-    What comes by surface or bed is a ghost: the array sees the target mirrored there. Powers of all snaps are summed,
-    directions weighted by power; NaN where no path comes that way,
-    directions also where echoes come from several sides, as by surface and bed both from above and from below.
+    What comes by surface or bed is a ghost: the array sees the target mirrored there. Levels are of the energy in the
+    band: phases count among the coherent paths of a snap and family (`LEDGER`), powers of all else are summed.
+    Directions are weighted by the share of each path in that. NaN where no path comes that way, directions also where
+    echoes come from several sides, as by surface and bed both from above and from below.
     """
 
     azimuth: Floats  # (target, family) rad, sonar frame
     elevation: Floats  # (target, family) rad
-    level: Floats  # (target, family) dB re 1 uPa: peak of a snap, echoes of all facets with powers summed
+    level: Floats  # (target, family) dB re 1 uPa: peak of a snap, times what the echoes bring of its energy in the band
 
 
 LEDGER = (
@@ -203,13 +204,27 @@ LEDGER = (
     "boundary_loss",
     "received_level",
 )
-"""Ledger terms in dB: received = source - loss_out + scattering - loss_in - absorption - boundary."""
+"""Ledger terms in dB: received = source - loss_out + scattering - loss_in - absorption - boundary.
+
+Source is the peak level of the snap at 1 m before any filter. Received is that, and the ratio of the energy in the band
+of the sonar that the paths of the family bring to the array centre over the energy that the snap has there at 1 m:
+10 log10(sum_f |H S|^2 / sum_f |S|^2), S the spectrum of the snap through the anti-alias filter, H the transfer function
+of the paths: coherent ones are summed with their phases, the powers of the others are added. Losses are ratios of sums
+of the powers of the paths with and without one factor: means of the losses of the paths, weighted by power. Scattering
+is what is left: the target strength, with what phases add or cancel; 0 dB of paths from snap to array.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Ledger:
-    """Levels of each (snap, target, family) in dB that add up; powers of a family's paths are summed."""
+    """Levels of each (snap, target, family) in dB that add up, and those of one path of it alone.
+
+    The isolated path is the loudest of its family. Its level is predicted from the columns of `Arrivals`, over the band
+    like the others; what is measured in the signals of that path alone must agree (`verification`).
+    """
 
     level: Floats  # (snap, target + 1, family, LEDGER) dB; the last target row is the direct path; NaN without paths
     paths: Ints  # (snap, target + 1, family)
     error_bound: Floats  # (snap, target + 1, family) dB
+    isolated_level: Floats  # (snap, target + 1, family) dB re 1 uPa at the array centre; NaN without a path
+    isolated: Arrivals  # the isolated paths, in the order of the levels that are not NaN

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
+from sonarsynth.acoustics.rays import TOLERANCE
 from sonarsynth.acoustics.snap import onset
 from sonarsynth.beamforming import FocusedDelayAndSum
 from sonarsynth.conventions import FASTEST, REFERENCE_PRESSURE, SLOWEST, Floats, depth
@@ -128,12 +131,15 @@ def check_windows(scene: Scene, windows: Windows) -> None:
         )
 
 
+@lru_cache(maxsize=16)
 def _hull(mesh: Mesh) -> Floats:
-    """Vertices that bound the mesh in every direction: all of them up to 20 000, else the corners of its box."""
-    if len(mesh.vertices) <= 20_000:
+    """Vertices that bound the mesh in every direction."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return np.asarray(mesh.vertices[ConvexHull(mesh.vertices).vertices])
+    except QhullError:  # all in one plane
         return np.asarray(mesh.vertices)
-    low, high = mesh.box
-    return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
 
 
 def _check_snap(shrimp: SnappingShrimp, bed: float, sonar: Sonar) -> None:
@@ -162,7 +168,7 @@ def _check_depth(path: tuple[str | int, ...], what: str, points: Floats, bed: fl
     if not np.abs(points).max() <= FARTHEST:
         raise FieldError(path, f"{what} is more than {FARTHEST:g} m from the origin at frame {frame.index}")
     shallow, deep = float(depth(points).min()), float(depth(points).max())
-    if shallow < 0:
+    if shallow < -TOLERANCE:
         raise FieldError(path, f"{what} is {-shallow:.3g} m above the surface at frame {frame.index}")
-    if deep > bed:
+    if deep > bed + TOLERANCE:
         raise FieldError(path, f"{what} is {deep - bed:.3g} m below the bed at frame {frame.index}")

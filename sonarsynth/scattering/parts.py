@@ -30,9 +30,9 @@ class Part(Protocol):
     """
 
     def amplitude(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
-        """Far-field amplitude (...) in m at a wavenumber (...) (rad/m), but for `pulses`; never negative.
+        """Far-field amplitude (...) in m at a wavenumber (...) (rad/m), but for `pulses`; of echoes never negative.
 
-        0 where a facet is not lit, or not seen.
+        0 where a facet is not lit, or, for an echo, not seen.
         """
         ...
 
@@ -127,6 +127,29 @@ class Rough:
     def polarity(self, mesh: Mesh) -> Floats:
         """At random."""
         return random_polarity(mesh)
+
+
+@dataclass(frozen=True)
+class Shadow:
+    """The wave that makes the shadow behind lit facets, seen or not (`acoustics.kirchhoff.shadow_amplitude`).
+
+    f = (i k/4 pi) A n.(ki + ks) 2 exp[corners], whatever the surface is made of and however rough it is.
+    """
+
+    def amplitude(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
+        """As `Part.amplitude`, but k A n.(ki + ks)/(4 pi) with its sign: below 0 ahead, 0 where an echo is mirrored."""
+        across = dot(patch.normal, incident + scattered)
+        return np.where(dot(incident, patch.normal) < 0.0, wavenumber * patch.area * across / (4.0 * np.pi), 0.0)
+
+    def pulses(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Pulses:
+        """As `Part.pulses`: differentiated, and a mean over the facet."""
+        count, zero = len(incident), np.zeros(len(incident))
+        corners = dot(patch.corners, (incident - scattered)[:, None, :]) / sound_speed[:, None]
+        return Pulses(np.ones(count, bool), corners, zero, zero, zero, zero, zero)
+
+    def polarity(self, mesh: Mesh) -> Floats:
+        """All alike: the amplitude has the sign."""
+        return np.ones(len(mesh.faces))
 
 
 def reflection(law: Kirchhoff, incident: Floats, scattered: Floats) -> np.ndarray:

@@ -15,6 +15,7 @@ from sonarsynth.scattering.patches import Pulses
 from sonarsynth.sonar import Elements
 from sonarsynth.tracing.aperture import Fronts, fronts
 from sonarsynth.tracing.echoes import echoes, fitted
+from sonarsynth.tracing.forward import forward_legs, opaque, shadow_parts
 from sonarsynth.tracing.legs import Facets, Legs, facets_of, legs_from, may_face, rays_to_centre
 from sonarsynth.tracing.moving import Moving, carried
 from sonarsynth.tracing.paths import Outward, assemble, join, silence
@@ -65,13 +66,15 @@ def trace(
     band: tuple[float, float],
     moving: Moving | None = None,
 ) -> Arrivals:
-    """The arrivals of a frame, sorted by snap, target and facet; those that met no target come first of a snap.
+    """The arrivals of a frame, sorted by snap; of each first those that met no target, then echoes by target, then the
+    shadow waves of targets that scatter forward.
 
     environment, profile: the water; moment: bodies and snaps; sonar_pose, elements: the array; absorption: dB/m at the
     centre of the band; propagation: how sound travels, and how many bounces are followed; laws: how the facets of
     each body scatter; band: Hz; moving: velocities, where they count. A facet counts where it is lit by the snap and
-    seen by the array centre, with no body in between (all sensors share what the centre sees). Raises ValueError for
-    anything outside the water.
+    seen by the array centre, with no body in between (all sensors share what the centre sees). The snap itself is heard
+    if no body stands in between, but for those that scatter forward (`tracing.forward`). Raises ValueError for anything
+    outside the water.
     """
     legs = array_legs(environment, profile, moment.bodies, sonar_pose, elements, propagation, band)
     return arrivals(legs, moment.snaps, absorption, laws, moving)
@@ -117,22 +120,30 @@ def arrivals(
     laws: tuple[ScatteringLaw, ...],
     moving: Moving | None = None,
 ) -> Arrivals:
-    """The arrivals of any snaps from legs that are traced already: as `trace`, without tracing the array side again."""
-    parts = [silence(array.legs, array.fronts)]
+    """The arrivals of any snaps from legs that are traced already: as `trace`, without tracing the array side again.
+
+    But for targets that scatter forward, whose shadows have legs of their own.
+    """
+    parts, through = [silence(array.legs, array.fronts)], forward_legs(array, laws)
     for index, snap in enumerate(snaps):
-        parts.append(_direct(array, index, snap, absorption, moving))
-        parts.append(echoes(array, index, snap, absorption, laws, moving))
+        solid = opaque(array.bodies, laws, snap.position)
+        parts.append(_direct(array, solid, index, snap, absorption, moving))
+        parts.append(echoes(array, index, snap, absorption, tuple(law.parts for law in laws), moving))
+        if through is not None:
+            parts.append(echoes(through, index, snap, absorption, tuple(shadow_parts(law) for law in laws), moving))
     return join(parts, float(array.profile.at(depth(array.sonar_pose.position))), array.centre)
 
 
-def _direct(array: ArrayLegs, index: int, snap: Snap, absorption: float, moving: Moving | None) -> Arrivals:
-    """Snap to array, where no body stands in between."""
+def _direct(
+    array: ArrayLegs, solid: tuple[Body, ...], index: int, snap: Snap, absorption: float, moving: Moving | None
+) -> Arrivals:
+    """Snap to array, where none of the solid bodies stands in between."""
     environment, profile, sonar_pose = array.environment, array.profile, array.sonar_pose
     legs = rays_to_centre(environment, profile, snap.position[None, :], sonar_pose, array.propagation, array.centre)
     end = np.broadcast_to(sonar_pose.position, legs.point.shape)
     legs = legs.select(
         ~hidden(
-            array.bodies, environment, array.bending, legs.point, end, legs.departure, legs.length, legs.bounces,
+            solid, environment, array.bending, legs.point, end, legs.departure, legs.length, legs.bounces,
             legs.turning,
         )
     )  # fmt: skip

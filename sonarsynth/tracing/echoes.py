@@ -9,14 +9,14 @@ import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.products import Arrivals
-from sonarsynth.scattering import Part, ScatteringLaw
+from sonarsynth.scattering import Part
 from sonarsynth.scattering.parts import Plain
 from sonarsynth.scattering.patches import Patches, Pulses, patches
 from sonarsynth.tracing.legs import may_face, usable
 from sonarsynth.tracing.moving import Moving, carried
 from sonarsynth.tracing.paths import Outward, assemble, silence
 from sonarsynth.tracing.reflections import reflections
-from sonarsynth.tracing.shadows import hidden
+from sonarsynth.tracing.shadows import hidden, overlapping
 from sonarsynth.tracing.wavefront import FEW, probes
 from sonarsynth.world.moment import Body, Snap
 
@@ -67,23 +67,23 @@ def echoes(
     index: int,
     snap: Snap,
     absorption: float,
-    laws: tuple[ScatteringLaw, ...],
+    parts: tuple[tuple[Part, ...], ...],
     moving: Moving | None,
 ) -> Arrivals:
-    """Snap `index` to facet to array, over every facet of the legs that is lit; laws: one a body."""
+    """Snap `index` to facet to array, over every facet of the legs that is lit; parts: of the law of each body."""
     facets, most = array.facets, array.propagation.bounces
     out = _ways(array, snap)
     way, leg = _pairs(out.facet, array.legs.row, len(facets.facet))
     kept = np.flatnonzero(out.bounces[way] + array.legs.bounces[leg] <= most)
     out, leg = out.select(way[kept]), leg[kept]
-    groups = _groups(array, out, leg, laws)
+    groups = _groups(array, out, leg, parts)
     if not groups:
         return silence(array.legs, array.fronts)
     factor = array.legs.spreading[leg] * array.legs.boundary[leg] * out.spreading * out.boundary
     few = [g.over(array.fronts.probe_departure[leg[g.row], :FEW]) for g in groups]
     pulses = Pulses.join([g.pulses(array.centre) for g in groups])
     row, amplitude = _columns(groups, "row", "amplitude")
-    strongest = np.maximum(np.concatenate(few).max(axis=1, initial=0.0), amplitude) * factor[row]
+    strongest = np.maximum(np.abs(np.concatenate(few)).max(axis=1, initial=0.0), np.abs(amplitude)) * factor[row]
     loud = _loud(strongest * _heard(pulses, array.band), pulses.coherent)
     mine = [np.flatnonzero(part) for part in np.split(loud, np.cumsum([len(g.row) for g in groups])[:-1])]
     groups = [g.select(keep) for g, keep in zip(groups, mine, strict=True)]
@@ -105,18 +105,18 @@ def _columns(groups: list[_Group], *names: str) -> list[np.ndarray]:
     return [np.concatenate([getattr(g, name) for g in groups]) for name in names]
 
 
-def _groups(array: ArrayLegs, out: Outward, leg: Ints, laws: tuple[ScatteringLaw, ...]) -> list[_Group]:
+def _groups(array: ArrayLegs, out: Outward, leg: Ints, parts: tuple[tuple[Part, ...], ...]) -> list[_Group]:
     """Echoes of pairs of a way and a leg (pair,), by body and part; those that are nothing are left out."""
     facets, found = array.facets, []
     target = facets.target[out.facet]
-    for number, (body, law) in enumerate(zip(array.bodies, laws, strict=True)):
+    for number, (body, of_law) in enumerate(zip(array.bodies, parts, strict=True)):
         row = np.flatnonzero(target == number)
         facet = facets.facet[out.facet[row]]
         incident = body.pose.turn_to_body(out.arrival[row])
         scattered = body.pose.turn_to_body(array.legs.departure[leg[row]])
         speed = array.profile.at(depth(array.legs.point[leg[row]]))
         wavenumber = 2.0 * np.pi * array.centre / speed
-        for part in law.parts:
+        for part in of_law:
             patch = patches(body.mesh, not isinstance(part, Plain)).select(facet)
             amplitude = part.amplitude(incident, scattered, patch, wavenumber)
             sign = part.polarity(body.mesh)[facet]
@@ -133,7 +133,7 @@ def _heard(pulses: Pulses, band: tuple[float, float]) -> Floats:
 
 
 def _ways(array: ArrayLegs, snap: Snap) -> Outward:
-    """Ways from a snap to the lit side of facets that no body hides."""
+    """Ways from a snap to the lit side of facets that no body hides; of facets in one place, the first body's."""
     environment, profile, facets = array.environment, array.profile, array.facets
     row = np.flatnonzero(may_face(facets, snap.position, array.propagation.bounces, profile, environment.depth))
     start = np.broadcast_to(snap.position, (len(row), 3))
@@ -141,12 +141,21 @@ def _ways(array: ArrayLegs, snap: Snap) -> Outward:
     facet = row[paths.pair]
     lit = usable(paths) & (np.einsum("ij,ij->i", facets.normal[facet], paths.arrival) < 0)
     out = Outward.of(paths, reflections(environment, profile, paths, array.centre), facet).select(np.flatnonzero(lit))
-    end = np.broadcast_to(snap.position, out.arrival.shape)
-    blocked = hidden(  # backwards, so that bodies are where a ray begins
-        array.bodies, environment, array.bending, facets.clear[out.facet], end, -out.arrival, out.length, out.bounces,
-        out.turning,
-    )  # fmt: skip
-    return out.select(~blocked).merged()
+    out = out.select(~_hides(array, array.bodies, snap, out, facets.clear[out.facet]))
+    for number, before in overlapping(array.bodies):
+        mine = np.flatnonzero(facets.target[out.facet] == number)
+        of = out.facet[mine]
+        again = _hides(array, before, snap, out.select(mine), 2.0 * facets.point[of] - facets.clear[of])  # from under
+        out = out.select(np.delete(np.arange(len(out.facet)), mine[again]))
+    return out.merged()
+
+
+def _hides(array: ArrayLegs, bodies: tuple[Body, ...], snap: Snap, out: Outward, start: Floats) -> Bools:
+    """Whether any of some bodies stands in ways (way,) from a snap to points near facets, start (way, xyz)."""
+    end = np.broadcast_to(snap.position, start.shape)
+    return hidden(  # backwards, so that bodies are where a ray begins
+        bodies, array.environment, array.bending, start, end, -out.arrival, out.length, out.bounces, out.turning
+    )
 
 
 def _pairs(facet: Ints, row: Ints, facets: int) -> tuple[Ints, Ints]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.acoustics.rays import COINCIDENT
+from sonarsynth.acoustics.rays import COINCIDENT, TOLERANCE
 from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Paths
@@ -109,10 +109,10 @@ def rays_to_centre(
 def facets_of(bodies: tuple[Body, ...], environment: Environment) -> Facets:
     """Every facet of every body. Raises ValueError for a body that reaches out of the water."""
     for body in bodies:
-        down = depth(body.pose.to_world(body.mesh.centroid))
+        down = depth(body.pose.to_world(body.mesh.vertices))
         highest, deepest = down.min(initial=environment.depth), down.max(initial=0.0)
-        if highest < 0.0 or deepest > environment.depth:
-            where = "above the surface" if highest < 0.0 else "below the bed"
+        if highest < -TOLERANCE or deepest > environment.depth + TOLERANCE:
+            where = "above the surface" if highest < -TOLERANCE else "below the bed"
             raise ValueError(
                 f"target '{body.name}' reaches {where} ({highest:g} to {deepest:g} m in {environment.depth:g} m)"
             )

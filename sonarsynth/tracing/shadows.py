@@ -52,6 +52,22 @@ def hidden(
     return blocked
 
 
+def overlapping(bodies: tuple[Body, ...]) -> list[tuple[int, tuple[Body, ...]]]:
+    """Bodies that may lie in or on others that come before them: number, and those others.
+
+    Of facets that coincide neither hides the other from a ray that starts off both; one that starts under them does.
+    """
+    if len(bodies) < 2:
+        return []
+    centres, radii = (np.array(column) for column in zip(*map(enclosing, bodies), strict=True))
+    apart = np.linalg.norm(centres[:, None] - centres, axis=-1)
+    near = np.tril(apart < radii[:, None] + radii, -1)
+    return [
+        (number, tuple(bodies[n] for n in np.flatnonzero(near[number])))
+        for number in np.flatnonzero(near.any(axis=1)).tolist()
+    ]
+
+
 def _curvature(profile: Profile) -> float:
     """Largest curvature (1/m) of any ray."""
     if profile.uniform:

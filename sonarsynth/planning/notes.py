@@ -1,0 +1,76 @@
+"""What a user should know about a plan before it is built: the lines that `plan` and `build` print."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonarsynth.planning.plans import Plan
+from sonarsynth.planning.validity import validity
+from sonarsynth.planning.windows import SUPPORT, extreme_waveforms
+from sonarsynth.recipe import Recipe
+from sonarsynth.scattering import Kirchhoff
+from sonarsynth.scattering.notes import concave_note
+from sonarsynth.synthesis.pulse import LONGEST_TAIL, cut_tail
+from sonarsynth.world.refinement import longest_edge
+
+COARSE = 0.1
+"""Facets longer than this (m) are noted: range errors of points are a few centimetres."""
+
+
+def notes(made: Plan) -> tuple[str, ...]:
+    """The notes on a plan, in order of importance."""
+    recipe, scene = made.recipe, made.scene
+    found: list[str] = []
+    if made.windows.disturbed:
+        found.append(
+            f"{made.windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest one"
+        )
+    cancelled = scene.processing.cancelling is not None
+    if made.propagation.bounces and not cancelled and made.products & {"image", "cloud"} and made.sizes["snap"]:
+        found.append("the snap's own reflections enter the image: processing.cancelling takes them out before")
+    found += _cut(recipe, made.profile.uniform)
+    found += _behind(recipe)
+    found += validity(scene, made.profile)
+    found += _meshes(recipe)
+    return tuple(found)
+
+
+def _cut(recipe: Recipe, uniform: bool) -> tuple[str, ...]:
+    """Which snaps fall so slowly, once a path turns their phase, that the windows cut them."""
+    scene = recipe.scene
+    if uniform and not scene.physics.tracing.bounces:
+        return ()
+    tails = [cut_tail(w, scene.sonar.antialias, SUPPORT) for w in extreme_waveforms(scene)]
+    if max(tails, default=0.0) <= 10.0 * SUPPORT:
+        return ()
+    return (
+        f"turned in phase by a path, a snap falls off slowly: it is cut {LONGEST_TAIL:g} s from its collapse, at "
+        f"{max(tails):.1g} of its peak (no net impulse, or a filter without the lowest frequencies, helps)",
+    )
+
+
+def _behind(recipe: Recipe) -> tuple[str, ...]:
+    """Which snaps of the first and last frame come from behind the array."""
+    found = []
+    for step in sorted({0, recipe.frames - 1}):
+        frame = recipe.frame(step)[1]
+        count = sum(bool(frame.sonar_pose.to_body(snap.position)[0] < 0) for snap in frame.moment.snaps)
+        if count:
+            found.append(
+                f"frame {step}: {count} snaps come from behind the array, which takes them for their mirror images"
+            )
+    return tuple(found)
+
+
+def _meshes(recipe: Recipe) -> list[str]:
+    """What meshes stand for: how coarse they are, what was repaired, what the law leaves out."""
+    scene, found = recipe.scene, []
+    for target, law, mesh in zip(scene.world.targets, scene.laws, scene.meshes, strict=True):
+        said = list(mesh.notes)
+        if isinstance(law, Kirchhoff):
+            concave = concave_note(mesh)
+            said += [concave] if concave else []
+        elif (edge := longest_edge((mesh.vertices, mesh.faces.astype(np.int64)))) > COARSE:
+            said.append(f"facets up to {edge:.2g} m long, each echoing from its middle: set shape.edge to refine")
+        found += [f"{target.name}: {line}" for line in said]
+    return found
