@@ -13,6 +13,8 @@ from functools import lru_cache
 import numpy as np
 
 from sonarsynth.planning.plans import Omission, Plan, Stage
+from sonarsynth.scattering import Kirchhoff
+from sonarsynth.scattering.fineness import expected_error
 from sonarsynth.tracing import Refracted, Straight
 from sonarsynth.tracing.bounces import MOST_BOUNCES
 from sonarsynth.world.reflection import rms_height
@@ -22,6 +24,7 @@ REFERENCE_TRANSFORM = 2.0e-3
 
 SECONDS = {
     "trace facet": 1.25e-6,  # straight rays, lit and seen, ray casting both ways, scattering law over the aperture
+    "trace coherent facet": 2.2e-6,  # none of them is too faint
     "trace refracted facet": 3e-6,  # eigenrays to the centre and to the probes of the aperture
     "label beam": 0.25e-6,
     "label facet": 0.28e-6,
@@ -37,8 +40,10 @@ SECONDS = {
     "write byte": 12e-9,
 }
 """Seconds per unit of work."""
-LIT = 0.22
-"""Share of the facets of a closed body that a snap lights and the array sees."""
+LIT, COHERENT = 0.22, 0.35
+"""Share of the facets of a closed body that are paths: lit, seen and not too faint; and of coherent ones."""
+RESHAPED = 1.9
+"""Cost of synthesising a path whose pulse its facet reshapes, over that of one that repeats the snap."""
 RANGED_BEAMS = 60
 """Beams over threshold round one glint."""
 
@@ -67,6 +72,21 @@ def _facets(plan: Plan) -> int:
     return sum(len(mesh.faces) for mesh in plan.scene.meshes)
 
 
+def _paths(plan: Plan) -> float:
+    """Paths of one snap and family, each with the weight of its cost in the synthesis."""
+    pairs = zip(plan.scene.laws, plan.scene.meshes, strict=True)
+    shares = {True: COHERENT * RESHAPED, False: LIT}
+    return sum(len(mesh.faces) * len(law.parts) * shares[isinstance(law, Kirchhoff)] for law, mesh in pairs)
+
+
+def _tracing(plan: Plan, kind: str) -> float:
+    """Seconds to trace every facet once."""
+    pairs = zip(plan.scene.laws, plan.scene.meshes, strict=True)
+    extra = SECONDS["trace coherent facet"] - SECONDS["trace facet"]
+    each = SECONDS[f"trace {kind}facet"]
+    return sum(len(mesh.faces) * (each + extra * isinstance(law, Kirchhoff)) for law, mesh in pairs)
+
+
 def _ways(plan: Plan) -> int:
     """Pairs of families, out and back, with as many reflections in all as are asked for: 1, 5, 13, 25, ..."""
     n = plan.propagation.bounces
@@ -88,7 +108,7 @@ def _synthesis(plan: Plan) -> tuple[str, str, str, str, float, int]:
     """The row of the synthesis, in seconds of the reference machine."""
     scene, sizes = plan.scene, plan.sizes
     sensor_samples = sizes["sensor"] * sizes["sample"]
-    paths = LIT * _facets(plan) * max(sizes["snap"], 1) * _ways(plan)
+    paths = _paths(plan) * max(sizes["snap"], 1) * _ways(plan)
     each = SECONDS["synthesise path sensor"] + _solid_angle(plan) * SECONDS["synthesise path sensor steradian"]
     work = paths * sizes["sensor"] * each + sensor_samples * SECONDS["synthesise sensor sample"]
     if scene.world.environment.noise:
@@ -102,7 +122,7 @@ def stages(plan: Plan) -> tuple[Stage, ...]:
     """What each stage will do, why, its error, and what it costs in one frame."""
     scene, sizes, factor = plan.scene, plan.sizes, machine_factor()
     sonar, processing = scene.sonar, scene.processing
-    facets, snaps = _facets(plan) * _ways(plan), max(sizes["snap"], 1)
+    snaps = max(sizes["snap"], 1)
     beams = sizes["azimuth"] * sizes["elevation"]
     gate = plan.windows.echo_stop - plan.windows.echo_start
     bins = (sonar.band.high - sonar.band.low) * gate
@@ -115,7 +135,7 @@ def stages(plan: Plan) -> tuple[Stage, ...]:
             f"{plan.propagation.kind} rays, {plan.propagation.bounces} bounces, {laws}",
             "one sound speed everywhere: rays are straight" if straight else "the sound speed varies with depth",
             "measured: /truth/amplitude_error" + ("" if straight else ", wavefront_error"),
-            facets * snaps * SECONDS[f"trace {kind}facet"],
+            _tracing(plan, kind) * snaps * _ways(plan),
             0,
         ),
         (
@@ -186,6 +206,7 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
                 "the energy that roughness takes from them is scattered, and not simulated",
             )
         )
+    rows += _facets_leave_out(plan)
     moving = any(b.velocity.any() for b in frame.moment.bodies) or frame.sonar_velocity.any()
     if moving and not scene.physics.doppler:
         rows.append(Omission("Doppler", "not asked for: all is where it is at the instant of the frame", _moved(plan)))
@@ -201,6 +222,25 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
     if isinstance(plan.propagation, Refracted):
         rows.append(Omission("rays to each sensor", "wavefront expansion over the aperture", "/truth/wavefront_error"))
     return tuple(rows)
+
+
+def _facets_leave_out(plan: Plan) -> list[Omission]:
+    """What coherent facets do not have of an echo."""
+    scene, rows = plan.scene, []
+    for target, law, mesh in zip(scene.world.targets, scene.laws, scene.meshes, strict=True):
+        if isinstance(law, Kirchhoff):
+            error = expected_error(mesh, scene.sonar.shortest_wavelength)
+            rows.append(
+                Omission(
+                    f"curvature within facets of {target.name}",
+                    f"{len(mesh.faces)} flat facets",
+                    f"about {100.0 * error:.2g} % of the echo at the top of the band",
+                )
+            )
+    if rows:
+        bound = "spheres over 26 wavelengths round: 0.3 dB to 60 degrees off backscatter, 2.6 dB to 120"
+        rows.append(Omission("waves that creep round bodies or pass inside", "facets are plane mirrors", bound))
+    return rows
 
 
 def _moved(plan: Plan) -> str:
