@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.planning import Plan
-from sonarsynth.products import FAMILIES, LEDGER
+from sonarsynth.products import FAMILIES
 from sonarsynth.recipe import SPLITS
 
 FORMAT_VERSION = "1"
@@ -40,6 +40,10 @@ _NONE = (("flag_values", [-1]), ("flag_meanings", "none"))
 
 def _group(group: str, product: str, *rows: Variable) -> tuple[Variable, ...]:
     return tuple(replace(row, group=group, product=product) for row in rows)
+
+
+def _comment(text: str) -> tuple[tuple[str, Any], ...]:
+    return (("comment", text),)
 
 
 def _v(name: str, dims: tuple[str, ...], dtype: str, units: str, long_name: str, **more: Any) -> Variable:
@@ -123,7 +127,7 @@ _TRUTH = _group(
     _v("visible_fraction", _TARGET, "float64", "1", "share of the area facing the array that the array sees"),
     _v("echo_azimuth", _ECHO, "float64", "degree", "azimuth that the target's echoes come from, weighted by power"),
     _v("echo_elevation", _ECHO, "float64", "degree", "elevation that they come from: ghosts by surface and bed"),
-    _v("echo_level", _ECHO, "float64", "dB", "peak level of the target's echoes re 1 uPa, powers of facets summed"),
+    _v("echo_level", _ECHO, "float64", "dB", "level of the target's echoes re 1 uPa, of their energy in the band"),
     _v("snap_position", (*_SNAP, "xyz"), "float64", "m", "position of the snap in the world"),
     _v("snap_time", _SNAP, "float64", "s", "time of the snap after the instant of the frame"),
     _v("snap_level", _SNAP, "float64", "dB", "peak source level of the snap re 1 uPa at 1 m"),
@@ -139,11 +143,37 @@ _TRUTH = _group(
     ),
     _v("amplitude_error", ("frame",), "float64", "1", "the same of amplitudes, relative to the strongest echo"),
 )
+LEDGER_COMMENT = (
+    "received = source - transmission_loss_out + scattering - transmission_loss_in - absorption - boundary. Ratios of "
+    "energies in the band of the sonar; of coherent paths the pressures are summed, of others the powers. Losses are "
+    "means over the paths, weighted by power; scattering has what phases add or cancel."
+)
+"""Stored with each level of the ledger."""
+
+_LEVELS = {
+    "source_level": "peak source level of the snap re 1 uPa at 1 m",
+    "transmission_loss_out": "spreading loss from snap to target (snap to array for the direct path)",
+    "scattering": "scattering of all facets together: target strength",
+    "transmission_loss_in": "spreading loss from target to array",
+    "absorption_loss": "absorption along the whole path",
+    "boundary_loss": "loss at surface and bed",
+    "received_level": "level at the array centre re 1 uPa: peak of a snap of the energy in the band",
+}
 _LEDGER = _group(
     "/ledger",
     "truth",
-    *(_v(name, _CELL, "float64", "dB", name.replace("_", " ")) for name in LEDGER),
+    *(_v(name, _CELL, "float64", "dB", text, attributes=_comment(LEDGER_COMMENT)) for name, text in _LEVELS.items()),
     _v("paths", _CELL, "int32", "1", "number of paths"),
+    _v("isolated_level", _CELL, "float64", "dB", "received level of the loudest path of the family alone, predicted"),
+    _v(
+        "measured_level",
+        _CELL,
+        "float64",
+        "dB",
+        "level of that path measured in its signals; NaN where none were made",
+        attributes=_comment("the path alone, synthesised at one ideal hydrophone in the array centre"),
+    ),
+    _v("isolated_facet", _CELL, "int32", "1", "facet of that path in the mesh of its target", attributes=_NONE),
     _v(
         "error_bound",
         _CELL,

@@ -144,19 +144,30 @@ def verify(store: Store, as_json: Json = False) -> None:
 
 @app.command()
 def show(
-    store: Store,
+    stores: Annotated[
+        list[Path], typer.Argument(metavar="STORE...", help="A store, or up to four to compare.", show_default=False)
+    ],
     out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Where the pictures go. Left out: <store>.pictures.")
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Where the pictures go. Left out: <store>.pictures, <a>-<b>.pictures."),
     ] = None,
     frame: Annotated[
         int | None, typer.Option(min=0, help="The frame of the sheet. Left out: the one with most points.")
     ] = None,
     film: Annotated[bool, typer.Option(help="Write the film as well.")] = True,
 ) -> None:
-    """Draw a store: a film of the energy image, a sheet with image, point cloud and signals; print a summary."""
-    from sonarsynth.show import show as draw
+    """Draw a store: a film of the energy image, a sheet with image, point cloud and signals; print a summary.
 
-    for file in draw(store, out, frame=frame, film=film, say=typer.echo):
+    Several stores: their films side by side, each with its range error, levels and cost.
+    """
+    from sonarsynth.show import show as draw
+    from sonarsynth.show.beside import show_beside
+
+    if len(stores) == 1:
+        files = draw(stores[0], out, frame=frame, film=film, say=typer.echo)
+    else:
+        files = show_beside(stores, out, frame=frame, film=film, say=typer.echo)
+    for file in files:
         typer.echo(str(file))
 
 

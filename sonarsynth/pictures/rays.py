@@ -64,6 +64,7 @@ def section_figure(
         flat = np.stack([hull.vertices @ along, hull.vertices[:, 2]], axis=1)
         for line in union_outline(flat, hull.faces):
             section.fill(*line.T, facecolor="#d9d9d9", edgecolor=INK, linewidth=0.8)
+        _name_over(section, hull.name, flat)
     flat_rays = [np.stack([ray @ along, ray[:, 2]], axis=1) for ray in rays]
     for i in _drawing_order(looks):
         _draw(section, flat_rays[i], looks[i])
@@ -109,19 +110,34 @@ def _name(axes: Axes, named: Sequence[tuple[str, tuple[float, ...]]]) -> None:
         text.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
 
 
+def _name_over(axes: Axes, name: str, points: Floats) -> None:
+    """The name of a body over its points (point, 2)."""
+    from matplotlib.patheffects import withStroke
+
+    if len(points):
+        low, high = points.min(axis=0), points.max(axis=0)
+        over = (0.5 * (low[0] + high[0]), high[1])
+        text = axes.annotate(
+            name, over, (0, 5), textcoords="offset points", fontsize=9, color=INK, ha="center", zorder=6
+        )
+        text.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
+
+
 def _legend(made: Figure, looks: Sequence[Look]) -> None:
-    """One legend for the whole figure: the families that are there, and the marks."""
+    """One legend for the whole figure: the families that are there with their marks, and the other marks."""
     from matplotlib.lines import Line2D
 
     if not looks:
         return
     there = {look.family for look in looks}
-    handles = [Line2D([], [], color=COLOURS[f], label=f) for f in COLOURS if f in there]
+    met = {event for look in looks if look.family != FAN for event in look.event}
+    named = {f: MARKERS.get(f, "") for f in COLOURS if f in there}
+    handles = [Line2D([], [], color=COLOURS[f], marker=m, markersize=4, label=f) for f, m in named.items()]
     if any(look.hidden for look in looks):
         handles.append(Line2D([], [], color=INK, linestyle=":", label="hidden by a target"))
-    met = {event for look in looks if look.family != FAN for event in look.event}
     for event, marker in MARKERS.items():
-        if event in met:
+        if event in met and event not in named and marker not in named.values():
+            named[event] = marker
             handles.append(Line2D([], [], color=INK, marker=marker, linestyle="", markersize=4, label=event))
     made.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=8, frameon=False)
 

@@ -11,16 +11,13 @@ import numpy as np
 from sonarsynth.pictures.frames import FramePicture, View, window
 from sonarsynth.pictures.sheet import Errors, sheet
 from sonarsynth.pictures.style import decibels
-from sonarsynth.show.film import write_film
+from sonarsynth.show.film import thinned, write_film
 from sonarsynth.show.listening import beams
 from sonarsynth.show.reading import NothingToDraw, Stored, beam_grid, built, opened, stored
 from sonarsynth.show.summary import summary
 
 if TYPE_CHECKING:
     import xarray as xr
-
-LONGEST = 128
-"""A film of more frames takes every second, third ... of them."""
 
 
 def show(
@@ -51,16 +48,16 @@ def show(
     say(summary(tree, path))
     folder = path.with_name(path.name + ".pictures") if out is None else Path(out)
     folder.mkdir(parents=True, exist_ok=True)
-    every = -(-len(frames) // LONGEST)
-    read = {int(i): stored(tree, int(i)) for i in frames[::every]}
+    filmed = thinned(frames.tolist())
+    read = {i: stored(tree, i) for i in filmed}
     if frame is not None and frame not in read:
         read[frame] = stored(tree, frame)
     chosen = frame if frame is not None else max(read, key=lambda i: _interest(read[i]))
     files = [_write_sheet(tree, read[chosen], folder, say)]
     if film and len(frames) > 1:
-        if every > 1:
-            say(f"film: every {every}th frame of {len(frames)}")
-        in_order = [read[int(i)] for i in frames[::every]]
+        if len(filmed) < len(frames):
+            say(f"film: {len(filmed)} of {len(frames)} frames")
+        in_order = [read[i] for i in filmed]
         reference = _reference(in_order)
         views = [_view(tree, one, reference) for one in in_order]
         picture = FramePicture(*beam_grid(tree), window(views), "energy re the brightest beam of all frames (dB)")

@@ -3,19 +3,50 @@
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
 
-from sonarsynth.pictures.frames import FramePicture, View
 from sonarsynth.pictures.style import BACKDROP, ENERGY_MAP, OUTLINES
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from PIL.Image import Image
 
+LONGEST = 128
+"""Frames of a film at most."""
 
-def write_film(picture: FramePicture, views: list[View], folder: Path, frames_per_second: float) -> Path:
+Item = TypeVar("Item")
+View_contra = TypeVar("View_contra", contravariant=True)
+
+
+class Picture(Protocol[View_contra]):
+    """A figure in which one view after another is drawn."""
+
+    @property
+    def figure(self) -> Figure:
+        """The figure, laid out."""
+        ...
+
+    def show(self, view: View_contra, /) -> None:
+        """Draw a view in place of the last."""
+        ...
+
+    def pixels(self) -> np.ndarray:
+        """The figure as drawn: (row, column, rgb) uint8."""
+        ...
+
+
+def thinned(frames: Sequence[Item]) -> list[Item]:
+    """The frames of a film: all, or of more than `LONGEST` every second, third ... of them."""
+    return list(frames[:: -(-len(frames) // LONGEST) or 1])
+
+
+def write_film(
+    picture: Picture[View_contra], views: Sequence[View_contra], folder: Path, frames_per_second: float
+) -> Path:
     """Draw views one after another into `folder`/film.mp4 or film.gif; returns its path."""
     from matplotlib.animation import FFMpegWriter
 
@@ -33,7 +64,7 @@ def write_film(picture: FramePicture, views: list[View], folder: Path, frames_pe
     return _gif(picture, views, folder / "film.gif", frames_per_second)
 
 
-def _gif(picture: FramePicture, views: list[View], path: Path, frames_per_second: float) -> Path:
+def _gif(picture: Picture[View_contra], views: Sequence[View_contra], path: Path, frames_per_second: float) -> Path:
     from PIL import Image
 
     colours = _palette()

@@ -100,7 +100,7 @@ def stored(tree: xr.DataTree, index: int) -> Stored:
     cloud = {name: read(tree, f"cloud/{name}", index) for name in ("x", "y", "z", "range", "energy", "delay")}
     layers = {name: nowhere if values is None else values.astype(float) for name, values in cloud.items()}
     energy = read(tree, "image/energy", index)
-    pose = Pose(needed(tree, "truth/sonar_position", index), needed(tree, "truth/sonar_orientation", index))
+    pose = _sonar(tree, index)
     time = read(tree, "time", index)
     return Stored(
         index=index,
@@ -114,9 +114,13 @@ def stored(tree: xr.DataTree, index: int) -> Stored:
         target=target,
         true_range=true_range,
         snap=pose.to_body(needed(tree, "truth/snap_position", index)),
-        hulls=_hulls(tree, index, pose),
+        hulls=hulls(tree, index),
         ghosts=ghosts(tree, index),
     )
+
+
+def _sonar(tree: xr.DataTree, index: int) -> Pose:
+    return Pose(needed(tree, "truth/sonar_position", index), needed(tree, "truth/sonar_orientation", index))
 
 
 def echo_levels(tree: xr.DataTree, frame: int) -> tuple[Floats, list[str]] | None:
@@ -166,16 +170,18 @@ def _blended(azimuth: Floats, elevation: Floats, families: list[str], family: in
     return bool((near[once] <= near[family]).any())
 
 
-def _hulls(tree: xr.DataTree, index: int, sonar: Pose) -> tuple[Hull, ...]:
+def hulls(tree: xr.DataTree, index: int) -> tuple[Hull, ...]:
+    """The targets of a frame where they truly are; none of a frame that was not built."""
+    sonar = _sonar(tree, index)
     names = read(tree, "truth/target_name")
     if names is None or not np.isfinite(sonar.position).all():
         return ()
     position = needed(tree, "truth/target_position", index)
     orientation = needed(tree, "truth/target_orientation", index)
-    hulls = []
+    made = []
     for i, name in enumerate(map(str, names)):
         vertices, faces = read(tree, f"targets/{name}/vertices"), read(tree, f"targets/{name}/faces")
         if vertices is not None and faces is not None and np.isfinite(position[i]).all():
             there = sonar.to_body(Pose(position[i], orientation[i]).to_world(vertices))
-            hulls.append(Hull(name, there, faces.astype(np.int64)))
-    return tuple(hulls)
+            made.append(Hull(name, there, faces.astype(np.int64)))
+    return tuple(made)

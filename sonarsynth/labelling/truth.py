@@ -8,14 +8,11 @@ import numpy as np
 
 from sonarsynth.conventions import NO_TARGET, Floats, azimuth_elevation, direction
 from sonarsynth.geometry import Pose
-from sonarsynth.products import FAMILIES, LEDGER, Arrivals, Echoes, Ledger, Paths, Truth
+from sonarsynth.products import Paths, Truth
 from sonarsynth.sonar import BeamGrid
 from sonarsynth.world.casting import OFFSET, first_hit, occluded
 from sonarsynth.world.meshes import Mesh
-from sonarsynth.world.moment import Body, Moment, Snap
-
-ONE_SIDE = 0.95
-"""Length of the mean direction of echoes, weighted by power, from which on they count as coming from one side."""
+from sonarsynth.world.moment import Body, Moment
 
 Connect = Callable[[Floats, Floats], Paths]
 """Rays from (pair, xyz) to (pair, xyz) in the world: a propagation model bound to its water."""
@@ -139,62 +136,3 @@ def _visible(body: Body, seen: Floats, bodies: tuple[Body, ...], sonar_pose: Pos
         return np.full(4, np.nan), 0.0
     azimuth, elevation = azimuth_elevation(seen[mesh.faces[visible]].reshape(-1, 3))
     return np.array([azimuth.min(), azimuth.max(), elevation.min(), elevation.max()]), fraction
-
-
-def echoes(arrivals: Arrivals, targets: int, snap_level: Floats, centre: float) -> Echoes:
-    """Where the echoes come from; snap_level: (snap,) dB re 1 uPa at 1 m; centre: Hz of the band."""
-    shape = (targets, len(FAMILIES))
-    azimuth, elevation, level = np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, np.nan)
-    power = (arrivals.amplitude * _roughness(arrivals, centre)) ** 2 * 10.0 ** (snap_level[arrivals.snap] / 10.0)
-    for cell in np.ndindex(shape):
-        mine = (arrivals.target == cell[0]) & (arrivals.arrives_by == cell[1])
-        total = float(power[mine].sum())
-        if total > 0.0:
-            level[cell] = 10.0 * np.log10(total)
-            mean = power[mine] @ arrivals.direction[mine] / total
-            if np.linalg.norm(mean) > ONE_SIDE:
-                azimuth[cell], elevation[cell] = azimuth_elevation(mean)
-    return Echoes(azimuth, elevation, level)
-
-
-def _roughness(paths: Arrivals, centre: float) -> Floats:
-    """What rough boundaries leave of each path (path,) at a frequency (Hz)."""
-    return np.asarray(np.exp(-0.5 * (2.0 * np.pi * centre * paths.blur) ** 2))
-
-
-def family(arrivals: Arrivals) -> np.ndarray:
-    """Index into FAMILIES of each arrival (path,)."""
-    return np.asarray((arrivals.surface > 0) + 2 * (arrivals.bottom > 0))
-
-
-def ledger(
-    arrivals: Arrivals, snaps: tuple[Snap, ...], targets: int, snap_level: Floats, error: float, centre: float
-) -> Ledger:
-    """Levels (snap, target + 1, family, LEDGER) that add up exactly: powers of the paths of a family are summed.
-
-    Each loss is the ratio of two power sums, with one more factor of the amplitude in the second, so that
-    received = source - loss_out + scattering - loss_in - absorption - boundary whatever the paths. NaN where a family
-    has no path. error: bound (dB) on each level from the approximations of the chain; centre (Hz) of the band, at which
-    the loss of rough boundaries counts.
-    """
-    shape = (len(snaps), targets + 1, len(FAMILIES))
-    which = np.where(arrivals.direct, targets, arrivals.target)
-    cell = np.ravel_multi_index((arrivals.snap, which, family(arrivals)), shape)
-    paths = np.bincount(cell, minlength=int(np.prod(shape)))
-    factors = [
-        arrivals.scattering,
-        arrivals.spreading_out,
-        arrivals.spreading_in,
-        10.0 ** (-arrivals.absorption / 20.0),
-        arrivals.boundary * _roughness(arrivals, centre),
-    ]
-    powers = np.cumprod(factors, axis=0) ** 2
-    sums = np.array([np.bincount(cell, power, len(paths)) for power in powers])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        scattering, out, back, absorption, boundary = np.diff(10.0 * np.log10(sums), axis=0, prepend=0.0)
-        source = np.repeat(np.asarray(snap_level, float), shape[1] * shape[2])
-        received = source + 10.0 * np.log10(sums[-1])
-    levels = np.stack([source, -out, scattering, -back, -absorption, -boundary, received], axis=-1)
-    levels[paths == 0] = np.nan
-    bound = np.where(paths > 0, error, np.nan)
-    return Ledger(levels.reshape(*shape, len(LEDGER)), paths.reshape(shape), bound.reshape(shape))

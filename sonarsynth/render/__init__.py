@@ -9,21 +9,33 @@ The three are the tasks that the scheduler runs; what nobody asked for is not co
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sonarsynth.conventions import Floats
 from sonarsynth.description import FieldError
-from sonarsynth.labelling import echoes, label, ledger
+from sonarsynth.labelling import SLICES, Band, echoes, label, ledger, path_powers
 from sonarsynth.planning import Plan, plan
-from sonarsynth.products import LEDGER, Arrivals, Bearings, Echoes, EnergyImage, Ledger, PointCloud, Signals, Truth
+from sonarsynth.products import Arrivals, Bearings, Echoes, EnergyImage, Ledger, Signals, Truth
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import Recipe
+from sonarsynth.render.stored import (
+    Values,
+    bearing_values,
+    cloud_values,
+    ledger_values,
+    of_isolated,
+    signal_values,
+    table,
+    truth_values,
+)
 from sonarsynth.scene import Frame
 from sonarsynth.synthesis.pulse import snap_levels
 from sonarsynth.tracing import Straight
 from sonarsynth.variables import VARIABLES, Variable, attributes, coordinates, variables
+from sonarsynth.world.moment import Snap
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,9 +58,6 @@ __all__ = [
     "variables",
 ]
 
-Values = dict[tuple[str, str], np.ndarray]
-"""(group, name) to the array of one frame, without the frame axis."""
-
 
 @dataclass(frozen=True, eq=False)
 class Traced:
@@ -69,6 +78,7 @@ class Heard:
     bearings: Bearings | None
     image: EnergyImage | None
     imaged: Signals | None = None  # what the image was made of: without the snap's own reflections, where these go
+    isolated: Floats | None = None  # (snap, target + 1, family) dB: isolated paths of the ledger as signals have them
 
 
 def trace_frame(plan: Plan, index: int) -> Traced:
@@ -94,16 +104,22 @@ def trace_frame(plan: Plan, index: int) -> Traced:
     levels = snap_levels(frame.moment.snaps)
     straight = isinstance(plan.propagation, Straight)
     truth = label(frame.moment, frame.sonar_pose, sonar.beams, plan.connect, levels, straight)
-    book = ledger(
-        arrivals,
-        frame.moment.snaps,
-        len(frame.moment.bodies),
-        levels,
-        _expansion_error(plan, arrivals),
-        sonar.band.centre,
-    )
-    heard = echoes(arrivals, len(frame.moment.bodies), levels, sonar.band.centre)
+    band, targets = _band(plan, frame.moment.snaps), len(frame.moment.bodies)
+    powers = path_powers(arrivals, band)
+    book = ledger(arrivals, powers, band, targets, levels, _expansion_error(plan, arrivals))
+    heard = echoes(arrivals, powers, targets, levels)
     return Traced(frame, arrivals, truth, book, heard)
+
+
+def _band(plan: Plan, snaps: tuple[Snap, ...]) -> Band:
+    """The band that levels are taken in."""
+    from sonarsynth.synthesis.direct_sum import relative_absorption
+    from sonarsynth.synthesis.isolated import energy_in_slices
+
+    sonar = plan.scene.sonar
+    energy = np.array([energy_in_slices(snap.waveform, sonar, SLICES) for snap in snaps]).reshape(-1, SLICES)
+    band = Band(sonar.band.low, sonar.band.high, energy, np.zeros(SLICES))
+    return replace(band, relative=relative_absorption(plan.absorption, band.frequency, sonar.band.centre))
 
 
 def _expansion_error(plan: Plan, arrivals: Arrivals) -> float:
@@ -115,12 +131,6 @@ def _expansion_error(plan: Plan, arrivals: Arrivals) -> float:
         return float("nan")
     phase = min(2 * np.pi * plan.scene.sonar.band.high * arrivals.wavefront_error, 1.5)
     return float(20 * np.log10((1.0 + arrivals.amplitude_error) / np.cos(phase)))
-
-
-def _expansion_errors(arrivals: Arrivals) -> dict[str, float]:
-    """As stored: NaN, not infinite, where a sensor has no ray."""
-    errors = {name: float(getattr(arrivals, name)) for name in ("wavefront_error", "amplitude_error")}
-    return {name: error if np.isfinite(error) else float("nan") for name, error in errors.items()}
 
 
 def follow_rays(plan: Plan, index: int) -> RayFan:
@@ -152,9 +162,9 @@ def beamform_frame(plan: Plan, index: int, traced: Traced) -> Heard:
     """What the array hears: signals, where the snap is, and the energy image of the echo window."""
     if not plan.products:
         return Heard(None, None, None)
-    signals = synthesise(plan, traced)
+    signals, isolated = synthesise(plan, traced), measure_isolated(plan, traced)
     if not plan.products & {"image", "cloud"}:
-        return Heard(signals, None, None)
+        return Heard(signals, None, None, isolated=isolated)
     scene, frame = plan.scene, traced.frame
     processing, sonar = scene.processing, scene.sonar
     snaps = plan.sizes["snap"]
@@ -174,7 +184,7 @@ def beamform_frame(plan: Plan, index: int, traced: Traced) -> Heard:
     else:  # no direct pulse was found, or an echo was taken for it: no clock, so no image, rather than an arbitrary one
         silent = np.full((sonar.beams.elevations, sonar.beams.azimuths), np.nan, np.float32)
         image = EnergyImage(silent, sonar.beams.azimuth, sonar.beams.elevation, np.nan, np.nan)
-    return Heard(signals, bearings, image, imaged)
+    return Heard(signals, bearings, image, imaged, isolated)
 
 
 def synthesise(plan: Plan, traced: Traced) -> Signals:
@@ -199,16 +209,29 @@ def synthesise(plan: Plan, traced: Traced) -> Signals:
     return signals if sonar.converter is None else convert(signals, sonar.converter)
 
 
+def measure_isolated(plan: Plan, traced: Traced) -> Floats:
+    """Levels (snap, target + 1, family) in dB of the isolated paths of the ledger, measured in signals of each."""
+    from sonarsynth.synthesis.isolated import measured_levels
+
+    scene, book = plan.scene, traced.ledger
+    method, snaps = scene.physics.synthesis, traced.frame.moment.snaps
+    measured = measured_levels(method, book.isolated, snaps, scene.sonar, plan.absorption)
+    return of_isolated(book, traced.truth.snap_level[book.isolated.snap] + measured)
+
+
 def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
     """The point cloud, and every stored value of the frame."""
-    values = _truth_values(plan, index, traced)
+    frame = traced.frame
+    values = table("/", trajectory=frame.trajectory, step=frame.step, time=frame.time, split=plan.recipe.split(index))
+    values |= truth_values(traced.truth, traced.echoes, traced.arrivals) | ledger_values(traced.ledger, heard.isolated)
     if heard.signals is not None and "signals" in plan.products:
-        values |= _signal_values(plan, heard.signals)
+        counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
+        values |= signal_values(heard.signals, counts)
     if heard.image is None or heard.bearings is None or heard.imaged is None:
         return values
-    values |= _bearing_values(heard.bearings)
+    values |= bearing_values(heard.bearings)
     if "image" in plan.products:
-        values |= _table("/image", energy=heard.image.energy, start=heard.image.start, stop=heard.image.stop)
+        values |= table("/image", energy=heard.image.energy, start=heard.image.start, stop=heard.image.stop)
     if "cloud" in plan.products:
         scene = plan.scene
         cloud = scene.processing.ranging.cloud(
@@ -217,50 +240,11 @@ def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
             heard.bearings,
             plan.elements,
             scene.sonar,
-            traced.frame.sonar_pose,
+            frame.sonar_pose,
             plan.profile,
         )
-        values |= _cloud_values(cloud)
+        values |= cloud_values(cloud)
     return values
-
-
-def _table(group: str, **columns: object) -> Values:
-    return {(group, name): np.asarray(value) for name, value in columns.items()}
-
-
-def _truth_values(plan: Plan, index: int, traced: Traced) -> Values:
-    frame, truth, book = traced.frame, traced.truth, traced.ledger
-    row = {"trajectory": frame.trajectory, "step": frame.step, "time": frame.time, "split": plan.recipe.split(index)}
-    stored = {name.removeprefix("beam_"): value for name, value in vars(truth).items()}
-    stored["image_box"] = np.rad2deg(truth.image_box)
-    for name in ("azimuth", "elevation"):
-        stored[f"echo_{name}"] = np.rad2deg(getattr(traced.echoes, name))
-    stored["echo_level"] = traced.echoes.level
-    levels = {name: book.level[..., n] for n, name in enumerate(LEDGER)}
-    return (
-        _table("/", **row)
-        | _table("/truth", **stored, **_expansion_errors(traced.arrivals))
-        | _table("/ledger", **levels, paths=book.paths, error_bound=book.error_bound)
-    )
-
-
-def _signal_values(plan: Plan, signals: Signals) -> Values:
-    counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
-    pressure = np.rint(signals.pressure / signals.quantum).astype(np.int16) if counts else signals.pressure
-    return _table("/signals", pressure=pressure, start=signals.start, clipped=signals.clipped, outside=signals.outside)
-
-
-def _bearing_values(bearings: Bearings) -> Values:
-    columns = dict(vars(bearings))
-    for name in ("azimuth", "azimuth_error", "elevation", "elevation_error"):
-        columns[name] = np.rad2deg(columns[name])
-    return _table("/bearings", **columns)
-
-
-def _cloud_values(cloud: PointCloud) -> Values:
-    x, y, z = np.moveaxis(cloud.position, -1, 0)
-    columns = {name: value for name, value in vars(cloud).items() if name != "position"}
-    return _table("/cloud", **columns, x=x, y=y, z=z)
 
 
 def render(recipe: Recipe | Plan, index: int) -> xr.DataTree:

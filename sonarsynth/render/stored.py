@@ -1,0 +1,70 @@
+"""Products as they are stored: (group, name) to the array of one frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonarsynth.conventions import NO_TARGET, Floats
+from sonarsynth.products import LEDGER, Arrivals, Bearings, Echoes, Ledger, PointCloud, Signals, Truth
+
+Values = dict[tuple[str, str], np.ndarray]
+"""(group, name) to the array of one frame, without the frame axis."""
+
+
+def table(group: str, **columns: object) -> Values:
+    """Arrays of one group."""
+    return {(group, name): np.asarray(value) for name, value in columns.items()}
+
+
+def truth_values(truth: Truth, echoes: Echoes, arrivals: Arrivals) -> Values:
+    """Truth, and the errors of the expansions of its arrivals: NaN, not infinite, where a sensor has no ray."""
+    stored = {name.removeprefix("beam_"): value for name, value in vars(truth).items()}
+    stored["image_box"] = np.rad2deg(truth.image_box)
+    for name in ("azimuth", "elevation"):
+        stored[f"echo_{name}"] = np.rad2deg(getattr(echoes, name))
+    stored["echo_level"] = echoes.level
+    for name in ("wavefront_error", "amplitude_error"):
+        error = float(getattr(arrivals, name))
+        stored[name] = error if np.isfinite(error) else float("nan")
+    return table("/truth", **stored)
+
+
+def ledger_values(book: Ledger, measured: Floats | None) -> Values:
+    """Levels; measured (snap, target + 1, family) in dB, or None where there were no signals."""
+    return table(
+        "/ledger",
+        **{name: book.level[..., n] for n, name in enumerate(LEDGER)},
+        paths=book.paths,
+        error_bound=book.error_bound,
+        isolated_facet=of_isolated(book, book.isolated.facet, NO_TARGET),
+        isolated_level=book.isolated_level,
+        measured_level=np.full(book.isolated_level.shape, np.nan) if measured is None else measured,
+    )
+
+
+def of_isolated(book: Ledger, values: np.ndarray, fill: float = np.nan) -> np.ndarray:
+    """Values of the isolated paths of a ledger (path,) as a table (snap, target + 1, family)."""
+    rows = np.full(book.isolated_level.shape, fill, values.dtype)
+    rows[np.isfinite(book.isolated_level)] = values
+    return rows
+
+
+def signal_values(signals: Signals, counts: bool) -> Values:
+    """Signals, as counts of the converter or in Pa."""
+    pressure = np.rint(signals.pressure / signals.quantum).astype(np.int16) if counts else signals.pressure
+    return table("/signals", pressure=pressure, start=signals.start, clipped=signals.clipped, outside=signals.outside)
+
+
+def bearing_values(bearings: Bearings) -> Values:
+    """Bearings, in degrees."""
+    columns = dict(vars(bearings))
+    for name in ("azimuth", "azimuth_error", "elevation", "elevation_error"):
+        columns[name] = np.rad2deg(columns[name])
+    return table("/bearings", **columns)
+
+
+def cloud_values(cloud: PointCloud) -> Values:
+    """The cloud, each coordinate apart."""
+    x, y, z = np.moveaxis(cloud.position, -1, 0)
+    columns = {name: value for name, value in vars(cloud).items() if name != "position"}
+    return table("/cloud", **columns, x=x, y=y, z=z)

@@ -1,0 +1,76 @@
+"""Truth against data: what a store says it sees, checked against what was there. Reads plain xarray."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from sonarsynth.verification.beams import beam_width, brightest_beam_on_target, near_target
+from sonarsynth.verification.ledger import INAUDIBLE, LEDGER_TOLERANCE, ledger_adds_up, ledger_measured
+from sonarsynth.verification.places import range_errors, snap_located
+from sonarsynth.verification.reading import Check, every
+
+__all__ = [
+    "EXPANSION_AMPLITUDE",
+    "EXPANSION_PHASE",
+    "INAUDIBLE",
+    "LEDGER_TOLERANCE",
+    "Check",
+    "beam_width",
+    "brightest_beam_on_target",
+    "check",
+    "expansions_hold",
+    "ledger_adds_up",
+    "ledger_measured",
+    "near_target",
+    "nothing_outside",
+    "range_errors",
+    "snap_located",
+]
+
+EXPANSION_PHASE = 0.2  # rad: costs a beam 0.09 dB at worst
+EXPANSION_AMPLITUDE = 0.02  # of the strongest echo
+
+
+def check(tree: xr.DataTree) -> list[Check]:
+    """All checks of truth against data, over the frames that were built."""
+    built = np.flatnonzero(np.isfinite(every(tree, "truth/sonar_position")[:, 0]))
+    if not len(built):
+        return [Check("frames", "at least one frame built", "none", False, {"frames": 0})]
+    checks = [Check("frames", "at least one frame built", f"{len(built)}", True, {"frames": len(built)})]
+    checks.append(ledger_adds_up(tree, built))
+    checks.append(ledger_measured(tree, built))
+    checks.append(expansions_hold(tree, built))
+    if "signals" in tree.children:
+        checks.append(nothing_outside(tree, built))
+    if "image" in tree.children:
+        checks.append(brightest_beam_on_target(tree, built))
+    if "bearings" in tree.children:
+        checks.append(snap_located(tree, built))
+    if "cloud" in tree.children:
+        checks.extend(range_errors(tree, built))
+    return checks
+
+
+def nothing_outside(tree: xr.DataTree, frames: np.ndarray) -> Check:
+    """Arrivals that fell outside the sample window, and samples at full scale."""
+    outside = int(every(tree, "signals/outside")[frames].sum())
+    clipped = int(every(tree, "signals/clipped")[frames].sum())
+    got = f"{outside} arrivals outside, {clipped} samples clipped"
+    return Check(
+        "signals whole",
+        "none outside, none clipped",
+        got,
+        outside + clipped == 0,
+        {"outside": outside, "clipped": clipped},
+    )
+
+
+def expansions_hold(tree: xr.DataTree, frames: np.ndarray) -> Check:
+    """Wavefronts and amplitudes are expanded over the aperture; what that errs by, as traced to probes."""
+    phase = 2 * np.pi * float(tree.attrs["band_high"]) * float(every(tree, "truth/wavefront_error")[frames].max())
+    amplitude = float(every(tree, "truth/amplitude_error")[frames].max())
+    got = f"{phase:.2g} rad at the top of the band, {100 * amplitude:.2g} % of the strongest echo"
+    good = phase <= EXPANSION_PHASE and amplitude <= EXPANSION_AMPLITUDE
+    expected = f"under {EXPANSION_PHASE} rad and {100 * EXPANSION_AMPLITUDE:g} %"
+    return Check("wavefronts over the aperture", expected, got, good, {"phase_rad": phase, "amplitude": amplitude})

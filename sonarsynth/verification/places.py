@@ -1,0 +1,86 @@
+"""Places: where the snap and the points are, against where they should be."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from sonarsynth.geometry import Pose
+from sonarsynth.verification.beams import near_target
+from sonarsynth.verification.ledger import snaps_heard
+from sonarsynth.verification.reading import Check, of_frame
+
+
+def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
+    """The located snap is within three predicted errors of the true one in 95 % of frames (Mahalanobis distance).
+
+    Three standard errors in each of three axes: the chi-square of three degrees of freedom that has the probability
+    of three sigma (99.73 %) is 14.16. A snap whose sound reaches the array directly and that is not found counts too.
+    """
+    good, total, errors = 0, 0, []
+    for i in frames:
+        pose = Pose(of_frame(tree, "truth/sonar_position", i), of_frame(tree, "truth/sonar_orientation", i))
+        true = pose.to_body(of_frame(tree, "truth/snap_position", i))
+        found, covariance = of_frame(tree, "bearings/position", i), of_frame(tree, "bearings/position_covariance", i)
+        reached = snaps_heard(tree, i)
+        rows = np.flatnonzero(np.isfinite(found).all(axis=1))
+        total += max(len(rows), int(reached.sum()))
+        for row in rows:
+            each = np.linalg.norm(true - found[row], axis=1)
+            error = found[row] - true[np.argmin(each)]
+            errors.append(float(np.min(each)))
+            good += bool(error @ np.linalg.solve(covariance[row], error) <= 14.16)
+    name, expected = "snap located", "within 3 predicted errors in 95 %"
+    if not total:
+        return Check(name, expected, "no snap reaches the array", None, {})
+    if not errors:
+        return Check(name, expected, f"none of {total} found", False, {"good": 0, "found": 0})
+    got = f"{good} of {total}, median error {np.median(errors):.3g} m"
+    numbers = {"good": good, "found": len(errors), "median_m": float(np.median(errors))}
+    return Check(name, expected, got, good >= 0.95 * total, numbers)
+
+
+def range_errors(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
+    """Range errors of the points on a target, and the count of those off it.
+
+    How large they are depends on the scene (beam width, size of the glints); that they are as predicted does not.
+    """
+    errors, scaled, off, near, beams = [], [], 0, 0, 0
+    for i in frames:
+        found, predicted = of_frame(tree, "cloud/range", i), of_frame(tree, "cloud/range_error", i)
+        true, target = of_frame(tree, "truth/range", i), of_frame(tree, "truth/target", i)
+        points, on = np.isfinite(found), target >= 0
+        beams += int(on.sum())
+        errors.append(np.abs(found - true)[points & on])
+        scaled.append(errors[-1] / predicted[points & on])
+        off += int((points & ~on).sum())
+        near += int((points & ~on & near_target(tree, target)).sum())
+    error, ratio = np.concatenate(errors), np.concatenate(scaled)
+    if not len(error):
+        return [Check("range of points on target", "reported", "no points on a target", None, {"off_target": off})]
+    median, share = float(np.median(error)), float(np.mean(ratio <= 3))
+    numbers: dict[str, Any] = {
+        "points": len(error),
+        "median_m": median,
+        "share_within_3": share,
+        "beams_on_target": beams,
+    }
+    return [
+        Check(
+            "range of points on target",
+            "reported",
+            f"median error {100 * median:.2g} cm over {len(error)} points",
+            None,
+            numbers,
+        ),
+        Check("predicted range errors", "90 % within three", f"{100 * share:.3g} %", share >= 0.9, numbers),
+        Check(
+            "points off target",
+            "reported",
+            f"{off} ({near} within a beam width of an outline) beside {len(error)} on it",
+            None,
+            {"off_target": off, "near_outline": near},
+        ),
+    ]

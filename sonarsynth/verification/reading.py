@@ -1,0 +1,29 @@
+"""One line of the report, and how checks read a store: plain xarray."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+
+@dataclass(frozen=True)
+class Check:
+    """One line of the report. `ok` is None where a figure is reported, or the store has nothing to check."""
+
+    name: str
+    expected: str
+    got: str
+    ok: bool | None
+    numbers: dict[str, float]
+
+
+def every(tree: xr.DataTree, name: str) -> np.ndarray:
+    """Values of a variable over all frames."""
+    return np.asarray(tree[name].values)
+
+
+def of_frame(tree: xr.DataTree, name: str, index: int) -> np.ndarray:
+    """Values of a variable in one frame."""
+    return np.asarray(tree[name].isel(frame=index).values)

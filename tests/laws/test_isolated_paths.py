@@ -1,0 +1,123 @@
+"""Single paths of the ledger are found again in signals of each alone, and `verify` sees when they are not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from sonarsynth.labelling import family
+from sonarsynth.planning import plan
+from sonarsynth.render import Traced, beamform_frame, measure_isolated, range_frame, trace_frame
+from sonarsynth.scattering import Kirchhoff
+from sonarsynth.synthesis import DirectSum, KernelDeposit
+from sonarsynth.synthesis.isolated import measured_levels
+from sonarsynth.verification import ledger_adds_up, ledger_measured
+from tests.laws.test_ledger import LEVEL, SNAPS, SONAR, assert_it_adds_up, booked, some_paths, the_band, transfer
+from tests.laws.test_synthesis import absorption
+from tests.scenes import point_scene, remus
+
+
+@pytest.mark.parametrize("method", [KernelDeposit(), DirectSum()], ids=["kernel", "direct"])
+def test_each_isolated_path_is_found_in_its_signals(method: KernelDeposit | DirectSum) -> None:
+    """Turned, blurred, rough, coherent over a facet, absorbed, stretched by Doppler, of another gain: all as said."""
+    of = some_paths(160, 6)
+    of = replace(of, stretch=np.random.default_rng(6).uniform(-5e-3, 5e-3, 160))
+    book = booked(of)
+    found = np.isfinite(book.isolated_level)
+    assert (found == (book.paths > 0)).all()
+    measured = LEVEL[book.isolated.snap] + measured_levels(method, book.isolated, SNAPS, SONAR, absorption)
+    assert np.abs(measured - book.isolated_level[found]).max() < 0.02
+    alone = [measured_levels(method, book.isolated.select([e]), SNAPS, SONAR, absorption)[0] for e in range(3)]
+    np.testing.assert_allclose(LEVEL[book.isolated.snap[:3]] + alone, measured[:3], atol=5e-3)
+
+
+@pytest.mark.parametrize(
+    "extreme",
+    [
+        {"blur": 3e-5},  # 110 dB less
+        {"absorption": 200.0},
+        {"corners": (-0.7e-3, -0.3e-3, 1e-3)},  # 400 rad over the facet
+        {"corners": (0.0, 0.0, 0.0)},
+        {"stretch": -0.09},
+        {"rough_share": 1.0, "rough_delay": 1e-10},
+        {"scattering": 1e-12},
+    ],
+    ids=str,
+)
+def test_extreme_paths_are_found_too(extreme: dict[str, float]) -> None:
+    one = replace(some_paths(1, 9, coherent="corners" in extreme), blur=np.zeros(1))
+    one = replace(one, **{name: np.array([value]) for name, value in extreme.items()})
+    product = one.scattering * one.spreading_out * one.spreading_in * one.boundary
+    book = booked(replace(one, amplitude=product * 10.0 ** (-one.absorption / 20.0)))
+    level = LEVEL[one.snap] + measured_levels(KernelDeposit(), book.isolated, SNAPS, SONAR, absorption)
+    assert level == pytest.approx(book.isolated_level[np.isfinite(book.isolated_level)], abs=0.06)
+    assert_it_adds_up(book)
+
+
+def test_the_isolated_path_is_the_loudest_and_silent_ones_are_none() -> None:
+    of = some_paths(300, 7)
+    loud = replace(of, blur=np.where(np.arange(300) % 2, 1e-3, of.blur))  # 1 ms of blur leaves nothing
+    book, band = booked(loud), the_band()
+    each = (np.abs(transfer(loud, band.frequency, band.relative)) ** 2 * band.weight[loud.snap]).sum(axis=1)
+    rows = np.argwhere(np.isfinite(book.isolated_level))
+    for n, (snap, target, kind) in enumerate(rows):
+        mine = (loud.snap == snap) & (loud.target == target) & (family(loud) == kind)
+        assert 10 * np.log10(each[mine].max()) + LEVEL[snap] == pytest.approx(
+            book.isolated_level[snap, target, kind], abs=0.02
+        )
+        assert book.isolated.blur[n] < 1e-3
+    silent = booked(replace(of, blur=np.full(300, 1e-3)))
+    assert not np.isfinite(silent.isolated_level).any()
+    assert (silent.paths == book.paths).all()
+
+
+def ledger_tree(values: dict[tuple[str, str], np.ndarray]) -> xr.DataTree:
+    dims = ("frame", "snap", "echo", "family")
+    group = {name: (dims, array[None]) for (where, name), array in values.items() if where == "/ledger"}
+    return xr.DataTree.from_dict({"/ledger": xr.Dataset(group)})
+
+
+@pytest.mark.parametrize("law", [None, Kirchhoff(), Kirchhoff(roughness=1e-3, diffuse=0.1)])
+def test_a_frame_has_the_levels_that_its_ledger_says_until_one_is_changed(law: Kirchhoff | None) -> None:
+    recipe = remus() if law is None else point_scene((20.0, 4.0, -47.0), (15.0, -6.0, -56.0))
+    if law is not None:
+        scene = recipe.scene
+        recipe = replace(recipe, scene=replace(scene, physics=replace(scene.physics, scattering=law)))
+    made = plan(recipe, frozenset({"signals"}))
+    traced = trace_frame(made, 0)
+
+    def rows(of: Traced) -> xr.DataTree:
+        return ledger_tree(range_frame(made, 0, of, beamform_frame(made, 0, of)))
+
+    good = rows(traced)
+    report = ledger_measured(good, np.array([0]))
+    assert report.ok and report.numbers["worst_db"] < 0.01 and report.numbers["paths"] == 2
+    assert ledger_adds_up(good, np.array([0])).ok
+    facet = good["ledger/isolated_facet"].values
+    assert facet[0, 0, -1, 0] == -1 and 0 <= facet[0, 0, 0, 0] < len(traced.frame.moment.bodies[0].mesh.faces)
+    alone = traced.ledger.isolated
+    louder = replace(alone, amplitude=1.02 * alone.amplitude)  # by 0.17 dB
+    wrong = ledger_measured(rows(replace(traced, ledger=replace(traced.ledger, isolated=louder))), np.array([0]))
+    assert wrong.ok is False and wrong.numbers["worst_db"] == pytest.approx(0.172, abs=0.01)
+    good["ledger/scattering"].values[0, 0, 0, 0] += 0.2
+    assert ledger_adds_up(good, np.array([0])).ok is False
+
+
+def test_truth_alone_is_not_measured_and_a_missing_level_is_a_fault() -> None:
+    made = plan(point_scene((20.0, 4.0, -47.0), (15.0, -6.0, -56.0)), frozenset())
+    traced = trace_frame(made, 0)
+    tree = ledger_tree(range_frame(made, 0, traced, beamform_frame(made, 0, traced)))
+    assert ledger_measured(tree, np.array([0])).ok is None
+    assert np.isfinite(tree["ledger/isolated_level"].values).sum() == 2
+    tree["ledger/measured_level"].values[:] = np.where(
+        np.arange(2)[:, None] > 0, measure_isolated(made, traced), np.nan
+    )
+    assert ledger_measured(tree, np.array([0])).ok is False
+    tree.attrs["products"] = ["signals"]
+    tree["ledger/measured_level"].values[:] = np.nan
+    assert ledger_measured(tree, np.array([0])).ok is False
+    del tree["ledger"]["measured_level"]
+    assert ledger_measured(tree, np.array([0])).ok is None
