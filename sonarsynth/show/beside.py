@@ -127,7 +127,7 @@ def _alike(some: tuple[Hull, ...], others: tuple[Hull, ...]) -> bool:
 
 def _fit(tree: xr.DataTree, path: Path) -> xr.DataTree:
     """The store, if its images can be drawn beside others."""
-    if read(tree, "image/energy") is None:
+    if "image" not in tree.children or "energy" not in tree["image"].dataset:
         raise NothingToDraw(f"{path}: the store has no image, which is what is drawn side by side")
     return tree
 

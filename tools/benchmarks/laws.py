@@ -1,0 +1,93 @@
+"""`tools/bench laws`: one frame of remus.yaml by each law of scattering, and what the shapes of its pulses cost."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+import sonarsynth as ss
+from benchmarks.frame import RECIPE, cpu, relative
+from sonarsynth import config, planning, render
+from sonarsynth.planning import Plan
+from sonarsynth.products import Arrivals, Signals
+from sonarsynth.render import Traced
+from sonarsynth.synthesis import DirectSum
+from sonarsynth.synthesis.direct_sum import exact_signals
+
+LAWS = {
+    "lobe": ss.MirrorLobe(),
+    "kirchhoff": ss.Kirchhoff(),
+    "rough, 2 mm": ss.Kirchhoff(roughness=0.002, slope=0.2),
+    "rough, 20 mm": ss.Kirchhoff(roughness=0.02, slope=0.2),
+}
+FRAMES = 7
+HEARD = (253,)
+"""Hydrophones that the slow exact way is asked at, beside the outmost."""
+
+
+def plain(arrivals: Arrivals) -> Arrivals:
+    """The same paths, each a scaled snap: what the pulses would be without their shapes."""
+    none = np.zeros(len(arrivals.delay))
+    return replace(
+        arrivals, coherent=none.astype(bool), corners=0.0 * arrivals.corners, rough_share=none, rough_delay=none,
+        blur=none, phase=none,
+    )  # fmt: skip
+
+
+def synthesise(plan: Plan, traced: Traced) -> Signals:
+    """What reaches the hydrophones: no noise, no converter."""
+    return plan.scene.physics.synthesis.signals(
+        traced.arrivals, traced.frame.moment.snaps, plan.elements, plan.scene.sonar, plan.absorption,
+        float(plan.windows.start[traced.frame.index]), plan.windows.samples,
+    )  # fmt: skip
+
+
+def synthesis_ms(plan: Plan, index: int) -> tuple[float, float, float]:
+    """Processor time (ms) of the synthesis of a frame not seen before, and of its paths without shapes; and the error
+    over the echo's peak."""
+    traced = render.trace_frame(plan, index)
+    echoes = replace(traced, arrivals=traced.arrivals.select(~traced.arrivals.direct))
+    shaped: Signals = synthesise(plan, echoes)
+    elements = plan.elements
+    outmost = int(np.argmax(np.linalg.norm(elements.position, axis=1)))  # what the aperture is measured by
+    some = np.unique([outmost, *HEARD])
+    few = replace(
+        elements, position=elements.position[some], gain=elements.gain[some], column=elements.column[some],
+        row=elements.row[some],
+    )  # fmt: skip
+    sonar, start = plan.scene.sonar, float(plan.windows.start[index])
+    exact, _ = exact_signals(
+        echoes.arrivals, traced.frame.moment.snaps, few, sonar, plan.absorption, start, plan.windows.samples
+    )
+    times = []
+    for make in (lambda a: a, plain):
+        others = []
+        for i in range(index + 1, index + 1 + FRAMES):
+            frame = render.trace_frame(plan, i)
+            frame = replace(frame, arrivals=make(frame.arrivals))
+            others.append(cpu(lambda frame=frame: synthesise(plan, frame), 1)[1])
+        times.append(1e3 * float(np.median(others)))
+    return times[0], times[1], relative(shaped.pressure[some], exact)
+
+
+def bench(index: int = 20) -> dict[str, Any]:
+    """Facets, paths, cost of tracing and of synthesis, error against direct sums."""
+    recipe = config.load(RECIPE)
+    rows = {}
+    for name, law in LAWS.items():
+        physics = replace(recipe.scene.physics, scattering=law)
+        plan = planning.plan(replace(recipe, scene=replace(recipe.scene, physics=physics)))
+        traced, tracing = cpu(lambda plan=plan: render.trace_frame(plan, index))
+        shaped, scaled, error = synthesis_ms(plan, index)
+        rows[name] = {
+            "facets": sum(len(mesh.faces) for mesh in plan.scene.meshes),
+            "paths": len(traced.arrivals.delay),
+            "trace_and_label_ms": 1e3 * tracing,
+            "synthesise_ms": shaped,
+            "synthesise_as_scaled_snaps_ms": scaled,
+            "shapes_cost": shaped / scaled,
+            "error_over_echo_peak": error,
+        }
+    return {"method": plan.scene.physics.synthesis.kind, "exact": DirectSum().kind, "laws": rows}
