@@ -11,7 +11,7 @@ from sonarsynth.planning import Plan
 from sonarsynth.products import FAMILIES
 from sonarsynth.recipe import SPLITS
 
-FORMAT_VERSION = "1"
+FORMAT_VERSION = "2"
 """Version of the layout of a store."""
 
 
