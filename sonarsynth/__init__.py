@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from sonarsynth.recipe import Recipe
     from sonarsynth.scattering import Isotropic, Kirchhoff, MirrorLobe, PartlyReflecting
     from sonarsynth.scattering.strength import target_strength
+    from sonarsynth.scattering.targets import Target
     from sonarsynth.scene import EchoWindow, Physics, Processing, Scene, Trajectory, World
     from sonarsynth.schedule import BuildReport, build
     from sonarsynth.sonar import (
@@ -71,7 +72,6 @@ if TYPE_CHECKING:
     from sonarsynth.world.shapes import Box, Cylinder, LShape, MeshFile, Myring, Remus100, Sphere
     from sonarsynth.world.snaps import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
     from sonarsynth.world.sources import LogarithmicBubble, SnappingShrimp
-    from sonarsynth.scattering.targets import Target
 
 __all__ = [
     "Absorption",

@@ -8,13 +8,13 @@ import numpy as np
 
 from sonarsynth.recipe import Recipe
 from sonarsynth.scattering import Isotropic
+from sonarsynth.scattering.targets import Target
 from sonarsynth.scene import Physics, Processing, Scene, Trajectory, World
 from sonarsynth.sonar import Band, BandPass, BeamGrid, Romanis, Sonar
 from sonarsynth.world.environment import Absorption, Environment, Isovelocity
 from sonarsynth.world.motion import Line, Still
 from sonarsynth.world.shapes import Remus100, Sphere
 from sonarsynth.world.sources import SnappingShrimp
-from sonarsynth.scattering.targets import Target
 
 
 def remus(frames: int = 2, **sonar: Any) -> Recipe:

@@ -15,6 +15,7 @@ from sonarsynth.description import FieldError
 from sonarsynth.planning import Plan, plan
 from sonarsynth.recipe import Recipe
 from sonarsynth.render import render
+from sonarsynth.scattering.targets import Target
 from sonarsynth.scene import EchoWindow, Physics, Processing, Scene, Trajectory, World
 from sonarsynth.schedule import build
 from sonarsynth.sonar import BeamGrid, Converter, LowPass, PlanarLattice, PositionTable, Sonar
@@ -23,7 +24,6 @@ from sonarsynth.world.environment import Environment, FlatNoise, Isovelocity, Ta
 from sonarsynth.world.motion import Circle, Still
 from sonarsynth.world.shapes import Box, Sphere
 from sonarsynth.world.sources import LogarithmicBubble, SnappingShrimp
-from sonarsynth.scattering.targets import Target
 
 LATTICE = PlanarLattice(columns=12, rows=12, pitch=0.05)
 BEAMS = BeamGrid(azimuths=11, elevations=11)

@@ -10,6 +10,7 @@ import pytest
 from sonarsynth.planning import plan
 from sonarsynth.recipe import Recipe
 from sonarsynth.render import synthesise, trace_frame
+from sonarsynth.scattering.targets import Target
 from sonarsynth.scene import Physics, Scene, Trajectory, World
 from sonarsynth.sonar import PlanarLattice, Sonar
 from sonarsynth.tracing import AutoTracing
@@ -18,7 +19,6 @@ from sonarsynth.world.environment import Environment, Isovelocity, Tabulated
 from sonarsynth.world.motion import Line, Still
 from sonarsynth.world.shapes import Sphere
 from sonarsynth.world.sources import SnappingShrimp
-from sonarsynth.scattering.targets import Target
 
 UNIFORM = Isovelocity(speed=1530.0)
 BENDING = Tabulated(depth=(0.0, 60.0), speed=(1540.0, 1500.0))

@@ -12,12 +12,12 @@ from sonarsynth import config
 from sonarsynth.config import RecipeError
 from sonarsynth.description import FieldError
 from sonarsynth.recipe import Recipe
+from sonarsynth.scattering.targets import Target
 from sonarsynth.scene import Scene, Trajectory, World
 from sonarsynth.sonar import Band, BandPass, BeamGrid, Converter, LowPass, PlanarLattice, PositionTable, Romanis, Sonar
 from sonarsynth.world import environment as water
 from sonarsynth.world import motion, shapes
 from sonarsynth.world.sources import SnappingShrimp
-from sonarsynth.scattering.targets import Target
 
 WRONG = [
     ("beams:", "beems:", "14: scene.sonar.beems: 'beems' is not a field here; did you mean 'beams'?"),

@@ -19,6 +19,7 @@ from sonarsynth.pictures.frames import Hull
 from sonarsynth.pictures.page import MOST_FACETS, page
 from sonarsynth.pictures.rays import COLOURS
 from sonarsynth.recipe import Recipe
+from sonarsynth.scattering.targets import Target
 from sonarsynth.scene import Scene, Trajectory, World
 from sonarsynth.show.rays import ray_lines, show_rays, table
 from sonarsynth.tracing.ray_request import EigenrayRequest, RayRequest
@@ -27,7 +28,6 @@ from sonarsynth.world.environment import Absorption, Environment, Isovelocity, T
 from sonarsynth.world.motion import Still
 from sonarsynth.world.shapes import Box
 from sonarsynth.world.sources import SnappingShrimp
-from sonarsynth.scattering.targets import Target
 
 SNAP, ARRAY, TARGET = np.array([30.0, 10.0, -14.0]), np.array([0.0, 0.0, -6.0]), np.array([40.0, -8.0, -9.0])
 BED = FluidHalfSpace(density_ratio=1.9, speed_ratio=1.15, loss_tangent=0.01)

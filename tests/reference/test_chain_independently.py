@@ -9,6 +9,7 @@ from sonarsynth.conventions import direction
 from sonarsynth.planning import plan
 from sonarsynth.render import beamform_frame, range_frame, render, trace_frame
 from sonarsynth.scattering import MirrorLobe
+from sonarsynth.scattering.targets import Target
 from sonarsynth.scene import Scene, Trajectory, World
 from sonarsynth.sonar import BeamGrid, Converter, Sonar
 from sonarsynth.synthesis import KernelDeposit
@@ -17,7 +18,6 @@ from sonarsynth.world.environment import Absorption, Environment, Tabulated
 from sonarsynth.world.motion import Still
 from sonarsynth.world.shapes import Sphere
 from sonarsynth.world.sources import SnappingShrimp
-from sonarsynth.scattering.targets import Target
 from tests.scenes import remus
 
 MOUNT = {"heading": np.deg2rad(88), "pitch": np.deg2rad(10), "roll": np.deg2rad(20)}
