@@ -78,7 +78,8 @@ class Arrivals:
     caustics: Ints  # (path,) caustics passed
     arrives_by: Ints  # (path,) index into FAMILIES: which boundaries it touched last, on its way to the array
     phase: Floats  # (path,) rad: constant phase of the pulse over frequency, from caustics and lossy reflections
-    blur: Floats  # (path,) s: rough boundaries take exp(-(2 pi f blur)^2/2) off the spectrum, a Gaussian in time
+    blur: Floats  # (path,) s: roughness takes exp(-(2 pi f blur)^2/2) off the spectrum, a Gaussian in time
+    echo_blur: Floats  # (path,) s: the part of blur that is the facet's, blur^2 the sum of its square and boundaries'
     stretch: Floats  # (path,) Doppler: the pulse is p((t - delay)/(1 + stretch))
     coherent: Bools  # (path,) of a smooth facet, or its shadow: differentiated, i f/centre; phases count in sums
     corners: Floats  # (path, 3) s: of the facet about `delay`, a mean over it; 0: a point

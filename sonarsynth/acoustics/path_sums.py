@@ -162,21 +162,25 @@ def mean_powers(
     rough_delay: Floats,
     loss: Floats,
     blur: Floats,
+    echo_blur: Floats,
     frequency: Floats,
     relative: Floats,
     weight: Floats,
     centre: float,
 ) -> Floats:
-    """Means over the band (3, path) of the power of each path over that at its centre.
+    """Means over the band (4, path) of the power of each path over that at its centre.
 
     First of what a facet does to the pulse, (f/centre)^2 of a coherent one (its mean left out) or 1 - w exp(-g^2) of a
-    rough one (`facet_pulses`); then with absorption of loss (path,) dB at the centre, relative (bin,) more at the other
-    frequencies; then with the blur (path,) s as well. weight (snap, bin) sums to 1.
+    rough one (`facet_pulses`); then with echo_blur (path,) s, the facet's part of the blur; then with absorption of
+    loss (path,) dB at the centre, relative (bin,) more at the other frequencies; then with the rest of the blur (path,)
+    s as well. weight (snap, bin) sums to 1.
     """
-    out = np.zeros((3, loss.size))
+    out = np.zeros((4, loss.size))
     omega = 2.0 * math.pi * frequency
     for e in range(loss.size):
         decay = math.log(10.0) / 10.0 * loss[e]
+        own = echo_blur[e] ** 2
+        others = max(blur[e] ** 2 - own, 0.0)
         for k in range(frequency.size):
             power = weight[snap[e], k]
             if coherent[e]:
@@ -185,9 +189,12 @@ def mean_powers(
                 g = omega[k] * rough_delay[e]
                 power *= 1.0 - rough_share[e] - rough_share[e] * math.expm1(-g * g)
             out[0, e] += power
-            power *= math.exp(-decay * relative[k])
+            if own > 0.0:
+                power *= math.exp(-(omega[k] ** 2) * own)
             out[1, e] += power
-            if blur[e] > 0.0:
-                power *= math.exp(-((omega[k] * blur[e]) ** 2))
+            power *= math.exp(-decay * relative[k])
             out[2, e] += power
+            if others > 0.0:
+                power *= math.exp(-(omega[k] ** 2) * others)
+            out[3, e] += power
     return out

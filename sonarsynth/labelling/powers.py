@@ -56,23 +56,24 @@ def path_powers(arrivals: Arrivals, band: Band) -> Powers:
     from sonarsynth.acoustics.path_sums import mean_powers
 
     few = band.sliced(FEWEST)
-    columns = arrivals.coherent, arrivals.rough_share, arrivals.rough_delay, arrivals.absorption, arrivals.blur
-    facet, absorbed, blurred = mean_powers(
-        arrivals.snap, *columns, few.frequency, few.relative, few.weight, arrivals.centre
-    )
+    columns = arrivals.coherent, arrivals.rough_share, arrivals.rough_delay, arrivals.absorption
+    blurs = arrivals.blur, arrivals.echo_blur
+    bins = few.frequency, few.relative, few.weight
+    # echo: with the facet's own roughness, which is no loss at a boundary
+    facet, echo, absorbed, blurred = mean_powers(arrivals.snap, *columns, *blurs, *bins, arrivals.centre)
     together = _Together()
     if arrivals.coherent.any():
         rows = np.flatnonzero(arrivals.coherent)
         mean, together = _coherent(arrivals, rows, band)
         with np.errstate(divide="ignore", invalid="ignore"):
-            absorbed[rows], blurred[rows] = (np.nan_to_num(x[rows] / facet[rows]) * mean for x in (absorbed, blurred))
-        facet[rows] = mean
+            for some in (echo, absorbed, blurred):
+                some[rows] = np.nan_to_num(some[rows] / facet[rows]) * mean
     start = arrivals.scattering**2
     out = start * arrivals.spreading_out**2
     back = out * arrivals.spreading_in**2
     faded = back * 10.0 ** (-arrivals.absorption / 10.0)
     last = faded * arrivals.boundary**2
-    steps = np.stack([start * facet, out * facet, back * facet, faded * absorbed, last * blurred])
+    steps = np.stack([start * echo, out * echo, back * echo, faded * absorbed, last * blurred])
     return Powers(steps, *together)
 
 

@@ -110,6 +110,7 @@ def assemble(
         arrives_by=np.asarray((legs.surface > 0) + 2 * (legs.bottom > 0)),
         phase=phase,
         blur=np.hypot(np.hypot(out.blur, legs.blur), pulses.blur),
+        echo_blur=pulses.blur,
         stretch=np.zeros(len(length)),
         coherent=pulses.coherent,
         corners=pulses.corners,

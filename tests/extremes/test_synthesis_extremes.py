@@ -54,6 +54,7 @@ def arrivals(delay: Floats, direction: Floats, radius: Floats, amplitude: Floats
         arrives_by=zero,
         phase=np.zeros(n),
         blur=np.zeros(n),
+        echo_blur=np.zeros(n),
         stretch=np.zeros(n),
         coherent=np.zeros(n, bool),
         corners=np.zeros((n, 3)),

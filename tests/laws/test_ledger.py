@@ -131,6 +131,33 @@ def test_losses_are_means_of_the_losses_of_paths_and_phases_are_in_the_scatterin
     assert terms["scattering"] == pytest.approx(10 * np.log10(unit), abs=0.02)
 
 
+def test_what_a_rough_facet_does_not_mirror_is_in_its_scattering_and_what_the_bed_takes_is_not() -> None:
+    """blur^2 is the sum of two squares: all of the loss is the target's, or the boundary's, or some of each."""
+    own, others = 2e-6, 1.5e-6
+    of = some_paths(1, 9, coherent=True)
+    of = replace(of, boundary=np.ones(1), absorption=np.zeros(1), amplitude=of.spreading_out * of.spreading_in)
+    of = replace(of, scattering=np.ones(1), corners=np.zeros((1, 3)))
+
+    def terms(blur: float, echo_blur: float) -> tuple[float, float]:
+        book = levels_of(booked(replace(of, blur=np.array([blur]), echo_blur=np.array([echo_blur]))))
+        return float(np.nanmax(book["scattering"])), float(np.nanmax(book["boundary_loss"]))
+
+    band = the_band()
+    factor = (band.frequency / of.centre) ** 2
+    mean = [band.weight[of.snap[0]] @ (factor * np.exp(-((2 * np.pi * band.frequency * s) ** 2))) for s in (0.0, own)]
+    smooth, none = terms(0.0, 0.0)
+    assert none == 0.0
+    scattering, boundary = terms(own, own)
+    assert (scattering - smooth, boundary) == pytest.approx((10 * np.log10(mean[1] / mean[0]), 0.0), abs=0.01)
+    assert boundary == 0.0
+    taken = terms(own, 0.0)
+    assert taken == pytest.approx((smooth, smooth - scattering), abs=3e-3)
+    total = float(np.hypot(own, others))
+    both = terms(total, own)
+    assert both[0] == pytest.approx(scattering, abs=3e-3)
+    assert both[1] - both[0] == pytest.approx(terms(total, 0.0)[1] - smooth, abs=3e-3)  # however it is divided
+
+
 def test_one_pulse_twice_is_6_db_louder_where_phases_count_and_3_db_where_not() -> None:
     one = arrivals([0.01], [[1.0, 0.0, 0.0]], [20.0], [0.1])
     one = replace(one, scattering=np.array([0.1]))

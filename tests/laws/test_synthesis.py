@@ -77,6 +77,7 @@ def arrivals(
         arrives_by=zero,
         phase=np.zeros(n),
         blur=np.zeros(n),
+        echo_blur=np.zeros(n),
         stretch=np.zeros(n),
         coherent=np.zeros(n, bool),
         corners=np.zeros((n, 3)),
