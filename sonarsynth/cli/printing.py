@@ -86,6 +86,11 @@ def size(count: float) -> str:
     raise AssertionError
 
 
+def _milliseconds(seconds: float) -> str:
+    """A time without an exponent, in ms to three figures."""
+    return f"{1e3 * seconds:.3g} ms" if seconds < 0.9995 else f"{1e3 * seconds:.0f} ms"
+
+
 def build_report(report: BuildReport) -> None:
     """What a build did, in a few lines."""
     out = console()
@@ -95,7 +100,7 @@ def build_report(report: BuildReport) -> None:
             f"{report.store}: {report.written} frames written in {duration(report.seconds)} ({rate:.3g} frames/s, "
             f"{size(report.bytes)}), {report.there} of {report.wanted} were there"
         )
-        times = ", ".join(f"{stage} {1e3 * s / report.written:.3g} ms" for stage, s in report.stage_cpu.items())
+        times = ", ".join(f"{stage} {_milliseconds(s / report.written)}" for stage, s in report.stage_cpu.items())
         where = (
             f"{report.workers} workers, at most {size(report.worker_peak_bytes)} each"
             if report.workers

@@ -75,11 +75,13 @@ def _shape(text: str, unit: str) -> Shape:
     """The shape that a text describes: a mapping in YAML, or the path of a mesh file. Raises BadOption, RecipeError."""
     from sonarsynth.world.shapes import MeshFile, Shape
 
-    if text.lstrip().startswith("{"):
-        found: Shape = _described(text, "shape", Shape)
-        return found
     if unit not in ("m", "cm", "mm", "in", "ft"):
         raise BadOption(f"--unit: {unit} is none of m, cm, mm, in, ft")
+    if text.lstrip().startswith("{"):
+        if unit != "m":
+            raise BadOption(f"--unit: is for a mesh file; write units in the shape, such as 'radius: 25 {unit}'")
+        found: Shape = _described(text, "shape", Shape)
+        return found
     if not Path(text).is_file():
         raise BadOption(f"{text}: no such file, and no shape such as '{{kind: sphere, radius: 0.25 m}}'")
     return MeshFile(path=text, unit=unit)  # type: ignore[arg-type]
@@ -92,6 +94,8 @@ def _described(text: str, name: str, kind: Any) -> Any:
     from sonarsynth.config.messages import explain
     from sonarsynth.config.source import read_text
 
+    if not text.lstrip().startswith("{"):
+        raise BadOption(f"{name}: must be a mapping such as '{{kind: kirchhoff}}', not '{text}'")
     source = read_text(text, name, Path.cwd())
     try:
         return TypeAdapter(kind).validate_json(json.dumps(source.data), strict=True)

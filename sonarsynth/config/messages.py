@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from sonarsynth.config.source import RecipeError, Source, Where
+from sonarsynth.scattering.targets import NAME
 
 
 def explain(error: ValidationError, root: type, source: Source) -> RecipeError:
@@ -19,7 +20,13 @@ def explain(error: ValidationError, root: type, source: Source) -> RecipeError:
     for details in error.errors(include_url=False):
         where = _where(details, source.data)
         where, message = _message(details, where, root, source.data)
+        if details["type"] == "dataclass_type" and (found.get(where) or "").startswith("must be '"):
+            found[where] = found[where].replace("' or '", "', '").replace(", not ", " or a mapping, not ", 1)
         found.setdefault(where, message)
+    words = {where for where, text in found.items() if text.startswith("must be '") and text.endswith("not a mapping")}
+    for where in words:  # of a word or a mapping, it is the mapping that was meant
+        if any(len(other) > len(where) and other[: len(where)] == where for other in found):
+            del found[where]
     guessed = [item for item in found.items() if "did you mean" in item[1]]  # a misspelt field explains a missing one
     where, message = next(iter(found.items()))
     if guessed and message == "is required":
@@ -65,6 +72,8 @@ def _text(details: ErrorDetails) -> str:
             return str(context["error"])
         case "dataclass_type" | "dict_type" | "model_attributes_type":
             return f"must be a mapping of fields, not {value}"
+        case "string_pattern_mismatch" if context["pattern"] == NAME:
+            return f"must be letters, digits, hyphens and underscores, a letter first, not {value}"
         case "tuple_type" | "list_type":
             return f"must be a list, not {value}"
         case "too_long":
@@ -144,4 +153,7 @@ def _chosen(kind: Any, data: Any) -> Any:
     if len(members) == 1:
         return members[0]
     tag = data.get("kind") if isinstance(data, dict) else None
-    return next((m for m in members if _tag(m) == tag), None)
+    tagged = [m for m in members if _tag(m) is not None]
+    if isinstance(data, dict) and tag is None and len(tagged) == 1:  # the kind of the only one may be left out
+        return tagged[0]
+    return next((m for m in tagged if _tag(m) == tag), None)

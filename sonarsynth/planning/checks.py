@@ -90,6 +90,8 @@ def check_positions(scene: Scene, recipe: Recipe) -> None:
         for i, body in enumerate(frame.moment.bodies):
             path = ("scene", "world", "targets", i, "motion")
             _check_depth(path, f"target '{body.name}'", body.pose.to_world(_hull(body.mesh)), bed, frame)
+            if inside(body, frame.sonar_pose.position):
+                raise FieldError(path, f"target '{body.name}' has the sonar inside at frame {frame.index}")
         _check_snaps(scene, frame)
 
 

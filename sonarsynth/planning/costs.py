@@ -230,13 +230,12 @@ def _facets_leave_out(plan: Plan) -> list[Omission]:
     for target, law, mesh in zip(scene.world.targets, scene.laws, scene.meshes, strict=True):
         if isinstance(law, Kirchhoff):
             error = expected_error(mesh, scene.sonar.shortest_wavelength)
-            rows.append(
-                Omission(
-                    f"curvature within facets of {target.name}",
-                    f"{len(mesh.faces)} flat facets",
-                    f"about {100.0 * error:.2g} % of the echo at the top of the band",
-                )
-            )
+            bound = f"about {100.0 * error:.2g} % of the echo at the top of the band"
+            if error > 0.995:
+                bound = "all of the echo at the top of the band"
+            if error == 0.0:
+                bound = "0: it has no curved surface"
+            rows.append(Omission(f"curvature within facets of {target.name}", f"{len(mesh.faces)} flat facets", bound))
     if rows:
         bound = "spheres over 26 wavelengths round: 0.3 dB to 60 degrees off backscatter, 2.6 dB to 120"
         rows.append(Omission("waves that creep round bodies or pass inside", "facets are plane mirrors", bound))

@@ -9,7 +9,7 @@ from sonarsynth.planning.validity import validity
 from sonarsynth.planning.windows import SUPPORT, extreme_waveforms
 from sonarsynth.recipe import Recipe
 from sonarsynth.scattering import Kirchhoff
-from sonarsynth.scattering.notes import concave_note
+from sonarsynth.scattering.notes import concave_note, small_note
 from sonarsynth.synthesis.pulse import LONGEST_TAIL, cut_tail
 from sonarsynth.world.refinement import longest_edge
 
@@ -31,7 +31,7 @@ def notes(made: Plan) -> tuple[str, ...]:
     found += _cut(recipe, made.profile.uniform)
     found += _behind(recipe)
     found += validity(scene, made.profile)
-    found += _meshes(recipe)
+    found += _meshes(made)
     return tuple(found)
 
 
@@ -62,14 +62,14 @@ def _behind(recipe: Recipe) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _meshes(recipe: Recipe) -> list[str]:
+def _meshes(made: Plan) -> list[str]:
     """What meshes stand for: how coarse they are, what was repaired, what the law leaves out."""
-    scene, found = recipe.scene, []
+    scene, found = made.scene, []
     for target, law, mesh in zip(scene.world.targets, scene.laws, scene.meshes, strict=True):
         said = list(mesh.notes)
         if isinstance(law, Kirchhoff):
-            concave = concave_note(mesh)
-            said += [concave] if concave else []
+            longest = float(made.profile.speed.max()) / scene.sonar.band.low
+            said += [line for line in (small_note(mesh, longest), concave_note(mesh)) if line]
         elif (edge := longest_edge((mesh.vertices, mesh.faces.astype(np.int64)))) > COARSE:
             said.append(f"facets up to {edge:.2g} m long, each echoing from its middle: set shape.edge to refine")
         found += [f"{target.name}: {line}" for line in said]

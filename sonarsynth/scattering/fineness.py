@@ -62,10 +62,15 @@ def mesh_report(mesh: Mesh, wavelength: float, allowed: float = FIVE_PERCENT) ->
     across = float(np.average(across_each, weights=weight))
     mean = 4.0 * np.pi / wavelength * float(np.average(sagitta, weights=weight))
     return (
-        f"facets of {1e3 * across:.3g} mm are too coarse for waves of {1e3 * wavelength:.3g} mm: expect an error of "
-        f"{100 * expected:.3g} % of the echo; 5 % takes facets of {1e3 * across * np.sqrt(FIVE_PERCENT / mean):.2g} mm "
+        f"facets of {_said(across)} are too coarse for waves of {_said(wavelength)}: expect an error of "
+        f"{100 * expected:.3g} % of the echo; 5 % takes facets of {_said(across * np.sqrt(FIVE_PERCENT / mean), 2)} "
         "on the true surface (smooth: true for a file that stands for a curved one, or a finer mesh)"
     )
+
+
+def _said(length: float, digits: int = 3) -> str:
+    """A length (m) as people say it."""
+    return f"{1e3 * length:.{digits}g} mm" if length < 0.995 else f"{length:.{digits}g} m"
 
 
 def checked(mesh: Mesh, wavelength: float, allowed: float = FIVE_PERCENT) -> Mesh:
@@ -120,10 +125,10 @@ def _fine(
     longest = longest_edge((mesh.vertices, mesh.faces.astype(np.int64)))
     rows = None
     if longest > 1.001 * ROWS * wavelength:
-        rows = f"{len(mesh.faces)} facets are too few for waves of {1e3 * wavelength:.3g} mm: " + (
-            f"their rows, up to {1e3 * longest:.3g} mm apart, echo like a grating at some aspects"
+        rows = f"{len(mesh.faces)} facets are too few for waves of {_said(wavelength)}: " + (
+            f"their rows, up to {_said(longest)} apart, echo like a grating at some aspects"
             if _refinable(shape)
-            else f"up to {1e3 * longest:.3g} mm long, each has one direction to all hydrophones"
+            else f"up to {_said(longest)} long, each has one direction to all hydrophones"
         )
     if in_frame:
         judged = mesh if _refinable(shape) else coarse  # cut in their planes, facets are as far from a curve as before

@@ -13,7 +13,8 @@ from sonarsynth.world.meshes import Mesh, mesh_of
 from sonarsynth.world.motion import Motion
 from sonarsynth.world.shapes import Shape
 
-Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,63}$")]
+NAME = r"^[A-Za-z][A-Za-z0-9_-]{0,63}$"
+Name = Annotated[str, StringConstraints(pattern=NAME)]
 
 
 @description

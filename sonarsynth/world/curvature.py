@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -65,6 +66,7 @@ class Bend(NamedTuple):
     across: Floats  # (facet,) m: edge of an equilateral facet as long as that piece across the curve; 0 where flat
 
 
+@lru_cache(maxsize=4)
 def bend(mesh: Mesh) -> Bend:
     """Mean sagitta and extent across the curve, of the flat pieces of a mesh: facets in one plane are one piece.
 

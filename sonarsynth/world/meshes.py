@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -70,6 +71,10 @@ class Mesh:
         return h.hexdigest()
 
 
+SHARP: Final = MeshFile(path="").crease
+"""The crease of shapes that leave it out."""
+
+
 def _fixed(array: Floats) -> Floats:
     """The array, read-only: it is shared by all who hold the mesh."""
     array.flags.writeable = False
@@ -125,19 +130,9 @@ def refined_mesh(shape: Shape, edge: float = np.inf, sagitta: float = np.inf) ->
 
 
 def _read(shape: MeshFile, edge: float, sagitta: float) -> tuple[Surface, tuple[str, ...]]:
-    from scipy.spatial.transform import Rotation
-
-    from sonarsynth.world.mesh_files import read_surface
-    from sonarsynth.world.mesh_repair import check, repair
     from sonarsynth.world.smoothing import curved
 
-    path = Path(shape.path)
-    vertices, faces = read_surface(path)
-    turn = Rotation.from_euler("xyz", [shape.roll, shape.pitch, shape.heading]).as_matrix()
-    with np.errstate(invalid="ignore", over="ignore"):
-        placed = (vertices * UNITS["m"][shape.unit]) @ turn.T + np.array(shape.offset)
-    check((placed, faces), shape.path)
-    surface, notes = repair((placed, faces), shape.path, shares_vertices=path.suffix.lower() != ".stl")
+    surface, notes = _repaired(replace(shape, edge=None, smooth=False, crease=SHARP), file_stamp(shape))
     longest = min(edge, np.inf if shape.edge is None else shape.edge)
     if np.isinf(longest) and not (shape.smooth and np.isfinite(sagitta)):
         return surface, notes
@@ -147,3 +142,22 @@ def _read(shape: MeshFile, edge: float, sagitta: float) -> tuple[Surface, tuple[
         return (halve_longest_edges if edge < np.inf else split_long_edges)(surface, longest), notes
     except MeshError as error:
         raise MeshError(f"{shape.path}: {error}") from None
+
+
+@lru_cache(maxsize=4)
+def _repaired(shape: MeshFile, stamp: tuple[int, int] | None) -> tuple[Surface, tuple[str, ...]]:
+    """What a file holds, before any refinement, read once for all of them."""
+    from scipy.spatial.transform import Rotation
+
+    from sonarsynth.world.mesh_files import read_surface
+    from sonarsynth.world.mesh_repair import check, repair
+
+    path = Path(shape.path)
+    vertices, faces = read_surface(path)
+    turn = Rotation.from_euler("xyz", [shape.roll, shape.pitch, shape.heading]).as_matrix()
+    with np.errstate(invalid="ignore", over="ignore"):
+        placed = (vertices * UNITS["m"][shape.unit]) @ turn.T + np.array(shape.offset)
+    check((placed, faces), shape.path)
+    (vertices, faces), notes = repair((placed, faces), shape.path, shares_vertices=path.suffix.lower() != ".stl")
+    vertices.flags.writeable = faces.flags.writeable = False
+    return (vertices, faces), notes

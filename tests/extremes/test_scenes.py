@@ -15,6 +15,7 @@ from sonarsynth.description import FieldError
 from sonarsynth.planning import Plan, plan
 from sonarsynth.recipe import Recipe
 from sonarsynth.render import render
+from sonarsynth.scattering import Kirchhoff
 from sonarsynth.scattering.targets import Target
 from sonarsynth.scene import EchoWindow, Physics, Processing, Scene, Trajectory, World
 from sonarsynth.schedule import build
@@ -251,6 +252,10 @@ REFUSED = [
     (scene(snaps=(shrimp(10.0, 1.0, -5.0),)), "scene.world.shrimp.0.position: is inside target 'ball' at frame 0"),
     (scene(snaps=(shrimp(0.0, 0.0, -5.0),)), "scene.world.shrimp.0.position: is at the centre of the array"),
     (
+        scene((Target(name="dome", shape=Sphere(radius=1.0), motion=Still(position=(0.5, 0, -5))),)),
+        "scene.world.targets.0.motion: target 'dome' has the sonar inside at frame 0",
+    ),
+    (
         scene((Target(name="wall", shape=Box(size=(2, 1000, 2), edge=0.01), motion=Still(position=(10, 0, -5))),)),
         "scene.world.targets.0.shape: edges of 0.01 m would take more than",
     ),
@@ -265,6 +270,14 @@ def test_scenes_that_cannot_be_are_refused_before_anything_is_computed(recipe: R
         plan(recipe)
     assert str(caught.value).startswith(message)
     assert "\n" not in str(caught.value)
+
+
+def test_a_target_too_small_for_its_law_is_announced() -> None:
+    law = Kirchhoff()
+    for radius, small in ((0.001, True), (0.3, False)):
+        ball = Target(name="ball", shape=Sphere(radius=radius), motion=Still(position=(10, 0, -5)), scattering=law)
+        made = plan(scene((ball,)))
+        assert any(note.startswith("ball: 0.002 m across is") for note in made.warnings) == small
 
 
 def test_a_snap_from_behind_is_announced() -> None:

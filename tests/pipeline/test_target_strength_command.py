@@ -52,6 +52,14 @@ def test_a_coarse_mesh_is_noted_in_one_line(tmp_path: Path, capsys: pytest.Captu
     assert noted[0].startswith("note: facets of")
 
 
+def test_a_body_too_small_for_the_lowest_frequency_is_noted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ["--frequency", "1e3:101e3:100e3", "--aspect", "90", "--out", str(tmp_path)]
+    assert run(app, ["target-strength", "{kind: sphere, radius: 20 mm}", *options]) == 0
+    noted = capsys.readouterr().err.splitlines()
+    assert len(noted) == 1
+    assert noted[0].startswith("note: 0.04 m across is 0.027 of the longest wavelength: too small")
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -64,7 +72,19 @@ def test_a_coarse_mesh_is_noted_in_one_line(tmp_path: Path, capsys: pytest.Captu
         ([BOX, "--frequency", "1:2"], "--frequency: '1:2' is no number and no range"),
         ([BOX, "--aspect", "0:360:0"], "--aspect: '0:360:0' holds no value"),
         ([BOX, "--aspect", "0:90:0.001", "--frequency", "1e3:1e5:1"], "too many: use longer steps"),
-        ([BOX, "--scattering", "{kind: kirchhoff, surface: hard}"], "surface: must be 'rigid' or 'soft'"),
+        (
+            [BOX, "--scattering", "{kind: kirchhoff, surface: hard}"],
+            "surface: must be 'rigid', 'soft' or a mapping, not",
+        ),
+        (
+            [BOX, "--scattering", "{kind: kirchhoff, surface: {density_ratio: 0, speed_ratio: 1}}"],
+            "surface.density_ratio: must",
+        ),
+        (
+            [BOX, "--scattering", "kirchhoff"],
+            "--scattering: must be a mapping such as '{kind: kirchhoff}', not 'kirchhoff'",
+        ),
+        ([BOX, "--unit", "cm"], "--unit: is for a mesh file"),
         ([BOX, "--sound-speed", "1"], "--sound-speed: must be from"),
         (["README.md", "--unit", "mile"], "--unit: mile is none of"),
     ],
