@@ -13,8 +13,8 @@ from sonarsynth.world.meshes import Mesh
 RAYS: Final = 4096
 """Rays by which a mesh is searched for facets that face each other."""
 NARROW: Final = 1.3
-"""Wavelengths across: rigid and soft spheres as wide, ka = 4, are within 1.3 dB at backscatter; narrower ones, to ka = 1,
-within 4.3; at ka = 0.3 rigid ones are 6 dB too loud, soft ones 16 dB too faint."""
+"""Wavelengths across: rigid and soft spheres as wide, ka = 4, are within 1.3 dB at backscatter; narrower ones, to
+ka = 1, within 4.3; at ka = 0.3 rigid ones are 6 dB too loud, soft ones 16 dB too faint."""
 LEAST: Final = 0.003
 """Share of them that must meet the mesh again for a note: the grooves of a cast hull are not worth one."""
 

@@ -39,8 +39,9 @@ def target_strength(
 
     With Kirchhoff, a shape is refined on its true surface (never made coarser) until the facets' error is about 2 % of
     the echo at the highest frequency; where more than 5 % is expected, of a `Mesh` or a mesh file, a `CoarseMesh`
-    warning says how much, and `SmallBody` of a body too small for the lowest frequency. Rigid and soft spheres of 0.25 m or more from 25 to 110 kHz are within 0.25 dB of the exact
-    series up to 120 degrees off backscatter, within 0.9 dB beyond.
+    warning says how much, and `SmallBody` of a body too small for the lowest frequency. Rigid and soft spheres of 0.25
+    m or more from 25 to 110 kHz are within 0.25 dB of the exact series up to 120 degrees off backscatter, within 0.9 dB
+    beyond.
 
     Raises ValueError (MeshError for a mesh) in one line for what is no target, frequency, direction or sound speed.
     """
