@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from sonarsynth.cli.accuracy import accuracy
+from sonarsynth.cli.repairing import repair
 from sonarsynth.cli.running import BadOption, run
 from sonarsynth.cli.selecting import frame_numbers, product_names
 from sonarsynth.cli.target_strength import target_strength
@@ -127,13 +128,17 @@ def plan(recipe: RecipeFile, settings: Settings = [], products: Products = ALL_P
 
 
 @app.command()
-def verify(store: Store, as_json: Json = False) -> None:
+def verify(
+    store: Store,
+    quick: Annotated[bool, typer.Option("--quick", help="Compare files with their digests, and no more.")] = False,
+    as_json: Json = False,
+) -> None:
     """Check a store: every file against its digest, every number read back, ground truth against the data."""
     from sonarsynth import store as stores
     from sonarsynth import verification
     from sonarsynth.cli import printing
 
-    report = stores.verify(store, [verification.check])
+    report = stores.verify(store, [verification.check], quick=quick)
     if as_json:
         _print_json(report.as_json())
     else:
@@ -172,6 +177,7 @@ def show(
 
 
 app.command()(accuracy)
+app.command()(repair)
 app.command("target-strength")(target_strength)
 
 

@@ -152,8 +152,17 @@ def verify_report(report: StoreReport) -> None:
         out.print(f"DAMAGE {problem.where}: {problem.what}", markup=False)
     if len(report.problems) > 50:
         out.print(f"and {len(report.problems) - 50} more")
+    spoiled = sorted({frame for problem in report.problems for frame in problem.frames})
+    if report.problems and spoiled:
+        from sonarsynth.store import ranges
+
+        out.print(f"damaged frames: {ranges(spoiled)}; 'sonarsynth repair' makes them again", markup=False)
     for check in report.checks:
         word = {True: "ok", False: "FAILED", None: "reported"}[check.ok]
         out.print(f"{word}: {check.name}: {check.got} (expected: {check.expected})", markup=False)
+        if check.ok is False and check.frames:
+            from sonarsynth.store import ranges
+
+            out.print(f"    in frames {ranges(check.frames)}", markup=False)
     if report.ok:
-        out.print("whole and as written")
+        out.print("whole and as written" if not report.quick else "all files are as written")

@@ -6,14 +6,16 @@ Laid out whole from the plan, written one whole shard at a time, each shard with
 from __future__ import annotations
 
 from sonarsynth.store.creating import Mismatch, create, identity, root_attributes
+from sonarsynth.store.examining import Findings, Problem, examine, must_be_store, ranges
 from sonarsynth.store.layout import Layout, layout_of
 from sonarsynth.store.lock import Locked, beside, lock
 from sonarsynth.store.marks import Damage, Mark
-from sonarsynth.store.verifying import Problem, Report, verify
+from sonarsynth.store.verifying import Report, verify
 from sonarsynth.store.writing import frames_there, missing, write_shard
 
 __all__ = [
     "Damage",
+    "Findings",
     "Layout",
     "Locked",
     "Mark",
@@ -22,11 +24,14 @@ __all__ = [
     "Report",
     "beside",
     "create",
+    "examine",
     "frames_there",
     "identity",
     "layout_of",
     "lock",
     "missing",
+    "must_be_store",
+    "ranges",
     "root_attributes",
     "verify",
     "write_shard",

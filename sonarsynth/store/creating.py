@@ -19,7 +19,17 @@ from zarr.errors import ZarrUserWarning
 from sonarsynth.config import dump
 from sonarsynth.render import attributes, coordinates
 from sonarsynth.store.layout import ArrayLayout, Layout, layout_of
-from sonarsynth.store.marks import LAYOUT, MARKS, Damage, Mark, all_files, load_mark, record, records, save_mark
+from sonarsynth.store.marks import (
+    LAYOUT,
+    MANIFESTS,
+    Damage,
+    Mark,
+    all_files,
+    load_layout,
+    record,
+    records,
+    save_mark,
+)
 
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan
@@ -29,7 +39,7 @@ LEVEL: Final = 3
 
 
 class Mismatch(ValueError):
-    """The store holds something else than what is to be built; str() is one line."""
+    """The store holds something else than what is wanted, or is none; str() is one line."""
 
 
 def create(path: Path | str, plan: Plan, *, restart: bool = False) -> Layout:
@@ -40,7 +50,7 @@ def create(path: Path | str, plan: Plan, *, restart: bool = False) -> Layout:
     where the store that is there is not as it was laid out.
     """
     path, layout = Path(path), layout_of(plan)
-    scratch, old = _hidden(path, "new"), _hidden(path, "old")
+    scratch, old = hidden(path, "new"), hidden(path, "old")
     for leftover in (scratch, old):
         shutil.rmtree(leftover, ignore_errors=True)
     if path.is_dir() and not any(path.iterdir()):
@@ -53,8 +63,8 @@ def create(path: Path | str, plan: Plan, *, restart: bool = False) -> Layout:
             _check_layout(path)
             _sweep(path)
             return layout
-    _lay_out(scratch, plan, layout)
-    save_mark(scratch, Mark(LAYOUT, (), "", records(scratch, sorted(all_files(scratch)))))
+    lay_out(scratch, plan, layout, {**attributes(plan), **identity(plan)})
+    mark_layout(scratch)
     if there:
         os.rename(path, old)
     os.rename(scratch, path)
@@ -62,23 +72,34 @@ def create(path: Path | str, plan: Plan, *, restart: bool = False) -> Layout:
     return layout
 
 
-def _hidden(path: Path, suffix: str) -> Path:
+def hidden(path: Path, suffix: str) -> Path:
+    """A folder beside a store for what is not yet, or no more, in it."""
     path = Path(os.path.abspath(path))
     return path.with_name(f".{path.name}.{suffix}")
 
 
+def mark_layout(path: Path) -> Mark:
+    """Mark everything that is in a store that was just laid out, and its attributes."""
+    mark = Mark(LAYOUT, (), "", records(path, sorted(all_files(path))), root_attributes(path))
+    save_mark(path, mark)
+    return mark
+
+
 def _check_layout(path: Path) -> None:
     """Raise Damage where metadata or fixed arrays are not as they were laid out."""
-    mark = load_mark(path, LAYOUT)
+    mark = load_layout(path)
     if mark is None:
-        raise Damage(f"{path}: {MARKS}/{LAYOUT}.json is missing")
+        raise Damage(f"{path}: {MANIFESTS[0]} is missing or damaged: 'sonarsynth repair' restores it")
     for name, expected in mark.files.items():
         try:
             whole = record(path, name) == expected
         except OSError:
             whole = False
         if not whole:
-            raise Damage(f"{path}: {name} is missing or has changed since the store was laid out")
+            raise Damage(
+                f"{path}: {name} is missing or has changed since the store was laid out: "
+                "'sonarsynth repair' restores it"
+            )
 
 
 def identity(plan: Plan) -> dict[str, Any]:
@@ -166,9 +187,10 @@ def _sweep(path: Path) -> None:
                 (Path(folder) / name).unlink(missing_ok=True)
 
 
-def _lay_out(path: Path, plan: Plan, layout: Layout) -> None:
+def lay_out(path: Path, plan: Plan, layout: Layout, attrs_of_root: Mapping[str, Any]) -> None:
+    """Write everything but frames: metadata and the arrays that no frame changes."""
     static = coordinates(plan)
-    root = zarr.create_group(path, zarr_format=3, attributes={**attributes(plan), **identity(plan)})
+    root = zarr.create_group(path, zarr_format=3, attributes=dict(attrs_of_root))
     framed = {a.variable.group for a in layout.arrays}
     for group in sorted({g for g, _ in static} | framed):
         extra = sorted(name for g, name in static if g == group and static[g, name][0] != (name,))

@@ -1,17 +1,21 @@
 """Completion marks: which frames of a shard are there, the digest of their contents, and the digest of every file.
 
 A mark is written last and atomically, and removed before its shard is written again, so a shard with a mark is whole.
-Marks carry their own digest. They lie in `.marks`, which readers of the store do not see.
+Marks carry their own digest. They lie in `.marks`, which readers of the store do not see. The mark of the layout is the
+manifest of everything that no frame changes: the digest of each file, and the attributes of the root with the recipe;
+there are two copies of it, so that one damage never takes what a repair needs.
 """
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
+import stat
 import uuid
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,6 +24,9 @@ import numpy as np
 MARKS: Final = ".marks"
 LAYOUT: Final = "layout"
 """Name of the mark of the files that are written when the store is laid out."""
+
+MANIFESTS: Final = (f"{MARKS}/{LAYOUT}.json", f"{MARKS}/{LAYOUT}.copy.json")
+"""Where the mark of the layout lies, twice."""
 
 FileRecord = tuple[int, str]
 """Size and SHA-256 of a file."""
@@ -40,6 +47,7 @@ class Mark:
     frames: tuple[int, ...]
     content: str  # SHA-256 of the arrays' values, whatever the codecs
     files: Mapping[str, FileRecord]
+    attributes: Mapping[str, Any] = field(default_factory=dict)  # of the root, in the mark of the layout
 
 
 def mark_file(store: Path, name: str | int) -> Path:
@@ -48,36 +56,58 @@ def mark_file(store: Path, name: str | int) -> Path:
 
 
 def save_mark(store: Path, mark: Mark) -> None:
-    """Write a mark: all of it or nothing, on the disk when this returns."""
-    body = {"name": mark.name, "frames": mark.frames, "content": mark.content, "files": mark.files}
-    write_atomically(mark_file(store, mark.name), json.dumps({**body, "seal": _seal(body)}).encode())
+    """Write a mark: all of it or nothing, on the disk when this returns. That of the layout is written twice."""
+    places = [store / m for m in MANIFESTS] if mark.name == LAYOUT else [mark_file(store, mark.name)]
+    for place in places:
+        write_atomically(place, _encode(mark))
 
 
 def load_mark(store: Path, name: str | int) -> Mark | None:
     """The mark of a shard, None where there is none. Raises Damage where it is not as it was written."""
-    file = mark_file(store, name)
+    return read_mark(store, mark_file(store, name).relative_to(store).as_posix(), str(name))
+
+
+def read_mark(store: Path, place: str, name: str) -> Mark | None:
+    """The mark of a name at a place in the store, None where there is none. Raises Damage where it is damaged."""
     try:
-        text = file.read_bytes()
+        _must_be_plain(store / place)
+        text = (store / place).read_bytes()
     except FileNotFoundError:
         return None
+    except OSError as error:
+        raise Damage(f"{place}: the mark is damaged: it cannot be read ({error.strerror})") from None
     try:
         body: dict[str, Any] = json.loads(text)
-        seal = body.pop("seal")
-        if seal != _seal(body) or body["name"] != str(name):
-            raise ValueError
         files = {path: (int(size), str(digest)) for path, (size, digest) in body["files"].items()}
-        return Mark(body["name"], tuple(body["frames"]), body["content"], files)
-    except (ValueError, KeyError, TypeError, AttributeError):
-        raise Damage(f"{file.relative_to(store)}: the mark is damaged") from None
+        mark = Mark(body["name"], tuple(body["frames"]), body["content"], files, body.get("attributes", {}))
+        if mark.name == name and _encode(mark) == text:  # to the byte, its seal included
+            return mark
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        pass
+    raise Damage(f"{place}: the mark is damaged")
+
+
+def load_layout(store: Path) -> Mark | None:
+    """The mark of the layout from whichever copy is whole; None where neither is."""
+    for place in MANIFESTS:
+        try:
+            mark = read_mark(store, place, LAYOUT)
+        except Damage:
+            continue
+        if mark is not None:
+            return mark
+    return None
 
 
 def marked(store: Path) -> list[int]:
     """Numbers of the shards that have a mark."""
     try:
-        names = [entry.name.removesuffix(".json") for entry in os.scandir(store / MARKS)]
-    except FileNotFoundError:
+        names = [
+            entry.name.removesuffix(".json") for entry in os.scandir(store / MARKS) if entry.name.endswith(".json")
+        ]
+    except (FileNotFoundError, NotADirectoryError):
         return []
-    return sorted(int(name) for name in names if name.isdecimal())
+    return sorted(int(name) for name in names if name.isascii() and name.isdecimal() and str(int(name)) == name)
 
 
 def drop_mark(store: Path, name: str | int) -> None:
@@ -90,6 +120,7 @@ def drop_mark(store: Path, name: str | int) -> None:
 
 def record(store: Path, path: str, *, sync: bool = False) -> FileRecord:
     """Size and SHA-256 of a file of the store; with `sync`, it is on the disk first. Raises OSError."""
+    _must_be_plain(store / path)
     with (store / path).open("rb") as file:
         if sync:
             os.fsync(file.fileno())
@@ -111,11 +142,13 @@ def add_to_digest(digest: hashlib._Hash, name: str, block: np.ndarray) -> None:
 
 
 def all_files(store: Path) -> Iterator[str]:
-    """Every file in the store but the marks, as paths within it."""
-    for folder, _, names in os.walk(store):
+    """Every file in the store but the marks, as paths within it; links to folders too."""
+    for folder, folders, names in os.walk(store):
         inside = Path(folder).relative_to(store)
         if inside.parts[:1] != (MARKS,):
             yield from ((inside / name).as_posix() for name in names)
+            links = (name for name in folders if os.path.islink(os.path.join(folder, name)))  # which are not followed
+            yield from ((inside / name).as_posix() for name in links)
 
 
 def write_atomically(file: Path, content: bytes) -> None:
@@ -140,6 +173,20 @@ def _sync(folder: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
+
+
+def _must_be_plain(file: Path) -> None:
+    """Raise OSError for what is no file: opening a pipe would wait for ever."""
+    if not stat.S_ISREG(file.stat().st_mode):
+        raise OSError(errno.EINVAL, "it is no plain file", str(file))
+
+
+def _encode(mark: Mark) -> bytes:
+    """A mark as it lies in the store, with its digest."""
+    body = {"name": mark.name, "frames": mark.frames, "content": mark.content, "files": mark.files}
+    if mark.attributes:
+        body["attributes"] = mark.attributes
+    return json.dumps({**body, "seal": _seal(body)}).encode()
 
 
 def _seal(body: dict[str, Any]) -> str:

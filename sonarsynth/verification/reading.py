@@ -10,13 +10,17 @@ import xarray as xr
 
 @dataclass(frozen=True)
 class Check:
-    """One line of the report. `ok` is None where a figure is reported, or the store has nothing to check."""
+    """One line of the report. `ok` is None where a figure is reported, or the store has nothing to check.
+
+    `frames` are those that are not as they should be, where that can be said of a frame.
+    """
 
     name: str
     expected: str
     got: str
     ok: bool | None
     numbers: dict[str, float]
+    frames: tuple[int, ...] = ()
 
 
 def every(tree: xr.DataTree, name: str) -> np.ndarray:

@@ -1,0 +1,187 @@
+"""Repairing a store: what is damaged is made again from the recipe that it holds, and nothing else is touched."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from sonarsynth import config, store
+from sonarsynth.description import FieldError
+from sonarsynth.planning import Plan, plan
+from sonarsynth.schedule import Progress, tasks, usable_cores
+from sonarsynth.schedule.tasks import Failure, Job, Written
+from sonarsynth.store import Findings, Mismatch, Problem
+from sonarsynth.store.creating import identity
+from sonarsynth.store.examining import shard_of
+from sonarsynth.store.layout import layout_of
+from sonarsynth.store.marks import MARKS, Damage, Mark, all_files, load_mark, mark_file
+from sonarsynth.store.reading import read_back
+from sonarsynth.store.restoring import drop_empty_folders, frames_written, move_out, obstacles, restore
+
+
+@dataclass
+class RepairReport:
+    """What a repair did. Grows while it runs."""
+
+    store: str
+    restored: tuple[str, ...] = ()  # metadata, fixed arrays, copies of the mark of the layout
+    shards: tuple[int, ...] = ()  # made again, with their marks
+    frames: tuple[int, ...] = ()  # of those
+    moved: tuple[str, ...] = ()  # files that did not belong there, where they are now
+    differing: list[int] = field(default_factory=list)  # shards whose numbers are not those that were written
+    failures: list[Failure] = field(default_factory=list)  # frames that could not be made again
+    problems: tuple[Problem, ...] = ()  # what is left
+
+    @property
+    def ok(self) -> bool:
+        """True where the store is what it was."""
+        return not (self.problems or self.failures or self.differing)
+
+    def as_json(self) -> dict[str, Any]:
+        """The report for a program."""
+        problems = [{"where": p.where, "what": p.what, "frames": store.ranges(p.frames)} for p in self.problems]
+        return {**asdict(self), "frames": store.ranges(self.frames), "problems": problems, "ok": self.ok}
+
+
+def repair(
+    path: Path | str,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    anyway: bool = False,
+    quick: bool = False,
+    progress: Progress | None = None,
+) -> RepairReport:
+    """Make what is damaged in a store again, from the recipe in it, so that it is what it was, bit for bit.
+
+    Metadata and fixed arrays are laid out again; damaged shards are computed again, those frames that they had, on
+    `workers` processes as in `build`; files that do not belong there move to `<store>.foreign`. What was set aside
+    when the store was built is not tried. Ended in whatever way, the same call goes on.
+
+    `quick` trusts files that have the digest of their mark; else every number is read back, as `verify` does.
+    Raises Mismatch where there is no store of ours, or where it cannot be made again as it was: the version of
+    sonarsynth is another (unless `anyway`), or files that the recipe names have changed or are gone; Damage where the
+    recipe cannot be read any more; store.Locked while a build runs; OSError where the store cannot be written.
+    """
+    path = Path(os.path.abspath(path))
+    store.must_be_store(path)
+    with store.lock(path):
+        found = store.examine(path)
+        laid = found.layout is not None and not found.fixed
+        unlike = _unlike(path, found) if laid and not quick else []
+        made = _plan_of(path, found, anyway) if not laid or found.shards or unlike else None
+        report = RepairReport(str(path))
+        report.moved = move_out(path, [*found.foreign, *obstacles(path, {*found.fixed, *found.manifests})])
+        report.restored = restore(path, found, made)
+        if made is not None:
+            unlike = unlike if laid or quick else _unlike(path, found)
+            todo = _todo(path, found, made, unlike)
+            report.moved += move_out(path, _in_the_way(path, found, made, todo))
+            report.shards, report.frames = tuple(todo), tuple(f for frames in todo.values() for f in frames)
+            written = {n: mark for n, mark in found.marks.items() if n not in unlike}
+            job = Job(str(path), made.digest, tuple(sorted(made.products)))
+            tasks.remember(job, made)
+            _recompute(job, todo, workers, scheduler, _counter(path, written, report, progress))
+        report.moved += move_out(path, store.examine(path).foreign)  # known only now if the layout was not
+        drop_empty_folders(path)
+        report.problems = store.examine(path).problems
+    return report
+
+
+def _plan_of(path: Path, found: Findings, anyway: bool) -> Plan:
+    """The plan that the store was built by. Raises Mismatch where it cannot be had again, Damage without a recipe."""
+    attrs = found.attributes or store.root_attributes(path)
+    try:
+        text, digest, products = str(attrs["recipe"]), attrs["recipe_digest"], frozenset(attrs["products"])
+    except (KeyError, TypeError):
+        raise Damage(
+            f"{path}: its recipe cannot be read any more, neither in {MARKS} nor in zarr.json: build it anew"
+        ) from None
+    try:
+        made = plan(config.loads(text, str(path)), products)
+    except OSError as error:
+        raise Mismatch(f"{path}: {error.filename}, which its recipe names, cannot be read: {error.strerror}") from None
+    except (ValueError, FieldError) as error:
+        raise Mismatch(f"{path}: its recipe cannot be followed any more: {error}") from None
+    if made.digest != digest:
+        raise Mismatch(f"{path}: a file that its recipe names has changed since the store was built")
+    now = identity(made)
+    if attrs.get("shard_frames") != now["shard_frames"]:
+        raise Mismatch(
+            f"{path} has {attrs.get('shard_frames')} frames in a shard, and would now have {now['shard_frames']}"
+        )
+    old, new = attrs.get("sonarsynth_version"), now["sonarsynth_version"]
+    if old != new and not anyway:
+        raise Mismatch(f"{path} was built by sonarsynth {old}, and this is {new}: use that one, or --anyway")
+    return made
+
+
+def _unlike(path: Path, found: Findings) -> list[int]:
+    """Shards whose files are as their mark says, and whose numbers are not. The layout must be whole."""
+    alike = sorted(found.marks.keys() - found.shards)
+    return [n for n in alike if any("not finite" not in p.what for p in read_back(path, found.marks[n]))]
+
+
+def _todo(path: Path, found: Findings, made: Plan, unlike: Iterable[int]) -> dict[int, tuple[int, ...]]:
+    """Shards to make again, with the frames that they had."""
+    todo = {}
+    for shard in sorted(found.shards | set(unlike)):
+        mark = found.marks.get(shard)
+        frames = frames_written(path, made, shard) if mark is None else mark.frames
+        if frames:
+            todo[shard] = frames
+    return todo
+
+
+def _in_the_way(path: Path, found: Findings, made: Plan, todo: Mapping[int, tuple[int, ...]]) -> list[str]:
+    """What cannot be written over, and what is named as of a shard of which the arrays of all shards have no sign."""
+    layout = layout_of(made)
+    ours = {a.file(shard) for shard in todo for a in layout.arrays if not a.empty}
+    marks = {number: mark_file(path, number).relative_to(path).as_posix() for number in found.shards}
+    lost = found.shards - todo.keys()
+    data = [n for n in all_files(path) if n not in ours and shard_of(path, n) in found.shards - found.marks.keys()]
+    return [*obstacles(path, ours | {marks[n] for n in todo if n in marks}), *data, *(marks[n] for n in lost)]
+
+
+def _counter(
+    path: Path, written: Mapping[int, Mark], report: RepairReport, progress: Progress | None
+) -> Callable[[Written], None]:
+    """What is done with a shard that is made again: compared with what its mark said, its failures kept."""
+    done_frames = 0
+
+    def done(again: Written) -> None:
+        nonlocal done_frames
+        done_frames += len(again.frames)
+        report.failures.extend(again.failures)
+        if again.failures:
+            tasks.append_lines(store.beside(path, "aside.jsonl"), [asdict(f) for f in again.failures])
+        mark, old = load_mark(path, again.shard), written.get(again.shard)
+        if mark is not None and old is not None and not again.failures and mark != old:
+            report.differing.append(again.shard)
+        if progress is not None:
+            progress(done_frames, len(report.frames), len(report.failures))
+
+    return done
+
+
+def _recompute(
+    job: Job,
+    todo: Mapping[int, tuple[int, ...]],
+    workers: int | None,
+    scheduler: str | None,
+    done: Callable[[Written], None],
+) -> None:
+    count = min(usable_cores() if workers is None else workers, len(todo))
+    if not todo:
+        return
+    if scheduler is None and (count == 0 or (workers is None and len(todo) == 1)):
+        for shard, frames in todo.items():
+            done(tasks.write(job, shard, [tasks.render_frame(job, frame) for frame in frames]))
+        return
+    from sonarsynth.schedule import cluster
+
+    with cluster.connected(count, scheduler) as client:
+        cluster.run(client, job, todo, done)

@@ -1,0 +1,137 @@
+"""Putting back what no frame changes: metadata, fixed arrays and their mark; and moving out what is not ours."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import zarr
+
+from sonarsynth.render import attributes
+from sonarsynth.store.creating import Mismatch, hidden, identity, lay_out, mark_layout, root_attributes
+from sonarsynth.store.examining import Findings
+from sonarsynth.store.layout import ArrayLayout, layout_of
+from sonarsynth.store.lock import beside
+from sonarsynth.store.marks import Mark, record, save_mark, write_atomically
+
+if TYPE_CHECKING:
+    from sonarsynth.planning import Plan
+
+
+def restore(path: Path, found: Findings, plan: Plan | None) -> tuple[str, ...]:
+    """Put back laid-out files and the mark of the layout. Returns their names. A plan is needed unless only a copy of
+    the mark is damaged.
+
+    Files are laid out again beside the store, and moved in only where they are what they were, to the byte: raises
+    Mismatch, with nothing changed, where they are not (other versions of libraries).
+    """
+    if found.layout is not None and (plan is None or not found.fixed):
+        if found.manifests:
+            save_mark(path, found.layout)
+        return tuple(sorted(found.manifests))
+    if plan is None:
+        raise ValueError("a plan is needed to restore what was laid out")
+    scratch = hidden(path, "new")
+    shutil.rmtree(scratch, ignore_errors=True)
+    try:
+        attrs = found.attributes or {**root_attributes(path), **attributes(plan), **identity(plan)}
+        lay_out(scratch, plan, layout_of(plan), attrs)
+        laid = mark_layout(scratch)
+        bad = _to_put_back(path, found, laid)
+        for name in bad:
+            (path / name).parent.mkdir(parents=True, exist_ok=True)
+            write_atomically(path / name, (scratch / name).read_bytes())
+        if found.manifests:
+            save_mark(path, found.layout or laid)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+    return (*bad, *sorted(found.manifests))
+
+
+def _to_put_back(path: Path, found: Findings, laid: Mark) -> list[str]:
+    """Names of laid-out files that are not as they were."""
+    if found.layout is None:
+        return sorted(name for name, now in laid.files.items() if not _is(path, name, now))
+    for name in sorted(found.fixed):
+        if laid.files.get(name) != found.layout.files[name]:
+            raise Mismatch(f"{path}: {name} cannot be made again as it was: other versions of libraries wrote it")
+    return sorted(found.fixed)
+
+
+def _is(path: Path, name: str, expected: tuple[int, str]) -> bool:
+    try:
+        return record(path, name) == expected
+    except OSError:
+        return False
+
+
+def frames_written(path: Path, plan: Plan, shard: int) -> tuple[int, ...]:
+    """The frames of a shard whose mark is lost, from what its data says; () where there is no sign of any.
+
+    A frame that is there always has its step, time and place of the sonar. Where these are there and none can be read,
+    all frames of the shard.
+    """
+    layout = layout_of(plan)
+    if shard >= layout.shards:
+        return ()
+    always = [a for a in layout.arrays if not a.empty and (a.variable.group == "/" or a.path == "truth/sonar_position")]
+    region, root = layout.region(shard), zarr.open_group(path, mode="r")
+    present = [a for a in always if os.path.lexists(path / a.file(shard))]
+    there = np.zeros(len(region), bool)
+    for array in present:
+        there |= _rows(root, array, region)
+    if present and not there.any():
+        return tuple(region)
+    return tuple(region.start + int(i) for i in np.flatnonzero(there))
+
+
+def _rows(root: zarr.Group, array: ArrayLayout, region: range) -> np.ndarray:
+    """Frames of a region in which an array has numbers; none where it cannot be decoded."""
+    try:
+        stored = root[array.path]
+        assert isinstance(stored, zarr.Array)
+        block = np.asarray(stored[region.start : region.stop]).reshape(len(region), -1)
+    except Exception:  # whatever a codec raises on what it cannot decode
+        return np.zeros(len(region), bool)
+    return np.array([not array.is_fill(row) for row in block])
+
+
+def move_out(path: Path, names: Iterable[str]) -> tuple[str, ...]:
+    """Move files that do not belong in a store to `<store>.foreign` beside it. Returns where they are now."""
+    moved = []
+    for name in sorted(names):
+        if not os.path.lexists(path / name):
+            continue
+        target = beside(path, "foreign") / name
+        for parent in reversed(target.relative_to(beside(path, "foreign")).parents):
+            _make_folder(beside(path, "foreign") / parent)
+        count = 0
+        while os.path.lexists(target):
+            count += 1
+            target = target.with_name(f"{Path(name).name}.{count}")
+        shutil.move(path / name, target)
+        moved.append(str(target))
+    return tuple(moved)
+
+
+def _make_folder(folder: Path) -> None:
+    """Make a folder; what has its name and is none goes out of the way."""
+    if os.path.lexists(folder) and not folder.is_dir():
+        folder.rename(folder.with_name(f"{folder.name}.file"))
+    folder.mkdir(parents=True, exist_ok=True)
+
+
+def obstacles(path: Path, names: Iterable[str]) -> list[str]:
+    """Those of some names that are no plain file, and so cannot be written over: folders, links, pipes."""
+    return [n for n in names if (path / n).is_symlink() or ((path / n).exists() and not (path / n).is_file())]
+
+
+def drop_empty_folders(path: Path) -> None:
+    """Remove folders without files, which moved files leave."""
+    for folder, _, _ in os.walk(path, topdown=False):
+        if not os.listdir(folder):
+            os.rmdir(folder)

@@ -1,0 +1,1 @@
+"""Faults on purpose, and whether everything is as it was afterwards."""
