@@ -17,7 +17,7 @@ from sonarsynth.store import Findings, Mismatch, Problem
 from sonarsynth.store.creating import identity
 from sonarsynth.store.examining import shard_of
 from sonarsynth.store.layout import layout_of
-from sonarsynth.store.marks import MARKS, Damage, Mark, all_files, load_mark, mark_file
+from sonarsynth.store.marks import MARKS, Damage, Mark, all_files, load_layout, load_mark, mark_file
 from sonarsynth.store.reading import read_back
 from sonarsynth.store.restoring import drop_empty_folders, frames_written, move_out, obstacles, restore
 
@@ -85,9 +85,12 @@ def repair(
             job = Job(str(path), made.digest, tuple(sorted(made.products)))
             tasks.remember(job, made)
             _recompute(job, todo, workers, scheduler, _counter(path, written, report, progress))
-        report.moved += move_out(path, store.examine(path).foreign)  # known only now if the layout was not
+        left = store.examine(path)
+        if left.foreign:  # known only now, if the layout was not
+            report.moved += move_out(path, left.foreign)
+            left = store.examine(path)
         drop_empty_folders(path)
-        report.problems = store.examine(path).problems
+        report.problems = left.problems
     return report
 
 
@@ -139,11 +142,13 @@ def _todo(path: Path, found: Findings, made: Plan, unlike: Iterable[int]) -> dic
 def _in_the_way(path: Path, found: Findings, made: Plan, todo: Mapping[int, tuple[int, ...]]) -> list[str]:
     """What cannot be written over, and what is named as of a shard of which the arrays of all shards have no sign."""
     layout = layout_of(made)
-    ours = {a.file(shard) for shard in todo for a in layout.arrays if not a.empty}
+    rewritten = {a.file(shard) for shard in todo for a in layout.arrays if not a.empty}
     marks = {number: mark_file(path, number).relative_to(path).as_posix() for number in found.shards}
     lost = found.shards - todo.keys()
+    laid = load_layout(path)
+    ours = rewritten | (set() if laid is None else set(laid.files))
     data = [n for n in all_files(path) if n not in ours and shard_of(path, n) in found.shards - found.marks.keys()]
-    return [*obstacles(path, ours | {marks[n] for n in todo if n in marks}), *data, *(marks[n] for n in lost)]
+    return [*obstacles(path, rewritten | {marks[n] for n in todo if n in marks}), *data, *(marks[n] for n in lost)]
 
 
 def _counter(

@@ -64,7 +64,7 @@ def create(path: Path | str, plan: Plan, *, restart: bool = False) -> Layout:
             _sweep(path)
             return layout
     lay_out(scratch, plan, layout, {**attributes(plan), **identity(plan)})
-    mark_layout(scratch)
+    save_mark(scratch, layout_mark(scratch, sync=True))
     if there:
         os.rename(path, old)
     os.rename(scratch, path)
@@ -78,11 +78,11 @@ def hidden(path: Path, suffix: str) -> Path:
     return path.with_name(f".{path.name}.{suffix}")
 
 
-def mark_layout(path: Path) -> Mark:
-    """Mark everything that is in a store that was just laid out, and its attributes."""
-    mark = Mark(LAYOUT, (), "", records(path, sorted(all_files(path))), root_attributes(path))
-    save_mark(path, mark)
-    return mark
+def layout_mark(path: Path, *, sync: bool = False) -> Mark:
+    """The mark of a store that was just laid out: everything in it, and its attributes; with `sync`, on the disk."""
+    names = sorted(all_files(path))
+    files = records(path, names) if sync else {name: record(path, name) for name in names}
+    return Mark(LAYOUT, (), "", files, root_attributes(path))
 
 
 def _check_layout(path: Path) -> None:

@@ -168,7 +168,10 @@ def _strangers(
     """Files that no mark knows: numbers of the shards that they are data of (a mark is lost, or a build was
     interrupted), and the names of those that are not ours."""
     files = known.files
-    folders = {MARKS} | {name[:at] for name in files for at, letter in enumerate(name) if letter == "/"}
+    folders = {MARKS}
+    for name in files:
+        while name := name.rpartition("/")[0]:
+            folders.add(name)
     folders -= {name for name in folders if not (path / name).is_dir()}
     lost: dict[int, list[str]] = {}
     foreign: list[str] = []

@@ -15,7 +15,9 @@ import os
 import stat
 import uuid
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from io import BufferedReader
 from pathlib import Path
 from typing import Any, Final
 
@@ -70,8 +72,8 @@ def load_mark(store: Path, name: str | int) -> Mark | None:
 def read_mark(store: Path, place: str, name: str) -> Mark | None:
     """The mark of a name at a place in the store, None where there is none. Raises Damage where it is damaged."""
     try:
-        _must_be_plain(store / place)
-        text = (store / place).read_bytes()
+        with _opened(f"{store}/{place}") as file:
+            text = file.read()
     except FileNotFoundError:
         return None
     except OSError as error:
@@ -120,8 +122,7 @@ def drop_mark(store: Path, name: str | int) -> None:
 
 def record(store: Path, path: str, *, sync: bool = False) -> FileRecord:
     """Size and SHA-256 of a file of the store; with `sync`, it is on the disk first. Raises OSError."""
-    _must_be_plain(store / path)
-    with (store / path).open("rb") as file:
+    with _opened(f"{store}/{path}") as file:
         if sync:
             os.fsync(file.fileno())
         digest = hashlib.file_digest(file, "sha256").hexdigest()
@@ -143,12 +144,12 @@ def add_to_digest(digest: hashlib._Hash, name: str, block: np.ndarray) -> None:
 
 def all_files(store: Path) -> Iterator[str]:
     """Every file in the store but the marks, as paths within it; links to folders too."""
+    start = len(f"{store}/")
     for folder, folders, names in os.walk(store):
-        inside = Path(folder).relative_to(store)
-        if inside.parts[:1] != (MARKS,):
-            yield from ((inside / name).as_posix() for name in names)
-            links = (name for name in folders if os.path.islink(os.path.join(folder, name)))  # which are not followed
-            yield from ((inside / name).as_posix() for name in links)
+        inside = folder[start:]
+        if inside.partition("/")[0] != MARKS:
+            links = [name for name in folders if os.path.islink(f"{folder}/{name}")]  # which are not followed
+            yield from (f"{inside}/{name}" if inside else name for name in names + links)
 
 
 def write_atomically(file: Path, content: bytes) -> None:
@@ -175,10 +176,13 @@ def _sync(folder: Path) -> None:
         os.close(handle)
 
 
-def _must_be_plain(file: Path) -> None:
-    """Raise OSError for what is no file: opening a pipe would wait for ever."""
-    if not stat.S_ISREG(file.stat().st_mode):
-        raise OSError(errno.EINVAL, "it is no plain file", str(file))
+@contextmanager
+def _opened(file: str) -> Iterator[BufferedReader]:
+    """A file to read. Raises OSError for what is no file: reading a pipe would wait for ever."""
+    with open(file, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as opened:
+        if not stat.S_ISREG(os.fstat(opened.fileno()).st_mode):
+            raise OSError(errno.EINVAL, "it is no plain file", file)
+        yield opened
 
 
 def _encode(mark: Mark) -> bytes:

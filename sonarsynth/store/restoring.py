@@ -12,7 +12,7 @@ import numpy as np
 import zarr
 
 from sonarsynth.render import attributes
-from sonarsynth.store.creating import Mismatch, hidden, identity, lay_out, mark_layout, root_attributes
+from sonarsynth.store.creating import Mismatch, hidden, identity, lay_out, layout_mark, root_attributes
 from sonarsynth.store.examining import Findings
 from sonarsynth.store.layout import ArrayLayout, layout_of
 from sonarsynth.store.lock import beside
@@ -40,7 +40,7 @@ def restore(path: Path, found: Findings, plan: Plan | None) -> tuple[str, ...]:
     try:
         attrs = found.attributes or {**root_attributes(path), **attributes(plan), **identity(plan)}
         lay_out(scratch, plan, layout_of(plan), attrs)
-        laid = mark_layout(scratch)
+        laid = layout_mark(scratch)
         bad = _to_put_back(path, found, laid)
         for name in bad:
             (path / name).parent.mkdir(parents=True, exist_ok=True)

@@ -89,7 +89,7 @@ def damage(path: Path, name: str, how: str, random: np.random.Generator) -> None
         added = place / f"{int(random.integers(10**6))}{random.choice(['', '.json', '.partial'])}"
         added.write_bytes(content if random.random() < 0.5 else random.bytes(100))
     elif how == "append":
-        file.write_bytes(bytes(content) + random.choice([b"\n", b"\0", b" "]))
+        file.write_bytes(bytes(content) + (b"\n", b"\0", b" ")[int(random.integers(3))])
     elif how == "exchange":
         others = [p for p in path.rglob("*") if p.is_file() and p.read_bytes() != content]
         shutil.copyfile(others[int(random.integers(len(others)))], file)
