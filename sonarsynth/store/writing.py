@@ -37,6 +37,7 @@ def write_shard(path: Path | str, plan: Plan, shard: int, frames: Mapping[int, V
     for array in arrays:
         block = layout.block(array, shard, checked)
         add_to_digest(content, array.path, block)
+        (path / array.file(shard)).unlink(missing_ok=True)  # zarr reads a short last shard before it writes it
         write_region(root, layout, array, region.start, block)
         if array.is_fill(block):
             empty.add(array.file(shard))

@@ -8,7 +8,7 @@ import xarray as xr
 from sonarsynth.verification.beams import beam_width, brightest_beam_on_target, near_target
 from sonarsynth.verification.ledger import INAUDIBLE, LEDGER_TOLERANCE, ledger_adds_up, ledger_measured
 from sonarsynth.verification.places import range_errors, snap_located
-from sonarsynth.verification.reading import Check, every
+from sonarsynth.verification.reading import Check, every, numbered
 
 __all__ = [
     "EXPANSION_AMPLITUDE",
@@ -54,8 +54,9 @@ def check(tree: xr.DataTree) -> list[Check]:
 
 def nothing_outside(tree: xr.DataTree, frames: np.ndarray) -> Check:
     """Arrivals that fell outside the sample window, and samples at full scale."""
-    outside = int(every(tree, "signals/outside")[frames].sum())
-    clipped = int(every(tree, "signals/clipped")[frames].sum())
+    of_frames = [every(tree, f"signals/{name}")[frames].reshape(len(frames), -1) for name in ("outside", "clipped")]
+    outside, clipped = (int(counts.sum()) for counts in of_frames)
+    spoiled = frames[sum(counts.sum(axis=1) for counts in of_frames) > 0]
     got = f"{outside} arrivals outside, {clipped} samples clipped"
     return Check(
         "signals whole",
@@ -63,14 +64,19 @@ def nothing_outside(tree: xr.DataTree, frames: np.ndarray) -> Check:
         got,
         outside + clipped == 0,
         {"outside": outside, "clipped": clipped},
+        numbered(spoiled),
     )
 
 
 def expansions_hold(tree: xr.DataTree, frames: np.ndarray) -> Check:
     """Wavefronts and amplitudes are expanded over the aperture; what that errs by, as traced to probes."""
-    phase = 2 * np.pi * float(tree.attrs["band_high"]) * float(every(tree, "truth/wavefront_error")[frames].max())
-    amplitude = float(every(tree, "truth/amplitude_error")[frames].max())
+    phases = 2 * np.pi * float(tree.attrs["band_high"]) * every(tree, "truth/wavefront_error")[frames]
+    amplitudes = every(tree, "truth/amplitude_error")[frames]
+    phase, amplitude = float(phases.max()), float(amplitudes.max())
+    good_frames = (phases <= EXPANSION_PHASE) & (amplitudes <= EXPANSION_AMPLITUDE)
     got = f"{phase:.2g} rad at the top of the band, {100 * amplitude:.2g} % of the strongest echo"
     good = phase <= EXPANSION_PHASE and amplitude <= EXPANSION_AMPLITUDE
     expected = f"under {EXPANSION_PHASE} rad and {100 * EXPANSION_AMPLITUDE:g} %"
-    return Check("wavefronts over the aperture", expected, got, good, {"phase_rad": phase, "amplitude": amplitude})
+    numbers = {"phase_rad": phase, "amplitude": amplitude}
+    bad = numbered(frames[~good_frames.reshape(len(frames), -1).all(axis=1)])
+    return Check("wavefronts over the aperture", expected, got, good, numbers, bad)

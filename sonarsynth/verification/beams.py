@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from sonarsynth.verification.ledger import echoes_heard, snaps_heard
-from sonarsynth.verification.reading import Check, every, of_frame
+from sonarsynth.verification.reading import Check, every, numbered, of_frame
 
 
 def beam_width(tree: xr.DataTree) -> float:
@@ -43,16 +43,19 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
 
     Frames without a target in view, or whose echoes are inaudible, do not count.
     """
-    hits, seen = 0, 0
+    hits, seen, missed = 0, 0, []
     for i in frames:
         energy, truth = of_frame(tree, "image/energy", i), of_frame(tree, "truth/target", i)
         if not ((truth >= 0).any() and echoes_heard(tree, i)):
             continue
         if not np.isfinite(energy).any():  # no clock, no image: a miss, unless no snap could be heard
-            seen += bool(snaps_heard(tree, i).any())
-            continue
-        seen += 1
-        hits += bool(near_target(tree, truth)[np.unravel_index(np.nanargmax(energy), energy.shape)])
+            hit, counts = False, bool(snaps_heard(tree, i).any())
+        else:
+            hit, counts = bool(near_target(tree, truth)[np.unravel_index(np.nanargmax(energy), energy.shape)]), True
+        seen += counts
+        hits += hit
+        if counts and not hit:
+            missed.append(i)
     if not seen:
         return Check("brightest beam on target", "every frame", "no target in view and heard", None, {})
     return Check(
@@ -61,4 +64,5 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
         f"{hits} of {seen} frames",
         hits == seen,
         {"hits": hits, "frames": seen},
+        numbered(missed),
     )

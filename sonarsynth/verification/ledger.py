@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from sonarsynth.products import LEDGER
-from sonarsynth.verification.reading import Check, every, of_frame
+from sonarsynth.verification.reading import Check, every, numbered, of_frame
 
 LEDGER_TOLERANCE = 0.1  # dB
 
@@ -20,13 +20,15 @@ def ledger_adds_up(tree: xr.DataTree, frames: np.ndarray) -> Check:
     total = book["source_level"] + book["scattering"]
     for loss in ("transmission_loss_out", "transmission_loss_in", "absorption_loss", "boundary_loss"):
         total = total - book[loss]
-    worst = float(np.nanmax(np.abs(total - book["received_level"]), initial=0.0))
+    apart = np.abs(total - book["received_level"])
+    worst = float(np.nanmax(apart, initial=0.0))
     return Check(
         "ledger adds up",
         f"within {LEDGER_TOLERANCE} dB",
         f"{worst:.2g} dB",
         worst <= LEDGER_TOLERANCE,
         {"worst_db": worst},
+        numbered(frames[(apart > LEDGER_TOLERANCE).reshape(len(frames), -1).any(axis=1)]),
     )
 
 
@@ -48,7 +50,9 @@ def ledger_measured(tree: xr.DataTree, frames: np.ndarray) -> Check:
     worst = float(np.max(apart, initial=0.0, where=np.isfinite(apart)))
     got = f"{worst:.2g} dB over {count - missing} paths" + (f", {missing} without a level" if missing else "")
     good = worst <= LEDGER_TOLERANCE and not missing
-    return Check(name, expected, got, good, {"worst_db": worst, "paths": count, "missing": missing})
+    bad = np.isfinite(predicted) & ~(np.abs(measured - predicted) <= LEDGER_TOLERANCE)
+    spoiled = numbered(frames[bad.reshape(len(frames), -1).any(axis=1)])
+    return Check(name, expected, got, good, {"worst_db": worst, "paths": count, "missing": missing}, spoiled)
 
 
 def echoes_heard(tree: xr.DataTree, frame: int) -> bool:

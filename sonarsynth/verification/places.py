@@ -10,7 +10,7 @@ import xarray as xr
 from sonarsynth.geometry import Pose
 from sonarsynth.verification.beams import near_target
 from sonarsynth.verification.ledger import snaps_heard
-from sonarsynth.verification.reading import Check, of_frame
+from sonarsynth.verification.reading import Check, numbered, of_frame
 
 
 def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
@@ -19,7 +19,7 @@ def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
     Three standard errors in each of three axes: the chi-square of three degrees of freedom that has the probability
     of three sigma (99.73 %) is 14.16. A snap whose sound reaches the array directly and that is not found counts too.
     """
-    good, total, errors = 0, 0, []
+    good, total, errors, missed = 0, 0, [], set()
     for i in frames:
         pose = Pose(of_frame(tree, "truth/sonar_position", i), of_frame(tree, "truth/sonar_orientation", i))
         true = pose.to_body(of_frame(tree, "truth/snap_position", i))
@@ -27,19 +27,24 @@ def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
         reached = snaps_heard(tree, i)
         rows = np.flatnonzero(np.isfinite(found).all(axis=1))
         total += max(len(rows), int(reached.sum()))
+        if len(rows) < reached.sum():
+            missed.add(i)
         for row in rows:
             each = np.linalg.norm(true - found[row], axis=1)
             error = found[row] - true[np.argmin(each)]
             errors.append(float(np.min(each)))
-            good += bool(error @ np.linalg.solve(covariance[row], error) <= 14.16)
+            near = bool(error @ np.linalg.solve(covariance[row], error) <= 14.16)
+            good += near
+            if not near:
+                missed.add(i)
     name, expected = "snap located", "within 3 predicted errors in 95 %"
     if not total:
         return Check(name, expected, "no snap reaches the array", None, {})
     if not errors:
-        return Check(name, expected, f"none of {total} found", False, {"good": 0, "found": 0})
+        return Check(name, expected, f"none of {total} found", False, {"good": 0, "found": 0}, numbered(sorted(missed)))
     got = f"{good} of {total}, median error {np.median(errors):.3g} m"
     numbers = {"good": good, "found": len(errors), "median_m": float(np.median(errors))}
-    return Check(name, expected, got, good >= 0.95 * total, numbers)
+    return Check(name, expected, got, good >= 0.95 * total, numbers, numbered(sorted(missed)))
 
 
 def range_errors(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,3 +32,8 @@ def every(tree: xr.DataTree, name: str) -> np.ndarray:
 def of_frame(tree: xr.DataTree, name: str, index: int) -> np.ndarray:
     """Values of a variable in one frame."""
     return np.asarray(tree[name].isel(frame=index).values)
+
+
+def numbered(frames: Iterable[int] | np.ndarray) -> tuple[int, ...]:
+    """Frame numbers as a report holds them."""
+    return tuple(int(frame) for frame in frames)

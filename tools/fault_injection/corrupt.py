@@ -97,6 +97,15 @@ def damage(path: Path, name: str, how: str, random: np.random.Generator) -> None
         raise ValueError(f"no such damage: {how}")
 
 
+def _mended(path: Path) -> tuple[bool, str]:
+    """Whether a repair says that the store is what it was, and what it says where not."""
+    try:
+        report = repair(path, workers=0, quick=True)
+    except Exception as error:  # whatever it is, this damage was not repaired, and the next is tried
+        return False, f"{type(error).__name__}: {error}"
+    return report.ok, "; ".join(f"{p.where}: {p.what}" for p in report.problems)
+
+
 def run(count: int, seed: int, folder: Path | None = None) -> dict[str, Any]:
     """Damage a store `count` times, verify it and repair it each time. Returns what came of it."""
     random = np.random.default_rng(seed)
@@ -115,15 +124,15 @@ def run(count: int, seed: int, folder: Path | None = None) -> dict[str, Any]:
             began = time.process_time()
             found = not store.verify(path, quick=True).ok
             middle = time.process_time()
-            report = repair(path, workers=0, quick=True)
+            mended, why = _mended(path)
             seconds["verify"] += middle - began
             seconds["repair"] += time.process_time() - middle
             now = contents(path)
             if not found:
                 missed.append(f"{how} {name}")
-            if not report.ok or now != whole:
+            if not mended or now != whole:
                 differing = sorted(n for n in now.keys() | whole.keys() if now.get(n) != whole.get(n))
-                unlike.append(f"{how} {name}: {differing[:5]}")
+                unlike.append(f"{how} {name}: {why} {differing[:5]}")
                 _put_back(path, whole)
             shutil.rmtree(store.beside(path, "foreign"), ignore_errors=True)
     return {

@@ -1,0 +1,16 @@
+"""Faults on purpose, a few of each kind: the command that makes a thousand of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tools.fault_injection.corrupt import KINDS, run
+
+
+def test_random_damages_are_found_and_repaired_to_the_byte(tmp_path: Path) -> None:
+    summary = run(24, seed=7, folder=tmp_path)
+    assert summary["missed"] == []
+    assert summary["not_identical"] == []
+    assert summary["ok"]
+    assert (summary["found"], summary["repaired_to_identical"]) == (24, 24)
+    assert {how for how in KINDS if any(name.startswith(how) for name in summary["tried"])} == set(KINDS)
