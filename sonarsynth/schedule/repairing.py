@@ -74,8 +74,9 @@ def repair(
         unlike = _unlike(path, found) if laid and not quick else []
         made = _plan_of(path, found, anyway) if not laid or found.shards or unlike else None
         report = RepairReport(str(path))
-        report.moved = move_out(path, [*found.foreign, *obstacles(path, {*found.fixed, *found.manifests})])
-        report.restored = restore(path, found, made)
+        report.moved = move_out(path, found.foreign)
+        report.restored, in_the_way = restore(path, found, made)
+        report.moved += in_the_way
         if made is not None:
             unlike = unlike if laid or quick else _unlike(path, found)
             todo = _todo(path, found, made, unlike)

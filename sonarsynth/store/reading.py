@@ -58,15 +58,20 @@ def structure(path: Path) -> Iterator[Problem]:
 
     try:
         with xr.open_datatree(path, engine="zarr", chunks=None) as tree:
-            for node in tree.subtree:
-                for name, variable in node.to_dataset(inherit=False).variables.items():
-                    where = f"{node.path}/{name}".replace("//", "/")
-                    if "units" not in variable.attrs:
-                        yield Problem(where, "has no units")
-                    if variable.dims == (name,):
-                        yield from _coordinate(where, variable)
+            yield from described(tree)
     except Exception as error:
         yield Problem(str(path), f"cannot be opened by xarray: {error}")
+
+
+def described(tree: xr.DataTree) -> Iterator[Problem]:
+    """Every variable of a tree has units, and every coordinate can be looked up."""
+    for node in tree.subtree:
+        for name, variable in node.to_dataset(inherit=False).variables.items():
+            where = f"{node.path}/{name}".replace("//", "/")
+            if "units" not in variable.attrs:
+                yield Problem(where, "has no units")
+            if variable.dims == (name,):
+                yield from _coordinate(where, variable)
 
 
 def _coordinate(where: str, variable: xr.Variable) -> Iterator[Problem]:

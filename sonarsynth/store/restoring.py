@@ -22,19 +22,20 @@ if TYPE_CHECKING:
     from sonarsynth.planning import Plan
 
 
-def restore(path: Path, found: Findings, plan: Plan | None) -> tuple[str, ...]:
-    """Put back laid-out files and the mark of the layout. Returns their names. A plan is needed unless only a copy of
-    the mark is damaged.
+def restore(path: Path, found: Findings, plan: Plan | None) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Put back laid-out files and the mark of the layout. Returns their names, and where what was in the way is now.
 
-    Files are laid out again beside the store, and moved in only where they are what they were, to the byte: raises
-    Mismatch, with nothing changed, where they are not (other versions of libraries).
+    A plan is needed unless only a copy of the mark is damaged. Files are laid out again beside the store, and moved in
+    only where they are what they were, to the byte: raises Mismatch, with nothing changed, where they are not (other
+    versions of libraries).
     """
-    if found.layout is not None and (plan is None or not found.fixed):
+    if plan is None or (found.layout is not None and not found.fixed):
+        if found.layout is None:
+            raise ValueError("a plan is needed to restore what was laid out")
+        moved = move_out(path, obstacles(path, found.manifests))
         if found.manifests:
             save_mark(path, found.layout)
-        return tuple(sorted(found.manifests))
-    if plan is None:
-        raise ValueError("a plan is needed to restore what was laid out")
+        return tuple(sorted(found.manifests)), moved
     scratch = hidden(path, "new")
     shutil.rmtree(scratch, ignore_errors=True)
     try:
@@ -42,6 +43,7 @@ def restore(path: Path, found: Findings, plan: Plan | None) -> tuple[str, ...]:
         lay_out(scratch, plan, layout_of(plan), attrs)
         laid = layout_mark(scratch)
         bad = _to_put_back(path, found, laid)
+        moved = move_out(path, obstacles(path, [*bad, *found.manifests]))
         for name in bad:
             (path / name).parent.mkdir(parents=True, exist_ok=True)
             write_atomically(path / name, (scratch / name).read_bytes())
@@ -49,7 +51,7 @@ def restore(path: Path, found: Findings, plan: Plan | None) -> tuple[str, ...]:
             save_mark(path, found.layout or laid)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
-    return (*bad, *sorted(found.manifests))
+    return (*bad, *sorted(found.manifests)), moved
 
 
 def _to_put_back(path: Path, found: Findings, laid: Mark) -> list[str]:
@@ -125,9 +127,17 @@ def _make_folder(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
 
 
-def obstacles(path: Path, names: Iterable[str]) -> list[str]:
-    """Those of some names that are no plain file, and so cannot be written over: folders, links, pipes."""
-    return [n for n in names if (path / n).is_symlink() or ((path / n).exists() and not (path / n).is_file())]
+def obstacles(path: Path, names: Iterable[str]) -> set[str]:
+    """What lies where files are to be written and cannot be written over: folders, links and pipes in the place of the
+    file, files in the place of a folder."""
+    found = set()
+    for name in names:
+        if (path / name).is_symlink() or ((path / name).exists() and not (path / name).is_file()):
+            found.add(name)
+        while name := name.rpartition("/")[0]:
+            if os.path.lexists(path / name) and not (path / name).is_dir():
+                found.add(name)
+    return found
 
 
 def drop_empty_folders(path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +15,7 @@ import xarray as xr
 from sonarsynth import store
 from sonarsynth.planning import Plan
 from sonarsynth.render import Values
+from sonarsynth.store.reading import described
 from sonarsynth.verification import Check
 
 
@@ -87,6 +89,16 @@ def test_a_flipped_bit_is_found_wherever_it_is(copy: Path) -> None:
         (lambda p: shutil.copy(p / ".marks/0.json", p / ".marks/2.json"), ".marks/2.json", "damaged"),
         (lambda p: (p / "notes.txt").write_text("hello"), "notes.txt", "does not belong"),
         (lambda p: (p / ".marks/x").write_text("hello"), ".marks/x", "does not belong"),
+        (lambda p: (p / ".marks/00.json").write_text("hello"), ".marks/00.json", "does not belong"),
+        (lambda p: (p / ".marks/layout.copy.json").unlink(), ".marks/layout.copy.json", "missing"),
+        (
+            lambda p: (p / ".marks/0.json").write_bytes((p / ".marks/0.json").read_bytes() + b"\n"),
+            ".marks/0.json",
+            "damaged",
+        ),
+        (lambda p: ((p / "zarr.json").unlink(), os.mkfifo(p / "zarr.json")), "zarr.json", "no plain file"),
+        (lambda p: (p / "image/x").symlink_to("/"), "image/x", "does not belong"),
+        (lambda p: (p / "two\nlines").write_text("hello"), "two\\nlines", "does not belong"),
         (
             lambda p: shutil.copytree(p / "image/energy/c/0", p / "image/energy/c/7"),
             "shard 7",
@@ -146,7 +158,62 @@ def test_checks_of_what_a_store_says_are_run_and_count(whole: Path) -> None:
 
 
 def test_no_store_at_all(tmp_path: Path) -> None:
-    with pytest.raises(store.Damage, match="no such store"):
-        store.verify(tmp_path / "none.zarr")
     (tmp_path / "empty").mkdir()
-    assert ".marks/layout.json" in found(tmp_path / "empty")
+    (tmp_path / "file").write_text("hello")
+    for name, message in (
+        ("none", "no such store"),
+        ("empty", "is not a store of sonarsynth"),
+        ("file", "it is no folder"),
+    ):
+        with pytest.raises(store.Mismatch, match=message):
+            store.verify(tmp_path / name)
+
+
+def test_frames_that_a_damage_spoils_are_named(copy: Path) -> None:
+    (copy / "image/energy/c/1/0/0").unlink()
+    (copy / "truth/zarr.json").unlink()
+    answer = store.verify(copy).as_json()
+    assert answer["frames"] == 20
+    assert answer["frames_whole"] == "0:8"
+    damage = ["image/energy/c/1/0/0: the file is missing"]
+    assert answer["frame_report"] == [{"frame": f, "damage": damage, "checks": []} for f in range(8, 13)]
+    assert [p["frames"] for p in answer["problems"]] == ["", "8:13"]
+    (copy / ".marks/1.json").write_text("{}")
+    assert store.verify(copy).as_json()["frames_whole"] == "0:8"
+
+
+def test_frames_that_a_check_fails_in_are_named(whole: Path) -> None:
+    def fails(tree: xr.DataTree) -> list[Check]:
+        return [Check("always", "yes", "no", False, {}, (3, 4, 9))]
+
+    answer = store.verify(whole, [fails]).as_json()
+    assert answer["checks"][0]["frames"] == "3:5,9:10"
+    assert [(row["frame"], row["checks"]) for row in answer["frame_report"]] == [(f, ["always"]) for f in (3, 4, 9)]
+
+
+def test_a_quick_look_compares_files_only(copy: Path) -> None:
+    mark = store.marks.load_mark(copy, 0)
+    assert mark is not None
+    store.marks.save_mark(copy, store.Mark("0", mark.frames, "0" * 64, mark.files))
+    assert store.verify(copy, quick=True).ok
+    assert not store.verify(copy).ok
+    (copy / "image/energy/c/1/0/0").unlink()
+    assert not store.verify(copy, quick=True).ok
+
+
+@pytest.mark.parametrize(
+    ("labels", "what"),
+    [
+        (np.array([0.0, 2.0, 1.0]), "neither rises nor falls"),
+        (np.array([0.0, np.nan, 1.0]), "1 values are not finite"),
+        (np.array(["a", "b", "a"]), "the same label twice"),
+    ],
+)
+def test_coordinates_that_nothing_can_be_looked_up_by_are_found(labels: np.ndarray, what: str) -> None:
+    tree = xr.DataTree.from_dict({"/": xr.Dataset(coords={"x": xr.Variable(("x",), labels, {"units": "1"})})})
+    assert [(p.where, what in p.what) for p in described(tree)] == [("/x", True)]
+
+
+def test_a_variable_without_units_is_found() -> None:
+    tree = xr.DataTree.from_dict({"/part": xr.Dataset({"x": 1.0})})
+    assert [(p.where, p.what) for p in described(tree)] == [("/part/x", "has no units")]

@@ -13,13 +13,13 @@ import xarray as xr
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
-from tools.fault_injection.corrupt import KINDS, RECIPE, contents, damage
 
 from sonarsynth import config, store
 from sonarsynth.planning import Plan, plan
 from sonarsynth.schedule import build
 from sonarsynth.schedule.repairing import repair
 from sonarsynth.store.layout import layout_of
+from tools.fault_injection.corrupt import KINDS, RECIPE, contents, damage
 
 FRAMES = 20
 SOME = st.sets(st.integers(0, FRAMES - 1), min_size=1, max_size=6)
