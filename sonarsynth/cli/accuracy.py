@@ -21,7 +21,10 @@ HELP = (
 
 
 def accuracy(
-    reference: Annotated[str, typer.Option(metavar="NAME", help=HELP)] = "rays",
+    reference: Annotated[str | None, typer.Option(metavar="NAME", help=HELP, show_default="rays")] = None,
+    extremes: Annotated[
+        bool, typer.Option("--extremes", help="Stiff and extreme cases of every stage instead.")
+    ] = False,
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where rows and picture go.")] = Path("accuracy"),
     as_json: Annotated[bool, typer.Option("--json", help="Print the rows as JSON.")] = False,
 ) -> None:
@@ -30,6 +33,13 @@ def accuracy(
     from sonarsynth.accuracy.report import as_json as for_programs
     from sonarsynth.accuracy.report import write
 
+    if extremes:
+        from sonarsynth.cli.extremes import extremes_table
+
+        if reference is not None:
+            raise BadOption("--extremes goes without --reference: it checks every stage")
+        return extremes_table(out, as_json=as_json)
+    reference = reference or "rays"
     if reference not in REFERENCES:
         raise BadOption(f"--reference {reference} is none of {', '.join(REFERENCES)}")
     try:

@@ -127,7 +127,8 @@ def _visible(body: Body, seen: Floats, bodies: tuple[Body, ...], sonar_pose: Pos
     facing = np.einsum("ij,ij->i", sonar_pose.position - centroid, normal) > 0
     if not facing.any():
         return np.full(4, np.nan), 0.0
-    start = centroid[facing] + OFFSET * mesh.radius * normal[facing]
+    rounding = 8.0 * np.finfo(float).eps * float(np.abs(centroid).max())  # of places in the world
+    start = centroid[facing] + max(OFFSET * mesh.radius, rounding) * normal[facing]
     clear = ~occluded(bodies, start, np.broadcast_to(sonar_pose.position, start.shape))
     clear &= np.isfinite(seen[mesh.faces[facing]]).all(axis=(1, 2))
     visible = np.flatnonzero(facing)[clear]

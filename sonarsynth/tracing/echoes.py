@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,9 +25,10 @@ if TYPE_CHECKING:
     from sonarsynth.tracing.arrivals import ArrayLegs
 
 NEGLIGIBLE = 1e-7
-"""The faintest echoes of a snap are left out, so many that their powers together stay below this part of the power of
-all (70 dB); each counts with the largest amplitude that it has anywhere on the array. Of coherent ones, which add by
-amplitude, so many that their amplitudes together stay below the root of this part of that of the largest."""
+"""The faintest echoes of a snap from each target are left out, so many that their powers together stay below this part
+of the power of all from there (70 dB); each counts with the largest amplitude that it has anywhere on the array. Of
+coherent ones, which add by amplitude, so many that their amplitudes together stay below the root of this part of that
+of the largest."""
 
 ENOUGH = 1e-4
 """Error of amplitudes over the aperture, of the strongest echo's, at which polynomials of the second degree will do."""
@@ -84,7 +86,7 @@ def echoes(
     pulses = Pulses.join([g.pulses(array.centre) for g in groups])
     row, amplitude = _columns(groups, "row", "amplitude")
     strongest = np.maximum(np.abs(np.concatenate(few)).max(axis=1, initial=0.0), np.abs(amplitude)) * factor[row]
-    loud = _loud(strongest * _heard(pulses, array.band), pulses.coherent)
+    loud = _loud(strongest * _heard(pulses, array.band), pulses.coherent, facets.target[out.facet[row]])
     mine = [np.flatnonzero(part) for part in np.split(loud, np.cumsum([len(g.row) for g in groups])[:-1])]
     groups = [g.select(keep) for g, keep in zip(groups, mine, strict=True)]
     row, amplitude, sign = _columns(groups, "row", "amplitude", "sign")
@@ -167,11 +169,11 @@ def _pairs(facet: Ints, row: Ints, facets: int) -> tuple[Ints, Ints]:
     return way, begin[facet[way]] + within
 
 
-def _loud(strength: Floats, coherent: Bools) -> Bools:
-    """Which (path,) are kept: all but the faintest, by `NEGLIGIBLE`."""
+def _loud(strength: Floats, coherent: Bools, target: Ints) -> Bools:
+    """Which (path,) are kept: all but the faintest of each target, by `NEGLIGIBLE`."""
     keep = np.ones(len(strength), bool)
-    for mine, exponent in ((~coherent, 2), (coherent, 1)):
-        some = np.flatnonzero(mine)
+    for number, exponent in product(np.unique(target), (1, 2)):
+        some = np.flatnonzero((target == number) & (coherent == (exponent == 1)))
         loudest = strength[some].max(initial=0.0)
         size = (strength[some] / (loudest or 1.0)) ** exponent  # amplitudes may be too small to be squared
         order = np.argsort(size, kind="stable")

@@ -121,7 +121,8 @@ def facets_of(bodies: tuple[Body, ...], environment: Environment) -> Facets:
     none = np.empty((0, 3))
     point = np.concatenate([none, *(b.pose.to_world(b.mesh.centroid) for b in bodies)])
     normal = np.concatenate([none, *(b.pose.turn_to_world(b.mesh.normal) for b in bodies)])
-    offset = OFFSET * np.array([b.mesh.radius for b in bodies])[target]
+    rounding = 8.0 * np.finfo(float).eps * np.abs(point).max(axis=1, initial=0.0)  # of places in the world
+    offset = np.maximum(OFFSET * np.array([b.mesh.radius for b in bodies])[target], rounding)
     return Facets(
         target=target,
         facet=np.concatenate([np.empty(0, np.int64), *(np.arange(n) for n in counts)]),

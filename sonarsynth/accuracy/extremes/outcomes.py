@@ -1,0 +1,111 @@
+"""Cases of the extremes table, and what came of each: what must come out, what did, whether it is right, how long."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+
+class Got(NamedTuple):
+    """What came out of a case, in words, and whether it is what must."""
+
+    text: str
+    ok: bool
+
+
+@dataclass(frozen=True)
+class Case:
+    """An extreme, what must come out, and the check: it computes both, the expectation on its own."""
+
+    name: str
+    expected: str
+    check: Callable[[], Got]
+    slow: bool = False
+    """Large: minutes, or gigabytes; in the command alone."""
+
+
+@dataclass(frozen=True)
+class Extreme:
+    """A row of the table."""
+
+    group: str
+    case: str
+    expected: str
+    got: str
+    ok: bool
+    seconds: float
+    """CPU time of one core, without compiling what was compiled before."""
+
+    def as_json(self) -> dict[str, Any]:
+        """The row, for programs."""
+        return asdict(self)
+
+
+def off(error: npt.ArrayLike, allowed: float, unit: str = "", what: str = "") -> Got:
+    """The largest of some errors against what is allowed; an error that is not a number is not within it."""
+    errors = np.abs(np.atleast_1d(np.asarray(error, float)))
+    largest = float(errors.max()) if errors.size and not np.isnan(errors).any() else float("nan")
+    head = f"{what} " if what else ""
+    return Got(f"{head}{largest:.2g}{unit and ' '}{unit} off ({allowed:g} allowed)", largest <= allowed)
+
+
+def relative(got: npt.ArrayLike, exact: npt.ArrayLike, allowed: float, what: str = "") -> Got:
+    """The largest relative error; of arrays that differ in shape none is right."""
+    one, other = np.asarray(got, float), np.asarray(exact, float)
+    if one.shape != other.shape:
+        return Got(f"{what or 'values'}: shape {one.shape} where {other.shape} belongs", False)
+    return off(one / other - 1.0, allowed, what=what)
+
+
+def holds(ok: bool | np.bool_, text: str) -> Got:
+    """A fact that is so, or is not."""
+    return Got(text if ok else f"NOT SO: {text}", bool(ok))
+
+
+def refused(call: Callable[[], object], words: str) -> Got:
+    """Whether a call is refused with a ValueError in one line that has these words."""
+    try:
+        call()
+    except ValueError as error:
+        said = str(error)
+        return Got(f"refused: {said}", words in said and "\n" not in said)
+    return Got("not refused", False)
+
+
+def together(*parts: Got | Iterable[Got]) -> Got:
+    """All of several; of an iterable the first that fails, or how many there are and the last."""
+    every = [part if isinstance(part, Got) else _all_of(list(part)) for part in parts]
+    return Got("; ".join(part.text for part in every), all(part.ok for part in every))
+
+
+def _all_of(some: list[Got]) -> Got:
+    wrong = [one for one in some if not one.ok]
+    if wrong or not some:
+        return wrong[0] if wrong else Got("nothing was checked", False)
+    return Got(f"{len(some)} of {len(some)} right, the last {some[-1].text}", True)
+
+
+def outcome(group: str, case: Case) -> Extreme:
+    """Run a case; a warning, and an error that nobody expects, is a failure."""
+    began = time.process_time()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            got = case.check()
+    except Exception as error:
+        got = Got(f"{type(error).__name__}: {' '.join(str(error).split())}", False)
+    return Extreme(group, case.name, case.expected, got.text, got.ok, time.process_time() - began)
+
+
+def outcomes(groups: dict[str, tuple[Case, ...]], *, quick: bool) -> Iterator[Extreme]:
+    """The rows of groups of cases, one by one; quick: without the slow ones."""
+    for group, cases in groups.items():
+        for case in cases:
+            if not (quick and case.slow):
+                yield outcome(group, case)
