@@ -127,31 +127,44 @@ class Scene:
     @property
     def meshes(self) -> tuple[Mesh, ...]:
         """What each target is traced with: kept by content, so that asking again costs nothing."""
-        pairs = zip(self.world.targets, self.laws, strict=True)
-        return tuple(mesh_for(t.shape, law, self.sonar.shortest_wavelength) for t, law in pairs)
+        return tuple(self.mesh_of(i) for i in range(len(self.world.targets)))
 
-    def moment(self, time: float, *, trajectory: int = 0, step: int = 0, seed: int = 0) -> Moment:
-        """The world at a time (s), with the snaps that a frame of this trajectory, step and seed draws."""
+    def mesh_of(self, target: int) -> Mesh:
+        """What a target is traced with. Raises ValueError, or OSError, where it has no mesh."""
+        return mesh_for(self.world.targets[target].shape, self.laws[target], self.sonar.shortest_wavelength)
+
+    def moment(self, time: float, *, key: int | str = 0, step: int = 0, seed: int = 0) -> Moment:
+        """The world at a time (s), with the snaps that a frame of the sequence of this key, step and seed draws."""
         placed = zip(self.world.targets, self.meshes, strict=True)
         bodies = tuple(Body(t.name, mesh, pose(t.motion, time), velocity(t.motion, time)) for t, mesh in placed)
         bed = self.world.environment.depth
         snaps: list[Snap] = []
         for i, shrimp in enumerate(self.world.shrimp):
-            drawn = scales(shrimp.variation, stream(seed, "snap", trajectory, step, i), len(shrimp.snap_times))
+            drawn = scales(shrimp.variation, stream(seed, "snap", key, step, i), len(shrimp.snap_times))
             snaps += snaps_of(shrimp, bed, drawn)
         return Moment(time, bodies, tuple(snaps))
 
-    def frame(self, step: int, *, index: int | None = None, trajectory: int = 0, seed: int = 0) -> Frame:
-        """Frame `step` of this scene's trajectory."""
+    def frame(
+        self,
+        step: int,
+        *,
+        index: int | None = None,
+        trajectory: int = 0,
+        seed: int = 0,
+        key: int | str | None = None,
+    ) -> Frame:
+        """Frame `step` of this scene's trajectory; `key` of its random streams (left out: the trajectory)."""
+        key = trajectory if key is None else key
         time = self.trajectory.time(step)
         return Frame(
             index=step if index is None else index,
             trajectory=trajectory,
             step=step,
             seed=seed,
+            key=key,
             sonar_pose=pose(self.trajectory.sonar, time),
             sonar_velocity=velocity(self.trajectory.sonar, time),
-            moment=self.moment(time, trajectory=trajectory, step=step, seed=seed),
+            moment=self.moment(time, key=key, step=step, seed=seed),
         )
 
 
@@ -163,6 +176,7 @@ class Frame:
     trajectory: int  # sequence
     step: int  # within the sequence
     seed: int
+    key: int | str  # of the sequence: random streams are keyed (seed, name, key, step)
     sonar_pose: Pose
     sonar_velocity: Floats  # (xyz) m/s, world
     moment: Moment

@@ -10,6 +10,7 @@ import numpy as np
 from sonarsynth.planning import Plan
 from sonarsynth.products import FAMILIES
 from sonarsynth.recipe import SPLITS
+from sonarsynth.recipe.columns import columns
 
 FORMAT_VERSION = "2"
 """Version of the layout of a store."""
@@ -236,11 +237,23 @@ def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.n
     add("/truth", "family", ("family",), list(FAMILIES), "1", touched)
     if "signals" in plan.products:
         _add_sensors(plan, add)
-    for target, mesh in zip(scene.world.targets, scene.meshes, strict=True):
-        group = f"/targets/{target.name}"
-        add(group, "vertices", ("vertex", "xyz"), mesh.vertices, "m", "vertices in the target's frame")
-        add(group, "faces", ("face", "corner"), mesh.faces, "1", "vertex indices of each facet, outward")
+    for column in columns(plan.recipe.spanned):
+        static["/", column.name] = (("frame",), np.repeat(column.values, plan.recipe.steps), column.attributes)
+    _add_meshes(plan, add)
     return static
+
+
+def _add_meshes(plan: Plan, add: Any) -> None:
+    """The mesh of each target in its group; where its shape varies, its meshes in groups 0, 1, ... of that."""
+    meshes = plan.recipe.meshes
+    for target, some in zip(plan.scene.world.targets, meshes, strict=True):
+        for n, (_, mesh) in enumerate(some):
+            group = f"/targets/{target.name}" + (f"/{n}" if len(some) > 1 else "")
+            add(group, "vertices", ("vertex", "xyz"), mesh.vertices, "m", "vertices in the target's frame")
+            add(group, "faces", ("face", "corner"), mesh.faces, "1", "vertex indices of each facet, outward")
+    if any(len(some) > 1 for some in meshes):
+        numbers = np.repeat(plan.recipe.mesh_numbers().astype(np.int32), plan.recipe.steps, axis=0)
+        add("/truth", "mesh", _TARGET, numbers, "1", "which mesh the target has: its group under /targets/<name>")
 
 
 def _add_sensors(plan: Plan, add: Any) -> None:

@@ -15,7 +15,7 @@ import typer
 from sonarsynth.cli.accuracy import accuracy
 from sonarsynth.cli.repairing import repair
 from sonarsynth.cli.running import BadOption, run
-from sonarsynth.cli.selecting import frame_numbers, product_names
+from sonarsynth.cli.selecting import chosen_frames, product_names
 from sonarsynth.cli.target_strength import target_strength
 
 __all__ = ["app", "main"]
@@ -74,6 +74,9 @@ def build(
     store: Annotated[Path, typer.Argument(help="Where the dataset goes.", show_default=False)],
     settings: Settings = [],  # noqa: B006 - typer copies it
     frames: Annotated[str | None, typer.Option(metavar="A:B", help="Only these frames, such as 0:8 or 0:8,12.")] = None,
+    sequences: Annotated[
+        str | None, typer.Option(metavar="A:B", help="Only these sequences, such as 0:10; with --frames: both.")
+    ] = None,
     products: Products = ALL_PRODUCTS,
     workers: Annotated[
         int | None, typer.Option(min=0, help="Worker processes; 0: none, in this process. Left out: one a core.")
@@ -95,9 +98,9 @@ def build(
     chosen = product_names(products)
     source = config.read(recipe, settings)
     made_from = config.recipe_of(source)
-    wanted = frame_numbers(frames, made_from.frames)
     with config.locating(source):
         plan = planning.plan(made_from, chosen)
+    wanted = chosen_frames(frames, sequences, made_from.sequences, made_from.steps)
     with printing.progress() as progress:
         report = schedule.build(
             plan, store, frames=wanted, workers=workers, scheduler=scheduler, restart=restart, progress=progress

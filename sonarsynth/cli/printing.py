@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
@@ -133,12 +133,27 @@ def plan_report(plan: Plan) -> None:
         out.print(omissions)
     for warning in plan.warnings:
         out.print(f"note: {warning}", markup=False)
+    for line in _spanned(plan.as_json()):
+        out.print(line, markup=False)
     out.print(", ".join(f"{count} {name}" for name, count in plan.sizes.items()))
     frames = plan.recipe.frames
     out.print(
         f"predicted: {duration(plan.predicted_seconds)} of one core for {frames} frames, "
         f"{size(plan.predicted_bytes)} before compression"
     )
+
+
+def _spanned(plan: dict[str, Any]) -> Iterator[str]:
+    """Sequences, grid, variations and splits of a plan, where there is more than one sequence."""
+    if not (plan["grid"] or plan["variations"] or plan["sequences"] > 1):
+        return
+    grid = [f"{' with '.join(entry['names'])} ({entry['values']})" for entry in plan["grid"]]
+    grid += [f"{plan['repeats']} repeats"] if plan["repeats"] > 1 else []
+    spans = f": {' x '.join(grid)}" if grid else ""
+    yield f"{plan['sequences']} sequences of {plan['frames_of_a_sequence']} frames{spans}"
+    if plan["variations"]:
+        yield "drawn for each: " + ", ".join(f"{v['name']} ({v['kind']})" for v in plan["variations"])
+    yield "splits: " + ", ".join(f"{name} {count}" for name, count in plan["splits"].items()) + " sequences"
 
 
 def verify_report(report: StoreReport) -> None:

@@ -9,19 +9,38 @@ from sonarsynth.cli.running import BadOption
 
 def frame_numbers(text: str | None, count: int) -> tuple[int, ...] | None:
     """Frames named by "0:8", "3", "8:" or several with commas; None (all) for None. Raises BadOption."""
+    return _numbers("--frames", "frame", text, count)
+
+
+def chosen_frames(frames: str | None, sequences: str | None, count: int, steps: int) -> tuple[int, ...] | None:
+    """Frames, of these sequences of so many steps, that both texts name; None for all. Raises BadOption."""
+    some = frame_numbers(frames, count * steps)
+    of = _numbers("--sequences", "sequence", sequences, count)
+    if of is None:
+        return some
+    if some is None:
+        return tuple(frame for n in of for frame in range(n * steps, (n + 1) * steps))
+    wanted = set(of)
+    both = tuple(frame for frame in some if frame // steps in wanted)
+    if not both:
+        raise BadOption("--frames and --sequences have no frame in common")
+    return both
+
+
+def _numbers(option: str, what: str, text: str | None, count: int) -> tuple[int, ...] | None:
     if text is None:
         return None
     chosen: set[int] = set()
     for part in text.split(","):
         found = re.fullmatch(r"\s*(\d*)(:?)(\d*)\s*", part)
         if found is None or not part.strip() or not (found[2] or found[1]):
-            raise BadOption(f"--frames: '{part}' is no frame and no range such as 0:8")
+            raise BadOption(f"{option}: '{part}' is no {what} and no range such as 0:8")
         first = int(found[1] or 0)
         stop = (int(found[3]) if found[3] else count) if found[2] else first + 1
         if stop > count:
-            raise BadOption(f"--frames: '{part}' ends past the last frame, {count - 1}")
+            raise BadOption(f"{option}: '{part}' ends past the last {what}, {count - 1}")
         if stop <= first:
-            raise BadOption(f"--frames: '{part}' holds no frame; there are 0 to {count - 1}")
+            raise BadOption(f"{option}: '{part}' holds no {what}; there are 0 to {count - 1}")
         chosen.update(range(first, stop))
     return tuple(sorted(chosen))
 

@@ -21,16 +21,11 @@ from ruamel.yaml import YAML
 from sonarsynth.config.messages import explain
 from sonarsynth.config.source import SET, RecipeError, Source, Where, override, read_file, read_text
 from sonarsynth.description import FieldError
-from sonarsynth.recipe import Recipe
-from sonarsynth.world.environment import Cast
-from sonarsynth.world.shapes import MeshFile
-from sonarsynth.world.snaps import RecordedSnap
+from sonarsynth.recipe import FILE_KINDS, Recipe
 
 __all__ = ["RecipeError", "Source", "dump", "load", "loads", "locating", "read", "recipe_of", "schema"]
 
 _ADAPTER: Final[TypeAdapter[Recipe]] = TypeAdapter(Recipe)
-_FILE_KINDS: Final = {MeshFile.kind, Cast.kind, RecordedSnap.kind}
-"""Descriptions whose `path` names a file."""
 
 
 def load(path: Path | str, sets: Sequence[str] = ()) -> Recipe:
@@ -100,7 +95,7 @@ def _resolved(source: Source, data: Any, where: Where, check: bool) -> Any:
     if not isinstance(data, dict):
         return data
     path = data.get("path")
-    if data.get("kind") in _FILE_KINDS and isinstance(path, str):
+    if data.get("kind") in FILE_KINDS and isinstance(path, str):
         place = (*where, "path")
         folder = Path.cwd() if source.place(place) == SET else source.folder
         file = Path(path) if Path(path).is_absolute() else folder / path

@@ -156,4 +156,6 @@ def _chosen(kind: Any, data: Any) -> Any:
     tagged = [m for m in members if _tag(m) is not None]
     if isinstance(data, dict) and tag is None and len(tagged) == 1:  # the kind of the only one may be left out
         return tagged[0]
-    return next((m for m in tagged if _tag(m) == tag), None)
+    fitting = [m for m in members if _tag(m) == tag and hasattr(m, "__pydantic_fields__")]
+    given = set(data) if isinstance(data, dict) else set()
+    return max(fitting, key=lambda m: len(given & set(_fields(m))), default=None)

@@ -2,29 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from sonarsynth.planning.checks import check_methods, check_positions, check_windows, read_inputs
+from sonarsynth.planning.checks import check_frame, check_methods, check_windows, read_inputs
 from sonarsynth.planning.costs import left_out, stages
+from sonarsynth.planning.looks import Look, check_alike, survey
 from sonarsynth.planning.notes import notes
-from sonarsynth.planning.plans import PRODUCTS, Omission, Plan, Stage, Windows
-from sonarsynth.planning.windows import lay_windows
+from sonarsynth.planning.plans import PRODUCTS, Omission, Plan, Stage, Windows, resolve
+from sonarsynth.planning.windows import frame_start, lay_windows
 from sonarsynth.recipe import Recipe
+from sonarsynth.scene import Frame
 from sonarsynth.sonar import elements
-from sonarsynth.tracing import AutoTracing, Refracted, Straight
 
-__all__ = ["PRODUCTS", "Omission", "Plan", "Stage", "Windows", "chosen_products", "lay_windows", "plan"]
+__all__ = [
+    "PRODUCTS",
+    "Omission",
+    "Plan",
+    "Stage",
+    "Windows",
+    "check_unseen",
+    "chosen_products",
+    "frame_start",
+    "lay_windows",
+    "plan",
+]
 
 SHARD_BYTES = 64e6
 """A shard holds about this much of the largest array, and at most SHARD_FRAMES frames."""
 SHARD_FRAMES = 8
+COSTED = 5
+"""Sequences over which the predicted cost is averaged."""
 
 
 def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS) -> Plan:
     """Resolve a recipe: check the scene at every frame, make every choice, and predict sizes and cost.
+
+    Of a dataset of more than looks.LOOKED_AT frames, so many are looked at; each other one is checked when it is
+    rendered.
 
     Raises FieldError, naming the field, for a body above the surface or in the bed, a sonar or shrimp out of the
     water, a snap that cannot be made, a missing or broken file, or methods that cannot serve the scene; ValueError for
@@ -33,22 +50,29 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS) -> Plan:
     if not isinstance(recipe, Recipe):
         raise TypeError(f"a recipe is planned, not a {type(recipe).__name__}: sonarsynth.load reads one from a file")
     products = chosen_products(products)
-    scene = recipe.scene
-    profile = read_inputs(scene)
-    check_methods(scene, products)
-    check_positions(scene, recipe)
-    tracing = scene.physics.tracing
-    if isinstance(tracing, AutoTracing):
-        propagation: Straight | Refracted = tracing.resolve(profile)
-    else:
-        propagation = tracing
-    windows = lay_windows(recipe, profile)
+    recipe.spanned.check()
+    with recipe.spanned.naming(0):
+        scene = recipe.scene_of(0)
+        profile = read_inputs(scene)
+        check_methods(scene, products)
+    looks = survey(recipe)
+    propagation = resolve(scene.physics.tracing, profile)
+    windows = lay_windows(recipe, looks)
     check_windows(scene, windows)
     sizes = _sizes(recipe, windows)
     frame_bytes = sizes["sensor"] * sizes["sample"] * (2 if scene.sonar.converter else 4)
     shard = int(np.clip(SHARD_BYTES // max(frame_bytes, 1), 1, SHARD_FRAMES))
     made = Plan(recipe, products, profile, propagation, windows, sizes=sizes, shard_frames=shard)
-    return replace(made, stages=stages(made), left_out=left_out(made), warnings=notes(made))
+    return replace(made, stages=_mean_stages(made, looks), left_out=left_out(made), warnings=notes(made, looks))
+
+
+def _mean_stages(made: Plan, looks: Sequence[Look]) -> tuple[Stage, ...]:
+    """The stages, with the mean cost over a few sequences."""
+    real = [look.frames[0].index for look in looks if look.real]
+    chosen = real[:: -(-len(real) // COSTED)]
+    rows = [stages(made.at(index)) for index in chosen]
+    means = (sum(row[i].seconds for row in rows) / len(rows) for i in range(len(rows[0])))
+    return tuple(replace(stage, seconds=mean) for stage, mean in zip(rows[0], means, strict=True))
 
 
 def chosen_products(names: Iterable[str]) -> frozenset[str]:
@@ -61,7 +85,7 @@ def chosen_products(names: Iterable[str]) -> frozenset[str]:
 
 
 def _sizes(recipe: Recipe, windows: Windows) -> dict[str, int]:
-    scene = recipe.scene
+    scene = recipe.scene_of(0)
     beams = scene.sonar.beams
     snaps = sum(len(s.snap_times) for s in scene.world.shrimp)
     return {
@@ -73,3 +97,15 @@ def _sizes(recipe: Recipe, windows: Windows) -> dict[str, int]:
         "target": len(scene.world.targets),
         "snap": snaps,
     }
+
+
+def check_unseen(plan: Plan, frame: Frame) -> None:
+    """Check a frame that was not looked at when its dataset was planned; `plan` is that of its sequence.
+
+    Raises FieldError where something is out of the water, or the frame does not fit in the windows.
+    """
+    if not np.isfinite(plan.windows.start[frame.index]):
+        with plan.recipe.spanned.naming(plan.sequence):
+            check_alike(plan.recipe.scene_of(0), plan.scene)
+            check_frame(plan.scene, frame)
+            frame_start(plan, frame)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,8 +12,6 @@ from sonarsynth.acoustics.snap import onset
 from sonarsynth.beamforming import FocusedDelayAndSum
 from sonarsynth.conventions import FASTEST, REFERENCE_PRESSURE, SLOWEST, Floats, depth
 from sonarsynth.description import FieldError
-from sonarsynth.planning.plans import Windows
-from sonarsynth.recipe import Recipe
 from sonarsynth.scattering.targets import mesh_for
 from sonarsynth.scene import Frame, Scene
 from sonarsynth.sonar import Sonar, elements
@@ -24,6 +23,9 @@ from sonarsynth.world.meshes import Mesh
 from sonarsynth.world.moment import model_of
 from sonarsynth.world.snap_pulses import largest_scales, pulse, waveform
 from sonarsynth.world.sources import LogarithmicBubble, SnappingShrimp
+
+if TYPE_CHECKING:
+    from sonarsynth.planning.plans import Windows
 
 FARTHEST = 1e6
 """m from the origin: beyond, travel times lose their microseconds."""
@@ -64,8 +66,8 @@ def read_inputs(scene: Scene) -> Profile:
     return profile
 
 
-def check_positions(scene: Scene, recipe: Recipe) -> None:
-    """Every body, the array and every shrimp must be in the water at every frame."""
+def check_shrimp(scene: Scene) -> None:
+    """Every shrimp must be in the water, and its snap one that can be made and heard."""
     bed = scene.world.environment.depth
     for i, shrimp in enumerate(scene.world.shrimp):
         position = shrimp.position
@@ -83,16 +85,19 @@ def check_positions(scene: Scene, recipe: Recipe) -> None:
             _check_snap(shrimp, bed, scene.sonar)
         except ValueError as error:
             raise FieldError(("scene", "world", "shrimp", i, "snap"), str(error)) from None
+
+
+def check_frame(scene: Scene, frame: Frame) -> None:
+    """The array and every body must be in the water, and no snap inside a body or the array."""
+    bed = scene.world.environment.depth
     reach = elements(scene.sonar.array).position
-    for step in range(recipe.frames):
-        _, frame = recipe.frame(step)
-        _check_depth(("scene", "trajectory", "sonar"), "the array", frame.sonar_pose.to_world(reach), bed, frame)
-        for i, body in enumerate(frame.moment.bodies):
-            path = ("scene", "world", "targets", i, "motion")
-            _check_depth(path, f"target '{body.name}'", body.pose.to_world(_hull(body.mesh)), bed, frame)
-            if inside(body, frame.sonar_pose.position):
-                raise FieldError(path, f"target '{body.name}' has the sonar inside at frame {frame.index}")
-        _check_snaps(scene, frame)
+    _check_depth(("scene", "trajectory", "sonar"), "the array", frame.sonar_pose.to_world(reach), bed, frame)
+    for i, body in enumerate(frame.moment.bodies):
+        path = ("scene", "world", "targets", i, "motion")
+        _check_depth(path, f"target '{body.name}'", body.pose.to_world(_hull(body.mesh)), bed, frame)
+        if inside(body, frame.sonar_pose.position):
+            raise FieldError(path, f"target '{body.name}' has the sonar inside at frame {frame.index}")
+    _check_snaps(scene, frame)
 
 
 def _check_snaps(scene: Scene, frame: Frame) -> None:

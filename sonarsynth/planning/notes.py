@@ -2,25 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from sonarsynth.planning.looks import Look
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.validity import validity
 from sonarsynth.planning.windows import SUPPORT, extreme_waveforms
 from sonarsynth.recipe import Recipe
 from sonarsynth.scattering import Kirchhoff
 from sonarsynth.scattering.notes import concave_note, small_note
+from sonarsynth.scene import Scene
 from sonarsynth.synthesis.pulse import LONGEST_TAIL, cut_tail
+from sonarsynth.world.environment import Profile
 from sonarsynth.world.refinement import longest_edge
 
 COARSE = 0.1
 """Facets longer than this (m) are noted: range errors of points are a few centimetres."""
 
 
-def notes(made: Plan) -> tuple[str, ...]:
+NOTED = 8
+"""Sequences that the notes on scenes are from, at most."""
+
+
+def notes(made: Plan, looks: Sequence[Look]) -> tuple[str, ...]:
     """The notes on a plan, in order of importance."""
     recipe, scene = made.recipe, made.scene
     found: list[str] = []
+    if made.looked_at < recipe.frames:
+        found.append(
+            f"{made.looked_at} of {recipe.frames} frames were looked at for the windows, and the ends of the "
+            "variations; each other frame is checked when it is rendered, and set aside where it does not fit"
+        )
+    found += _shared(recipe, looks)
     if made.windows.disturbed:
         found.append(
             f"{made.windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest one"
@@ -28,16 +43,38 @@ def notes(made: Plan) -> tuple[str, ...]:
     cancelled = scene.processing.cancelling is not None
     if made.propagation.bounces and not cancelled and made.products & {"image", "cloud"} and made.sizes["snap"]:
         found.append("the snap's own reflections enter the image: processing.cancelling takes them out before")
-    found += _cut(recipe, made.profile.uniform)
     found += _behind(recipe)
-    found += validity(scene, made.profile)
-    found += _meshes(made)
-    return tuple(found)
+    real = [look for look in looks if look.real]
+    for look in real[:: -(-len(real) // NOTED)]:
+        found += _cut(look.scene, look.profile.uniform)
+        found += validity(look.scene, look.profile)
+        found += _meshes(look.scene, look.profile)
+    return tuple(dict.fromkeys(found))
 
 
-def _cut(recipe: Recipe, uniform: bool) -> tuple[str, ...]:
+def _shared(recipe: Recipe, looks: Sequence[Look]) -> list[str]:
+    """What sequences of different splits have in common, so that one tells of the other."""
+    if recipe.splits is None:
+        return []
+    found = []
+    held: dict[str, dict[object, set[int]]] = {"target poses": {}, "snap positions": {}}
+    for look in looks:
+        if look.real:
+            split, world = recipe.split(look.frames[0].index), look.scene.world
+            trajectory = look.scene.trajectory
+            poses = tuple((t.motion, trajectory.start, trajectory.interval) for t in world.targets)
+            snaps = tuple((s.position, s.height) for s in world.shrimp)
+            held["target poses"].setdefault(poses, set()).add(split)
+            held["snap positions"].setdefault(snaps, set()).add(split)
+    for what, splits in held.items():
+        count = sum(len(some) > 1 for some in splits.values())
+        if count:
+            found.append(f"{count} sets of {what} are the same in several splits: vary them, or see splits.undivided")
+    return found
+
+
+def _cut(scene: Scene, uniform: bool) -> tuple[str, ...]:
     """Which snaps fall so slowly, once a path turns their phase, that the windows cut them."""
-    scene = recipe.scene
     if uniform and not scene.physics.tracing.bounces:
         return ()
     tails = [cut_tail(w, scene.sonar.antialias, SUPPORT) for w in extreme_waveforms(scene)]
@@ -62,13 +99,13 @@ def _behind(recipe: Recipe) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _meshes(made: Plan) -> list[str]:
+def _meshes(scene: Scene, profile: Profile) -> list[str]:
     """What meshes stand for: how coarse they are, what was repaired, what the law leaves out."""
-    scene, found = made.scene, []
+    found: list[str] = []
     for target, law, mesh in zip(scene.world.targets, scene.laws, scene.meshes, strict=True):
         said = list(mesh.notes)
         if isinstance(law, Kirchhoff):
-            longest = float(made.profile.speed.max()) / scene.sonar.band.low
+            longest = float(profile.speed.max()) / scene.sonar.band.low
             said += [line for line in (small_note(mesh, longest), concave_note(mesh)) if line]
         elif (edge := longest_edge((mesh.vertices, mesh.faces.astype(np.int64)))) > COARSE:
             said.append(f"facets up to {edge:.2g} m long, each echoing from its middle: set shape.edge to refine")

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.planning.checks import check_shrimp, read_inputs
 from sonarsynth.products import Paths
 from sonarsynth.recipe import Recipe
 from sonarsynth.scene import Scene
 from sonarsynth.sonar import Elements, elements
-from sonarsynth.tracing import Refracted, Straight
+from sonarsynth.tracing import AutoTracing, Refracted, Straight, Tracing
 from sonarsynth.world.environment import Profile
 from sonarsynth.world.water import absorption_db_per_m
 
@@ -43,14 +44,26 @@ class Omission:
 
 
 @dataclass(frozen=True, eq=False)
+class Supports:
+    """How long pulses are (s), before and after their collapse, over the whole aperture."""
+
+    before: float
+    after: float
+    echo_before: float  # the part that the echo window must hold
+    echo_after: float
+    clear: float  # after the direct arrival: no echo window begins earlier
+
+
+@dataclass(frozen=True, eq=False)
 class Windows:
     """When each frame listens; times on the clock of the frame."""
 
-    start: Floats  # (frame,) s: first sample, a whole number of sampling intervals
+    start: Floats  # (frame,) s: first sample, a whole number of sampling intervals; NaN of a frame not looked at
     samples: int
     echo_start: float  # s after the direct arrival
     echo_stop: float  # s after the direct arrival
-    disturbed: int  # frames in whose echo window other snaps, or their echoes, are heard as well
+    supports: Supports
+    disturbed: int  # of the frames looked at: in whose echo window other snaps, or their echoes, are heard as well
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,11 +80,22 @@ class Plan:
     warnings: tuple[str, ...] = ()
     sizes: dict[str, int] = field(default_factory=dict)
     shard_frames: int = 1
+    sequence: int = 0  # whose scene, profile and propagation these are
 
     @property
     def scene(self) -> Scene:
-        """The scene of the recipe."""
-        return self.recipe.scene
+        """The scene of the sequence."""
+        return self.recipe.scene_of(self.sequence)
+
+    def at(self, index: int) -> Plan:
+        """The plan for a frame: with the scene, the water and the propagation of its sequence. Raises FieldError."""
+        sequence = index // self.recipe.steps
+        return self if sequence == self.sequence else _of_sequence(self, sequence)
+
+    @property
+    def looked_at(self) -> int:
+        """Frames that were looked at."""
+        return int(np.isfinite(self.windows.start).sum())
 
     @cached_property
     def elements(self) -> Elements:
@@ -119,4 +143,20 @@ class Plan:
                 "echo_start": self.windows.echo_start,
                 "echo_stop": self.windows.echo_stop,
             },
+            "frames_looked_at": self.looked_at,
+            **self.recipe.spanned.as_json(),
         }
+
+
+def resolve(tracing: Tracing, profile: Profile) -> Straight | Refracted:
+    """How sound travels in this water."""
+    return tracing.resolve(profile) if isinstance(tracing, AutoTracing) else tracing
+
+
+@lru_cache(maxsize=16)
+def _of_sequence(plan: Plan, sequence: int) -> Plan:
+    with plan.recipe.spanned.naming(sequence):
+        scene = plan.recipe.scene_of(sequence)
+        profile = read_inputs(scene)
+        check_shrimp(scene)
+    return replace(plan, sequence=sequence, profile=profile, propagation=resolve(scene.physics.tracing, profile))

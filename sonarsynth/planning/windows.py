@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +10,8 @@ import numpy as np
 from sonarsynth.acoustics.rays import mean_slowness, water
 from sonarsynth.conventions import SLOWEST, Floats, depth
 from sonarsynth.description import FieldError
-from sonarsynth.planning.plans import Windows
+from sonarsynth.planning.looks import Look
+from sonarsynth.planning.plans import Plan, Supports, Windows
 from sonarsynth.products import Paths
 from sonarsynth.recipe import Recipe
 from sonarsynth.scattering import Kirchhoff, PartlyReflecting
@@ -34,51 +36,90 @@ TAIL = 1e-3
 """s after the direct pulse in its plain shape: echoes are heard from then on, though a turned one has a longer tail."""
 ECHO_SUPPORT = 1e-4
 """The echo window holds every echo down to this part of its peak: its feet, under -80 dB, are cut."""
+UNSEEN = 0.1
+"""Windows of datasets of which not every frame is looked at are wider by this part of themselves."""
 
 
-def lay_windows(recipe: Recipe, profile: Profile) -> Windows:
+def lay_windows(recipe: Recipe, looks: Sequence[Look]) -> Windows:
     """The sample window, which holds every arrival of every frame, and the echo window.
 
     The sonar takes the pulse that it hears best for the start of its clock: the echo window holds the echoes of any
     snap after its own direct arrival. From geometry alone: the delay of each facet's echo along straight lines at the
-    slowness averaged between its ends, and the support of the filtered snap.
+    slowness averaged between its ends, and the support of the filtered snap. Where not every frame was looked at, the
+    windows are wider by UNSEEN, and each other frame is asked whether it fits when it is rendered.
     """
-    scene = recipe.scene
-    sonar = scene.sonar
-    across = elements(sonar.array).aperture / profile.speed.min()  # of a wave, from the centre to the edge
-    lossy = any(isinstance(law, Kirchhoff) and isinstance(law.surface, PartlyReflecting) for law in scene.laws)
-    turned = (
-        lossy or scene.physics.tracing.bounces > 0 or not profile.uniform
-    )  # reflections and caustics turn the phase
-    before, after = _support(recipe, SUPPORT, turned=turned) + across
-    echo_before, echo_after = _support(recipe, ECHO_SUPPORT, turned=turned) + across
-    spans = _spans(recipe, profile)
+    sonar, gate = looks[0].scene.sonar, looks[0].scene.processing.echo_window
+    supports = _supports(looks)
+    real = np.array([frame.index if look.real else -1 for look in looks for frame in look.frames])
+    spans = [span for look in looks for span in _spans(look)]
     first_heard, last_direct, first_echo, last_echo, last_heard = np.array([_times(span) for span in spans]).T
-    gate = scene.processing.echo_window
     echoes = bool(np.isfinite(first_echo).any())
     shortest = float(np.nanmin(first_echo)) if echoes else np.nan
     longest = float(np.nanmax(last_echo)) if echoes else np.nan
-    earliest, latest = shortest - echo_before - MARGIN, longest + echo_after + MARGIN
+    unseen = UNSEEN * (longest - shortest) if (real >= 0).sum() < recipe.frames else 0.0
+    earliest = shortest - supports.echo_before - MARGIN - unseen
+    latest = longest + supports.echo_after + MARGIN + unseen
     if not np.isfinite(latest - earliest):  # nothing echoes: listen for a moment after the snap
-        earliest, latest = after, after + 2e-3
-    plain = _support(recipe, SUPPORT, turned=False)[1]
-    clear = min(after, plain + across + TAIL)  # a turned pulse may never end: what echoes meanwhile must be heard
-    start = gate.start if gate.start is not None else max(earliest, clear)
+        earliest, latest = supports.after, supports.after + 2e-3
+    start = gate.start if gate.start is not None else max(earliest, supports.clear)
     stop = gate.stop if gate.stop is not None else max(latest, start + 1e-3)
     if stop <= start:
         raise FieldError(("scene", "processing", "echo_window", "stop"), f"must be after start ({start:g} s)")
     rate = sonar.sampling_frequency
-    first = np.floor((first_heard - before - MARGIN) * rate) / rate
-    last = np.maximum(last_heard + after, last_direct + stop) + MARGIN
-    samples = int(np.ceil(np.max(last - first) * rate)) + 1
-    disturbed = sum(_disturbed(span, start - before, stop + before) for span in spans)
-    return Windows(first, samples, float(start), float(stop), disturbed)
+    first = _first_sample(first_heard, supports, rate)
+    last = np.maximum(last_heard + supports.after, last_direct + stop) + MARGIN
+    samples = int(np.ceil(np.max(last - first) * rate * (1.0 + (UNSEEN if unseen else 0.0)))) + 1
+    disturbed = sum(_disturbed(span, start - supports.before, stop + supports.before) for span in spans)
+    starts = np.full(recipe.frames, np.nan)
+    starts[real[real >= 0]] = first[real >= 0]
+    return Windows(starts, samples, float(start), float(stop), supports, disturbed)
 
 
-def _support(recipe: Recipe, tolerance: float, *, turned: bool) -> Floats:
+def _first_sample(first_heard: Floats, supports: Supports, rate: float) -> Floats:
+    return np.asarray(np.floor((first_heard - supports.before - MARGIN) * rate) / rate)
+
+
+def frame_start(plan: Plan, frame: Frame) -> float:
+    """Time (s) of the first sample of a frame, after its instant; `plan` is that of its sequence.
+
+    Raises FieldError for a frame that was not looked at before and does not fit in the windows.
+    """
+    windows, scene = plan.windows, plan.scene
+    known = float(windows.start[frame.index])
+    if np.isfinite(known):
+        return known
+    (span,) = _spans(Look(scene, plan.profile, (frame,)))
+    supports, rate, gate = windows.supports, scene.sonar.sampling_frequency, scene.processing.echo_window
+    first = float(_first_sample(np.asarray(span.first), supports, rate))
+    last = max(span.last + supports.after, span.last_direct + windows.echo_stop) + MARGIN
+    path, advice = ("scene", "processing", "echo_window"), "give its start and stop, or fewer frames"
+    if np.ceil((last - first) * rate) + 1 > windows.samples:
+        raise FieldError(path, f"frame {frame.index} lasts {last - first:.3g} s, more than those looked at: {advice}")
+    early = gate.start is None and max(span.first_echo - supports.echo_before, supports.clear) < windows.echo_start
+    late = gate.stop is None and span.last_echo + supports.echo_after > windows.echo_stop
+    if early or late:
+        raise FieldError(path, f"frame {frame.index} echoes outside the window of those looked at: {advice}")
+    return first
+
+
+def _supports(looks: Sequence[Look]) -> Supports:
+    """How long pulses are, over all scenes."""
+    rows = []
+    for look in looks:
+        scene, profile = look.scene, look.profile
+        across = elements(scene.sonar.array).aperture / profile.speed.min()  # of a wave, from the centre to the edge
+        lossy = any(isinstance(law, Kirchhoff) and isinstance(law.surface, PartlyReflecting) for law in scene.laws)
+        turned = lossy or scene.physics.tracing.bounces > 0 or not profile.uniform  # also caustics turn the phase
+        before, after = _support(scene, SUPPORT, turned=turned) + across
+        plain = _support(scene, SUPPORT, turned=False)[1]
+        clear = min(after, plain + across + TAIL)  # a turned pulse may never end: what echoes meanwhile must be heard
+        rows.append((before, after, *(_support(scene, ECHO_SUPPORT, turned=turned) + across), clear))
+    return Supports(*(float(n) for n in np.max(rows, axis=0)))
+
+
+def _support(scene: Scene, tolerance: float, *, turned: bool) -> Floats:
     """Longest time (s) before and after its collapse that any filtered snap exceeds `tolerance` of its peak, and the
     echo of any facet."""
-    scene = recipe.scene
     chosen, waveforms = scene.sonar.antialias, extreme_waveforms(scene)
     supports = [(0.0, 0.0), *(pulse_support(w, chosen, tolerance, turned=turned) for w in waveforms)]
     for law, mesh in zip(scene.laws, scene.meshes, strict=True):
@@ -95,9 +136,8 @@ def _support(recipe: Recipe, tolerance: float, *, turned: bool) -> Floats:
     return np.asarray(np.max(supports, axis=0))
 
 
-def _blurred(recipe: Recipe) -> float:
+def _blurred(scene: Scene) -> float:
     """By how much (s) rough boundaries and bodies lengthen the pulses that they reflect and leave anything of."""
-    scene = recipe.scene
     environment, bounces = scene.world.environment, scene.physics.tracing.bounces
     heights = [law.roughness for law in scene.laws if isinstance(law, Kirchhoff)]
     roughest = max(rms_height(environment.surface), rms_height(environment.bed))
@@ -153,14 +193,14 @@ class _Span:
     others: tuple[tuple[float, float], ...] = ()  # direct arrival and last echo of the snaps that are not the loudest
 
 
-def _spans(recipe: Recipe, profile: Profile) -> list[_Span]:
+def _spans(look: Look) -> list[_Span]:
     """When each frame is heard, with what straight lines between things at rest leave out."""
-    bounces, bed = recipe.scene.physics.tracing.bounces, recipe.scene.world.environment.depth
-    blurred, spans = _blurred(recipe), []
-    for index in range(recipe.frames):
-        frame = recipe.frame(index)[1]
+    scene, profile = look.scene, look.profile
+    bounces, bed = scene.physics.tracing.bounces, scene.world.environment.depth
+    blurred, spans = _blurred(scene), []
+    for frame in look.frames:
         span = _span(frame, profile, bed, bounces)
-        slack = _slack(recipe.scene.physics.doppler, frame, span, profile)
+        slack = _slack(scene.physics.doppler, frame, span, profile)
         spans.append(
             replace(
                 span,

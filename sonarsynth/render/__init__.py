@@ -17,7 +17,7 @@ import numpy as np
 from sonarsynth.conventions import Floats
 from sonarsynth.description import FieldError
 from sonarsynth.labelling import SLICES, Band, echoes, label, ledger, path_powers
-from sonarsynth.planning import Plan, plan
+from sonarsynth.planning import Plan, check_unseen, frame_start, plan
 from sonarsynth.products import Arrivals, Bearings, Echoes, EnergyImage, Ledger, Signals, Truth
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import Recipe
@@ -86,7 +86,9 @@ def trace_frame(plan: Plan, index: int) -> Traced:
     from sonarsynth.tracing.arrivals import trace
     from sonarsynth.tracing.moving import Moving
 
+    plan = plan.at(index)
     scene, frame = plan.recipe.frame(index)
+    check_unseen(plan, frame)
     environment, sonar = scene.world.environment, scene.sonar
     velocities = np.array([body.velocity for body in frame.moment.bodies]).reshape(-1, 3)
     arrivals = trace(
@@ -140,6 +142,7 @@ def follow_rays(plan: Plan, index: int) -> RayFan:
     request = plan.recipe.rays
     if request is None:
         raise FieldError((), "the recipe asks for no rays: add 'rays:', with directions or a grid")
+    plan = plan.at(index)
     scene, frame = plan.recipe.frame(index)
     if request.towards_shrimp and not frame.moment.snaps:
         raise FieldError(("rays", "towards_shrimp"), "the scene has no shrimp")
@@ -191,6 +194,7 @@ def synthesise(plan: Plan, traced: Traced) -> Signals:
     """Pressure at each hydrophone: echoes and direct snap, ambient noise, converter."""
     from sonarsynth.synthesis import add_noise, convert
 
+    plan = plan.at(traced.frame.index)
     scene, frame = plan.scene, traced.frame
     sonar = scene.sonar
     signals = scene.physics.synthesis.signals(
@@ -199,12 +203,12 @@ def synthesise(plan: Plan, traced: Traced) -> Signals:
         plan.elements,
         sonar,
         plan.absorption,
-        float(plan.windows.start[frame.index]),
+        frame_start(plan, frame),
         plan.windows.samples,
     )
     noise = scene.world.environment.noise
     if noise is not None:
-        random = stream(frame.seed, "noise", frame.trajectory, frame.step)
+        random = stream(frame.seed, "noise", frame.key, frame.step)
         signals = add_noise(signals, noise, sonar, plan.elements, random)
     return signals if sonar.converter is None else convert(signals, sonar.converter)
 
@@ -213,6 +217,7 @@ def measure_isolated(plan: Plan, traced: Traced) -> Floats:
     """Levels (snap, target + 1, family) in dB of the isolated paths of the ledger, measured in signals of each."""
     from sonarsynth.synthesis.isolated import measured_levels
 
+    plan = plan.at(traced.frame.index)
     scene, book = plan.scene, traced.ledger
     method, snaps = scene.physics.synthesis, traced.frame.moment.snaps
     measured = measured_levels(method, book.isolated, snaps, scene.sonar, plan.absorption)
@@ -221,6 +226,7 @@ def measure_isolated(plan: Plan, traced: Traced) -> Floats:
 
 def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
     """The point cloud, and every stored value of the frame."""
+    plan = plan.at(index)
     frame = traced.frame
     values = table("/", trajectory=frame.trajectory, step=frame.step, time=frame.time, split=plan.recipe.split(index))
     values |= truth_values(traced.truth, traced.echoes, traced.arrivals) | ledger_values(traced.ledger, heard.isolated)
@@ -256,8 +262,8 @@ def render(recipe: Recipe | Plan, index: int) -> xr.DataTree:
     values = range_frame(made, index, traced, beamform_frame(made, index, traced))
     groups: dict[str, xr.Dataset] = {"/": xr.Dataset(attrs=attributes(made))}
     for (group, name), (dims, array, attrs) in coordinates(made).items():
-        if "frame" not in dims:
-            groups.setdefault(group, xr.Dataset()).coords[name] = (dims, array, attrs)
+        one = (dims[1:], array[index], attrs) if "frame" in dims else (dims, array, attrs)
+        groups.setdefault(group, xr.Dataset()).coords[name] = one
     for v in variables(made):
         attrs = {"units": v.units, "long_name": v.long_name, **dict(v.attributes)}
         data = values[v.group, v.name]

@@ -30,7 +30,12 @@ def truth_values(truth: Truth, echoes: Echoes, arrivals: Arrivals) -> Values:
 
 
 def ledger_values(book: Ledger, measured: Floats | None) -> Values:
-    """Levels; measured (snap, target + 1, family) in dB, or None where there were no signals."""
+    """Levels; measured (snap, target + 1, family) in dB, or None where there were no signals.
+
+    A path so faint that single precision holds nothing of it (hundreds of dB down a lobe) has no measured level: NaN.
+    """
+    if measured is not None:
+        measured = np.where(np.isneginf(measured), np.nan, measured)
     return table(
         "/ledger",
         **{name: book.level[..., n] for n, name in enumerate(LEDGER)},

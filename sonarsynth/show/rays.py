@@ -51,6 +51,7 @@ def show_rays(plan: Plan, index: int, out: Path) -> tuple[list[Path], str]:
     little along that axis. Where rays of a fan are sent on to the shrimp, their colour in space is their coefficient,
     and only those that met a target are drawn. Raises FieldError where there is nothing to draw.
     """
+    plan = plan.at(index)
     frame = plan.recipe.frame(index)[1]
     lines = ray_lines(plan, frame, index)
     hulls = [Hull(b.name, b.pose.to_world(b.mesh.vertices), b.mesh.faces.astype(int)) for b in frame.moment.bodies]

@@ -170,6 +170,14 @@ def _blended(azimuth: Floats, elevation: Floats, families: list[str], family: in
     return bool((near[once] <= near[family]).any())
 
 
+def mesh_group(tree: xr.DataTree, name: str, target: int, index: int) -> str:
+    """Where the mesh is that a target has in a frame: its group, or one of those in it where its shape varies."""
+    group = f"targets/{name}"
+    if read(tree, f"{group}/0/faces") is None:
+        return group
+    return f"{group}/{int(needed(tree, 'truth/mesh', index)[target])}"
+
+
 def hulls(tree: xr.DataTree, index: int) -> tuple[Hull, ...]:
     """The targets of a frame where they truly are; none of a frame that was not built."""
     sonar = _sonar(tree, index)
@@ -180,7 +188,8 @@ def hulls(tree: xr.DataTree, index: int) -> tuple[Hull, ...]:
     orientation = needed(tree, "truth/target_orientation", index)
     made = []
     for i, name in enumerate(map(str, names)):
-        vertices, faces = read(tree, f"targets/{name}/vertices"), read(tree, f"targets/{name}/faces")
+        group = mesh_group(tree, name, i, index)
+        vertices, faces = read(tree, f"{group}/vertices"), read(tree, f"{group}/faces")
         if vertices is not None and faces is not None and np.isfinite(position[i]).all():
             there = sonar.to_body(Pose(position[i], orientation[i]).to_world(vertices))
             made.append(Hull(name, there, faces.astype(np.int64)))

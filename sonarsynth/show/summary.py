@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.show.reading import built, echo_levels, needed, read
+from sonarsynth.show.reading import built, echo_levels, mesh_group, needed, read
 from sonarsynth.verification import brightest_beam_on_target, range_errors, snap_located
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def _targets(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
     seen = (needed(tree, "truth/visible_fraction")[frames] > 0).sum(axis=0)
     lines = []
     for i, name in enumerate(map(str, names)):
-        faces = read(tree, f"targets/{name}/faces")
+        faces = read(tree, f"{mesh_group(tree, name, i, int(frames[0]))}/faces")
         facets = f"{len(faces)} facets, " if faces is not None else ""
         reach = f"{away[:, i].min():.2f} to {away[:, i].max():.2f} m away"
         lines.append(f"  target     {name}: {facets}{reach}, in sight in {seen[i]} frames")

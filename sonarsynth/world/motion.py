@@ -86,7 +86,24 @@ class Circle:
     roll: Radians = 0.0
 
 
-Motion = Annotated[Still | Line | Waypoints | Circle, BY_KIND]
+@description
+class Course:
+    """From start at constant speed, straight ahead: what a grid over ranges, headings, speeds and depths varies."""
+
+    kind: Literal["course"] = "course"
+    start: Position
+    """Where the body is at time 0."""
+    heading: Radians = 0.0
+    """Compass heading of the body and of its way."""
+    speed: MetresPerSecond = 0.0
+    """Negative is astern."""
+    climb: MetresPerSecond = 0.0
+    """How fast it rises; it stays level."""
+    pitch: Radians = 0.0
+    roll: Radians = 0.0
+
+
+Motion = Annotated[Still | Line | Waypoints | Circle | Course, BY_KIND]
 
 
 def pose(motion: Motion, time: float) -> Pose:
@@ -98,6 +115,9 @@ def pose(motion: Motion, time: float) -> Pose:
             position = np.array(motion.start) + velocity(motion, time) * time
             heading = _course(velocity(motion, time)) if motion.heading is None else motion.heading
             return Pose(position, quaternion(heading, motion.pitch, motion.roll))
+        case Course():
+            position = np.array(motion.start) + velocity(motion, time) * time
+            return Pose(position, quaternion(motion.heading, motion.pitch, motion.roll))
         case Waypoints():
             return _pose_on_waypoints(motion, time)
         case Circle():
@@ -113,6 +133,9 @@ def velocity(motion: Motion, time: float) -> Floats:
             return np.zeros(3)
         case Line():
             return np.asarray((np.array(motion.stop) - np.array(motion.start)) / motion.duration)
+        case Course():
+            ahead = motion.speed * np.array([np.sin(motion.heading), np.cos(motion.heading), 0.0])
+            return np.asarray(ahead + [0.0, 0.0, motion.climb])
         case Waypoints():
             a, b = _leg(motion, time)
             if not motion.points[0].time <= time < motion.points[-1].time:

@@ -63,6 +63,24 @@ def test_ghosts_by_surface_and_bed_are_imaged_where_the_truth_says(tmp_path: Pat
                 assert 10 * np.log10(peak.item() / energy.median().item()) > 15.0
 
 
+def test_a_grid_of_ranges_headings_and_hulls(tmp_path: Path) -> None:
+    """Of its 24 sequences the first, the last and one between."""
+    made = _plan("grid.yaml")
+    assert (made.recipe.sequences, made.sizes["frame"]) == (24, 144) and made.looked_at == 144
+    steps = made.recipe.steps
+    frames = [frame for n in (0, 12, 23) for frame in (n * steps, (n + 1) * steps - 1)]
+    assert schedule.build(made, tmp_path / "grid.zarr", frames=frames, workers=0).ok
+    checks = _checks(tmp_path / "grid.zarr")
+    assert all(checks[name].ok for name in ("frames", "ledger adds up", "signals whole", "snap located")), checks
+    with xr.open_datatree(tmp_path / "grid.zarr", engine="zarr") as tree:
+        root = tree.to_dataset().isel(frame=slice(0, None, steps))
+        assert np.bincount(root.split.values[[0, 12, 23]], minlength=3).sum() == 3
+        assert np.unique(root.start_range.values).tolist() == [10.0, 12.0, 15.0]
+        assert len(tree["targets/body"].children) == 4 and set(tree["truth/mesh"].values[::6, 0]) == {0, 1, 2, 3}
+        there = tree["truth/target_position"].values[frames, 0]
+        assert np.isfinite(there).all() and np.array_equal(there[::2, 2], tree.to_dataset().depth.values[frames[::2]])
+
+
 def test_the_target_crosses_20_m_ahead_9_m_to_the_right() -> None:
     made = _plan("remus.yaml")
     places = [

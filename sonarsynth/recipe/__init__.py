@@ -1,0 +1,145 @@
+"""A recipe: the seed, the scene, and which frames make the dataset. `frame(i)` is the only way to a frame."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any
+
+from annotated_types import Ge, Le
+from pydantic import Discriminator, Tag, TypeAdapter
+
+from sonarsynth.conventions import Ints
+from sonarsynth.description import description
+from sonarsynth.recipe.grid import Axis, Together, entry_tag
+from sonarsynth.recipe.sequences import Sequences
+from sonarsynth.recipe.splits import SPLITS, Splits
+from sonarsynth.recipe.values import Plain
+from sonarsynth.recipe.variants import Variants, target_meshes, variant_numbers
+from sonarsynth.recipe.variations import Choice, Normal, Sobol, Uniform, Variation
+from sonarsynth.scene import Frame, Scene
+from sonarsynth.tracing.ray_request import RayRequest
+from sonarsynth.world.shapes import MeshFile
+from sonarsynth.world.snaps import RecordedSnap
+from sonarsynth.world.sound_speed import Cast
+
+__all__ = [
+    "FILE_KINDS",
+    "SPLITS",
+    "Axis",
+    "Choice",
+    "Normal",
+    "Plain",
+    "Recipe",
+    "Sobol",
+    "Splits",
+    "Together",
+    "Uniform",
+]
+
+FILE_KINDS = frozenset({MeshFile.kind, Cast.kind, RecordedSnap.kind})
+"""Descriptions whose `path` names a file."""
+
+Entry = Annotated[Annotated[Axis, Tag("axis")] | Annotated[Together, Tag("zip")], Discriminator(entry_tag)]
+
+
+@description
+class Recipe:
+    """A dataset: sequences of frames, drawn from one seed. The scene moves along its trajectory; a grid, variations and
+    repeats make several sequences of it.
+    """
+
+    title: str = "sonarsynth dataset"
+    seed: Annotated[int, Ge(0)] = 0
+    licence: str = "CC-BY-4.0"
+    """Licence of the dataset (not of the software)."""
+    scene: Scene
+    grid: tuple[Entry, ...] = ()
+    """What the sequences span: every combination of the values of the entries, the last entry changing fastest."""
+    variations: tuple[Variation, ...] = ()
+    """What is drawn anew for each sequence."""
+    repeats: Annotated[int, Ge(1), Le(100_000_000)] = 1
+    """Sequences for each point of the grid."""
+    splits: Splits | None = None
+    """Shares of the sequences for training, validation and test; left out: all are for training."""
+    rays: RayRequest | None = None
+    """Rays to follow through the scene, for `sonarsynth rays`; they do not change the dataset."""
+
+    @cached_property
+    def spanned(self) -> Sequences:
+        """The sequences."""
+        return Sequences(self.scene, self.seed, self.grid, self.variations, self.repeats, self.splits)
+
+    @property
+    def sequences(self) -> int:
+        """Number of sequences of the whole dataset."""
+        return self.spanned.count
+
+    @property
+    def steps(self) -> int:
+        """Number of frames of a sequence."""
+        return self.scene.trajectory.frames
+
+    @property
+    def frames(self) -> int:
+        """Number of frames of the whole dataset."""
+        return self.sequences * self.steps
+
+    def scene_of(self, sequence: int) -> Scene:
+        """Scene of a sequence. Raises IndexError outside 0..sequences-1, FieldError where it cannot be."""
+        return self.spanned.scene(sequence)
+
+    @property
+    def meshes(self) -> Variants:
+        """The different meshes of each target, and the first sequence that has each. Raises FieldError."""
+        return target_meshes(self.spanned)
+
+    def mesh_numbers(self) -> Ints:
+        """Which of its meshes each target has (sequence, target)."""
+        return variant_numbers(self.spanned)
+
+    def frame(self, index: int) -> tuple[Scene, Frame]:
+        """Scene and frame number `index`; raises IndexError outside 0..frames-1, FieldError where it cannot be."""
+        if not 0 <= index < self.frames:
+            raise IndexError(f"frame {index} is outside 0..{self.frames - 1}")
+        sequence, step = divmod(index, self.steps)
+        scene = self.scene_of(sequence)
+        key = self.spanned.key(sequence)
+        return scene, scene.frame(step, index=index, trajectory=sequence, seed=self.seed, key=key)
+
+    def split(self, index: int) -> int:
+        """Index into SPLITS of a frame; a sequence is never divided."""
+        return int(self.spanned.split[index // self.steps])
+
+    def as_json(self) -> dict[str, Any]:
+        """The resolved recipe as plain JSON values."""
+        value: dict[str, Any] = _ADAPTER.dump_python(self, mode="json")
+        return value
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of everything in the recipe that decides numbers: descriptions, seed, and what the files hold.
+
+        Where the files lie does not matter.
+        """
+        deciding = {name: value for name, value in self.as_json().items() if name != "rays"}
+        meshes = {
+            t.name: [mesh.digest for _, mesh in some]
+            for t, some in zip(self.scene.world.targets, self.meshes, strict=True)
+        }
+        text = json.dumps([_by_content(deciding), meshes], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _by_content(value: Any) -> Any:
+    """The same JSON value with the path of each file replaced by the digest of what it holds."""
+    if isinstance(value, dict):
+        path = value.get("path") if value.get("kind") in FILE_KINDS else None
+        held = {"path": hashlib.sha256(Path(path).read_bytes()).hexdigest()} if isinstance(path, str) else {}
+        return {name: _by_content(v) for name, v in value.items()} | held
+    return [_by_content(v) for v in value] if isinstance(value, list) else value
+
+
+_ADAPTER: TypeAdapter[Recipe] = TypeAdapter(Recipe)

@@ -1,0 +1,252 @@
+"""The sequences of a recipe: which point of the grid each is, what is drawn for it, and its scene.
+
+Everything random of a sequence is keyed by its `key`: the values of its grid point and the number of the repeat, as
+written. So neither the order of entries' values, nor other points, repeats or variations, nor the number that the
+sequence happens to have, change what it is.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from sonarsynth.conventions import Ints
+from sonarsynth.description import FieldError
+from sonarsynth.randomness import number
+from sonarsynth.recipe.grid import Axis, Together, axes
+from sonarsynth.recipe.setting import Setting, plain_scene, with_settings
+from sonarsynth.recipe.splits import SPLITS, Splits, assign
+from sonarsynth.recipe.values import Plain, Where, default_name, where
+from sonarsynth.recipe.variations import Choice, Sobol, Variation
+from sonarsynth.scene import Scene
+
+MOST_FRAMES = 100_000_000
+RESERVED = ("frame", "trajectory", "step", "time", "split", "repeat")
+"""Names of the store that no entry can have."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sequences:
+    """What a recipe spans."""
+
+    base: Scene
+    seed: int
+    grid: tuple[Axis | Together, ...]
+    variations: tuple[Variation, ...]
+    repeats: int
+    splits: Splits | None
+
+    @property
+    def varied(self) -> bool:
+        """Whether there is more than the base scene, once."""
+        return bool(self.grid or self.variations or self.repeats > 1)
+
+    @cached_property
+    def sizes(self) -> tuple[int, ...]:
+        """Number of values of each entry of the grid, and the repeats: the last changes fastest."""
+        return (*(len(some[0][2]) for some in self._axes), self.repeats)
+
+    @property
+    def count(self) -> int:
+        """Number of sequences."""
+        return math.prod(self.sizes)
+
+    @cached_property
+    def _axes(self) -> list[list[tuple[Where, Axis, tuple[Plain, ...]]]]:
+        """Axes of each entry of the grid with their values, and where they stand in the recipe."""
+        return [
+            [
+                (("grid", i, "zip", j) if isinstance(e, Together) else ("grid", i), a, a.taken)
+                for j, a in enumerate(axes(e))
+            ]
+            for i, e in enumerate(self.grid)
+        ]
+
+    @property
+    def entries(self) -> list[tuple[Where, Axis | Variation]]:
+        """Everything that varies, and where it stands in the recipe."""
+        grid: list[tuple[Where, Axis | Variation]] = [(place, axis) for some in self._axes for place, axis, _ in some]
+        return grid + [(("variations", i), variation) for i, variation in enumerate(self.variations)]
+
+    def point(self, sequence: int) -> tuple[int, ...]:
+        """Number of the value of each entry of the grid, and of the repeat. Raises IndexError."""
+        if not 0 <= sequence < self.count:
+            raise IndexError(f"sequence {sequence} is outside 0..{self.count - 1}")
+        found = []
+        for size in reversed(self.sizes):
+            sequence, n = divmod(sequence, size)
+            found.append(n)
+        return tuple(reversed(found))
+
+    def grid_settings(self, sequence: int) -> tuple[Setting, ...]:
+        """The values of the grid point of a sequence."""
+        return _point(self, self.point(sequence)[:-1])[0]
+
+    def key(self, sequence: int) -> int | str:
+        """What everything random of a sequence is keyed by; 0 for a recipe that spans one scene."""
+        if not self.varied:
+            return 0
+        point = self.point(sequence)
+        return f"{_point(self, point[:-1])[1]} {point[-1]}"
+
+    def drawn(self, sequence: int) -> tuple[Setting, ...]:
+        """The values of the variations of a sequence."""
+        point = self.point(sequence)
+        of_point, dimension, found = _point(self, point[:-1])[1], 0, []
+        key = f"{of_point} {point[-1]}"
+        for i, variation in enumerate(self.variations):
+            path = variation.path[0]
+            if isinstance(variation, Sobol):
+                value = variation.draw(self.seed, of_point, path, dimension, point[-1])
+                dimension += 1
+            else:
+                value = variation.draw(self.seed, key, path)
+            found.append(Setting(("variations", i), name_of(variation), variation.path, value))
+        return tuple(found)
+
+    def settings(self, sequence: int) -> tuple[Setting, ...]:
+        """Every value of a sequence, those of the grid first."""
+        return self.grid_settings(sequence) + self.drawn(sequence)
+
+    def extremes(self, sequence: int) -> Iterator[Scene]:
+        """Scenes as that of a sequence, each with one variation at an end; those that cannot be are left out."""
+        settings, before = self.settings(sequence), len(self.entries) - len(self.variations)
+        for i, variation in enumerate(self.variations):
+            if isinstance(variation, Choice):
+                continue
+            for part in (0.0, 1.0):
+                changed = list(settings)
+                old = settings[before + i]
+                changed[before + i] = Setting(old.source, old.name, old.paths, variation.at(part))
+                try:
+                    yield with_settings(self.base, self._plain, changed)
+                except FieldError:
+                    continue
+
+    @cached_property
+    def _plain(self) -> dict[str, Any]:
+        return plain_scene(self.base)
+
+    def scene(self, sequence: int) -> Scene:
+        """Scene of a sequence. Raises FieldError that names the entry and its value where there is none."""
+        return _scene(self, sequence) if self.varied else self.base
+
+    def check(self) -> None:
+        """Raises FieldError for entries that cannot go together; the scenes are not looked at."""
+        if self.count * self.base.trajectory.frames > MOST_FRAMES:
+            raise FieldError(("grid",), f"spans {self.count} sequences: more than {MOST_FRAMES} frames")
+        names: dict[str, str] = {}
+        paths: dict[str, str] = {}
+        for place, entry in self.entries:
+            name = name_of(entry)
+            if name in RESERVED or name in names:
+                raise FieldError((*place, "name"), f"'{name}' is the name of another coordinate: give another name")
+            names[name] = name
+            for path in entry.path:
+                if path in paths:
+                    raise FieldError((*place, "path"), f"'{path}' is set by '{paths[path]}' as well")
+                paths[path] = name
+        if self.splits is not None:
+            stratify = [] if self.splits.stratify is None else [(("splits", "stratify"), self.splits.stratify)]
+            for at, name in [*stratify, *((("splits", "undivided"), n) for n in self.splits.undivided)]:
+                self._check_name(at, name)
+
+    def _check_name(self, at: Where, name: str) -> None:
+        """A name must be that of an entry with values that several sequences can have."""
+        known = {name_of(e): isinstance(e, (Axis, Choice)) for _, e in self.entries}
+        if name not in known:
+            raise FieldError(at, f"'{name}' names nothing that varies; known: {', '.join(known) or 'nothing varies'}")
+        if not known[name]:
+            raise FieldError(at, f"'{name}' has another value in each sequence: name an entry of the grid or a choice")
+
+    @cached_property
+    def split(self) -> Ints:
+        """Split (sequence,) of each sequence: an index into SPLITS; all in the first where the recipe has no splits."""
+        if self.splits is None:
+            return np.zeros(self.count, np.int64)
+        stratify, undivided = self.splits.stratify, self.splits.undivided
+        discrete = all(isinstance(v, Choice) for v in self.variations)
+        groups: list[object] = []
+        strata: list[object] = []
+        for sequence in range(self.count):
+            named = {} if not (stratify or undivided or discrete) else self._discrete(sequence)
+            strata.append(named.get(stratify or ""))
+            groups.append(
+                tuple(named[n] for n in undivided) if undivided else tuple(named.items()) if discrete else sequence
+            )
+        priority = [number(self.seed, "split", self.key(n)) for n in range(self.count)]
+        return assign(self.splits.shares, groups, strata, priority)
+
+    def _discrete(self, sequence: int) -> dict[str, str]:
+        """The values of a sequence that others may have as well: of grid entries and choices."""
+        drawn = self.drawn(sequence) if any(isinstance(v, Choice) for v in self.variations) else ()
+        chosen = [s for s, v in zip(drawn, self.variations, strict=False) if isinstance(v, Choice)]
+        return {s.name: s.value.text for s in (*self.grid_settings(sequence), *chosen)}
+
+    def as_json(self) -> dict[str, Any]:
+        """What is spanned, for a program."""
+        counts = np.bincount(self.split, minlength=len(SPLITS))
+        return {
+            "sequences": self.count,
+            "frames_of_a_sequence": self.base.trajectory.frames,
+            "grid": [
+                {"names": [name_of(axis) for _, axis, _ in some], "values": size}
+                for some, size in zip(self._axes, self.sizes, strict=False)
+            ],
+            "repeats": self.repeats,
+            "variations": [{"name": name_of(v), "kind": v.kind} for v in self.variations],
+            "splits": {name: int(n) for name, n in zip(SPLITS, counts, strict=True)},
+        }
+
+    @contextmanager
+    def naming(self, sequence: int) -> Iterator[None]:
+        """Have a FieldError about the scene of a sequence name the entry that made it so, where there is one."""
+        try:
+            yield
+        except FieldError as error:
+            if not self.varied or error.path[:1] != ("scene",):
+                raise
+            settings = self.settings(sequence)
+            blamed = [s for s in settings if any(_meet(where(path), error.path) for path in s.paths)]
+            said = ", ".join(s.shown for s in blamed or settings)
+            place = max(blamed, key=_closeness).source if blamed else error.path
+            field = "" if place == error.path else f"{'.'.join(map(str, error.path))}: "
+            raise FieldError(place, f"{field}{error.message} (sequence {sequence}: {said})") from None
+
+
+def name_of(entry: Axis | Variation) -> str:
+    """Name of the coordinate of an entry."""
+    return entry.name or default_name(entry.path)
+
+
+def _closeness(setting: Setting) -> tuple[int, bool]:
+    """How much a setting is to blame, of several that meet a field: the one that leads deepest, a drawn one first."""
+    return max(len(where(path)) for path in setting.paths), setting.source[0] == "variations"
+
+
+def _meet(a: Where, b: Where) -> bool:
+    """Whether one path leads through the other."""
+    return all(x == y for x, y in zip(a, b, strict=False))
+
+
+@lru_cache(maxsize=128)
+def _scene(sequences: Sequences, sequence: int) -> Scene:
+    return with_settings(sequences.base, sequences._plain, sequences.settings(sequence))
+
+
+@lru_cache(maxsize=4096)
+def _point(sequences: Sequences, values: tuple[int, ...]) -> tuple[tuple[Setting, ...], str]:
+    """What a point of the grid sets, and its key: the values as written, in whatever order they are entered."""
+    found = []
+    for some, n in zip(sequences._axes, values, strict=True):
+        for place, axis, taken in some:
+            at = (*place, "values", n) if axis.values is not None else place
+            found.append(Setting(at, name_of(axis), axis.path, taken[n]))
+    return tuple(found), json.dumps(sorted([list(s.paths), s.value.text] for s in found))

@@ -1,0 +1,149 @@
+"""Values that a recipe sets in its scene: any plain value, numbers with units, and the paths that they go to."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import dataclass, is_dataclass
+from typing import Annotated, Any
+
+from pydantic import PlainSerializer, PlainValidator, TypeAdapter, WithJsonSchema
+
+Where = tuple[str | int, ...]
+"""A path into a recipe: field names and indices from the top."""
+
+FIXED = ("scene.trajectory.frames",)
+"""Fields that cannot vary though their neighbours can: they decide the shape of the dataset."""
+
+
+@dataclass(frozen=True)
+class Plain:
+    """A number, text, list or mapping as written, made hashable."""
+
+    text: str
+    """Canonical JSON."""
+
+    @property
+    def value(self) -> Any:
+        """The value."""
+        return json.loads(self.text)
+
+    @classmethod
+    def of(cls, value: Any) -> Plain:
+        """From a plain value, or a description. Raises ValueError for anything else."""
+        if isinstance(value, cls):
+            return value
+        if is_dataclass(value) and not isinstance(value, type):
+            value = TypeAdapter(type(value)).dump_python(value, mode="json")
+        try:
+            return cls(json.dumps(value, sort_keys=True, allow_nan=False))
+        except (TypeError, ValueError):
+            raise ValueError("must be a number, a text, a list or a mapping") from None
+
+    @property
+    def shown(self) -> str:
+        """As people read it, in short."""
+        value = self.value
+        text = value if isinstance(value, str) else self.text
+        return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+PlainValue = Annotated[
+    Plain, PlainValidator(Plain.of), PlainSerializer(lambda plain: plain.value), WithJsonSchema({"title": "Value"})
+]
+"""Any value that the field it goes to accepts."""
+
+
+def number_and_unit(value: float | str) -> tuple[float, str]:
+    """(12.0, "m") of "12 m", (12.0, "") of 12. Raises ValueError where there is no finite number."""
+    if isinstance(value, str):
+        text, _, unit = value.strip().partition(" ")
+        try:
+            number = float(text)
+        except ValueError:
+            number = math.nan
+    else:
+        number, unit = float(value), ""
+    if not math.isfinite(number):
+        raise ValueError(f"must be a number, or a text such as '1 m', not '{value}'")
+    return number, unit.strip()
+
+
+def with_unit(number: float, unit: str) -> Plain:
+    """A number in the unit that it was written in."""
+    return Plain.of(f"{number!r} {unit}" if unit else number)
+
+
+def same_unit(**values: float | str | None) -> str:
+    """The unit that all of these have; those that are None do not count. Raises ValueError where they differ."""
+    units = {name: number_and_unit(value)[1] for name, value in values.items() if value is not None}
+    if len(set(units.values())) > 1:
+        shown = ", ".join(f"{name} in '{unit}'" if unit else f"{name} without" for name, unit in units.items())
+        raise ValueError(f"must all have the same unit: {shown}")
+    return next(iter(units.values()))
+
+
+def _quantity(value: Any) -> float | str:
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise ValueError("must be a number, or a text such as '1 m'")
+    number_and_unit(value)
+    return value
+
+
+Quantity = Annotated[
+    float | str,
+    PlainValidator(_quantity),
+    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string", "pattern": "^[-+0-9.eE]+ .+$"}]}),
+]
+"""A number, with its unit where the field it goes to has one."""
+
+
+def _paths(value: Any) -> tuple[str, ...]:
+    texts = (value,) if isinstance(value, str) else value
+    if not isinstance(texts, (list, tuple)) or not texts or not all(isinstance(t, str) for t in texts):
+        raise ValueError("must be a path such as scene.world.targets.0.motion.heading, or a list of them")
+    for text in texts:
+        if not text.startswith(("scene.world.", "scene.trajectory.")) or text in FIXED:
+            raise ValueError(
+                f"'{text}' cannot vary: scene.world and scene.trajectory do; the instrument, the methods and the "
+                "number of frames are the same for all sequences"
+            )
+        if text.endswith(".path"):
+            raise ValueError(f"'{text}' is the name of a file: vary what holds it, with its kind and path")
+        if not all(re.fullmatch(r"\w+", part) for part in text.split(".")):
+            raise ValueError(f"'{text}' is not a path such as scene.world.targets.0.motion.heading")
+    return tuple(texts)
+
+
+def _written(paths: tuple[str, ...]) -> str | list[str]:
+    return paths[0] if len(paths) == 1 else list(paths)
+
+
+Paths = Annotated[
+    tuple[str, ...],
+    PlainValidator(_paths),
+    PlainSerializer(_written),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}, "minItems": 1}]}),
+]
+"""Where a value goes: one path into the scene, or several that all get it."""
+
+
+def where(path: str) -> Where:
+    """A dotted path in parts."""
+    return tuple(int(part) if part.isdecimal() else part for part in path.split("."))
+
+
+def _name(value: Any) -> str:
+    if not isinstance(value, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,63}", value):
+        raise ValueError("must be a word of letters, digits and _")
+    return value
+
+
+Name = Annotated[str, PlainValidator(_name), WithJsonSchema({"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$"})]
+"""Name of a coordinate of the store."""
+
+
+def default_name(paths: tuple[str, ...]) -> str:
+    """What an entry without a name is called: targets_0_motion_heading."""
+    return paths[0].removeprefix("scene.").removeprefix("world.").replace(".", "_")

@@ -1,0 +1,225 @@
+"""What a recipe spans: a draw belongs to its sequence, whatever else there is and in whatever order it is asked for."""
+
+from __future__ import annotations
+
+import json
+import random
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import kstest, norm
+from scipy.stats.qmc import discrepancy
+
+from sonarsynth import config
+from sonarsynth.recipe import Axis, Choice, Normal, Recipe, Sobol, Together, Uniform
+from sonarsynth.scattering.targets import Target
+from sonarsynth.scene import Scene, Trajectory, World
+from sonarsynth.world.environment import Environment, Isovelocity
+from sonarsynth.world.motion import Course, Line, pose, velocity
+from sonarsynth.world.shapes import Box, Sphere
+from sonarsynth.world.sources import SnappingShrimp
+
+MOTION = "scene.world.targets.0.motion"
+SHRIMP = "scene.world.shrimp.0.position"
+
+
+def recipe(**more: Any) -> Recipe:
+    world = World(
+        environment=Environment(depth=20.0, sound_speed=Isovelocity(speed=1500.0)),
+        targets=(Target(name="body", shape=Sphere(radius=0.5), motion=Course(start=(10.0, 0.0, -7.0), speed=1.0)),),
+        shrimp=(SnappingShrimp(position=(20.0, 0.0)),),
+    )
+    return Recipe(**({"seed": 5, "scene": Scene(world=world, trajectory=Trajectory(frames=3))} | more))
+
+
+RANGES = Axis(path=f"{MOTION}.start.0", values=("10 m", "1200 cm", 15))
+HEADINGS = Axis(path=f"{MOTION}.heading", first="0 deg", last="270 deg", step="90 deg", name="heading")
+DRAWN = (
+    Uniform(path=f"{SHRIMP}.0", low="18 m", high="25 m"),
+    Normal(path=f"{MOTION}.start.2", mean=-7.0, deviation=2.0, low=-9.0, high=-5.0),
+    Choice(path=f"{MOTION}.speed", values=("1 m/s", "2 kn"), weights=(3.0, 1.0)),
+    Sobol(path=f"{SHRIMP}.1", low=-5.0, high=5.0),
+    Sobol(path="scene.world.environment.depth", low="20 m", high="30 m"),
+)
+
+
+def by_content(of: Recipe) -> dict[str, str]:
+    """Of each point and repeat: everything that its frames are made from."""
+    spanned, made = of.spanned, {}
+    for n in range(of.sequences):
+        point = sorted((s.paths, s.value.text) for s in spanned.grid_settings(n))
+        frame = of.frame(n * of.steps + 1)[1]
+        made[str((point, spanned.point(n)[-1]))] = f"{of.scene_of(n)} {frame.key} {frame.moment.snaps}"
+    return made
+
+
+def test_the_grid_is_every_combination_and_the_last_changes_fastest() -> None:
+    made = recipe(grid=(RANGES, HEADINGS), repeats=2)
+    assert (made.sequences, made.frames) == (24, 72)
+    seen = [
+        (s.world.targets[0].motion.start[0], s.world.targets[0].motion.heading) for s in map(made.scene_of, range(24))
+    ]
+    expected = [(x, h) for x in (10.0, 12.0, 15.0) for h in np.deg2rad([0, 90, 180, 270]) for _ in range(2)]
+    assert np.allclose(seen, expected, rtol=1e-15)
+    scene, frame = made.frame(3 * 23 + 2)
+    assert (frame.trajectory, frame.step, frame.index) == (23, 2, 71)
+    assert scene.sonar is made.scene.sonar
+    with pytest.raises(IndexError, match=r"outside 0\.\.71"):
+        made.frame(72)
+
+
+def test_ranges_end_where_they_say() -> None:
+    def taken(**parts: Any) -> list[Any]:
+        return [plain.value for plain in Axis(path=f"{MOTION}.speed", **parts).taken]
+
+    assert taken(first=0.0, last=0.3, step=0.1) == [0.0, 0.1, 0.2, 0.3]
+    assert taken(first=1, last=4, step=2) == [1, 3]
+    assert taken(first="3 kn", last="1 kn", step="-1 kn") == ["3.0 kn", "2.0 kn", "1.0 kn"]
+    assert taken(first="0 m/s", last="1 m/s", count=5) == [f"{n} m/s" for n in (0.0, 0.25, 0.5, 0.75, 1.0)]
+
+
+def test_zipped_entries_advance_together() -> None:
+    shapes = Axis(
+        path="scene.world.targets.0.shape", values=(Sphere(radius=0.3), Box(size=(1, 1, 1)), {"kind": "remus100"})
+    )
+    made = recipe(grid=(Together(zip=(RANGES, shapes)),))
+    targets = [made.scene_of(n).world.targets[0] for n in range(3)]
+    assert [(t.motion.start[0], t.shape.kind) for t in targets] == [(10, "sphere"), (12, "box"), (15, "remus100")]
+
+
+def test_several_fields_can_get_the_same_value() -> None:
+    made = recipe(grid=(Axis(path=[f"{MOTION}.start.0", f"{SHRIMP}.0"], values=(9.0,)),))
+    world = made.scene_of(0).world
+    assert world.targets[0].motion.start[0] == world.shrimp[0].position[0] == 9.0
+
+
+def test_no_order_changes_a_draw() -> None:
+    made, again = (recipe(grid=(RANGES, HEADINGS), variations=DRAWN, repeats=3) for _ in range(2))
+    numbers = list(range(made.sequences))
+    forward = {n: str(made.scene_of(n)) for n in numbers}
+    random.Random(1).shuffle(numbers)
+    assert {n: str(again.scene_of(n)) for n in numbers[:20]} == {n: forward[n] for n in numbers[:20]}
+    assert len(set(forward.values())) == made.sequences
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"repeats": 4},
+        {"grid": (Axis(path=f"{MOTION}.start.0", values=("8 m", 15, "10 m", 9.0, "1200 cm")), HEADINGS)},
+        {"grid": (HEADINGS, RANGES)},
+        {"splits": {"train": 0.5, "test": 0.5}},
+    ],
+    ids=["more repeats", "more values, elsewhere", "entries in another order", "splits"],
+)
+def test_more_sequences_change_none_of_those_there(more: dict[str, Any]) -> None:
+    """Their scenes, snaps and the key of all that is random in them; numbers may change."""
+    there = {"grid": (RANGES, HEADINGS), "variations": DRAWN, "repeats": 2}
+    before, after = by_content(recipe(**there)), by_content(recipe(**(there | more)))
+    assert before.items() <= after.items()
+
+
+def test_one_variation_more_changes_none_of_the_others() -> None:
+    few, many = recipe(variations=DRAWN[:4], repeats=5), recipe(variations=DRAWN, repeats=5)
+    for n in range(5):
+        assert few.spanned.drawn(n) == many.spanned.drawn(n)[:4]
+
+
+def test_another_seed_is_another_dataset() -> None:
+    one, other = recipe(variations=DRAWN, repeats=20), recipe(variations=DRAWN, repeats=20, seed=6)
+    assert all(one.scene_of(n) != other.scene_of(n) for n in range(20))
+
+
+def test_a_recipe_without_a_grid_is_its_scene() -> None:
+    made = recipe()
+    assert made.scene_of(0) is made.scene and made.frames == 3
+    assert made.frame(2)[1].key == 0
+
+
+def drawn(variation: Any, count: int = 4000) -> np.ndarray:
+    made = recipe(variations=(variation,), repeats=count)
+    values = [made.spanned.drawn(n)[0].value.value for n in range(count)]
+    return np.array([float(str(v).split()[0]) for v in values])
+
+
+def test_draws_have_their_distributions() -> None:
+    assert kstest(drawn(DRAWN[0]), "uniform", (18, 7)).pvalue > 0.01
+    cut = norm(-7, 2)
+    low, high = cut.cdf([-9, -5])
+    values = drawn(DRAWN[1])
+    assert values.min() >= -9 and values.max() <= -5
+    assert kstest(values, lambda x: (cut.cdf(x) - low) / (high - low)).pvalue > 0.01
+    assert kstest(drawn(Normal(path=f"{SHRIMP}.0", mean="3 m", deviation="2 m")), norm(3, 2).cdf).pvalue > 0.01
+    assert np.mean(drawn(DRAWN[2]) == 1.0) == pytest.approx(0.75, abs=4 * np.sqrt(0.75 * 0.25 / 4000))
+
+
+def test_a_far_tail_is_drawn_from_without_loss() -> None:
+    """Beyond 6 deviations, where 1 - cdf is lost to rounding, on either side."""
+    for sign in (1.0, -1.0):
+        bound = {"low": 6.0} if sign > 0 else {"high": -6.0}
+        values = sign * drawn(Normal(path=f"{SHRIMP}.0", mean=0, deviation=1, **bound), 2000)
+        assert values.min() >= 6.0
+        assert kstest(values, lambda x: 1.0 - norm.sf(x) / norm.sf(6.0)).pvalue > 0.01
+
+
+def test_sobol_draws_cover_evenly_in_all_dimensions_together() -> None:
+    """Every 1 of 256 draws in an interval of its own in each dimension, and in each square of 16 x 16; less uneven than
+    chance."""
+    made = recipe(variations=DRAWN, repeats=256)
+    rows = [[s.value.value for s in made.spanned.drawn(n)[3:]] for n in range(256)]
+    unit = np.array([[(y + 5.0) / 10.0, (float(z.split()[0]) - 20.0) / 10.0] for y, z in rows])
+    assert all(len(set(np.floor(256 * column))) == 256 for column in unit.T)
+    assert len({tuple(square) for square in np.floor(16 * unit)}) == 256
+    chance = [discrepancy(np.random.default_rng(n).random((256, 2))) for n in range(20)]
+    assert discrepancy(unit) < 0.2 * min(chance)
+
+
+def test_what_varies_survives_yaml() -> None:
+    made = recipe(
+        grid=(RANGES, Together(zip=(HEADINGS, Axis(path=f"{MOTION}.pitch", values=(0, "1 deg", 2e-3, "3 mrad"))))),
+        variations=DRAWN,
+        repeats=2,
+        splits={"train": 0.75, "test": 0.25, "stratify": "heading"},
+    )
+    again = config.loads(config.dump(made))
+    assert again == made and hash(again) == hash(made) and again.digest == made.digest
+    assert by_content(again) == by_content(made)
+
+
+def test_the_digest_knows_the_files_of_the_grid_wherever_they_lie(tmp_path: Path) -> None:
+    import shutil
+
+    from sonarsynth.world.meshes import mesh_of
+
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+    mesh = mesh_of(Box(size=(1.0, 1.0, 1.0)))
+    faces = "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in mesh.faces)
+    (tmp_path / "a" / "hull.obj").write_text("".join(f"v {x} {y} {z}\n" for x, y, z in mesh.vertices) + faces)
+    shutil.copy(tmp_path / "a" / "hull.obj", tmp_path / "b" / "hull.obj")
+
+    def digest(folder: str) -> str:
+        held = {"kind": "mesh_file", "path": str(tmp_path / folder / "hull.obj"), "unit": "m"}
+        return recipe(grid=(Axis(path="scene.world.targets.0.shape", values=(held,)),)).digest
+
+    assert digest("a") == digest("b")
+    (tmp_path / "b" / "hull.obj").write_text("".join(f"v {2 * x} {y} {z}\n" for x, y, z in mesh.vertices) + faces)
+    assert digest("a") != digest("b")
+
+
+def test_a_course_is_a_line_by_heading_and_speed() -> None:
+    course = Course(start=(1.0, 2.0, -9.0), heading=np.deg2rad(30.0), speed=2.0, climb=0.1)
+    ahead = (1.0 + 2.0 * 5 * np.sin(np.deg2rad(30)), 2.0 + 2.0 * 5 * np.cos(np.deg2rad(30)), -8.5)
+    line = Line(start=course.start, stop=ahead, duration=5.0, heading=course.heading)
+    for time in (-3.0, 0.0, 7.5):
+        assert pose(course, time).position == pytest.approx(pose(line, time).position, rel=1e-14)
+        assert pose(course, time).orientation == pytest.approx(pose(line, time).orientation)
+        assert velocity(course, time) == pytest.approx(velocity(line, time), rel=1e-13)
+
+
+def test_keys_are_texts_that_say_what_they_are() -> None:
+    key = recipe(grid=(RANGES,), repeats=2).spanned.key(3)
+    values, repeat = str(key).rsplit(" ", 1)
+    assert json.loads(values) == [[[f"{MOTION}.start.0"], '"1200 cm"']] and repeat == "1"

@@ -1,0 +1,326 @@
+"""Grids and variations from recipe to store: what is stored, what is selected, what is refused and where."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from sonarsynth import cli, config, planning, schedule, store, verification
+from sonarsynth.cli.running import run
+from sonarsynth.config import RecipeError
+from sonarsynth.planning import looks
+from sonarsynth.recipe import Recipe
+from sonarsynth.render import render
+
+SPAN = """\
+grid:
+  - {name: away, path: scene.world.targets.0.motion.start.0, values: [9 m, 1100 cm]}
+  - zip:
+      - {name: heading, path: scene.world.targets.0.motion.heading, first: 0 deg, last: 90 deg, count: 2}
+      - name: hull
+        path: scene.world.targets.0.shape
+        values: [{kind: box, size: [1, 1, 1], edge: 0.5}, {kind: sphere, radius: 40 cm, edge: 0.3}]
+variations:
+  - {name: shrimp_x, path: scene.world.shrimp.0.position.0, kind: uniform, low: 20 m, high: 30 m}
+  - {name: water, path: scene.world.environment.sound_speed, kind: choice, values: [{kind: linear, surface_speed: 1500, gradient: 0.1}, {kind: isovelocity, speed: 1520}]}
+repeats: 2
+splits: {train: 0.5, test: 0.5, stratify: hull}
+"""
+
+
+@pytest.fixture
+def spanning(small_text: str, tmp_path: Path) -> Path:
+    text = small_text.replace("frames: 20", "frames: 2").replace(
+        "{kind: line, start: [10, 0, -5], stop: [10, 1, -5], duration: 1}",
+        "{kind: course, start: [10, 0, -5], speed: 1}",
+    )
+    file = tmp_path / "grid.yaml"
+    file.write_text(text + SPAN)
+    return file
+
+
+def said(capfd: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    status = run(cli.app, [str(a) for a in arguments])
+    return (status, *capfd.readouterr())
+
+
+def test_a_store_holds_every_value_and_every_mesh(spanning: Path, tmp_path: Path) -> None:
+    """Read with plain xarray; alike in any order and on its own."""
+    recipe = config.load(spanning)
+    whole, part = tmp_path / "whole.zarr", tmp_path / "part.zarr"
+    assert schedule.build(recipe, whole, workers=0).ok
+    assert schedule.build(recipe, part, frames=(13,), workers=0).ok
+    assert not store.verify(whole, [verification.check]).problems
+    with xr.open_datatree(whole, engine="zarr") as tree, xr.open_datatree(part, engine="zarr") as other:
+        root = tree.to_dataset()
+        assert {"away", "heading", "hull", "shrimp_x", "water", "repeat"} < set(root.coords)
+        first = root.isel(frame=slice(0, 16, 2))
+        assert first.trajectory.values.tolist() == list(range(8)) and root.step.values[:4].tolist() == [0, 1, 0, 1]
+        assert first.away.values.tolist() == [9.0] * 4 + [11.0] * 4 and root.away.attrs["units"] == "m"
+        assert first.heading.values.tolist() == [0.0, 0.0, 90.0, 90.0] * 2 and root.heading.attrs["units"] == "degree"
+        assert first.repeat.values.tolist() == [0, 1] * 4
+        assert first.hull.values.tolist() == [0, 0, 1, 1] * 2 and root.hull.attrs["flag_meanings"] == "box sphere"
+        assert root.water.attrs["flag_meanings"] == "linear isovelocity"
+        assert np.array_equal(tree["truth/mesh"].values[::2, 0], first.hull.values)
+        assert np.array_equal(tree["truth/target_position"].values[::2, 0, 0], first.away.values)
+        assert np.array_equal(tree["truth/snap_position"].values[:, 0, 0], root.shrimp_x.values)
+        assert len(np.unique(root.shrimp_x.values)) == 8
+        faces = [tree[f"targets/box/{n}/faces"] for n in range(2)]
+        for frame in range(16):
+            mesh = faces[int(tree["truth/mesh"][frame, 0])]
+            assert tree["truth/facet"].values[frame].max() < len(mesh)
+        assert np.bincount(first.split.values, minlength=3).tolist() == [4, 0, 4]
+        assert set(other["away"].values) == {9.0, 11.0}, "every value is there before its frame is"
+        for name in ("signals/pressure", "cloud/range", "truth/target", "ledger/received_level"):
+            assert np.array_equal(tree[name].values[13], other[name].values[13], equal_nan=True)
+    one = render(recipe, 13)
+    assert float(one.coords["away"]) == 11.0 and int(one["truth"].coords["mesh"][0]) == 1
+
+
+def test_the_sound_speed_of_a_sequence_is_the_one_its_rays_go_through(spanning: Path) -> None:
+    made = planning.plan(config.load(spanning))
+    kinds = {made.at(f).propagation.kind for f in range(16)}
+    assert kinds == {"straight", "refracted"}
+    for frame in range(0, 16, 2):
+        speed = made.recipe.scene_of(frame // 2).world.environment.sound_speed
+        view = made.at(frame)
+        assert view.at(frame + 1) is view and view.profile.uniform == (speed.kind == "isovelocity")
+
+
+def test_sequences_and_frames_are_selected(spanning: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    place = tmp_path / "s.zarr"
+    build = ("build", spanning, place, "--workers", "0", "--products", "signals")
+    assert said(capfd, *build, "--sequences", "1:3,7")[0] == 0
+    assert store.frames_there(place) == [2, 3, 4, 5, 14, 15]
+    assert said(capfd, *build, "--sequences", "4", "--frames", "0:9")[0] == 0
+    assert store.frames_there(place) == [2, 3, 4, 5, 8, 14, 15]
+    for options, message in (
+        (("--sequences", "8"), "--sequences: '8' ends past the last sequence, 7"),
+        (("--sequences", "x"), "--sequences: 'x' is no sequence and no range such as 0:8"),
+        (("--sequences", "4", "--frames", "0:8"), "--frames and --sequences have no frame in common"),
+    ):
+        assert said(capfd, *build, *options) == (2, "", f"sonarsynth: {message}\n")
+
+
+def test_settings_override_the_grid(spanning: Path) -> None:
+    sets = ("grid.0.values=[12 m]", "repeats=3", "variations.0.high=21 m")
+    recipe = config.load(spanning, sets)
+    assert recipe.sequences == 6
+    assert all(20 <= recipe.scene_of(n).world.shrimp[0].position[0] <= 21 for n in range(6))
+
+
+def test_plan_says_what_is_spanned(spanning: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = said(capfd, "plan", spanning)
+    assert status == 0
+    assert "8 sequences of 2 frames: away (2) x heading with hull (2) x 2 repeats\n" in out
+    assert "drawn for each: shrimp_x (uniform), water (choice)\n" in out
+    assert "splits: train 4, validation 0, test 4 sequences\n" in out
+    _, out, _ = said(capfd, "plan", spanning, "--json")
+    made = json.loads(out)
+    assert (made["sequences"], made["frames_of_a_sequence"], made["frames_looked_at"]) == (8, 2, 16)
+    assert made["splits"] == {"train": 4, "validation": 0, "test": 4}
+
+
+def test_the_schema_covers_the_grid() -> None:
+    schema = config.schema()
+    assert {"grid", "variations", "repeats", "splits"} <= schema["properties"].keys()
+    assert {"Axis", "Together", "Uniform", "Normal", "Choice", "Sobol", "Splits"} <= schema["$defs"].keys()
+    assert all("description" in schema["$defs"][name] for name in ("Axis", "Sobol", "Splits"))
+
+
+START, SHAPE = "scene.world.targets.0.motion.start", "scene.world.targets.0.shape"
+WRONG = [
+    ("[9 m, 1100 cm]", "[9 m, 11 kHz]", f"17: grid.0.values.1: {START}.0: has unit 'kHz'; use one of m, km"),
+    ("[9 m, 1100 cm]", "[9 m, far]", f"17: grid.0.values.1: {START}.0: must be a number in m"),
+    ("[9 m, 1100 cm]", "[9 m, 9 m]", "17: grid.0: value 9 m is given twice"),
+    ("[9 m, 1100 cm]", "[]", "17: grid.0.values: "),
+    ("values: [9 m, 1100 cm]", "value: [9 m]", "17: grid.0.value: 'value' is not a field here; did you mean 'values'?"),
+    ("values: [9 m, 1100 cm]", "first: 9 m", "17: grid.0: needs values: [...], or first, last and one of step and"),
+    ("values: [9 m, 1100 cm]", "first: 9 m, last: 1 km, step: 1 m", "17: grid.0: must all have the same unit"),
+    ("values: [9 m, 1100 cm]", "first: 9 m, last: 8 m, step: 1 m", "17: grid.0: step 1 m does not lead from first"),
+    ("motion.start.0", "motion.strat.0", "17: grid.0.values.0: scene.world.targets.0.motion.strat: 'strat' is not a"),
+    ("motion.start.0", "motion.start.7", "17: grid.0.path: scene.world.targets.0.motion.start.7: '7' is not one of"),
+    ("motion.start.0", "motion.hedding", "17: grid.0.values.0: scene.world.targets.0.motion.hedding: 'hedding' is not"),
+    ("motion.start.0", "motion.speed.0", "17: grid.0.path: scene.world.targets.0.motion.speed.0: 'scene.world.targets"),
+    ("scene.world.targets.0.motion.start.0", "scene.sonar.beams.azimuths", "17: grid.0.path: 'scene.sonar.beams.az"),
+    ("scene.world.targets.0.motion.start.0", "scene.trajectory.frames", "17: grid.0.path: 'scene.trajectory.frames' c"),
+    ("scene.world.targets.0.motion.start.0", f"{SHAPE}.path", f"17: grid.0.path: '{SHAPE}.path' is the name of a fil"),
+    ("name: away", "name: time", "17: grid.0.name: 'time' is the name of another coordinate"),
+    ("name: away", "name: heading", "19: grid.1.zip.0.name: 'heading' is the name of another coordinate"),
+    ("motion.heading", "motion.start.0", "19: grid.1.zip.0.path: 'scene.world.targets.0.motion.start.0' is set by"),
+    ("count: 2", "count: 3", "18: grid.1.zip: the entries have 3, 2 values; they must have equally many"),
+    ("kind: sphere, radius", "kind: sphere, radios", f"22: grid.1.zip.1.values.1: {SHAPE}.radios: 'radios' is not a "),
+    ("40 cm, edge", "-40 cm, edge", f"22: grid.1.zip.1.values.1: {SHAPE}.radius: must be greater than 0"),
+    ("kind: sphere, radius: 40 cm", "kind: ball", f"22: grid.1.zip.1.values.1: {SHAPE}: input tag 'ball'"),
+    ("low: 20 m", "low: 31 m", "24: variations.0: low must be less than high: 31 m to 30 m"),
+    ("low: 20 m", "low: 20", "24: variations.0: must all have the same unit"),
+    (
+        "kind: uniform",
+        "kind: uniformly",
+        "24: variations.0.kind: 'uniformly' is not a kind here; did you mean 'uniform'",
+    ),
+    ("high: 30 m", "high: 9e9 m", "24: variations.0: scene.world.shrimp.0.position: is more than 1e+06 m"),
+    ("repeats: 2", "repeats: 0", "26: repeats: must be greater than or equal to 1"),
+    ("repeats: 2", "repeats: 90000000", "16: grid: spans 360000000 sequences: more than 100000000 frames"),
+    ("test: 0.5", "test: 0.4", "27: splits: train, validation and test must add up to 1, not 0.9"),
+    ("stratify: hull", "stratify: hall", "27: splits.stratify: 'hall' names nothing that varies; known: away"),
+    ("stratify: hull", "stratify: shrimp_x", "27: splits.stratify: 'shrimp_x' has another value in each sequence"),
+    (
+        f"path: {START}.0, values: [9 m, 1100 cm]",
+        "path: scene.world.targets, values: [[]]",
+        "21: grid.1.zip.1.path: scene.w",
+    ),
+    (
+        f"path: {START}.0, values: [9 m, 1100 cm]",
+        f"path: {START}.2, values: [-5 m, -0.2 m]",
+        "17: grid.0.values.1: scene.world.targets.0.motion: target 'box' is 0.3 m above the surface at frame 8 (seq",
+    ),
+    (
+        f"path: {START}.0, values: [9 m, 1100 cm]",
+        "path: scene.world.shrimp.0.snap_times, values: [[0], [0, 0.01]]",
+        "17: grid.0.values.1: scene.world.shrimp.0.snap_times: all sequences must have equally many: 1 and 2 (seq",
+    ),
+]
+
+
+@pytest.mark.parametrize(("right", "wrong", "message"), WRONG)
+def test_what_is_wrong_is_named_with_file_line_and_field(
+    spanning: Path, right: str, wrong: str, message: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    text = spanning.read_text()
+    assert right in text
+    spanning.write_text(text.replace(right, wrong, 1))
+    place = spanning.parent / "s.zarr"
+    status, out, err = said(capfd, "build", spanning, place, "--workers", "0")
+    assert (status, out, err.count("\n")) == (2, "", 1), err
+    assert err.startswith(f"sonarsynth: {spanning}:{message}")
+    assert not place.exists()
+
+
+def test_a_drawn_value_that_cannot_be_is_named(spanning: Path) -> None:
+    spanning.write_text(
+        spanning.read_text().replace(
+            "scene.world.shrimp.0.position.0, kind: uniform, low: 20 m, high: 30 m",
+            "scene.world.targets.0.motion.start.2, kind: uniform, low: -8 m, high: 6 m",
+        )
+    )
+    source = config.read(spanning)
+    with pytest.raises(RecipeError) as caught, config.locating(source):
+        planning.plan(config.recipe_of(source))
+    assert f"{spanning}:24: variations.0: scene.world.targets.0.motion: target 'box' is " in str(caught.value)
+    assert "(sequence " in str(caught.value) and "shrimp_x = " in str(caught.value)
+
+
+def test_a_target_that_one_sequence_lacks_is_refused(spanning: Path) -> None:
+    text = spanning.read_text().replace(
+        "{kind: course, start: [10, 0, -5], speed: 1}",
+        "{kind: course, start: [10, 0, -5], speed: 1}\n        scattering: null",
+    )
+    names = "path: scene.world.targets.0.name, values: [box, crate]"
+    spanning.write_text(text.replace(f"path: {START}.0, values: [9 m, 1100 cm]", names))
+    source = config.read(spanning)
+    told = r"targets\.0\.name: must be the same in all sequences: 'box' and 'crate'"
+    with pytest.raises(RecipeError, match=told), config.locating(source):
+        planning.plan(config.recipe_of(source))
+
+
+def large(small_text: str) -> Recipe:
+    """30 000 frames, most of which no plan looks at."""
+    text = small_text.replace("frames: 20", "frames: 3").replace(
+        "{kind: line, start: [10, 0, -5], stop: [10, 1, -5], duration: 1}",
+        "{kind: course, start: [10, 0, -5], speed: 1}",
+    )
+    varied = (
+        "variations:\n"
+        "  - {name: away, path: scene.world.targets.0.motion.start.0, kind: uniform, low: 8 m, high: 14 m}\n"
+        "  - {name: deep, path: scene.world.targets.0.motion.start.2, kind: normal, mean: -6 m, deviation: 1.4 m}\n"
+        "repeats: 10000\n"
+    )
+    return config.loads(text + varied)
+
+
+def test_of_a_large_dataset_a_part_is_looked_at_and_the_rest_checked_when_rendered(
+    small_text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(looks, "LOOKED_AT", 60)
+    recipe = large(small_text)
+    made = planning.plan(recipe)
+    assert made.looked_at == 60
+    assert any(note.startswith("60 of 30000 frames were looked at") for note in made.warnings)
+    deep = {n: float(str(recipe.spanned.drawn(n)[1].value.value).split()[0]) for n in range(0, 9000)}
+    bad = min(deep, key=lambda n: abs(deep[n] + 0.3))  # the box reaches 0.2 m out of the water
+    unseen = next(n for n in range(1, 9000) if not np.isfinite(made.windows.start[3 * n]) and -8 < deep[n] < -4)
+    frames = (3 * bad, 3 * unseen, 3 * unseen + 2)
+    report = schedule.build(made, tmp_path / "s.zarr", frames=frames, workers=0)
+    assert report.written == 2
+    (failure,) = report.failures
+    assert failure.frame == 3 * bad and failure.error.startswith(
+        "FieldError: variations.0: scene.world.targets.0.motion"
+    )
+    assert "above the surface at frame" in failure.error and "deep = -0." in failure.error and "\n" not in failure.error
+    with xr.open_datatree(tmp_path / "s.zarr", engine="zarr") as tree:
+        assert tree["signals/outside"].values[list(frames[1:])].tolist() == [0, 0]
+
+
+def test_unseen_frames_are_laid_as_they_would_be_if_seen(small_text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first sample of a frame is the same whether or not the plan looked at it."""
+    recipe = large(small_text)
+    monkeypatch.setattr(looks, "LOOKED_AT", 60)
+    few = planning.plan(recipe)
+    frame = recipe.frame(0)[1]
+    known = few.windows.start[0]
+    few.windows.start[0] = np.nan
+    assert planning.frame_start(few.at(0), frame) == known
+
+
+def test_a_frame_that_does_not_fit_is_refused(small_text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    from dataclasses import replace
+
+    from sonarsynth.description import FieldError
+
+    monkeypatch.setattr(looks, "LOOKED_AT", 60)
+    recipe = large(small_text)
+    made = planning.plan(recipe)
+    unseen = next(f for f in range(0, 30000, 3) if not np.isfinite(made.windows.start[f]))
+    for change, message in (
+        ({"samples": made.windows.samples // 2}, "more than those looked at"),
+        ({"echo_stop": 0.5 * made.windows.echo_stop}, "echoes outside the window"),
+    ):
+        tight = replace(made, windows=replace(made.windows, **change)).at(unseen)
+        with pytest.raises(FieldError, match=message):
+            planning.frame_start(tight, recipe.frame(unseen)[1])
+
+
+def test_a_single_long_trajectory_is_looked_at_from_end_to_end(
+    small_text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(looks, "LOOKED_AT", 7)
+    made = planning.plan(config.loads(small_text))
+    assert np.flatnonzero(np.isfinite(made.windows.start)).tolist() == [0, 3, 6, 10, 13, 16, 19]
+
+
+def test_too_many_meshes_are_refused(spanning: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from sonarsynth.recipe import variants
+
+    monkeypatch.setattr(variants, "MOST_VARIANTS", 3)
+    radius = f"path: {SHAPE}, kind: uniform, low: 1, high: 2"
+    text = spanning.read_text().replace(
+        "path: scene.world.shrimp.0.position.0, kind: uniform, low: 20 m, high: 30 m", radius
+    )
+    text = (
+        text.replace("{kind: box, size: [1, 1, 1], edge: 0.25}", "{kind: sphere, radius: 0.3, edge: 0.3}")
+        .replace(f"path: {SHAPE}, kind: uniform", f"path: {SHAPE}.radius, kind: uniform")
+        .replace("low: 1, high: 2", "low: 0.3, high: 0.6")
+        .replace(SPAN[SPAN.index("  - zip") : SPAN.index("variations")], "")
+    )
+    spanning.write_text(text.replace("stratify: hull", "stratify: away"))
+    source = config.read(spanning)
+    with (
+        pytest.raises(RecipeError, match=r"19: variations.0: makes more than 3 different meshes"),
+        config.locating(source),
+    ):
+        _ = config.recipe_of(source).meshes
