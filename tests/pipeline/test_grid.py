@@ -26,7 +26,10 @@ grid:
         values: [{kind: box, size: [1, 1, 1], edge: 0.5}, {kind: sphere, radius: 40 cm, edge: 0.3}]
 variations:
   - {name: shrimp_x, path: scene.world.shrimp.0.position.0, kind: uniform, low: 20 m, high: 30 m}
-  - {name: water, path: scene.world.environment.sound_speed, kind: choice, values: [{kind: linear, surface_speed: 1500, gradient: 0.1}, {kind: isovelocity, speed: 1520}]}
+  - name: water
+    path: scene.world.environment.sound_speed
+    kind: choice
+    values: [{kind: linear, surface_speed: 1500, gradient: 0.1}, {kind: isovelocity, speed: 1520}]
 repeats: 2
 splits: {train: 0.5, test: 0.5, stratify: hull}
 """
@@ -164,11 +167,11 @@ WRONG = [
         "24: variations.0.kind: 'uniformly' is not a kind here; did you mean 'uniform'",
     ),
     ("high: 30 m", "high: 9e9 m", "24: variations.0: scene.world.shrimp.0.position: is more than 1e+06 m"),
-    ("repeats: 2", "repeats: 0", "26: repeats: must be greater than or equal to 1"),
+    ("repeats: 2", "repeats: 0", "29: repeats: must be greater than or equal to 1"),
     ("repeats: 2", "repeats: 90000000", "16: grid: spans 360000000 sequences: more than 100000000 frames"),
-    ("test: 0.5", "test: 0.4", "27: splits: train, validation and test must add up to 1, not 0.9"),
-    ("stratify: hull", "stratify: hall", "27: splits.stratify: 'hall' names nothing that varies; known: away"),
-    ("stratify: hull", "stratify: shrimp_x", "27: splits.stratify: 'shrimp_x' has another value in each sequence"),
+    ("test: 0.5", "test: 0.4", "30: splits: train, validation and test must add up to 1, not 0.9"),
+    ("stratify: hull", "stratify: hall", "30: splits.stratify: 'hall' names nothing that varies; known: away"),
+    ("stratify: hull", "stratify: shrimp_x", "30: splits.stratify: 'shrimp_x' has another value in each sequence"),
     (
         f"path: {START}.0, values: [9 m, 1100 cm]",
         "path: scene.world.targets, values: [[]]",
@@ -324,3 +327,19 @@ def test_too_many_meshes_are_refused(spanning: Path, monkeypatch: pytest.MonkeyP
         config.locating(source),
     ):
         _ = config.recipe_of(source).meshes
+
+
+def test_a_path_too_faint_for_single_precision_has_no_measured_level() -> None:
+    """-inf would be an infinite number in the store, which verify takes for damage."""
+    from types import SimpleNamespace
+
+    from sonarsynth.products import LEDGER
+    from sonarsynth.render.stored import ledger_values
+
+    level = np.full((1, 1, 1), -1274.0)
+    isolated = SimpleNamespace(facet=np.array([3]), level=np.array([-1274.0]))
+    book = SimpleNamespace(
+        level=np.zeros((1, 1, 1, len(LEDGER))), paths=level, error_bound=level, isolated=isolated, isolated_level=level
+    )
+    stored = ledger_values(book, np.full((1, 1, 1), -np.inf))["/ledger", "measured_level"]  # type: ignore[arg-type]
+    assert np.isnan(stored).all()
