@@ -23,12 +23,13 @@ if TYPE_CHECKING:
     from sonarsynth.description import FieldError
     from sonarsynth.planning import Plan, plan
     from sonarsynth.ranging import IsovelocityRange, RefractedRange, SensorDelays, WavefrontCancelling
-    from sonarsynth.recipe import Recipe
+    from sonarsynth.recipe import Axis, Choice, Normal, Recipe, Sobol, Splits, Together, Uniform
     from sonarsynth.scattering import Isotropic, Kirchhoff, MirrorLobe, PartlyReflecting
     from sonarsynth.scattering.strength import target_strength
     from sonarsynth.scattering.targets import Target
     from sonarsynth.scene import EchoWindow, Physics, Processing, Scene, Trajectory, World
     from sonarsynth.schedule import BuildReport, build
+    from sonarsynth.schedule.repairing import RepairReport, repair
     from sonarsynth.sonar import (
         Band,
         BandPass,
@@ -68,7 +69,7 @@ if TYPE_CHECKING:
         Thermocline,
         WenzNoise,
     )
-    from sonarsynth.world.motion import Circle, Line, Still, Waypoint, Waypoints
+    from sonarsynth.world.motion import Circle, Course, Line, Still, Waypoint, Waypoints
     from sonarsynth.world.shapes import Box, Cylinder, LShape, MeshFile, Myring, Remus100, Sphere
     from sonarsynth.world.snaps import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
     from sonarsynth.world.sources import LogarithmicBubble, SnappingShrimp
@@ -76,6 +77,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Absorption",
     "AutoTracing",
+    "Axis",
     "Band",
     "BandPass",
     "BeamGrid",
@@ -83,8 +85,10 @@ __all__ = [
     "BuildReport",
     "Cast",
     "Catenary",
+    "Choice",
     "Circle",
     "Converter",
+    "Course",
     "Cylinder",
     "DenseDelayAndSum",
     "DirectSum",
@@ -111,6 +115,7 @@ __all__ = [
     "MirrorLobe",
     "Munk",
     "Myring",
+    "Normal",
     "PartlyReflecting",
     "Physics",
     "Plan",
@@ -127,6 +132,7 @@ __all__ = [
     "Refracted",
     "RefractedRange",
     "Remus100",
+    "RepairReport",
     "Ricker",
     "Rigid",
     "Romanis",
@@ -137,15 +143,19 @@ __all__ = [
     "SensorDelays",
     "SnapVariation",
     "SnappingShrimp",
+    "Sobol",
     "Sonar",
     "Sphere",
+    "Splits",
     "Still",
     "Straight",
     "Tabulated",
     "Target",
     "TemperatureSalinity",
     "Thermocline",
+    "Together",
     "Trajectory",
+    "Uniform",
     "WavefrontCancelling",
     "Waypoint",
     "Waypoints",
@@ -158,134 +168,42 @@ __all__ = [
     "load",
     "loads",
     "plan",
+    "repair",
     "schema",
     "target_strength",
     "verify",
 ]
 
 _HOMES = {
-    "beamforming": (
-        "DenseDelayAndSum",
-        "FocusedDelayAndSum",
-    ),
-    "config": (
-        "RecipeError",
-        "dump",
-        "load",
-        "loads",
-        "schema",
-    ),
-    "description": ("FieldError",),
-    "planning": (
-        "Plan",
-        "plan",
-    ),
-    "ranging": (
-        "IsovelocityRange",
-        "RefractedRange",
-        "SensorDelays",
-        "WavefrontCancelling",
-    ),
-    "recipe": ("Recipe",),
-    "scattering": (
-        "Isotropic",
-        "Kirchhoff",
-        "MirrorLobe",
-        "PartlyReflecting",
-    ),
-    "scattering.strength": ("target_strength",),
-    "scene": (
-        "EchoWindow",
-        "Physics",
-        "Processing",
-        "Scene",
-        "Trajectory",
-        "World",
-    ),
-    "schedule": (
-        "BuildReport",
-        "build",
-    ),
-    "sonar": (
-        "Band",
-        "BandPass",
-        "BeamGrid",
-        "Converter",
-        "LowPass",
-        "PlanarLattice",
-        "PositionTable",
-        "Romanis",
-        "Sonar",
-    ),
-    "store": ("verify",),
-    "synthesis": (
-        "DirectSum",
-        "KernelDeposit",
-    ),
-    "tracing": (
-        "AutoTracing",
-        "Refracted",
-        "Straight",
-    ),
-    "tracing.eigenrays": (
-        "RayArrivals",
-        "eigenrays",
-        "eigenrays_between",
-    ),
-    "tracing.ray_request": ("EigenrayRequest", "RayRequest"),
-    "world.boundaries": (
-        "FluidHalfSpace",
-        "PressureRelease",
-        "ReflectionTable",
-        "Rigid",
-        "SeaBed",
-        "SeaSurface",
-        "Sediment",
-    ),
+    "beamforming": "DenseDelayAndSum FocusedDelayAndSum",
+    "config": "RecipeError dump load loads schema",
+    "description": "FieldError",
+    "planning": "Plan plan",
+    "ranging": "IsovelocityRange RefractedRange SensorDelays WavefrontCancelling",
+    "recipe": "Axis Choice Normal Recipe Sobol Splits Together Uniform",
+    "scattering": "Isotropic Kirchhoff MirrorLobe PartlyReflecting",
+    "scattering.strength": "target_strength",
+    "scattering.targets": "Target",
+    "scene": "EchoWindow Physics Processing Scene Trajectory World",
+    "schedule": "BuildReport build",
+    "schedule.repairing": "RepairReport repair",
+    "sonar": "Band BandPass BeamGrid Converter LowPass PlanarLattice PositionTable Romanis Sonar",
+    "store": "verify",
+    "synthesis": "DirectSum KernelDeposit",
+    "tracing": "AutoTracing Refracted Straight",
+    "tracing.eigenrays": "RayArrivals eigenrays eigenrays_between",
+    "tracing.ray_request": "EigenrayRequest RayRequest",
+    "world.boundaries": "FluidHalfSpace PressureRelease ReflectionTable Rigid SeaBed SeaSurface Sediment",
     "world.environment": (
-        "Absorption",
-        "Cast",
-        "Catenary",
-        "Environment",
-        "FlatNoise",
-        "Isovelocity",
-        "Linear",
-        "Munk",
-        "Tabulated",
-        "TemperatureSalinity",
-        "Thermocline",
-        "WenzNoise",
+        "Absorption Cast Catenary Environment FlatNoise Isovelocity Linear Munk Tabulated "
+        "TemperatureSalinity Thermocline WenzNoise"
     ),
-    "world.motion": (
-        "Circle",
-        "Line",
-        "Still",
-        "Waypoint",
-        "Waypoints",
-    ),
-    "world.shapes": (
-        "Box",
-        "Cylinder",
-        "LShape",
-        "MeshFile",
-        "Myring",
-        "Remus100",
-        "Sphere",
-    ),
-    "world.snaps": (
-        "Gabor",
-        "KellerMiksis",
-        "RecordedSnap",
-        "Ricker",
-        "SnapVariation",
-    ),
-    "world.sources": (
-        "LogarithmicBubble",
-        "SnappingShrimp",
-    ),
-    "scattering.targets": ("Target",),
+    "world.motion": "Circle Course Line Still Waypoint Waypoints",
+    "world.shapes": "Box Cylinder LShape MeshFile Myring Remus100 Sphere",
+    "world.snaps": "Gabor KellerMiksis RecordedSnap Ricker SnapVariation",
+    "world.sources": "LogarithmicBubble SnappingShrimp",
 }
-_HOME = {name: home for home, names in _HOMES.items() for name in names}
+_HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
 
 
 def __getattr__(name: str) -> Any:
