@@ -38,7 +38,7 @@ def ball(place=(15.0, 1.0, -6.0), radius: float = 0.3, subdivisions: int = 2) ->
 
 
 def run(bodies=None, profile=UNIFORM, environment=RIGID, bounces=2, law=None, array=ONE, **more) -> Arrivals:
-    snaps = (Snap(SOURCE, 0.0, LogarithmicBubble(), None),)
+    snaps = (Snap(SOURCE, more.pop("time", 0.0), LogarithmicBubble(), None),)
     bodies = (ball(),) if bodies is None else bodies
     tracing = more.pop("tracing", AutoTracing(bounces=bounces))
     return trace(
