@@ -84,9 +84,18 @@ class Smooth:
         """As `Part.pulses`: differentiated, and a mean over the facet; blurred by roughness."""
         count, zero = len(incident), np.zeros(len(incident))
         corners = dot(patch.corners, (incident - scattered)[:, None, :]) / sound_speed[:, None]
-        phase = np.angle(reflection(self.law, incident, scattered) + 0.0 * zero)
+        phase = self.phase(incident, scattered) + zero
         blur = self.law.roughness * np.abs(dot(patch.normal, scattered - incident)) / sound_speed
         return Pulses(np.ones(count, bool), corners, zero, zero, zero, phase, blur)
+
+    def phase(self, incident: Floats, scattered: Floats) -> Floats:
+        """Phase (...) of the reflection coefficient in rad, which directions change where `turns`."""
+        return np.asarray(np.angle(reflection(self.law, incident, scattered)))
+
+    @property
+    def turns(self) -> bool:
+        """Whether the phase differs from direction to direction."""
+        return not isinstance(self.law.surface, str)
 
     def polarity(self, mesh: Mesh) -> Floats:
         """All alike: the sign is the reflection coefficient's."""

@@ -11,8 +11,9 @@ import numpy as np
 from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.products import Arrivals
 from sonarsynth.scattering import Part
-from sonarsynth.scattering.parts import Plain
+from sonarsynth.scattering.parts import Plain, Smooth
 from sonarsynth.scattering.patches import Patches, Pulses, patches
+from sonarsynth.tracing.aperture import Fronts
 from sonarsynth.tracing.legs import may_face, usable
 from sonarsynth.tracing.moving import Moving, carried
 from sonarsynth.tracing.paths import Outward, assemble, silence
@@ -32,6 +33,9 @@ of the largest."""
 
 ENOUGH = 1e-4
 """Error of amplitudes over the aperture, of the strongest echo's, at which polynomials of the second degree will do."""
+
+LEAP = 1.0
+"""rad: a phase of reflection that varies by more over the aperture is not followed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +61,15 @@ class _Group:
         """Amplitudes (echo, probe) in directions (echo, probe, xyz) of the world."""
         away = self.body.pose.turn_to_body(departure)
         return self.part.amplitude(self.incident[:, None, :], away, self.patch.over(), self.wavenumber[:, None])
+
+    def turned(self, departure: Floats) -> Floats:
+        """Phase (echo, probe) in directions (echo, probe, xyz) of the world more than in that of the array centre."""
+        if not (isinstance(self.part, Smooth) and self.part.turns):
+            return np.zeros(departure.shape[:2])
+        away = self.body.pose.turn_to_body(departure)
+        at_centre = self.part.phase(self.incident, self.scattered)[:, None]
+        more = self.part.phase(self.incident[:, None, :], away) - at_centre
+        return np.asarray(more - 2.0 * np.pi * np.rint(more / (2.0 * np.pi)))
 
     def pulses(self, centre: float) -> Pulses:
         """What they make of the pulse; centre (Hz)."""
@@ -93,8 +106,9 @@ def echoes(
     pulses = pulses.select(loud)
     at_few = np.concatenate([f[keep] for f, keep in zip(few, mine, strict=True)])
     variation = _variation(array, groups, leg, at_few, amplitude, factor[row])
+    over = _turned(array, groups, leg, amplitude * factor[row])
     out, leg = out.select(row), leg[row]
-    legs, over = array.legs.select(leg), array.fronts.select(leg)
+    legs = array.legs.select(leg)
     target, facet = facets.target[out.facet], facets.facet[out.facet]
     made = assemble(legs, over, out, index, snap.time, absorption, target, facet, sign * amplitude, variation, pulses)
     if moving is not None:
@@ -196,6 +210,28 @@ def _variation(
         return terms, error
     every = np.concatenate([g.over(fronts.probe_departure[leg[g.row]]) for g in groups])
     return fitted(array, _gain(every, amplitude, fronts.probe_gain[rows]), strength, None)
+
+
+def _turned(array: ArrayLegs, groups: list[_Group], leg: Ints, strength: Floats) -> Fronts:
+    """Wavefronts (path,) of echoes of that strength (path,), with the phases of reflections from facets to each probe.
+
+    They vary over the aperture where part of the sound enters the body, and are taken for delays, right at the centre
+    of the band; what that errs by at its edges counts as far as the echo is as strong as the strongest. Where the
+    coefficient passes near 0 its phase leaps: there all sensors have that of the centre.
+    """
+    rows = leg[np.concatenate([g.row for g in groups])]
+    over = array.fronts.select(rows)
+    shift = np.concatenate([g.turned(array.fronts.probe_departure[leg[g.row]]) for g in groups])
+    shift[np.abs(shift).max(axis=1, initial=0.0) > LEAP] = 0.0
+    if not shift.any():
+        return over
+    probe, (low, high) = probes(array.elements), array.band
+    late = shift / (-2.0 * np.pi * array.centre)
+    terms = probe.fit(late)
+    edges = np.abs(shift).max(axis=1) * (high - low) / (2.0 * array.centre) / (2.0 * np.pi * high)
+    share = np.abs(strength) / max(float(np.abs(strength).max()), 1e-300)
+    error = over.error + share * (probe.misfit(late, terms) + edges)
+    return replace(over, delay_terms=over.delay_terms + terms if over.delay_terms.shape[1] else terms, error=error)
 
 
 def _gain(over_aperture: Floats, amplitude: Floats, probe_gain: Floats) -> Floats:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import eval_legendre, spherical_jn, spherical_yn
 
+from sonarsynth.acoustics.arrays import aperture_terms
 from sonarsynth.acoustics.facet_pulses import facet_response
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose, quaternion
@@ -36,10 +37,12 @@ def body(mesh: Mesh, place: Floats, name: str = "body", turned: float = 0.5 * np
     return Body(name, mesh, Pose(np.array(place, float), quaternion(turned)), np.zeros(3))
 
 
-def echo(bodies: tuple[Body, ...], source: Floats, laws: tuple[object, ...], bounces: int = 0) -> Arrivals:
+def echo(
+    bodies: tuple[Body, ...], source: Floats, laws: tuple[object, ...], bounces: int = 0, array: Floats = ARRAY
+) -> Arrivals:
     snaps = (Snap(np.array(source, float), 0.0, LogarithmicBubble(), None),)
     found = trace(
-        WATER, PROFILE, Moment(0.0, bodies, snaps), Pose(ARRAY, EAST), ROMANIS, 0.0, AutoTracing(bounces=bounces),
+        WATER, PROFILE, Moment(0.0, bodies, snaps), Pose(array, EAST), ROMANIS, 0.0, AutoTracing(bounces=bounces),
         laws, band=(25e3, 85e3),
     )  # fmt: skip
     return found.select(~found.direct)
@@ -139,6 +142,26 @@ def test_a_body_of_water_is_not_heard_and_a_dense_one_is_rigid() -> None:
     assert not len(same.delay)
     like = by(PartlyReflecting(density_ratio=1.1, speed_ratio=1.0))
     np.testing.assert_allclose(like, 0.1 / 2.1 * rigid, rtol=1e-9)
+
+
+def test_the_phase_of_a_lossy_reflection_is_that_of_each_hydrophone() -> None:
+    """A panel in mirror position under its critical angle: the same from an array whose centre is at the hydrophone."""
+    panel, source = mesh_of(Box(size=(0.02, 0.3, 0.3), edge=0.01)), ARRAY + [13.0, -1.0, 0.0]
+    place = (body(panel, ARRAY + [7.0, 1.5, 0.0], turned=0.0),)  # its large faces look north and south
+    law = (Kirchhoff(surface=PartlyReflecting(density_ratio=2.0, speed_ratio=1.6, loss_tangent=0.02)),)
+    found = echo(place, source, law)
+    rigid = echo(place, source, (Kirchhoff(),))
+    far = np.argmax(np.abs(ROMANIS.position[:, 1]))
+    basis = aperture_terms(ROMANIS.position[far], ROMANIS.aperture)
+    there = echo(place, source, law, array=ARRAY + Pose(ARRAY, EAST).turn_to_world(ROMANIS.position[far]))
+    assert not rigid.delay_terms.shape[1]
+    shared = found.select(np.isin(found.facet, there.facet))
+    exact = there.select(np.isin(there.facet, shared.facet))
+    np.testing.assert_array_equal(shared.facet, exact.facet)
+    turned = exact.phase - shared.phase
+    assert np.abs(turned).max() > 0.1
+    np.testing.assert_allclose(-2.0 * np.pi * 55e3 * (shared.delay_terms @ basis), turned, atol=2e-3)
+    assert found.wavefront_error > 1e-8  # what a phase taken for a delay errs by at the edges of the band
 
 
 def test_source_and_array_exchanged_hear_the_same() -> None:
