@@ -11,7 +11,7 @@ from sonarsynth.acoustics.boundaries import rayleigh
 from sonarsynth.acoustics.facet_pulses import facet_response
 from sonarsynth.acoustics.kirchhoff import local_grazing
 from sonarsynth.acoustics.lobes import dot, lambert, lit_and_seen, slope_lobe
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Bools, Floats
 from sonarsynth.scattering.patches import Patches, Pulses
 from sonarsynth.scattering.polarity import random_polarity
 from sonarsynth.world.meshes import Mesh
@@ -91,6 +91,11 @@ class Smooth:
     def phase(self, incident: Floats, scattered: Floats) -> Floats:
         """Phase (...) of the reflection coefficient in rad, which directions change where `turns`."""
         return np.asarray(np.angle(reflection(self.law, incident, scattered)))
+
+    def tapers(self, patch: Patches) -> Bools:
+        """Where (facet,) the echo falls to 0 towards the limb of the body, rather than ending there (`edges`)."""
+        smooth = {"auto": patch.curved, "smooth": np.ones_like(patch.curved), "sharp": np.zeros_like(patch.curved)}
+        return smooth[self.law.edges]
 
     @property
     def turns(self) -> bool:

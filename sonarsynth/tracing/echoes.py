@@ -62,6 +62,11 @@ class _Group:
         away = self.body.pose.turn_to_body(departure)
         return self.part.amplitude(self.incident[:, None, :], away, self.patch.over(), self.wavenumber[:, None])
 
+    @property
+    def tapered(self) -> Bools:
+        """(echo,) whether it falls to 0 at the limb of the body, rather than ending there."""
+        return self.part.tapers(self.patch) if isinstance(self.part, Smooth) else np.zeros(len(self.row), bool)
+
     def turned(self, departure: Floats) -> Floats:
         """Phase (echo, probe) in directions (echo, probe, xyz) of the world more than in that of the array centre."""
         if not (isinstance(self.part, Smooth) and self.part.turns):
@@ -203,13 +208,16 @@ def _variation(
 
     The second degree serves where it errs by no more than `ENOUGH`.
     """
-    fronts, strength = array.fronts, amplitude * factor
+    fronts = array.fronts
     rows = leg[np.concatenate([g.row for g in groups])]
-    terms, error = fitted(array, _gain(few, amplitude, fronts.probe_gain[:, :FEW][rows]), strength, FEW)
+    tapered, strength = np.concatenate([g.tapered for g in groups]), amplitude * factor
+    strength = np.where((few == 0.0).any(axis=1), 0.0, strength)  # on the limb of some probe: not counted
+    terms, error = fitted(array, _gain(few, amplitude, tapered, fronts.probe_gain[:, :FEW][rows]), strength, FEW)
     if error <= ENOUGH:
         return terms, error
     every = np.concatenate([g.over(fronts.probe_departure[leg[g.row]]) for g in groups])
-    return fitted(array, _gain(every, amplitude, fronts.probe_gain[rows]), strength, None)
+    strength = np.where((every == 0.0).any(axis=1), 0.0, strength)
+    return fitted(array, _gain(every, amplitude, tapered, fronts.probe_gain[rows]), strength, None)
 
 
 def _turned(array: ArrayLegs, groups: list[_Group], leg: Ints, strength: Floats) -> Fronts:
@@ -234,13 +242,12 @@ def _turned(array: ArrayLegs, groups: list[_Group], leg: Ints, strength: Floats)
     return replace(over, delay_terms=over.delay_terms + terms if over.delay_terms.shape[1] else terms, error=error)
 
 
-def _gain(over_aperture: Floats, amplitude: Floats, probe_gain: Floats) -> Floats:
-    """Amplitude (path, probe) over that of the centre and the sphere; 1 for a facet on the limb of some probe.
-
-    All sensors share what the centre sees.
+def _gain(over_aperture: Floats, amplitude: Floats, tapered: Bools, probe_gain: Floats) -> Floats:
+    """Amplitude (path, probe) over that of the centre and the sphere; 1 for a facet that ends at the limb of some
+    probe; one that is tapered (path,) to nothing there is followed. All sensors share what the centre sees.
     """
     gain = over_aperture / amplitude[:, None] * probe_gain
-    gain[(over_aperture == 0).any(axis=1)] = 1.0
+    gain[(over_aperture == 0).any(axis=1) & ~tapered] = 1.0
     return np.asarray(gain)
 
 

@@ -164,6 +164,27 @@ def test_the_phase_of_a_lossy_reflection_is_that_of_each_hydrophone() -> None:
     assert found.wavefront_error > 1e-8  # what a phase taken for a delay errs by at the edges of the band
 
 
+@pytest.mark.parametrize("edges", ["smooth", "auto"])
+def test_facets_near_the_limb_are_as_loud_at_each_hydrophone_as_it_sees_them(edges: str) -> None:
+    """A small sphere, 140 degrees off backscatter: the echo at the rim of the array, against an array that is there."""
+    ball = mesh_of(Sphere(radius=0.1, edge=0.008))
+    place, source = (body(ball, ARRAY + [5.0, 1.0, 1.0]),), ARRAY + [9.0, -1.0, -1.0]
+    law = (Kirchhoff(edges=edges),)
+    found = echo(place, source, law)
+    for far in (np.argmax(ROMANIS.position[:, 1]), np.argmin(ROMANIS.position[:, 1])):
+        q = ROMANIS.position[far]
+        seen = echo(place, source, law, array=ARRAY + Pose(ARRAY, EAST).turn_to_world(q))
+        away = np.linalg.norm(found.radius[:, None] * found.direction - q, axis=1)
+        basis = aperture_terms(q, ROMANIS.aperture)
+        heard = replace(
+            found,
+            delay=found.delay + (away - found.radius) / C,
+            amplitude=found.amplitude * found.radius / away * (1.0 + found.amplitude_terms @ basis),
+        )
+        exact = transfer(seen)
+        assert np.abs(transfer(heard) - exact).max() < 0.05 * np.abs(exact).max()
+
+
 def test_source_and_array_exchanged_hear_the_same() -> None:
     mesh = mesh_of(Sphere(radius=0.2, edge=0.015))
     place, source = ARRAY + [9.0, 2.0, 1.0], ARRAY + [3.0, -6.0, -2.0]
