@@ -142,7 +142,13 @@ _TRUTH = _group(
         "s",
         "largest error of wavefronts measured at probes over the aperture; NaN where one has no ray",
     ),
-    _v("amplitude_error", ("frame",), "float64", "1", "the same of amplitudes, relative to the strongest echo"),
+    _v(
+        "amplitude_error",
+        ("frame",),
+        "float64",
+        "1",
+        "largest error of amplitudes measured at those probes, relative to the strongest echo",
+    ),
 )
 LEDGER_COMMENT = (
     "received = source - transmission_loss_out + scattering - transmission_loss_in - absorption - boundary. Ratios of "

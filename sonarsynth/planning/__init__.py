@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from sonarsynth.planning.checks import check_frame, check_methods, check_windows, read_inputs
-from sonarsynth.planning.costs import left_out, stages
+from sonarsynth.planning.costs import stages
 from sonarsynth.planning.looks import Look, check_alike, survey
 from sonarsynth.planning.notes import notes
+from sonarsynth.planning.omissions import left_out
 from sonarsynth.planning.plans import PRODUCTS, Omission, Plan, Stage, Windows, resolve
 from sonarsynth.planning.windows import frame_start, lay_windows
 from sonarsynth.recipe import Recipe

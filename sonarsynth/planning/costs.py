@@ -1,4 +1,4 @@
-"""What a plan costs and what it leaves out: the rows that `sonarsynth plan` prints.
+"""What a plan costs: rows that `sonarsynth plan` prints.
 
 Costs are counts of work times seconds per unit of work, measured on one core of a 2-core AVX-512 machine (`tools/bench
 frame`), scaled by how fast this machine does a fixed set of transforms. Predictions are for one core.
@@ -7,17 +7,13 @@ frame`), scaled by how fast this machine does a fixed set of transforms. Predict
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
-from sonarsynth.planning.plans import Omission, Plan, Stage
+from sonarsynth.planning.plans import Plan, Stage
 from sonarsynth.scattering import Kirchhoff
-from sonarsynth.scattering.fineness import expected_error
-from sonarsynth.tracing import Refracted, Straight
-from sonarsynth.tracing.bounces import MOST_BOUNCES
-from sonarsynth.world.reflection import rms_height
+from sonarsynth.tracing import Straight
 
 REFERENCE_TRANSFORM = 2.0e-3
 """Seconds of the transforms in `machine_factor` on the machine where the constants below were measured."""
@@ -181,102 +177,3 @@ def stages(plan: Plan) -> tuple[Stage, ...]:
     total = sum(row[5] for row in rows)
     rows.append(("write", "zarr, blosc-zstd, crc32c", "always", "none", total * SECONDS["write byte"], 0))
     return tuple(Stage(a, b, c, d, seconds * factor, size) for a, b, c, d, seconds, size in rows)
-
-
-def left_out(plan: Plan) -> tuple[Omission, ...]:
-    """What is not computed, why, and the bound on what that costs."""
-    scene, frame = plan.recipe.frame(0)
-    environment, products = scene.world.environment, plan.products
-    rows = []
-    if isinstance(plan.propagation, Straight):
-        speeds = plan.profile.speed
-        bound = "0: the sound speed is the same everywhere"
-        if not plan.profile.uniform:
-            bound = f"asked for, but the sound speed varies by {np.ptp(speeds):.3g} m/s: angles and delays are biased"
-        rows.append(Omission("refraction", "straight rays", bound))
-    bounces = plan.propagation.bounces
-    kept = "the direct family" if not bounces else f"paths by at most {bounces} reflections of surface and bed in all"
-    rows.append(Omission("more reflections", f"asked for: {kept}", reflected_bound(plan)))
-    rough = [b for b in (environment.surface, environment.bed) if rms_height(b) > 0.0]
-    if bounces and rough:
-        rows.append(
-            Omission(
-                "scattering by rough boundaries",
-                "reflections are coherent",
-                "the energy that roughness takes from them is scattered, and not simulated",
-            )
-        )
-    rows += _facets_leave_out(plan)
-    moving = any(b.velocity.any() for b in frame.moment.bodies) or frame.sonar_velocity.any()
-    if moving and not scene.physics.doppler:
-        rows.append(Omission("Doppler", "not asked for: all is where it is at the instant of the frame", _moved(plan)))
-    elif moving:
-        rows.append(Omission("turning of targets in a frame", "velocities move them", "its rate times travel time"))
-    if environment.noise is None:
-        rows.append(Omission("ambient noise", "the scene describes none", "signals are free of noise"))
-    if scene.sonar.converter is None and "signals" in products:
-        rows.append(Omission("converter", "the sonar describes none", "0: pressure is stored as float32"))
-    for name in ("signals", "image", "cloud"):
-        if name not in products:
-            rows.append(Omission(name, "not asked for", "0"))
-    if isinstance(plan.propagation, Refracted):
-        rows.append(Omission("rays to each sensor", "wavefront expansion over the aperture", "/truth/wavefront_error"))
-    return tuple(rows)
-
-
-def _facets_leave_out(plan: Plan) -> list[Omission]:
-    """What coherent facets do not have of an echo."""
-    scene, rows = plan.scene, []
-    for target, law, mesh in zip(scene.world.targets, scene.laws, scene.meshes, strict=True):
-        if isinstance(law, Kirchhoff):
-            error = expected_error(mesh, scene.sonar.shortest_wavelength)
-            bound = f"about {100.0 * error:.2g} % of the echo at the top of the band"
-            if error > 0.995:
-                bound = "all of the echo at the top of the band"
-            if error == 0.0:
-                bound = "0: it has no curved surface"
-            rows.append(Omission(f"curvature within facets of {target.name}", f"{len(mesh.faces)} flat facets", bound))
-    if rows:
-        bound = "spheres over 26 wavelengths round: 0.3 dB to 60 degrees off backscatter, 2.6 dB to 120"
-        rows.append(Omission("waves that creep round bodies or pass inside", "facets are plane mirrors", bound))
-    return rows
-
-
-def _moved(plan: Plan) -> str:
-    """How far targets and sonar move while sound is under way, and how much longer pulses come out."""
-    frame = plan.recipe.frame(0)[1]
-    fastest = max((float(np.linalg.norm(body.velocity)) for body in frame.moment.bodies), default=0.0)
-    fastest += float(np.linalg.norm(frame.sonar_velocity))
-    stretch = 2 * fastest / float(plan.profile.speed.min())
-    phase = 2 * np.pi * plan.scene.sonar.band.high * stretch * 50e-6
-    metres = fastest * plan.windows.echo_stop
-    return f"echoes {metres:.2g} m off; time stretch {stretch:.2g}, {phase:.2g} rad over 50 us at the top of the band"
-
-
-def reflected_bound(plan: Plan) -> str:
-    """Level of what one reflection more would add in the first frame, over the echoes that are kept."""
-    from sonarsynth.tracing.arrivals import trace
-
-    scene, frame = plan.recipe.frame(0)
-    sonar, bounces = scene.sonar, plan.propagation.bounces
-    if not frame.moment.snaps or bounces >= MOST_BOUNCES:
-        return "not computed"
-    found = trace(
-        scene.world.environment,
-        plan.profile,
-        frame.moment,
-        frame.sonar_pose,
-        plan.elements,
-        float(plan.absorption(sonar.band.centre)),
-        replace(plan.propagation, bounces=bounces + 1),
-        scene.laws,
-        band=(sonar.band.low, sonar.band.high),
-    )
-    blur = np.exp(-0.5 * (2 * np.pi * sonar.band.centre * found.blur) ** 2)
-    power, more = (found.amplitude * blur) ** 2, found.surface + found.bottom > bounces
-    parts = []
-    for what, some in (("echoes", ~found.direct), ("snap itself", found.direct)):
-        kept, left = float(power[some & ~more].sum()), float(power[some & more].sum())
-        if kept > 0.0 and left > 0.0:
-            parts.append(f"{what} {10 * np.log10(left / kept):+.1f} dB")
-    return "one more would add, re what is kept in frame 0: " + (", ".join(parts) or "nothing")

@@ -71,9 +71,8 @@ def test_a_grid_of_ranges_headings_and_hulls(tmp_path: Path) -> None:
     frames = [frame for n in (0, 12, 23) for frame in (n * steps, (n + 1) * steps - 1)]
     assert schedule.build(made, tmp_path / "grid.zarr", frames=frames, workers=0).ok
     checks = _checks(tmp_path / "grid.zarr")
-    whole = ("frames", "ledger adds up", "ledger measured in signals", "wavefronts over the aperture", "signals whole")
-    assert all(checks[name].ok for name in whole), checks
-    assert checks["brightest beam on target"].numbers["hits"] >= 4
+    assert all(check.ok is not False for check in checks.values()), checks
+    assert checks["brightest beam on target"].numbers["hits"] == len(frames)
     with xr.open_datatree(tmp_path / "grid.zarr", engine="zarr") as tree:
         root = tree.to_dataset().isel(frame=slice(0, None, steps))
         assert np.bincount(root.split.values[[0, 12, 23]], minlength=3).sum() == 3
