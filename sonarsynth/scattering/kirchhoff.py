@@ -7,13 +7,12 @@ from typing import Annotated, Literal
 import numpy as np
 from annotated_types import Ge, Gt, Le
 
-from sonarsynth.acoustics.boundaries import rayleigh
-from sonarsynth.acoustics.kirchhoff import local_grazing, shadow_taper
+from sonarsynth.acoustics.kirchhoff import shadow_taper
 from sonarsynth.acoustics.lobes import lit_and_seen
 from sonarsynth.acoustics.roughness import incoherent_power, roughness_parameter
 from sonarsynth.conventions import Bools, Floats, NonNegativeMetres, Number
 from sonarsynth.description import description
-from sonarsynth.scattering.parts import Part, Rough, Smooth
+from sonarsynth.scattering.parts import Part, Rough, Smooth, reflection
 
 
 @description
@@ -52,7 +51,9 @@ class Kirchhoff:
     roughness: NonNegativeMetres = 0.0
     """Rms height of the surface about the facets."""
     slope: Annotated[Number, Gt(0), Le(0.5)] = 0.1
-    """Rms slope per axis of a rough surface: how wide the incoherent part spreads. Nothing where roughness is 0."""
+    """Rms slope per axis of a rough surface: how wide the incoherent part spreads. Nothing where roughness is 0.
+    The lobe knows no shadows of its heights: 0.1 gives back 0.95 to 0.99 of the power, 0.2 up to 1.09 and 0.5 up to
+    1.46 of it at 75 degrees incidence."""
     diffuse: Annotated[Number, Ge(0), Le(1)] = 0.0
     """Share of the returned power that is scattered by Lambert's law instead."""
     forward: Literal["blocked", "scattered"] = "blocked"
@@ -76,13 +77,7 @@ class Kirchhoff:
 
         It stands for that of all facets, which keeps the law reciprocal.
         """
-        match self.surface:
-            case "rigid":
-                return 1.0 + 0.0j
-            case "soft":
-                return -1.0 + 0.0j
-            case PartlyReflecting(density_ratio=m, speed_ratio=n, loss_tangent=loss):
-                return complex(rayleigh(local_grazing(incident, scattered), m, n, loss))
+        return complex(reflection(self, incident, scattered))
 
     def lit(self, incident: Floats, scattered: Floats, normal: Floats, curved: Bools) -> Floats:
         """Factor (facet,) on the amplitude of facets with normals (facet, xyz), 0 where a facet is not lit or not seen.
