@@ -177,7 +177,8 @@ def _turned(out: Complexes, path: float, k: Floats, pace: float) -> None:
 def _powers(out: Complexes, a: float, b: float, c: float, limit: float, k: Floats, room: Floats) -> None:
     """`divided` of k times paths a <= b <= c (m): one series in k up to the `limit`."""
     scale = min(k.max(), limit)
-    terms = _series(room, scale * a, scale * b, scale * c)
+    x, y, z = scale * a, scale * b, scale * c
+    terms = series(room, x * (y + z) + y * z, x * y * z, z - x, 1e-17)
     for i in range(k.size):
         if k[i] <= scale:
             q = k[i] / scale if scale > 0.0 else 0.0
@@ -192,17 +193,17 @@ def _powers(out: Complexes, a: float, b: float, c: float, limit: float, k: Float
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _series(room: Floats, a: float, b: float, c: float) -> int:
-    """Terms (even or odd, j) of `divided` of q times the phases a <= b <= c: sum_j of q^(2j) (even + i q odd).
+def series(room: Floats, e2: float, e3: float, gap: float, tolerance: float) -> int:
+    """Terms (even or odd, j) of `divided` of q times phases with mean 0: sum_j of q^(2j) (even + i q odd).
 
-    Returns the last j: |h_j|/(j+2)! is at most (2 gap/3)^j/(2 j!).
+    e2, e3: elementary symmetric polynomials of the phases; `gap` (rad) between the outer ones of the largest q times
+    them. Returns the last j, or the last that there is room for: |h_j|/(j+2)! is at most (2 gap/3)^j/(2 j!).
     """
-    largest = 2.0 / 3.0 * (c - a)
-    e2, e3 = a * (b + c) + b * c, a * b * c
+    largest = 2.0 / 3.0 * gap
     even, odd, before = 1.0, 0.0, 0.0  # s_j, s_(j+1), s_(j-1): h_j with the signs of i^j
     room[0, 0], room[1, 0] = 0.5, 0.0
     weight, bound, j, order = 0.5, 0.5, 0, 0.0
-    while bound > 1e-17:
+    while bound > tolerance and j < room.shape[1] - 1:
         j += 1
         order += 2.0
         even, odd, before = e2 * even + e3 * before, e2 * odd - e3 * even, odd

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numba import njit
 
-from sonarsynth.acoustics.kirchhoff_kernels import divided
+from sonarsynth.acoustics.kirchhoff_kernels import divided, series
 from sonarsynth.conventions import Bools, Floats, Ints
 
 WIDEST = 6.0  # rad: facets whose corners are closer together in phase go by the series
@@ -105,7 +105,7 @@ def _facet_mean(x: Floats, y: Floats, corners: Floats, omega: Floats, square: Fl
     a, c = min(low, r), max(high, r)
     gap, top = c - a, omega.size - 1
     if gap * omega[top] < WIDEST:
-        terms = _series(room, p * (q + r) + q * r, p * q * r, gap, omega[top])
+        terms = series(room, p * (q + r) + q * r, p * q * r, gap * omega[top], 0.5 * TOLERANCE)
         x[:] = room[0, terms]
         y[:] = room[1, terms]
         for j in range(terms - 1, -1, -1):
@@ -114,7 +114,8 @@ def _facet_mean(x: Floats, y: Floats, corners: Floats, omega: Floats, square: Fl
                 x[k] = x[k] * square[k] + u
                 y[k] = y[k] * square[k] + v
         for k in range(omega.size):
-            y[k] *= omega[k]
+            x[k] *= 2.0
+            y[k] *= 2.0 * omega[k]
     else:
         b = max(low, min(high, r))
         for k in range(omega.size):
@@ -122,24 +123,6 @@ def _facet_mean(x: Floats, y: Floats, corners: Floats, omega: Floats, square: Fl
             x[k], y[k] = value.real, value.imag
     if abs(middle) * omega[top] > TOLERANCE:
         _turn(x, y, 0.0, middle, omega, room)
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _series(room: Floats, e2: float, e3: float, gap: float, highest: float) -> int:
-    """Terms (even or odd, j) of twice `kirchhoff.divided_exponential`: sum_j of omega^(2j) (even + i omega odd), from
-    the elementary symmetric polynomials of its phases over omega; returns the last j needed up to `highest`."""
-    largest = 2.0 / 3.0 * gap * highest
-    even, odd, before = 1.0, 0.0, 0.0  # h_j with the signs of i^j, as in `kirchhoff_kernels`
-    room[0, 0], room[1, 0] = 1.0, 0.0
-    weight, bound, j, order = 1.0, 1.0, 0, 0.0
-    while bound > TOLERANCE and j < ROOM - 1:
-        j += 1
-        order += 2.0
-        even, odd, before = e2 * even + e3 * before, e2 * odd - e3 * even, odd
-        weight /= (order + 1.0) * (order + 2.0)
-        room[0, j], room[1, j] = even * weight, odd * weight / (order + 3.0)
-        bound *= largest * largest / ((order - 1.0) * order)
-    return j
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.special import eval_legendre, spherical_jn, spherical_yn
 
 from sonarsynth.acoustics.arrays import aperture_terms
 from sonarsynth.acoustics.facet_pulses import facet_response
@@ -22,6 +21,7 @@ from sonarsynth.world.meshes import Mesh, mesh_of
 from sonarsynth.world.moment import Body, Moment, Snap
 from sonarsynth.world.shapes import Box, Sphere
 from sonarsynth.world.sources import LogarithmicBubble
+from tests.spheres import exact_sphere
 
 C = 1500.0
 BED = 30.0
@@ -56,21 +56,6 @@ def transfer(found: Arrivals) -> Floats:
     return (found.amplitude[:, None] * shape * left * np.exp(1j * phase)).sum(axis=0)
 
 
-def exact_sphere(radius: float, out: float, back: float, cosine: float, rigid: bool = True) -> Floats:
-    """Echo (frequency,) of a point source from a sphere at a point receiver, by its series of spherical waves.
-
-    i k sum (2n+1) A_n h_n(k d1) h_n(k d2) P_n(cos), Morse and Ingard (1968), section 8.2, conjugated.
-    """
-    total = []
-    for k in 2.0 * np.pi * F / C:
-        n = np.arange(int(k * radius + 4.05 * (k * radius) ** (1 / 3) + 20))
-        h = [spherical_jn(n, x) + 1j * spherical_yn(n, x) for x in (k * out, k * back)]
-        j = spherical_jn(n, k * radius, rigid)
-        a = -j / (j + 1j * spherical_yn(n, k * radius, rigid))
-        total.append(np.conj(1j * k * np.sum((2 * n + 1) * a * h[0] * h[1] * eval_legendre(n, cosine))))
-    return np.array(total)
-
-
 @pytest.mark.parametrize("angle", [0.0, 60.0, 100.0])
 @pytest.mark.parametrize("surface", ["rigid", "soft"])
 def test_a_sphere_near_by_echoes_as_its_series_says_in_level_and_phase(angle: float, surface: str) -> None:
@@ -79,7 +64,7 @@ def test_a_sphere_near_by_echoes_as_its_series_says_in_level_and_phase(angle: fl
     turn = np.deg2rad(angle)
     source = centre + 12.0 * np.array([-np.cos(turn), np.sin(turn), 0.0])
     found = transfer(echo((body(mesh, centre),), source, (Kirchhoff(surface=surface),)))
-    ratio = found / exact_sphere(radius, 12.0, 10.0, np.cos(turn), surface == "rigid")
+    ratio = found / exact_sphere(F, C, radius, 12.0, 10.0, np.cos(turn), rigid=surface == "rigid")
     assert np.abs(20.0 * np.log10(np.abs(ratio))).max() < 0.5
     assert np.abs(np.angle(ratio)).max() < 0.2
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.special import eval_legendre, fresnel, spherical_jn, spherical_yn
+from scipy.special import fresnel
 
 from sonarsynth.acoustics.arrays import aperture_terms
 from sonarsynth.acoustics.facet_pulses import facet_response
@@ -23,6 +23,7 @@ from sonarsynth.world.meshes import Mesh, mesh_of
 from sonarsynth.world.moment import Body, Moment, Snap
 from sonarsynth.world.shapes import Box, Sphere
 from sonarsynth.world.sources import LogarithmicBubble
+from tests.spheres import exact_sphere
 
 C = 1500.0
 BED = 30.0
@@ -81,21 +82,6 @@ def straight(source: Floats, array: Floats = ARRAY) -> Floats:
     return np.exp(-2j * np.pi * F * r / C) / r
 
 
-def exact_sphere(radius: float, out: float, back: float, cosine: float) -> Floats:
-    """What a rigid sphere adds (frequency,) to a point source's wave at a point receiver: series of spherical waves.
-
-    i k sum (2n+1) A_n h_n(k d1) h_n(k d2) P_n(cos), Morse and Ingard (1968), section 8.2, conjugated.
-    """
-    total = []
-    for k in 2.0 * np.pi * F / C:
-        n = np.arange(int(k * radius + 4.05 * (k * radius) ** (1 / 3) + 20))
-        h = [spherical_jn(n, x) + 1j * spherical_yn(n, x) for x in (k * out, k * back)]
-        j = spherical_jn(n, k * radius, True)
-        a = -j / (j + 1j * spherical_yn(n, k * radius, True))
-        total.append(np.conj(1j * k * np.sum((2 * n + 1) * a * h[0] * h[1] * eval_legendre(n, cosine))))
-    return np.array(total)
-
-
 def ball(radius: float, fine: float = 0.14) -> Mesh:
     return mesh_of(Sphere(radius=radius, edge=fine * np.sqrt(C / 85e3 * radius)))
 
@@ -122,7 +108,7 @@ def test_behind_and_beside_a_sphere_the_whole_field_is_that_of_its_series(
     centre, turn = ARRAY + [back, 0.0, 0.0], np.pi - np.deg2rad(degrees)
     source = centre + out * np.array([-np.cos(turn), np.sin(turn), 0.0])
     found = transfer(heard((body(ball(radius), centre),), source))
-    exact = straight(source) + exact_sphere(radius, out, back, np.cos(turn))
+    exact = straight(source) + exact_sphere(F, C, radius, out, back, np.cos(turn))
     assert np.abs(20.0 * np.log10(np.abs(found / exact))).max() < level
     assert np.abs(found - exact).max() < error * np.abs(straight(source)).max()
 
