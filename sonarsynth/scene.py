@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
-from annotated_types import Ge, Le
+from annotated_types import Ge, Gt, Le
 from pydantic import Field, field_validator
 
 from sonarsynth.beamforming import Beamformer, FocusedDelayAndSum
-from sonarsynth.conventions import Floats, PositiveSeconds, Seconds
+from sonarsynth.conventions import Decibels, Floats, PositiveSeconds, Seconds
 from sonarsynth.description import description
 from sonarsynth.geometry import Pose
 from sonarsynth.randomness import stream
-from sonarsynth.ranging import Cancelling, IsovelocityRange, Locator, Ranging, SensorDelays
+from sonarsynth.ranging import AutoRange, Cancelling, Locator, Ranging, SensorDelays
 from sonarsynth.scattering import MirrorLobe, Scattering
 from sonarsynth.scattering.targets import Target, mesh_for
 from sonarsynth.sonar import Sonar
-from sonarsynth.synthesis import KernelDeposit, Synthesis
+from sonarsynth.synthesis import AutoSynthesis, Synthesis
 from sonarsynth.tracing import AutoTracing, Tracing
 from sonarsynth.world.environment import Environment
 from sonarsynth.world.meshes import Mesh
@@ -74,7 +74,12 @@ class Physics:
     """How sound travels."""
     scattering: Scattering = Field(default_factory=MirrorLobe)
     """How facets scatter it, of targets that do not say so themselves."""
-    synthesis: Synthesis = Field(default_factory=KernelDeposit)
+    subarrays: Literal["auto", "sensors"] | Annotated[int, Ge(1), Le(100_000)] = "auto"
+    """Parts that the array is cut into: paths are traced to the middle of each and expanded from there to its
+    hydrophones. `sensors`: every hydrophone by itself; `auto`: as few as the accuracy of the recipe allows."""
+    faintest: Literal["auto"] | Annotated[Decibels, Gt(0), Le(300)] = "auto"
+    """The faintest echoes of each target are left out, all of them together this far below the whole echo."""
+    synthesis: Synthesis = Field(default_factory=AutoSynthesis)
     """How signals are made from arrivals."""
     doppler: bool = True
     """Whether targets and sonar move while sound is under way; false: all is where it is at the instant of the frame.
@@ -105,7 +110,7 @@ class Processing:
     """How the snap's own reflections are taken out of the signals before imaging; left out: they stay in."""
     beamforming: Beamformer = Field(default_factory=FocusedDelayAndSum)
     """How the energy image is made."""
-    ranging: Ranging = Field(default_factory=IsovelocityRange)
+    ranging: Ranging = Field(default_factory=AutoRange)
     """How echoes are ranged and placed."""
 
 

@@ -7,12 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from sonarsynth.planning.arriving import arrivals_of
+from sonarsynth.planning.bending import propagation
 from sonarsynth.planning.checks import check_frame, check_methods, check_windows, read_inputs
+from sonarsynth.planning.choices import Choices, choices_from
+from sonarsynth.planning.choosing import choose
 from sonarsynth.planning.costs import stages
 from sonarsynth.planning.looks import Look, check_alike, survey
 from sonarsynth.planning.notes import notes
 from sonarsynth.planning.omissions import left_out
-from sonarsynth.planning.plans import PRODUCTS, Omission, Plan, Stage, Windows, resolve
+from sonarsynth.planning.plans import PRODUCTS, Errors, Omission, Plan, Stage, Windows
 from sonarsynth.planning.windows import frame_start, lay_windows
 from sonarsynth.recipe import Recipe
 from sonarsynth.scene import Frame
@@ -20,11 +24,15 @@ from sonarsynth.sonar import elements
 
 __all__ = [
     "PRODUCTS",
+    "Choices",
+    "Errors",
     "Omission",
     "Plan",
     "Stage",
     "Windows",
+    "arrivals_of",
     "check_unseen",
+    "choices_from",
     "chosen_products",
     "frame_start",
     "lay_windows",
@@ -38,11 +46,12 @@ COSTED = 5
 """Sequences over which the predicted cost is averaged."""
 
 
-def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS) -> Plan:
+def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS, choices: Choices | None = None) -> Plan:
     """Resolve a recipe: check the scene at every frame, make every choice, and predict sizes and cost.
 
     Of a dataset of more than looks.LOOKED_AT frames, so many are looked at; each other one is checked when it is
-    rendered.
+    rendered. `choices`: those that another plan of the same recipe made; left out: the cheapest that keep within the
+    accuracy of the recipe.
 
     Raises FieldError, naming the field, for a body above the surface or in the bed, a sonar or shrimp out of the
     water, a snap that cannot be made, a missing or broken file, or methods that cannot serve the scene; ValueError for
@@ -57,13 +66,15 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS) -> Plan:
         profile = read_inputs(scene)
         check_methods(scene, products)
     looks = survey(recipe)
-    propagation = resolve(scene.physics.tracing, profile)
+    ends = (looks[0].frames[0], looks[0].frames[-1])
+    paths = propagation(scene, profile, ends, recipe.accuracy.signal)
     windows = lay_windows(recipe, looks)
     check_windows(scene, windows)
     sizes = _sizes(recipe, windows)
     frame_bytes = sizes["sensor"] * sizes["sample"] * (2 if scene.sonar.converter else 4)
     shard = int(np.clip(SHARD_BYTES // max(frame_bytes, 1), 1, SHARD_FRAMES))
-    made = Plan(recipe, products, profile, propagation, windows, sizes=sizes, shard_frames=shard)
+    made = Plan(recipe, products, profile, paths, windows, sizes=sizes, shard_frames=shard)
+    made = choose(made, looks) if choices is None else replace(made, choices=choices)
     return replace(made, stages=_mean_stages(made, looks), left_out=left_out(made), warnings=notes(made, looks))
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from sonarsynth.planning.plans import Plan, Stage
 from sonarsynth.scattering import Kirchhoff
+from sonarsynth.synthesis import DirectSum
 from sonarsynth.tracing import Straight
 
 REFERENCE_TRANSFORM = 2.0e-3
@@ -44,8 +45,6 @@ RANGED_BEAMS = 60
 """Beams over threshold round one glint."""
 
 ERRORS = {
-    "kernel_deposit": "1e-4 of the peak",
-    "direct_sum": "rounding",
     "focused": "2e-7 of the peak; 0.16 dB at 25 degree corners at 20 m",
     "dense": "rounding",
 }
@@ -110,28 +109,61 @@ def _synthesis(plan: Plan) -> tuple[str, str, str, str, float, int]:
     if scene.world.environment.noise:
         work += sensor_samples * SECONDS["noise sensor sample"]
     stored = sensor_samples * (2 if scene.sonar.converter else 4) if "signals" in plan.products else 0
-    kind = scene.physics.synthesis.kind
-    return ("synthesise", kind, "asked for, or needed by the image", ERRORS[kind], work, stored)
+    error = f"{plan.errors.synthesis:.1g} of the peak" if plan.errors.synthesis > 0.0 else "rounding"
+    return ("synthesise", _synthesised(plan), "asked for, or needed by the image", error, work, stored)
+
+
+def _synthesised(plan: Plan) -> str:
+    """The method of synthesis in words."""
+    method = plan.choices.synthesis
+    if isinstance(method, DirectSum):
+        return method.kind
+    return f"{method.kind}, {method.width} wide, tolerance {method.tolerance:.1g}, {method.precision}"
+
+
+def _traced(plan: Plan) -> str:
+    """How paths are traced, in words."""
+    laws = ", ".join(dict.fromkeys(law.kind for law in plan.scene.laws))
+    parts = plan.choices.subarrays
+    to = "the array" if parts == 1 else f"each of {parts} subarrays"
+    if parts == plan.elements.count > 1:
+        to = "each hydrophone by itself"
+    words = [f"{plan.propagation.kind} rays to {to}", f"{plan.propagation.bounces} bounces", laws]
+    return ", ".join(word for word in words if word)
+
+
+def _bent(plan: Plan) -> str:
+    """What straight paths in bending water do to ranges, in words."""
+    return f"; bent rays {100.0 * plan.errors.ranging:.1g} cm" if plan.errors.ranging > 0.0 else ""
+
+
+def _expanded(plan: Plan) -> str:
+    """What tracing errs by, in words."""
+    if np.isnan(plan.errors.expansion):
+        return "not measured"
+    if plan.errors.expansion == 0.0:
+        return "none"
+    return f"{plan.errors.expansion:.1g} of the signals, measured at some hydrophones"
 
 
 def stages(plan: Plan) -> tuple[Stage, ...]:
     """What each stage will do, why, its error, and what it costs in one frame."""
     scene, sizes, factor = plan.scene, plan.sizes, machine_factor()
     sonar, processing = scene.sonar, scene.processing
+    traced = 1 if plan.choices.subarrays == 1 else 1 + plan.choices.subarrays
     snaps = max(sizes["snap"], 1)
     beams = sizes["azimuth"] * sizes["elevation"]
     gate = plan.windows.echo_stop - plan.windows.echo_start
     bins = (sonar.band.high - sonar.band.low) * gate
     straight = isinstance(plan.propagation, Straight)
     kind = "" if straight else "refracted "
-    laws = ", ".join(dict.fromkeys(law.kind for law in scene.laws))
     rows: list[tuple[str, str, str, str, float, int]] = [
         (
             "trace",
-            f"{plan.propagation.kind} rays, {plan.propagation.bounces} bounces, {laws}",
-            "one sound speed everywhere: rays are straight" if straight else "the sound speed varies with depth",
-            "measured: /truth/amplitude_error" + ("" if straight else ", wavefront_error"),
-            _tracing(plan, kind) * snaps * _ways(plan),
+            _traced(plan),
+            "rays bend by less than the accuracy allows" if straight else "the sound speed varies with depth",
+            _expanded(plan),
+            _tracing(plan, kind) * snaps * _ways(plan) * traced,
             0,
         ),
         (
@@ -159,7 +191,7 @@ def stages(plan: Plan) -> tuple[Stage, ...]:
         transform = sizes["sensor"] * gate * sonar.sampling_frequency * SECONDS["transform sensor sample"]
         image = transform + beams * bins * SECONDS["image beam bin"]
         stored = 4 * beams if "image" in plan.products else 0
-        beamformer = processing.beamforming
+        beamformer = plan.choices.beamforming
         rows.append(
             ("beamform", beamformer.kind, "asked for, or needed by the cloud", ERRORS[beamformer.kind], image, stored)
         )
@@ -167,9 +199,9 @@ def stages(plan: Plan) -> tuple[Stage, ...]:
         rows.append(
             (
                 "range",
-                processing.ranging.kind,
+                plan.choices.ranging.kind,
                 "asked for",
-                "predicted, /cloud/range_error",
+                "predicted, /cloud/range_error" + _bent(plan),
                 RANGED_BEAMS * SECONDS["range beam"],
                 28 * beams,
             )

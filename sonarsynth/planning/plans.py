@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.planning.bending import propagation
 from sonarsynth.planning.checks import check_shrimp, read_inputs
+from sonarsynth.planning.choices import Choices
 from sonarsynth.products import Paths
 from sonarsynth.recipe import Recipe
 from sonarsynth.scene import Scene
 from sonarsynth.sonar import Elements, elements
-from sonarsynth.tracing import AutoTracing, Refracted, Straight, Tracing
+from sonarsynth.tracing import Refracted, Straight
 from sonarsynth.world.environment import Profile
 from sonarsynth.world.water import absorption_db_per_m
 
@@ -66,6 +68,15 @@ class Windows:
     disturbed: int  # of the frames looked at: in whose echo window other snaps, or their echoes, are heard as well
 
 
+@dataclass(frozen=True)
+class Errors:
+    """What a plan's choices err by."""
+
+    expansion: float = float("nan")  # of signals, relative: of expanding paths over the array, and of faint ones
+    synthesis: float = float("nan")  # of signals, relative to their peak
+    ranging: float = float("nan")  # m: of the method that turns delays into places
+
+
 @dataclass(frozen=True, eq=False)
 class Plan:
     """A recipe with every choice made. Everything that a frame needs, and nothing that it computes."""
@@ -75,6 +86,8 @@ class Plan:
     profile: Profile
     propagation: Straight | Refracted
     windows: Windows
+    choices: Choices = field(default_factory=Choices)
+    errors: Errors = field(default_factory=Errors)
     stages: tuple[Stage, ...] = ()
     left_out: tuple[Omission, ...] = ()
     warnings: tuple[str, ...] = ()
@@ -137,6 +150,8 @@ class Plan:
             "predicted_seconds": self.predicted_seconds,
             "predicted_bytes": self.predicted_bytes,
             "sizes": self.sizes,
+            "choices": self.choices.as_json(),
+            "errors": {name: None if np.isnan(value) else value for name, value in vars(self.errors).items()},
             "shard_frames": self.shard_frames,
             "window": {
                 "samples": self.windows.samples,
@@ -148,15 +163,13 @@ class Plan:
         }
 
 
-def resolve(tracing: Tracing, profile: Profile) -> Straight | Refracted:
-    """How sound travels in this water."""
-    return tracing.resolve(profile) if isinstance(tracing, AutoTracing) else tracing
-
-
 @lru_cache(maxsize=16)
 def _of_sequence(plan: Plan, sequence: int) -> Plan:
     with plan.recipe.spanned.naming(sequence):
         scene = plan.recipe.scene_of(sequence)
         profile = read_inputs(scene)
         check_shrimp(scene)
-    return replace(plan, sequence=sequence, profile=profile, propagation=resolve(scene.physics.tracing, profile))
+        first = sequence * plan.recipe.steps
+        ends = (plan.recipe.frame(first)[1], plan.recipe.frame(first + plan.recipe.steps - 1)[1])
+    paths = propagation(scene, profile, ends, plan.recipe.accuracy.signal)
+    return replace(plan, sequence=sequence, profile=profile, propagation=paths)

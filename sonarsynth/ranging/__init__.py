@@ -7,6 +7,7 @@ from typing import Annotated, Protocol
 from sonarsynth.description import BY_KIND
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Bearings, EnergyImage, PointCloud, Signals
+from sonarsynth.ranging.auto import AutoRange
 from sonarsynth.ranging.cancelling import WavefrontCancelling
 from sonarsynth.ranging.isovelocity import IsovelocityRange
 from sonarsynth.ranging.refracted import RefractedRange
@@ -15,6 +16,7 @@ from sonarsynth.sonar import Elements, Sonar
 from sonarsynth.world.environment import Profile
 
 __all__ = [
+    "AutoRange",
     "Cancelling",
     "CancellingMethod",
     "IsovelocityRange",
@@ -89,4 +91,4 @@ class RangingMethod(Protocol):
 
 Locator = Annotated[SensorDelays, BY_KIND]
 Cancelling = Annotated[WavefrontCancelling, BY_KIND]
-Ranging = Annotated[IsovelocityRange | RefractedRange, BY_KIND]
+Ranging = Annotated[AutoRange | IsovelocityRange | RefractedRange, BY_KIND]

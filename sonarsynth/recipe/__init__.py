@@ -16,6 +16,7 @@ from sonarsynth.description import description
 from sonarsynth.recipe.grid import Axis, Together, entry_tag
 from sonarsynth.recipe.sequences import Sequences
 from sonarsynth.recipe.splits import SPLITS, Splits
+from sonarsynth.recipe.tolerance import Accuracy
 from sonarsynth.recipe.values import Plain
 from sonarsynth.recipe.variants import Variants, target_meshes, variant_numbers
 from sonarsynth.recipe.variations import Choice, Normal, Sobol, Uniform, Variation
@@ -28,6 +29,7 @@ from sonarsynth.world.sound_speed import Cast
 __all__ = [
     "FILE_KINDS",
     "SPLITS",
+    "Accuracy",
     "Axis",
     "Choice",
     "Normal",
@@ -55,6 +57,8 @@ class Recipe:
     seed: Annotated[int, Ge(0)] = 0
     licence: str = "CC-BY-4.0"
     """Licence of the dataset (not of the software)."""
+    accuracy: Accuracy = Accuracy()
+    """How much the simulation may err; the planner chooses the cheapest methods that err no more."""
     scene: Scene
     grid: tuple[Entry, ...] = ()
     """What the sequences span: every combination of the values of the entries, the last entry changing fastest."""

@@ -17,10 +17,11 @@ import numpy as np
 from sonarsynth.conventions import Floats
 from sonarsynth.description import FieldError
 from sonarsynth.labelling import SLICES, Band, echoes, label, ledger, path_powers
-from sonarsynth.planning import Plan, check_unseen, frame_start, plan
+from sonarsynth.planning import Plan, arrivals_of, check_unseen, plan
 from sonarsynth.products import Arrivals, Bearings, Echoes, EnergyImage, Ledger, Signals, Truth
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import Recipe
+from sonarsynth.render.hearing import hear
 from sonarsynth.render.stored import (
     Values,
     bearing_values,
@@ -83,26 +84,10 @@ class Heard:
 
 def trace_frame(plan: Plan, index: int) -> Traced:
     """Every path of a frame, and its truth."""
-    from sonarsynth.tracing.arrivals import trace
-    from sonarsynth.tracing.moving import Moving
-
     plan = plan.at(index)
     scene, frame = plan.recipe.frame(index)
     check_unseen(plan, frame)
-    environment, sonar = scene.world.environment, scene.sonar
-    velocities = np.array([body.velocity for body in frame.moment.bodies]).reshape(-1, 3)
-    arrivals = trace(
-        environment,
-        plan.profile,
-        frame.moment,
-        frame.sonar_pose,
-        plan.elements,
-        float(plan.absorption(sonar.band.centre)),
-        plan.propagation,
-        scene.laws,
-        band=(sonar.band.low, sonar.band.high),
-        moving=Moving(velocities, frame.sonar_velocity) if scene.physics.doppler else None,
-    )
+    sonar, arrivals = scene.sonar, arrivals_of(plan, frame)
     levels = snap_levels(frame.moment.snaps)
     straight = isinstance(plan.propagation, Straight)
     truth = label(frame.moment, frame.sonar_pose, sonar.beams, plan.connect, levels, straight)
@@ -183,7 +168,7 @@ def beamform_frame(plan: Plan, index: int, traced: Traced) -> Heard:
             bed = scene.world.environment.depth
             pose = frame.sonar_pose
             imaged = processing.cancelling.cancel(signals, bearings, plan.elements, sonar, pose, bed, (start, stop))
-        image = processing.beamforming.image(imaged, plan.elements, sonar, start, stop)
+        image = plan.choices.beamforming.image(imaged, plan.elements, sonar, start, stop)
     else:  # no direct pulse was found, or an echo was taken for it: no clock, so no image, rather than an arbitrary one
         silent = np.full((sonar.beams.elevations, sonar.beams.azimuths), np.nan, np.float32)
         image = EnergyImage(silent, sonar.beams.azimuth, sonar.beams.elevation, np.nan, np.nan)
@@ -196,16 +181,7 @@ def synthesise(plan: Plan, traced: Traced) -> Signals:
 
     plan = plan.at(traced.frame.index)
     scene, frame = plan.scene, traced.frame
-    sonar = scene.sonar
-    signals = scene.physics.synthesis.signals(
-        traced.arrivals,
-        frame.moment.snaps,
-        plan.elements,
-        sonar,
-        plan.absorption,
-        frame_start(plan, frame),
-        plan.windows.samples,
-    )
+    sonar, signals = scene.sonar, hear(plan, frame, traced.arrivals)
     noise = scene.world.environment.noise
     if noise is not None:
         random = stream(frame.seed, "noise", frame.key, frame.step)
@@ -219,7 +195,7 @@ def measure_isolated(plan: Plan, traced: Traced) -> Floats:
 
     plan = plan.at(traced.frame.index)
     scene, book = plan.scene, traced.ledger
-    method, snaps = scene.physics.synthesis, traced.frame.moment.snaps
+    method, snaps = plan.choices.synthesis, traced.frame.moment.snaps
     measured = measured_levels(method, book.isolated, snaps, scene.sonar, plan.absorption)
     return of_isolated(book, traced.truth.snap_level[book.isolated.snap] + measured)
 
@@ -240,7 +216,7 @@ def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
         values |= table("/image", energy=heard.image.energy, start=heard.image.start, stop=heard.image.stop)
     if "cloud" in plan.products:
         scene = plan.scene
-        cloud = scene.processing.ranging.cloud(
+        cloud = plan.choices.ranging.cloud(
             heard.imaged,
             heard.image,
             heard.bearings,

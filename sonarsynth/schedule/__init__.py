@@ -6,12 +6,12 @@ import json
 import os
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from sonarsynth import store
-from sonarsynth.planning import PRODUCTS, Plan, chosen_products, plan
+from sonarsynth.planning import PRODUCTS, Plan, choices_from, chosen_products, plan
 from sonarsynth.recipe import Recipe
 from sonarsynth.schedule import tasks
 from sonarsynth.schedule.tasks import STAGES, Failure, Job, Written
@@ -96,6 +96,7 @@ def build(
     made = what if isinstance(what, Plan) else plan(what, chosen_products(products))
     path = Path(os.path.abspath(path))
     with store.lock(path):
+        made = made if restart else _as_begun(path, made)
         store.create(path, made, restart=restart)
         chosen = range(made.recipe.frames) if frames is None else sorted(set(frames))
         todo = store.missing(path, made, chosen)
@@ -112,6 +113,14 @@ def build(
             report.seconds = time.perf_counter() - began
             report.client_peak_bytes = tasks.peak_memory()
     return report
+
+
+def _as_begun(path: Path, made: Plan) -> Plan:
+    """The plan, with the choices that a store of the same recipe was begun with: another machine may choose others."""
+    there = store.root_attributes(path)
+    if there.get("recipe_digest") != made.digest or "choices" not in there:
+        return made
+    return replace(made, choices=choices_from(there["choices"]))
 
 
 def usable_cores() -> int:

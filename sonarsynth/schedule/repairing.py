@@ -10,7 +10,7 @@ from typing import Any
 
 from sonarsynth import config, store
 from sonarsynth.description import FieldError
-from sonarsynth.planning import Plan, plan
+from sonarsynth.planning import Plan, choices_from, plan
 from sonarsynth.schedule import Progress, tasks, usable_cores
 from sonarsynth.schedule.tasks import Failure, Job, Written
 from sonarsynth.store import Findings, Mismatch, Problem
@@ -105,7 +105,8 @@ def _plan_of(path: Path, found: Findings, anyway: bool) -> Plan:
             f"{path}: its recipe cannot be read any more, neither in {MARKS} nor in zarr.json: build it anew"
         ) from None
     try:
-        made = plan(config.loads(text, str(path)), products)
+        choices = choices_from(attrs["choices"]) if "choices" in attrs else None
+        made = plan(config.loads(text, str(path)), products, choices)
     except OSError as error:
         raise Mismatch(f"{path}: {error.filename}, which its recipe names, cannot be read: {error.strerror}") from None
     except (ValueError, FieldError) as error:

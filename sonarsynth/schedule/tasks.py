@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from sonarsynth import config, render, store
-from sonarsynth.planning import Plan, plan
+from sonarsynth.planning import Plan, choices_from, plan
 from sonarsynth.store.layout import layout_of
 
 STAGES = ("trace", "beamform", "range")
@@ -117,8 +117,9 @@ def plan_of(job: Job) -> Plan:
     Raises store.Damage where the recipe, or a file that it names, is not the one to build.
     """
     if job not in _plans:
-        text = store.root_attributes(job.path).get("recipe", "")
-        made = plan(config.loads(text, job.path), frozenset(job.products))
+        stored = store.root_attributes(job.path)
+        recipe = config.loads(stored.get("recipe", ""), job.path)
+        made = plan(recipe, frozenset(job.products), choices_from(stored.get("choices")))
         if made.digest != job.digest:
             raise store.Damage(f"{job.path}: a file that the recipe names is not the same on this worker")
         remember(job, made)

@@ -9,13 +9,23 @@ from sonarsynth.conventions import Floats
 from sonarsynth.description import BY_KIND
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.sonar import Elements, Sonar
+from sonarsynth.synthesis.auto import AutoSynthesis
 from sonarsynth.synthesis.direct_sum import DirectSum
 from sonarsynth.synthesis.instrument import add_noise, convert
 from sonarsynth.synthesis.kernel_deposit import KernelDeposit
 from sonarsynth.synthesis.pulse import pulse_support
 from sonarsynth.world.moment import Snap
 
-__all__ = ["DirectSum", "KernelDeposit", "SignalSynthesis", "Synthesis", "add_noise", "convert", "pulse_support"]
+__all__ = [
+    "AutoSynthesis",
+    "DirectSum",
+    "KernelDeposit",
+    "SignalSynthesis",
+    "Synthesis",
+    "add_noise",
+    "convert",
+    "pulse_support",
+]
 
 
 class SignalSynthesis(Protocol):
@@ -40,5 +50,5 @@ class SignalSynthesis(Protocol):
         ...
 
 
-Synthesis = Annotated[KernelDeposit | DirectSum, BY_KIND]
+Synthesis = Annotated[AutoSynthesis | KernelDeposit | DirectSum, BY_KIND]
 """The methods of synthesis, by `kind`."""

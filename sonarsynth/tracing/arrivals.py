@@ -27,6 +27,13 @@ if TYPE_CHECKING:
     from sonarsynth.tracing import Propagation
 
 
+NEGLIGIBLE = 1e-7
+"""The faintest echoes of a snap from each target are left out, so many that their powers together stay below this part
+of the power of all from there (70 dB); each counts with the largest amplitude that it has anywhere on the array. Of
+coherent ones, which add by amplitude, so many that their amplitudes together stay below the root of this part of that
+of the largest."""
+
+
 @dataclass(frozen=True, eq=False)
 class ArrayLegs:
     """Every facet that the array sees, with its legs to the array: serves any snap without tracing this side again."""
@@ -41,6 +48,7 @@ class ArrayLegs:
     sonar_pose: Pose
     elements: Elements
     band: tuple[float, float]  # Hz
+    negligible: float = NEGLIGIBLE  # power of the faintest echoes, that are left out
 
     @property
     def bending(self) -> Profile:
@@ -65,18 +73,19 @@ def trace(
     *,
     band: tuple[float, float],
     moving: Moving | None = None,
+    negligible: float = NEGLIGIBLE,
 ) -> Arrivals:
     """The arrivals of a frame, sorted by snap; of each first those that met no target, then echoes by target, then the
     shadow waves of targets that scatter forward.
 
     environment, profile: the water; moment: bodies and snaps; sonar_pose, elements: the array; absorption: dB/m at the
-    centre of the band; propagation: how sound travels, and how many bounces are followed; laws: how the facets of
-    each body scatter; band: Hz; moving: velocities, where they count. A facet counts where it is lit by the snap and
-    seen by the array centre, with no body in between (all sensors share what the centre sees). The snap itself is heard
-    if no body stands in between, but for those that scatter forward (`tracing.forward`). Raises ValueError for anything
-    outside the water.
+    centre of the band; propagation: how sound travels, and how many bounces are followed; laws: how the facets of each
+    body scatter; band: Hz; moving: velocities, where they count; negligible: see `NEGLIGIBLE`. A facet counts where it
+    is lit by the snap and seen by the array centre, with no body in between (all sensors share what the centre sees).
+    The snap itself is heard if no body stands in between, but for those that scatter forward (`tracing.forward`).
+    Raises ValueError for anything outside the water.
     """
-    legs = array_legs(environment, profile, moment.bodies, sonar_pose, elements, propagation, band)
+    legs = array_legs(environment, profile, moment.bodies, sonar_pose, elements, propagation, band, negligible)
     return arrivals(legs, moment.snaps, absorption, laws, moving)
 
 
@@ -88,6 +97,7 @@ def array_legs(
     elements: Elements,
     propagation: Propagation,
     band: tuple[float, float],
+    negligible: float = NEGLIGIBLE,
 ) -> ArrayLegs:
     """Facet to array, for every facet of every body that leaves a ray for the array that no body hides.
 
@@ -103,7 +113,9 @@ def array_legs(
     facets = every.select(kept)
     group = facets.target[legs.row]
     over = fronts(legs, group, environment, bent, sonar_pose, elements, propagation, band)
-    return ArrayLegs(legs, over, facets, bodies, environment, profile, propagation, sonar_pose, elements, band)
+    return ArrayLegs(
+        legs, over, facets, bodies, environment, profile, propagation, sonar_pose, elements, band, negligible
+    )
 
 
 def bending(profile: Profile, propagation: Propagation, sonar_pose: Pose) -> Profile:

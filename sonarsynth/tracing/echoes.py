@@ -25,11 +25,6 @@ from sonarsynth.world.moment import Body, Snap
 if TYPE_CHECKING:
     from sonarsynth.tracing.arrivals import ArrayLegs
 
-NEGLIGIBLE = 1e-7
-"""The faintest echoes of a snap from each target are left out, so many that their powers together stay below this part
-of the power of all from there (70 dB); each counts with the largest amplitude that it has anywhere on the array. Of
-coherent ones, which add by amplitude, so many that their amplitudes together stay below the root of this part of that
-of the largest."""
 
 ENOUGH = 1e-4
 """Error of amplitudes over the aperture, of the strongest echo's, at which polynomials of the second degree will do."""
@@ -104,7 +99,8 @@ def echoes(
     pulses = Pulses.join([g.pulses(array.centre) for g in groups])
     row, amplitude = _columns(groups, "row", "amplitude")
     strongest = np.maximum(np.abs(np.concatenate(few)).max(axis=1, initial=0.0), np.abs(amplitude)) * factor[row]
-    loud = _loud(strongest * _heard(pulses, array.band), pulses.coherent, facets.target[out.facet[row]])
+    target = facets.target[out.facet[row]]
+    loud = _loud(strongest * _heard(pulses, array.band), pulses.coherent, target, array.negligible)
     mine = [np.flatnonzero(part) for part in np.split(loud, np.cumsum([len(g.row) for g in groups])[:-1])]
     groups = [g.select(keep) for g, keep in zip(groups, mine, strict=True)]
     row, amplitude, sign = _columns(groups, "row", "amplitude", "sign")
@@ -188,15 +184,15 @@ def _pairs(facet: Ints, row: Ints, facets: int) -> tuple[Ints, Ints]:
     return way, begin[facet[way]] + within
 
 
-def _loud(strength: Floats, coherent: Bools, target: Ints) -> Bools:
-    """Which (path,) are kept: all but the faintest of each target, by `NEGLIGIBLE`."""
+def _loud(strength: Floats, coherent: Bools, target: Ints, negligible: float) -> Bools:
+    """Which (path,) are kept: all but the faintest of each target, by `arrivals.NEGLIGIBLE`."""
     keep = np.ones(len(strength), bool)
     for number, exponent in product(np.unique(target), (1, 2)):
         some = np.flatnonzero((target == number) & (coherent == (exponent == 1)))
         loudest = strength[some].max(initial=0.0)
         size = (strength[some] / (loudest or 1.0)) ** exponent  # amplitudes may be too small to be squared
         order = np.argsort(size, kind="stable")
-        least = NEGLIGIBLE * size.sum() if exponent == 2 else np.sqrt(NEGLIGIBLE)
+        least = negligible * size.sum() if exponent == 2 else np.sqrt(negligible)
         keep[some[order[np.cumsum(size[order]) <= least]]] = False
     return keep
 

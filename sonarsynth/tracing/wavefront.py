@@ -63,7 +63,7 @@ class Probes:
         return np.where(np.isnan(values).any(axis=1), np.inf, error)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=1024)
 def probes(elements: Elements) -> Probes:
     """Probe sensors of an array, each the one farthest from those before it, from the element farthest out."""
     position = elements.position

@@ -1,0 +1,41 @@
+"""The arrivals of a frame by the methods of its plan, at the whole array or at a part of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonarsynth.geometry import Pose
+from sonarsynth.planning.plans import Plan
+from sonarsynth.products import Arrivals
+from sonarsynth.scene import Frame
+from sonarsynth.sonar.subarrays import Subarray
+
+
+def arrivals_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Arrivals:
+    """Every path of a frame to the middle of the array, or of a part of it, expanded over its hydrophones.
+
+    `plan` is that of the frame's sequence. Raises ValueError for anything outside the water.
+    """
+    from sonarsynth.tracing.arrivals import trace
+    from sonarsynth.tracing.moving import Moving
+
+    scene, sonar = plan.scene, plan.scene.sonar
+    velocities = np.array([body.velocity for body in frame.moment.bodies]).reshape(-1, 3)
+    return trace(
+        scene.world.environment,
+        plan.profile,
+        frame.moment,
+        frame.sonar_pose if part is None else moved_to(frame.sonar_pose, part),
+        plan.elements if part is None else part.elements,
+        float(plan.absorption(sonar.band.centre)),
+        plan.propagation,
+        scene.laws,
+        band=(sonar.band.low, sonar.band.high),
+        moving=Moving(velocities, frame.sonar_velocity) if scene.physics.doppler else None,
+        negligible=plan.choices.negligible,
+    )
+
+
+def moved_to(pose: Pose, part: Subarray) -> Pose:
+    """The pose of a part of an array that has a pose."""
+    return Pose(pose.to_world(part.centre[None, :])[0], pose.orientation)

@@ -1,0 +1,41 @@
+"""The choices of a plan: what was left to the planner, made concrete."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from annotated_types import Ge, Lt
+from pydantic import TypeAdapter
+
+from sonarsynth.beamforming import DenseDelayAndSum, FocusedDelayAndSum
+from sonarsynth.conventions import Number
+from sonarsynth.description import BY_KIND, description
+from sonarsynth.ranging import IsovelocityRange, RefractedRange
+from sonarsynth.synthesis import DirectSum, KernelDeposit
+
+
+@description
+class Choices:
+    """Methods and their settings, the same for every frame of a dataset. The arrays of a store follow from the recipe
+    and these alone."""
+
+    subarrays: Annotated[int, Ge(1)] = 1
+    """Parts that the array is cut into; as many as it has hydrophones: each is traced by itself."""
+    negligible: Annotated[Number, Ge(0), Lt(1)] = 1e-7
+    """Share of the power of a target's echo that its faintest paths may have, and be left out."""
+    synthesis: Annotated[KernelDeposit | DirectSum, BY_KIND] = KernelDeposit()
+    beamforming: Annotated[FocusedDelayAndSum | DenseDelayAndSum, BY_KIND] = FocusedDelayAndSum()
+    ranging: Annotated[IsovelocityRange | RefractedRange, BY_KIND] = IsovelocityRange()
+
+    def as_json(self) -> dict[str, Any]:
+        """The choices as plain JSON values."""
+        value: dict[str, Any] = _CHOICES.dump_python(self, mode="json")
+        return value
+
+
+_CHOICES: TypeAdapter[Choices] = TypeAdapter(Choices)
+
+
+def choices_from(value: object) -> Choices:
+    """Choices from JSON values, as `Choices.as_json` gives them. Raises ValueError where they are none."""
+    return _CHOICES.validate_python(value)

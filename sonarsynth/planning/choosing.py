@@ -1,0 +1,190 @@
+"""`auto` made concrete: the cheapest choices that keep within the accuracy of a recipe.
+
+The error of signals is spent in three parts, whose squares add up: paths that are too faint, the synthesis, and paths
+that are expanded over the array (or parts of it) from its middle. The first two have bounds; the third is measured, in
+a few frames at a few hydrophones that are traced by themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from sonarsynth.beamforming import DenseDelayAndSum
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.planning.arriving import arrivals_of
+from sonarsynth.planning.bending import ranging_error
+from sonarsynth.planning.choices import Choices
+from sonarsynth.planning.looks import Look
+from sonarsynth.planning.plans import Errors, Plan
+from sonarsynth.planning.windows import frame_start
+from sonarsynth.products import Arrivals
+from sonarsynth.ranging import AutoRange, IsovelocityRange, RefractedRange
+from sonarsynth.recipe import Accuracy
+from sonarsynth.scene import Frame, Scene
+from sonarsynth.sonar import Elements
+from sonarsynth.sonar.subarrays import Subarray, subarray, subarrays
+from sonarsynth.synthesis import AutoSynthesis, DirectSum, KernelDeposit
+from sonarsynth.synthesis.auto import deposit_error, deposit_for
+
+FAINT, SYNTHESIS, EXPANSION = 0.1, 0.1, 0.8
+"""Shares of the square of the error allowed to signals: of paths left out, of the synthesis, of expansions."""
+HEARD_AT = 4
+"""Hydrophones that are traced by themselves to measure what expansions err by."""
+MEASURED = 3
+"""Frames of a dataset that expansions are measured in."""
+SAFETY = 1.25
+"""What was measured at some hydrophones of some frames may be so much more at others."""
+GOLDEN = 0.03
+"""Error of the synthesis that measures, over what is allowed."""
+
+
+def choose(plan: Plan, looks: Sequence[Look]) -> Plan:
+    """A plan whose windows are laid, with its choices made. Nothing in them depends on how fast this machine is."""
+    scene, accuracy = plan.scene, plan.recipe.accuracy
+    some = _some(looks)
+    bent = max((ranging_error(look.scene, look.profile, look.frames) for look in some), default=0.0)
+    synthesis = _synthesis(scene, accuracy)
+    choices = Choices(
+        subarrays=1,
+        negligible=_negligible(scene, accuracy),
+        synthesis=synthesis,
+        beamforming=_beamforming(plan, accuracy),
+        ranging=_ranging(scene, accuracy, bent),
+    )
+    made = replace(plan, choices=choices)
+    count, error = _subarrays(made, [look.frames[0].index for look in some])
+    straight = isinstance(choices.ranging, IsovelocityRange)
+    by_synthesis = deposit_error(synthesis) if isinstance(synthesis, KernelDeposit) else 0.0
+    return replace(
+        made,
+        choices=replace(choices, subarrays=count),
+        errors=Errors(error, by_synthesis, bent if straight else 0.0),
+    )
+
+
+def _some(looks: Sequence[Look]) -> list[Look]:
+    """Frames of the dataset to measure in, one a look: of different sequences, and along them."""
+    real = [look for look in looks if look.real]
+    chosen = [real[n] for n in np.unique(np.linspace(0, len(real) - 1, MEASURED).round().astype(int))]
+    if len(chosen) < MEASURED:
+        frames = chosen[0].frames
+        wanted = np.unique(np.linspace(0, len(frames) - 1, MEASURED).round().astype(int))
+        return [replace(chosen[0], frames=(frames[n],)) for n in wanted]
+    return [replace(one, frames=(one.frames[n * (len(one.frames) - 1) // 2],)) for n, one in enumerate(chosen)]
+
+
+def _negligible(scene: Scene, accuracy: Accuracy) -> float:
+    if scene.physics.faintest != "auto":
+        return float(10.0 ** (-scene.physics.faintest / 10.0))
+    return 0.0 if accuracy.exact else FAINT * accuracy.signal**2
+
+
+def _synthesis(scene: Scene, accuracy: Accuracy) -> KernelDeposit | DirectSum:
+    method = scene.physics.synthesis
+    if not isinstance(method, AutoSynthesis):
+        return method
+    return DirectSum() if accuracy.exact else method.resolve(np.sqrt(SYNTHESIS) * accuracy.signal)
+
+
+def _beamforming(plan: Plan, accuracy: Accuracy) -> Any:
+    method = plan.scene.processing.beamforming
+    if accuracy.exact:
+        return DenseDelayAndSum(focus=method.focus, shading=method.shading)
+    return method
+
+
+def _ranging(scene: Scene, accuracy: Accuracy, bent: float) -> IsovelocityRange | RefractedRange:
+    method = scene.processing.ranging
+    if not isinstance(method, AutoRange):
+        return method
+    return method.resolve(straight=bent == 0.0 if accuracy.exact else bent <= accuracy.range_m)
+
+
+def _subarrays(plan: Plan, indices: Sequence[int]) -> tuple[int, float]:
+    """Parts that the array is cut into, and what signals err by then."""
+    wanted, count = plan.scene.physics.subarrays, plan.elements.count
+    if wanted == "sensors" or (wanted == "auto" and plan.recipe.accuracy.exact):
+        return count, 0.0
+    measures = [Expansion.of(plan, index) for index in indices]
+    allowed = np.inf if wanted != "auto" else np.sqrt(EXPANSION) * plan.recipe.accuracy.signal / SAFETY
+    parts, errors = 1 if wanted == "auto" else min(wanted, count), [np.inf]
+    while parts < count:
+        errors = []
+        for measure in measures:
+            errors.append(measure.error(parts))
+            if errors[-1] > allowed:
+                break
+        if errors[-1] <= allowed:
+            break
+        parts, errors = min(parts * (2 if errors[-1] < 3.0 * allowed else 4), count), [0.0]
+    return parts, max(errors)
+
+
+@dataclass(frozen=True, eq=False)
+class Expansion:
+    """A frame at a few hydrophones, each traced by itself: what expansions are measured against."""
+
+    plan: Plan
+    frame: Frame
+    sensor: Ints  # (heard,)
+    exact: tuple[Floats, Floats]  # echoes, and direct arrivals (heard, sample) Pa
+
+    @staticmethod
+    def of(plan: Plan, index: int) -> Expansion:
+        """Trace a frame to some hydrophones one by one, and synthesise what each hears."""
+        plan = plan.at(index)
+        frame = plan.recipe.frame(index)[1]
+        sensor = heard_at(plan.elements)
+        every = replace(plan, choices=replace(plan.choices, negligible=0.0))
+        rows = []
+        for one in sensor:
+            part = subarray(plan.elements, np.array([one]))
+            rows.append(_heard(plan, frame, arrivals_of(every, frame, part), part.elements))
+        return Expansion(plan, frame, sensor, (np.vstack([r[0] for r in rows]), np.vstack([r[1] for r in rows])))
+
+    def error(self, parts: int) -> float:
+        """Error of signals, relative, where the array is cut into so many parts: of echoes or direct arrivals."""
+        found = tuple(np.zeros_like(x) for x in self.exact)
+        for part in subarrays(self.plan.elements, parts):
+            rows = np.flatnonzero(np.isin(self.sensor, part.sensor))
+            if len(rows):
+                arrivals = arrivals_of(self.plan, self.frame, part)
+                own = np.searchsorted(part.sensor, self.sensor[rows])
+                for out, made in zip(found, _heard(self.plan, self.frame, arrivals, _with_rim(part, own)), strict=True):
+                    out[rows] = made[: len(rows)]
+        sizes = [float(np.linalg.norm(x)) for x in self.exact]
+        errors = [float(np.linalg.norm(a - b)) for a, b in zip(found, self.exact, strict=True)]
+        return max((e / size for e, size in zip(errors, sizes, strict=True) if size > 0.0), default=0.0)
+
+
+def heard_at(elements: Elements) -> Ints:
+    """Live hydrophones spread through an array, by golden ratio, ascending."""
+    live = np.flatnonzero(elements.gain)
+    count = min(HEARD_AT, len(live))
+    return np.unique(live[np.floor(np.mod((np.arange(count) + 0.5) * 0.6180339887498949, 1.0) * len(live)).astype(int)])
+
+
+def _with_rim(part: Subarray, own: Ints) -> Elements:
+    """Some elements of a part (own,), and after them the one that is farthest out: so that polynomials over the
+    aperture mean the same."""
+    elements = part.elements
+    rim = int(np.argmax(np.linalg.norm(elements.position, axis=1)))
+    rows = np.append(own, rim)
+    column, row = elements.column[rows], elements.row[rows]
+    return replace(elements, position=elements.position[rows], gain=elements.gain[rows], column=column, row=row)
+
+
+def _heard(plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements) -> tuple[Floats, Floats]:
+    """Echoes and direct arrivals (sensor, sample) in Pa, each by itself, of given arrivals."""
+    method = deposit_for(GOLDEN * plan.recipe.accuracy.signal)
+    start, samples = frame_start(plan, frame), plan.windows.samples
+    sonar, snaps = plan.scene.sonar, frame.moment.snaps
+    echoes, direct = (
+        method.pressure(arrivals.select(some), snaps, elements, sonar, plan.absorption, start, samples)[0]
+        for some in (~arrivals.direct, arrivals.direct)
+    )
+    return echoes, direct

@@ -1,0 +1,29 @@
+"""How much the simulation may err: one tolerance, which the planner spends at the least cost."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from annotated_types import Ge, Gt, Le
+
+from sonarsynth.conventions import Number
+from sonarsynth.description import description
+
+
+@description
+class Accuracy:
+    """Largest error that is allowed to what the scene describes, against computing it the slow, exact way.
+
+    Exact: paths are traced to each hydrophone by itself, none is too faint, and summed one by one in float64; every
+    beam is steered with the exact delay of every hydrophone; echoes are ranged along rays. What the scene says is
+    taken at its word: its facets, its band and its beams are not errors.
+    """
+
+    signal: Annotated[Number, Ge(1e-7), Le(0.3)] = 1e-3
+    """Error of the echoes, and of the direct arrivals, relative: root of the summed squares, over the array."""
+    range_m: Annotated[Number, Gt(0)] = 0.01
+    """Error of ranges by the method that turns delays into places, in m."""
+    image_db: Annotated[Number, Gt(0), Le(10)] = 0.1
+    """Error of the energy in a beam, in dB, within 20 dB of the brightest."""
+    exact: bool = False
+    """Whether everything is computed the slow, exact way, but for what the scene chooses otherwise."""

@@ -1,0 +1,56 @@
+"""An array cut into parts, each of which is small enough to be taken for one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.sonar.hydrophones import Elements
+
+
+@dataclass(frozen=True, eq=False)
+class Subarray:
+    """Some elements of an array, round a centre of their own."""
+
+    sensor: Ints  # (element,) numbers in the array, ascending
+    centre: Floats  # (xyz) m, sonar frame
+    elements: Elements  # positions from the centre
+
+
+@lru_cache(maxsize=16)
+def subarrays(elements: Elements, count: int) -> tuple[Subarray, ...]:
+    """Cut an array into at least `count` parts, by halves along their longer sides; no more than it has elements.
+
+    Parts of dead elements alone are left out: nothing is heard there.
+    """
+    parts = [np.arange(elements.count)]
+    while len(parts) < min(count, elements.count):
+        parts = [half for part in parts for half in _halves(elements.position, part)]
+    return tuple(subarray(elements, part) for part in parts if elements.gain[part].any())
+
+
+def subarray(elements: Elements, sensor: Ints) -> Subarray:
+    """The part of an array with these elements, about the middle of the box round them."""
+    position = elements.position[sensor]
+    centre = 0.5 * (position.min(axis=0) + position.max(axis=0))
+    own = replace(
+        elements,
+        position=position - centre,
+        gain=elements.gain[sensor],
+        column=elements.column[sensor],
+        row=elements.row[sensor],
+    )
+    return Subarray(sensor, centre, own)
+
+
+def _halves(position: Floats, part: Ints) -> list[Ints]:
+    """A part cut in two across its longest side, where it has more than one element."""
+    if len(part) == 1:
+        return [part]
+    along = position[part, np.argmax(np.ptp(position[part], axis=0))]
+    order = part[np.argsort(along, kind="stable")]
+    middle = len(part) // 2
+    return [np.sort(order[:middle]), np.sort(order[middle:])]
