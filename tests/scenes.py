@@ -11,6 +11,7 @@ from sonarsynth.scattering import Isotropic
 from sonarsynth.scattering.targets import Target
 from sonarsynth.scene import Physics, Processing, Scene, Trajectory, World
 from sonarsynth.sonar import Band, BandPass, BeamGrid, Romanis, Sonar
+from sonarsynth.synthesis import KernelDeposit
 from sonarsynth.world.environment import Absorption, Environment, Isovelocity
 from sonarsynth.world.motion import Line, Still
 from sonarsynth.world.shapes import Remus100, Sphere
@@ -71,6 +72,7 @@ def point_scene(
             ),
             sonar=Sonar(assumed_sound_speed=1500.0, **sonar),
             trajectory=Trajectory(frames=1, sonar=Still(position=place, heading=heading)),
-            physics=Physics(scattering=Isotropic(strength=strength)),
+            # one point: not each facet as each hydrophone by itself would see it
+            physics=Physics(scattering=Isotropic(strength=strength), subarrays=1, synthesis=KernelDeposit()),
         )
     )

@@ -56,13 +56,13 @@ def choose(plan: Plan, looks: Sequence[Look]) -> Plan:
         ranging=_ranging(scene, accuracy, bent),
     )
     made = replace(plan, choices=choices)
-    count, error = _subarrays(made, [look.frames[0].index for look in some])
+    count, error, whole = _subarrays(made, [look.frames[0].index for look in some])
     straight = isinstance(choices.ranging, IsovelocityRange)
     by_synthesis = deposit_error(synthesis) if isinstance(synthesis, KernelDeposit) else 0.0
     return replace(
         made,
         choices=replace(choices, subarrays=count),
-        errors=Errors(error, by_synthesis, bent if straight else 0.0),
+        errors=Errors(error, whole, by_synthesis, bent if straight else 0.0),
     )
 
 
@@ -104,24 +104,25 @@ def _ranging(scene: Scene, accuracy: Accuracy, bent: float) -> IsovelocityRange 
     return method.resolve(straight=bent == 0.0 if accuracy.exact else bent <= accuracy.range_m)
 
 
-def _subarrays(plan: Plan, indices: Sequence[int]) -> tuple[int, float]:
-    """Parts that the array is cut into, and what signals err by then."""
+def _subarrays(plan: Plan, indices: Sequence[int]) -> tuple[int, float, float]:
+    """Parts that the array is cut into, what signals err by then, and where it is not cut."""
     wanted, count = plan.scene.physics.subarrays, plan.elements.count
     if wanted == "sensors" or (wanted == "auto" and plan.recipe.accuracy.exact):
-        return count, 0.0
+        return count, 0.0, np.nan
     measures = [Expansion.of(plan, index) for index in indices]
     allowed = np.inf if wanted != "auto" else np.sqrt(EXPANSION) * plan.recipe.accuracy.signal / SAFETY
-    parts, errors = 1 if wanted == "auto" else min(wanted, count), [np.inf]
+    parts, errors, whole = 1 if wanted == "auto" else min(wanted, count), [0.0], np.nan
     while parts < count:
         errors = []
         for measure in measures:
             errors.append(measure.error(parts))
             if errors[-1] > allowed:
                 break
+        whole = errors[-1] if parts == 1 else whole
         if errors[-1] <= allowed:
             break
         parts, errors = min(parts * (2 if errors[-1] < 3.0 * allowed else 4), count), [0.0]
-    return parts, max(errors)
+    return parts, max(errors), whole
 
 
 @dataclass(frozen=True, eq=False)

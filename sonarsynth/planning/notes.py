@@ -47,7 +47,7 @@ def notes(made: Plan, looks: Sequence[Look]) -> tuple[str, ...]:
     cancelled = scene.processing.cancelling is not None
     if made.propagation.bounces and not cancelled and made.products & {"image", "cloud"} and made.sizes["snap"]:
         found.append("the snap's own reflections enter the image: processing.cancelling takes them out before")
-    found += _behind(recipe)
+    found += _accuracy(made) + list(_behind(recipe))
     real = [look for look in looks if look.real]
     for look in real[:: -(-len(real) // NOTED)]:
         found += _cut(look.scene, look.profile.uniform)
@@ -89,6 +89,27 @@ def _cut(scene: Scene, uniform: bool) -> tuple[str, ...]:
         f"turned in phase by a path, a snap falls off slowly: it is cut {LONGEST_TAIL:g} s from its collapse, at "
         f"{max(tails):.1g} of its peak (no net impulse, or a filter without the lowest frequencies, helps)",
     )
+
+
+def _accuracy(made: Plan) -> list[str]:
+    """Where the accuracy of the recipe costs a lot, or what the scene chooses does not keep within it."""
+    found, allowed, errors, parts = [], made.recipe.accuracy, made.errors, made.choices.subarrays
+    if parts > 1 and errors.whole > 0.0:
+        found.append(
+            f"accuracy.signal {allowed.signal:g} takes {parts} subarrays, each traced by itself: one would err by "
+            f"{errors.whole:.2g}"
+        )
+    if np.hypot(np.nan_to_num(errors.expansion), np.nan_to_num(errors.synthesis)) > allowed.signal:
+        found.append(
+            f"signals err by {errors.expansion:.2g} (paths over the array) and {errors.synthesis:.2g} (synthesis), more "
+            f"than accuracy.signal, {allowed.signal:g}: the scene says how they are made (scene.physics)"
+        )
+    if errors.ranging > allowed.range_m:
+        found.append(
+            f"ranges err by {errors.ranging:.2g} m where rays bend, more than accuracy.range_m, {allowed.range_m:g}: the "
+            f"scene asks for '{made.choices.ranging.kind}' (scene.processing.ranging)"
+        )
+    return found
 
 
 def _behind(recipe: Recipe) -> tuple[str, ...]:
