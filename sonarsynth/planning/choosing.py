@@ -110,19 +110,32 @@ def _subarrays(plan: Plan, indices: Sequence[int]) -> tuple[int, float, float]:
     if wanted == "sensors" or (wanted == "auto" and plan.recipe.accuracy.exact):
         return count, 0.0, np.nan
     measures = [Expansion.of(plan, index) for index in indices]
-    allowed = np.inf if wanted != "auto" else np.sqrt(EXPANSION) * plan.recipe.accuracy.signal / SAFETY
-    parts, errors, whole = 1 if wanted == "auto" else min(wanted, count), [0.0], np.nan
-    while parts < count:
-        errors = []
-        for measure in measures:
-            errors.append(measure.error(parts))
-            if errors[-1] > allowed:
-                break
-        whole = errors[-1] if parts == 1 else whole
-        if errors[-1] <= allowed:
+    if wanted != "auto":
+        parts = min(wanted, count)
+        return parts, _worst(measures, parts, np.inf), np.nan
+    allowed = np.sqrt(EXPANSION) * plan.recipe.accuracy.signal / SAFETY
+    sizes = [2**n for n in range(int(np.ceil(np.log2(count))))] + [count]
+    errors = {sizes[0]: _worst(measures, sizes[0], allowed)}
+    low, high = 0, len(sizes) - 1  # the array whole, and every hydrophone by itself
+    if errors[1] > allowed:
+        errors[count] = 0.0
+        while high - low > 1:  # a jump by what the error falls with the size of parts, about as its square
+            jump = int(np.ceil(np.log2(errors[sizes[low]] / allowed)))
+            middle = min(max(low + jump, low + 1), high - 1)
+            errors[sizes[middle]] = _worst(measures, sizes[middle], allowed)
+            low, high = (middle, high) if errors[sizes[middle]] > allowed else (low, middle)
+        return sizes[high], errors[sizes[high]], errors[1]
+    return 1, errors[1], errors[1]
+
+
+def _worst(measures: Sequence[Expansion], parts: int, allowed: float) -> float:
+    """Largest error of signals in some frames, or the first that is more than is allowed."""
+    worst = 0.0
+    for measure in measures:
+        worst = max(worst, measure.error(parts))
+        if worst > allowed:
             break
-        parts, errors = min(parts * (2 if errors[-1] < 3.0 * allowed else 4), count), [0.0]
-    return parts, max(errors), whole
+    return worst
 
 
 @dataclass(frozen=True, eq=False)

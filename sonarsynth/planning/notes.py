@@ -101,13 +101,13 @@ def _accuracy(made: Plan) -> list[str]:
         )
     if np.hypot(np.nan_to_num(errors.expansion), np.nan_to_num(errors.synthesis)) > allowed.signal:
         found.append(
-            f"signals err by {errors.expansion:.2g} (paths over the array) and {errors.synthesis:.2g} (synthesis), more "
-            f"than accuracy.signal, {allowed.signal:g}: the scene says how they are made (scene.physics)"
+            f"signals err by {errors.expansion:.2g} (paths over the array) and {errors.synthesis:.2g} (synthesis): "
+            f"accuracy.signal allows {allowed.signal:g}, but the scene says how they are made (scene.physics)"
         )
     if errors.ranging > allowed.range_m:
         found.append(
-            f"ranges err by {errors.ranging:.2g} m where rays bend, more than accuracy.range_m, {allowed.range_m:g}: the "
-            f"scene asks for '{made.choices.ranging.kind}' (scene.processing.ranging)"
+            f"ranges err by {errors.ranging:.2g} m where rays bend: accuracy.range_m allows {allowed.range_m:g}, but "
+            f"the scene asks for '{made.choices.ranging.kind}' (scene.processing.ranging)"
         )
     return found
 

@@ -10,6 +10,9 @@ import numpy as np
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.sonar.hydrophones import Elements
 
+STEPS = 64
+"""Towards the middle of a part."""
+
 
 @dataclass(frozen=True, eq=False)
 class Subarray:
@@ -33,9 +36,9 @@ def subarrays(elements: Elements, count: int) -> tuple[Subarray, ...]:
 
 
 def subarray(elements: Elements, sensor: Ints) -> Subarray:
-    """The part of an array with these elements, about the middle of the box round them."""
+    """The part of an array with these elements, about the middle of the ball round them."""
     position = elements.position[sensor]
-    centre = 0.5 * (position.min(axis=0) + position.max(axis=0))
+    centre = _middle(position)
     own = replace(
         elements,
         position=position - centre,
@@ -44,6 +47,18 @@ def subarray(elements: Elements, sensor: Ints) -> Subarray:
         row=elements.row[sensor],
     )
     return Subarray(sensor, centre, own)
+
+
+def _middle(position: Floats) -> Floats:
+    """Centre (xyz) of the smallest ball round points (point, xyz), to some per cent of its radius.
+
+    Source: Badoiu and Clarkson (2003), Proc. 14th SODA, 801: steps towards the farthest point, of 1/(n + 1) of the way.
+    """
+    centre = 0.5 * (position.min(axis=0) + position.max(axis=0))
+    for n in range(1, STEPS if len(position) > 2 else 0):
+        farthest = position[np.argmax(np.linalg.norm(position - centre, axis=1))]
+        centre = centre + (farthest - centre) / (n + 1)
+    return np.asarray(centre)
 
 
 def _halves(position: Floats, part: Ints) -> list[Ints]:

@@ -1,0 +1,132 @@
+"""The planner keeps within the accuracy of a recipe, on frames, seeds and hydrophones that it did not measure at."""
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sonarsynth import config, planning
+from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start
+from sonarsynth.planning.choosing import HEARD_AT, heard_at
+from sonarsynth.recipe import Accuracy
+from sonarsynth.render import synthesise, trace_frame
+from sonarsynth.sonar.subarrays import subarray, subarrays
+from sonarsynth.synthesis import KernelDeposit
+from tests.scenes import remus
+
+CONFIGS = Path(__file__).resolve().parents[2] / "configs"
+DEEP_GRADIENT = "scene.world.environment.sound_speed={kind: tabulated, depth: [0 m, 300 m], speed: [1500, %s]}"
+RECIPES = {
+    "remus.yaml": (),
+    "tank.yaml": ("scene.trajectory.frames=4",),
+    "deep.yaml": (),
+    "thermocline.yaml": ("scene.physics.tracing.bounces=0", "scene.world.environment.sound_speed.mixed_depth=4.6 m"),
+    "crowd.yaml": (),
+}
+"""Those of the request: the thesis's scene, its tank, deep water, the array in a thermocline, and a crowd."""
+EXACT = KernelDeposit(width=16, precision="float64", tolerance=1e-9)
+"""Within 1e-8 of `DirectSum` (tests/extremes)."""
+
+
+def _planned(name: str, signal: float, seed: int) -> Plan:
+    sets = (f"accuracy.signal={signal}", f"seed={seed}", *RECIPES[name])
+    return planning.plan(config.load(CONFIGS / name, sets), {"signals"})
+
+
+def _error(made: Plan, index: int, sensors: np.ndarray) -> float:
+    """Error of echoes or direct arrivals, as planned, against every hydrophone traced and summed by itself."""
+    made = made.at(index)
+    frame = made.recipe.frame(index)[1]
+    start, samples = frame_start(made, frame), made.windows.samples
+    sonar, snaps = made.scene.sonar, frame.moment.snaps
+    alone = replace(made, choices=Choices(negligible=0.0))
+    worst = []
+    for direct in (False, True):
+        missed, size = 0.0, 0.0
+        for part in subarrays(made.elements, made.choices.subarrays):
+            mine = np.flatnonzero(np.isin(part.sensor, sensors))
+            if not len(mine):
+                continue
+            arrivals = arrivals_of(made, frame, part)
+            some = arrivals.select(arrivals.direct == direct)
+            method = made.choices.synthesis
+            heard = method.signals(some, snaps, part.elements, sonar, made.absorption, start, samples).pressure
+            for n in mine:
+                one = subarray(made.elements, part.sensor[n : n + 1])
+                own = arrivals_of(alone, frame, one)
+                own = own.select(own.direct == direct)
+                truth = EXACT.pressure(own, snaps, one.elements, sonar, made.absorption, start, samples)[0][0]
+                missed += float(np.sum((heard[n] - truth) ** 2))
+                size += float(np.sum(truth**2))
+        worst.append(np.sqrt(missed / size))
+    return max(worst)
+
+
+@pytest.mark.parametrize("signal", [1e-2, 1e-3, 1e-5])
+@pytest.mark.parametrize("name", RECIPES)
+def test_signals_are_within_the_accuracy(name: str, signal: float) -> None:
+    made = _planned(name, signal, seed=11)
+    measured = heard_at(made.elements)
+    others = np.setdiff1d(np.flatnonzero(made.elements.gain), measured)
+    sensors = np.random.default_rng(4).choice(others, HEARD_AT, replace=False)
+    index = made.recipe.frames // 3  # the first, the middle and the last were measured in
+    assert _error(made, index, sensors) <= signal
+
+
+def test_more_accuracy_takes_more_work() -> None:
+    """Of each choice, more or as much, at every tenfold accuracy."""
+    plans = [_planned("deep.yaml", signal, seed=1).choices for signal in (1e-2, 1e-3, 1e-4)]
+    for rough, fine in pairwise(plans):
+        assert fine.negligible < rough.negligible
+        assert fine.subarrays >= rough.subarrays
+        assert isinstance(rough.synthesis, KernelDeposit) and isinstance(fine.synthesis, KernelDeposit)
+        assert fine.synthesis.tolerance < rough.synthesis.tolerance
+
+
+def test_bending_that_moves_nothing_is_left_out() -> None:
+    """A gradient of 1e-6 per second bends no ray by a thousandth of a wave; one of 1 does."""
+    for speed, kind in (("1500.0003", "straight"), ("1800", "refracted")):
+        made = planning.plan(config.load(CONFIGS / "deep.yaml", (DEEP_GRADIENT % speed,)), {"signals"})
+        assert made.propagation.kind == kind
+    made = planning.plan(config.load(CONFIGS / "deep.yaml", (DEEP_GRADIENT % "1500.0003",)), {"signals"})
+    assert made.errors.expansion <= 1e-3
+
+
+def test_exact_is_every_slow_way() -> None:
+    recipe = replace(remus(1), accuracy=Accuracy(exact=True))
+    made = planning.plan(recipe)
+    assert made.choices.subarrays == made.elements.count and made.choices.negligible == 0.0
+    assert made.choices.synthesis.kind == "direct_sum" and made.choices.beamforming.kind == "dense"
+
+
+def test_choices_of_the_scene_are_kept_and_their_error_is_said() -> None:
+    scene = remus(1).scene
+    physics = replace(scene.physics, subarrays=1, faintest=20.0, synthesis=KernelDeposit(width=4, tolerance=0.01))
+    made = planning.plan(replace(remus(1), scene=replace(scene, physics=physics)))
+    assert made.choices.subarrays == 1 and made.choices.synthesis == physics.synthesis
+    assert made.choices.negligible == pytest.approx(0.01)
+    assert any("accuracy.signal allows 0.001" in note for note in made.warnings)
+
+
+def test_subarrays_make_the_signals_that_the_whole_array_hears() -> None:
+    """Cut in 8, every hydrophone hears what it did, to what one expansion errs by."""
+    recipe = remus(1)
+    whole = planning.plan(recipe, {"signals"})
+    cut = replace(whole, choices=replace(whole.choices, subarrays=8))
+    one, parts = (synthesise(made, trace_frame(made, 0)) for made in (whole, cut))
+    assert one.outside == parts.outside == 0
+    difference = np.linalg.norm(one.pressure - parts.pressure) / np.linalg.norm(one.pressure)
+    assert 0.0 < difference <= 1e-3
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 64, 508, 1000])
+def test_parts_hold_every_element_once_about_their_middle(count: int) -> None:
+    elements = planning.plan(remus(1), set()).elements
+    parts = subarrays(elements, count)
+    assert len(parts) >= min(count, elements.count) and len(parts) <= min(2 * count - 1, elements.count)
+    assert np.array_equal(np.sort(np.concatenate([p.sensor for p in parts])), np.arange(elements.count))
+    for part in parts:
+        assert np.allclose(part.elements.position + part.centre, elements.position[part.sensor], atol=1e-15)
+        assert part.elements.aperture <= 1.05 * elements.aperture
