@@ -6,11 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from sonarsynth.planning.bending import bending_error
 from sonarsynth.planning.plans import Omission, Plan
 from sonarsynth.scattering import Kirchhoff, MirrorLobe
 from sonarsynth.scattering.fineness import expected_error
 from sonarsynth.scene import Frame
-from sonarsynth.tracing import Refracted, Straight
+from sonarsynth.sonar import stop_frequency
+from sonarsynth.tracing import Straight
 from sonarsynth.tracing.bounces import MOST_BOUNCES
 from sonarsynth.world.meshes import Mesh, mesh_of
 from sonarsynth.world.moment import Moment
@@ -26,11 +28,7 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
     environment, products = scene.world.environment, plan.products
     rows = []
     if isinstance(plan.propagation, Straight):
-        speeds = plan.profile.speed
-        bound = "0: the sound speed is the same everywhere"
-        if not plan.profile.uniform:
-            bound = f"asked for, but the sound speed varies by {np.ptp(speeds):.3g} m/s: angles and delays are biased"
-        rows.append(Omission("refraction", "straight rays", bound))
+        rows.append(Omission("refraction", "straight rays", _refraction_bound(plan, frame)))
     bounces = plan.propagation.bounces
     kept = "the direct family" if not bounces else f"paths by at most {bounces} reflections of surface and bed in all"
     rows.append(Omission("more reflections", f"asked for: {kept}", reflected_bound(plan)))
@@ -56,9 +54,52 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
     for name in ("signals", "image", "cloud"):
         if name not in products:
             rows.append(Omission(name, "not asked for", "0"))
-    if isinstance(plan.propagation, Refracted):
-        rows.append(Omission("rays to each sensor", "wavefront expansion over the aperture", "/truth/wavefront_error"))
-    return tuple(rows)
+    return tuple(rows + _not_traced(plan) + _not_heard(plan))
+
+
+def _refraction_bound(plan: Plan, frame: Frame) -> str:
+    if plan.profile.uniform:
+        return "0: the sound speed is the same everywhere"
+    bound = bending_error(plan.scene, plan.profile, [frame])
+    if bound <= plan.recipe.accuracy.signal:
+        return f"{bound:.1g} of the signals"
+    varies = np.ptp(plan.profile.speed)
+    return f"asked for, but the sound speed varies by {varies:.3g} m/s: angles and delays are biased"
+
+
+def _not_traced(plan: Plan) -> list[Omission]:
+    """Paths that are not traced by themselves, or not kept."""
+    rows: list[Omission] = []
+    choices, count = plan.choices, plan.elements.count
+    if choices.subarrays < count and plan.products:
+        parts = "the array" if choices.subarrays == 1 else f"each of {choices.subarrays} subarrays"
+        known = np.isfinite(plan.errors.expansion)
+        bound = f"{plan.errors.expansion:.1g} of the signals, measured" if known else "not measured"
+        rows.append(Omission("rays to each hydrophone", f"paths are expanded over {parts}", bound))
+    if choices.negligible > 0.0:
+        bound = f"{np.sqrt(choices.negligible):.1g} of the echo of each target"
+        rows.append(Omission("the faintest echoes", f"{-10 * np.log10(choices.negligible):.3g} dB below all", bound))
+    rows.append(Omission("facets in the dark, out of sight or turned away", "no ray meets them", "0"))
+    return rows
+
+
+def _not_heard(plan: Plan) -> list[Omission]:
+    """Hydrophones and frequencies that are not computed."""
+    rows: list[Omission] = []
+    dead, sonar = int((plan.elements.gain == 0.0).sum()), plan.scene.sonar
+    if not plan.products:
+        return rows
+    if dead:
+        rows.append(Omission(f"{dead} dead hydrophones", "they hear nothing", "0"))
+    chosen = sonar.antialias
+    rows.append(
+        Omission(
+            f"the spectrum over {stop_frequency(chosen) / 1e3:.4g} kHz",
+            "the filter stops it",
+            f"-{chosen.attenuation:g} dB of what is there",
+        )
+    )
+    return rows
 
 
 def _facets_leave_out(plan: Plan) -> list[Omission]:
