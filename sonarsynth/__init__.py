@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from sonarsynth.config import RecipeError, dump, load, loads, schema
     from sonarsynth.description import FieldError
     from sonarsynth.planning import Plan, plan
-    from sonarsynth.ranging import IsovelocityRange, RefractedRange, SensorDelays, WavefrontCancelling
-    from sonarsynth.recipe import Axis, Choice, Normal, Recipe, Sobol, Splits, Together, Uniform
+    from sonarsynth.ranging import AutoRange, IsovelocityRange, RefractedRange, SensorDelays, WavefrontCancelling
+    from sonarsynth.recipe import Accuracy, Axis, Choice, Normal, Recipe, Sobol, Splits, Together, Uniform
     from sonarsynth.scattering import Isotropic, Kirchhoff, MirrorLobe, PartlyReflecting
     from sonarsynth.scattering.strength import target_strength
     from sonarsynth.scattering.targets import Target
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
         Sonar,
     )
     from sonarsynth.store import verify
-    from sonarsynth.synthesis import DirectSum, KernelDeposit
+    from sonarsynth.synthesis import AutoSynthesis, DirectSum, KernelDeposit
     from sonarsynth.tracing import AutoTracing, Refracted, Straight
     from sonarsynth.tracing.eigenrays import RayArrivals, eigenrays, eigenrays_between
     from sonarsynth.tracing.ray_request import EigenrayRequest, RayRequest
@@ -76,6 +76,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Absorption",
+    "Accuracy",
+    "AutoRange",
+    "AutoSynthesis",
     "AutoTracing",
     "Axis",
     "Band",
@@ -179,8 +182,8 @@ _HOMES = {
     "config": "RecipeError dump load loads schema",
     "description": "FieldError",
     "planning": "Plan plan",
-    "ranging": "IsovelocityRange RefractedRange SensorDelays WavefrontCancelling",
-    "recipe": "Axis Choice Normal Recipe Sobol Splits Together Uniform",
+    "ranging": "AutoRange IsovelocityRange RefractedRange SensorDelays WavefrontCancelling",
+    "recipe": "Accuracy Axis Choice Normal Recipe Sobol Splits Together Uniform",
     "scattering": "Isotropic Kirchhoff MirrorLobe PartlyReflecting",
     "scattering.strength": "target_strength",
     "scattering.targets": "Target",
@@ -189,7 +192,7 @@ _HOMES = {
     "schedule.repairing": "RepairReport repair",
     "sonar": "Band BandPass BeamGrid Converter LowPass PlanarLattice PositionTable Romanis Sonar",
     "store": "verify",
-    "synthesis": "DirectSum KernelDeposit",
+    "synthesis": "AutoSynthesis DirectSum KernelDeposit",
     "tracing": "AutoTracing Refracted Straight",
     "tracing.eigenrays": "RayArrivals eigenrays eigenrays_between",
     "tracing.ray_request": "EigenrayRequest RayRequest",

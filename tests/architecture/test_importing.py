@@ -23,6 +23,9 @@ HEAVY = (
 
 SURFACE = [
     "Absorption",
+    "Accuracy",
+    "AutoRange",
+    "AutoSynthesis",
     "AutoTracing",
     "Axis",
     "Band",
