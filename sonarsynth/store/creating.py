@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import zarr
@@ -18,6 +18,7 @@ from zarr.errors import ZarrUserWarning
 
 from sonarsynth.config import dump
 from sonarsynth.render import attributes, coordinates
+from sonarsynth.store.encoding import CODEC, LEVEL
 from sonarsynth.store.layout import ArrayLayout, Layout, layout_of
 from sonarsynth.store.marks import (
     LAYOUT,
@@ -33,9 +34,6 @@ from sonarsynth.store.marks import (
 
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan
-
-LEVEL: Final = 3
-"""Compression level of zstd."""
 
 
 class Mismatch(ValueError):
@@ -249,4 +247,4 @@ def _write_static(
 
 def _codecs(dtype: np.dtype[Any]) -> tuple[BloscCodec, Crc32cCodec]:
     """Blosc (zstd) with the bits of the numbers shuffled (noisy float32: smaller and faster than bytes); a checksum."""
-    return BloscCodec(cname="zstd", clevel=LEVEL, shuffle="bitshuffle", typesize=dtype.itemsize), Crc32cCodec()
+    return BloscCodec(cname=CODEC, clevel=LEVEL, shuffle="bitshuffle", typesize=dtype.itemsize), Crc32cCodec()

@@ -61,13 +61,19 @@ class ArrayLayout:
     def is_fill(self, block: np.ndarray) -> bool:
         """True where every number is the fill value."""
         fill = np.asarray(self.variable.fill, self.dtype)
+        first = block.flat[0] if block.size else fill
+        if first != fill and not (np.isnan(first) and np.isnan(fill)):
+            return False  # which spares reading the rest
         return bool(np.all(np.isnan(block) if np.isnan(fill) else block == fill))
 
     def cast(self, value: np.ndarray) -> np.ndarray:
-        """A frame's value in the array's own type; raises ValueError where shape or type do not fit."""
+        """A frame's value in the array's own type, the same array where it has it; raises ValueError where shape or type
+        do not fit."""
         value = np.asarray(value)
         if value.shape != self.shape[1:]:
             raise ValueError(f"{self.path} has shape {value.shape}, but the store is laid out for {self.shape[1:]}")
+        if value.dtype == self.dtype:
+            return value
         if not np.can_cast(value.dtype, self.dtype, "same_kind"):
             raise ValueError(f"{self.path} is {value.dtype}, but the store is laid out for {self.dtype}")
         cast = value.astype(self.dtype)

@@ -14,7 +14,7 @@ import json
 import os
 import stat
 import uuid
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from io import BufferedReader
@@ -129,10 +129,22 @@ def record(store: Path, path: str, *, sync: bool = False) -> FileRecord:
         return os.fstat(file.fileno()).st_size, digest
 
 
-def records(store: Path, paths: Iterable[str], *, empty: Collection[str] = ()) -> dict[str, FileRecord]:
-    """Records of files that were just written, on the disk when this returns; those of `empty` may be absent."""
-    there = {path: path not in empty or (store / path).exists() for path in paths}
-    return {path: record(store, path, sync=True) if found else ABSENT for path, found in there.items()}
+def records(store: Path, paths: Iterable[str]) -> dict[str, FileRecord]:
+    """Records of files that were just written, on the disk when this returns."""
+    return {path: record(store, path, sync=True) for path in paths}
+
+
+def write_new(file: Path, content: bytes) -> FileRecord:
+    """Write a file that is not there, with its folders: on the disk when this returns. Its record."""
+    try:
+        opened = open(file, "xb")  # noqa: SIM115
+    except FileNotFoundError:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        opened = open(file, "xb")  # noqa: SIM115
+    with opened as out:
+        out.write(content)
+        os.fsync(out.fileno())
+    return len(content), hashlib.sha256(content).hexdigest()
 
 
 def add_to_digest(digest: hashlib._Hash, name: str, block: np.ndarray) -> None:

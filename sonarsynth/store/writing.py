@@ -8,11 +8,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import zarr
 
 from sonarsynth.render import Values
+from sonarsynth.store.encoding import encoded
 from sonarsynth.store.layout import ArrayLayout, Layout, layout_of
-from sonarsynth.store.marks import Damage, Mark, add_to_digest, drop_mark, load_mark, marked, records, save_mark
+from sonarsynth.store.marks import (
+    ABSENT,
+    Damage,
+    FileRecord,
+    Mark,
+    add_to_digest,
+    drop_mark,
+    load_mark,
+    marked,
+    save_mark,
+    write_new,
+)
 
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan
@@ -30,30 +41,27 @@ def write_shard(path: Path | str, plan: Plan, shard: int, frames: Mapping[int, V
         raise ValueError(f"frame {outside[0]} is not in shard {shard} (frames {region.start} to {region.stop - 1})")
     checked = {frame: layout.check(values) for frame, values in sorted(frames.items())}
     drop_mark(path, shard)
-    root = zarr.open_group(path, mode="r+")
     content = hashlib.sha256()
-    arrays = sorted((a for a in layout.arrays if not a.empty), key=lambda a: a.path)
-    empty = set()
-    for array in arrays:
+    files: dict[str, FileRecord] = {}
+    for array in sorted((a for a in layout.arrays if not a.empty), key=lambda a: a.path):
         block = layout.block(array, shard, checked)
         add_to_digest(content, array.path, block)
-        (path / array.file(shard)).unlink(missing_ok=True)  # zarr reads a short last shard before it writes it
-        write_region(root, layout, array, region.start, block)
-        if array.is_fill(block):
-            empty.add(array.file(shard))
-    files = records(path, (a.file(shard) for a in arrays), empty=empty)
+        files[array.file(shard)] = write_region(path, layout, array, region.start, block)
     mark = Mark(str(shard), tuple(checked), content.hexdigest(), files)
     save_mark(path, mark)
     return mark
 
 
-def write_region(root: zarr.Group, layout: Layout, array: ArrayLayout, start: int, block: np.ndarray) -> None:
-    """Write frames start:start+len(block) of an array. Raises ValueError unless they are exactly one shard."""
-    stop = start + len(block)
-    layout.check_region(start, stop)
-    target = root[array.path]
-    assert isinstance(target, zarr.Array)
-    target[start:stop] = block
+def write_region(path: Path, layout: Layout, array: ArrayLayout, start: int, block: np.ndarray) -> FileRecord:
+    """Write frames start:start+len(block) of an array: their file, on the disk when this returns, and its record.
+
+    Raises ValueError unless they are exactly one shard.
+    """
+    layout.check_region(start, start + len(block))
+    name = array.file(start // layout.shard_frames)
+    (path / name).unlink(missing_ok=True)
+    content = encoded(array, block)
+    return ABSENT if content is None else write_new(path / name, content)
 
 
 def missing(path: Path | str, plan: Plan, frames: Iterable[int] | None = None) -> dict[int, tuple[int, ...]]:
