@@ -61,6 +61,30 @@ def spectrum(frequency: npt.ArrayLike, pulse: Pulse) -> ComplexArray:
     return np.asarray(out.ravel()[: flat.size].reshape(f.shape))
 
 
+def stretched_spectra(frequency: Floats, pulse: Pulse, longer: Floats) -> ComplexArray:
+    """Spectra (stretch, bin) of the pulse at `longer` (stretch,) times frequencies (bin,) from 0 Hz in equal steps.
+
+    As `spectrum` to rounding, by powers of one exponential a node: for many stretches, a quarter of the time.
+    """
+    columns = int(np.ceil(np.sqrt(frequency.size)))
+    step = float(frequency[-1]) / max(frequency.size - 1, 1)
+    out = np.zeros((longer.size, columns, columns), complex)
+    for near in _parts(pulse.time, 2 * columns * longer.size):
+        once = np.exp(-2j * np.pi * step * np.multiply.outer(longer, pulse.time[near]))
+        fine = _powers(once, columns)  # (power, stretch, node)
+        coarse = _powers(fine[-1] * once, columns) * pulse.strength[near]
+        out += np.moveaxis(coarse, 0, 1) @ np.moveaxis(fine, 0, 2)
+    return out.reshape(longer.size, -1)[:, : frequency.size]
+
+
+def _powers(values: ComplexArray, count: int) -> ComplexArray:
+    """Powers (power < count, ...) of values."""
+    out = np.ones((count, *values.shape), complex)
+    for before, power in zip(out, out[1:], strict=False):
+        np.multiply(before, values, out=power)
+    return out
+
+
 def _parts(values: Floats, columns: int) -> Iterator[slice]:
     length = max(MOST // max(columns, 1), 16)
     return (slice(i, i + length) for i in range(0, values.size, length))

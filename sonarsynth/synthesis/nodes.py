@@ -76,12 +76,18 @@ def _polynomials(x: Floats, count: int) -> Floats:
 
 def _waves(x: Floats, axis: Axis) -> Floats:
     """Waves (point, function) at points: cosines and sines, weighed as paths within the phase and the colours give."""
-    point, weight = np.polynomial.legendre.leggauss(ceil(WIDER * axis.phase) + 16)
+    point, weight = _gauss(ceil(WIDER * axis.phase) + 16)
     k = 0.5 * WIDER * (1.0 + point)
     weight = weight * np.mean([(k < WIDER * w) / w for w in axis.weights], axis=0)
     some = weight > 0.0
     angle = np.outer(x, axis.phase * k[some])
     return np.asarray(np.concatenate([np.cos(angle), np.sin(angle)], axis=1) * np.sqrt(np.tile(weight[some], 2)))
+
+
+@lru_cache(maxsize=256)
+def _gauss(count: int) -> tuple[Floats, Floats]:
+    """Points and weights (count,) of Gauss and Legendre."""
+    return np.polynomial.legendre.leggauss(count)
 
 
 @lru_cache(maxsize=1024)
@@ -95,9 +101,10 @@ def _errors(axis: Axis, phase: float, weights: Colour) -> tuple[float, ...]:
     x = np.cos(np.linspace(0.0, np.pi, 4 * axis.nodes + 17))
     k = np.linspace(0.0, 1.0, 17 + 2 * int(phase))
     at, onto = chebyshev(axis.nodes), interpolation(x, axis)
+    waves, angles = [np.exp(1j * phase * np.outer(y, k)) for y in (x, at)], [np.arccos(y) for y in (x, at)]
     found = []
     for d in range(DEGREES):
-        here, there = ((np.cos(d * np.arccos(y))[:, None] * np.exp(1j * phase * np.outer(y, k))) for y in (x, at))
+        here, there = (np.cos(d * angle)[:, None] * wave for angle, wave in zip(angles, waves, strict=True))
         most = np.maximum.accumulate(np.abs(here - onto @ there).max(axis=0))
         found.append(float(np.interp(weights, k, most).mean()))
     return tuple(found)

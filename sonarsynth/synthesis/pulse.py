@@ -246,7 +246,8 @@ def stretch_sizes(waveform: Waveform, chosen: Filter, widest: float, sloped: boo
     f = np.linspace(0.0, stop_frequency(chosen), 97)
     filtered = spectra.response(f, fir(chosen)) * (f if sloped else 1.0)
     at = 1.0 + widest * chebyshev(16)
-    value = analysis(16) @ [_snap_spectrum(waveform, float(x), f) * x * filtered for x in at]
+    made = _pulse(waveform, 1.2 * float(f[-1]))
+    value = analysis(16) @ (pulses.stretched_spectra(f, made, at) * at[:, None] * filtered)
     sizes = np.abs(value).sum(axis=1)
     return tuple((sizes / sizes[0]).tolist()) if sizes[0] > 0.0 else (1.0, inf)
 
