@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -80,7 +81,7 @@ def stretched_spectra(frequency: Floats, pulse: Pulse, longer: Floats) -> Comple
 def _powers(values: ComplexArray, count: int) -> ComplexArray:
     """Powers (power < count, ...) of values."""
     out = np.ones((count, *values.shape), complex)
-    for before, power in zip(out, out[1:], strict=False):
+    for before, power in pairwise(out):
         np.multiply(before, values, out=power)
     return out
 

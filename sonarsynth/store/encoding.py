@@ -27,9 +27,9 @@ NOT_THERE: Final = np.iinfo(np.uint64).max
 def encoded(array: ArrayLayout, block: np.ndarray) -> bytes | None:
     """The file of a shard from the frames that it has (frame, ...); None for fill values only, which have no file.
 
-    A chunk is the frames' numbers, little-endian, in C order, compressed by blosc, with a CRC-32C. A shard of several is
-    its chunks, but those of fill values only, and an index of their offsets and lengths, with a CRC-32C. A last shard
-    with fewer frames than others has no more chunks; a chunk with fewer is filled up.
+    A chunk is the frames' numbers, little-endian, in C order, compressed by blosc, with a CRC-32C. A shard of several
+    is its chunks, but those of fill values only, and an index of their offsets and lengths, with a CRC-32C. A last
+    shard with fewer frames than others has no more chunks; a chunk with fewer is filled up.
     """
     chunks = [block[at : at + array.chunk] for at in range(0, len(block), array.chunk)]
     parts = [None if array.is_fill(chunk) else _chunk(array, chunk) for chunk in chunks]

@@ -67,8 +67,8 @@ class ArrayLayout:
         return bool(np.all(np.isnan(block) if np.isnan(fill) else block == fill))
 
     def cast(self, value: np.ndarray) -> np.ndarray:
-        """A frame's value in the array's own type, the same array where it has it; raises ValueError where shape or type
-        do not fit."""
+        """A frame's value in the array's own type (the same array where it has that); raises ValueError where shape or
+        type do not fit."""
         value = np.asarray(value)
         if value.shape != self.shape[1:]:
             raise ValueError(f"{self.path} has shape {value.shape}, but the store is laid out for {self.shape[1:]}")
