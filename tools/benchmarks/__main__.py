@@ -1,4 +1,4 @@
-"""Benchmarks against peers and against the slow exact way, as JSON: `tools/bench frame` and others."""
+"""Benchmarks against peers and against the slow exact way, as JSON or a table: `tools/bench frame` and others."""
 
 from __future__ import annotations
 
@@ -11,11 +11,15 @@ BENCHMARKS = ("frame", "build", "rays", "reflections", "scattering", "laws")
 
 
 def main() -> int:
-    """Run the benchmark that the only argument names."""
-    if len(sys.argv) != 2 or sys.argv[1] not in BENCHMARKS:
-        print(f"usage: tools/bench {' | '.join(BENCHMARKS)}", file=sys.stderr)
+    """Run the benchmark that the first argument names; JSON, or its table where it has one and `--json` is not said."""
+    name, options = (sys.argv[1], sys.argv[2:]) if len(sys.argv) > 1 else ("", [])
+    if name not in BENCHMARKS or options not in ([], ["--json"]):
+        print(f"usage: tools/bench {' | '.join(BENCHMARKS)} [--json]", file=sys.stderr)
         return 2
-    print(json.dumps(import_module(f"benchmarks.{sys.argv[1]}").bench(), indent=2))
+    module = import_module(f"benchmarks.{name}")
+    result = module.bench()
+    readable = hasattr(module, "table") and not options
+    print(module.table(result) if readable else json.dumps(result, indent=2))
     return 0
 
 
