@@ -51,6 +51,8 @@ class Arrivals:
     with d = direction[e], R = radius[e], and amplitude
         amplitude[e] * R/|R d - q| * (1 + amplitude_terms[e] @ aperture_terms(q)).
     (`acoustics.arrays.aperture_terms`.) In isovelocity water the sphere is exact and delay_terms has no columns.
+    Reflections on the way differ over the aperture: there the phase is phase[e] + phase_terms[e] @ aperture_terms(q),
+    at every frequency, and the square of the blur is blur[e]^2 + blur_terms[e] @ aperture_terms(q).
     amplitude is the factor on the pressure waveform of the snap at 1 m: the product of the columns below it. Facets
     change the waveform: its spectrum is multiplied by `acoustics.facet_pulses.facet_response` of the last four columns,
     whose modulus is 1 at `centre` for a coherent facet that is small.
@@ -61,6 +63,8 @@ class Arrivals:
     radius: Floats  # (path,) m: radius of curvature of the reference sphere
     delay_terms: Floats  # (path, term) s; (path, 0) where the sphere is exact
     amplitude_terms: Floats  # (path, term); (path, 0) where R/|R d - q| is exact
+    phase_terms: Floats  # (path, term) rad; (path, 0) where all hydrophones have the phase of the centre
+    blur_terms: Floats  # (path, term) s2; (path, 0) where all have the blur of the centre
     amplitude: Floats  # (path,) signed: spreading_out * scattering * spreading_in * boundary * 10^(-absorption/20)
     spreading_out: Floats  # (path,) 1/m: snap to facet (snap to array for the direct path)
     spreading_in: Floats  # (path,) 1/m: facet to array (1 for the direct path)

@@ -12,6 +12,14 @@ from sonarsynth.acoustics.facet_pulses import facet_mean, rough_factor
 from sonarsynth.acoustics.snap import ComplexArray
 from sonarsynth.conventions import Floats
 from sonarsynth.sonar import Sonar
+from sonarsynth.synthesis.changing import (
+    UNCHANGING,
+    Changes,
+    changes,
+    widest_spread,
+    widest_turn,
+    with_changes,
+)
 from sonarsynth.synthesis.direct_sum import relative_absorption
 from sonarsynth.synthesis.layout import Stretch
 from sonarsynth.synthesis.nodes import rounded_up
@@ -36,6 +44,7 @@ class Bins(NamedTuple):
     relative: Floats  # (bin,) absorption over that at the band centre, less one
     step: float  # Hz
     modes: ComplexArray  # (mode, bin) spectra that the modes of the paths weigh; none where all share their shape
+    changes: Changes  # of pulses over the aperture, in these modes
 
     def cut(self, count: int) -> Bins:
         """The first of them."""
@@ -74,20 +83,36 @@ def bins_of(
         front, spectrum, series = _shared(front, frequency, spectrum, series, widest, tolerance)
     some = audible(spectrum, tolerance)
     frequency, spectrum, series = frequency[some], spectrum[some], series[:, some]
-    modes = np.zeros((0, spectrum.size), complex)
+    modes, found = np.zeros((0, spectrum.size), complex), UNCHANGING
     if front.variance.any():
         front = _loud(front, frequency, spectrum, tolerance)
     relative = relative_absorption(absorption, frequency, sonar.band.centre)
     if front.corners.any():
         _check_corners(front, float(frequency[-1]))
+    if front.count > 1:
+        front = _changing(front, frequency[-1:], tolerance)
     if len(series) or _shaped(front):
         front, spectrum, modes = _with_modes(front, frequency, spectrum, relative, series, widest, tolerance)
-    return front, Bins(some.start, frequency, spectrum, relative, fs / part.samples, modes)
+        found = changes(front, frequency, modes) if front.count > 1 else UNCHANGING
+    return front, Bins(some.start, frequency, spectrum, relative, fs / part.samples, modes, found)
 
 
 def _shaped(front: Fronts) -> bool:
     """Whether pulses have shapes, beside Doppler."""
-    return bool(front.variance.any() or front.phase.any() or front.corners.any() or front.rough_share.any())
+    found = bool(front.variance.any() or front.phase.any() or front.corners.any() or front.rough_share.any())
+    return found or (front.count > 1 and bool(front.turn_terms.any() or front.spread_terms.any()))
+
+
+def _changing(front: Fronts, highest: Floats, tolerance: float) -> Fronts:
+    """Paths without what their pulses change by over the aperture, up to the highest frequency (1,), where that is
+    nothing beside the loudest."""
+    loud = np.abs(front.amplitude)
+    turn = np.linalg.norm(widest_turn(front) * loud)
+    spread = np.linalg.norm(widest_spread(front) * loud) * float(blur_exponent(highest)[0])
+    least = SHAPES * tolerance * loud.max()
+    terms = (v if size > least else v[:, :0] for size, v in ((turn, front.turn_terms), (spread, front.spread_terms)))
+    turn_terms, spread_terms = terms
+    return replace(front, turn_terms=turn_terms, spread_terms=spread_terms)
 
 
 def _check_corners(front: Fronts, highest: float) -> None:
@@ -119,7 +144,9 @@ def _with_modes(
         front, spectrum, series = replace(front, loss=front.loss - middle), spectrum * lost, series * lost
     else:
         decay = np.zeros(frequency.size)
-    weight, modes = shape_modes(front, frequency, spectrum, decay, series, widest, SHAPES * tolerance)
+    every = with_changes(front) if front.count > 1 else front
+    weight, modes = shape_modes(every, frequency, spectrum, decay, series, widest, SHAPES * tolerance)
+    weight = weight[: front.count]
     if front.corners.any() or front.rough_share.any():
         spectrum = modes[0]  # what paths mostly send: the colour of the errors
     return replace(front, modes=weight, loss=np.zeros(front.count) if few else front.loss), spectrum, modes

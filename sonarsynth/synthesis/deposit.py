@@ -14,6 +14,7 @@ from sonarsynth.acoustics.spectra import kaiser_bessel, kaiser_bessel_beta, kais
 from sonarsynth.conventions import Floats
 from sonarsynth.sonar import Elements
 from sonarsynth.synthesis.bins import Bins
+from sonarsynth.synthesis.changing import Changes, changed, shares
 from sonarsynth.synthesis.expansion import colour, face_pairs, recipe, sinc_polynomials
 from sonarsynth.synthesis.interpolating import to_sensors
 from sonarsynth.synthesis.nodes import Axis, chebyshev, interpolation, nodes_for
@@ -87,6 +88,7 @@ def add_stretch(
         weights=colour(bins.frequency, bins.spectrum, highest),
         steepest=float(np.abs(bins.relative[bins.frequency <= highest]).max(initial=0.0)),
         tolerance=tolerance,
+        changes=bins.changes,
         bins=used,
         circle=circle,
     )
@@ -111,6 +113,8 @@ def _add_tile(heard: npt.NDArray[Any], tile: Tile, part: Fronts, stage: Stage) -
     points = tile.nodes(elements)
     alone = part.count == 1
     field = _alone(tile, part, points, stage) if alone else _deposited(tile, part, points, stage)
+    if tile.reference.turn_terms.any() or tile.reference.spread_terms.any():
+        field = _changed(field, tile, points, stage)
     delay, gain = delay_and_gain(tile.reference, elements.position)
     late = delay[0] + (part.delay[0] - stage.origin if alone else 0.0)
     gain = gain[0] * elements.gain * (part.amplitude[0] if alone else 1.0)
@@ -129,6 +133,12 @@ def _alone(tile: Tile, part: Fronts, points: Floats, stage: Stage) -> npt.NDArra
     return np.asarray(faces * _power(tile, stage, np.ones(1)) * response)
 
 
+def _changed(field: npt.NDArray[Any], tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
+    """The field (node, 2, bin) with what pulses change by at each node, as the reference of the tile does."""
+    value = (field[:, 0] + 1j * field[:, 1]) * changed(tile.reference, points, stage.bins.frequency)
+    return np.stack([value.real, value.imag], axis=1).astype(stage.dtype)
+
+
 def _deposited(tile: Tile, part: Fronts, points: Floats, stage: Stage) -> npt.NDArray[Any]:
     """The field (node, 2, bin) of a tile at its nodes, steered to its reference: real and imaginary part."""
     from sonarsynth.synthesis.kernels import combine
@@ -140,7 +150,7 @@ def _deposited(tile: Tile, part: Fronts, points: Floats, stage: Stage) -> npt.ND
     mode = np.array(tile.terms)[:, 3]
     response = _responses(tile.modes.T[: mode.max() + 1], stage)
     _, place = face_pairs(tile.terms)
-    table = _packed(part, tile, (part.delay - stage.origin) * (grid.circle * bins.step))
+    table = _packed(part, tile, bins.changes, (part.delay - stage.origin) * (grid.circle * bins.step))
     field = np.empty((len(points), 2, bins.frequency.size), stage.dtype)
     group = max(1, LARGEST // (len(tile.terms) * grid.circle))
     for first in range(0, len(points), group):
@@ -161,6 +171,7 @@ def _deposits(table: Floats, part: Fronts, tile: Tile, points: Floats, stage: St
     steer, level = delay_and_gain(reference, points)
     middle, _ = towards(reference, points)
     late = louder = np.zeros((0, 0))
+    share = shares(part, reference, tile.changes, stage.bins.changes, points, stage.dtype)
     if part.delay_terms.shape[1]:
         late = (aperture_terms(points, part.aperture) @ part.delay_terms.T) * rate
     if part.gain_terms.shape[1]:
@@ -177,6 +188,7 @@ def _deposits(table: Floats, part: Fronts, tile: Tile, points: Floats, stage: St
         np.array([1.0 / d if d > 0 else 0.0 for d in tile.deviation[:2]]),
         late,
         louder,
+        share,
         recipe(tile.terms),
         grid.taps,
         0.5 * grid.width,
@@ -188,13 +200,14 @@ def _deposits(table: Floats, part: Fronts, tile: Tile, points: Floats, stage: St
     return out
 
 
-def _packed(part: Fronts, tile: Tile, position: Floats) -> Floats:
+def _packed(part: Fronts, tile: Tile, found: Changes, position: Floats) -> Floats:
     """Paths in blocks of rows (block, row, path), padded with silent ones: what `deposit` reads."""
     from sonarsynth.synthesis.kernels import BLOCK
 
     loss = (part.loss - tile.reference.loss) / (tile.deviation[2] or 1.0)
-    modes = part.modes @ tile.modes[:, : max(term[3] for term in tile.terms) + 1]
-    values = (*part.direction.T, part.curvature, position, part.amplitude, loss, *modes.T)
+    onto = tile.modes[:, : max(term[3] for term in tile.terms) + 1]
+    modes = np.concatenate([onto, *(found.onto[change] @ onto for change in tile.changes)], axis=1)
+    values = (*part.direction.T, part.curvature, position, part.amplitude, loss, *(part.modes @ modes).T)
     blocks = -(-part.count // BLOCK)
     rows = np.zeros((len(values), blocks * BLOCK))
     rows[0] = 1.0

@@ -13,6 +13,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.description import description
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.sonar import Elements, Sonar
+from sonarsynth.synthesis.changing import changed
 from sonarsynth.synthesis.layout import fast_length, layout
 from sonarsynth.synthesis.pulse import pulse_spectrum
 from sonarsynth.synthesis.wavefront import Fronts, delay_and_gain, fronts, reach, towards
@@ -46,6 +47,8 @@ def exact_spectra(front: Fronts, elements: Elements, frequency: Floats, relative
             shape = shape * facet_response(
                 frequency, one.coherent, one.corners, one.rough_share, one.rough_delay, one.centre
             )
+        if one.turn_terms.any() or one.spread_terms.any():
+            shape = shape * changed(one, elements.position, frequency)
         total += (one.amplitude[0] * gain[0] * elements.gain)[:, None] * (
             face * loss * shape * np.exp(-2j * np.pi * late[:, None] * frequency)
         )

@@ -20,7 +20,7 @@ RUN = 64
 
 ROWS = 7
 """Rows of the packed table: direction x, y, z; curvature; position (samples); amplitude; absorption (scaled
-deviation). Weights of the modes may follow."""
+deviation). Weights of the modes may follow, then those of what they change by."""
 
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
@@ -69,7 +69,24 @@ def _recur(out: Any, earlier: Any) -> None:
 
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
-def _expand(value: Any, block: Any, recipe: Any, modes: bool) -> None:
+def _mix(weight: Any, share: Any, node: int, first: int, size: int, modes: int, out: Any) -> None:
+    """Weights of modes (mode * BLOCK,) at a node: of the pulses, and of what they change by, (change * mode * BLOCK,),
+    in shares (change, node, path)."""
+    for s in range(share.shape[0]):
+        part = share[s, node, first : first + size]
+        for k in range(modes):
+            row = weight[(s * modes + k) * BLOCK : (s * modes + k) * BLOCK + size]
+            mixed = out[k * BLOCK : k * BLOCK + size]
+            if s == 0:
+                for i in range(size):
+                    mixed[i] = part[i] * row[i]
+            else:
+                for i in range(size):
+                    mixed[i] += part[i] * row[i]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+def _expand(value: Any, weight: Any, recipe: Any, modes: bool) -> None:
     """Terms of a block of paths, from row 4 of value on; there is the amplitude, which with modes moves to row 3."""
     if modes:
         value[3 * BLOCK : 4 * BLOCK] = value[4 * BLOCK : 5 * BLOCK]
@@ -78,7 +95,7 @@ def _expand(value: Any, block: Any, recipe: Any, modes: bool) -> None:
         if recipe[t, 1] < 3:
             _multiply(value[a : a + BLOCK], value[b : b + BLOCK], value[c : c + BLOCK])
         else:
-            _multiply(value[a : a + BLOCK], block[(ROWS - 3) * BLOCK + b :], value[c : c + BLOCK])
+            _multiply(value[a : a + BLOCK], weight[b - 3 * BLOCK :], value[c : c + BLOCK])
         if recipe[t, 2] >= 0:
             d = (4 + recipe[t, 2]) * BLOCK
             _recur(value[c : c + BLOCK], value[d : d + BLOCK])
@@ -109,6 +126,7 @@ def deposit(
     scale: Any,
     late: Any,
     louder: Any,
+    share: Any,
     recipe: Any,
     taps: Any,
     half: float,
@@ -122,14 +140,17 @@ def deposit(
     table: `count` paths in blocks (block * rows * BLOCK,), float64. nodes (node, xyz) in m. Of the tile's middle at the
     nodes, taken off: steer (node,) its delay in samples, level (node,) its gain, middle (node, 2) its direction y, z.
     scale (2,) is one over the deviation of y and z. late (samples) and louder (node, path) are the wavefront's terms,
-    or empty. recipe (term, 3) makes terms. taps (row * 4 * lane,) is the kernel, a cubic a row, and half its half width
-    in samples. rate is in samples/m; the grid is a circle of `length` samples.
+    or empty; share (change, node, path) is how much the modes are of each change, or empty. recipe (term, 3) makes
+    terms. taps (row * 4 * lane,) is the kernel, a cubic a row, and half its half width in samples. rate is in
+    samples/m; the grid is a circle of `length` samples.
     """
     terms, stride = recipe.shape[0], length + lanes
     cubes = taps.size // (4 * lanes)
     place, fraction = np.empty(BLOCK), np.empty(BLOCK, grid.dtype)
     begin, row = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
     value = np.empty((4 + terms) * BLOCK, grid.dtype)
+    modes = (rows - ROWS) // max(share.shape[0], 1)
+    mixed = np.zeros(modes * BLOCK, grid.dtype)
     for m in range(nodes.shape[0]):
         for first in range(0, count, BLOCK):
             size = min(BLOCK, count - first)
@@ -139,7 +160,11 @@ def deposit(
                 _add(place, late[m, first : first + size])
             if louder.size:
                 _amplify(value[4 * BLOCK :], louder[m, first : first + size])
-            _expand(value, block, recipe, rows > ROWS)
+            if share.size:
+                _mix(block[ROWS * BLOCK :], share, m, first, size, modes, mixed)
+                _expand(value, mixed, recipe, True)
+            else:
+                _expand(value, block[ROWS * BLOCK :], recipe, rows > ROWS)
             _split(place, half, cubes, length, begin, row, fraction)
             for i in range(size):
                 for lane in range(0, lanes, 8):

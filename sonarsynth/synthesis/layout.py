@@ -12,6 +12,7 @@ from sonarsynth.acoustics.spectra import SUPPORT_TOLERANCE
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.products import Arrivals
 from sonarsynth.sonar import Elements, Sonar, stop_frequency
+from sonarsynth.synthesis.changing import widest_spread
 from sonarsynth.synthesis.pulse import FEET, Reshaped, at_longest, silencing_blur, support_of
 from sonarsynth.synthesis.wavefront import Fronts, delay_and_gain, reach
 from sonarsynth.world.moment import Snap
@@ -88,7 +89,10 @@ def _supports(arrivals: Arrivals, front: Fronts, snaps: tuple[Snap, ...], sonar:
     (path,) are silent, blurred or from a facet that is not rough."""
     if not front.count:
         return np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0, bool)
-    chosen, blur, rough = sonar.antialias, np.sqrt(front.variance), front.rough_share > 0.0
+    chosen, rough = sonar.antialias, front.rough_share > 0.0
+    spread = widest_spread(front)
+    blur, least = np.sqrt(front.variance + spread), np.sqrt(np.maximum(front.variance - spread, 0.0))
+    turned = (front.phase != 0.0) | front.turn_terms.any(axis=1)
     longest = [at_longest(s.waveform) for s in snaps]
     roughest = float(front.rough_delay[rough].max(initial=0.0))
 
@@ -103,9 +107,9 @@ def _supports(arrivals: Arrivals, front: Fronts, snaps: tuple[Snap, ...], sonar:
 
     none, silent = np.zeros(front.count, bool), np.zeros(front.count, bool)
     plain = each(none, none)
-    support = each(front.phase != 0.0, rough) if front.phase.any() or roughest else plain
+    support = each(turned, rough) if turned.any() or roughest else plain
     if blur.any():
-        silent = blur >= np.array([silencing_blur(w, chosen) for w in longest])[arrivals.snap]
+        silent = least >= np.array([silencing_blur(w, chosen) for w in longest])[arrivals.snap]
     if rough.any():
         highest = np.array([stop_frequency(chosen)])
         left = rough_factor(highest, front.rough_share, front.rough_delay)[:, 0]

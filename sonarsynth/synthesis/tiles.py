@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonarsynth.acoustics.arrays import aperture_terms
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.sonar import Elements
+from sonarsynth.synthesis.changing import Changes, Rest, aperture_gradient, pulses, rest, slopes
 from sonarsynth.synthesis.expansion import PLAIN, Term, terms_for
 from sonarsynth.synthesis.interpolating import Axes, box_nodes, columns
 from sonarsynth.synthesis.nodes import MOST_NODES, Colour, nodes_for
@@ -31,6 +31,7 @@ class Aim:
     weights: Colour
     steepest: float  # largest change of absorption over the band, over that at the centre
     tolerance: float
+    changes: Changes  # of pulses over the aperture
     bins: int
     circle: int  # samples of the deposit grid
 
@@ -44,6 +45,7 @@ class Tile:
     axes: Axes | None  # nodes along x, y, z; None where the hydrophones themselves are the nodes
     terms: tuple[Term, ...]
     deviation: tuple[float, float, float]  # half range of direction y and z, and of absorption (dB)
+    changes: Ints  # (some,) which of the changes of pulses over the aperture count, beside the reference
     modes: Floats  # (mode, mode) turn of the modes of all paths to those of the tile; (0, 0) where there are none
     cost: float  # ns, predicted
 
@@ -82,18 +84,18 @@ class _Views:
     amplitude: Floats  # (row, path) of `variation`
     probes: _Probes
     gradient: Floats  # (xyz, point, term) of the aperture terms; empty where there are none
+    bend: Floats  # (xyz, path) rad/m: how fast pulses change over the aperture (`changing.slopes`)
     near: bool  # a source is within or about that box, where no nodes can stand for the hydrophones
 
 
-def _views(front: Fronts, elements: Elements) -> _Views:
+def _views(front: Fronts, aim: Aim) -> _Views:
+    elements = aim.elements
     near = bool(front.curvature.max() * np.linalg.norm(np.abs(elements.position).max(axis=0)) > 0.8)
-    probes, gradient = _probes(elements, near), np.zeros((3, 0, 0))
-    if front.delay_terms.shape[1]:
-        steps = 1e-4 * front.aperture * np.eye(3)
-        sides = [[aperture_terms(probes.points + way * step, front.aperture) for way in (1, -1)] for step in steps]
-        gradient = np.array([(ahead - behind) / (2e-4 * front.aperture) for ahead, behind in sides])
+    probes = _probes(elements, near)
+    gradient = aperture_gradient(front, probes.points)
     columns = _columns(front, probes.points, gradient)
-    return _Views(front, columns, variation(front, elements), probes, gradient, near)
+    bend = slopes(front, gradient, aim.weights[0] * aim.highest, aim.highest)
+    return _Views(front, columns, variation(front, elements), probes, gradient, bend, near)
 
 
 def _columns(front: Fronts, probes: Floats, gradient: Floats) -> Floats:
@@ -109,8 +111,8 @@ def _columns(front: Fronts, probes: Floats, gradient: Floats) -> Floats:
     return np.ascontiguousarray(np.concatenate(columns))
 
 
-def _reference(middle: Floats, front: Fronts) -> Fronts:
-    """The front in the middle of a tile, from its middle row."""
+def _reference(middle: Floats, front: Fronts, over: Rest) -> Fronts:
+    """The front in the middle of a tile, from its middle row and the change over the aperture that it takes."""
     norm = np.linalg.norm(middle[:3])
     direction = middle[:3] if norm < 0.1 else middle[:3] / norm
     terms = front.delay_terms.shape[1]
@@ -122,6 +124,8 @@ def _reference(middle: Floats, front: Fronts) -> Fronts:
         loss=middle[4:5],
         delay_terms=middle[None, 5 : 5 + terms],
         gain_terms=np.zeros((1, 0)),
+        turn_terms=over.turn_terms[None],
+        spread_terms=over.spread_terms[None],
         sound_speed=front.sound_speed,
         aperture=front.aperture,
         phase=np.zeros(1),
@@ -168,7 +172,8 @@ def _try(paths: Ints, views: _Views, aim: Aim) -> _Trial:
     whole = paths.size == views.front.count
     columns = views.columns if whole else np.take(views.columns, paths, axis=1)
     low, high = columns.min(axis=1), columns.max(axis=1)
-    reference = _reference(0.5 * (low + high), views.front)
+    over = rest(views.front, paths, aim.changes, 0.1 * aim.tolerance)
+    reference = _reference(0.5 * (low + high), views.front, over)
     probes = views.probes
     own = _columns(reference, probes.points, views.gradient)[:, 0]
     far = np.maximum(high - own, own - low)
@@ -177,10 +182,11 @@ def _try(paths: Ints, views: _Views, aim: Aim) -> _Trial:
     slope = far[-probed:].reshape(-1, 3).max(axis=0)
     wave = aim.highest / reference.sound_speed  # 1/m
     turn, loss = (aim.elements.face * wave * dy, aim.elements.face * wave * dz), float(far[4])
-    phase = np.full(3, np.inf) if views.near else 2.0 * np.pi * wave * slope * probes.size
+    bend = views.bend[:, paths].max(axis=1)
+    phase = np.full(3, np.inf) if views.near else (2.0 * np.pi * wave * slope + bend) * probes.size
     modes, sizes = np.zeros((0, 0)), PLAIN
     if views.front.modes.shape[1]:
-        modes, sizes = main_modes(views.front.modes[paths], np.abs(views.front.amplitude[paths]))
+        modes, sizes = main_modes(*pulses(views.front, paths, over, aim.changes))
     extent = _Extent(
         paths=paths.size,
         phase=tuple(phase.tolist()),
@@ -191,7 +197,7 @@ def _try(paths: Ints, views: _Views, aim: Aim) -> _Trial:
         modes=sizes,
     )
     axes, terms, cost = _cheapest(extent, aim)
-    return _Trial(Tile(paths, reference, axes, terms, (dy, dz, loss), modes, cost), extent)
+    return _Trial(Tile(paths, reference, axes, terms, (dy, dz, loss), over.which, modes, cost), extent)
 
 
 def _drift(front: Fronts, aim: Aim) -> tuple[float, ...]:
@@ -249,17 +255,32 @@ def tiles(front: Fronts, aim: Aim) -> list[Tile]:
     second."""
     if front.count == 1:
         return [_alone(np.arange(1), front, aim)]
-    views = _views(front, aim.elements)
+    views = _views(front, aim)
     return _best(_try(np.arange(front.count), views, aim), views, aim, patient=True)
 
 
 def _alone(paths: Ints, front: Fronts, aim: Aim) -> Tile:
     """One path is its own reference: nothing is deposited, and its directivity is all that varies."""
     reference = front.select(paths)
-    x, y, z = (nodes_for(d, aim.weights, aim.tolerance) for d in _drift(reference, aim))
+    points, size = _probes(aim.elements, True).points, _probes(aim.elements, False).size
+    bend = (
+        slopes(reference, aperture_gradient(reference, points), aim.weights[0] * aim.highest, aim.highest)[:, 0] * size
+    )
+    x, y, z = (
+        nodes_for(d + b, aim.weights, aim.tolerance) for d, b in zip(_drift(reference, aim), bend.tolist(), strict=True)
+    )
     axes = (x, y, z) if 2 * x.nodes * y.nodes * z.nodes < aim.elements.count else None
     cost = 2e5 + 4.0 * aim.elements.count * aim.bins
-    return Tile(paths, reference, axes, ((0, 0, 0, 0),), (0.0, 0.0, 0.0), np.eye(reference.modes.shape[1]), cost)
+    return Tile(
+        paths,
+        reference,
+        axes,
+        ((0, 0, 0, 0),),
+        (0.0, 0.0, 0.0),
+        np.zeros(0, int),
+        np.eye(reference.modes.shape[1]),
+        cost,
+    )
 
 
 def _best(trial: _Trial, views: _Views, aim: Aim, patient: bool) -> list[Tile]:

@@ -26,7 +26,7 @@ LONGEST_CORNER = 0.01
 
 FINITE = (
     *("delay", "direction", "amplitude", "absorption", "delay_terms", "amplitude_terms", "phase", "blur", "stretch"),
-    *("corners", "rough_share", "rough_delay"),
+    *("phase_terms", "blur_terms", "corners", "rough_share", "rough_delay"),
 )
 """What of the arrivals must be finite."""
 
@@ -42,6 +42,8 @@ class Fronts:
     loss: Floats  # (path,) dB of absorption at the band centre, inside amplitude
     delay_terms: Floats  # (path, term) s
     gain_terms: Floats  # (path, term)
+    turn_terms: Floats  # (path, term) rad: phase over that at the centre
+    spread_terms: Floats  # (path, term) s2: variance over that at the centre
     sound_speed: float  # m/s
     aperture: float  # m: scale of the terms
     phase: Floats  # (path,) rad, -pi/2 to pi/2: whole half turns are signs of the amplitude
@@ -98,6 +100,8 @@ def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements) -> F
         loss=arrivals.absorption,
         delay_terms=arrivals.delay_terms,
         gain_terms=arrivals.amplitude_terms,
+        turn_terms=arrivals.phase_terms,
+        spread_terms=arrivals.blur_terms,
         sound_speed=arrivals.sound_speed,
         aperture=elements.aperture or 1.0,
         phase=phase,

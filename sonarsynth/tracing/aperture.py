@@ -7,7 +7,7 @@ polynomials over the body; held-out facets measure the error, and where it is to
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,6 +32,10 @@ SAMPLES = 96
 """Facets of a body and family that rays to the probes are traced from where that is enough; a quarter is held out."""
 SMOOTH_TIME = 1e-9
 """s: largest error of a delay from facet to facet: 5e-4 rad at 85 kHz."""
+SMOOTH_PHASE = 5e-4
+"""rad: largest error of a phase of reflection from facet to facet."""
+SMOOTH_BLUR = 4e-15
+"""s2: largest error of a squared blur from facet to facet: 5e-4 of the amplitude at 85 kHz."""
 SMOOTH_GAIN = 1e-3
 """Largest relative error of an amplitude from facet to facet."""
 SMOOTH_DIRECTION = 1e-4
@@ -43,6 +47,8 @@ class Fronts:
     """Legs over the aperture."""
 
     delay_terms: Floats  # (leg, term) s; no columns where all are spheres
+    phase_terms: Floats  # (leg, term) rad: phases of reflection over that of the centre; no columns where all have it
+    blur_terms: Floats  # (leg, term) s2: squares of blurs over that of the centre; no columns where all have it
     error: Floats  # (leg,) s: misfit of the wavefront at the probes, the held-out ones among them
     probe_departure: Floats  # (leg, probe, xyz) world: where each probe is seen from the point
     probe_gain: Floats  # (leg, probe): amplitude at the probe over that of the sphere; 1 in uniform water
@@ -64,8 +70,8 @@ def fronts(
 ) -> Fronts:
     """Wavefronts of legs. group (leg,): legs of one body; band (Hz).
 
-    The phase of a lossy reflection varies over the aperture: it is taken for a delay, right at the centre of the band,
-    and what that errs by at its edges is in `error`.
+    Reflections turn and blur the pulse by the grazing angle, which varies over the aperture. What the polynomials in
+    that miss is in `error`, as delays that are as much at the upper edge of the band.
     """
     probe = probes(elements)
     count, sensors = len(legs.row), len(probe.sensor)
@@ -77,12 +83,13 @@ def fronts(
             chosen = members[_spread(legs.point[members])]
         exact = _exact(legs.select(chosen), place)
         if len(chosen) < len(members):
-            exact = _over_body(legs.point[members], legs.point[chosen], exact) or _exact(legs.select(members), place)
+            smooth = _over_body(legs.point[members], legs.point[chosen], exact, 2.0 * np.pi * band[1])
+            exact = smooth or _exact(legs.select(members), place)
         made.put(members, exact)
-    terms = made.terms
-    if profile.uniform and not terms.any():
-        terms = np.empty((count, 0))
-    return Fronts(terms, made.error, made.departure, made.gain)
+    none = np.empty((count, 0))
+    terms = none if profile.uniform and not made.terms.any() else made.terms
+    phase, blur = (value if value.any() else none for value in (made.phase, made.blur))
+    return Fronts(terms, phase, blur, made.error, made.departure, made.gain)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,15 +109,16 @@ class _Made:
     """Legs at the probes."""
 
     terms: Floats  # (leg, term) s: delay over the sphere's
+    phase: Floats  # (leg, term) rad: of reflections, over that at the centre
+    blur: Floats  # (leg, term) s2: its square, over that at the centre
     gain: Floats  # (leg, probe)
     departure: Floats  # (leg, probe, xyz)
     error: Floats  # (leg,) s
 
     @staticmethod
     def room(count: int, sensors: int) -> _Made:
-        return _Made(
-            np.zeros((count, TERMS)), np.ones((count, sensors)), np.zeros((count, sensors, 3)), np.zeros(count)
-        )
+        terms, phase, blur = np.zeros((3, count, TERMS))
+        return _Made(terms, phase, blur, np.ones((count, sensors)), np.zeros((count, sensors, 3)), np.zeros(count))
 
     def put(self, rows: Ints, made: _Made) -> None:
         for name, value in vars(made).items():
@@ -124,15 +132,15 @@ def _exact(legs: Legs, place: _Place) -> _Made:
     if profile.uniform:
         departure, left, gain = _image(legs, place.probe, place.sonar_pose), np.zeros(made.gain.shape), made.gain
         if not legs.bounces.any():
-            return _Made(made.terms, gain, departure, made.error)
+            return replace(made, departure=departure)
     else:
         left, gain, departure = _to_probes(legs, environment, profile, place.sonar_pose, place.probe, place.propagation)
-    shift, loss = _boundaries(legs, departure, environment, profile, band)
-    centre, half = 0.5 * (band[0] + band[1]), 0.5 * (band[1] - band[0])
-    error = np.nan_to_num(np.abs(shift)).max(axis=1, initial=0.0) * half / centre / (2.0 * np.pi * band[1])
-    left = left - shift / (2.0 * np.pi * centre)
-    terms = place.probe.fit(left)
-    return _Made(terms, gain * loss, departure, place.probe.misfit(left, terms) + error)
+    probe, rate = place.probe, 2.0 * np.pi * band[1]
+    turned, loss, softer = _boundaries(legs, departure, environment, profile, 0.5 * (band[0] + band[1]))
+    turned, softer = (np.where(np.isnan(left), np.nan, value) for value in (turned, softer))
+    terms, phase, blur = probe.fit(left), probe.fit(turned), probe.fit(softer)
+    error = probe.misfit(left, terms) + probe.misfit(turned, phase) / rate + probe.misfit(softer, blur) * 0.5 * rate
+    return _Made(terms, phase, blur, gain * loss, departure, error)
 
 
 def _image(legs: Legs, probe: Probes, sonar_pose: Pose) -> Floats:
@@ -145,22 +153,25 @@ def _image(legs: Legs, probe: Probes, sonar_pose: Pose) -> Floats:
 
 
 def _boundaries(
-    legs: Legs, departure: Floats, environment: Environment, profile: Profile, band: tuple[float, float]
-) -> tuple[Floats, Floats]:
-    """Phase (leg, probe) that the reflections to each probe add to those to the centre, and ratio of their moduli."""
-    shift, ratio = np.zeros(departure.shape[:2]), np.ones(departure.shape[:2])
+    legs: Legs, departure: Floats, environment: Environment, profile: Profile, centre: float
+) -> tuple[Floats, Floats, Floats]:
+    """Phase (leg, probe) that the reflections to each probe add to those to the centre, ratio of their moduli, and
+    what their squared blurs (s2) add; centre: of the band (Hz)."""
+    shape = departure.shape[:2]
+    shift, ratio, softer = np.zeros(shape), np.ones(shape), np.zeros(shape)
     some = np.flatnonzero(legs.bounces > 0)
     if not len(some):
-        return shift, ratio
+        return shift, ratio, softer
     p = np.hypot(departure[some, :, 0], departure[some, :, 1]) / profile.at(depth(legs.point[some]))[:, None]
     surface, bottom = (np.repeat(n[some, None], p.shape[1], axis=1) for n in (legs.surface, legs.bottom))
     angles = [np.arccos(np.minimum(p * float(profile.at(z)), 1.0)) for z in (0.0, environment.depth)]
-    seen = at_boundaries(environment, profile, angles[0], surface, angles[1], bottom, 0.5 * (band[0] + band[1]))
+    seen = at_boundaries(environment, profile, angles[0], surface, angles[1], bottom, centre)
     turned = seen.phase - (legs.phase - 0.5 * np.pi * legs.caustics)[some, None]
     shift[some] = turned - 2.0 * np.pi * np.rint(turned / (2.0 * np.pi))
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio[some] = np.where(legs.boundary[some, None] > 0, seen.modulus / legs.boundary[some, None], 1.0)
-    return shift, ratio
+    softer[some] = seen.blur**2 - legs.blur[some, None] ** 2
+    return shift, ratio, softer
 
 
 def _families(legs: Legs, group: Ints) -> list[Ints]:
@@ -182,25 +193,28 @@ def _spread(point: Floats) -> Ints:
     return np.unique(np.concatenate([extreme, golden]))
 
 
-def _over_body(point: Floats, sample: Floats, exact: _Made) -> _Made | None:
-    """Legs from points (point, xyz) of a body from those of a sample of them, by cubics; None if they err too much."""
+def _over_body(point: Floats, sample: Floats, exact: _Made, rate: float) -> _Made | None:
+    """Legs from points (point, xyz) of a body from those of a sample of them, by cubics; None if they err too much;
+    rate (rad/s): of the upper edge of the band."""
     middle, half = 0.5 * (point.min(axis=0) + point.max(axis=0)), np.maximum(0.5 * np.ptp(point, axis=0), 1e-9)
     basis, at = (aperture_terms((x - middle) / half, 1.0) for x in (point, sample))
-    terms, sensors = exact.terms.shape[1], exact.gain.shape[1]
-    values = np.concatenate([exact.terms, exact.gain, exact.departure.reshape(len(sample), -1)], axis=1)
+    degrees, sensors = exact.terms.shape[1], exact.gain.shape[1]
+    towards = exact.departure.reshape(len(sample), -1)
+    values = np.concatenate([exact.terms, exact.phase, exact.blur, exact.gain, towards], axis=1)
+    parts = np.cumsum([degrees, degrees, degrees, sensors])
     if not np.isfinite(values).all():
         return None
     held = np.arange(len(sample)) % 4 == 3
     coefficients = np.linalg.lstsq(at[~held], values[~held], rcond=1e-10)[0]
     misfit = np.abs(at[held] @ coefficients - values[held]).max(axis=0)
-    late = float(misfit[:terms].sum())  # monomials over the aperture are at most 1
-    gain, departure = misfit[terms : terms + sensors].max(), misfit[terms + sensors :].max()
-    if not (late <= SMOOTH_TIME and gain <= SMOOTH_GAIN and departure <= SMOOTH_DIRECTION):
+    wrong = np.split(misfit, parts)
+    late, turned, softer = (float(w.sum()) for w in wrong[:3])  # monomials over the aperture are at most 1
+    smooth = late <= SMOOTH_TIME and turned <= SMOOTH_PHASE and softer <= SMOOTH_BLUR
+    if not (smooth and wrong[3].max() <= SMOOTH_GAIN and wrong[4].max() <= SMOOTH_DIRECTION):
         return None
-    found = basis @ coefficients
-    error = np.full(len(point), late + float(exact.error.max()))
-    towards = found[:, terms + sensors :].reshape(len(point), sensors, 3)
-    return _Made(found[:, :terms], found[:, terms : terms + sensors], towards, error)
+    terms, phase, blur, gain, away = np.split(basis @ coefficients, parts, axis=1)
+    error = np.full(len(point), late + turned / rate + 0.5 * rate * softer + float(exact.error.max()))
+    return _Made(terms, phase, blur, gain, away.reshape(len(point), sensors, 3), error)
 
 
 def _to_probes(

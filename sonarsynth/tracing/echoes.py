@@ -219,23 +219,21 @@ def _variation(
 def _turned(array: ArrayLegs, groups: list[_Group], leg: Ints, strength: Floats) -> Fronts:
     """Wavefronts (path,) of echoes of that strength (path,), with the phases of reflections from facets to each probe.
 
-    They vary over the aperture where part of the sound enters the body, and are taken for delays, right at the centre
-    of the band; what that errs by at its edges counts as far as the echo is as strong as the strongest. Where the
-    coefficient passes near 0 its phase leaps: there all sensors have that of the centre.
+    They vary over the aperture where part of the sound enters the body; what polynomials miss counts as far as the echo
+    is as strong as the strongest. Where the coefficient passes near 0 its phase leaps: there all sensors have that of
+    the centre.
     """
     rows = leg[np.concatenate([g.row for g in groups])]
     over = array.fronts.select(rows)
     shift = np.concatenate([g.turned(array.fronts.probe_departure[leg[g.row]]) for g in groups])
-    shift[np.abs(shift).max(axis=1, initial=0.0) > LEAP] = 0.0
+    leaps = np.abs(shift).max(axis=1, initial=0.0) > LEAP
     if not shift.any():
         return over
-    probe, (low, high) = probes(array.elements), array.band
-    late = shift / (-2.0 * np.pi * array.centre)
-    terms = probe.fit(late)
-    edges = np.abs(shift).max(axis=1) * (high - low) / (2.0 * array.centre) / (2.0 * np.pi * high)
+    probe = probes(array.elements)
+    terms = probe.fit(np.where(leaps[:, None], 0.0, shift))
     share = np.abs(strength) / max(float(np.abs(strength).max()), 1e-300)
-    error = over.error + share * (probe.misfit(late, terms) + edges)
-    return replace(over, delay_terms=over.delay_terms + terms if over.delay_terms.shape[1] else terms, error=error)
+    error = over.error + share * np.where(leaps, 0.0, probe.misfit(shift, terms)) / (2.0 * np.pi * array.band[1])
+    return replace(over, phase_terms=over.phase_terms + terms if over.phase_terms.shape[1] else terms, error=error)
 
 
 def _gain(over_aperture: Floats, amplitude: Floats, tapered: Bools, probe_gain: Floats) -> Floats:

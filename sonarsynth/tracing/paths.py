@@ -91,6 +91,8 @@ def assemble(
         direction=legs.direction,
         radius=legs.radius,
         delay_terms=over.delay_terms,
+        phase_terms=over.phase_terms,
+        blur_terms=over.blur_terms,
         amplitude_terms=variation[0],
         amplitude=first * scattering * second * boundary * 10.0 ** (-loss / 20.0),
         spreading_out=first,

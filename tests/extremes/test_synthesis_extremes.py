@@ -36,6 +36,8 @@ def arrivals(delay: Floats, direction: Floats, radius: Floats, amplitude: Floats
         radius=np.asarray(radius, float),
         delay_terms=none,
         amplitude_terms=none,
+        phase_terms=none,
+        blur_terms=none,
         amplitude=np.asarray(amplitude, float),
         spreading_out=one,
         spreading_in=one,

@@ -145,8 +145,9 @@ def test_the_phase_of_a_lossy_reflection_is_that_of_each_hydrophone() -> None:
     np.testing.assert_array_equal(shared.facet, exact.facet)
     turned = exact.phase - shared.phase
     assert np.abs(turned).max() > 0.1
-    np.testing.assert_allclose(-2.0 * np.pi * 55e3 * (shared.delay_terms @ basis), turned, atol=2e-3)
-    assert found.wavefront_error > 1e-8  # what a phase taken for a delay errs by at the edges of the band
+    assert not rigid.phase_terms.shape[1] and not found.delay_terms.shape[1]
+    np.testing.assert_allclose(shared.phase_terms @ basis, turned, atol=2e-3)
+    assert found.wavefront_error < 2e-3 / (2.0 * np.pi * 85e3)
 
 
 @pytest.mark.parametrize("edges", ["smooth", "auto"])

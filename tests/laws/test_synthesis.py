@@ -59,6 +59,8 @@ def arrivals(
         radius=np.asarray(radius, float),
         delay_terms=np.zeros((n, 0)) if delay_terms is None else delay_terms,
         amplitude_terms=np.zeros((n, 0)) if amplitude_terms is None else amplitude_terms,
+        phase_terms=np.zeros((n, 0)),
+        blur_terms=np.zeros((n, 0)),
         amplitude=np.asarray(amplitude, float),
         spreading_out=one,
         spreading_in=one,

@@ -30,9 +30,10 @@ HEARD = (253,)
 def plain(arrivals: Arrivals) -> Arrivals:
     """The same paths, each a scaled snap: what the pulses would be without their shapes."""
     none = np.zeros(len(arrivals.delay))
+    terms = np.empty((len(none), 0))
     return replace(
         arrivals, coherent=none.astype(bool), corners=0.0 * arrivals.corners, rough_share=none, rough_delay=none,
-        blur=none, phase=none,
+        blur=none, phase=none, phase_terms=terms, blur_terms=terms,
     )  # fmt: skip
 
 
