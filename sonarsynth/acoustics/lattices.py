@@ -24,12 +24,17 @@ def mirrored_sensors(column: Ints, row: Ints, columns: int, rows: int, live: Int
     return places
 
 
+def half_coordinates(count: int, pitch: float) -> Floats:
+    """Coordinates >= 0 (half count,) in m of `count` sensors `pitch` apart, from the middle outwards."""
+    return 0.5 * pitch * np.arange((count + 1) % 2, count, 2, dtype=float)
+
+
 def axial_focus_delay(columns: int, rows: int, pitch: float, focus: float | None, sound_speed: float) -> Floats:
     """Delay (half column, half row) in s after the array centre of a source at `focus` (m) on the axis x.
 
     (sqrt(R^2 + q^2) - R)/c, the same for the four sensors of a place; pitch in m; focus None: 0, a plane wave.
     """
-    y, z = (0.5 * pitch * np.arange((n + 1) % 2, n, 2, dtype=float) for n in (columns, rows))
+    y, z = half_coordinates(columns, pitch), half_coordinates(rows, pitch)
     sensors = np.stack(np.broadcast_arrays(0.0, y[:, None], z), axis=-1)
     delay = focus_delay(sensors.reshape(-1, 3), np.array([1.0, 0.0, 0.0]), focus, sound_speed)
     return delay.reshape(len(y), len(z))

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from typing import Annotated, Protocol
 
+from sonarsynth.beamforming.auto import AutoBeamforming
 from sonarsynth.beamforming.dense import DenseDelayAndSum
 from sonarsynth.beamforming.focused import FocusedDelayAndSum
 from sonarsynth.description import BY_KIND
 from sonarsynth.products import EnergyImage, Signals
 from sonarsynth.sonar import Elements, Sonar
 
-__all__ = ["Beamformer", "BeamformingMethod", "DenseDelayAndSum", "FocusedDelayAndSum"]
+__all__ = ["AutoBeamforming", "Beamformer", "BeamformingMethod", "DenseDelayAndSum", "FocusedDelayAndSum"]
 
 
 class BeamformingMethod(Protocol):
@@ -30,4 +31,4 @@ class BeamformingMethod(Protocol):
         ...
 
 
-Beamformer = Annotated[FocusedDelayAndSum | DenseDelayAndSum, BY_KIND]
+Beamformer = Annotated[FocusedDelayAndSum | DenseDelayAndSum | AutoBeamforming, BY_KIND]

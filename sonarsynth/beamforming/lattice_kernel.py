@@ -42,7 +42,7 @@ FOUR = np.float32(4.0)
 
 
 @nb.njit(cache=True, nogil=True, forceinline=True)
-def _seeds(c: Any, s: Any, odd: bool) -> Any:
+def seeds(c: Any, s: Any, odd: bool) -> Any:
     """The recurrence from the phasor (c, s) of half a step t: cosines and sines at o and o - 1 steps, and 2 cos(2t)."""
     cc, ss = c * c, s * s
     # 2 cc - 2 ss, from the smaller square: an error here is an error of frequency, largest where 2t is near 0 or pi.
@@ -59,8 +59,8 @@ def _sums(terms: Any, start: int, stop: int, odd: bool, c: Any, s: Any, d: Any, 
 
     The terms lie at terms[start : stop : TERM]. Twenty multiply-adds a term and nothing else, in 26 registers.
     """
-    c, c_, s, s_, p = _seeds(c, s, odd)
-    d, d_, t, t_, q = _seeds(d, t, odd)
+    c, c_, s, s_, p = seeds(c, s, odd)
+    d, d_, t, t_, q = seeds(d, t, odd)
     a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = splat(ZERO)
     b0 = b1 = b2 = b3 = b4 = b5 = b6 = b7 = splat(ZERO)
     for i in range(start, stop, TERM):

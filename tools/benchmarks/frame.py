@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.peers import acoular_image, thesis_image
 from sonarsynth import config, planning, render
 from sonarsynth.acoustics.spectra import filtered_pulse
-from sonarsynth.beamforming import DenseDelayAndSum
+from sonarsynth.beamforming import DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.products import Arrivals, EnergyImage, Signals
 from sonarsynth.synthesis import DirectSum
 from sonarsynth.synthesis.pulse import bubble, fir
@@ -94,6 +94,13 @@ def bench(index: int = 32) -> dict[str, Any]:
         "error_of_peak_kernel": relative(kernel, check),  # the same plane waves, float64
         "error_of_peak_focus": relative(image.energy, dense.energy),  # separable against spherical focusing
     }
+    if isinstance(beamformer, FocusedDelayAndSum):
+        one = replace(beamformer, zones=1)
+        axial, seconds = cpu(lambda: one.image(signals, plan.elements, sonar, start, stop))
+        stages["beamform"] |= {
+            **likeness(image.energy, dense.energy),
+            "one_zone": {"ms": 1e3 * seconds, **likeness(axial.energy, dense.energy)},
+        }
 
     def cloud(of: EnergyImage) -> Any:
         return scene.processing.ranging.cloud(
