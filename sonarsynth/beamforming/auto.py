@@ -1,4 +1,4 @@
-"""The fast beamformer where it is right, the dense one elsewhere."""
+"""The fast beamformer where its error is estimated to be small enough, the dense one elsewhere."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sonarsynth.sonar import Elements, Sonar
 
 @description
 class AutoBeamforming:
-    """Delay and sum: `focused` with the fewest zones that are right, `dense` where the array is no lattice or 32 do
+    """Delay and sum: `focused` with the fewest zones that `focus_error` allows, `dense` where the array is no lattice or 32 do
     not suffice."""
 
     kind: Literal["auto"] = "auto"
@@ -25,7 +25,7 @@ class AutoBeamforming:
     """Weights over the aperture: all alike, or falling off towards the rim (lower side lobes, a wider beam)."""
 
     def resolve(self, elements: Elements, sonar: Sonar, error_db: float) -> FocusedDelayAndSum | DenseDelayAndSum:
-        """The method whose beams within 20 dB of the peak are right to `error_db` (dB), a source being at the focus."""
+        """The method whose `focus_error`, an estimate and no bound, is not above `error_db` (dB)."""
         if elements.on_lattice:
             from sonarsynth.beamforming.focus_error import zones_needed
 
@@ -35,5 +35,5 @@ class AutoBeamforming:
         return DenseDelayAndSum(focus=self.focus, shading=self.shading)
 
     def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
-        """Image of the window from start to stop (s), by the method that is right to 0.1 dB."""
+        """Image of the window from start to stop (s), resolved for 0.1 dB."""
         return self.resolve(elements, sonar, AUTO_ERROR).image(signals, elements, sonar, start, stop)

@@ -4,6 +4,11 @@ The error is that of one beam, for sources at the focus with a flat spectrum ove
 that the zones leave out, against that with the delays of a sphere. The beams tried are those at the corners of the
 zones where most is left out; the sources are those that such a beam hears: in its main lobe, its first side lobes, and
 where the lattice has ghosts.
+
+An estimate, no bound: of its numbers (`MARGIN`, where sources are, how many beams) some were chosen on the 508-element
+disc and a rectangle of 20 by 8. On 160 cases that nothing was chosen on (five other arrays, 2 to 14 zones, 4 to 40 m,
+151 with an error above 0.002 dB) it was 1.9 times the error of whole images at the median, but under 0.9 of it in 14,
+and 0.16 of it at worst: mostly with many zones, where the worst beam is not among those tried.
 """
 
 from __future__ import annotations
@@ -26,7 +31,7 @@ MARGIN = 1.1
 """The worst source lies between those that are tried."""
 
 BINS = 64
-BEAMS = 4
+BEAMS = 16
 """Beams that are tried."""
 
 RAYS, REACH = 12, 0.15 * np.arange(1, 19)
@@ -46,7 +51,7 @@ def focus_error(
     zones: int,
     within: float = 20.0,
 ) -> float:
-    """Largest error (dB) of the image of a source at the focus, over beams at most `within` dB under its peak.
+    """Estimate of the largest error (dB) of the image of a source at the focus, over beams `within` dB of its peak.
 
     weight (sensor,), of sum one; focus in m, None for plane waves (no error); `zones` as for `FocusedDelayAndSum`.
     within 0: the energy that is lost in the beam of the source itself.

@@ -88,8 +88,11 @@ def test_kernel_equals_sums_with_the_delays_that_the_zones_state(array, beams, z
     (50, 20.0, 1), (50, 20.0, 4), (50, 5.0, 2), (50, 5.0, 8), (50, 10.0, 6), (50, 2.0, 10), (20, 50.0, 1),
     (20, 5.0, 3), (20, 2.0, 4),
 ])  # fmt: skip
-def test_error_model_bounds_the_error_of_images_within_20_db_of_their_peak(array, span, focus, zones):
-    """Sources at the focus in the worst beams of the model and in beams drawn at random; and the loss at the peak."""
+def test_error_model_is_not_below_the_error_of_these_images_within_20_db_of_their_peak(array, span, focus, zones):
+    """Sources at the focus in the worst beams of the model and in beams drawn at random; and the loss at the peak.
+
+    The constants of the model were chosen on these arrays and views: this guards them, and says nothing of others.
+    """
     parts, beams = elements(array), grid(span, 31)
     weight, glass = uniform(parts), lens(parts, focus, SPEED)
     heard = heard_by(parts, weight, BAND)
@@ -143,7 +146,7 @@ def heard(parts, source, rate=196e3):
     return Signals(pressure.astype(np.float32), 0.0, rate, 0.0, 0, 0)
 
 
-def test_one_zone_is_the_delay_of_the_axis_and_auto_is_right_to_a_tenth_of_a_decibel():
+def test_auto_is_right_to_a_tenth_of_a_decibel_where_one_zone_is_not():
     sonar = Sonar(array=RECTANGLE, beams=grid(50, 31))
     parts = elements(RECTANGLE)
     signals = heard(parts, 5.0 * direction(sonar.beams.azimuth[30], sonar.beams.elevation[24]))
