@@ -9,7 +9,7 @@ import numpy as np
 from annotated_types import Ge, Gt, Le
 from pydantic import Field, field_validator
 
-from sonarsynth.beamforming import Beamformer, FocusedDelayAndSum
+from sonarsynth.beamforming import AutoBeamforming, Beamformer
 from sonarsynth.conventions import Decibels, Floats, PositiveSeconds, Seconds
 from sonarsynth.description import description
 from sonarsynth.geometry import Pose
@@ -108,7 +108,7 @@ class Processing:
     """How the snap is located."""
     cancelling: Cancelling | None = None
     """How the snap's own reflections are taken out of the signals before imaging; left out: they stay in."""
-    beamforming: Beamformer = Field(default_factory=FocusedDelayAndSum)
+    beamforming: Beamformer = Field(default_factory=AutoBeamforming)
     """How the energy image is made."""
     ranging: Ranging = Field(default_factory=AutoRange)
     """How echoes are ranged and placed."""

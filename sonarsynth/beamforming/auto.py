@@ -15,8 +15,8 @@ from sonarsynth.sonar import Elements, Sonar
 
 @description
 class AutoBeamforming:
-    """Delay and sum: `focused` with the fewest zones that `focus_error` allows, `dense` where the array is no lattice or 32 do
-    not suffice."""
+    """Delay and sum: `focused` with the fewest zones that `focus_error` allows, `dense` where the array is no lattice
+    or 32 do not suffice."""
 
     kind: Literal["auto"] = "auto"
     focus: PositiveMetres | None = 20.0

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from sonarsynth.beamforming import DenseDelayAndSum
+from sonarsynth.beamforming import AutoBeamforming, DenseDelayAndSum, FocusedDelayAndSum
+from sonarsynth.beamforming.focus_error import MOST_ZONES, focus_error, zones_needed
+from sonarsynth.beamforming.window import weights
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.planning.arriving import arrivals_of
 from sonarsynth.planning.bending import ranging_error
@@ -47,12 +48,12 @@ def choose(plan: Plan, looks: Sequence[Look]) -> Plan:
     scene, accuracy = plan.scene, plan.recipe.accuracy
     some = _some(looks)
     bent = max((ranging_error(look.scene, look.profile, look.frames) for look in some), default=0.0)
-    synthesis = _synthesis(scene, accuracy)
+    synthesis, imaged = _synthesis(scene, accuracy), bool(plan.products & {"image", "cloud"})
     choices = Choices(
         subarrays=1,
         negligible=_negligible(scene, accuracy),
         synthesis=synthesis,
-        beamforming=_beamforming(plan, accuracy),
+        beamforming=_beamforming(plan, accuracy) if imaged else DenseDelayAndSum(),
         ranging=_ranging(scene, accuracy, bent),
     )
     made = replace(plan, choices=choices)
@@ -62,7 +63,7 @@ def choose(plan: Plan, looks: Sequence[Look]) -> Plan:
     return replace(
         made,
         choices=replace(choices, subarrays=count),
-        errors=Errors(error, whole, by_synthesis, bent if straight else 0.0),
+        errors=Errors(error, whole, by_synthesis, bent if straight else 0.0, image_error(made)),
     )
 
 
@@ -90,11 +91,25 @@ def _synthesis(scene: Scene, accuracy: Accuracy) -> KernelDeposit | DirectSum:
     return DirectSum() if accuracy.exact else method.resolve(np.sqrt(SYNTHESIS) * accuracy.signal)
 
 
-def _beamforming(plan: Plan, accuracy: Accuracy) -> Any:
-    method = plan.scene.processing.beamforming
-    if accuracy.exact:
+def _beamforming(plan: Plan, accuracy: Accuracy) -> FocusedDelayAndSum | DenseDelayAndSum:
+    method, sonar, elements = plan.scene.processing.beamforming, plan.scene.sonar, plan.elements
+    if isinstance(method, DenseDelayAndSum) or accuracy.exact:
         return DenseDelayAndSum(focus=method.focus, shading=method.shading)
+    if isinstance(method, AutoBeamforming):
+        return method.resolve(elements, sonar, accuracy.image_db)
+    if method.zones == "auto":
+        zones = zones_needed(elements, method.shading, sonar, method.focus, accuracy.image_db)
+        return replace(method, zones=zones or MOST_ZONES)
     return method
+
+
+def image_error(plan: Plan) -> float:
+    """Error (dB) of the image by the method chosen, estimated; 0 for the exact one."""
+    method, sonar = plan.choices.beamforming, plan.scene.sonar
+    if isinstance(method, DenseDelayAndSum) or method.zones == "auto":
+        return 0.0 if isinstance(method, DenseDelayAndSum) else np.nan
+    weight, speed = weights(plan.elements, method.shading), sonar.assumed_sound_speed
+    return focus_error(plan.elements, weight, sonar.beams, speed, method.focus, sonar.band, method.zones)
 
 
 def _ranging(scene: Scene, accuracy: Accuracy, bent: float) -> IsovelocityRange | RefractedRange:

@@ -11,6 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from sonarsynth.beamforming import DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.planning.plans import Plan, Stage
 from sonarsynth.scattering import Kirchhoff
 from sonarsynth.synthesis import DirectSum
@@ -43,12 +44,6 @@ RESHAPED = 1.9
 """Cost of synthesising a path whose pulse its facet reshapes, over that of one that repeats the snap."""
 RANGED_BEAMS = 60
 """Beams over threshold round one glint."""
-
-ERRORS = {
-    "focused": "2e-7 of the peak; 0.16 dB at 25 degree corners at 20 m",
-    "dense": "rounding",
-}
-"""What each method errs by, against the slow exact way (measured: the docstrings of the methods)."""
 
 
 @lru_cache(maxsize=1)
@@ -132,6 +127,21 @@ def _traced(plan: Plan) -> str:
     return ", ".join(word for word in words if word)
 
 
+def _beams(plan: Plan) -> str:
+    """The beamformer in words."""
+    method = plan.choices.beamforming
+    if isinstance(method, FocusedDelayAndSum) and method.zones != "auto" and method.zones > 1:
+        return f"{method.kind}, {method.zones} zones"
+    return method.kind
+
+
+def _steered(plan: Plan) -> str:
+    """What the beamformer errs by, in words."""
+    if isinstance(plan.choices.beamforming, DenseDelayAndSum):
+        return "rounding"
+    return f"{plan.errors.image:.1g} dB within 20 dB of the peak, estimated"
+
+
 def _bent(plan: Plan) -> str:
     """What straight paths in bending water do to ranges, in words."""
     return f"; bent rays {100.0 * plan.errors.ranging:.1g} cm" if plan.errors.ranging > 0.0 else ""
@@ -191,10 +201,7 @@ def stages(plan: Plan) -> tuple[Stage, ...]:
         transform = sizes["sensor"] * gate * sonar.sampling_frequency * SECONDS["transform sensor sample"]
         image = transform + beams * bins * SECONDS["image beam bin"]
         stored = 4 * beams if "image" in plan.products else 0
-        beamformer = plan.choices.beamforming
-        rows.append(
-            ("beamform", beamformer.kind, "asked for, or needed by the cloud", ERRORS[beamformer.kind], image, stored)
-        )
+        rows.append(("beamform", _beams(plan), "asked for, or needed by the cloud", _steered(plan), image, stored))
     if "cloud" in plan.products:
         rows.append(
             (

@@ -109,6 +109,11 @@ def _accuracy(made: Plan) -> list[str]:
             f"ranges err by {errors.ranging:.2g} m where rays bend: accuracy.range_m allows {allowed.range_m:g}, but "
             f"the scene asks for '{made.choices.ranging.kind}' (scene.processing.ranging)"
         )
+    if errors.image > allowed.image_db:
+        found.append(
+            f"beams err by {errors.image:.2g} dB where the focus is not theirs: accuracy.image_db allows "
+            f"{allowed.image_db:g}; more scene.processing.beamforming.zones, or kind dense"
+        )
     return found
 
 
