@@ -39,6 +39,9 @@ MEASURED = 3
 """Frames of a dataset that expansions are measured in."""
 SAFETY = 1.25
 """What was measured at some hydrophones of some frames may be so much more at others."""
+AT_PEAK = 0.0
+"""dB: what is asked of beamformers is the energy of an echo in its own beam. Over beams within 20 dB of the brightest
+the root mean square of errors was less, in every recipe here."""
 GOLDEN = 0.03
 """Error of the synthesis that measures, over what is allowed."""
 
@@ -96,20 +99,20 @@ def _beamforming(plan: Plan, accuracy: Accuracy) -> FocusedDelayAndSum | DenseDe
     if isinstance(method, DenseDelayAndSum) or accuracy.exact:
         return DenseDelayAndSum(focus=method.focus, shading=method.shading)
     if isinstance(method, AutoBeamforming):
-        return method.resolve(elements, sonar, accuracy.image_db)
+        return method.resolve(elements, sonar, accuracy.image_db, AT_PEAK)
     if method.zones == "auto":
-        zones = zones_needed(elements, method.shading, sonar, method.focus, accuracy.image_db)
+        zones = zones_needed(elements, method.shading, sonar, method.focus, accuracy.image_db, AT_PEAK)
         return replace(method, zones=zones or MOST_ZONES)
     return method
 
 
 def image_error(plan: Plan) -> float:
-    """Error (dB) of the image by the method chosen, estimated; 0 for the exact one."""
+    """Energy (dB) that an echo loses in its own beam by the method chosen, at worst; 0 for the exact one."""
     method, sonar = plan.choices.beamforming, plan.scene.sonar
     if isinstance(method, DenseDelayAndSum) or method.zones == "auto":
         return 0.0 if isinstance(method, DenseDelayAndSum) else np.nan
     weight, speed = weights(plan.elements, method.shading), sonar.assumed_sound_speed
-    return focus_error(plan.elements, weight, sonar.beams, speed, method.focus, sonar.band, method.zones)
+    return focus_error(plan.elements, weight, sonar.beams, speed, method.focus, sonar.band, method.zones, AT_PEAK)
 
 
 def _ranging(scene: Scene, accuracy: Accuracy, bent: float) -> IsovelocityRange | RefractedRange:
