@@ -8,7 +8,7 @@ where the lattice has ghosts.
 An estimate, no bound: of its numbers (`MARGIN`, where sources are, how many beams) some were chosen on the 508-element
 disc and a rectangle of 20 by 8. On 160 cases that nothing was chosen on (five other arrays, 2 to 14 zones, 4 to 40 m,
 151 with an error above 0.002 dB) it was 1.9 times the error of whole images at the median, but under 0.9 of it in 14,
-and 0.16 of it at worst: mostly with many zones, where the worst beam is not among those tried.
+and 0.16 of it at worst: 13 of them with 11 or 14 zones.
 """
 
 from __future__ import annotations
