@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sonarsynth.conventions import NO_TARGET, Floats, azimuth_elevation, direction
+from sonarsynth.conventions import NO_TARGET, Bools, Floats, azimuth_elevation, direction
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Paths, Truth
 from sonarsynth.sonar import BeamGrid
 from sonarsynth.world.casting import OFFSET, first_hit, occluded
-from sonarsynth.world.meshes import Mesh
+from sonarsynth.world.meshes import Mesh, in_blocks
 from sonarsynth.world.moment import Body, Moment
 
 Connect = Callable[[Floats, Floats], Paths]
@@ -70,11 +70,12 @@ def _as_seen(body: Body, sonar_pose: Pose, connect: Connect, straight: bool) -> 
     true = sonar_pose.to_body(world)
     if straight:
         return true
-    paths = connect(world, np.broadcast_to(sonar_pose.position, world.shape))
-    pairs, first = np.unique(paths.pair, return_index=True)  # the earliest: paths are sorted by time
     apparent = np.full_like(true, np.nan)
-    towards = -sonar_pose.turn_to_body(paths.arrival[first])
-    apparent[pairs] = towards * np.linalg.norm(true[pairs], axis=1)[:, None]
+    for some in in_blocks(len(world)):
+        paths = connect(world[some], np.broadcast_to(sonar_pose.position, world[some].shape))
+        pairs, first = np.unique(paths.pair, return_index=True)  # the earliest: paths are sorted by time
+        towards = -sonar_pose.turn_to_body(paths.arrival[first])
+        apparent[some][pairs] = towards * np.linalg.norm(true[some][pairs], axis=1)[:, None]
     return apparent
 
 
@@ -88,11 +89,13 @@ def _label_beams(
     facet = np.full(shape, NO_TARGET, np.int32)
     nearest = np.full(shape, np.inf)
     for index, (body, vertices) in enumerate(zip(bodies, seen, strict=True)):
-        kept = np.flatnonzero(np.isfinite(vertices[body.mesh.faces]).all(axis=(1, 2)))
-        faces = body.mesh.faces[kept]
-        if not len(faces):
+        kept = np.flatnonzero(_finite(vertices, body.mesh.faces))
+        if not len(kept):
             continue
-        rows, columns = _beams_near(vertices[np.unique(faces)], rays)
+        faces = body.mesh.faces if len(kept) == len(body.mesh.faces) else body.mesh.faces[kept]
+        named = np.zeros(len(vertices), bool)
+        named[faces] = True
+        rows, columns = _beams_near(vertices if named.all() else vertices[named], rays)
         look = rays[rows, columns]
         if straight:  # in the frame of the mesh, which is made ready for casting once
             origin = np.broadcast_to(body.pose.to_body(sonar_pose.position), look.shape)
@@ -123,17 +126,29 @@ def _beams_near(points: Floats, rays: Floats) -> tuple[np.ndarray, np.ndarray]:
 def _visible(body: Body, seen: Floats, bodies: tuple[Body, ...], sonar_pose: Pose) -> tuple[Floats, float]:
     """Azimuth and elevation bounds (4,) of the visible facets, and the seen share of the area that faces the array."""
     mesh = body.mesh
-    centroid, normal = body.pose.to_world(mesh.centroid), body.pose.turn_to_world(mesh.normal)
-    facing = np.einsum("ij,ij->i", sonar_pose.position - centroid, normal) > 0
-    if not facing.any():
+    facing, farthest = np.zeros(len(mesh.faces), bool), 0.0
+    for some in in_blocks(len(mesh.faces)):
+        centroid, normal = body.pose.to_world(mesh.centroid[some]), body.pose.turn_to_world(mesh.normal[some])
+        facing[some] = np.einsum("ij,ij->i", sonar_pose.position - centroid, normal) > 0
+        farthest = max(farthest, float(np.abs(centroid).max()))
+    rounding = 8.0 * np.finfo(float).eps * farthest  # of places in the world
+    offset = max(OFFSET * mesh.radius, rounding)
+    visible = np.zeros(len(mesh.faces), bool)
+    for some in in_blocks(len(mesh.faces)):
+        rows = np.flatnonzero(facing[some]) + some.start
+        start = body.pose.to_world(mesh.centroid[rows]) + offset * body.pose.turn_to_world(mesh.normal[rows])
+        clear = ~occluded(bodies, start, np.broadcast_to(sonar_pose.position, start.shape))
+        visible[rows] = clear & _finite(seen, mesh.faces[rows])
+    if not visible.any():
         return np.full(4, np.nan), 0.0
-    rounding = 8.0 * np.finfo(float).eps * float(np.abs(centroid).max())  # of places in the world
-    start = centroid[facing] + max(OFFSET * mesh.radius, rounding) * normal[facing]
-    clear = ~occluded(bodies, start, np.broadcast_to(sonar_pose.position, start.shape))
-    clear &= np.isfinite(seen[mesh.faces[facing]]).all(axis=(1, 2))
-    visible = np.flatnonzero(facing)[clear]
+    named = np.zeros(len(seen), bool)
+    named[mesh.faces[visible]] = True
+    azimuth, elevation = azimuth_elevation(seen[named])
     fraction = float(mesh.area[visible].sum() / mesh.area[facing].sum())
-    if not len(visible):
-        return np.full(4, np.nan), 0.0
-    azimuth, elevation = azimuth_elevation(seen[mesh.faces[visible]].reshape(-1, 3))
     return np.array([azimuth.min(), azimuth.max(), elevation.min(), elevation.max()]), fraction
+
+
+def _finite(points: Floats, faces: np.ndarray) -> Bools:
+    """Facets (facet,) whose corners are all finite points (point, xyz)."""
+    finite = np.isfinite(points).all(axis=1)
+    return np.ones(len(faces), bool) if finite.all() else np.asarray(finite[faces].all(axis=1))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
-from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from sonarsynth.acoustics.facets import FIVE_PERCENT
 from sonarsynth.conventions import Floats
 from sonarsynth.world.curvature import bend
+from sonarsynth.world.keeping import kept
 from sonarsynth.world.meshes import Mesh, file_stamp, mesh_of, refined_mesh
 from sonarsynth.world.refinement import longest_edge
 from sonarsynth.world.shapes import Box, Cylinder, LShape, MeshFile, Remus100, Shape, Sphere
@@ -102,7 +102,7 @@ def frame_mesh(shape: Shape, wavelength: float, error: float = FIVE_PERCENT) -> 
     return _fine(shape, file_stamp(shape), wavelength, error, True)[0]
 
 
-@lru_cache(maxsize=16)
+@kept(16)
 def _fine(
     shape: Shape, stamp: tuple[int, int] | None, wavelength: float, error: float, in_frame: bool
 ) -> tuple[Mesh, str | None]:

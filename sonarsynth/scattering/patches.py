@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.randomness import stream
 from sonarsynth.world.curvature import curvature_radius
+from sonarsynth.world.keeping import kept
 from sonarsynth.world.meshes import Mesh
 
 
@@ -33,7 +33,7 @@ class Patches:
         return Patches(**{name: value[:, None] for name, value in vars(self).items()})
 
 
-@lru_cache(maxsize=32)
+@kept(32)
 def patches(mesh: Mesh, whole: bool = True) -> Patches:
     """All facets (facet, ...) of a mesh. What is drawn is the same for every mesh of this content.
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.randomness import stream
+from sonarsynth.world.keeping import kept
 from sonarsynth.world.meshes import Mesh
 
 
@@ -20,7 +19,7 @@ def random_polarity(mesh: Mesh) -> Floats:
     return _signs(mesh.digest, len(mesh.faces))
 
 
-@lru_cache(maxsize=16)
+@kept(16)
 def _signs(digest: str, facets: int) -> Floats:
     signs = stream(0, "polarity", digest).choice([-1.0, 1.0], facets)
     signs.setflags(write=False)

@@ -110,7 +110,7 @@ class _Body:
             return self.law.cross_section(*parts, incident, scattered, wavenumber, self.shape)
         on = np.flatnonzero(self.seen_from(-incident) & self.seen_from(scattered))
         if isinstance(self.law, Kirchhoff):
-            parts = mesh.corners[on], mesh.normal[on], mesh.area[on], self.curved[on]
+            parts = mesh.corners_of(on), mesh.normal[on], mesh.area[on], self.curved[on]
             return self.law.cross_section(*parts, incident, scattered, wavenumber)
         amplitude = self.law.amplitude(incident, scattered, mesh.normal[on], mesh.area[on])
         return np.full(wavenumber.shape, np.sum(amplitude**2))

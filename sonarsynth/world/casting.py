@@ -9,21 +9,26 @@ rays that pass a silhouette closer than 1e-6 of the body's size may go either wa
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from importlib import import_module
 from typing import Any, Literal, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints
+from sonarsynth.world.keeping import kept
 from sonarsynth.world.meshes import Mesh
 from sonarsynth.world.moment import Body
 
+Int32s = npt.NDArray[np.int32]
 Backend = Literal["embree", "open3d"]
 OFFSET = 1e-6
 """Of the body's size: how far off a facet, along its normal, a ray starts so as not to meet it."""
 ROUNDS = 8
 """Proposals tried before the slow exact search."""
+BYTES = 90
+"""Of Embree's own tables for a facet."""
 SLACK = 1e-3
 """Of the body's size: a hit this much beyond the proposed one is another hit, with others before it perhaps."""
 
@@ -44,7 +49,8 @@ class EmbreeCaster:
         from embreex.rtcore_scene import EmbreeScene
 
         self._scene: Any = EmbreeScene(robust=True)
-        TriangleMesh(self._scene, vertices.astype(np.float32), faces.astype(np.int32))
+        TriangleMesh(self._scene, vertices.astype(np.float32), faces.astype(np.int32, copy=False))
+        self.nbytes = BYTES * len(faces)
 
     def nearest(self, origin: Floats, direction: Floats, far: Floats) -> tuple[Ints, Floats]:
         """As `Caster.nearest`."""
@@ -80,17 +86,16 @@ class CastingMesh:
 
     centre: Floats  # (xyz) m, in the mesh's frame
     size: float  # m: radius of the bounding sphere about the centre
-    corners: Floats  # (facet, 3, xyz) centred, in units of size
-    faces: np.ndarray  # (facet, 3) int32
+    vertices: Floats  # (vertex, xyz) centred, in units of size
+    faces: Int32s  # (facet, 3)
     caster: Caster
 
     @cached_property
-    def around(self) -> tuple[Ints, Ints]:
+    def around(self) -> tuple[Int32s, Int32s]:
         """Facets round each vertex: (vertex + 1,) where each list begins, and the lists."""
-        vertex = self.faces.ravel()
-        order = np.argsort(vertex, kind="stable")
-        first = np.searchsorted(vertex[order], np.arange(int(vertex.max()) + 2))
-        return first.astype(np.int64), (order // 3).astype(np.int64)
+        from sonarsynth.world import intersections
+
+        return intersections.round_vertices(self.faces, len(self.vertices))
 
     def cast(self, origin: Floats, direction: Floats, far: Floats) -> tuple[Ints, Floats]:
         """Facet (ray,) and distance of the nearest hit for rays in this mesh's frame and unit; -1 and NaN for none."""
@@ -113,7 +118,7 @@ class CastingMesh:
                 from_start,
                 as_proposed,
                 proposed,
-                self.corners,
+                self.vertices,
                 self.faces,
                 *self.around,
                 1.0,
@@ -128,7 +133,7 @@ class CastingMesh:
             passed = (passed + at + 2 * OFFSET)[left]
             open_rays, start, heading, limit = open_rays[left], start[left], heading[left], limit[left]
         found, where = np.empty(len(start), np.int64), np.empty(len(start))
-        intersections.search(start, heading, np.zeros(len(start)), limit, self.corners, 1.0, found, where)
+        intersections.search(start, heading, np.zeros(len(start)), limit, self.vertices, self.faces, 1.0, found, where)
         hit = found >= 0
         facet[open_rays[hit]], distance[open_rays[hit]] = found[hit], where[hit] + entry[open_rays[hit]]
         return facet, distance
@@ -157,22 +162,24 @@ class _ByContent:
         return isinstance(other, _ByContent) and self.digest == other.digest
 
 
-@lru_cache(maxsize=16)
+@kept(16)
 def _casting_mesh(key: _ByContent, backend: Backend) -> CastingMesh:
     mesh = key.mesh
     if not np.isfinite(mesh.vertices).all():
         raise ValueError("a mesh with vertices that are not finite cannot be cast at")
     if len(mesh.faces) and not (mesh.faces.min() >= 0 and mesh.faces.max() < len(mesh.vertices)):
         raise ValueError("a mesh with faces that name no vertex cannot be cast at")
-    used = mesh.corners.reshape(-1, 3)
+    named = np.zeros(len(mesh.vertices), bool)
+    named[mesh.faces] = True
+    used = mesh.vertices if named.all() else mesh.vertices[named]
     centre = 0.5 * (used.min(axis=0) + used.max(axis=0))
     size = float(np.linalg.norm(used - centre, axis=1).max())
     if not size > 0:
         raise ValueError("a mesh without extent cannot be cast at")
     vertices = (mesh.vertices - centre) / size
     make = EmbreeCaster if backend == "embree" else Open3DCaster
-    corners = np.ascontiguousarray((mesh.corners - centre) / size)
-    return CastingMesh(centre, size, corners, mesh.faces.astype(np.int32), make(vertices, mesh.faces))
+    faces = np.ascontiguousarray(mesh.faces, np.int32)
+    return CastingMesh(centre, size, np.ascontiguousarray(vertices), faces, make(vertices, faces))
 
 
 def casting_mesh(mesh: Mesh, backend: Backend = "embree") -> CastingMesh:

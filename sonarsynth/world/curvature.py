@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -10,6 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from sonarsynth.conventions import Floats, Ints
+from sonarsynth.world.keeping import kept
 from sonarsynth.world.meshes import Mesh
 from sonarsynth.world.refinement import sides, weld
 
@@ -39,7 +39,8 @@ def neighbours(mesh: Mesh) -> Neighbours:
     at, other = order[shared], order[shared + 1] // 3
     one, corner = at // 3, at % 3
     turn = np.linalg.norm(mesh.normal[one] - mesh.normal[other], axis=1)
-    return Neighbours(one, other, mesh.corners[one, corner], mesh.corners[one, (corner + 1) % 3], turn)
+    start, stop = (mesh.vertices[mesh.faces[one, n]] for n in (corner, (corner + 1) % 3))
+    return Neighbours(one, other, start, stop, turn)
 
 
 def curvature_radius(mesh: Mesh) -> Floats:
@@ -66,7 +67,7 @@ class Bend(NamedTuple):
     across: Floats  # (facet,) m: edge of an equilateral facet as long as that piece across the curve; 0 where flat
 
 
-@lru_cache(maxsize=4)
+@kept(4)
 def bend(mesh: Mesh) -> Bend:
     """Mean sagitta and extent across the curve, of the flat pieces of a mesh: facets in one plane are one piece.
 

@@ -15,14 +15,15 @@ EDGE = 1e-14  # of the square of the body's size: rays this close to an edge hit
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def distance_to_facet(o: Floats, d: Floats, corners: Floats, facet: int, tolerance: float) -> float:
-    """Distance along the ray o + t d to a facet (3, xyz), from either side; NaN where it misses.
+def distance_to_facet(o: Floats, d: Floats, vertices: Floats, faces: Int32s, facet: int, tolerance: float) -> float:
+    """Distance along the ray o + t d to a facet, from either side; NaN where it misses.
 
     Signed volumes of the ray with the three edges have one sign inside: Moeller & Trumbore (1997) in a symmetric form.
     """
-    ax, ay, az = corners[facet, 0, 0] - o[0], corners[facet, 0, 1] - o[1], corners[facet, 0, 2] - o[2]
-    bx, by, bz = corners[facet, 1, 0] - o[0], corners[facet, 1, 1] - o[1], corners[facet, 1, 2] - o[2]
-    cx, cy, cz = corners[facet, 2, 0] - o[0], corners[facet, 2, 1] - o[1], corners[facet, 2, 2] - o[2]
+    a, b, c = faces[facet, 0], faces[facet, 1], faces[facet, 2]
+    ax, ay, az = vertices[a, 0] - o[0], vertices[a, 1] - o[1], vertices[a, 2] - o[2]
+    bx, by, bz = vertices[b, 0] - o[0], vertices[b, 1] - o[1], vertices[b, 2] - o[2]
+    cx, cy, cz = vertices[c, 0] - o[0], vertices[c, 1] - o[1], vertices[c, 2] - o[2]
     u = d[0] * (by * cz - bz * cy) + d[1] * (bz * cx - bx * cz) + d[2] * (bx * cy - by * cx)
     v = d[0] * (cy * az - cz * ay) + d[1] * (cz * ax - cx * az) + d[2] * (cx * ay - cy * ax)
     w = d[0] * (ay * bz - az * by) + d[1] * (az * bx - ax * bz) + d[2] * (ax * by - ay * bx)
@@ -44,10 +45,10 @@ def confirm(
     near: Floats,
     far: Floats,
     proposed: Ints,
-    corners: Floats,
+    vertices: Floats,
     faces: Int32s,
-    first: Ints,
-    around: Ints,
+    first: Int32s,
+    around: Int32s,
     size: float,
     facet: Ints,
     distance: Floats,
@@ -65,7 +66,7 @@ def confirm(
         for corner in range(3):
             vertex = faces[proposed[i], corner]
             for j in range(first[vertex], first[vertex + 1]):
-                t = distance_to_facet(origin[i], direction[i], corners, around[j], tolerance)
+                t = distance_to_facet(origin[i], direction[i], vertices, faces, around[j], tolerance)
                 if near[i] <= t <= far[i] and (t < best or (t == best and around[j] < facet[i])):
                     best, facet[i], distance[i] = t, around[j], t
 
@@ -76,7 +77,8 @@ def search(
     direction: Floats,
     near: Floats,
     far: Floats,
-    corners: Floats,
+    vertices: Floats,
+    faces: Int32s,
     size: float,
     facet: Ints,
     distance: Floats,
@@ -86,10 +88,28 @@ def search(
     for i in range(len(origin)):
         facet[i], distance[i] = -1, math.nan
         best = math.inf
-        for j in range(len(corners)):
-            t = distance_to_facet(origin[i], direction[i], corners, j, tolerance)
+        for j in range(len(faces)):
+            t = distance_to_facet(origin[i], direction[i], vertices, faces, j, tolerance)
             if near[i] <= t <= far[i] and t < best:
                 best, facet[i], distance[i] = t, j, t
+
+
+@njit(cache=True, nogil=True)
+def round_vertices(faces: Int32s, vertices: int) -> tuple[Int32s, Int32s]:
+    """Facets round each vertex, in order: (vertex + 1,) where each list begins, and the lists."""
+    first, around = np.zeros(vertices + 1, np.int32), np.empty(faces.size, np.int32)
+    for facet in range(len(faces)):
+        for corner in range(3):
+            first[faces[facet, corner] + 1] += 1
+    for vertex in range(vertices):
+        first[vertex + 1] += first[vertex]
+    place = first.copy()
+    for facet in range(len(faces)):
+        for corner in range(3):
+            vertex = faces[facet, corner]
+            around[place[vertex]] = facet
+            place[vertex] += 1
+    return first, around
 
 
 @njit(cache=True, nogil=True)

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import UNITS, Bools, Floats
+from sonarsynth.conventions import UNITS, Bools, Floats, Ints
 from sonarsynth.world.generation import generate
+from sonarsynth.world.keeping import kept
 from sonarsynth.world.refinement import MeshError, Surface, halve_longest_edges, split_long_edges
 from sonarsynth.world.shapes import Cylinder, MeshFile, Myring, Remus100, Shape
 
 __all__ = ["Mesh", "MeshError", "file_stamp", "mesh_of", "refined_mesh"]
+
+BLOCK: Final = 250_000
+"""Facets, or vertices, that tables are made of at a time: what is needed on the way stays below 100 MB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,30 +33,47 @@ class Mesh:
     notes: tuple[str, ...] = ()  # what was repaired on reading, or how fine the surface is; one line each
     flat: Bools | None = None  # (facet,) known to be flat in the body itself, so that no finer mesh is nearer to it
 
-    @cached_property
+    @property
     def corners(self) -> Floats:
-        """(facet, 3, xyz) m."""
+        """(facet, 3, xyz) m: of large meshes made anew, for they take more room than all else; see `corners_of`."""
+        return self._corners if len(self.faces) <= BLOCK else _fixed(self.vertices[self.faces])
+
+    @cached_property
+    def _corners(self) -> Floats:
         return _fixed(self.vertices[self.faces])
 
-    @cached_property
-    def _cross(self) -> Floats:
-        a, b, c = np.moveaxis(self.corners, 1, 0)
-        return _fixed(np.cross(b - a, c - a))
+    def corners_of(self, some: Ints | slice) -> Floats:
+        """(row, 3, xyz) m: corners of the facets picked by indices or a slice."""
+        return self.vertices[self.faces[some]]
 
     @cached_property
+    def _sizes(self) -> tuple[Floats, Floats, Floats]:
+        """Area, normal and centroid, by blocks of facets."""
+        count = len(self.faces)
+        area, normal, centroid = np.empty(count), np.empty((count, 3)), np.empty((count, 3))
+        for some in in_blocks(count):
+            corners = self.corners_of(some)
+            a, b, c = np.moveaxis(corners, 1, 0)
+            cross = np.cross(b - a, c - a)
+            area[some] = 0.5 * np.linalg.norm(cross, axis=1)
+            normal[some] = cross / (2.0 * area[some, None])
+            centroid[some] = corners.mean(axis=1)
+        return _fixed(area), _fixed(normal), _fixed(centroid)
+
+    @property
     def area(self) -> Floats:
         """(facet,) m2."""
-        return _fixed(0.5 * np.linalg.norm(self._cross, axis=1))
+        return self._sizes[0]
 
-    @cached_property
+    @property
     def normal(self) -> Floats:
         """(facet, xyz) outward unit normals."""
-        return _fixed(self._cross / (2.0 * self.area[:, None]))
+        return self._sizes[1]
 
-    @cached_property
+    @property
     def centroid(self) -> Floats:
         """(facet, xyz) m."""
-        return _fixed(self.corners.mean(axis=1))
+        return self._sizes[2]
 
     @cached_property
     def box(self) -> Floats:
@@ -66,9 +88,16 @@ class Mesh:
     @cached_property
     def digest(self) -> str:
         """SHA-256 of vertices and faces: the mesh's identity in caches and in the store."""
-        h = hashlib.sha256(np.ascontiguousarray(self.vertices, "<f8").tobytes())
-        h.update(np.ascontiguousarray(self.faces, "<i4").tobytes())
+        h = hashlib.sha256(memoryview(np.ascontiguousarray(self.vertices, "<f8")).cast("B"))
+        h.update(memoryview(np.ascontiguousarray(self.faces, "<i4")).cast("B"))
         return h.hexdigest()
+
+
+def in_blocks(count: int, block: int = BLOCK) -> list[slice]:
+    """0 to count - 1 in as many equal parts as hold no more than `block` each."""
+    parts = max(-(-count // block), 1)
+    edges = [count * n // parts for n in range(parts + 1)]
+    return [slice(first, last) for first, last in pairwise(edges)]
 
 
 SHARP: Final = MeshFile(path="").crease
@@ -90,7 +119,7 @@ def mesh_of(shape: Shape) -> Mesh:
     return _mesh_of(shape, file_stamp(shape))
 
 
-@lru_cache(maxsize=32)
+@kept(32)
 def _mesh_of(shape: Shape, stamp: tuple[int, int] | None) -> Mesh:
     return refined_mesh(shape)
 
@@ -144,7 +173,7 @@ def _read(shape: MeshFile, edge: float, sagitta: float) -> tuple[Surface, tuple[
         raise MeshError(f"{shape.path}: {error}") from None
 
 
-@lru_cache(maxsize=4)
+@kept(4)
 def _repaired(shape: MeshFile, stamp: tuple[int, int] | None) -> tuple[Surface, tuple[str, ...]]:
     """What a file holds, before any refinement, read once for all of them."""
     from scipy.spatial.transform import Rotation

@@ -144,7 +144,7 @@ def test_a_wrong_proposal_is_passed_over() -> None:
                 return np.zeros(len(origin), int), np.full(len(origin), 1e-9)
             return ready.caster.nearest(origin, direction, far)
 
-    lying = casting.CastingMesh(ready.centre, ready.size, ready.corners, ready.faces, Liar())
+    lying = casting.CastingMesh(ready.centre, ready.size, ready.vertices, ready.faces, Liar())
     origin, direction = rays_at(1.0, 3.0, 300, 5)
     honest, at = ready.cast(origin, direction, np.full(300, np.inf))
     facet, distance = lying.cast(origin, direction, np.full(300, np.inf))
