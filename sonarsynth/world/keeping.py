@@ -1,0 +1,91 @@
+"""Results kept by their arguments, as `functools.lru_cache` keeps them, but bounded in bytes: meshes can be large."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from dataclasses import fields, is_dataclass
+from functools import update_wrapper
+from threading import Lock
+from typing import Any, Final, ParamSpec, TypeVar
+
+import numpy as np
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+MOST_BYTES: Final = 2**29
+"""What one cache may hold, but for the results that were asked for last."""
+LEAST: Final = 4
+"""Results that stay whatever their size: a scene asks for the meshes of its targets again in every frame."""
+
+
+def size_of(value: object, seen: set[int] | None = None) -> int:
+    """Bytes of all arrays that a result holds, each counted once; what says its `nbytes` is believed."""
+    seen = set() if seen is None else seen
+    if id(value) in seen:
+        return 0
+    seen.add(id(value))
+    if isinstance(value, np.ndarray):
+        base = value.base
+        return size_of(base, seen) if isinstance(base, np.ndarray) else value.nbytes
+    if isinstance(value, (tuple, list)):
+        return sum(size_of(part, seen) for part in value)
+    if isinstance(value, dict):
+        return sum(size_of(part, seen) for part in value.values())
+    if is_dataclass(value):
+        named = {field.name: getattr(value, field.name, None) for field in fields(value)}
+        return size_of(named | getattr(value, "__dict__", {}), seen)
+    return int(getattr(value, "nbytes", 0))
+
+
+class Kept:
+    """A function that keeps its results: at most `most`, and the last `LEAST` or no more than `MOST_BYTES` together.
+
+    Sizes are taken anew whenever a result is added, for meshes grow with what is asked of them. Safe in threads; two
+    that ask for the same at once may both make it.
+    """
+
+    def __init__(self, function: Callable[..., Any], most: int) -> None:
+        self._function, self._most = function, most
+        self._results: OrderedDict[Hashable, tuple[Any, Any]] = OrderedDict()
+        self._lock = Lock()
+        update_wrapper(self, function)
+
+    def __call__(self, *args: Any, **named: Any) -> Any:
+        key = (args, tuple(sorted(named.items())))
+        with self._lock:
+            if key in self._results:
+                self._results.move_to_end(key)
+                return self._results[key][1]
+        made = self._function(*args, **named)
+        with self._lock:
+            self._results[key] = (key, made)
+            self._results.move_to_end(key)
+            while len(self._results) > self._most or (
+                len(self._results) > LEAST and size_of(list(self._results.values())) > MOST_BYTES
+            ):
+                self._results.popitem(last=False)
+        return made
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of arrays in results and arguments that are kept now."""
+        return size_of(list(self._results.values()))
+
+    def __len__(self) -> int:
+        return len(self._results)
+
+    def cache_clear(self) -> None:
+        """Forget all results."""
+        with self._lock:
+            self._results.clear()
+
+
+def kept(most: int) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Decorator: keep results by arguments, at most so many, bounded in bytes (`Kept`)."""
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        return Kept(function, most)
+
+    return decorate
