@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,14 +18,15 @@ from sonarsynth.synthesis.pulse import bubble, heard_part
 from sonarsynth.world.casting import inside
 from sonarsynth.world.casts import profile_of
 from sonarsynth.world.environment import Profile
-from sonarsynth.world.meshes import Mesh
-from sonarsynth.world.moment import model_of
+from sonarsynth.world.meshes import in_blocks
+from sonarsynth.world.moment import Body, model_of
 from sonarsynth.world.snap_pulses import largest_scales, pulse, waveform
 from sonarsynth.world.sources import LogarithmicBubble, SnappingShrimp
 
 if TYPE_CHECKING:
     from sonarsynth.planning.plans import Windows
 
+CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 FARTHEST = 1e6
 """m from the origin: beyond, travel times lose their microseconds."""
 CLOSEST = 1e-3
@@ -94,7 +94,8 @@ def check_frame(scene: Scene, frame: Frame) -> None:
     _check_depth(("scene", "trajectory", "sonar"), "the array", frame.sonar_pose.to_world(reach), bed, frame)
     for i, body in enumerate(frame.moment.bodies):
         path = ("scene", "world", "targets", i, "motion")
-        _check_depth(path, f"target '{body.name}'", body.pose.to_world(_hull(body.mesh)), bed, frame)
+        if not _box_in_water(body, bed):
+            _check_depth(path, f"target '{body.name}'", _places(body), bed, frame)
         if inside(body, frame.sonar_pose.position):
             raise FieldError(path, f"target '{body.name}' has the sonar inside at frame {frame.index}")
     _check_snaps(scene, frame)
@@ -138,15 +139,21 @@ def check_windows(scene: Scene, windows: Windows) -> None:
         )
 
 
-@lru_cache(maxsize=16)
-def _hull(mesh: Mesh) -> Floats:
-    """Vertices that bound the mesh in every direction."""
-    from scipy.spatial import ConvexHull, QhullError
+def _box_in_water(body: Body, bed: float) -> bool:
+    """Whether the box round a body is in the water: then all of the body is."""
+    low, high = body.mesh.box
+    corners = body.pose.to_world(low + CORNERS * (high - low))
+    down = depth(corners)
+    return bool(down.min() >= 0.0 and down.max() <= bed and np.abs(corners).max() <= FARTHEST)
 
-    try:
-        return np.asarray(mesh.vertices[ConvexHull(mesh.vertices).vertices])
-    except QhullError:  # all in one plane
-        return np.asarray(mesh.vertices)
+
+def _places(body: Body) -> Floats:
+    """Places in the world of the vertices of a body that lie farthest out along each axis of the world, either way."""
+    extreme = []
+    for some in in_blocks(len(body.mesh.vertices)):
+        places = body.pose.to_world(body.mesh.vertices[some])
+        extreme.append(places[np.concatenate([places.argmin(axis=0), places.argmax(axis=0)])])
+    return np.concatenate(extreme)
 
 
 def _check_snap(shrimp: SnappingShrimp, bed: float, sonar: Sonar) -> None:

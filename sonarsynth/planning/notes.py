@@ -157,7 +157,7 @@ def _meshes(scene: Scene, profile: Profile) -> list[str]:
         if isinstance(law, Kirchhoff):
             longest = float(profile.speed.max()) / scene.sonar.band.low
             said += [line for line in (small_note(mesh, longest), concave_note(mesh)) if line]
-        elif (edge := longest_edge((mesh.vertices, mesh.faces.astype(np.int64)))) > COARSE:
+        elif (edge := longest_edge((mesh.vertices, mesh.faces))) > COARSE:
             said.append(f"facets up to {edge:.2g} m long, each echoing from its middle: set shape.edge to refine")
         found += [f"{target.name}: {line}" for line in said]
     return found

@@ -170,5 +170,11 @@ def _rough_moment(plan: Plan, frame: Frame) -> Moment:
     for target, body in zip(plan.scene.world.targets, frame.moment.bodies, strict=True):
         mesh = mesh_of(target.shape)
         every = -(-len(mesh.faces) // ENOUGH)
-        bodies.append(replace(body, mesh=mesh if every == 1 else Mesh(mesh.vertices, mesh.faces[::every])))
+        bodies.append(replace(body, mesh=mesh if every == 1 else _every(mesh, every)))
     return replace(frame.moment, bodies=tuple(bodies))
+
+
+def _every(mesh: Mesh, step: int) -> Mesh:
+    """Every so manieth facet of a mesh."""
+    used, number = np.unique(mesh.faces[::step], return_inverse=True)
+    return Mesh(mesh.vertices[used], number.reshape(-1, 3).astype(np.int32))

@@ -21,6 +21,7 @@ from sonarsynth.synthesis import pulse_support
 from sonarsynth.synthesis.pulse import FEET, at_longest, silencing_blur, snap_levels
 from sonarsynth.tracing import Straight
 from sonarsynth.world.environment import Profile
+from sonarsynth.world.meshes import Mesh, in_blocks
 from sonarsynth.world.moment import model_of
 from sonarsynth.world.reflection import rms_height
 from sonarsynth.world.snap_pulses import Waveform, largest_scales, waveform
@@ -130,10 +131,17 @@ def _support(scene: Scene, tolerance: float, *, turned: bool) -> Floats:
                 for w in waveforms
                 if law.roughness > 0
             ]
-            apart = np.linalg.norm(mesh.corners - mesh.centroid[:, None, :], axis=-1).max()  # m
-            corner = 2.0 * float(apart) / SLOWEST
+            corner = 2.0 * _farthest_corner(mesh) / SLOWEST
             supports += [(before + corner, after + corner) for before, after in smooth + rough]
     return np.asarray(np.max(supports, axis=0))
+
+
+def _farthest_corner(mesh: Mesh) -> float:
+    """Largest distance (m) of a corner of a facet from its middle."""
+    blocks = in_blocks(len(mesh.faces))
+    return max(
+        float(np.linalg.norm(mesh.corners_of(b) - mesh.centroid[b, None, :], axis=-1).max(initial=0.0)) for b in blocks
+    )
 
 
 def _blurred(scene: Scene) -> float:
@@ -224,11 +232,17 @@ def _span(frame: Frame, profile: Profile, bed: float, bounces: int) -> _Span:
     snaps = frame.moment.snaps
     if not snaps:
         return _Span(0.0, 0.0, 0.0, np.nan, np.nan, 0.0)
-    points = np.concatenate([np.empty((0, 3)), *(b.pose.to_world(b.mesh.centroid) for b in frame.moment.bodies)])
-    back = _straight_time(profile, bed, points, array)
     direct = np.array([s.time + float(_straight_time(profile, bed, s.position, array)) for s in snaps])
-    echoes = [s.time + _straight_time(profile, bed, s.position, points) + back for s in snaps]
-    late_echo = [e.max(initial=-np.inf) for e in echoes]
+    earliest, late_echo = np.full(len(snaps), np.inf), [-np.inf] * len(snaps)
+    for body in frame.moment.bodies:
+        for some in in_blocks(len(body.mesh.faces)):
+            points = body.pose.to_world(body.mesh.centroid[some])
+            back = _straight_time(profile, bed, points, array)
+            for n, snap in enumerate(snaps):
+                echo = snap.time + _straight_time(profile, bed, snap.position, points) + back
+                earliest[n] = min(earliest[n], echo.min(initial=np.inf))
+                late_echo[n] = max(late_echo[n], echo.max(initial=-np.inf))
+    echoes = any(len(body.mesh.faces) for body in frame.moment.bodies)
     late_direct = direct
     if bounces:
         late_direct, late_echo = _reflected(frame, profile, bed, bounces)
@@ -238,14 +252,13 @@ def _span(frame: Frame, profile: Profile, bed: float, bounces: int) -> _Span:
         for s, level in zip(snaps, snap_levels(snaps), strict=True)
     ]
     loudest = int(np.argmax(heard))
-    late = np.array([e - d for e, d in zip(echoes, direct, strict=True)]) if len(points) else np.array([np.nan])
-    latest = float(np.max(np.asarray(late_echo) - direct)) if len(points) else np.nan
+    latest = float(np.max(np.asarray(late_echo) - direct)) if echoes else np.nan
     others = tuple((float(direct[n]), float(last[n])) for n in range(len(snaps)) if n != loudest)
     return _Span(
         first=float(direct.min()),
         clock=float(direct[loudest]),
         last_direct=float(direct.max()),
-        first_echo=float(late.min()),
+        first_echo=float((earliest - direct).min()) if echoes else np.nan,
         last_echo=latest,
         last=float(last.max()),
         others=others,

@@ -122,7 +122,7 @@ def _fine(
         if ratio > 0.9 * was:  # what is left are edges that are neither creases nor rounded
             break
         mesh = finer
-    longest = longest_edge((mesh.vertices, mesh.faces.astype(np.int64)))
+    longest = longest_edge((mesh.vertices, mesh.faces))
     rows = None
     if longest > 1.001 * ROWS * wavelength:
         rows = f"{len(mesh.faces)} facets are too few for waves of {_said(wavelength)}: " + (
@@ -171,4 +171,4 @@ def convex(shape: Shape | None, mesh: Mesh) -> bool:
         hull = float(ConvexHull(mesh.vertices).volume)
     except QhullError:
         return False
-    return abs(volume((mesh.vertices, mesh.faces.astype(np.int64))) - hull) <= 1e-6 * hull
+    return abs(volume((mesh.vertices, mesh.faces)) - hull) <= 1e-6 * hull

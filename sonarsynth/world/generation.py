@@ -9,7 +9,7 @@ import numpy as np
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.world.blocks import blocks
 from sonarsynth.world.myring import hull_meridian
-from sonarsynth.world.refinement import Surface, join, require_possible, split_long_edges, volume
+from sonarsynth.world.refinement import Surface, area_of, join, longest_edge, require_possible, split_long_edges, volume
 from sonarsynth.world.remus import HULL, remus100
 from sonarsynth.world.revolution import Arc, enclosed_volume, line, revolve
 from sonarsynth.world.shapes import Box, Cylinder, LShape, MeshFile, Myring, Remus100, Shape, Sphere
@@ -54,10 +54,8 @@ def _finer(own: float | None, edge: float) -> bool:
 
 def _inscribed(surface: Surface, true_volume: float) -> tuple[str, ...]:
     """The note that says how much smaller than the true body its inscribed mesh is."""
-    corners = surface[0][surface[1]]
-    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
     missing = true_volume - volume(surface)
-    return (f"inscribed in the true surface: mean sagitta {1e3 * missing / area:.3g} mm",)
+    return (f"inscribed in the true surface: mean sagitta {1e3 * missing / area_of(surface):.3g} mm",)
 
 
 def _refined(surface: Surface, edge: float | None) -> Surface:
@@ -78,8 +76,7 @@ def sphere(radius: float, edge: float) -> Surface:
     while True:
         points, fine = _cut_evenly(corners, faces, n)
         points *= radius / np.linalg.norm(points, axis=1)[:, None]
-        corner = points[fine]
-        longest = float(np.linalg.norm(corner - np.roll(corner, -1, axis=1), axis=2).max())
+        longest = longest_edge((points, fine))
         if longest <= edge:
             return points, fine
         n = max(n + 1, int(n * longest / edge))
@@ -111,8 +108,8 @@ def _cut_evenly(vertices: Floats, faces: Ints, n: int) -> Surface:
     points = np.einsum("pc,fcx->fpx", weight / n, vertices[faces]).reshape(-1, 3)
     # A vertex is known by its corners and their weights, not by rounded coordinates.
     code = np.where(weight[None] > 0, faces[:, None, :] * (n + 1) + weight[None], 0)
-    code = np.sort(code.reshape(-1, 3), axis=1)
-    _, first, same = np.unique(code, axis=0, return_index=True, return_inverse=True)
+    code = np.sort(code.reshape(-1, 3), axis=1) @ (len(vertices) * (n + 1)) ** np.arange(2, -1, -1)
+    _, first, same = np.unique(code, return_index=True, return_inverse=True)
     fine = (pattern[None] + len(a) * np.arange(len(faces))[:, None, None]).reshape(-1, 3)
     return points[first], same.ravel()[fine]
 

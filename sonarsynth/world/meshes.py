@@ -15,14 +15,10 @@ import numpy.typing as npt
 from sonarsynth.conventions import UNITS, Bools, Floats, Ints
 from sonarsynth.world.generation import generate
 from sonarsynth.world.keeping import kept
-from sonarsynth.world.refinement import MeshError, Surface, halve_longest_edges, split_long_edges
+from sonarsynth.world.refinement import BLOCK, MeshError, Surface, halve_longest_edges, split_long_edges
 from sonarsynth.world.shapes import Cylinder, MeshFile, Myring, Remus100, Shape
 
 __all__ = ["Mesh", "MeshError", "file_stamp", "mesh_of", "refined_mesh"]
-
-BLOCK: Final = 250_000
-"""Facets, or vertices, that tables are made of at a time: what is needed on the way stays below 100 MB."""
-
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
@@ -94,7 +90,7 @@ class Mesh:
 
 
 def in_blocks(count: int, block: int = BLOCK) -> list[slice]:
-    """0 to count - 1 in as many equal parts as hold no more than `block` each."""
+    """Of tables that are made a part at a time, so that what is needed on the way stays small: 0 to count - 1 in as many equal parts as hold no more than `block` each."""
     parts = max(-(-count // block), 1)
     edges = [count * n // parts for n in range(parts + 1)]
     return [slice(first, last) for first, last in pairwise(edges)]

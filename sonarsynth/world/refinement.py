@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 import numpy.typing as npt
 
@@ -10,6 +12,10 @@ from sonarsynth.world.shapes import MAX_FACETS
 
 Surface = tuple[Floats, Ints]
 """Vertices (vertex, xyz) in m and faces (facet, 3), counter-clockwise seen from outside."""
+
+
+BLOCK: Final = 250_000
+"""Facets that are looked at at a time."""
 
 
 class MeshError(ValueError):
@@ -44,14 +50,32 @@ def weld(surface: Surface, tolerance: float = 0.0) -> Surface:
 
 def longest_edge(surface: Surface) -> float:
     """The longest edge of any facet (m)."""
-    corners = surface[0][surface[1]]
-    return float(np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max())
+    vertices, faces = surface
+    longest = 0.0
+    for first in range(0, len(faces), BLOCK):
+        corners = vertices[faces[first : first + BLOCK]]
+        longest = max(longest, float(np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max()))
+    return longest
 
 
 def volume(surface: Surface) -> float:
     """Signed volume (m3): positive for a closed surface with outward normals."""
-    a, b, c = np.moveaxis(surface[0][surface[1]], 1, 0)
-    return float(np.einsum("fi,fi->", a, np.cross(b, c)) / 6.0)
+    vertices, faces = surface
+    six = 0.0
+    for first in range(0, len(faces), BLOCK):
+        a, b, c = np.moveaxis(vertices[faces[first : first + BLOCK]], 1, 0)
+        six += float(np.einsum("fi,fi->", a, np.cross(b, c)))
+    return six / 6.0
+
+
+def area_of(surface: Surface) -> float:
+    """Area of all facets (m2)."""
+    vertices, faces = surface
+    area = 0.0
+    for first in range(0, len(faces), BLOCK):
+        a, b, c = np.moveaxis(vertices[faces[first : first + BLOCK]], 1, 0)
+        area += 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    return area
 
 
 def require_possible(area: float, edge: float) -> None:
@@ -71,8 +95,7 @@ def split_long_edges(surface: Surface, edge: float) -> Surface:
     Raises MeshError where that would take more than MAX_FACETS facets.
     """
     vertices, faces = surface
-    a, b, c = np.moveaxis(vertices[faces], 1, 0)
-    require_possible(0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()), edge)
+    require_possible(area_of(surface), edge)
     while True:
         ends, of_facet = sides(faces)
         length = np.linalg.norm(vertices[ends[:, 0]] - vertices[ends[:, 1]], axis=1)
@@ -96,8 +119,7 @@ def halve_longest_edges(surface: Surface, edge: float) -> Surface:
     they are not equilateral, in twice the time. Closed surfaces stay closed. Raises MeshError as that.
     """
     vertices, faces = surface
-    a, b, c = np.moveaxis(vertices[faces], 1, 0)
-    require_possible(0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()), edge)
+    require_possible(area_of(surface), edge)
     while True:
         ends, of_facet = sides(faces)
         length = np.linalg.norm(vertices[ends[:, 0]] - vertices[ends[:, 1]], axis=1)[of_facet]
