@@ -150,5 +150,5 @@ def _visible(body: Body, seen: Floats, bodies: tuple[Body, ...], sonar_pose: Pos
 
 def _finite(points: Floats, faces: np.ndarray) -> Bools:
     """Facets (facet,) whose corners are all finite points (point, xyz)."""
-    finite = np.isfinite(points).all(axis=1)
+    finite = np.asarray(np.isfinite(points).all(axis=1))
     return np.ones(len(faces), bool) if finite.all() else np.asarray(finite[faces].all(axis=1))

@@ -10,6 +10,7 @@ import numpy as np
 from sonarsynth.acoustics.rays import mean_slowness, water
 from sonarsynth.conventions import SLOWEST, Floats, depth
 from sonarsynth.description import FieldError
+from sonarsynth.planning.checks import CORNERS
 from sonarsynth.planning.looks import Look
 from sonarsynth.planning.plans import Plan, Supports, Windows
 from sonarsynth.products import Paths
@@ -21,12 +22,11 @@ from sonarsynth.synthesis import pulse_support
 from sonarsynth.synthesis.pulse import FEET, at_longest, silencing_blur, snap_levels
 from sonarsynth.tracing import Straight
 from sonarsynth.world.environment import Profile
-from sonarsynth.world.meshes import Mesh, in_blocks
+from sonarsynth.world.meshes import farthest_corner, in_blocks
 from sonarsynth.world.moment import model_of
 from sonarsynth.world.reflection import rms_height
 from sonarsynth.world.snap_pulses import Waveform, largest_scales, waveform
 
-CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 MARGIN = 0.1e-3
 """Seconds added at both ends of every window. Covers what straight rays leave out of an arrival time: under 2 us at
 20 m in a gradient of 4 per second. Arrivals that still fall outside are counted in `/signals/outside`."""
@@ -53,7 +53,8 @@ def lay_windows(recipe: Recipe, looks: Sequence[Look]) -> Windows:
     supports = _supports(looks)
     real = np.array([frame.index if look.real else -1 for look in looks for frame in look.frames])
     spans = [span for look in looks for span in _spans(look)]
-    first_heard, last_direct, first_echo, last_echo, last_heard = np.array([_times(span) for span in spans]).T
+    times = np.array([(s.first, s.last_direct, s.first_echo, s.last_echo, s.last) for s in spans])
+    first_heard, last_direct, first_echo, last_echo, last_heard = times.T
     echoes = bool(np.isfinite(first_echo).any())
     shortest = float(np.nanmin(first_echo)) if echoes else np.nan
     longest = float(np.nanmax(last_echo)) if echoes else np.nan
@@ -131,17 +132,9 @@ def _support(scene: Scene, tolerance: float, *, turned: bool) -> Floats:
                 for w in waveforms
                 if law.roughness > 0
             ]
-            corner = 2.0 * _farthest_corner(mesh) / SLOWEST
+            corner = 2.0 * farthest_corner(mesh) / SLOWEST
             supports += [(before + corner, after + corner) for before, after in smooth + rough]
     return np.asarray(np.max(supports, axis=0))
-
-
-def _farthest_corner(mesh: Mesh) -> float:
-    """Largest distance (m) of a corner of a facet from its middle."""
-    blocks = in_blocks(len(mesh.faces))
-    return max(
-        float(np.linalg.norm(mesh.corners_of(b) - mesh.centroid[b, None, :], axis=-1).max(initial=0.0)) for b in blocks
-    )
 
 
 def _blurred(scene: Scene) -> float:
@@ -222,11 +215,6 @@ def _spans(look: Look) -> list[_Span]:
     return spans
 
 
-def _times(span: _Span) -> tuple[float, ...]:
-    """The times of a span that bound the windows of all frames."""
-    return (span.first, span.last_direct, span.first_echo, span.last_echo, span.last)
-
-
 def _span(frame: Frame, profile: Profile, bed: float, bounces: int) -> _Span:
     array = frame.sonar_pose.position
     snaps = frame.moment.snaps
@@ -234,15 +222,15 @@ def _span(frame: Frame, profile: Profile, bed: float, bounces: int) -> _Span:
         return _Span(0.0, 0.0, 0.0, np.nan, np.nan, 0.0)
     direct = np.array([s.time + float(_straight_time(profile, bed, s.position, array)) for s in snaps])
     earliest, late_echo = np.full(len(snaps), np.inf), [-np.inf] * len(snaps)
-    for body in frame.moment.bodies:
-        for some in in_blocks(len(body.mesh.faces)):
-            points = body.pose.to_world(body.mesh.centroid[some])
-            back = _straight_time(profile, bed, points, array)
-            for n, snap in enumerate(snaps):
-                echo = snap.time + _straight_time(profile, bed, snap.position, points) + back
-                earliest[n] = min(earliest[n], echo.min(initial=np.inf))
-                late_echo[n] = max(late_echo[n], echo.max(initial=-np.inf))
-    echoes = any(len(body.mesh.faces) for body in frame.moment.bodies)
+    parts = [(body, some) for body in frame.moment.bodies for some in in_blocks(len(body.mesh.faces))]
+    for body, some in parts:
+        points = body.pose.to_world(body.mesh.centroid[some])
+        back = _straight_time(profile, bed, points, array)
+        for n, snap in enumerate(snaps):
+            echo = snap.time + _straight_time(profile, bed, snap.position, points) + back
+            earliest[n] = min(earliest[n], echo.min(initial=np.inf))
+            late_echo[n] = max(late_echo[n], echo.max(initial=-np.inf))
+    echoes = bool(np.isfinite(earliest).all())
     late_direct = direct
     if bounces:
         late_direct, late_echo = _reflected(frame, profile, bed, bounces)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,14 +14,25 @@ from sonarsynth.products import Arrivals
 from sonarsynth.scattering import ScatteringLaw
 from sonarsynth.scattering.patches import Pulses
 from sonarsynth.sonar import Elements
-from sonarsynth.tracing.aperture import Fronts, fronts
-from sonarsynth.tracing.echoes import echoes, fitted
+from sonarsynth.tracing.aperture import Fronts, Wavefronts, fronts, wavefronts
+from sonarsynth.tracing.echoes import echoes
 from sonarsynth.tracing.forward import forward_legs, opaque, shadow_parts
-from sonarsynth.tracing.legs import Facets, Legs, facets_of, legs_from, may_face, rays_to_centre
+from sonarsynth.tracing.legs import (
+    Facets,
+    Legs,
+    facets_of,
+    legs_from,
+    may_face,
+    one_of,
+    rays_to_centre,
+    require_in_water,
+)
 from sonarsynth.tracing.moving import Moving, carried
 from sonarsynth.tracing.paths import Outward, assemble, join, silence
 from sonarsynth.tracing.shadows import hidden
+from sonarsynth.tracing.variation import fitted
 from sonarsynth.world.environment import Environment, Profile
+from sonarsynth.world.meshes import in_blocks
 from sonarsynth.world.moment import Body, Moment, Snap
 
 if TYPE_CHECKING:
@@ -39,7 +51,7 @@ class ArrayLegs:
     """Every facet that the array sees, with its legs to the array: serves any snap without tracing this side again."""
 
     legs: Legs  # (leg,) sorted by row
-    fronts: Fronts  # (leg,)
+    wavefronts: Wavefronts  # of all legs, those of other parts among them
     facets: Facets  # (facet,) that have a leg; legs.row counts them
     bodies: tuple[Body, ...]
     environment: Environment
@@ -49,6 +61,28 @@ class ArrayLegs:
     elements: Elements
     band: tuple[float, float]  # Hz
     negligible: float = NEGLIGIBLE  # power of the faintest echoes, that are left out
+    first: int = 0  # of the legs, in the wavefronts
+
+    @property
+    def fronts(self) -> Fronts:
+        """(leg,) over the aperture: kept for all legs, made anew for some."""
+        return self._whole if self.legs is self.wavefronts.legs else self._made()
+
+    @cached_property
+    def _whole(self) -> Fronts:
+        return self._made()
+
+    def _made(self) -> Fronts:
+        return self.wavefronts.of(slice(self.first, self.first + len(self.legs.row)))
+
+    def part(self, some: slice) -> ArrayLegs:
+        """Some of the facets, and the legs from them."""
+        if some == slice(0, len(self.facets.facet)):
+            return self
+        first, last = (int(n) for n in np.searchsorted(self.legs.row, (some.start, some.stop)))
+        legs = self.legs.select(slice(first, last))
+        legs, facets = legs.numbered(legs.row - some.start), self.facets.select(some)
+        return replace(self, legs=legs, facets=facets, first=self.first + first)
 
     @property
     def bending(self) -> Profile:
@@ -103,16 +137,21 @@ def array_legs(
 
     Raises ValueError for a body or an array that reaches out of the water.
     """
-    every = facets_of(bodies, environment)
-    every = every.select(may_face(every, sonar_pose.position, propagation.bounces, profile, environment.depth))
-    centre = 0.5 * (band[0] + band[1])
-    bent = bending(profile, propagation, sonar_pose)
-    legs = legs_from(every, bodies, environment, profile, bent, sonar_pose, propagation, centre)
-    kept, row = np.unique(legs.row, return_inverse=True)
-    legs = legs.numbered(row)
-    facets = every.select(kept)
+    require_in_water(bodies, environment)
+    bent, centre = bending(profile, propagation, sonar_pose), 0.5 * (band[0] + band[1])
+    found: tuple[list[Legs], list[Facets]] = [], []
+    seen = 0
+    for some in in_blocks(sum(len(body.mesh.faces) for body in bodies)):
+        every = facets_of(bodies, some)
+        every = every.select(may_face(every, sonar_pose.position, propagation.bounces, profile, environment.depth))
+        part = legs_from(every, bodies, environment, profile, bent, sonar_pose, propagation, centre)
+        kept, row = np.unique(part.row, return_inverse=True)
+        found[0].append(part.numbered(seen + row))
+        found[1].append(every.select(kept))
+        seen += len(kept)
+    legs, facets = one_of(found[0]), one_of(found[1])
     group = facets.target[legs.row]
-    over = fronts(legs, group, environment, bent, sonar_pose, elements, propagation, band)
+    over = wavefronts(legs, group, environment, bent, sonar_pose, elements, propagation, band)
     return ArrayLegs(
         legs, over, facets, bodies, environment, profile, propagation, sonar_pose, elements, band, negligible
     )
@@ -136,7 +175,7 @@ def arrivals(
 
     But for targets that scatter forward, whose shadows have legs of their own.
     """
-    parts, through = [silence(array.legs, array.fronts)], forward_legs(array, laws)
+    parts, through = [silence(array.legs)], forward_legs(array, laws)
     for index, snap in enumerate(snaps):
         solid = opaque(array.bodies, laws, snap.position)
         parts.append(_direct(array, solid, index, snap, absorption, moving))
@@ -171,8 +210,11 @@ def _direct(
     )
     plain = Pulses.plain(len(legs.row))
     one, none = np.ones(len(legs.row)), np.full(len(legs.row), NO_TARGET)
-    variation = fitted(array, over.probe_gain, legs.spreading, None)
-    made = assemble(legs, over, Outward.none(len(one)), index, snap.time, absorption, none, none, one, variation, plain)
+    variation = fitted(array, over.gain(np.arange(len(legs.row))), legs.spreading)
+    made = assemble(
+        legs, over.terms, Outward.none(len(one)), index, snap.time, absorption, none, none, one,
+        variation, plain,
+    )  # fmt: skip
     if moving is None:
         return made
     return carried(made, legs, None, snap, sonar_pose, profile, moving, array.elements.aperture)

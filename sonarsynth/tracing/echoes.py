@@ -4,77 +4,101 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats, Ints, depth
+from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.products import Arrivals
 from sonarsynth.scattering import Part
-from sonarsynth.scattering.parts import Plain, Smooth
-from sonarsynth.scattering.patches import Patches, Pulses, patches
-from sonarsynth.tracing.aperture import Fronts
+from sonarsynth.scattering.patches import Pulses
+from sonarsynth.tracing.echo_groups import Group, groups_of, heard
 from sonarsynth.tracing.legs import may_face, usable
 from sonarsynth.tracing.moving import Moving, carried
-from sonarsynth.tracing.paths import Outward, assemble, silence
+from sonarsynth.tracing.paths import Outward, assemble, ordered, silence
 from sonarsynth.tracing.reflections import reflections
 from sonarsynth.tracing.shadows import hidden, overlapping
-from sonarsynth.tracing.wavefront import FEW, probes
+from sonarsynth.tracing.variation import variations
+from sonarsynth.tracing.wavefront import FEW, Terms, probes
+from sonarsynth.world.meshes import in_blocks
 from sonarsynth.world.moment import Body, Snap
 
 if TYPE_CHECKING:
     from sonarsynth.tracing.arrivals import ArrayLegs
 
 
-ENOUGH = 1e-4
-"""Error of amplitudes over the aperture, of the strongest echo's, at which polynomials of the second degree will do."""
+FAINTER = 1e-3
+"""Of what is negligible: fainter echoes are not held while other facets are looked at."""
 
 LEAP = 1.0
 """rad: a phase of reflection that varies by more over the aperture is not followed."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Group:
-    """Echoes by one part of the law of one body, in the frame of the body."""
+class _Found:
+    """Echoes of a snap from some facets, group by group."""
 
-    body: Body
-    part: Part
-    row: Ints  # (echo,) which pair of a way and a leg
-    patch: Patches  # (echo,)
-    incident: Floats  # (echo, xyz)
-    scattered: Floats  # (echo, xyz)
-    wavenumber: Floats  # (echo,) rad/m at the centre of the band
-    amplitude: Floats  # (echo,) m
-    sign: Floats  # (echo,)
+    array: ArrayLegs  # of these facets
+    groups: list[Group]
+    out: Outward  # (pair,)
+    leg: Ints  # (pair,)
+    factor: Floats  # (pair,) what the ways do to amplitudes
+    few: Floats  # (echo, FEW) amplitudes of the law at the first probes
+    gain: Floats  # (echo, FEW) of the legs there
+    terms: Terms  # (echo,) of the wavefronts
+    pulses: Pulses  # (echo,)
 
-    def select(self, keep: Ints) -> _Group:
-        """The echoes picked by indices."""
-        rows: dict[str, Any] = {k: v[keep] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
-        return replace(self, patch=self.patch.select(keep), **rows)
+    def select(self, loud: Bools) -> _Found:
+        """The echoes picked by a mask, each with a pair of its own."""
+        ends = np.cumsum([len(g.row) for g in self.groups])[:-1]
+        groups = [g.select(np.flatnonzero(keep)) for g, keep in zip(self.groups, np.split(loud, ends), strict=True)]
+        (row,) = _columns(groups, "row")
+        number = np.split(np.arange(len(row)), np.cumsum([len(g.row) for g in groups])[:-1])
+        groups = [replace(g, row=mine) for g, mine in zip(groups, number, strict=True)]
+        out, leg, factor = self.out.select(row), self.leg[row], self.factor[row]
+        terms, pulses = self.terms.select(loud), self.pulses.select(loud)
+        return _Found(self.array, groups, out, leg, factor, self.few[loud], self.gain[loud], terms, pulses)
 
-    def over(self, departure: Floats) -> Floats:
-        """Amplitudes (echo, probe) in directions (echo, probe, xyz) of the world."""
-        away = self.body.pose.turn_to_body(departure)
-        return self.part.amplitude(self.incident[:, None, :], away, self.patch.over(), self.wavenumber[:, None])
+    @property
+    def amplitude(self) -> Floats:
+        """(echo,) of the law."""
+        return np.concatenate([g.amplitude for g in self.groups])
+
+    @property
+    def strength(self) -> Floats:
+        """(echo,) amplitude with the ways."""
+        row, amplitude = _columns(self.groups, "row", "amplitude")
+        return np.asarray(amplitude * self.factor[row])
 
     @property
     def tapered(self) -> Bools:
-        """(echo,) whether it falls to 0 at the limb of the body, rather than ending there."""
-        return self.part.tapers(self.patch) if isinstance(self.part, Smooth) else np.zeros(len(self.row), bool)
+        """(echo,) as its group says."""
+        return np.concatenate([g.tapered for g in self.groups])
 
-    def turned(self, departure: Floats) -> Floats:
-        """Phase (echo, probe) in directions (echo, probe, xyz) of the world more than in that of the array centre."""
-        if not (isinstance(self.part, Smooth) and self.part.turns):
-            return np.zeros(departure.shape[:2])
-        away = self.body.pose.turn_to_body(departure)
-        at_centre = self.part.phase(self.incident, self.scattered)[:, None]
-        more = self.part.phase(self.incident[:, None, :], away) - at_centre
-        return np.asarray(more - 2.0 * np.pi * np.rint(more / (2.0 * np.pi)))
+    def over(self, few: int | None) -> tuple[Floats, Floats]:
+        """Amplitude of the law (echo, probe) at all probes or the first few, and the gain of the legs there."""
+        if few is not None:
+            return self.few, self.gain
+        fronts = self.array.fronts
+        law = np.concatenate([g.over(fronts.departure(self.leg[g.row])) for g in self.groups])
+        return law, fronts.gain(self.leg[_columns(self.groups, "row")[0]])
 
-    def pulses(self, centre: float) -> Pulses:
-        """What they make of the pulse; centre (Hz)."""
-        sound_speed = 2.0 * np.pi * centre / self.wavenumber
-        return self.part.pulses(self.incident, self.scattered, self.patch, sound_speed)
+    def seen(self) -> _Seen:
+        """What decides which of them are kept."""
+        row, amplitude = _columns(self.groups, "row", "amplitude")
+        most = np.maximum(np.abs(self.few).max(axis=1, initial=0.0), np.abs(amplitude)) * self.factor[row]
+        target = self.array.facets.target[self.out.facet[row]]
+        number = np.repeat(np.arange(len(self.groups)), [len(g.row) for g in self.groups])
+        return _Seen(most * heard(self.pulses, self.array.band), self.pulses.coherent, target, number)
+
+
+class _Seen(NamedTuple):
+    """Echoes, and how loud they are."""
+
+    strength: Floats  # (echo,) the largest amplitude that it has anywhere on the array
+    coherent: Bools  # (echo,)
+    target: Ints  # (echo,)
+    group: Ints  # (echo,)
 
 
 def echoes(
@@ -85,68 +109,84 @@ def echoes(
     parts: tuple[tuple[Part, ...], ...],
     moving: Moving | None,
 ) -> Arrivals:
-    """Snap `index` to facet to array, over every facet of the legs that is lit; parts: of the law of each body."""
-    facets, most = array.facets, array.propagation.bounces
-    out = _ways(array, snap)
-    way, leg = _pairs(out.facet, array.legs.row, len(facets.facet))
-    kept = np.flatnonzero(out.bounces[way] + array.legs.bounces[leg] <= most)
+    """Snap `index` to facet to array, over every facet of the legs that is lit; parts: of the law of each body.
+
+    Facets are taken in blocks, so that little is held at a time; the echoes are those of one block, in its order.
+    """
+    if not any(parts):
+        return silence(array.legs)
+    found = _loudest(array, snap, parts)
+    terms, error = variations(found)
+    most = max(float(np.abs(some.strength).max(initial=0.0)) for some in found)
+    group, made = [some.seen().group for some in found], []
+    found.reverse()
+    for variation in terms:
+        some = found.pop()
+        over = _turned(some, most)
+        array, out, legs = some.array, some.out, some.array.legs.select(some.leg)
+        target, facet = array.facets.target[out.facet], array.facets.facet[out.facet]
+        amplitude, sign = _columns(some.groups, "amplitude", "sign")
+        scattered, vary = sign * amplitude, (variation, error)
+        one = assemble(legs, over, out, index, snap.time, absorption, target, facet, scattered, vary, some.pulses)
+        if moving is not None:
+            one = carried(one, legs, out, snap, array.sonar_pose, array.profile, moving, array.elements.aperture)
+        made.append(replace(one, delay=one.delay + some.pulses.late))
+    return ordered(made, group)
+
+
+def _loudest(array: ArrayLegs, snap: Snap, parts: tuple[tuple[Part, ...], ...]) -> list[_Found]:
+    """Echoes from each block of facets that are not too faint.
+
+    What is much fainter than will do, by the blocks so far, is not held; should it be wanted after all, its block is
+    looked at again.
+    """
+    blocks = in_blocks(len(array.facets.facet))
+    if len(blocks) == 1:
+        found = _found(array, snap, parts)
+        return [found.select(_loud(found.seen(), array.negligible))]
+    held: list[_Found] = []
+    seen: list[_Seen] = []
+    kept: list[Bools] = []
+    for some in blocks:
+        found = _found(array.part(some), snap, parts)
+        seen.append(found.seen())
+        kept.append(_loud_of_all(seen, FAINTER * array.negligible)[-1])
+        held.append(found.select(kept[-1]))
+    for n, wanted in enumerate(_loud_of_all(seen, array.negligible)):
+        if (wanted & ~kept[n]).any():
+            held[n] = _found(array.part(blocks[n]), snap, parts).select(wanted)
+        else:
+            held[n] = held[n].select(wanted[kept[n]])
+    return held
+
+
+def _loud_of_all(seen: list[_Seen], negligible: float) -> list[Bools]:
+    """Which echoes of each block are kept, by all of them in the order of one block."""
+    columns = [np.concatenate(column) for column in zip(*seen, strict=True)]
+    order = np.argsort(columns[-1], kind="stable")
+    keep = np.empty(len(order), bool)
+    in_order: Any = [column[order] for column in columns]
+    keep[order] = _loud(_Seen(*in_order), negligible)
+    return np.split(keep, np.cumsum([len(some.strength) for some in seen])[:-1])
+
+
+def _found(array: ArrayLegs, snap: Snap, parts: tuple[tuple[Part, ...], ...]) -> _Found:
+    """All echoes of a snap from the facets of the legs."""
+    out, fronts = _ways(array, snap), array.fronts
+    way, leg = _pairs(out.facet, array.legs.row, len(array.facets.facet))
+    kept = np.flatnonzero(out.bounces[way] + array.legs.bounces[leg] <= array.propagation.bounces)
     out, leg = out.select(way[kept]), leg[kept]
-    groups = _groups(array, out, leg, parts)
-    if not groups:
-        return silence(array.legs, array.fronts)
+    groups = groups_of(array, out, leg, parts)
     factor = array.legs.spreading[leg] * array.legs.boundary[leg] * out.spreading * out.boundary
-    few = [g.over(array.fronts.probe_departure[leg[g.row], :FEW]) for g in groups]
+    few = np.concatenate([g.over(fronts.departure(leg[g.row], FEW)) for g in groups])
     pulses = Pulses.join([g.pulses(array.centre) for g in groups])
-    row, amplitude = _columns(groups, "row", "amplitude")
-    strongest = np.maximum(np.abs(np.concatenate(few)).max(axis=1, initial=0.0), np.abs(amplitude)) * factor[row]
-    target = facets.target[out.facet[row]]
-    loud = _loud(strongest * _heard(pulses, array.band), pulses.coherent, target, array.negligible)
-    mine = [np.flatnonzero(part) for part in np.split(loud, np.cumsum([len(g.row) for g in groups])[:-1])]
-    groups = [g.select(keep) for g, keep in zip(groups, mine, strict=True)]
-    row, amplitude, sign = _columns(groups, "row", "amplitude", "sign")
-    pulses = pulses.select(loud)
-    at_few = np.concatenate([f[keep] for f, keep in zip(few, mine, strict=True)])
-    variation = _variation(array, groups, leg, at_few, amplitude, factor[row])
-    over = _turned(array, groups, leg, amplitude * factor[row])
-    out, leg = out.select(row), leg[row]
-    legs = array.legs.select(leg)
-    target, facet = facets.target[out.facet], facets.facet[out.facet]
-    made = assemble(legs, over, out, index, snap.time, absorption, target, facet, sign * amplitude, variation, pulses)
-    if moving is not None:
-        made = carried(made, legs, out, snap, array.sonar_pose, array.profile, moving, array.elements.aperture)
-    return replace(made, delay=made.delay + pulses.late)
+    rows = leg[_columns(groups, "row")[0]]
+    return _Found(array, groups, out, leg, factor, few, fronts.gain(rows, FEW), fronts.terms.select(rows), pulses)
 
 
-def _columns(groups: list[_Group], *names: str) -> list[np.ndarray]:
+def _columns(groups: list[Group], *names: str) -> list[np.ndarray]:
     """Columns (echo,) of all groups, in order."""
     return [np.concatenate([getattr(g, name) for g in groups]) for name in names]
-
-
-def _groups(array: ArrayLegs, out: Outward, leg: Ints, parts: tuple[tuple[Part, ...], ...]) -> list[_Group]:
-    """Echoes of pairs of a way and a leg (pair,), by body and part; those that are nothing are left out."""
-    facets, found = array.facets, []
-    target = facets.target[out.facet]
-    for number, (body, of_law) in enumerate(zip(array.bodies, parts, strict=True)):
-        row = np.flatnonzero(target == number)
-        facet = facets.facet[out.facet[row]]
-        incident = body.pose.turn_to_body(out.arrival[row])
-        scattered = body.pose.turn_to_body(array.legs.departure[leg[row]])
-        speed = array.profile.at(depth(array.legs.point[leg[row]]))
-        wavenumber = 2.0 * np.pi * array.centre / speed
-        for part in of_law:
-            patch = patches(body.mesh, not isinstance(part, Plain)).select(facet)
-            amplitude = part.amplitude(incident, scattered, patch, wavenumber)
-            sign = part.polarity(body.mesh)[facet]
-            group = _Group(body, part, row, patch, incident, scattered, wavenumber, amplitude, sign)
-            found.append(group.select(np.flatnonzero(amplitude)))
-    return found
-
-
-def _heard(pulses: Pulses, band: tuple[float, float]) -> Floats:
-    """What roughness leaves of each pulse (path,) at most, at any frequency of the band (Hz)."""
-    low, high = (2.0 * np.pi * f for f in band)
-    rough = np.sqrt(1.0 - pulses.rough_share * np.exp(-((high * pulses.rough_delay) ** 2)))
-    return np.asarray(np.exp(-0.5 * (low * pulses.blur) ** 2) * rough)
 
 
 def _ways(array: ArrayLegs, snap: Snap) -> Outward:
@@ -184,8 +224,9 @@ def _pairs(facet: Ints, row: Ints, facets: int) -> tuple[Ints, Ints]:
     return way, begin[facet[way]] + within
 
 
-def _loud(strength: Floats, coherent: Bools, target: Ints, negligible: float) -> Bools:
+def _loud(seen: _Seen, negligible: float) -> Bools:
     """Which (path,) are kept: all but the faintest of each target, by `arrivals.NEGLIGIBLE`."""
+    strength, coherent, target, _ = seen
     keep = np.ones(len(strength), bool)
     for number, exponent in product(np.unique(target), (1, 2)):
         some = np.flatnonzero((target == number) & (coherent == (exponent == 1)))
@@ -197,67 +238,24 @@ def _loud(strength: Floats, coherent: Bools, target: Ints, negligible: float) ->
     return keep
 
 
-def _variation(
-    array: ArrayLegs, groups: list[_Group], leg: Ints, few: Floats, amplitude: Floats, factor: Floats
-) -> tuple[Floats, float]:
-    """Polynomials (path, term) of the amplitude over the aperture, and their error; few: the law at the first probes.
-
-    The second degree serves where it errs by no more than `ENOUGH`.
-    """
-    fronts = array.fronts
-    rows = leg[np.concatenate([g.row for g in groups])]
-    tapered, strength = np.concatenate([g.tapered for g in groups]), amplitude * factor
-    strength = np.where((few == 0.0).any(axis=1), 0.0, strength)  # on the limb of some probe: not counted
-    terms, error = fitted(array, _gain(few, amplitude, tapered, fronts.probe_gain[:, :FEW][rows]), strength, FEW)
-    if error <= ENOUGH:
-        return terms, error
-    every = np.concatenate([g.over(fronts.probe_departure[leg[g.row]]) for g in groups])
-    strength = np.where((every == 0.0).any(axis=1), 0.0, strength)
-    return fitted(array, _gain(every, amplitude, tapered, fronts.probe_gain[rows]), strength, None)
-
-
-def _turned(array: ArrayLegs, groups: list[_Group], leg: Ints, strength: Floats) -> Fronts:
-    """Wavefronts (path,) of echoes of that strength (path,), with the phases of reflections from facets to each probe.
+def _turned(found: _Found, most: float) -> Terms:
+    """Wavefronts (path,) of echoes, with the phases of reflections from facets to each probe; most: the strongest of
+    all.
 
     They vary over the aperture where part of the sound enters the body; what polynomials miss counts as far as the echo
     is as strong as the strongest. Where the coefficient passes near 0 its phase leaps: there all sensors have that of
     the centre.
     """
-    rows = leg[np.concatenate([g.row for g in groups])]
-    over = array.fronts.select(rows)
-    shift = np.concatenate([g.turned(array.fronts.probe_departure[leg[g.row]]) for g in groups])
+    over, array = found.terms, found.array
+    if not any(g.turns for g in found.groups):
+        return over
+    fronts = array.fronts
+    shift = np.concatenate([g.turned(fronts.departure(found.leg[g.row])) for g in found.groups])
     leaps = np.abs(shift).max(axis=1, initial=0.0) > LEAP
     if not shift.any():
         return over
     probe = probes(array.elements)
     terms = probe.fit(np.where(leaps[:, None], 0.0, shift))
-    share = np.abs(strength) / max(float(np.abs(strength).max()), 1e-300)
+    share = np.abs(found.strength) / max(most, 1e-300)
     error = over.error + share * np.where(leaps, 0.0, probe.misfit(shift, terms)) / (2.0 * np.pi * array.band[1])
-    return replace(over, phase_terms=over.phase_terms + terms if over.phase_terms.shape[1] else terms, error=error)
-
-
-def _gain(over_aperture: Floats, amplitude: Floats, tapered: Bools, probe_gain: Floats) -> Floats:
-    """Amplitude (path, probe) over that of the centre and the sphere; 1 for a facet that ends at the limb of some
-    probe; one that is tapered (path,) to nothing there is followed. All sensors share what the centre sees.
-    """
-    gain = over_aperture / amplitude[:, None] * probe_gain
-    gain[(over_aperture == 0).any(axis=1) & ~tapered] = 1.0
-    return np.asarray(gain)
-
-
-def fitted(array: ArrayLegs, gain: Floats, strength: Floats, few: int | None) -> tuple[Floats, float]:
-    """Polynomials (path, term) of gain (path, probe) - 1 over the aperture; no columns where it is 1 everywhere.
-
-    And their largest error at the probes, for paths of that strength (path,), relative to the strongest.
-    """
-    if (gain == 1.0).all():
-        return np.empty((len(gain), 0)), 0.0
-    probe = probes(array.elements)
-    left = gain - 1.0
-    if few is None or len(probe.sensor) < FEW:
-        terms = probe.fit(left)
-        error = probe.misfit(left, terms)
-    else:
-        terms, error = probe.fit_few(left)
-    loudest = np.nanmax(np.abs(strength)[:, None] * np.abs(gain), initial=0.0)
-    return terms, float((np.abs(strength) * error).max(initial=0.0) / max(loudest, 1e-300))
+    return over._replace(phase=over.phase + terms if over.phase.shape[1] else terms, error=error)

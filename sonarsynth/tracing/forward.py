@@ -17,7 +17,7 @@ import numpy as np
 from sonarsynth.conventions import Floats
 from sonarsynth.scattering import Kirchhoff, Part, ScatteringLaw
 from sonarsynth.scattering.parts import Shadow
-from sonarsynth.tracing.aperture import fronts
+from sonarsynth.tracing.aperture import wavefronts
 from sonarsynth.tracing.legs import facets_of, rays_to_centre
 from sonarsynth.tracing.shadows import hidden
 from sonarsynth.world.casting import inside
@@ -47,7 +47,7 @@ def forward_legs(array: ArrayLegs, laws: tuple[ScatteringLaw, ...]) -> ArrayLegs
     if len(solid) == len(array.bodies):
         return None
     environment, profile, pose, propagation = array.environment, array.profile, array.sonar_pose, array.propagation
-    every = facets_of(array.bodies, environment)
+    every = facets_of(array.bodies, slice(0, sum(len(body.mesh.faces) for body in array.bodies)))
     scatters = np.array([bool(shadow_parts(law)) for law in laws])
     every = every.select(scatters[every.target])
     legs = rays_to_centre(environment, profile, every.point, pose, propagation, array.centre)
@@ -58,5 +58,5 @@ def forward_legs(array: ArrayLegs, laws: tuple[ScatteringLaw, ...]) -> ArrayLegs
     kept, row = np.unique(legs.row, return_inverse=True)
     legs, facets = legs.numbered(row), every.select(kept)
     group = facets.target[legs.row]
-    over = fronts(legs, group, environment, array.bending, pose, array.elements, propagation, array.band)
-    return replace(array, legs=legs, fronts=over, facets=facets)
+    over = wavefronts(legs, group, environment, array.bending, pose, array.elements, propagation, array.band)
+    return replace(array, legs=legs, wavefronts=over, facets=facets)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from itertools import pairwise
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from sonarsynth.tracing.reflections import Reflections, reflections
 from sonarsynth.tracing.shadows import hidden
 from sonarsynth.world.casting import OFFSET
 from sonarsynth.world.environment import Environment, Profile
+from sonarsynth.world.meshes import in_blocks
 from sonarsynth.world.moment import Body
 
 if TYPE_CHECKING:
@@ -42,8 +44,8 @@ class Legs:
     phase: Floats  # (leg,) rad of reflections and caustics
     blur: Floats  # (leg,) s
 
-    def select(self, keep: Bools | Ints) -> Legs:
-        """The legs picked by a mask or by indices."""
+    def select(self, keep: Bools | Ints | slice) -> Legs:
+        """The legs picked by a mask, by indices, or by a slice, which copies nothing."""
         return Legs(**{name: value[keep] for name, value in vars(self).items()})
 
     def numbered(self, row: Ints) -> Legs:
@@ -67,9 +69,21 @@ class Facets:
     normal: Floats  # (facet, xyz)
     area: Floats  # (facet,) m2
 
-    def select(self, keep: Bools | Ints) -> Facets:
-        """The facets picked by a mask or by indices."""
+    def select(self, keep: Bools | Ints | slice) -> Facets:
+        """The facets picked by a mask, by indices, or by a slice, which copies nothing."""
         return Facets(**{name: value[keep] for name, value in vars(self).items()})
+
+
+T = TypeVar("T", Legs, Facets)
+
+
+def one_of(parts: list[T]) -> T:
+    """All rows of some parts, in order; the list is emptied, so that no more than a column is there twice."""
+    if len(parts) == 1:
+        return parts.pop()
+    kind, columns = type(parts[0]), [dict(vars(part)) for part in parts]
+    parts.clear()
+    return kind(**{name: np.concatenate([part.pop(name) for part in columns]) for name in list(columns[0])})
 
 
 def usable(paths: Paths) -> Bools:
@@ -106,30 +120,37 @@ def rays_to_centre(
     )
 
 
-def facets_of(bodies: tuple[Body, ...], environment: Environment) -> Facets:
-    """Every facet of every body. Raises ValueError for a body that reaches out of the water."""
+def require_in_water(bodies: tuple[Body, ...], environment: Environment) -> None:
+    """Raises ValueError for a body that reaches out of the water."""
     for body in bodies:
-        down = depth(body.pose.to_world(body.mesh.vertices))
-        highest, deepest = down.min(initial=environment.depth), down.max(initial=0.0)
+        highest, deepest = environment.depth, 0.0
+        for some in in_blocks(len(body.mesh.vertices)):
+            down = depth(body.pose.to_world(body.mesh.vertices[some]))
+            highest, deepest = float(down.min(initial=highest)), float(down.max(initial=deepest))
         if highest < -TOLERANCE or deepest > environment.depth + TOLERANCE:
             where = "above the surface" if highest < -TOLERANCE else "below the bed"
             raise ValueError(
                 f"target '{body.name}' reaches {where} ({highest:g} to {deepest:g} m in {environment.depth:g} m)"
             )
-    counts = [len(body.mesh.faces) for body in bodies]
-    target = np.repeat(np.arange(len(bodies)), counts)
-    none = np.empty((0, 3))
-    point = np.concatenate([none, *(b.pose.to_world(b.mesh.centroid) for b in bodies)])
-    normal = np.concatenate([none, *(b.pose.turn_to_world(b.mesh.normal) for b in bodies)])
+
+
+def facets_of(bodies: tuple[Body, ...], some: slice) -> Facets:
+    """Some of the facets of all bodies, one body after the other."""
+    last = np.cumsum([0, *(len(body.mesh.faces) for body in bodies)])
+    of = [slice(*np.clip([some.start - n, some.stop - n], 0, m - n)) for n, m in pairwise(last.tolist())]
+    target = np.repeat(np.arange(len(bodies)), [part.stop - part.start for part in of])
+    none, mine = np.empty((0, 3)), list(zip(bodies, of, strict=True))
+    point = np.concatenate([none, *(b.pose.to_world(b.mesh.centroid[part]) for b, part in mine)])
+    normal = np.concatenate([none, *(b.pose.turn_to_world(b.mesh.normal[part]) for b, part in mine)])
     rounding = 8.0 * np.finfo(float).eps * np.abs(point).max(axis=1, initial=0.0)  # of places in the world
     offset = np.maximum(OFFSET * np.array([b.mesh.radius for b in bodies])[target], rounding)
     return Facets(
         target=target,
-        facet=np.concatenate([np.empty(0, np.int64), *(np.arange(n) for n in counts)]),
+        facet=np.concatenate([np.empty(0, np.int64), *(np.arange(part.start, part.stop) for part in of)]),
         point=point,
         clear=point + offset[:, None] * normal,
         normal=normal,
-        area=np.concatenate([np.empty(0), *(b.mesh.area for b in bodies)]),
+        area=np.concatenate([np.empty(0), *(b.mesh.area[part] for b, part in mine)]),
     )
 
 

@@ -22,9 +22,9 @@ from sonarsynth.acoustics.lobes import dot
 from sonarsynth.conventions import Floats, depth
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Arrivals
-from sonarsynth.tracing.aperture import TERMS
 from sonarsynth.tracing.legs import Legs
 from sonarsynth.tracing.paths import Outward
+from sonarsynth.tracing.probe_legs import TERMS
 from sonarsynth.world.environment import Profile
 from sonarsynth.world.moment import Snap
 

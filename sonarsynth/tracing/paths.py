@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.products import Arrivals, Paths
 from sonarsynth.scattering.patches import Pulses
-from sonarsynth.tracing.aperture import Fronts
 from sonarsynth.tracing.legs import Legs
 from sonarsynth.tracing.reflections import Reflections, as_sign
+from sonarsynth.tracing.wavefront import Terms
 
 TOGETHER = 1e-12
 """s: ways to a facet whose travel times differ by less are one."""
@@ -75,11 +76,10 @@ class Outward:
 
 
 def assemble(
-    legs: Legs, over: Fronts, out: Outward, index: int, time: float, absorption: float, target: Ints, facet: Ints,
-    scattering: Floats, variation: tuple[Floats, float], pulses: Pulses,
+    legs: Legs, over: Terms, out: Outward, index: int, time: float, absorption: float,
+    target: Ints, facet: Ints, scattering: Floats, variation: tuple[Floats, float], pulses: Pulses,
 ) -> Arrivals:  # fmt: skip
-    """Arrivals of snap `index` at `time` (s) from both halves of their paths; variation: its terms and error;
-    pulses: what facets make of the snap."""
+    """Arrivals of snap `index` at `time` (s) from both halves of their paths; over: the wavefronts; variation: terms of the amplitude and their error; pulses: what facets make of the snap."""
     length = out.length + legs.length
     loss = absorption * length
     sign, phase = as_sign(out.phase + legs.phase + pulses.phase)
@@ -90,9 +90,9 @@ def assemble(
         delay=time + (out.travel_time + legs.travel_time),
         direction=legs.direction,
         radius=legs.radius,
-        delay_terms=over.delay_terms,
-        phase_terms=over.phase_terms,
-        blur_terms=over.blur_terms,
+        delay_terms=over.delay,
+        phase_terms=over.phase,
+        blur_terms=over.blur,
         amplitude_terms=variation[0],
         amplitude=first * scattering * second * boundary * 10.0 ** (-loss / 20.0),
         spreading_out=first,
@@ -125,33 +125,41 @@ def assemble(
     )
 
 
-def silence(legs: Legs, over: Fronts) -> Arrivals:
+def silence(legs: Legs) -> Arrivals:
     """No arrivals at all: what a frame without a snap has."""
     none, zero = np.empty(0), np.empty(0, int)
-    empty = legs.select(zero), over.select(zero), Outward.none(0)
+    empty = legs.select(zero), Terms.none(0), Outward.none(0)
     return assemble(*empty, 0, 0.0, 0.0, zero, zero, none, (np.empty((0, 0)), 0.0), Pulses.plain(0))
 
 
 def join(parts: list[Arrivals], sound_speed: float, centre: float) -> Arrivals:
     """Arrivals of all snaps, in order, at the centre of a band (Hz); terms that some of them lack are 0.
 
-    What absorption leaves nothing of is out.
+    What absorption leaves nothing of is out. The list is emptied.
     """
-    columns = {}
-    for name, value in vars(parts[0]).items():
-        if isinstance(value, np.ndarray):
-            arrays = [getattr(part, name) for part in parts]
-            if name.endswith("_terms"):
-                width = max(a.shape[1] for a in arrays)
-                arrays = [a if a.shape[1] == width else np.zeros((len(a), width)) for a in arrays]
-            columns[name] = np.concatenate(arrays)
-    heard = columns["amplitude"] != 0.0
-    if not heard.all():
-        columns = {name: value[heard] for name, value in columns.items()}
-    return Arrivals(
-        **columns,
-        centre=centre,
-        sound_speed=sound_speed,
-        wavefront_error=max(part.wavefront_error for part in parts),
-        amplitude_error=max(part.amplitude_error for part in parts),
-    )
+    heard = np.concatenate([part.amplitude for part in parts]) != 0.0
+    return replace(_stacked(parts, None if heard.all() else heard), sound_speed=sound_speed, centre=centre)
+
+
+def ordered(parts: list[Arrivals], group: list[Ints]) -> Arrivals:
+    """Arrivals of all parts, sorted by group (path,) of each; the list is emptied."""
+    if len(parts) == 1:
+        return parts.pop()
+    return _stacked(parts, np.argsort(np.concatenate(group), kind="stable"))
+
+
+def _stacked(parts: list[Arrivals], rows: Bools | Ints | None) -> Arrivals:
+    """These rows of all parts, one after the other; the list is emptied, so that only one column is there twice."""
+    left = [dict(vars(part)) for part in parts]
+    errors = {name: max(part[name] for part in left) for name in ("wavefront_error", "amplitude_error")}
+    plain = {name: left[0][name] for name in ("centre", "sound_speed")}
+    parts.clear()
+    columns: dict[str, Any] = {}
+    for name in [name for name, value in left[0].items() if isinstance(value, np.ndarray)]:
+        arrays = [part.pop(name) for part in left]
+        if name.endswith("_terms"):
+            width = max(a.shape[1] for a in arrays)
+            arrays = [a if a.shape[1] == width else np.zeros((len(a), width)) for a in arrays]
+        whole = np.concatenate(arrays)
+        columns[name] = whole if rows is None else whole[rows]
+    return Arrivals(**columns, **plain, **errors)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -61,6 +62,25 @@ class Probes:
         basis = self.basis[: values.shape[1], : terms.shape[1]]
         error = np.abs(values - terms @ basis.T).max(axis=1, initial=0.0)
         return np.where(np.isnan(values).any(axis=1), np.inf, error)
+
+
+class Terms(NamedTuple):
+    """How paths vary over the aperture: polynomials, without columns where there is nothing to say."""
+
+    delay: Floats  # (path, term) s: over the sphere's
+    phase: Floats  # (path, term) rad: of reflections, over that of the centre
+    blur: Floats  # (path, term) s2: squares of blurs, over that of the centre
+    error: Floats  # (path,) s: misfit of the wavefront at the probes, the held-out ones among them
+
+    @staticmethod
+    def none(count: int) -> Terms:
+        """Of spheres, all alike."""
+        nothing = np.empty((count, 0))
+        return Terms(nothing, nothing, nothing, np.zeros(count))
+
+    def select(self, rows: Bools | Ints) -> Terms:
+        """The paths picked by a mask or by indices."""
+        return Terms(*(value[rows] for value in self))
 
 
 @lru_cache(maxsize=1024)

@@ -53,6 +53,7 @@ class Kept:
         update_wrapper(self, function)
 
     def __call__(self, *args: Any, **named: Any) -> Any:
+        """The result for these arguments."""
         key = (args, tuple(sorted(named.items())))
         with self._lock:
             if key in self._results:

@@ -20,6 +20,7 @@ from sonarsynth.world.shapes import Cylinder, MeshFile, Myring, Remus100, Shape
 
 __all__ = ["Mesh", "MeshError", "file_stamp", "mesh_of", "refined_mesh"]
 
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """A checked triangle mesh in the body frame; facets are counter-clockwise seen from outside."""
@@ -84,16 +85,25 @@ class Mesh:
     @cached_property
     def digest(self) -> str:
         """SHA-256 of vertices and faces: the mesh's identity in caches and in the store."""
-        h = hashlib.sha256(memoryview(np.ascontiguousarray(self.vertices, "<f8")).cast("B"))
-        h.update(memoryview(np.ascontiguousarray(self.faces, "<i4")).cast("B"))
+        h = hashlib.sha256(np.ascontiguousarray(self.vertices, "<f8").view(np.uint8).data)
+        h.update(np.ascontiguousarray(self.faces, "<i4").view(np.uint8).data)
         return h.hexdigest()
 
 
-def in_blocks(count: int, block: int = BLOCK) -> list[slice]:
-    """Of tables that are made a part at a time, so that what is needed on the way stays small: 0 to count - 1 in as many equal parts as hold no more than `block` each."""
-    parts = max(-(-count // block), 1)
+def in_blocks(count: int) -> list[slice]:
+    """Parts of a table, so that what is needed to make it stays small: as many equal ones as hold BLOCK at most."""
+    parts = max(-(-count // BLOCK), 1)
     edges = [count * n // parts for n in range(parts + 1)]
     return [slice(first, last) for first, last in pairwise(edges)]
+
+
+def farthest_corner(mesh: Mesh) -> float:
+    """Largest distance (m) of a corner of a facet from its middle."""
+    far = 0.0
+    for some in in_blocks(len(mesh.faces)):
+        apart = np.linalg.norm(mesh.corners_of(some) - mesh.centroid[some, None, :], axis=-1)
+        far = max(far, float(apart.max(initial=0.0)))
+    return far
 
 
 SHARP: Final = MeshFile(path="").crease

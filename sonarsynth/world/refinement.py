@@ -14,6 +14,8 @@ Surface = tuple[Floats, Ints]
 """Vertices (vertex, xyz) in m and faces (facet, 3), counter-clockwise seen from outside."""
 
 
+Facets = tuple[Floats, Ints | npt.NDArray[np.int32]]
+"""The same, with faces as a mesh keeps them."""
 BLOCK: Final = 250_000
 """Facets that are looked at at a time."""
 
@@ -48,7 +50,7 @@ def weld(surface: Surface, tolerance: float = 0.0) -> Surface:
     return points[kept[order]], rank[corner.ravel()].reshape(-1, 3)
 
 
-def longest_edge(surface: Surface) -> float:
+def longest_edge(surface: Facets) -> float:
     """The longest edge of any facet (m)."""
     vertices, faces = surface
     longest = 0.0
@@ -58,7 +60,7 @@ def longest_edge(surface: Surface) -> float:
     return longest
 
 
-def volume(surface: Surface) -> float:
+def volume(surface: Facets) -> float:
     """Signed volume (m3): positive for a closed surface with outward normals."""
     vertices, faces = surface
     six = 0.0
@@ -68,7 +70,7 @@ def volume(surface: Surface) -> float:
     return six / 6.0
 
 
-def area_of(surface: Surface) -> float:
+def area_of(surface: Facets) -> float:
     """Area of all facets (m2)."""
     vertices, faces = surface
     area = 0.0

@@ -6,6 +6,7 @@ kernel's mark of the peak before each (Linux), and where that cannot be done pea
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import json
 import resource
@@ -42,10 +43,8 @@ def peak() -> float:
 def forget_peak() -> None:
     """Begin a new peak."""
     gc.collect()
-    try:
+    with contextlib.suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5")
-    except OSError:
-        pass
 
 
 class Stages:
@@ -83,7 +82,9 @@ def of_mesh(facets: int, refracted: bool = False) -> dict[str, Any]:
 
     changes = []
     if refracted:
-        changes = [("scene.world.environment.sound_speed", {"kind": "linear", "surface_speed": 1540.0, "gradient": 0.5})]
+        changes = [
+            ("scene.world.environment.sound_speed", {"kind": "linear", "surface_speed": 1540.0, "gradient": 0.5})
+        ]
     recipe, stages = sphere_recipe(facets, *changes), Stages()
     start = resident()
     mesh = stages.run("mesh", lambda: recipe.scene_of(0).meshes[0])

@@ -175,7 +175,7 @@ def expanded(plan: Plan, made: ArrayLegs) -> tuple[np.ndarray, np.ndarray]:
     c = float(plan.profile.at(depth(made.sonar_pose.position)))
     farther = sphere(legs.direction, legs.radius, elements.position) / c
     terms = aperture_terms(elements.position, elements.aperture)
-    return legs.travel_time[:, None] + farther + over.delay_terms @ terms.T, over.error
+    return legs.travel_time[:, None] + farther + over.terms.delay @ terms.T, over.terms.error
 
 
 def of_legs(

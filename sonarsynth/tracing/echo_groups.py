@@ -1,0 +1,94 @@
+"""Echoes by one part of the law of one body, in the frame of the body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sonarsynth.conventions import Bools, Floats, Ints, depth
+from sonarsynth.scattering import Part
+from sonarsynth.scattering.parts import Plain, Smooth
+from sonarsynth.scattering.patches import Patches, Pulses, patches
+from sonarsynth.tracing.paths import Outward
+from sonarsynth.world.moment import Body
+
+if TYPE_CHECKING:
+    from sonarsynth.tracing.arrivals import ArrayLegs
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Echoes by one part of the law of one body, in the frame of the body."""
+
+    body: Body
+    part: Part
+    row: Ints  # (echo,) which pair of a way and a leg
+    patch: Patches  # (echo,)
+    incident: Floats  # (echo, xyz)
+    scattered: Floats  # (echo, xyz)
+    wavenumber: Floats  # (echo,) rad/m at the centre of the band
+    amplitude: Floats  # (echo,) m
+    sign: Floats  # (echo,)
+
+    def select(self, keep: Ints) -> Group:
+        """The echoes picked by indices."""
+        rows: dict[str, Any] = {k: v[keep] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
+        return replace(self, patch=self.patch.select(keep), **rows)
+
+    def over(self, departure: Floats) -> Floats:
+        """Amplitudes (echo, probe) in directions (echo, probe, xyz) of the world."""
+        away = self.body.pose.turn_to_body(departure)
+        return self.part.amplitude(self.incident[:, None, :], away, self.patch.over(), self.wavenumber[:, None])
+
+    @property
+    def tapered(self) -> Bools:
+        """(echo,) whether it falls to 0 at the limb of the body, rather than ending there."""
+        return self.part.tapers(self.patch) if isinstance(self.part, Smooth) else np.zeros(len(self.row), bool)
+
+    @property
+    def turns(self) -> bool:
+        """Whether the phase of its reflections differs from direction to direction."""
+        return isinstance(self.part, Smooth) and self.part.turns
+
+    def turned(self, departure: Floats) -> Floats:
+        """Phase (echo, probe) in directions (echo, probe, xyz) of the world more than in that of the array centre."""
+        if not (isinstance(self.part, Smooth) and self.part.turns):
+            return np.zeros(departure.shape[:2])
+        away = self.body.pose.turn_to_body(departure)
+        at_centre = self.part.phase(self.incident, self.scattered)[:, None]
+        more = self.part.phase(self.incident[:, None, :], away) - at_centre
+        return np.asarray(more - 2.0 * np.pi * np.rint(more / (2.0 * np.pi)))
+
+    def pulses(self, centre: float) -> Pulses:
+        """What they make of the pulse; centre (Hz)."""
+        sound_speed = 2.0 * np.pi * centre / self.wavenumber
+        return self.part.pulses(self.incident, self.scattered, self.patch, sound_speed)
+
+
+def groups_of(array: ArrayLegs, out: Outward, leg: Ints, parts: tuple[tuple[Part, ...], ...]) -> list[Group]:
+    """Echoes of pairs of a way and a leg (pair,), by body and part; those that are nothing are left out."""
+    facets, found = array.facets, []
+    target = facets.target[out.facet]
+    for number, (body, of_law) in enumerate(zip(array.bodies, parts, strict=True)):
+        row = np.flatnonzero(target == number)
+        facet = facets.facet[out.facet[row]]
+        incident = body.pose.turn_to_body(out.arrival[row])
+        scattered = body.pose.turn_to_body(array.legs.departure[leg[row]])
+        speed = array.profile.at(depth(array.legs.point[leg[row]]))
+        wavenumber = 2.0 * np.pi * array.centre / speed
+        for part in of_law:
+            patch = patches(body.mesh, not isinstance(part, Plain)).select(facet)
+            amplitude = part.amplitude(incident, scattered, patch, wavenumber)
+            sign = part.polarity(body.mesh)[facet]
+            group = Group(body, part, row, patch, incident, scattered, wavenumber, amplitude, sign)
+            found.append(group.select(np.flatnonzero(amplitude)))
+    return found
+
+
+def heard(pulses: Pulses, band: tuple[float, float]) -> Floats:
+    """What roughness leaves of each pulse (path,) at most, at any frequency of the band (Hz)."""
+    low, high = (2.0 * np.pi * f for f in band)
+    rough = np.sqrt(1.0 - pulses.rough_share * np.exp(-((high * pulses.rough_delay) ** 2)))
+    return np.asarray(np.exp(-0.5 * (low * pulses.blur) ** 2) * rough)

@@ -1,0 +1,118 @@
+"""What is made a block of facets at a time is what is made at once, bit for bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from sonarsynth.conventions import NO_TARGET
+from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.labelling import label
+from sonarsynth.products import Arrivals
+from sonarsynth.scattering import Kirchhoff, MirrorLobe, PartlyReflecting, Scattering
+from sonarsynth.sonar import BeamGrid, Romanis, elements
+from sonarsynth.tracing import AutoTracing, Refracted, Straight, echoes
+from sonarsynth.tracing.arrivals import trace
+from sonarsynth.tracing.moving import Moving
+from sonarsynth.world import meshes
+from sonarsynth.world.environment import Environment, Isovelocity, Profile
+from sonarsynth.world.meshes import Mesh, in_blocks
+from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.sources import LogarithmicBubble
+
+ENVIRONMENT = Environment(depth=30.0, sound_speed=Isovelocity(speed=1540.0))
+UNIFORM = Profile(np.array([0.0, 30.0]), np.array([1540.0, 1540.0]))
+LAYERED = Profile(np.array([0.0, 8.0, 13.0, 30.0]), np.array([1541.0, 1540.0, 1535.0, 1534.0]))
+SONAR = Pose(np.array([0.0, 0.0, -10.0]), quaternion(0.5 * np.pi))
+ROMANIS = elements(Romanis())
+
+
+def hull(subdivisions: int) -> Mesh:
+    shape = trimesh.creation.icosphere(subdivisions=subdivisions)
+    return Mesh(np.asarray(shape.vertices) * [0.8, 0.2, 0.2], np.asarray(shape.faces, np.int32))
+
+
+BODIES = tuple(
+    Body(name, hull(n), Pose(np.array(place), quaternion(0.4, 0.1, 0.2)), np.array([1.0, -2.0, 0.1]))
+    for name, n, place in (("large", 5, (20.0, 1.0, -11.0)), ("small", 3, (15.0, 0.5, -11.5)))
+)
+MOMENT = Moment(
+    0.0,
+    BODIES,
+    tuple(Snap(np.array(at), 1e-3 * at[0], LogarithmicBubble(), None) for at in ((3.0, 6.0, -30.0), (9.0, -6.0, -30))),
+)
+CASES: dict[str, tuple[Profile, int, Scattering]] = {
+    "straight": (UNIFORM, 0, MirrorLobe(width=0.3)),
+    "reflected": (UNIFORM, 1, MirrorLobe(width=0.3)),
+    "refracted": (LAYERED, 0, MirrorLobe(width=0.3)),
+    "refracted and reflected": (LAYERED, 1, MirrorLobe(width=0.5)),
+    "coherent and rough": (UNIFORM, 0, Kirchhoff(roughness=1e-3)),
+    "partly reflecting": (LAYERED, 0, Kirchhoff(surface=PartlyReflecting(density_ratio=2.0, speed_ratio=1.2))),
+    "forward": (UNIFORM, 1, Kirchhoff(forward="scattered")),
+}
+
+
+def found(profile: Profile, bounces: int, law: Scattering) -> Arrivals:
+    moving = Moving(np.array([body.velocity for body in BODIES]), np.array([0.5, 0.0, 0.0]))
+    tracing = AutoTracing(bounces=bounces)
+    laws = (law, MirrorLobe())
+    return trace(
+        ENVIRONMENT, profile, MOMENT, SONAR, ROMANIS, 0.02, tracing, laws, band=(25e3, 85e3), moving=moving
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("block", [2500, 9000])
+def test_arrivals_are_the_same_whatever_the_block(monkeypatch: pytest.MonkeyPatch, case: str, block: int) -> None:
+    whole = found(*CASES[case])
+    assert {NO_TARGET, 0, 1} == set(whole.target.tolist())
+    monkeypatch.setattr(meshes, "BLOCK", block)
+    assert len(in_blocks(sum(len(body.mesh.faces) for body in BODIES))) > 1
+    for name, value in vars(found(*CASES[case])).items():
+        np.testing.assert_array_equal(value, getattr(whole, name), err_msg=name)
+
+
+@pytest.mark.parametrize("case", ["straight", "coherent and rough"])
+def test_what_was_given_up_too_soon_is_looked_at_again(monkeypatch: pytest.MonkeyPatch, case: str) -> None:
+    whole = found(*CASES[case])
+    monkeypatch.setattr(meshes, "BLOCK", 2500)
+    monkeypatch.setattr(echoes, "FAINTER", 1e5)
+    for name, value in vars(found(*CASES[case])).items():
+        np.testing.assert_array_equal(value, getattr(whole, name), err_msg=name)
+
+
+@pytest.mark.parametrize("straight", [True, False])
+def test_labels_are_the_same_whatever_the_block(monkeypatch: pytest.MonkeyPatch, straight: bool) -> None:
+    profile, rays = (UNIFORM, Straight()) if straight else (LAYERED, Refracted())
+    beams = BeamGrid(azimuth_span=0.5, azimuths=41, elevation_span=0.5, elevations=41)
+
+    def labels() -> dict[str, object]:
+        levels = np.zeros(len(MOMENT.snaps))
+        return vars(label(MOMENT, SONAR, beams, lambda a, b: rays.connect(profile, 30.0, a, b), levels, straight))
+
+    whole = labels()
+    assert (np.asarray(whole["visible_fraction"]) > 0.0).all() and (np.asarray(whole["beam_target"]) >= 0).any()
+    monkeypatch.setattr(meshes, "BLOCK", 1000)
+    for name, value in labels().items():
+        np.testing.assert_array_equal(value, whole[name], err_msg=name)
+
+
+def test_tables_of_a_mesh_are_the_same_whatever_the_block(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = hull(4)
+    corners = whole.corners
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    np.testing.assert_array_equal(whole.area, 0.5 * np.linalg.norm(cross, axis=1))
+    monkeypatch.setattr(meshes, "BLOCK", 333)
+    part = hull(4)
+    for name in ("area", "normal", "centroid", "corners"):
+        np.testing.assert_array_equal(getattr(part, name), getattr(whole, name), err_msg=name)
+
+
+def test_blocks_are_all_and_none_is_too_large(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(meshes, "BLOCK", 10)
+    for count in (0, 1, 9, 10, 11, 20, 21, 99):
+        parts = in_blocks(count)
+        assert [n for part in parts for n in range(part.start, part.stop)] == list(range(count))
+        assert max(part.stop - part.start for part in parts) <= 10
+        assert len(parts) == max(-(-count // 10), 1)
