@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,8 +19,10 @@ from sonarsynth.synthesis.pulse import bubble, heard_part
 from sonarsynth.world.casting import inside
 from sonarsynth.world.casts import profile_of
 from sonarsynth.world.environment import Profile
-from sonarsynth.world.meshes import in_blocks
+from sonarsynth.world.meshes import in_blocks, mesh_of
 from sonarsynth.world.moment import Body, model_of
+from sonarsynth.world.motion import pose
+from sonarsynth.world.shapes import MeshFile
 from sonarsynth.world.snap_pulses import largest_scales, pulse, waveform
 from sonarsynth.world.sources import LogarithmicBubble, SnappingShrimp
 
@@ -56,7 +59,10 @@ def read_inputs(scene: Scene) -> Profile:
         )
     for i, (target, law) in enumerate(zip(scene.world.targets, scene.laws, strict=True)):
         try:
+            _check_plain(scene, i)
             mesh_for(target.shape, law, scene.sonar.shortest_wavelength)
+        except FieldError:
+            raise
         except (ValueError, OSError) as error:
             raise FieldError((*world, "targets", i, "shape"), str(error)) from None
     try:
@@ -64,6 +70,19 @@ def read_inputs(scene: Scene) -> Profile:
     except ValueError as error:
         raise FieldError(("scene", "sonar", "array"), str(error)) from None
     return profile
+
+
+def _check_plain(scene: Scene, number: int) -> None:
+    """A mesh file must be in the water as it stands, before it is cut into many facets: its unit may be wrong."""
+    target, bed = scene.world.targets[number], scene.world.environment.depth
+    if not isinstance(target.shape, MeshFile):
+        return
+    plain = mesh_of(replace(target.shape, edge=None, smooth=False))
+    body = Body(target.name, plain, pose(target.motion, scene.trajectory.time(0)), np.zeros(3))
+    if not _box_in_water(body, bed):
+        size = float(np.ptp(plain.box, axis=0).max())
+        what = f"target '{body.name}', {size:.3g} m long with numbers in {target.shape.unit},"
+        _check_depth(("scene", "world", "targets", number, "motion"), what, _places(body), bed, "the first frame")
 
 
 def check_shrimp(scene: Scene) -> None:
@@ -91,11 +110,12 @@ def check_frame(scene: Scene, frame: Frame) -> None:
     """The array and every body must be in the water, and no snap inside a body or the array."""
     bed = scene.world.environment.depth
     reach = elements(scene.sonar.array).position
-    _check_depth(("scene", "trajectory", "sonar"), "the array", frame.sonar_pose.to_world(reach), bed, frame)
+    when = f"frame {frame.index}"
+    _check_depth(("scene", "trajectory", "sonar"), "the array", frame.sonar_pose.to_world(reach), bed, when)
     for i, body in enumerate(frame.moment.bodies):
         path = ("scene", "world", "targets", i, "motion")
         if not _box_in_water(body, bed):
-            _check_depth(path, f"target '{body.name}'", _places(body), bed, frame)
+            _check_depth(path, f"target '{body.name}'", _places(body), bed, when)
         if inside(body, frame.sonar_pose.position):
             raise FieldError(path, f"target '{body.name}' has the sonar inside at frame {frame.index}")
     _check_snaps(scene, frame)
@@ -178,11 +198,11 @@ def _check_snap(shrimp: SnappingShrimp, bed: float, sonar: Sonar) -> None:
             raise ValueError(f"is not heard: the sonar's filter lets {part:.1g} of it pass")
 
 
-def _check_depth(path: tuple[str | int, ...], what: str, points: Floats, bed: float, frame: Frame) -> None:
+def _check_depth(path: tuple[str | int, ...], what: str, points: Floats, bed: float, when: str) -> None:
     if not np.abs(points).max() <= FARTHEST:
-        raise FieldError(path, f"{what} is more than {FARTHEST:g} m from the origin at frame {frame.index}")
+        raise FieldError(path, f"{what} is more than {FARTHEST:g} m from the origin at {when}")
     shallow, deep = float(depth(points).min()), float(depth(points).max())
     if shallow < -TOLERANCE:
-        raise FieldError(path, f"{what} is {-shallow:.3g} m above the surface at frame {frame.index}")
+        raise FieldError(path, f"{what} is {-shallow:.3g} m above the surface at {when}")
     if deep > bed + TOLERANCE:
-        raise FieldError(path, f"{what} is {deep - bed:.3g} m below the bed at frame {frame.index}")
+        raise FieldError(path, f"{what} is {deep - bed:.3g} m below the bed at {when}")

@@ -20,23 +20,28 @@ LEAST: Final = 4
 """Results that stay whatever their size: a scene asks for the meshes of its targets again in every frame."""
 
 
-def size_of(value: object, seen: set[int] | None = None) -> int:
-    """Bytes of all arrays that a result holds, each counted once; what says its `nbytes` is believed."""
-    seen = set() if seen is None else seen
-    if id(value) in seen:
-        return 0
-    seen.add(id(value))
-    if isinstance(value, np.ndarray):
-        base = value.base
-        return size_of(base, seen) if isinstance(base, np.ndarray) else value.nbytes
-    if isinstance(value, (tuple, list)):
-        return sum(size_of(part, seen) for part in value)
-    if isinstance(value, dict):
-        return sum(size_of(part, seen) for part in value.values())
-    if is_dataclass(value):
-        named = {field.name: getattr(value, field.name, None) for field in fields(value)}
-        return size_of(named | getattr(value, "__dict__", {}), seen)
-    return int(getattr(value, "nbytes", 0))
+def size_of(*values: object) -> int:
+    """Bytes of all arrays that results hold, each counted once; what says its `nbytes` is believed."""
+    total, seen, left = 0, set[int](), list(values)
+    held: list[object] = []  # so that no two have the same id
+    while left:
+        value = left.pop()
+        if id(value) in seen:
+            continue
+        seen.add(id(value))
+        held.append(value)
+        if isinstance(value, np.ndarray) and isinstance(value.base, np.ndarray):
+            left.append(value.base)
+        elif isinstance(value, (tuple, list)):
+            left += value
+        elif isinstance(value, dict):
+            left += value.values()
+        elif is_dataclass(value):
+            left += [getattr(value, field.name, None) for field in fields(value)]
+            left += getattr(value, "__dict__", {}).values()
+        else:
+            total += int(getattr(value, "nbytes", 0))
+    return total
 
 
 class Kept:
@@ -64,7 +69,7 @@ class Kept:
             self._results[key] = (key, made)
             self._results.move_to_end(key)
             while len(self._results) > self._most or (
-                len(self._results) > LEAST and size_of(list(self._results.values())) > MOST_BYTES
+                len(self._results) > LEAST and size_of(*self._results.values()) > MOST_BYTES
             ):
                 self._results.popitem(last=False)
         return made
@@ -72,7 +77,7 @@ class Kept:
     @property
     def nbytes(self) -> int:
         """Bytes of arrays in results and arguments that are kept now."""
-        return size_of(list(self._results.values()))
+        return size_of(*self._results.values())
 
     def __len__(self) -> int:
         return len(self._results)
