@@ -133,9 +133,10 @@ def wavefronts(
             families.append((members, None))
             continue
         chosen = members[_spread(legs.point[members])]
-        kept: Made | _Smooth | None = traced(legs.select(chosen), place)
+        exact = traced(legs.select(chosen), place)
+        kept: Made | _Smooth | None = exact
         if len(chosen) < len(members):
-            kept = _over_body(legs.point[members], legs.point[chosen], kept, 2.0 * np.pi * band[1])
+            kept = _over_body(legs.point[members], legs.point[chosen], exact, 2.0 * np.pi * band[1])
         families.append((members, kept or traced(legs.select(members), place)))
     return Wavefronts(legs, place, tuple(families), False)
 

@@ -79,7 +79,8 @@ def assemble(
     legs: Legs, over: Terms, out: Outward, index: int, time: float, absorption: float,
     target: Ints, facet: Ints, scattering: Floats, variation: tuple[Floats, float], pulses: Pulses,
 ) -> Arrivals:  # fmt: skip
-    """Arrivals of snap `index` at `time` (s) from both halves of their paths; over: the wavefronts; variation: terms of the amplitude and their error; pulses: what facets make of the snap."""
+    """Arrivals of snap `index` at `time` (s) from both halves of their paths; over: the wavefronts; variation: terms of
+    the amplitude and their error; pulses: what facets make of the snap."""
     length = out.length + legs.length
     loss = absorption * length
     sign, phase = as_sign(out.phase + legs.phase + pulses.phase)
