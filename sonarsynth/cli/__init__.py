@@ -17,6 +17,7 @@ from sonarsynth.cli.repairing import repair
 from sonarsynth.cli.running import BadOption, run
 from sonarsynth.cli.selecting import chosen_frames, product_names
 from sonarsynth.cli.target_strength import target_strength
+from sonarsynth.cli.workers import worker_bounds
 
 __all__ = ["app", "main"]
 
@@ -87,6 +88,20 @@ def build(
     restart: Annotated[
         bool, typer.Option("--restart", help="Begin anew where the store holds something else.")
     ] = False,
+    retry_failed: Annotated[
+        bool, typer.Option("--retry-failed", help="Try frames again that an earlier build set aside.")
+    ] = False,
+    frame_timeout: Annotated[
+        float | None,
+        typer.Option(min=0, metavar="SECONDS", help="Set a frame aside whose stage takes longer; 0: never."),
+    ] = None,
+    worker_memory: Annotated[
+        float | None, typer.Option(metavar="GB", help="Memory of a worker. Left out: its share of the machine's.")
+    ] = None,
+    agreed: Annotated[bool, typer.Option("--yes", help="Build what needs more than is free, or over 1 TB.")] = False,
+    insecure: Annotated[
+        bool, typer.Option("--insecure", help="Use a scheduler on another machine without TLS.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Build a dataset, or the part of it that is missing. Interrupted, the same command goes on."""
@@ -95,6 +110,7 @@ def build(
 
     if scheduler is not None and workers is not None:
         raise BadOption("--workers is for worker processes of our own, --scheduler for those of another: give one")
+    bounds = worker_bounds(workers, scheduler, frame_timeout, worker_memory, insecure)
     chosen = product_names(products)
     source = config.read(recipe, settings)
     made_from = config.recipe_of(source)
@@ -103,8 +119,10 @@ def build(
     wanted = chosen_frames(frames, sequences, made_from.sequences, made_from.steps)
     with printing.progress() as progress:
         report = schedule.build(
-            plan, store, frames=wanted, workers=workers, scheduler=scheduler, restart=restart, progress=progress
-        )
+            plan, store, frames=wanted, workers=workers, scheduler=scheduler, restart=restart,
+            retry_failed=retry_failed, agreed=agreed, insecure=insecure, progress=progress,
+            announce=printing.announce, **bounds,
+        )  # fmt: skip
     if as_json:
         _print_json(report.as_json())
     else:

@@ -45,6 +45,11 @@ def progress() -> Iterator[Report]:
         yield update
 
 
+def announce(dashboard: str) -> None:
+    """Say where the dashboard is."""
+    console(stderr=True).print(f"dashboard: {dashboard}", markup=False)
+
+
 class _Lines:
     """Progress as lines."""
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sonarsynth.cli.running import BadOption
+from sonarsynth.cli.workers import worker_bounds
 
 if TYPE_CHECKING:
     from sonarsynth.schedule.repairing import RepairReport
@@ -28,6 +29,9 @@ def repair(
     quick: Annotated[
         bool, typer.Option("--quick", help="Compare files with their digests; do not read every number back.")
     ] = False,
+    insecure: Annotated[
+        bool, typer.Option("--insecure", help="Use a scheduler on another machine without TLS.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")] = False,
 ) -> None:
     """Make what is damaged in a store again, from the recipe in it. What does not belong there moves out."""
@@ -36,8 +40,17 @@ def repair(
 
     if scheduler is not None and workers is not None:
         raise BadOption("--workers is for worker processes of our own, --scheduler for those of another: give one")
+    worker_bounds(workers, scheduler, None, None, insecure)
     with printing.progress() as progress:
-        report = run(store, workers=workers, scheduler=scheduler, anyway=anyway, quick=quick, progress=progress)
+        report = run(
+            store,
+            workers=workers,
+            scheduler=scheduler,
+            anyway=anyway,
+            quick=quick,
+            insecure=insecure,
+            progress=progress,
+        )
     if as_json:
         typer.echo(json.dumps(report.as_json(), indent=2))
     else:

@@ -58,9 +58,9 @@ def _explain(error: Exception, shown: bool) -> int:
     from sonarsynth.description import FieldError
 
     match type(error).__name__:
-        case "Locked" | "Damage":
+        case "Locked" | "Ended" | "Damage":
             return _say(str(error), STORE)
-        case "RecipeError" | "Mismatch" | "NothingToDraw":
+        case "RecipeError" | "Mismatch" | "NothingToDraw" | "TooLarge":
             return _say(str(error), INPUT)
     if isinstance(error, (BadOption, FieldError)):
         return _say(str(error), INPUT)

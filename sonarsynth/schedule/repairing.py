@@ -11,8 +11,10 @@ from typing import Any
 from sonarsynth import config, store
 from sonarsynth.description import FieldError
 from sonarsynth.planning import Plan, choices_from, plan
-from sonarsynth.schedule import Progress, tasks, usable_cores
-from sonarsynth.schedule.tasks import Failure, Job, Written
+from sonarsynth.schedule.log import append_lines
+from sonarsynth.schedule.making import job_of, make_shards
+from sonarsynth.schedule.report import Progress
+from sonarsynth.schedule.tasks import Failure, Written
 from sonarsynth.store import Findings, Mismatch, Problem
 from sonarsynth.store.creating import identity
 from sonarsynth.store.examining import shard_of
@@ -53,6 +55,7 @@ def repair(
     scheduler: str | None = None,
     anyway: bool = False,
     quick: bool = False,
+    insecure: bool = False,
     progress: Progress | None = None,
 ) -> RepairReport:
     """Make what is damaged in a store again, from the recipe in it, so that it is what it was, bit for bit.
@@ -63,12 +66,17 @@ def repair(
 
     `quick` trusts files that have the digest of their mark; else every number is read back, as `verify` does.
     Raises Mismatch where there is no store of ours, or where it cannot be made again as it was: the version of
-    sonarsynth is another (unless `anyway`), or files that the recipe names have changed or are gone; Damage where the
-    recipe cannot be read any more; store.Locked while a build runs; OSError where the store cannot be written.
+    sonarsynth or its code is another (unless `anyway`), or files that the recipe names have changed or are gone; Damage
+    where the recipe cannot be read any more; store.Locked while a build runs; OSError where the store cannot be
+    written; ValueError for a scheduler on another machine without TLS, unless `insecure`.
     """
+    if scheduler is not None:
+        from sonarsynth.schedule.connecting import check_address
+
+        check_address(scheduler, insecure)
     path = Path(os.path.abspath(path))
     store.must_be_store(path)
-    with store.lock(path):
+    with store.lock(path) as name:
         found = store.examine(path)
         laid = found.layout is not None and not found.fixed
         unlike = _unlike(path, found) if laid and not quick else []
@@ -83,9 +91,9 @@ def repair(
             report.moved += move_out(path, _in_the_way(path, found, made, todo))
             report.shards, report.frames = tuple(todo), tuple(f for frames in todo.values() for f in frames)
             written = {n: mark for n, mark in found.marks.items() if n not in unlike}
-            job = Job(str(path), made.digest, tuple(sorted(made.products)))
-            tasks.remember(job, made)
-            _recompute(job, todo, workers, scheduler, _counter(path, written, report, progress))
+            here = 0 if workers is None and len(todo) == 1 else workers
+            done = _counter(path, written, report, progress)
+            make_shards(job_of(path, made, name), made, todo, done, workers=here, scheduler=scheduler)
         left = store.examine(path)
         if left.foreign:  # known only now, if the layout was not
             report.moved += move_out(path, left.foreign)
@@ -121,6 +129,8 @@ def _plan_of(path: Path, found: Findings, anyway: bool) -> Plan:
     old, new = attrs.get("sonarsynth_version"), now["sonarsynth_version"]
     if old != new and not anyway:
         raise Mismatch(f"{path} was built by sonarsynth {old}, and this is {new}: use that one, or --anyway")
+    if attrs.get("code_digest") != now["code_digest"] and not anyway:
+        raise Mismatch(f"{path} was built by another state of the code of sonarsynth {new}: use that one, or --anyway")
     return made
 
 
@@ -163,8 +173,7 @@ def _counter(
         nonlocal done_frames
         done_frames += len(again.frames)
         report.failures.extend(again.failures)
-        if again.failures:
-            tasks.append_lines(store.beside(path, "aside.jsonl"), [asdict(f) for f in again.failures])
+        append_lines(store.beside(path, "aside.jsonl"), [asdict(f) for f in again.failures])
         mark, old = load_mark(path, again.shard), written.get(again.shard)
         if mark is not None and old is not None and not again.failures and mark != old:
             report.differing.append(again.shard)
@@ -172,23 +181,3 @@ def _counter(
             progress(done_frames, len(report.frames), len(report.failures))
 
     return done
-
-
-def _recompute(
-    job: Job,
-    todo: Mapping[int, tuple[int, ...]],
-    workers: int | None,
-    scheduler: str | None,
-    done: Callable[[Written], None],
-) -> None:
-    count = min(usable_cores() if workers is None else workers, len(todo))
-    if not todo:
-        return
-    if scheduler is None and (count == 0 or (workers is None and len(todo) == 1)):
-        for shard, frames in todo.items():
-            done(tasks.write(job, shard, [tasks.render_frame(job, frame) for frame in frames]))
-        return
-    from sonarsynth.schedule import cluster
-
-    with cluster.connected(count, scheduler) as client:
-        cluster.run(client, job, todo, done)

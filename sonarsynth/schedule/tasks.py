@@ -6,21 +6,25 @@ that raises gives its failure as its result, so that one bad frame costs only it
 
 from __future__ import annotations
 
-import json
 import resource
 import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from contextlib import nullcontext
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from sonarsynth import config, render, store
 from sonarsynth.planning import Plan, choices_from, plan
+from sonarsynth.schedule import diary
 from sonarsynth.store.layout import layout_of
 
 STAGES = ("trace", "beamform", "range")
 """Tasks of a frame, in order."""
+
+WARM_UP: Final = 300.0
+"""Seconds that the first stage of its kind may take longer."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,10 @@ class Job:
     path: str  # of the store, absolute
     digest: str  # of the recipe
     products: tuple[str, ...]
+    build: str = ""  # the build that this is for, as its lock names it; "": not under a lock
+    frame_timeout: float = 0.0  # s that a stage of a frame may take; 0: no limit
+    shard_frames: int = 0  # frames of a shard; 0: as planned
+    together: bool = False  # frames so short that a shard of them is one task
 
 
 @dataclass(frozen=True)
@@ -40,6 +48,11 @@ class Failure:
     stage: str
     error: str  # one line
     traceback: str
+
+    @property
+    def transient(self) -> bool:
+        """True where the frame may well come out when it is tried alone."""
+        return self.error.startswith(("MemoryError", "numpy._core._exceptions._ArrayMemoryError", "_ArrayMemoryError"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +81,15 @@ class Written:
 
 def trace(job: Job, frame: int) -> Step:
     """Task trace-<digest>-<frame>."""
-    return _stage("trace", Step(frame), lambda: render.trace_frame(plan_of(job), frame))
+    return _stage(job, "trace", Step(frame), lambda: render.trace_frame(plan_of(job), frame))
 
 
 def beamform(job: Job, traced: Step) -> Step:
     """Task beamform-<digest>-<frame>. Gives what it heard together with what was traced."""
     frame = traced.frame
-    return _stage("beamform", traced, lambda: (traced.made, render.beamform_frame(plan_of(job), frame, traced.made)))
+    return _stage(
+        job, "beamform", traced, lambda: (traced.made, render.beamform_frame(plan_of(job), frame, traced.made))
+    )
 
 
 def range_(job: Job, heard: Step) -> Step:
@@ -84,7 +99,7 @@ def range_(job: Job, heard: Step) -> Step:
         made = plan_of(job)
         return layout_of(made).check(render.range_frame(made, heard.frame, *heard.made))
 
-    return _stage("range", heard, values)
+    return _stage(job, "range", heard, values)
 
 
 def render_frame(job: Job, frame: int) -> Step:
@@ -98,7 +113,8 @@ def write(job: Job, shard: int, steps: Sequence[Step]) -> Written:
     good = {step.frame: step.made for step in steps if step.failure is None}
     size = 0
     if good:
-        mark = store.write_shard(job.path, plan_of(job), shard, good)
+        with store.shared_lock(job.path, job.build) if job.build else nullcontext():
+            mark = store.write_shard(job.path, plan_of(job), shard, good)
         size = sum(max(size, 0) for size, _ in mark.files.values())
     return Written(
         shard=shard,
@@ -109,6 +125,11 @@ def write(job: Job, shard: int, steps: Sequence[Step]) -> Written:
         bytes=size,
         peak_bytes=peak_memory(),
     )
+
+
+def make_shard(job: Job, shard: int, frames: Sequence[int]) -> Written:
+    """Task shard-<digest>-<shard> where frames are short: its frames and the writing at once."""
+    return write(job, shard, [render_frame(job, frame) for frame in frames])
 
 
 def plan_of(job: Job) -> Plan:
@@ -122,7 +143,7 @@ def plan_of(job: Job) -> Plan:
         made = plan(recipe, frozenset(job.products), choices_from(stored.get("choices")))
         if made.digest != job.digest:
             raise store.Damage(f"{job.path}: a file that the recipe names is not the same on this worker")
-        remember(job, made)
+        remember(job, replace(made, shard_frames=job.shard_frames or made.shard_frames))
     return _plans[job]
 
 
@@ -149,25 +170,29 @@ def peak_memory() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-def _stage(name: str, before: Step, work: Callable[[], Any]) -> Step:
+def _stage(job: Job, name: str, before: Step, work: Callable[[], Any]) -> Step:
     if before.failure is not None:
         return before
     wall, cpu = time.perf_counter(), time.thread_time()
     try:
-        made, failure = work(), None
+        with diary.noted(job.path, before.frame, name, _limit(job, name)):
+            made, failure = work(), None
+        _warm.add(name)
     except Exception as error:
         made, failure = None, failure_of(before.frame, name, error)
     seconds = {**before.seconds, name: time.perf_counter() - wall}
     return Step(before.frame, made, failure, seconds, {**before.cpu, name: time.thread_time() - cpu})
 
 
+_warm: set[str] = set()
+
+
+def _limit(job: Job, stage: str) -> float:
+    """Seconds that a stage may take: the first of its kind in a process loads and compiles what it needs."""
+    return job.frame_timeout + (0.0 if stage in _warm or not job.frame_timeout else WARM_UP)
+
+
 def failure_of(frame: int, stage: str, error: BaseException) -> Failure:
     """A failure from the exception that was raised."""
     line = " ".join(f"{type(error).__name__}: {error}".split())
     return Failure(frame, stage, line, "".join(traceback.format_exception(error)))
-
-
-def append_lines(file: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Add rows to a file of JSON lines."""
-    with file.open("a", encoding="utf-8") as out:
-        out.writelines(json.dumps(row) + "\n" for row in rows)

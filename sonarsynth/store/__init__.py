@@ -8,13 +8,14 @@ from __future__ import annotations
 from sonarsynth.store.creating import Mismatch, create, identity, root_attributes
 from sonarsynth.store.examining import Findings, Problem, examine, must_be_store, ranges
 from sonarsynth.store.layout import Layout, layout_of
-from sonarsynth.store.lock import Locked, beside, lock
+from sonarsynth.store.lock import Ended, Locked, beside, lock, shared_lock
 from sonarsynth.store.marks import Damage, Mark
 from sonarsynth.store.verifying import Report, verify
 from sonarsynth.store.writing import frames_there, missing, write_shard
 
 __all__ = [
     "Damage",
+    "Ended",
     "Findings",
     "Layout",
     "Locked",
@@ -33,6 +34,7 @@ __all__ = [
     "must_be_store",
     "ranges",
     "root_attributes",
+    "shared_lock",
     "verify",
     "write_shard",
 ]

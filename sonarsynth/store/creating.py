@@ -18,6 +18,7 @@ from zarr.errors import ZarrUserWarning
 
 from sonarsynth.config import dump
 from sonarsynth.render import attributes, coordinates
+from sonarsynth.store.code import code_digest
 from sonarsynth.store.encoding import CODEC, LEVEL
 from sonarsynth.store.layout import ArrayLayout, Layout, layout_of
 from sonarsynth.store.marks import (
@@ -107,6 +108,7 @@ def identity(plan: Plan) -> dict[str, Any]:
         "products": sorted(plan.products),
         "shard_frames": plan.shard_frames,
         "sonarsynth_version": _version(),
+        "code_digest": code_digest(),
         "recipe": dump(plan.recipe),
     }
 
@@ -149,14 +151,21 @@ def _compare(path: Path, stored: Mapping[str, Any], wanted: Mapping[str, Any]) -
             "products": "products",
             "shard_frames": "frames in a shard",
             "sonarsynth_version": "version of sonarsynth",
+            "code_digest": "digest of the code",
         }
         changed = next((key for key in names if stored.get(key) != wanted[key]), None)
         difference = (
             "the content of a file that the recipe names has changed"
             if changed is None
-            else f"{names[changed]}: {stored.get(changed)} there and {wanted[changed]} now"
+            else f"{names[changed]}: {_short(stored.get(changed))} there and {_short(wanted[changed])} now"
         )
     raise Mismatch(f"{path} was begun differently ({difference}): use --restart to begin anew, or another place")
+
+
+def _short(value: Any) -> str:
+    """A value as people compare it: a digest by its beginning."""
+    text = str(value)
+    return text if len(text) < 64 else text[:12]
 
 
 def _plain_recipe(attrs: Mapping[str, Any]) -> Any:

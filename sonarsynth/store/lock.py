@@ -1,4 +1,8 @@
-"""One builder at a time: a lock file beside the store, released by the system when its holder ends in whatever way."""
+"""One builder at a time: a lock file beside the store, released by the system when its holder ends in whatever way.
+
+Writers on a cluster may outlive the build that sent them. So each shard is written under a second, shared lock, and
+only while the build that it belongs to holds the first: the next build waits for such writers, and they then refuse.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +10,23 @@ import errno
 import fcntl
 import os
 import socket
+import time
+import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Final
+
+WAIT: Final = 60.0
+"""Seconds that a build waits for a writer of an earlier one."""
 
 
 class Locked(RuntimeError):
     """Another build holds the store; str() is one line."""
+
+
+class Ended(RuntimeError):
+    """The build that a shard was to be written for has ended; str() is one line."""
 
 
 def beside(store: Path | str, suffix: str) -> Path:
@@ -24,28 +38,80 @@ def beside(store: Path | str, suffix: str) -> Path:
 
 
 @contextmanager
-def lock(store: Path | str) -> Iterator[None]:
-    """Hold a store for building. Raises Locked when someone else does, OSError when the folder cannot be written."""
+def lock(store: Path | str, *, wait: float = WAIT) -> Iterator[str]:
+    """Hold a store for building; gives the name of this build, which its writers must know.
+
+    Raises Locked when someone else does, or when a writer of an earlier build has not ended after `wait` seconds;
+    OSError when the folder cannot be written.
+    """
     file = beside(store, "lock")
     file.parent.mkdir(parents=True, exist_ok=True)
     handle = _take(file)
     try:
+        name = uuid.uuid4().hex
         os.ftruncate(handle, 0)
-        os.write(handle, f"process {os.getpid()} on {socket.gethostname()}\n".encode())
-        yield
+        os.pwrite(handle, f"process {os.getpid()} on {socket.gethostname()}, build {name}\n".encode(), 0)
+        _wait_for_writers(store, wait)
+        yield name
     finally:
+        with suppress(OSError):
+            _drop_writers(store)
         file.unlink(missing_ok=True)
         os.close(handle)
 
 
-def _take(file: Path) -> int:
+@contextmanager
+def shared_lock(store: Path | str, build: str) -> Iterator[None]:
+    """Keep the next build waiting while a shard is written for this one. Raises Ended where this one has ended."""
+    handle = _take(beside(store, "writers"), fcntl.LOCK_SH)
+    try:
+        if _holder(store) != build:
+            raise Ended(f"{store}: the build that this shard is for has ended")
+        yield
+    finally:
+        os.close(handle)
+
+
+def _holder(store: Path | str) -> str:
+    """The build that the lock file names."""
+    try:
+        return beside(store, "lock").read_text().rpartition(" ")[2].strip()
+    except OSError:
+        return ""
+
+
+def _wait_for_writers(store: Path | str, wait: float) -> None:
+    file, until = beside(store, "writers"), time.monotonic() + wait
+    while file.exists():
+        try:
+            handle = _take(file)
+        except Locked:
+            if time.monotonic() > until:
+                raise Locked(f"{store}: a worker of an earlier build is still writing: end it first") from None
+            time.sleep(0.05)
+        else:
+            os.close(handle)
+            return
+
+
+def _drop_writers(store: Path | str) -> None:
+    """Remove the file of the writers, if none is left."""
+    file = beside(store, "writers")
+    if file.exists():
+        with suppress(Locked):
+            handle = _take(file)
+            file.unlink(missing_ok=True)
+            os.close(handle)
+
+
+def _take(file: Path, how: int = fcntl.LOCK_EX | fcntl.LOCK_NB) -> int:
     """Open and lock the file that is there now: one that its last holder removed meanwhile is not it."""
     while True:
         handle = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(handle, how)
         except BlockingIOError:
-            holder = os.read(handle, 200).decode(errors="replace").strip() or "another process"
+            holder = os.read(handle, 200).decode(errors="replace").partition(",")[0].strip() or "another process"
             os.close(handle)
             raise Locked(f"{file.with_suffix('')} is being built by {holder}") from None
         except BaseException:

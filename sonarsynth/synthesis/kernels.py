@@ -23,7 +23,7 @@ ROWS = 7
 deviation). Weights of the modes may follow, then those of what they change by."""
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
 def _wavefront(
     block: Any, node: Any, middle: Any, scale: Any, rate: float, steer: float, level: float, place: Any, value: Any
 ) -> None:
@@ -44,31 +44,31 @@ def _wavefront(
         value[4 * BLOCK + i] = block[5 * BLOCK + i] * near / level
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
 def _multiply(a: Any, b: Any, out: Any) -> None:
     for i in range(BLOCK):
         out[i] = a[i] * b[i]
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
 def _add(out: Any, more: Any) -> None:
     for i in range(more.size):
         out[i] += more[i]
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
 def _amplify(out: Any, more: Any) -> None:
     for i in range(more.size):
         out[i] *= 1.0 + more[i]
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
 def _recur(out: Any, earlier: Any) -> None:
     for i in range(BLOCK):
         out[i] = 2.0 * out[i] - earlier[i]
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
 def _mix(weight: Any, share: Any, node: int, first: int, size: int, modes: int, out: Any) -> None:
     """Weights of modes (mode * BLOCK,) at a node: of the pulses, and of what they change by, (change * mode * BLOCK,),
     in shares (change, node, path)."""
@@ -85,7 +85,7 @@ def _mix(weight: Any, share: Any, node: int, first: int, size: int, modes: int, 
                     mixed[i] += part[i] * row[i]
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
 def _expand(value: Any, weight: Any, recipe: Any, modes: bool) -> None:
     """Terms of a block of paths, from row 4 of value on; there is the amplitude, which with modes moves to row 3."""
     if modes:
@@ -101,7 +101,7 @@ def _expand(value: Any, weight: Any, recipe: Any, modes: bool) -> None:
             _recur(value[c : c + BLOCK], value[d : d + BLOCK])
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
 def _split(place: Any, half: float, rows: int, length: int, begin: Any, row: Any, fraction: Any) -> None:
     """First sample of the kernel on the circle, row of its table, and place in the row, from -1/2 to 1/2."""
     for i in range(BLOCK):
@@ -204,7 +204,7 @@ def combine(spectra: Any, first: int, factors: Any, place: Any, power: Any, resp
                     out[m, 1, b] += re[b] * response[k, 1, b] + im[b] * response[k, 0, b]
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
 def _turn(real: Any, imaginary: Any, c: Any, s: Any, re: Any, im: Any, out: Any) -> None:
     for i in range(real.size):
         cr, ci = re * c[i] - im * s[i], re * s[i] + im * c[i]
@@ -212,7 +212,7 @@ def _turn(real: Any, imaginary: Any, c: Any, s: Any, re: Any, im: Any, out: Any)
         out[2 * i + 1] += cr * imaginary[i] + ci * real[i]
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
 def _phasors(turn: complex, c: Any, s: Any) -> complex:
     """Powers 0 to RUN - 1 of turn, real and imaginary part, in four chains that do not wait for each other; power
     RUN."""
@@ -227,7 +227,7 @@ def _phasors(turn: complex, c: Any, s: Any) -> complex:
     return p3
 
 
-@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
 def _accumulate(field: Any, weight: float, out: Any) -> None:
     for i in range(out.size):
         out[i] += weight * field[i]

@@ -169,7 +169,9 @@ def test_frames_that_raise_are_set_aside_and_the_rest_goes_on(
     assert store.verify(path).problems == ()
     aside = store.beside(path, "aside.jsonl")
     assert sorted(json.loads(line)["frame"] for line in aside.read_text().splitlines()) == [3, 16]
-    assert build(small, path, workers=0).ok
+    left = build(small, path, workers=0)
+    assert (left.written, sorted(f.frame for f in left.failures), left.there) == (0, [3, 16], 18)
+    assert build(small, path, workers=0, retry_failed=True).ok
     assert not aside.exists()
     assert_same(path, reference)
 

@@ -7,7 +7,10 @@ import json
 import sys
 from importlib import import_module
 
-KINDS = {"corrupt": "damage files of a store, verify, repair, compare"}
+KINDS = {
+    "kills": "kill builds with SIGKILL, resume, compare",
+    "corrupt": "damage files of a store, verify, repair, compare",
+}
 """Modules beside this one; each has a function `run(count, seed) -> dict` with "ok" in what it gives."""
 
 

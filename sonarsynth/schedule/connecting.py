@@ -1,0 +1,159 @@
+"""Dask clients: of fresh processes on this machine, on loopback alone, or of a running scheduler."""
+
+from __future__ import annotations
+
+import ipaddress
+import logging
+import resource
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
+from typing import Final
+from urllib.parse import urlsplit
+
+import dask
+from distributed import Client, LocalCluster, Worker, WorkerPlugin
+from distributed.system import MEMORY_LIMIT
+
+ONE_THREAD: Final = dict.fromkeys(
+    ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
+)
+"""Environment of workers: frames run side by side, so a frame runs on one thread (and sums in one order)."""
+
+KEEP_MEMORY: Final = {"MALLOC_TRIM_THRESHOLD_": str(2**28), "MALLOC_MMAP_THRESHOLD_": str(2**28)}
+"""Environment of workers: a frame takes its arrays from memory that the last one left. Dask would give that
+back (from 64 kB up), and the kernel clear it anew: half of the CPU time of a frame."""
+
+_SETTINGS: Final = {
+    "distributed.nanny.pre-spawn-environ": ONE_THREAD | KEEP_MEMORY,
+    "distributed.scheduler.work-stealing": False,  # a shard stays where it is
+    "distributed.scheduler.allowed-failures": 1,  # workers that a task may take with it, less one
+    "distributed.worker.memory.target": False,  # no spilling: the window bounds memory
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,  # a worker that pauses with finished frames in memory never goes on
+    "distributed.worker.memory.terminate": 0.95,
+    "distributed.comm.timeouts.connect": "120s",  # all of it is on this machine, which may be very busy
+    "distributed.comm.timeouts.tcp": "120s",
+    "distributed.admin.log-length": 100,  # logs that would grow for days
+    "distributed.admin.low-level-log-length": 100,
+}
+
+
+CLOSING: Final = 60.0
+"""Seconds for a cluster to close."""
+
+CLOSING_IN_HASTE: Final = 4.0
+"""Seconds for a cluster to close when the build was interrupted or failed."""
+
+HEAP: Final = 0.9
+"""Part of a worker's memory that its arrays may take: beyond it a frame gets a MemoryError, and the worker lives on."""
+
+
+class MemoryLimit(WorkerPlugin):
+    """Gives a worker process a limit on what it may allocate."""
+
+    def __init__(self, limit: int) -> None:
+        self.limit = limit
+
+    def setup(self, worker: Worker) -> None:
+        """Set the limit, in a process of the worker's own."""
+        if worker.nanny:
+            hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
+            soft = self.limit if hard == resource.RLIM_INFINITY else min(self.limit, hard)
+            resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
+
+
+def check_address(address: str, insecure: bool) -> None:
+    """Raise ValueError for a scheduler on another machine without TLS: whoever reaches one may run code on it."""
+    parts = urlsplit(address if "://" in address else f"tcp://{address}")
+    if insecure or parts.scheme in ("tls", "wss", "inproc") or _loopback(parts.hostname or ""):
+        return
+    raise ValueError(
+        f"{address} is not on this machine and not encrypted: use tls://, or --insecure in a network that you trust"
+    )
+
+
+def _loopback(host: str) -> bool:
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+@contextmanager
+def connected(workers: int, scheduler: str | None = None, memory: int | None = None) -> Iterator[Client]:
+    """A client of the scheduler at an address, or of `workers` fresh processes on this machine (loopback only).
+
+    Each of these may take `memory` bytes (None: its share of the machine's).
+    """
+    if scheduler is not None:
+        with Client(scheduler, set_as_default=False) as client:
+            yield client
+        return
+    each = memory or MEMORY_LIMIT // max(workers, 1)
+    with dask.config.set(_SETTINGS):
+        with _interrupts_put_off() as interrupted:
+            try:
+                cluster = _local_cluster(workers, each)
+            except RuntimeError:  # a worker was killed while it started; or none can, and the second says so
+                cluster = _local_cluster(workers, each)
+            client = Client(cluster, set_as_default=False)
+        patience = CLOSING_IN_HASTE
+        try:
+            if interrupted:
+                raise KeyboardInterrupt
+            client.register_plugin(MemoryLimit(int(HEAP * each)), name="memory-limit")
+            yield client
+            patience = CLOSING
+        finally:
+            with _interrupts_put_off():  # what does not close in time ends with this process
+                with suppress(TimeoutError):
+                    client.close(timeout=patience)
+                with suppress(TimeoutError):
+                    cluster.close(timeout=patience)
+
+
+def _local_cluster(workers: int, memory: int) -> LocalCluster:
+    try:
+        return LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            dashboard_address="127.0.0.1:0",
+            worker_dashboard_address="127.0.0.1:0",
+            memory_limit=memory,
+            silence_logs=logging.CRITICAL,
+            env=ONE_THREAD,
+        )
+    except RuntimeError as error:  # workers import the script that builds, which must not build again
+        raise RuntimeError(
+            'no worker process could start: in a script, build under `if __name__ == "__main__":`, or with workers=0'
+        ) from error
+
+
+@contextmanager
+def _interrupts_put_off() -> Iterator[list[int]]:
+    """Put SIGINT and SIGTERM off, and give those that came: a cluster half started or half closed leaves processes.
+
+    SIGINT is blocked besides, which workers that start meanwhile inherit: Ctrl-C goes to the whole group.
+    """
+    came: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield came
+        return
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    for number, handler in handlers.items():
+        if handler not in (signal.SIG_IGN, None):
+            signal.signal(number, lambda number, frame: came.append(number))
+    resource_tracker.ensure_running()  # its start, in whichever thread, unblocks SIGINT
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield came
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        for number, handler in handlers.items():
+            if handler is not None:
+                signal.signal(number, handler)

@@ -1,0 +1,62 @@
+"""The log of a build: JSON lines beside the store, one an event, each with the time (UTC)."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final
+
+PROGRESS_EVERY: Final = 10.0
+"""Seconds between two events `progress`."""
+
+
+def append_lines(file: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Add rows to a file of JSON lines, all of them with one write."""
+    if not rows:
+        return
+    handle = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    with os.fdopen(handle, "ab", buffering=0) as out:
+        out.write("".join(json.dumps(row) + "\n" for row in rows).encode())
+
+
+def read_lines(file: Path) -> list[dict[str, Any]]:
+    """Rows of a file of JSON lines, [] where there is none; a line cut off by a crash is left out."""
+    try:
+        lines = file.read_text("utf-8", errors="replace").splitlines()
+    except FileNotFoundError:
+        return []
+    rows = []
+    for line in lines:
+        try:
+            row = json.loads(line)
+        except ValueError:
+            continue
+        if isinstance(row, dict):
+            rows.append(row)
+    return rows
+
+
+class Log:
+    """Events of a build, added to a file."""
+
+    def __init__(self, file: Path) -> None:
+        self.file, self.began = file, time.monotonic()
+        self.said = self.began
+
+    def event(self, event: str, **facts: Any) -> None:
+        """Add an event."""
+        now = datetime.now(UTC).isoformat(timespec="milliseconds")
+        append_lines(self.file, [{"time": now, "event": event, **facts}])
+
+    def progress(self, done: int, total: int, aside: int) -> None:
+        """Say how far it is, now and then."""
+        now = time.monotonic()
+        if now - self.said >= PROGRESS_EVERY:
+            self.said = now
+            rate = (done + aside) / (now - self.began)
+            left = (total - done - aside) / rate if rate else None
+            self.event("progress", done=done, of=total, aside=aside, frames_per_second=rate, seconds_left=left)

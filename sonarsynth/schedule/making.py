@@ -1,0 +1,65 @@
+"""Making shards: in this process, on processes of this machine, or on the workers of a running scheduler."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Final
+
+from sonarsynth.planning import Plan
+from sonarsynth.schedule import diary, tasks
+from sonarsynth.schedule.tasks import Job, Written
+
+PATIENCE: Final = 600.0
+"""Seconds that a stage of a frame may always take: a first one compiles."""
+
+SHORT: Final = 0.3
+"""Frames of fewer seconds are not worth tasks of their own."""
+
+
+def job_of(path: Path, made: Plan, build: str, frame_timeout: float | None = None) -> Job:
+    """What workers need to know of a build that holds the lock of its store under the name `build`.
+
+    A stage of a frame may take `frame_timeout` seconds (None: many times what the plan predicts; 0: no limit).
+    """
+    predicted = made.predicted_seconds / max(made.recipe.frames, 1)
+    limit = PATIENCE + 20 * predicted if frame_timeout is None else frame_timeout
+    return Job(str(path), made.digest, tuple(sorted(made.products)), build, limit, made.shard_frames, predicted < SHORT)
+
+
+def make_shards(
+    job: Job,
+    made: Plan,
+    todo: Mapping[int, tuple[int, ...]],
+    done: Callable[[Written], None],
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    memory: int | None = None,
+    started: Callable[[int, str], None] = lambda workers, dashboard: None,
+    lost: Callable[[str, str], None] = lambda worker, why: None,
+) -> None:
+    """Make the frames of some shards, and write these; `done` is called as each is written.
+
+    `started` is called with the number of workers and the dashboard's address, `lost` when a worker ends.
+    """
+    if not todo:
+        return
+    tasks.remember(job, made)
+    diary.close_folder(job.path)  # of a build that was killed
+    if scheduler is None and workers == 0:
+        for shard, frames in todo.items():
+            done(tasks.make_shard(job, shard, frames))
+        return
+    from sonarsynth.schedule import cluster, connecting
+
+    count = min(usable_cores() if workers is None else workers, len(todo))
+    with connecting.connected(count, scheduler, memory) as client:
+        started(len(client.nthreads()), client.dashboard_link or "")
+        cluster.run(client, job, todo, done, lost)
+
+
+def usable_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,0 +1,67 @@
+"""Room on the disk: asked for before a build starts, and told when it runs out."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+LARGE: Final = 1e12
+"""Bytes above which a build starts only when told so."""
+
+FULL: Final = {
+    errno.ENOSPC: "No space left",
+    errno.EDQUOT: "The quota is used up",
+    errno.EROFS: "The file system is read-only",
+    errno.EFBIG: "The file would be larger than this process may write",
+}
+"""Errors of a disk that takes no more."""
+
+
+class TooLarge(ValueError):
+    """A build needs more than is free, or very much, and nobody agreed to it; str() is one line."""
+
+
+def free_bytes(path: Path) -> int:
+    """Free bytes where a path is, or is to be."""
+    place = path
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    return shutil.disk_usage(place).free
+
+
+def check_space(path: Path, needed: float) -> None:
+    """Raise TooLarge where a build that needs so many bytes should not start unasked."""
+    free = free_bytes(path)
+    if needed > free:
+        raise TooLarge(f"{path}: needs up to {size(needed)} and {size(free)} are free there: --yes builds all the same")
+    if needed > LARGE:
+        raise TooLarge(f"{path}: needs up to {size(needed)} ({size(free)} are free there): --yes builds it")
+
+
+@contextmanager
+def told_when_full(path: Path, needed: Callable[[], float]) -> Iterator[None]:
+    """Turn the error of a disk that takes no more into one line with the bytes still needed and those free."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        line = (
+            f"{FULL[error.errno]}: up to {size(needed())} more are needed, {size(free_bytes(path))} are free; "
+            "with room made, the same command goes on"
+        )
+        raise OSError(error.errno, line, os.fspath(path)) from error
+
+
+def size(count: float) -> str:
+    """A number of bytes as people say it."""
+    for unit in ("bytes", "kB", "MB", "GB"):
+        if count < 1000:
+            return f"{count:.3g} {unit}"
+        count /= 1000
+    return f"{count:.3g} TB"

@@ -1,0 +1,16 @@
+"""The log of a build and the lists beside the store."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from sonarsynth.schedule.log import append_lines, read_lines
+
+
+def test_lines_cut_off_by_a_crash_are_left_out(tmp_path: Path) -> None:
+    file = tmp_path / "x.jsonl"
+    assert read_lines(file) == []
+    append_lines(file, [{"a": 1}, {"a": 2}])
+    with file.open("a") as out:
+        out.write('{"a": 3')
+    assert read_lines(file) == [{"a": 1}, {"a": 2}]

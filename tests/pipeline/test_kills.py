@@ -1,0 +1,55 @@
+"""tools/faults --kills: as many kills as fit, and all of them without a trace; and what it would not miss."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def faults(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run the tool."""
+    paths = os.pathsep.join([str(ROOT), str(ROOT / "tools")])
+    return subprocess.run(
+        [sys.executable, "-m", "fault_injection", *arguments],
+        env=os.environ | {"PYTHONPATH": paths}, capture_output=True, text=True, check=False, timeout=3600,
+    )  # fmt: skip
+
+
+def test_killed_builds_come_out_identical() -> None:
+    done = faults("--kills", os.environ.get("SONARSYNTH_KILLS", "5"), "--seed", "3")
+    assert done.returncode == 0, done.stdout + done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["ok"]
+    assert summary["identical"] == summary["trials"]
+    assert summary["kills"] >= 1
+
+
+@pytest.mark.parametrize("arguments", [(), ("--kills", "0"), ("--kills", "many"), ("--kills", "1", "--corrupt", "1")])
+def test_what_the_tool_cannot_do_is_said(arguments: tuple[str, ...]) -> None:
+    done = faults(*arguments)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+
+
+def test_a_changed_store_is_seen(tmp_path: Path) -> None:
+    script = """
+import sys
+from pathlib import Path
+from fault_injection import kills
+folder = Path(sys.argv[1])
+(folder / "tiny.yaml").write_text(kills.RECIPE)
+whole = kills._undisturbed(folder / "tiny.yaml", folder / "whole.zarr")
+assert kills._different(whole.path, whole) == [] == kills._bad_marks(whole.path, whole)
+file = next(whole.path.glob("signals/pressure/c/1/*/*"))
+file.write_bytes(file.read_bytes()[:-1])
+assert kills._different(whole.path, whole) and kills._bad_marks(whole.path, whole)
+"""
+    paths = os.pathsep.join([str(ROOT), str(ROOT / "tools")])
+    subprocess.run([sys.executable, "-c", script, str(tmp_path)], env=os.environ | {"PYTHONPATH": paths}, check=True)

@@ -1,0 +1,61 @@
+"""The same arrays whatever the order, the shards, the locale, the time zone, the hash seed and the folder."""
+
+from __future__ import annotations
+
+import os
+import random
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zarr
+
+from sonarsynth.planning import Plan
+from sonarsynth.schedule import build
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def contents(path: Path) -> dict[str, bytes]:
+    """Every array of a store, as bytes."""
+    found = zarr.open_group(path, mode="r").members(max_depth=None)
+    arrays = {name: np.asarray(array[...]) for name, array in found if isinstance(array, zarr.Array)}
+    return {n: str(a.tolist()).encode() if a.dtype.kind in "TO" else a.tobytes() for n, a in arrays.items()}
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory, small_plan: Plan) -> dict[str, bytes]:
+    path = tmp_path_factory.mktemp("reference") / "s.zarr"
+    assert build(small_plan, path, workers=0).ok
+    return contents(path)
+
+
+@pytest.mark.parametrize("shard_frames", [1, 3, 20])
+def test_another_number_of_frames_in_a_shard(
+    tmp_path: Path, small_plan: Plan, reference: dict[str, bytes], shard_frames: int
+) -> None:
+    made = replace(small_plan, shard_frames=shard_frames)
+    assert build(made, tmp_path / "s.zarr", workers=0).ok
+    assert contents(tmp_path / "s.zarr") == reference
+
+
+def test_another_order(tmp_path: Path, small_plan: Plan, reference: dict[str, bytes]) -> None:
+    frames = list(range(20))
+    random.Random(5).shuffle(frames)
+    for first in range(0, 20, 5):
+        build(small_plan, tmp_path / "s.zarr", frames=frames[first : first + 5], workers=0)
+    assert contents(tmp_path / "s.zarr") == reference
+
+
+def test_another_locale_time_zone_hash_seed_and_folder(
+    tmp_path: Path, small_file: Path, reference: dict[str, bytes]
+) -> None:
+    place = tmp_path / "elsewhere"
+    place.mkdir()
+    env = os.environ | {"LC_ALL": "C", "TZ": "Pacific/Chatham", "PYTHONHASHSEED": "4242", "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", "sonarsynth", "build", "../small.yaml", "s.zarr", "--workers", "0"]
+    subprocess.run(command, cwd=place, env=env, check=True, capture_output=True)
+    assert contents(place / "s.zarr") == reference

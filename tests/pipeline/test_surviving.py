@@ -1,0 +1,309 @@
+"""Frames that hang, crash or take all memory cost themselves alone; workers, disks and schedulers may fail."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+
+import dask
+import numpy as np
+import psutil
+import pytest
+import zarr
+from distributed import LocalCluster
+
+from sonarsynth import store
+from sonarsynth.planning import Plan
+from sonarsynth.recipe import Recipe
+from sonarsynth.schedule import TooLarge, build, connecting, space
+from sonarsynth.schedule.log import read_lines
+
+FAULTS = """\
+import faulthandler, time
+import numpy as np
+from sonarsynth import render
+works = getattr(render.beamform_frame, "works", render.beamform_frame)  # preloaded more than once
+def fails(made, index, *parts):
+    if index == 2:
+        time.sleep(1e4)
+    if index == 5:
+        faulthandler._sigsegv()
+    if index == 9:
+        np.ones(10**11)
+    if index == 17:
+        raise ZeroDivisionError("no way")
+    return works(made, index, *parts)
+fails.works = works
+render.beamform_frame = fails
+"""
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory, small_plan: Plan) -> Path:
+    path = tmp_path_factory.mktemp("reference") / "s.zarr"
+    assert build(small_plan, path, workers=0).ok
+    return path
+
+
+def different(path: Path, reference: Path, frames: list[int] | None = None) -> list[str]:
+    """Arrays that are not the same, bit for bit, in the frames given."""
+    ours, theirs = zarr.open_group(path, mode="r"), zarr.open_group(reference, mode="r")
+    chosen = slice(None) if frames is None else frames
+    return [
+        name
+        for name, array in ours.members(max_depth=None)
+        if isinstance(array, zarr.Array)
+        and "frame" in (array.metadata.dimension_names or ())
+        and np.asarray(array[...])[chosen].tobytes() != np.asarray(theirs[name][...])[chosen].tobytes()
+    ]
+
+
+def listening() -> set[str]:
+    """Addresses that this process and those that it started listen on."""
+    us = psutil.Process()
+    found = [c for process in (us, *us.children(recursive=True)) for c in process.net_connections(kind="tcp")]
+    return {connection.laddr.ip for connection in found if connection.status == psutil.CONN_LISTEN}
+
+
+def test_frames_that_end_their_worker_are_named_with_why_and_the_rest_goes_on(
+    tmp_path: Path, small_plan: Plan, reference: Path
+) -> None:
+    faults, path = tmp_path / "faults.py", tmp_path / "s.zarr"
+    faults.write_text(FAULTS)
+    addresses: set[str] = set()
+    dashboards: list[str] = []
+
+    def look(dashboard: str) -> None:
+        dashboards.append(dashboard)
+        addresses.update(listening())
+
+    with dask.config.set({"distributed.worker.preload": [str(faults)]}):
+        report = build(small_plan, path, workers=1, frame_timeout=10.0, announce=look)
+    found = {failure.frame: failure for failure in report.failures}
+    assert sorted(found) == [2, 5, 9, 17]
+    assert {failure.stage for failure in found.values()} == {"beamform"}
+    assert "longer than 10 s" in found[2].error
+    assert "crashed its worker process: Fatal Python error" in found[5].error
+    assert "MemoryError" in found[9].error
+    assert found[17].error == "ZeroDivisionError: no way"
+    assert all("in fails" in failure.traceback for failure in found.values())
+    good = [frame for frame in range(20) if frame not in found]
+    assert store.frames_there(path) == good
+    assert different(path, reference, good) == []
+    assert report.workers_lost >= 2
+    assert dashboards == [report.dashboard]
+    assert report.dashboard.startswith("http://127.0.0.1:")
+    assert addresses == {"127.0.0.1"}
+    events = [row["event"] for row in read_lines(store.beside(path, "log.jsonl"))]
+    assert events.count("aside") == 4
+    assert events[0] == "build"
+    assert events[-1] == "end"
+    assert {"workers", "worker lost"} <= set(events)
+    assert not store.beside(path, "doing").exists()
+    again = build(small_plan, path, workers=0)
+    assert (again.written, len(again.failures)) == (0, 4)
+    assert build(small_plan, path, workers=0, retry_failed=True).ok
+    assert different(path, reference) == []
+
+
+STUCK = """\
+import time
+from sonarsynth import render
+works = getattr(render.beamform_frame, "works", render.beamform_frame)  # preloaded more than once
+def stuck(made, index, *parts):
+    while index >= 8:
+        time.sleep(1)
+    return works(made, index, *parts)
+stuck.works = works
+render.beamform_frame = stuck
+"""
+
+
+@pytest.fixture
+def elsewhere(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
+    """A Dask scheduler, with a worker that comes no further than the first shard, as processes of their own."""
+    file, preload = tmp_path / "scheduler.json", tmp_path / "stuck.py"
+    preload.write_text(STUCK)
+    common = ["--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", str(file)]
+    parts = {"scheduler": ["--port", "0"], "worker": ["--nthreads", "1", "--no-nanny", "--preload", str(preload)]}
+    with ExitStack() as stack:
+        processes = []
+        for name, options in parts.items():
+            command = [sys.executable, "-W", "ignore", "-m", f"distributed.cli.dask_{name}", *common, *options]
+            process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            stack.callback(process.wait)
+            stack.callback(process.kill)
+            processes.append(process)
+        until = time.monotonic() + 600
+        while not file.exists() or not file.read_text().endswith("}"):
+            assert time.monotonic() < until
+            assert processes[0].poll() is None
+            time.sleep(0.1)
+        yield processes[0], json.loads(file.read_text())["address"]
+
+
+def test_a_scheduler_that_dies_ends_the_build_in_one_line_and_it_goes_on(
+    tmp_path: Path, small_plan: Plan, reference: Path, elsewhere: tuple[subprocess.Popen[bytes], str]
+) -> None:
+    scheduler, address = elsewhere
+    path = tmp_path / "s.zarr"
+
+    def kill(done: int, total: int, aside: int) -> None:
+        if done:
+            scheduler.kill()
+
+    with pytest.raises(ConnectionError, match="is gone"):
+        build(small_plan, path, scheduler=address, progress=kill)
+    assert not store.beside(path, "lock").exists()
+    assert store.frames_there(path) == list(range(8))
+    assert build(small_plan, path, workers=0).ok
+    assert different(path, reference) == []
+
+
+@pytest.mark.parametrize(
+    ("address", "fine"),
+    [
+        ("tcp://127.0.0.1:8786", True),
+        ("localhost:8786", True),
+        ("tcp://[::1]:8786", True),
+        ("tls://10.1.2.3:8786", True),
+        ("tcp://10.1.2.3:8786", False),
+        ("node7:8786", False),
+        ("tcp://0.0.0.0:8786", False),
+        ("ws://example.org", False),
+    ],
+)
+def test_a_scheduler_elsewhere_needs_tls_or_consent(address: str, fine: bool) -> None:
+    connecting.check_address(address, True)
+    if fine:
+        connecting.check_address(address, False)
+    else:
+        with pytest.raises(ValueError, match="--insecure"):
+            connecting.check_address(address, False)
+
+
+def test_what_does_not_fit_is_refused_before_anything_is_written_unless_agreed(
+    tmp_path: Path, small_plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(space.shutil, "disk_usage", lambda place: shutil._ntuple_diskusage(10**9, 10**9, 1000))
+    with pytest.raises(TooLarge, match=r"needs up to [\d.]+ [kM]B and 1 kB are free there: --yes"):
+        build(small_plan, tmp_path / "s.zarr", workers=0)
+    assert list(tmp_path.iterdir()) == []
+    assert build(small_plan, tmp_path / "s.zarr", frames=[0], workers=0, agreed=True).ok
+    monkeypatch.setattr(space.shutil, "disk_usage", lambda place: shutil._ntuple_diskusage(10**15, 0, 10**15))
+    huge = replace(small_plan, stages=tuple(replace(s, bytes=10**12) for s in small_plan.stages))
+    with pytest.raises(TooLarge, match="TB"):
+        build(huge, tmp_path / "h.zarr", workers=0)
+
+
+def in_namespace(script: str) -> subprocess.CompletedProcess[str]:
+    """Run a shell script where it may mount."""
+    return subprocess.run(["unshare", "-rm", "sh", "-euc", script], capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize(("options", "what"), [("rw", "No space left"), ("ro", "read-only")])
+def test_a_disk_that_takes_no_more_is_one_line_and_the_build_goes_on(
+    tmp_path: Path, small_file: Path, reference: Path, options: str, what: str
+) -> None:
+    if shutil.which("unshare") is None or in_namespace(f"mount -t tmpfs none {tmp_path}").returncode:
+        pytest.skip("may not mount a disk here")
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    tool = f"{sys.executable} -m sonarsynth build {small_file}"
+    done = in_namespace(
+        f"mount -t tmpfs -o size=9m none {disk}; {tool} {disk}/s.zarr --workers 0 --frames 0:1 --yes >&2; "
+        f"dd if=/dev/zero of={disk}/ballast 2>&1 >/dev/null || true; mount -o remount,{options} {disk}; "
+        f"{tool} {disk}/s.zarr --workers 0 --yes >&2 && exit 77 || st=$?; "
+        f"mount -o remount,rw {disk}; rm {disk}/ballast; {tool} {disk}/s.zarr --workers 0 >&2; "
+        f"cp -r {disk}/s.zarr {tmp_path}; "
+        "exit $st"
+    )
+    assert done.returncode == 1, done.stderr
+    line = next(line for line in done.stderr.splitlines() if line.startswith("sonarsynth: "))
+    assert what in line
+    assert "the same command goes on" in line
+    assert "are free" in line
+    assert "Traceback" not in done.stderr
+    assert different(tmp_path / "s.zarr", reference) == []
+
+
+def test_the_next_build_waits_for_a_writer_that_outlived_its_own_and_that_writer_then_refuses(tmp_path: Path) -> None:
+    path = tmp_path / "s.zarr"
+    with store.lock(path) as name, store.shared_lock(path, name):
+        pass
+    with store.lock(path) as name:
+        held = store.shared_lock(path, name)
+        held.__enter__()
+    with pytest.raises(store.Locked, match="still writing"), store.lock(path, wait=0.1):
+        pass
+    ended: list[bool] = []
+
+    def end() -> None:
+        ended.append(True)
+        held.__exit__(None, None, None)
+
+    threading.Timer(0.3, end).start()
+    with store.lock(path, wait=600.0) as now:
+        assert ended
+        with pytest.raises(store.Ended, match="has ended"), store.shared_lock(path, name):
+            pass
+        with store.shared_lock(path, now):
+            pass
+    with pytest.raises(store.Ended), store.shared_lock(path, now):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("options", "what"),
+    [
+        ({"frame_timeout": -1.0}, "frame_timeout"),
+        ({"frame_timeout": float("nan")}, "frame_timeout"),
+        ({"worker_memory": 1000}, "worker_memory"),
+        ({"scheduler": "tcp://10.1.2.3:1"}, "--insecure"),
+    ],
+)
+def test_options_that_cannot_be_are_refused(
+    tmp_path: Path, small_plan: Plan, options: dict[str, object], what: str
+) -> None:
+    with pytest.raises(ValueError, match=what):
+        build(small_plan, tmp_path / "s.zarr", **options)  # type: ignore[arg-type]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_another_code_is_shown_and_refused(tmp_path: Path, small: Recipe, monkeypatch: pytest.MonkeyPatch) -> None:
+    build(small, tmp_path / "s.zarr", frames=[0], workers=0)
+    monkeypatch.setattr("sonarsynth.store.creating.code_digest", lambda: "f" * 64)
+    with pytest.raises(store.Mismatch, match=r"digest of the code: [0-9a-f]{12} there and f{12} now"):
+        build(small, tmp_path / "s.zarr", workers=0)
+
+
+def test_a_disk_error_that_is_not_about_room_stays_as_it_is(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="I/O") as raised, space.told_when_full(tmp_path, lambda: 1.0):
+        raise OSError(errno.EIO, "I/O error")
+    assert raised.value.errno == errno.EIO
+    for number in space.FULL:
+        with (
+            pytest.raises(OSError, match=r"up to 5 GB more are needed, .* are free"),
+            space.told_when_full(tmp_path, lambda: 5e9),
+        ):
+            raise OSError(number, os.strerror(number))
+
+
+def test_threads_of_this_process_are_not_limited(tmp_path: Path, small_plan: Plan, reference: Path) -> None:
+    """A worker without a nanny keeps no diary: its process is not its own."""
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", host="127.0.0.1", dashboard_address=":0"
+    ) as threads:
+        report = build(small_plan, tmp_path / "s.zarr", scheduler=threads.scheduler_address, frame_timeout=1e-3)
+    assert report.ok
+    assert different(tmp_path / "s.zarr", reference) == []

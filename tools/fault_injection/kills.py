@@ -1,0 +1,306 @@
+"""`tools/faults --kills N`: builds killed with SIGKILL at random times and at named points, resumed, compared.
+
+A victim is the command line itself, in a process forked from this one (so that it need not import everything again).
+What is killed: the client, a worker, the scheduler (of a cluster of its own), or the whole group at once. When: at a
+random time, or when something appears on the disk: the lock, the new folder, the layout, the first file of a shard,
+a mark, the n-th file. After the kill every completion mark must be of what an undisturbed build has; then builds are
+resumed, and perhaps killed again, until one ends well; its files and marks must be those of the undisturbed build.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+import signal
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from fault_injection.cluster import Cluster
+from sonarsynth import cli, config, planning, schedule, store
+from sonarsynth.store.marks import ABSENT, all_files, load_mark, marked, record
+
+RECIPE = """\
+title: tiny
+seed: 3
+scene:
+  world:
+    environment: {depth: 12 m, sound_speed: {kind: isovelocity, speed: 1540}, noise: {kind: flat, level: 40 dB}}
+    targets:
+      - name: box
+        shape: {kind: box, size: [1, 1, 1], edge: 1.0}
+        motion: {kind: line, start: [10, 0, -5], stop: [10, 1, -5], duration: 1}
+    shrimp:
+      - position: [30, 1]
+  sonar:
+    array: {kind: planar_lattice, columns: 3, rows: 2, pitch: 5 cm}
+    beams: {azimuths: 5, elevations: 3, azimuth_span: 30 deg, elevation_span: 30 deg}
+  trajectory: {frames: 40, interval: 0.02}
+"""
+
+POINTS = ("random time", "lock", "laying out", "laid out", "first file of a shard", "mark", "files")
+VICTIMS = ("client", "worker", "client", "group", "client", "scheduler", "client", "client of workers")
+"""What is killed first, by turns; later kills of a build, if any, are drawn from these."""
+
+WORKERS = {"worker": "2", "group": "1", "client of workers": "1"}
+"""Worker processes, where the victim has any."""
+
+LONGEST = 600.0
+"""Seconds after which a build that was not killed counts as hung: on a busy machine a worker starts in a minute."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What is killed, and when."""
+
+    victim: str
+    point: str
+    number: float  # seconds, the number of a shard, or the number of files
+
+    def reached(self, path: Path, began: float) -> bool:
+        """True once the point is reached, as far as the disk tells."""
+        shard = int(self.number)
+        match self.point:
+            case "random time":
+                return time.monotonic() - began > self.number
+            case "lock":
+                return store.beside(path, "lock").exists()
+            case "laying out":
+                return path.with_name(f".{path.name}.new").exists()
+            case "laid out":
+                return (path / ".marks/layout.json").exists()
+            case "first file of a shard":
+                return any(path.glob(f"*/*/c/{shard}"))
+            case "mark":
+                return (path / f".marks/{shard}.json").exists()
+            case _:
+                return path.exists() and sum(len(names) for _, _, names in os.walk(path)) >= self.number
+
+
+@dataclass(frozen=True)
+class Undisturbed:
+    """What a build gives that nobody disturbs."""
+
+    path: Path
+    files: dict[str, tuple[int, str]]
+    marks: dict[int, Any]
+    seconds: float
+
+
+def run(count: int, seed: int) -> dict[str, Any]:
+    """Kill `count` builds; `ok` where all came out identical and no mark was wrong at any time."""
+    dice, began = random.Random(seed), time.monotonic()
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(1))  # so that the cluster ends with this process
+    rows: list[dict[str, Any]] = []
+    with tempfile.TemporaryDirectory(prefix="sonarsynth-kills-") as folder:
+        recipe = Path(folder) / "tiny.yaml"
+        recipe.write_text(RECIPE)
+        whole = _undisturbed(recipe, Path(folder) / "whole.zarr")
+        with Cluster(Path(folder)) as cluster:
+            for number in range(count):
+                place = Path(folder) / str(number)
+                place.mkdir()
+                victim = VICTIMS[number % len(VICTIMS)]
+                rows.append(_attempt(dice, victim, recipe, place / "s.zarr", whole, cluster))
+                shutil.rmtree(place, ignore_errors=True)
+                said = ", ".join(map(" at ".join, zip(rows[-1]["victims"], rows[-1]["points"], strict=True)))
+                print(f"{number + 1}: {said}: {rows[-1]['wrong'] or 'identical'}", file=sys.stderr, flush=True)
+    wrong = [row for row in rows if row["wrong"]]
+    return {
+        "trials": count,
+        "seed": seed,
+        "identical": count - len(wrong),
+        "kills": sum(row["kills"] for row in rows),
+        "ended before the kill": sum(row["missed"] for row in rows),
+        "victims": Counter(name for row in rows for name in row["victims"]),
+        "points": Counter(name for row in rows for name in row["points"]),
+        "wrong": wrong[:20],
+        "seconds": round(time.monotonic() - began, 1),
+        "ok": not wrong,
+    }
+
+
+def _undisturbed(recipe: Path, path: Path) -> Undisturbed:
+    plan = planning.plan(config.load(recipe))
+    schedule.build(plan, path, frames=[0], workers=0)  # compiles
+    shutil.rmtree(path)
+    report = schedule.build(plan, path, workers=0)
+    files = {name: record(path, name) for name in sorted(all_files(path))}
+    return Undisturbed(path, files, {shard: load_mark(path, shard) for shard in marked(path)}, report.seconds)
+
+
+def _attempt(
+    dice: random.Random, victim: str, recipe: Path, path: Path, whole: Undisturbed, cluster: Cluster
+) -> dict[str, Any]:
+    """One build, killed one to three times and resumed; what was wrong with it."""
+    row: dict[str, Any] = {"victims": [], "points": [], "kills": 0, "missed": 0, "wrong": []}
+    for again in range(dice.choice((1, 1, 1, 2, 3))):
+        trial = _draw(dice, dice.choice(VICTIMS) if again else victim, whole)
+        row["victims"].append(trial.victim)
+        row["points"].append(trial.point)
+        killed, status = _kill(trial, recipe, path, cluster, dice)
+        row["kills"] += killed
+        row["missed"] += not killed
+        row["wrong"] += [f"{trial}: {text}" for text in _bad_marks(path, whole)]
+        if status == "hung" or (status not in ("killed", 0) and trial.victim != "scheduler"):
+            row["wrong"].append(
+                f"{trial}: the build ended with {status}: {path.with_suffix('.txt').read_text()[-300:]}"
+            )
+    workers = dice.choice(("0", "0", "0", "1"))
+    child = _fork([*_command(recipe, path), "--workers", workers], path.with_suffix(".txt"))
+    status = _wait(child, LONGEST)
+    if status != 0:
+        row["wrong"].append(f"the last build ended with {status}: {path.with_suffix('.txt').read_text()[-500:]}")
+    row["wrong"] += _different(path, whole)
+    return row
+
+
+def _draw(dice: random.Random, victim: str, whole: Undisturbed) -> Trial:
+    point, longest = dice.choice(POINTS), whole.seconds if victim == "client" else 6 * whole.seconds
+    number = {"random time": dice.uniform(0.0, longest), "files": dice.randrange(1, len(whole.files))}
+    return Trial(victim, point, number.get(point, dice.randrange(len(whole.marks))))
+
+
+def _command(recipe: Path, path: Path) -> list[str]:
+    return ["build", str(recipe), str(path)]
+
+
+def _kill(trial: Trial, recipe: Path, path: Path, cluster: Cluster, dice: random.Random) -> tuple[bool, int | str]:
+    """Start a build and kill its victim when the point is reached. Whether it was, and how the build ended."""
+    scheduler = trial.victim == "scheduler"
+    options = ["--scheduler", cluster.address()] if scheduler else ["--workers", WORKERS.get(trial.victim, "0")]
+    child = _fork([*_command(recipe, path), *options], path.with_suffix(".txt"))
+    began = time.monotonic()
+    while not trial.reached(path, began):
+        if (status := _ended(child)) is not None:
+            return False, status
+        if time.monotonic() - began > LONGEST:
+            os.killpg(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+            return False, "hung"
+        time.sleep(0.001)
+    match trial.victim:
+        case "worker":
+            killed = _kill_worker(child, dice)
+            return killed, _wait(child, LONGEST)
+        case "scheduler":
+            cluster.kill_scheduler()
+            return True, _wait(child, LONGEST)
+        case "group":
+            _strike(lambda: os.killpg(child, signal.SIGKILL))
+        case _:
+            _strike(lambda: os.kill(child, signal.SIGKILL))
+    os.waitpid(child, 0)
+    return True, "killed"
+
+
+def _kill_worker(child: int, dice: random.Random) -> bool:
+    """Kill one worker process of a build, once there is one."""
+    until = time.monotonic() + LONGEST
+    while time.monotonic() < until:
+        try:
+            found = [
+                process
+                for process in psutil.Process(child).children(recursive=True)
+                if any("spawn_main" in word for word in process.cmdline())
+            ]
+        except psutil.Error:
+            return False
+        if not found and psutil.Process(child).status() == psutil.STATUS_ZOMBIE:
+            return False
+        if found:
+            _strike(dice.choice(found).kill)
+            return True
+        time.sleep(0.01)
+    return False
+
+
+def _strike(kill: Callable[[], object]) -> None:
+    with suppress(ProcessLookupError, psutil.NoSuchProcess):
+        kill()
+
+
+def _fork(arguments: list[str], log: Path) -> int:
+    """Run the command line in a process and a group of its own."""
+    sys.stdout.flush()
+    child = os.fork()
+    if child:
+        return child
+    status = 1
+    try:
+        os.setsid()
+        out = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+        os.dup2(out, 1)
+        os.dup2(out, 2)
+        cli.main(arguments)
+    except SystemExit as end:
+        status = end.code if isinstance(end.code, int) else 0
+    finally:
+        os._exit(status)
+
+
+def _ended(child: int) -> int | None:
+    """Exit status of a process that has ended, None while it runs."""
+    found, status = os.waitpid(child, os.WNOHANG)
+    return os.waitstatus_to_exitcode(status) if found else None
+
+
+def _wait(child: int, limit: float) -> int | str:
+    until = time.monotonic() + limit
+    while time.monotonic() < until:
+        if (status := _ended(child)) is not None:
+            return status
+        time.sleep(0.01)
+    os.killpg(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    return "hung"
+
+
+def _bad_marks(path: Path, whole: Undisturbed) -> list[str]:
+    """Marks that say something is there that is not, or not as an undisturbed build has it."""
+    wrong = []
+    for shard in marked(path):
+        mark = load_mark(path, shard)
+        if mark != whole.marks[shard]:
+            wrong.append(f"mark {shard} is another")
+        elif any(_found(path, name) != kept for name, kept in mark.files.items()):
+            wrong.append(f"shard {shard} is marked and not whole")
+    return wrong
+
+
+def _found(path: Path, name: str) -> tuple[int, str]:
+    """Record of a file; of fill values alone there is none."""
+    return record(path, name) if (path / name).exists() else ABSENT
+
+
+def _different(path: Path, whole: Undisturbed) -> list[str]:
+    """Files that are not those of the undisturbed build."""
+    files = {name: record(path, name) for name in sorted(all_files(path))}
+    odd = sorted(files.keys() ^ whole.files.keys()) + [n for n in files.keys() & whole.files if _other(n, path, whole)]
+    marks = {shard: load_mark(path, shard) for shard in marked(path)}
+    return [f"{name} differs" for name in odd[:5]] + ([] if marks == whole.marks else ["the marks differ"])
+
+
+def _other(name: str, path: Path, whole: Undisturbed) -> bool:
+    """True where a file differs: metadata in more than the time it was made."""
+    if record(path, name) == whole.files[name]:
+        return False
+    return not name.endswith("zarr.json") or _timeless(path / name) != _timeless(whole.path / name)
+
+
+def _timeless(file: Path) -> Any:
+    value = json.loads(file.read_text())
+    attributes = value.get("attributes", {})
+    for changing in ("date_created", "created", "machine"):
+        attributes.pop(changing, None)
+    return value
