@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import math
+import time
 import uuid
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
@@ -56,8 +58,10 @@ class _Builder:
         job: Job,
         done: Callable[[Written], None],
         lost: Callable[[str, str], None] = lambda worker, why: None,
+        patience: float = math.inf,
     ) -> None:
         self.client, self.job, self.done, self.lost = client, job, done, lost
+        self.patience, self.seen = patience, time.monotonic()  # s without any worker; when there was one
         self.token = hashlib.sha256(f"{job} {uuid.uuid4()}".encode()).hexdigest()[:12]
         self.frames = 0  # submitted so far: earlier ones go first
         self.submitted = 0  # shards, with those submitted again
@@ -126,12 +130,18 @@ class _Builder:
             return None
 
     def _workers(self) -> list[str]:
-        """Addresses of the workers. Raises ConnectionError where the scheduler is gone."""
+        """Addresses of the workers. Raises ConnectionError where the scheduler is gone, RuntimeError where they are."""
         try:
-            return sorted(self.client.nthreads())
+            workers = sorted(self.client.nthreads())
         except (OSError, TimeoutError, CancelledError) as error:
             line = "the scheduler is gone; with one running, the same command goes on"
             raise ConnectionError(errno.ECONNRESET, line, getattr(self.client.scheduler, "address", None)) from error
+        now = time.monotonic()
+        if workers:
+            self.seen = now
+        elif now - self.seen > self.patience:
+            raise RuntimeError(f"no worker process came back in {self.patience:g} s; the same command goes on")
+        return workers
 
     def _launch(self, flight: _Flight, workers: Sequence[str]) -> None:
         load = Counter(f.worker for f in self.flights.values())
@@ -201,13 +211,15 @@ def run(
     todo: Mapping[int, tuple[int, ...]],
     done: Callable[[Written], None],
     lost: Callable[[str, str], None] = lambda worker, why: None,
+    patience: float = math.inf,
 ) -> None:
     """Build shards on the workers of a client; `done` is called as each is written, `lost` when a worker ends.
 
-    Raises what writing raises, ConnectionError where the scheduler is gone.
+    Raises what writing raises, ConnectionError where the scheduler is gone, RuntimeError where there is no worker for
+    `patience` seconds.
     """
     diary.open_folder(job.path)
     try:
-        _Builder(client, job, done, lost).run(todo)
+        _Builder(client, job, done, lost, patience).run(todo)
     finally:
         diary.close_folder(job.path)

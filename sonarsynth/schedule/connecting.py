@@ -34,6 +34,7 @@ _SETTINGS: Final = {
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,  # a worker that pauses with finished frames in memory never goes on
     "distributed.worker.memory.terminate": 0.95,
+    "distributed.deploy.lost-worker-timeout": "30 days",  # else a worker that is slow to start again is given up
     "distributed.comm.timeouts.connect": "120s",  # all of it is on this machine, which may be very busy
     "distributed.comm.timeouts.tcp": "120s",
     "distributed.admin.log-length": 100,  # logs that would grow for days

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -12,7 +13,7 @@ from sonarsynth.schedule import diary, tasks
 from sonarsynth.schedule.tasks import Job, Written
 
 PATIENCE: Final = 600.0
-"""Seconds that a stage of a frame may always take: a first one compiles."""
+"""Seconds that a stage of a frame may always take (a first one compiles), and a worker to start again."""
 
 SHORT: Final = 0.3
 """Frames of fewer seconds are not worth tasks of their own."""
@@ -57,7 +58,7 @@ def make_shards(
     count = min(usable_cores() if workers is None else workers, len(todo))
     with connecting.connected(count, scheduler, memory) as client:
         started(len(client.nthreads()), client.dashboard_link or "")
-        cluster.run(client, job, todo, done, lost)
+        cluster.run(client, job, todo, done, lost, math.inf if scheduler else PATIENCE)
 
 
 def usable_cores() -> int:

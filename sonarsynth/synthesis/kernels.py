@@ -1,6 +1,8 @@
 """Compiled loops of the kernel deposit. One thread, fixed order: the same bits on any number of workers.
 
 Arrays are flat with constant offsets and loop bodies are straight lines, because the compiler vectorises only those.
+Functions that others call are inlined always: of a function that is not, each caller has a copy, which fast mathematics
+gives other bits, and which of them runs depends on what was compiled in this process and what was loaded.
 """
 
 from __future__ import annotations

@@ -248,6 +248,13 @@ class FakeFuture:
         self.cancelled = True
 
 
+def test_a_build_whose_workers_never_come_back_ends() -> None:
+    builder = cluster._Builder(Lost([[]]), tasks.Job("", "", ()), lambda written: None, patience=0.0)  # type: ignore[arg-type]
+    builder._next = lambda: None  # type: ignore[method-assign]
+    with pytest.raises(RuntimeError, match="no worker process came back"):
+        builder._pass([cluster._Flight(0, (0,))])
+
+
 def test_shards_of_a_dead_worker_go_to_another_and_after_two_deaths_to_the_end() -> None:
     builder = cluster._Builder(
         Lost([["a", "b"], ["b"], ["b"], ["c"], ["c"]]), tasks.Job("", "", ()), lambda written: None

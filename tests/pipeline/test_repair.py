@@ -169,13 +169,20 @@ def test_what_moves_out_is_kept_whatever_was_there_before(copy: Path) -> None:
     assert sorted(kept) == ["first", "second", "third"]
 
 
+@pytest.mark.parametrize(
+    ("what", "now", "said"),
+    [
+        ("_version", "9.9", r"was built by sonarsynth .+, and this is 9\.9"),
+        ("code_digest", "f" * 64, r"was built by another state of the code of sonarsynth"),
+    ],
+)
 def test_another_version_is_refused_unless_told_otherwise(
-    copy: Path, whole: Path, monkeypatch: pytest.MonkeyPatch
+    copy: Path, whole: Path, monkeypatch: pytest.MonkeyPatch, what: str, now: str, said: str
 ) -> None:
-    monkeypatch.setattr("sonarsynth.store.creating._version", lambda: "9.9")
+    monkeypatch.setattr(f"sonarsynth.store.creating.{what}", lambda: now)
     os.truncate(copy / SHARD, 10)
     damaged = contents(copy)
-    with pytest.raises(store.Mismatch, match=r"was built by sonarsynth .+, and this is 9\.9"):
+    with pytest.raises(store.Mismatch, match=said):
         repair(copy, workers=0)
     assert contents(copy) == damaged
     (copy / "truth/zarr.json").unlink()
