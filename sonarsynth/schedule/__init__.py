@@ -66,10 +66,11 @@ def build(
     chosen = range(made.recipe.frames) if frames is None else sorted(set(frames))
     if not path.exists() and not agreed:
         check_space(path, _bytes(made, len(chosen)))
-    report = BuildReport(str(path), made.recipe.frames, len(chosen), 0, notes=made.warnings)
+    report = BuildReport(str(path), made.recipe.frames, len(chosen), 0)
     still = lambda: _bytes(made, max(len(chosen) - report.there - report.written, 1))  # noqa: E731
     with told_when_full(path, still), store.lock(path) as name:
         made = made if restart else _as_begun(path, made)
+        report.notes = made.warnings
         store.create(path, made, restart=restart)
         earlier = {} if restart else _set_aside(path)
         left = set() if retry_failed else earlier.keys() & set(chosen)

@@ -105,7 +105,6 @@ def connected(workers: int, scheduler: str | None = None, memory: int | None = N
         try:
             if interrupted:
                 raise KeyboardInterrupt
-            client.register_plugin(MemoryLimit(int(HEAP * each)), name="memory-limit")
             yield client
             patience = CLOSING
         finally:
@@ -126,6 +125,7 @@ def _local_cluster(workers: int, memory: int) -> LocalCluster:
             dashboard_address="127.0.0.1:0",
             worker_dashboard_address="127.0.0.1:0",
             memory_limit=memory,
+            plugins=(MemoryLimit(int(HEAP * memory)),),
             silence_logs=logging.CRITICAL,
             env=ONE_THREAD,
         )

@@ -39,7 +39,7 @@ def fails(made, index, *parts):
     if index == 5:
         faulthandler._sigsegv()
     if index == 9:
-        np.ones(10**11)
+        np.ones(10**11)  # more than any worker may take
     if index == 17:
         raise ZeroDivisionError("no way")
     return works(made, index, *parts)
