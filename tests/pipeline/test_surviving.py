@@ -221,7 +221,7 @@ def test_a_disk_that_takes_no_more_is_one_line_and_the_build_goes_on(
     build = f"{sys.executable} -m sonarsynth build {small_file} {disk}/s.zarr --workers 0 >&2"
     done = in_namespace(
         f"mount -t tmpfs -o size=9m none {disk}; {build} --frames 0:1 --yes; "
-        f"dd if=/dev/zero of={disk}/ballast 2>&1 >/dev/null || true; {build} --yes && exit 77 || full=$?; "
+        f"dd if=/dev/zero of={disk}/ballast >/dev/null 2>&1 || true; {build} --yes && exit 77 || full=$?; "
         f"mount -o remount,ro {disk}; {build} --yes && exit 77 || ro=$?; "
         f"mount -o remount,rw {disk}; rm {disk}/ballast; {build}; cp -r {disk}/s.zarr {tmp_path}; echo $full $ro"
     )
