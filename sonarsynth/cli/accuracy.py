@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.table import Table
@@ -21,23 +21,47 @@ HELP = (
 
 
 def accuracy(
+    recipe: Annotated[
+        Path | None,
+        typer.Argument(help="A recipe: every knob is walked about what the plan chooses for it.", show_default=False),
+    ] = None,
     reference: Annotated[str | None, typer.Option(metavar="NAME", help=HELP, show_default="rays")] = None,
     extremes: Annotated[
         bool, typer.Option("--extremes", help="Stiff and extreme cases of every stage instead.")
     ] = False,
+    settings: Annotated[
+        list[str], typer.Option("--set", metavar="PATH=VALUE", help="Set a field over the recipe. Repeatable.")
+    ] = [],  # noqa: B006 - typer copies it
+    frames: Annotated[
+        str | None,
+        typer.Option(metavar="LIST", help="Frames of the recipe, such as 21,42. Left out: at 1/3 and 2/3 of the way."),
+    ] = None,
+    hydrophones: Annotated[
+        str | None,
+        typer.Option(metavar="all|N", help="Hydrophones heard exactly. Left out: all, or 24 where that takes long."),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Draw the frames anew from this seed, by the choices of the recipe's.")
+    ] = None,
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where rows and picture go.")] = Path("accuracy"),
     as_json: Annotated[bool, typer.Option("--json", help="Print the rows as JSON.")] = False,
 ) -> None:
-    """Measure errors against independent, slow and exact computations, and run times; exit status 1 if one is off."""
+    """Measure errors against slow and exact computations, and run times; exit status 1 if one is off.
+
+    Of a recipe, of a reference, or of stiff and extreme cases.
+    """
     from sonarsynth.accuracy import REFERENCES
     from sonarsynth.accuracy.report import as_json as for_programs
     from sonarsynth.accuracy.report import write
 
+    _check(recipe, reference, extremes, settings or [o for o in (frames, hydrophones, seed) if o is not None])
+    if recipe is not None:
+        from sonarsynth.cli.frontier import recipe_table
+
+        return recipe_table(recipe, settings, frames, hydrophones, seed, out, as_json=as_json)
     if extremes:
         from sonarsynth.cli.extremes import extremes_table
 
-        if reference is not None:
-            raise BadOption("--extremes goes without --reference: it checks every stage")
         return extremes_table(out, as_json=as_json)
     reference = reference or "rays"
     if reference not in REFERENCES:
@@ -55,6 +79,16 @@ def accuracy(
             typer.echo(str(file))
     if not all(row.ok for row in rows):
         raise typer.Exit(1)
+
+
+def _check(recipe: Path | None, reference: str | None, extremes: bool, of_recipe: list[Any]) -> None:
+    """Raise BadOption for more than one thing to measure."""
+    if extremes and reference is not None:
+        raise BadOption("--extremes goes without --reference: it checks every stage")
+    if recipe is not None and (extremes or reference is not None):
+        raise BadOption(f"a recipe goes without {'--extremes' if extremes else '--reference'}: give one of the three")
+    if recipe is None and of_recipe:
+        raise BadOption("--set, --frames, --hydrophones and --seed go with a recipe")
 
 
 def _table(rows: list[Row]) -> None:

@@ -53,7 +53,9 @@ __all__ = [
     "beamform_frame",
     "coordinates",
     "follow_rays",
+    "process",
     "range_frame",
+    "record",
     "render",
     "trace_frame",
     "variables",
@@ -153,11 +155,15 @@ def beamform_frame(plan: Plan, index: int, traced: Traced) -> Heard:
     signals, isolated = synthesise(plan, traced), measure_isolated(plan, traced)
     if not plan.products & {"image", "cloud"}:
         return Heard(signals, None, None, isolated=isolated)
-    scene, frame = plan.scene, traced.frame
-    processing, sonar = scene.processing, scene.sonar
+    return replace(process(plan, traced.frame, signals), isolated=isolated)
+
+
+def process(plan: Plan, frame: Frame, signals: Signals) -> Heard:
+    """What the sonar makes of signals: where the snap is, and the energy image of the echo window."""
+    processing, sonar, environment = plan.scene.processing, plan.scene.sonar, plan.scene.world.environment
     snaps = plan.sizes["snap"]
     bearings = processing.locating.locate(
-        signals, plan.elements, sonar, frame.sonar_pose, scene.world.environment.depth, snaps, plan.profile
+        signals, plan.elements, sonar, frame.sonar_pose, environment.depth, snaps, plan.profile
     )
     heard = float(bearings.time[0]) if snaps else np.nan
     start, stop = heard + plan.windows.echo_start, heard + plan.windows.echo_stop
@@ -165,24 +171,26 @@ def beamform_frame(plan: Plan, index: int, traced: Traced) -> Heard:
     imaged = signals
     if signals.start <= start and stop <= end:
         if processing.cancelling is not None:
-            bed = scene.world.environment.depth
-            pose = frame.sonar_pose
+            bed, pose = environment.depth, frame.sonar_pose
             imaged = processing.cancelling.cancel(signals, bearings, plan.elements, sonar, pose, bed, (start, stop))
         image = plan.choices.beamforming.image(imaged, plan.elements, sonar, start, stop)
     else:  # no direct pulse was found, or an echo was taken for it: no clock, so no image, rather than an arbitrary one
         silent = np.full((sonar.beams.elevations, sonar.beams.azimuths), np.nan, np.float32)
         image = EnergyImage(silent, sonar.beams.azimuth, sonar.beams.elevation, np.nan, np.nan)
-    return Heard(signals, bearings, image, imaged, isolated)
+    return Heard(signals, bearings, image, imaged)
 
 
 def synthesise(plan: Plan, traced: Traced) -> Signals:
     """Pressure at each hydrophone: echoes and direct snap, ambient noise, converter."""
+    plan = plan.at(traced.frame.index)
+    return record(plan, traced.frame, hear(plan, traced.frame, traced.arrivals))
+
+
+def record(plan: Plan, frame: Frame, signals: Signals) -> Signals:
+    """Signals as the sonar has them: with ambient noise, through the converter; `plan` is that of the sequence."""
     from sonarsynth.synthesis import add_noise, convert
 
-    plan = plan.at(traced.frame.index)
-    scene, frame = plan.scene, traced.frame
-    sonar, signals = scene.sonar, hear(plan, frame, traced.arrivals)
-    noise = scene.world.environment.noise
+    sonar, noise = plan.scene.sonar, plan.scene.world.environment.noise
     if noise is not None:
         random = stream(frame.seed, "noise", frame.key, frame.step)
         signals = add_noise(signals, noise, sonar, plan.elements, random)

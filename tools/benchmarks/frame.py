@@ -10,13 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.peers import acoular_image, thesis_image
 from sonarsynth import config, planning, render
-from sonarsynth.acoustics.spectra import filtered_pulse
+from sonarsynth.accuracy.recipe.peers import acoular_image, likeness, thesis_image, thesis_pulse
 from sonarsynth.beamforming import DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.products import Arrivals, EnergyImage, Signals
 from sonarsynth.synthesis import DirectSum
-from sonarsynth.synthesis.pulse import bubble, fir
 
 RECIPE = Path(__file__).resolve().parents[2] / "configs" / "remus.yaml"
 PATHS = 2000
@@ -44,17 +42,6 @@ def thin(arrivals: Arrivals, paths: int) -> Arrivals:
 def relative(got: np.ndarray, exact: np.ndarray) -> float:
     """Largest error over the largest exact value."""
     return float(np.nanmax(np.abs(got - exact)) / np.nanmax(np.abs(exact)))
-
-
-def likeness(image: np.ndarray, exact: np.ndarray) -> dict[str, float]:
-    """How far an image is from the exact one, whatever its scale: over the beams within 20 dB of the peak."""
-    bright = exact >= 0.01 * exact.max()
-    decibels = 10 * np.log10(image[bright] / exact[bright])
-    return {
-        "rms_error_db": float(np.std(decibels)),
-        "largest_error_db": float(np.abs(decibels - np.mean(decibels)).max()),
-        "correlation": float(np.corrcoef(image[bright], exact[bright])[0, 1]),
-    }
 
 
 def bench(index: int = 32) -> dict[str, Any]:
@@ -179,8 +166,7 @@ def peers(
     focus = plan.scene.processing.beamforming.focus or 1e6
     acoular, acoular_seconds = acoular_image(plan, signals, start, stop, focus)
     rate = sonar.sampling_frequency
-    lag = np.arange(-int(0.6e-3 * rate), int(0.6e-3 * rate)) / rate
-    pulse = filtered_pulse(lag, bubble(traced.frame.moment.snaps[0].model), fir(sonar.antialias))
+    pulse = thesis_pulse(traced.frame.moment.snaps[0], plan)
     bright = np.flatnonzero(exact.ravel() >= 0.01 * exact.max())
     beams = bright[np.linspace(0, len(bright) - 1, min(THESIS_BEAMS, len(bright))).astype(int)]
     thesis, thesis_seconds = thesis_image(plan, traced.arrivals, pulse, rate, beams, sonar.band.centre)

@@ -1,0 +1,116 @@
+"""Error against run time on a recipe of one's own: every knob walked about the plan's choices, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from sonarsynth.accuracy.recipe.beside import image_peers, synthesis_peers
+from sonarsynth.accuracy.recipe.exact import Exact, exact_frame, synthesis_check
+from sonarsynth.accuracy.recipe.images import image_points, range_points
+from sonarsynth.accuracy.recipe.points import Point, Verdict, finite, merged
+from sonarsynth.accuracy.recipe.signals import synthesis_points
+from sonarsynth.accuracy.recipe.tracing import Traced, trace_points
+from sonarsynth.accuracy.recipe.verdicts import set_by_recipe, verdicts
+from sonarsynth.accuracy.recipe.whole import Whole, whole_points
+from sonarsynth.planning import Plan, arrivals_of
+from sonarsynth.planning import plan as plan_of
+from sonarsynth.recipe import Recipe
+from sonarsynth.render.hearing import hear
+
+__all__ = ["Exact", "Measured", "Point", "Verdict", "exact_frame", "measure", "usual_frames"]
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """The rows of a recipe's accuracy."""
+
+    title: str
+    frames: tuple[int, ...]
+    hydrophones: int
+    """Hydrophones of the array that were heard exactly."""
+    points: tuple[Point, ...]
+    verdicts: tuple[Verdict, ...]
+    choices: dict[str, Any] = field(default_factory=dict)
+    own: tuple[str, ...] = ()
+    """Stages whose method the recipe sets itself."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether every verdict is good, and the exact way itself right."""
+        return all(v.ok for v in self.verdicts) and all(p.meets for p in self.points if p.role == "check")
+
+    def as_json(self) -> list[dict[str, Any]]:
+        """A list of rows, for programs: points, peers and checks, then verdicts."""
+        common = {"frames": list(self.frames), "recipe": self.title}
+        rows = [p.as_json() for p in self.points] + [v.as_json() for v in self.verdicts]
+        return [finite(row | common) for row in rows]
+
+
+def usual_frames(frames: int) -> tuple[int, ...]:
+    """Frames to measure: a third and two thirds of the way; a plan measures at the ends and in the middle."""
+    return tuple(sorted({frames // 3, (2 * frames) // 3} - ({0} if frames > 1 else set())))
+
+
+def measure(
+    recipe: Recipe,
+    frames: Sequence[int] | None = None,
+    *,
+    hydrophones: int | None = None,
+    seed: int | None = None,
+    say: Say = lambda text: None,
+) -> Measured:
+    """Walk every knob of a recipe about the plan's choices.
+
+    frames: which; left out: `usual_frames`. hydrophones: so many are heard exactly; left out: all, where that takes
+    half a minute a frame at most, else 24. seed: frames are drawn anew from this one, by the choices of the recipe's.
+    Raises FieldError as `plan` does.
+    """
+    say("planning")
+    made = plan_of(recipe)
+    if seed is not None:
+        made = replace(plan_of(replace(recipe, seed=seed), choices=made.choices), errors=made.errors)
+    chosen = usual_frames(recipe.frames) if frames is None else tuple(frames)
+    points: list[Point] = []
+    rests, heard = [], 0
+    for index in chosen:
+        found, rest, count = _frame(made, index, hydrophones, say, peers=index == chosen[0])
+        points += found
+        rests.append(rest)
+        heard = count
+    rows = merged(points)
+    rest = sum(rests) / len(rests)
+    own = tuple(sorted(set_by_recipe(made.scene)))
+    return Measured(
+        recipe.title, chosen, heard, tuple(rows), tuple(verdicts(rows, made.scene, rest)), made.choices.as_json(), own
+    )
+
+
+def _frame(made: Plan, index: int, hydrophones: int | None, say: Say, *, peers: bool) -> tuple[list[Point], float, int]:
+    """The points of one frame; seconds of what nothing is chosen for; and hydrophones heard exactly."""
+    say(f"frame {index}: exactly")
+    exact = exact_frame(made, index, hydrophones)
+    plan, frame = exact.plan, exact.frame
+    points = [synthesis_check(exact)]
+    say(f"frame {index}: tracing, {len(exact.sensor)} hydrophones")
+    traced = Traced.of(plan, frame, exact.sensor)
+    points += trace_points(exact, traced)
+    say(f"frame {index}: synthesis")
+    points += synthesis_points(traced)
+    arrivals = arrivals_of(plan, frame)
+    signals = hear(plan, frame, arrivals)
+    whole = Whole.of(exact, signals)
+    say(f"frame {index}: image and range")
+    points += image_points(plan, whole.heard)
+    points += range_points(plan, frame, whole.heard)
+    if peers:
+        say(f"frame {index}: peers")
+        points += synthesis_peers(plan, frame, arrivals)
+        points += image_peers(plan, frame, arrivals, whole.heard)
+    say(f"frame {index}: everything exact")
+    spent = whole.seconds + sum(p.seconds for p in points if p.chosen and p.stage != "synthesis")
+    points += whole_points(whole, traced, spent)
+    return points, whole.seconds, len(exact.sensor)
