@@ -43,6 +43,9 @@ def accuracy(
     seed: Annotated[
         int | None, typer.Option(min=0, help="Draw the frames anew from this seed, by the choices of the recipe's.")
     ] = None,
+    peers: Annotated[
+        bool, typer.Option(help="Measure a recipe's peers too: the thesis's loop, FINUFFT, Acoular.")
+    ] = True,
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where rows and picture go.")] = Path("accuracy"),
     as_json: Annotated[bool, typer.Option("--json", help="Print the rows as JSON.")] = False,
 ) -> None:
@@ -58,7 +61,7 @@ def accuracy(
     if recipe is not None:
         from sonarsynth.cli.frontier import recipe_table
 
-        return recipe_table(recipe, settings, frames, hydrophones, seed, out, as_json=as_json)
+        return recipe_table(recipe, settings, frames, hydrophones, seed, out, peers=peers, as_json=as_json)
     if extremes:
         from sonarsynth.cli.extremes import extremes_table
 

@@ -35,6 +35,7 @@ def recipe_table(
     seed: int | None,
     out: Path,
     *,
+    peers: bool,
     as_json: bool,
 ) -> None:
     """Walk the knobs of a recipe, write <out>/<recipe>.json and .png, print the table; raises typer.Exit(1) where a
@@ -48,7 +49,7 @@ def recipe_table(
     made_from = config.recipe_of(source)
     chosen = frame_numbers(frames, made_from.frames)
     with config.locating(source):
-        measured = measure(made_from, chosen, hydrophones=count, seed=seed, say=_say)
+        measured = measure(made_from, chosen, hydrophones=count, seed=seed, peers=peers, say=_say)
     _say("")
     files = write(measured, out, recipe.stem)
     if as_json:

@@ -61,12 +61,14 @@ def measure(
     *,
     hydrophones: int | None = None,
     seed: int | None = None,
+    peers: bool = True,
     say: Say = lambda text: None,
 ) -> Measured:
     """Walk every knob of a recipe about the plan's choices.
 
     frames: which; left out: `usual_frames`. hydrophones: so many are heard exactly; left out: all, where that takes
     half a minute a frame at most, else 24. seed: frames are drawn anew from this one, by the choices of the recipe's.
+    peers: whether they are measured too, in the first frame.
     Raises FieldError as `plan` does.
     """
     say("planning")
@@ -77,7 +79,7 @@ def measure(
     points: list[Point] = []
     rests, heard = [], 0
     for index in chosen:
-        found, rest, count = _frame(made, index, hydrophones, say, peers=index == chosen[0])
+        found, rest, count = _frame(made, index, hydrophones, say, peers=peers and index == chosen[0])
         points += found
         rests.append(rest)
         heard = count

@@ -42,7 +42,8 @@ def synthesis_points(traced: Traced) -> Iterator[Point]:
     if isinstance(chosen, KernelDeposit):
         for knob, method in _settings(chosen, plan.recipe.accuracy.signal):
             yield _point(traced, exact, method, knob)
-    yield direct_sum_point(traced)
+    if len(traced.few[0][1].delay):
+        yield direct_sum_point(traced)
 
 
 def _settings(chosen: KernelDeposit, allowed: float) -> Iterator[tuple[str, KernelDeposit]]:
