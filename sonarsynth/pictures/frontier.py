@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sonarsynth.pictures.rays import RAYS
 from sonarsynth.pictures.style import INK, PALE, figure, grid, label
@@ -56,38 +56,40 @@ def frontier_figure(title: str, panels: Sequence[Panel], note: str) -> Figure:
 
 
 def _draw(axes: Axes, panel: Panel) -> None:
-    grid(axes)
+    errors = [panel.allowed, *(e for line in panel.lines for e in line.error)]
+    floor = min(e for e in errors if e > 0.0) * 10.0**-DECADES
     axes.set_xscale("log")
     axes.set_yscale("log")
-    errors = [e for line in panel.lines for e in line.error if e > 0.0]
-    if panel.allowed > 0.0:
-        errors.append(panel.allowed)
-    floor = min(errors, default=1.0) * 10.0**-DECADES
     axes.axhline(floor, color=PALE, linewidth=0.6, linestyle=":")
     axes.axhline(panel.allowed, color=INK, linewidth=0.9, linestyle="--", label=f"allowed, {panel.allowed:g}")
     _frontier(axes, panel, floor)
-    ours = peers = 0
-    for line in panel.lines:
-        pairs = sorted(zip(line.milliseconds, (max(e, floor) for e in line.error), strict=True))
-        x, y = [p[0] for p in pairs], [p[1] for p in pairs]
-        if line.peer:
-            axes.plot(x, y, PEERS[peers % len(PEERS)], color=INK, markersize=8, linestyle=":", linewidth=0.8,
-                      label=line.name)  # fmt: skip
-            peers += 1
-        else:
-            shape, colour = SHAPES[ours % len(SHAPES)], RAYS[ours % len(RAYS)]
-            axes.plot(x, y, shape, color=colour, markersize=5, linestyle="-" if len(x) > 1 else "", linewidth=1.0,
-                      alpha=0.9, label=line.name)  # fmt: skip
-            ours += 1
+    for peer, shapes in ((False, SHAPES), (True, PEERS)):
+        for n, line in enumerate(line for line in panel.lines if line.peer == peer):
+            pairs = sorted(zip(line.milliseconds, (max(e, floor) for e in line.error), strict=True))
+            style: dict[str, Any] = (
+                {"color": INK, "markersize": 8, "linestyle": ":", "linewidth": 0.8}
+                if line.peer
+                else {"color": RAYS[n % len(RAYS)], "markersize": 5, "linewidth": 1.0}
+            )
+            axes.plot(*zip(*pairs, strict=True), marker=shapes[n % len(shapes)], label=line.name, **style)
     at = (panel.chosen[0], max(panel.chosen[1], floor))
     axes.plot(*at, "o", markersize=4, color=CHOSEN, zorder=5)
-    axes.plot(*at, "o", markersize=15, markerfacecolor="none", markeredgecolor=CHOSEN, markeredgewidth=2.2,
-              linestyle="", label="chosen", zorder=5)  # fmt: skip
+    ring: dict[str, Any] = {"markerfacecolor": "none", "markeredgecolor": CHOSEN, "markeredgewidth": 2.2}
+    axes.plot(*at, "o", markersize=15, linestyle="", label="chosen", zorder=5, **ring)
+    _finish(axes, panel, floor)
+
+
+def _finish(axes: Axes, panel: Panel, floor: float) -> None:
+    """Limits, names and legend."""
+    from matplotlib.ticker import NullFormatter
+
+    grid(axes)
     low, high = axes.get_ylim()
     axes.set_ylim(min(low, 0.5 * floor), high)
     left, right = axes.get_xlim()
     middle = (left * right) ** 0.5
     axes.set_xlim(min(left, middle / NARROWEST), max(right, middle * NARROWEST))
+    axes.xaxis.set_minor_formatter(NullFormatter())
     label(axes, "CPU time of one core a frame (ms)", f"error ({panel.unit})", panel.title)
     axes.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, labelspacing=0.7)
 

@@ -27,7 +27,7 @@ AUTO = tuple(10.0**e for e in (-1.5, -2, -2.5, -3, -3.5, -4, -5, -6, -7))
 """Errors that the planner's own choice is walked over."""
 FINER = 0.01
 """Error of what is compared with, over that of the exact way's synthesis."""
-SUMMED_HYDROPHONES, SUMMED_PATHS = 2, 100
+SUMMED_HYDROPHONES, SUMMED_PATHS = (1, 8), 50
 """What the direct sum is timed on."""
 
 Method = KernelDeposit | DirectSum
@@ -108,16 +108,26 @@ def named(method: Method) -> str:
 def direct_sum_point(traced: Traced) -> Point:
     """The direct sum: no error; its cost from a few hydrophones and paths."""
     plan, (part, arrivals) = traced.plan, traced.few[0]
-    sensor = np.flatnonzero(part.elements.gain)[:SUMMED_HYDROPHONES]
     some = np.linspace(0, len(arrivals.delay) - 1, min(SUMMED_PATHS, len(arrivals.delay))).astype(int)
-    elements = subarray(part.elements, sensor).elements
     start, samples = frame_start(plan, traced.frame), plan.windows.samples
-    began = time.process_time()
-    exact_signals(
-        arrivals.select(some), traced.frame.moment.snaps, elements, plan.scene.sonar, plan.absorption, start, samples
-    )
-    each = (time.process_time() - began) / (len(some) * len(sensor))
+    seconds = []
+    for count in SUMMED_HYDROPHONES:
+        elements = subarray(part.elements, np.resize(np.arange(part.elements.count), count)).elements
+        began = time.process_time()
+        exact_signals(
+            arrivals.select(some),
+            traced.frame.moment.snaps,
+            elements,
+            plan.scene.sonar,
+            plan.absorption,
+            start,
+            samples,
+        )
+        seconds.append(time.process_time() - began)
+    few, more = SUMMED_HYDROPHONES
+    each = max(seconds[1] - seconds[0], 0.0) / (more - few)  # of a hydrophone; the pulses' spectra serve all
     live = int(np.count_nonzero(plan.elements.gain))
+    once = max(seconds[0] - few * each, 0.0)
     return Point(
         stage="synthesis",
         knob="direct sum",
@@ -125,7 +135,7 @@ def direct_sum_point(traced: Traced) -> Point:
         error=0.0,
         unit="relative",
         allowed=plan.recipe.accuracy.signal,
-        seconds=each * len(arrivals.delay) * live,
+        seconds=(once * traced.parts + each * live) * len(arrivals.delay) / len(some),
         chosen=isinstance(plan.choices.synthesis, DirectSum),
-        note=f"cost from {len(some)} paths at {len(sensor)} hydrophones",
+        note=f"cost from {len(some)} paths at {few} and {more} hydrophones",
     )

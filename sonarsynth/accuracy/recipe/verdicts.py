@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot, isnan
+from math import hypot, inf, isnan
 
 from sonarsynth.accuracy.recipe.points import STAGES, Point, Verdict
 from sonarsynth.ranging import AutoRange
@@ -23,17 +23,19 @@ def verdicts(points: Sequence[Point], scene: Scene, rest: float) -> list[Verdict
         one = chosen[stage]
         if one is None:
             continue
-        other = chosen[{"trace": "synthesis", "synthesis": "trace"}.get(stage, "")] if stage in PAIR else None
+        other = chosen[PAIR[stage]] if stage in PAIR else None
         beside = 0.0 if other is None or not other.meets else other.error
         best = cheapest(walked[stage], beside)
         made.append(_verdict(one, one.setting, best, stage in own))
     frame = [p for p in walked["frame"] if p.chosen]
     if frame:
-        made.append(_whole(frame, walked, rest, bool(own)))
+        there = {p.knob for p in frame}
+        alone = [one for stage in ("image", "range") if (one := chosen[stage]) is not None and stage not in there]
+        made.append(_whole([*frame, *alone], walked, rest, own))
     return made
 
 
-PAIR = ("trace", "synthesis")
+PAIR = {"trace": "synthesis", "synthesis": "trace"}
 """Stages that share one tolerance: their errors add by squares."""
 
 
@@ -65,18 +67,20 @@ def _verdict(one: Point, choice: str, best: Point | None, own: bool) -> Verdict:
     )
 
 
-def _whole(frame: Sequence[Point], walked: dict[str, list[Point]], rest: float, own: bool) -> Verdict:
-    """Of all settings together: signals by every pair of a tracing and a synthesis, image, range."""
+def _whole(errors: Sequence[Point], walked: dict[str, list[Point]], rest: float, own: set[str]) -> Verdict:
+    """Of all settings together: signals by every pair of a tracing and a synthesis, image, range. errors: first those
+    of the whole frame, then of stages that it has none of."""
     best_signals, names = _signals(walked["trace"], walked["synthesis"])
     seconds = rest + best_signals
     for stage in ("image", "range"):
-        best = cheapest(walked[stage]) or next((p for p in walked[stage] if p.chosen), None)
+        best = None if stage in own else cheapest(walked[stage])
+        best = best or next((p for p in walked[stage] if p.chosen), None)
         if best is not None:
             seconds += best.seconds
             names.append(best.setting)
-    worst = max(frame, key=lambda p: p.error / p.allowed)
-    slow = worst.seconds > SLOWER * seconds
-    broken = [p.knob for p in frame if not p.meets]
+    worst = max(errors, key=lambda p: inf if isnan(p.error) else p.error / p.allowed)
+    spent = errors[0].seconds
+    broken = [p.stage if p.stage != "frame" else p.knob for p in errors if not p.meets]
     note = "; ".join(
         [*(f"{knob} beyond what is allowed" for knob in broken), *(["partly set in the recipe"] if own else [])]
     )
@@ -86,10 +90,10 @@ def _whole(frame: Sequence[Point], walked: dict[str, list[Point]], rest: float, 
         worst.error,
         worst.unit,
         worst.allowed,
-        worst.seconds,
+        spent,
         ", ".join(names),
         seconds,
-        not broken and not slow,
+        not broken and spent <= SLOWER * seconds,
         note,
     )
 
