@@ -24,14 +24,12 @@ class AutoBeamforming:
     shading: Shading = "uniform"
     """Weights over the aperture: all alike, or falling off towards the rim (lower side lobes, a wider beam)."""
 
-    def resolve(
-        self, elements: Elements, sonar: Sonar, error_db: float, within: float = 20.0
-    ) -> FocusedDelayAndSum | DenseDelayAndSum:
-        """The method whose `focus_error`, an estimate and no bound, is not above `error_db` (dB); within: see there."""
+    def resolve(self, elements: Elements, sonar: Sonar, error_db: float) -> FocusedDelayAndSum | DenseDelayAndSum:
+        """The method whose `focus_error`, an estimate and no bound, is not above `error_db` (dB)."""
         if elements.on_lattice:
             from sonarsynth.beamforming.focus_error import zones_needed
 
-            zones = zones_needed(elements, self.shading, sonar, self.focus, error_db, within)
+            zones = zones_needed(elements, self.shading, sonar, self.focus, error_db)
             if zones is not None:
                 return FocusedDelayAndSum(focus=self.focus, shading=self.shading, zones=zones)
         return DenseDelayAndSum(focus=self.focus, shading=self.shading)

@@ -163,8 +163,8 @@ def zones_for(
 
 @lru_cache(maxsize=64)
 def zones_needed(
-    elements: Elements, shading: Shading, sonar: Sonar, focus: float | None, error_db: float, within: float = 20.0
+    elements: Elements, shading: Shading, sonar: Sonar, focus: float | None, error_db: float
 ) -> int | None:
     """`zones_for` the array, the beams and the band of a sonar; kept from frame to frame."""
     weight = weights(elements, shading)
-    return zones_for(elements, weight, sonar.beams, sonar.assumed_sound_speed, focus, sonar.band, error_db, within)
+    return zones_for(elements, weight, sonar.beams, sonar.assumed_sound_speed, focus, sonar.band, error_db)

@@ -12,13 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sonarsynth.beamforming import AutoBeamforming, DenseDelayAndSum, FocusedDelayAndSum
-from sonarsynth.beamforming.focus_error import MOST_ZONES, focus_error, zones_needed
-from sonarsynth.beamforming.window import weights
+from sonarsynth.beamforming import DenseDelayAndSum
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.planning.arriving import arrivals_of
 from sonarsynth.planning.bending import ranging_error
 from sonarsynth.planning.choices import Choices
+from sonarsynth.planning.imaging import beamformer
 from sonarsynth.planning.looks import Look
 from sonarsynth.planning.plans import Errors, Plan
 from sonarsynth.planning.windows import frame_start
@@ -39,9 +38,6 @@ MEASURED = 3
 """Frames of a dataset that expansions are measured in."""
 SAFETY = 1.25
 """What was measured at some hydrophones of some frames may be so much more at others."""
-AT_PEAK = 0.0
-"""dB: what is asked of beamformers is the energy of an echo in its own beam. Over beams within 20 dB of the brightest
-the root mean square of errors was less, in every recipe here."""
 EVERY = 1e-3
 """Share of the paths left out that are left out where errors are measured: 3 % of what that errs by."""
 MANY = 1_000_000
@@ -60,17 +56,19 @@ def choose(plan: Plan, looks: Sequence[Look]) -> Plan:
         subarrays=1,
         negligible=_negligible(scene, accuracy),
         synthesis=synthesis,
-        beamforming=_beamforming(plan, accuracy) if imaged else DenseDelayAndSum(),
+        beamforming=DenseDelayAndSum(),
         ranging=_ranging(scene, accuracy, bent),
     )
     made = replace(plan, choices=choices)
-    count, error, whole = _subarrays(made, [look.frames[0].index for look in some])
+    indices = [look.frames[0].index for look in some]
+    count, error, whole = _subarrays(made, indices)
+    steering, blurred = beamformer(made, indices) if imaged else (choices.beamforming, 0.0)
     straight = isinstance(choices.ranging, IsovelocityRange)
     by_synthesis = deposit_error(synthesis) if isinstance(synthesis, KernelDeposit) else 0.0
     return replace(
         made,
-        choices=replace(choices, subarrays=count),
-        errors=Errors(error, whole, by_synthesis, bent if straight else 0.0, image_error(made)),
+        choices=replace(choices, subarrays=count, beamforming=steering),
+        errors=Errors(error, whole, by_synthesis, bent if straight else 0.0, blurred),
     )
 
 
@@ -100,27 +98,6 @@ def _synthesis(scene: Scene, accuracy: Accuracy) -> KernelDeposit | DirectSum:
     if not isinstance(method, AutoSynthesis):
         return method
     return DirectSum() if accuracy.exact else method.resolve(np.sqrt(SYNTHESIS) * accuracy.signal)
-
-
-def _beamforming(plan: Plan, accuracy: Accuracy) -> FocusedDelayAndSum | DenseDelayAndSum:
-    method, sonar, elements = plan.scene.processing.beamforming, plan.scene.sonar, plan.elements
-    if isinstance(method, DenseDelayAndSum) or accuracy.exact:
-        return DenseDelayAndSum(focus=method.focus, shading=method.shading)
-    if isinstance(method, AutoBeamforming):
-        return method.resolve(elements, sonar, accuracy.image_db, AT_PEAK)
-    if method.zones == "auto":
-        zones = zones_needed(elements, method.shading, sonar, method.focus, accuracy.image_db, AT_PEAK)
-        return replace(method, zones=zones or MOST_ZONES)
-    return method
-
-
-def image_error(plan: Plan) -> float:
-    """Energy (dB) that an echo loses in its own beam by the method chosen, at worst; 0 for the exact one."""
-    method, sonar = plan.choices.beamforming, plan.scene.sonar
-    if isinstance(method, DenseDelayAndSum) or method.zones == "auto":
-        return 0.0 if isinstance(method, DenseDelayAndSum) else np.nan
-    weight, speed = weights(plan.elements, method.shading), sonar.assumed_sound_speed
-    return focus_error(plan.elements, weight, sonar.beams, speed, method.focus, sonar.band, method.zones, AT_PEAK)
 
 
 def _ranging(scene: Scene, accuracy: Accuracy, bent: float) -> IsovelocityRange | RefractedRange:

@@ -139,7 +139,7 @@ def _steered(plan: Plan) -> str:
     """What the beamformer errs by, in words."""
     if isinstance(plan.choices.beamforming, DenseDelayAndSum):
         return "rounding"
-    return f"{plan.errors.image:.1g} dB of an echo in its beam, anywhere in the picture"
+    return f"{plan.errors.image:.1g} dB rms of beams within 20 dB of the brightest, measured"
 
 
 def _bent(plan: Plan) -> str:

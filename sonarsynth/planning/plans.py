@@ -76,7 +76,7 @@ class Errors:
     whole: float = float("nan")  # the same, where the array is not cut into subarrays
     synthesis: float = float("nan")  # of signals, relative to their peak
     ranging: float = float("nan")  # m: of the method that turns delays into places
-    image: float = float("nan")  # dB: of the energy of beams, estimated
+    image: float = float("nan")  # dB: of the energy of beams, root mean square within 20 dB of the brightest
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,6 +24,6 @@ class Accuracy:
     range_m: Annotated[Number, Gt(0)] = 0.01
     """Error of ranges by the method that turns delays into places, in m."""
     image_db: Annotated[Number, Gt(0), Le(10)] = 0.1
-    """Error of the energy of an echo in its beam, in dB, wherever in the picture it comes from."""
+    """Error of the energy in a beam, in dB: root mean square over those within 20 dB of the brightest."""
     exact: bool = False
     """Whether everything is computed the slow, exact way, but for what the scene chooses otherwise."""
