@@ -19,9 +19,12 @@ from sonarsynth.accuracy.recipe.report import write
 from sonarsynth.accuracy.recipe.verdicts import cheapest, verdicts
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
-from sonarsynth.planning import plan
+from sonarsynth.planning import Choices, plan
 from sonarsynth.recipe import Accuracy, Recipe
 from sonarsynth.sonar import BeamGrid, PlanarLattice
+from sonarsynth.synthesis import KernelDeposit
+from sonarsynth.tracing import AutoTracing
+from sonarsynth.world.boundaries import SeaBed, Sediment
 from tests.scenes import remus
 
 STAGES = {"trace", "synthesis", "image", "range", "frame"}
@@ -184,13 +187,18 @@ def test_another_seed_keeps_the_choices(alone: pytest.MonkeyPatch) -> None:
     assert "at 2 hydrophones" in rows(made, "frame", "signals")[0].note
 
 
-def test_finufft_and_ours_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("bounces", [0, 1])
+def test_finufft_and_ours_agree(bounces: int, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("finufft")
     monkeypatch.setattr("sonarsynth.accuracy.recipe.beside.installed", lambda library: True)
     from sonarsynth.accuracy.recipe.beside import synthesis_peers
     from sonarsynth.planning import arrivals_of
 
-    made = plan(small(1e-4))
+    recipe, bed = small(1e-4), SeaBed(reflection=Sediment(name="medium sand"))
+    world = replace(recipe.scene.world, environment=replace(recipe.scene.world.environment, bed=bed))
+    physics = replace(recipe.scene.physics, tracing=AutoTracing(bounces=bounces))
+    recipe = replace(recipe, scene=replace(recipe.scene, world=world, physics=physics))
+    made = plan(recipe, choices=Choices(synthesis=KernelDeposit(width=8, tolerance=1e-5)))
     frame = made.recipe.frame(1)[1]
     found = list(synthesis_peers(made, frame, arrivals_of(made, frame)))
     errors = [p.error for p in found if p.knob == "FINUFFT"]

@@ -127,6 +127,8 @@ def plain(arrivals: Arrivals, plan: Plan, frame: Frame) -> Arrivals:
         corners=np.zeros((len(nought), 3)),
         rough_share=nought,
         rough_delay=nought,
+        phase_terms=np.zeros((len(nought), 0)),
+        blur_terms=np.zeros((len(nought), 0)),
     )
 
 
