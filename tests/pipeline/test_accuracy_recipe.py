@@ -17,6 +17,7 @@ from sonarsynth.accuracy.recipe.images import off_by
 from sonarsynth.accuracy.recipe.points import merged
 from sonarsynth.accuracy.recipe.report import write
 from sonarsynth.accuracy.recipe.verdicts import cheapest, verdicts
+from sonarsynth.beamforming import AutoBeamforming, FocusedDelayAndSum
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
 from sonarsynth.planning import Choices, plan
@@ -159,8 +160,12 @@ def test_verdicts() -> None:
     assert not verdict_of(replace(good[0], error=2e-2), good[1], frame)["trace"]
     assert not verdict_of(*good, replace(frame, error=nan))["frame"]
     own = point("image", 1.0, 1e-3, chosen=True), point("image", 0.1, 1e-3)
-    (image,) = (v for v in verdicts([*good, frame, *own], small().scene, 0.0) if v.stage == "image")
-    assert image.ok and image.note == "set in the recipe" and image.ratio == pytest.approx(10.0)
+    scene = small().scene
+    for method, ok in ((FocusedDelayAndSum(), True), (AutoBeamforming(), False)):
+        chosen = replace(scene, processing=replace(scene.processing, beamforming=method))
+        (image,) = (v for v in verdicts([*good, frame, *own], chosen, 0.0) if v.stage == "image")
+        assert image.ok == ok and image.ratio == pytest.approx(10.0)
+        assert image.note == ("set in the recipe" if ok else "")
     assert cheapest([point("trace", 1.0, inf)]) is None
 
 
