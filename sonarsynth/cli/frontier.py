@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SECOND = (
     ("largest", "of the peak ", ""),
-    ("rms", "rms ", " dB"),
+    ("largest", "largest ", " dB"),
     ("direction_rad", "direction ", " rad"),
     ("correlation", "correlation ", ""),
 )

@@ -10,6 +10,9 @@ from sonarsynth.products import Arrivals
 from sonarsynth.scene import Frame
 from sonarsynth.sonar.subarrays import Subarray
 
+AMPLITUDES = 0.1
+"""Share of the error of signals that amplitudes over the aperture may err by, for a lower degree to do."""
+
 
 def arrivals_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Arrivals:
     """Every path of a frame to the middle of the array, or of a part of it, expanded over its hydrophones.
@@ -33,6 +36,7 @@ def arrivals_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Arriv
         band=(sonar.band.low, sonar.band.high),
         moving=Moving(velocities, frame.sonar_velocity) if scene.physics.doppler else None,
         negligible=plan.choices.negligible,
+        enough=AMPLITUDES * plan.recipe.accuracy.signal,
     )
 
 

@@ -32,7 +32,7 @@ from sonarsynth.synthesis.auto import deposit_error, deposit_for
 
 FAINT, SYNTHESIS, EXPANSION = 0.1, 0.1, 0.8
 """Shares of the square of the error allowed to signals: of paths left out, of the synthesis, of expansions."""
-HEARD_AT = 4
+HEARD_AT = 6
 """Hydrophones that are traced by themselves to measure what expansions err by."""
 MEASURED = 3
 """Frames of a dataset that expansions are measured in."""
@@ -118,17 +118,16 @@ def _subarrays(plan: Plan, indices: Sequence[int]) -> tuple[int, float, float]:
         return parts, _worst(measures, parts, np.inf), np.nan
     allowed = np.sqrt(EXPANSION) * plan.recipe.accuracy.signal / SAFETY
     sizes = [2**n for n in range(int(np.ceil(np.log2(count))))] + [count]
-    errors = {sizes[0]: _worst(measures, sizes[0], allowed)}
-    low, high = 0, len(sizes) - 1  # the array whole, and every hydrophone by itself
-    if errors[1] > allowed:
-        errors[count] = 0.0
-        while high - low > 1:  # a jump by what the error falls with the size of parts, about as its square
-            jump = int(np.ceil(np.log2(errors[sizes[low]] / allowed)))
-            middle = min(max(low + jump, low + 1), high - 1)
-            errors[sizes[middle]] = _worst(measures, sizes[middle], allowed)
-            low, high = (middle, high) if errors[sizes[middle]] > allowed else (low, middle)
-        return sizes[high], errors[sizes[high]], errors[1]
-    return 1, errors[1], errors[1]
+    whole = _worst(measures, 1, allowed)
+    if whole <= allowed:
+        return 1, whole, whole
+    # Cubics err by the fourth power of the width of parts, the square of their number: no fewer will do.
+    fewest = max(int(np.log2(whole / allowed) / 2.0), 1)
+    for parts in sizes[fewest:-1]:
+        error = _worst(measures, parts, allowed)
+        if error <= allowed:
+            return parts, error, whole
+    return count, 0.0, whole
 
 
 def _worst(measures: Sequence[Expansion], parts: int, allowed: float) -> float:

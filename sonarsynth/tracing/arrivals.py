@@ -30,7 +30,7 @@ from sonarsynth.tracing.legs import (
 from sonarsynth.tracing.moving import Moving, carried
 from sonarsynth.tracing.paths import Outward, assemble, join, silence
 from sonarsynth.tracing.shadows import hidden
-from sonarsynth.tracing.variation import fitted
+from sonarsynth.tracing.variation import ENOUGH, fitted
 from sonarsynth.world.environment import Environment, Profile
 from sonarsynth.world.meshes import in_blocks
 from sonarsynth.world.moment import Body, Moment, Snap
@@ -61,6 +61,7 @@ class ArrayLegs:
     elements: Elements
     band: tuple[float, float]  # Hz
     negligible: float = NEGLIGIBLE  # power of the faintest echoes, that are left out
+    enough: float = ENOUGH  # error of amplitudes over the aperture, where the second degree will do
     first: int = 0  # of the legs, in the wavefronts
 
     @property
@@ -108,18 +109,19 @@ def trace(
     band: tuple[float, float],
     moving: Moving | None = None,
     negligible: float = NEGLIGIBLE,
+    enough: float = ENOUGH,
 ) -> Arrivals:
     """The arrivals of a frame, sorted by snap; of each first those that met no target, then echoes by target, then the
     shadow waves of targets that scatter forward.
 
     environment, profile: the water; moment: bodies and snaps; sonar_pose, elements: the array; absorption: dB/m at the
     centre of the band; propagation: how sound travels, and how many bounces are followed; laws: how the facets of each
-    body scatter; band: Hz; moving: velocities, where they count; negligible: see `NEGLIGIBLE`. A facet counts where it
-    is lit by the snap and seen by the array centre, with no body in between (all sensors share what the centre sees).
-    The snap itself is heard if no body stands in between, but for those that scatter forward (`tracing.forward`).
-    Raises ValueError for anything outside the water.
+    body scatter; band: Hz; moving: velocities, where they count; negligible: see `NEGLIGIBLE`; enough:
+    `variation.ENOUGH`. A facet counts where it is lit by the snap and seen by the array centre, with no body in
+    between (all sensors share what the centre sees). The snap itself is heard if no body stands in between, but for
+    those that scatter forward (`tracing.forward`). Raises ValueError for anything outside the water.
     """
-    legs = array_legs(environment, profile, moment.bodies, sonar_pose, elements, propagation, band, negligible)
+    legs = array_legs(environment, profile, moment.bodies, sonar_pose, elements, propagation, band, negligible, enough)
     return arrivals(legs, moment.snaps, absorption, laws, moving)
 
 
@@ -132,6 +134,7 @@ def array_legs(
     propagation: Propagation,
     band: tuple[float, float],
     negligible: float = NEGLIGIBLE,
+    enough: float = ENOUGH,
 ) -> ArrayLegs:
     """Facet to array, for every facet of every body that leaves a ray for the array that no body hides.
 
@@ -153,7 +156,7 @@ def array_legs(
     group = facets.target[legs.row]
     over = wavefronts(legs, group, environment, bent, sonar_pose, elements, propagation, band)
     return ArrayLegs(
-        legs, over, facets, bodies, environment, profile, propagation, sonar_pose, elements, band, negligible
+        legs, over, facets, bodies, environment, profile, propagation, sonar_pose, elements, band, negligible, enough
     )
 
 

@@ -49,10 +49,10 @@ class Varying(Protocol):
 def variations(blocks: Sequence[Varying]) -> tuple[list[Floats], float]:
     """Polynomials (echo, term) of the amplitude over the aperture for echoes of each block, and the error of all.
 
-    The second degree serves where it errs by no more than `ENOUGH`.
+    The second degree serves where it errs by no more than `enough` of the legs.
     """
     terms, error = _fitted(blocks, FEW)
-    return (terms, error) if error <= ENOUGH else _fitted(blocks, None)
+    return (terms, error) if not blocks or error <= blocks[0].array.enough else _fitted(blocks, None)
 
 
 def _fitted(blocks: Sequence[Varying], few: int | None) -> tuple[list[Floats], float]:

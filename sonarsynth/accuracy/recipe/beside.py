@@ -101,12 +101,12 @@ def _image_row(plan: Plan, name: str, like: dict[str, float], seconds: float, no
         stage="image",
         knob=name,
         setting="BeamformerTime" if name == "Acoular" else "every ray, every beam",
-        error=like["largest_error_db"],
+        error=like["rms_error_db"],
         unit="dB",
         allowed=plan.recipe.accuracy.image_db,
         seconds=seconds,
         role="peer",
-        also={"rms": like["rms_error_db"], "correlation": like["correlation"]},
+        also={"largest": like["largest_error_db"], "correlation": like["correlation"]},
         note=note,
     )
 

@@ -94,12 +94,12 @@ def image_point(
         stage="image",
         knob=knob,
         setting=setting,
-        error=float(np.abs(error).max(initial=0.0)),
+        error=float(np.sqrt(np.mean(error**2))) if len(error) else 0.0,
         unit="dB",
         allowed=plan.recipe.accuracy.image_db,
         seconds=seconds,
         chosen=chosen,
-        also={"rms": float(np.sqrt(np.mean(error**2))) if len(error) else 0.0, "beams": len(error)},
+        also={"largest": float(np.abs(error).max(initial=0.0)), "beams": len(error)},
     )
 
 

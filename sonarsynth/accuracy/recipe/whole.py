@@ -86,12 +86,12 @@ def whole_points(whole: Whole, traced: Traced, seconds: float) -> Iterator[Point
         stage="frame",
         knob="image",
         setting="the plan",
-        error=float(np.abs(off).max(initial=0.0)),
+        error=float(np.sqrt(np.mean(off**2))),
         unit="dB",
         allowed=accuracy.image_db,
         seconds=seconds,
         chosen=True,
-        also={"rms": float(np.sqrt(np.mean(off**2))), "beams": len(off)},
+        also={"largest": float(np.abs(off).max(initial=0.0)), "beams": len(off)},
     )
     metres, angle, alone = apart(cloud_of(plan, frame, whole.heard, plan.choices.ranging), cloud)
     yield Point(
