@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SECOND = (
     ("largest", "of the peak ", ""),
-    ("largest", "largest ", " dB"),
+    ("largest_db", "largest ", " dB"),
     ("direction_rad", "direction ", " rad"),
     ("correlation", "correlation ", ""),
 )

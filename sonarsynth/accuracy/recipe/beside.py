@@ -106,7 +106,7 @@ def _image_row(plan: Plan, name: str, like: dict[str, float], seconds: float, no
         allowed=plan.recipe.accuracy.image_db,
         seconds=seconds,
         role="peer",
-        also={"largest": like["largest_error_db"], "correlation": like["correlation"]},
+        also={"largest_db": like["largest_error_db"], "correlation": like["correlation"]},
         note=note,
     )
 

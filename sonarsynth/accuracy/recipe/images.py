@@ -99,7 +99,7 @@ def image_point(
         allowed=plan.recipe.accuracy.image_db,
         seconds=seconds,
         chosen=chosen,
-        also={"largest": float(np.abs(error).max(initial=0.0)), "beams": len(error)},
+        also={"largest_db": float(np.abs(error).max(initial=0.0)), "beams": len(error)},
     )
 
 

@@ -91,7 +91,7 @@ def whole_points(whole: Whole, traced: Traced, seconds: float) -> Iterator[Point
         allowed=accuracy.image_db,
         seconds=seconds,
         chosen=True,
-        also={"largest": float(np.abs(off).max(initial=0.0)), "beams": len(off)},
+        also={"largest_db": float(np.abs(off).max(initial=0.0)), "beams": len(off)},
     )
     metres, angle, alone = apart(cloud_of(plan, frame, whole.heard, plan.choices.ranging), cloud)
     yield Point(
