@@ -7,6 +7,8 @@ Exit status: 0 done, 1 our fault, 2 bad input, 3 finished with frames set aside,
 from __future__ import annotations
 
 import json
+import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -102,10 +104,14 @@ def build(
     insecure: Annotated[
         bool, typer.Option("--insecure", help="Use a scheduler on another machine without TLS.")
     ] = False,
+    predicting: Annotated[
+        bool, typer.Option("--predict/--no-predict", help="Predict time and size first, and compare afterwards.")
+    ] = True,
     as_json: Json = False,
 ) -> None:
     """Build a dataset, or the part of it that is missing. Interrupted, the same command goes on."""
     from sonarsynth import config, planning, schedule
+    from sonarsynth import store as stores
     from sonarsynth.cli import printing
 
     if scheduler is not None and workers is not None:
@@ -117,11 +123,15 @@ def build(
     with config.locating(source):
         plan = planning.plan(made_from, chosen)
     wanted = chosen_frames(frames, sequences, made_from.sequences, made_from.steps)
+    prediction = None
+    if predicting and scheduler is None and stores.missing(store, plan, wanted):
+        prediction = schedule.predict(plan, prepared=time.process_time())
     with printing.progress() as progress:
         report = schedule.build(
             plan, store, frames=wanted, workers=workers, scheduler=scheduler, restart=restart,
             retry_failed=retry_failed, agreed=agreed, insecure=insecure, progress=progress,
             announce=printing.announce, **bounds,
+            prediction=prediction,
         )  # fmt: skip
     if as_json:
         _print_json(report.as_json())
@@ -133,8 +143,11 @@ def build(
 
 @app.command()
 def plan(recipe: RecipeFile, settings: Settings = [], products: Products = ALL_PRODUCTS, as_json: Json = False) -> None:  # noqa: B006
-    """Say what each stage will do and why, what is left out and what that costs, predicted time and size."""
-    from sonarsynth import config, planning
+    """Say what each stage will do and why, what is left out and what that costs, predicted time and size.
+
+    Time and size are of a build with as many workers as this machine has cores, known from frames made here.
+    """
+    from sonarsynth import config, planning, schedule
     from sonarsynth.cli import printing
 
     chosen = product_names(products)
@@ -142,10 +155,12 @@ def plan(recipe: RecipeFile, settings: Settings = [], products: Products = ALL_P
     made_from = config.recipe_of(source)
     with config.locating(source):
         made = planning.plan(made_from, chosen)
+    prediction = schedule.predict(made, prepared=time.process_time())
+    made = replace(made, stages=prediction.rows(made))
     if as_json:
-        _print_json(made.as_json())
+        _print_json({**made.as_json(), **prediction.as_json()})
     else:
-        printing.plan_report(made)
+        printing.plan_report(made, prediction)
 
 
 @app.command()

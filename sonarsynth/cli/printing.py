@@ -14,7 +14,7 @@ from rich.table import Table
 
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan
-    from sonarsynth.schedule import BuildReport
+    from sonarsynth.schedule import BuildReport, Prediction
     from sonarsynth.schedule import Progress as Report
     from sonarsynth.store import Report as StoreReport
 
@@ -114,6 +114,9 @@ def build_report(report: BuildReport) -> None:
         out.print(f"a frame: {times} of one core; {where}, {size(report.client_peak_bytes)} here")
     elif not report.failures:
         out.print(f"{report.store}: all {report.wanted} frames are there")
+    if report.prediction and report.written:
+        for line in _compared(report.prediction):
+            out.print(line)
     for note in report.notes:
         out.print(f"note: {note}", markup=False)
     for failure in report.failures[:10]:
@@ -122,7 +125,15 @@ def build_report(report: BuildReport) -> None:
         out.print(f"{len(report.failures)} frames set aside; tracebacks in {report.store}.aside.jsonl", markup=False)
 
 
-def plan_report(plan: Plan) -> None:
+def _compared(found: dict[str, Any]) -> Iterator[str]:
+    """Prediction and measurement of a build, a line each."""
+    for name, what, said in (("seconds", "took", duration), ("bytes", "the store takes", size)):
+        ratio, predicted = found[f"{name}_ratio"], said(found[f"predicted_{name}"])
+        if ratio is not None:
+            yield f"predicted {predicted}, {what} {said(found[f'measured_{name}'])}: {ratio:.2f} of it"
+
+
+def plan_report(plan: Plan, prediction: Prediction) -> None:
     """Stages, what is left out, sizes and predicted cost."""
     out = console()
     stages = Table(
@@ -141,11 +152,13 @@ def plan_report(plan: Plan) -> None:
     for line in _spanned(plan.as_json()):
         out.print(line, markup=False)
     out.print(", ".join(f"{count} {name}" for name, count in plan.sizes.items()))
-    frames = plan.recipe.frames
+    p = prediction
     out.print(
-        f"predicted: {duration(plan.predicted_seconds)} of one core for {frames} frames, "
-        f"{size(plan.predicted_bytes)} before compression"
+        f"predicted: {duration(p.seconds)} for {p.frames} frames with {p.workers} workers, {duration(p.core_seconds)} "
+        f"of the processor; {size(p.bytes)} on the disk, {size(p.file_bytes)} of it files, {size(p.raw_bytes)} before "
+        "compression"
     )
+    out.print(f"known from {p.how}", markup=False)
 
 
 def _spanned(plan: dict[str, Any]) -> Iterator[str]:

@@ -1,7 +1,8 @@
 """What a plan costs: rows that `sonarsynth plan` prints.
 
 Costs are counts of work times seconds per unit of work, measured on one core of a 2-core AVX-512 machine (`tools/bench
-frame`), scaled by how fast this machine does a fixed set of transforms. Predictions are for one core.
+frame`), scaled by how fast this machine does a fixed set of transforms. Predictions are for one core, and quick: no
+frame is made. `schedule.predicting` makes some, and knows better.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from sonarsynth.scattering import Kirchhoff
 from sonarsynth.synthesis import DirectSum
 from sonarsynth.tracing import Straight
 
-REFERENCE_TRANSFORM = 2.0e-3
+REFERENCE_TRANSFORM = 0.63e-3
 """Seconds of the transforms in `machine_factor` on the machine where the constants below were measured."""
 
 SECONDS = {
@@ -49,12 +50,12 @@ RANGED_BEAMS = 60
 @lru_cache(maxsize=1)
 def machine_factor() -> float:
     """How much slower this machine is than the one where SECONDS was measured (best of five, about 10 ms in all)."""
-    block = np.ones((64, 4096), np.float32)
-    best = np.inf
+    block, spectrum = np.ones((64, 4096), np.float32), np.empty((64, 2049), np.complex64)
+    best = np.inf  # into memory that is there: fresh memory, cleared page by page, costs three times the transform
     for _ in range(5):
-        began = time.perf_counter()
-        np.fft.rfft(block)
-        best = min(best, time.perf_counter() - began)
+        began = time.thread_time()
+        np.fft.rfft(block, out=spectrum)
+        best = min(best, time.thread_time() - began)
     return float(best / REFERENCE_TRANSFORM)
 
 

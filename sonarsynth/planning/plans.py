@@ -135,7 +135,7 @@ class Plan:
 
     @property
     def predicted_seconds(self) -> float:
-        """Seconds of one core for the whole dataset."""
+        """Seconds of one core for the whole dataset, by counts of work; `schedule.predict` knows better."""
         return self.recipe.frames * sum(s.seconds for s in self.stages)
 
     @property
@@ -144,7 +144,9 @@ class Plan:
         return self.recipe.frames * sum(s.bytes for s in self.stages)
 
     def as_json(self) -> dict[str, Any]:
-        """The plan for a program: stages, left_out, predicted_seconds, predicted_bytes, sizes, windows."""
+        """The plan for a program: stages, left_out, sizes, windows; predicted_seconds (of one core, by counts of work) and
+        predicted_bytes (before compression), in whose place `sonarsynth plan --json` has those of `schedule.predict`.
+        """
         return {
             "stages": [vars(s) for s in self.stages],
             "left_out": [vars(o) for o in self.left_out],

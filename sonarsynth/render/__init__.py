@@ -22,6 +22,7 @@ from sonarsynth.products import Arrivals, Bearings, Echoes, EnergyImage, Ledger,
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import Recipe
 from sonarsynth.render.hearing import hear
+from sonarsynth.render.laps import LAPS, counted, lap
 from sonarsynth.render.stored import (
     Values,
     bearing_values,
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from sonarsynth.tracing.fan import RayFan
 
 __all__ = [
+    "LAPS",
     "VARIABLES",
     "Heard",
     "Traced",
@@ -52,11 +54,13 @@ __all__ = [
     "attributes",
     "beamform_frame",
     "coordinates",
+    "counted",
     "follow_rays",
     "process",
     "range_frame",
     "record",
     "render",
+    "trace_at",
     "trace_frame",
     "variables",
 ]
@@ -87,9 +91,15 @@ class Heard:
 def trace_frame(plan: Plan, index: int) -> Traced:
     """Every path of a frame, and its truth."""
     plan = plan.at(index)
-    scene, frame = plan.recipe.frame(index)
+    frame = plan.recipe.frame(index)[1]
     check_unseen(plan, frame)
-    sonar, arrivals = scene.sonar, arrivals_of(plan, frame)
+    return trace_at(plan, frame)
+
+
+def trace_at(plan: Plan, frame: Frame) -> Traced:
+    """Every path of a frame that is at hand, and its truth; `plan` is that of its sequence."""
+    sonar, arrivals = plan.scene.sonar, arrivals_of(plan, frame)
+    lap("trace")
     levels = snap_levels(frame.moment.snaps)
     straight = isinstance(plan.propagation, Straight)
     truth = label(frame.moment, frame.sonar_pose, sonar.beams, plan.connect, levels, straight)
@@ -97,6 +107,7 @@ def trace_frame(plan: Plan, index: int) -> Traced:
     powers = path_powers(arrivals, band)
     book = ledger(arrivals, powers, band, targets, levels, _expansion_error(plan, arrivals))
     heard = echoes(arrivals, powers, targets, levels)
+    lap("label")
     return Traced(frame, arrivals, truth, book, heard)
 
 
@@ -153,6 +164,7 @@ def beamform_frame(plan: Plan, index: int, traced: Traced) -> Heard:
     if not plan.products:
         return Heard(None, None, None)
     signals, isolated = synthesise(plan, traced), measure_isolated(plan, traced)
+    lap("synthesise")
     if not plan.products & {"image", "cloud"}:
         return Heard(signals, None, None, isolated=isolated)
     return replace(process(plan, traced.frame, signals), isolated=isolated)
@@ -165,6 +177,7 @@ def process(plan: Plan, frame: Frame, signals: Signals) -> Heard:
     bearings = processing.locating.locate(
         signals, plan.elements, sonar, frame.sonar_pose, environment.depth, snaps, plan.profile
     )
+    lap("locate")
     heard = float(bearings.time[0]) if snaps else np.nan
     start, stop = heard + plan.windows.echo_start, heard + plan.windows.echo_stop
     end = signals.start + plan.windows.samples / signals.sampling_frequency
@@ -177,6 +190,7 @@ def process(plan: Plan, frame: Frame, signals: Signals) -> Heard:
     else:  # no direct pulse was found, or an echo was taken for it: no clock, so no image, rather than an arbitrary one
         silent = np.full((sonar.beams.elevations, sonar.beams.azimuths), np.nan, np.float32)
         image = EnergyImage(silent, sonar.beams.azimuth, sonar.beams.elevation, np.nan, np.nan)
+    lap("beamform")
     return Heard(signals, bearings, image, imaged)
 
 
@@ -218,10 +232,12 @@ def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
         counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
         values |= signal_values(heard.signals, counts)
     if heard.image is None or heard.bearings is None or heard.imaged is None:
+        lap("collect")
         return values
     values |= bearing_values(heard.bearings)
     if "image" in plan.products:
         values |= table("/image", energy=heard.image.energy, start=heard.image.start, stop=heard.image.stop)
+    lap("collect")
     if "cloud" in plan.products:
         scene = plan.scene
         cloud = plan.choices.ranging.cloud(
@@ -234,6 +250,7 @@ def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
             plan.profile,
         )
         values |= cloud_values(cloud)
+        lap("range")
     return values
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from sonarsynth.planning import Plan, arrivals_of, frame_start
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.scene import Frame
-from sonarsynth.sonar.subarrays import subarrays
+from sonarsynth.sonar.subarrays import Subarray, subarrays
 
 
 def hear(plan: Plan, frame: Frame, arrivals: Arrivals) -> Signals:
@@ -22,7 +22,13 @@ def hear(plan: Plan, frame: Frame, arrivals: Arrivals) -> Signals:
         return method.signals(arrivals, snaps, plan.elements, sonar, plan.absorption, start, samples)
     pressure, outside = np.zeros((plan.elements.count, samples), np.float32), 0
     for part in subarrays(plan.elements, plan.choices.subarrays):
-        own = arrivals_of(plan, frame, part)
-        heard = method.signals(own, snaps, part.elements, sonar, plan.absorption, start, samples)
+        heard = hear_part(plan, frame, part)
         pressure[part.sensor], outside = heard.pressure, max(outside, heard.outside)
     return Signals(pressure, start, sonar.sampling_frequency, 0.0, 0, outside)
+
+
+def hear_part(plan: Plan, frame: Frame, part: Subarray) -> Signals:
+    """What a part of the array hears, of paths that are traced to it."""
+    method, sonar, snaps = plan.choices.synthesis, plan.scene.sonar, frame.moment.snaps
+    own, start = arrivals_of(plan, frame, part), frame_start(plan, frame)
+    return method.signals(own, snaps, part.elements, sonar, plan.absorption, start, plan.windows.samples)

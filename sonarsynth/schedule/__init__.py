@@ -13,11 +13,12 @@ from sonarsynth.planning import PRODUCTS, Plan, choices_from, chosen_products, p
 from sonarsynth.recipe import Recipe
 from sonarsynth.schedule.log import append_lines, read_lines
 from sonarsynth.schedule.making import job_of, make_shards, usable_cores
+from sonarsynth.schedule.predicting import Prediction, predict
 from sonarsynth.schedule.report import BuildReport, Course, Progress
 from sonarsynth.schedule.space import TooLarge, check_space, told_when_full
 from sonarsynth.schedule.tasks import Failure
 
-__all__ = ["BuildReport", "Failure", "Progress", "TooLarge", "build", "usable_cores"]
+__all__ = ["BuildReport", "Failure", "Prediction", "Progress", "TooLarge", "build", "predict", "usable_cores"]
 
 LEAST_MEMORY: Final = 300_000_000
 """Bytes that a worker needs before it has done anything."""
@@ -39,6 +40,7 @@ def build(
     insecure: bool = False,
     progress: Progress | None = None,
     announce: Callable[[str], None] | None = None,
+    prediction: Prediction | None = None,
 ) -> BuildReport:
     """Build the frames (left out: all) of a recipe that a store lacks, laying it out if it is not there.
 
@@ -52,7 +54,7 @@ def build(
     stage (left out: by the plan; 0: no limit), or whose worker takes more than `worker_memory` bytes (left out: its
     share of the machine's); `retry_failed` tries those of earlier builds again. `agreed` builds what needs more than is
     free, or over 1 TB; `insecure` uses a scheduler on another machine without TLS. `announce` gets the dashboard's
-    address.
+    address. A `prediction` of `schedule.predicting.predict` is compared with what is measured.
 
     Raises FieldError for a scene that cannot be, IndexError for frames that are not there, store.Mismatch for a store
     of something else, store.Locked while another build runs, store.Damage where the store cannot go on, TooLarge where
@@ -88,6 +90,9 @@ def build(
                 job, made, todo, course.done, workers=workers, scheduler=scheduler, memory=worker_memory,
                 started=course.started, lost=course.lost,
             )  # fmt: skip
+        if prediction is not None:
+            report.prediction = prediction.against(report)
+            append_lines(store.beside(path, "times.jsonl"), [{"build": report.prediction}])
     return report
 
 

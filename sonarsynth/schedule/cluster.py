@@ -160,16 +160,14 @@ class _Builder:
             return self._task(
                 tasks.make_shard, flight.shard, flight.frames, key=name, priority=-self.frames, flight=flight
             )
+        made: Any
         for frame in flight.frames:
             self.frames += 1
-            first = -len(tasks.STAGES) * self.frames
-            traced = self._task(tasks.trace, frame, key=f"trace-{token}-{frame}", priority=first, flight=flight)
-            heard = self._task(
-                tasks.beamform, traced, key=f"beamform-{token}-{frame}", priority=first + 1, flight=flight
-            )
-            steps.append(
-                self._task(tasks.range_, heard, key=f"range-{token}-{frame}", priority=first + 2, flight=flight)
-            )
+            first, made = -len(tasks.STAGES) * self.frames, frame
+            for n, stage in enumerate(tasks.tasks_of(self.job.products)):
+                key = f"{stage}-{token}-{frame}"
+                made = self._task(tasks.RUN[stage], made, key=key, priority=first + n, flight=flight)
+            steps.append(made)
         return self._task(tasks.write, flight.shard, steps, key=name, priority=1, flight=flight)
 
     def _task(

@@ -15,7 +15,7 @@ from sonarsynth import store
 from sonarsynth.planning import Plan
 from sonarsynth.schedule import tasks
 from sonarsynth.schedule.log import Log, append_lines
-from sonarsynth.schedule.tasks import STAGES, Failure, Written
+from sonarsynth.schedule.tasks import Failure, Written
 
 Progress = Callable[[int, int, int], None]
 """Called with the frames done, the frames to do, and the frames set aside, as shards are written."""
@@ -35,14 +35,15 @@ class BuildReport:
     bytes: int = 0
     seconds: float = 0.0
     writing_seconds: float = 0.0  # of workers, in writing
-    stage_seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
-    stage_cpu: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
+    stage_seconds: dict[str, float] = field(default_factory=dict)  # of the tasks that ran, by name
+    stage_cpu: dict[str, float] = field(default_factory=dict)
     workers_lost: int = 0
     dashboard: str = ""  # address
     worker_peak_bytes: int = 0  # largest of any worker
     client_peak_bytes: int = 0
     failures: list[Failure] = field(default_factory=list)
     notes: tuple[str, ...] = ()  # what the plan warns of
+    prediction: dict[str, Any] = field(default_factory=dict)  # predicted and measured, where a prediction was given
 
     @property
     def ok(self) -> bool:
@@ -59,8 +60,8 @@ class BuildReport:
         self.failures.extend(written.failures)
         for row in written.times:
             for stage, seconds in row["seconds"].items():
-                self.stage_seconds[stage] += seconds
-                self.stage_cpu[stage] += row["cpu"][stage]
+                self.stage_seconds[stage] = self.stage_seconds.get(stage, 0.0) + seconds
+                self.stage_cpu[stage] = self.stage_cpu.get(stage, 0.0) + row["cpu"][stage]
 
     def as_json(self) -> dict[str, Any]:
         """The report for a program."""

@@ -27,6 +27,11 @@ WARM_UP: Final = 300.0
 """Seconds that the first stage of its kind may take longer."""
 
 
+def tasks_of(products: Sequence[str]) -> tuple[str, ...]:
+    """Those of a frame of such products: no beamform where only truth is wanted, no range without a cloud."""
+    return STAGES[: 1 if not products else 3 if "cloud" in products else 2]
+
+
 @dataclass(frozen=True)
 class Job:
     """What is built, small enough to send with every task."""
@@ -64,6 +69,7 @@ class Step:
     failure: Failure | None = None
     seconds: Mapping[str, float] = field(default_factory=dict)  # by stage, wall clock
     cpu: Mapping[str, float] = field(default_factory=dict)  # by stage, of the thread
+    parts: Mapping[str, float] = field(default_factory=dict)  # of that, by what was done: render.LAPS
 
 
 @dataclass(frozen=True)
@@ -80,31 +86,48 @@ class Written:
 
 
 def trace(job: Job, frame: int) -> Step:
-    """Task trace-<digest>-<frame>."""
-    return _stage(job, "trace", Step(frame), lambda: render.trace_frame(plan_of(job), frame))
+    """Task trace-<digest>-<frame>. Gives what was traced; the frame's values where nothing else is wanted."""
+
+    def work() -> Any:
+        traced = render.trace_frame(plan_of(job), frame)
+        return traced if job.products else _values(job, frame, traced, render.Heard(None, None, None))
+
+    return _stage(job, "trace", Step(frame), work)
 
 
 def beamform(job: Job, traced: Step) -> Step:
-    """Task beamform-<digest>-<frame>. Gives what it heard together with what was traced."""
-    frame = traced.frame
-    return _stage(
-        job, "beamform", traced, lambda: (traced.made, render.beamform_frame(plan_of(job), frame, traced.made))
-    )
+    """Task beamform-<digest>-<frame>. Gives what it heard together with what was traced; values without a cloud."""
+
+    def work() -> Any:
+        heard = render.beamform_frame(plan_of(job), traced.frame, traced.made)
+        if "cloud" in job.products:
+            return traced.made, heard
+        return _values(job, traced.frame, traced.made, heard)
+
+    return _stage(job, "beamform", traced, work)
 
 
 def range_(job: Job, heard: Step) -> Step:
     """Task range-<digest>-<frame>: the values of the frame, in the types of the store."""
+    return _stage(job, "range", heard, lambda: _values(job, heard.frame, *heard.made))
 
-    def values() -> render.Values:
-        made = plan_of(job)
-        return layout_of(made).check(render.range_frame(made, heard.frame, *heard.made))
 
-    return _stage(job, "range", heard, values)
+def _values(job: Job, frame: int, traced: render.Traced, heard: render.Heard) -> render.Values:
+    made = plan_of(job)
+    return layout_of(made).check(render.range_frame(made, frame, traced, heard))
+
+
+RUN: Mapping[str, Callable[[Job, Any], Step]] = {"trace": trace, "beamform": beamform, "range": range_}
+"""What each task runs: the first of a frame is given its number, each other what the one before it made."""
 
 
 def render_frame(job: Job, frame: int) -> Step:
     """All stages of a frame, here and now."""
-    return range_(job, beamform(job, trace(job, frame)))
+    made: Any = frame
+    for name in tasks_of(job.products):
+        made = RUN[name](job, made)
+    step: Step = made
+    return step
 
 
 def write(job: Job, shard: int, steps: Sequence[Step]) -> Written:
@@ -120,7 +143,9 @@ def write(job: Job, shard: int, steps: Sequence[Step]) -> Written:
         shard=shard,
         frames=tuple(sorted(good)),
         failures=tuple(step.failure for step in steps if step.failure is not None),
-        times=tuple({"frame": s.frame, "seconds": dict(s.seconds), "cpu": dict(s.cpu)} for s in steps),
+        times=tuple(
+            {"frame": s.frame, "seconds": dict(s.seconds), "cpu": dict(s.cpu), "parts": dict(s.parts)} for s in steps
+        ),
         seconds=time.perf_counter() - start,
         bytes=size,
         peak_bytes=peak_memory(),
@@ -174,14 +199,16 @@ def _stage(job: Job, name: str, before: Step, work: Callable[[], Any]) -> Step:
     if before.failure is not None:
         return before
     wall, cpu = time.perf_counter(), time.thread_time()
-    try:
-        with diary.noted(job.path, before.frame, name, _limit(job, name)):
-            made, failure = work(), None
-        _warm.add(name)
-    except Exception as error:
-        made, failure = None, failure_of(before.frame, name, error)
+    with render.counted() as parts:
+        try:
+            with diary.noted(job.path, before.frame, name, _limit(job, name)):
+                made, failure = work(), None
+            _warm.add(name)
+        except Exception as error:
+            made, failure = None, failure_of(before.frame, name, error)
     seconds = {**before.seconds, name: time.perf_counter() - wall}
-    return Step(before.frame, made, failure, seconds, {**before.cpu, name: time.thread_time() - cpu})
+    spent = {**before.cpu, name: time.thread_time() - cpu}
+    return Step(before.frame, made, failure, seconds, spent, {**before.parts, **parts})
 
 
 _warm: set[str] = set()

@@ -103,13 +103,11 @@ def _level(energy: float) -> str:
 
 def _costs(file: Path, frames: frozenset[int]) -> dict[str, str]:
     """Median processor time of each stage and of all, from the file of run times; the last time a frame was built."""
-    rows = {
-        row["frame"]: row["cpu"] for row in _rows(file) if row["frame"] in frames and set(row["cpu"]) >= set(STAGES)
-    }
+    rows = {row["frame"]: row["cpu"] for row in _rows(file) if row.get("frame") in frames and "trace" in row["cpu"]}
     called = [f"CPU a frame: {name}" for name in (*STAGES.values(), "all")]
     if not rows:
         return dict.fromkeys([*called, SPEED], UNKNOWN)
-    spent = np.array([[cpu[stage] for stage in STAGES] for cpu in rows.values()])
+    spent = np.array([[cpu.get(stage, 0.0) for stage in STAGES] for cpu in rows.values()])
     medians = [*np.median(spent, axis=0), np.median(spent.sum(axis=1))]
     said = {name: f"{1e3 * cost:.3g} ms" for name, cost in zip(called, medians, strict=True)}
     return said | {SPEED: f"{1 / medians[-1]:.3g}" if medians[-1] > 0 else UNKNOWN}

@@ -1,0 +1,46 @@
+"""What each stage of a frame costs: processor time of this thread, counted where somebody asks for it.
+
+Nothing that is computed depends on it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Final
+
+LAPS: Final = ("trace", "label", "synthesise", "locate", "beamform", "range", "collect")
+"""Stages that are counted, in order: names of rows of a plan, and `collect`, values made ready to be stored."""
+
+
+class _Watch:
+    """Seconds by stage, and when the last lap ended."""
+
+    def __init__(self) -> None:
+        self.cpu: dict[str, float] = {}
+        self.last = time.thread_time()
+
+
+_watch: ContextVar[_Watch | None] = ContextVar("watch", default=None)
+
+
+@contextmanager
+def counted() -> Iterator[dict[str, float]]:
+    """Give seconds of processor time by stage, of those stages alone that ran; it fills while the block runs."""
+    watch = _Watch()
+    token = _watch.set(watch)
+    try:
+        yield watch.cpu
+    finally:
+        _watch.reset(token)
+
+
+def lap(stage: str) -> None:
+    """Count the time since the last lap to a stage that ends here."""
+    watch = _watch.get()
+    if watch is not None:
+        now = time.thread_time()
+        watch.cpu[stage] = watch.cpu.get(stage, 0.0) + now - watch.last
+        watch.last = now

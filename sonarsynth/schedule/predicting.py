@@ -1,0 +1,269 @@
+"""How long a build will take and how large its store will be; and what came of it.
+
+The plan alone gives costs by counts of work. A prediction is better: it makes some frames (`schedule.trials`). Where
+that cannot be, it goes by the counts, and says why.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from math import log
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from sonarsynth.planning import Plan, Stage
+from sonarsynth.planning.costs import machine_factor
+from sonarsynth.schedule.trials import Sizes, Trial, disk_use, try_frames
+
+if TYPE_CHECKING:
+    from sonarsynth.schedule import BuildReport
+
+PREPARED: Final = 3.0
+"""Seconds of one core until a process has a plan, where that was not measured: imports, reading, compiled kernels."""
+CLUSTER: Final = 0.35
+"""Share of that to start and to end a scheduler and its client."""
+WORKER: Final = 1.3
+"""Share of it that a worker takes until it is at its pace: to join its scheduler, to have the plan, kernels; of this"""
+LOADED: Final = 0.35
+"""so much is in its first frame, for kernels that planning has loaded here."""
+PER_FRAME: Final = 3e-3
+"""Seconds of one core for the scheduler to see to the tasks of a frame."""
+CLOSING: Final = 0.3
+"""Seconds that nothing happens in while processes start and end."""
+LAYING_OUT: Final = 0.35
+"""Seconds of one core to lay a store out, where that was not tried."""
+COMPRESSED: Final = 0.4
+"""Bytes after compression over those before, where that was not tried."""
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a build of so many frames on so many workers will take."""
+
+    frames: int
+    workers: int  # 0: in the process that builds
+    cores: int  # that these have
+    shard_frames: int
+    how: str  # how it is known, in words
+    stages: Mapping[str, float]  # s of one core a frame, by stage; `write` with it
+    raw_bytes_a_frame: int  # before compression
+    loading: float  # s of one core, before the first frame of a process is at the pace of the others
+    fresh: tuple[float, ...]  # s of one core that tried frames took longer for the first time
+    prepared: float  # s of one core until a process has the plan
+    waiting: float  # wall-clock time over processor time here and now
+    writing_wait: float  # s a frame that writing takes longer than its processor time
+    sharing: float  # processor time of work where all workers run, over that of one alone
+    laying_out: tuple[float, float]  # s: processor, wall clock
+    sizes: tuple[Sizes, Sizes]  # of the store without frames; that a whole shard adds
+    failures: tuple[str, ...] = ()  # frames that could not be tried, a line each
+
+    def of(self, *, frames: int | None = None, workers: int | None = None) -> Prediction:
+        """The prediction for other numbers of frames or workers (never more of these than shards)."""
+        frames = self.frames if frames is None else frames
+        workers = self.workers if workers is None else workers
+        return replace(self, frames=frames, workers=min(workers, -(-frames // self.shard_frames)))
+
+    @property
+    def frame_seconds(self) -> float:
+        """Seconds of one core to make a frame and to write it, all warm."""
+        return sum(self.stages.values())
+
+    @property
+    def frames_seconds(self) -> float:
+        """Seconds of one core for all frames: making (what is done for the first time with it), without writing."""
+        each = self.frame_seconds - self.stages.get("write", 0.0)
+        return self.frames * each + self.workers * (self._first_times + LOADED * self.prepared)
+
+    @property
+    def core_seconds(self) -> float:
+        """Seconds of the processor in all, those of starting too."""
+        work = self.frames * self.frame_seconds + self.workers * self._first_times
+        if self.workers:
+            work += (CLUSTER + self.workers * WORKER) * self.prepared + self.frames * PER_FRAME
+        return self.laying_out[0] + work
+
+    @property
+    def seconds(self) -> float:
+        """Seconds of the wall clock, from the call of `build` to its end, with the machine as busy as it is now."""
+        if not self.frames:
+            return self.laying_out[1]
+        side = max(min(self.workers, self.cores), 1)  # that run side by side
+        crowded = max(self.workers, 1) / side
+        shards = -(-self.frames // self.shard_frames)
+        busiest = min(self.frames, -(-shards // max(self.workers, 1)) * self.shard_frames)
+        work = busiest * self.frame_seconds + self._first_times
+        wall = self.laying_out[1] + work * crowded * self.sharing * self.waiting + busiest * self.writing_wait
+        if self.workers:
+            seeing_to = self.frames * PER_FRAME / (self.cores if self.workers >= self.cores else 1)
+            wall += self.waiting * ((CLUSTER + crowded * WORKER) * self.prepared + seeing_to) + CLOSING
+        return wall
+
+    @property
+    def raw_bytes(self) -> int:
+        """Bytes of all frames before compression."""
+        return self.frames * self.raw_bytes_a_frame
+
+    @property
+    def file_bytes(self) -> int:
+        """Bytes of all files of the store."""
+        fixed, shard = self.sizes
+        return round(fixed.files + shard.files * self.frames / self.shard_frames)
+
+    @property
+    def bytes(self) -> int:
+        """Bytes that the store takes on the disk, as `du` counts them: files, folders and unfilled blocks."""
+        fixed, shard = self.sizes
+        shards = -(-self.frames // self.shard_frames)
+        return round(self.file_bytes + fixed.disk - fixed.files + shards * max(shard.disk - shard.files, 0.0))
+
+    @property
+    def _first_times(self) -> float:
+        """Seconds of one core that frames of a worker take longer for the first time, ever fewer; here, none."""
+        frames, tried = self.frames / max(self.workers, 1), max(len(self.fresh), 1)
+        grown = 1.0 + log(frames / tried) if frames > tried else frames / tried
+        return self.loading + sum(self.fresh) * grown if self.workers else 0.0
+
+    def rows(self, plan: Plan) -> tuple[Stage, ...]:
+        """The stages of a plan with the seconds of this prediction."""
+        return tuple(replace(row, seconds=self.stages.get(row.stage, row.seconds)) for row in plan.stages)
+
+    def as_json(self) -> dict[str, Any]:
+        """For a program: wall-clock seconds on `workers`, bytes on the disk; seconds of cores, bytes otherwise."""
+        return {
+            "predicted_seconds": self.seconds,
+            "predicted_bytes": self.bytes,
+            "predicted_core_seconds": self.core_seconds,
+            "predicted_frame_seconds": self.frame_seconds,
+            "predicted_file_bytes": self.file_bytes,
+            "predicted_raw_bytes": self.raw_bytes,
+            "predicted_for": {"frames": self.frames, "workers": self.workers, "cores": self.cores},
+            "predicted_from": self.how,
+            "not_tried": list(self.failures),
+        }
+
+    def against(self, report: BuildReport) -> dict[str, Any]:
+        """Prediction and measurement of a build that has ended: for what it did, and for the store as it is."""
+        built, whole = self.of(frames=report.written, workers=report.workers), self.of(frames=_there(report))
+        size = disk_use(Path(report.store))
+        measured = {
+            "seconds": (built.seconds, report.seconds),
+            "frames_core_seconds": (built.frames_seconds, sum(report.stage_cpu.values())),
+            "bytes": (float(whole.bytes), size.disk),
+            "file_bytes": (float(whole.file_bytes), size.files),
+        }
+        rows: dict[str, Any] = {"frames": report.written, "workers": report.workers, "predicted_from": self.how}
+        for name, (predicted, found) in measured.items():
+            rows[f"predicted_{name}"], rows[f"measured_{name}"] = predicted, found
+            rows[f"{name}_ratio"] = predicted / found if found > 0.0 else None
+        return rows
+
+
+def _there(report: BuildReport) -> int:
+    return min(report.there + report.written, report.frames)
+
+
+def predict(
+    plan: Plan,
+    *,
+    frames: int | None = None,
+    workers: int | None = None,
+    folder: Path | str | None = None,
+    prepared: float | None = None,
+) -> Prediction:
+    """Predict a build of a plan, by making some of its frames, which takes a second or two.
+
+    `frames`: how many (left out: all); `workers`: as for `build`; `folder`: where a scratch store may be laid out and
+    removed again (left out: that of temporary files); `prepared`: seconds of the processor that a process like this
+    one takes until it has the plan, where that was measured. Never raises for a frame or a disk that fails: costs are
+    by counts of work then, and `how` says why.
+    """
+    from sonarsynth.schedule import usable_cores
+
+    cores = usable_cores()
+    counted = {stage.stage: stage.seconds for stage in plan.stages}
+    usual = PREPARED * machine_factor()
+    raw = sum(stage.bytes for stage in plan.stages)
+    made = Prediction(
+        frames=plan.recipe.frames,
+        workers=cores,
+        cores=cores,
+        shard_frames=min(plan.shard_frames, plan.recipe.frames),
+        how="counts of work",
+        stages=counted,
+        raw_bytes_a_frame=raw,
+        loading=0.0,
+        fresh=(),
+        prepared=usual if prepared is None else min(prepared, 3.0 * usual),
+        waiting=1.0,
+        writing_wait=0.0,
+        sharing=1.0,
+        laying_out=(LAYING_OUT, LAYING_OUT),
+        sizes=(Sizes(3e5, 1.1e6), Sizes(1.0, 1.6) * (COMPRESSED * raw * plan.shard_frames)),
+    )
+    try:
+        trial = try_frames(plan, None if folder is None else Path(folder))
+    except Exception as error:
+        line = " ".join(f"{error}".split()) or type(error).__name__
+        made = replace(made, how=f"counts of work: no frame could be tried ({line})", failures=(line,))
+    else:
+        made = _from(made, trial)
+    return made.of(frames=frames, workers=workers)
+
+
+def _from(made: Prediction, trial: Trial) -> Prediction:
+    """A prediction with what a trial has shown."""
+    stages = {name: seconds for name, seconds in trial.cpu.items() if name != "collect"}
+    stages["write"] = trial.writing[0] / made.shard_frames + trial.cpu.get("collect", 0.0)
+    few = "" if trial.every == 1 else f" with one facet of {trial.every}"
+    return replace(
+        made,
+        how=f"frames {', '.join(map(str, sorted(trial.frames)))} made here{few}",
+        stages=stages,
+        loading=trial.loading,
+        fresh=trial.fresh,
+        waiting=trial.waiting,
+        writing_wait=max(trial.writing[1] - trial.waiting * trial.writing[0], 0.0) / made.shard_frames,
+        sharing=sharing(made.cores),
+        laying_out=trial.laying_out,
+        sizes=(trial.fixed, trial.shard),
+        failures=trial.failures,
+    )
+
+
+def sharing(cores: int) -> float:
+    """Processor time of work while all of so many cores do the same, over that of one alone: 1 where none shares."""
+    if cores < 2:
+        return 1.0
+    count = min(cores, 16)
+    together = threading.Barrier(count)
+    spent = [0.0] * count
+
+    def work(n: int) -> None:
+        spent[n] = _busy(together.wait)
+
+    alone = _busy(lambda: 0)
+    threads = [threading.Thread(target=work, args=(n,)) for n in range(count)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return float(np.clip(np.median(spent) / alone, 1.0, 2.0))
+
+
+def _busy(ready: Callable[[], int]) -> float:
+    """Processor time of a pass of arithmetic through 4 MB, the best of many that take about 20 ms in all."""
+    block, result = np.ones((2, 2**19), np.float32)
+    np.sqrt(block, out=result)  # memory is there
+    ready()
+    best = np.inf
+    for _ in range(20):
+        began = time.thread_time()
+        np.sqrt(block, out=result)
+        np.multiply(result, block, out=result)
+        best = min(best, time.thread_time() - began)
+    return best

@@ -1,0 +1,203 @@
+"""What a build is predicted to take, and that only what was asked for runs."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sonarsynth import config, render, schedule, store
+from sonarsynth.planning import Plan, plan
+from sonarsynth.products import Signals
+from sonarsynth.recipe import Recipe
+from sonarsynth.scene import Frame
+from sonarsynth.schedule import predicting, trials
+from sonarsynth.sonar.subarrays import Subarray
+
+TASKS = {
+    "signals,image,cloud": ["trace", "beamform", "range"],
+    "image": ["trace", "beamform"],
+    "signals": ["trace", "beamform"],
+    "": ["trace"],
+}
+PARTS = {
+    "signals,image,cloud": {"trace", "label", "synthesise", "locate", "beamform", "collect", "range"},
+    "image": {"trace", "label", "synthesise", "locate", "beamform", "collect"},
+    "signals": {"trace", "label", "synthesise", "collect"},
+    "": {"trace", "label", "collect"},
+}
+
+
+@pytest.fixture(scope="module")
+def prediction(small_plan: Plan) -> schedule.Prediction:
+    return schedule.predict(small_plan, workers=0)
+
+
+def split(names: str) -> list[str]:
+    return [name for name in names.split(",") if name]
+
+
+@pytest.mark.parametrize("products", TASKS)
+def test_only_what_was_asked_for_runs(small: Recipe, tmp_path: Path, products: str) -> None:
+    report = schedule.build(small, tmp_path / "s", frames=[0], products=split(products), workers=0)
+    (row,) = map(json.loads, (tmp_path / "s.times.jsonl").read_text().splitlines())
+    assert list(row["seconds"]) == list(row["cpu"]) == list(report.stage_cpu) == TASKS[products]
+    assert row["parts"].keys() == PARTS[products]
+    assert row["parts"].keys() <= set(render.LAPS)
+    assert math.fsum(row["parts"].values()) == pytest.approx(math.fsum(row["cpu"].values()), abs=0.01)
+
+
+def test_only_what_was_asked_for_is_submitted(small: Recipe, tmp_path: Path) -> None:
+    report = schedule.build(small, tmp_path / "s", frames=[0], products="image", workers=1)
+    assert report.ok
+    assert list(report.stage_cpu) == TASKS["image"]
+
+
+def test_laps_count_to_the_innermost_and_nowhere_else(small_plan: Plan) -> None:
+    with render.counted() as outer:
+        with render.counted() as inner:
+            render.trace_frame(small_plan, 0)
+        assert outer == {}
+    assert inner.keys() == {"trace", "label"}
+    render.trace_frame(small_plan, 0)
+    assert inner.keys() == {"trace", "label"}
+
+
+def test_the_size_of_a_store_is_foreseen(small_plan: Plan, prediction: schedule.Prediction, tmp_path: Path) -> None:
+    report = schedule.build(small_plan, tmp_path / "s", workers=0, prediction=prediction)
+    found = trials.disk_use(tmp_path / "s")
+    assert report.prediction["measured_file_bytes"] == found.files
+    assert prediction.file_bytes == pytest.approx(found.files, rel=0.1)
+    assert prediction.bytes == pytest.approx(found.disk, rel=0.1)
+    last = json.loads((tmp_path / "s.times.jsonl").read_text().splitlines()[-1])
+    assert last == {"build": report.prediction}
+    assert last["build"]["seconds_ratio"] == pytest.approx(prediction.seconds / report.seconds)
+
+
+def test_nothing_is_left_of_a_trial(small_plan: Plan, tmp_path: Path) -> None:
+    made = schedule.predict(small_plan, folder=tmp_path)
+    assert list(tmp_path.iterdir()) == []
+    assert made.how.startswith("frames ")
+    assert made.failures == ()
+
+
+def test_a_store_does_not_depend_on_predictions(small: Recipe, prediction: schedule.Prediction, tmp_path: Path) -> None:
+    for name, given in (("a", None), ("b", prediction)):
+        schedule.build(small, tmp_path / name, frames=range(8), workers=0, prediction=given)
+    for file in (tmp_path / "a").rglob("*"):
+        if file.is_file():
+            assert file.read_bytes() == (tmp_path / "b" / file.relative_to(tmp_path / "a")).read_bytes()
+
+
+def test_where_nothing_can_be_tried_counts_serve(
+    small_plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = schedule.predict(small_plan, folder=tmp_path / "not there")
+    assert made.how.startswith("counts of work: no frame could be tried")
+    assert made.frame_seconds == pytest.approx(sum(stage.seconds for stage in small_plan.stages))
+    assert made.bytes > 0
+    assert math.isfinite(made.seconds)
+
+    def fails(plan: Plan, frame: object) -> None:
+        raise ValueError("no such\nwater")
+
+    monkeypatch.setattr(trials, "trace_at", fails)
+    made = schedule.predict(small_plan)
+    assert made.failures[0].endswith("ValueError: no such water")
+
+
+def test_a_frame_that_fails_is_named_and_the_others_serve(small_plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = trials.trace_at
+
+    def fails(plan: Plan, frame: object) -> object:
+        if frame.index == 12:  # type: ignore[attr-defined]
+            raise ValueError("no water")
+        return real(plan, frame)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(trials, "trace_at", fails)
+    made = schedule.predict(small_plan)
+    assert made.failures == ("frame 12: ValueError: no water",)
+    assert made.how.startswith("frames ")
+    assert "12" not in made.how
+
+
+def test_predictions_grow_as_they_must(prediction: schedule.Prediction) -> None:
+    one = replace(prediction, cores=4, sharing=1.0, waiting=1.0, writing_wait=0.0, prepared=2.0)
+    times = [one.of(frames=n, workers=2).seconds for n in (8, 800, 8000)]
+    assert times == sorted(times)
+    large = [one.of(frames=80000, workers=n).seconds for n in (1, 2, 4)]
+    assert large[0] / large[1] == pytest.approx(2.0, rel=0.1)
+    assert large[1] / large[2] == pytest.approx(2.0, rel=0.1)
+    assert one.of(frames=80000, workers=40).seconds > 0.95 * large[2]  # no more cores than there are
+    assert one.of(frames=16, workers=9).workers == 2  # of two shards
+    sizes = [one.of(frames=n).file_bytes for n in (0, 1000, 2000)]
+    assert sizes[2] - sizes[1] == pytest.approx(sizes[1] - sizes[0], abs=2)
+
+
+def test_slow_frames_are_tried_with_few_facets(small_plan: Plan) -> None:
+    """The cost of a whole frame by straight lines, where the counts say that it takes long."""
+    hours = tuple(replace(stage, seconds=0.4) for stage in small_plan.stages)
+    trial = trials.try_frames(replace(small_plan, stages=hours))
+    assert trial.every > 1
+    assert len(trial.frames) == 1
+    assert {"trace", "label", "synthesise", "locate", "beamform", "range"} <= trial.cpu.keys()
+    assert all(np.isfinite(list(trial.cpu.values()))) and min(trial.cpu.values()) > 0.0
+
+
+def test_some_parts_of_the_array_stand_for_all(small: Recipe, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An array of 20 hydrophones, each heard by itself, is tried at few of them, and its store is as large."""
+
+    def cut(parts: object) -> Plan:
+        return plan(replace(small, scene=replace(small.scene, physics=replace(small.scene.physics, subarrays=parts))))
+
+    real, heard = trials.hear_part, []
+
+    def hears(made: Plan, frame: Frame, part: Subarray) -> Signals:
+        heard.append(int(part.sensor[0]))
+        return real(made, frame, part)
+
+    monkeypatch.setattr(trials, "hear_part", hears)
+    alone, whole = trials.try_frames(cut("sensors")), trials.try_frames(cut(1))
+    assert 2 <= len(set(heard)) <= trials.PARTS
+    assert alone.shard.files == pytest.approx(whole.shard.files, rel=0.05)
+
+
+def test_work_shared_costs_no_less() -> None:
+    assert predicting.sharing(1) == 1.0
+    assert 1.0 <= predicting.sharing(2) <= 2.0
+
+
+def test_the_commands_predict_and_compare(small_file: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    from sonarsynth.cli import app
+    from sonarsynth.cli.running import run
+
+    def command(*arguments: object) -> str:
+        assert run(app, [str(a) for a in arguments]) == 0
+        return capfd.readouterr().out
+
+    answer = json.loads(command("plan", small_file, "--json"))
+    assert answer["predicted_for"] == {
+        "frames": 20,
+        "workers": min(schedule.usable_cores(), 3),
+        "cores": schedule.usable_cores(),
+    }
+    assert 0 < answer["predicted_file_bytes"] < answer["predicted_bytes"]
+    assert answer["predicted_frame_seconds"] * 20 < answer["predicted_core_seconds"]
+    assert re.search(r"predicted: .* for 20 frames with \d+ workers, .* on the disk", command("plan", small_file))
+    built = json.loads(command("build", small_file, tmp_path / "s", "--workers", 0, "--frames", "0:8", "--json"))
+    assert built["prediction"]["frames"] == 8
+    assert built["prediction"]["bytes_ratio"] == pytest.approx(1.0, abs=0.1)
+    again = json.loads(command("build", small_file, tmp_path / "s", "--workers", 0, "--frames", "0:8", "--json"))
+    assert again["prediction"] == {}
+    said = command("build", small_file, tmp_path / "s", "--workers", 0)
+    assert re.search(r"^predicted .*, took .*: [\d.]+ of it$", said, re.M)
+    assert re.search(r"^predicted .*, the store takes .*: [\d.]+ of it$", said, re.M)
+    quiet = command("build", small_file, tmp_path / "t", "--workers", 0, "--frames", "0:1", "--no-predict")
+    assert "predicted" not in quiet
+    assert store.verify(tmp_path / "s", quick=True).ok
+    assert config.load(small_file).frames == 20
