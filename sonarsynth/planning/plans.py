@@ -144,8 +144,10 @@ class Plan:
         return self.recipe.frames * sum(s.bytes for s in self.stages)
 
     def as_json(self) -> dict[str, Any]:
-        """The plan for a program: stages, left_out, sizes, windows; predicted_seconds (of one core, by counts of work) and
-        predicted_bytes (before compression), in whose place `sonarsynth plan --json` has those of `schedule.predict`.
+        """The plan for a program: stages, left_out, predicted_seconds, predicted_bytes, sizes, windows.
+
+        Seconds of one core by counts of work, bytes before compression: `sonarsynth plan --json` has those of
+        `schedule.predict` in their place.
         """
         return {
             "stages": [vars(s) for s in self.stages],
