@@ -182,7 +182,7 @@ def predict(
     one takes until it has the plan, where that was measured. Never raises for a frame or a disk that fails: costs are
     by counts of work then, and `how` says why.
     """
-    from sonarsynth.schedule import usable_cores
+    from sonarsynth.schedule.making import usable_cores
 
     cores = usable_cores()
     counted = {stage.stage: stage.seconds for stage in plan.stages}
