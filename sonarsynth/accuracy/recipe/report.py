@@ -15,7 +15,7 @@ from sonarsynth.pictures.frontier import Line, Panel, frontier_figure
 TITLES: Final = {
     "trace": "signals: tracing and synthesis, by how paths are traced",
     "synthesis": "synthesis of the traced paths",
-    "image": "image: beams within 20 dB of the brightest, largest error",
+    "image": "image: beams within 20 dB of the brightest, root mean square",
     "range": "cloud: largest error of a range by the method",
 }
 
