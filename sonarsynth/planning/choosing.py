@@ -26,7 +26,7 @@ from sonarsynth.ranging import AutoRange, IsovelocityRange, RefractedRange
 from sonarsynth.recipe import Accuracy
 from sonarsynth.scene import Frame, Scene
 from sonarsynth.sonar import Elements
-from sonarsynth.sonar.subarrays import Subarray, subarray, subarrays
+from sonarsynth.sonar.subarrays import subarray, subarrays, with_rim
 from sonarsynth.synthesis import AutoSynthesis, DirectSum, KernelDeposit
 from sonarsynth.synthesis.auto import deposit_error, deposit_for
 
@@ -170,7 +170,7 @@ class Expansion:
             if len(rows):
                 arrivals = arrivals_of(self.plan, self.frame, part)
                 own = np.searchsorted(part.sensor, self.sensor[rows])
-                for out, made in zip(found, _heard(self.plan, self.frame, arrivals, _with_rim(part, own)), strict=True):
+                for out, made in zip(found, _heard(self.plan, self.frame, arrivals, with_rim(part, own)), strict=True):
                     out[rows] = made[: len(rows)]
         sizes = [float(np.linalg.norm(x)) for x in self.exact]
         errors = [float(np.linalg.norm(a - b)) for a, b in zip(found, self.exact, strict=True)]
@@ -182,16 +182,6 @@ def heard_at(elements: Elements) -> Ints:
     live = np.flatnonzero(elements.gain)
     count = min(HEARD_AT, len(live))
     return np.unique(live[np.floor(np.mod((np.arange(count) + 0.5) * 0.6180339887498949, 1.0) * len(live)).astype(int)])
-
-
-def _with_rim(part: Subarray, own: Ints) -> Elements:
-    """Some elements of a part (own,), and after them the one that is farthest out: so that polynomials over the
-    aperture mean the same."""
-    elements = part.elements
-    rim = int(np.argmax(np.linalg.norm(elements.position, axis=1)))
-    rows = np.append(own, rim)
-    column, row = elements.column[rows], elements.row[rows]
-    return replace(elements, position=elements.position[rows], gain=elements.gain[rows], column=column, row=row)
 
 
 def _heard(plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements) -> tuple[Floats, Floats]:

@@ -49,6 +49,16 @@ def subarray(elements: Elements, sensor: Ints) -> Subarray:
     return Subarray(sensor, centre, own)
 
 
+def with_rim(part: Subarray, own: Ints) -> Elements:
+    """Some elements of a part (own,), and after them the one that is farthest out: so that polynomials over the
+    aperture mean the same."""
+    elements = part.elements
+    rim = int(np.argmax(np.linalg.norm(elements.position, axis=1)))
+    rows = np.append(own, rim)
+    column, row = elements.column[rows], elements.row[rows]
+    return replace(elements, position=elements.position[rows], gain=elements.gain[rows], column=column, row=row)
+
+
 def _middle(position: Floats) -> Floats:
     """Centre (xyz) of the smallest ball round points (point, xyz), to some per cent of its radius.
 

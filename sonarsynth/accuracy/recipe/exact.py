@@ -16,7 +16,7 @@ from sonarsynth.products import Arrivals
 from sonarsynth.ranging import RefractedRange
 from sonarsynth.scene import Frame
 from sonarsynth.sonar import Elements
-from sonarsynth.sonar.subarrays import Subarray, subarray
+from sonarsynth.sonar.subarrays import subarray
 from sonarsynth.synthesis import DirectSum, KernelDeposit
 from sonarsynth.synthesis.auto import deposit_for
 from sonarsynth.synthesis.direct_sum import exact_signals
@@ -137,15 +137,6 @@ def pressures(
         for some in (~arrivals.direct, arrivals.direct)
     )
     return np.asarray(echoes, float), np.asarray(direct, float)
-
-
-def with_rim(part: Subarray, own: Ints) -> Elements:
-    """Some elements of a part (own,), and after them the one that is farthest out: so that polynomials over the
-    aperture mean the same."""
-    elements = part.elements
-    rows = np.append(own, int(np.argmax(np.linalg.norm(elements.position, axis=1))))
-    column, row = elements.column[rows], elements.row[rows]
-    return replace(elements, position=elements.position[rows], gain=elements.gain[rows], column=column, row=row)
 
 
 def differences(found: Sequence[Floats], exact: Sequence[Floats]) -> tuple[float, float]:

@@ -10,13 +10,13 @@ from itertools import takewhile
 
 import numpy as np
 
-from sonarsynth.accuracy.recipe.exact import Exact, Heard, differences, golden, pressures, with_rim
+from sonarsynth.accuracy.recipe.exact import Exact, Heard, differences, golden, pressures
 from sonarsynth.accuracy.recipe.points import Point, timed
 from sonarsynth.conventions import Ints
 from sonarsynth.planning import Plan, arrivals_of, frame_start
 from sonarsynth.products import Arrivals
 from sonarsynth.scene import Frame
-from sonarsynth.sonar.subarrays import Subarray, subarrays
+from sonarsynth.sonar.subarrays import Subarray, subarrays, with_rim
 from sonarsynth.tracing import Refracted, Straight
 
 FAINTEST = (30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 100.0)
