@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 from sonarsynth import store, verification
-from sonarsynth.beamforming import DenseDelayAndSum
+from sonarsynth.beamforming import DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.description import FieldError
 from sonarsynth.planning import Plan, plan
 from sonarsynth.recipe import Recipe
@@ -242,7 +242,10 @@ REFUSED = [
         "scene.processing.echo_window.stop: must be after start",
     ),
     (
-        scene(sonar={"array": PositionTable(positions=((0.0, 0.0, 0.0), (0.0, 0.1, 0.0)))}),
+        scene(
+            sonar={"array": PositionTable(positions=((0.0, 0.0, 0.0), (0.0, 0.1, 0.0)))},
+            processing=Processing(beamforming=FocusedDelayAndSum()),
+        ),
         "scene.processing.beamforming.kind: 'focused' needs an array on a lattice",
     ),
     (

@@ -69,11 +69,6 @@ WRONG = [
         "pitch: 5 cm}\n    filter: {kind: low_pass, cutoff: 9 kHz}",
         "12: scene.sonar: nothing to sample: the filter stops the whole band",
     ),
-    (
-        "{kind: planar_lattice, columns: 5, rows: 4, pitch: 5 cm}",
-        "{kind: position_table, positions: [[0, 0, 0], [0, 1, 0], [0, 0, 1]]}",
-        "scene.processing.beamforming.kind: 'focused' needs an array on a lattice",
-    ),
     ("level: 40 dB", "level: 4000 dB", f"5: {WATER}.noise.level: must be less than or equal to 300"),
     (
         "position: [30, 1]",
