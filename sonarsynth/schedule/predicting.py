@@ -54,8 +54,10 @@ class Prediction:
     raw_bytes_a_frame: int  # before compression
     loading: float  # s of one core, before the first frame of a process is at the pace of the others
     fresh: tuple[float, ...]  # s of one core that tried frames took longer for the first time
+    steps: int  # frames of a sequence, where there is more than one sequence; else 0
     prepared: float  # s of one core until a process has the plan
-    waiting: float  # wall-clock time over processor time here and now
+    waiting: float  # wall-clock time over processor time here and now, of one process
+    others: float  # processes that ran or waited for a core then, besides this one
     writing_wait: float  # s a frame that writing takes longer than its processor time
     sharing: float  # processor time of work where all workers run, over that of one alone
     laying_out: tuple[float, float]  # s: processor, wall clock
@@ -77,12 +79,12 @@ class Prediction:
     def frames_seconds(self) -> float:
         """Seconds of one core for all frames: making (what is done for the first time with it), without writing."""
         each = self.frame_seconds - self.stages.get("write", 0.0)
-        return self.frames * each + self.workers * (self._first_times + LOADED * self.prepared)
+        return self.frames * each + max(self.workers, 1) * self._first_times + self.workers * LOADED * self.prepared
 
     @property
     def core_seconds(self) -> float:
         """Seconds of the processor in all, those of starting too."""
-        work = self.frames * self.frame_seconds + self.workers * self._first_times
+        work = self.frames * self.frame_seconds + max(self.workers, 1) * self._first_times
         if self.workers:
             work += (CLUSTER + self.workers * WORKER) * self.prepared + self.frames * PER_FRAME
         return self.laying_out[0] + work
@@ -96,11 +98,11 @@ class Prediction:
         crowded = max(self.workers, 1) / side
         shards = -(-self.frames // self.shard_frames)
         busiest = min(self.frames, -(-shards // max(self.workers, 1)) * self.shard_frames)
-        work = busiest * self.frame_seconds + self._first_times
-        wall = self.laying_out[1] + work * crowded * self.sharing * self.waiting + busiest * self.writing_wait
+        work, waiting = busiest * self.frame_seconds + self._first_times, self._waiting
+        wall = self.laying_out[1] + work * crowded * self.sharing * waiting + busiest * self.writing_wait
         if self.workers:
             seeing_to = self.frames * PER_FRAME / (self.cores if self.workers >= self.cores else 1)
-            wall += self.waiting * ((CLUSTER + crowded * WORKER) * self.prepared + seeing_to) + CLOSING
+            wall += waiting * ((CLUSTER + crowded * WORKER) * self.prepared + seeing_to) + CLOSING
         return wall
 
     @property
@@ -122,9 +124,20 @@ class Prediction:
         return round(self.file_bytes + fixed.disk - fixed.files + shards * max(shard.disk - shard.files, 0.0))
 
     @property
+    def _waiting(self) -> float:
+        """Wall-clock time over processor time of a worker: they wait for each other and for all else that runs."""
+        side = max(min(self.workers, self.cores), 1)
+        return self.waiting * max(1.0, (side + self.others) / self.cores) / max(1.0, (1 + self.others) / self.cores)
+
+    @property
     def _first_times(self) -> float:
-        """Seconds of one core that frames of a worker take longer for the first time, ever fewer; here, none."""
+        """Seconds of one core that frames of a worker take longer for the first time.
+
+        Each sequence has its first frame; along one, ever fewer frames are new, and in this process, none.
+        """
         frames, tried = self.frames / max(self.workers, 1), max(len(self.fresh), 1)
+        if self.steps:
+            return self.loading * bool(self.workers) + sum(self.fresh) / tried * frames / self.steps
         grown = 1.0 + log(frames / tried) if frames > tried else frames / tried
         return self.loading + sum(self.fresh) * grown if self.workers else 0.0
 
@@ -198,8 +211,10 @@ def predict(
         raw_bytes_a_frame=raw,
         loading=0.0,
         fresh=(),
+        steps=plan.recipe.steps if plan.recipe.sequences > 1 else 0,
         prepared=usual if prepared is None else min(prepared, 3.0 * usual),
         waiting=1.0,
+        others=0.0,
         writing_wait=0.0,
         sharing=1.0,
         laying_out=(LAYING_OUT, LAYING_OUT),
@@ -224,9 +239,10 @@ def _from(made: Prediction, trial: Trial) -> Prediction:
         made,
         how=f"frames {', '.join(map(str, sorted(trial.frames)))} made here{few}",
         stages=stages,
-        loading=trial.loading,
+        loading=min(trial.loading, 0.2 * made.prepared),  # not what a compiler did, which is kept
         fresh=trial.fresh,
         waiting=trial.waiting,
+        others=trial.others,
         writing_wait=max(trial.writing[1] - trial.waiting * trial.writing[0], 0.0) / made.shard_frames,
         sharing=sharing(made.cores),
         laying_out=trial.laying_out,

@@ -64,6 +64,7 @@ class Trial:
     loading: float  # s of one core that the very first frame took longer
     fresh: tuple[float, ...]  # s of one core that each of the others took longer for the first time
     waiting: float  # wall-clock time over processor time, of frames
+    others: float  # processes that ran or waited for a core meanwhile, besides this one
     writing: tuple[float, float]  # s to write a whole shard: processor, wall clock
     laying_out: tuple[float, float]  # s to lay the store out: processor, wall clock
     fixed: Sizes  # of the store without frames
@@ -80,6 +81,7 @@ class _Made:
     cpu: Stages
     wall: float
     spent: float  # s of the processor, for all that was made
+    others: int  # processes besides this one that ran then, or waited for a core
 
     @property
     def seconds(self) -> float:
@@ -94,10 +96,12 @@ def try_frames(plan: Plan, folder: Path | None = None) -> Trial:
     """
     predicted = sum(stage.seconds for stage in plan.stages)
     failures: list[str] = []
-    attempt = _try_whole if predicted <= WHOLE else partial(_try_small, predicted=predicted)
-    pairs, costs, every = attempt(plan, failures)
+    pairs, costs, every = _try_small(plan, failures, predicted) if predicted > WHOLE else ([], [], 1)
+    if not pairs or (every > 1 and sum(costs[0].values()) <= WHOLE):  # counts thought more of it
+        pairs, costs, every = _try_whole(plan, failures)
     if not pairs:
         raise RuntimeError(failures[0])
+    failures = list(dict.fromkeys(failures))
     made = [warm for _, warm in pairs]
     fresh = [max(first.seconds - warm.seconds, 0.0) for first, warm in pairs]
     waiting = sum(one.wall for one in made) / max(sum(one.spent for one in made), 1e-9)
@@ -109,6 +113,7 @@ def try_frames(plan: Plan, folder: Path | None = None) -> Trial:
         loading=fresh[0],
         fresh=tuple(fresh[1:]),
         waiting=max(waiting, 1.0),
+        others=float(np.mean([one.others for pair in pairs for one in pair])),
         writing=writing,
         laying_out=laying_out,
         fixed=fixed,
@@ -177,15 +182,15 @@ def _make(plan: Plan, index: int, every: int = 1) -> _Made:
 
     Where the array is cut into more than PARTS parts, it is heard as one and by so many of these.
     """
-    plan = plan.at(index)
-    frame = plan.recipe.frame(index)[1]
-    check_unseen(plan, frame)
-    if every > 1:
-        frame = _thinned(frame, every)
-    parts = plan.choices.subarrays
-    one = replace(plan, choices=replace(plan.choices, subarrays=1)) if parts > PARTS else plan
     began, before = time.perf_counter(), time.thread_time()
     with counted() as cpu:
+        plan = plan.at(index)
+        frame = plan.recipe.frame(index)[1]
+        check_unseen(plan, frame)
+        if every > 1:
+            frame = _thinned(frame, every)
+        parts = plan.choices.subarrays
+        one = replace(plan, choices=replace(plan.choices, subarrays=1)) if parts > PARTS else plan
         traced = trace_at(one, frame)
         values = range_frame(one, index, traced, beamform_frame(one, index, traced))
         values = layout_of(one).check(values)
@@ -196,7 +201,15 @@ def _make(plan: Plan, index: int, every: int = 1) -> _Made:
         for part in some:
             hear_part(plan, frame, part)
         cpu["synthesise"] += (time.thread_time() - start) * len(every_part) / len(some)
-    return _Made(index, values, dict(cpu), time.perf_counter() - began, time.thread_time() - before)
+    return _Made(index, values, dict(cpu), time.perf_counter() - began, time.thread_time() - before, _others())
+
+
+def _others() -> int:
+    """Processes besides this one that run or wait for a core now; 0 where nothing tells."""
+    try:
+        return max(int(Path("/proc/loadavg").read_text().split()[3].partition("/")[0]) - 1, 0)
+    except (OSError, ValueError, IndexError):
+        return 0
 
 
 def _thinned(frame: Frame, every: int) -> Frame:

@@ -127,7 +127,7 @@ def test_a_frame_that_fails_is_named_and_the_others_serve(small_plan: Plan, monk
 
 
 def test_predictions_grow_as_they_must(prediction: schedule.Prediction) -> None:
-    one = replace(prediction, cores=4, sharing=1.0, waiting=1.0, writing_wait=0.0, prepared=2.0)
+    one = replace(prediction, cores=4, sharing=1.0, waiting=1.0, others=0.0, writing_wait=0.0, prepared=2.0)
     times = [one.of(frames=n, workers=2).seconds for n in (8, 800, 8000)]
     assert times == sorted(times)
     large = [one.of(frames=80000, workers=n).seconds for n in (1, 2, 4)]
@@ -135,6 +135,8 @@ def test_predictions_grow_as_they_must(prediction: schedule.Prediction) -> None:
     assert large[1] / large[2] == pytest.approx(2.0, rel=0.1)
     assert one.of(frames=80000, workers=40).seconds > 0.95 * large[2]  # no more cores than there are
     assert one.of(frames=16, workers=9).workers == 2  # of two shards
+    busy = replace(one, others=4.0, waiting=1.25).of(frames=80000, workers=4)  # four others on four cores
+    assert busy.seconds / large[2] == pytest.approx(2.0, rel=0.05)
     sizes = [one.of(frames=n).file_bytes for n in (0, 1000, 2000)]
     assert sizes[2] - sizes[1] == pytest.approx(sizes[1] - sizes[0], abs=2)
 
