@@ -51,6 +51,8 @@ def image_error(plan: Plan, method: FocusedDelayAndSum, signals: Signals, start:
     """Root mean square error (dB) of an image of signals from start to stop (s), over its bright beams."""
     elements, sonar = plan.elements, plan.scene.sonar
     energy = method.image(signals, elements, sonar, start, stop).energy.astype(float)
+    if not energy.any():
+        return 0.0
     row, column = np.nonzero(energy >= energy.max() * 10.0 ** (-WITHIN / 10.0))
     every = -(-len(row) // COMPARED)
     row, column = row[::every], column[::every]
