@@ -124,7 +124,7 @@ def build(
         plan = planning.plan(made_from, chosen)
     wanted = chosen_frames(frames, sequences, made_from.sequences, made_from.steps)
     prediction = None
-    if predicting and scheduler is None and stores.missing(store, plan, wanted):
+    if predicting and scheduler is None and (restart or stores.missing(store, plan, wanted)):
         prediction = schedule.predict(plan, prepared=time.process_time())
     with printing.progress() as progress:
         report = schedule.build(
