@@ -142,7 +142,7 @@ def test_predictions_grow_as_they_must(prediction: schedule.Prediction) -> None:
 
 
 def test_slow_frames_are_tried_with_few_facets(small_plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The cost of a whole frame by straight lines, where it takes long; whole frames where counts made too much of it."""
+    """By straight lines, where a whole one takes long; a whole frame where counts made too much of it."""
     hours = replace(small_plan, stages=tuple(replace(stage, seconds=0.4) for stage in small_plan.stages))
     assert trials.try_frames(hours).every == 1
     monkeypatch.setattr(trials, "WHOLE", 0.0)
