@@ -27,7 +27,7 @@ PREPARED: Final = 3.0
 """Seconds of one core until a process has a plan, where that was not measured: imports, reading, compiled kernels."""
 CLUSTER: Final = 0.35
 """Share of that to start and to end a scheduler and its client."""
-WORKER: Final = 1.3
+WORKER: Final = 1.15
 """Share of it that a worker takes until it is at its pace: to join its scheduler, to have the plan, kernels; of this"""
 LOADED: Final = 0.35
 """so much is in its first frame, for kernels that planning has loaded here."""
@@ -192,7 +192,8 @@ def predict(
 
     `frames`: how many (left out: all); `workers`: as for `build`; `folder`: where a scratch store may be laid out and
     removed again (left out: that of temporary files); `prepared`: seconds of the processor that a process like this
-    one takes until it has the plan, where that was measured. Never raises for a frame or a disk that fails: costs are
+    one takes until it has the plan, where that was measured (much more of it was for choices, that workers are
+    given, or for a compiler, whose work is kept). Never raises for a frame or a disk that fails: costs are
     by counts of work then, and `how` says why.
     """
     from sonarsynth.schedule.making import usable_cores
@@ -212,7 +213,7 @@ def predict(
         loading=0.0,
         fresh=(),
         steps=plan.recipe.steps if plan.recipe.sequences > 1 else 0,
-        prepared=usual if prepared is None else min(prepared, 3.0 * usual),
+        prepared=usual if prepared is None else min(prepared, 1.25 * usual),
         waiting=1.0,
         others=0.0,
         writing_wait=0.0,
