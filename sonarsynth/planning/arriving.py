@@ -36,7 +36,7 @@ def arrivals_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Arriv
         band=(sonar.band.low, sonar.band.high),
         moving=Moving(velocities, frame.sonar_velocity) if scene.physics.doppler else None,
         negligible=plan.choices.negligible,
-        enough=AMPLITUDES * plan.recipe.accuracy.signal,
+        enough=AMPLITUDES * plan.recipe.accuracy.cheap,
     )
 
 

@@ -90,14 +90,14 @@ def _some(looks: Sequence[Look], count: int) -> list[Look]:
 def _negligible(scene: Scene, accuracy: Accuracy) -> float:
     if scene.physics.faintest != "auto":
         return float(10.0 ** (-scene.physics.faintest / 10.0))
-    return 0.0 if accuracy.exact else FAINT * accuracy.signal**2
+    return 0.0 if accuracy.exact else FAINT * accuracy.cheap**2
 
 
 def _synthesis(scene: Scene, accuracy: Accuracy) -> KernelDeposit | DirectSum:
     method = scene.physics.synthesis
     if not isinstance(method, AutoSynthesis):
         return method
-    return DirectSum() if accuracy.exact else method.resolve(np.sqrt(SYNTHESIS) * accuracy.signal)
+    return DirectSum() if accuracy.exact else method.resolve(np.sqrt(SYNTHESIS) * accuracy.cheap)
 
 
 def _ranging(scene: Scene, accuracy: Accuracy, bent: float) -> IsovelocityRange | RefractedRange:
@@ -186,7 +186,7 @@ def heard_at(elements: Elements) -> Ints:
 
 def _heard(plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements) -> tuple[Floats, Floats]:
     """Echoes and direct arrivals (sensor, sample) in Pa, each by itself, of given arrivals."""
-    method = deposit_for(GOLDEN * plan.recipe.accuracy.signal)
+    method = deposit_for(GOLDEN * plan.recipe.accuracy.cheap)
     start, samples = frame_start(plan, frame), plan.windows.samples
     sonar, snaps = plan.scene.sonar, frame.moment.snaps
     echoes, direct = (

@@ -19,7 +19,7 @@ class Accuracy:
     taken at its word: its facets, its band and its beams are not errors.
     """
 
-    signal: Annotated[Number, Ge(1e-7), Le(0.3)] = 1e-3
+    signal: Annotated[Number, Ge(1e-7), Le(0.3)] = 0.02
     """Error of the echoes, and of the direct arrivals, relative: root of the summed squares, over the array."""
     range_m: Annotated[Number, Gt(0)] = 0.01
     """Error of ranges by the method that turns delays into places, in m."""
@@ -27,3 +27,8 @@ class Accuracy:
     """Error of the energy in a beam, in dB: root mean square over those within 20 dB of the brightest."""
     exact: bool = False
     """Whether everything is computed the slow, exact way, but for what the scene chooses otherwise."""
+
+    @property
+    def cheap(self) -> float:
+        """Error of signals that is allowed to what costs little to do better: never more than 1e-3."""
+        return min(self.signal, 1e-3)
