@@ -17,6 +17,7 @@ from sonarsynth.planning.arriving import arrivals_of
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.windows import frame_start
 from sonarsynth.products import Signals
+from sonarsynth.synthesis.auto import USUAL, deposit_for
 from sonarsynth.synthesis.pulse import snap_levels
 
 ZONES = (1, 2, 4, 8, 16, MOST_ZONES)
@@ -72,8 +73,9 @@ def _heard(plan: Plan, index: int) -> tuple[Signals, float, float] | None:
     if not arrivals.direct.any() or arrivals.direct.all():
         return None
     start, samples = frame_start(plan, frame), plan.windows.samples
-    method, sonar = plan.choices.synthesis, plan.scene.sonar
-    signals = method.signals(arrivals, snaps, plan.elements, sonar, plan.absorption, start, samples)
+    sonar = plan.scene.sonar
+    # Not by the plan's own method: direct sums would take minutes, and the same signals go into both images.
+    signals = deposit_for(USUAL).signals(arrivals, snaps, plan.elements, sonar, plan.absorption, start, samples)
     direct, levels = arrivals.select(arrivals.direct), np.array(snap_levels(snaps))
     loudest = np.argmax(levels[direct.snap] + 20.0 * np.log10(np.abs(direct.amplitude)))
     clock = float(direct.delay[loudest])
