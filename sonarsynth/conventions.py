@@ -28,6 +28,7 @@ Floats = npt.NDArray[np.float64]
 
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
+Bytes = npt.NDArray[np.uint8]
 
 REFERENCE_PRESSURE: Final = 1e-6  # Pa: levels are dB re 1 uPa
 SLOWEST, FASTEST = 100.0, 10e3

@@ -7,13 +7,13 @@ the instant of the frame; a snap at `Snap.time` is heard a travel time later).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.conventions import Bools, Bytes, Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +89,9 @@ class Arrivals:
     corners: Floats  # (path, 3) s: of the facet about `delay`, a mean over it; 0: a point
     rough_share: Floats  # (path,) w: of the power that is coherent where it is smooth
     rough_delay: Floats  # (path,) s: a rough facet sends sqrt(1 - w exp(-(2 pi f rough_delay)^2)); w = 0: all
+    hidden_from: (
+        Bytes  # (path, byte) bits: a body hides it from the array centre, from each hydrophone; (path, 0): none
+    )
     centre: float  # Hz: centre of the band, where amplitudes hold
     sound_speed: float  # m/s of the water at the array centre
     wavefront_error: float  # s: largest error of the wavefronts that was measured, at probes spread over the aperture
@@ -100,6 +103,26 @@ class Arrivals:
             name: value[keep] if isinstance(value, np.ndarray) else value for name, value in vars(self).items()
         }
         return Arrivals(**rows)
+
+    def hidden(self, sensors: int) -> Bools:
+        """(path, sensor) hydrophones that a body hides each path from; (path, 0) where none is hidden anywhere."""
+        bits = np.unpackbits(self.hidden_from, axis=1, count=1 + sensors if self.hidden_from.shape[1] else None)
+        return bits[:, 1:].astype(bool)
+
+    def heard_by(self, rows: Ints, sensors: int) -> Arrivals:
+        """The same for some (row,) of so many hydrophones, in another order perhaps."""
+        if not self.hidden_from.shape[1]:
+            return self
+        bits = np.unpackbits(self.hidden_from, axis=1, count=1 + sensors)
+        return replace(self, hidden_from=np.packbits(bits[:, np.append(0, 1 + rows)], axis=1))
+
+    @property
+    def at_centre(self) -> Arrivals:
+        """The paths that reach the centre of the array, as if all hydrophones saw what it sees."""
+        if not self.hidden_from.shape[1]:
+            return self
+        seen = self.select(self.hidden_from[:, 0] < 128)
+        return replace(seen, hidden_from=seen.hidden_from[:, :0])
 
     @property
     def direct(self) -> Bools:

@@ -77,6 +77,9 @@ class Physics:
     subarrays: Literal["auto", "sensors"] | Annotated[int, Ge(1), Le(100_000)] = "auto"
     """Parts that the array is cut into: paths are traced to the middle of each and expanded from there to its
     hydrophones. `sensors`: every hydrophone by itself; `auto`: as few as the accuracy of the recipe allows."""
+    visibility: Literal["auto", "centre", "hydrophones"] = "auto"
+    """Whether a facet is heard where the middle of the array (or part) sees it, or by each hydrophone that sees it.
+    `auto`: the latter where the accuracy of the recipe asks for it."""
     faintest: Literal["auto"] | Annotated[Decibels, Gt(0), Le(300)] = "auto"
     """The faintest echoes of each target are left out, all of them together this far below the whole echo."""
     synthesis: Synthesis = Field(default_factory=AutoSynthesis)

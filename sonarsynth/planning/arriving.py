@@ -17,7 +17,8 @@ AMPLITUDES = 0.1
 def arrivals_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Arrivals:
     """Every path of a frame to the middle of the array, or of a part of it, expanded over its hydrophones.
 
-    `plan` is that of the frame's sequence. Raises ValueError for anything outside the water.
+    What is not traced to any hydrophone, as where parts are, is seen by the array's middle alone. `plan` is that of
+    the frame's sequence. Raises ValueError for anything outside the water.
     """
     from sonarsynth.tracing.arrivals import trace
     from sonarsynth.tracing.moving import Moving
@@ -37,6 +38,7 @@ def arrivals_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Arriv
         moving=Moving(velocities, frame.sonar_velocity) if scene.physics.doppler else None,
         negligible=plan.choices.negligible,
         enough=AMPLITUDES * plan.recipe.accuracy.cheap,
+        visibility=plan.choices.visibility if part is not None or plan.choices.subarrays == 1 else "centre",
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Lt
 from pydantic import TypeAdapter
@@ -13,6 +13,8 @@ from sonarsynth.description import BY_KIND, description
 from sonarsynth.ranging import IsovelocityRange, RefractedRange
 from sonarsynth.synthesis import DirectSum, KernelDeposit
 
+Visibility = Literal["centre", "hydrophones"]
+
 
 @description
 class Choices:
@@ -21,6 +23,8 @@ class Choices:
 
     subarrays: Annotated[int, Ge(1)] = 1
     """Parts that the array is cut into; as many as it has hydrophones: each is traced by itself."""
+    visibility: Visibility = "centre"
+    """From where facets must be seen to be heard: from the middle of the array or part, or from each hydrophone."""
     negligible: Annotated[Number, Ge(0), Lt(1)] = 1e-7
     """Share of the power of a target's echo that its faintest paths may have, and be left out."""
     synthesis: Annotated[KernelDeposit | DirectSum, BY_KIND] = KernelDeposit()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from sonarsynth.beamforming import DenseDelayAndSum
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.planning.arriving import arrivals_of
 from sonarsynth.planning.bending import ranging_error
-from sonarsynth.planning.choices import Choices
+from sonarsynth.planning.choices import Choices, Visibility
 from sonarsynth.planning.imaging import beamformer
 from sonarsynth.planning.looks import Look
 from sonarsynth.planning.plans import Errors, Plan
@@ -42,6 +43,8 @@ EVERY = 1e-3
 """Share of the paths left out that are left out where errors are measured: 3 % of what that errs by."""
 MANY = 1_000_000
 """Facets over which errors are measured in one frame only, at half as many hydrophones."""
+BETTER = 0.7
+"""Of the error where the middle of the array sees for all, that must be left where each hydrophone sees for itself."""
 GOLDEN = 0.03
 """Error of the synthesis that measures, over what is allowed."""
 
@@ -61,14 +64,14 @@ def choose(plan: Plan, looks: Sequence[Look]) -> Plan:
     )
     made = replace(plan, choices=choices)
     indices = [look.frames[0].index for look in some]
-    count, error, whole = _subarrays(made, indices)
+    cut = _subarrays(made, indices)
     steering, blurred = beamformer(made, indices) if imaged else (choices.beamforming, 0.0)
     straight = isinstance(choices.ranging, IsovelocityRange)
     by_synthesis = deposit_error(synthesis) if isinstance(synthesis, KernelDeposit) else 0.0
     return replace(
         made,
-        choices=replace(choices, subarrays=count, beamforming=steering),
-        errors=Errors(error, whole, by_synthesis, bent if straight else 0.0, blurred),
+        choices=replace(choices, subarrays=cut.parts, visibility=cut.visibility, beamforming=steering),
+        errors=Errors(cut.error, cut.whole, by_synthesis, bent if straight else 0.0, blurred),
     )
 
 
@@ -107,34 +110,49 @@ def _ranging(scene: Scene, accuracy: Accuracy, bent: float) -> IsovelocityRange 
     return method.resolve(straight=bent == 0.0 if accuracy.exact else bent <= accuracy.range_m)
 
 
-def _subarrays(plan: Plan, indices: Sequence[int]) -> tuple[int, float, float]:
-    """Parts that the array is cut into, what signals err by then, and where it is not cut."""
-    wanted, count = plan.scene.physics.subarrays, plan.elements.count
-    if wanted == "sensors" or (wanted == "auto" and plan.recipe.accuracy.exact):
-        return count, 0.0, np.nan
+class _Cut(NamedTuple):
+    """How paths reach the hydrophones."""
+
+    parts: int  # that the array is cut into
+    visibility: Visibility
+    error: float  # of signals
+    whole: float = np.nan  # the same, where the array is not cut and its middle sees for all
+
+
+def _subarrays(plan: Plan, indices: Sequence[int]) -> _Cut:
+    """The fewest parts of the array that will do; where one will not, each hydrophone's own view of the targets is
+    tried first."""
+    physics, count = plan.scene.physics, plan.elements.count
+    seeing: Visibility = "centre" if physics.visibility == "auto" else physics.visibility
+    if physics.subarrays == "sensors" or (physics.subarrays == "auto" and plan.recipe.accuracy.exact):
+        return _Cut(count, "centre", 0.0)
     measures = [Expansion.of(plan, index) for index in indices]
-    if wanted != "auto":
-        parts = min(wanted, count)
-        return parts, _worst(measures, parts, np.inf), np.nan
     allowed = np.sqrt(EXPANSION) * plan.recipe.accuracy.signal / SAFETY
-    sizes = [2**n for n in range(int(np.ceil(np.log2(count))))] + [count]
-    whole = _worst(measures, 1, allowed)
-    if whole <= allowed:
-        return 1, whole, whole
+    given = physics.subarrays != "auto"
+    first = min(physics.subarrays, count) if physics.subarrays != "auto" else 1
+    whole = error = _worst(measures, first, seeing, np.inf if given else allowed)
+    if error > allowed and physics.visibility == "auto":
+        better = _worst(measures, first, "hydrophones", np.inf if given else allowed)
+        if better < BETTER * error:
+            seeing, error = "hydrophones", better
+    if given:
+        return _Cut(first, seeing, error)
+    if error <= allowed:
+        return _Cut(1, seeing, error, whole)
     # Cubics err by the fourth power of the width of parts, the square of their number: no fewer will do.
-    fewest = max(int(np.log2(whole / allowed) / 2.0), 1)
-    for parts in sizes[fewest:-1]:
-        error = _worst(measures, parts, allowed)
+    fewest = max(int(np.log2(error / allowed) / 2.0), 1)
+    for parts in [2**n for n in range(int(np.ceil(np.log2(count))))][fewest:]:
+        error = _worst(measures, parts, seeing, allowed)
         if error <= allowed:
-            return parts, error, whole
-    return count, 0.0, whole
+            return _Cut(parts, seeing, error, whole)
+    return _Cut(count, "centre", 0.0, whole)
 
 
-def _worst(measures: Sequence[Expansion], parts: int, allowed: float) -> float:
+def _worst(measures: Sequence[Expansion], parts: int, visibility: Visibility, allowed: float) -> float:
     """Largest error of signals in some frames, or the first that is more than is allowed."""
     worst = 0.0
     for measure in measures:
-        worst = max(worst, measure.error(parts))
+        worst = max(worst, measure.error(parts, visibility))
         if worst > allowed:
             break
     return worst
@@ -162,15 +180,16 @@ class Expansion:
             rows.append(_heard(plan, frame, arrivals_of(every, frame, part), part.elements))
         return Expansion(plan, frame, sensor, (np.vstack([r[0] for r in rows]), np.vstack([r[1] for r in rows])))
 
-    def error(self, parts: int) -> float:
+    def error(self, parts: int, visibility: Visibility = "centre") -> float:
         """Error of signals, relative, where the array is cut into so many parts: of echoes or direct arrivals."""
+        plan = replace(self.plan, choices=replace(self.plan.choices, subarrays=parts, visibility=visibility))
         found = tuple(np.zeros_like(x) for x in self.exact)
         for part in subarrays(self.plan.elements, parts):
             rows = np.flatnonzero(np.isin(self.sensor, part.sensor))
             if len(rows):
-                arrivals = arrivals_of(self.plan, self.frame, part)
-                own = np.searchsorted(part.sensor, self.sensor[rows])
-                for out, made in zip(found, _heard(self.plan, self.frame, arrivals, with_rim(part, own)), strict=True):
+                own, place = with_rim(part, np.searchsorted(part.sensor, self.sensor[rows]))
+                arrivals = arrivals_of(plan, self.frame, part).heard_by(place, part.elements.count)
+                for out, made in zip(found, _heard(plan, self.frame, arrivals, own), strict=True):
                     out[rows] = made[: len(rows)]
         sizes = [float(np.linalg.norm(x)) for x in self.exact]
         errors = [float(np.linalg.norm(a - b)) for a, b in zip(found, self.exact, strict=True)]

@@ -124,6 +124,8 @@ def _traced(plan: Plan) -> str:
     to = "the array" if parts == 1 else f"each of {parts} subarrays"
     if parts == plan.elements.count > 1:
         to = "each hydrophone by itself"
+    if plan.choices.visibility == "hydrophones":
+        to += ", seen from each hydrophone"
     words = [f"{plan.propagation.kind} rays to {to}", f"{plan.propagation.bounces} bounces", laws]
     return ", ".join(word for word in words if word)
 

@@ -99,6 +99,11 @@ def _accuracy(made: Plan) -> list[str]:
             f"accuracy.signal {allowed.signal:g} takes {parts} subarrays, each traced by itself: one would err by "
             f"{errors.whole:.2g}"
         )
+    if made.choices.visibility == "hydrophones" and made.scene.physics.visibility == "auto":
+        found.append(
+            f"accuracy.signal {allowed.signal:g} takes each hydrophone's own view of the targets: that from the middle "
+            f"of the array errs by {errors.whole:.2g}"
+        )
     if np.hypot(np.nan_to_num(errors.expansion), np.nan_to_num(errors.synthesis)) > allowed.signal:
         found.append(
             f"signals err by {errors.expansion:.2g} (paths over the array) and {errors.synthesis:.2g} (synthesis): "

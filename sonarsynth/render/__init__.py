@@ -100,13 +100,14 @@ def trace_at(plan: Plan, frame: Frame) -> Traced:
     """Every path of a frame that is at hand, and its truth; `plan` is that of its sequence."""
     sonar, arrivals = plan.scene.sonar, arrivals_of(plan, frame)
     lap("trace")
+    seen = arrivals.at_centre
     levels = snap_levels(frame.moment.snaps)
     straight = isinstance(plan.propagation, Straight)
     truth = label(frame.moment, frame.sonar_pose, sonar.beams, plan.connect, levels, straight)
     band, targets = _band(plan, frame.moment.snaps), len(frame.moment.bodies)
-    powers = path_powers(arrivals, band)
-    book = ledger(arrivals, powers, band, targets, levels, _expansion_error(plan, arrivals))
-    heard = echoes(arrivals, powers, targets, levels)
+    powers = path_powers(seen, band)
+    book = ledger(seen, powers, band, targets, levels, _expansion_error(plan, seen))
+    heard = echoes(seen, powers, targets, levels)
     lap("label")
     return Traced(frame, arrivals, truth, book, heard)
 

@@ -27,7 +27,7 @@ PREPARED: Final = 3.0
 """Seconds of one core until a process has a plan, where that was not measured: imports, reading, compiled kernels."""
 CLUSTER: Final = 0.35
 """Share of that to start and to end a scheduler and its client."""
-WORKER: Final = 1.15
+WORKER: Final = 0.75
 """Share of it that a worker takes until it is at its pace: to join its scheduler, to have the plan, kernels; of this"""
 LOADED: Final = 0.35
 """so much is in its first frame, for kernels that planning has loaded here."""

@@ -49,14 +49,15 @@ def subarray(elements: Elements, sensor: Ints) -> Subarray:
     return Subarray(sensor, centre, own)
 
 
-def with_rim(part: Subarray, own: Ints) -> Elements:
+def with_rim(part: Subarray, own: Ints) -> tuple[Elements, Ints]:
     """Some elements of a part (own,), and after them the one that is farthest out: so that polynomials over the
-    aperture mean the same."""
+    aperture mean the same. With their rows in the part."""
     elements = part.elements
     rim = int(np.argmax(np.linalg.norm(elements.position, axis=1)))
     rows = np.append(own, rim)
     column, row = elements.column[rows], elements.row[rows]
-    return replace(elements, position=elements.position[rows], gain=elements.gain[rows], column=column, row=row)
+    some = replace(elements, position=elements.position[rows], gain=elements.gain[rows], column=column, row=row)
+    return some, rows
 
 
 def _middle(position: Floats) -> Floats:

@@ -118,6 +118,8 @@ def _add_tile(heard: npt.NDArray[Any], tile: Tile, part: Fronts, stage: Stage) -
     delay, gain = delay_and_gain(tile.reference, elements.position)
     late = delay[0] + (part.delay[0] - stage.origin if alone else 0.0)
     gain = gain[0] * elements.gain * (part.amplitude[0] if alone else 1.0)
+    if alone and part.dark.shape[1]:
+        gain = gain * ~part.dark[0]
     onto, column, weight = to_sensors(elements, tile.axes, dtype.name)
     field = field.reshape(len(points) // weight.shape[1], -1)
     if onto is not None:
@@ -154,20 +156,19 @@ def _deposited(tile: Tile, part: Fronts, points: Floats, stage: Stage) -> npt.ND
     field = np.empty((len(points), 2, bins.frequency.size), stage.dtype)
     group = max(1, LARGEST // (len(tile.terms) * grid.circle))
     for first in range(0, len(points), group):
-        some = points[first : first + group]
-        deposits = _deposits(table, part, tile, some, stage)
-        spectra, faces = rfft(deposits[:, :, : grid.circle], axis=2), _faces(tile, some, stage)
-        combine(spectra, bins.first, faces, place, power, response, mode, field[first : first + group])
+        some = slice(first, first + group)
+        deposits = _deposits(table, part, tile, points, some, stage)
+        spectra, faces = rfft(deposits[:, :, : grid.circle], axis=2), _faces(tile, points[some], stage)
+        combine(spectra, bins.first, faces, place, power, response, mode, field[some])
     return field
 
 
-def _deposits(table: Floats, part: Fronts, tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
-    """The grid (node, term, sample) of a tile at some points."""
+def _deposits(table: Floats, part: Fronts, tile: Tile, nodes: Floats, some: slice, stage: Stage) -> npt.NDArray[Any]:
+    """The grid (node, term, sample) of a tile at some of its nodes (node, xyz)."""
     from sonarsynth.synthesis.kernels import deposit
 
-    grid = stage.grid
+    points, grid, reference = nodes[some], stage.grid, tile.reference
     rate = grid.circle * stage.bins.step
-    reference = tile.reference
     steer, level = delay_and_gain(reference, points)
     middle, _ = towards(reference, points)
     late = louder = np.zeros((0, 0))
@@ -176,6 +177,8 @@ def _deposits(table: Floats, part: Fronts, tile: Tile, points: Floats, stage: St
         late = (aperture_terms(points, part.aperture) @ part.delay_terms.T) * rate
     if part.gain_terms.shape[1]:
         louder = aperture_terms(points, part.aperture) @ part.gain_terms.T
+    if part.dark.any():
+        louder = np.where(part.dark.T[some], -1.0, louder if louder.size else 0.0)
     out = np.zeros((len(points), len(tile.terms), grid.circle + grid.lanes), stage.dtype)
     deposit(
         table.ravel(),

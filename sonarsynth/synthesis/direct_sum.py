@@ -49,7 +49,8 @@ def exact_spectra(front: Fronts, elements: Elements, frequency: Floats, relative
             )
         if one.turn_terms.any() or one.spread_terms.any():
             shape = shape * changed(one, elements.position, frequency)
-        total += (one.amplitude[0] * gain[0] * elements.gain)[:, None] * (
+        heard = elements.gain * ~one.dark[0] if one.dark.shape[1] else elements.gain
+        total += (one.amplitude[0] * gain[0] * heard)[:, None] * (
             face * loss * shape * np.exp(-2j * np.pi * late[:, None] * frequency)
         )
     return total

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -85,17 +85,17 @@ class _Views:
     probes: _Probes
     gradient: Floats  # (xyz, point, term) of the aperture terms; empty where there are none
     bend: Floats  # (xyz, path) rad/m: how fast pulses change over the aperture (`changing.slopes`)
-    near: bool  # a source is within or about that box, where no nodes can stand for the hydrophones
+    own: bool  # no nodes can stand for the hydrophones: a source is within or about that box, or paths miss some
 
 
-def _views(front: Fronts, aim: Aim) -> _Views:
+def _views(front: Fronts, aim: Aim, missed: bool) -> _Views:
     elements = aim.elements
     near = bool(front.curvature.max() * np.linalg.norm(np.abs(elements.position).max(axis=0)) > 0.8)
     probes = _probes(elements, near)
     gradient = aperture_gradient(front, probes.points)
     columns = _columns(front, probes.points, gradient)
     bend = slopes(front, gradient, aim.weights[0] * aim.highest, aim.highest)
-    return _Views(front, columns, variation(front, elements), probes, gradient, bend, near)
+    return _Views(front, columns, variation(front, elements), probes, gradient, bend, near or missed)
 
 
 def _columns(front: Fronts, probes: Floats, gradient: Floats) -> Floats:
@@ -135,6 +135,7 @@ def _reference(middle: Floats, front: Fronts, over: Rest) -> Fronts:
         corners=np.zeros((1, 3)),
         rough_share=np.zeros(1),
         rough_delay=np.zeros(1),
+        dark=np.zeros((1, 0), bool),
         modes=np.zeros((1, 0)),
         centre=front.centre,
     )
@@ -183,7 +184,7 @@ def _try(paths: Ints, views: _Views, aim: Aim) -> _Trial:
     wave = aim.highest / reference.sound_speed  # 1/m
     turn, loss = (aim.elements.face * wave * dy, aim.elements.face * wave * dz), float(far[4])
     bend = views.bend[:, paths].max(axis=1)
-    phase = np.full(3, np.inf) if views.near else (2.0 * np.pi * wave * slope + bend) * probes.size
+    phase = np.full(3, np.inf) if views.own else (2.0 * np.pi * wave * slope + bend) * probes.size
     modes, sizes = np.zeros((0, 0)), PLAIN
     if views.front.modes.shape[1]:
         modes, sizes = main_modes(*pulses(views.front, paths, over, aim.changes))
@@ -252,10 +253,22 @@ def _halves(paths: Ints, views: _Views, aim: Aim) -> tuple[Ints, Ints] | None:
 
 def tiles(front: Fronts, aim: Aim) -> list[Tile]:
     """The tiles of predicted least cost: each is halved while that pays; the first halving may pay only with the
-    second."""
+    second.
+
+    Paths that miss some hydrophones are apart: each of these is a node of their tiles."""
+    missed = front.dark.any(axis=1)
+    if not missed.any() or missed.all():
+        return _tiles(front, aim, bool(missed.any()))
+    rows = [np.flatnonzero(~missed), np.flatnonzero(missed)]
+    found = [(some, _tiles(front.select(some), aim, n == 1)) for n, some in enumerate(rows)]
+    return [replace(tile, paths=some[tile.paths]) for some, made in found for tile in made]
+
+
+def _tiles(front: Fronts, aim: Aim, missed: bool) -> list[Tile]:
+    """The tiles of paths of one kind."""
     if front.count == 1:
         return [_alone(np.arange(1), front, aim)]
-    views = _views(front, aim)
+    views = _views(front, aim, missed)
     return _best(_try(np.arange(front.count), views, aim), views, aim, patient=True)
 
 

@@ -53,6 +53,7 @@ class Fronts:
     corners: Floats  # (path, 3) s: delays over which the pulse is a mean; their sum is 0
     rough_share: Floats  # (path,) and
     rough_delay: Floats  # (path,) s: of `facet_pulses.rough_factor`
+    dark: Bools  # (path, sensor) hydrophones that a path does not reach; (path, 0): it reaches all
     modes: Floats  # (path, mode) weights of the modes of a stretch of time (`shapes`); none as yet
     centre: float  # Hz, where the amplitudes hold
 
@@ -82,6 +83,8 @@ def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements) -> F
     if count and not (arrivals.radius > 0.0).all():
         raise ValueError(f"arrival {np.flatnonzero(~(arrivals.radius > 0.0))[0]} has a radius that is not positive")
     _check_shapes(arrivals)
+    if arrivals.hidden_from.shape[1] not in (0, 1 + elements.count // 8):
+        raise ValueError(f"arrivals are hidden from hydrophones of another array, not of one of {elements.count}")
     if count and not (arrivals.snap.min() >= 0 and arrivals.snap.max() < len(snaps)):
         raise ValueError(f"arrivals name a snap outside 0..{len(snaps) - 1}")
     near = np.flatnonzero(arrivals.radius <= 1.001 * elements.aperture)
@@ -111,6 +114,7 @@ def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements) -> F
         corners=corners,
         rough_share=arrivals.rough_share,
         rough_delay=np.minimum(arrivals.rough_delay, LONGEST_BLUR),
+        dark=arrivals.hidden(elements.count),
         modes=np.zeros((count, 0)),
         centre=arrivals.centre,
     )

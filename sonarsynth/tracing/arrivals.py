@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from sonarsynth.tracing.legs import (
 )
 from sonarsynth.tracing.moving import Moving, carried
 from sonarsynth.tracing.paths import Outward, assemble, join, silence
-from sonarsynth.tracing.shadows import hidden
+from sonarsynth.tracing.shading import visible
 from sonarsynth.tracing.variation import ENOUGH, fitted
 from sonarsynth.world.environment import Environment, Profile
 from sonarsynth.world.meshes import in_blocks
@@ -62,6 +62,7 @@ class ArrayLegs:
     band: tuple[float, float]  # Hz
     negligible: float = NEGLIGIBLE  # power of the faintest echoes, that are left out
     enough: float = ENOUGH  # error of amplitudes over the aperture, where the second degree will do
+    visibility: Literal["centre", "hydrophones"] = "centre"  # from where facets must be seen
     first: int = 0  # of the legs, in the wavefronts
 
     @property
@@ -84,6 +85,11 @@ class ArrayLegs:
         legs = self.legs.select(slice(first, last))
         legs, facets = legs.numbered(legs.row - some.start), self.facets.select(some)
         return replace(self, legs=legs, facets=facets, first=self.first + first)
+
+    @property
+    def lookout(self) -> Elements | None:
+        """The hydrophones, where each must see what it hears; None where the array centre sees for all."""
+        return self.elements if self.visibility == "hydrophones" else None
 
     @property
     def bending(self) -> Profile:
@@ -110,6 +116,7 @@ def trace(
     moving: Moving | None = None,
     negligible: float = NEGLIGIBLE,
     enough: float = ENOUGH,
+    visibility: Literal["centre", "hydrophones"] = "centre",
 ) -> Arrivals:
     """The arrivals of a frame, sorted by snap; of each first those that met no target, then echoes by target, then the
     shadow waves of targets that scatter forward.
@@ -117,11 +124,14 @@ def trace(
     environment, profile: the water; moment: bodies and snaps; sonar_pose, elements: the array; absorption: dB/m at the
     centre of the band; propagation: how sound travels, and how many bounces are followed; laws: how the facets of each
     body scatter; band: Hz; moving: velocities, where they count; negligible: see `NEGLIGIBLE`; enough:
-    `variation.ENOUGH`. A facet counts where it is lit by the snap and seen by the array centre, with no body in
-    between (all sensors share what the centre sees). The snap itself is heard if no body stands in between, but for
-    those that scatter forward (`tracing.forward`). Raises ValueError for anything outside the water.
+    `variation.ENOUGH`. A facet counts where it is lit by the snap and seen, with no body in between, by the array
+    centre; or, with `visibility`, by some hydrophone that it faces, and is heard by those.
+    The snap itself is heard if no body stands in between, but for those that scatter forward (`tracing.forward`).
+    Raises ValueError for anything outside the water.
     """
-    legs = array_legs(environment, profile, moment.bodies, sonar_pose, elements, propagation, band, negligible, enough)
+    legs = array_legs(
+        environment, profile, moment.bodies, sonar_pose, elements, propagation, band, negligible, enough, visibility
+    )
     return arrivals(legs, moment.snaps, absorption, laws, moving)
 
 
@@ -135,6 +145,7 @@ def array_legs(
     band: tuple[float, float],
     negligible: float = NEGLIGIBLE,
     enough: float = ENOUGH,
+    visibility: Literal["centre", "hydrophones"] = "centre",
 ) -> ArrayLegs:
     """Facet to array, for every facet of every body that leaves a ray for the array that no body hides.
 
@@ -142,12 +153,17 @@ def array_legs(
     """
     require_in_water(bodies, environment)
     bent, centre = bending(profile, propagation, sonar_pose), 0.5 * (band[0] + band[1])
+    lookout = elements if visibility == "hydrophones" else None
+    slack = elements.aperture if lookout is not None else 0.0
     found: tuple[list[Legs], list[Facets]] = [], []
     seen = 0
     for some in in_blocks(sum(len(body.mesh.faces) for body in bodies)):
         every = facets_of(bodies, some)
-        every = every.select(may_face(every, sonar_pose.position, propagation.bounces, profile, environment.depth))
-        part = legs_from(every, bodies, environment, profile, bent, sonar_pose, propagation, centre)
+        reached = may_face(every, sonar_pose.position, propagation.bounces, profile, environment.depth, slack)
+        every = every.select(reached)
+        part = legs_from(every, environment, profile, sonar_pose, propagation, centre, slack)
+        side = every.clear[part.row], every.normal[part.row]
+        part = visible(part, *side, bodies, environment, bent, sonar_pose, lookout)
         kept, row = np.unique(part.row, return_inverse=True)
         found[0].append(part.numbered(seen + row))
         found[1].append(every.select(kept))
@@ -156,8 +172,9 @@ def array_legs(
     group = facets.target[legs.row]
     over = wavefronts(legs, group, environment, bent, sonar_pose, elements, propagation, band)
     return ArrayLegs(
-        legs, over, facets, bodies, environment, profile, propagation, sonar_pose, elements, band, negligible, enough
-    )
+        legs, over, facets, bodies, environment, profile, propagation, sonar_pose, elements, band, negligible, enough,
+        visibility,
+    )  # fmt: skip
 
 
 def bending(profile: Profile, propagation: Propagation, sonar_pose: Pose) -> Profile:
@@ -194,13 +211,7 @@ def _direct(
     """Snap to array, where none of the solid bodies stands in between."""
     environment, profile, sonar_pose = array.environment, array.profile, array.sonar_pose
     legs = rays_to_centre(environment, profile, snap.position[None, :], sonar_pose, array.propagation, array.centre)
-    end = np.broadcast_to(sonar_pose.position, legs.point.shape)
-    legs = legs.select(
-        ~hidden(
-            solid, environment, array.bending, legs.point, end, legs.departure, legs.length, legs.bounces,
-            legs.turning,
-        )
-    )  # fmt: skip
+    legs = visible(legs, legs.point, None, solid, environment, array.bending, sonar_pose, array.lookout)
     over = fronts(
         legs,
         np.zeros(len(legs.row), int),

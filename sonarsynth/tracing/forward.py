@@ -19,7 +19,7 @@ from sonarsynth.scattering import Kirchhoff, Part, ScatteringLaw
 from sonarsynth.scattering.parts import Shadow
 from sonarsynth.tracing.aperture import wavefronts
 from sonarsynth.tracing.legs import facets_of, rays_to_centre
-from sonarsynth.tracing.shadows import hidden
+from sonarsynth.tracing.shading import visible
 from sonarsynth.world.casting import inside
 from sonarsynth.world.moment import Body
 
@@ -51,10 +51,7 @@ def forward_legs(array: ArrayLegs, laws: tuple[ScatteringLaw, ...]) -> ArrayLegs
     scatters = np.array([bool(shadow_parts(law)) for law in laws])
     every = every.select(scatters[every.target])
     legs = rays_to_centre(environment, profile, every.point, pose, propagation, array.centre)
-    start, end = every.clear[legs.row], np.broadcast_to(pose.position, legs.point.shape)
-    legs = legs.select(
-        ~hidden(solid, environment, array.bending, start, end, legs.departure, legs.length, legs.bounces, legs.turning)
-    )
+    legs = visible(legs, every.clear[legs.row], None, solid, environment, array.bending, pose, array.lookout)
     kept, row = np.unique(legs.row, return_inverse=True)
     legs, facets = legs.numbered(row), every.select(kept)
     group = facets.target[legs.row]

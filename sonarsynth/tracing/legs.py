@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from sonarsynth.acoustics.rays import COINCIDENT, TOLERANCE
-from sonarsynth.conventions import Bools, Floats, Ints, depth
+from sonarsynth.conventions import Bools, Bytes, Floats, Ints, depth
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Paths
 from sonarsynth.tracing.reflections import Reflections, reflections
-from sonarsynth.tracing.shadows import hidden
 from sonarsynth.world.casting import OFFSET
 from sonarsynth.world.environment import Environment, Profile
 from sonarsynth.world.meshes import in_blocks
@@ -43,6 +42,7 @@ class Legs:
     boundary: Floats  # (leg,) product of the moduli of reflection
     phase: Floats  # (leg,) rad of reflections and caustics
     blur: Floats  # (leg,) s
+    hidden_from: Bytes  # (leg, byte) as of `Arrivals`
 
     def select(self, keep: Bools | Ints | slice) -> Legs:
         """The legs picked by a mask, by indices, or by a slice, which copies nothing."""
@@ -51,6 +51,10 @@ class Legs:
     def numbered(self, row: Ints) -> Legs:
         """The legs with other numbers (leg,) for the points that they start from."""
         return replace(self, row=row)
+
+    def seen(self, hidden_from: Bytes) -> Legs:
+        """The legs, hidden from some hydrophones."""
+        return replace(self, hidden_from=hidden_from)
 
     @property
     def bounces(self) -> Ints:
@@ -117,6 +121,7 @@ def rays_to_centre(
         boundary=bounced.modulus[keep],
         phase=bounced.phase[keep],
         blur=bounced.blur[keep],
+        hidden_from=np.zeros((len(keep), 0), np.uint8),
     )
 
 
@@ -156,37 +161,36 @@ def facets_of(bodies: tuple[Body, ...], some: slice) -> Facets:
 
 def legs_from(
     facets: Facets,
-    bodies: tuple[Body, ...],
     environment: Environment,
     profile: Profile,
-    bending: Profile,
     sonar_pose: Pose,
     propagation: Propagation,
     centre: float,
+    slack: float = 0.0,
 ) -> Legs:
-    """Facet to array: rays that leave a facet on its outer side and that no body hides; rows are facets."""
+    """Facet to array: rays that leave a facet on its outer side, whether or not a body stands in them; rows are facets.
+
+    Or that would on their way to a point within `slack` (m) of the array centre.
+    """
     legs = rays_to_centre(environment, profile, facets.point, sonar_pose, propagation, centre)
-    seen = np.flatnonzero(np.einsum("ij,ij->i", facets.normal[legs.row], legs.departure) > 0)
-    legs = legs.select(seen)
-    end = np.broadcast_to(sonar_pose.position, legs.point.shape)
-    start = facets.clear[legs.row]
-    return legs.select(
-        ~hidden(bodies, environment, bending, start, end, legs.departure, legs.length, legs.bounces, legs.turning)
-    )
+    ahead = np.einsum("ij,ij->i", facets.normal[legs.row], legs.departure) * legs.length
+    return legs.select(np.flatnonzero(ahead > -slack))
 
 
-def may_face(facets: Facets, position: Floats, bounces: int, profile: Profile, bed: float) -> Bools:
-    """(facet,) which may have a ray to a point (xyz) on their outer side; exactly so in uniform water, unreflected.
+def may_face(facets: Facets, position: Floats, bounces: int, profile: Profile, bed: float, slack: float = 0.0) -> Bools:
+    """(facet,) which may have a ray on their outer side to a point (xyz), or within `slack` (m) of it; exactly so in
+    uniform water, unreflected.
 
     A ray rises and falls by (bounces + 2) bed depths at most over its distance, so somewhere it has that slope or less,
     and by Snell's law its cosine is nowhere less than there times the ratio of the extreme sound speeds.
     """
     if not bounces and profile.uniform:
-        return np.asarray(np.einsum("ij,ij->i", facets.normal, position - facets.point) > 0)
+        return np.asarray(np.einsum("ij,ij->i", facets.normal, position - facets.point) > -slack)
     level = position[:2] - facets.point[:, :2]
     distance = np.hypot(level[:, 0], level[:, 1])
     flattest = distance / np.hypot(distance, (bounces + 2) * bed)
     cosine = flattest * profile.speed.min() / profile.speed.max()
     ahead = np.einsum("ij,ij->i", facets.normal[:, :2], level) / np.maximum(distance, 1e-300)
     steepest = np.abs(facets.normal[:, 2]) * np.sqrt((1.0 - cosine) * (1.0 + cosine))
-    return np.asarray((ahead >= -1e-9) | (ahead * cosine + steepest > -1e-9))
+    margin = 1e-9 + slack / np.maximum(distance, 1e-300)
+    return np.asarray((ahead >= -margin) | (ahead * cosine + steepest > -margin))

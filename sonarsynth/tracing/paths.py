@@ -119,6 +119,7 @@ def assemble(
         corners=pulses.corners,
         rough_share=pulses.rough_share,
         rough_delay=pulses.rough_delay,
+        hidden_from=legs.hidden_from,
         centre=np.nan,
         sound_speed=np.nan,
         wavefront_error=float(over.error.max(initial=0.0)),
@@ -158,9 +159,9 @@ def _stacked(parts: list[Arrivals], rows: Bools | Ints | None) -> Arrivals:
     columns: dict[str, Any] = {}
     for name in [name for name, value in left[0].items() if isinstance(value, np.ndarray)]:
         arrays = [part.pop(name) for part in left]
-        if name.endswith("_terms"):
+        if arrays[0].ndim == 2:  # columns that some lack are 0
             width = max(a.shape[1] for a in arrays)
-            arrays = [a if a.shape[1] == width else np.zeros((len(a), width)) for a in arrays]
+            arrays = [a if a.shape[1] == width else np.zeros((len(a), width), a.dtype) for a in arrays]
         whole = np.concatenate(arrays)
         columns[name] = whole if rows is None else whole[rows]
     return Arrivals(**columns, **plain, **errors)

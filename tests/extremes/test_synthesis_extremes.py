@@ -62,6 +62,7 @@ def arrivals(delay: Floats, direction: Floats, radius: Floats, amplitude: Floats
         corners=np.zeros((n, 3)),
         rough_share=np.zeros(n),
         rough_delay=np.zeros(n),
+        hidden_from=np.zeros((n, 0), np.uint8),
         centre=55e3,
         sound_speed=C,
         wavefront_error=0.0,

@@ -85,6 +85,7 @@ def arrivals(
         corners=np.zeros((n, 3)),
         rough_share=np.zeros(n),
         rough_delay=np.zeros(n),
+        hidden_from=np.zeros((n, 0), np.uint8),
         centre=55e3,
         sound_speed=C,
         wavefront_error=0.0,

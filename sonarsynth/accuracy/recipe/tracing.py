@@ -14,6 +14,7 @@ from sonarsynth.accuracy.recipe.exact import Exact, Heard, differences, golden, 
 from sonarsynth.accuracy.recipe.points import Point, timed
 from sonarsynth.conventions import Ints
 from sonarsynth.planning import Plan, arrivals_of, frame_start
+from sonarsynth.planning.choices import Visibility
 from sonarsynth.products import Arrivals
 from sonarsynth.scene import Frame
 from sonarsynth.sonar.subarrays import Subarray, subarrays, with_rim
@@ -57,10 +58,12 @@ class Traced:
     def heard(self, sensor: Ints) -> Heard:
         """Echoes and direct arrivals at some hydrophones, by the exact way's synthesis."""
         out = tuple(np.zeros((len(sensor), self.plan.windows.samples)) for _ in range(2))
-        for part, arrivals in self.pieces:
+        for part, traced in self.pieces:
             rows = np.flatnonzero(np.isin(sensor, part.sensor))
             own = np.searchsorted(part.sensor, sensor[rows])
-            made = pressures(self.plan, self.frame, arrivals, with_rim(part, own), golden(self.plan))
+            some, place = with_rim(part, own)
+            arrivals = traced.heard_by(place, part.elements.count)
+            made = pressures(self.plan, self.frame, arrivals, some, golden(self.plan))
             for total, one in zip(out, made, strict=True):
                 total[rows] = one[: len(rows)]
         return out[0], out[1]
@@ -92,6 +95,8 @@ def trace_points(exact: Exact, traced: Traced) -> Iterator[Point]:
             yield (point := _walked(exact, replace(plan, choices=replace(plan.choices, subarrays=count)), "subarrays"))
             if count > plan.choices.subarrays and point.error < FINER * point.allowed:
                 break
+    view: Visibility = "centre" if plan.choices.visibility == "hydrophones" else "hydrophones"
+    yield _walked(exact, replace(plan, choices=replace(plan.choices, visibility=view)), "visibility")
     for level in FAINTEST:
         share = 10.0 ** (-level / 10.0)
         if not np.isclose(share, plan.choices.negligible, rtol=1e-6):
@@ -125,7 +130,12 @@ def exact_point(exact: Exact) -> Point:
 
 def _walked(exact: Exact, plan: Plan, knob: str) -> Point:
     traced = Traced.of(plan, exact.frame, exact.sensor)
-    setting = {"subarrays": _cut(plan), "faintest": _faint(plan), "rays": type(plan.propagation).__name__.lower()}
+    setting = {
+        "subarrays": _cut(plan),
+        "visibility": f"seen from the {plan.choices.visibility}",
+        "faintest": _faint(plan),
+        "rays": type(plan.propagation).__name__.lower(),
+    }
     return _point(exact, traced, knob, setting[knob])
 
 

@@ -1,0 +1,148 @@
+"""What a body hides from part of the array, that part does not hear; the rest does."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sonarsynth import planning
+from sonarsynth.planning import arrivals_of
+from sonarsynth.planning.choosing import Expansion
+from sonarsynth.products import Arrivals
+from sonarsynth.recipe import Recipe
+from sonarsynth.render import trace_frame
+from sonarsynth.scattering.targets import Target
+from sonarsynth.sonar.subarrays import subarray
+from sonarsynth.synthesis import KernelDeposit
+from sonarsynth.synthesis.direct_sum import exact_signals
+from sonarsynth.tracing import Refracted, Straight
+from sonarsynth.world.environment import Profile
+from sonarsynth.world.motion import Still
+from sonarsynth.world.shapes import Box, Sphere
+from tests.laws.test_synthesis import FACES, SNAPS, SONAR, absorption, error, some_of, target_at, window
+from tests.scenes import point_scene, remus
+
+
+def screened(edge: float) -> Recipe:
+    """A small ball 20 m ahead, and half way a screen whose left edge is `edge` m to the right of the line to it."""
+    recipe = point_scene((20.0, 0.0, -50.0), (6.0, 9.0, -45.0))
+    ball = replace(recipe.scene.world.targets[0], shape=Sphere(radius=0.1, edge=0.03))
+    wall = Target(
+        name="screen",
+        shape=Box(size=(0.02, 2.0, 2.0)),
+        motion=Still(position=(10.0, -1.0 - edge, -50.0), heading=0.5 * np.pi),
+    )
+    world = replace(recipe.scene.world, targets=(ball, wall))
+    return replace(recipe, scene=replace(recipe.scene, world=world))
+
+
+def test_each_hydrophone_hears_what_it_sees() -> None:
+    """Behind the edge of a screen: as each hydrophone traced by itself, which the middle's view is far from."""
+    made = planning.plan(screened(0.02), {"signals"})
+    assert made.choices.visibility == "hydrophones"
+    measure = Expansion.of(made, 0)
+    assert measure.error(1, "centre") > 0.1
+    assert measure.error(1, "hydrophones") < 2e-3
+
+
+def test_paths_are_hidden_as_each_hydrophone_finds_for_itself() -> None:
+    made = planning.plan(screened(0.02), {"signals"})
+    made = replace(made, choices=replace(made.choices, visibility="hydrophones", negligible=0.0))
+    frame = made.recipe.frame(0)[1]
+    whole = arrivals_of(made, frame)
+    hidden = whole.hidden(made.elements.count)
+    assert 0.05 < hidden[whole.target == 0].mean() < 0.95
+    key = whole.facet + 10_000 * (whole.target + 1)
+    for sensor in range(0, made.elements.count, 61):
+        own = arrivals_of(made, frame, subarray(made.elements, np.array([sensor])))
+        alone = own.facet + 10_000 * (own.target + 1)
+        ball = (whole.target == 0) & ~hidden[:, sensor]
+        assert set(key[ball]) == set(alone[own.target == 0])
+
+
+def test_convex_and_alone_nothing_is_hidden_from_some() -> None:
+    made = planning.plan(remus(2), {"signals"})
+    frame = made.recipe.frame(0)[1]
+    seen = replace(made, choices=replace(made.choices, visibility="hydrophones"))
+    one, other = arrivals_of(made, frame), arrivals_of(seen, frame)
+    hidden = other.hidden(made.elements.count).any(axis=1)
+    assert hidden.mean() < 0.1  # facets of the flanks, in the shade of others for some
+    np.testing.assert_array_equal(np.sort(one.delay), np.sort(other.at_centre.delay))
+
+
+def test_truth_and_ledger_are_of_the_centre() -> None:
+    made = planning.plan(screened(0.02), {"signals"})
+    made, seen = (replace(made, choices=replace(made.choices, visibility=v)) for v in ("centre", "hydrophones"))
+    centre, own = trace_frame(made, 0), trace_frame(seen, 0)
+    np.testing.assert_array_equal(centre.ledger.level, own.ledger.level)
+    np.testing.assert_array_equal(centre.echoes.level, own.echoes.level)
+    assert len(own.arrivals.delay) > len(centre.arrivals.delay)
+
+
+def test_the_snap_is_not_heard_behind_a_screen() -> None:
+    """The direct pulse reaches the hydrophones whose straight line to the snap passes beside the screen."""
+    recipe = screened(0.0)
+    world = recipe.scene.world
+    snap = replace(world.shrimp[0], position=(30.0, 0.0, -50.0))
+    ball = replace(world.targets[0], motion=Still(position=(20.0, 3.0, -50.0), heading=0.0))
+    world = replace(world, shrimp=(snap,), targets=(ball, world.targets[1]))
+    made = planning.plan(replace(recipe, scene=replace(recipe.scene, world=world)), {"signals"})
+    seen = replace(made, choices=replace(made.choices, visibility="hydrophones"))
+    frame = made.recipe.frame(0)[1]
+    arrivals = arrivals_of(seen, frame)
+    hidden = arrivals.select(arrivals.direct).hidden(made.elements.count)[0]
+    place = frame.sonar_pose.to_world(made.elements.position)
+    at_screen = place[:, 1] * 20.0 / 30.0  # from (30, 0) to (0, y), at x = 10 m: the screen is at y < 0
+    clear = np.abs(at_screen) > 0.01
+    assert 0.4 < hidden.mean() < 0.6
+    np.testing.assert_array_equal(hidden[clear], at_screen[clear] < 0.0)
+
+
+@pytest.mark.parametrize("bounces", [0, 2])
+def test_bent_rays_in_uniform_water_see_what_straight_ones_do(bounces: int) -> None:
+    made = planning.plan(screened(0.02), {"signals"})
+    made = replace(made, choices=replace(made.choices, visibility="hydrophones", negligible=0.0))
+    frame = made.recipe.frame(0)[1]
+    slope = Profile(made.profile.depth[[0, -1]], made.profile.speed[[0, -1]] + np.array([0.0, 1e-9]))
+    found = []
+    for rays, water in ((Straight(bounces=bounces), made.profile), (Refracted(bounces=bounces), slope)):
+        traced = arrivals_of(replace(made, propagation=rays, profile=water), frame)
+        order = np.lexsort((traced.delay.round(9), traced.facet, traced.target))
+        found.append(traced.select(order).hidden(made.elements.count))
+    assert found[0].shape == found[1].shape
+    assert (found[0] != found[1]).mean() < 1e-3
+
+
+@pytest.mark.parametrize("hidden", [1, 12, 40])
+def test_kernel_deposit_keeps_silent_where_the_exact_sum_does(hidden: int) -> None:
+    array = some_of(FACES, 12)
+    of = partly_hidden(target_at(8.0, 40, 2, refracted=True, direct=True), hidden, array.count)
+    start, samples = window(of, SONAR, array)
+    exact, _ = exact_signals(of, SNAPS, array, SONAR, absorption, start, samples)
+    got = KernelDeposit().signals(of, SNAPS, array, SONAR, absorption, start, samples).pressure
+    plain = KernelDeposit().signals(of.at_centre, SNAPS, array, SONAR, absorption, start, samples).pressure
+    late = slice(int((of.delay[of.target == 0].min() - 1e-3 - start) * SONAR.sampling_frequency), None)
+    assert error(got[:, late], exact[:, late]) < 1e-4
+    assert error(got, exact) < 1e-4
+    assert error(plain, exact) > 1e-2
+
+
+def partly_hidden(of: Arrivals, count: int, sensors: int = FACES.count) -> Arrivals:
+    """Some of the paths hidden from random hydrophones, the direct one too."""
+    dark = np.zeros((len(of.delay), 1 + sensors), np.uint8)
+    dark[-count:, 1:] = np.random.default_rng(count).integers(0, 2, (count, sensors))
+    return replace(of, hidden_from=np.packbits(dark, axis=1))
+
+
+def test_hydrophones_keep_their_own_shade() -> None:
+    of = partly_hidden(target_at(8.0, 40, 2), 20)
+    rows = np.array([400, 3, 77])
+    np.testing.assert_array_equal(of.heard_by(rows, FACES.count).hidden(3), of.hidden(FACES.count)[:, rows])
+
+
+def test_shade_of_another_array_is_refused() -> None:
+    of = partly_hidden(target_at(8.0, 4, 2), 2)
+    start, samples = window(of, SONAR, FACES)
+    array = replace(FACES, position=FACES.position[:9], gain=FACES.gain[:9])
+    with pytest.raises(ValueError, match="hidden from hydrophones of another array"):
+        KernelDeposit().signals(of, SNAPS, array, SONAR, absorption, start, samples)
