@@ -10,13 +10,13 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.sonar import Elements
-from sonarsynth.synthesis.changing import Changes, Rest, aperture_gradient, pulses, rest, slopes
+from sonarsynth.synthesis.changing import Changes, aperture_gradient, pulses, rest, slopes
 from sonarsynth.synthesis.expansion import PLAIN, Term, terms_for
 from sonarsynth.synthesis.interpolating import Axes, box_nodes, columns
 from sonarsynth.synthesis.nodes import MOST_NODES, Colour, nodes_for
 from sonarsynth.synthesis.shapes import main_modes
 from sonarsynth.synthesis.variation import degrees, variation
-from sonarsynth.synthesis.wavefront import Fronts
+from sonarsynth.synthesis.wavefront import Fronts, reference_of
 
 MOST_TERMS = 24
 """A tile that needs more terms, of one mode of its pulses, is split."""
@@ -111,36 +111,6 @@ def _columns(front: Fronts, probes: Floats, gradient: Floats) -> Floats:
     return np.ascontiguousarray(np.concatenate(columns))
 
 
-def _reference(middle: Floats, front: Fronts, over: Rest) -> Fronts:
-    """The front in the middle of a tile, from its middle row and the change over the aperture that it takes."""
-    norm = np.linalg.norm(middle[:3])
-    direction = middle[:3] if norm < 0.1 else middle[:3] / norm
-    terms = front.delay_terms.shape[1]
-    return Fronts(
-        delay=np.zeros(1),
-        direction=direction[None] if norm >= 0.1 else np.array([[1.0, 0.0, 0.0]]),
-        curvature=middle[3:4],
-        amplitude=np.ones(1),
-        loss=middle[4:5],
-        delay_terms=middle[None, 5 : 5 + terms],
-        gain_terms=np.zeros((1, 0)),
-        turn_terms=over.turn_terms[None],
-        spread_terms=over.spread_terms[None],
-        sound_speed=front.sound_speed,
-        aperture=front.aperture,
-        phase=np.zeros(1),
-        variance=np.zeros(1),
-        doppler=np.zeros(1),
-        coherent=np.zeros(1, bool),
-        corners=np.zeros((1, 3)),
-        rough_share=np.zeros(1),
-        rough_delay=np.zeros(1),
-        dark=np.zeros((1, 0), bool),
-        modes=np.zeros((1, 0)),
-        centre=front.centre,
-    )
-
-
 class _Extent(NamedTuple):
     """What decides how a tile is represented, and what that costs."""
 
@@ -174,7 +144,7 @@ def _try(paths: Ints, views: _Views, aim: Aim) -> _Trial:
     columns = views.columns if whole else np.take(views.columns, paths, axis=1)
     low, high = columns.min(axis=1), columns.max(axis=1)
     over = rest(views.front, paths, aim.changes, 0.1 * aim.tolerance)
-    reference = _reference(0.5 * (low + high), views.front, over)
+    reference = reference_of(views.front, 0.5 * (low + high), over.turn_terms, over.spread_terms)
     probes = views.probes
     own = _columns(reference, probes.points, views.gradient)[:, 0]
     far = np.maximum(high - own, own - low)

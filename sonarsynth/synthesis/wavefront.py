@@ -180,3 +180,34 @@ def delay_and_gain(front: Fronts, points: Floats) -> tuple[Floats, Floats]:
 def reach(front: Fronts) -> Floats:
     """Bound (path,) on how long (s) before or after the array centre a wavefront meets any hydrophone."""
     return np.asarray(front.aperture / front.sound_speed + np.abs(front.delay_terms).sum(axis=1))
+
+
+def reference_of(front: Fronts, middle: Floats, turn_terms: Floats, spread_terms: Floats) -> Fronts:
+    """The front that a tile of paths is steered to, from the middle (column,) of their directions, curvatures,
+    absorption and delay terms, and the change over the aperture that it takes."""
+    norm = np.linalg.norm(middle[:3])
+    direction = middle[:3] if norm < 0.1 else middle[:3] / norm
+    terms = front.delay_terms.shape[1]
+    return Fronts(
+        delay=np.zeros(1),
+        direction=direction[None] if norm >= 0.1 else np.array([[1.0, 0.0, 0.0]]),
+        curvature=middle[3:4],
+        amplitude=np.ones(1),
+        loss=middle[4:5],
+        delay_terms=middle[None, 5 : 5 + terms],
+        gain_terms=np.zeros((1, 0)),
+        turn_terms=turn_terms[None],
+        spread_terms=spread_terms[None],
+        sound_speed=front.sound_speed,
+        aperture=front.aperture,
+        phase=np.zeros(1),
+        variance=np.zeros(1),
+        doppler=np.zeros(1),
+        coherent=np.zeros(1, bool),
+        corners=np.zeros((1, 3)),
+        rough_share=np.zeros(1),
+        rough_delay=np.zeros(1),
+        dark=np.zeros((1, 0), bool),
+        modes=np.zeros((1, 0)),
+        centre=front.centre,
+    )
