@@ -17,9 +17,12 @@ from sonarsynth.synthesis.bins import Bins
 from sonarsynth.synthesis.changing import Changes, changed, shares
 from sonarsynth.synthesis.expansion import colour, face_pairs, recipe, sinc_polynomials
 from sonarsynth.synthesis.interpolating import to_sensors
-from sonarsynth.synthesis.nodes import Axis, chebyshev, interpolation, nodes_for
+from sonarsynth.synthesis.nodes import DEGREES, Axis, chebyshev, interpolation, nodes_for, polynomials_for
 from sonarsynth.synthesis.tiles import Aim, Tile, tiles
-from sonarsynth.synthesis.wavefront import Fronts, delay_and_gain, towards
+from sonarsynth.synthesis.wavefront import NEPER, Fronts, delay_and_gain, lost, towards
+
+RELAXING = np.log(4.0)
+"""Chebyshev coefficients of absorption over the band fall by this (Np) from each degree to the next, or by more."""
 
 LARGEST = 1 << 20
 """Most numbers in a deposit grid: nodes are taken in groups of so many."""
@@ -87,6 +90,7 @@ def add_stretch(
         highest=highest,
         weights=colour(bins.frequency, bins.spectrum, highest),
         steepest=float(np.abs(bins.relative[bins.frequency <= highest]).max(initial=0.0)),
+        fading=float(np.abs(bins.relative) @ np.abs(bins.spectrum) / np.abs(bins.spectrum).sum()),
         tolerance=tolerance,
         changes=bins.changes,
         bins=used,
@@ -169,8 +173,8 @@ def _deposits(table: Floats, part: Fronts, tile: Tile, nodes: Floats, some: slic
 
     points, grid, reference = nodes[some], stage.grid, tile.reference
     rate = grid.circle * stage.bins.step
-    steer, level = delay_and_gain(reference, points)
-    middle, _ = towards(reference, points)
+    steer, _ = delay_and_gain(reference, points)
+    middle, level = towards(reference, points)
     late = louder = np.zeros((0, 0))
     share = shares(part, reference, tile.changes, stage.bins.changes, points, stage.dtype)
     if part.delay_terms.shape[1]:
@@ -179,6 +183,7 @@ def _deposits(table: Floats, part: Fronts, tile: Tile, nodes: Floats, some: slic
         louder = aperture_terms(points, part.aperture) @ part.gain_terms.T
     if part.dark.any():
         louder = np.where(part.dark.T[some], -1.0, louder if louder.size else 0.0)
+    farther = part.attenuation * part.sound_speed / rate  # dB a sample
     out = np.zeros((len(points), len(tile.terms), grid.circle + grid.lanes), stage.dtype)
     deposit(
         table.ravel(),
@@ -186,9 +191,10 @@ def _deposits(table: Floats, part: Fronts, tile: Tile, nodes: Floats, some: slic
         part.count,
         points,
         steer[0] * rate,
-        level[0],
+        1.0 / level[0],
         np.ascontiguousarray(middle[0, :, 1:]),
         np.array([1.0 / d if d > 0 else 0.0 for d in tile.deviation[:2]]),
+        np.array([NEPER * farther, farther / (tile.deviation[2] or 1.0)]),
         late,
         louder,
         share,
@@ -230,8 +236,8 @@ def _responses(weight: Floats, stage: Stage) -> npt.NDArray[Any]:
 def _power(tile: Tile, stage: Stage, blur: Floats) -> npt.NDArray[Any]:
     """Real factor (term, bin) of each term's spectrum: the polynomials of absorption, without the blur (bin,)."""
     relative = stage.bins.relative
-    loss = 10.0 ** (-tile.reference.loss * relative / 20.0) / blur
-    decay = -np.log(10.0) / 20.0 * tile.deviation[2] * relative
+    loss = lost(tile.reference.loss * relative) / blur
+    decay = -NEPER * tile.deviation[2] * relative
     degree = np.array(tile.terms)[:, 2]
     power = np.cumprod(np.concatenate([[loss], decay / np.arange(1, degree.max() + 1)[:, None]]), axis=0)
     return np.asarray(power.astype(stage.dtype)[degree])
@@ -239,22 +245,32 @@ def _power(tile: Tile, stage: Stage, blur: Floats) -> npt.NDArray[Any]:
 
 def _faces(tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
     """Real factor (node, pair, bin) of the spectra of terms, by `face_pairs`: the polynomials of the face's
-    directivity."""
-    f, dtype, face = stage.bins.frequency, stage.dtype, stage.aim.elements.face
-    if face == 0.0:
-        return np.broadcast_to(np.ones(1, dtype), (len(points), len(tile.terms), f.size))
+    directivity, and what the longer way of the reference loses at a frequency beside that at the band centre."""
+    f, dtype, face, reference = stage.bins.frequency, stage.dtype, stage.aim.elements.face, tile.reference
     degrees, _ = face_pairs(tile.terms)
-    u = towards(tile.reference, points)[0][0, :, 1:].T
+    if face == 0.0 and not reference.attenuation:
+        return np.broadcast_to(np.ones(1, dtype), (len(points), len(degrees), f.size))
+    u = towards(reference, points)[0][0, :, 1:].T
     middle, half = 0.5 * (f[-1] + f[0]), 0.5 * (f[-1] - f[0])
-    scale = face / tile.reference.sound_speed
+    scale = face / reference.sound_speed
     deviation = np.array(tile.deviation[:2])[:, None]
     # smooth in frequency: a few Chebyshev frequencies do
     widest = float((np.abs(u) + deviation).max(axis=1).sum())
-    axis = nodes_for(np.pi * scale * half * widest, (1.0,), 0.1 * stage.aim.tolerance)
-    at = (middle + half * chebyshev(axis.nodes)) * scale
-    most = int(degrees.max())
-    y, z = sinc_polynomials(u[:, :, None] * at, (deviation * at)[:, None], most).swapaxes(0, 1)
-    some = (y[degrees[:, 0]] * z[degrees[:, 1]]).swapaxes(0, 1).reshape(-1, axis.nodes).astype(dtype)
+    farther = reference.attenuation * reference.sound_speed * delay_and_gain(reference, points)[0][0]  # dB
+    most = NEPER * float(np.abs(farther).max()) * stage.aim.steepest
+    allowed = 0.1 * stage.aim.tolerance
+    axis = nodes_for(np.pi * scale * half * widest, (1.0,), allowed)
+    if most:
+        axis = polynomials_for(np.pi * scale * half * widest, (1.0,), allowed, (1.0, most, most, most))
+        axis = Axis(axis.nodes + max(int(np.ceil(np.log(most / allowed) / RELAXING)) - DEGREES, 0))
+    frequency = middle + half * chebyshev(axis.nodes)
+    at = frequency * scale
+    degree = int(degrees.max())
+    y, z = sinc_polynomials(u[:, :, None] * at, (deviation * at)[:, None], degree).swapaxes(0, 1)
+    some = (y[degrees[:, 0]] * z[degrees[:, 1]]).swapaxes(0, 1)
+    if most:
+        some = some * lost(np.multiply.outer(farther, np.interp(frequency, f, stage.bins.relative)))[:, None]
+    some = some.reshape(-1, axis.nodes).astype(dtype)
     return np.asarray(some @ _to_bins(f.size, axis, dtype)).reshape(len(points), len(degrees), f.size)
 
 

@@ -16,7 +16,7 @@ from sonarsynth.sonar import Elements, Sonar
 from sonarsynth.synthesis.changing import changed
 from sonarsynth.synthesis.layout import fast_length, layout
 from sonarsynth.synthesis.pulse import pulse_spectrum
-from sonarsynth.synthesis.wavefront import Fronts, delay_and_gain, fronts, reach, towards
+from sonarsynth.synthesis.wavefront import Fronts, delay_and_gain, fronts, lost, reach, towards
 from sonarsynth.world.moment import Snap
 
 
@@ -30,6 +30,11 @@ def relative_absorption(absorption: Callable[[Floats], Floats] | None, frequency
     return np.asarray(at[:-1] / at[-1] - 1.0)
 
 
+def attenuation(absorption: Callable[[Floats], Floats] | None, centre: float) -> float:
+    """Absorption (dB/m) at the band centre; zero where none is given."""
+    return 0.0 if absorption is None else max(float(absorption(np.array([centre]))[0]), 0.0)
+
+
 def exact_spectra(front: Fronts, elements: Elements, frequency: Floats, relative: Floats, origin: float) -> np.ndarray:
     """Transfer functions (sensor, bin) from the snap at 1 m to each hydrophone, delays counted from `origin` (s); but
     for Doppler, which is the snap's."""
@@ -41,7 +46,8 @@ def exact_spectra(front: Fronts, elements: Elements, frequency: Floats, relative
         u, _ = towards(one, elements.position)
         late = one.delay[0] - origin + delay[0]
         face = element_directivity(frequency, u[0][:, None, :], elements.face, one.sound_speed)
-        loss = 10.0 ** (-one.loss[0] * relative / 20.0)
+        farther = one.attenuation * one.sound_speed * delay[0]  # dB
+        loss = lost(np.multiply.outer(one.loss[0] + farther, relative))
         shape = np.exp(1j * one.phase[0] - 0.5 * one.variance[0] * (2.0 * np.pi * frequency) ** 2)
         if facets:
             shape = shape * facet_response(
@@ -88,7 +94,7 @@ def exact_signals(
 ) -> tuple[Floats, Signals]:
     """The signals in float64 (sensor, sample), and as the stage gives them."""
     fs = sonar.sampling_frequency
-    front = fronts(arrivals, snaps, elements)
+    front = fronts(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
     plan = layout(arrivals, front, snaps, elements, sonar, start, samples)
     pressure = np.zeros((elements.count, samples))
     waveforms = [s.waveform for s in snaps]

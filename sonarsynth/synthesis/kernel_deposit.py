@@ -16,6 +16,7 @@ from sonarsynth.products import Arrivals, Signals
 from sonarsynth.sonar import Elements, Sonar, stop_frequency
 from sonarsynth.synthesis.bins import bins_of
 from sonarsynth.synthesis.deposit import add_stretch
+from sonarsynth.synthesis.direct_sum import attenuation
 from sonarsynth.synthesis.layout import Stretch, layout
 from sonarsynth.synthesis.wavefront import fronts
 from sonarsynth.world.moment import Snap
@@ -95,7 +96,7 @@ class KernelDeposit:
     ) -> tuple[npt.NDArray[Any], int]:
         """Pressure (sensor, sample) in the precision of the method, and the number of arrivals that the window cuts."""
         fs = sonar.sampling_frequency
-        front = fronts(arrivals, snaps, elements)
+        front = fronts(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
         plan = layout(arrivals, front, snaps, elements, sonar, start, samples)
         out = np.zeros((elements.count, samples), self.precision)
         method = (self.width, self.oversampling, self.precision, self.tolerance)

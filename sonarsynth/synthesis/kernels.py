@@ -27,23 +27,28 @@ deviation). Weights of the modes may follow, then those of what they change by."
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
 def _wavefront(
-    block: Any, node: Any, middle: Any, scale: Any, rate: float, steer: float, level: float, place: Any, value: Any
-) -> None:
+    block: Any, node: Any, middle: Any, scale: Any, absorbed: Any, rate: float, steer: float, level: float, late: Any,
+    place: Any, value: Any,
+) -> None:  # fmt: skip
     """Positions (samples) of a block of paths at a node, and rows of value: deviations in y, z and absorption, -,
     amplitude."""
     qx, qy, qz = node[0], node[1], node[2]
     qq = qx * qx + qy * qy + qz * qz
     uy, uz, sy, sz = middle[0], middle[1], scale[0], scale[1]
+    nepers, scaled, louder = absorbed[0], absorbed[1], 1.0 / level
     for i in range(BLOCK):
         dx, dy, dz, k = block[i], block[BLOCK + i], block[2 * BLOCK + i], block[3 * BLOCK + i]
         vx, vy, vz = dx - k * qx, dy - k * qy, dz - k * qz
         n = np.sqrt(vx * vx + vy * vy + vz * vz)
         near = 1.0 / n
-        place[i] = block[4 * BLOCK + i] - steer + (k * qq - 2.0 * (qx * dx + qy * dy + qz * dz)) / (n + 1.0) * rate
+        away = (k * qq - 2.0 * (qx * dx + qy * dy + qz * dz)) / (n + 1.0) * rate + (late[i] - steer)
+        lost = nepers * away
+        place[i] = block[4 * BLOCK + i] + away
         value[i] = (vy * near - uy) * sy
         value[BLOCK + i] = (vz * near - uz) * sz
-        value[2 * BLOCK + i] = block[6 * BLOCK + i]
-        value[4 * BLOCK + i] = block[5 * BLOCK + i] * near / level
+        value[2 * BLOCK + i] = block[6 * BLOCK + i] + scaled * away
+        left = louder - louder * lost * (1.0 - lost * (0.5 - lost * (1.0 / 6.0)))
+        value[4 * BLOCK + i] = block[5 * BLOCK + i] * near * left
 
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
@@ -53,9 +58,9 @@ def _multiply(a: Any, b: Any, out: Any) -> None:
 
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
-def _add(out: Any, more: Any) -> None:
-    for i in range(more.size):
-        out[i] += more[i]
+def _copy(row: Any, out: Any) -> None:
+    for i in range(row.size):
+        out[i] = row[i]
 
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
@@ -126,6 +131,7 @@ def deposit(
     level: Any,
     middle: Any,
     scale: Any,
+    absorbed: Any,
     late: Any,
     louder: Any,
     share: Any,
@@ -141,14 +147,15 @@ def deposit(
 
     table: `count` paths in blocks (block * rows * BLOCK,), float64. nodes (node, xyz) in m. Of the tile's middle at the
     nodes, taken off: steer (node,) its delay in samples, level (node,) its gain, middle (node, 2) its direction y, z.
-    scale (2,) is one over the deviation of y and z. late (samples) and louder (node, path) are the wavefront's terms,
-    or empty; share (change, node, path) is how much the modes are of each change, or empty. recipe (term, 3) makes
-    terms. taps (row * 4 * lane,) is the kernel, a cubic a row, and half its half width in samples. rate is in
-    samples/m; the grid is a circle of `length` samples.
+    scale (2,) is one over the deviation of y and z; absorbed (2,) what a sample more of the way takes, in Np and in
+    deviations of absorption. late (samples) and louder (node, path) are the wavefront's terms, or empty; share (change,
+    node, path) is how much the modes are of each change, or empty. recipe (term, 3) makes terms. taps (row * 4 * lane,)
+    is the kernel, a cubic a row, and half its half width in samples. rate is in samples/m; the grid is a circle of
+    `length` samples.
     """
     terms, stride = recipe.shape[0], length + lanes
     cubes = taps.size // (4 * lanes)
-    place, fraction = np.empty(BLOCK), np.empty(BLOCK, grid.dtype)
+    place, more, fraction = np.empty(BLOCK), np.zeros(BLOCK), np.empty(BLOCK, grid.dtype)
     begin, row = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
     value = np.empty((4 + terms) * BLOCK, grid.dtype)
     modes = (rows - ROWS) // max(share.shape[0], 1)
@@ -157,9 +164,9 @@ def deposit(
         for first in range(0, count, BLOCK):
             size = min(BLOCK, count - first)
             block = table[first * rows : (first + BLOCK) * rows]
-            _wavefront(block, nodes[m], middle[m], scale, rate, steer[m], level[m], place, value)
             if late.size:
-                _add(place, late[m, first : first + size])
+                _copy(late[m, first : first + size], more)
+            _wavefront(block, nodes[m], middle[m], scale, absorbed, rate, steer[m], level[m], more, place, value)
             if louder.size:
                 _amplify(value[4 * BLOCK :], louder[m, first : first + size])
             if share.size:

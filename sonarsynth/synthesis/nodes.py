@@ -144,6 +144,11 @@ def _by_polynomials(phase: float, weights: Colour, tolerance: float, degrees: tu
     return int(np.argmax(np.append(bound, 0.0) <= tolerance)) + 1
 
 
+def polynomials_for(phase: float, weights: Colour, tolerance: float, degrees: tuple[float, ...] = (1.0,)) -> Axis:
+    """As `nodes_for`, by polynomials, which more nodes may then be given for what is no wave."""
+    return Axis(_by_polynomials(rounded_up(phase, 1.04), weights, tolerance, tuple(map(rounded_up, degrees))))
+
+
 def nodes_for(phase: float, weights: Colour, tolerance: float, degrees: tuple[float, ...] = (1.0,)) -> Axis:
     """Nodes that interpolate waves of phase within +-`phase` (rad) to `tolerance`; MOST_NODES + 1 where none do.
 
@@ -151,7 +156,7 @@ def nodes_for(phase: float, weights: Colour, tolerance: float, degrees: tuple[fl
     Phase is rounded up by at most 4 %, degrees by a tenth, so that choices are kept from frame to frame.
     """
     wide, sizes = rounded_up(phase, 1.04), tuple(map(rounded_up, degrees))
-    most = _by_polynomials(wide, weights, tolerance, sizes)
+    most = polynomials_for(phase, weights, tolerance, degrees).nodes
     if most == 1 or wide > MOST_FITTED or max(sizes) == inf:
         return Axis(most)
 

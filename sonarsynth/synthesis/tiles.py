@@ -16,7 +16,7 @@ from sonarsynth.synthesis.interpolating import Axes, box_nodes, columns
 from sonarsynth.synthesis.nodes import MOST_NODES, Colour, nodes_for
 from sonarsynth.synthesis.shapes import main_modes
 from sonarsynth.synthesis.variation import degrees, variation
-from sonarsynth.synthesis.wavefront import Fronts, reference_of
+from sonarsynth.synthesis.wavefront import NEPER, Fronts, reference_of
 
 MOST_TERMS = 24
 """A tile that needs more terms, of one mode of its pulses, is split."""
@@ -30,6 +30,7 @@ class Aim:
     highest: float  # Hz
     weights: Colour
     steepest: float  # largest change of absorption over the band, over that at the centre
+    fading: float  # mean of it over the pulse
     tolerance: float
     changes: Changes  # of pulses over the aperture
     bins: int
@@ -158,22 +159,23 @@ def _try(paths: Ints, views: _Views, aim: Aim) -> _Trial:
     modes, sizes = np.zeros((0, 0)), PLAIN
     if views.front.modes.shape[1]:
         modes, sizes = main_modes(*pulses(views.front, paths, over, aim.changes))
+    farther = views.front.attenuation * float(slope @ np.abs(aim.elements.position).max(axis=0))  # dB
     extent = _Extent(
         paths=paths.size,
         phase=tuple(phase.tolist()),
         drift=_drift(reference, aim),
         degrees=degrees(views.amplitude if whole else np.take(views.amplitude, paths, axis=1)),
         turn=turn,
-        decay=loss * np.log(10.0) / 20.0 * aim.steepest,
+        decay=NEPER * (loss * aim.steepest + farther * aim.fading),
         modes=sizes,
     )
     axes, terms, cost = _cheapest(extent, aim)
-    return _Trial(Tile(paths, reference, axes, terms, (dy, dz, loss), over.which, modes, cost), extent)
+    return _Trial(Tile(paths, reference, axes, terms, (dy, dz, loss + farther), over.which, modes, cost), extent)
 
 
 def _drift(front: Fronts, aim: Aim) -> tuple[float, ...]:
     """Half range (xyz, rad) of the phase that is left over a face, along each axis of the box: du_j/dq_i is
-    -(e_i - u_i u)_j k/n; inf about the source."""
+    -(e_i - u_i u)_j k/n; and of what absorption varies by (Np). inf about the source."""
     _, _, size = _probes(aim.elements, False)
     k = float(front.curvature[0])
     nearest = 1.0 - k * float(np.linalg.norm(np.abs(aim.elements.position).max(axis=0)))
@@ -183,7 +185,9 @@ def _drift(front: Fronts, aim: Aim) -> tuple[float, ...]:
     x, y, z = np.abs(front.direction[0]).tolist()
     slack = 3.0 * (1.0 - nearest) / nearest  # u itself turns by a third of it
     change = x * (y + z), 1.0 - y * y + y * z, 1.0 - z * z + y * z
-    return tuple(scale * min(c + slack, 1.21) * s for c, s in zip(change, size.tolist(), strict=True))
+    faded = NEPER * front.attenuation * aim.steepest
+    faded += np.sqrt(faded * k)  # a wave that bends as much as what a curved front loses
+    return tuple((scale * min(c + slack, 1.21) + faded) * s for c, s in zip(change, size.tolist(), strict=True))
 
 
 def _cheapest(extent: _Extent, aim: Aim) -> tuple[Axes | None, tuple[Term, ...], float]:
@@ -211,7 +215,7 @@ def _halves(paths: Ints, views: _Views, aim: Aim) -> tuple[Ints, Ints] | None:
     """Two halves of a tile, cut across its widest extent in phase; None where all paths are alike."""
     front = views.front
     size = np.append(views.probes.size + aim.elements.face, 0.5 * front.aperture**2)
-    weight = np.append(2.0 * np.pi * aim.highest / front.sound_speed * size, np.log(10.0) / 20.0 * aim.steepest)
+    weight = np.append(2.0 * np.pi * aim.highest / front.sound_speed * size, NEPER * aim.steepest)
     where = np.take(views.columns[:5], paths, axis=1)
     low, high = where.min(axis=1), where.max(axis=1)
     axis = int(np.argmax((high - low) * weight))
@@ -253,17 +257,8 @@ def _alone(paths: Ints, front: Fronts, aim: Aim) -> Tile:
         nodes_for(d + b, aim.weights, aim.tolerance) for d, b in zip(_drift(reference, aim), bend.tolist(), strict=True)
     )
     axes = (x, y, z) if 2 * x.nodes * y.nodes * z.nodes < aim.elements.count else None
-    cost = 2e5 + 4.0 * aim.elements.count * aim.bins
-    return Tile(
-        paths,
-        reference,
-        axes,
-        ((0, 0, 0, 0),),
-        (0.0, 0.0, 0.0),
-        np.zeros(0, int),
-        np.eye(reference.modes.shape[1]),
-        cost,
-    )
+    cost, modes = 2e5 + 4.0 * aim.elements.count * aim.bins, np.eye(reference.modes.shape[1])
+    return Tile(paths, reference, axes, ((0, 0, 0, 0),), (0.0, 0.0, 0.0), np.zeros(0, int), modes, cost)
 
 
 def _best(trial: _Trial, views: _Views, aim: Aim, patient: bool) -> list[Tile]:

@@ -21,6 +21,9 @@ MOST_STRETCH = 0.1
 LONGEST_BLUR = 1.0
 """A longer blur (s) leaves as little of a snap: nothing."""
 
+NEPER = np.log(10.0) / 20.0
+"""Of a dB."""
+
 LONGEST_CORNER = 0.01
 """The corners of a facet are closer to its arrival than this (s): 7 m, there and back."""
 
@@ -56,6 +59,7 @@ class Fronts:
     dark: Bools  # (path, sensor) hydrophones that a path does not reach; (path, 0): it reaches all
     modes: Floats  # (path, mode) weights of the modes of a stretch of time (`shapes`); none as yet
     centre: float  # Hz, where the amplitudes hold
+    attenuation: float = 0.0  # dB/m there: absorption of what the way to a hydrophone is longer than to the centre
 
     @property
     def count(self) -> int:
@@ -70,8 +74,9 @@ class Fronts:
         return Fronts(**rows)
 
 
-def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements) -> Fronts:
-    """The wavefronts of arrivals; raises ValueError where one cannot be synthesised."""
+def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements, attenuation: float = 0.0) -> Fronts:
+    """The wavefronts of arrivals, in water that absorbs `attenuation` (dB/m) at the band centre; raises ValueError
+    where one cannot be synthesised."""
     count = arrivals.delay.size
     for name in FINITE:
         value = getattr(arrivals, name)
@@ -117,6 +122,7 @@ def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements) -> F
         dark=arrivals.hidden(elements.count),
         modes=np.zeros((count, 0)),
         centre=arrivals.centre,
+        attenuation=attenuation,
     )
 
 
@@ -164,7 +170,7 @@ def towards(front: Fronts, points: Floats) -> tuple[Floats, Floats]:
 
 
 def delay_and_gain(front: Fronts, points: Floats) -> tuple[Floats, Floats]:
-    """Delay (s) after the array centre, and gain over it, (path, point) each."""
+    """Delay (s) after the array centre, and gain over it at the band centre, (path, point) each."""
     _, n = towards(front, points)
     square = np.einsum("pi,pi->p", points, points)
     # (|R d - q| - R)/c without the difference of nearly equal numbers
@@ -174,7 +180,14 @@ def delay_and_gain(front: Fronts, points: Floats) -> tuple[Floats, Floats]:
         delay = delay + front.delay_terms @ aperture_terms(points, front.aperture).T
     if front.gain_terms.shape[1]:
         gain = gain * (1.0 + front.gain_terms @ aperture_terms(points, front.aperture).T)
+    if front.attenuation:
+        gain = gain * lost(front.attenuation * front.sound_speed * delay)
     return delay, gain
+
+
+def lost(level: Floats) -> Floats:
+    """Factor on the amplitude of what loses `level` (dB)."""
+    return np.asarray(np.exp(-NEPER * level))
 
 
 def reach(front: Fronts) -> Floats:
@@ -210,4 +223,5 @@ def reference_of(front: Fronts, middle: Floats, turn_terms: Floats, spread_terms
         dark=np.zeros((1, 0), bool),
         modes=np.zeros((1, 0)),
         centre=front.centre,
+        attenuation=front.attenuation,
     )
