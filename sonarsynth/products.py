@@ -52,12 +52,11 @@ class Arrivals:
         amplitude[e] * R/|R d - q| * (1 + amplitude_terms[e] @ aperture_terms(q)).
     (`acoustics.arrays.aperture_terms`.) Water absorbs on what the way is longer by, its delay times sound_speed, as it
     does on the way to the array centre: synthesis takes that off at each frequency. In isovelocity water the sphere is
-    exact and delay_terms has no columns. Reflections on the way differ over the aperture: there the phase is phase[e] + phase_terms[e] @ aperture_terms(q),
-    at every frequency, and the square of the blur is blur[e]^2 + blur_terms[e] @ aperture_terms(q).
-    amplitude is the factor on the pressure waveform of the snap at 1 m: the product of the columns below it. Facets
-    change the waveform: its spectrum is multiplied by `acoustics.facet_pulses.facet_response` of coherent, corners,
-    rough_share and rough_delay,
-    whose modulus is 1 at `centre` for a coherent facet that is small.
+    exact and delay_terms has no columns. Reflections on the way differ over the aperture: there the phase is phase[e] +
+    phase_terms[e] @ aperture_terms(q), at every frequency, and the square of the blur is blur[e]^2 + blur_terms[e] @
+    aperture_terms(q). amplitude is the factor on the pressure waveform of the snap at 1 m: the product of the columns
+    below it. Facets change the waveform: its spectrum is multiplied by `acoustics.facet_pulses.facet_response` of
+    coherent, corners, rough_share and rough_delay, whose modulus is 1 at `centre` for a coherent facet that is small.
     """
 
     delay: Floats  # (path,) s at the array centre, snap time included
