@@ -38,7 +38,8 @@ def from_points(points: Floats, place: Floats, loss: float) -> Arrivals:
         scattering=one, boundary=one, absorption=loss * distance, length=distance, snap=whole, target=whole,
         facet=whole, point=points, surface=whole, bottom=whole, turning=whole, caustics=whole, arrives_by=whole,
         phase=zero, blur=zero, echo_blur=zero, stretch=zero, coherent=np.zeros(n, bool), corners=np.zeros((n, 3)),
-        rough_share=zero, rough_delay=zero, hidden_from=np.zeros((n, 0), np.uint8), centre=SONAR.band.centre, sound_speed=C, wavefront_error=0.0,
+        rough_share=zero, rough_delay=zero, hidden_from=np.zeros((n, 0), np.uint8),
+        centre=SONAR.band.centre, sound_speed=C, wavefront_error=0.0,
     )  # fmt: skip
 
 
