@@ -15,6 +15,7 @@ from typing import Annotated, Any
 import typer
 
 from sonarsynth.cli.accuracy import accuracy
+from sonarsynth.cli.card import card
 from sonarsynth.cli.repairing import repair
 from sonarsynth.cli.running import BadOption, run
 from sonarsynth.cli.selecting import chosen_frames, product_names
@@ -131,7 +132,7 @@ def build(
             plan, store, frames=wanted, workers=workers, scheduler=scheduler, restart=restart,
             retry_failed=retry_failed, agreed=agreed, insecure=insecure, progress=progress,
             announce=printing.announce, **bounds,
-            prediction=prediction,
+            prediction=prediction, source=source,
         )  # fmt: skip
     if as_json:
         _print_json(report.as_json())
@@ -213,6 +214,7 @@ def show(
 
 
 app.command()(accuracy)
+app.command()(card)
 app.command()(repair)
 app.command("target-strength")(target_strength)
 

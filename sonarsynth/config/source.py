@@ -49,6 +49,10 @@ class Source:
     """Where relative paths of the file start."""
     data: Any
     places: dict[Where, str]
+    text: str = ""
+    """The text as written."""
+    settings: tuple[str, ...] = ()
+    """What `--set` set over it, in order."""
 
     def place(self, where: Where) -> str:
         """Line of a value, or of the nearest one that holds it; `--set` where that set a part of the value."""
@@ -97,7 +101,7 @@ def read_text(text: str, name: str, folder: Path) -> Source:
     data = reader.value(node, ())
     if not isinstance(data, dict):
         raise RecipeError(name, "1", "", "must be a mapping of fields (title, seed, scene, ...)")
-    return Source(name, folder, data, reader.places)
+    return Source(name, folder, data, reader.places, text)
 
 
 def override(source: Source, setting: str) -> Source:
@@ -115,6 +119,8 @@ def override(source: Source, setting: str) -> Source:
         source.folder,
         _replaced(source, source.data, where, 0, value),
         places | reader.places | {where: SET},
+        source.text,
+        (*source.settings, setting),
     )
 
 

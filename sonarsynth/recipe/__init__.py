@@ -13,6 +13,7 @@ from pydantic import Discriminator, Tag, TypeAdapter
 
 from sonarsynth.conventions import Ints
 from sonarsynth.description import description
+from sonarsynth.recipe.attribution import Attribution, Creator
 from sonarsynth.recipe.grid import Axis, Together, entry_tag
 from sonarsynth.recipe.sequences import Sequences
 from sonarsynth.recipe.splits import SPLITS, Splits
@@ -30,8 +31,10 @@ __all__ = [
     "FILE_KINDS",
     "SPLITS",
     "Accuracy",
+    "Attribution",
     "Axis",
     "Choice",
+    "Creator",
     "Normal",
     "Plain",
     "Recipe",
@@ -57,6 +60,8 @@ class Recipe:
     seed: Annotated[int, Ge(0)] = 0
     licence: str = "CC-BY-4.0"
     """Licence of the dataset (not of the software)."""
+    dataset: Attribution = Attribution()
+    """Who made it, how to cite it; changes no number, and is taken from the recipe when the store is begun."""
     accuracy: Accuracy = Accuracy()
     """How much the simulation may err; the planner chooses the cheapest methods that err no more."""
     scene: Scene
@@ -128,7 +133,7 @@ class Recipe:
 
         Where the files lie does not matter.
         """
-        deciding = {name: value for name, value in self.as_json().items() if name != "rays"}
+        deciding = {name: value for name, value in self.as_json().items() if name not in ("rays", "dataset")}
         meshes = {
             t.name: [mesh.digest for _, mesh in some]
             for t, some in zip(self.scene.world.targets, self.meshes, strict=True)

@@ -8,7 +8,8 @@ from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Final
 
-from sonarsynth import store
+from sonarsynth import cards, store
+from sonarsynth.config import Source
 from sonarsynth.planning import PRODUCTS, Plan, choices_from, chosen_products, plan
 from sonarsynth.recipe import Recipe
 from sonarsynth.schedule.log import append_lines, read_lines
@@ -41,20 +42,23 @@ def build(
     progress: Progress | None = None,
     announce: Callable[[str], None] | None = None,
     prediction: Prediction | None = None,
+    source: Source | None = None,
 ) -> BuildReport:
     """Build the frames (left out: all) of a recipe that a store lacks, laying it out if it is not there.
 
     On `workers` processes of this machine (left out: one a usable core; 0: in this process), or on the workers of a
     running Dask scheduler. `products` counts where a recipe is given; a Plan has its own. The arrays are the same
     whatever the number of workers, the order, the interruptions. Beside the store: a log in `<store>.log.jsonl`, run
-    times in `<store>.times.jsonl`, frames set aside in `<store>.aside.jsonl`. From a script, call it under
+    times in `<store>.times.jsonl`, frames set aside in `<store>.aside.jsonl`, a card in `<store>.card.md`, Croissant
+    metadata in `<store>.croissant.json`. From a script, call it under
     `if __name__ == "__main__":`, as all multiprocessing needs.
 
     A frame that raises is set aside, and on worker processes one that crashes, that takes `frame_timeout` seconds for a
     stage (left out: by the plan; 0: no limit), or whose worker takes more than `worker_memory` bytes (left out: its
     share of the machine's); `retry_failed` tries those of earlier builds again. `agreed` builds what needs more than is
     free, or over 1 TB; `insecure` uses a scheduler on another machine without TLS. `announce` gets the dashboard's
-    address. A `prediction` of `schedule.predicting.predict` is compared with what is measured.
+    address. A `prediction` of `schedule.predicting.predict` is compared with what is measured. The text of the recipe
+    is kept where its `source` is given (`config.read`).
 
     Raises FieldError for a scene that cannot be, IndexError for frames that are not there, store.Mismatch for a store
     of something else, store.Locked while another build runs, store.Damage where the store cannot go on, TooLarge where
@@ -73,7 +77,7 @@ def build(
     with told_when_full(path, still), store.lock(path) as name:
         made = made if restart else _as_begun(path, made)
         report.notes = made.warnings
-        store.create(path, made, restart=restart)
+        store.create(path, made, restart=restart, source=source)
         earlier = {} if restart else _set_aside(path)
         left = set() if retry_failed else earlier.keys() & set(chosen)
         todo = store.missing(path, made, [frame for frame in chosen if frame not in left])
@@ -90,10 +94,17 @@ def build(
                 job, made, todo, course.done, workers=workers, scheduler=scheduler, memory=worker_memory,
                 started=course.started, lost=course.lost,
             )  # fmt: skip
-        if prediction is not None:
-            report.prediction = prediction.against(report)
-            append_lines(store.beside(path, "times.jsonl"), [{"build": report.prediction}])
+        _describe(path, report, prediction)
     return report
+
+
+def _describe(path: Path, report: BuildReport, prediction: Prediction | None) -> None:
+    """Put the card beside the store, and what was predicted into its times."""
+    if report.written or not store.beside(path, "card.md").exists():
+        cards.write(path)
+    if prediction is not None:
+        report.prediction = prediction.against(report)
+        append_lines(store.beside(path, "times.jsonl"), [{"build": report.prediction}])
 
 
 def _as_begun(path: Path, made: Plan) -> Plan:

@@ -7,7 +7,17 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-APART: Final = ("cli", "show", "pictures", "accuracy", "verification", "schedule", "__main__.py", "__init__.py")
+APART: Final = (
+    "cli",
+    "cards",
+    "show",
+    "pictures",
+    "accuracy",
+    "verification",
+    "schedule",
+    "__main__.py",
+    "__init__.py",
+)
 """Parts of the package that change no stored number."""
 
 

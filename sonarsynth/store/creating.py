@@ -32,8 +32,10 @@ from sonarsynth.store.marks import (
     records,
     save_mark,
 )
+from sonarsynth.store.provenance import begun, made_of
 
 if TYPE_CHECKING:
+    from sonarsynth.config import Source
     from sonarsynth.planning import Plan
 
 
@@ -41,12 +43,12 @@ class Mismatch(ValueError):
     """The store holds something else than what is wanted, or is none; str() is one line."""
 
 
-def create(path: Path | str, plan: Plan, *, restart: bool = False) -> Layout:
+def create(path: Path | str, plan: Plan, *, restart: bool = False, source: Source | None = None) -> Layout:
     """Lay the store out, or make ready to go on with the one that is there. Returns its layout.
 
     Raises Mismatch where the store that is there belongs to another recipe, other products or another version, or is
     no store of ours; `restart` begins anew instead (and never removes what is not a store of ours). Raises Damage
-    where the store that is there is not as it was laid out.
+    where the store that is there is not as it was laid out. The text of the recipe is kept where its `source` is given.
     """
     path, layout = Path(path), layout_of(plan)
     scratch, old = hidden(path, "new"), hidden(path, "old")
@@ -62,7 +64,7 @@ def create(path: Path | str, plan: Plan, *, restart: bool = False) -> Layout:
             _check_layout(path)
             _sweep(path)
             return layout
-    lay_out(scratch, plan, layout, {**attributes(plan), **identity(plan)})
+    lay_out(scratch, plan, layout, {**described(plan), **begun(source)})
     save_mark(scratch, layout_mark(scratch, sync=True))
     if there:
         os.rename(path, old)
@@ -99,6 +101,11 @@ def _check_layout(path: Path) -> None:
                 f"{path}: {name} is missing or has changed since the store was laid out: "
                 "'sonarsynth repair' restores it"
             )
+
+
+def described(plan: Plan) -> dict[str, Any]:
+    """Root attributes of a store of this plan, whoever builds it, wherever and whenever."""
+    return {**attributes(plan), **identity(plan), **made_of(plan)}
 
 
 def identity(plan: Plan) -> dict[str, Any]:

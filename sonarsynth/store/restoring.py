@@ -12,7 +12,7 @@ import numpy as np
 import zarr
 
 from sonarsynth.render import attributes
-from sonarsynth.store.creating import Mismatch, hidden, identity, lay_out, layout_mark, root_attributes
+from sonarsynth.store.creating import Mismatch, described, hidden, identity, lay_out, layout_mark, root_attributes
 from sonarsynth.store.examining import Findings
 from sonarsynth.store.layout import ArrayLayout, layout_of
 from sonarsynth.store.lock import beside
@@ -39,7 +39,12 @@ def restore(path: Path, found: Findings, plan: Plan | None) -> tuple[tuple[str, 
     scratch = hidden(path, "new")
     shutil.rmtree(scratch, ignore_errors=True)
     try:
-        attrs = found.attributes or {**root_attributes(path), **attributes(plan), **identity(plan)}
+        attrs = found.attributes or {
+            **described(plan),
+            **root_attributes(path),  # how it was begun, and as what was planned then
+            **attributes(plan),
+            **identity(plan),
+        }
         lay_out(scratch, plan, layout_of(plan), attrs)
         laid = layout_mark(scratch)
         bad = _to_put_back(path, found, laid)

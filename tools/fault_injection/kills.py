@@ -29,6 +29,7 @@ import psutil
 from fault_injection.cluster import Cluster
 from sonarsynth import cli, config, planning, schedule, store
 from sonarsynth.store.marks import ABSENT, all_files, load_mark, marked, record
+from sonarsynth.store.provenance import PROVENANCE
 
 RECIPE = """\
 title: tiny
@@ -292,7 +293,7 @@ def _different(path: Path, whole: Undisturbed) -> list[str]:
 
 
 def _other(name: str, path: Path, whole: Undisturbed) -> bool:
-    """True where a file differs: metadata in more than the time it was made."""
+    """True where a file differs: metadata in more than how the store was begun."""
     if record(path, name) == whole.files[name]:
         return False
     return not name.endswith("zarr.json") or _timeless(path / name) != _timeless(whole.path / name)
@@ -300,7 +301,5 @@ def _other(name: str, path: Path, whole: Undisturbed) -> bool:
 
 def _timeless(file: Path) -> Any:
     value = json.loads(file.read_text())
-    attributes = value.get("attributes", {})
-    for changing in ("date_created", "created", "machine"):
-        attributes.pop(changing, None)
+    value.get("attributes", {}).pop(PROVENANCE, None)
     return value

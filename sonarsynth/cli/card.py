@@ -1,0 +1,21 @@
+"""`sonarsynth card STORE`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def card(
+    store: Annotated[Path, typer.Argument(help="The store, a Zarr folder.", show_default=False)],
+    out: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Where the two files go. Left out: beside the store.")
+    ] = None,
+) -> None:
+    """Describe a store: a card to read (Markdown), and Croissant metadata for programs."""
+    from sonarsynth import cards
+
+    for file in cards.write(store, out):
+        typer.echo(str(file))

@@ -1,0 +1,197 @@
+"""Where a store comes from: what it was made of, by what code, with which libraries, on what machine, and when.
+
+What follows from the recipe goes into attributes of its own, the same for every builder of the plan. What another
+machine, another day or another check-out would make different is all in one attribute, `provenance`, which says how the
+store was begun, is written once, and is no part of what the store is of.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import platform
+import re
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime
+from hashlib import sha256
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from sonarsynth.recipe import FILE_KINDS
+
+if TYPE_CHECKING:
+    from sonarsynth.config import Source
+    from sonarsynth.planning import Plan
+
+PROVENANCE: Final = "provenance"
+"""The attribute of the root that differs between two builds of one plan."""
+
+LIBRARIES: Final = (
+    "numpy",
+    "scipy",
+    "numba",
+    "llvmlite",
+    "trimesh",
+    "embreex",
+    "open3d",
+    "gsw",
+    "numcodecs",
+    "google-crc32c",
+    "zarr",
+    "xarray",
+    "dask",
+    "distributed",
+    "pydantic",
+    "ruamel.yaml",
+)
+"""What touches numbers on their way from the recipe to the disk; those that are not installed are left out."""
+
+_GIT_SECONDS: Final = 10.0
+
+
+def made_of(plan: Plan) -> dict[str, Any]:
+    """Attributes that follow from the plan: what it does, what it was made of, whose it is."""
+    dataset = plan.recipe.as_json()["dataset"]
+    return {"plan": planned(plan), "inputs": inputs(plan), "dataset": dataset}
+
+
+def planned(plan: Plan) -> dict[str, Any]:
+    """The plan, without predicted times (which are the machine's)."""
+    made = plan.as_json()
+    for name in ("predicted_seconds", "choices", "shard_frames"):  # attributes of their own, but the first
+        made.pop(name)
+    made["stages"] = [{name: value for name, value in row.items() if name != "seconds"} for row in made["stages"]]
+    finite: dict[str, Any] = _finite(made)
+    return finite
+
+
+def inputs(plan: Plan) -> dict[str, Any]:
+    """SHA-256 of the meshes of each target as used, and of the files that the recipe names (their names, not paths)."""
+    recipe = plan.recipe
+    meshes = {
+        target.name: [mesh.digest for _, mesh in some]
+        for target, some in zip(recipe.scene.world.targets, recipe.meshes, strict=True)
+    }
+    files = {(Path(path).name, sha256(Path(path).read_bytes()).hexdigest()) for path in _paths(recipe.as_json())}
+    return {"meshes": meshes, "files": [{"name": name, "sha256": digest} for name, digest in sorted(files)]}
+
+
+def begun(source: Source | None = None) -> dict[str, Any]:
+    """How a store is begun, here and now: the attribute `provenance`."""
+    return {
+        PROVENANCE: {
+            "created": datetime.now(UTC).isoformat(timespec="seconds"),
+            "recipe_as_written": "" if source is None else source.text,
+            "recipe_settings": [] if source is None else list(source.settings),
+            "versions": versions(),
+            "machine": machine(),
+            "git": git_state(),
+        }
+    }
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python, of the libraries that touch numbers, and of the BLAS."""
+    found = {"python": f"{platform.python_implementation()} {platform.python_version()}"}
+    for name in LIBRARIES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    import numpy as np
+
+    blas = np.show_config(mode="dicts").get("Build Dependencies", {}).get("blas", {})
+    return found | {"blas": f"{blas.get('name', 'unknown')} {blas.get('version', '')}".strip()}
+
+
+def machine() -> dict[str, Any]:
+    """Processor, its cores and the system; nothing that names the host, a user or a path."""
+    return {
+        "cpu": _cpu_model(),
+        "architecture": platform.machine(),
+        "cores": os.cpu_count() or 0,
+        "system": platform.system(),
+        "release": _leading_number(platform.release()),
+        "distribution": _distribution(),
+        "libc": " ".join(platform.libc_ver()).strip(),
+        "byte_order": sys.byteorder,
+    }
+
+
+def git_state(package: Path | None = None) -> dict[str, Any] | None:
+    """Commit of the check-out that the code runs from, and whether the package differs from it; None outside one."""
+    package = Path(__file__).resolve().parent.parent if package is None else package
+    tracked = _git(package, "ls-files", "--error-unmatch", "__init__.py")
+    commit = None if tracked is None else _git(package, "rev-parse", "HEAD")
+    if not commit:
+        return None
+    changed = _git(package, "status", "--porcelain", "--", ".")
+    return {"commit": commit, "dirty": None if changed is None else bool(changed)}
+
+
+def _git(folder: Path, *arguments: str) -> str | None:
+    """What git prints; None where there is no git, or it has no answer."""
+    command = ["git", "-C", str(folder), "-c", "core.fsmonitor=false", *arguments]
+    inherited = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
+    env = inherited | {"GIT_OPTIONAL_LOCKS": "0", "LC_ALL": "C"}
+    try:
+        done = subprocess.run(
+            command,
+            env=env,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=_GIT_SECONDS,
+            check=True,
+        )
+    except (OSError, subprocess.SubprocessError, UnicodeDecodeError):
+        return None
+    return done.stdout.strip()
+
+
+def _paths(value: Any) -> Iterator[str]:
+    """Paths of files in a recipe."""
+    if isinstance(value, Mapping):
+        if value.get("kind") in FILE_KINDS and isinstance(value.get("path"), str):
+            yield value["path"]
+        for inner in value.values():
+            yield from _paths(inner)
+    elif isinstance(value, list):
+        for inner in value:
+            yield from _paths(inner)
+
+
+def _cpu_model() -> str:
+    try:
+        for line in Path("/proc/cpuinfo").read_text("utf-8", errors="replace").splitlines():
+            name, _, value = line.partition(":")
+            if name.strip() in ("model name", "Processor", "cpu model"):
+                return " ".join(value.split())
+    except OSError:
+        pass
+    return platform.processor() or "unknown"
+
+
+def _distribution() -> str:
+    try:
+        return str(platform.freedesktop_os_release().get("PRETTY_NAME", ""))
+    except OSError:
+        return ""
+
+
+def _leading_number(text: str) -> str:
+    """A version without what a builder of kernels may have added, such as a name of a company or a host."""
+    found = re.match(r"[\d.]+", text)
+    return found[0].rstrip(".") if found else ""
+
+
+def _finite(value: Any) -> Any:
+    """Plain JSON values: numbers that JSON does not have become null."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, Mapping):
+        return {str(name): _finite(inner) for name, inner in value.items()}
+    return [_finite(inner) for inner in value] if isinstance(value, list | tuple) else value

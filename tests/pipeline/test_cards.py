@@ -1,0 +1,202 @@
+"""The card of a dataset and its Croissant metadata: made from the store alone, beside it, complete and valid."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+import xarray as xr
+
+from sonarsynth import cards, config, schedule, store
+from sonarsynth.cards.croissant import CONTEXT
+from sonarsynth.cli import main
+
+SAID = """\
+dataset:
+  description: Boxes | tubes, with <tags> and `ticks`.
+  creators:
+    - {name: A. Author, url: "https://orcid.org/0000-0002-1825-0097", affiliation: An Institute}
+    - {name: A Group, organisation: true}
+  keywords: [box]
+  url: https://example.org/boxes
+"""
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory, small_text: str) -> Path:
+    path = tmp_path_factory.mktemp("cards") / "small.zarr"
+    file = path.with_name("small.yaml")
+    file.write_text(SAID + small_text)
+    source = config.read(file)
+    assert schedule.build(config.recipe_of(source), path, frames=range(8), workers=0, source=source).ok
+    return path
+
+
+def status(*arguments: str) -> object:
+    with pytest.raises(SystemExit) as end:
+        main(list(arguments))
+    return end.value.code
+
+
+def card_of(path: Path) -> str:
+    return store.beside(path, "card.md").read_text()
+
+
+def croissant_of(path: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(store.beside(path, "croissant.json").read_text())
+    return found
+
+
+def test_a_build_leaves_both_beside_the_store_and_nothing_in_it(built: Path) -> None:
+    names = {file.name for file in built.parent.iterdir()}
+    assert {"small.zarr.card.md", "small.zarr.croissant.json"} <= names
+    assert store.verify(built).ok
+
+
+def test_every_variable_is_in_the_card_with_its_units(built: Path) -> None:
+    text = card_of(built)
+    with xr.open_datatree(built, engine="zarr", chunks=None) as tree:
+        for node in tree.subtree:
+            assert not node.to_dataset(inherit=False).variables or f"### `{node.path}`\n" in text
+            for name, variable in node.to_dataset(inherit=False).variables.items():
+                units, meaning = variable.attrs["units"], variable.attrs["long_name"]
+                dims = ", ".join(f"{d} {n}" for d, n in variable.sizes.items()) or "one value"
+                row = rf"\| `{name}` \| {re.escape(dims)} \| \w+ \| {re.escape(units)} \| {re.escape(meaning)} \|"
+                assert re.search(row, text), f"{node.path}/{name}"
+
+
+def test_the_lines_that_load_it_do(built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    code = re.search(r"```python\n(.*?)```", card_of(built), re.DOTALL)
+    assert code is not None
+    assert len(code[1].strip().splitlines()) == 3
+    monkeypatch.chdir(built.parent)
+    names: dict[str, Any] = {}
+    exec(code[1], names)
+    assert names["first"].shape == (9, 11)
+    names["tree"].close()
+
+
+def test_the_card_says_what_was_planned_and_what_is_missing(built: Path) -> None:
+    text, attrs = card_of(built), store.root_attributes(built)
+    for row in attrs["plan"]["stages"]:
+        assert f"| {row['stage']} | {row['method']} |" in text
+    for row in attrs["plan"]["left_out"]:
+        assert f"| {row['what']} | {row['why']} | {row['bound']} |" in text
+    assert "8 of 20 are there" in text
+    assert "- 12 of 20 frames are not there." in text
+    assert f"| digest of the recipe | {attrs['recipe_digest']} |" in text
+    assert attrs["provenance"]["recipe_as_written"].strip() in text
+    assert "| train | 1 | 20 |" in text
+
+
+def test_texts_of_the_recipe_are_no_markup(built: Path, small_text: str, tmp_path: Path) -> None:
+    odd = 'title: "a | <script>b</script>"\ndataset: {citation: "line <one>\\n# two"}\n'
+    file = tmp_path / "odd.yaml"
+    file.write_text(odd + small_text.partition("\n")[2] + "# ```\n# ````\n")
+    source = config.read(file)
+    path = tmp_path / "odd.zarr"
+    schedule.build(config.recipe_of(source), path, frames=[0], workers=0, source=source)
+    text = card_of(path)
+    outside = re.sub(r"(?ms)^(`````+)yaml$.*^\1$", "", text)
+    assert "# ````" not in outside
+    assert "<script>" not in outside
+    assert "\n# two" not in outside
+    assert "> # two" in outside
+
+
+def test_the_command_makes_them_again_the_same(built: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text, data = card_of(built), croissant_of(built)
+    for suffix in ("card.md", "croissant.json"):
+        store.beside(built, suffix).unlink()
+    assert status("card", str(built)) == 0
+    assert capsys.readouterr().out.split() == [f"{built}.card.md", f"{built}.croissant.json"]
+    assert (card_of(built), croissant_of(built)) == (text, data)
+    assert status("card", str(built), "--out", str(tmp_path / "out")) == 0
+    assert (tmp_path / "out/small.zarr.card.md").read_text() == text
+
+
+def test_frames_set_aside_are_counted(built: Path, tmp_path: Path) -> None:
+    path = Path(shutil.copytree(built, tmp_path / "s.zarr"))
+    row = {"frame": 9, "stage": "trace", "error": "ValueError: no such ray", "traceback": ""}
+    store.beside(path, "aside.jsonl").write_text(json.dumps(row) + "\n" + json.dumps(row) + "\nnot json\n")
+    assert "- 1 frames were set aside (trace: ValueError)." in cards.markdown(cards.facts_of(path))
+
+
+@pytest.mark.parametrize("how", ["nothing", "folder", "metadata"])
+def test_what_is_no_store_is_one_line(
+    built: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], how: str
+) -> None:
+    path = tmp_path / "s.zarr"
+    if how == "folder":
+        path.mkdir()
+    if how == "metadata":
+        shutil.copytree(built, path)
+        (path / "zarr.json").write_text("{")
+    assert status("card", str(path)) == (4 if how == "metadata" else 2)
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert str(path) in said
+    assert not store.beside(path, "card.md").exists()
+
+
+def test_a_store_that_says_little_of_itself_has_a_card(built: Path, tmp_path: Path) -> None:
+    """As one of an earlier version: no plan, no provenance, nothing about whose it is."""
+    path = Path(shutil.copytree(built, tmp_path / "s.zarr"))
+    root = json.loads((path / "zarr.json").read_bytes())
+    for name in ("plan", "provenance", "inputs", "dataset", "title", "licence"):
+        del root["attributes"][name]
+    (path / "zarr.json").write_text(json.dumps(root))
+    files = cards.write(path)
+    assert files[0].read_text().startswith("# s.zarr\n")
+    assert json.loads(files[1].read_text())["creator"][0]["name"].startswith("unnamed, with sonarsynth")
+
+
+def test_croissant_has_every_required_property(built: Path) -> None:
+    found = croissant_of(built)
+    for name in ("@context", "@type", "conformsTo", "description", "license", "name", "url", "creator"):
+        assert found[name], name
+    assert found["conformsTo"] == "http://mlcommons.org/croissant/1.0"
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d", found["datePublished"])
+    assert found["license"] == "https://spdx.org/licenses/CC-BY-4.0.html"
+    assert found["url"] == "https://example.org/boxes"
+    assert [c["@type"] for c in found["creator"]] == ["sc:Person", "sc:Organization"]
+    terms = set(CONTEXT) | {"name", "description", "contentUrl", "contentSize", "encodingFormat", "sha256"}
+    for entry in found["distribution"] + found["recordSet"]:
+        assert {key for key in entry if not key.startswith("@")} <= terms
+
+
+def test_croissant_has_every_array_and_digests_that_are_true(built: Path) -> None:
+    import hashlib
+
+    found = croissant_of(built)
+    with xr.open_datatree(built, engine="zarr", chunks=None) as tree:
+        arrays = {
+            f"{node.path}/{name}".strip("/").replace("//", "/")
+            for node in tree.subtree
+            for name in node.to_dataset(inherit=False).variables
+        }
+    fields = [field for records in found["recordSet"] if records["@id"] != "splits" for field in records["field"]]
+    assert {field["source"]["extract"]["column"] for field in fields} == arrays
+    objects = {entry["@id"]: entry for entry in found["distribution"]}
+    assert all(field["source"]["fileSet"]["@id"] in objects for field in fields)
+    file = built.parent / objects["metadata"]["contentUrl"]
+    assert objects["metadata"]["sha256"] == hashlib.sha256(file.read_bytes()).hexdigest()
+    assert objects["metadata"]["contentSize"] == f"{file.stat().st_size} B"
+    assert list(built.parent.glob(objects["store"]["includes"]))
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_the_reference_reader_of_croissant_finds_nothing_wrong(built: Path) -> None:
+    mlcroissant = pytest.importorskip("mlcroissant")
+    dataset = mlcroissant.Dataset(str(store.beside(built, "croissant.json")))
+    assert not dataset.metadata.ctx.issues.errors
+    assert not dataset.metadata.ctx.issues.warnings
+    assert [row["splits/name"] for row in dataset.records("splits")] == ["train", "validation", "test"]
+    broken = croissant_of(built)
+    del broken["recordSet"][1]["field"][0]["dataType"]
+    with pytest.raises(mlcroissant.ValidationError):
+        mlcroissant.Dataset(broken)
