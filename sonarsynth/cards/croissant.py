@@ -1,4 +1,4 @@
-"""The card that programs read: Croissant 1.0, JSON-LD (https://docs.mlcommons.org/croissant/docs/croissant-spec.html).
+"""The card that programs read: Croissant 1.0, JSON-LD (MLCommons, Croissant format specification, 2024).
 
 Croissant 1.0 has no word for an array of a Zarr store. So the files of the store are one FileSet, and an array is a
 column of it: a field of the record set `frames`, with a record a frame, where it has a frame axis, and else of `fixed`;

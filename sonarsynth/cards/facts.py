@@ -137,8 +137,9 @@ def facts_of(store: Path) -> Facts:
             continue
         if mark is not None:
             complete += len(mark.frames)
-            files += len(mark.files)
-            size += sum(max(bytes_, 0) for bytes_, _ in mark.files.values())
+            there = [bytes_ for bytes_, _ in mark.files.values() if bytes_ >= 0]
+            files += len(there)
+            size += sum(there)
     return Facts(
         name=store.name,
         attributes=root_attributes(store),

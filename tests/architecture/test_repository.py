@@ -27,7 +27,18 @@ TOP = {
     "tools",
 }
 
-HOSTS = ("www.apache.org", "json-schema.org", "doi.org", "spdx.org", "cfconventions.org", "creativecommons.org")
+HOSTS = (
+    "www.apache.org",
+    "json-schema.org",
+    "doi.org",
+    "spdx.org",
+    "cfconventions.org",
+    "creativecommons.org",
+    "schema.org",
+    "mlcommons.org/croissant",
+    "purl.org",
+    "orcid.org",
+)
 """Hosts that are names of things, not places to fetch from."""
 
 FORBIDDEN = {

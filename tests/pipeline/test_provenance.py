@@ -141,7 +141,7 @@ def test_the_commit_is_of_the_checkout_that_holds_the_code(tmp_path: Path, monke
 
 
 def test_what_is_said_of_a_dataset_changes_no_identity(tmp_path: Path, small_text: str) -> None:
-    said = "dataset: {creators: [{name: A. Author}], citation: 'cite me', url: 'https://example.org/d'}\n"
+    said = "dataset: {creators: [{name: A. Author}], citation: 'cite me', url: 'https://doi.org/10.1000/d'}\n"
     plain, told = config.loads(small_text), config.loads(said + small_text)
     assert told.dataset.creators[0].name == "A. Author"
     assert plain.digest == told.digest
