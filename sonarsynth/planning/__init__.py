@@ -12,7 +12,7 @@ from sonarsynth.planning.bending import propagation
 from sonarsynth.planning.checks import check_frame, check_methods, check_windows, read_inputs
 from sonarsynth.planning.choices import Choices, choices_from
 from sonarsynth.planning.choosing import choose
-from sonarsynth.planning.costs import stages
+from sonarsynth.planning.costs import machine_factor, stages
 from sonarsynth.planning.looks import Look, check_alike, survey
 from sonarsynth.planning.notes import notes
 from sonarsynth.planning.omissions import left_out
@@ -40,8 +40,14 @@ __all__ = [
 ]
 
 SHARD_BYTES = 64e6
-"""A shard holds about this much of the largest array, and at most SHARD_FRAMES frames."""
+"""A shard holds about this much of the largest array, and at most so many frames:"""
 SHARD_FRAMES = 8
+MANY_FRAMES = 64
+"""Frames of a shard of a large dataset of short frames: a shard costs some 30 ms, whatever it holds, and 60 files."""
+SHARDS = 128
+"""Shards of a dataset, at least, for there to be more than SHARD_FRAMES frames in one."""
+SHARD_SECONDS = 10.0
+"""Seconds that such a shard takes at most, by counts of work: those of the machine that costs were measured on."""
 COSTED = 5
 """Sequences over which the predicted cost is averaged."""
 
@@ -71,11 +77,19 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS, choices: Choices | 
     windows = lay_windows(recipe, looks)
     check_windows(scene, windows)
     sizes = _sizes(recipe, windows)
-    frame_bytes = sizes["sensor"] * sizes["sample"] * (2 if scene.sonar.converter else 4)
-    shard = int(np.clip(SHARD_BYTES // max(frame_bytes, 1), 1, SHARD_FRAMES))
-    made = Plan(recipe, products, profile, paths, windows, sizes=sizes, shard_frames=shard)
+    made = Plan(recipe, products, profile, paths, windows, sizes=sizes)
     made = choose(made, looks) if choices is None else replace(made, choices=choices)
-    return replace(made, stages=_mean_stages(made, looks), left_out=left_out(made), warnings=notes(made, looks))
+    made = replace(made, stages=_mean_stages(made, looks))
+    return replace(made, shard_frames=_shard_frames(made), left_out=left_out(made), warnings=notes(made, looks))
+
+
+def _shard_frames(made: Plan) -> int:
+    """Frames of a shard: the same on every machine, so that a build can go on elsewhere."""
+    frame_bytes = made.sizes["sensor"] * made.sizes["sample"] * (2 if made.scene.sonar.converter else 4)
+    seconds = max(sum(stage.seconds for stage in made.stages) / machine_factor(), 1e-6)
+    many = min(SHARD_SECONDS / seconds, made.recipe.frames / SHARDS, MANY_FRAMES)
+    frames = max(2 ** int(np.log2(max(many, 1.0))), SHARD_FRAMES)
+    return int(np.clip(SHARD_BYTES // max(frame_bytes, 1), 1, frames))
 
 
 def _mean_stages(made: Plan, looks: Sequence[Look]) -> tuple[Stage, ...]:

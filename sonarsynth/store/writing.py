@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+from collections import deque
 from collections.abc import Iterable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -28,6 +30,9 @@ from sonarsynth.store.marks import (
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan
 
+AT_ONCE: Final = 8
+"""Files of a shard that are on their way at once: each waits for the disk, which takes several in the time of one."""
+
 
 def write_shard(path: Path | str, plan: Plan, shard: int, frames: Mapping[int, Values]) -> Mark:
     """Write one whole shard of every array, then its completion mark. Frames not given read as fill values.
@@ -43,10 +48,16 @@ def write_shard(path: Path | str, plan: Plan, shard: int, frames: Mapping[int, V
     drop_mark(path, shard)
     content = hashlib.sha256()
     files: dict[str, FileRecord] = {}
-    for array in sorted((a for a in layout.arrays if not a.empty), key=lambda a: a.path):
-        block = layout.block(array, shard, checked)
-        add_to_digest(content, array.path, block)
-        files[array.file(shard)] = write_region(path, layout, array, region.start, block)
+    under_way: deque[tuple[str, Future[FileRecord]]] = deque()
+    with ThreadPoolExecutor(AT_ONCE) as writers:
+        for array in sorted((a for a in layout.arrays if not a.empty), key=lambda a: a.path):
+            if len(under_way) == AT_ONCE:
+                name, written = under_way.popleft()
+                files[name] = written.result()
+            block = layout.block(array, shard, checked)
+            add_to_digest(content, array.path, block)
+            under_way.append((array.file(shard), writers.submit(write_region, path, layout, array, region.start, block)))
+        files |= {name: written.result() for name, written in under_way}
     mark = Mark(str(shard), tuple(checked), content.hexdigest(), files)
     save_mark(path, mark)
     return mark
