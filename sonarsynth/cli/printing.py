@@ -197,5 +197,7 @@ def verify_report(report: StoreReport) -> None:
             from sonarsynth.store import ranges
 
             out.print(f"    in frames {ranges(check.frames)}", markup=False)
+    if report.building:
+        out.print(f"it is being built by {report.building}: what is complete was looked at, the rest not", markup=False)
     if report.ok:
         out.print("whole and as written" if not report.quick else "all files are as written")

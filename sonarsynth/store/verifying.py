@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from sonarsynth.store.examining import Problem, examine, frame_count, ranges
+from sonarsynth.store.examining import Findings, Problem, examine, frame_count, ranges
+from sonarsynth.store.lock import held_by
+from sonarsynth.store.marks import LAYOUT, MARKS, mark_file
 from sonarsynth.store.reading import read_back, structure
 
 if TYPE_CHECKING:
@@ -57,6 +60,7 @@ class Report:
     problems: tuple[Problem, ...]
     checks: tuple[CheckRow, ...]
     quick: bool = False  # True where only files were compared
+    building: str = ""  # who built it meanwhile; then what is not complete yet is no damage, and no check was run
 
     @property
     def ok(self) -> bool:
@@ -69,6 +73,7 @@ class Report:
             "store": self.store,
             "quick": self.quick,
             "ok": self.ok,
+            "building": self.building,
             "frames": self.frames,
             "frames_complete": len(self.complete),
             "frames_whole": ranges(self.complete),
@@ -105,23 +110,59 @@ class Report:
 def verify(path: Path | str, checks: Sequence[Check] = (), *, quick: bool = False) -> Report:
     """Compare marks, digests and files of a store, read every number back, and run checks on what it says.
 
-    `quick` compares files with their digests and no more. Raises Mismatch where there is no store of ours.
+    `quick` compares files with their digests and no more. Of a store that is being built, what is complete is looked
+    at, and no checks are run. Raises Mismatch where there is no store of ours.
     """
     path = Path(path)
-    found = examine(path)
-    problems = list(found.problems)
-    readable = not quick and found.layout is not None and not found.fixed
-    rows: Sequence[CheckRow] = ()
-    if readable:
-        for number in sorted(found.marks.keys() - found.shards):
-            problems.extend(read_back(path, found.marks[number]))
-        problems.extend(structure(path))
-        rows = () if problems else _run(path, checks)
+    building, stamps = held_by(path), _stamps(path)
+    found, problems = _look(path, quick)
+    building = building or held_by(path)
+    if problems and (building or stamps != _stamps(path)):  # a build's own doing is over, or has another mark, by now
+        before = {problem.where for problem in problems}
+        found, problems = _look(path, quick)
+        changed = {name for name, _ in stamps.items() ^ _stamps(path).items()}
+        problems = [p for p in problems if p.where in before and _lasting(p, found, changed)]
+    rows = [] if problems or building or quick else _run(path, checks)
     spoiled = {frame for problem in problems for frame in problem.frames}
     complete = tuple(sorted({f for mark in found.marks.values() for f in mark.frames} - spoiled))
     files = found.files
     size = sum(max(size, 0) for size, _ in files.values())
-    return Report(str(path), frame_count(path), complete, len(files), size, tuple(problems), tuple(rows), quick)
+    return Report(
+        str(path), frame_count(path), complete, len(files), size, tuple(problems), tuple(rows), quick, building
+    )
+
+
+def _look(path: Path, quick: bool) -> tuple[Findings, list[Problem]]:
+    """What there is in a store, and everything that is wrong with it."""
+    found = examine(path)
+    problems = list(found.problems)
+    if not quick and found.layout is not None and not found.fixed:
+        for number in sorted(found.marks.keys() - found.shards):
+            problems.extend(read_back(path, found.marks[number]))
+        problems.extend(structure(path))
+    return found, problems
+
+
+def _stamps(path: Path) -> dict[str, tuple[int, int]]:
+    """What tells of each mark whether it is written again, even with the same contents."""
+    try:
+        found = {entry.name: entry.stat() for entry in os.scandir(mark_file(path, LAYOUT).parent)}
+    except OSError:
+        return {}
+    return {name: (stat.st_ino, stat.st_mtime_ns) for name, stat in found.items()}
+
+
+def _lasting(problem: Problem, found: Findings, changed: set[str]) -> bool:
+    """Whether a problem is of what no build has in hand: it was there before, and its mark was not written since."""
+    if problem.where.endswith(".partial"):
+        return False
+    folder, _, name = problem.where.rpartition("/")
+    if folder != MARKS and problem.frames:
+        shard = next((n for n, mark in found.marks.items() if problem.frames[0] in mark.frames), None)
+        name = "" if shard is None else mark_file(Path(), shard).name
+    elif folder != MARKS:
+        name = mark_file(Path(), LAYOUT).name
+    return bool(name) and name not in changed
 
 
 def _run(path: Path, checks: Sequence[Check]) -> list[CheckRow]:
