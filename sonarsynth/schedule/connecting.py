@@ -39,6 +39,8 @@ _SETTINGS: Final = {
     "distributed.comm.timeouts.tcp": "120s",
     "distributed.admin.log-length": 100,  # logs that would grow for days
     "distributed.admin.low-level-log-length": 100,
+    "distributed.admin.system-monitor.log-length": 600,
+    "distributed.worker.profile.enabled": False,  # its samples of stacks: 8 MB a worker in each 1000 frames of 13 ms
 }
 
 

@@ -52,12 +52,13 @@ def write_shard(path: Path | str, plan: Plan, shard: int, frames: Mapping[int, V
     with ThreadPoolExecutor(AT_ONCE) as writers:
         for array in sorted((a for a in layout.arrays if not a.empty), key=lambda a: a.path):
             if len(under_way) == AT_ONCE:
-                name, written = under_way.popleft()
-                files[name] = written.result()
+                name, first = under_way.popleft()
+                files[name] = first.result()
             block = layout.block(array, shard, checked)
             add_to_digest(content, array.path, block)
-            under_way.append((array.file(shard), writers.submit(write_region, path, layout, array, region.start, block)))
-        files |= {name: written.result() for name, written in under_way}
+            written = writers.submit(write_region, path, layout, array, region.start, block)
+            under_way.append((array.file(shard), written))
+        files |= {name: rest.result() for name, rest in under_way}
     mark = Mark(str(shard), tuple(checked), content.hexdigest(), files)
     save_mark(path, mark)
     return mark

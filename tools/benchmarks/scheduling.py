@@ -14,11 +14,11 @@ import tempfile
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import dask
-import distributed  # noqa: F401: its settings must be there before one of them is set for a while
 import psutil
 from fault_injection.cluster import Cluster
 from fault_injection.kills import RECIPE
@@ -108,6 +108,7 @@ def padded(made: Plan) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         pad = Path(folder) / "pad.py"
         pad.write_text(PAD)
+        import_module("distributed")  # its settings must be there before one of them is set for a while
         with dask.config.set({"distributed.worker.preload": [str(pad)]}):
             return built(made, Path(folder) / "s.zarr", Watch(here), workers=1)
 
