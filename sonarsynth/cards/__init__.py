@@ -6,32 +6,33 @@ Both lie beside the store, not in it: what is in a store is only what was laid o
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 
 from sonarsynth.cards.croissant import croissant
 from sonarsynth.cards.facts import Facts, facts_of
 from sonarsynth.cards.markdown import markdown
-from sonarsynth.store import beside
-from sonarsynth.store.marks import write_atomically
+from sonarsynth.store import Folder, absolute, beside, folder_of
+from sonarsynth.store.place import write_atomically
 
 __all__ = ["Facts", "croissant", "facts_of", "markdown", "write"]
 
 
-def write(store: Path | str, folder: Path | str | None = None) -> tuple[Path, Path]:
+def write(store: Folder | str, folder: Folder | str | None = None) -> tuple[Folder, Folder]:
     """Write `<store>.card.md`, the card, and `<store>.croissant.json`, the Croissant metadata: beside the store, or in
     another folder. Returns the two files.
 
     Raises store.Mismatch where there is no store of ours, store.Damage where its metadata cannot be read, OSError where
     the files cannot be written.
     """
-    store = Path(os.path.abspath(store))
+    store = absolute(store)
     facts = facts_of(store)
     texts = {"card.md": markdown(facts), "croissant.json": json.dumps(croissant(facts), indent=2) + "\n"}
     files = [beside(store, suffix) for suffix in texts]
     if folder is not None:
-        Path(folder).mkdir(parents=True, exist_ok=True)
-        files = [Path(folder) / file.name for file in files]
+        folder = folder_of(folder)
+        if isinstance(folder, Path):
+            folder.mkdir(parents=True, exist_ok=True)
+        files = [folder / file.name for file in files]
     for file, text in zip(files, texts.values(), strict=True):
         write_atomically(file, text.encode())
     return files[0], files[1]

@@ -81,7 +81,7 @@ def croissant(facts: Facts) -> dict[str, Any]:
         "name": facts.title,
         "description": facts.summary,
         "license": _licence(str(facts.attributes.get("licence", ""))),
-        "url": str(dataset.get("url", "")) or f"./{facts.name}",
+        "url": str(dataset.get("url", "")) or facts.url or f"./{facts.name}",
         "creator": _creators(facts),
         "datePublished": created or "1970-01-01",
         "dateCreated": facts.created,

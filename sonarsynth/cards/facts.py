@@ -6,11 +6,11 @@ import json
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from sonarsynth.store import beside, must_be_store, root_attributes
-from sonarsynth.store.marks import Damage, FileRecord, load_layout, load_mark, marked
+from sonarsynth.store import Folder, Remote, beside, must_be_store, root_attributes
+from sonarsynth.store.marks import Damage, Mark, load_layout, load_marks, marked
+from sonarsynth.store.place import FileRecord
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,7 @@ class Facts:
     attributes: Mapping[str, Any]  # of the root
     arrays: tuple[Array, ...]  # in the order of their paths
     laid_out: Mapping[str, FileRecord]  # files that no frame changes
+    url: str  # of a store that has one
     complete: int  # frames that are there
     files: int
     bytes: int
@@ -124,24 +125,21 @@ class Facts:
         )
 
 
-def facts_of(store: Path) -> Facts:
+def facts_of(store: Folder) -> Facts:
     """Read what there is to say. Raises Mismatch where there is no store of ours, Damage where it cannot be read."""
     must_be_store(store)
     complete = files = size = 0
     layout = load_layout(store)
     records = {} if layout is None else dict(layout.files)
-    for number in marked(store):
-        try:
-            mark = load_mark(store, number)
-        except Damage:
-            continue
-        if mark is not None:
+    for _, mark in load_marks(store, marked(store)):
+        if isinstance(mark, Mark):
             complete += len(mark.frames)
             there = [bytes_ for bytes_, _ in mark.files.values() if bytes_ >= 0]
             files += len(there)
             size += sum(there)
     return Facts(
         name=store.name,
+        url=str(store) if isinstance(store, Remote) else "",
         attributes=root_attributes(store),
         arrays=_arrays(store),
         laid_out=records,
@@ -152,7 +150,7 @@ def facts_of(store: Path) -> Facts:
     )
 
 
-def _arrays(store: Path) -> tuple[Array, ...]:
+def _arrays(store: Folder) -> tuple[Array, ...]:
     try:
         members = json.loads((store / "zarr.json").read_bytes())["consolidated_metadata"]["metadata"]
         found = [
@@ -171,7 +169,7 @@ def _type(name: Any) -> str:
     return str(name["name"] if isinstance(name, dict) else name)
 
 
-def _aside(store: Path) -> dict[str, int]:
+def _aside(store: Folder) -> dict[str, int]:
     """Frames that were set aside, counted by the kind of what went wrong."""
     last: dict[int, str] = {}
     try:

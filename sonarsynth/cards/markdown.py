@@ -55,11 +55,11 @@ def _loading(facts: Facts) -> str:
     example = next((a for a in facts.arrays if a.framed and a.group == "image"), None) or next(
         (a for a in facts.arrays if a.framed and a.group), None
     )
-    lines = ["import xarray as xr", f'tree = xr.open_datatree("{facts.name}", engine="zarr")']
+    lines = ["import xarray as xr", f'tree = xr.open_datatree("{facts.url or facts.name}", engine="zarr")']
     if example is not None:
         lines.append(f'first = tree["{example.path}"].isel(frame=0)  # {example.meaning}, {example.units}')
     code = "```python\n" + "\n".join(lines) + "\n```"
-    return f"{code}\n\n`sonarsynth verify {facts.name}` compares every file with its digest."
+    return f"{code}\n\n`sonarsynth verify {facts.url or facts.name}` compares every file with its digest."
 
 
 def _variables(facts: Facts) -> str:

@@ -33,7 +33,7 @@ app = typer.Typer(
 )
 
 RecipeFile = Annotated[Path, typer.Argument(help="The recipe, a YAML file.", show_default=False)]
-Store = Annotated[Path, typer.Argument(help="The store, a Zarr folder.", show_default=False)]
+Store = Annotated[str, typer.Argument(help="The store, a Zarr folder or its URL.", show_default=False)]
 Settings = Annotated[
     list[str],
     typer.Option(
@@ -75,7 +75,7 @@ def _options(
 @app.command()
 def build(
     recipe: RecipeFile,
-    store: Annotated[Path, typer.Argument(help="Where the dataset goes.", show_default=False)],
+    store: Annotated[str, typer.Argument(help="Where the dataset goes: a folder, or a URL.", show_default=False)],
     settings: Settings = [],  # noqa: B006 - typer copies it
     frames: Annotated[str | None, typer.Option(metavar="A:B", help="Only these frames, such as 0:8 or 0:8,12.")] = None,
     sequences: Annotated[
@@ -187,7 +187,7 @@ def verify(
 @app.command()
 def show(
     stores: Annotated[
-        list[Path], typer.Argument(metavar="STORE...", help="A store, or up to four to compare.", show_default=False)
+        list[str], typer.Argument(metavar="STORE...", help="A store, or up to four to compare.", show_default=False)
     ],
     out: Annotated[
         Path | None,

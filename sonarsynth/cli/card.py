@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 
 def card(
-    store: Annotated[Path, typer.Argument(help="The store, a Zarr folder.", show_default=False)],
+    store: Annotated[str, typer.Argument(help="The store, a Zarr folder or its URL.", show_default=False)],
     out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Where the two files go. Left out: beside the store.")
+        str | None, typer.Option(metavar="FOLDER", help="Where the two files go. Left out: beside the store.")
     ] = None,
 ) -> None:
     """Describe a store: a card to read (Markdown), and Croissant metadata for programs."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def repair(
-    store: Annotated[Path, typer.Argument(help="The store, a Zarr folder.", show_default=False)],
+    store: Annotated[str, typer.Argument(help="The store, a Zarr folder or its URL.", show_default=False)],
     workers: Annotated[
         int | None, typer.Option(min=0, help="Worker processes; 0: none, in this process. Left out: one a core.")
     ] = None,

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, fields, replace
-from pathlib import Path
 from typing import Final
 
 from sonarsynth import cards, store
 from sonarsynth.config import Source
 from sonarsynth.planning import PRODUCTS, Plan, choices_from, chosen_products, plan
 from sonarsynth.recipe import Recipe
-from sonarsynth.schedule.log import append_lines, read_lines
-from sonarsynth.schedule.making import job_of, make_shards, usable_cores
+from sonarsynth.schedule.log import append_lines, read_lines, write_lines
+from sonarsynth.schedule.making import job_of, make_shards, seen_by, usable_cores
 from sonarsynth.schedule.predicting import Prediction, predict
 from sonarsynth.schedule.report import BuildReport, Course, Progress
 from sonarsynth.schedule.space import TooLarge, check_space, told_when_full
 from sonarsynth.schedule.tasks import Failure
+from sonarsynth.store import Folder
 
 __all__ = ["BuildReport", "Failure", "Prediction", "Progress", "TooLarge", "build", "predict", "usable_cores"]
 
@@ -27,7 +26,7 @@ LEAST_MEMORY: Final = 300_000_000
 
 def build(
     what: Recipe | Plan,
-    path: Path | str,
+    path: Folder | str,
     *,
     frames: Iterable[int] | None = None,
     products: Iterable[str] = PRODUCTS,
@@ -60,15 +59,18 @@ def build(
     address. A `prediction` of `schedule.predicting.predict` is compared with what is measured. The text of the recipe
     is kept where its `source` is given (`config.read`).
 
+    `path` may be a URL that fsspec knows, such as s3://bucket/remus.zarr: the files beside it are objects there, but
+    for the log and the run times, which are in ~/.local/state/sonarsynth.
+
     Raises FieldError for a scene that cannot be, IndexError for frames that are not there, store.Mismatch for a store
     of something else, store.Locked while another build runs, store.Damage where the store cannot go on, TooLarge where
-    `agreed` is needed, OSError where it cannot be written or the scheduler is gone, RuntimeError where workers do not
-    start, ValueError for options that cannot be. After any of these, and after an interruption, the same call goes on
-    where it ended.
+    `agreed` is needed, OSError where it cannot be written or the scheduler is gone, store.Unreachable for a URL that
+    cannot be used, RuntimeError where workers do not start, ValueError for options that cannot be. After any of these,
+    and after an interruption, the same call goes on where it ended.
     """
     made = what if isinstance(what, Plan) else plan(what, chosen_products(products))
     _check(workers, scheduler, frame_timeout, worker_memory, insecure)
-    path = Path(os.path.abspath(path))
+    path = seen_by(store.absolute(path), workers)
     chosen = range(made.recipe.frames) if frames is None else sorted(set(frames))
     if not path.exists() and not agreed:
         check_space(path, _bytes(made, len(chosen)))
@@ -98,16 +100,16 @@ def build(
     return report
 
 
-def _describe(path: Path, report: BuildReport, prediction: Prediction | None) -> None:
+def _describe(path: Folder, report: BuildReport, prediction: Prediction | None) -> None:
     """Put the card beside the store, and what was predicted into its times."""
     if report.written or not store.beside(path, "card.md").exists():
         cards.write(path)
     if prediction is not None:
         report.prediction = prediction.against(report)
-        append_lines(store.beside(path, "times.jsonl"), [{"build": report.prediction}])
+        append_lines(store.here(path, "times.jsonl"), [{"build": report.prediction}])
 
 
-def _as_begun(path: Path, made: Plan) -> Plan:
+def _as_begun(path: Folder, made: Plan) -> Plan:
     """The plan, with the choices that a store of the same recipe was begun with: another machine may choose others."""
     there = store.root_attributes(path)
     if there.get("recipe_digest") != made.digest or "choices" not in there:
@@ -140,7 +142,7 @@ def _bytes(made: Plan, frames: int) -> float:
     return made.predicted_bytes * frames / max(made.recipe.frames, 1)
 
 
-def _set_aside(path: Path) -> dict[int, Failure]:
+def _set_aside(path: Folder) -> dict[int, Failure]:
     """Frames that earlier builds set aside and that are still missing."""
     names = {field.name for field in fields(Failure)}
     rows = [row for row in read_lines(store.beside(path, "aside.jsonl")) if names <= row.keys()]
@@ -149,18 +151,12 @@ def _set_aside(path: Path) -> dict[int, Failure]:
     return {failure.frame: failure for failure in found if failure.frame not in there}
 
 
-def _tidy(path: Path, again: set[int], earlier: Mapping[int, Failure], restart: bool) -> None:
+def _tidy(path: Folder, again: set[int], earlier: Mapping[int, Failure], restart: bool) -> None:
     """Forget the failures of frames that are tried again, and, on a restart, old run times and the log."""
     if restart:
         for old in ("times.jsonl", "log.jsonl"):
-            store.beside(path, old).unlink(missing_ok=True)
+            store.here(path, old).unlink(missing_ok=True)
     aside = store.beside(path, "aside.jsonl")
     kept = [asdict(failure) for frame, failure in earlier.items() if frame not in again]
     if aside.exists():
-        scratch = store.beside(path, "aside.partial")
-        scratch.unlink(missing_ok=True)
-        append_lines(scratch, kept)
-        if kept:
-            scratch.replace(aside)
-        else:
-            aside.unlink()
+        write_lines(aside, kept)

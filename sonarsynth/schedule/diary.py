@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TextIO
 
-from sonarsynth.store import beside
+from sonarsynth.store import here
 
 LONGEST: Final = 20_000
 """Characters of a traceback that are kept."""
@@ -37,12 +37,12 @@ class Entry:
 def open_folder(store: str) -> None:
     """Make the folder for the workers of a build, empty."""
     close_folder(store)
-    beside(store, "doing").mkdir()
+    here(store, "doing").mkdir()
 
 
 def close_folder(store: str) -> None:
     """Remove the folder."""
-    shutil.rmtree(beside(store, "doing"), ignore_errors=True)
+    shutil.rmtree(here(store, "doing"), ignore_errors=True)
 
 
 def read(store: str, worker: str) -> Entry | None:
@@ -105,7 +105,7 @@ def _mine(store: str) -> TextIO | None:
 
 
 def _file(store: str, worker: str) -> Path:
-    return beside(store, "doing") / re.sub(r"[^\w.]+", "-", worker)
+    return here(store, "doing") / re.sub(r"[^\w.]+", "-", worker)
 
 
 def _reason(text: str, limit: float) -> str:

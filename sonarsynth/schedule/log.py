@@ -10,20 +10,34 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
+from sonarsynth.store.place import Folder, remove, write_atomically
+from sonarsynth.store.remote import Remote
+
 PROGRESS_EVERY: Final = 10.0
 """Seconds between two events `progress`."""
 
 
-def append_lines(file: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+def append_lines(file: Folder, rows: Sequence[Mapping[str, Any]]) -> None:
     """Add rows to a file of JSON lines, all of them with one write."""
     if not rows:
+        return
+    if isinstance(file, Remote):
+        write_lines(file, [*read_lines(file), *rows])
         return
     handle = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
     with os.fdopen(handle, "ab", buffering=0) as out:
         out.write("".join(json.dumps(row) + "\n" for row in rows).encode())
 
 
-def read_lines(file: Path) -> list[dict[str, Any]]:
+def write_lines(file: Folder, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Put rows in the place of a file of JSON lines; without rows there is none."""
+    if rows:
+        write_atomically(file, "".join(json.dumps(row) + "\n" for row in rows).encode())
+    else:
+        remove(file)
+
+
+def read_lines(file: Folder) -> list[dict[str, Any]]:
     """Rows of a file of JSON lines, [] where there is none; a line cut off by a crash is left out."""
     try:
         lines = file.read_text("utf-8", errors="replace").splitlines()

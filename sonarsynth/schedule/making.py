@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Final
 
 from sonarsynth.planning import Plan
 from sonarsynth.schedule import diary, tasks
 from sonarsynth.schedule.tasks import Job, Written
+from sonarsynth.store import Folder, Remote, Unreachable
 
 PATIENCE: Final = 600.0
 """Seconds that a stage of a frame may always take (a first one compiles), and a worker to start again."""
@@ -19,7 +19,14 @@ SHORT: Final = 0.3
 """Frames of fewer seconds are not worth tasks of their own."""
 
 
-def job_of(path: Path, made: Plan, build: str, frame_timeout: float | None = None) -> Job:
+def seen_by(path: Folder, workers: int | None) -> Folder:
+    """The place itself; raises Unreachable where worker processes would not see it."""
+    if isinstance(path, Remote) and not path.shared and workers != 0:
+        raise Unreachable(f"{path}: is of this process alone: give workers=0 (--workers 0)")
+    return path
+
+
+def job_of(path: Folder, made: Plan, build: str, frame_timeout: float | None = None) -> Job:
     """What workers need to know of a build that holds the lock of its store under the name `build`.
 
     A stage of a frame may take `frame_timeout` seconds (None: many times what the plan predicts; 0: no limit).

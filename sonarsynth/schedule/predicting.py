@@ -162,7 +162,7 @@ class Prediction:
     def against(self, report: BuildReport) -> dict[str, Any]:
         """Prediction and measurement of a build that has ended: for what it did, and for the store as it is."""
         built, whole = self.of(frames=report.written, workers=report.workers), self.of(frames=_there(report))
-        size = disk_use(Path(report.store))
+        size = disk_use(report.store)
         measured = {
             "seconds": (built.seconds, report.seconds),
             "frames_core_seconds": (built.frames_seconds, sum(report.stage_cpu.values())),

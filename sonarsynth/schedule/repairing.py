@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import Any
 
 from sonarsynth import config, store
 from sonarsynth.description import FieldError
 from sonarsynth.planning import Plan, choices_from, plan
 from sonarsynth.schedule.log import append_lines
-from sonarsynth.schedule.making import job_of, make_shards
+from sonarsynth.schedule.making import job_of, make_shards, seen_by
 from sonarsynth.schedule.report import Progress
 from sonarsynth.schedule.tasks import Failure, Written
-from sonarsynth.store import Findings, Mismatch, Problem
+from sonarsynth.store import Findings, Folder, Mismatch, Problem
 from sonarsynth.store.creating import identity
 from sonarsynth.store.examining import shard_of
 from sonarsynth.store.layout import layout_of
-from sonarsynth.store.marks import MARKS, Damage, Mark, all_files, load_layout, load_mark, mark_file
+from sonarsynth.store.marks import MARKS, Damage, Mark, all_files, load_layout, load_mark
 from sonarsynth.store.reading import read_back
 from sonarsynth.store.restoring import drop_empty_folders, frames_written, move_out, obstacles, restore
 
@@ -49,7 +47,7 @@ class RepairReport:
 
 
 def repair(
-    path: Path | str,
+    path: Folder | str,
     *,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -74,7 +72,7 @@ def repair(
         from sonarsynth.schedule.connecting import check_address
 
         check_address(scheduler, insecure)
-    path = Path(os.path.abspath(path))
+    path = seen_by(store.absolute(path), workers)
     store.must_be_store(path)
     with store.lock(path) as name:
         found = store.examine(path)
@@ -103,7 +101,7 @@ def repair(
     return report
 
 
-def _plan_of(path: Path, found: Findings, anyway: bool) -> Plan:
+def _plan_of(path: Folder, found: Findings, anyway: bool) -> Plan:
     """The plan that the store was built by. Raises Mismatch where it cannot be had again, Damage without a recipe."""
     attrs = found.attributes or store.root_attributes(path)
     try:
@@ -134,13 +132,13 @@ def _plan_of(path: Path, found: Findings, anyway: bool) -> Plan:
     return made
 
 
-def _unlike(path: Path, found: Findings) -> list[int]:
+def _unlike(path: Folder, found: Findings) -> list[int]:
     """Shards whose files are as their mark says, and whose numbers are not. The layout must be whole."""
     alike = sorted(found.marks.keys() - found.shards)
     return [n for n in alike if any("not finite" not in p.what for p in read_back(path, found.marks[n]))]
 
 
-def _todo(path: Path, found: Findings, made: Plan, unlike: Iterable[int]) -> dict[int, tuple[int, ...]]:
+def _todo(path: Folder, found: Findings, made: Plan, unlike: Iterable[int]) -> dict[int, tuple[int, ...]]:
     """Shards to make again, with the frames that they had."""
     todo = {}
     for shard in sorted(found.shards | set(unlike)):
@@ -151,11 +149,11 @@ def _todo(path: Path, found: Findings, made: Plan, unlike: Iterable[int]) -> dic
     return todo
 
 
-def _in_the_way(path: Path, found: Findings, made: Plan, todo: Mapping[int, tuple[int, ...]]) -> list[str]:
+def _in_the_way(path: Folder, found: Findings, made: Plan, todo: Mapping[int, tuple[int, ...]]) -> list[str]:
     """What cannot be written over, and what is named as of a shard of which the arrays of all shards have no sign."""
     layout = layout_of(made)
     rewritten = {a.file(shard) for shard in todo for a in layout.arrays if not a.empty}
-    marks = {number: mark_file(path, number).relative_to(path).as_posix() for number in found.shards}
+    marks = {number: f"{MARKS}/{number}.json" for number in found.shards}
     lost = found.shards - todo.keys()
     laid = load_layout(path)
     ours = rewritten | (set() if laid is None else set(laid.files))
@@ -164,7 +162,7 @@ def _in_the_way(path: Path, found: Findings, made: Plan, todo: Mapping[int, tupl
 
 
 def _counter(
-    path: Path, written: Mapping[int, Mark], report: RepairReport, progress: Progress | None
+    path: Folder, written: Mapping[int, Mark], report: RepairReport, progress: Progress | None
 ) -> Callable[[Written], None]:
     """What is done with a shard that is made again: compared with what its mark said, its failures kept."""
     done_frames = 0

@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import Any
 
 from sonarsynth import store
@@ -16,6 +15,7 @@ from sonarsynth.planning import Plan
 from sonarsynth.schedule import tasks
 from sonarsynth.schedule.log import Log, append_lines
 from sonarsynth.schedule.tasks import Failure, Written
+from sonarsynth.store import Folder
 
 Progress = Callable[[int, int, int], None]
 """Called with the frames done, the frames to do, and the frames set aside, as shards are written."""
@@ -73,7 +73,7 @@ class Course:
 
     def __init__(
         self,
-        path: Path,
+        path: Folder,
         report: BuildReport,
         total: int,
         progress: Progress | None,
@@ -82,7 +82,7 @@ class Course:
         self.path, self.report, self.total = path, report, total
         self.progress, self.announce = progress, announce
         self.before = len(report.failures)
-        self.log = Log(store.beside(path, "log.jsonl"))
+        self.log = Log(store.here(path, "log.jsonl"))
         self._tell()
 
     def _tell(self) -> None:
@@ -101,7 +101,7 @@ class Course:
     def done(self, written: Written) -> None:
         """A shard is written."""
         self.report.add(written)
-        append_lines(store.beside(self.path, "times.jsonl"), written.times)
+        append_lines(store.here(self.path, "times.jsonl"), written.times)
         append_lines(store.beside(self.path, "aside.jsonl"), [asdict(f) for f in written.failures])
         for failure in written.failures:
             self.log.event("aside", frame=failure.frame, stage=failure.stage, error=failure.error)

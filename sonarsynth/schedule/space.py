@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import errno
+import math
 import os
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Final
+
+from sonarsynth.store import Folder, Remote
 
 LARGE: Final = 1e12
 """Bytes above which a build starts only when told so."""
@@ -26,30 +28,33 @@ class TooLarge(ValueError):
     """A build needs more than is free, or very much, and nobody agreed to it; str() is one line."""
 
 
-def free_bytes(path: Path) -> int:
-    """Free bytes where a path is, or is to be."""
+def free_bytes(path: Folder) -> float:
+    """Free bytes where a path is, or is to be; nobody knows of an object store."""
+    if isinstance(path, Remote):
+        return math.inf
     place = path
     while not place.exists() and place != place.parent:
         place = place.parent
     return shutil.disk_usage(place).free
 
 
-def check_space(path: Path, needed: float) -> None:
+def check_space(path: Folder, needed: float) -> None:
     """Raise TooLarge where a build that needs so many bytes should not start unasked."""
     free = free_bytes(path)
     if needed > free:
         raise TooLarge(f"{path}: needs up to {size(needed)} and {size(free)} are free there: --yes builds all the same")
     if needed > LARGE:
-        raise TooLarge(f"{path}: needs up to {size(needed)} ({size(free)} are free there): --yes builds it")
+        known = f" ({size(free)} are free there)" if math.isfinite(free) else ""
+        raise TooLarge(f"{path}: needs up to {size(needed)}{known}: --yes builds it")
 
 
 @contextmanager
-def told_when_full(path: Path, needed: Callable[[], float]) -> Iterator[None]:
+def told_when_full(path: Folder, needed: Callable[[], float]) -> Iterator[None]:
     """Turn the error of a disk that takes no more into one line with the bytes still needed and those free."""
     try:
         yield
     except OSError as error:
-        if error.errno not in FULL:
+        if error.errno not in FULL or isinstance(path, Remote):
             raise
         line = (
             f"{FULL[error.errno]}: up to {size(needed())} more are needed, {size(free_bytes(path))} are free; "

@@ -36,7 +36,7 @@ def tasks_of(products: Sequence[str]) -> tuple[str, ...]:
 class Job:
     """What is built, small enough to send with every task."""
 
-    path: str  # of the store, absolute
+    path: str  # of the store, absolute, or its URL
     digest: str  # of the recipe
     products: tuple[str, ...]
     build: str = ""  # the build that this is for, as its lock names it; "": not under a lock
@@ -136,8 +136,8 @@ def write(job: Job, shard: int, steps: Sequence[Step]) -> Written:
     good = {step.frame: step.made for step in steps if step.failure is None}
     size = 0
     if good:
-        with store.shared_lock(job.path, job.build) if job.build else nullcontext():
-            mark = store.write_shard(job.path, plan_of(job), shard, good)
+        with store.shared_lock(job.path, job.build) if job.build else nullcontext(lambda: None) as still:
+            mark = store.write_shard(job.path, plan_of(job), shard, good, still)
         size = sum(max(size, 0) for size, _ in mark.files.values())
     return Written(
         shard=shard,

@@ -249,8 +249,12 @@ def _timed(work: Callable[[], object]) -> Times:
     return time.process_time() - cpu, time.perf_counter() - wall
 
 
-def disk_use(path: Path) -> Sizes:
-    """Bytes below a folder, itself too: those of files, and as `du` counts them."""
+def disk_use(where: store.Folder | str) -> Sizes:
+    """Bytes below a folder, itself too: those of files, and as `du` counts them; at a URL both are those of objects."""
+    path = store.folder_of(where)
+    if isinstance(path, store.Remote):
+        objects = float(sum(path.sizes().values()))
+        return Sizes(objects, objects)
     files = disk = 0
     for folder, _, names in os.walk(path):
         for entry in (Path(folder), *(Path(folder) / name for name in names)):

@@ -13,15 +13,16 @@ from sonarsynth.pictures.sheet import Errors, sheet
 from sonarsynth.pictures.style import decibels
 from sonarsynth.show.film import thinned, write_film
 from sonarsynth.show.listening import beams
-from sonarsynth.show.reading import NothingToDraw, Stored, beam_grid, built, opened, stored
+from sonarsynth.show.reading import NothingToDraw, Stored, beam_grid, built, opened, pictures_of, stored
 from sonarsynth.show.summary import summary
+from sonarsynth.store import Folder, folder_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
 def show(
-    store: str | Path,
+    store: str | Folder,
     out: str | Path | None = None,
     *,
     frame: int | None = None,
@@ -35,7 +36,7 @@ def show(
     with most points on a target). What the store does not hold is left out of the pictures and said. Raises
     NothingToDraw, a ValueError, where there is no store, or not that frame.
     """
-    path = Path(store)
+    path = folder_of(store)
     tree = opened(path)
     frames = built(tree)
     if not len(frames):
@@ -46,7 +47,7 @@ def show(
             f"{path}: frame {frame} has not been built; there are {len(frames)}, {frames[0]} to {frames[-1]}"
         )
     say(summary(tree, path))
-    folder = path.with_name(path.name + ".pictures") if out is None else Path(out)
+    folder = pictures_of(path) if out is None else Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     filmed = thinned(frames.tolist())
     read = {i: stored(tree, i) for i in filmed}

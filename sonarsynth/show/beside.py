@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,8 +14,9 @@ from sonarsynth.pictures.beside import BesidePicture, Column, Moment, Panel
 from sonarsynth.pictures.style import decibels
 from sonarsynth.show.differences import names_of
 from sonarsynth.show.film import thinned, write_film
-from sonarsynth.show.reading import NothingToDraw, beam_grid, built, hulls, needed, opened, read
+from sonarsynth.show.reading import NothingToDraw, beam_grid, built, hulls, needed, opened, pictures_of, read
 from sonarsynth.show.standing import LEVEL, Heard, as_table, heard, standing
+from sonarsynth.store import Folder, folder_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,7 +37,7 @@ NOTE = (
 
 
 def show_beside(
-    stores: Sequence[str | Path],
+    stores: Sequence[str | Folder],
     out: str | Path | None = None,
     *,
     frame: int | None = None,
@@ -54,7 +55,7 @@ def show_beside(
     Raises NothingToDraw, a ValueError, where a store is none or has no image, where beam grids differ, where no frame
     is in all stores, or not that one.
     """
-    paths = [Path(store) for store in stores]
+    paths = [folder_of(store) for store in stores]
     if not 2 <= len(paths) <= MOST:
         raise NothingToDraw(f"{len(paths)} stores: from 2 to {MOST} fit beside each other")
     trees = [_fit(opened(path), path) for path in paths]
@@ -125,7 +126,7 @@ def _alike(some: tuple[Hull, ...], others: tuple[Hull, ...]) -> bool:
     )
 
 
-def _fit(tree: xr.DataTree, path: Path) -> xr.DataTree:
+def _fit(tree: xr.DataTree, path: Folder) -> xr.DataTree:
     """The store, if its images can be drawn beside others."""
     if "image" not in tree.children or "energy" not in tree["image"].dataset:
         raise NothingToDraw(f"{path}: the store has no image, which is what is drawn side by side")
@@ -133,7 +134,7 @@ def _fit(tree: xr.DataTree, path: Path) -> xr.DataTree:
 
 
 def _common(
-    trees: Sequence[xr.DataTree], paths: Sequence[Path], frame: int | None, say: Callable[[str], None]
+    trees: Sequence[xr.DataTree], paths: Sequence[Folder], frame: int | None, say: Callable[[str], None]
 ) -> list[int]:
     """Frames that all stores have; refuses stores whose images do not fit together."""
     for tree, path in zip(trees[1:], paths[1:], strict=True):
@@ -181,14 +182,14 @@ def _heading(trees: Sequence[xr.DataTree], count: int) -> str:
     return f"{' / '.join(titles)}   {count} frames"
 
 
-def _file_names(paths: Sequence[Path]) -> list[str]:
+def _file_names(paths: Sequence[Folder]) -> list[str]:
     """Names that tell stores apart: their own, or else the whole paths, or else with a number."""
-    for names in ([path.stem for path in paths], [str(path) for path in paths]):
+    for names in ([PurePosixPath(path.name).stem for path in paths], [str(path) for path in paths]):
         if len(set(names)) == len(names):
             return names
     return [f"{path} ({n})" for n, path in enumerate(paths, 1)]
 
 
-def _folder(paths: Sequence[Path]) -> Path:
+def _folder(paths: Sequence[Folder]) -> Path:
     names = [path.name.removesuffix(".zarr") for path in paths]
-    return paths[0].with_name("-".join(names) + ".pictures")
+    return pictures_of(paths[0], "-".join(names))

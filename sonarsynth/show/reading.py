@@ -12,6 +12,8 @@ from sonarsynth.conventions import Floats, direction
 from sonarsynth.geometry import Pose
 from sonarsynth.pictures.frames import Hull
 from sonarsynth.pictures.ghosts import Ghost
+from sonarsynth.store import Folder, Remote, folder_of
+from sonarsynth.store.place import opens
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,20 +26,34 @@ class NothingToDraw(ValueError):
     """There is no store, or nothing in it to draw; str() is one line."""
 
 
-def opened(store: str | Path) -> xr.DataTree:
+def opened(store: str | Folder) -> xr.DataTree:
     """The store as a DataTree. Raises NothingToDraw when it is not one."""
     import xarray as xr
 
-    path = Path(store)
+    path = folder_of(store)
     if not path.is_dir():
         raise NothingToDraw(f"{path}: there is no such store")
     try:
-        tree = xr.open_datatree(path, engine="zarr")
+        tree = xr.open_datatree(opens(path), engine="zarr")
     except (OSError, ValueError, KeyError) as problem:
         raise NothingToDraw(f"{path}: not a store that xarray can open ({str(problem).splitlines()[0]})") from None
     if "truth" not in tree.children or "frame" not in tree["truth"].sizes:
         raise NothingToDraw(f"{path}: a store has a group /truth with frames; this has none")
     return tree
+
+
+def pictures_of(store: str | Folder, name: str = "") -> Path:
+    """The folder that the pictures of a store go to: beside it, or in the working directory where it is at a URL."""
+    path = folder_of(store)
+    found = f"{name or path.name}.pictures"
+    return path.with_name(found) if isinstance(path, Path) else Path(found)
+
+
+def bytes_of(store: Folder) -> int:
+    """Bytes of the files of a store; 0 where nobody can list them."""
+    if isinstance(store, Remote):
+        return sum(store.sizes().values()) if store.listed else 0
+    return sum(path.stat().st_size for path in store.rglob("*") if path.is_file())
 
 
 def read(tree: xr.DataTree, name: str, frame: int | None = None) -> np.ndarray | None:

@@ -13,7 +13,7 @@ import numpy as np
 from sonarsynth.conventions import REFERENCE_PRESSURE, Floats, Ints
 from sonarsynth.pictures.style import decibels
 from sonarsynth.show.reading import needed, read
-from sonarsynth.store import beside
+from sonarsynth.store import Folder, here
 from sonarsynth.verification import brightest_beam_on_target, range_errors
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def heard(tree: xr.DataTree, frames: Sequence[int]) -> Heard:
     return Heard(float(max(peaks)), np.array(means), np.array(points), np.array(beams))
 
 
-def standing(tree: xr.DataTree, store: Path, frames: Sequence[int], sound: Heard) -> dict[str, str]:
+def standing(tree: xr.DataTree, store: Folder, frames: Sequence[int], sound: Heard) -> dict[str, str]:
     """Rows of a table about frames of a store that has an image, by name.
 
     Costs are medians over the frames, of the processor time of one core: the first frame of a process also waits for
@@ -67,7 +67,7 @@ def standing(tree: xr.DataTree, store: Path, frames: Sequence[int], sound: Heard
     return {
         **_ranges(tree, np.asarray(frames)),
         **_echoes(tree, np.asarray(frames), sound),
-        **_costs(beside(store, "times.jsonl"), frozenset(frames)),
+        **_costs(here(store, "times.jsonl"), frozenset(frames)),
     }
 
 

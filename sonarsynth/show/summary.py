@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.show.reading import built, echo_levels, mesh_group, needed, read
+from sonarsynth.show.reading import built, bytes_of, echo_levels, mesh_group, needed, read
+from sonarsynth.store import Folder
 from sonarsynth.verification import brightest_beam_on_target, range_errors, snap_located
 
 if TYPE_CHECKING:
@@ -22,14 +22,14 @@ VARIABLES = {
 """The variable that stands for each group in a summary."""
 
 
-def summary(tree: xr.DataTree, store: Path) -> str:
+def summary(tree: xr.DataTree, store: Folder) -> str:
     """What a store holds and how well it agrees with its own truth, over the frames that were built."""
     frames = built(tree)
     total = tree["truth"].sizes["frame"]
-    size = sum(path.stat().st_size for path in store.rglob("*") if path.is_file())
+    size = bytes_of(store)
     lines = [
         f"{store.name}: {tree.attrs.get('title') or 'untitled'}",
-        f"  frames     {len(frames)} of {total} built, {size / 1e6:.1f} MB on disk",
+        f"  frames     {len(frames)} of {total} built" + (f", {size / 1e6:.1f} MB on disk" if size else ""),
         *(f"  {name:10s} {_shape(tree, variable)}" for name, variable in VARIABLES.items()),
     ]
     if not len(frames):

@@ -8,8 +8,10 @@ from __future__ import annotations
 from sonarsynth.store.creating import Mismatch, create, identity, root_attributes
 from sonarsynth.store.examining import Findings, Problem, examine, must_be_store, ranges
 from sonarsynth.store.layout import Layout, layout_of
-from sonarsynth.store.lock import Ended, Locked, beside, lock, shared_lock
+from sonarsynth.store.lock import Ended, Locked, lock, shared_lock
 from sonarsynth.store.marks import Damage, Mark
+from sonarsynth.store.place import Folder, absolute, beside, folder_of, here
+from sonarsynth.store.remote import Remote, Unreachable
 from sonarsynth.store.verifying import Report, verify
 from sonarsynth.store.writing import frames_there, missing, write_shard
 
@@ -17,16 +19,22 @@ __all__ = [
     "Damage",
     "Ended",
     "Findings",
+    "Folder",
     "Layout",
     "Locked",
     "Mark",
     "Mismatch",
     "Problem",
+    "Remote",
     "Report",
+    "Unreachable",
+    "absolute",
     "beside",
     "create",
     "examine",
+    "folder_of",
     "frames_there",
+    "here",
     "identity",
     "layout_of",
     "lock",

@@ -1,10 +1,15 @@
-"""Laying a store out: all of it at once, in a folder beside the place, which is then moved there."""
+"""Laying a store out: all of it at once, in a folder beside the place, which is then moved there.
+
+At a URL nothing is moved: it is laid out on this machine, and sent, the mark of the layout first and the metadata of
+the root last. What has the mark and neither metadata nor marks of shards was never finished, and is laid out anew.
+"""
 
 from __future__ import annotations
 
 import json
 import os
 import shutil
+import tempfile
 import warnings
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
@@ -28,11 +33,12 @@ from sonarsynth.store.marks import (
     Mark,
     all_files,
     load_layout,
-    record,
-    records,
+    marked,
     save_mark,
 )
+from sonarsynth.store.place import Folder, folder_of, record, records, upload
 from sonarsynth.store.provenance import begun, made_of
+from sonarsynth.store.remote import Remote
 
 if TYPE_CHECKING:
     from sonarsynth.config import Source
@@ -43,14 +49,16 @@ class Mismatch(ValueError):
     """The store holds something else than what is wanted, or is none; str() is one line."""
 
 
-def create(path: Path | str, plan: Plan, *, restart: bool = False, source: Source | None = None) -> Layout:
+def create(path: Folder | str, plan: Plan, *, restart: bool = False, source: Source | None = None) -> Layout:
     """Lay the store out, or make ready to go on with the one that is there. Returns its layout.
 
     Raises Mismatch where the store that is there belongs to another recipe, other products or another version, or is
     no store of ours; `restart` begins anew instead (and never removes what is not a store of ours). Raises Damage
     where the store that is there is not as it was laid out. The text of the recipe is kept where its `source` is given.
     """
-    path, layout = Path(path), layout_of(plan)
+    path, layout = folder_of(path), layout_of(plan)
+    if isinstance(path, Remote):
+        return _create_there(path, plan, layout, restart, source)
     scratch, old = hidden(path, "new"), hidden(path, "old")
     for leftover in (scratch, old):
         shutil.rmtree(leftover, ignore_errors=True)
@@ -60,8 +68,7 @@ def create(path: Path | str, plan: Plan, *, restart: bool = False, source: Sourc
     if there:
         stored = _identity_of(path)
         if not restart:
-            _compare(path, stored, identity(plan))
-            _check_layout(path)
+            _go_on(path, stored, plan)
             _sweep(path)
             return layout
     lay_out(scratch, plan, layout, {**described(plan), **begun(source)})
@@ -73,6 +80,31 @@ def create(path: Path | str, plan: Plan, *, restart: bool = False, source: Sourc
     return layout
 
 
+def _go_on(path: Folder, stored: Mapping[str, Any], plan: Plan) -> None:
+    """Raise Mismatch or Damage unless a plan's build may go on in the store that is there."""
+    _compare(path, stored, identity(plan))
+    _check_layout(path)
+
+
+def _create_there(path: Remote, plan: Plan, layout: Layout, restart: bool, source: Source | None) -> Layout:
+    """The same at a URL."""
+    if path.is_dir():
+        unfinished = not (path / "zarr.json").is_file() and load_layout(path) is not None and not marked(path)
+        if not unfinished:
+            stored = _identity_of(path)
+            if not restart:
+                _go_on(path, stored, plan)
+                return layout
+        path.unlink_each(["zarr.json", *path.sizes()])
+    with tempfile.TemporaryDirectory(prefix="sonarsynth-") as folder:
+        scratch = Path(folder) / "new"
+        lay_out(scratch, plan, layout, {**described(plan), **begun(source)})
+        save_mark(scratch, layout_mark(scratch))
+        files = {name: (scratch / name).read_bytes() for name in (*all_files(scratch), *MANIFESTS)}
+        upload(path, files, MANIFESTS, "zarr.json")
+    return layout
+
+
 def hidden(path: Path, suffix: str) -> Path:
     """A folder beside a store for what is not yet, or no more, in it."""
     path = Path(os.path.abspath(path))
@@ -81,22 +113,17 @@ def hidden(path: Path, suffix: str) -> Path:
 
 def layout_mark(path: Path, *, sync: bool = False) -> Mark:
     """The mark of a store that was just laid out: everything in it, and its attributes; with `sync`, on the disk."""
-    names = sorted(all_files(path))
-    files = records(path, names) if sync else {name: record(path, name) for name in names}
+    files = {name: record(path, name, sync=sync) for name in sorted(all_files(path))}
     return Mark(LAYOUT, (), "", files, root_attributes(path))
 
 
-def _check_layout(path: Path) -> None:
+def _check_layout(path: Folder) -> None:
     """Raise Damage where metadata or fixed arrays are not as they were laid out."""
     mark = load_layout(path)
     if mark is None:
         raise Damage(f"{path}: {MANIFESTS[0]} is missing or damaged: 'sonarsynth repair' restores it")
-    for name, expected in mark.files.items():
-        try:
-            whole = record(path, name) == expected
-        except OSError:
-            whole = False
-        if not whole:
+    for name, found in records(path, mark.files):
+        if found != mark.files[name]:
             raise Damage(
                 f"{path}: {name} is missing or has changed since the store was laid out: "
                 "'sonarsynth repair' restores it"
@@ -120,11 +147,10 @@ def identity(plan: Plan) -> dict[str, Any]:
     }
 
 
-def root_attributes(path: Path | str) -> dict[str, Any]:
+def root_attributes(path: Folder | str) -> dict[str, Any]:
     """Root attributes of a store, {} where there is none."""
     try:
-        with (Path(path) / "zarr.json").open(encoding="utf-8") as file:
-            found = json.load(file)["attributes"]
+        found = json.loads((folder_of(path) / "zarr.json").read_text("utf-8"))["attributes"]
     except (OSError, ValueError, KeyError, TypeError):
         return {}
     return found if isinstance(found, dict) else {}
@@ -137,14 +163,14 @@ def _version() -> str:
         return "unknown"
 
 
-def _identity_of(path: Path) -> dict[str, Any]:
+def _identity_of(path: Folder) -> dict[str, Any]:
     stored = root_attributes(path)
     if not path.is_dir() or "recipe_digest" not in stored:
         raise Mismatch(f"{path} exists and is not a store of sonarsynth: choose another place")
     return stored
 
 
-def _compare(path: Path, stored: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
+def _compare(path: Folder, stored: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
     """Raise Mismatch with the first difference between what is there and what is to be built."""
     if all(stored.get(key) == value for key, value in wanted.items() if key != "recipe"):
         return

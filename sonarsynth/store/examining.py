@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from sonarsynth.store.creating import Mismatch, root_attributes
@@ -16,16 +15,15 @@ from sonarsynth.store.marks import (
     MANIFESTS,
     MARKS,
     Damage,
-    FileRecord,
     Mark,
     all_files,
     load_layout,
-    load_mark,
-    mark_file,
+    load_marks,
     marked,
     read_mark,
-    record,
 )
+from sonarsynth.store.place import FileRecord, Folder, entries, read, records, there
+from sonarsynth.store.remote import Remote
 
 
 @dataclass(frozen=True)
@@ -61,7 +59,7 @@ class Findings:
         return {} if self.layout is None else self.layout.attributes
 
 
-def examine(path: Path) -> Findings:
+def examine(path: Folder) -> Findings:
     """Compare every file of a store with its record. Raises Mismatch where there is no store of ours."""
     must_be_store(path)
     problems: list[Problem] = []
@@ -79,16 +77,16 @@ def examine(path: Path) -> Findings:
     return Findings(layout, marks, tuple(problems), manifests, known.fixed, frozenset(shards), foreign)
 
 
-def must_be_store(path: Path) -> None:
+def must_be_store(path: Folder) -> None:
     """Raise Mismatch where there is no store of ours: neither marks nor metadata with the digest of a recipe."""
     if not path.is_dir():
-        raise Mismatch(f"{path} is not a store: it is no folder" if os.path.lexists(path) else f"{path}: no such store")
-    manifest = any(os.path.lexists(path / place) for place in MANIFESTS)
+        raise Mismatch(f"{path} is not a store: it is no folder" if there(path) else f"{path}: no such store")
+    manifest = any(there(path, place) for place in MANIFESTS)
     if not (manifest or "recipe_digest" in root_attributes(path) or marked(path)):
         raise Mismatch(f"{path} is not a store of sonarsynth")
 
 
-def _manifests(path: Path, problems: list[Problem]) -> frozenset[str]:
+def _manifests(path: Folder, problems: list[Problem]) -> frozenset[str]:
     """Copies of the mark of the layout that are damaged."""
     bad = set()
     for place in MANIFESTS:
@@ -103,11 +101,11 @@ def _manifests(path: Path, problems: list[Problem]) -> frozenset[str]:
     return frozenset(bad)
 
 
-def frame_count(path: Path) -> int:
+def frame_count(path: Folder) -> int:
     """Frames of the dataset, by the metadata of the array `frame` or the copy in the root's; 0 where both are lost."""
     for file, inside in (("frame/zarr.json", ()), ("zarr.json", ("consolidated_metadata", "metadata", "frame"))):
         try:
-            found: Any = json.loads((path / file).read_bytes())
+            found: Any = json.loads(read(path, file))
             for name in inside:
                 found = found[name]
             return int(found["shape"][0])
@@ -116,7 +114,7 @@ def frame_count(path: Path) -> int:
     return 0
 
 
-def _regions(path: Path, layout: Mark | None) -> Callable[[int], tuple[int, ...]]:
+def _regions(path: Folder, layout: Mark | None) -> Callable[[int], tuple[int, ...]]:
     """The frames of a shard."""
     step = (root_attributes(path) if layout is None else layout.attributes).get("shard_frames")
     count = frame_count(path)
@@ -124,35 +122,31 @@ def _regions(path: Path, layout: Mark | None) -> Callable[[int], tuple[int, ...]
 
 
 def _marks(
-    path: Path, region: Callable[[int], tuple[int, ...]], problems: list[Problem]
+    path: Folder, region: Callable[[int], tuple[int, ...]], problems: list[Problem]
 ) -> tuple[dict[int, Mark], set[int]]:
     """Marks of shards, and the numbers of those that are damaged."""
     marks, bad = {}, set()
-    for number in marked(path):
-        try:
-            mark = load_mark(path, number)
-        except Damage as damage:
-            where, _, what = str(damage).partition(": ")
+    for number, mark in load_marks(path, marked(path)):
+        if isinstance(mark, Damage):
+            where, _, what = str(mark).partition(": ")
             problems.append(Problem(where, what, region(number)))
             bad.add(number)
-        else:
-            if mark is not None:
-                marks[number] = mark
+        elif mark is not None:
+            marks[number] = mark
     return marks, bad
 
 
-def _compare(path: Path, mark: Mark, problems: list[Problem]) -> set[str]:
+def _compare(path: Folder, mark: Mark, problems: list[Problem]) -> set[str]:
     """Names of the files of a mark that are not as recorded."""
     bad = set()
-    for name, (size, digest) in sorted(mark.files.items()):
-        try:
-            found = record(path, name)
-        except (FileNotFoundError, NotADirectoryError):
+    for name, found in records(path, mark.files):
+        size, digest = mark.files[name]
+        if isinstance(found, FileNotFoundError | NotADirectoryError):
             if (size, digest) == ABSENT:
                 continue
             what = "the file is missing"
-        except OSError as error:
-            what = f"cannot be read: {error.strerror}"
+        elif isinstance(found, OSError):
+            what = f"cannot be read: {found.strerror}"
         else:
             if found == (size, digest):
                 continue
@@ -163,16 +157,18 @@ def _compare(path: Path, mark: Mark, problems: list[Problem]) -> set[str]:
 
 
 def _strangers(
-    path: Path, known: Findings, region: Callable[[int], tuple[int, ...]], problems: list[Problem]
+    path: Folder, known: Findings, region: Callable[[int], tuple[int, ...]], problems: list[Problem]
 ) -> tuple[set[int], frozenset[str]]:
     """Files that no mark knows: numbers of the shards that they are data of (a mark is lost, or a build was
     interrupted), and the names of those that are not ours."""
+    if isinstance(path, Remote) and not path.listed:
+        return set(), frozenset()  # nobody can ask what else there is
     files = known.files
     folders = {MARKS}
     for name in files:
         while name := name.rpartition("/")[0]:
             folders.add(name)
-    folders -= {name for name in folders if not (path / name).is_dir()}
+    folders = {name for name in folders if isinstance(path, Path) and (path / name).is_dir()}
     lost: dict[int, list[str]] = {}
     foreign: list[str] = []
     for name in sorted(set(all_files(path)) - set(files) - folders):
@@ -185,14 +181,13 @@ def _strangers(
     for shard in sorted(lost):
         what = "data without a completion mark: build again, or repair, to finish it"
         problems.append(Problem(f"shard {shard}", what, region(shard)))
-    if (path / MARKS).is_dir():
-        ours = {mark_file(path, number).name for number in marked(path)} | {Path(m).name for m in MANIFESTS}
-        foreign += sorted(f"{MARKS}/{entry.name}" for entry in (path / MARKS).iterdir() if entry.name not in ours)
+    ours = {f"{number}.json" for number in marked(path)} | {PurePosixPath(m).name for m in MANIFESTS}
+    foreign += sorted(f"{MARKS}/{name}" for name in entries(path / MARKS) if name not in ours)
     problems.extend(Problem(shown(name), "the file does not belong here") for name in foreign)
     return set(lost), frozenset(foreign)
 
 
-def shard_of(path: Path, name: str) -> int | None:
+def shard_of(path: Folder, name: str) -> int | None:
     """The shard that a file of an array would be of by its name, None for other files."""
     parts = name.split("/")
     at = len(parts) - 1 - parts[::-1].index("c") if "c" in parts else -1

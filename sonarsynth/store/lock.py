@@ -2,20 +2,24 @@
 
 Writers on a cluster may outlive the build that sent them. So each shard is written under a second, shared lock, and
 only while the build that it belongs to holds the first: the next build waits for such writers, and they then refuse.
+At a URL, where nothing is locked, `lease` has the first lock, and writers look at it.
 """
 
 from __future__ import annotations
 
-import errno
 import fcntl
 import os
 import socket
 import time
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
+
+from sonarsynth.store import lease
+from sonarsynth.store.place import Folder, absolute, beside
+from sonarsynth.store.remote import Remote
 
 WAIT: Final = 60.0
 """Seconds that a build waits for a writer of an earlier one."""
@@ -29,41 +33,44 @@ class Ended(RuntimeError):
     """The build that a shard was to be written for has ended; str() is one line."""
 
 
-def beside(store: Path | str, suffix: str) -> Path:
-    """A file beside a store: `remus.zarr` -> `remus.zarr.lock`."""
-    store = Path(os.path.abspath(store))
-    if not store.name:
-        raise OSError(errno.EISDIR, "is no place for a store", str(store))
-    return store.with_name(f"{store.name}.{suffix}")
-
-
 @contextmanager
-def lock(store: Path | str, *, wait: float = WAIT) -> Iterator[str]:
+def lock(store: Folder | str, *, wait: float = WAIT) -> Iterator[str]:
     """Hold a store for building; gives the name of this build, which its writers must know.
 
     Raises Locked when someone else does, or when a writer of an earlier build has not ended after `wait` seconds;
-    OSError when the folder cannot be written.
+    OSError when the folder cannot be written, Unreachable where a URL cannot.
     """
+    store = absolute(store)
     file = beside(store, "lock")
+    if isinstance(file, Remote):
+        try:
+            with lease.leased(file) as name:
+                yield name
+        except lease.Taken as taken:
+            raise Locked(f"{store} is being built by {taken}") from None
+        return
     file.parent.mkdir(parents=True, exist_ok=True)
     handle = _take(file)
     try:
         name = uuid.uuid4().hex
         os.ftruncate(handle, 0)
         os.pwrite(handle, f"process {os.getpid()} on {socket.gethostname()}, build {name}\n".encode(), 0)
-        _wait_for_writers(store, wait)
+        _wait_for_writers(file, wait)
         yield name
     finally:
         with suppress(OSError):
-            _drop_writers(store)
+            _drop_writers(file)
         file.unlink(missing_ok=True)
         os.close(handle)
 
 
-def held_by(store: Path | str) -> str:
+def held_by(store: Folder | str) -> str:
     """Who builds a store now, such as "process 7 on here"; "" where nobody does."""
+    file = beside(store, "lock")
+    if isinstance(file, Remote):
+        return lease.who(file)
     try:
-        handle = os.open(beside(store, "lock"), os.O_RDONLY)
+        handle = os.open(file, os.O_RDONLY)
     except OSError:
         return ""
     try:
@@ -76,42 +83,60 @@ def held_by(store: Path | str) -> str:
 
 
 @contextmanager
-def shared_lock(store: Path | str, build: str) -> Iterator[None]:
-    """Keep the next build waiting while a shard is written for this one. Raises Ended where this one has ended."""
-    handle = _take(beside(store, "writers"), fcntl.LOCK_SH)
-    try:
+def shared_lock(store: Folder | str, build: str) -> Iterator[Callable[[], None]]:
+    """Keep the next build waiting while a shard is written for this one. Raises Ended where this one has ended.
+
+    Gives what is to be called before the mark is written, which raises Ended where it has ended meanwhile.
+    """
+    store = absolute(store)
+
+    def still() -> None:
         if _holder(store) != build:
             raise Ended(f"{store}: the build that this shard is for has ended")
-        yield
+
+    file = beside(store, "writers")
+    if isinstance(file, Remote):
+        still()
+        yield still
+        return
+    handle = _take(file, fcntl.LOCK_SH)
+    try:
+        still()
+        yield still
     finally:
         os.close(handle)
 
 
-def _holder(store: Path | str) -> str:
+def _holder(store: Folder) -> str:
     """The build that the lock file names."""
+    file = beside(store, "lock")
+    if isinstance(file, Remote):
+        return lease.holder(file)
     try:
-        return beside(store, "lock").read_text().rpartition(" ")[2].strip()
+        return file.read_text().rpartition(" ")[2].strip()
     except OSError:
         return ""
 
 
-def _wait_for_writers(store: Path | str, wait: float) -> None:
-    file, until = beside(store, "writers"), time.monotonic() + wait
+def _wait_for_writers(held: Path, wait: float) -> None:
+    file, until = held.with_suffix(".writers"), time.monotonic() + wait
     while file.exists():
         try:
             handle = _take(file)
         except Locked:
             if time.monotonic() > until:
-                raise Locked(f"{store}: a worker of an earlier build is still writing: end it first") from None
+                raise Locked(
+                    f"{held.with_suffix('')}: a worker of an earlier build is still writing: end it first"
+                ) from None
             time.sleep(0.05)
         else:
             os.close(handle)
             return
 
 
-def _drop_writers(store: Path | str) -> None:
+def _drop_writers(held: Path) -> None:
     """Remove the file of the writers, if none is left."""
-    file = beside(store, "writers")
+    file = held.with_suffix(".writers")
     if file.exists():
         with suppress(Locked):
             handle = _take(file)

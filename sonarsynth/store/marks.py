@@ -8,20 +8,17 @@ there are two copies of it, so that one damage never takes what a repair needs.
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import json
-import os
-import stat
-import uuid
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass, field
-from io import BufferedReader
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+
+from sonarsynth.store import place
+from sonarsynth.store.place import FileRecord, Folder, entries, read, read_each, remove, write_atomically
+from sonarsynth.store.remote import Remote
 
 MARKS: Final = ".marks"
 LAYOUT: Final = "layout"
@@ -29,9 +26,6 @@ LAYOUT: Final = "layout"
 
 MANIFESTS: Final = (f"{MARKS}/{LAYOUT}.json", f"{MARKS}/{LAYOUT}.copy.json")
 """Where the mark of the layout lies, twice."""
-
-FileRecord = tuple[int, str]
-"""Size and SHA-256 of a file."""
 
 ABSENT: Final[FileRecord] = (-1, "")
 """Record of a shard whose numbers are all the fill value: zarr leaves its file out, and readers fill in."""
@@ -52,32 +46,47 @@ class Mark:
     attributes: Mapping[str, Any] = field(default_factory=dict)  # of the root, in the mark of the layout
 
 
-def mark_file(store: Path, name: str | int) -> Path:
+def mark_file(store: Folder, name: str | int) -> Folder:
     """Where a mark lies."""
     return store / MARKS / f"{name}.json"
 
 
-def save_mark(store: Path, mark: Mark) -> None:
+def save_mark(store: Folder, mark: Mark) -> None:
     """Write a mark: all of it or nothing, on the disk when this returns. That of the layout is written twice."""
     places = [store / m for m in MANIFESTS] if mark.name == LAYOUT else [mark_file(store, mark.name)]
-    for place in places:
-        write_atomically(place, _encode(mark))
+    for file in places:
+        write_atomically(file, _encode(mark))
 
 
-def load_mark(store: Path, name: str | int) -> Mark | None:
+def load_mark(store: Folder, name: str | int) -> Mark | None:
     """The mark of a shard, None where there is none. Raises Damage where it is not as it was written."""
-    return read_mark(store, mark_file(store, name).relative_to(store).as_posix(), str(name))
+    return read_mark(store, f"{MARKS}/{name}.json", str(name))
 
 
-def read_mark(store: Path, place: str, name: str) -> Mark | None:
-    """The mark of a name at a place in the store, None where there is none. Raises Damage where it is damaged."""
+def read_mark(store: Folder, file: str, name: str) -> Mark | None:
+    """The mark of a name in a file of the store, None where there is none. Raises Damage where it is damaged."""
     try:
-        with _opened(f"{store}/{place}") as file:
-            text = file.read()
-    except FileNotFoundError:
-        return None
+        return parsed(file, name, read(store, file))
     except OSError as error:
-        raise Damage(f"{place}: the mark is damaged: it cannot be read ({error.strerror})") from None
+        return parsed(file, name, error)
+
+
+def load_marks(store: Folder, numbers: Iterable[int]) -> Iterator[tuple[int, Mark | Damage | None]]:
+    """The marks of shards, as `load_mark` has them, with the Damage that it would raise; read many at a time."""
+    names = {f"{MARKS}/{number}.json": number for number in numbers}
+    for file, text in read_each(store, names):
+        try:
+            yield names[file], parsed(file, str(names[file]), text)
+        except Damage as damage:
+            yield names[file], damage
+
+
+def parsed(file: str, name: str, text: bytes | OSError) -> Mark | None:
+    """A mark of a name from what was read in a file. Raises Damage."""
+    if isinstance(text, FileNotFoundError):
+        return None
+    if isinstance(text, OSError):
+        raise Damage(f"{file}: the mark is damaged: it cannot be read ({text.strerror})")
     try:
         body: dict[str, Any] = json.loads(text)
         files = {path: (int(size), str(digest)) for path, (size, digest) in body["files"].items()}
@@ -86,14 +95,14 @@ def read_mark(store: Path, place: str, name: str) -> Mark | None:
             return mark
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         pass
-    raise Damage(f"{place}: the mark is damaged")
+    raise Damage(f"{file}: the mark is damaged")
 
 
-def load_layout(store: Path) -> Mark | None:
+def load_layout(store: Folder) -> Mark | None:
     """The mark of the layout from whichever copy is whole; None where neither is."""
-    for place in MANIFESTS:
+    for file in MANIFESTS:
         try:
-            mark = read_mark(store, place, LAYOUT)
+            mark = read_mark(store, file, LAYOUT)
         except Damage:
             continue
         if mark is not None:
@@ -101,50 +110,33 @@ def load_layout(store: Path) -> Mark | None:
     return None
 
 
-def marked(store: Path) -> list[int]:
+def marked(store: Folder) -> list[int]:
     """Numbers of the shards that have a mark."""
-    try:
-        names = [
-            entry.name.removesuffix(".json") for entry in os.scandir(store / MARKS) if entry.name.endswith(".json")
-        ]
-    except (FileNotFoundError, NotADirectoryError):
-        return []
+    if isinstance(store, Remote) and not store.listed:
+        return _marks_asked_for(store)
+    names = [name.removesuffix(".json") for name in entries(store / MARKS) if name.endswith(".json")]
     return sorted(int(name) for name in names if name.isascii() and name.isdecimal() and str(int(name)) == name)
 
 
-def drop_mark(store: Path, name: str | int) -> None:
-    """Remove a mark, before its shard is written again."""
-    file = mark_file(store, name)
-    if file.exists():
-        file.unlink()
-        _sync(file.parent)
-
-
-def record(store: Path, path: str, *, sync: bool = False) -> FileRecord:
-    """Size and SHA-256 of a file of the store; with `sync`, it is on the disk first. Raises OSError."""
-    with _opened(f"{store}/{path}") as file:
-        if sync:
-            os.fsync(file.fileno())
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-        return os.fstat(file.fileno()).st_size, digest
-
-
-def records(store: Path, paths: Iterable[str]) -> dict[str, FileRecord]:
-    """Records of files that were just written, on the disk when this returns."""
-    return {path: record(store, path, sync=True) for path in paths}
-
-
-def write_new(file: Path, content: bytes) -> FileRecord:
-    """Write a file that is not there, with its folders: on the disk when this returns. Its record."""
+def _marks_asked_for(store: Remote) -> list[int]:
+    """The same where nothing can be listed: every shard that there may be is asked for."""
     try:
-        opened = open(file, "xb")  # noqa: SIM115
-    except FileNotFoundError:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        opened = open(file, "xb")  # noqa: SIM115
-    with opened as out:
-        out.write(content)
-        os.fsync(out.fileno())
-    return len(content), hashlib.sha256(content).hexdigest()
+        root = json.loads(read(store, "zarr.json"))
+        frames = root["consolidated_metadata"]["metadata"]["frame"]["shape"][0]
+        shards = -(-int(frames) // int(root["attributes"]["shard_frames"]))
+    except (OSError, ValueError, KeyError, TypeError, IndexError, ZeroDivisionError):
+        return []
+    return [number for number, mark in load_marks(store, range(shards)) if mark is not None]
+
+
+def all_files(store: Folder) -> Iterator[str]:
+    """Every file in the store but the marks, as paths within it; links to folders too."""
+    return place.all_files(store, apart=MARKS)
+
+
+def drop_mark(store: Folder, name: str | int) -> None:
+    """Remove a mark, before its shard is written again."""
+    remove(mark_file(store, name))
 
 
 def add_to_digest(digest: hashlib._Hash, name: str, block: np.ndarray) -> None:
@@ -152,49 +144,6 @@ def add_to_digest(digest: hashlib._Hash, name: str, block: np.ndarray) -> None:
     little = np.ascontiguousarray(block, block.dtype.newbyteorder("<"))
     digest.update(f"{name} {little.dtype.str} {little.shape}\n".encode())
     digest.update(little.reshape(-1).view(np.uint8).data)
-
-
-def all_files(store: Path) -> Iterator[str]:
-    """Every file in the store but the marks, as paths within it; links to folders too."""
-    start = len(f"{store}/")
-    for folder, folders, names in os.walk(store):
-        inside = folder[start:]
-        if inside.partition("/")[0] != MARKS:
-            links = [name for name in folders if os.path.islink(f"{folder}/{name}")]  # which are not followed
-            yield from (f"{inside}/{name}" if inside else name for name in names + links)
-
-
-def write_atomically(file: Path, content: bytes) -> None:
-    """Write a file so that it is there whole or not at all."""
-    file.parent.mkdir(exist_ok=True)
-    scratch = file.with_name(f".{file.name}.{uuid.uuid4().hex}.partial")
-    try:
-        with scratch.open("xb") as out:
-            out.write(content)
-            out.flush()
-            os.fsync(out.fileno())
-        scratch.replace(file)
-    except BaseException:
-        scratch.unlink(missing_ok=True)
-        raise
-    _sync(file.parent)
-
-
-def _sync(folder: Path) -> None:
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
-
-
-@contextmanager
-def _opened(file: str) -> Iterator[BufferedReader]:
-    """A file to read. Raises OSError for what is no file: reading a pipe would wait for ever."""
-    with open(file, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as opened:
-        if not stat.S_ISREG(os.fstat(opened.fileno()).st_mode):
-            raise OSError(errno.EINVAL, "it is no plain file", file)
-        yield opened
 
 
 def _encode(mark: Mark) -> bytes:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from sonarsynth.store.creating import root_attributes
 from sonarsynth.store.examining import Problem
 from sonarsynth.store.marks import Mark, add_to_digest
+from sonarsynth.store.place import Folder, opens
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,11 +20,11 @@ MUST_BE_FINITE: Final = ("/", "/signals")
 """Groups without NaN in the frames that are there; elsewhere NaN means "no point", "not found"."""
 
 
-def read_back(path: Path, mark: Mark) -> Iterator[Problem]:
+def read_back(path: Folder, mark: Mark) -> Iterator[Problem]:
     """Decode a shard: its contents must have the digest of its mark, and be finite where they must be."""
     import zarr
 
-    root = zarr.open_group(path, mode="r")
+    root = zarr.open_group(opens(path), mode="r")
     shard, step = int(mark.name), int(root_attributes(path)["shard_frames"])
     digest = hashlib.sha256()
     for name in sorted({file.partition("/c/")[0] for file in mark.files}):
@@ -52,12 +52,12 @@ def _finite(name: str, block: np.ndarray, frames: tuple[int, ...], first: int) -
         yield Problem(f"{name}, frame {frame}", f"{int(bad[i].sum())} values are not finite", (frame,))
 
 
-def structure(path: Path) -> Iterator[Problem]:
+def structure(path: Folder) -> Iterator[Problem]:
     """Plain xarray opens it, every variable has units, and every coordinate can be looked up."""
     import xarray as xr
 
     try:
-        with xr.open_datatree(path, engine="zarr", chunks=None) as tree:
+        with xr.open_datatree(opens(path), engine="zarr", chunks=None) as tree:
             yield from described(tree)
     except Exception as error:
         yield Problem(str(path), f"cannot be opened by xarray: {error}")

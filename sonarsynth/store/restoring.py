@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,14 +16,15 @@ from sonarsynth.render import attributes
 from sonarsynth.store.creating import Mismatch, described, hidden, identity, lay_out, layout_mark, root_attributes
 from sonarsynth.store.examining import Findings
 from sonarsynth.store.layout import ArrayLayout, layout_of
-from sonarsynth.store.lock import beside
-from sonarsynth.store.marks import Mark, record, save_mark, write_atomically
+from sonarsynth.store.marks import Mark, save_mark
+from sonarsynth.store.place import Folder, opens, record, there, write_atomically
+from sonarsynth.store.remote import Remote
 
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan
 
 
-def restore(path: Path, found: Findings, plan: Plan | None) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def restore(path: Folder, found: Findings, plan: Plan | None) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Put back laid-out files and the mark of the layout. Returns their names, and where what was in the way is now.
 
     A plan is needed unless only a copy of the mark is damaged. Files are laid out again beside the store, and moved in
@@ -36,7 +38,8 @@ def restore(path: Path, found: Findings, plan: Plan | None) -> tuple[tuple[str, 
         if found.manifests:
             save_mark(path, found.layout)
         return tuple(sorted(found.manifests)), moved
-    scratch = hidden(path, "new")
+    folder = tempfile.mkdtemp(prefix="sonarsynth-") if isinstance(path, Remote) else ""
+    scratch = Path(folder) / "new" if isinstance(path, Remote) else hidden(path, "new")
     shutil.rmtree(scratch, ignore_errors=True)
     try:
         attrs = found.attributes or {
@@ -50,16 +53,17 @@ def restore(path: Path, found: Findings, plan: Plan | None) -> tuple[tuple[str, 
         bad = _to_put_back(path, found, laid)
         moved = move_out(path, obstacles(path, [*bad, *found.manifests]))
         for name in bad:
-            (path / name).parent.mkdir(parents=True, exist_ok=True)
+            if isinstance(path, Path):
+                (path / name).parent.mkdir(parents=True, exist_ok=True)
             write_atomically(path / name, (scratch / name).read_bytes())
         if found.manifests:
             save_mark(path, found.layout or laid)
     finally:
-        shutil.rmtree(scratch, ignore_errors=True)
+        shutil.rmtree(folder or scratch, ignore_errors=True)
     return (*bad, *sorted(found.manifests)), moved
 
 
-def _to_put_back(path: Path, found: Findings, laid: Mark) -> list[str]:
+def _to_put_back(path: Folder, found: Findings, laid: Mark) -> list[str]:
     """Names of laid-out files that are not as they were."""
     if found.layout is None:
         return sorted(name for name, now in laid.files.items() if not _is(path, name, now))
@@ -69,14 +73,14 @@ def _to_put_back(path: Path, found: Findings, laid: Mark) -> list[str]:
     return sorted(found.fixed)
 
 
-def _is(path: Path, name: str, expected: tuple[int, str]) -> bool:
+def _is(path: Folder, name: str, expected: tuple[int, str]) -> bool:
     try:
         return record(path, name) == expected
     except OSError:
         return False
 
 
-def frames_written(path: Path, plan: Plan, shard: int) -> tuple[int, ...]:
+def frames_written(path: Folder, plan: Plan, shard: int) -> tuple[int, ...]:
     """The frames of a shard whose mark is lost, from what its data says; () where there is no sign of any.
 
     A frame that is there always has its step, time and place of the sonar. Where these are there and none can be read,
@@ -86,14 +90,14 @@ def frames_written(path: Path, plan: Plan, shard: int) -> tuple[int, ...]:
     if shard >= layout.shards:
         return ()
     always = [a for a in layout.arrays if not a.empty and (a.variable.group == "/" or a.path == "truth/sonar_position")]
-    region, root = layout.region(shard), zarr.open_group(path, mode="r")
-    present = [a for a in always if os.path.lexists(path / a.file(shard))]
-    there = np.zeros(len(region), bool)
+    region, root = layout.region(shard), zarr.open_group(opens(path), mode="r")
+    present = [a for a in always if there(path, a.file(shard))]
+    written = np.zeros(len(region), bool)
     for array in present:
-        there |= _rows(root, array, region)
-    if present and not there.any():
+        written |= _rows(root, array, region)
+    if present and not written.any():
         return tuple(region)
-    return tuple(region.start + int(i) for i in np.flatnonzero(there))
+    return tuple(region.start + int(i) for i in np.flatnonzero(written))
 
 
 def _rows(root: zarr.Group, array: ArrayLayout, region: range) -> np.ndarray:
@@ -107,20 +111,40 @@ def _rows(root: zarr.Group, array: ArrayLayout, region: range) -> np.ndarray:
     return np.array([not array.is_fill(row) for row in block])
 
 
-def move_out(path: Path, names: Iterable[str]) -> tuple[str, ...]:
+def move_out(path: Folder, names: Iterable[str]) -> tuple[str, ...]:
     """Move files that do not belong in a store to `<store>.foreign` beside it. Returns where they are now."""
+    if isinstance(path, Remote):
+        return _move_out_there(path, names)
     moved = []
+    outside = path.with_name(f"{path.name}.foreign")
     for name in sorted(names):
         if not os.path.lexists(path / name):
             continue
-        target = beside(path, "foreign") / name
-        for parent in reversed(target.relative_to(beside(path, "foreign")).parents):
-            _make_folder(beside(path, "foreign") / parent)
+        target = outside / name
+        for parent in reversed(target.relative_to(outside).parents):
+            _make_folder(outside / parent)
         count = 0
         while os.path.lexists(target):
             count += 1
             target = target.with_name(f"{Path(name).name}.{count}")
         shutil.move(path / name, target)
+        moved.append(str(target))
+    return tuple(moved)
+
+
+def _move_out_there(path: Remote, names: Iterable[str]) -> tuple[str, ...]:
+    """The same at a URL."""
+    moved = []
+    for name in sorted(names):
+        try:
+            content = (path / name).read_bytes()
+        except FileNotFoundError:
+            continue
+        target, count = path.with_name(f"{path.name}.foreign") / name, 0
+        while not target.write_if_absent(content):
+            count += 1
+            target = target.with_name(f"{name.rpartition('/')[2]}.{count}")
+        (path / name).unlink()
         moved.append(str(target))
     return tuple(moved)
 
@@ -132,10 +156,12 @@ def _make_folder(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
 
 
-def obstacles(path: Path, names: Iterable[str]) -> set[str]:
+def obstacles(path: Folder, names: Iterable[str]) -> set[str]:
     """What lies where files are to be written and cannot be written over: folders, links and pipes in the place of the
     file, files in the place of a folder."""
-    found = set()
+    found: set[str] = set()
+    if isinstance(path, Remote):
+        return found  # an object is in nobody's way
     for name in names:
         if (path / name).is_symlink() or ((path / name).exists() and not (path / name).is_file()):
             found.add(name)
@@ -145,8 +171,10 @@ def obstacles(path: Path, names: Iterable[str]) -> set[str]:
     return found
 
 
-def drop_empty_folders(path: Path) -> None:
+def drop_empty_folders(path: Folder) -> None:
     """Remove folders without files, which moved files leave."""
+    if isinstance(path, Remote):
+        return
     for folder, _, _ in os.walk(path, topdown=False):
         if not os.listdir(folder):
             os.rmdir(folder)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from sonarsynth.store.examining import Findings, Problem, examine, frame_count, ranges
 from sonarsynth.store.lock import held_by
-from sonarsynth.store.marks import LAYOUT, MARKS, mark_file
+from sonarsynth.store.marks import LAYOUT, MARKS
+from sonarsynth.store.place import Folder, folder_of, opens, stamps
 from sonarsynth.store.reading import read_back, structure
 
 if TYPE_CHECKING:
@@ -107,20 +106,22 @@ class Report:
         return [rows[frame] for frame in sorted(rows)]
 
 
-def verify(path: Path | str, checks: Sequence[Check] = (), *, quick: bool = False) -> Report:
+def verify(path: Folder | str, checks: Sequence[Check] = (), *, quick: bool = False) -> Report:
     """Compare marks, digests and files of a store, read every number back, and run checks on what it says.
 
     `quick` compares files with their digests and no more. Of a store that is being built, what is complete is looked
     at, and no checks are run. Raises Mismatch where there is no store of ours.
     """
-    path = Path(path)
-    building, stamps = held_by(path), _stamps(path)
+    path = folder_of(path)
+    building, stamped = held_by(path), stamps(path / MARKS)
     found, problems = _look(path, quick)
     building = building or held_by(path)
-    if problems and (building or stamps != _stamps(path)):  # a build's own doing is over, or has another mark, by now
+    if problems and (
+        building or stamped != stamps(path / MARKS)
+    ):  # a build's own doing is over, or has another mark, by now
         before = {problem.where for problem in problems}
         found, problems = _look(path, quick)
-        changed = {name for name, _ in stamps.items() ^ _stamps(path).items()}
+        changed = {name for name, _ in stamped.items() ^ stamps(path / MARKS).items()}
         problems = [p for p in problems if p.where in before and _lasting(p, found, changed)]
     rows = [] if problems or building or quick else _run(path, checks)
     spoiled = {frame for problem in problems for frame in problem.frames}
@@ -132,7 +133,7 @@ def verify(path: Path | str, checks: Sequence[Check] = (), *, quick: bool = Fals
     )
 
 
-def _look(path: Path, quick: bool) -> tuple[Findings, list[Problem]]:
+def _look(path: Folder, quick: bool) -> tuple[Findings, list[Problem]]:
     """What there is in a store, and everything that is wrong with it."""
     found = examine(path)
     problems = list(found.problems)
@@ -143,15 +144,6 @@ def _look(path: Path, quick: bool) -> tuple[Findings, list[Problem]]:
     return found, problems
 
 
-def _stamps(path: Path) -> dict[str, tuple[int, int]]:
-    """What tells of each mark whether it is written again, even with the same contents."""
-    try:
-        found = {entry.name: entry.stat() for entry in os.scandir(mark_file(path, LAYOUT).parent)}
-    except OSError:
-        return {}
-    return {name: (stat.st_ino, stat.st_mtime_ns) for name, stat in found.items()}
-
-
 def _lasting(problem: Problem, found: Findings, changed: set[str]) -> bool:
     """Whether a problem is of what no build has in hand: it was there before, and its mark was not written since."""
     if problem.where.endswith(".partial"):
@@ -159,16 +151,16 @@ def _lasting(problem: Problem, found: Findings, changed: set[str]) -> bool:
     folder, _, name = problem.where.rpartition("/")
     if folder != MARKS and problem.frames:
         shard = next((n for n, mark in found.marks.items() if problem.frames[0] in mark.frames), None)
-        name = "" if shard is None else mark_file(Path(), shard).name
+        name = "" if shard is None else f"{shard}.json"
     elif folder != MARKS:
-        name = mark_file(Path(), LAYOUT).name
+        name = f"{LAYOUT}.json"
     return bool(name) and name not in changed
 
 
-def _run(path: Path, checks: Sequence[Check]) -> list[CheckRow]:
+def _run(path: Folder, checks: Sequence[Check]) -> list[CheckRow]:
     import xarray as xr
 
     if not checks:
         return []
-    with xr.open_datatree(path, engine="zarr", chunks=None) as tree:
+    with xr.open_datatree(opens(path), engine="zarr", chunks=None) as tree:
         return [row for check in checks for row in check(tree)]

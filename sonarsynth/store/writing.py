@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -14,18 +14,8 @@ import numpy as np
 from sonarsynth.render import Values
 from sonarsynth.store.encoding import encoded
 from sonarsynth.store.layout import ArrayLayout, Layout, layout_of
-from sonarsynth.store.marks import (
-    ABSENT,
-    Damage,
-    FileRecord,
-    Mark,
-    add_to_digest,
-    drop_mark,
-    load_mark,
-    marked,
-    save_mark,
-    write_new,
-)
+from sonarsynth.store.marks import ABSENT, Mark, add_to_digest, drop_mark, load_marks, marked, save_mark
+from sonarsynth.store.place import FileRecord, Folder, folder_of, write_new
 
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan
@@ -34,12 +24,19 @@ AT_ONCE: Final = 8
 """Files of a shard that are on their way at once: each waits for the disk, which takes several in the time of one."""
 
 
-def write_shard(path: Path | str, plan: Plan, shard: int, frames: Mapping[int, Values]) -> Mark:
+def write_shard(
+    path: Folder | str,
+    plan: Plan,
+    shard: int,
+    frames: Mapping[int, Values],
+    still: Callable[[], None] = lambda: None,
+) -> Mark:
     """Write one whole shard of every array, then its completion mark. Frames not given read as fill values.
 
-    Raises ValueError, before anything is written, where a frame is not of this shard or its values do not fit.
+    `still` is called before the mark is written, and may raise. Raises ValueError, before anything is written, where a
+    frame is not of this shard or its values do not fit.
     """
-    path, layout = Path(path), layout_of(plan)
+    path, layout = folder_of(path), layout_of(plan)
     region = layout.region(shard)
     outside = sorted(set(frames) - set(region))
     if outside:
@@ -59,52 +56,52 @@ def write_shard(path: Path | str, plan: Plan, shard: int, frames: Mapping[int, V
             written = writers.submit(write_region, path, layout, array, region.start, block)
             under_way.append((array.file(shard), written))
         files |= {name: rest.result() for name, rest in under_way}
+    still()
     mark = Mark(str(shard), tuple(checked), content.hexdigest(), files)
     save_mark(path, mark)
     return mark
 
 
-def write_region(path: Path, layout: Layout, array: ArrayLayout, start: int, block: np.ndarray) -> FileRecord:
+def write_region(path: Folder, layout: Layout, array: ArrayLayout, start: int, block: np.ndarray) -> FileRecord:
     """Write frames start:start+len(block) of an array: their file, on the disk when this returns, and its record.
 
     Raises ValueError unless they are exactly one shard.
     """
     layout.check_region(start, start + len(block))
     name = array.file(start // layout.shard_frames)
-    (path / name).unlink(missing_ok=True)
     content = encoded(array, block)
+    if content is None or isinstance(path, Path):  # an object is written over
+        (path / name).unlink(missing_ok=True)
     return ABSENT if content is None else write_new(path / name, content)
 
 
-def missing(path: Path | str, plan: Plan, frames: Iterable[int] | None = None) -> dict[int, tuple[int, ...]]:
+def missing(path: Folder | str, plan: Plan, frames: Iterable[int] | None = None) -> dict[int, tuple[int, ...]]:
     """Shards to do so that `frames` (left out: all) are in the store, and the frames to render for each.
 
     A shard is written whole, so one that has some of its frames is rendered again with those and the wanted ones.
     Raises IndexError for a frame outside the dataset.
     """
-    path, layout = Path(path), layout_of(plan)
+    path, layout = folder_of(path), layout_of(plan)
     wanted: dict[int, set[int]] = {}
     for frame in range(layout.frames) if frames is None else frames:
         if not 0 <= frame < layout.frames:
             raise IndexError(f"frame {frame} is outside 0..{layout.frames - 1}")
         wanted.setdefault(frame // layout.shard_frames, set()).add(frame)
-    there = set(marked(path))
+    there = _have(path, wanted.keys() & set(marked(path)))
     todo = {}
     for shard, some in sorted(wanted.items()):
-        have = _have(path, shard) if shard in there else set()
+        have = there.get(shard, set())
         if not some <= have:
             todo[shard] = tuple(sorted(some | have))
     return todo
 
 
-def frames_there(path: Path | str) -> list[int]:
+def frames_there(path: Folder | str) -> list[int]:
     """Frames that are complete in the store, by their marks."""
-    return sorted(frame for shard in marked(Path(path)) for frame in _have(Path(path), shard))
+    path = folder_of(path)
+    return sorted(frame for have in _have(path, marked(path)).values() for frame in have)
 
 
-def _have(path: Path, shard: int) -> set[int]:
-    try:
-        mark = load_mark(path, shard)
-    except Damage:
-        return set()
-    return set() if mark is None else set(mark.frames)
+def _have(path: Folder, shards: Iterable[int]) -> dict[int, set[int]]:
+    """The frames of shards whose marks are whole."""
+    return {n: set(mark.frames) for n, mark in load_marks(path, sorted(shards)) if isinstance(mark, Mark)}

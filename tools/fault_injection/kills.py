@@ -28,7 +28,8 @@ import psutil
 
 from fault_injection.cluster import Cluster
 from sonarsynth import cli, config, planning, schedule, store
-from sonarsynth.store.marks import ABSENT, all_files, load_mark, marked, record
+from sonarsynth.store.marks import ABSENT, all_files, load_mark, marked
+from sonarsynth.store.place import record
 from sonarsynth.store.provenance import PROVENANCE
 
 RECIPE = """\

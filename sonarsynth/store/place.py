@@ -1,0 +1,248 @@
+"""Where a store is: a folder of this machine, or a URL. All that the rest needs to do there is here.
+
+On a disk a file is written beside its place and moved there, or written once and synchronised. An object store has
+neither; there an object is written whole.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import re
+import stat
+import uuid
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from io import BufferedReader
+from pathlib import Path
+from typing import Any, Final
+
+from sonarsynth.store.remote import Remote
+
+Folder = Path | Remote
+"""A place of a store, or of something in it."""
+
+FileRecord = tuple[int, str]
+"""Size and SHA-256 of a file."""
+
+_AT_ONCE_BYTES: Final = 256_000_000
+
+
+def folder_of(where: Folder | str) -> Folder:
+    """The place that a path or a URL names; file:// is a path. Raises Unreachable for a URL that cannot be one."""
+    if isinstance(where, Path | Remote):
+        return where
+    if where.startswith("file://"):
+        return Path(where.removeprefix("file://"))
+    return Remote(where) if re.match(r"[A-Za-z][A-Za-z0-9+.-]*://", where) else Path(where)
+
+
+def absolute(where: Folder | str) -> Folder:
+    """The same wherever this process goes."""
+    folder = folder_of(where)
+    return folder if isinstance(folder, Remote) else Path(os.path.abspath(folder))
+
+
+def beside(store: Folder | str, suffix: str) -> Folder:
+    """A file beside a store: `remus.zarr` -> `remus.zarr.lock`."""
+    store = absolute(store)
+    if not store.name:
+        raise OSError(errno.EISDIR, "is no place for a store", str(store))
+    return store.with_name(f"{store.name}.{suffix}")
+
+
+def here(store: Folder | str, suffix: str) -> Path:
+    """What grows line by line, or is for processes of this machine: beside a store, or in `state_folder` of a URL."""
+    file = beside(store, suffix)
+    return file if isinstance(file, Path) else state_folder(absolute(store)) / file.name
+
+
+def state_folder(store: Folder) -> Path:
+    """Where log and run times of a store at a URL are: a folder of this machine, made if it is not there."""
+    base = os.environ.get("XDG_STATE_HOME") or os.path.join(os.path.expanduser("~"), ".local", "state")
+    folder = Path(base) / "sonarsynth" / re.sub(r"[^\w.-]+", "-", str(store))
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def opens(folder: Folder) -> Any:
+    """What zarr and xarray open, to read."""
+    return folder.zarr_store() if isinstance(folder, Remote) else folder
+
+
+def read(folder: Folder, name: str) -> bytes:
+    """A whole file of a store. Raises OSError."""
+    if isinstance(folder, Remote):
+        return (folder / name).read_bytes()
+    with opened(f"{folder}/{name}") as file:
+        return file.read()
+
+
+def read_each(folder: Folder, names: Iterable[str]) -> Iterator[tuple[str, bytes | OSError]]:
+    """Whole files, many at a time where they are far; the error in place of those that cannot be read."""
+    if isinstance(folder, Remote):
+        yield from folder.read_each(names)
+        return
+    for name in names:
+        try:
+            yield name, read(folder, name)
+        except OSError as error:
+            yield name, error
+
+
+def record(folder: Folder, name: str, *, sync: bool = False) -> FileRecord:
+    """Size and SHA-256 of a file of a store; with `sync`, it is on the disk first. Raises OSError."""
+    if isinstance(folder, Remote):
+        return record_of((folder / name).read_bytes())
+    with opened(f"{folder}/{name}") as file:
+        if sync:
+            os.fsync(file.fileno())
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+        return os.fstat(file.fileno()).st_size, digest
+
+
+def records(folder: Folder, expected: Mapping[str, FileRecord]) -> Iterator[tuple[str, FileRecord | OSError]]:
+    """Records of files as they are, in the order of their names; the error in place of those that cannot be read.
+
+    Where they are far, as many at a time as should fit in memory by the records that are expected.
+    """
+    if isinstance(folder, Remote):
+        for some in _batches(expected):
+            for name, content in folder.read_each(some):
+                yield name, content if isinstance(content, OSError) else record_of(content)
+        return
+    for name in sorted(expected):
+        try:
+            yield name, record(folder, name)
+        except OSError as error:
+            yield name, error
+
+
+def _batches(expected: Mapping[str, FileRecord]) -> Iterator[list[str]]:
+    batch: list[str] = []
+    total = 0
+    for name in sorted(expected):
+        size = max(expected[name][0], 0)
+        if batch and total + size > _AT_ONCE_BYTES:
+            yield batch
+            batch, total = [], 0
+        batch.append(name)
+        total += size
+    if batch:
+        yield batch
+
+
+def record_of(content: bytes) -> FileRecord:
+    """Size and SHA-256 of a content."""
+    return len(content), hashlib.sha256(content).hexdigest()
+
+
+def all_files(folder: Folder, apart: str = "") -> Iterator[str]:
+    """Every file beneath, as a path from there, but those in a folder `apart`; links to folders too."""
+    if isinstance(folder, Remote):
+        yield from (name for name in folder.sizes() if name.partition("/")[0] != apart)
+        return
+    start = len(f"{folder}/")
+    for inner, folders, names in os.walk(folder):
+        inside = inner[start:]
+        if not apart or inside.partition("/")[0] != apart:
+            links = [name for name in folders if os.path.islink(f"{inner}/{name}")]  # which are not followed
+            yield from (f"{inside}/{name}" if inside else name for name in names + links)
+
+
+def entries(folder: Folder) -> list[str]:
+    """Names right beneath, [] where there is nothing."""
+    if isinstance(folder, Remote):
+        return sorted({name.partition("/")[0] for name in folder.sizes()})
+    try:
+        return [entry.name for entry in os.scandir(folder)]
+    except (FileNotFoundError, NotADirectoryError):
+        return []
+
+
+def stamps(folder: Folder) -> dict[str, object]:
+    """What tells of each file right beneath whether it was written again, even with the same contents."""
+    if isinstance(folder, Remote):
+        return folder.stamps()
+    try:
+        found = {entry.name: entry.stat() for entry in os.scandir(folder)}
+    except OSError:
+        return {}
+    return {name: (stat.st_ino, stat.st_mtime_ns) for name, stat in found.items()}
+
+
+def there(folder: Folder, name: str = "") -> bool:
+    """True where something has this name, whatever it is."""
+    place = folder / name if name else folder
+    return place.exists() if isinstance(place, Remote) else os.path.lexists(place)
+
+
+def write_new(file: Folder, content: bytes) -> FileRecord:
+    """Write a file that is not there, with its folders: on the disk when this returns. Its record."""
+    if isinstance(file, Remote):
+        file.write_bytes(content)
+        return record_of(content)
+    try:
+        out = open(file, "xb")  # noqa: SIM115
+    except FileNotFoundError:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        out = open(file, "xb")  # noqa: SIM115
+    with out:
+        out.write(content)
+        os.fsync(out.fileno())
+    return record_of(content)
+
+
+def write_atomically(file: Folder, content: bytes) -> None:
+    """Write a file so that it is there whole or not at all."""
+    if isinstance(file, Remote):
+        file.write_bytes(content)
+        return
+    file.parent.mkdir(exist_ok=True)
+    scratch = file.with_name(f".{file.name}.{uuid.uuid4().hex}.partial")
+    try:
+        with scratch.open("xb") as out:
+            out.write(content)
+            out.flush()
+            os.fsync(out.fileno())
+        scratch.replace(file)
+    except BaseException:
+        scratch.unlink(missing_ok=True)
+        raise
+    sync_folder(file.parent)
+
+
+def remove(file: Folder) -> None:
+    """Remove a file if it is there, for good."""
+    if isinstance(file, Remote):
+        file.unlink(missing_ok=True)
+    elif file.exists():
+        file.unlink()
+        sync_folder(file.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Put what a folder lists on the disk."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+@contextmanager
+def opened(file: str) -> Iterator[BufferedReader]:
+    """A file to read. Raises OSError for what is no file: reading a pipe would wait for ever."""
+    with open(file, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as found:
+        if not stat.S_ISREG(os.fstat(found.fileno()).st_mode):
+            raise OSError(errno.EINVAL, "it is no plain file", file)
+        yield found
+
+
+def upload(folder: Remote, files: Mapping[str, bytes], first: Iterable[str], last: str) -> None:
+    """Write files in three steps, each when those of the one before are there: `first`, the others, `last`."""
+    before = list(first)
+    folder.write_each({name: files[name] for name in before})
+    folder.write_each({name: content for name, content in files.items() if name not in (*before, last)})
+    folder.write_each({last: files[last]})

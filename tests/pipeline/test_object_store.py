@@ -1,0 +1,194 @@
+"""Stores in S3, on a server on loopback: built by worker processes, killed, resumed, damaged, repaired."""
+
+from __future__ import annotations
+
+import importlib.util
+import logging
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sonarsynth import schedule, store
+from sonarsynth.cli import main
+from sonarsynth.planning import Plan
+from sonarsynth.schedule.repairing import repair
+from sonarsynth.store import Remote
+
+pytest.importorskip("s3fs")
+pytest.importorskip("moto")
+ROOT = Path(__file__).resolve().parents[2]
+SECRET = "not-to-be-kept-anywhere"
+FRAMES = "0:10"
+KILLED_AT = ("layout", "shard")
+
+spec = importlib.util.spec_from_file_location("remote_places", Path(__file__).parent / "remote.py")
+assert spec is not None
+assert spec.loader is not None
+places = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(places)
+
+
+@pytest.fixture(scope="module")
+def bucket(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The URL of a bucket of a server that runs while the tests of this file do."""
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from moto.server import ThreadedMotoServer
+    quiet = logging.getLogger("werkzeug")
+    level = quiet.level
+    quiet.setLevel(logging.CRITICAL)
+    server = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
+    server.start()
+    host, port = server.get_host_and_port()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("AWS_ENDPOINT_URL", f"http:{'//'}{host}:{port}")
+        patch.setenv("AWS_ACCESS_KEY_ID", "someone")
+        patch.setenv("AWS_SECRET_ACCESS_KEY", SECRET)
+        patch.setenv("AWS_DEFAULT_REGION", "us-east-1")
+        patch.setenv("AWS_EC2_METADATA_DISABLED", "true")
+        patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+        Remote("s3://bucket/x").driver.mkdir("bucket")
+        yield "s3://bucket"
+    server.stop()
+    quiet.setLevel(level)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory, small_plan: Plan) -> Path:
+    path = tmp_path_factory.mktemp("whole") / "s.zarr"
+    assert schedule.build(small_plan, path, frames=range(10), workers=0).ok
+    return path
+
+
+def same(place: Remote, whole: Path) -> bool:
+    """Whether the objects are the files, but for how the store was begun and what follows from that."""
+    there, here = places.contents(place), places.contents(whole)
+    apart = {"zarr.json", *store.marks.MANIFESTS}
+    attributes = [store.root_attributes(at) for at in (place, whole)]
+    for found in attributes:
+        found.pop("provenance")
+    alike = {n: c for n, c in there.items() if n not in apart} == {n: c for n, c in here.items() if n not in apart}
+    return alike and there.keys() == here.keys() and attributes[0] == attributes[1]
+
+
+def status(*arguments: str) -> object:
+    with pytest.raises(SystemExit) as end:
+        main(list(arguments))
+    return end.value.code
+
+
+def test_what_workers_build_is_what_a_folder_would_hold(bucket: str, small_plan: Plan, whole: Path) -> None:
+    place = Remote(f"{bucket}/built/s.zarr")
+    report = schedule.build(small_plan, place, frames=range(10), workers=1)
+    assert (report.ok, report.written, report.workers) == (True, 10, 1)
+    assert same(place, whole)
+    kept = b"".join(places.contents(Remote(f"{bucket}/built")).values())
+    state = b"".join(file.read_bytes() for file in Path(os.environ["XDG_STATE_HOME"]).rglob("*") if file.is_file())
+    assert SECRET.encode() not in kept + state
+    assert b"someone" not in kept + state
+
+
+def test_damage_in_a_bucket_is_found_and_mended(bucket: str, whole: Path) -> None:
+    place = Remote(f"{bucket}/damaged/s.zarr")
+    place.write_each(places.contents(whole))
+    flipped = bytearray((place / "image/energy/c/1/0/0").read_bytes())
+    flipped[3] ^= 1
+    (place / "image/energy/c/1/0/0").write_bytes(bytes(flipped))
+    (place / "truth/range/c/0/0/0").unlink()
+    (place / "stranger").write_bytes(b"mine")
+    where = {problem.where for problem in store.verify(place, quick=True).problems}
+    assert where == {"image/energy/c/1/0/0", "truth/range/c/0/0/0", "stranger"}
+    assert repair(place, workers=0, quick=True).ok
+    assert places.contents(place) == places.contents(whole)
+
+
+def reached(place: Remote, point: str) -> bool:
+    names = place.sizes()
+    if point == "layout":
+        return ".marks/layout.json" in names
+    return any("/c/0/" in name and name.startswith("ledger/") for name in names)
+
+
+def test_killed_builds_are_resumed_to_the_same(bucket: str, small_file: Path, whole: Path) -> None:
+    place = Remote(f"{bucket}/killed/s.zarr")
+    command = [sys.executable, "-m", "sonarsynth", "build", str(small_file), str(place), "--frames", FRAMES]
+    command += ["--workers", "0", "--no-predict"]
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
+    for point in KILLED_AT:
+        with subprocess.Popen(command, env=env, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as child:
+            until = time.monotonic() + 120
+            while child.poll() is None and time.monotonic() < until and not reached(place, point):
+                time.sleep(0.01)
+            child.send_signal(signal.SIGKILL)
+            said = child.stderr.read() if child.stderr is not None else b""
+        assert child.returncode in (-signal.SIGKILL, 0), said
+        for number, mark in store.marks.load_marks(place, store.marks.marked(place)):
+            assert isinstance(mark, store.Mark), number
+            found = dict(store.place.records(place, mark.files))
+            assert all(found[name] == kept or kept == store.marks.ABSENT for name, kept in mark.files.items())
+    done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert same(place, whole)
+    assert store.verify(place, quick=True).ok
+
+
+def test_commands_take_the_url(bucket: str, whole: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    place = Remote(f"{bucket}/read/s.zarr")
+    place.write_each(places.contents(whole))
+    assert status("verify", "--quick", str(place)) == 0
+    assert status("card", str(place)) == 0
+    assert f'xr.open_datatree("{place}", engine="zarr")' in Remote(f"{place}.card.md").read_text()
+    assert status("show", str(place), "--no-film", "--out", str(tmp_path / "pictures")) == 0
+    assert (tmp_path / "pictures/sheet.png").exists()
+    capsys.readouterr()
+
+
+def test_a_bucket_or_a_server_that_is_not_there_is_one_line(
+    bucket: str, small_file: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*arguments: str) -> str:
+        assert status(*arguments) == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1, said
+        return said
+
+    build = ["build", str(small_file), "s3://nowhere/s.zarr", "--no-predict", "--workers", "0"]
+    assert "does not exist" in refused(*build)
+    assert "no such store" in refused("verify", "s3://nowhere/s.zarr")
+    driver: Any = Remote("s3://bucket/x").driver
+    monkeypatch.setattr(type(driver), "_pipe_file", _forbidden)
+    assert "not permitted" in refused(*build[:2], f"{bucket}/forbidden/s.zarr", *build[3:])
+
+
+async def _forbidden(*_: object, **__: object) -> None:
+    raise PermissionError("Access Denied")
+
+
+def test_no_credentials_and_no_server_are_one_line(bucket: str, tmp_path: Path) -> None:
+    env = {name: value for name, value in os.environ.items() if not name.startswith("AWS_")}
+    env |= {"PYTHONPATH": str(ROOT), "AWS_EC2_METADATA_DISABLED": "true", "HOME": str(tmp_path)}
+    env |= {"AWS_ENDPOINT_URL": "http:" + "//127.0.0.1:9", "AWS_ACCESS_KEY_ID": "a", "AWS_SECRET_ACCESS_KEY": "b"}
+    command = [sys.executable, "-m", "sonarsynth", "verify", f"{bucket}/x/s.zarr"]
+    started = {
+        said: subprocess.Popen(
+            command,
+            env={name: value for name, value in env.items() if name != without},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for without, said in (("AWS_ACCESS_KEY_ID", "credentials"), ("", "Could not connect"))
+    }
+    for said, child in started.items():
+        found = child.communicate()[1]
+        assert (child.returncode, found.count("\n")) == (2, 1), found
+        assert said in found

@@ -1,0 +1,285 @@
+"""A store at a URL is the store that a folder would hold, object for object; what a URL cannot do is one line."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+import threading
+import time
+from collections.abc import Callable
+from itertools import count
+from pathlib import Path
+
+import pytest
+
+from sonarsynth import schedule, store
+from sonarsynth.cli import main
+from sonarsynth.planning import Plan
+from sonarsynth.schedule.repairing import repair
+from sonarsynth.store import Remote, creating, lease
+
+HERE = Path(__file__).parent
+spec = importlib.util.spec_from_file_location("remote_places", HERE / "remote.py")
+assert spec is not None
+assert spec.loader is not None
+places = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(places)
+contents, web_server = places.contents, places.web_server
+
+FRAMES = range(10)
+"""What is built: a whole shard, and a part of the second."""
+
+NUMBERS = count()
+
+
+@pytest.fixture(autouse=True)
+def _state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setattr(creating, "begun", lambda source=None: {"provenance": {"created": "then"}})
+
+
+@pytest.fixture
+def place() -> Remote:
+    """A place that no test has used."""
+    return Remote(f"memory://tests/{next(NUMBERS)}/s.zarr")
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory, small_plan: Plan) -> Path:
+    path = tmp_path_factory.mktemp("whole") / "s.zarr"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(creating, "begun", lambda source=None: {"provenance": {"created": "then"}})
+        assert schedule.build(small_plan, path, frames=FRAMES, workers=0).ok
+    return path
+
+
+@pytest.fixture
+def copy(whole: Path, place: Remote) -> Remote:
+    """The store, sent there."""
+    place.write_each(contents(whole))
+    return place
+
+
+def status(*arguments: str) -> object:
+    with pytest.raises(SystemExit) as end:
+        main(list(arguments))
+    return end.value.code
+
+
+def test_a_store_at_a_url_is_the_one_in_a_folder(small_plan: Plan, place: Remote, whole: Path, tmp_path: Path) -> None:
+    assert schedule.build(small_plan, str(place), frames=range(8), workers=0).there == 0
+    report = schedule.build(small_plan, str(place), frames=FRAMES, workers=0)
+    assert (report.ok, report.there, report.store) == (True, 8, str(place))
+    assert contents(place) == contents(whole)
+    beside = {name for name in Remote(f"{place.url.rpartition('/')[0]}").sizes() if not name.startswith("s.zarr/")}
+    assert beside == {"s.zarr.card.md", "s.zarr.croissant.json"}, "the lock is given back"
+    local = sorted(file.name for file in (tmp_path / "state").rglob("*") if file.is_file())
+    assert local == ["s.zarr.log.jsonl", "s.zarr.times.jsonl"]
+    assert schedule.build(small_plan, place, frames=FRAMES, workers=0).written == 0
+
+
+def test_verify_says_of_it_what_it_says_of_a_folder(copy: Remote, whole: Path) -> None:
+    there, here = store.verify(copy), store.verify(whole)
+    assert there.ok
+    assert (there.complete, there.files, there.bytes) == (here.complete, here.files, here.bytes)
+
+
+def flip(place: Remote) -> None:
+    content = bytearray(place.read_bytes())
+    content[len(content) // 2] ^= 4
+    place.write_bytes(bytes(content))
+
+
+DAMAGES: dict[str, Callable[[Remote], None]] = {
+    "a bit of a shard": lambda at: flip(at / "image/energy/c/0/0/0"),
+    "a shard cut short": lambda at: (at / "truth/box/c/1/0/0/0").write_bytes(b"short"),
+    "a shard gone": lambda at: (at / "signals/pressure/c/0/0/0").unlink(),
+    "a mark gone": lambda at: (at / ".marks/1.json").unlink(),
+    "a bit of a mark": lambda at: flip(at / ".marks/0.json"),
+    "metadata of the root": lambda at: (at / "zarr.json").unlink(),
+    "an axis": lambda at: flip(at / "image/azimuth/c/0"),
+    "both manifests": lambda at: at.unlink_each([".marks/layout.json", ".marks/layout.copy.json"]),
+    "a stranger": lambda at: (at / "image/notes.txt").write_bytes(b"mine"),
+    "a stranger among the marks": lambda at: (at / ".marks/x.json").write_bytes(b"{}"),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_damage_is_found_and_mended(copy: Remote, whole: Path, name: str) -> None:
+    DAMAGES[name](copy)
+    assert not store.verify(copy, quick=True).ok
+    report = repair(copy, workers=0, quick=True)
+    assert report.ok, report
+    assert contents(copy) == contents(whole)
+    if "stranger" in name:
+        assert report.moved
+        assert all(moved.startswith(f"{copy}.foreign/") for moved in report.moved)
+
+
+def test_a_store_that_was_not_laid_out_whole_is_laid_out_anew(small_plan: Plan, place: Remote, whole: Path) -> None:
+    some = {name: found for name, found in contents(whole).items() if "layout" in name or name.startswith("truth/")}
+    place.write_each({name: found for name, found in some.items() if "/c/1" not in name and "/c/0/" not in name})
+    schedule.build(small_plan, place, frames=FRAMES, workers=0)
+    assert contents(place) == contents(whole)
+
+
+def test_what_is_not_ours_stays(small_plan: Plan, place: Remote) -> None:
+    (place / "precious.txt").write_bytes(b"mine")
+    for restart in (False, True):
+        with pytest.raises(store.Mismatch, match="not a store of sonarsynth"):
+            schedule.build(small_plan, place, workers=0, restart=restart)
+    assert contents(place) == {"precious.txt": b"mine"}
+
+
+def test_another_recipe_is_refused_and_restart_begins_anew(small_plan: Plan, copy: Remote, small_text: str) -> None:
+    from sonarsynth import config, planning
+
+    other = planning.plan(config.loads(small_text.replace("seed: 3", "seed: 4")))
+    with pytest.raises(store.Mismatch, match="seed is 3 there and 4 now"):
+        schedule.build(other, copy, frames=range(8), workers=0)
+    schedule.build(other, copy, frames=range(8), workers=0, restart=True)
+    assert store.frames_there(copy) == list(range(8))
+    assert store.verify(copy, quick=True).ok
+
+
+def test_frames_set_aside_are_known_the_next_time(
+    small_plan: Plan, place: Remote, whole: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from sonarsynth import render
+
+    trace = render.trace_frame
+    with monkeypatch.context() as patch:
+        patch.setattr(render, "trace_frame", lambda plan, i: 1 / 0 if i == 3 else trace(plan, i))
+        assert not schedule.build(small_plan, place, frames=FRAMES, workers=0).ok
+    assert store.beside(place, "aside.jsonl").exists()
+    again = schedule.build(small_plan, place, frames=FRAMES, workers=0)
+    assert [failure.frame for failure in again.failures] == [3]
+    assert schedule.build(small_plan, place, frames=FRAMES, workers=0, retry_failed=True).ok
+    assert not store.beside(place, "aside.jsonl").exists()
+    assert contents(place) == contents(whole)
+
+
+def test_a_second_build_is_refused_while_the_first_runs(small_plan: Plan, place: Remote) -> None:
+    file = store.beside(place, "lock")
+    assert isinstance(file, Remote)
+    with lease.leased(file, renewed=0.05), pytest.raises(store.Locked, match=r"is being built by process \d+ on"):
+        schedule.build(small_plan, place, frames=FRAMES, workers=0)
+    assert not place.exists()
+    assert not file.exists()
+
+
+def lock_of(file: Remote, **facts: object) -> None:
+    found = {"build": "other", "process": 1, "host": "there", "machine": "there", "started": "1", "renewed": 0}
+    file.write_bytes(json.dumps(found | facts).encode())
+
+
+def test_the_lock_of_a_process_that_is_gone_is_taken_at_once(place: Remote) -> None:
+    with lease.leased(place):
+        mine = json.loads(place.read_bytes())
+    lock_of(place, machine=mine["machine"], process=mine["process"], started="1")
+    began = time.monotonic()
+    with lease.leased(place) as name:
+        assert lease.holder(place) == name
+    assert time.monotonic() - began < 5
+
+
+def test_a_lock_that_nobody_renews_is_taken_in_the_end(place: Remote) -> None:
+    lock_of(place)
+    began = time.monotonic()
+    with lease.leased(place, lease=0.5) as name:
+        assert time.monotonic() - began >= 0.5
+        assert lease.holder(place) == name
+
+
+def test_a_lock_that_is_renewed_is_not_taken(place: Remote) -> None:
+    lock_of(place)
+    renewing = threading.Timer(0.3, lambda: lock_of(place, renewed=1))
+    renewing.start()
+    with pytest.raises(lease.Taken, match="process 1 on there"), lease.leased(place, lease=20):
+        pass
+    renewing.join()
+    assert lease.holder(place) == "other"
+
+
+def test_a_holder_renews_its_lock_and_leaves_that_of_another(place: Remote) -> None:
+    with lease.leased(place, renewed=0.05) as name:
+        until = time.monotonic() + 10
+        while json.loads(place.read_bytes())["renewed"] < 2 and time.monotonic() < until:
+            time.sleep(0.02)
+        assert json.loads(place.read_bytes())["renewed"] >= 2
+        assert lease.holder(place) == name
+        lock_of(place)
+    assert lease.holder(place) == "other"
+
+
+def test_a_writer_that_outlived_its_build_writes_no_mark(
+    small_plan: Plan, place: Remote, made_up: Callable[..., object]
+) -> None:
+    store.create(place, small_plan)
+    frames = {0: made_up(small_plan, 0)}
+    with pytest.raises(store.Ended), store.shared_lock(place, "gone"):
+        raise AssertionError
+    with store.lock(place) as build, store.shared_lock(place, build) as still:
+        lock_of(Remote(f"{place}.lock"))
+        with pytest.raises(store.Ended):
+            store.write_shard(place, small_plan, 0, frames, still)  # type: ignore[arg-type]
+    assert store.frames_there(place) == []
+
+
+@pytest.mark.parametrize(
+    ("url", "said"),
+    [
+        ("s3x://bucket/s.zarr", "Protocol not known"),
+        ("gs://bucket/s.zarr", "a package is missing"),
+        ("memory://a/s.zarr", "of this process alone"),
+        ("s3://user:word@bucket/s.zarr", "may hold no credentials"),
+        ("s3://bucket/s.zarr?signature=word", "may hold no ?"),
+        ("s3://bucket", "names no place"),
+        ("simplecache::s3://bucket/s.zarr", "s.zarr"),
+    ],
+)
+def test_a_url_that_cannot_be_a_store_is_one_line(
+    small_file: Path, capsys: pytest.CaptureFixture[str], url: str, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "gcsfs", None)
+    monkeypatch.chdir(small_file.parent)
+    if url.startswith("simplecache"):
+        with pytest.raises(store.Unreachable):
+            Remote(url)
+        return
+    assert status("build", str(small_file), url, "--no-predict") == 2
+    found = capsys.readouterr().err
+    assert found.count("\n") == 1
+    assert said in found
+    assert "word" not in found
+
+
+def test_a_store_on_the_web_is_read(
+    whole: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], small_file: Path
+) -> None:
+    with web_server(whole.parent) as address:
+        url = f"{address}/s.zarr"
+        report = store.verify(url, quick=True)
+        assert report.ok
+        assert report.complete == tuple(FRAMES)
+        assert status("card", url, "--out", str(tmp_path)) == 0
+        assert (tmp_path / "s.zarr.card.md").exists()
+        assert status("show", url, "--no-film", "--out", str(tmp_path)) == 0
+        assert (tmp_path / "sheet.png").exists()
+        capsys.readouterr()
+        for command in (["build", str(small_file), url, "--no-predict"], ["repair", url], ["card", url]):
+            assert status(*command) == 2
+            found = capsys.readouterr().err
+            assert "can be read, not written" in found
+            assert found.count("\n") == 1
+        assert status("verify", f"{url}x") == 2
+    with web_server(whole.parent, ranges=False) as address:
+        capsys.readouterr()
+        assert status("show", f"{address}/s.zarr") == 2
+        assert "no parts of files" in capsys.readouterr().err
+
+
+def test_file_urls_are_paths(whole: Path) -> None:
+    assert store.folder_of(f"file://{whole}") == whole
+    assert store.verify(f"file://{whole}", quick=True).ok
