@@ -138,7 +138,7 @@ class Remote:
         """Seconds since an object was written; 0 where nobody knows, or it is not there."""
         with self._told():
             try:
-                return (datetime.now(UTC) - self.driver.modified(self.path)).total_seconds()
+                return float((datetime.now(UTC) - self.driver.modified(self.path)).total_seconds())
             except (NotImplementedError, FileNotFoundError, TypeError):
                 return 0.0
 
