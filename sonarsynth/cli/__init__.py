@@ -124,6 +124,7 @@ def build(
     with config.locating(source):
         plan = planning.plan(made_from, chosen)
     wanted = chosen_frames(frames, sequences, made_from.sequences, made_from.steps)
+    stores.try_writing(stores.folder_of(store))
     prediction = None
     if predicting and scheduler is None and (restart or stores.missing(store, plan, wanted)):
         prediction = schedule.predict(plan, prepared=time.process_time())

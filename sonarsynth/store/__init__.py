@@ -10,7 +10,7 @@ from sonarsynth.store.examining import Findings, Problem, examine, must_be_store
 from sonarsynth.store.layout import Layout, layout_of
 from sonarsynth.store.lock import Ended, Locked, lock, shared_lock
 from sonarsynth.store.marks import Damage, Mark
-from sonarsynth.store.place import Folder, absolute, beside, folder_of, here
+from sonarsynth.store.place import Folder, absolute, beside, folder_of, here, try_writing
 from sonarsynth.store.remote import Remote, Unreachable
 from sonarsynth.store.verifying import Report, verify
 from sonarsynth.store.writing import frames_there, missing, write_shard
@@ -43,6 +43,7 @@ __all__ = [
     "ranges",
     "root_attributes",
     "shared_lock",
+    "try_writing",
     "verify",
     "write_shard",
 ]

@@ -95,7 +95,8 @@ def _create_there(path: Remote, plan: Plan, layout: Layout, restart: bool, sourc
             if not restart:
                 _go_on(path, stored, plan)
                 return layout
-        path.unlink_each(["zarr.json", *path.sizes()])
+        (path / "zarr.json").unlink(missing_ok=True)
+        path.unlink_each(path.sizes())
     with tempfile.TemporaryDirectory(prefix="sonarsynth-") as folder:
         scratch = Path(folder) / "new"
         lay_out(scratch, plan, layout, {**described(plan), **begun(source)})

@@ -66,6 +66,14 @@ def state_folder(store: Folder) -> Path:
     return folder
 
 
+def try_writing(folder: Folder) -> None:
+    """Raise Unreachable where nothing can be written at a URL; on a disk nothing is tried."""
+    probe = beside(folder, "probe") if isinstance(folder, Remote) else None
+    if isinstance(probe, Remote):
+        probe.write_bytes(b"")
+        probe.unlink(missing_ok=True)
+
+
 def opens(folder: Folder) -> Any:
     """What zarr and xarray open, to read."""
     return folder.zarr_store() if isinstance(folder, Remote) else folder

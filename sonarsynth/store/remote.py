@@ -25,6 +25,9 @@ READ_ONLY: Final = ("http", "https")
 
 _STAMPS: Final = ("ETag", "LastModified", "etag", "updated", "generation", "created", "modified")
 
+MOST_REMOVED: Final = 1000
+"""Objects that are removed at a time."""
+
 AT_ONCE: Final = 64
 """Objects that are under way at a time."""
 
@@ -224,9 +227,12 @@ class Remote:
                     raise
 
     def unlink_each(self, names: Iterable[str]) -> None:
-        """Remove objects beneath, those that are there."""
-        for name in names:
-            (self / name).unlink(missing_ok=True)
+        """Remove objects beneath, which are there, many at a time."""
+        self._writable()
+        waiting = [f"{self.path}/{name}" for name in names]
+        with self._told():
+            for first in range(0, len(waiting), MOST_REMOVED):
+                self.driver.rm(waiting[first : first + MOST_REMOVED])
 
     def zarr_store(self) -> Any:
         """The store as zarr and xarray open it, to read. Raises Unreachable where only whole files can be had."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import logging
 import os
 import signal
@@ -20,6 +19,7 @@ from sonarsynth.cli import main
 from sonarsynth.planning import Plan
 from sonarsynth.schedule.repairing import repair
 from sonarsynth.store import Remote
+from tests.places import contents
 
 pytest.importorskip("s3fs")
 pytest.importorskip("moto")
@@ -27,12 +27,6 @@ ROOT = Path(__file__).resolve().parents[2]
 SECRET = "not-to-be-kept-anywhere"
 FRAMES = "0:10"
 KILLED_AT = ("layout", "shard")
-
-spec = importlib.util.spec_from_file_location("remote_places", Path(__file__).parent / "remote.py")
-assert spec is not None
-assert spec.loader is not None
-places = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(places)
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +65,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory, small_plan: Plan) -> Path:
 
 def same(place: Remote, whole: Path) -> bool:
     """Whether the objects are the files, but for how the store was begun and what follows from that."""
-    there, here = places.contents(place), places.contents(whole)
+    there, here = contents(place), contents(whole)
     apart = {"zarr.json", *store.marks.MANIFESTS}
     attributes = [store.root_attributes(at) for at in (place, whole)]
     for found in attributes:
@@ -91,7 +85,7 @@ def test_what_workers_build_is_what_a_folder_would_hold(bucket: str, small_plan:
     report = schedule.build(small_plan, place, frames=range(10), workers=1)
     assert (report.ok, report.written, report.workers) == (True, 10, 1)
     assert same(place, whole)
-    kept = b"".join(places.contents(Remote(f"{bucket}/built")).values())
+    kept = b"".join(contents(Remote(f"{bucket}/built")).values())
     state = b"".join(file.read_bytes() for file in Path(os.environ["XDG_STATE_HOME"]).rglob("*") if file.is_file())
     assert SECRET.encode() not in kept + state
     assert b"someone" not in kept + state
@@ -99,7 +93,7 @@ def test_what_workers_build_is_what_a_folder_would_hold(bucket: str, small_plan:
 
 def test_damage_in_a_bucket_is_found_and_mended(bucket: str, whole: Path) -> None:
     place = Remote(f"{bucket}/damaged/s.zarr")
-    place.write_each(places.contents(whole))
+    place.write_each(contents(whole))
     flipped = bytearray((place / "image/energy/c/1/0/0").read_bytes())
     flipped[3] ^= 1
     (place / "image/energy/c/1/0/0").write_bytes(bytes(flipped))
@@ -108,7 +102,7 @@ def test_damage_in_a_bucket_is_found_and_mended(bucket: str, whole: Path) -> Non
     where = {problem.where for problem in store.verify(place, quick=True).problems}
     assert where == {"image/energy/c/1/0/0", "truth/range/c/0/0/0", "stranger"}
     assert repair(place, workers=0, quick=True).ok
-    assert places.contents(place) == places.contents(whole)
+    assert contents(place) == contents(whole)
 
 
 def reached(place: Remote, point: str) -> bool:
@@ -143,7 +137,7 @@ def test_killed_builds_are_resumed_to_the_same(bucket: str, small_file: Path, wh
 
 def test_commands_take_the_url(bucket: str, whole: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     place = Remote(f"{bucket}/read/s.zarr")
-    place.write_each(places.contents(whole))
+    place.write_each(contents(whole))
     assert status("verify", "--quick", str(place)) == 0
     assert status("card", str(place)) == 0
     assert f'xr.open_datatree("{place}", engine="zarr")' in Remote(f"{place}.card.md").read_text()

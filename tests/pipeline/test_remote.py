@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
+import re
 import sys
 import threading
 import time
@@ -18,14 +18,7 @@ from sonarsynth.cli import main
 from sonarsynth.planning import Plan
 from sonarsynth.schedule.repairing import repair
 from sonarsynth.store import Remote, creating, lease
-
-HERE = Path(__file__).parent
-spec = importlib.util.spec_from_file_location("remote_places", HERE / "remote.py")
-assert spec is not None
-assert spec.loader is not None
-places = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(places)
-contents, web_server = places.contents, places.web_server
+from tests.places import contents, web_server
 
 FRAMES = range(10)
 """What is built: a whole shard, and a part of the second."""
@@ -211,6 +204,38 @@ def test_a_holder_renews_its_lock_and_leaves_that_of_another(place: Remote) -> N
         assert lease.holder(place) == name
         lock_of(place)
     assert lease.holder(place) == "other"
+
+
+def test_verify_says_that_it_is_being_built_and_by_whom(copy: Remote) -> None:
+    (copy / ".marks/1.json").unlink()
+    assert store.verify(copy, quick=True).building == ""
+    with store.lock(copy):
+        report = store.verify(copy, quick=True)
+    assert report.ok
+    assert re.fullmatch(r"process \d+ on .+", report.building)
+    assert report.complete == tuple(range(8))
+    with lease.leased(Remote(f"{copy}.other")):
+        mine = json.loads(Remote(f"{copy}.other").read_bytes())
+    lock_of(Remote(f"{copy}.lock"), machine=mine["machine"], process=mine["process"])
+    report = store.verify(copy, quick=True)
+    assert report.building == "", "that process is gone"
+    assert not report.ok
+
+
+def test_pictures_of_a_url_go_to_the_working_directory(copy: Remote, tmp_path: Path) -> None:
+    from sonarsynth.show.reading import pictures_of
+
+    assert pictures_of(copy) == Path("s.zarr.pictures")
+    assert pictures_of(tmp_path / "s.zarr") == tmp_path / "s.zarr.pictures"
+
+
+def test_a_place_that_cannot_be_written_is_found_before_anything_is_predicted(
+    small_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(schedule, "predict", lambda *_, **__: 1 / 0)
+    with web_server(tmp_path) as address:
+        assert status("build", str(small_file), f"{address}/s.zarr") == 2
+    assert "can be read, not written" in capsys.readouterr().err
 
 
 def test_a_writer_that_outlived_its_build_writes_no_mark(
