@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import logging
+import os
 import resource
 import signal
 import threading
@@ -14,7 +15,7 @@ from typing import Final
 from urllib.parse import urlsplit
 
 import dask
-from distributed import Client, LocalCluster, Worker, WorkerPlugin
+from distributed import Client, LocalCluster, Security, Worker, WorkerPlugin
 from distributed.system import MEMORY_LIMIT
 
 ONE_THREAD: Final = dict.fromkeys(
@@ -68,14 +69,33 @@ class MemoryLimit(WorkerPlugin):
             resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
 
 
+class NoScheduler(ConnectionError):
+    """Nothing that can be built on answers at an address; str() is one line."""
+
+
 def check_address(address: str, insecure: bool) -> None:
-    """Raise ValueError for a scheduler on another machine without TLS: whoever reaches one may run code on it."""
+    """Raise ValueError for a scheduler on another machine without TLS, on which whoever reaches it may run code, and
+    for one with TLS where this process has no certificates.
+    """
     parts = urlsplit(address if "://" in address else f"tcp://{address}")
-    if insecure or parts.scheme in ("tls", "wss", "inproc") or _loopback(parts.hostname or ""):
-        return
-    raise ValueError(
-        f"{address} is not on this machine and not encrypted: use tls://, or --insecure in a network that you trust"
-    )
+    if parts.scheme in ("tls", "wss"):
+        _check_certificates(address)
+    elif not insecure and parts.scheme != "inproc" and not _loopback(parts.hostname or ""):
+        raise ValueError(
+            f"{address} is not on this machine and not encrypted: use tls://, or --insecure in a network that you trust"
+        )
+
+
+def _check_certificates(address: str) -> None:
+    try:
+        context = Security().get_connection_args("client").get("ssl_context")
+    except (OSError, ValueError) as error:  # ssl.SSLError is one
+        raise ValueError(f"{address}: the certificates of Dask's configuration cannot be used: {error}") from None
+    if context is None:
+        raise ValueError(
+            f"{address} needs certificates: ca-file, client.key and client.cert under distributed.comm.tls "
+            "in Dask's configuration"
+        )
 
 
 def _loopback(host: str) -> bool:
@@ -89,10 +109,10 @@ def _loopback(host: str) -> bool:
 def connected(workers: int, scheduler: str | None = None, memory: int | None = None) -> Iterator[Client]:
     """A client of the scheduler at an address, or of `workers` fresh processes on this machine (loopback only).
 
-    Each of these may take `memory` bytes (None: its share of the machine's).
+    Each of these may take `memory` bytes (None: its share of the machine's). Raises NoScheduler.
     """
     if scheduler is not None:
-        with Client(scheduler, set_as_default=False) as client:
+        with _client_of(scheduler) as client:
             yield client
         return
     each = memory or MEMORY_LIMIT // max(workers, 1)
@@ -115,6 +135,13 @@ def connected(workers: int, scheduler: str | None = None, memory: int | None = N
                     client.close(timeout=patience)
                 with suppress(TimeoutError):
                     cluster.close(timeout=patience)
+
+
+def _client_of(scheduler: str) -> Client:
+    try:
+        return Client(scheduler, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise NoScheduler(f"{scheduler}: no Dask scheduler answers there: {' '.join(str(error).split())}") from error
 
 
 def _local_cluster(workers: int, memory: int) -> LocalCluster:
@@ -151,7 +178,7 @@ def _interrupts_put_off() -> Iterator[list[int]]:
     for number, handler in handlers.items():
         if handler not in (signal.SIG_IGN, None):
             signal.signal(number, lambda number, frame: came.append(number))
-    resource_tracker.ensure_running()  # its start, in whichever thread, unblocks SIGINT
+    _start_tracker()
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield came
@@ -160,3 +187,19 @@ def _interrupts_put_off() -> Iterator[list[int]]:
         for number, handler in handlers.items():
             if handler is not None:
                 signal.signal(number, handler)
+
+
+def _start_tracker() -> None:
+    """Start the resource tracker of multiprocessing: its start, in whichever thread, unblocks SIGINT.
+
+    What workers that were ended in haste leave, it removes, and should not warn of after our last line.
+    """
+    before = os.environ.get("PYTHONWARNINGS")
+    os.environ["PYTHONWARNINGS"] = ",".join(filter(None, [before, "ignore:resource_tracker"]))
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        if before is None:
+            del os.environ["PYTHONWARNINGS"]
+        else:
+            os.environ["PYTHONWARNINGS"] = before

@@ -12,9 +12,10 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import psutil
 import pytest
 
-from sonarsynth import render, store
+from sonarsynth import config, render, schedule, store
 from sonarsynth.cli import app
 from sonarsynth.cli.running import BadOption, run
 from sonarsynth.cli.selecting import frame_numbers, product_names
@@ -194,6 +195,35 @@ def test_frames_and_products_are_read() -> None:
     for text in ("", "3:3", "9", "-1", "1:2:3", ",", "0:10"):
         with pytest.raises(BadOption):
             frame_numbers(text, 9)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signals_end_a_build_and_its_workers_in_10_s_and_it_goes_on(
+    small_file: Path, tmp_path: Path, number: signal.Signals
+) -> None:
+    path = tmp_path / "s.zarr"
+    small_file.write_text(small_file.read_text().replace("frames: 20, interval: 0.1", "frames: 4000, interval: 2e-4"))
+    building = subprocess.Popen(
+        [sys.executable, "-m", "sonarsynth", "build", str(small_file), str(path), "--workers", "1", "--no-predict"],
+        stderr=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(HERE)}, start_new_session=True,
+    )  # fmt: skip
+    while not any((path / ".marks").glob("[0-9]*.json")):
+        assert building.poll() is None
+        time.sleep(0.05)
+    family = psutil.Process(building.pid).children(recursive=True)
+    assert family
+    os.killpg(building.pid, number)  # as Ctrl-C, or a batch system, does
+    _, err = building.communicate(timeout=10 if os.getloadavg()[0] < 2 * (os.cpu_count() or 1) else 120)
+    assert building.returncode == 130
+    assert err.endswith("sonarsynth: interrupted; the same command goes on from here\n") and "Traceback" not in err
+    assert psutil.wait_procs(family, timeout=30)[1] == []
+    assert not store.beside(path, "lock").exists()
+    there = store.frames_there(path)
+    assert len(there) >= 8
+    report = store.verify(path, quick=True)
+    assert all("without a completion mark" in problem.what for problem in report.problems)
+    again = schedule.build(config.load(small_file), path, frames=range(len(there) + 1), workers=0)
+    assert again.ok and set(there) <= set(store.frames_there(path))
 
 
 def test_sigterm_ends_a_build_that_can_go_on(small_file: Path, tmp_path: Path) -> None:

@@ -42,6 +42,17 @@ def test_another_number_of_frames_in_a_shard(
     assert contents(tmp_path / "s.zarr") == reference
 
 
+@pytest.mark.parametrize(("workers", "shard_frames"), [(1, 8), (4, 3)])
+def test_other_numbers_of_worker_processes(
+    tmp_path: Path, small_plan: Plan, reference: dict[str, bytes], workers: int, shard_frames: int
+) -> None:
+    """Two, and a running scheduler, are in test_building; several encrypted ones in test_encrypted_cluster."""
+    made = replace(small_plan, shard_frames=shard_frames)
+    report = build(made, tmp_path / "s.zarr", workers=workers)
+    assert report.ok and report.workers == workers
+    assert contents(tmp_path / "s.zarr") == reference
+
+
 def test_another_order(tmp_path: Path, small_plan: Plan, reference: dict[str, bytes]) -> None:
     frames = list(range(20))
     random.Random(5).shuffle(frames)

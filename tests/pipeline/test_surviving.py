@@ -176,7 +176,6 @@ def test_a_scheduler_that_dies_ends_the_build_in_one_line_and_it_goes_on(
         ("tcp://127.0.0.1:8786", True),
         ("localhost:8786", True),
         ("tcp://[::1]:8786", True),
-        ("tls://10.1.2.3:8786", True),
         ("tcp://10.1.2.3:8786", False),
         ("node7:8786", False),
         ("tcp://0.0.0.0:8786", False),

@@ -1,0 +1,152 @@
+"""A Dask cluster started by hand, as in any network: a scheduler and two workers that speak TLS and nothing else."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import dask
+import psutil
+import pytest
+
+from sonarsynth import store
+from sonarsynth.cli import main
+from sonarsynth.planning import Plan
+from sonarsynth.schedule import build
+from sonarsynth.schedule.connecting import check_address
+from tests.pipeline.test_same_anywhere import contents
+
+HERE = Path(__file__).resolve().parents[2]
+START = 600.0
+"""Seconds that processes may take to start, on a busy machine."""
+
+
+def certificate(folder: Path) -> tuple[Path, Path]:
+    """A key and a certificate signed by itself."""
+    if shutil.which("openssl") is None:
+        pytest.skip("needs openssl")
+    key, made = folder / "key.pem", folder / "certificate.pem"
+    command = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes"]
+    names = ["-subj", "/CN=localhost", "-days", "2", "-keyout", str(key), "-out", str(made)]
+    subprocess.run([*command, *names], check=True, capture_output=True)
+    return key, made
+
+
+@pytest.fixture
+def environment(tmp_path: Path) -> dict[str, str]:
+    """What every process of the cluster is told, as a site would write into its Dask configuration."""
+    key, made = certificate(tmp_path)
+    tls = {"CA_FILE": made}
+    tls |= {
+        f"{who}__{what}": file
+        for who in ("SCHEDULER", "WORKER", "CLIENT")
+        for what, file in (("KEY", key), ("CERT", made))
+    }
+    settings = {f"DASK_DISTRIBUTED__COMM__TLS__{name}": str(file) for name, file in tls.items()}
+    encrypted = {"DASK_DISTRIBUTED__COMM__REQUIRE_ENCRYPTION": "True", "OMP_NUM_THREADS": "1"}
+    return {**os.environ, **settings, **encrypted, "PYTHONPATH": str(HERE)}
+
+
+@pytest.fixture
+def address(tmp_path: Path, environment: dict[str, str]) -> Iterator[str]:
+    """Address of the scheduler, which has two workers."""
+    file = tmp_path / "scheduler.json"
+    common = ["--protocol", "tls", "--scheduler-file", str(file), "--no-dashboard"]
+    each = {
+        "scheduler": ["--host", "127.0.0.1", "--port", "0"],
+        "worker 1": ["--host", "127.0.0.1", "--nthreads", "1"],
+        "worker 2": ["--host", "127.0.0.1", "--nthreads", "1"],
+    }
+    with ExitStack() as stack:
+        for name, options in each.items():
+            module = f"distributed.cli.dask_{name.split()[0]}"
+            with (tmp_path / f"{name}.txt").open("w") as log:
+                started = subprocess.Popen(
+                    [sys.executable, "-W", "ignore", "-m", module, *common, *options],
+                    env=environment, stdout=log, stderr=log, cwd=tmp_path,
+                )  # fmt: skip
+            stack.callback(ended, started)
+        until = time.monotonic() + START
+        while not file.exists() or not file.read_text().endswith("}"):
+            assert time.monotonic() < until, (tmp_path / "scheduler.txt").read_text()
+            time.sleep(0.1)
+        yield json.loads(file.read_text())["address"]
+
+
+def ended(process: subprocess.Popen[bytes]) -> None:
+    """End a process and what it started."""
+    children = psutil.Process(process.pid).children(recursive=True) if process.poll() is None else []
+    process.kill()
+    process.wait()
+    for child in children:
+        if child.is_running():
+            child.kill()
+
+
+def test_a_cluster_that_speaks_tls_makes_the_same_arrays(
+    tmp_path: Path, small_file: Path, small_plan: Plan, environment: dict[str, str], address: str
+) -> None:
+    assert address.startswith("tls://127.0.0.1:")
+    path, here = tmp_path / "s.zarr", tmp_path / "here.zarr"
+    command = [sys.executable, "-m", "sonarsynth", "build", str(small_file), str(path), "--json"]
+    done = subprocess.run(
+        [*command, "--scheduler", address], env=environment, capture_output=True, text=True, check=False, timeout=START
+    )
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout)
+    assert report["ok"] and report["written"] == 20 and report["workers"] >= 1
+    build(small_plan, here, workers=0)
+    assert contents(path) == contents(here)
+    assert store.verify(path).ok
+
+
+NONE_THERE = {f"distributed.comm.tls.{name}": "no/such.pem" for name in ("ca-file", "client.cert", "client.key")}
+
+
+@pytest.mark.parametrize(
+    ("address", "settings", "said"),
+    [
+        ("tls://127.0.0.1:9", {}, "--scheduler: tls://127.0.0.1:9 needs certificates"),
+        ("tls://10.1.2.3:9", NONE_THERE, "certificates of Dask's configuration cannot be used: "),
+        ("tcp://127.0.0.1:9", {}, "tcp://127.0.0.1:9: no Dask scheduler answers there"),
+        ("nonsense", {}, "--insecure"),
+        ("what://127.0.0.1:9", {}, "what://127.0.0.1:9: no Dask scheduler answers there"),
+    ],
+)
+def test_a_scheduler_that_cannot_be_used_is_one_line(
+    tmp_path: Path,
+    small_file: Path,
+    capfd: pytest.CaptureFixture[str],
+    address: str,
+    settings: dict[str, str],
+    said: str,
+) -> None:
+    path = tmp_path / "n.zarr"
+    with dask.config.set({"distributed.comm.timeouts.connect": "1s", **settings}), pytest.raises(SystemExit) as raised:
+        main(["build", str(small_file), str(path), "--scheduler", address])
+    line = capfd.readouterr().err.splitlines()[-1]
+    assert raised.value.code == 2
+    assert line.startswith("sonarsynth: ") and said in line
+    assert not store.beside(path, "lock").exists()
+
+
+@pytest.mark.usefixtures("trusted")
+def test_certificates_make_an_address_elsewhere_fine() -> None:
+    check_address("tls://10.1.2.3:8786", False)
+
+
+@pytest.fixture
+def trusted(environment: dict[str, str]) -> Iterator[None]:
+    """The certificates of the cluster, in the Dask configuration of this process."""
+    prefix = "DASK_DISTRIBUTED__COMM__TLS__"
+    found = {name.removeprefix(prefix): value for name, value in environment.items() if name.startswith(prefix)}
+    keys = {name.lower().replace("__", ".").replace("_", "-"): value for name, value in found.items()}
+    with dask.config.set({f"distributed.comm.tls.{name}": value for name, value in keys.items()}):
+        yield
