@@ -82,6 +82,23 @@ def test_a_store_holds_every_value_and_every_mesh(spanning: Path, tmp_path: Path
     assert float(one.coords["away"]) == 11.0 and int(one["truth"].coords["mesh"][0]) == 1
 
 
+def test_a_sequence_more_changes_no_number_of_the_others(spanning: Path, tmp_path: Path) -> None:
+    """Each point of the grid is repeated once more, as far away: every array of the old sequences is as it was."""
+    text = spanning.read_text()
+    text = text[: text.index("  - zip")] + text[text.index("variations") : text.index("  - name: water")]
+    kept: dict[str, list[np.ndarray]] = {}
+    for repeats, rows in ((2, [0, 1, 2, 3, 4, 5, 6, 7]), (3, [0, 1, 2, 3, 6, 7, 8, 9])):
+        spanning.write_text(f"{text}repeats: {repeats}\n")
+        path = tmp_path / f"{repeats}.zarr"
+        assert schedule.build(config.load(spanning), path, workers=0).ok
+        with xr.open_datatree(path, engine="zarr", chunks=None) as tree:
+            for array in store.layout_of(planning.plan(config.load(spanning))).arrays:
+                kept.setdefault(array.path, []).append(np.asarray(tree[array.path].values)[rows])
+    differing = [name for name, (few, more) in kept.items() if few.tobytes() != more.tobytes()]
+    assert set(differing) <= {"trajectory"}
+    assert len(kept) > 50
+
+
 def test_the_sound_speed_of_a_sequence_is_the_one_its_rays_go_through(spanning: Path) -> None:
     made = planning.plan(config.load(spanning))
     kinds = {made.at(f).propagation.kind for f in range(16)}
