@@ -88,6 +88,11 @@ class Smooth:
         blur = self.law.roughness * np.abs(dot(patch.normal, scattered - incident)) / sound_speed
         return Pulses(np.ones(count, bool), corners, zero, zero, zero, phase, blur)
 
+    def spread(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Floats:
+        """Variance (...) of the delays of an echo in s2, over the facet and the heights of its surface."""
+        rough = self.law.roughness * dot(patch.normal, scattered - incident) / sound_speed
+        return np.asarray(over_facet(incident, scattered, patch, sound_speed) + rough * rough)
+
     def phase(self, incident: Floats, scattered: Floats) -> Floats:
         """Phase (...) of the reflection coefficient in rad, which directions change where `turns`."""
         return np.asarray(np.angle(reflection(self.law, incident, scattered)))
@@ -164,6 +169,16 @@ class Shadow:
     def polarity(self, mesh: Mesh) -> Floats:
         """All alike: the amplitude has the sign."""
         return np.ones(len(mesh.faces))
+
+    def spread(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Floats:
+        """Variance (...) of the delays over the facet in s2."""
+        return over_facet(incident, scattered, patch, sound_speed)
+
+
+def over_facet(incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Floats:
+    """Variance (...) of the delays over facets in s2: a twelfth of the sum of squares of those of the corners."""
+    late = dot(patch.corners, (incident - scattered)[..., None, :]) / sound_speed[..., None]
+    return np.asarray(dot(late, late) / 12.0)
 
 
 def reflection(law: Kirchhoff, incident: Floats, scattered: Floats) -> np.ndarray:

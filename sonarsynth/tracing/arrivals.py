@@ -30,7 +30,7 @@ from sonarsynth.tracing.legs import (
 from sonarsynth.tracing.moving import Moving, carried
 from sonarsynth.tracing.paths import Outward, assemble, join, silence
 from sonarsynth.tracing.shading import visible
-from sonarsynth.tracing.variation import ENOUGH, fitted
+from sonarsynth.tracing.variation import ALIKE, ENOUGH, fitted
 from sonarsynth.world.environment import Environment, Profile
 from sonarsynth.world.meshes import in_blocks
 from sonarsynth.world.moment import Body, Moment, Snap
@@ -62,6 +62,7 @@ class ArrayLegs:
     band: tuple[float, float]  # Hz
     negligible: float = NEGLIGIBLE  # power of the faintest echoes, that are left out
     enough: float = ENOUGH  # error of amplitudes over the aperture, where the second degree will do
+    alike: float = ALIKE  # change of an echo by the mean over its facet, over the aperture, that is left out
     visibility: Literal["centre", "hydrophones"] = "centre"  # from where facets must be seen
     first: int = 0  # of the legs, in the wavefronts
 
@@ -116,6 +117,7 @@ def trace(
     moving: Moving | None = None,
     negligible: float = NEGLIGIBLE,
     enough: float = ENOUGH,
+    alike: float = ALIKE,
     visibility: Literal["centre", "hydrophones"] = "centre",
 ) -> Arrivals:
     """The arrivals of a frame, sorted by snap; of each first those that met no target, then echoes by target, then the
@@ -124,13 +126,23 @@ def trace(
     environment, profile: the water; moment: bodies and snaps; sonar_pose, elements: the array; absorption: dB/m at the
     centre of the band; propagation: how sound travels, and how many bounces are followed; laws: how the facets of each
     body scatter; band: Hz; moving: velocities, where they count; negligible: see `NEGLIGIBLE`; enough:
-    `variation.ENOUGH`. A facet counts where it is lit by the snap and seen, with no body in between, by the array
-    centre; or, with `visibility`, by some hydrophone that it faces, and is heard by those.
-    The snap itself is heard if no body stands in between, but for those that scatter forward (`tracing.forward`).
-    Raises ValueError for anything outside the water.
+    `variation.ENOUGH`; alike: `variation.ALIKE`. A facet counts where it is lit by the snap and seen, with no body in
+    between, by the array centre; or, with `visibility`, by some hydrophone that it faces, and is heard by those. The
+    snap itself is heard if no body stands in between, but for those that scatter forward (`tracing.forward`). Raises
+    ValueError for anything outside the water.
     """
     legs = array_legs(
-        environment, profile, moment.bodies, sonar_pose, elements, propagation, band, negligible, enough, visibility
+        environment,
+        profile,
+        moment.bodies,
+        sonar_pose,
+        elements,
+        propagation,
+        band,
+        negligible,
+        enough,
+        alike,
+        visibility,
     )
     return arrivals(legs, moment.snaps, absorption, laws, moving)
 
@@ -145,6 +157,7 @@ def array_legs(
     band: tuple[float, float],
     negligible: float = NEGLIGIBLE,
     enough: float = ENOUGH,
+    alike: float = ALIKE,
     visibility: Literal["centre", "hydrophones"] = "centre",
 ) -> ArrayLegs:
     """Facet to array, for every facet of every body that leaves a ray for the array that no body hides.
@@ -173,7 +186,7 @@ def array_legs(
     over = wavefronts(legs, group, environment, bent, sonar_pose, elements, propagation, band)
     return ArrayLegs(
         legs, over, facets, bodies, environment, profile, propagation, sonar_pose, elements, band, negligible, enough,
-        visibility,
+        alike, visibility,
     )  # fmt: skip
 
 

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sonarsynth.acoustics.lobes import dot
 from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.scattering import Part
-from sonarsynth.scattering.parts import Plain, Smooth
+from sonarsynth.scattering.parts import Plain, Shadow, Smooth
 from sonarsynth.scattering.patches import Patches, Pulses, patches
 from sonarsynth.tracing.paths import Outward
 from sonarsynth.world.moment import Body
@@ -60,6 +61,33 @@ class Group:
         at_centre = self.part.phase(self.incident, self.scattered)[:, None]
         more = self.part.phase(self.incident[:, None, :], away) - at_centre
         return np.asarray(more - 2.0 * np.pi * np.rint(more / (2.0 * np.pi)))
+
+    @property
+    def spreads(self) -> bool:
+        """Whether echoes are means over their facets, which directions change."""
+        return isinstance(self.part, Smooth | Shadow)
+
+    def most_spread(self, late: Floats, turn: Floats, centre: float) -> Floats:
+        """Bound (echo,) on |spread|, of directions that differ by no more than `turn` (echo,).
+
+        late (echo, 3) s: of the corners in that of the array centre; centre (Hz).
+        """
+        if not isinstance(self.part, Smooth | Shadow):
+            return np.zeros(len(self.row))
+        speed = 2.0 * np.pi * centre / self.wavenumber
+        more = np.sqrt(dot(self.patch.corners, self.patch.corners)) * (turn / speed)[:, None]
+        rough = self.part.law.roughness / speed if isinstance(self.part, Smooth) else 0.0
+        return np.asarray(((2.0 * np.abs(late) + more) * more).sum(axis=1) / 12.0 + rough**2 * turn * (4.0 + turn))
+
+    def spread(self, departure: Floats, centre: float) -> Floats:
+        """Variance (echo, probe) in s2 of the delays of each echo in directions (echo, probe, xyz) of the world more
+        than in that of the array centre; centre (Hz)."""
+        if not isinstance(self.part, Smooth | Shadow):
+            return np.zeros(departure.shape[:2])
+        away, speed = self.body.pose.turn_to_body(departure), 2.0 * np.pi * centre / self.wavenumber
+        at_centre = self.part.spread(self.incident, self.scattered, self.patch, speed)
+        over = self.part.spread(self.incident[:, None, :], away, self.patch.over(), speed[:, None])
+        return np.asarray(over - at_centre[:, None])
 
     def pulses(self, centre: float) -> Pulses:
         """What they make of the pulse; centre (Hz)."""

@@ -14,6 +14,8 @@ from sonarsynth.tracing.wavefront import FEW, probes
 if TYPE_CHECKING:
     from sonarsynth.tracing.arrivals import ArrayLegs
 
+ALIKE = 1e-3
+"""Change of an echo over the aperture by the mean over its facet, over the strongest echo, that is left out."""
 ENOUGH = 1e-4
 """Error of amplitudes over the aperture, of the strongest echo's, at which polynomials of the second degree will do."""
 
