@@ -8,8 +8,10 @@ give for nothing: a point that moves at v changes the time of a ray that arrives
 
 with a, d, b the directions of travel at facet, facet and array, v and u the velocities of target and array; and each
 leg is longer by its curvature, as a straight one of its length is (`aside`), so that times are exact in uniform water.
-The pulse is longer by dt_2/dt_s. What is left out: how spreading and the directions at the facet change on the way,
-v t/r of them (3 cm in 10 m: 0.03 dB); of a moving array, u/c of the curvature of the wavefront; the turning of a body.
+The pulse is longer by dt_2/dt_s, and spreads on the way to the array from where the target was when the sound met it,
+at each hydrophone as from there. What is left out: how spreading on the way to the target and the directions at the
+facet change, v t/r of them (3 cm in 10 m: 0.03 dB); of a moving array, u/c of the curvature of the wavefront; the
+turning of a body.
 """
 
 from __future__ import annotations
@@ -97,4 +99,8 @@ def carried(
     if moving.sonar.any() and aperture > 0.0:
         terms = terms.copy() if terms.shape[1] else np.zeros((len(heard), TERMS))
         terms[:, 1:4] -= (of_array / (1.0 - of_array) * aperture / c_array)[:, None] * direction
-    return replace(made, delay=heard, stretch=stretch, direction=direction, radius=radius, delay_terms=terms)
+    nearer = legs.radius / radius
+    made = replace(made, delay=heard, stretch=stretch, direction=direction, radius=radius, delay_terms=terms)
+    if out is None:
+        return replace(made, spreading_out=made.spreading_out * nearer, amplitude=made.amplitude * nearer)
+    return replace(made, spreading_in=made.spreading_in * nearer, amplitude=made.amplitude * nearer)

@@ -94,3 +94,17 @@ def test_a_moving_array_meets_the_wavefront_at_every_sensor_when_it_is_there() -
         for _ in range(50):
             at = np.linalg.norm(SONAR.to_world(q) + u * at[:, None] - source, axis=1) / C
         assert abs(late[i] - at).max() < 2e-8  # second order; without the linear terms it is 3e-7
+
+
+def test_an_echo_spreads_from_where_the_target_is_when_the_sound_meets_it() -> None:
+    """1/r of the way from there to the array, and the amplitude with it."""
+    v = np.array([-3.0, 20.0, 0.5])
+    found, still = (run(bounces=0, moving=moving) for moving in (Moving(v[None, :], np.zeros(3)), None))
+    echo = ~found.direct
+    met = np.linalg.norm(still.point - SOURCE, axis=1) / C  # to v/c of it
+    from_there = np.linalg.norm(found.point + np.outer(met, v) - ARRAY, axis=1)
+    np.testing.assert_allclose(found.spreading_in[echo], 1.0 / from_there[echo], rtol=1e-3 * 20.0 / C)
+    assert np.abs(found.spreading_in / still.spreading_in - 1.0)[echo].max() > 5e-4
+    ratio = found.amplitude / still.amplitude
+    np.testing.assert_allclose(ratio[echo], (found.spreading_in / still.spreading_in)[echo], rtol=1e-12)
+    np.testing.assert_allclose(ratio[~echo], 1.0, rtol=0.0)
