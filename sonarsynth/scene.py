@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from annotated_types import Ge, Gt, Le
-from pydantic import Field, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from sonarsynth.beamforming import AutoBeamforming, Beamformer
 from sonarsynth.conventions import Decibels, Floats, PositiveSeconds, Seconds
@@ -27,6 +27,9 @@ from sonarsynth.world.motion import Motion, Still, pose, velocity
 from sonarsynth.world.snap_pulses import scales
 from sonarsynth.world.sources import SnappingShrimp
 
+MOST = 500
+"""Targets of a scene; snaps of a frame."""
+
 
 @description
 class World:
@@ -41,18 +44,28 @@ class World:
     @field_validator("targets")
     @classmethod
     def _check_names(cls, targets: tuple[Target, ...]) -> tuple[Target, ...]:
-        names = [t.name for t in targets]
-        for name in names:
-            if names.count(name) > 1:
-                raise ValueError(f"two targets are called '{name}'")
+        names = set[str]()
+        for target in targets:
+            if target.name in names:
+                raise ValueError(f"two targets are called '{target.name}'")
+            names.add(target.name)
         return targets
+
+    @field_validator("targets", "shrimp")
+    @classmethod
+    def _check_count(cls, several: tuple[Any, ...], info: ValidationInfo) -> tuple[Any, ...]:
+        count = sum(len(one.snap_times) if isinstance(one, SnappingShrimp) else 1 for one in several)
+        if count > MOST:
+            what = "snaps" if info.field_name == "shrimp" else "targets"
+            raise ValueError(f"{count} {what} are more than {MOST}")
+        return several
 
 
 @description
 class Trajectory:
     """When frames are taken, and how the sonar moves."""
 
-    frames: Annotated[int, Ge(1), Le(100_000_000)] = 1
+    frames: Annotated[int, Ge(1), Le(10_000_000)] = 1
     """Number of frames."""
     interval: PositiveSeconds = 0.1
     """Time from one frame to the next."""

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
 from rich.table import Table
 
@@ -137,7 +138,7 @@ def plan_report(plan: Plan, prediction: Prediction) -> None:
     """Stages, what is left out, sizes and predicted cost."""
     out = console()
     stages = Table(
-        "stage", "method", "why", "error", "s a frame", "a frame", title=plan.recipe.title, title_justify="left"
+        "stage", "method", "why", "error", "s a frame", "a frame", title=escape(plan.recipe.title), title_justify="left"
     )
     for s in plan.stages:
         stages.add_row(s.stage, s.method, s.why, s.error, f"{s.seconds:.2g}", size(s.bytes))

@@ -78,5 +78,6 @@ def _keep_traceback(error: Exception) -> str:
 
 
 def _say(message: str, status: int) -> int:
-    sys.stderr.write(f"sonarsynth: {' '.join(message.split())}\n")
+    line = "".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in " ".join(message.split()))
+    sys.stderr.write(f"sonarsynth: {line}\n")
     return status

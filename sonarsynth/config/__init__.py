@@ -1,13 +1,15 @@
 """YAML and recipes: the same classes as in Python, with errors that name file, line and field.
 
 A value is checked as strictly as JSON: a number is a number (or a text with a unit), a whole number has no point,
-true is no 1. Paths inside a file are relative to it, paths given by `--set` to the working directory.
+true is no 1. Paths inside a file are relative to it and stay in its folder; paths given by `--set` are relative to the
+working directory.
 """
 
 from __future__ import annotations
 
 import io
 import json
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -62,6 +64,8 @@ def locating(source: Source) -> Iterator[None]:
         yield
     except FieldError as error:
         raise source.error(error.path, error.message) from None
+    except MemoryError:
+        raise RecipeError(source.name, "", "", "needs more memory than there is") from None
 
 
 def dump(recipe: Recipe) -> str:
@@ -95,11 +99,12 @@ def _resolved(source: Source, data: Any, where: Where, check: bool) -> Any:
     if not isinstance(data, dict):
         return data
     path = data.get("path")
-    if data.get("kind") in FILE_KINDS and isinstance(path, str):
+    if isinstance(path, str) and any(data.get("kind") == kind for kind in FILE_KINDS):
         place = (*where, "path")
         folder = Path.cwd() if source.place(place) == SET else source.folder
         file = Path(path) if Path(path).is_absolute() else folder / path
         if check:
+            _check_place(source, place, path)
             _check_file(source, place, path, file)
         return data | {"path": path if Path(path).is_absolute() else str(file)}
     return {key: _resolved(source, value, (*where, key), check) for key, value in data.items()}
@@ -114,3 +119,22 @@ def _check_file(source: Source, where: Where, path: str, file: Path) -> None:
         raise source.error(where, f"no such file: {path or file}")
     if not there:
         raise source.error(where, f"is not a file: {path or file}")
+
+
+def _check_place(source: Source, where: Where, path: str) -> None:
+    """What a recipe names lies in its folder: what comes from elsewhere with a recipe opens no other file of ours."""
+    if source.place(where) == SET:
+        return
+    if re.match(r"[A-Za-z][A-Za-z0-9+.-]+://|file:", path):
+        raise source.error(where, "is a URL: a recipe names files in its own folder")
+    elsewhere = "a recipe names files in its own folder; `--set` may name any"
+    if Path(path).is_absolute():
+        raise source.error(where, f"is an absolute path: {elsewhere}")
+    if ".." in Path(path).parts:
+        raise source.error(where, f"leaves the folder of the recipe: {elsewhere}")
+    try:
+        inside = (source.folder / path).resolve().is_relative_to(source.folder.resolve())
+    except (OSError, ValueError, RuntimeError):  # too long, a NUL byte, links in a circle
+        raise source.error(where, "is not the path of a file") from None
+    if not inside:
+        raise source.error(where, f"is a link out of the folder of the recipe: {elsewhere}")

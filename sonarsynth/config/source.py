@@ -13,15 +13,19 @@ from pathlib import Path
 from typing import Any, Final
 
 from ruamel.yaml import YAML
+from ruamel.yaml.composer import Composer
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.events import AliasEvent
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 Where = tuple[str | int, ...]
 """Path of a value: keys and list indices from the top."""
 
 MAX_BYTES: Final = 2_000_000
-MAX_VALUES: Final = 200_000
+MAX_VALUES: Final = 50_000
 MAX_DEPTH: Final = 64
+MAX_DIGITS: Final = 40
+"""Of a whole number."""
 SET: Final = "--set"
 _TAG: Final = "tag:yaml.org,2002:"
 
@@ -142,12 +146,15 @@ def _replaced(source: Source, data: Any, where: Where, depth: int, value: Any) -
 
 def _compose(text: str, name: str, place: str = "", field: str = "") -> Node | None:
     yaml = YAML(typ="safe", pure=True)
+    yaml.Composer = _Composer
     try:
         node: Node | None = yaml.compose(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = place or str(mark.line + 1 if mark else 1)
         raise RecipeError(name, line, field, _plain(error)) from None
+    except MemoryError:
+        raise RecipeError(name, place or "1", field, "does not fit in memory") from None
     except RecursionError:
         raise RecipeError(name, place or "1", field, "is nested too deeply") from None
     except (YAMLError, ValueError) as error:
@@ -157,9 +164,38 @@ def _compose(text: str, name: str, place: str = "", field: str = "") -> Node | N
 
 def _plain(error: MarkedYAMLError) -> str:
     problem = str(error.problem or error.context or "is not YAML")
+    if isinstance(error, _Unwanted):
+        return problem
     if "'\\t'" in problem:
         return "tabs cannot indent YAML; use spaces"
     return f"is not YAML: {problem}"
+
+
+class _Unwanted(MarkedYAMLError):
+    """YAML that no recipe needs."""
+
+
+class _Composer(Composer):
+    """Composes a document; stops where it is too large, before it takes long."""
+
+    values = 0
+
+    def compose_document(self) -> Any:
+        event = self.parser.peek_event()
+        if event.version not in (None, (1, 2)):
+            raise _Unwanted(problem="is not of YAML 1.2: leave out '%YAML'", problem_mark=event.start_mark)
+        return super().compose_document()
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        event = self.parser.peek_event()
+        self.values += 1
+        if self.values > MAX_VALUES:
+            raise _Unwanted(problem=f"holds more than {MAX_VALUES} keys and values", problem_mark=event.start_mark)
+        if self.depth > MAX_DEPTH:
+            raise _Unwanted(problem=f"is nested deeper than {MAX_DEPTH} levels", problem_mark=event.start_mark)
+        if not isinstance(event, AliasEvent) and getattr(event, "anchor", None) in self.anchors:
+            raise _Unwanted(problem=f"the anchor '{event.anchor}' is given twice", problem_mark=event.start_mark)
+        return super().compose_node(parent, index)
 
 
 @dataclass
@@ -192,6 +228,8 @@ class _Reader:
         for key, value in node.value:
             if not isinstance(key, ScalarNode):
                 raise self.error(key, where, "a key must be a text")
+            if not _is_text(key.value):
+                raise self.error(key, where, "a key holds half a character (a surrogate)")
             if key.value in seen:
                 raise self.error(key, (*where, key.value), "is given twice")
             seen.add(key.value)
@@ -203,11 +241,15 @@ class _Reader:
             raise self.error(node, where, f"has the tag {tag}; tags are not used in recipes")
         match tag.removeprefix(_TAG):
             case "str" | "timestamp" | "merge" | "value":
+                if not _is_text(text):
+                    raise self.error(node, where, "holds half a character (a surrogate)")
                 return text
             case "null":
                 return None
-            case "bool":
+            case "bool" if text.lower() in ("true", "false"):
                 return text.lower() == "true"
+            case "bool":
+                raise self.error(node, where, f"must be true or false, not {text[:40]}")
             case "int":
                 return self._integer(node, where, text)
             case "float":
@@ -218,7 +260,10 @@ class _Reader:
         digits = text.lower().lstrip("+-")
         base = {"0x": 16, "0o": 8, "0b": 2}.get(digits[:2], 10)
         try:
-            return int(text, base)
+            number = int(text, base)
+            if abs(number) < 10**MAX_DIGITS:
+                return number
+            raise ValueError
         except ValueError:
             raise self.error(node, where, "is not a whole number that can be used") from None
 
@@ -228,5 +273,9 @@ class _Reader:
         except ValueError:  # .inf and .nan, as YAML writes them
             number = math.nan
         if not math.isfinite(number):
-            raise self.error(node, where, f"must be a finite number, not {text}")
+            raise self.error(node, where, f"must be a finite number, not {text[:40]}")
         return number
+
+
+def _is_text(text: str) -> bool:
+    return not any("\ud800" <= c <= "\udfff" for c in text)

@@ -16,6 +16,7 @@ from sonarsynth.scattering.targets import mesh_for
 from sonarsynth.scene import Frame, Scene
 from sonarsynth.sonar import Sonar, elements
 from sonarsynth.synthesis.pulse import bubble, heard_part
+from sonarsynth.synthesis.wavefront import MOST_STRETCH
 from sonarsynth.world.casting import inside
 from sonarsynth.world.casts import profile_of
 from sonarsynth.world.environment import Profile
@@ -40,6 +41,8 @@ LONGEST_SNAP = 0.1
 """s."""
 FAINTEST = 1e-9
 """Part of a snap that the filter must let pass: what rounding makes of nothing is less."""
+STEEPEST = 1e6
+"""m/s a metre: more is a jump, which is written as two speeds at one depth."""
 FRAME_BYTES = 2e9
 """Signals of a frame may take so much memory."""
 
@@ -56,6 +59,14 @@ def read_inputs(scene: Scene) -> Profile:
         raise FieldError(
             (*world, "environment", "sound_speed"),
             f"is {profile.speed[odd[0]]:g} m/s at {profile.depth[odd[0]]:g} m, outside {SLOWEST:g} to {FASTEST:g} m/s",
+        )
+    steep = np.flatnonzero(np.abs(np.diff(profile.speed)) > STEEPEST * np.diff(profile.depth))
+    jumps = steep[np.diff(profile.depth)[steep] > 0]
+    if len(jumps):
+        at, below = profile.depth[jumps[0]], profile.depth[jumps[0] + 1]
+        raise FieldError(
+            (*world, "environment", "sound_speed"),
+            f"changes by more than {STEEPEST:g} m/s a metre between {at:.12g} and {below:.12g} m",
         )
     for i, (target, law) in enumerate(zip(scene.world.targets, scene.laws, strict=True)):
         try:
@@ -116,9 +127,23 @@ def check_frame(scene: Scene, frame: Frame) -> None:
         path = ("scene", "world", "targets", i, "motion")
         if not _box_in_water(body, bed):
             _check_depth(path, f"target '{body.name}'", _places(body), bed, when)
+        if scene.physics.doppler:
+            _check_speed(scene, frame, i)
         if inside(body, frame.sonar_pose.position):
             raise FieldError(path, f"target '{body.name}' has the sonar inside at frame {frame.index}")
     _check_snaps(scene, frame)
+
+
+def _check_speed(scene: Scene, frame: Frame, number: int) -> None:
+    """Nothing moves so fast that the pulses are stretched beyond what the synthesis can do (`MOST_STRETCH`)."""
+    body, array = frame.moment.bodies[number], float(np.linalg.norm(frame.sonar_velocity))
+    own = float(np.linalg.norm(body.velocity))
+    slowest = float(profile_of(scene.world.environment.sound_speed).speed.min())
+    if array + 2.0 * own > 0.9 * MOST_STRETCH * slowest:
+        sonar = array > 2.0 * own
+        path = ("scene", "trajectory", "sonar") if sonar else ("scene", "world", "targets", number, "motion")
+        what, speed = ("the array", array) if sonar else (f"target '{body.name}'", own)
+        raise FieldError(path, f"{what} moves at {speed:.3g} m/s at frame {frame.index}, too fast for sound in water")
 
 
 def _check_snaps(scene: Scene, frame: Frame) -> None:

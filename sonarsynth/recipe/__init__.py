@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 from functools import cached_property
-from pathlib import Path
 from typing import Annotated, Any
 
 from annotated_types import Ge, Le
@@ -15,7 +14,7 @@ from sonarsynth.conventions import Ints
 from sonarsynth.description import description
 from sonarsynth.recipe.attribution import Attribution, Creator
 from sonarsynth.recipe.grid import Axis, Together, entry_tag
-from sonarsynth.recipe.sequences import Sequences
+from sonarsynth.recipe.sequences import MOST_SEQUENCES, Sequences
 from sonarsynth.recipe.splits import SPLITS, Splits
 from sonarsynth.recipe.tolerance import Accuracy
 from sonarsynth.recipe.values import Plain
@@ -23,6 +22,7 @@ from sonarsynth.recipe.variants import Variants, target_meshes, variant_numbers
 from sonarsynth.recipe.variations import Choice, Normal, Sobol, Uniform, Variation
 from sonarsynth.scene import Frame, Scene
 from sonarsynth.tracing.ray_request import RayRequest
+from sonarsynth.world import files
 from sonarsynth.world.shapes import MeshFile
 from sonarsynth.world.snaps import RecordedSnap
 from sonarsynth.world.sound_speed import Cast
@@ -69,7 +69,7 @@ class Recipe:
     """What the sequences span: every combination of the values of the entries, the last entry changing fastest."""
     variations: tuple[Variation, ...] = ()
     """What is drawn anew for each sequence."""
-    repeats: Annotated[int, Ge(1), Le(100_000_000)] = 1
+    repeats: Annotated[int, Ge(1), Le(MOST_SEQUENCES)] = 1
     """Sequences for each point of the grid."""
     splits: Splits | None = None
     """Shares of the sequences for training, validation and test; left out: all are for training."""
@@ -146,7 +146,7 @@ def _by_content(value: Any) -> Any:
     """The same JSON value with the path of each file replaced by the digest of what it holds."""
     if isinstance(value, dict):
         path = value.get("path") if value.get("kind") in FILE_KINDS else None
-        held = {"path": hashlib.sha256(Path(path).read_bytes()).hexdigest()} if isinstance(path, str) else {}
+        held = {"path": files.digest(path)} if isinstance(path, str) else {}
         return {name: _by_content(v) for name, v in value.items()} | held
     return [_by_content(v) for v in value] if isinstance(value, list) else value
 

@@ -12,7 +12,7 @@ from pydantic import model_validator
 from sonarsynth.description import description
 from sonarsynth.recipe.values import Name, Paths, Plain, PlainValue, Quantity, number_and_unit, same_unit, with_unit
 
-MOST_VALUES = 1_000_000
+MOST_VALUES = 100_000
 """Of one entry."""
 
 
@@ -53,6 +53,11 @@ class Axis:
         return self
 
     @property
+    def size(self) -> int:
+        """Number of values, without making them."""
+        return len(self.values) if self.values is not None else self.count or len(_numbers(self))
+
+    @property
     def taken(self) -> tuple[Plain, ...]:
         """The values, in order."""
         if self.values is not None:
@@ -85,7 +90,7 @@ class Together:
 
     @model_validator(mode="after")
     def _check(self) -> Together:
-        counts = [len(axis.taken) for axis in self.zip]
+        counts = [axis.size for axis in self.zip]
         if len(set(counts)) > 1:
             raise ValueError(f"the entries have {', '.join(map(str, counts))} values; they must have equally many")
         return self

@@ -27,7 +27,8 @@ from sonarsynth.recipe.values import Plain, Where, default_name, where
 from sonarsynth.recipe.variations import Choice, Sobol, Variation
 from sonarsynth.scene import Scene
 
-MOST_FRAMES = 100_000_000
+MOST_FRAMES = 10_000_000
+MOST_SEQUENCES = 1_000_000
 RESERVED = ("frame", "trajectory", "step", "time", "split", "repeat")
 """Names of the store that no entry can have."""
 
@@ -51,7 +52,7 @@ class Sequences:
     @cached_property
     def sizes(self) -> tuple[int, ...]:
         """Number of values of each entry of the grid, and the repeats: the last changes fastest."""
-        return (*(len(some[0][2]) for some in self._axes), self.repeats)
+        return (*(axes(entry)[0].size for entry in self.grid), self.repeats)
 
     @property
     def count(self) -> int:
@@ -140,6 +141,8 @@ class Sequences:
 
     def check(self) -> None:
         """Raises FieldError for entries that cannot go together; the scenes are not looked at."""
+        if self.count > MOST_SEQUENCES:
+            raise FieldError(("grid",), f"spans {self.count:.8g} sequences, more than {MOST_SEQUENCES}")
         if self.count * self.base.trajectory.frames > MOST_FRAMES:
             raise FieldError(("grid",), f"spans {self.count} sequences: more than {MOST_FRAMES} frames")
         names: dict[str, str] = {}

@@ -111,6 +111,8 @@ def _paths(value: Any) -> tuple[str, ...]:
             )
         if text.endswith(".path"):
             raise ValueError(f"'{text}' is the name of a file: vary what holds it, with its kind and path")
+        if text.endswith(".kind"):
+            raise ValueError(f"'{text}' cannot vary by itself: vary what holds it, with its kind and all its fields")
         if not all(re.fullmatch(r"\w+", part) for part in text.split(".")):
             raise ValueError(f"'{text}' is not a path such as scene.world.targets.0.motion.heading")
     return tuple(texts)

@@ -17,6 +17,10 @@ ROMANIS_ROWS = (4, 10, 14, 18, 20, 20, 22, 22, 24, 24, 24, 26, 26, 26, 26, 24, 2
 """Elements in each row of the 508-element disc: 500 cells centred on a corner, and the octet (9.5, 8.5), (8.5, 9.5)."""
 
 
+MOST_PLACES = 100_000
+"""Of a lattice."""
+
+
 @description
 class PlanarLattice:
     """Elements on a regular lattice in the plane x = 0, facing x, centred on the origin.
@@ -41,6 +45,8 @@ class PlanarLattice:
 
     @model_validator(mode="after")
     def _check(self) -> PlanarLattice:
+        if self.columns * self.rows > MOST_PLACES:
+            raise ValueError(f"has {self.columns * self.rows} places, more than {MOST_PLACES}")
         if self.mask is not None:
             if len(self.mask) != self.rows or any(len(row) != self.columns for row in self.mask):
                 raise ValueError(f"mask must have {self.rows} rows of {self.columns} characters")

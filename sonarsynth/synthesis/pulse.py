@@ -252,6 +252,7 @@ def stretch_sizes(waveform: Waveform, chosen: Filter, widest: float, sloped: boo
     return tuple((sizes / sizes[0]).tolist()) if sizes[0] > 0.0 else (1.0, inf)
 
 
+@lru_cache(maxsize=64)
 def heard_part(waveform: Waveform, chosen: Filter) -> float:
     """Largest modulus of the filtered snap's spectrum over that of the snap, up to the stop band; 0 for one that has
     nothing there."""

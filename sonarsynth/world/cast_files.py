@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.world import files
 
 NAMES = {
     "depth": ("depth", "dep", "depsm", "depth below surface"),
@@ -46,7 +47,8 @@ PLACE = r"[%#]\s*(?:start\s+)?{}\s*[,;:=]\s*([-+.\d]+)"
 LATITUDE = re.compile(PLACE.format("latitude"), re.IGNORECASE)
 LONGITUDE = re.compile(PLACE.format("longitude"), re.IGNORECASE)
 MISSING = ("", "nan", "na", "null", "none")
-MAX_ROWS = 1_000_000
+MAX_ROWS = 200_000
+MAX_BYTES = 1 << 25
 
 
 class CastError(ValueError):
@@ -121,11 +123,13 @@ class Table:
 def read_table(path: Path) -> Table:
     """Read a cast: comments ('%' or '#'), column names, rows; commas, tabs, or semicolons (then "12,5" is a number)."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        data = files.read(path, MAX_BYTES)
+    except files.FileError as error:
+        raise CastError(f"{path}: {error}") from None
+    try:
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        text = path.read_text(encoding="latin-1")
-    except OSError as error:
-        raise CastError(f"{path}: {(error.strerror or str(error)).lower()}") from None
+        text = data.decode("latin-1")
     if "\0" in text:
         raise CastError(f"{path}: is not a text file")
     numbered = [(i, line) for i, line in enumerate(text.splitlines(), start=1) if line.strip(" \t,;")]

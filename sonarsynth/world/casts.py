@@ -11,6 +11,7 @@ import numpy.typing as npt
 from sonarsynth.acoustics.ranges import noted
 from sonarsynth.acoustics.seawater import depth_of_pressure
 from sonarsynth.conventions import FASTEST, SLOWEST, Floats
+from sonarsynth.world import files
 from sonarsynth.world.cast_files import CastError, Column, Table, read_table
 from sonarsynth.world.hydrography import another_unit, sea_water_speed
 from sonarsynth.world.profiles import nearest
@@ -52,12 +53,10 @@ def profile_of(sound_speed: SoundSpeed) -> Profile:
     `CastError` in one line that names file, line and column, ImportError where a formula needs what is not installed.
     """
     if isinstance(sound_speed, Cast):
-        path = Path(sound_speed.path)
         try:
-            status = path.stat()
-        except OSError as error:
-            raise CastError(f"{path}: {(error.strerror or str(error)).lower()}") from None
-        return _profile_of(sound_speed, (status.st_mtime_ns, status.st_size))
+            return _profile_of(sound_speed, files.stamp(sound_speed.path))
+        except files.FileError as error:
+            raise CastError(f"{sound_speed.path}: {error}") from None
     return _profile_of(sound_speed, None)
 
 

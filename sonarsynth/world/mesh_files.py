@@ -6,16 +6,25 @@ the index 0 of an OBJ, all without an error: what a file promises is checked her
 
 from __future__ import annotations
 
+import io
+import json
+import logging
+import os
 import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from sonarsynth.world import files
 from sonarsynth.world.refinement import MeshError, Surface
+from sonarsynth.world.shapes import MAX_FACETS
 
-MAX_BYTES = 4 * 2**30
+MAX_BYTES = {"stl": 4 << 30, "glb": 1 << 30, "ply": 1 << 30, "obj": 1 << 29, "off": 1 << 29}
+"""Text takes several times its size in memory to read."""
 
 
 def read_surface(path: Path) -> Surface:
@@ -27,16 +36,14 @@ def read_surface(path: Path) -> Surface:
     if kind not in PROMISES:
         raise MeshError(f"{path}: is not one of {', '.join(k.upper() for k in PROMISES)} (by its ending)")
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise MeshError(f"{path}: is larger than {MAX_BYTES >> 30} GiB")
-        data = path.read_bytes()
-    except OSError as error:
-        raise MeshError(f"{path}: {(error.strerror or str(error)).lower()}") from None
+        data = _content(path, kind)
+    except files.FileError as error:
+        raise MeshError(f"{path}: {error}") from None
     if not data.strip():
         raise MeshError(f"{path}: is empty")
     if reason := PROMISES[kind](data):
         raise MeshError(f"{path}: {reason}")
-    vertices, faces = _load(path, kind)
+    vertices, faces = _load(path, kind, data)
     if vertices.ndim != 2 or vertices.shape[1:] != (3,):
         raise MeshError(f"{path}: has vertices without three coordinates")
     if faces.size == 0:
@@ -44,17 +51,41 @@ def read_surface(path: Path) -> Surface:
     return vertices, faces.reshape(-1, 3)
 
 
-def _load(path: Path, kind: str) -> Surface:
+def _content(path: Path, kind: str) -> bytes:
+    """The bytes of a file; a binary STL says in its head how many facets it has, so that it need not be read to be
+    refused. Raises FileError."""
+    with files.opened(path) as file:
+        head = file.read(84) if kind == "stl" else b""
+        count, size = int.from_bytes(head[80:84], "little"), os.fstat(file.fileno()).st_size
+    if len(head) == 84 and size == 84 + 50 * count and count > MAX_FACETS:
+        raise files.FileError(f"has {count} facets, more than {MAX_FACETS}")
+    return files.read(path, MAX_BYTES[kind])
+
+
+def _load(path: Path, kind: str, data: bytes) -> Surface:
     import trimesh
 
     try:
-        with warnings.catch_warnings(), path.open("rb") as file:
-            warnings.simplefilter("ignore")
-            mesh = trimesh.load_mesh(file, file_type=kind, process=False)
+        with _silent():
+            # bytes without a name: what the file may name in turn (materials, pictures, URLs) is not looked for
+            mesh = trimesh.load_mesh(io.BytesIO(data), file_type=kind, process=False, skip_materials=True)
             return np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
     except Exception as error:  # whatever a reader of five formats may meet in a damaged file
         text = " ".join(str(error).split())[:120]
         raise MeshError(f"{path}: cannot be read as {kind.upper()} ({type(error).__name__}: {text})") from None
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Without warnings, and without what trimesh logs: tracebacks of what it tried first."""
+    log = logging.getLogger("trimesh")
+    before, log.disabled = log.disabled, True
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        log.disabled = before
 
 
 def _stl(data: bytes) -> str | None:
@@ -122,7 +153,31 @@ def _glb(data: bytes) -> str | None:
     if data[:4] != b"glTF" or len(data) < 12:
         return "is no GLB file"
     size = int.from_bytes(data[8:12], "little")
-    return None if len(data) >= size else f"is cut off: {len(data)} bytes where its header says {size}"
+    if len(data) < size:
+        return f"is cut off: {len(data)} bytes where its header says {size}"
+    length = int.from_bytes(data[12:16], "little")
+    try:
+        tree = json.loads(data[20 : 20 + length])
+        return _absurd(tree)
+    except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
+        return f"cannot be read as GLB ({type(error).__name__} in its description)"
+
+
+def _absurd(tree: dict[str, Any]) -> str | None:
+    """Why the description in a GLB file cannot be believed: numbers that stand nowhere, a mesh placed without end."""
+    for number, accessor in enumerate(tree.get("accessors", [])):
+        if "bufferView" not in accessor:
+            return f"accessor {number} has {accessor['count']} values that are not in the file"
+    nodes = tree.get("nodes", [])
+    placed = sorted(child for node in nodes for child in node.get("children", []))
+    if len(set(placed)) < len(placed):
+        return "has a node that is in two places"
+    facets = [
+        sum(int(tree["accessors"][p.get("indices", p["attributes"]["POSITION"])]["count"]) for p in mesh["primitives"])
+        for mesh in tree.get("meshes", [])
+    ]
+    total = sum(facets[node["mesh"]] for node in nodes if "mesh" in node)
+    return f"places {total} corners, more than of {MAX_FACETS} facets" if total > 3 * MAX_FACETS else None
 
 
 PROMISES: dict[str, Callable[[bytes], str | None]] = {"stl": _stl, "obj": _obj, "ply": _ply, "off": _off, "glb": _glb}

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import UNITS, Bools, Floats, Ints
+from sonarsynth.world import files
 from sonarsynth.world.generation import generate
 from sonarsynth.world.keeping import kept
 from sonarsynth.world.refinement import BLOCK, MeshError, Surface, halve_longest_edges, split_long_edges
@@ -135,10 +136,9 @@ def file_stamp(shape: Shape) -> tuple[int, int] | None:
     if not isinstance(shape, MeshFile):
         return None
     try:
-        status = Path(shape.path).stat()
-    except OSError as error:
-        raise MeshError(f"{shape.path}: {(error.strerror or str(error)).lower()}") from None
-    return status.st_mtime_ns, status.st_size
+        return files.stamp(shape.path)
+    except files.FileError as error:
+        raise MeshError(f"{shape.path}: {error}") from None
 
 
 def refined_mesh(shape: Shape, edge: float = np.inf, sagitta: float = np.inf) -> Mesh:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 import warnings
 from dataclasses import dataclass
@@ -11,10 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from sonarsynth.conventions import UNITS, Floats
+from sonarsynth.world import files
 from sonarsynth.world.snaps import RecordedSnap
 
 MOST_SAMPLES = 1 << 18
 """A longer file is a recording of the sea, not of a snap."""
+
+MOST_BYTES = 1 << 26
 
 Stamp = tuple[int, int]
 
@@ -46,10 +50,9 @@ def read_recording(snap: RecordedSnap) -> Recording:
 def stamp(snap: RecordedSnap) -> Stamp:
     """What changes when the file does: when it was written, and its size. Raises RecordingError without a file."""
     try:
-        status = Path(snap.path).stat()
-    except OSError as error:
-        raise RecordingError(f"{snap.path}: {(error.strerror or str(error)).lower()}") from None
-    return status.st_mtime_ns, status.st_size
+        return files.stamp(snap.path)
+    except files.FileError as error:
+        raise RecordingError(f"{snap.path}: {error}") from None
 
 
 @lru_cache(maxsize=32)
@@ -94,7 +97,9 @@ def _wav(path: Path, snap: RecordedSnap) -> tuple[float, float, Floats]:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             warnings.filterwarnings("ignore", "Chunk .* not understood")
-            rate, data = wavfile.read(path)
+            rate, data = wavfile.read(io.BytesIO(_bytes(path)))
+    except RecordingError:
+        raise
     except Exception as error:  # whatever a damaged file may bring
         text = " ".join(str(error).split())[:120]
         raise RecordingError(f"{path}: cannot be read as WAV ({type(error).__name__}: {text})") from None
@@ -133,12 +138,9 @@ def _text(path: Path, snap: RecordedSnap) -> tuple[float, float, Floats]:
 def _rows(path: Path) -> tuple[Floats, list[int], list[str]]:
     """Numbers (row, column), the number of each one's line, and the names of the columns where the file has them."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = (
-            "is not a text file" if isinstance(error, UnicodeDecodeError) else (error.strerror or str(error)).lower()
-        )
-        raise RecordingError(f"{path}: {reason}") from None
+        text = _bytes(path).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise RecordingError(f"{path}: is not a text file") from None
     written = [(i, s) for i, s in enumerate(text.splitlines(), start=1) if s.strip() and s.lstrip()[0] not in "#%"]
     if len(written) > MOST_SAMPLES + 1:
         raise RecordingError(f"{path}: has more than {MOST_SAMPLES} rows: cut it to the snap")
@@ -157,6 +159,13 @@ def _rows(path: Path) -> tuple[Floats, list[int], list[str]]:
                 raise RecordingError(f"{path}, line {i}, column {j + 1}: {cell[:40]!r} is not a finite number")
             rows[k, j] = number
     return rows, [i for i, _ in cells], names
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return files.read(path, MOST_BYTES)
+    except files.FileError as error:
+        raise RecordingError(f"{path}: {error}") from None
 
 
 def _cells(line: str) -> list[str]:

@@ -15,6 +15,10 @@ MAX_FACETS = 20_000_000
 """A mesh of more facets is refused (about 3 GB of arrays)."""
 
 
+Size = Annotated[PositiveMetres, Ge(1e-6), Le(10e3)]
+"""Of a body, or of a part of it."""
+
+
 @description
 class MeshFile:
     """A mesh in a file: STL, OBJ, PLY, OFF or GLB."""
@@ -32,7 +36,7 @@ class MeshFile:
     """Turn about y, before the heading."""
     roll: Radians = 0.0
     """Turn about x, first."""
-    edge: PositiveMetres | None = None
+    edge: Size | None = None
     """Subdivide facets until no edge is longer; unless smooth, they are cut in their planes, and the surface stays as
     it is."""
     smooth: bool = False
@@ -47,8 +51,8 @@ class Sphere:
     """A sphere, refined on the true surface."""
 
     kind: Literal["sphere"] = "sphere"
-    radius: PositiveMetres
-    edge: PositiveMetres | None = None
+    radius: Size
+    edge: Size | None = None
     """Longest edge of a facet; left out: an eighth of the radius."""
 
 
@@ -57,9 +61,9 @@ class Cylinder:
     """A solid circular cylinder along x, with flat ends, centred on the origin; refined on the true surface."""
 
     kind: Literal["cylinder"] = "cylinder"
-    radius: PositiveMetres
-    length: PositiveMetres
-    edge: PositiveMetres | None = None
+    radius: Size
+    length: Size
+    edge: Size | None = None
     """Longest edge of a facet; left out: an eighth of the radius."""
 
 
@@ -68,9 +72,9 @@ class Box:
     """A box, centred on the origin."""
 
     kind: Literal["box"] = "box"
-    size: tuple[PositiveMetres, PositiveMetres, PositiveMetres]
+    size: tuple[Size, Size, Size]
     """Lengths along x, y and z."""
-    edge: PositiveMetres | None = None
+    edge: Size | None = None
     """Longest edge of a facet; left out: two facets a face."""
 
 
@@ -82,15 +86,15 @@ class LShape:
     """
 
     kind: Literal["l_shape"] = "l_shape"
-    height: PositiveMetres
+    height: Size
     """Of the inner face of the upright plate (x = 0, facing forward)."""
-    length: PositiveMetres
+    length: Size
     """Of the inner face of the lying plate (z = 0, facing up)."""
-    width: PositiveMetres
+    width: Size
     """Of both plates, along y."""
-    thickness: PositiveMetres
+    thickness: Size
     """Of both plates, behind and below the inner faces."""
-    edge: PositiveMetres | None = None
+    edge: Size | None = None
     """Longest edge of a facet; left out: the fewest facets."""
 
 
@@ -103,7 +107,7 @@ class Remus100:
     """
 
     kind: Literal["remus100"] = "remus100"
-    edge: PositiveMetres = 0.014
+    edge: Size = 0.014
     """Longest edge of a facet round the girth and along the hull, refined on the true surface."""
     fins: bool = True
     """With its four fins."""
@@ -120,10 +124,10 @@ class Myring:
     """
 
     kind: Literal["myring"] = "myring"
-    nose: PositiveMetres
+    nose: Size
     middle: NonNegativeMetres
-    tail: PositiveMetres
-    diameter: PositiveMetres
+    tail: Size
+    diameter: Size
     exponent: Annotated[Number, Ge(0.5), Le(10)] = 2.0
     """Of the nose: 2 is an ellipse, more is blunter."""
     tail_angle: Annotated[Radians, Ge(0), Le(1.5)] = 0.436
@@ -132,7 +136,7 @@ class Myring:
     """Length of the nose that is missing."""
     tail_offset: NonNegativeMetres = 0.0
     """Length of the tail that is missing."""
-    edge: PositiveMetres | None = None
+    edge: Size | None = None
     """Longest edge of a facet; left out: a sixteenth of the diameter."""
 
     @field_validator("tail_angle")

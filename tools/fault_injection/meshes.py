@@ -1,0 +1,150 @@
+"""Random changes of mesh files, by bytes, by numbers and by what they say of themselves: refused, or a usable mesh."""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from fault_injection.fuzz import judged
+from fault_injection.recipes import Case, by_file, by_structure, damaged, numbers, pick, places
+
+RECIPE = """\
+title: a mesh
+seed: 3
+scene:
+  world:
+    environment: {{depth: 12 m, sound_speed: {{kind: isovelocity, speed: 1540}}, noise: {{kind: flat, level: 40 dB}}}}
+    targets:
+      - name: body
+        shape: {{kind: mesh_file, path: {name}, smooth: {smooth}}}
+        motion: {{kind: line, start: [10, 0, -5], stop: [10, 1, -5], duration: 1}}
+    shrimp:
+      - position: [30, 1]
+  sonar:
+    array: {{kind: planar_lattice, columns: 5, rows: 4, pitch: 5 cm}}
+    beams: {{azimuths: 11, elevations: 9, azimuth_span: 30 deg, elevation_span: 30 deg}}
+  trajectory: {{frames: 2, interval: 0.5}}
+  processing: {{beamforming: {{kind: focused, focus: 10 m}}}}
+"""
+ODD_WORDS = (
+    b"\x00\x00\xc0\x7f", b"\x00\x00\x80\x7f", b"\xff\xff\x7f\x7f", b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f",
+    b"\x00\x00\x00\x80", b"\x01\x00\x00\x00", b"\x00\x00\x00\x00", b"\x00\x00\x80\x3f", b"\x80\x96\x98\x00",
+)  # fmt: skip
+"""NaN, infinity, the largest number, -1, the largest index, the smallest, 1, 0, 1.0, 10 000 000."""
+ODD_LINES = (
+    b"f 1 2 3", b"f 1 1 1", b"f -1 -2 -3", b"f 1 2 3 4 5 6 7 8", b"f 0 0 0", b"f 1/1/1 2//2 3/3", b"v 0 0 0",
+    b"v 1e300 0 0", b"v nan nan nan", b"v", b"mtllib ../outside/x.mtl", b"mtllib /dev/zero", b"usemtl x", b"o x",
+    b"g x", b"s off", b"l 1 2", b"\\", b"vn 0 0 0", b"vt 0", b"element face 1000000000", b"element vertex 1000000000",
+    b"element x 1000000000", b"property list uint double vertex_indices", b"property float x",
+    b"comment TextureFile /dev/zero", b"format binary_big_endian 1.0", b"end_header", b"endsolid", b"solid",
+    b"facet normal 0 0 1", b"endfacet", b"1000000000 1000000000 0", b"3 0 1 2", b"3 0 0 0", b"9 0 1 2", b"4 0 1 2 3",
+    b"OFF", b"#", b"\0", b"\xff",
+)  # fmt: skip
+
+
+def run(count: int, seed: int, folder: Path | None = None) -> dict[str, Any]:
+    """Judge so many changed mesh files. Returns what came of them."""
+    return judged(bases(), mutated, count, seed, folder)
+
+
+def bases() -> list[Case]:
+    """A recipe with a mesh, in every format that is read, binary and text, closed, open and in several parts."""
+    ball = trimesh.creation.icosphere(subdivisions=1, radius=0.5)
+    parts = trimesh.util.concatenate(
+        [trimesh.creation.box((0.4, 0.3, 0.2)), trimesh.creation.cone(0.3, 0.6, sections=8)]
+    )
+    sheet = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    found = []
+    for name, mesh, kind, options in (
+        ("ball.stl", ball, "stl", {}),
+        ("text.stl", parts, "stl_ascii", {}),
+        ("ball.obj", ball, "obj", {}),
+        ("parts.ply", parts, "ply", {}),
+        ("text.ply", ball, "ply", {"encoding": "ascii"}),
+        ("parts.off", parts, "off", {}),
+        ("ball.glb", ball, "glb", {}),
+        ("sheet.obj", sheet, "obj", {}),
+    ):
+        data = mesh.export(file_type=kind, **options)
+        data = data.encode() if isinstance(data, str) else bytes(data)
+        smooth = str(name.startswith("ball")).lower()
+        found.append(Case(name, RECIPE.format(name=name, smooth=smooth).encode(), {name: data}))
+    return found
+
+
+def mutated(case: Case, random: np.random.Generator) -> Case:
+    """The case with a mesh changed once to three times; now and then its recipe too, or the path to it."""
+    (name,) = case.files
+    for _ in range(pick((1, 1, 2, 3), random)):
+        case = replace(case, files={name: _changed(case.files[name], name, random)}, done=(*case.done, "mesh"))
+    if random.random() < 0.1:
+        case = by_structure(case, random)
+    return by_file(case, random) if random.random() < 0.1 else case
+
+
+def _changed(data: bytes, name: str, random: np.random.Generator) -> bytes:
+    text = name in ("text.stl", "ball.obj", "sheet.obj", "text.ply", "parts.off")
+    ways = [numbers, numbers, _lines, _lines, damaged] if text else [_words, _words, _words, damaged, _lines]
+    if name.endswith(".glb"):
+        ways = [_tree, _tree, _tree, _words, damaged]
+    return pick(ways, random)(data, random)
+
+
+def _lines(data: bytes, random: np.random.Generator) -> bytes:
+    """A line added, dropped, repeated, or put elsewhere."""
+    lines = data.split(b"\n")
+    n, how = int(random.integers(len(lines))), int(random.integers(4))
+    if how == 0:
+        lines[n:n] = [pick(ODD_LINES, random)] * int(pick((1, 1, 100), random))
+    elif how == 1:
+        del lines[n : n + int(pick((1, 5, 1000), random))]
+    elif how == 2:
+        lines[n:n] = [lines[n]] * int(pick((1, 1000), random))
+    else:
+        lines.insert(int(random.integers(len(lines))), lines.pop(n))
+    return b"\n".join(lines)
+
+
+def _words(data: bytes, random: np.random.Generator) -> bytes:
+    """Numbers of four bytes changed, where binary files have them: after the head, at steps of two bytes."""
+    for _ in range(int(pick((1, 1, 3, 100), random))):
+        start = 80 if random.random() < 0.3 else int(random.integers(max(len(data) - 4, 1)))
+        data = data[:start] + pick(ODD_WORDS, random) + data[start + 4 :]
+    return data
+
+
+ODD_VALUES = (
+    0, -1, 1, 3, 1e9, 10**9, 10**12, 2**31, 0.5, "x", "../outside/x.bin", "file:///etc/passwd", "data:,x",
+    "/dev/zero", None, [], {}, [0], [0] * 1000, True, 5126, "SCALAR", "VEC3", "MAT4",
+)  # fmt: skip
+
+
+def _tree(data: bytes, random: np.random.Generator) -> bytes:
+    """The description in a GLB file changed: counts, offsets, types, links; the lengths in the file stay right."""
+    try:
+        size = struct.unpack("<I", data[12:16])[0]
+        tree = json.loads(data[20 : 20 + size])
+        where = list(places(tree))
+        holder, key = pick(where, random)
+    except (ValueError, struct.error, IndexError):
+        return damaged(data, random)
+    how = int(random.integers(5))
+    if how == 0:
+        del holder[key]
+    elif how == 1 and isinstance(holder, list):
+        holder.extend([holder[key]] * int(pick((1, 100, 10_000), random)))
+    elif how == 2:
+        other, name = pick(where, random)
+        holder[key] = json.loads(json.dumps(other[name]))
+    else:
+        holder[key] = pick(ODD_VALUES, random)
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    rest = data[20 + size :]
+    return b"glTF" + struct.pack("<IIII", 2, 20 + len(text) + len(rest), len(text), 0x4E4F534A) + text + rest
