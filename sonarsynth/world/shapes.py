@@ -11,8 +11,8 @@ from pydantic import ValidationInfo, field_validator
 from sonarsynth.conventions import NonNegativeMetres, Number, Position, PositiveMetres, Radians
 from sonarsynth.description import BY_KIND, description
 
-MAX_FACETS = 20_000_000
-"""A mesh of more facets is refused (about 3 GB of arrays)."""
+MAX_FACETS = 5_000_000
+"""A mesh of more facets is refused (about 1 GB of arrays)."""
 
 
 Size = Annotated[PositiveMetres, Ge(1e-6), Le(10e3)]

@@ -253,7 +253,7 @@ recipes = st.builds(
             ).map(tuple),
         ),
         sonar=sonars,
-        trajectory=st.builds(Trajectory, frames=st.integers(1, 10**8), start=numbers, sonar=motions),
+        trajectory=st.builds(Trajectory, frames=st.integers(1, 10**7), start=numbers, sonar=motions),
     ),
 )
 

@@ -18,7 +18,7 @@ from fault_injection.judging import ACCEPTED, LONG, RECIPE, REFUSED, judge
 from fault_injection.recipes import Case, bases, mutated
 from sonarsynth import config, planning
 
-WHOLE = 10
+WHOLE = 50
 """One in so many is planned with the choices that are made by trying."""
 Mutate = Callable[[Case, np.random.Generator], Case]
 
@@ -47,7 +47,7 @@ def judged(cases: list[Case], change: Mutate, count: int, seed: int, folder: Pat
         case = change(cases[number % len(cases)], random)
         place = lay(case, kept / f"{number}")
         start = time.perf_counter()
-        outcome = judge(place, must_refuse=case.must_refuse, whole=number % WHOLE == 0)
+        outcome = judge(place, must_refuse=case.must_refuse, whole=number % WHOLE == WHOLE - 1)
         longest = max(longest, time.perf_counter() - start)
         most = max(most, outcome.memory)
         verdicts[outcome.verdict] += 1

@@ -1,0 +1,258 @@
+"""Files that a recipe names: plain files of its own folder, whatever lies or points elsewhere."""
+
+from __future__ import annotations
+
+import os
+import re
+import socket
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from sonarsynth import config
+from sonarsynth.config import RecipeError
+from sonarsynth.world import files
+from sonarsynth.world.casts import CastError, profile_of
+from sonarsynth.world.mesh_files import MAX_BYTES, read_surface
+from sonarsynth.world.meshes import MeshError, mesh_of
+from sonarsynth.world.recordings import RecordingError, read_recording
+from sonarsynth.world.shapes import MAX_FACETS, MeshFile
+from sonarsynth.world.snaps import RecordedSnap
+from sonarsynth.world.sound_speed import Cast
+
+SHAPE = "kind: box, size: [1, 1, 1], edge: 0.25"
+FIELD = "scene.world.targets.0.shape.path"
+
+
+@pytest.fixture
+def home(tmp_path: Path, small_text: str) -> Path:
+    """The folder of a recipe that wants a mesh, `{path}`; beside it, in `outside`, lies a good one."""
+    home, outside = tmp_path / "home", tmp_path / "outside"
+    home.mkdir()
+    outside.mkdir()
+    trimesh.creation.box((1, 1, 1)).export(outside / "good.stl")
+    (home / "link.stl").symlink_to("../outside/good.stl")
+    (home / "folder").symlink_to("../outside")
+    (home / "zero.stl").symlink_to("/dev/zero")
+    (home / "loop.stl").symlink_to("loop.stl")
+    os.mkfifo(home / "pipe.stl")
+    (home / "folder.stl").mkdir()
+    (home / "here.stl").write_bytes((outside / "good.stl").read_bytes())
+    (home / "inner").mkdir()
+    (home / "inner" / "link.stl").symlink_to("../here.stl")
+    (home / "small.yaml").write_text(small_text.replace(SHAPE, 'kind: mesh_file, path: "{path}"'))
+    return home
+
+
+def recipe(home: Path, path: str) -> Path:
+    file = home / "recipe.yaml"
+    file.write_text((home / "small.yaml").read_text().replace("{path}", path))
+    return file
+
+
+ELSEWHERE = {
+    "/etc/passwd": "is an absolute path: a recipe names files in its own folder; `--set` may name any",
+    "/dev/zero": "is an absolute path",
+    "../outside/good.stl": "leaves the folder of the recipe",
+    "x/../../outside/good.stl": "leaves the folder of the recipe",
+    "inner/../here.stl": "leaves the folder of the recipe",
+    "link.stl": "is a link out of the folder of the recipe",
+    "folder/good.stl": "is a link out of the folder of the recipe",
+    "zero.stl": "is a link out of the folder of the recipe",
+    "http:" + "//127.0.0.1/good.stl": "is a URL: a recipe names files in its own folder",
+    "file:/etc/passwd": "is a URL",
+    "s3:" + "//bucket/good.stl": "is a URL",
+    "pipe.stl": "is not a file",
+    "folder.stl": "is not a file",
+    "loop.stl": "is not the path of a file",
+    "none.stl": "no such file",
+    "a\\0.stl": "is not the path of a file",
+    "n" * 300 + ".stl": "is not the path of a file",
+    "d/" * 3000 + "good.stl": "is not the path of a file",
+    "~/good.stl": "no such file",
+    "": "is not a file",
+    ".": "is not a file",
+}
+
+
+@pytest.mark.parametrize("path", ELSEWHERE)
+def test_a_recipe_opens_no_file_out_of_its_folder(home: Path, path: str) -> None:
+    file = recipe(home, path)
+    with pytest.raises(RecipeError) as error:
+        config.load(file)
+    text = str(error.value)
+    assert text.startswith(f"{file}:8: {FIELD}: ") and ELSEWHERE[path] in text and "\n" not in text
+
+
+def test_it_opens_those_that_are_in_it(home: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    for path in ("here.stl", "./here.stl", "inner/link.stl"):
+        (target,) = config.load(recipe(home, path)).scene.world.targets
+        assert len(mesh_of(target.shape).faces) == 12
+    (tmp_path / "elsewhere").symlink_to(home)  # the folder itself may be a link
+    config.load(recipe(tmp_path / "elsewhere", "inner/link.stl"))
+
+
+def test_who_gives_the_path_by_hand_may_name_any_file(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file, good = recipe(home, "none.stl"), home.parent / "outside" / "good.stl"
+    monkeypatch.chdir(home)
+    for path in (good, "../outside/good.stl", "link.stl"):
+        (target,) = config.load(file, [f"{FIELD}={path}"]).scene.world.targets
+        assert len(mesh_of(target.shape).faces) == 12
+    with pytest.raises(RecipeError, match=r"--set: .*: is not a file: /dev/zero"):
+        config.load(file, [f"{FIELD}=/dev/zero"])
+
+
+def test_what_varies_opens_no_other_file_either(home: Path) -> None:
+    text = recipe(home, "here.stl").read_text()
+    grid = "grid: [{path: scene.world.targets.0.shape, values: [{kind: mesh_file, path: here.stl}, %s]}]\n"
+    for value in ("{kind: mesh_file, path: /etc/passwd}", "{kind: mesh_file, path: link.stl}"):
+        (home / "recipe.yaml").write_text(text + grid % value)
+        with pytest.raises(RecipeError, match=r"grid\.0\.values\.1\.path: is a"):
+            config.load(home / "recipe.yaml")
+    for part, message in ((".kind", "cannot vary by itself"), (".path", "is the name of a file")):
+        entry = f"grid: [{{path: scene.world.targets.0.shape{part}, values: [mesh_file, box]}}]\n"
+        (home / "recipe.yaml").write_text(text + entry)
+        with pytest.raises(RecipeError, match=message):
+            config.load(home / "recipe.yaml")
+
+
+@pytest.mark.parametrize("ending", ["stl", "obj", "ply", "off", "glb", "csv", "wav"])
+def test_only_plain_files_are_read(tmp_path: Path, ending: str) -> None:
+    """From Python too: a pipe would wait for ever, a device has no end."""
+    pipe, device, folder, plug = (tmp_path / f"{name}.{ending}" for name in ("pipe", "device", "folder", "plug"))
+    os.mkfifo(pipe)
+    device.symlink_to("/dev/zero")
+    folder.mkdir()
+    with socket.socket(socket.AF_UNIX) as made:
+        made.bind(str(plug))
+    for path, reason in ((pipe, "a pipe"), (device, "a device"), (folder, "a directory"), (plug, "a socket")):
+        with pytest.raises((MeshError, CastError, RecordingError), match=f"^{re.escape(str(path))}: is {reason}"):
+            if ending == "wav":
+                read_recording(RecordedSnap(path=str(path)))
+            elif ending == "csv":
+                profile_of(Cast(path=str(path)))
+            else:
+                mesh_of(MeshFile(path=str(path)))
+
+
+def test_files_are_read_up_to_a_size(tmp_path: Path) -> None:
+    file = tmp_path / "x"
+    file.write_bytes(b"1234")
+    assert files.read(file, 4) == b"1234"
+    with pytest.raises(files.FileError, match="is larger than 0 MiB"):
+        files.read(file, 3)
+    with pytest.raises(files.FileError, match="no such file"):
+        files.digest(tmp_path / "none")
+    with pytest.raises(files.FileError, match="not the path"):
+        files.stamp("a\0b")
+    assert files.digest(file) == "03ac674216f3e15c761ee1a5e255f067953623c8b388b4459e13f978d7c846f4"
+
+
+def test_files_too_large_are_not_read(tmp_path: Path) -> None:
+    for ending, most in MAX_BYTES.items():
+        file = tmp_path / f"huge.{ending}"
+        with file.open("wb") as out:
+            out.truncate(most + 1)
+        with pytest.raises(MeshError, match=r"is larger than \d+ [GM]iB"):
+            read_surface(file)
+    facets = MAX_FACETS + 1
+    with (tmp_path / "many.stl").open("wb") as out:
+        out.write(bytes(80) + struct.pack("<I", facets))
+        out.truncate(84 + 50 * facets)
+    with pytest.raises(MeshError, match=f"many.stl: has {facets} facets, more than {MAX_FACETS}$"):
+        read_surface(tmp_path / "many.stl")
+
+
+def test_a_mesh_opens_no_further_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise AssertionError("a file was looked for")
+
+    monkeypatch.setattr(trimesh.resolvers.FilePathResolver, "__init__", refuse)
+    box = trimesh.creation.box((1, 1, 1))
+    obj = tmp_path / "box.obj"
+    obj.write_text("mtllib x.mtl\nusemtl x\n" + box.export(file_type="obj"))
+    ply = tmp_path / "box.ply"
+    ply.write_bytes(box.export(file_type="ply").replace(b"comment", b"comment TextureFile x.png\ncomment", 1))
+    for file in (obj, ply):
+        assert len(mesh_of(MeshFile(path=str(file))).faces) == 12
+
+
+def glb(change: object) -> bytes:
+    """A box as GLB, its description changed."""
+    import json
+
+    data = trimesh.creation.box((1, 1, 1)).export(file_type="glb")
+    size = struct.unpack("<I", data[12:16])[0]
+    tree = json.loads(data[20 : 20 + size])
+    change(tree)  # type: ignore[operator]
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    rest = data[20 + size :]
+    return b"glTF" + struct.pack("<IIII", 2, 20 + len(text) + len(rest), len(text), 0x4E4F534A) + text + rest
+
+
+def _nowhere(tree: dict[str, list[dict[str, object]]]) -> None:
+    del tree["accessors"][0]["bufferView"]
+    tree["accessors"][0]["count"] = 10**10
+
+
+def _placed_often(tree: dict[str, list[dict[str, object]]]) -> None:
+    mesh = next(i for i, node in enumerate(tree["nodes"]) if "mesh" in node)
+    tree["nodes"] += [dict(tree["nodes"][mesh])] * 3
+    tree["accessors"][0]["count"] = MAX_FACETS
+
+
+def _in_two_places(tree: dict[str, list[dict[str, object]]]) -> None:
+    tree["nodes"][0]["children"] = [1, 1]
+
+
+def _elsewhere(tree: dict[str, list[dict[str, object]]]) -> None:
+    tree["buffers"][0]["uri"] = "../outside/x.bin"
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda tree: None, None),
+        (_nowhere, "accessor 0 has 10000000000 values that are not in the file"),
+        (_placed_often, r"places \d+ corners, more than of 5000000 facets"),
+        (_in_two_places, "has a node that is in two places"),
+        (_elsewhere, "cannot be read as GLB"),
+        (lambda tree: tree["nodes"].append(5), r"cannot be read as GLB \(AttributeError in its description\)"),
+        (lambda tree: tree.update(meshes=7), "cannot be read as GLB"),
+    ],
+)
+def test_what_a_glb_says_of_itself_is_checked(tmp_path: Path, change: object, message: str | None) -> None:
+    file = tmp_path / "x.glb"
+    file.write_bytes(glb(change))
+    if message is None:
+        assert len(mesh_of(MeshFile(path=str(file))).faces) == 12
+        return
+    with pytest.raises(MeshError, match=message) as error:
+        mesh_of(MeshFile(path=str(file)))
+    assert str(error.value).startswith(str(file)) and "\n" not in str(error.value)
+
+
+def test_reading_a_damaged_mesh_says_nothing_by_itself(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """trimesh logs tracebacks of what it tries; without a logger of the user's they would reach the screen."""
+    good = trimesh.creation.box((1, 1, 1)).export(file_type="stl_ascii")
+    file = tmp_path / "x.stl"
+    file.write_text(good.replace("facet normal", "facet normal x", 1))
+    try:
+        mesh_of(MeshFile(path=str(file)))
+    except MeshError as error:
+        assert "\n" not in str(error)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_the_digest_of_a_recipe_is_of_what_its_files_hold(home: Path) -> None:
+    made = config.load(recipe(home, "here.stl"))
+    other = home / "other.stl"
+    other.write_bytes((home / "here.stl").read_bytes())
+    assert config.load(recipe(home, "other.stl")).digest == made.digest
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
+    trimesh.Trimesh(vertices, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]).export(other)
+    assert config.load(recipe(home, "other.stl")).digest != made.digest

@@ -1,0 +1,174 @@
+"""Whatever a file holds, it is read, or refused in one line that names it: recipes, casts, recordings, meshes."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from sonarsynth import config
+from sonarsynth.config import RecipeError
+from sonarsynth.config.source import read_file, read_text
+from sonarsynth.world.casts import CastError, profile_of
+from sonarsynth.world.meshes import MeshError, mesh_of
+from sonarsynth.world.recordings import RecordingError, read_recording
+from sonarsynth.world.shapes import MeshFile
+from sonarsynth.world.snaps import RecordedSnap
+from sonarsynth.world.sound_speed import Cast
+
+few = settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+RECIPE = (Path(__file__).parents[2] / "configs" / "grid.yaml").read_text()
+CAST = "% Start latitude,-36.2\nDepth (m),Temperature (C),Salinity (psu)\n0.5,20.1,35\n4,19.7,35.1\n20,15,35.2\n"
+SNAP = "time (us),pressure (Pa)\n" + "".join(f"{t},{p}\n" for t, p in enumerate((0, 0, 1, 9, -3, 1, 0, 0)))
+
+cell = st.one_of(
+    st.floats().map(repr),
+    st.integers().map(str),
+    st.sampled_from(["", "x", "1e999", "-9999", "0x1", "1_0", "1,5", " "]),
+)
+yaml_text = st.text(alphabet=st.sampled_from(list("ab:-,[]{}&*!|>'\"#%@` \n\t?0.1~e+\\<=")), max_size=80)
+plain = st.recursive(
+    st.none() | st.booleans() | st.integers(-(10**39), 10**39) | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=10),
+    lambda inner: st.lists(inner, max_size=4)
+    | st.dictionaries(st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=6), inner, max_size=4),
+    max_leaves=12,
+)  # fmt: skip
+
+
+def one_line(error: ValueError, name: object) -> None:
+    text = str(error)
+    assert "\n" not in text and text.startswith(str(name)) and len(text) > len(str(name)) + 3, text
+
+
+@few
+@given(yaml_text)
+def test_any_text_is_read_as_a_recipe_or_refused(text: str) -> None:
+    try:
+        source = read_text(text, "x.yaml", Path())
+        config.recipe_of(source)
+    except RecipeError as error:
+        one_line(error, "x.yaml")
+        assert re.match(r"x\.yaml:\d+: ", str(error))
+    else:
+        raise AssertionError("no recipe is so short")
+
+
+@few
+@given(st.binary(max_size=100))
+def test_any_bytes_are_read_as_a_recipe_or_refused(tmp_path: Path, data: bytes) -> None:
+    file = tmp_path / "x.yaml"
+    file.write_bytes(data)
+    with pytest.raises(RecipeError) as error:
+        config.load(file)
+    one_line(error.value, file)
+
+
+@few
+@given(st.dictionaries(st.text(st.characters(min_codepoint=32, max_codepoint=126), min_size=1), plain, min_size=1))
+def test_what_json_says_is_what_is_read(data: dict[str, object]) -> None:
+    source = read_text(json.dumps(data), "x.yaml", Path())
+    assert source.data == data
+    assert json.dumps(source.data) == json.dumps(data)
+
+
+@few
+@given(st.integers(0, len(RECIPE) - 1), st.integers(0, 40), yaml_text)
+def test_a_recipe_with_a_part_exchanged_is_read_or_refused(start: int, length: int, text: str) -> None:
+    changed = RECIPE[:start] + text + RECIPE[start + length :]
+    try:
+        made = config.loads(changed, "x.yaml")
+    except RecipeError as error:
+        one_line(error, "x.yaml")
+        assert re.match(r"x\.yaml:\d+: ", str(error))
+    else:
+        assert config.loads(config.dump(made)) == made
+
+
+@few
+@given(st.one_of(st.binary(max_size=200), st.text(max_size=200).map(str.encode)))
+def test_any_bytes_are_no_cast_and_no_recording(tmp_path: Path, data: bytes) -> None:
+    for ending in ("csv", "wav"):
+        file = tmp_path / f"x.{ending}"
+        file.write_bytes(data)
+        with pytest.raises((CastError, RecordingError)) as error:
+            profile_of(Cast(path=str(file))) if ending == "csv" else read_recording(RecordedSnap(path=str(file)))
+        one_line(error.value, file)
+
+
+def exchanged(text: str, where: int, value: str) -> str:
+    """The text with one of its numbers exchanged."""
+    numbers = list(re.finditer(r"-?\d+(?:\.\d+)?", text))
+    one = numbers[where % len(numbers)]
+    return text[: one.start()] + value + text[one.end() :]
+
+
+@few
+@given(st.integers(0, 99), cell)
+def test_a_cast_with_one_other_number_is_a_profile_of_water_or_refused(tmp_path: Path, where: int, value: str) -> None:
+    file = tmp_path / "cast.csv"
+    file.write_text(exchanged(CAST, where, value))
+    try:
+        profile = profile_of(Cast(path=str(file)))
+    except CastError as error:
+        one_line(error, file)
+    else:
+        assert np.isfinite(profile.speed).all() and (np.diff(profile.depth) >= 0).all()
+        assert (profile.speed > 1300).all() and (profile.speed < 1700).all() and profile.depth.max() <= 12e3
+
+
+@few
+@given(st.integers(0, 99), cell)
+def test_a_recording_with_one_other_number_is_a_pulse_or_refused(tmp_path: Path, where: int, value: str) -> None:
+    file = tmp_path / "snap.csv"
+    file.write_text(exchanged(SNAP, where, value))
+    try:
+        recording = read_recording(RecordedSnap(path=str(file)))
+    except RecordingError as error:
+        one_line(error, file)
+    else:
+        assert np.isfinite(recording.pressure).all() and recording.pressure.any()
+        assert 0 <= recording.zero <= recording.pressure.size - 1 and recording.sampling_frequency > 0
+
+
+@few
+@given(st.sampled_from(["stl", "obj", "ply", "off", "glb"]), st.binary(max_size=150), st.booleans())
+def test_any_bytes_are_no_mesh(tmp_path: Path, ending: str, data: bytes, begun: bool) -> None:
+    start = {
+        "stl": b"solid facet",
+        "obj": b"v 0 0 0\nf ",
+        "ply": b"ply\nformat ascii 1.0\n",
+        "off": b"OFF\n",
+        "glb": b"glTF",
+    }
+    file = tmp_path / f"x.{ending}"
+    file.write_bytes((start[ending] if begun else b"") + data)
+    with pytest.raises(MeshError) as error:
+        mesh_of(MeshFile(path=str(file)))
+    one_line(error.value, file)
+
+
+@few
+@given(st.sampled_from(["stl_ascii", "obj", "off"]), st.integers(0, 10_000), cell)
+def test_a_mesh_with_one_other_number_is_usable_or_refused(tmp_path: Path, kind: str, where: int, value: str) -> None:
+    text = str(trimesh.creation.box((1, 1, 1)).export(file_type=kind))
+    file = tmp_path / f"x.{kind.partition('_')[0]}"
+    file.write_text(exchanged(text, where, value))
+    try:
+        mesh = mesh_of(MeshFile(path=str(file)))
+    except MeshError as error:
+        one_line(error, file)
+    else:
+        assert np.isfinite(mesh.vertices).all() and mesh.area.min() > 0
+        assert 1e-3 <= np.ptp(mesh.box, axis=0).max() <= 1e4
+
+
+def test_a_recipe_is_read_from_a_plain_file(tmp_path: Path) -> None:
+    with pytest.raises(RecipeError, match="is not a file"):
+        read_file("/dev/zero")
