@@ -25,6 +25,7 @@ from sonarsynth.world.moment import Body, model_of
 from sonarsynth.world.motion import pose
 from sonarsynth.world.shapes import MeshFile
 from sonarsynth.world.snap_pulses import largest_scales, pulse, waveform
+from sonarsynth.world.sound_speed import Cast, Tabulated, TemperatureSalinity
 from sonarsynth.world.sources import LogarithmicBubble, SnappingShrimp
 
 if TYPE_CHECKING:
@@ -41,6 +42,8 @@ LONGEST_SNAP = 0.1
 """s."""
 FAINTEST = 1e-9
 """Part of a snap that the filter must let pass: what rounding makes of nothing is less."""
+IN_WATER = (1000.0, 2500.0)
+"""m/s: what may be measured in water, warm or cold, in depths or in a tank."""
 STEEPEST = 1e6
 """m/s a metre: more is a jump, which is written as two speeds at one depth."""
 FRAME_BYTES = 2e9
@@ -54,20 +57,7 @@ def read_inputs(scene: Scene) -> Profile:
         profile = profile_of(scene.world.environment.sound_speed)
     except (ValueError, OSError, ImportError) as error:
         raise FieldError((*world, "environment", "sound_speed"), str(error)) from None
-    odd = np.flatnonzero(~((profile.speed >= SLOWEST) & (profile.speed <= FASTEST)))
-    if len(odd):
-        raise FieldError(
-            (*world, "environment", "sound_speed"),
-            f"is {profile.speed[odd[0]]:g} m/s at {profile.depth[odd[0]]:g} m, outside {SLOWEST:g} to {FASTEST:g} m/s",
-        )
-    steep = np.flatnonzero(np.abs(np.diff(profile.speed)) > STEEPEST * np.diff(profile.depth))
-    jumps = steep[np.diff(profile.depth)[steep] > 0]
-    if len(jumps):
-        at, below = profile.depth[jumps[0]], profile.depth[jumps[0] + 1]
-        raise FieldError(
-            (*world, "environment", "sound_speed"),
-            f"changes by more than {STEEPEST:g} m/s a metre between {at:.12g} and {below:.12g} m",
-        )
+    _check_profile(scene, profile)
     for i, (target, law) in enumerate(zip(scene.world.targets, scene.laws, strict=True)):
         try:
             _check_plain(scene, i)
@@ -81,6 +71,34 @@ def read_inputs(scene: Scene) -> Profile:
     except ValueError as error:
         raise FieldError(("scene", "sonar", "array"), str(error)) from None
     return profile
+
+
+def _check_profile(scene: Scene, profile: Profile) -> None:
+    """The sound speed must be that of water, somewhere above the bed, and change at a rate that rays can follow."""
+    path = ("scene", "world", "environment", "sound_speed")
+    measured = isinstance(scene.world.environment.sound_speed, (Tabulated, TemperatureSalinity, Cast))
+    slowest, fastest = IN_WATER if measured else (SLOWEST, FASTEST)
+    odd = np.flatnonzero(~((profile.speed >= slowest) & (profile.speed <= fastest)))
+    if len(odd):
+        feet = IN_WATER[0] <= 0.3048 * profile.speed[odd[0]] <= IN_WATER[1]
+        raise FieldError(
+            path,
+            f"is {profile.speed[odd[0]]:g} m/s at {profile.depth[odd[0]]:g} m, outside {slowest:g} to {fastest:g} m/s"
+            + (": is it in feet a second?" if feet else ""),
+        )
+    if profile.depth[0] > scene.world.environment.depth:
+        raise FieldError(
+            path,
+            f"is given from {profile.depth[0]:g} m down, below the bed at {scene.world.environment.depth:g} m",
+        )
+    steep = np.flatnonzero(np.abs(np.diff(profile.speed)) > STEEPEST * np.diff(profile.depth))
+    jumps = steep[np.diff(profile.depth)[steep] > 0]
+    if len(jumps):
+        at, below = profile.depth[jumps[0]], profile.depth[jumps[0] + 1]
+        raise FieldError(
+            path,
+            f"changes by more than {STEEPEST:g} m/s a metre between {at:.12g} and {below:.12g} m",
+        )
 
 
 def _check_plain(scene: Scene, number: int) -> None:

@@ -19,6 +19,7 @@ from sonarsynth.synthesis.pulse import LONGEST_TAIL, cut_tail
 from sonarsynth.world.casting import enclosing
 from sonarsynth.world.environment import Profile
 from sonarsynth.world.refinement import longest_edge
+from sonarsynth.world.sound_speed import Cast, Tabulated, TemperatureSalinity
 
 NEAR = 4.0
 """Distances, over the radius of the aperture, under which facets should be finer (measured: 2 to 5 % at 2.3)."""
@@ -26,6 +27,8 @@ COARSE = 0.1
 """Facets longer than this (m) are noted: range errors of points are a few centimetres."""
 
 
+UNKNOWN = 0.1
+"""Part of the water, at an end, that a profile may leave out without a word."""
 NOTED = 8
 """Sequences that the notes on scenes are from, at most."""
 
@@ -50,11 +53,22 @@ def notes(made: Plan, looks: Sequence[Look]) -> tuple[str, ...]:
     found += _accuracy(made) + list(_behind(recipe))
     real = [look for look in looks if look.real]
     for look in real[:: -(-len(real) // NOTED)]:
+        found += _extent(look.scene, look.profile)
         found += _cut(look.scene, look.profile.uniform)
         found += validity(look.scene, look.profile)
         found += _meshes(look.scene, look.profile)
         found += _near(look)
     return tuple(dict.fromkeys(found))
+
+
+def _extent(scene: Scene, profile: Profile) -> list[str]:
+    """Where measured water ends before the real one."""
+    bed, first, last = scene.world.environment.depth, profile.depth[0], profile.depth[-1]
+    written = isinstance(scene.world.environment.sound_speed, (Tabulated, TemperatureSalinity, Cast))
+    if not written or max(first, bed - last) <= UNKNOWN * bed:
+        return []
+    known = f"at {first:g} m only" if first == last else f"from {first:g} to {last:g} m"
+    return [f"the sound speed is given {known}, of {bed:g} m of water: beyond, it stays as it is there"]
 
 
 def _shared(recipe: Recipe, looks: Sequence[Look]) -> list[str]:

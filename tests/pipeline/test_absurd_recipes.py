@@ -84,6 +84,12 @@ ABSURD = [
         "kind: tabulated, depth: [-5, 1], speed: [1500, 1500]",
         f"5: {WATER}.depth.0: must be greater than or equal",
     ),
+    (
+        SPEED,
+        "kind: tabulated, depth: [0, 12], speed: [4920, 4921]",
+        f"5: {WATER}: is 4920 m/s at 0 m, outside 1000 to 2500 m/s: is it in feet a second?",
+    ),
+    (SPEED, "kind: tabulated, depth: [50], speed: [1500]", f"5: {WATER}: is given from 50 m down, below the bed at"),
     ("kind: flat", "kind: [flat]", "5: scene.world.environment.noise"),
     ("title: small", "%YAML 1.1\n---\ntitle: small", "2: is not of YAML 1.2: leave out '%YAML'"),
     ("title: small", "title: &a small\nlicence: &a CC0-1.0", "2: the anchor 'a' is given twice"),
@@ -112,6 +118,19 @@ def test_it_is_refused_in_one_line_soon(
     assert (out, err.count("\n")) == ("", 1)
     assert err.startswith(f"sonarsynth: {small_file}:") and message in err
     assert os.listdir(small_file.parent) == [small_file.name]
+
+
+@pytest.mark.parametrize(
+    ("water", "known"),
+    [("depth: [0, 5], speed: [1500, 1501]", "from 0 to 5 m"), ("depth: [3], speed: [1500]", "at 3 m")],
+)
+def test_water_that_is_not_known_to_the_bed_is_noted(small_text: str, water: str, known: str) -> None:
+    text = small_text.replace(SPEED, f"kind: tabulated, {water}")
+    made = planning.plan(config.loads(text), choices=planning.Choices())
+    assert any(f"the sound speed is given {known}" in note and "of 12 m of water" in note for note in made.warnings)
+    whole = small_text.replace(SPEED, "kind: tabulated, depth: [0.1, 11], speed: [1500, 1501]")
+    made = planning.plan(config.loads(whole), choices=planning.Choices())
+    assert not any("is given" in note for note in made.warnings)
 
 
 def test_memory_that_is_not_there(small_file: Path) -> None:

@@ -130,12 +130,14 @@ def test_only_plain_files_are_read(tmp_path: Path, ending: str) -> None:
         made.bind(str(plug))
     for path, reason in ((pipe, "a pipe"), (device, "a device"), (folder, "a directory"), (plug, "a socket")):
         with pytest.raises((MeshError, CastError, RecordingError), match=f"^{re.escape(str(path))}: is {reason}"):
-            if ending == "wav":
-                read_recording(RecordedSnap(path=str(path)))
-            elif ending == "csv":
-                profile_of(Cast(path=str(path)))
-            else:
-                mesh_of(MeshFile(path=str(path)))
+            read_as(ending, path)
+
+
+def read_as(ending: str, path: Path) -> object:
+    """What a file of this ending is read as."""
+    if ending == "wav":
+        return read_recording(RecordedSnap(path=str(path)))
+    return profile_of(Cast(path=str(path))) if ending == "csv" else mesh_of(MeshFile(path=str(path)))
 
 
 def test_files_are_read_up_to_a_size(tmp_path: Path) -> None:

@@ -183,7 +183,7 @@ WRONG = [
     ),
     ("high: 30 m", "high: 9e9 m", "24: variations.0: scene.world.shrimp.0.position: is more than 1e+06 m"),
     ("repeats: 2", "repeats: 0", "29: repeats: must be greater than or equal to 1"),
-    ("repeats: 2", "repeats: 90000000", "16: grid: spans 360000000 sequences: more than 100000000 frames"),
+    ("repeats: 2", "repeats: 900000", "16: grid: spans 3600000 sequences, more than 1000000"),
     ("test: 0.5", "test: 0.4", "30: splits: train, validation and test must add up to 1, not 0.9"),
     ("stratify: hull", "stratify: hall", "30: splits.stratify: 'hall' names nothing that varies; known: away"),
     ("stratify: hull", "stratify: shrimp_x", "30: splits.stratify: 'shrimp_x' has another value in each sequence"),

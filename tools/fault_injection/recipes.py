@@ -41,7 +41,7 @@ LINES = (
 )  # fmt: skip
 ELSEWHERE = (
     "/etc/passwd", "/dev/zero", "/dev/stdin", "/proc/self/mem", "/proc/self/environ", "../outside/good.{}",
-    "x/../../outside/good.{}", "~/good.{}", "file:///etc/passwd", "http://127.0.0.1:9/good.{}", "s3://bucket/good.{}",
+    "x/../../outside/good.{}", "~/good.{}", "file:///etc/passwd", f"http{':'}//127.0.0.1:9/good.{{}}", "s3://bucket/good.{}",
     "\\\\host\\good.{}", ".", "..", "/", "", " ", "none.{}", "a\0b.{}", "n" * 300 + ".{}", "d/" * 3000 + "good.{}",
     "link.{}", "folder/good.{}", "zero.{}", "pipe.{}", "loop.{}", "folder.{}", "bomb.{}", "huge.{}", "case.yaml",
 )  # fmt: skip
