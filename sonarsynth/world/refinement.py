@@ -98,6 +98,8 @@ def split_long_edges(surface: Surface, edge: float) -> Surface:
     """
     vertices, faces = surface
     require_possible(area_of(surface), edge)
+    if _split_count(surface, edge) > 1.25 * MAX_FACETS:  # known before it is done: the last cuts take seconds
+        raise _too_fine(edge)
     while True:
         ends, of_facet = sides(faces)
         length = np.linalg.norm(vertices[ends[:, 0]] - vertices[ends[:, 1]], axis=1)
@@ -110,6 +112,19 @@ def split_long_edges(surface: Surface, edge: float) -> Surface:
         middle[long] = len(vertices) + np.arange(np.count_nonzero(long))
         vertices = np.concatenate([vertices, vertices[ends[long]].mean(axis=1)])
         faces = cut(vertices, faces, middle[of_facet])
+
+
+def _split_count(surface: Surface, edge: float) -> float:
+    """About how many facets `split_long_edges` makes: while three edges of a facet are long, each round makes four of
+    it, then three while two are, then two."""
+    vertices, faces = surface
+    count = 0.0
+    for first in range(0, len(faces), BLOCK):
+        corners = vertices[faces[first : first + BLOCK]]
+        length = np.sort(np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2), axis=1)
+        short, middle, long = np.ceil(np.log2(np.maximum(length / edge, 1.0))).T
+        count += float(np.exp2(2.0 * short + np.log2(3.0) * (middle - short) + (long - middle)).sum())
+    return count
 
 
 def halve_longest_edges(surface: Surface, edge: float) -> Surface:

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 import trimesh
 
+from sonarsynth.world import refinement
+from sonarsynth.world.generation import generate
 from sonarsynth.world.meshes import MeshError, mesh_of
-from sonarsynth.world.refinement import longest_edge, volume
+from sonarsynth.world.refinement import longest_edge, split_long_edges, volume
 from sonarsynth.world.shapes import Box, LShape, MeshFile, Sphere
 
 REAL = Path(__file__).parents[2].parent / "shared" / "data" / "rexrov.stl"
@@ -173,3 +175,13 @@ def test_a_real_vehicle():
     assert mesh.notes == ("1 of 4 closed parts inside out, turned",)
     assert solid(mesh) == pytest.approx(1.2822 + 2 * 0.3891, abs=1e-3)
     np.testing.assert_allclose(mesh.box, [[-1.3145, -0.7565, -0.7967], [1.2968, 0.7565, 0.8014]], atol=1e-4)
+
+
+def test_a_splitting_that_would_take_too_many_is_refused_before_it_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A long plate: its area alone does not tell, for facets with one short edge are cut in three."""
+    plate = generate(Box(size=(1.0, 30.0, 0.3)))[0]
+    assert len(split_long_edges(plate, 0.3)[1]) == 24352  # 3.4 times what its area would need
+    monkeypatch.setattr(refinement, "cut", None)  # nothing is cut
+    monkeypatch.setattr(refinement, "MAX_FACETS", 19_000)
+    with pytest.raises(MeshError, match=r"edges of 0\.3 m would take more than 19000 facets"):
+        split_long_edges(plate, 0.3)
