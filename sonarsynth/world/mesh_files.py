@@ -21,7 +21,7 @@ import numpy as np
 
 from sonarsynth.world import files
 from sonarsynth.world.refinement import MeshError, Surface
-from sonarsynth.world.shapes import MAX_FACETS
+from sonarsynth.world.room import most_facets
 
 MAX_BYTES = {"stl": 4 << 30, "glb": 1 << 30, "ply": 1 << 30, "obj": 1 << 29, "off": 1 << 29}
 """Text takes several times its size in memory to read."""
@@ -57,8 +57,8 @@ def _content(path: Path, kind: str) -> bytes:
     with files.opened(path) as file:
         head = file.read(84) if kind == "stl" else b""
         count, size = int.from_bytes(head[80:84], "little"), os.fstat(file.fileno()).st_size
-    if len(head) == 84 and size == 84 + 50 * count and count > MAX_FACETS:
-        raise files.FileError(f"has {count} facets, more than {MAX_FACETS}")
+    if len(head) == 84 and size == 84 + 50 * count and count > most_facets():
+        raise files.FileError(f"has {count} facets, more than {most_facets()}")
     return files.read(path, MAX_BYTES[kind])
 
 
@@ -177,7 +177,7 @@ def _absurd(tree: dict[str, Any]) -> str | None:
         for mesh in tree.get("meshes", [])
     ]
     total = sum(facets[node["mesh"]] for node in nodes if "mesh" in node)
-    return f"places {total} corners, more than of {MAX_FACETS} facets" if total > 3 * MAX_FACETS else None
+    return f"places {total} corners, more than of {most_facets()} facets" if total > 3 * most_facets() else None
 
 
 PROMISES: dict[str, Callable[[bytes], str | None]] = {"stl": _stl, "obj": _obj, "ply": _ply, "off": _off, "glb": _glb}

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.world.refinement import MeshError, Surface, sides, weld
-from sonarsynth.world.shapes import MAX_FACETS
+from sonarsynth.world.room import most_facets
 
 SMALLEST, LARGEST = 1e-3, 10e3  # m, of the whole mesh
 SAME_VERTEX = 1e-7  # of the size: what single precision leaves of equal coordinates
@@ -21,8 +21,8 @@ NEARLY_CLOSED = 0.25  # area of the opening over the area of the part (0 closed,
 def check(surface: Surface, name: str) -> None:
     """Refuse what cannot be a mesh: too many facets, NaN or infinity, indices out of range, an absurd size."""
     vertices, faces = surface
-    if len(faces) > MAX_FACETS:
-        raise MeshError(f"{name}: has {len(faces)} facets, more than {MAX_FACETS}")
+    if len(faces) > most_facets():
+        raise MeshError(f"{name}: has {len(faces)} facets, more than {most_facets()}")
     if faces.size == 0:
         raise MeshError(f"{name}: holds no facets")
     outside = (faces < 0) | (faces >= len(vertices))

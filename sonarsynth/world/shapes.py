@@ -11,10 +11,6 @@ from pydantic import ValidationInfo, field_validator
 from sonarsynth.conventions import NonNegativeMetres, Number, Position, PositiveMetres, Radians
 from sonarsynth.description import BY_KIND, description
 
-MAX_FACETS = 5_000_000
-"""A mesh of more facets is refused (about 1 GB of arrays)."""
-
-
 Size = Annotated[PositiveMetres, Ge(1e-6), Le(10e3)]
 """Of a body, or of a part of it."""
 

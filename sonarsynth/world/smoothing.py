@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.world.refinement import MeshError, Surface, cut, require_possible, sides
-from sonarsynth.world.shapes import MAX_FACETS
+from sonarsynth.world.room import most_facets
 
 FLAT: Final = 1e-6
 """Angle (rad) up to which two facets are one plane."""
@@ -37,7 +37,7 @@ def curved(surface: Surface, edge: float, sagitta: float, crease: float) -> Surf
     """The surface cut until no edge is longer than `edge` (m), nor farther than `sagitta` (m) from its curve.
 
     Edges that turn by more than `crease` (rad) stay sharp, and straight where both sides are flat; corners stay where
-    they are. Raises MeshError where that would take more than MAX_FACETS facets.
+    they are. Raises MeshError where that would take more than `room.most_facets`.
     """
     vertices, faces = surface
     if np.isfinite(edge):
@@ -51,8 +51,8 @@ def curved(surface: Surface, edge: float, sagitta: float, crease: float) -> Surf
         long = (length > edge) | (curves.height > sagitta)
         if not long.any():
             break
-        if len(faces) + np.count_nonzero(long[of_facet]) > MAX_FACETS:
-            raise MeshError(f"so smooth a surface would take more than {MAX_FACETS} facets; use a longer edge")
+        if len(faces) + np.count_nonzero(long[of_facet]) > most_facets():
+            raise MeshError(f"so smooth a surface would take more than {most_facets()} facets; use a longer edge")
         number = np.full(len(ends), -1)
         number[long] = len(vertices) + np.arange(np.count_nonzero(long))
         vertices = np.concatenate([vertices, curves.middle[long]])
