@@ -53,8 +53,8 @@ def write_shard(
                 files[name] = first.result()
             block = layout.block(array, shard, checked)
             add_to_digest(content, array.path, block)
-            written = writers.submit(write_region, path, layout, array, region.start, block)
-            under_way.append((array.file(shard), written))
+            packed = _content(layout, array, region.start, block)  # here: threads keep the memory that they allocate
+            under_way.append((array.file(shard), writers.submit(_put, path, array.file(shard), packed)))
         files |= {name: rest.result() for name, rest in under_way}
     still()
     mark = Mark(str(shard), tuple(checked), content.hexdigest(), files)
@@ -67,9 +67,16 @@ def write_region(path: Folder, layout: Layout, array: ArrayLayout, start: int, b
 
     Raises ValueError unless they are exactly one shard.
     """
+    return _put(path, array.file(start // layout.shard_frames), _content(layout, array, start, block))
+
+
+def _content(layout: Layout, array: ArrayLayout, start: int, block: np.ndarray) -> bytes | None:
+    """What the file of a shard is to hold."""
     layout.check_region(start, start + len(block))
-    name = array.file(start // layout.shard_frames)
-    content = encoded(array, block)
+    return encoded(array, block)
+
+
+def _put(path: Folder, name: str, content: bytes | None) -> FileRecord:
     if content is None or isinstance(path, Path):  # an object is written over
         (path / name).unlink(missing_ok=True)
     return ABSENT if content is None else write_new(path / name, content)

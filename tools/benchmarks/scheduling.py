@@ -117,6 +117,7 @@ def apart(made: Plan) -> dict[str, Any]:
     """Frames as short as they are, on a scheduler and a worker of their own."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        os.environ["DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED"] = "False"  # as the README says of such clusters
         cluster = stack.enter_context(Cluster(folder))
         address = cluster.address()
 
