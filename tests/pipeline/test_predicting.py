@@ -18,6 +18,7 @@ from sonarsynth.recipe import Recipe
 from sonarsynth.scene import Frame
 from sonarsynth.schedule import predicting, trials
 from sonarsynth.sonar.subarrays import Subarray
+from sonarsynth.store import creating
 
 TASKS = {
     "signals,image,cloud": ["trace", "beamform", "range"],
@@ -86,7 +87,10 @@ def test_nothing_is_left_of_a_trial(small_plan: Plan, tmp_path: Path) -> None:
     assert made.failures == ()
 
 
-def test_a_store_does_not_depend_on_predictions(small: Recipe, prediction: schedule.Prediction, tmp_path: Path) -> None:
+def test_a_store_does_not_depend_on_predictions(
+    small: Recipe, prediction: schedule.Prediction, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(creating, "begun", lambda source=None: {})  # when, on what machine
     for name, given in (("a", None), ("b", prediction)):
         schedule.build(small, tmp_path / name, frames=range(8), workers=0, prediction=given)
     for file in (tmp_path / "a").rglob("*"):
