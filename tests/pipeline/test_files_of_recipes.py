@@ -221,7 +221,7 @@ def _elsewhere(tree: dict[str, list[dict[str, object]]]) -> None:
     [
         (lambda tree: None, None),
         (_nowhere, "accessor 0 has 10000000000 values that are not in the file"),
-        (_placed_often, r"places \d+ corners, more than of \\d+ facets"),
+        (_placed_often, r"places \d+ corners, more than of \d+ facets"),
         (_in_two_places, "has a node that is in two places"),
         (_elsewhere, "cannot be read as GLB"),
         (lambda tree: tree["nodes"].append(5), r"cannot be read as GLB \(AttributeError in its description\)"),
