@@ -91,7 +91,7 @@ def test_edges_are_split_to_size(tmp_path):
     mesh = mesh_of(MeshFile(path=path, edge=0.1))
     assert longest_edge((mesh.vertices, mesh.faces)) <= 0.1
     assert mesh.area.sum() == pytest.approx(body.area.sum(), rel=1e-6)
-    with pytest.raises(MeshError, match=r"body\.stl: edges of 1e-06 m would take more than 5000000 facets"):
+    with pytest.raises(MeshError, match=r"body\.stl: edges of 1e-06 m would take more than \d+ facets"):
         mesh_of(MeshFile(path=path, edge=1e-6))
 
 
