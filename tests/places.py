@@ -49,11 +49,15 @@ class _Whole(_Parts):
     ranges = False
 
 
+class _Server(http.server.ThreadingHTTPServer):
+    request_queue_size = 256  # with 5, those that come at once wait seconds for each other
+
+
 @contextmanager
 def web_server(folder: Path, *, ranges: bool = True) -> Iterator[str]:
     """Serve a folder on loopback; gives its address."""
     handler = partial(_Parts if ranges else _Whole, directory=str(folder))
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+    with _Server(("127.0.0.1", 0), handler) as server:
         thread = threading.Thread(target=server.serve_forever, daemon=True)
         thread.start()
         try:
