@@ -155,7 +155,7 @@ class Sonar:
     band: Band = Band(low=25e3, high=85e3)
     filter: Filter | None = None
     """Anti-alias filter before sampling; left out: a `BandPass` of the band."""
-    sampling_frequency: Annotated[PositiveHertz, Le(10e6)] = 196e3
+    sampling_frequency: Annotated[PositiveHertz, Le(100e6)] = 196e3
     converter: Converter | None = None
     """Left out: pressure is stored as float32."""
     beams: BeamGrid = BeamGrid()

@@ -118,11 +118,13 @@ def echoes(
     found = _loudest(array, snap, parts)
     terms, error = variations(found)
     most = max(float(np.abs(some.strength).max(initial=0.0)) for some in found)
+    spread = any(_spreads(some, most) for some in found)
     group, made = [some.seen().group for some in found], []
     found.reverse()
     for variation in terms:
         some = found.pop()
-        over = _spread(some, _turned(some, most), most)
+        over = _turned(some, most)
+        over = _spread(some, over, most) if spread else over
         array, out, legs = some.array, some.out, some.array.legs.select(some.leg)
         target, facet = array.facets.target[out.facet], array.facets.facet[out.facet]
         amplitude, sign = _columns(some.groups, "amplitude", "sign")
@@ -261,22 +263,27 @@ def _turned(found: _Found, most: float) -> Terms:
     return over._replace(phase=over.phase + terms if over.phase.shape[1] else terms, error=error)
 
 
-def _spread(found: _Found, over: Terms, most: float) -> Terms:
-    """Wavefronts (path,) of echoes, with what facets spread them by in time more at a hydrophone than at the centre.
-
-    Their delays over a facet have another variance there; the mean over a facet is that of the centre, blurred by what
-    it is more. Left out where that changes no echo by more than `ArrayLegs.alike` of the strongest.
-    """
+def _spreads(found: _Found, most: float) -> bool:
+    """Whether what facets spread echoes by in time changes any of them over the array by more than `ArrayLegs.alike` of
+    the strongest of all."""
     array, rate = found.array, 2.0 * np.pi * found.array.band[1]
     if not any(g.spreads for g in found.groups):
-        return over
+        return False
     share, turn = np.abs(found.strength) / max(most, 1e-300), array.elements.aperture / array.legs.length[found.leg]
     late = np.split(found.pulses.corners, np.cumsum([len(g.row) for g in found.groups])[:-1])
     of = zip(found.groups, late, strict=True)
     bound = np.concatenate([g.most_spread(corners, turn[g.row], array.centre) for g, corners in of])
-    if 0.5 * rate**2 * (share * bound).max(initial=0.0) <= array.alike:
-        return over
+    return bool(0.5 * rate**2 * (share * bound).max(initial=0.0) > array.alike)
+
+
+def _spread(found: _Found, over: Terms, most: float) -> Terms:
+    """Wavefronts (path,) of echoes, with what facets spread them by in time more at a hydrophone than at the centre.
+
+    Their delays over a facet have another variance there; the mean over a facet is that of the centre, blurred by what
+    it is more.
+    """
+    array, share = found.array, np.abs(found.strength) / max(most, 1e-300)
     more = np.concatenate([g.spread(array.fronts.departure(found.leg[g.row], FEW), array.centre) for g in found.groups])
     terms, misfit = probes(array.elements).fit_few(more)
     blur = over.blur + terms if over.blur.shape[1] else terms
-    return over._replace(blur=blur, error=over.error + share * 0.5 * rate * misfit)
+    return over._replace(blur=blur, error=over.error + share * np.pi * array.band[1] * misfit)

@@ -11,7 +11,7 @@ from pydantic import ValidationInfo, field_validator
 from sonarsynth.conventions import NonNegativeMetres, Number, Position, PositiveMetres, Radians
 from sonarsynth.description import BY_KIND, description
 
-Size = Annotated[PositiveMetres, Ge(1e-6), Le(10e3)]
+Size = Annotated[PositiveMetres, Ge(1e-9), Le(10e3)]
 """Of a body, or of a part of it."""
 
 
