@@ -69,7 +69,7 @@ def bench(index: int = 32) -> dict[str, Any]:
     true = traced.frame.sonar_pose.to_body(traced.frame.moment.snaps[0].position)
     stages["locate"] = {"ms": 1e3 * seconds, "error_m": float(np.linalg.norm(located.position[0] - true))}
     start, stop = (float(located.time[0]) + t for t in (plan.windows.echo_start, plan.windows.echo_stop))
-    beamformer = scene.processing.beamforming
+    beamformer = plan.choices.beamforming
     image, image_seconds = cpu(lambda: beamformer.image(signals, plan.elements, sonar, start, stop))
     dense, dense_seconds = cpu(
         lambda: DenseDelayAndSum(focus=beamformer.focus).image(signals, plan.elements, sonar, start, stop), 1
@@ -163,7 +163,7 @@ def peers(
 ) -> dict[str, Any]:
     """The image by dense steering, by Acoular and by the thesis's loop: time, ratio to ours, error."""
     sonar = plan.scene.sonar
-    focus = plan.scene.processing.beamforming.focus or 1e6
+    focus = plan.choices.beamforming.focus or 1e6
     acoular, acoular_seconds = acoular_image(plan, signals, start, stop, focus)
     rate = sonar.sampling_frequency
     pulse = thesis_pulse(traced.frame.moment.snaps[0], plan)
