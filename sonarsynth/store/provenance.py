@@ -15,12 +15,12 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
-from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from sonarsynth.recipe import FILE_KINDS
+from sonarsynth.world.files import digest
 
 if TYPE_CHECKING:
     from sonarsynth.config import Source
@@ -75,8 +75,8 @@ def inputs(plan: Plan) -> dict[str, Any]:
         target.name: [mesh.digest for _, mesh in some]
         for target, some in zip(recipe.scene.world.targets, recipe.meshes, strict=True)
     }
-    files = {(Path(path).name, sha256(Path(path).read_bytes()).hexdigest()) for path in _paths(recipe.as_json())}
-    return {"meshes": meshes, "files": [{"name": name, "sha256": digest} for name, digest in sorted(files)]}
+    files = {(Path(path).name, digest(path)) for path in _paths(recipe.as_json())}
+    return {"meshes": meshes, "files": [{"name": name, "sha256": found} for name, found in sorted(files)]}
 
 
 def begun(source: Source | None = None) -> dict[str, Any]:
