@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from sonarsynth import planning
+from sonarsynth.accuracy.recipe import measure
 from sonarsynth.planning import arrivals_of
 from sonarsynth.planning.choosing import Expansion
 from sonarsynth.products import Arrivals
 from sonarsynth.recipe import Recipe
 from sonarsynth.render import trace_frame
 from sonarsynth.scattering.targets import Target
+from sonarsynth.sonar import BeamGrid
 from sonarsynth.sonar.subarrays import subarray
 from sonarsynth.synthesis import KernelDeposit
 from sonarsynth.synthesis.direct_sum import exact_signals
@@ -146,3 +148,14 @@ def test_shade_of_another_array_is_refused() -> None:
     array = replace(FACES, position=FACES.position[:9], gain=FACES.gain[:9])
     with pytest.raises(ValueError, match="hidden from hydrophones of another array"):
         KernelDeposit().signals(of, SNAPS, array, SONAR, absorption, start, samples)
+
+
+def test_errors_are_measured_where_each_hydrophone_sees_for_itself() -> None:
+    """Every knob of `accuracy RECIPE`: subarrays and views of the targets, syntheses, images."""
+    recipe = screened(0.02)
+    scene = recipe.scene
+    band = replace(scene.sonar, beams=BeamGrid(azimuths=5, elevations=5))
+    points = measure(replace(recipe, scene=replace(scene, sonar=band)), (0,), hydrophones=3, peers=False).points
+    views = {p.setting: p.error for p in points if p.knob in ("subarrays", "visibility") and p.stage == "trace"}
+    assert views["1 part"] < 2e-3
+    assert views["seen from the centre"] > 0.1
