@@ -14,11 +14,14 @@ from sonarsynth.sonar import Elements
 from sonarsynth.tracing.legs import Legs
 from sonarsynth.tracing.shadows import hidden
 from sonarsynth.world.environment import Environment, Profile
-from sonarsynth.world.meshes import in_blocks
 from sonarsynth.world.moment import Body
 
 _Hides = Callable[[Floats, Floats, Floats, Floats, Ints, Ints], Bools]
 """Which rays (ray,) bodies stand in: start, end, departure (ray, xyz), length, bounces, turning points (ray,)."""
+
+
+RAYS = 30_000
+"""Rays that are looked at together."""
 
 
 @lru_cache(maxsize=16)
@@ -59,14 +62,18 @@ def _shaded(
     out = np.concatenate([np.zeros((1, 3)), elements.position])
     first = np.append(0, 1 + rim(elements))
     dark = np.zeros((len(legs.row), len(out)), bool)
-    for some in in_blocks(len(legs.row) * len(first)):
-        rows = np.arange(some.start // len(first), -(-some.stop // len(first)))
+    for rows in _parts(np.arange(len(legs.row)), len(first)):
         unseen = _unseen(legs, start, normal, rows, sonar_pose, out[first], hides)
         dark[rows] = unseen.all(axis=1, keepdims=True)
-        mixed = rows[np.flatnonzero(unseen.any(axis=1) & ~unseen.all(axis=1))]
-        dark[mixed] = _unseen(legs, start, normal, mixed, sonar_pose, out, hides)
+        for mixed in _parts(rows[np.flatnonzero(unseen.any(axis=1) & ~unseen.all(axis=1))], len(out)):
+            dark[mixed] = _unseen(legs, start, normal, mixed, sonar_pose, out, hides)
     kept = np.flatnonzero(~dark.all(axis=1))
     return legs.select(kept).seen(np.packbits(dark[kept], axis=1))
+
+
+def _parts(rows: Ints, points: int) -> list[Ints]:
+    """Rows in parts, so that few rays to so many points are held at a time."""
+    return np.array_split(rows, max(1, len(rows) * points // RAYS))
 
 
 def _unseen(
