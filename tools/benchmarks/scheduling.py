@@ -92,7 +92,7 @@ def built(made: Plan, path: Path, watch: Watch, **options: Any) -> dict[str, Any
         "seconds": report.seconds,
         "frames_seconds": frames,
         "writing_seconds": report.writing_seconds,
-        "overhead": (report.seconds * report.workers - frames) / frames,
+        "overhead": (report.seconds * max(report.workers, 1) - frames) / frames,  # a running cluster here has one
         "writing_over_frames": report.writing_seconds / frames,
         "writing_ms_a_frame": 1e3 * report.writing_seconds / report.written,
         "frames_cpu_ms": 1e3 * sum(report.stage_cpu.values()) / report.written,
