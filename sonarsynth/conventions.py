@@ -165,3 +165,12 @@ def level(pressure: npt.ArrayLike) -> Floats:
 def pressure(level_db: npt.ArrayLike) -> Floats:
     """Pressure in Pa of a level in dB re 1 uPa: the inverse of `level`."""
     return np.asarray(REFERENCE_PRESSURE * 10.0 ** (np.asarray(level_db, float) / 20.0))
+
+
+def size(count: float) -> str:
+    """A number of bytes as people say it."""
+    for unit in ("bytes", "kB", "MB", "GB"):
+        if count < 1000:
+            return f"{count:.3g} {unit}"
+        count /= 1000
+    return f"{count:.3g} TB"

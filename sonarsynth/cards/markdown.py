@@ -8,6 +8,7 @@ from itertools import groupby
 from typing import Any, Final
 
 from sonarsynth.cards.facts import Facts
+from sonarsynth.conventions import size
 
 LIMITS: Final = (
     "Everything is simulated; nothing was measured at sea.",
@@ -42,7 +43,7 @@ def _head(facts: Facts) -> str:
         ("frames", f"{facts.complete} of {facts.frames} are there"),
         ("sequences", str(facts.plan.get("sequences", ""))),
         ("holds", ", ".join([*map(str, facts.attributes.get("products", [])), "truth, ledger"])),
-        ("size", f"{_size(facts.bytes)} in {facts.files} files"),
+        ("size", f"{size(facts.bytes)} in {facts.files} files"),
         ("format", "Zarr 3, one folder; one chunk a frame, CRC-32C on each"),
         ("version", str(facts.dataset.get("version", ""))),
         ("begun", facts.created),
@@ -195,11 +196,3 @@ def _quoted(text: str) -> str:
 
 def _mapping(value: Any) -> Mapping[str, Any]:
     return value if isinstance(value, Mapping) else {}
-
-
-def _size(count: float) -> str:
-    for unit in ("bytes", "kB", "MB", "GB"):
-        if count < 1000:
-            return f"{count:.3g} {unit}"
-        count /= 1000
-    return f"{count:.3g} TB"

@@ -13,6 +13,8 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
 from rich.table import Table
 
+from sonarsynth.conventions import size
+
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan
     from sonarsynth.schedule import BuildReport, Prediction
@@ -81,15 +83,6 @@ def duration(seconds: float) -> str:
         return f"{seconds:.3g} s"
     minutes, hours = seconds / 60, seconds / 3600
     return f"{minutes:.3g} min" if minutes < 100 else f"{hours:.3g} h" if hours < 72 else f"{hours / 24:.3g} days"
-
-
-def size(count: float) -> str:
-    """A number of bytes as people say it."""
-    for unit in ("bytes", "kB", "MB", "GB", "TB"):
-        if count < 1000 or unit == "TB":
-            return f"{count:.3g} {unit}"
-        count /= 1000
-    raise AssertionError
 
 
 def _milliseconds(seconds: float) -> str:

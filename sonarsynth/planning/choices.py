@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from annotated_types import Ge, Lt
 from pydantic import TypeAdapter
@@ -12,8 +12,7 @@ from sonarsynth.conventions import Number
 from sonarsynth.description import BY_KIND, description
 from sonarsynth.ranging import IsovelocityRange, RefractedRange
 from sonarsynth.synthesis import DirectSum, KernelDeposit
-
-Visibility = Literal["centre", "hydrophones"]
+from sonarsynth.tracing import Visibility
 
 
 @description

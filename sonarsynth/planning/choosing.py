@@ -17,7 +17,7 @@ from sonarsynth.beamforming import DenseDelayAndSum
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.planning.arriving import arrivals_of
 from sonarsynth.planning.bending import ranging_error
-from sonarsynth.planning.choices import Choices, Visibility
+from sonarsynth.planning.choices import Choices
 from sonarsynth.planning.imaging import beamformer
 from sonarsynth.planning.looks import Look
 from sonarsynth.planning.plans import Errors, Plan
@@ -30,6 +30,7 @@ from sonarsynth.sonar import Elements
 from sonarsynth.sonar.subarrays import subarray, subarrays, with_rim
 from sonarsynth.synthesis import AutoSynthesis, DirectSum, KernelDeposit
 from sonarsynth.synthesis.auto import deposit_error, deposit_for
+from sonarsynth.tracing import Visibility
 
 FAINT, SYNTHESIS, EXPANSION = 0.1, 0.1, 0.8
 """Shares of the square of the error allowed to signals: of paths left out, of the synthesis, of expansions."""

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final
 
+from sonarsynth.conventions import size
 from sonarsynth.store import Folder, Remote
 
 LARGE: Final = 1e12
@@ -61,12 +62,3 @@ def told_when_full(path: Folder, needed: Callable[[], float]) -> Iterator[None]:
             "with room made, the same command goes on"
         )
         raise OSError(error.errno, line, os.fspath(path)) from error
-
-
-def size(count: float) -> str:
-    """A number of bytes as people say it."""
-    for unit in ("bytes", "kB", "MB", "GB"):
-        if count < 1000:
-            return f"{count:.3g} {unit}"
-        count /= 1000
-    return f"{count:.3g} TB"

@@ -6,7 +6,7 @@ rays wherever they go.
 
 from __future__ import annotations
 
-from typing import Annotated, Protocol
+from typing import Annotated, Literal, Protocol
 
 from sonarsynth.conventions import Floats
 from sonarsynth.description import BY_KIND
@@ -15,6 +15,9 @@ from sonarsynth.tracing.auto import AutoTracing
 from sonarsynth.tracing.refracted import Refracted
 from sonarsynth.tracing.straight import Straight
 from sonarsynth.world.environment import Profile
+
+Visibility = Literal["centre", "hydrophones"]
+"""From where facets are seen: the middle of the array or part, or each hydrophone for itself."""
 
 
 class Propagation(Protocol):

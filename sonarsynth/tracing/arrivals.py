@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -36,7 +36,7 @@ from sonarsynth.world.meshes import in_blocks
 from sonarsynth.world.moment import Body, Moment, Snap
 
 if TYPE_CHECKING:
-    from sonarsynth.tracing import Propagation
+    from sonarsynth.tracing import Propagation, Visibility
 
 
 NEGLIGIBLE = 1e-7
@@ -63,7 +63,7 @@ class ArrayLegs:
     negligible: float = NEGLIGIBLE  # power of the faintest echoes, that are left out
     enough: float = ENOUGH  # error of amplitudes over the aperture, where the second degree will do
     alike: float = ALIKE  # change of an echo by the mean over its facet, over the aperture, that is left out
-    visibility: Literal["centre", "hydrophones"] = "centre"  # from where facets must be seen
+    visibility: Visibility = "centre"  # from where facets must be seen
     first: int = 0  # of the legs, in the wavefronts
 
     @property
@@ -118,7 +118,7 @@ def trace(
     negligible: float = NEGLIGIBLE,
     enough: float = ENOUGH,
     alike: float = ALIKE,
-    visibility: Literal["centre", "hydrophones"] = "centre",
+    visibility: Visibility = "centre",
 ) -> Arrivals:
     """The arrivals of a frame, sorted by snap; of each first those that met no target, then echoes by target, then the
     shadow waves of targets that scatter forward.
@@ -158,7 +158,7 @@ def array_legs(
     negligible: float = NEGLIGIBLE,
     enough: float = ENOUGH,
     alike: float = ALIKE,
-    visibility: Literal["centre", "hydrophones"] = "centre",
+    visibility: Visibility = "centre",
 ) -> ArrayLegs:
     """Facet to array, for every facet of every body that leaves a ray for the array that no body hides.
 

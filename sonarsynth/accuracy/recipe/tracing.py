@@ -14,11 +14,10 @@ from sonarsynth.accuracy.recipe.exact import Exact, Heard, differences, golden, 
 from sonarsynth.accuracy.recipe.points import Point, timed
 from sonarsynth.conventions import Ints
 from sonarsynth.planning import Plan, arrivals_of, frame_start
-from sonarsynth.planning.choices import Visibility
 from sonarsynth.products import Arrivals
 from sonarsynth.scene import Frame
 from sonarsynth.sonar.subarrays import Subarray, subarrays, with_rim
-from sonarsynth.tracing import Refracted, Straight
+from sonarsynth.tracing import Refracted, Straight, Visibility
 
 FAINTEST = (30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 100.0)
 """dB: levels under which the faintest echoes of each target are left out."""
