@@ -22,6 +22,9 @@ from sonarsynth.schedule.tasks import Failure, Job, Step, Written
 SHARDS_AHEAD: Final = 3
 """Shards in flight for each worker: one being written, one being rendered, one to come."""
 
+LANDING: Final = 5.0
+"""Seconds to wait for what a finished shard gives: where its worker dies just then, Dask waits for that for ever."""
+
 MAX_LOSSES: Final = 2
 """A shard whose workers died this often is put off to the end, and its frames are tried alone."""
 
@@ -92,20 +95,34 @@ class _Builder:
             landed = self._next()
             if landed is None or landed not in self.flights:
                 continue
-            flight = self.flights.pop(landed)
+            flight = self.flights[landed]
             try:
-                written: Written = landed.result()
+                written = self._given_by(landed)
             except KilledWorker:
                 suspects.append(flight)
             except CancelledError:  # the scheduler forgot it: it is gone, or the worker is
                 self._workers()
                 waiting.append(flight)
             else:
+                if written is None:
+                    continue
                 if not flight.last and any(failure.transient for failure in written.failures):
                     suspects.append(flight)
                 else:
                     self.done(replace(written, failures=(*flight.aside, *written.failures)))
+            del self.flights[landed]
         return suspects
+
+    def _given_by(self, landed: Future[Any]) -> Written | None:
+        """What a shard gives; None where its worker is slow, or gone, which the next round sees. Raises what it did."""
+        try:
+            written: Written = landed.result(timeout=LANDING)
+        except TimeoutError:
+            if landed.status == "error":
+                raise
+            self.landed.put(landed)
+            return None
+        return written
 
     def _left_by(self, worker: str) -> list[_Flight]:
         """The shards that a worker took with it, without the frame that ended it where its diary tells.
@@ -181,7 +198,10 @@ class _Builder:
         """Render a frame with nothing else in flight: the failure where it ends its worker."""
         before = set(self._workers())
         future = self.client.submit(_probe, self.job, frame, key=f"alone-{self.token}-{frame}", pure=False)
-        error = future.exception()
+        while not future.done():
+            self._workers()  # are there any?
+            time.sleep(0.05)
+        error = None if future.status == "finished" else future.exception()
         if isinstance(error, CancelledError):
             self._workers()  # is the scheduler gone?
             return None

@@ -1,0 +1,67 @@
+"""A worker may die at the one moment when its shard is done and nobody has fetched what it gives."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from sonarsynth.planning import Plan
+from sonarsynth.schedule import build
+from sonarsynth.store.marks import all_files, load_mark, marked
+from sonarsynth.store.place import record
+
+LONGEST = 300.0
+"""Seconds that nothing here takes."""
+
+
+def workers() -> list[psutil.Process]:
+    """Worker processes that this one started."""
+    children = psutil.Process().children(recursive=True)
+    return [child for child in children if any("spawn_main" in word for word in child.cmdline())]
+
+
+class Striking:
+    """Progress of a build that, once, stops its only worker when all shards are on the disk, and kills it later."""
+
+    def __init__(self, path: Path, shards: int) -> None:
+        self.path, self.shards, self.struck = path, shards, 0
+
+    def __call__(self, done: int, total: int, aside: int) -> None:
+        if self.struck or not done:
+            return
+        until = time.monotonic() + LONGEST
+        while len(marked(self.path)) < self.shards and time.monotonic() < until:
+            time.sleep(0.01)
+        time.sleep(0.5)  # the scheduler hears that they are done
+        (worker,) = workers()
+        worker.send_signal(signal.SIGSTOP)
+        threading.Timer(2.0, worker.kill).start()
+        self.struck = worker.pid
+
+
+def test_a_worker_that_dies_with_what_its_last_shards_gave_does_not_hold_the_build_up(
+    tmp_path: Path, small_plan: Plan
+) -> None:
+    whole, path = tmp_path / "whole.zarr", tmp_path / "s.zarr"
+    assert build(small_plan, whole, workers=0).ok
+    strike = Striking(path, len(marked(whole)))
+    assert strike.shards > 1
+    reports: list[Any] = []
+    thread = threading.Thread(
+        target=lambda: reports.append(build(small_plan, path, workers=1, progress=strike)), daemon=True
+    )
+    thread.start()
+    thread.join(LONGEST)
+    assert not thread.is_alive(), "the build hangs"
+    assert strike.struck
+    assert reports[0].ok
+    assert {shard: load_mark(path, shard) for shard in marked(path)} == {
+        shard: load_mark(whole, shard) for shard in marked(whole)
+    }
+    chunks = {name for name in all_files(whole) if not name.endswith("zarr.json")}
+    assert {name: record(path, name) for name in chunks} == {name: record(whole, name) for name in chunks}
