@@ -1,5 +1,7 @@
 """The planner keeps within the accuracy of a recipe, on frames, seeds and hydrophones that it did not measure at."""
 
+import importlib
+import sys
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -11,7 +13,7 @@ from sonarsynth import config, planning
 from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start
 from sonarsynth.planning.choosing import HEARD_AT, heard_at
 from sonarsynth.recipe import Accuracy
-from sonarsynth.render import synthesise, trace_frame
+from sonarsynth.render import beamform_frame, range_frame, synthesise, trace_frame
 from sonarsynth.sonar.subarrays import subarray, subarrays
 from sonarsynth.synthesis import KernelDeposit
 from tests.scenes import remus
@@ -25,7 +27,7 @@ RECIPES = {
     "thermocline.yaml": ("scene.physics.tracing.bounces=0", "scene.world.environment.sound_speed.mixed_depth=4.6 m"),
     "crowd.yaml": (),
 }
-"""Those of the request: the thesis's scene, its tank, deep water, the array in a thermocline, and a crowd."""
+"""The thesis's scene, its tank, deep water, the array in a thermocline, and a crowd."""
 EXACT = KernelDeposit(width=16, precision="float64", tolerance=1e-9)
 """Within 1e-8 of `DirectSum` (tests/extremes)."""
 
@@ -130,3 +132,47 @@ def test_parts_hold_every_element_once_about_their_middle(count: int) -> None:
     for part in parts:
         assert np.allclose(part.elements.position + part.centre, elements.position[part.sensor], atol=1e-15)
         assert part.elements.aperture <= 1.05 * elements.aperture
+
+
+BENT = (
+    "acoustics.rays_chain", "acoustics.rays_layers", "acoustics.rays_march", "ranging.refraction",
+    "tracing.eigenrays", "tracing.fan", "tracing.marching", "tracing.polylines",
+)  # fmt: skip
+"""Modules that solve, follow or invert rays that bend."""
+
+
+def _forbidden(monkeypatch: pytest.MonkeyPatch) -> int:
+    """Let every function of those modules raise, wherever it is known; gives how many names that were."""
+    modules = {name: module for name, module in sys.modules.items() if name.startswith("sonarsynth")}
+    homes = {f"sonarsynth.{name}" for name in BENT}
+
+    def refused(*arguments: object, **named: object) -> None:
+        raise AssertionError("a ray that bends, in uniform water")
+
+    names = [
+        (module, name)
+        for module in modules.values()
+        for name, value in vars(module).items()
+        if callable(value) and not isinstance(value, type) and getattr(value, "__module__", None) in homes
+    ]
+    for module, name in names:
+        monkeypatch.setattr(module, name, refused)
+    return len(names)
+
+
+def _frame(made: Plan) -> list[bytes]:
+    traced = trace_frame(made, 1)
+    values = range_frame(made, 1, traced, beamform_frame(made, 1, traced))
+    return [np.asarray(value).tobytes() for value in values.values()]
+
+
+def test_a_frame_in_uniform_water_is_made_without_any_code_for_rays_that_bend(monkeypatch: pytest.MonkeyPatch) -> None:
+    uniform = planning.plan(config.load(CONFIGS / "remus.yaml"))
+    bending = planning.plan(config.load(CONFIGS / "thermocline.yaml"))
+    whole = _frame(uniform)
+    for name in BENT:
+        importlib.import_module(f"sonarsynth.{name}")
+    assert _forbidden(monkeypatch) > 30
+    assert _frame(uniform) == whole
+    with pytest.raises(AssertionError, match="bends"):  # so these functions are those that matter
+        _frame(bending)
