@@ -10,7 +10,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from sonarsynth.config.source import RecipeError, Source, Where
+from sonarsynth.config.source import SET, RecipeError, Source, Where, dotted
 from sonarsynth.scattering.targets import NAME
 
 
@@ -32,7 +32,18 @@ def explain(error: ValidationError, root: type, source: Source) -> RecipeError:
     if guessed and message == "is required":
         where, message = guessed[0]
     more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-    return source.error(where, message + more)
+    return source.error(where, message + _of_another_kind(where, source) + more)
+
+
+def _of_another_kind(where: Where, source: Source) -> str:
+    """What to do about a field of the kind that `--set` has replaced; "" where it has not."""
+    kind = (*where[:-1], "kind")
+    if not where or where[-1] == "kind" or source.places.get(kind) != SET or source.places.get(where, SET) == SET:
+        return ""
+    holder = source.data
+    for part in where[:-1]:
+        holder = holder[part]
+    return f"; to replace all fields: --set {dotted(where[:-1])}='{{kind: {holder['kind']}}}'"
 
 
 def _where(details: ErrorDetails, data: Any) -> Where:

@@ -152,6 +152,14 @@ def test_what_is_wrong_in_a_setting_is_named_with_its_field(small_file: Path, se
     assert refused(small_file, (setting,)).startswith(message)
 
 
+def test_a_kind_set_over_the_fields_of_another_says_how_to_replace_them(small_file: Path) -> None:
+    message = refused(small_file, ("scene.sonar.array.kind=romanis",))
+    (hint,) = message.split("--set ")[1:]
+    assert "columns" in message
+    assert hint == "scene.sonar.array='{kind: romanis}' (and 1 more)"
+    assert "--set" not in refused(small_file, ("scene.sonar.array={kind: romanis, columns: 2}",)).removeprefix("--set")
+
+
 def test_paths_in_a_file_are_relative_to_it_and_those_of_settings_to_the_working_directory(
     small_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
