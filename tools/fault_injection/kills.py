@@ -1,6 +1,6 @@
 """`tools/faults --kills N`: builds killed with SIGKILL at random times and at named points, resumed, compared.
 
-A victim is the command line itself, in a process forked from this one (so that it need not import everything again).
+A victim is the command line itself, in a process forked from this one.
 What is killed: the client, a worker, the scheduler (of a cluster of its own), or the whole group at once. When: at a
 random time, or when something appears on the disk: the lock, the new folder, the layout, the first file of a shard,
 a mark, the n-th file. After the kill every completion mark must be of what an undisturbed build has; then builds are
@@ -18,16 +18,13 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import psutil
-
 from fault_injection.cluster import Cluster
-from sonarsynth import cli, config, planning, schedule, store
+from fault_injection.processes import LONGEST, end_hung, ended, fork, kill_worker, strike, wait
+from sonarsynth import config, planning, schedule, store
 from sonarsynth.store.marks import ABSENT, all_files, load_mark, marked
 from sonarsynth.store.place import record
 from sonarsynth.store.provenance import PROVENANCE
@@ -56,9 +53,6 @@ VICTIMS = ("client", "worker", "client", "group", "client", "scheduler", "client
 
 WORKERS = {"worker": "2", "group": "1", "client of workers": "1"}
 """Worker processes, where the victim has any."""
-
-LONGEST = 600.0
-"""Seconds after which a build that was not killed counts as hung: on a busy machine a worker starts in a minute."""
 
 
 @dataclass(frozen=True)
@@ -155,16 +149,19 @@ def _attempt(
         row["missed"] += not killed
         row["wrong"] += [f"{trial}: {text}" for text in _bad_marks(path, whole)]
         if status == "hung" or (status not in ("killed", 0) and trial.victim != "scheduler"):
-            row["wrong"].append(
-                f"{trial}: the build ended with {status}: {path.with_suffix('.txt').read_text()[-300:]}"
-            )
+            row["wrong"].append(f"{trial}: the build ended with {status}: {_said(path)}")
     workers = dice.choice(("0", "0", "0", "1"))
-    child = _fork([*_command(recipe, path), "--workers", workers], path.with_suffix(".txt"))
-    status = _wait(child, LONGEST)
+    child = fork([*_command(recipe, path), "--workers", workers], path.with_suffix(".txt"))
+    status = wait(child)
     if status != 0:
-        row["wrong"].append(f"the last build ended with {status}: {path.with_suffix('.txt').read_text()[-500:]}")
+        row["wrong"].append(f"the last build ended with {status}: {_said(path)}")
     row["wrong"] += _different(path, whole)
     return row
+
+
+def _said(path: Path) -> str:
+    """The end of what a build printed; of one that hung, what its threads were at."""
+    return path.with_suffix(".txt").read_text()[-6000:]
 
 
 def _draw(dice: random.Random, victim: str, whole: Undisturbed) -> Trial:
@@ -181,91 +178,27 @@ def _kill(trial: Trial, recipe: Path, path: Path, cluster: Cluster, dice: random
     """Start a build and kill its victim when the point is reached. Whether it was, and how the build ended."""
     scheduler = trial.victim == "scheduler"
     options = ["--scheduler", cluster.address()] if scheduler else ["--workers", WORKERS.get(trial.victim, "0")]
-    child = _fork([*_command(recipe, path), *options], path.with_suffix(".txt"))
+    child = fork([*_command(recipe, path), *options], path.with_suffix(".txt"))
     began = time.monotonic()
     while not trial.reached(path, began):
-        if (status := _ended(child)) is not None:
+        if (status := ended(child)) is not None:
             return False, status
         if time.monotonic() - began > LONGEST:
-            os.killpg(child, signal.SIGKILL)
-            os.waitpid(child, 0)
-            return False, "hung"
+            return False, end_hung(child)
         time.sleep(0.001)
     match trial.victim:
         case "worker":
-            killed = _kill_worker(child, dice)
-            return killed, _wait(child, LONGEST)
+            killed = kill_worker(child, dice)
+            return killed, wait(child)
         case "scheduler":
             cluster.kill_scheduler()
-            return True, _wait(child, LONGEST)
+            return True, wait(child)
         case "group":
-            _strike(lambda: os.killpg(child, signal.SIGKILL))
+            strike(lambda: os.killpg(child, signal.SIGKILL))
         case _:
-            _strike(lambda: os.kill(child, signal.SIGKILL))
+            strike(lambda: os.kill(child, signal.SIGKILL))
     os.waitpid(child, 0)
     return True, "killed"
-
-
-def _kill_worker(child: int, dice: random.Random) -> bool:
-    """Kill one worker process of a build, once there is one."""
-    until = time.monotonic() + LONGEST
-    while time.monotonic() < until:
-        try:
-            found = [
-                process
-                for process in psutil.Process(child).children(recursive=True)
-                if any("spawn_main" in word for word in process.cmdline())
-            ]
-        except psutil.Error:
-            return False
-        if not found and psutil.Process(child).status() == psutil.STATUS_ZOMBIE:
-            return False
-        if found:
-            _strike(dice.choice(found).kill)
-            return True
-        time.sleep(0.01)
-    return False
-
-
-def _strike(kill: Callable[[], object]) -> None:
-    with suppress(ProcessLookupError, psutil.NoSuchProcess):
-        kill()
-
-
-def _fork(arguments: list[str], log: Path) -> int:
-    """Run the command line in a process and a group of its own."""
-    sys.stdout.flush()
-    child = os.fork()
-    if child:
-        return child
-    status = 1
-    try:
-        os.setsid()
-        out = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
-        os.dup2(out, 1)
-        os.dup2(out, 2)
-        cli.main(arguments)
-    except SystemExit as end:
-        status = end.code if isinstance(end.code, int) else 0
-    finally:
-        os._exit(status)
-
-
-def _ended(child: int) -> int | None:
-    """Exit status of a process that has ended, None while it runs."""
-    found, status = os.waitpid(child, os.WNOHANG)
-    return os.waitstatus_to_exitcode(status) if found else None
-
-
-def _wait(child: int, limit: float) -> int | str:
-    until = time.monotonic() + limit
-    while time.monotonic() < until:
-        if (status := _ended(child)) is not None:
-            return status
-        time.sleep(0.01)
-    os.killpg(child, signal.SIGKILL)
-    os.waitpid(child, 0)
-    return "hung"
 
 
 def _bad_marks(path: Path, whole: Undisturbed) -> list[str]:
