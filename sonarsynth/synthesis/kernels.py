@@ -254,6 +254,8 @@ def steer_back(field: Any, column: Any, weight: Any, delay: Any, gain: Any, firs
     bins = field.shape[2] // 2
     here = np.empty(2 * bins, field.dtype)
     for q in range(out.shape[0]):
+        if gain[q] == 0.0:
+            continue
         here[:] = 0.0
         for n in range(weight.shape[1]):
             _accumulate(field[column[q], n], weight[q, n], here)

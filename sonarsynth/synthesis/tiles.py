@@ -243,7 +243,21 @@ def _tiles(front: Fronts, aim: Aim, missed: bool) -> list[Tile]:
     if front.count == 1:
         return [_alone(np.arange(1), front, aim)]
     views = _views(front, aim, missed)
-    return _best(_try(np.arange(front.count), views, aim), views, aim, patient=True)
+    best = _best(_try(np.arange(front.count), views, aim), views, aim, patient=True)
+    if missed:  # halving seldom leads to the last
+        return [one for tile in best for one in (_each(tile, front, aim) if _alone_pays(tile, front, aim) else [tile])]
+    return best
+
+
+def _alone_pays(tile: Tile, front: Fronts, aim: Aim) -> bool:
+    """Whether the paths of a tile cost less one by one, each steered to the hydrophones that it does not miss."""
+    steered = 4.0 * aim.bins * float(np.count_nonzero(~front.dark[tile.paths]))
+    return tile.paths.size > 1 and 2e5 * tile.paths.size + steered < tile.cost
+
+
+def _each(tile: Tile, front: Fronts, aim: Aim) -> list[Tile]:
+    """The paths of a tile one by one."""
+    return [_alone(path[None], front, aim) for path in tile.paths]
 
 
 def _alone(paths: Ints, front: Fronts, aim: Aim) -> Tile:
