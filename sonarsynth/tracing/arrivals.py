@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import NO_TARGET, depth
+from sonarsynth.conventions import NO_TARGET, Ints, depth
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Arrivals
 from sonarsynth.scattering import ScatteringLaw
@@ -29,7 +29,7 @@ from sonarsynth.tracing.legs import (
 )
 from sonarsynth.tracing.moving import Moving, carried
 from sonarsynth.tracing.paths import Outward, assemble, join, silence
-from sonarsynth.tracing.shading import visible
+from sonarsynth.tracing.shading import settled, visible
 from sonarsynth.tracing.variation import ALIKE, ENOUGH, fitted
 from sonarsynth.world.environment import Environment, Profile
 from sonarsynth.world.meshes import in_blocks
@@ -96,6 +96,20 @@ class ArrayLegs:
     def bending(self) -> Profile:
         """What bends the rays: the profile, or for straight rays the speed at the array everywhere."""
         return bending(self.profile, self.propagation, self.sonar_pose)
+
+    def settled(self, leg: Ints) -> Legs:
+        """Some legs (row,), with the hydrophones that bodies hide them from."""
+        number, row = np.unique(leg[self.legs.open[leg]], return_inverse=True)
+        legs = self.legs.select(leg)
+        if not len(number):
+            return legs
+        some = self.legs.select(number)
+        side = self.facets.clear[some.row], self.facets.normal[some.row]
+        world = self.bodies, self.environment, self.bending, self.sonar_pose
+        some = settled(some, *side, *world, self.lookout)
+        hidden_from = legs.hidden_from.copy()
+        hidden_from[legs.open] = some.hidden_from[row]
+        return legs.seen(hidden_from, np.zeros(len(leg), bool))
 
     @property
     def centre(self) -> float:
@@ -224,7 +238,9 @@ def _direct(
     """Snap to array, where none of the solid bodies stands in between."""
     environment, profile, sonar_pose = array.environment, array.profile, array.sonar_pose
     legs = rays_to_centre(environment, profile, snap.position[None, :], sonar_pose, array.propagation, array.centre)
-    legs = visible(legs, legs.point, None, solid, environment, array.bending, sonar_pose, array.lookout)
+    seen_by = solid, environment, array.bending, sonar_pose, array.lookout
+    legs = visible(legs, legs.point, None, *seen_by)
+    legs = settled(legs, legs.point, None, *seen_by)
     over = fronts(
         legs,
         np.zeros(len(legs.row), int),

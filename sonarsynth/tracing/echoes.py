@@ -125,7 +125,7 @@ def echoes(
         some = found.pop()
         over = _turned(some, most)
         over = _spread(some, over, most) if spread else over
-        array, out, legs = some.array, some.out, some.array.legs.select(some.leg)
+        array, out, legs = some.array, some.out, some.array.settled(some.leg)
         target, facet = array.facets.target[out.facet], array.facets.facet[out.facet]
         amplitude, sign = _columns(some.groups, "amplitude", "sign")
         scattered, vary = sign * amplitude, (variation, error)

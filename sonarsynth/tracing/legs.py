@@ -43,6 +43,7 @@ class Legs:
     phase: Floats  # (leg,) rad of reflections and caustics
     blur: Floats  # (leg,) s
     hidden_from: Bytes  # (leg, byte) as of `Arrivals`
+    open: Bools  # (leg,) bodies hide it from some hydrophones: which ones, is not known yet (`shading.settled`)
 
     def select(self, keep: Bools | Ints | slice) -> Legs:
         """The legs picked by a mask, by indices, or by a slice, which copies nothing."""
@@ -52,9 +53,9 @@ class Legs:
         """The legs with other numbers (leg,) for the points that they start from."""
         return replace(self, row=row)
 
-    def seen(self, hidden_from: Bytes) -> Legs:
-        """The legs, hidden from some hydrophones."""
-        return replace(self, hidden_from=hidden_from)
+    def seen(self, hidden_from: Bytes, open: Bools) -> Legs:
+        """The legs, hidden from some hydrophones, which are not known yet for some."""
+        return replace(self, hidden_from=hidden_from, open=open)
 
     @property
     def bounces(self) -> Ints:
@@ -122,6 +123,7 @@ def rays_to_centre(
         phase=bounced.phase[keep],
         blur=bounced.blur[keep],
         hidden_from=np.zeros((len(keep), 0), np.uint8),
+        open=np.zeros(len(keep), bool),
     )
 
 

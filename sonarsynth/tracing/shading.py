@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import lru_cache
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -42,7 +43,7 @@ def visible(
     elements: Elements | None,
 ) -> Legs:
     """The legs that no body hides from the array centre; or, with elements, from every hydrophone, each leg with those
-    that bodies hide it from.
+    that bodies hide it from, or as one that is open for `settled`.
 
     start (leg, xyz): of the legs, moved off their facets; normal (leg, xyz): of these, which legs leave on their outer
     side; None where they have none.
@@ -51,24 +52,52 @@ def visible(
         end = np.broadcast_to(sonar_pose.position, start.shape)
         ray = start, end, legs.departure, legs.length, legs.bounces, legs.turning
         return legs.select(~hidden(bodies, environment, bending, *ray))
-    return _shaded(legs, start, normal, sonar_pose, elements, lambda *ray: hidden(bodies, environment, bending, *ray))
+
+    def hides(*ray: Any) -> Bools:
+        return hidden(bodies, environment, bending, *ray)
+
+    return _seen_at_all(legs, start, normal, sonar_pose, elements, hides)
 
 
-def _shaded(
+def _seen_at_all(
     legs: Legs, start: Floats, normal: Floats | None, sonar_pose: Pose, elements: Elements, hides: _Hides
 ) -> Legs:
-    """As `visible`. Where the centre and the rim of the array do not all see the same, every hydrophone is looked at;
-    what only those within the rim see otherwise, through a gap say, is not found."""
-    out = np.concatenate([np.zeros((1, 3)), elements.position])
-    first = np.append(0, 1 + rim(elements))
-    dark = np.zeros((len(legs.row), len(out)), bool)
+    """As `visible`. Where the centre and the rim of the array do not all see the same, legs are open; what only those
+    within the rim see otherwise, through a gap say, is not found."""
+    first = np.concatenate([np.zeros((1, 3)), elements.position[rim(elements)]])
+    kept, mixed = np.zeros(len(legs.row), bool), np.zeros(len(legs.row), bool)
     for rows in _parts(np.arange(len(legs.row)), len(first)):
-        unseen = _unseen(legs, start, normal, rows, sonar_pose, out[first], hides)
-        dark[rows] = unseen.all(axis=1, keepdims=True)
-        for mixed in _parts(rows[np.flatnonzero(unseen.any(axis=1) & ~unseen.all(axis=1))], len(out)):
-            dark[mixed] = _unseen(legs, start, normal, mixed, sonar_pose, out, hides)
-    kept = np.flatnonzero(~dark.all(axis=1))
-    return legs.select(kept).seen(np.packbits(dark[kept], axis=1))
+        unseen = _unseen(legs, start, normal, rows, sonar_pose, first, hides)
+        kept[rows], mixed[rows] = ~unseen.all(axis=1), unseen.any(axis=1)
+    none = np.zeros((np.count_nonzero(kept), 1 + elements.count // 8), np.uint8)
+    return legs.select(np.flatnonzero(kept)).seen(none, mixed[kept])
+
+
+def settled(
+    legs: Legs,
+    start: Floats,
+    normal: Floats | None,
+    bodies: tuple[Body, ...],
+    environment: Environment,
+    bending: Profile,
+    sonar_pose: Pose,
+    elements: Elements | None,
+) -> Legs:
+    """The same legs, none of them open: those that are, looked at from each hydrophone; arguments as of `visible`.
+
+    That is left until it is known which of them count: of facets that are neither lit nor loud, none.
+    """
+    rows = np.flatnonzero(legs.open)
+    if elements is None or not len(rows):
+        return legs
+
+    def hides(*ray: Any) -> Bools:
+        return hidden(bodies, environment, bending, *ray)
+
+    out, hidden_from = np.concatenate([np.zeros((1, 3)), elements.position]), legs.hidden_from.copy()
+    for some in _parts(rows, len(out)):
+        hidden_from[some] = np.packbits(_unseen(legs, start, normal, some, sonar_pose, out, hides), axis=1)
+    return legs.seen(hidden_from, np.zeros(len(legs.row), bool))
 
 
 def _parts(rows: Ints, points: int) -> list[Ints]:
