@@ -29,7 +29,7 @@ from sonarsynth.tracing.legs import (
 )
 from sonarsynth.tracing.moving import Moving, carried
 from sonarsynth.tracing.paths import Outward, assemble, join, silence
-from sonarsynth.tracing.shading import settled, visible
+from sonarsynth.tracing.shading import View
 from sonarsynth.tracing.variation import ALIKE, ENOUGH, fitted
 from sonarsynth.world.environment import Environment, Profile
 from sonarsynth.world.meshes import in_blocks
@@ -87,10 +87,10 @@ class ArrayLegs:
         legs, facets = legs.numbered(legs.row - some.start), self.facets.select(some)
         return replace(self, legs=legs, facets=facets, first=self.first + first)
 
-    @property
-    def lookout(self) -> Elements | None:
-        """The hydrophones, where each must see what it hears; None where the array centre sees for all."""
-        return self.elements if self.visibility == "hydrophones" else None
+    def view(self, bodies: tuple[Body, ...]) -> View:
+        """Who looks, and which bodies stand in between."""
+        lookout = self.elements if self.visibility == "hydrophones" else None
+        return View(bodies, self.environment, self.bending, self.sonar_pose, lookout)
 
     @property
     def bending(self) -> Profile:
@@ -105,8 +105,7 @@ class ArrayLegs:
             return legs
         some = self.legs.select(number)
         side = self.facets.clear[some.row], self.facets.normal[some.row]
-        world = self.bodies, self.environment, self.bending, self.sonar_pose
-        some = settled(some, *side, *world, self.lookout)
+        some = self.view(self.bodies).settled(some, *side)
         hidden_from = legs.hidden_from.copy()
         hidden_from[legs.open] = some.hidden_from[row]
         return legs.seen(hidden_from, np.zeros(len(leg), bool))
@@ -182,6 +181,7 @@ def array_legs(
     bent, centre = bending(profile, propagation, sonar_pose), 0.5 * (band[0] + band[1])
     lookout = elements if visibility == "hydrophones" else None
     slack = elements.aperture if lookout is not None else 0.0
+    view = View(bodies, environment, bent, sonar_pose, lookout)
     found: tuple[list[Legs], list[Facets]] = [], []
     seen = 0
     for some in in_blocks(sum(len(body.mesh.faces) for body in bodies)):
@@ -190,7 +190,7 @@ def array_legs(
         every = every.select(reached)
         part = legs_from(every, environment, profile, sonar_pose, propagation, centre, slack)
         side = every.clear[part.row], every.normal[part.row]
-        part = visible(part, *side, bodies, environment, bent, sonar_pose, lookout)
+        part = view.visible(part, *side)
         kept, row = np.unique(part.row, return_inverse=True)
         found[0].append(part.numbered(seen + row))
         found[1].append(every.select(kept))
@@ -238,9 +238,9 @@ def _direct(
     """Snap to array, where none of the solid bodies stands in between."""
     environment, profile, sonar_pose = array.environment, array.profile, array.sonar_pose
     legs = rays_to_centre(environment, profile, snap.position[None, :], sonar_pose, array.propagation, array.centre)
-    seen_by = solid, environment, array.bending, sonar_pose, array.lookout
-    legs = visible(legs, legs.point, None, *seen_by)
-    legs = settled(legs, legs.point, None, *seen_by)
+    view = array.view(solid)
+    legs = view.visible(legs, legs.point, None)
+    legs = view.settled(legs, legs.point, None)
     over = fronts(
         legs,
         np.zeros(len(legs.row), int),

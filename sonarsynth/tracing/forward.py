@@ -19,7 +19,6 @@ from sonarsynth.scattering import Kirchhoff, Part, ScatteringLaw
 from sonarsynth.scattering.parts import Shadow
 from sonarsynth.tracing.aperture import wavefronts
 from sonarsynth.tracing.legs import facets_of, rays_to_centre
-from sonarsynth.tracing.shading import settled, visible
 from sonarsynth.world.casting import inside
 from sonarsynth.world.moment import Body
 
@@ -51,9 +50,9 @@ def forward_legs(array: ArrayLegs, laws: tuple[ScatteringLaw, ...]) -> ArrayLegs
     scatters = np.array([bool(shadow_parts(law)) for law in laws])
     every = every.select(scatters[every.target])
     legs = rays_to_centre(environment, profile, every.point, pose, propagation, array.centre)
-    seen_by = solid, environment, array.bending, pose, array.lookout
-    legs = visible(legs, every.clear[legs.row], None, *seen_by)
-    legs = settled(legs, every.clear[legs.row], None, *seen_by)
+    view = array.view(solid)
+    legs = view.visible(legs, every.clear[legs.row], None)
+    legs = view.settled(legs, every.clear[legs.row], None)
     kept, row = np.unique(legs.row, return_inverse=True)
     legs, facets = legs.numbered(row), every.select(kept)
     group = facets.target[legs.row]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,16 +13,15 @@ from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.geometry import Pose
 from sonarsynth.sonar import Elements
 from sonarsynth.tracing.legs import Legs
-from sonarsynth.tracing.shadows import hidden
+from sonarsynth.tracing.shadows import bundles, hidden
+from sonarsynth.world.cones import CLOSED, UNKNOWN, look
 from sonarsynth.world.environment import Environment, Profile
 from sonarsynth.world.moment import Body
 
-_Hides = Callable[[Floats, Floats, Floats, Floats, Ints, Ints], Bools]
-"""Which rays (ray,) bodies stand in: start, end, departure (ray, xyz), length, bounces, turning points (ray,)."""
-
-
 RAYS = 30_000
 """Rays that are looked at together."""
+PARTS = 32
+"""Parts of the array that are looked at as one where the whole does not see alike."""
 
 
 @lru_cache(maxsize=16)
@@ -32,99 +31,171 @@ def rim(elements: Elements) -> Ints:
     return np.unique((elements.position @ towards.T).argmax(axis=0))
 
 
-def visible(
-    legs: Legs,
-    start: Floats,
-    normal: Floats | None,
-    bodies: tuple[Body, ...],
-    environment: Environment,
-    bending: Profile,
-    sonar_pose: Pose,
-    elements: Elements | None,
-) -> Legs:
-    """The legs that no body hides from the array centre; or, with elements, from every hydrophone, each leg with those
-    that bodies hide it from, or as one that is open for `settled`.
+@dataclass(frozen=True, eq=False)
+class View:
+    """What stands between points in the water and those who look at them."""
 
-    start (leg, xyz): of the legs, moved off their facets; normal (leg, xyz): of these, which legs leave on their outer
-    side; None where they have none.
-    """
-    if elements is None or elements.count == 1 or not bodies:
-        end = np.broadcast_to(sonar_pose.position, start.shape)
-        ray = start, end, legs.departure, legs.length, legs.bounces, legs.turning
-        return legs.select(~hidden(bodies, environment, bending, *ray))
+    bodies: tuple[Body, ...]
+    environment: Environment
+    bending: Profile
+    sonar_pose: Pose
+    elements: Elements | None  # None: the array centre looks for all
 
-    def hides(*ray: Any) -> Bools:
-        return hidden(bodies, environment, bending, *ray)
+    def visible(self, legs: Legs, start: Floats, normal: Floats | None) -> Legs:
+        """The legs that no body hides from the array centre; or, with elements, from every hydrophone, some of them
+        open for `settled`.
 
-    return _seen_at_all(legs, start, normal, sonar_pose, elements, hides)
+        start (leg, xyz): of the legs, moved off their facets; normal (leg, xyz): of these, which legs leave on their
+        outer side; None where they have none.
+        """
+        if self.elements is None or self.elements.count == 1 or not self.bodies:
+            end = np.broadcast_to(self.sonar_pose.position, start.shape)
+            return legs.select(~self._hides(start, end, legs.departure, legs.length, legs.bounces, legs.turning))
+        certain = self._certain(legs, start, normal)
+        kept, rim_of = certain != CLOSED, 1 + rim(self.elements)
+        rows = np.flatnonzero(certain == UNKNOWN)
+        first = np.append(0, rim_of)
+        for some in _parts(rows, len(first)):
+            leg, point = np.repeat(some, len(first)), np.tile(first, len(some))
+            kept[some] = ~self._unseen(legs, start, normal, leg, point).reshape(len(some), len(first)).all(axis=1)
+        for some in _parts(rows[~kept[rows]], len(self._points)):  # what only those within the rim see
+            kept[some] = ~self._dark(legs, start, normal, some).all(axis=1)
+        none = np.zeros((np.count_nonzero(kept), 1 + self.elements.count // 8), np.uint8)
+        return legs.select(np.flatnonzero(kept)).seen(none, certain[kept] == UNKNOWN)
+
+    def settled(self, legs: Legs, start: Floats, normal: Floats | None) -> Legs:
+        """The same legs, none of them open: those that are, looked at from each hydrophone; arguments as above.
+
+        That is left until it is known which of them count: of facets that are neither lit nor loud, none.
+        """
+        rows = np.flatnonzero(legs.open)
+        if not len(rows):
+            return legs
+        hidden_from = legs.hidden_from.copy()
+        for some in _parts(rows, len(self._points)):
+            hidden_from[some] = np.packbits(self._dark(legs, start, normal, some), axis=1)
+        return legs.seen(hidden_from, np.zeros(len(legs.row), bool))
+
+    @property
+    def _points(self) -> Floats:
+        """(1 + sensor, xyz) the array centre, and the hydrophones."""
+        return np.concatenate([np.zeros((1, 3)), self.elements.position if self.elements else np.empty((0, 3))])
+
+    def _certain(self, legs: Legs, start: Floats, normal: Floats | None) -> Ints:
+        """(leg,) EMPTY where all hydrophones see it, CLOSED where none does; UNKNOWN elsewhere."""
+        points = self._points
+        spread = np.full(len(start), 1.001 * float(np.linalg.norm(points, axis=1).max()))
+        middle = np.zeros((len(start), 3))
+        if normal is None:
+            return self._cones(legs, start, middle, spread, None)
+        least, most = _within(legs, normal, spread)
+        rows = np.flatnonzero((least <= 0.0) & (most >= 0.0))
+        flip = np.where(legs.bounces[rows] % 2 == 1, -1.0, 1.0)  # of the mirrored array
+        across = self.sonar_pose.turn_to_body(normal[rows] * np.column_stack([np.ones((len(rows), 2)), flip]))
+        beside, ahead = across @ points.T, 0.5 * (least + most)[rows]
+        least[rows] = ahead + beside.min(axis=1, initial=np.inf) - 1e-9 * legs.length[rows]
+        most[rows] = ahead + beside.max(axis=1, initial=-np.inf) + 1e-9 * legs.length[rows]
+        return self._cones(legs, start, middle, spread, (least, most))
+
+    def _cones(
+        self, legs: Legs, start: Floats, offset: Floats, spread: Floats, ahead: tuple[Floats, Floats] | None
+    ) -> Ints:
+        """(leg,) as `_certain`, of the hydrophones within `spread` (leg,) of places beside the centre (leg, xyz); ahead
+        (leg,): how far (m) they are on the outer side of the facet, at least and at most."""
+        away, length = _towards(legs, offset)
+        found, rows = np.full(len(start), UNKNOWN), np.arange(len(start))
+        if ahead is not None:
+            found[ahead[1] < 0.0] = CLOSED
+            rows = np.flatnonzero(ahead[0] > 0.0)
+        end, counts = (self.sonar_pose.position + offset)[rows], (legs.bounces[rows], legs.turning[rows])
+        ray = start[rows], end, away[rows], length[rows], spread[rows], *counts
+        slope, reach, far = bundles(self.bodies, self.environment, self.bending, *ray)
+        sure = np.flatnonzero(np.isfinite(slope))
+        rows = rows[sure]
+        found[rows] = look(self.bodies, start[rows], away[rows], slope[sure], reach[sure], far[sure])
+        return found
+
+    def _dark(self, legs: Legs, start: Floats, normal: Floats | None, rows: Ints) -> Bools:
+        """(row, 1 + sensor) from where some legs are hidden: the array centre, each hydrophone. Parts of the array that
+        see alike are looked at together."""
+        parts = cells(self.elements)
+        row, cell = np.repeat(rows, len(parts.radius)), np.tile(np.arange(len(parts.radius)), len(rows))
+        some, offset, spread = legs.select(row), self.sonar_pose.turn_to_world(parts.centre)[cell], parts.radius[cell]
+        ahead = None if normal is None else _within(some, normal[row], spread, offset)
+        found = self._cones(some, start[row], offset, spread, ahead)
+        found = found.reshape(len(rows), len(parts.radius))[:, parts.cell]
+        dark = np.asarray(found == CLOSED)
+        one, point = np.nonzero(found == UNKNOWN)
+        dark[one, point] = self._unseen(legs, start, normal, rows[one], point)
+        return dark
+
+    def _unseen(self, legs: Legs, start: Floats, normal: Floats | None, leg: Ints, point: Ints) -> Bools:
+        """(ray,) which legs (ray,) leave the back of their facets, or meet a body, on the way to points (ray,): the
+        centre, or the hydrophones from 1.
+
+        To each point a ray leaves for where it is beside the image of the array centre: exact for straight rays, and
+        for bent ones to the second order in the size of the array.
+        """
+        legs, offset = legs.select(leg), self.sonar_pose.turn_to_world(self._points)[point]
+        ahead, length = _towards(legs, offset)
+        unseen = np.zeros(len(leg), bool)
+        if normal is not None:
+            unseen = np.einsum("rx,rx->r", ahead, normal[leg]) <= 0.0
+        ray = np.flatnonzero(~unseen)
+        end, times, turns = self.sonar_pose.position + offset[ray], legs.bounces[ray], legs.turning[ray]
+        unseen[ray] = self._hides(start[leg[ray]], end, ahead[ray], length[ray], times, turns)
+        return unseen
+
+    def _hides(self, *ray: Any) -> Bools:
+        return hidden(self.bodies, self.environment, self.bending, *ray)
 
 
-def _seen_at_all(
-    legs: Legs, start: Floats, normal: Floats | None, sonar_pose: Pose, elements: Elements, hides: _Hides
-) -> Legs:
-    """As `visible`. Where the centre and the rim of the array do not all see the same, legs are open; what only those
-    within the rim see otherwise, through a gap say, is not found."""
-    first = np.concatenate([np.zeros((1, 3)), elements.position[rim(elements)]])
-    kept, mixed = np.zeros(len(legs.row), bool), np.zeros(len(legs.row), bool)
-    for rows in _parts(np.arange(len(legs.row)), len(first)):
-        unseen = _unseen(legs, start, normal, rows, sonar_pose, first, hides)
-        kept[rows], mixed[rows] = ~unseen.all(axis=1), unseen.any(axis=1)
-    none = np.zeros((np.count_nonzero(kept), 1 + elements.count // 8), np.uint8)
-    return legs.select(np.flatnonzero(kept)).seen(none, mixed[kept])
+def _towards(legs: Legs, offset: Floats) -> tuple[Floats, Floats]:
+    """Unit vectors (leg, xyz) and distances (leg,) from the starts of legs to the images of places beside the centre
+    (leg, xyz)."""
+    ahead = legs.length[:, None] * legs.departure + offset
+    odd = np.asarray(legs.bounces % 2 == 1)
+    ahead[odd, 2] -= 2.0 * offset[odd, 2]  # of the mirrored array
+    length = np.linalg.norm(ahead, axis=1)
+    return ahead / np.maximum(length, 1e-300)[:, None], length
 
 
-def settled(
-    legs: Legs,
-    start: Floats,
-    normal: Floats | None,
-    bodies: tuple[Body, ...],
-    environment: Environment,
-    bending: Profile,
-    sonar_pose: Pose,
-    elements: Elements | None,
-) -> Legs:
-    """The same legs, none of them open: those that are, looked at from each hydrophone; arguments as of `visible`.
+def _within(legs: Legs, normal: Floats, spread: Floats, offset: Floats | None = None) -> tuple[Floats, Floats]:
+    """(leg,) how far (m) on the outer side of a facet what is within `spread` (leg,) of a place beside the centre is,
+    at least and at most."""
+    away, length = (legs.departure, legs.length) if offset is None else _towards(legs, offset)
+    ahead = np.einsum("ij,ij->i", normal, away) * length
+    return ahead - spread, ahead + spread
 
-    That is left until it is known which of them count: of facets that are neither lit nor loud, none.
-    """
-    rows = np.flatnonzero(legs.open)
-    if elements is None or not len(rows):
-        return legs
 
-    def hides(*ray: Any) -> Bools:
-        return hidden(bodies, environment, bending, *ray)
+class Cells(NamedTuple):
+    """Parts of an array, its centre among them."""
 
-    out, hidden_from = np.concatenate([np.zeros((1, 3)), elements.position]), legs.hidden_from.copy()
-    for some in _parts(rows, len(out)):
-        hidden_from[some] = np.packbits(_unseen(legs, start, normal, some, sonar_pose, out, hides), axis=1)
-    return legs.seen(hidden_from, np.zeros(len(legs.row), bool))
+    cell: Ints  # (1 + sensor,) which part it is in
+    centre: Floats  # (cell, xyz) m
+    radius: Floats  # (cell,) m, of all of it about the centre
+
+
+@lru_cache(maxsize=16)
+def cells(elements: Elements) -> Cells:
+    """An array cut into parts by halves along their longer sides."""
+    points = np.concatenate([np.zeros((1, 3)), elements.position])
+    parts = [np.arange(len(points))]
+    while len(parts) < min(PARTS, len(points) // 2):
+        halves = []
+        for part in parts:
+            along = points[part, np.ptp(points[part], axis=0).argmax()]
+            halves += np.array_split(part[np.argsort(along, kind="stable")], 2)
+        parts = halves
+    centre = np.array([0.5 * (points[part].min(axis=0) + points[part].max(axis=0)) for part in parts])
+    away = zip(parts, centre, strict=True)
+    radius = np.array([1e-6 + 1.001 * np.linalg.norm(points[part] - c, axis=1).max() for part, c in away])
+    cell = np.empty(len(points), int)
+    for number, part in enumerate(parts):
+        cell[part] = number
+    return Cells(cell, centre, radius)
 
 
 def _parts(rows: Ints, points: int) -> list[Ints]:
     """Rows in parts, so that few rays to so many points are held at a time."""
     return np.array_split(rows, max(1, len(rows) * points // RAYS))
-
-
-def _unseen(
-    legs: Legs, start: Floats, normal: Floats | None, rows: Ints, sonar_pose: Pose, points: Floats, hides: _Hides
-) -> Bools:
-    """(row, point) which legs leave the back of their facets, or meet a body, on the way to points (point, xyz) of the
-    sonar frame.
-
-    To each point a ray leaves for where it is beside the image of the array centre: exact for straight rays, and for
-    bent ones to the second order in the size of the array.
-    """
-    legs, offset = legs.select(rows), sonar_pose.turn_to_world(points)
-    ahead = (legs.length[:, None] * legs.departure)[:, None] + offset
-    odd = np.asarray(legs.bounces % 2 == 1)
-    ahead[odd, :, 2] -= 2.0 * offset[:, 2]  # of the mirrored array
-    length = np.linalg.norm(ahead, axis=2)
-    ahead /= np.maximum(length, 1e-300)[:, :, None]
-    unseen = np.zeros(length.shape, bool)
-    if normal is not None:
-        unseen = np.einsum("rpx,rx->rp", ahead, normal[rows]) <= 0.0
-    leg, point = np.nonzero(~unseen)
-    end = sonar_pose.position + offset[point]
-    times, turns = legs.bounces[leg], legs.turning[leg]
-    unseen[leg, point] = hides(start[rows[leg]], end, ahead[leg, point], length[leg, point], times, turns)
-    return unseen

@@ -52,6 +52,69 @@ def hidden(
     return blocked
 
 
+def bundles(
+    bodies: tuple[Body, ...],
+    environment: Environment,
+    profile: Profile,
+    start: Floats,
+    end: Floats,
+    departure: Floats,
+    length: Floats,
+    spread: Floats,
+    bounces: Ints,
+    turning: Ints,
+) -> tuple[Floats, Floats, Floats]:
+    """Cones that hold what `hidden` looks at of all rays to within `spread` (ray,) m of some: slope, and how far (m)
+    along the departure bodies may be met, and surely would be if they close the cone, (ray,) each.
+
+    Arguments as of `hidden`, for the rays to the middle; those beside them, unfolded, end within `spread` of them and
+    leave as straight rays to there would. The slope is NaN where no cone is certain: of reflected rays that may meet a
+    body again.
+    """
+    longest, shortest = length + spread, length - spread
+    bow = _curvature(profile) * longest**2 / 8.0
+    straight = (bounces == 0) & (_curvature(profile) * shortest**2 <= 8.0 * BOW)  # some of them
+    again, first = _near(bodies, environment, start, end, departure, bounces, bow + spread)
+    whole = straight | again | ((bounces > 0) & (turning > 0))
+    reach = np.where(whole, longest, np.minimum(first, longest))
+    far = 0.98 * np.where(whole, shortest, np.minimum(first - 2.0 * (bow + spread), shortest))
+    angle = _subtended(spread, length) + 0.5 * _curvature_about(profile, depth(start), reach) * reach
+    ahead = end - start
+    distance = np.linalg.norm(ahead, axis=1)
+    off = np.linalg.norm(np.cross(departure, ahead), axis=1) / np.maximum(distance, 1e-300)
+    angle = np.where(whole, np.maximum(angle, np.arcsin(np.minimum(off, 1.0)) + _subtended(spread, distance)), angle)
+    slope = 1.02 * np.tan(np.minimum(angle, 0.5)) + 2e-5  # more than what casting may err by
+    room = np.where(departure[:, 2] > 0.0, -start[:, 2], environment.depth + start[:, 2])
+    bounced = (bounces > 0) & (whole | (reach * (np.abs(departure[:, 2]) + slope) >= room))
+    return (
+        np.where(bounced | (angle > 0.4) | (bounces > 0) & (np.abs(departure[:, 2]) <= slope), np.nan, slope),
+        reach,
+        far,
+    )
+
+
+def _subtended(radius: Floats, distance: Floats) -> Floats:
+    """Half of the angle (rad) that a ball is seen under; a right angle from within."""
+    return np.asarray(np.arcsin(np.minimum(radius / np.maximum(distance, 1e-300), 1.0)))
+
+
+def _curvature_about(profile: Profile, middle: Floats, reach: Floats) -> Floats:
+    """Largest curvature (1/m) of rays within `reach` (m) of some depths (ray,)."""
+    if profile.uniform or len(profile.depth) < 2:
+        return np.full(len(middle), _curvature(profile))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bend = np.nan_to_num(np.abs(np.diff(profile.speed)) / np.diff(profile.depth)) / float(profile.speed.min())
+    first = np.clip(np.searchsorted(profile.depth, middle - reach, "right") - 1, 0, len(bend) - 1)
+    last = np.clip(np.searchsorted(profile.depth, middle + reach, "left"), first + 1, len(bend))
+    most, step, level = [bend], 1, np.frexp(last - first)[1] - 1  # largest of 1, 2, 4, ... layers from each on
+    while 2 * step <= len(bend):
+        most.append(np.maximum(most[-1], np.append(most[-1][step:], np.zeros(min(step, len(bend))))))
+        step *= 2
+    level = np.minimum(level, len(most) - 1)
+    table = np.stack(most)
+    return np.asarray(np.maximum(table[level, first], table[level, last - (1 << level)]))
+
+
 def overlapping(bodies: tuple[Body, ...]) -> list[tuple[int, tuple[Body, ...]]]:
     """Bodies that may lie in or on others that come before them: number, and those others.
 

@@ -97,6 +97,13 @@ class CastingMesh:
 
         return intersections.round_vertices(self.faces, len(self.vertices))
 
+    @cached_property
+    def tree(self) -> tuple[Floats, Int32s]:
+        """Boxes (node, 6) round facets, and the facets in order of place; see `facet_tree`."""
+        from sonarsynth.world import facet_tree
+
+        return facet_tree.tree(self.vertices, self.faces)
+
     def cast(self, origin: Floats, direction: Floats, far: Floats) -> tuple[Ints, Floats]:
         """Facet (ray,) and distance of the nearest hit for rays in this mesh's frame and unit; -1 and NaN for none."""
         from sonarsynth.world import intersections

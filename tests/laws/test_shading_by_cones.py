@@ -1,0 +1,156 @@
+"""What is certain of cones of rays is so for each ray: all hydrophones see what each would see alone, to the last."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.sonar import Elements, Romanis, elements
+from sonarsynth.sonar.subarrays import subarray
+from sonarsynth.tracing import Propagation, Refracted, Straight
+from sonarsynth.tracing.arrivals import bending
+from sonarsynth.tracing.legs import Legs, facets_of, legs_from
+from sonarsynth.tracing.shading import View, cells, rim
+from sonarsynth.tracing.shadows import hidden
+from sonarsynth.world.casting import occluded
+from sonarsynth.world.cones import CLOSED, EMPTY, UNKNOWN, look
+from sonarsynth.world.environment import Environment, Profile
+from sonarsynth.world.meshes import mesh_of
+from sonarsynth.world.moment import Body
+from sonarsynth.world.shapes import Box, Cylinder, LShape, Remus100, Shape, Sphere
+from sonarsynth.world.sound_speed import Isovelocity
+
+BED = 30.0
+WATER = Environment(depth=BED, sound_speed=Isovelocity(speed=1500.0))
+UNIFORM = Profile(np.array([0.0, BED]), np.array([1500.0, 1500.0]))
+THERMOCLINE = Profile(np.array([0.0, 12.0, 14.0, 16.0, BED]), np.array([1540.0, 1539.0, 1533.0, 1529.0, 1528.0]))
+SONAR = Pose(np.array([0.0, 0.0, -15.0]), quaternion(0.5 * np.pi, 0.05, 0.02))
+
+
+def array_of(count: int) -> Elements:
+    """Some hydrophones of the whole array, in a wild order."""
+    whole = elements(Romanis())
+    return subarray(whole, np.random.default_rng(count).permutation(whole.count)[:count]).elements
+
+
+def body(shape: Shape, place: tuple[float, float, float], *turned: float) -> Body:
+    return Body("body", mesh_of(shape), Pose(np.array(place), quaternion(*turned)), np.zeros(3))
+
+
+def seen_alone(view: View, legs: Legs, start: Floats, normal: Floats, sensor: int) -> Ints:
+    """(leg,) whether a hydrophone does not see a leg, by the one ray to it."""
+    assert view.elements is not None
+    offset = view.sonar_pose.turn_to_world(view.elements.position[sensor])
+    image = np.where((legs.bounces % 2 == 1)[:, None], offset * [1.0, 1.0, -1.0], offset)
+    ahead = legs.length[:, None] * legs.departure + image
+    length = np.linalg.norm(ahead, axis=1)
+    ahead /= length[:, None]
+    end = np.broadcast_to(view.sonar_pose.position + offset, start.shape)
+    ray = start, end, ahead, length, legs.bounces, legs.turning
+    blocked = hidden(view.bodies, view.environment, view.bending, *ray)
+    return np.asarray(blocked | (np.einsum("ij,ij->i", ahead, normal) <= 0.0))
+
+
+def shaded(bodies: tuple[Body, ...], array: Elements, rays: Propagation, profile: Profile) -> Bools:
+    """Hold every leg against each hydrophone by itself: (leg, sensor) which do not see it."""
+    facets = facets_of(bodies, slice(0, sum(len(b.mesh.faces) for b in bodies)))
+    legs = legs_from(facets, WATER, profile, SONAR, rays, 50e3, array.aperture)
+    view = View(bodies, WATER, bending(profile, rays, SONAR), SONAR, array)
+    side = facets.clear[legs.row], facets.normal[legs.row]
+    alone = np.stack([seen_alone(view, legs, *side, sensor) for sensor in range(array.count)], axis=1)
+    numbered = replace(legs, caustics=np.arange(len(legs.row)))
+    seen = view.visible(numbered, *side)
+    side = facets.clear[seen.row], facets.normal[seen.row]
+    seen = view.settled(seen, *side)
+    assert not seen.open.any()
+    found = np.ones_like(alone)
+    found[seen.caustics] = np.unpackbits(seen.hidden_from, axis=1, count=1 + array.count)[:, 1:]
+    np.testing.assert_array_equal(found, alone)
+    return alone
+
+
+def mixed(dark: Bools) -> Bools:
+    """(leg,) which some hydrophones see and others do not."""
+    return np.asarray(dark.any(axis=1) & ~dark.all(axis=1))
+
+
+def some_bodies(seed: int) -> tuple[Body, ...]:
+    """Bodies of every kind, some before others."""
+    rng = np.random.default_rng(seed)
+    plates = LShape(height=0.8, length=0.6, width=0.5, thickness=0.05, edge=0.3)
+    round_ones: list[Shape] = [Sphere(radius=0.4, edge=0.15), Cylinder(length=1.2, radius=0.15, edge=0.1)]
+    shapes: list[Shape] = [Box(size=(0.8, 0.5, 0.4), edge=0.2), plates, *round_ones, Remus100(edge=0.12)]
+    picked = rng.permutation(len(shapes))[:3]
+    place = np.column_stack([rng.uniform(7.0, 16.0, 3), rng.uniform(-0.7, 0.7, 3), rng.uniform(-15.6, -14.4, 3)])
+    return tuple(body(shapes[n], tuple(p), *rng.uniform(-3.0, 3.0, 3)) for n, p in zip(picked, place, strict=True))
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("rays", [Straight(), Straight(bounces=1), Refracted(bounces=1)])
+def test_verdicts_are_those_of_each_hydrophone_alone(seed: int, rays: Propagation) -> None:
+    few = array_of(61)
+    dark = shaded(some_bodies(seed), few, rays, THERMOCLINE if rays.bends else UNIFORM)
+    assert mixed(dark).sum() > 5
+    assert mixed(dark).mean() < 0.8
+
+
+def one_in_the_middle(array: Elements) -> Floats:
+    """(xyz) in the world: of a hydrophone far from the rim and the centre of the array."""
+    wanted = 0.4 * array.aperture * np.array([0.0, 0.7, 0.7])
+    sensor = int(np.argmin(np.linalg.norm(array.position - wanted, axis=1)))
+    return SONAR.to_world(array.position[sensor][None])[0]
+
+
+def test_a_rod_that_hides_from_few_in_the_middle_is_found() -> None:
+    """Thinner than the spaces between hydrophones."""
+    array = array_of(121)
+    ball = body(Box(size=(0.05, 0.05, 0.05)), (20.0, 0.0, -15.0), 0.0)
+    place = 0.9 * one_in_the_middle(array) + 0.1 * ball.pose.position
+    dark = shaded((ball, body(Cylinder(length=0.02, radius=0.004), tuple(place), 0.0)), array, Straight(), UNIFORM)
+    assert (mixed(dark) & ~dark[:, rim(array)].any(axis=1)).any()
+
+
+def test_a_hole_that_few_in_the_middle_see_through_is_found() -> None:
+    """Two slits, one behind the other and across it."""
+    array = array_of(121)
+    ball = body(Box(size=(0.01, 0.01, 0.01)), (20.0, 0.0, -15.0), 0.0)
+    _, y, z = 0.5 * (one_in_the_middle(array) + ball.pose.position)
+    plate = Box(size=(0.02, 2.0, 2.0))
+    lying = [body(plate, (10.0, y, z + off), 0.5 * np.pi) for off in (1.004, -1.004)]
+    upright = [body(plate, (10.1, y + off, z), 0.5 * np.pi) for off in (1.004, -1.004)]
+    dark = shaded((ball, *lying, *upright), array, Straight(), UNIFORM)
+    assert (mixed(dark) & dark[:, rim(array)].all(axis=1)).any()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_cones_that_are_certain_are_so_for_any_ray_in_them(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    bodies = some_bodies(seed)
+    count = 3000
+    apex = rng.uniform([5.0, -2.0, -17.0], [18.0, 2.0, -13.0], (count, 3))
+    axis = rng.normal(size=(count, 3))
+    axis /= np.linalg.norm(axis, axis=1)[:, None]
+    slope, reach = 10.0 ** rng.uniform(-3.0, -1.0, count), rng.uniform(1.0, 15.0, count)
+    found = look(bodies, apex, axis, slope, reach, reach)
+    blocked = np.zeros((40, count), bool)
+    for ray in blocked:
+        across = np.cross(axis, rng.normal(size=(count, 3)))
+        across *= (rng.uniform(size=count) ** 0.5 * slope / np.linalg.norm(across, axis=1))[:, None]
+        ray[:] = occluded(bodies, apex, apex + reach[:, None] * (axis + across))
+    assert not blocked[:, found == EMPTY].any()
+    assert blocked[:, found == CLOSED].all()
+    alike = blocked.all(axis=0) | ~blocked.any(axis=0)
+    assert (found == CLOSED).sum() > 20
+    assert (found[alike] == UNKNOWN).mean() < 0.2  # and little else is uncertain
+
+
+def test_parts_of_an_array_hold_all_of_it() -> None:
+    for count in (2, 3, 7, 61, 508):
+        array = array_of(count)
+        parts = cells(array)
+        points = np.concatenate([np.zeros((1, 3)), array.position])
+        away = np.linalg.norm(points - parts.centre[parts.cell], axis=1)
+        assert (away <= parts.radius[parts.cell]).all()
+        assert set(parts.cell) == set(range(len(parts.radius)))
