@@ -20,6 +20,9 @@ from sonarsynth.world.moment import Body
 
 RAYS = 30_000
 """Rays that are looked at together."""
+NO_CONE = 3
+"""Rays that are in no narrow cone for certain, by `shadows.bundles`: of these the centre and the rim of the array are
+looked at, and where they do not see alike every hydrophone; what only those within the rim see is not found."""
 PARTS = 32
 """Parts of the array that are looked at as one where the whole does not see alike."""
 
@@ -52,16 +55,17 @@ class View:
             end = np.broadcast_to(self.sonar_pose.position, start.shape)
             return legs.select(~self._hides(start, end, legs.departure, legs.length, legs.bounces, legs.turning))
         certain = self._certain(legs, start, normal)
-        kept, rim_of = certain != CLOSED, 1 + rim(self.elements)
-        rows = np.flatnonzero(certain == UNKNOWN)
-        first = np.append(0, rim_of)
+        kept, mixed = certain != CLOSED, certain == UNKNOWN
+        rows, first = np.flatnonzero(certain >= UNKNOWN), np.append(0, 1 + rim(self.elements))
         for some in _parts(rows, len(first)):
             leg, point = np.repeat(some, len(first)), np.tile(first, len(some))
-            kept[some] = ~self._unseen(legs, start, normal, leg, point).reshape(len(some), len(first)).all(axis=1)
-        for some in _parts(rows[~kept[rows]], len(self._points)):  # what only those within the rim see
+            unseen = self._unseen(legs, start, normal, leg, point).reshape(len(some), len(first))
+            kept[some] = ~unseen.all(axis=1)
+            mixed[some] |= unseen.any(axis=1)
+        for some in _parts(np.flatnonzero(mixed & ~kept & (certain == UNKNOWN)), len(self._points)):
             kept[some] = ~self._dark(legs, start, normal, some).all(axis=1)
         none = np.zeros((np.count_nonzero(kept), 1 + self.elements.count // 8), np.uint8)
-        return legs.select(np.flatnonzero(kept)).seen(none, certain[kept] == UNKNOWN)
+        return legs.select(np.flatnonzero(kept)).seen(none, mixed[kept])
 
     def settled(self, legs: Legs, start: Floats, normal: Floats | None) -> Legs:
         """The same legs, none of them open: those that are, looked at from each hydrophone; arguments as above.
@@ -82,7 +86,7 @@ class View:
         return np.concatenate([np.zeros((1, 3)), self.elements.position if self.elements else np.empty((0, 3))])
 
     def _certain(self, legs: Legs, start: Floats, normal: Floats | None) -> Ints:
-        """(leg,) EMPTY where all hydrophones see it, CLOSED where none does; UNKNOWN elsewhere."""
+        """(leg,) EMPTY where all hydrophones see it, CLOSED where none does; elsewhere UNKNOWN or NO_CONE."""
         points = self._points
         spread = np.full(len(start), 1.001 * float(np.linalg.norm(points, axis=1).max()))
         middle = np.zeros((len(start), 3))
@@ -111,7 +115,7 @@ class View:
         ray = start[rows], end, away[rows], length[rows], spread[rows], *counts
         slope, reach, far = bundles(self.bodies, self.environment, self.bending, *ray)
         sure = np.flatnonzero(np.isfinite(slope))
-        rows = rows[sure]
+        found[rows], rows = NO_CONE, rows[sure]
         found[rows] = look(self.bodies, start[rows], away[rows], slope[sure], reach[sure], far[sure])
         return found
 
@@ -125,7 +129,7 @@ class View:
         found = self._cones(some, start[row], offset, spread, ahead)
         found = found.reshape(len(rows), len(parts.radius))[:, parts.cell]
         dark = np.asarray(found == CLOSED)
-        one, point = np.nonzero(found == UNKNOWN)
+        one, point = np.nonzero(found >= UNKNOWN)
         dark[one, point] = self._unseen(legs, start, normal, rows[one], point)
         return dark
 

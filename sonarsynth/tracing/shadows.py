@@ -77,8 +77,9 @@ def bundles(
     again, first = _near(bodies, environment, start, end, departure, bounces, bow + spread)
     whole = straight | again | ((bounces > 0) & (turning > 0))
     reach = np.where(whole, longest, np.minimum(first, longest))
-    far = 0.98 * np.where(whole, shortest, np.minimum(first - 2.0 * (bow + spread), shortest))
-    angle = _subtended(spread, length) + 0.5 * _curvature_about(profile, depth(start), reach) * reach
+    with np.errstate(invalid="ignore", over="ignore"):  # where the speed jumps, rays bend by any angle
+        far = 0.98 * np.where(whole, shortest, np.minimum(first - 2.0 * (bow + spread), shortest))
+        angle = _subtended(spread, length) + 0.5 * _curvature_about(profile, depth(start), reach) * reach
     ahead = end - start
     distance = np.linalg.norm(ahead, axis=1)
     off = np.linalg.norm(np.cross(departure, ahead), axis=1) / np.maximum(distance, 1e-300)
@@ -103,7 +104,8 @@ def _curvature_about(profile: Profile, middle: Floats, reach: Floats) -> Floats:
     if profile.uniform or len(profile.depth) < 2:
         return np.full(len(middle), _curvature(profile))
     with np.errstate(divide="ignore", invalid="ignore"):
-        bend = np.nan_to_num(np.abs(np.diff(profile.speed)) / np.diff(profile.depth)) / float(profile.speed.min())
+        bend = np.nan_to_num(np.abs(np.diff(profile.speed)) / np.diff(profile.depth), posinf=np.inf)
+    bend /= float(profile.speed.min())
     first = np.clip(np.searchsorted(profile.depth, middle - reach, "right") - 1, 0, len(bend) - 1)
     last = np.clip(np.searchsorted(profile.depth, middle + reach, "left"), first + 1, len(bend))
     most, step, level = [bend], 1, np.frexp(last - first)[1] - 1  # largest of 1, 2, 4, ... layers from each on
