@@ -115,9 +115,10 @@ def test_bent_rays_in_uniform_water_see_what_straight_ones_do(bounces: int) -> N
     assert (found[0] != found[1]).mean() < 1e-3
 
 
-@pytest.mark.parametrize("hidden", [1, 12, 40])
-def test_kernel_deposit_keeps_silent_where_the_exact_sum_does(hidden: int) -> None:
-    array = some_of(FACES, 12)
+@pytest.mark.parametrize(("hidden", "step"), [(1, 12), (12, 12), (40, 12), (12, 2)])
+def test_kernel_deposit_keeps_silent_where_the_exact_sum_does(hidden: int, step: int) -> None:
+    """Of many hydrophones, paths that miss some are synthesised one by one, of few together."""
+    array = some_of(FACES, step)
     of = partly_hidden(target_at(8.0, 40, 2, refracted=True, direct=True), hidden, array.count)
     start, samples = window(of, SONAR, array)
     exact, _ = exact_signals(of, SNAPS, array, SONAR, absorption, start, samples)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.conventions import Bools, Floats
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.sonar import Elements, Romanis, elements
 from sonarsynth.sonar.subarrays import subarray
@@ -39,7 +39,7 @@ def body(shape: Shape, place: tuple[float, float, float], *turned: float) -> Bod
     return Body("body", mesh_of(shape), Pose(np.array(place), quaternion(*turned)), np.zeros(3))
 
 
-def seen_alone(view: View, legs: Legs, start: Floats, normal: Floats, sensor: int) -> Ints:
+def seen_alone(view: View, legs: Legs, start: Floats, normal: Floats, sensor: int) -> Bools:
     """(leg,) whether a hydrophone does not see a leg, by the one ray to it."""
     assert view.elements is not None
     offset = view.sonar_pose.turn_to_world(view.elements.position[sensor])
@@ -100,7 +100,7 @@ def one_in_the_middle(array: Elements) -> Floats:
     """(xyz) in the world: of a hydrophone far from the rim and the centre of the array."""
     wanted = 0.4 * array.aperture * np.array([0.0, 0.7, 0.7])
     sensor = int(np.argmin(np.linalg.norm(array.position - wanted, axis=1)))
-    return SONAR.to_world(array.position[sensor][None])[0]
+    return np.asarray(SONAR.to_world(array.position[sensor][None])[0])
 
 
 def test_a_rod_that_hides_from_few_in_the_middle_is_found() -> None:
