@@ -243,10 +243,18 @@ def _tiles(front: Fronts, aim: Aim, missed: bool) -> list[Tile]:
     if front.count == 1:
         return [_alone(np.arange(1), front, aim)]
     views = _views(front, aim, missed)
-    best = _best(_try(np.arange(front.count), views, aim), views, aim, patient=True)
-    if missed:  # halving seldom leads to the last
-        return [one for tile in best for one in (_each(tile, front, aim) if _alone_pays(tile, front, aim) else [tile])]
-    return best
+    trial = _try(np.arange(front.count), views, aim)
+    if not missed:
+        return _best(trial, views, aim, patient=True)
+    best = [trial.tile] if _alone_pays(trial.tile, front, aim) else _best(trial, views, aim, patient=True)
+    gradient = aperture_gradient(front, _probes(aim.elements, True).points)
+    found: list[Tile] = []
+    for tile in best:  # halving seldom leads to single paths
+        alone = (
+            [_alone(path[None], front, aim, gradient) for path in tile.paths] if _alone_pays(tile, front, aim) else []
+        )
+        found += alone or [tile]
+    return found
 
 
 def _alone_pays(tile: Tile, front: Fronts, aim: Aim) -> bool:
@@ -255,18 +263,13 @@ def _alone_pays(tile: Tile, front: Fronts, aim: Aim) -> bool:
     return tile.paths.size > 1 and 2e5 * tile.paths.size + steered < tile.cost
 
 
-def _each(tile: Tile, front: Fronts, aim: Aim) -> list[Tile]:
-    """The paths of a tile one by one."""
-    return [_alone(path[None], front, aim) for path in tile.paths]
-
-
-def _alone(paths: Ints, front: Fronts, aim: Aim) -> Tile:
-    """One path is its own reference: nothing is deposited, and its directivity is all that varies."""
-    reference = front.select(paths)
-    points, size = _probes(aim.elements, True).points, _probes(aim.elements, False).size
-    bend = (
-        slopes(reference, aperture_gradient(reference, points), aim.weights[0] * aim.highest, aim.highest)[:, 0] * size
-    )
+def _alone(paths: Ints, front: Fronts, aim: Aim, gradient: Floats | None = None) -> Tile:
+    """One path is its own reference: nothing is deposited, and its directivity is all that varies; gradient: of the
+    aperture terms at all hydrophones."""
+    reference, size = front.select(paths), _probes(aim.elements, False).size
+    if gradient is None:
+        gradient = aperture_gradient(reference, _probes(aim.elements, True).points)
+    bend = slopes(reference, gradient, aim.weights[0] * aim.highest, aim.highest)[:, 0] * size
     x, y, z = (
         nodes_for(d + b, aim.weights, aim.tolerance) for d, b in zip(_drift(reference, aim), bend.tolist(), strict=True)
     )
