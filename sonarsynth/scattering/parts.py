@@ -134,6 +134,43 @@ class Rough:
         lobe, floor = self._powers(incident, scattered, patch)
         return np.sqrt(patch.area * (lobe + floor))
 
+    def _sent(
+        self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats, frequency: Floats
+    ) -> Floats:
+        """Power (frequency, ...) in m2 that is sent without phase in common."""
+        lobe, floor = self._powers(incident, scattered, patch)
+        late = self.law.roughness * dot(patch.normal, scattered - incident) / sound_speed
+        g = 2.0 * np.pi * np.multiply.outer(frequency, late)
+        return np.asarray(patch.area * (floor - lobe * np.expm1(-g * g)))
+
+    def elsewhere(
+        self,
+        incident: Floats,
+        scattered: Floats,
+        away: Floats,
+        patch: Patches,
+        sound_speed: Floats,
+        band: tuple[float, float],
+    ) -> tuple[Floats, Floats]:
+        """What is sent in directions `away` (path, direction, xyz) over that in `scattered` (path, xyz), nearly
+        gain exp(-spread (2 pi f)^2/2): gain and spread (s2) (path, direction).
+
+        Exact at two frequencies, Chebyshev's in f^2 over the band (Hz). The factor 1 - exp(-g^2) is a power of f for
+        small g and 1 for large g, and its change with direction falls smoothly with f^2 in between: of its amplitude
+        this leaves a tenth at most.
+        """
+        low, high = (f * f for f in band)
+        half = np.sqrt(0.125) * (high - low)
+        square = 0.5 * (low + high) + half * np.array([-1.0, 1.0])
+        at = patch, sound_speed, np.sqrt(square)
+        there = self._sent(incident[:, None], away, patch.over(), sound_speed[:, None], at[2])
+        here = self._sent(incident, scattered, *at)[:, :, None]
+        both = (there > 0.0).all(axis=0) & (here > 0.0).all(axis=0)
+        first, last = 0.5 * np.log(np.divide(there, here, out=np.ones_like(there), where=both))
+        slope = (last - first) / (square[1] - square[0])
+        gain = np.where(both, np.exp(first - slope * square[0]), (there[1] > 0.0) * 1.0)
+        return gain, -slope / (2.0 * np.pi**2)
+
     def pulses(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Pulses:
         """As `Part.pulses`: without the share of the power that is coherent still."""
         count, zero = len(incident), np.zeros(len(incident))

@@ -10,13 +10,18 @@ import numpy as np
 from sonarsynth.acoustics.lobes import dot
 from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.scattering import Part
-from sonarsynth.scattering.parts import Plain, Shadow, Smooth
+from sonarsynth.scattering.parts import Plain, Rough, Shadow, Smooth
 from sonarsynth.scattering.patches import Patches, Pulses, patches
 from sonarsynth.tracing.paths import Outward
 from sonarsynth.world.moment import Body
 
 if TYPE_CHECKING:
     from sonarsynth.tracing.arrivals import ArrayLegs
+
+
+TOGETHER = 10.0
+"""How much more what heights take from echoes counts, where it changes over the aperture, than means over facets do: it
+is alike on all facets, where these make up for each other (`ArrayLegs.alike`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +35,7 @@ class Group:
     incident: Floats  # (echo, xyz)
     scattered: Floats  # (echo, xyz)
     wavenumber: Floats  # (echo,) rad/m at the centre of the band
+    band: tuple[float, float]  # Hz
     amplitude: Floats  # (echo,) m
     sign: Floats  # (echo,)
 
@@ -40,8 +46,21 @@ class Group:
 
     def over(self, departure: Floats) -> Floats:
         """Amplitudes (echo, probe) in directions (echo, probe, xyz) of the world."""
+        if self._heights:
+            return np.asarray(self.amplitude[:, None] * self._elsewhere(departure)[0])
         away = self.body.pose.turn_to_body(departure)
         return self.part.amplitude(self.incident[:, None, :], away, self.patch.over(), self.wavenumber[:, None])
+
+    @property
+    def _heights(self) -> Rough | None:
+        """The part, where it is what heights scatter without phase in common."""
+        return self.part if isinstance(self.part, Rough) and self.part.law.roughness > 0.0 else None
+
+    def _elsewhere(self, departure: Floats) -> tuple[Floats, Floats]:
+        """As `Rough.elsewhere`, in directions (echo, probe, xyz) of the world."""
+        away, speed = self.body.pose.turn_to_body(departure), np.pi * sum(self.band) / self.wavenumber
+        part: Any = self.part
+        return part.elsewhere(self.incident, self.scattered, away, self.patch, speed, self.band)
 
     @property
     def tapered(self) -> Bools:
@@ -64,30 +83,47 @@ class Group:
 
     @property
     def spreads(self) -> bool:
-        """Whether echoes are means over their facets, which directions change."""
-        return isinstance(self.part, Smooth | Shadow)
+        """Whether directions change what echoes are blurred by: means over facets, or what heights scatter."""
+        return isinstance(self.part, Smooth | Shadow) or self._heights is not None
 
     def most_spread(self, late: Floats, turn: Floats, centre: float) -> Floats:
-        """Bound (echo,) on |spread|, of directions that differ by no more than `turn` (echo,).
+        """Bound (echo,) on |spread|, of directions that differ by no more than `turn` (echo,); `TOGETHER` times that
+        of heights.
 
         late (echo, 3) s: of the corners in that of the array centre; centre (Hz).
         """
+        if (heights := self._heights) is not None:
+            low, high = (2.0 * np.pi * f for f in self.band)
+            across = dot(self.patch.normal, self.scattered - self.incident)
+            square = (heights.law.roughness * across * self.wavenumber / (2.0 * np.pi * centre)) ** 2
+            left = np.minimum(square * np.exp(-0.3 * low**2 * square), 2.0 / high**2)
+            relative = turn * (1.0 / across + (heights.law.diffuse > 0.0) / heights.law.slope**2)
+            return np.asarray(TOGETHER * left * np.minimum(relative, 1.0))
         if not isinstance(self.part, Smooth | Shadow):
             return np.zeros(len(self.row))
         speed = 2.0 * np.pi * centre / self.wavenumber
         more = np.sqrt(dot(self.patch.corners, self.patch.corners)) * (turn / speed)[:, None]
         rough = self.part.law.roughness / speed if isinstance(self.part, Smooth) else 0.0
-        return np.asarray(((2.0 * np.abs(late) + more) * more).sum(axis=1) / 12.0 + rough**2 * turn * (4.0 + turn))
+        return np.asarray(((2.0 * np.abs(late) + more) * more).sum(axis=1) / 12.0 + TOGETHER * rough**2 * turn * (4.0 + turn))
 
     def spread(self, departure: Floats, centre: float) -> Floats:
         """Variance (echo, probe) in s2 of the delays of each echo in directions (echo, probe, xyz) of the world more
         than in that of the array centre; centre (Hz)."""
+        if self._heights:
+            return self._elsewhere(departure)[1]
         if not isinstance(self.part, Smooth | Shadow):
             return np.zeros(departure.shape[:2])
         away, speed = self.body.pose.turn_to_body(departure), 2.0 * np.pi * centre / self.wavenumber
         at_centre = self.part.spread(self.incident, self.scattered, self.patch, speed)
         over = self.part.spread(self.incident[:, None, :], away, self.patch.over(), speed[:, None])
         return np.asarray(over - at_centre[:, None])
+
+    @property
+    def spot(self) -> Floats:
+        """Where on its facet each echo comes from (echo, xyz) m, world, from the middle; 0 of means over facets."""
+        if not isinstance(self.part, Rough):
+            return np.zeros((len(self.row), 3))
+        return self.body.pose.turn_to_world(self.patch.spot)
 
     def pulses(self, centre: float) -> Pulses:
         """What they make of the pulse; centre (Hz)."""
@@ -110,7 +146,7 @@ def groups_of(array: ArrayLegs, out: Outward, leg: Ints, parts: tuple[tuple[Part
             patch = patches(body.mesh, not isinstance(part, Plain)).select(facet)
             amplitude = part.amplitude(incident, scattered, patch, wavenumber)
             sign = part.polarity(body.mesh)[facet]
-            group = Group(body, part, row, patch, incident, scattered, wavenumber, amplitude, sign)
+            group = Group(body, part, row, patch, incident, scattered, wavenumber, array.band, amplitude, sign)
             found.append(group.select(np.flatnonzero(amplitude)))
     return found
 

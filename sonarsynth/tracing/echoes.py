@@ -18,6 +18,7 @@ from sonarsynth.tracing.moving import Moving, carried
 from sonarsynth.tracing.paths import Outward, assemble, ordered, silence
 from sonarsynth.tracing.reflections import reflections
 from sonarsynth.tracing.shadows import hidden, overlapping
+from sonarsynth.tracing.spots import delayed_by_spots, from_spots
 from sonarsynth.tracing.variation import variations
 from sonarsynth.tracing.wavefront import FEW, Terms, probes
 from sonarsynth.world.meshes import in_blocks
@@ -125,6 +126,9 @@ def echoes(
         some = found.pop()
         over = _turned(some, most)
         over = _spread(some, over, most) if spread else over
+        spot = np.concatenate([g.spot for g in some.groups])
+        if spot.any() and not some.array.bending.uniform:
+            over = delayed_by_spots(over, some.array, some.leg, spot)
         array, out, legs = some.array, some.out, some.array.settled(some.leg)
         target, facet = array.facets.target[out.facet], array.facets.facet[out.facet]
         amplitude, sign = _columns(some.groups, "amplitude", "sign")
@@ -132,6 +136,8 @@ def echoes(
         one = assemble(legs, over, out, index, snap.time, absorption, target, facet, scattered, vary, some.pulses)
         if moving is not None:
             one = carried(one, legs, out, snap, array.sonar_pose, array.profile, moving, array.elements.aperture)
+        if spot.any() and array.bending.uniform:
+            one = from_spots(one, legs, spot, array.sonar_pose)
         made.append(replace(one, delay=one.delay + some.pulses.late))
     return ordered(made, group)
 
