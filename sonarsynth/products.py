@@ -55,7 +55,8 @@ class Arrivals:
     exact and delay_terms has no columns. Reflections on the way differ over the aperture: there the phase is phase[e] +
     phase_terms[e] @ aperture_terms(q), at every frequency, and the square of the blur is blur[e]^2 + blur_terms[e] @
     aperture_terms(q), which may be below 0: the delays over a facet, whose mean `corners` is that at the centre, have
-    another variance there.
+    another variance there, and heights of a rough facet, of which the centre's `rough_delay` tells, another echo: what
+    blur and amplitude together nearly say over the band.
     amplitude is the factor on the pressure waveform of the snap at 1 m: the product of the columns below it. Facets
     change the waveform: its spectrum is multiplied by `acoustics.facet_pulses.facet_response` of
     coherent, corners, rough_share and rough_delay, whose modulus is 1 at `centre` for a coherent facet that is small.

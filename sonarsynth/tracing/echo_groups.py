@@ -46,8 +46,8 @@ class Group:
 
     def over(self, departure: Floats) -> Floats:
         """Amplitudes (echo, probe) in directions (echo, probe, xyz) of the world."""
-        if self._heights:
-            return np.asarray(self.amplitude[:, None] * self._elsewhere(departure)[0])
+        if (heights := self._heights) is not None:
+            return np.asarray(self.amplitude[:, None] * self._elsewhere(heights, departure)[0])
         away = self.body.pose.turn_to_body(departure)
         return self.part.amplitude(self.incident[:, None, :], away, self.patch.over(), self.wavenumber[:, None])
 
@@ -56,11 +56,10 @@ class Group:
         """The part, where it is what heights scatter without phase in common."""
         return self.part if isinstance(self.part, Rough) and self.part.law.roughness > 0.0 else None
 
-    def _elsewhere(self, departure: Floats) -> tuple[Floats, Floats]:
+    def _elsewhere(self, heights: Rough, departure: Floats) -> tuple[Floats, Floats]:
         """As `Rough.elsewhere`, in directions (echo, probe, xyz) of the world."""
         away, speed = self.body.pose.turn_to_body(departure), np.pi * sum(self.band) / self.wavenumber
-        part: Any = self.part
-        return part.elsewhere(self.incident, self.scattered, away, self.patch, speed, self.band)
+        return heights.elsewhere(self.incident, self.scattered, away, self.patch, speed, self.band)
 
     @property
     def tapered(self) -> Bools:
@@ -104,13 +103,15 @@ class Group:
         speed = 2.0 * np.pi * centre / self.wavenumber
         more = np.sqrt(dot(self.patch.corners, self.patch.corners)) * (turn / speed)[:, None]
         rough = self.part.law.roughness / speed if isinstance(self.part, Smooth) else 0.0
-        return np.asarray(((2.0 * np.abs(late) + more) * more).sum(axis=1) / 12.0 + TOGETHER * rough**2 * turn * (4.0 + turn))
+        return np.asarray(
+            ((2.0 * np.abs(late) + more) * more).sum(axis=1) / 12.0 + TOGETHER * rough**2 * turn * (4.0 + turn)
+        )
 
     def spread(self, departure: Floats, centre: float) -> Floats:
         """Variance (echo, probe) in s2 of the delays of each echo in directions (echo, probe, xyz) of the world more
         than in that of the array centre; centre (Hz)."""
-        if self._heights:
-            return self._elsewhere(departure)[1]
+        if (heights := self._heights) is not None:
+            return self._elsewhere(heights, departure)[1]
         if not isinstance(self.part, Smooth | Shadow):
             return np.zeros(departure.shape[:2])
         away, speed = self.body.pose.turn_to_body(departure), 2.0 * np.pi * centre / self.wavenumber

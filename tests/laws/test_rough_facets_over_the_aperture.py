@@ -1,0 +1,191 @@
+"""Rough facets at each hydrophone: one expansion over the array against each hydrophone traced alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from sonarsynth.acoustics.arrays import aperture_terms
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.products import Arrivals
+from sonarsynth.scattering import Kirchhoff
+from sonarsynth.sonar import Elements, PositionTable, Romanis, Sonar, elements
+from sonarsynth.synthesis import KernelDeposit
+from sonarsynth.synthesis.direct_sum import exact_signals
+from sonarsynth.tracing import AutoTracing
+from sonarsynth.tracing.arrivals import trace
+from sonarsynth.tracing.wavefront import sphere
+from sonarsynth.world.environment import Absorption, Environment, Isovelocity, Profile
+from sonarsynth.world.meshes import mesh_of
+from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.shapes import Box
+from sonarsynth.world.sources import LogarithmicBubble
+
+C, DEPTH = 1500.0, 40.0
+EVEN = Profile(np.array([0.0, DEPTH]), np.array([C, C]))
+BENT = Profile(np.array([0.0, 18.0, 22.0, DEPTH]), np.array([1500.0, 1500.0, 1490.0, 1490.0]))
+WATER = Environment(depth=DEPTH, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"))
+PLACE, EAST = np.array([0.0, 0.0, -20.5]), quaternion(0.5 * np.pi)
+SONAR, FACE = Sonar(), Romanis().face
+SHAPE = elements(Romanis()).position[::6]
+FAR = np.argsort(np.linalg.norm(SHAPE, axis=1))[[-1, -2, -9, 30]]
+"""Hydrophones that are traced alone, the outmost one among them, which the aperture is measured by."""
+SINGLE = elements(PositionTable(positions=((0.0, 0.0, 0.0),), face=FACE))
+PANEL = mesh_of(Box(size=(0.02, 0.2, 0.2), edge=0.025))
+
+
+class View(NamedTuple):
+    """A panel, and the snap that lights it."""
+
+    place: tuple[float, float, float]  # m from the array
+    heading: float  # rad, of its front
+    snap: tuple[float, float, float]  # m from the array
+
+
+ROUGH = Kirchhoff(roughness=0.002, slope=0.2)
+NORMAL = View((12.0, 0.2, 0.2), np.radians(275.0), (0.5, 2.0, 1.0))
+GRAZING = View((12.0, -2.2, 0.2), np.radians(4.0), (24.0, 0.5, 1.0))
+"""At 80 degrees from the normal, within the lobe."""
+
+
+def array_of(scale: float) -> Elements:
+    return elements(PositionTable(positions=tuple(map(tuple, (scale * SHAPE).tolist())), face=FACE))
+
+
+def some_of(array: Elements, sensors: Ints) -> Elements:
+    names = ("position", "gain", "column", "row")
+    return replace(array, **{name: getattr(array, name)[sensors] for name in names})
+
+
+def traced(
+    law: Kirchhoff, view: View, place: Floats, array: Elements, profile: Profile = EVEN, bounces: int = 0
+) -> Arrivals:
+    """What the front of the panel echoes without phase in common."""
+    panel = Body("panel", PANEL, Pose(PLACE + view.place, quaternion(view.heading)), np.zeros(3))
+    snap = Snap(PLACE + view.snap, 0.0, LogarithmicBubble(), None)
+    found = trace(
+        WATER, profile, Moment(0.0, (panel,), (snap,)), Pose(place, EAST), array, 0.0, AutoTracing(bounces=bounces),
+        (law,), band=(SONAR.band.low, SONAR.band.high), negligible=0.0, enough=0.0, alike=0.0,
+    )  # fmt: skip
+    front = np.isin(found.facet, np.flatnonzero(PANEL.normal[:, 0] > 0.9))
+    return found.select(~found.direct & ~found.coherent & front)
+
+
+def heard(found: Arrivals, array: Elements, start: float) -> Floats:
+    snap = Snap(PLACE, 0.0, LogarithmicBubble(), None)
+    return exact_signals(found, (snap,), array, SONAR, None, start, 512)[0]
+
+
+def bounced(found: Arrivals, bounces: int) -> Arrivals:
+    """Of paths with so many reflections from the surface, all on the way to the array, and none from the bed."""
+    return found.select((found.surface == bounces) & (found.bottom == 0) & (found.arrives_by == bounces))
+
+
+def errors(
+    law: Kirchhoff, view: View, array: Elements, profile: Profile = EVEN, bounces: int = 0
+) -> tuple[float, float]:
+    """Of the signals, relative: of one expansion, and of that where all lose to heights what the centre does."""
+    found, plain = (
+        bounced(traced(x, view, PLACE, array, profile, bounces), bounces) for x in (law, replace(law, roughness=1.0))
+    )
+    assert len(found.delay) == len(plain.delay) > 50
+    start, part = found.delay.min() - 2e-4, some_of(array, FAR)
+    place = Pose(PLACE, EAST).to_world(array.position[FAR])
+    alone = [bounced(traced(law, view, at, SINGLE, profile, bounces), bounces) for at in place]
+    exact = np.vstack([heard(x, SINGLE, start) for x in alone])
+    shared = replace(found, amplitude_terms=plain.amplitude_terms, blur_terms=np.zeros((len(found.delay), 0)))
+    one, two = (float(np.linalg.norm(heard(x, part, start) - exact)) for x in (found, shared))
+    size = float(np.linalg.norm(exact))
+    return one / size, two / size
+
+
+VIEWS = pytest.mark.parametrize("view", [NORMAL, GRAZING], ids=["normal", "grazing"])
+
+
+@VIEWS
+@pytest.mark.parametrize("height", [0.0003, 0.002])
+def test_one_expansion_hears_what_each_hydrophone_hears_alone(view: View, height: float) -> None:
+    """Facets in full view change little by their heights over the array; grazed ones change by 8 %."""
+    mine, shared = errors(Kirchhoff(roughness=height, slope=0.2), view, array_of(1.0))
+    assert mine < 5e-4
+    assert 20.0 * mine < shared
+
+
+@VIEWS
+@pytest.mark.parametrize("height", [0.004, 0.01])
+def test_of_heights_about_a_wavelength_little_is_left(view: View, height: float) -> None:
+    """Where heights change some frequencies and not others, as the law is nearly, but not quite, a blur.
+
+    Those that are great for the waves that come down on the facet, but for few that graze it.
+    """
+    mine, shared = errors(Kirchhoff(roughness=height, slope=0.2), view, array_of(0.5))
+    assert mine < 1e-3
+    assert 2.0 * mine < shared or shared < 1e-5
+
+
+@VIEWS
+def test_the_error_falls_with_the_square_of_the_aperture(view: View) -> None:
+    """Heights well below the wavelength change all frequencies alike; without, it falls with the aperture."""
+    law = Kirchhoff(roughness=0.0003, slope=0.2)
+    (one, flat), (half, flat_half), (quarter, _) = (errors(law, view, array_of(scale)) for scale in (1.0, 0.5, 0.25))
+    assert one > 4.0 * half
+    assert half > 3.3 * quarter
+    assert flat == pytest.approx(2.0 * flat_half, rel=0.1)
+
+
+@pytest.mark.parametrize(("profile", "bounces"), [(BENT, 0), (EVEN, 1)], ids=["bent", "mirrored"])
+def test_bent_and_mirrored_waves_too(profile: Profile, bounces: int) -> None:
+    mine, shared = errors(Kirchhoff(roughness=0.002, slope=0.2), NORMAL, array_of(1.0), profile, bounces)
+    assert mine < 1e-4
+    assert 8.0 * mine < shared
+
+
+def test_a_floor_does_not_lose_to_heights() -> None:
+    """The share of the lobe in what is sent changes with direction."""
+    mine, shared = errors(Kirchhoff(roughness=0.002, slope=0.2, diffuse=0.3), GRAZING, array_of(0.5))
+    assert 10.0 * mine < shared
+
+
+@pytest.mark.parametrize(
+    ("profile", "bounces"),
+    [(EVEN, 0), (EVEN, 1), (BENT, 0), (BENT, 1)],
+    ids=["even", "mirrored", "bent", "bent and mirrored"],
+)
+def test_echoes_come_from_their_points(profile: Profile, bounces: int) -> None:
+    """Path by path, when each is heard: from the middles of these facets it would be up to 4e-7 s off."""
+    law, array = Kirchhoff(roughness=0.002, slope=0.2, diffuse=0.5), array_of(1.0)
+    found = bounced(traced(law, NORMAL, PLACE, array, profile, bounces), bounces)
+    place = Pose(PLACE, EAST).to_world(array.position[FAR])
+    for at, q in zip(place, array.position[FAR], strict=True):
+        alone = bounced(traced(law, NORMAL, at, SINGLE, profile, bounces), bounces)
+        a, b = (np.lexsort((np.round(x.delay, 5), x.facet)) for x in (found, alone))
+        assert (found.facet[a] == alone.facet[b]).all()
+        late = found.delay + sphere(found.direction, found.radius, q[None])[:, 0] / found.sound_speed
+        if found.delay_terms.shape[1]:
+            late = late + found.delay_terms @ aperture_terms(q, array.aperture)
+        error = late[a] - alone.delay[b]
+        assert np.abs(error).max() < 1e-10
+
+
+def test_the_fast_synthesis_follows_rough_facets_over_the_array() -> None:
+    found, array = traced(ROUGH, GRAZING, PLACE, array_of(1.0)), array_of(1.0)
+    assert found.blur_terms.any()
+    start, snap = found.delay.min() - 2e-4, Snap(PLACE, 0.0, LogarithmicBubble(), None)
+    exact = heard(found, array, start)
+    for tolerance, most in ((1.5e-4, 2e-4), (1e-6, 3e-6)):
+        method = KernelDeposit(width=10, precision="float64", tolerance=tolerance)
+        got, _ = method.pressure(found, (snap,), array, SONAR, None, start, 512)
+        assert np.abs(got - exact).max() < most * np.abs(exact).max()
+
+
+def test_surfaces_that_are_not_rough_have_no_such_terms() -> None:
+    """What is diffuse alone, or so rough that heights lose nothing, is as it was; nor is it asked for where it is
+    little."""
+    for law in (Kirchhoff(diffuse=1.0), Kirchhoff(roughness=0.3, slope=0.2)):
+        found = traced(law, NORMAL, PLACE, array_of(1.0))
+        assert len(found.delay) > 50
+        assert not found.blur_terms.any()
