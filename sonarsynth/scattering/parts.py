@@ -72,13 +72,28 @@ class Smooth:
     """
 
     law: Kirchhoff
+    beyond: bool = False
+    """Whether the amplitude goes on, below 0 perhaps, where a facet is lit but not seen: for arrays of which some
+    hydrophones see it, and are told from those that do not."""
 
     def amplitude(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
         """As `Part.amplitude`: |V| k A n.(ks - ki)/(4 pi), by the factor `Kirchhoff.lit`."""
+        if self.beyond:
+            return self._beyond(incident, scattered, patch, wavenumber)
         across = dot(patch.normal, scattered - incident)
         lit = self.law.lit(incident, scattered, patch.normal, patch.curved)
         mirrored = np.abs(reflection(self.law, incident, scattered)) * np.sqrt(1.0 - self.law.diffuse)
         return np.where(lit > 0.0, lit * mirrored * wavenumber * patch.area * across / (4.0 * np.pi), 0.0)
+
+    def _beyond(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
+        """The same, going on in n.ks past where facets are seen: of those that taper to 0 as an odd function, which is
+        bounded; its bend there is least where it falls least steeply, and those that the snap grazes as well are
+        faint."""
+        inward, outward = np.maximum(-dot(patch.normal, incident), 0.0), dot(patch.normal, scattered)
+        both = np.where(inward > 0.0, inward + np.abs(outward), 1.0)
+        across = np.where(self.tapers(patch), 4.0 * inward * outward / both, inward + outward)
+        mirrored = np.abs(reflection(self.law, incident, scattered)) * np.sqrt(1.0 - self.law.diffuse)
+        return np.where(inward > 0.0, mirrored * wavenumber * patch.area * across / (4.0 * np.pi), 0.0)
 
     def pulses(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Pulses:
         """As `Part.pulses`: differentiated, and a mean over the facet; blurred by roughness."""

@@ -135,6 +135,7 @@ class Group:
 def groups_of(array: ArrayLegs, out: Outward, leg: Ints, parts: tuple[tuple[Part, ...], ...]) -> list[Group]:
     """Echoes of pairs of a way and a leg (pair,), by body and part; those that are nothing are left out."""
     facets, found = array.facets, []
+    looked_for = array.visibility == "hydrophones" and array.elements.count > 1
     target = facets.target[out.facet]
     for number, (body, of_law) in enumerate(zip(array.bodies, parts, strict=True)):
         row = np.flatnonzero(target == number)
@@ -143,7 +144,7 @@ def groups_of(array: ArrayLegs, out: Outward, leg: Ints, parts: tuple[tuple[Part
         scattered = body.pose.turn_to_body(array.legs.departure[leg[row]])
         speed = array.profile.at(depth(array.legs.point[leg[row]]))
         wavenumber = 2.0 * np.pi * array.centre / speed
-        for part in of_law:
+        for part in (replace(p, beyond=True) if looked_for and isinstance(p, Smooth) else p for p in of_law):
             patch = patches(body.mesh, not isinstance(part, Plain)).select(facet)
             amplitude = part.amplitude(incident, scattered, patch, wavenumber)
             sign = part.polarity(body.mesh)[facet]

@@ -1,0 +1,110 @@
+"""Facets at the limb of a body, which some hydrophones see and others do not: one expansion against each alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sonarsynth.acoustics.arrays import aperture_terms
+from sonarsynth.conventions import Floats
+from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.products import Arrivals
+from sonarsynth.scattering import Kirchhoff, PartlyReflecting
+from sonarsynth.scattering.parts import Smooth
+from sonarsynth.scattering.patches import patches
+from sonarsynth.sonar import Elements, PositionTable, Romanis, Sonar, elements
+from sonarsynth.synthesis.direct_sum import exact_signals
+from sonarsynth.tracing import AutoTracing, Visibility
+from sonarsynth.tracing.arrivals import trace
+from sonarsynth.world.environment import Absorption, Environment, Isovelocity, Profile
+from sonarsynth.world.meshes import mesh_of
+from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.shapes import Sphere
+from sonarsynth.world.sources import LogarithmicBubble
+
+C = 1500.0
+PROFILE = Profile(np.array([0.0]), np.array([C]))
+WATER = Environment(depth=200.0, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"))
+PLACE, EAST = np.array([0.0, 0.0, -100.0]), quaternion(0.5 * np.pi)
+SONAR, FACE = Sonar(), Romanis().face
+BALL = mesh_of(Sphere(radius=0.08, edge=0.008))
+SNAP = Snap(PLACE + [4.0, 6.0, 1.0], 0.0, LogarithmicBubble(), None)
+ARRAY = elements(PositionTable(positions=tuple(map(tuple, elements(Romanis()).position[::6].tolist())), face=FACE))
+FAR = np.argsort(np.linalg.norm(ARRAY.position, axis=1))[[-1, -2, 30]]
+SINGLE = elements(PositionTable(positions=((0.0, 0.0, 0.0),), face=FACE))
+FLUID = PartlyReflecting(density_ratio=1.5, speed_ratio=1.2)
+LAWS = [(Kirchhoff(), 5.0), (Kirchhoff(edges="sharp"), 50.0), (Kirchhoff(surface=FLUID, roughness=0.001), 5.0)]
+ROWS = ("position", "gain", "column", "row")
+
+
+def traced(law: Kirchhoff, place: Floats, array: Elements, visibility: Visibility = "hydrophones") -> Arrivals:
+    """Coherent echoes of a ball 8 m ahead, lit from the side."""
+    ball = Body("ball", BALL, Pose(PLACE + [8.0, 0.3, 0.2], EAST), np.zeros(3))
+    found = trace(
+        WATER, PROFILE, Moment(0.0, (ball,), (SNAP,)), Pose(place, EAST), array, 0.0, AutoTracing(), (law,),
+        band=(SONAR.band.low, SONAR.band.high), negligible=0.0, enough=0.0, alike=0.0, visibility=visibility,
+    )  # fmt: skip
+    return found.select(found.coherent)
+
+
+def heard(found: Arrivals, array: Elements, start: float) -> Floats:
+    return exact_signals(found, (SNAP,), array, SONAR, None, start, 512)[0]
+
+
+def alone(law: Kirchhoff, sensor: int) -> Arrivals:
+    return traced(law, Pose(PLACE, EAST).to_world(ARRAY.position[sensor][None])[0], SINGLE)
+
+
+@pytest.mark.parametrize(("law", "better"), LAWS)
+def test_one_expansion_hears_what_each_hydrophone_sees(law: Kirchhoff, better: float) -> None:
+    found, centre = (traced(law, PLACE, ARRAY, visibility) for visibility in ("hydrophones", "centre"))
+    start, part = found.delay.min() - 2e-4, replace(ARRAY, **{n: getattr(ARRAY, n)[FAR] for n in ROWS})
+    assert found.hidden(ARRAY.count)[:, FAR].any()
+    exact = np.vstack([heard(alone(law, int(n)), SINGLE, start) for n in FAR])
+    mine, plain = (np.linalg.norm(heard(x.heard_by(FAR, ARRAY.count), part, start) - exact) for x in (found, centre))
+    assert mine < 3e-4 * np.linalg.norm(exact)
+    assert better * mine < plain
+
+
+def test_facets_that_the_centre_does_not_see_are_heard_where_they_are_seen() -> None:
+    """Facet by facet: amplitudes where each is seen, those of a hydrophone alone; below 0 where it is not.
+
+    Least alike are those that the snap grazes as well: their amplitudes turn within the array."""
+    found, scale = traced(Kirchhoff(), PLACE, ARRAY), aperture_terms(ARRAY.position[FAR], ARRAY.aperture)
+    beyond = found.hidden_from[:, 0] >= 128
+    assert (found.amplitude[beyond] < 0.0).all()
+    assert (found.amplitude[~beyond] > 0.0).all()
+    assert not found.at_centre.hidden_from.any()
+    for n, sensor in enumerate(FAR):
+        exact = alone(Kirchhoff(), int(sensor))
+        away = found.radius[:, None] * found.direction - ARRAY.position[sensor]
+        mine = found.amplitude * (1.0 + found.amplitude_terms @ scale[n]) * found.radius / np.linalg.norm(away, axis=1)
+        seen = ~found.hidden(ARRAY.count)[:, sensor]
+        assert set(found.facet[seen]) == set(exact.facet)
+        at = dict(zip(exact.facet, exact.amplitude, strict=True))
+        error = np.abs(mine[seen] - [at[f] for f in found.facet[seen]]) / exact.amplitude.max()
+        assert np.sqrt((error**2).mean()) < 1e-3
+        assert error.max() < 1e-2
+    assert beyond.sum() > 3
+
+
+@pytest.mark.parametrize("law", [Kirchhoff(), Kirchhoff(edges="sharp"), Kirchhoff(surface=FLUID)])
+def test_amplitudes_go_on_from_those_that_are_seen(law: Kirchhoff) -> None:
+    """The same where a facet is lit and seen, continuous past that in value and slope, and 0 where it is not lit."""
+    whole = patches(BALL)
+    patch, count = whole.select(np.zeros(401, int)), 401
+    normal = patch.normal[0]
+    side = np.cross(normal, [0.0, 0.0, 1.0])
+    side /= np.linalg.norm(side)
+    angle = np.linspace(0.3, -0.3, count)[:, None]  # rad above the plane of the facet
+    scattered = np.cos(angle) * side + np.sin(angle) * normal
+    incident = np.broadcast_to(0.8 * side - 0.6 * normal, (count, 3))
+    wavenumber = np.full(count, 200.0)
+    plain, goes_on = (Smooth(law, b).amplitude(incident, scattered, patch, wavenumber) for b in (False, True))
+    seen = scattered @ normal > 0.0
+    assert goes_on[seen] == pytest.approx(plain[seen], rel=1e-12)
+    assert not plain[~seen].any()
+    assert np.abs(np.diff(goes_on, 2)).max() < 1e-3 * np.abs(goes_on).max()
+    assert not Smooth(law, True).amplitude(-incident, scattered, patch, wavenumber).any()
