@@ -56,7 +56,8 @@ class Arrivals:
     phase_terms[e] @ aperture_terms(q), at every frequency, and the square of the blur is blur[e]^2 + blur_terms[e] @
     aperture_terms(q), which may be below 0: the delays over a facet, whose mean `corners` is that at the centre, have
     another variance there, and heights of a rough facet, of which the centre's `rough_delay` tells, another echo: what
-    blur and amplitude together nearly say over the band.
+    blur and amplitude together nearly say over the band. What moves is seen from another side there: the stretch is
+    stretch[e] + stretch_terms[e] @ aperture_terms(q).
     amplitude is the factor on the pressure waveform of the snap at 1 m: the product of the columns below it. Facets
     change the waveform: its spectrum is multiplied by `acoustics.facet_pulses.facet_response` of
     coherent, corners, rough_share and rough_delay, whose modulus is 1 at `centre` for a coherent facet that is small.
@@ -89,6 +90,7 @@ class Arrivals:
     blur: Floats  # (path,) s: roughness takes exp(-(2 pi f blur)^2/2) off the spectrum, a Gaussian in time
     echo_blur: Floats  # (path,) s: the part of blur that is the facet's, blur^2 the sum of its square and boundaries'
     stretch: Floats  # (path,) Doppler: the pulse is p((t - delay)/(1 + stretch))
+    stretch_terms: Floats  # (path, term); (path, 0) where all hydrophones have the Doppler of the centre
     coherent: Bools  # (path,) of a smooth facet, or its shadow: differentiated, i f/centre; phases count in sums
     corners: Floats  # (path, 3) s: of the facet about `delay`, a mean over it; 0: a point
     rough_share: Floats  # (path,) w: of the power that is coherent where it is smooth

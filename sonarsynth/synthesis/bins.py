@@ -16,6 +16,7 @@ from sonarsynth.synthesis.changing import (
     UNCHANGING,
     Changes,
     changes,
+    widest_bend,
     widest_spread,
     widest_turn,
     with_changes,
@@ -24,7 +25,7 @@ from sonarsynth.synthesis.direct_sum import relative_absorption
 from sonarsynth.synthesis.layout import Stretch
 from sonarsynth.synthesis.nodes import rounded_up
 from sonarsynth.synthesis.pulse import at_longest, pulse_spectrum, stretch_sizes, stretched_spectra
-from sonarsynth.synthesis.shapes import MOST_PHASE, blur_exponent, shape_modes, stretched
+from sonarsynth.synthesis.shapes import MOST_PHASE, bending, blur_exponent, shape_modes, stretched
 from sonarsynth.synthesis.wavefront import Fronts
 
 SHAPES = 0.02
@@ -72,13 +73,14 @@ def bins_of(
     frequency, spectrum = pulse_spectrum(part.waveform, sonar.antialias, fs, part.samples)
     slope = np.asarray(1j * frequency / front.centre if part.coherent else 1.0)
     spectrum = spectrum * slope
-    widest = rounded_up(float(np.abs(front.doppler).max()), 2.0)
+    widest = rounded_up(float((np.abs(front.doppler) + widest_bend(front)).max()), 2.0)
     series = np.zeros((0, spectrum.size), complex)
     if widest > 0.0:
         sizes = np.array(stretch_sizes(at_longest(part.waveform), sonar.antialias, widest, part.coherent))
         left = np.append(np.cumsum(sizes[::-1])[::-1], 0.0)
         count = int(np.flatnonzero(left <= SHAPES * tolerance)[0])
         series = slope * stretched_spectra(part.waveform, sonar.antialias, fs, part.samples, widest, count)
+        front = _bent(front, spectrum, series, widest, tolerance)
     if len(series) or _shaped(front):
         front, spectrum, series = _shared(front, frequency, spectrum, series, widest, tolerance)
     some = audible(spectrum, tolerance)
@@ -115,6 +117,17 @@ def _changing(front: Fronts, highest: Floats, tolerance: float) -> Fronts:
     return replace(front, turn_terms=turn_terms, spread_terms=spread_terms)
 
 
+def _bent(front: Fronts, spectrum: ComplexArray, series: ComplexArray, widest: float, tolerance: float) -> Fronts:
+    """Paths without what their Doppler changes by over the aperture, where that is nothing beside the loudest."""
+    if not front.bend_terms.shape[1]:
+        return front
+    loud, longer = np.abs(front.amplitude), widest_bend(front)
+    slope = bending(series, front.doppler[:1] / widest) @ series / widest
+    rate = float(np.abs(slope).sum() / np.abs(spectrum).sum())
+    size = max(np.linalg.norm(loud * longer) / np.linalg.norm(loud), (loud * longer).max() / loud.max())
+    return front if rate * size > SHAPES * tolerance else replace(front, bend_terms=front.bend_terms[:, :0])
+
+
 def _check_corners(front: Fronts, highest: float) -> None:
     """Raise ValueError where a facet is too large for the series in its corners."""
     longest = MOST_PHASE / (2.0 * np.pi * highest)
@@ -144,12 +157,13 @@ def _with_modes(
         front, spectrum, series = replace(front, loss=front.loss - middle), spectrum * lost, series * lost
     else:
         decay = np.zeros(frequency.size)
-    every = with_changes(front) if front.count > 1 else front
-    weight, modes = shape_modes(every, frequency, spectrum, decay, series, widest, SHAPES * tolerance)
-    weight = weight[: front.count]
+    bent = front.count if len(series) and front.bend_terms.shape[1] else 0
+    every = with_changes(front) if front.count > 1 or bent else front
+    weight, modes, bends = shape_modes(every, frequency, spectrum, decay, series, widest, SHAPES * tolerance, bent)
+    weight, bends = weight[: front.count], bends[: front.count]
     if front.corners.any() or front.rough_share.any():
         spectrum = modes[0]  # what paths mostly send: the colour of the errors
-    return replace(front, modes=weight, loss=np.zeros(front.count) if few else front.loss), spectrum, modes
+    return replace(front, modes=weight, bends=bends, loss=np.zeros(front.count) if few else front.loss), spectrum, modes
 
 
 def _shared(
@@ -158,12 +172,13 @@ def _shared(
     """Paths without the shape that all share, and the spectrum with it; and the series in Doppler, empty where all
     share that."""
     if len(series):
-        low, high = float(front.doppler.min()), float(front.doppler.max())
+        longer = widest_bend(front)
+        low, high = float((front.doppler - longer).min()), float((front.doppler + longer).max())
         spectrum = (stretched(series, np.array([0.5 * (low + high) / widest])) @ series)[0]
         # the ends of a smooth series differ most
         bend = stretched(series, np.array([low, high]) / widest) @ series
         if np.abs(bend[1] - bend[0]).sum() <= SHAPES * tolerance * np.abs(spectrum).sum():
-            series = series[:0]
+            series, front = series[:0], replace(front, bend_terms=front.bend_terms[:, :0])
     least = float(front.variance.min())
     spread = float(front.variance.max()) - least
     if least > 0.0:

@@ -5,6 +5,7 @@ At a point of the aperture a path has the phase and the variance of its blur
 both polynomials (`acoustics.arrays.aperture_terms`). The modes of its pulse (`shapes`) change with them: by the cosine
 and the sine of turn, times its modes and those of the pulse a quarter of a period ahead; and by powers of spread, times
 those of the pulse times powers of -(2 pi f)^2/2. What all paths of a tile share of it the field of the tile takes.
+Doppler is seen from another side too: of doppler + bend, the first power of bend counts, with weights of their own.
 """
 
 from __future__ import annotations
@@ -51,6 +52,16 @@ def widest_spread(front: Fronts) -> Floats:
     return np.asarray(np.abs(front.spread_terms).sum(axis=1))
 
 
+def widest_bend(front: Fronts) -> Floats:
+    """Bound (path,) on |bend| over the aperture."""
+    return np.asarray(np.abs(front.bend_terms).sum(axis=1))
+
+
+def bend(front: Fronts, points: Floats) -> Floats:
+    """Doppler (path, point) at points (point, xyz), over that at the centre."""
+    return np.asarray(front.bend_terms @ aperture_terms(points, front.aperture)[:, : front.bend_terms.shape[1]].T)
+
+
 def turn_and_spread(front: Fronts, points: Floats) -> tuple[Floats, Floats]:
     """Turn (rad) and spread (s2), (path, point) each, at points (point, xyz)."""
     basis = aperture_terms(points, front.aperture).T
@@ -68,7 +79,8 @@ def changed(front: Fronts, points: Floats, frequency: Floats) -> ComplexArray:
 
 def aperture_gradient(front: Fronts, points: Floats) -> Floats:
     """Gradient (xyz, point, term) of the aperture terms at points (point, xyz); empty where no front has such terms."""
-    if not (front.delay_terms.shape[1] or front.turn_terms.shape[1] or front.spread_terms.shape[1]):
+    every = front.delay_terms, front.turn_terms, front.spread_terms, front.bend_terms
+    if not any(terms.shape[1] for terms in every):
         return np.zeros((3, 0, 0))
     steps = 1e-4 * front.aperture * np.eye(3)
     sides = [[aperture_terms(points + way * step, front.aperture) for way in (1, -1)] for step in steps]
@@ -88,25 +100,32 @@ def slopes(front: Fronts, gradient: Floats, lowest: float, highest: float) -> Fl
     ):
         if terms.shape[1]:
             total += scale * np.abs(np.einsum("et,ipt->ipe", terms, gradient)).max(axis=1)
+    if front.bends.shape[1]:
+        share = np.linalg.norm(front.bends, axis=1) / np.maximum(np.linalg.norm(front.modes, axis=1), 1e-300)
+        steep = np.abs(np.einsum("et,ipt->ipe", front.bend_terms, gradient)).max(axis=1)
+        total += highest / lowest * share * steep
     return total
 
 
 def with_changes(front: Fronts) -> Fronts:
     """Paths, and after them the loudest of those that change, as they are elsewhere on the aperture: more and less
-    blurred, and as loud as what turns, a quarter of a period ahead."""
-    turn, spread, loud = widest_turn(front), widest_spread(front), np.abs(front.amplitude)
+    blurred, more and less stretched, and as loud as what turns, a quarter of a period ahead."""
+    turn, spread, longer = widest_turn(front), widest_spread(front), widest_bend(front)
+    loud = np.abs(front.amplitude)
     parts = [np.arange(front.count)]
-    parts += [_loudest(loud * (spread > 0.0))] * 2 + [_loudest(loud * turn)]
+    parts += [_loudest(loud * (spread > 0.0))] * 2 + [_loudest(loud * turn)] + [_loudest(loud * (longer > 0.0))] * 2
     count = [part.size for part in parts]
     every = front.select(np.concatenate(parts))
-    way = np.repeat([0.0, 1.0, -1.0, 0.0], count)
-    ahead = np.repeat([0.0, 0.0, 0.0, 1.0], count)
+    way = np.repeat([0.0, 1.0, -1.0, 0.0, 0.0, 0.0], count)
+    ahead = np.repeat([0.0, 0.0, 0.0, 1.0, 0.0, 0.0], count)
+    bent = np.repeat([0.0, 0.0, 0.0, 0.0, 1.0, -1.0], count)
     size = np.where(ahead > 0.0, np.minimum(widest_turn(every), 1.0), 1.0)
     return replace(
         every,
         amplitude=every.amplitude * size,
         variance=every.variance + way * widest_spread(every),
         phase=every.phase + 0.5 * np.pi * ahead,
+        doppler=every.doppler + bent * widest_bend(every),
     )
 
 
@@ -140,6 +159,7 @@ class Rest(NamedTuple):
     spread_terms: Floats  # (term,) s2
     which: Ints  # (some,) changes that count
     size: Floats  # (some, path) bounds on how much there is of each in some paths of the tile
+    bent: bool  # whether their Doppler's change counts
     paths: Ints  # (path,) those
 
 
@@ -148,16 +168,29 @@ def rest(front: Fronts, paths: Ints, found: Changes, tolerance: float) -> Rest:
     loudest."""
     none = np.zeros(0)
     some = paths[:: max(1, paths.size // LOUDEST)]
+    loud, weight = np.abs(front.amplitude[some]), front.modes[some]
+    bent = front.bends.shape[1] > 0 and _counts(_bent(front, some), loud * np.linalg.norm(weight, axis=1), tolerance)
     if not found.kinds:
-        return Rest(none, none, np.zeros(0, int), np.zeros((0, some.size)), some)
+        return Rest(none, none, np.zeros(0, int), np.zeros((0, some.size)), bent, some)
     turn, turned = _middle(front.turn_terms, some)
     spread, softer = _middle(front.spread_terms, some)
     share = np.array([np.minimum(turned, 1.0) ** a * (softer * found.rate) ** p for p, a in found.kinds])
-    loud, weight = np.abs(front.amplitude[some]), front.modes[some]
     size = np.sqrt((np.tensordot(weight, found.onto, (1, 1)) ** 2).sum(axis=2)).T * share * loud
     mean = np.sqrt((size**2).sum(axis=1) / (loud**2).sum())
     which = np.flatnonzero(np.maximum(mean, size.max(axis=1) / loud.max()) > tolerance)
-    return Rest(turn, spread, which, share[which], some)
+    return Rest(turn, spread, which, share[which], bent, some)
+
+
+def _bent(front: Fronts, some: Ints) -> Floats:
+    """Bounds (path,) on what Doppler's change over the aperture adds to some paths."""
+    size = np.linalg.norm(front.bends[some], axis=1) * np.abs(front.amplitude[some])
+    return np.asarray(size * np.abs(front.bend_terms[some]).sum(axis=1))
+
+
+def _counts(size: Floats, loud: Floats, tolerance: float) -> bool:
+    """Whether what adds up to `size` (path,) is more than `tolerance` of all together, or of the loudest."""
+    mean = np.linalg.norm(size) / max(float(np.linalg.norm(loud)), 1e-300)
+    return bool(max(mean, size.max(initial=0.0) / max(float(loud.max(initial=0.0)), 1e-300)) > tolerance)
 
 
 def pulses(front: Fronts, paths: Ints, over: Rest, found: Changes) -> tuple[Floats, Floats]:
@@ -166,6 +199,9 @@ def pulses(front: Fronts, paths: Ints, over: Rest, found: Changes) -> tuple[Floa
     for change, size in zip(over.which, over.size, strict=True):
         weight.append(front.modes[over.paths] @ found.onto[change])
         loud.append(np.abs(front.amplitude[over.paths]) * size)
+    if over.bent:
+        weight.append(front.bends[over.paths])
+        loud.append(np.abs(front.amplitude[over.paths]) * widest_bend(front)[over.paths])
     return np.concatenate(weight), np.concatenate(loud)
 
 
@@ -178,10 +214,14 @@ def _middle(terms: Floats, some: Ints) -> tuple[Floats, Floats]:
     return mean, np.asarray(np.abs(value - mean).sum(axis=1))
 
 
-def shares(front: Fronts, reference: Fronts, which: Ints, found: Changes, points: Floats, dtype: str) -> Floats:
-    """How much there is of pulses and of each change that counts, (1 + some, point, path), beside the reference."""
+def shares(
+    front: Fronts, reference: Fronts, which: Ints, bent: bool, found: Changes, points: Floats, dtype: str
+) -> Floats:
+    """How much there is of pulses and of each change that counts, (1 + some, point, path), beside the reference; the
+    change of Doppler comes last, if it is `bent`."""
+    longer = [bend(front, points).T.astype(dtype)] if bent else []
     if not which.size:
-        return np.zeros((0, 0, 0), dtype)
+        return np.array([np.ones_like(longer[0]), *longer]) if bent else np.zeros((0, 0, 0), dtype)
     turn, spread = (value.T for value in turn_and_spread(front, points))
     own, softer = turn_and_spread(reference, points)
     turn, spread = (turn - own[0][:, None]).astype(dtype), ((spread - softer[0][:, None]) * found.rate).astype(dtype)
@@ -190,4 +230,5 @@ def shares(front: Fronts, reference: Fronts, which: Ints, found: Changes, points
         quarter = np.cos(turn), np.sin(turn)
     else:
         quarter = np.ones_like(turn), turn
-    return np.array([quarter[ahead] * spread**power if power else quarter[ahead] for power, ahead in kinds])
+    found_shares = [quarter[ahead] * spread**power if power else quarter[ahead] for power, ahead in kinds]
+    return np.array(found_shares + longer)

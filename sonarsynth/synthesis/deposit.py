@@ -14,7 +14,7 @@ from sonarsynth.acoustics.spectra import kaiser_bessel, kaiser_bessel_beta, kais
 from sonarsynth.conventions import Floats
 from sonarsynth.sonar import Elements
 from sonarsynth.synthesis.bins import Bins
-from sonarsynth.synthesis.changing import Changes, changed, shares
+from sonarsynth.synthesis.changing import Changes, bend, changed, shares
 from sonarsynth.synthesis.expansion import colour, face_pairs, recipe, sinc_polynomials
 from sonarsynth.synthesis.interpolating import to_sensors
 from sonarsynth.synthesis.nodes import DEGREES, Axis, chebyshev, interpolation, nodes_for, polynomials_for
@@ -135,7 +135,10 @@ def _add_tile(heard: npt.NDArray[Any], tile: Tile, part: Fronts, stage: Stage) -
 def _alone(tile: Tile, part: Fronts, points: Floats, stage: Stage) -> npt.NDArray[Any]:
     """The field (node, 2, bin) of one path that everything is steered to: that of the snap, through its face."""
     faces = _faces(tile, points, stage)
-    response = _responses(part.modes, stage)
+    weight = part.modes
+    if part.bends.shape[1]:
+        weight = weight + bend(part, points).T * part.bends
+    response = _responses(weight, stage)
     return np.asarray(faces * _power(tile, stage, np.ones(1)) * response)
 
 
@@ -176,7 +179,7 @@ def _deposits(table: Floats, part: Fronts, tile: Tile, nodes: Floats, some: slic
     steer, _ = delay_and_gain(reference, points)
     middle, level = towards(reference, points)
     late = louder = np.zeros((0, 0))
-    share = shares(part, reference, tile.changes, stage.bins.changes, points, stage.dtype)
+    share = shares(part, reference, tile.changes, tile.bent, stage.bins.changes, points, stage.dtype)
     if part.delay_terms.shape[1]:
         late = (aperture_terms(points, part.aperture) @ part.delay_terms.T) * rate
     if part.gain_terms.shape[1]:
@@ -216,7 +219,8 @@ def _packed(part: Fronts, tile: Tile, found: Changes, position: Floats) -> Float
     loss = (part.loss - tile.reference.loss) / (tile.deviation[2] or 1.0)
     onto = tile.modes[:, : max(term[3] for term in tile.terms) + 1]
     modes = np.concatenate([onto, *(found.onto[change] @ onto for change in tile.changes)], axis=1)
-    values = (*part.direction.T, part.curvature, position, part.amplitude, loss, *(part.modes @ modes).T)
+    bent = (part.bends @ onto).T if tile.bent else ()
+    values = (*part.direction.T, part.curvature, position, part.amplitude, loss, *(part.modes @ modes).T, *bent)
     blocks = -(-part.count // BLOCK)
     rows = np.zeros((len(values), blocks * BLOCK))
     rows[0] = 1.0

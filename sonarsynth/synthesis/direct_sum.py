@@ -13,7 +13,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.description import description
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.sonar import Elements, Sonar
-from sonarsynth.synthesis.changing import changed
+from sonarsynth.synthesis.changing import bend, changed
 from sonarsynth.synthesis.layout import fast_length, layout
 from sonarsynth.synthesis.pulse import pulse_spectrum
 from sonarsynth.synthesis.wavefront import Fronts, delay_and_gain, fronts, lost, reach, towards
@@ -60,6 +60,12 @@ def exact_spectra(front: Fronts, elements: Elements, frequency: Floats, relative
             face * loss * shape * np.exp(-2j * np.pi * late[:, None] * frequency)
         )
     return total
+
+
+def through(before: np.ndarray, at: np.ndarray, after: np.ndarray, x: Floats) -> np.ndarray:
+    """The parabola (sensor, bin) through values (bin,) at -1, 0 and 1, at x (sensor,)."""
+    slope, curve = 0.5 * (after - before), 0.5 * (after - 2.0 * at + before)
+    return np.asarray(at + np.multiply.outer(x, slope) + np.multiply.outer(x * x, curve))
 
 
 @description
@@ -110,6 +116,19 @@ def exact_signals(
             frequency, spectrum = pulse_spectrum(waveform, sonar.antialias, fs, length, float(doppler))
             relative = relative_absorption(absorption, frequency, sonar.band.centre)
             some = front.select(rows[front.doppler[rows] == doppler])
-            transfer = exact_spectra(some, elements, frequency, relative, start - spread / fs)
-            pressure += np.fft.irfft(transfer * spectrum, length)[:, spread : spread + samples] * fs
+            if not some.bend_terms.any():
+                transfer = exact_spectra(some, elements, frequency, relative, start - spread / fs)
+                pressure += np.fft.irfft(transfer * spectrum, length)[:, spread : spread + samples] * fs
+                continue
+            for e in range(some.count):
+                one = some.select(np.array([e]))
+                more = bend(one, elements.position)[0]
+                widest = float(np.abs(more).max(initial=1e-12))
+                ends = [
+                    pulse_spectrum(waveform, sonar.antialias, fs, length, float(doppler) + way * widest)[1]
+                    for way in (-1.0, 1.0)
+                ]
+                each = through(ends[0], spectrum, ends[1], more / widest)
+                transfer = exact_spectra(one, elements, frequency, relative, start - spread / fs)
+                pressure += np.fft.irfft(transfer * each, length)[:, spread : spread + samples] * fs
     return pressure, Signals(pressure.astype(np.float32), start, fs, 0.0, 0, plan.outside)

@@ -29,7 +29,7 @@ LONGEST_CORNER = 0.01
 
 FINITE = (
     *("delay", "direction", "amplitude", "absorption", "delay_terms", "amplitude_terms", "phase", "blur", "stretch"),
-    *("phase_terms", "blur_terms", "corners", "rough_share", "rough_delay"),
+    *("phase_terms", "blur_terms", "stretch_terms", "corners", "rough_share", "rough_delay"),
 )
 """What of the arrivals must be finite."""
 
@@ -47,6 +47,7 @@ class Fronts:
     gain_terms: Floats  # (path, term)
     turn_terms: Floats  # (path, term) rad: phase over that at the centre
     spread_terms: Floats  # (path, term) s2: variance over that at the centre
+    bend_terms: Floats  # (path, term) doppler over that at the centre
     sound_speed: float  # m/s
     aperture: float  # m: scale of the terms
     phase: Floats  # (path,) rad, -pi/2 to pi/2: whole half turns are signs of the amplitude
@@ -58,6 +59,7 @@ class Fronts:
     rough_delay: Floats  # (path,) s: of `facet_pulses.rough_factor`
     dark: Bools  # (path, sensor) hydrophones that a path does not reach; (path, 0): it reaches all
     modes: Floats  # (path, mode) weights of the modes of a stretch of time (`shapes`); none as yet
+    bends: Floats  # (path, mode) what they change by for each unit of doppler more; none as yet
     centre: float  # Hz, where the amplitudes hold
     attenuation: float = 0.0  # dB/m there: absorption of what the way to a hydrophone is longer than to the centre
 
@@ -110,6 +112,7 @@ def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements, atte
         gain_terms=arrivals.amplitude_terms,
         turn_terms=arrivals.phase_terms,
         spread_terms=arrivals.blur_terms,
+        bend_terms=arrivals.stretch_terms,
         sound_speed=arrivals.sound_speed,
         aperture=elements.aperture or 1.0,
         phase=phase,
@@ -121,6 +124,7 @@ def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements, atte
         rough_delay=np.minimum(arrivals.rough_delay, LONGEST_BLUR),
         dark=arrivals.hidden(elements.count),
         modes=np.zeros((count, 0)),
+        bends=np.zeros((count, 0)),
         centre=arrivals.centre,
         attenuation=attenuation,
     )
@@ -138,7 +142,10 @@ def _check_shapes(arrivals: Arrivals) -> None:
     """Raise ValueError for a path whose pulse has no shape."""
     for wrong, what in (
         (arrivals.blur < 0.0, "a negative blur"),
-        (np.abs(arrivals.stretch) >= MOST_STRETCH, f"a stretch that is not within +-{MOST_STRETCH:g}"),
+        (
+            np.abs(arrivals.stretch) + np.abs(arrivals.stretch_terms).sum(axis=1) >= MOST_STRETCH,
+            f"a stretch that is not within +-{MOST_STRETCH:g}",
+        ),
         (np.abs(arrivals.corners.T) >= LONGEST_CORNER, f"corners that are not within {LONGEST_CORNER:g} s"),
         ((arrivals.rough_share < 0.0) | (arrivals.rough_share > 1.0), "a rough_share that is not from 0 to 1"),
         (arrivals.rough_delay < 0.0, "a negative rough_delay"),
@@ -211,6 +218,7 @@ def reference_of(front: Fronts, middle: Floats, turn_terms: Floats, spread_terms
         gain_terms=np.zeros((1, 0)),
         turn_terms=turn_terms[None],
         spread_terms=spread_terms[None],
+        bend_terms=np.zeros((1, 0)),
         sound_speed=front.sound_speed,
         aperture=front.aperture,
         phase=np.zeros(1),
@@ -222,6 +230,7 @@ def reference_of(front: Fronts, middle: Floats, turn_terms: Floats, spread_terms
         rough_delay=np.zeros(1),
         dark=np.zeros((1, 0), bool),
         modes=np.zeros((1, 0)),
+        bends=np.zeros((1, 0)),
         centre=front.centre,
         attenuation=front.attenuation,
     )

@@ -260,4 +260,4 @@ def _direct(
     )  # fmt: skip
     if moving is None:
         return made
-    return carried(made, legs, None, snap, sonar_pose, profile, moving, array.elements.aperture)
+    return carried(made, legs, None, snap, sonar_pose, profile, moving, array.elements, None, array.enough)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -135,7 +136,9 @@ def echoes(
         scattered, vary = sign * amplitude, (variation, error)
         one = assemble(legs, over, out, index, snap.time, absorption, target, facet, scattered, vary, some.pulses)
         if moving is not None:
-            one = carried(one, legs, out, snap, array.sonar_pose, array.profile, moving, array.elements.aperture)
+            view = partial(array.fronts.departure, some.leg, FEW)
+            place = array.sonar_pose, array.profile, moving, array.elements
+            one = carried(one, legs, out, snap, *place, view, array.enough)
         if spot.any() and array.bending.uniform:
             one = from_spots(one, legs, spot, array.sonar_pose)
         made.append(replace(one, delay=one.delay + some.pulses.late))

@@ -16,7 +16,9 @@ turning of a body.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,9 +26,11 @@ from sonarsynth.acoustics.lobes import dot
 from sonarsynth.conventions import Floats, depth
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Arrivals
+from sonarsynth.sonar import Elements
 from sonarsynth.tracing.legs import Legs
 from sonarsynth.tracing.paths import Outward
 from sonarsynth.tracing.probe_legs import TERMS
+from sonarsynth.tracing.wavefront import FEW, probes
 from sonarsynth.world.environment import Profile
 from sonarsynth.world.moment import Snap
 
@@ -48,6 +52,17 @@ ROUNDS = 3
 """Of solving for times that depend on themselves: each leaves v/c of the error, or v t/r of that."""
 
 
+CHANGED = 2.0
+"""What a snap changes by, of itself, for each unit of Doppler: one of few periods, in whose band it is heard."""
+
+
+def turned(legs: Legs, points: Floats) -> Floats:
+    """What (path, point, xyz) the unit vectors towards where legs come from turn by, from the array centre to points
+    (point, xyz); sonar frame."""
+    v = legs.direction[:, None] - points / legs.radius[:, None, None]
+    return np.asarray(v / np.sqrt(dot(v, v))[..., None] - legs.direction[:, None])
+
+
 def aside(length: Floats, along: Floats, moved: Floats) -> Floats:
     """How much longer (path,) in m straight legs get when their ends come apart, more than by what is along them.
 
@@ -60,14 +75,44 @@ def aside(length: Floats, along: Floats, moved: Floats) -> Floats:
     return np.asarray(square / np.maximum(np.sqrt(forward**2 + square) + forward, 1e-300))
 
 
+class _Doppler(NamedTuple):
+    """Of paths, at the array centre."""
+
+    velocity: Floats  # (path, xyz) m/s of the target, world
+    rate_out: Floats  # (path,) of the way to it,
+    rate_in: Floats  # (path,) and from there
+    of_array: Floats  # (path,) by the motion of the array
+    stretch: Floats  # (path,)
+
+
+def _over_aperture(
+    of: _Doppler, legs: Legs, sonar_pose: Pose, profile: Profile, sonar: Floats, elements: Elements,
+    departure: Callable[[], Floats] | None, enough: float,
+) -> Floats:  # fmt: skip
+    """Polynomials (path, term) of the second degree of Doppler over the aperture; none where that errs less."""
+    c_array = float(profile.at(depth(sonar_pose.position)))
+    turning = np.sqrt(dot(of.velocity, of.velocity)) / legs.length + np.sqrt(sonar @ sonar) / legs.radius  # rad/s
+    if not CHANGED * float(turning.max()) * elements.aperture / c_array > enough:
+        return np.empty((len(of.stretch), 0))
+    probe = probes(elements)
+    of_array = turned(legs, probe.position[:FEW]) @ -sonar_pose.turn_to_body(sonar) / c_array + of.of_array[:, None]
+    rate_in = of.rate_in[:, None]
+    if departure is not None:
+        rate_in = -np.einsum("px,pqx->pq", of.velocity, departure()) / profile.at(depth(legs.point))[:, None]
+    there = (1.0 + rate_in) / ((1.0 - of.rate_out[:, None]) * (1.0 - of_array)) - 1.0
+    return probe.fit_few(there - of.stretch[:, None])[0]
+
+
 def carried(
     made: Arrivals, legs: Legs, out: Outward | None, snap: Snap, sonar_pose: Pose, profile: Profile, moving: Moving,
-    aperture: float,
+    elements: Elements, departure: Callable[[], Floats] | None = None, enough: float = 0.0,
 ) -> Arrivals:  # fmt: skip
     """Arrivals of a snap with what moves taken into account; out: the ways to the facets, None for direct paths.
 
     An array that moves meets a wavefront later, or sooner, the farther it has still to go: delays over the aperture (m)
-    are longer by u.b/c, which goes into their linear terms.
+    are longer by u.b/c, which goes into their linear terms. departure: makes the directions (path, FEW, xyz) in which
+    the first probes are seen from the facets, world; enough: error of signals that is left, of Doppler over the
+    aperture.
     """
     if moving.still or not len(made.delay):
         return made
@@ -92,15 +137,19 @@ def carried(
         heard = (gone + aside(legs.length, legs.arrival, apart) / c_array) / (1.0 - of_array)
     stretch = (1.0 + rate_in) / ((1.0 - rate_out) * (1.0 - of_array)) - 1.0
     # where the target was when the sound met it, from where the array is when it comes; as seen in straight rays
+    doppler = _Doppler(velocity, rate_out, rate_in, of_array, stretch)
     moved = sonar_pose.turn_to_body(mirrored * met[:, None] - moving.sonar * heard[:, None])
     seen = legs.radius[:, None] * legs.direction + moved
     radius = np.sqrt(dot(seen, seen))
     direction, terms = seen / radius[:, None], made.delay_terms
-    if moving.sonar.any() and aperture > 0.0:
+    if moving.sonar.any() and elements.aperture > 0.0:
         terms = terms.copy() if terms.shape[1] else np.zeros((len(heard), TERMS))
-        terms[:, 1:4] -= (of_array / (1.0 - of_array) * aperture / c_array)[:, None] * direction
+        terms[:, 1:4] -= (of_array / (1.0 - of_array) * elements.aperture / c_array)[:, None] * direction
     nearer = legs.radius / radius
-    made = replace(made, delay=heard, stretch=stretch, direction=direction, radius=radius, delay_terms=terms)
-    if out is None:
-        return replace(made, spreading_out=made.spreading_out * nearer, amplitude=made.amplitude * nearer)
-    return replace(made, spreading_in=made.spreading_in * nearer, amplitude=made.amplitude * nearer)
+    there, back = (nearer, 1.0) if out is None else (1.0, nearer)
+    return replace(
+        made, delay=heard, stretch=stretch, direction=direction, radius=radius, delay_terms=terms,
+        stretch_terms=_over_aperture(doppler, legs, sonar_pose, profile, moving.sonar, elements, departure, enough),
+        spreading_out=made.spreading_out * there, spreading_in=made.spreading_in * back,
+        amplitude=made.amplitude * nearer,
+    )  # fmt: skip

@@ -115,6 +115,7 @@ def assemble(
         blur=np.hypot(np.hypot(out.blur, legs.blur), pulses.blur),
         echo_blur=pulses.blur,
         stretch=np.zeros(len(length)),
+        stretch_terms=np.empty((len(length), 0)),
         coherent=pulses.coherent,
         corners=pulses.corners,
         rough_share=pulses.rough_share,

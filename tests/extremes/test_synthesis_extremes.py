@@ -38,6 +38,7 @@ def arrivals(delay: Floats, direction: Floats, radius: Floats, amplitude: Floats
         amplitude_terms=none,
         phase_terms=none,
         blur_terms=none,
+        stretch_terms=none,
         amplitude=np.asarray(amplitude, float),
         spreading_out=one,
         spreading_in=one,

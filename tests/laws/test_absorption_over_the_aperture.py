@@ -33,7 +33,7 @@ def from_points(points: Floats, place: Floats, loss: float) -> Arrivals:
     none, whole = np.zeros((n, 0)), np.zeros(n, np.int64)
     return Arrivals(
         delay=distance / C, direction=away / distance[:, None], radius=distance, delay_terms=none,
-        amplitude_terms=none, phase_terms=none, blur_terms=none,
+        amplitude_terms=none, phase_terms=none, blur_terms=none, stretch_terms=none,
         amplitude=10.0 ** (-loss * distance / 20.0) / distance, spreading_out=1.0 / distance, spreading_in=one,
         scattering=one, boundary=one, absorption=loss * distance, length=distance, snap=whole, target=whole,
         facet=whole, point=points, surface=whole, bottom=whole, turning=whole, caustics=whole, arrives_by=whole,

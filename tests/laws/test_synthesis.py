@@ -61,6 +61,7 @@ def arrivals(
         amplitude_terms=np.zeros((n, 0)) if amplitude_terms is None else amplitude_terms,
         phase_terms=np.zeros((n, 0)),
         blur_terms=np.zeros((n, 0)),
+        stretch_terms=np.zeros((n, 0)),
         amplitude=np.asarray(amplitude, float),
         spreading_out=one,
         spreading_in=one,

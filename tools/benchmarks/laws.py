@@ -33,7 +33,7 @@ def plain(arrivals: Arrivals) -> Arrivals:
     terms = np.empty((len(none), 0))
     return replace(
         arrivals, coherent=none.astype(bool), corners=0.0 * arrivals.corners, rough_share=none, rough_delay=none,
-        blur=none, phase=none, phase_terms=terms, blur_terms=terms,
+        blur=none, phase=none, phase_terms=terms, blur_terms=terms, stretch_terms=terms,
     )  # fmt: skip
 
 

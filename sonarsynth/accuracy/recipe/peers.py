@@ -123,6 +123,7 @@ def plain(arrivals: Arrivals, plan: Plan, frame: Frame) -> Arrivals:
         blur=nought,
         echo_blur=nought,
         stretch=nought,
+        stretch_terms=np.zeros((len(nought), 0)),
         coherent=np.zeros(len(nought), bool),
         corners=np.zeros((len(nought), 3)),
         rough_share=nought,

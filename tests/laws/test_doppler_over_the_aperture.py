@@ -1,0 +1,163 @@
+"""What moves is seen from another side at each hydrophone: one expansion over the array against each alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sonarsynth.acoustics.arrays import aperture_terms
+from sonarsynth.conventions import Floats
+from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.products import Arrivals
+from sonarsynth.scattering import Isotropic
+from sonarsynth.sonar import Elements, Romanis, Sonar, elements
+from sonarsynth.sonar.subarrays import subarray
+from sonarsynth.synthesis import DirectSum, KernelDeposit
+from sonarsynth.synthesis.direct_sum import exact_signals
+from sonarsynth.tracing import AutoTracing
+from sonarsynth.tracing.arrivals import trace
+from sonarsynth.tracing.moving import Moving
+from sonarsynth.tracing.variation import ENOUGH
+from sonarsynth.world.boundaries import Rigid, SeaBed
+from sonarsynth.world.environment import Absorption, Environment, Isovelocity, Profile
+from sonarsynth.world.meshes import mesh_of
+from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.shapes import Box
+from sonarsynth.world.sources import LogarithmicBubble
+
+C = 1500.0
+PROFILE = Profile(np.array([0.0]), np.array([C]))
+POSE = Pose(np.array([0.0, 0.0, -5.0]), quaternion(0.5 * np.pi))
+ROMANIS = elements(Romanis())
+SNAP = Snap(np.array([14.0, -5.0, -9.5]), 0.0, LogarithmicBubble(), None)
+SONAR = Sonar()
+BAND = (SONAR.band.low, SONAR.band.high)
+PANEL = mesh_of(Box(size=(0.006, 0.3, 0.2), edge=0.05))
+FRONT = np.flatnonzero(PANEL.normal[:, 0] < -0.9)
+STILL, FAST = np.zeros(3), np.array([1.0, 6.0, -2.0])
+MOVING = {"target": Moving(FAST[None], STILL), "array": Moving(STILL[None], FAST), "both": Moving(FAST[None], -FAST)}
+FAR = np.array([int(np.argmax(np.linalg.norm(ROMANIS.position, axis=1))), int(np.argmin(ROMANIS.position[:, 1])), 300])
+START, SAMPLES = 0.010, 1600
+
+
+def traced(moving: Moving, array: Elements, pose: Pose, *, bounces: int = 0, enough: float = 0.0) -> Arrivals:
+    water = Environment(
+        depth=10.0,
+        sound_speed=Isovelocity(speed=C),
+        absorption=Absorption(formula="none"),
+        bed=SeaBed(reflection=Rigid()),
+    )
+    panel = Body("panel", PANEL, Pose(np.array([12.0, 1.5, -4.8]), quaternion(0.6)), moving.targets[0])
+    found = trace(
+        water, PROFILE, Moment(0.0, (panel,), (SNAP,)), pose, array, 0.0, AutoTracing(bounces=bounces), (Isotropic(),),
+        band=BAND, moving=moving, enough=enough, negligible=0.0,
+    )  # fmt: skip
+    return found.select(found.direct | np.isin(found.facet, FRONT))  # those that no hydrophone sees from their edge
+
+
+def alone(moving: Moving, sensor: int, array: Elements = ROMANIS, *, bounces: int = 0) -> tuple[Arrivals, Elements]:
+    """Traced to a hydrophone by itself, the middle of an array of its own."""
+    part = subarray(array, np.array([sensor]))
+    pose = Pose(POSE.to_world(part.centre[None])[0], POSE.orientation)
+    return traced(moving, part.elements, pose, bounces=bounces), part.elements
+
+
+def stretch(found: Arrivals, array: Elements, sensor: int) -> Floats:
+    """Doppler (path,) at a hydrophone."""
+    terms = aperture_terms(array.position[sensor], array.aperture)
+    return np.asarray(found.stretch + found.stretch_terms @ terms[: found.stretch_terms.shape[1]])
+
+
+def smaller(share: float) -> Elements:
+    return replace(ROMANIS, position=share * ROMANIS.position)
+
+
+def worst(moving: Moving, array: Elements, bounces: int) -> tuple[float, float]:
+    """Largest error of Doppler at three hydrophones, of one expansion and of that of the array centre for all."""
+    one = traced(moving, array, POSE, bounces=bounces)
+    errors = []
+    for sensor in FAR:
+        own, _ = alone(moving, int(sensor), array, bounces=bounces)
+        mine = np.abs(stretch(one, array, int(sensor)) - own.stretch).max()
+        errors.append((mine, np.abs(one.stretch - own.stretch).max()))
+    first, second = zip(*errors, strict=True)
+    return max(first), max(second)
+
+
+@pytest.mark.parametrize("which", MOVING)
+@pytest.mark.parametrize("bounces", [0, 1])
+def test_doppler_is_that_of_each_hydrophone_to_the_third_order_of_the_aperture(which: str, bounces: int) -> None:
+    whole, centre = worst(MOVING[which], ROMANIS, bounces)
+    half, centre_of_half = worst(MOVING[which], smaller(0.5), bounces)
+    assert centre > 5e-5  # v/c of the angle that the array takes up
+    assert whole < 0.02 * centre
+    assert 0.4 < centre_of_half / centre < 0.6
+    assert half < whole / 5.0  # 8 in the limit
+
+
+def test_signals_of_one_expansion_are_those_of_each_hydrophone() -> None:
+    method, moving = DirectSum(), MOVING["target"]
+    one, part = echoes(moving), over_far()
+    theirs = []
+    for sensor in FAR:
+        found, element = alone(moving, int(sensor))
+        theirs.append(heard(method, found.select(~found.direct), element)[0])
+    exact = np.array(theirs)
+    error, worse = (np.linalg.norm(heard(method, f, part) - exact) / np.linalg.norm(exact) for f in (one, flat(one)))
+    assert worse > 5e-5
+    assert error < 0.01 * worse
+
+
+def over_far() -> Elements:
+    """Three hydrophones of the array; the first is the farthest out."""
+    return replace(subarray(ROMANIS, FAR).elements, position=ROMANIS.position[FAR])
+
+
+def echoes(moving: Moving) -> Arrivals:
+    found = traced(moving, ROMANIS, POSE)
+    return found.select(~found.direct)
+
+
+def flat(found: Arrivals) -> Arrivals:
+    """With the Doppler of the array centre everywhere."""
+    return replace(found, stretch_terms=np.zeros((len(found.delay), 0)))
+
+
+@pytest.mark.parametrize("amplify", [1.0, 20.0])
+def test_kernel_deposit_adds_what_the_direct_sum_adds(amplify: float) -> None:
+    """To the first power: the second is left out."""
+    found = echoes(MOVING["both"])
+    found = replace(found, stretch_terms=amplify * found.stretch_terms)
+    part = over_far()
+    fast, slow = (
+        heard(method, found, part) - heard(method, flat(found), part)
+        for method in (KernelDeposit(tolerance=1e-7, precision="float64"), DirectSum())
+    )
+    assert np.linalg.norm(slow) > 1e-4 * amplify * np.linalg.norm(heard(DirectSum(), found, part))
+    assert np.linalg.norm(fast - slow) < 2e-3 * amplify * np.linalg.norm(slow)
+
+
+def heard(method: KernelDeposit | DirectSum, found: Arrivals, part: Elements) -> Floats:
+    if isinstance(method, KernelDeposit):
+        return np.asarray(method.pressure(found, (SNAP,), part, SONAR, None, START, SAMPLES)[0])
+    return exact_signals(found, (SNAP,), part, SONAR, None, START, SAMPLES)[0]
+
+
+def test_one_path_alone_is_the_direct_sum() -> None:
+    found = traced(MOVING["array"], ROMANIS, POSE)
+    found = found.select(found.direct)
+    assert len(found.delay) == 1 and found.stretch_terms.any()
+    fast, slow = (
+        np.asarray(m.signals(found, (SNAP,), ROMANIS, SONAR, None, 0.009, 800).pressure, float)
+        for m in (KernelDeposit(tolerance=1e-6, precision="float64"), DirectSum())
+    )
+    assert np.linalg.norm(fast - slow) / np.linalg.norm(slow) < 1e-6
+
+
+def test_nothing_is_carried_where_it_would_not_be_heard() -> None:
+    slow = Moving(0.1 * FAST[None], STILL)
+    assert traced(slow, ROMANIS, POSE, enough=ENOUGH).stretch_terms.shape[1] == 0
+    assert traced(Moving(STILL[None], STILL), ROMANIS, POSE).stretch_terms.shape[1] == 0
+    assert traced(MOVING["target"], ROMANIS, POSE, enough=ENOUGH).stretch_terms.shape[1] > 0
