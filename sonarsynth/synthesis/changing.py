@@ -19,7 +19,7 @@ import numpy as np
 from sonarsynth.acoustics.arrays import aperture_terms
 from sonarsynth.acoustics.snap import ComplexArray
 from sonarsynth.conventions import Floats, Ints
-from sonarsynth.synthesis.wavefront import Fronts
+from sonarsynth.synthesis.wavefront import Fronts, terms_gradient
 
 MOST_POWERS = 8
 """Powers of spread that pulses may be expanded in."""
@@ -82,9 +82,7 @@ def aperture_gradient(front: Fronts, points: Floats) -> Floats:
     every = front.delay_terms, front.turn_terms, front.spread_terms, front.bend_terms
     if not any(terms.shape[1] for terms in every):
         return np.zeros((3, 0, 0))
-    steps = 1e-4 * front.aperture * np.eye(3)
-    sides = [[aperture_terms(points + way * step, front.aperture) for way in (1, -1)] for step in steps]
-    return np.array([(ahead - behind) / (2e-4 * front.aperture) for ahead, behind in sides])
+    return terms_gradient(points, front.aperture)
 
 
 def slopes(front: Fronts, gradient: Floats, lowest: float, highest: float) -> Floats:

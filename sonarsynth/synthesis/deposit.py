@@ -19,7 +19,7 @@ from sonarsynth.synthesis.expansion import colour, face_pairs, recipe, sinc_poly
 from sonarsynth.synthesis.interpolating import to_sensors
 from sonarsynth.synthesis.nodes import DEGREES, Axis, chebyshev, interpolation, nodes_for, polynomials_for
 from sonarsynth.synthesis.tiles import Aim, Tile, tiles
-from sonarsynth.synthesis.wavefront import NEPER, Fronts, delay_and_gain, lost, towards
+from sonarsynth.synthesis.wavefront import NEPER, Fronts, delay_and_gain, faced, lost, terms_gradient, tilt, towards
 
 RELAXING = np.log(4.0)
 """Chebyshev coefficients of absorption over the band fall by this (Np) from each degree to the next, or by more."""
@@ -177,11 +177,13 @@ def _deposits(table: Floats, part: Fronts, tile: Tile, nodes: Floats, some: slic
     points, grid, reference = nodes[some], stage.grid, tile.reference
     rate = grid.circle * stage.bins.step
     steer, _ = delay_and_gain(reference, points)
-    middle, level = towards(reference, points)
-    late = louder = np.zeros((0, 0))
+    middle, level = faced(reference, points), towards(reference, points)[1]
+    late, louder, lean = np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0, 0))
     share = shares(part, reference, tile.changes, tile.bent, stage.bins.changes, points, stage.dtype)
     if part.delay_terms.shape[1]:
         late = (aperture_terms(points, part.aperture) @ part.delay_terms.T) * rate
+        if stage.aim.elements.face > 0.0:
+            lean = np.ascontiguousarray(tilt(part, terms_gradient(points, part.aperture)[1:]))
     if part.gain_terms.shape[1]:
         louder = aperture_terms(points, part.aperture) @ part.gain_terms.T
     if part.dark.any():
@@ -200,6 +202,7 @@ def _deposits(table: Floats, part: Fronts, tile: Tile, nodes: Floats, some: slic
         np.array([NEPER * farther, farther / (tile.deviation[2] or 1.0)]),
         late,
         louder,
+        lean,
         share,
         recipe(tile.terms),
         grid.taps,
@@ -254,7 +257,7 @@ def _faces(tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
     degrees, _ = face_pairs(tile.terms)
     if face == 0.0 and not reference.attenuation:
         return np.broadcast_to(np.ones(1, dtype), (len(points), len(degrees), f.size))
-    u = towards(reference, points)[0][0, :, 1:].T
+    u = faced(reference, points)[0, :, 1:].T
     middle, half = 0.5 * (f[-1] + f[0]), 0.5 * (f[-1] - f[0])
     scale = face / reference.sound_speed
     deviation = np.array(tile.deviation[:2])[:, None]

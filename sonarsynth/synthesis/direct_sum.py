@@ -16,7 +16,7 @@ from sonarsynth.sonar import Elements, Sonar
 from sonarsynth.synthesis.changing import bend, changed
 from sonarsynth.synthesis.layout import fast_length, layout
 from sonarsynth.synthesis.pulse import pulse_spectrum
-from sonarsynth.synthesis.wavefront import Fronts, delay_and_gain, fronts, lost, reach, towards
+from sonarsynth.synthesis.wavefront import Fronts, delay_and_gain, faced, fronts, lost, reach
 from sonarsynth.world.moment import Snap
 
 
@@ -43,7 +43,7 @@ def exact_spectra(front: Fronts, elements: Elements, frequency: Floats, relative
     for e in range(front.count):
         one = front.select(np.array([e]))
         delay, gain = delay_and_gain(one, elements.position)
-        u, _ = towards(one, elements.position)
+        u = faced(one, elements.position)
         late = one.delay[0] - origin + delay[0]
         face = element_directivity(frequency, u[0][:, None, :], elements.face, one.sound_speed)
         farther = one.attenuation * one.sound_speed * delay[0]  # dB

@@ -70,6 +70,12 @@ def _amplify(out: Any, more: Any) -> None:
 
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+def _lean(out: Any, more: Any, scale: float) -> None:
+    for i in range(more.size):
+        out[i] += scale * more[i]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
 def _recur(out: Any, earlier: Any) -> None:
     for i in range(BLOCK):
         out[i] = 2.0 * out[i] - earlier[i]
@@ -134,6 +140,7 @@ def deposit(
     absorbed: Any,
     late: Any,
     louder: Any,
+    lean: Any,
     share: Any,
     recipe: Any,
     taps: Any,
@@ -148,10 +155,10 @@ def deposit(
     table: `count` paths in blocks (block * rows * BLOCK,), float64. nodes (node, xyz) in m. Of the tile's middle at the
     nodes, taken off: steer (node,) its delay in samples, level (node,) its gain, middle (node, 2) its direction y, z.
     scale (2,) is one over the deviation of y and z; absorbed (2,) what a sample more of the way takes, in Np and in
-    deviations of absorption. late (samples) and louder (node, path) are the wavefront's terms, or empty; share (change,
-    node, path) is how much the modes are of each change, or empty. recipe (term, 3) makes terms. taps (row * 4 * lane,)
-    is the kernel, a cubic a row, and half its half width in samples. rate is in samples/m; the grid is a circle of
-    `length` samples.
+    deviations of absorption. late (samples) and louder (node, path) and lean (node, y or z, path) are the wavefront's
+    terms, or empty; share (change, node, path) is how much the modes are of each change, or empty. recipe (term, 3)
+    makes terms. taps (row * 4 * lane,) is the kernel, a cubic a row, and half its half width in samples. rate is in
+    samples/m; the grid is a circle of `length` samples.
     """
     terms, stride = recipe.shape[0], length + lanes
     cubes = taps.size // (4 * lanes)
@@ -167,6 +174,9 @@ def deposit(
             if late.size:
                 _copy(late[m, first : first + size], more)
             _wavefront(block, nodes[m], middle[m], scale, absorbed, rate, steer[m], level[m], more, place, value)
+            if lean.size:
+                _lean(value, lean[m, 0, first : first + size], scale[0])
+                _lean(value[BLOCK:], lean[m, 1, first : first + size], scale[1])
             if louder.size:
                 _amplify(value[4 * BLOCK :], louder[m, first : first + size])
             if share.size:

@@ -82,7 +82,7 @@ class _Views:
     """What every tile that is tried looks at, computed once: a tile is the smallest and the largest of each column."""
 
     front: Fronts
-    columns: Floats  # (column, path): direction, curvature, absorption, delay terms; directions, slownesses at probes
+    columns: Floats  # (column, path): direction, curvature, absorption, delay terms; slownesses at probes
     amplitude: Floats  # (row, path) of `variation`
     probes: _Probes
     gradient: Floats  # (xyz, point, term) of the aperture terms; empty where there are none
@@ -101,15 +101,14 @@ def _views(front: Fronts, aim: Aim, missed: bool) -> _Views:
 
 
 def _columns(front: Fronts, probes: Floats, gradient: Floats) -> Floats:
-    """Columns of `_Views` of fronts; slownesses (-c times the gradient of delay) only where they are not the
-    directions."""
+    """Columns of `_Views` of fronts; slownesses are -c times the gradient of delay: directions where rays are
+    straight."""
     v = front.direction.T - front.curvature * probes[:, :, None]  # (point, xyz, path)
     u = v / np.sqrt(v[:, 0] ** 2 + v[:, 1] ** 2 + v[:, 2] ** 2)[:, None]
     columns = [front.direction.T, front.curvature[None], front.loss[None], front.delay_terms.T]
-    columns.append(u.reshape(-1, front.count))
     if front.delay_terms.shape[1]:
-        slope = u - front.sound_speed * np.einsum("et,ipt->pie", front.delay_terms, gradient)
-        columns.append(slope.reshape(-1, front.count))
+        u = u - front.sound_speed * np.einsum("et,ipt->pie", front.delay_terms, gradient)
+    columns.append(u.reshape(-1, front.count))
     return np.ascontiguousarray(np.concatenate(columns))
 
 
@@ -150,9 +149,8 @@ def _try(paths: Ints, views: _Views, aim: Aim) -> _Trial:
     probes = views.probes
     own = _columns(reference, probes.points, views.gradient)[:, 0]
     far = np.maximum(high - own, own - low)
-    at, probed = 5 + views.front.delay_terms.shape[1], 3 * len(probes.points)
-    _, dy, dz = far[at : at + probed].reshape(-1, 3).max(axis=0).tolist()
-    slope = far[-probed:].reshape(-1, 3).max(axis=0)
+    slope = far[-3 * len(probes.points) :].reshape(-1, 3).max(axis=0)
+    _, dy, dz = slope.tolist()
     wave = aim.highest / reference.sound_speed  # 1/m
     turn, loss = (aim.elements.face * wave * dy, aim.elements.face * wave * dz), float(far[4])
     bend = views.bend[:, paths].max(axis=1)

@@ -176,6 +176,33 @@ def towards(front: Fronts, points: Floats) -> tuple[Floats, Floats]:
         return v / n[:, :, None], n
 
 
+BENT = 4
+"""The first of the terms that turn the wavefront: a linear one is the motion of the array, which turns no wave."""
+
+
+def tilt(front: Fronts, gradient: Floats) -> Floats:
+    """What delay terms turn the wavefront by, (point, xyz, path), beside the sphere: -c times their gradient (xyz,
+    point, term)."""
+    slope = gradient[:, :, BENT:] @ front.delay_terms[:, BENT:].T
+    return np.asarray(-front.sound_speed * slope.swapaxes(0, 1))
+
+
+def faced(front: Fronts, points: Floats) -> Floats:
+    """Slownesses of the wavefronts at points (point, xyz), times the speed of sound at the centre, (path, point, xyz):
+    what element faces hear, and unit vectors of `towards` where rays are straight."""
+    u, _ = towards(front, points)
+    if not front.delay_terms.shape[1]:
+        return u
+    return np.asarray(u + np.moveaxis(tilt(front, terms_gradient(points, front.aperture)), 2, 0))
+
+
+def terms_gradient(points: Floats, aperture: float) -> Floats:
+    """Gradient (xyz, point, term) in 1/m of the aperture terms at points (point, xyz)."""
+    steps = 1e-4 * aperture * np.eye(3)
+    sides = [[aperture_terms(points + way * step, aperture) for way in (1, -1)] for step in steps]
+    return np.array([(ahead - behind) / (2e-4 * aperture) for ahead, behind in sides])
+
+
 def delay_and_gain(front: Fronts, points: Floats) -> tuple[Floats, Floats]:
     """Delay (s) after the array centre, and gain over it at the band centre, (path, point) each."""
     _, n = towards(front, points)
