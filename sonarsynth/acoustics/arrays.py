@@ -8,28 +8,20 @@ import numpy.typing as npt
 from sonarsynth.conventions import Floats
 
 
-def aperture_terms(position: npt.ArrayLike, aperture: float) -> Floats:
-    """Polynomials up to the third degree over the aperture (..., term) at positions (..., xyz) in the sonar frame.
+def aperture_terms(position: npt.ArrayLike, aperture: float, terms: int = 20) -> Floats:
+    """Polynomials over the aperture (..., term) at positions (..., xyz) in the sonar frame.
 
-    Coordinates are divided by `aperture` (m). The basis is the 20 monomials of x, y, z: 1; x, y, z; xx, xy, xz, yy, yz,
-    zz; xxx, xxy, xxz, xyy, xyz, xzz, yyy, yyz, yzz, zzz. On a planar array those with x vanish.
+    Coordinates are divided by `aperture` (m). The basis is the monomials of x, y, z, degree by degree: 1; x, y, z; xx,
+    xy, xz, yy, yz, zz; xxx, xxy, xxz, xyy, xyz, xzz, yyy, yyz, yzz, zzz; and so on. So many of them: 20 are those up to
+    the third degree, 56 up to the fifth. On a planar array those with x vanish.
     """
-    x, y, z = np.moveaxis(np.asarray(position, float) / aperture, -1, 0)
-    one = np.ones_like(x)
-    second = [x * x, x * y, x * z, y * y, y * z, z * z]
-    third = [
-        x * x * x,
-        x * x * y,
-        x * x * z,
-        x * y * y,
-        x * y * z,
-        x * z * z,
-        y * y * y,
-        y * y * z,
-        y * z * z,
-        z * z * z,
-    ]
-    return np.stack([one, x, y, z, *second, *third], axis=-1)
+    axes = np.moveaxis(np.asarray(position, float) / aperture, -1, 0)
+    found = [np.ones_like(axes[0])]
+    degree = list(enumerate(axes))  # the last axis of each monomial, and its value
+    while len(found) < terms:
+        found += [value for _, value in degree]
+        degree = [(axis, value * axes[axis]) for last, value in degree for axis in range(last, 3)]
+    return np.stack(found[:terms], axis=-1)
 
 
 def element_directivity(frequency: npt.ArrayLike, direction: npt.ArrayLike, face: float, sound_speed: float) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Lt
 from pydantic import TypeAdapter
@@ -14,6 +14,8 @@ from sonarsynth.ranging import IsovelocityRange, RefractedRange
 from sonarsynth.synthesis import DirectSum, KernelDeposit
 from sonarsynth.tracing import Visibility
 
+Degree = Literal[3, 5]
+
 
 @description
 class Choices:
@@ -22,6 +24,8 @@ class Choices:
 
     subarrays: Annotated[int, Ge(1)] = 1
     """Parts that the array is cut into; as many as it has hydrophones: each is traced by itself."""
+    degree: Degree = 3
+    """Of the polynomials that paths are expanded in over the array, or a part of it."""
     visibility: Visibility = "centre"
     """From where facets must be seen to be heard: from the middle of the array or part, or from each hydrophone."""
     negligible: Annotated[Number, Ge(0), Lt(1)] = 1e-7

@@ -17,7 +17,7 @@ from sonarsynth.beamforming import DenseDelayAndSum
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.planning.arriving import arrivals_of
 from sonarsynth.planning.bending import ranging_error
-from sonarsynth.planning.choices import Choices
+from sonarsynth.planning.choices import Choices, Degree
 from sonarsynth.planning.imaging import beamformer
 from sonarsynth.planning.looks import Look
 from sonarsynth.planning.plans import Errors, Plan
@@ -71,7 +71,9 @@ def choose(plan: Plan, looks: Sequence[Look]) -> Plan:
     by_synthesis = deposit_error(synthesis) if isinstance(synthesis, KernelDeposit) else 0.0
     return replace(
         made,
-        choices=replace(choices, subarrays=cut.parts, visibility=cut.visibility, beamforming=steering),
+        choices=replace(
+            choices, subarrays=cut.parts, degree=cut.degree, visibility=cut.visibility, beamforming=steering
+        ),
         errors=Errors(cut.error, cut.whole, by_synthesis, bent if straight else 0.0, blurred),
     )
 
@@ -116,44 +118,51 @@ class _Cut(NamedTuple):
 
     parts: int  # that the array is cut into
     visibility: Visibility
+    degree: Degree  # of polynomials over each part
     error: float  # of signals
     whole: float = np.nan  # the same, where the array is not cut and its middle sees for all
 
 
 def _subarrays(plan: Plan, indices: Sequence[int]) -> _Cut:
     """The fewest parts of the array that will do; where one will not, each hydrophone's own view of the targets is
-    tried first."""
+    tried first, and then polynomials of the fifth degree."""
     physics, count = plan.scene.physics, plan.elements.count
     seeing: Visibility = "centre" if physics.visibility == "auto" else physics.visibility
     if physics.subarrays == "sensors" or (physics.subarrays == "auto" and plan.recipe.accuracy.exact):
-        return _Cut(count, "centre", 0.0)
+        return _Cut(count, "centre", 3, 0.0)
     measures = [Expansion.of(plan, index) for index in indices]
     allowed = np.sqrt(EXPANSION) * plan.recipe.accuracy.signal / SAFETY
     given = physics.subarrays != "auto"
     first = min(physics.subarrays, count) if physics.subarrays != "auto" else 1
-    whole = error = _worst(measures, first, seeing, np.inf if given else allowed)
+    degree: Degree = 3
+    enough = np.inf if given else allowed
+    whole = error = _worst(measures, first, seeing, degree, enough)
     if error > allowed and physics.visibility == "auto":
-        better = _worst(measures, first, "hydrophones", np.inf if given else allowed)
+        better = _worst(measures, first, "hydrophones", degree, enough)
         if better < BETTER * error:
             seeing, error = "hydrophones", better
+    if error > allowed and first < count:
+        better = _worst(measures, first, seeing, 5, enough)
+        if better < BETTER * error:
+            degree, error = 5, better
     if given:
-        return _Cut(first, seeing, error)
+        return _Cut(first, seeing, degree, error)
     if error <= allowed:
-        return _Cut(1, seeing, error, whole)
+        return _Cut(1, seeing, degree, error, whole)
     # Cubics err by the fourth power of the width of parts, the square of their number: no fewer will do.
-    fewest = max(int(np.log2(error / allowed) / 2.0), 1)
+    fewest = max(int(np.log2(error / allowed) / (0.5 * (degree + 1))), 1)
     for parts in [2**n for n in range(int(np.ceil(np.log2(count))))][fewest:]:
-        error = _worst(measures, parts, seeing, allowed)
+        error = _worst(measures, parts, seeing, degree, allowed)
         if error <= allowed:
-            return _Cut(parts, seeing, error, whole)
-    return _Cut(count, "centre", 0.0, whole)
+            return _Cut(parts, seeing, degree, error, whole)
+    return _Cut(count, "centre", 3, 0.0, whole)
 
 
-def _worst(measures: Sequence[Expansion], parts: int, visibility: Visibility, allowed: float) -> float:
+def _worst(measures: Sequence[Expansion], parts: int, visibility: Visibility, degree: Degree, allowed: float) -> float:
     """Largest error of signals in some frames, or the first that is more than is allowed."""
     worst = 0.0
     for measure in measures:
-        worst = max(worst, measure.error(parts, visibility))
+        worst = max(worst, measure.error(parts, visibility, degree))
         if worst > allowed:
             break
     return worst
@@ -181,9 +190,10 @@ class Expansion:
             rows.append(_heard(plan, frame, arrivals_of(every, frame, part), part.elements))
         return Expansion(plan, frame, sensor, (np.vstack([r[0] for r in rows]), np.vstack([r[1] for r in rows])))
 
-    def error(self, parts: int, visibility: Visibility = "centre") -> float:
+    def error(self, parts: int, visibility: Visibility = "centre", degree: Degree = 3) -> float:
         """Error of signals, relative, where the array is cut into so many parts: of echoes or direct arrivals."""
-        plan = replace(self.plan, choices=replace(self.plan.choices, subarrays=parts, visibility=visibility))
+        choices = replace(self.plan.choices, subarrays=parts, degree=degree, visibility=visibility)
+        plan = replace(self.plan, choices=choices)
         found = tuple(np.zeros_like(x) for x in self.exact)
         for part in subarrays(self.plan.elements, parts):
             rows = np.flatnonzero(np.isin(self.sensor, part.sensor))

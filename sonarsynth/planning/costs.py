@@ -59,6 +59,10 @@ def machine_factor() -> float:
     return float(best / REFERENCE_TRANSFORM)
 
 
+FIFTH = 1.6
+"""Times what cubics over the array take, polynomials of the fifth degree take to trace."""
+
+
 def _facets(plan: Plan) -> int:
     return sum(len(mesh.faces) for mesh in plan.scene.meshes)
 
@@ -75,7 +79,8 @@ def _tracing(plan: Plan, kind: str) -> float:
     pairs = zip(plan.scene.laws, plan.scene.meshes, strict=True)
     extra = SECONDS["trace coherent facet"] - SECONDS["trace facet"]
     each = SECONDS[f"trace {kind}facet"]
-    return sum(len(mesh.faces) * (each + extra * isinstance(law, Kirchhoff)) for law, mesh in pairs)
+    whole = sum(len(mesh.faces) * (each + extra * isinstance(law, Kirchhoff)) for law, mesh in pairs)
+    return whole * (FIFTH if plan.choices.degree > 3 else 1.0)
 
 
 def _ways(plan: Plan) -> int:
@@ -124,6 +129,8 @@ def _traced(plan: Plan) -> str:
     to = "the array" if parts == 1 else f"each of {parts} subarrays"
     if parts == plan.elements.count > 1:
         to = "each hydrophone by itself"
+    if plan.choices.degree > 3 and parts < plan.elements.count:
+        to += f", to the degree {plan.choices.degree}"
     if plan.choices.visibility == "hydrophones":
         to += ", seen from each hydrophone"
     words = [f"{plan.propagation.kind} rays to {to}", f"{plan.propagation.bounces} bounces", laws]

@@ -16,10 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonarsynth.acoustics.arrays import aperture_terms
 from sonarsynth.acoustics.snap import ComplexArray
 from sonarsynth.conventions import Floats, Ints
-from sonarsynth.synthesis.wavefront import Fronts, terms_gradient
+from sonarsynth.synthesis.wavefront import Fronts, over, terms_gradient
 
 MOST_POWERS = 8
 """Powers of spread that pulses may be expanded in."""
@@ -59,15 +58,12 @@ def widest_bend(front: Fronts) -> Floats:
 
 def bend(front: Fronts, points: Floats) -> Floats:
     """Doppler (path, point) at points (point, xyz), over that at the centre."""
-    return np.asarray(front.bend_terms @ aperture_terms(points, front.aperture)[:, : front.bend_terms.shape[1]].T)
+    return over(front.bend_terms, points, front.aperture)
 
 
 def turn_and_spread(front: Fronts, points: Floats) -> tuple[Floats, Floats]:
     """Turn (rad) and spread (s2), (path, point) each, at points (point, xyz)."""
-    basis = aperture_terms(points, front.aperture).T
-    turn, spread = (terms @ basis if terms.shape[1] else None for terms in (front.turn_terms, front.spread_terms))
-    none = np.zeros((front.count, len(points)))
-    return none if turn is None else turn, none if spread is None else spread
+    return over(front.turn_terms, points, front.aperture), over(front.spread_terms, points, front.aperture)
 
 
 def changed(front: Fronts, points: Floats, frequency: Floats) -> ComplexArray:
@@ -80,9 +76,10 @@ def changed(front: Fronts, points: Floats, frequency: Floats) -> ComplexArray:
 def aperture_gradient(front: Fronts, points: Floats) -> Floats:
     """Gradient (xyz, point, term) of the aperture terms at points (point, xyz); empty where no front has such terms."""
     every = front.delay_terms, front.turn_terms, front.spread_terms, front.bend_terms
-    if not any(terms.shape[1] for terms in every):
+    widest = max(terms.shape[1] for terms in every)
+    if not widest:
         return np.zeros((3, 0, 0))
-    return terms_gradient(points, front.aperture)
+    return terms_gradient(points, front.aperture, widest)
 
 
 def slopes(front: Fronts, gradient: Floats, lowest: float, highest: float) -> Floats:
@@ -97,10 +94,12 @@ def slopes(front: Fronts, gradient: Floats, lowest: float, highest: float) -> Fl
         (front.spread_terms, 0.5 * (2.0 * np.pi * highest) ** 2),
     ):
         if terms.shape[1]:
-            total += scale * np.abs(np.einsum("et,ipt->ipe", terms, gradient)).max(axis=1)
+            total += scale * np.abs(np.einsum("et,ipt->ipe", terms, gradient[:, :, : terms.shape[1]])).max(axis=1)
     if front.bends.shape[1]:
         share = np.linalg.norm(front.bends, axis=1) / np.maximum(np.linalg.norm(front.modes, axis=1), 1e-300)
-        steep = np.abs(np.einsum("et,ipt->ipe", front.bend_terms, gradient)).max(axis=1)
+        steep = np.abs(np.einsum("et,ipt->ipe", front.bend_terms, gradient[:, :, : front.bend_terms.shape[1]])).max(
+            axis=1
+        )
         total += highest / lowest * share * steep
     return total
 

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy.fft import irfft, next_fast_len, rfft
 
-from sonarsynth.acoustics.arrays import aperture_terms
 from sonarsynth.acoustics.spectra import kaiser_bessel, kaiser_bessel_beta, kaiser_bessel_transform
 from sonarsynth.conventions import Floats
 from sonarsynth.sonar import Elements
@@ -19,7 +18,17 @@ from sonarsynth.synthesis.expansion import colour, face_pairs, recipe, sinc_poly
 from sonarsynth.synthesis.interpolating import to_sensors
 from sonarsynth.synthesis.nodes import DEGREES, Axis, chebyshev, interpolation, nodes_for, polynomials_for
 from sonarsynth.synthesis.tiles import Aim, Tile, tiles
-from sonarsynth.synthesis.wavefront import NEPER, Fronts, delay_and_gain, faced, lost, terms_gradient, tilt, towards
+from sonarsynth.synthesis.wavefront import (
+    NEPER,
+    Fronts,
+    delay_and_gain,
+    faced,
+    lost,
+    over,
+    terms_gradient,
+    tilt,
+    towards,
+)
 
 RELAXING = np.log(4.0)
 """Chebyshev coefficients of absorption over the band fall by this (Np) from each degree to the next, or by more."""
@@ -181,11 +190,13 @@ def _deposits(table: Floats, part: Fronts, tile: Tile, nodes: Floats, some: slic
     late, louder, lean = np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0, 0))
     share = shares(part, reference, tile.changes, tile.bent, stage.bins.changes, points, stage.dtype)
     if part.delay_terms.shape[1]:
-        late = (aperture_terms(points, part.aperture) @ part.delay_terms.T) * rate
+        late = over(part.delay_terms, points, part.aperture).T * rate
         if stage.aim.elements.face > 0.0:
-            lean = np.ascontiguousarray(tilt(part, terms_gradient(points, part.aperture)[1:]))
+            lean = np.ascontiguousarray(
+                tilt(part, terms_gradient(points, part.aperture, part.delay_terms.shape[1])[1:])
+            )
     if part.gain_terms.shape[1]:
-        louder = aperture_terms(points, part.aperture) @ part.gain_terms.T
+        louder = np.ascontiguousarray(over(part.gain_terms, points, part.aperture).T)
     if part.dark.any():
         louder = np.where(part.dark.T[some], -1.0, louder if louder.size else 0.0)
     farther = part.attenuation * part.sound_speed / rate  # dB a sample

@@ -107,7 +107,9 @@ def _columns(front: Fronts, probes: Floats, gradient: Floats) -> Floats:
     u = v / np.sqrt(v[:, 0] ** 2 + v[:, 1] ** 2 + v[:, 2] ** 2)[:, None]
     columns = [front.direction.T, front.curvature[None], front.loss[None], front.delay_terms.T]
     if front.delay_terms.shape[1]:
-        u = u - front.sound_speed * np.einsum("et,ipt->pie", front.delay_terms, gradient)
+        u = u - front.sound_speed * np.einsum(
+            "et,ipt->pie", front.delay_terms, gradient[:, :, : front.delay_terms.shape[1]]
+        )
     columns.append(u.reshape(-1, front.count))
     return np.ascontiguousarray(np.concatenate(columns))
 

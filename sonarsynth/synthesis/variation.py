@@ -18,14 +18,14 @@ from sonarsynth.synthesis.wavefront import Fronts
 
 
 @lru_cache(maxsize=16)
-def _basis(elements: Elements, aperture: float) -> tuple[tuple[int, int, int], Floats, Floats]:
+def _basis(elements: Elements, aperture: float, terms: int) -> tuple[tuple[int, int, int], Floats, Floats]:
     """Degrees + 1 (xyz), Chebyshev coefficients over the box (degrees, term) of each aperture term, and what makes of
     terms a vector as long as their root mean square over the hydrophones (term, term)."""
     x, y, z = (DEGREES if s > 0 else 1 for s in np.ptp(elements.position, axis=0))
-    value = aperture_terms(box_nodes(elements, (x, y, z)), aperture).reshape(x, y, z, -1)
+    value = aperture_terms(box_nodes(elements, (x, y, z)), aperture, terms).reshape(x, y, z, -1)
     for axis, n in enumerate((x, y, z)):
         value = np.moveaxis(np.tensordot(analysis(n), value, (1, axis)), 0, axis)
-    heard = np.linalg.qr(aperture_terms(elements.position, aperture), mode="r") / np.sqrt(elements.count)
+    heard = np.linalg.qr(aperture_terms(elements.position, aperture, terms), mode="r") / np.sqrt(elements.count)
     return (x, y, z), value.reshape(x * y * z, -1), heard
 
 
@@ -37,7 +37,7 @@ def variation(front: Fronts, elements: Elements) -> Floats:
     """
     if not front.gain_terms.shape[1]:
         return np.zeros((0, front.count))
-    shape, basis, heard = _basis(elements, front.aperture)
+    shape, basis, heard = _basis(elements, front.aperture, front.gain_terms.shape[1])
     terms = front.gain_terms.T.copy()
     terms[0] += 1.0
     rows = np.zeros((1 + 3 * DEGREES, front.count))

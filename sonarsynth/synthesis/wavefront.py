@@ -193,14 +193,22 @@ def faced(front: Fronts, points: Floats) -> Floats:
     u, _ = towards(front, points)
     if not front.delay_terms.shape[1]:
         return u
-    return np.asarray(u + np.moveaxis(tilt(front, terms_gradient(points, front.aperture)), 2, 0))
+    gradient = terms_gradient(points, front.aperture, front.delay_terms.shape[1])
+    return np.asarray(u + np.moveaxis(tilt(front, gradient), 2, 0))
 
 
-def terms_gradient(points: Floats, aperture: float) -> Floats:
-    """Gradient (xyz, point, term) in 1/m of the aperture terms at points (point, xyz)."""
+def terms_gradient(points: Floats, aperture: float, terms: int) -> Floats:
+    """Gradient (xyz, point, term) in 1/m of so many aperture terms at points (point, xyz)."""
     steps = 1e-4 * aperture * np.eye(3)
-    sides = [[aperture_terms(points + way * step, aperture) for way in (1, -1)] for step in steps]
+    sides = [[aperture_terms(points + way * step, aperture, terms) for way in (1, -1)] for step in steps]
     return np.array([(ahead - behind) / (2e-4 * aperture) for ahead, behind in sides])
+
+
+def over(terms: Floats, points: Floats, aperture: float) -> Floats:
+    """Polynomials with coefficients terms (path, term) at points (point, xyz): (path, point); 0 without terms."""
+    if not terms.shape[1]:
+        return np.zeros((len(terms), len(points)))
+    return np.asarray(terms @ aperture_terms(points, aperture, terms.shape[1]).T)
 
 
 def delay_and_gain(front: Fronts, points: Floats) -> tuple[Floats, Floats]:
@@ -211,9 +219,9 @@ def delay_and_gain(front: Fronts, points: Floats) -> tuple[Floats, Floats]:
     path = (front.curvature[:, None] * square - 2.0 * front.direction @ points.T) / (n + 1.0)
     delay, gain = path / front.sound_speed, 1.0 / n
     if front.delay_terms.shape[1]:
-        delay = delay + front.delay_terms @ aperture_terms(points, front.aperture).T
+        delay = delay + over(front.delay_terms, points, front.aperture)
     if front.gain_terms.shape[1]:
-        gain = gain * (1.0 + front.gain_terms @ aperture_terms(points, front.aperture).T)
+        gain = gain * (1.0 + over(front.gain_terms, points, front.aperture))
     if front.attenuation:
         gain = gain * lost(front.attenuation * front.sound_speed * delay)
     return delay, gain

@@ -78,7 +78,7 @@ class Wavefronts:
         count = len(legs.row)
         if self.plain:
             return Fronts(Terms.none(count), legs, self.place, None, None)
-        made = Made.room(count, len(self.place.probe.sensor))
+        made = Made.room(count, *self.place.probe.basis.shape)
         for members, kept in self.families:
             first, last = np.searchsorted(members, (some.start, some.stop))
             rows = members[first:last] - some.start
@@ -103,9 +103,10 @@ def fronts(
     elements: Elements,
     propagation: Propagation,
     band: tuple[float, float],
+    degree: int = 3,
 ) -> Fronts:
     """Wavefronts of all legs, as `wavefronts`."""
-    made = wavefronts(legs, group, environment, profile, sonar_pose, elements, propagation, band)
+    made = wavefronts(legs, group, environment, profile, sonar_pose, elements, propagation, band, degree)
     return made.of(slice(0, len(legs.row)))
 
 
@@ -118,13 +119,14 @@ def wavefronts(
     elements: Elements,
     propagation: Propagation,
     band: tuple[float, float],
+    degree: int = 3,
 ) -> Wavefronts:
-    """Wavefronts of legs. group (leg,): legs of one body; band (Hz).
+    """Wavefronts of legs. group (leg,): legs of one body; band (Hz); degree: of their polynomials.
 
     Reflections turn and blur the pulse by the grazing angle, which varies over the aperture. What the polynomials in
     that miss is in `error`, as delays that are as much at the upper edge of the band.
     """
-    place = Place(environment, profile, sonar_pose, probes(elements), propagation, band)
+    place = Place(environment, profile, sonar_pose, probes(elements, degree), propagation, band)
     if profile.uniform and not legs.bounces.any():
         return Wavefronts(legs, place, (), True)
     families: list[tuple[Ints, Made | _Smooth | None]] = []

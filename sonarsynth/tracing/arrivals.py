@@ -65,6 +65,7 @@ class ArrayLegs:
     alike: float = ALIKE  # change of an echo by the mean over its facet, over the aperture, that is left out
     visibility: Visibility = "centre"  # from where facets must be seen
     first: int = 0  # of the legs, in the wavefronts
+    degree: int = 3  # of polynomials over the aperture
 
     @property
     def fronts(self) -> Fronts:
@@ -132,6 +133,7 @@ def trace(
     enough: float = ENOUGH,
     alike: float = ALIKE,
     visibility: Visibility = "centre",
+    degree: int = 3,
 ) -> Arrivals:
     """The arrivals of a frame, sorted by snap; of each first those that met no target, then echoes by target, then the
     shadow waves of targets that scatter forward.
@@ -139,10 +141,10 @@ def trace(
     environment, profile: the water; moment: bodies and snaps; sonar_pose, elements: the array; absorption: dB/m at the
     centre of the band; propagation: how sound travels, and how many bounces are followed; laws: how the facets of each
     body scatter; band: Hz; moving: velocities, where they count; negligible: see `NEGLIGIBLE`; enough:
-    `variation.ENOUGH`; alike: `variation.ALIKE`. A facet counts where it is lit by the snap and seen, with no body in
-    between, by the array centre; or, with `visibility`, by some hydrophone that it faces, and is heard by those. The
-    snap itself is heard if no body stands in between, but for those that scatter forward (`tracing.forward`). Raises
-    ValueError for anything outside the water.
+    `variation.ENOUGH`; alike: `variation.ALIKE`; degree: of polynomials over the aperture. A facet counts where it is
+    lit by the snap and seen, with no body in between, by the array centre; or, with `visibility`, by some hydrophone
+    that it faces, and is heard by those. The snap itself is heard if no body stands in between, but for those that
+    scatter forward (`tracing.forward`). Raises ValueError for anything outside the water.
     """
     legs = array_legs(
         environment,
@@ -156,6 +158,7 @@ def trace(
         enough,
         alike,
         visibility,
+        degree,
     )
     return arrivals(legs, moment.snaps, absorption, laws, moving)
 
@@ -172,6 +175,7 @@ def array_legs(
     enough: float = ENOUGH,
     alike: float = ALIKE,
     visibility: Visibility = "centre",
+    degree: int = 3,
 ) -> ArrayLegs:
     """Facet to array, for every facet of every body that leaves a ray for the array that no body hides.
 
@@ -197,10 +201,10 @@ def array_legs(
         seen += len(kept)
     legs, facets = one_of(found[0]), one_of(found[1])
     group = facets.target[legs.row]
-    over = wavefronts(legs, group, environment, bent, sonar_pose, elements, propagation, band)
+    over = wavefronts(legs, group, environment, bent, sonar_pose, elements, propagation, band, degree)
     return ArrayLegs(
         legs, over, facets, bodies, environment, profile, propagation, sonar_pose, elements, band, negligible, enough,
-        alike, visibility,
+        alike, visibility, degree=degree,
     )  # fmt: skip
 
 
@@ -250,6 +254,7 @@ def _direct(
         array.elements,
         array.propagation,
         array.band,
+        array.degree,
     )
     plain = Pulses.plain(len(legs.row))
     one, none = np.ones(len(legs.row)), np.full(len(legs.row), NO_TARGET)

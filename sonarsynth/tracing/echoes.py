@@ -265,7 +265,7 @@ def _turned(found: _Found, most: float) -> Terms:
     leaps = np.abs(shift).max(axis=1, initial=0.0) > LEAP
     if not shift.any():
         return over
-    probe = probes(array.elements)
+    probe = probes(array.elements, array.degree)
     terms = probe.fit(np.where(leaps[:, None], 0.0, shift))
     share = np.abs(found.strength) / max(most, 1e-300)
     error = over.error + share * np.where(leaps, 0.0, probe.misfit(shift, terms)) / (2.0 * np.pi * array.band[1])
@@ -293,6 +293,6 @@ def _spread(found: _Found, over: Terms, most: float) -> Terms:
     """
     array, share = found.array, np.abs(found.strength) / max(most, 1e-300)
     more = np.concatenate([g.spread(array.fronts.departure(found.leg[g.row], FEW), array.centre) for g in found.groups])
-    terms, misfit = probes(array.elements).fit_few(more)
+    terms, misfit = probes(array.elements, array.degree).fit_few(more)
     blur = over.blur + terms if over.blur.shape[1] else terms
     return over._replace(blur=blur, error=over.error + share * np.pi * array.band[1] * misfit)

@@ -48,9 +48,9 @@ class Made:
     error: Floats  # (leg,) s
 
     @staticmethod
-    def room(count: int, sensors: int) -> Made:
-        """Room for so many."""
-        terms, phase, blur = np.zeros((3, count, TERMS))
+    def room(count: int, sensors: int, degrees: int) -> Made:
+        """Room for so many, at so many probes, with so many terms."""
+        terms, phase, blur = np.zeros((3, count, degrees))
         return Made(terms, phase, blur, np.ones((count, sensors)), np.zeros((count, sensors, 3)), np.zeros(count))
 
     def put(self, rows: Ints, made: Made) -> None:
@@ -62,7 +62,7 @@ class Made:
 def traced(legs: Legs, place: Place) -> Made:
     """Legs at the probes, each of them traced."""
     environment, profile, band = place.environment, place.profile, place.band
-    made = Made.room(len(legs.row), len(place.probe.sensor))
+    made = Made.room(len(legs.row), *place.probe.basis.shape)
     if profile.uniform:
         departure, left, gain = image(legs, place.probe, place.sonar_pose), np.zeros(made.gain.shape), made.gain
         if not legs.bounces.any():

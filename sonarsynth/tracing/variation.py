@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats
-from sonarsynth.sonar import Elements
 from sonarsynth.tracing.wavefront import FEW, probes
 
 if TYPE_CHECKING:
@@ -62,7 +61,7 @@ def _fitted(blocks: Sequence[Varying], few: int | None) -> tuple[list[Floats], f
     for block in blocks:
         law, gain = block.over(few)
         strength = np.where((law == 0.0).any(axis=1), 0.0, block.strength)  # on the limb of some probe: not counted
-        fitted = _fit(block.array.elements, _gain(law, block.amplitude, block.tapered, gain), strength, few)
+        fitted = _fit(block.array, _gain(law, block.amplitude, block.tapered, gain), strength, few)
         terms.append(fitted[0])
         worst, loudest = max(worst, fitted[1]), max(loudest, fitted[2])
     return terms, worst / max(loudest, 1e-300)
@@ -82,16 +81,16 @@ def fitted(array: ArrayLegs, gain: Floats, strength: Floats) -> tuple[Floats, fl
 
     And their largest error at the probes, for paths of that strength (path,), relative to the strongest.
     """
-    terms, worst, loudest = _fit(array.elements, gain, strength, None)
+    terms, worst, loudest = _fit(array, gain, strength, None)
     return terms, worst / max(loudest, 1e-300)
 
 
-def _fit(elements: Elements, gain: Floats, strength: Floats, few: int | None) -> tuple[Floats, float, float]:
+def _fit(array: ArrayLegs, gain: Floats, strength: Floats, few: int | None) -> tuple[Floats, float, float]:
     """Polynomials, the largest error at the probes, and the largest amplitude there."""
     loudest = float(np.nanmax(np.abs(strength)[:, None] * np.abs(gain), initial=0.0))
     if (gain == 1.0).all():
         return np.empty((len(gain), 0)), 0.0, loudest
-    probe = probes(elements)
+    probe = probes(array.elements, array.degree)
     left = gain - 1.0
     if few is None or len(probe.sensor) < FEW:
         terms = probe.fit(left)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import takewhile
+from typing import Literal
 
 import numpy as np
 
@@ -96,6 +97,9 @@ def trace_points(exact: Exact, traced: Traced) -> Iterator[Point]:
                 break
     view: Visibility = "centre" if plan.choices.visibility == "hydrophones" else "hydrophones"
     yield _walked(exact, replace(plan, choices=replace(plan.choices, visibility=view)), "visibility")
+    if plan.choices.subarrays < plan.elements.count:
+        degree: Literal[3, 5] = 3 if plan.choices.degree == 5 else 5
+        yield _walked(exact, replace(plan, choices=replace(plan.choices, degree=degree)), "degree")
     for level in FAINTEST:
         share = 10.0 ** (-level / 10.0)
         if not np.isclose(share, plan.choices.negligible, rtol=1e-6):
@@ -131,6 +135,7 @@ def _walked(exact: Exact, plan: Plan, knob: str) -> Point:
     traced = Traced.of(plan, exact.frame, exact.sensor)
     setting = {
         "subarrays": _cut(plan),
+        "degree": f"of degree {plan.choices.degree} over the aperture",
         "visibility": f"seen from the {plan.choices.visibility}",
         "faintest": _faint(plan),
         "rays": type(plan.propagation).__name__.lower(),

@@ -1,0 +1,107 @@
+"""Polynomials over the aperture, to the third degree and to the fifth: what they leave falls with the next power."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sonarsynth import config, planning
+from sonarsynth.acoustics.arrays import aperture_terms
+from sonarsynth.conventions import Floats
+from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.planning.choosing import Expansion
+from sonarsynth.products import Arrivals
+from sonarsynth.sonar import Elements, Romanis, Sonar, elements
+from sonarsynth.sonar.subarrays import subarray
+from sonarsynth.synthesis import DirectSum, KernelDeposit
+from sonarsynth.synthesis.direct_sum import exact_signals
+from sonarsynth.synthesis.wavefront import delay_and_gain, fronts
+from sonarsynth.tracing import Refracted
+from sonarsynth.tracing.arrivals import trace
+from sonarsynth.tracing.wavefront import terms_of
+from sonarsynth.world.environment import Absorption, Environment, Isovelocity, Profile
+from sonarsynth.world.moment import Moment, Snap
+from sonarsynth.world.sources import LogarithmicBubble
+
+POSE = Pose(np.array([0.0, 0.0, -5.0]), quaternion(0.5 * np.pi))
+ROMANIS = elements(Romanis())
+SNAP = Snap(np.array([5.0, -2.0, -9.0]), 0.0, LogarithmicBubble(), None)
+SONAR = Sonar()
+PROFILE = Profile(np.array([0.0, 10.0]), np.array([1500.0, 1700.0]))
+WATER = Environment(depth=10.0, sound_speed=Isovelocity(speed=1500.0), absorption=Absorption(formula="none"))
+FAR = np.array([int(np.argmax(np.linalg.norm(ROMANIS.position, axis=1))), int(np.argmin(ROMANIS.position[:, 2])), 300])
+TANK = Path(__file__).parents[2] / "configs" / "tank.yaml"
+
+
+def traced(array: Elements, pose: Pose, degree: int = 3) -> Arrivals:
+    return trace(
+        WATER, PROFILE, Moment(0.0, (), (SNAP,)), pose, array, 0.0, Refracted(bounces=0), (),
+        band=(SONAR.band.low, SONAR.band.high), degree=degree,
+    )  # fmt: skip
+
+
+def error(degree: int, share: float) -> float:
+    """Largest error (s) of the delays at three hydrophones of a smaller array, each traced by itself."""
+    array = replace(ROMANIS, position=share * ROMANIS.position)
+    front, errors = fronts(traced(array, POSE, degree), (SNAP,), array), []
+    delay, _ = delay_and_gain(front, array.position)
+    for sensor in FAR:
+        part = subarray(array, np.array([sensor]))
+        own = traced(part.elements, Pose(POSE.to_world(part.centre[None])[0], POSE.orientation))
+        errors.append(abs(front.delay[0] + delay[0, sensor] - own.delay[0]))
+    return max(errors)
+
+
+def test_what_is_left_falls_with_the_power_after_the_degree() -> None:
+    cubic, quintic = error(3, 1.0), error(5, 1.0)
+    assert cubic > 1e-10
+    assert quintic < 0.1 * cubic
+    assert error(3, 0.5) < cubic / 10.0  # 16 in the limit
+    assert error(5, 0.5) < quintic / 30.0 + 1e-14  # 64, or rounding
+
+
+def test_there_are_as_many_terms_as_monomials() -> None:
+    q = np.random.default_rng(1).normal(size=(7, 3))
+    every = aperture_terms(q, 2.0, terms_of(5))
+    powers = [(a, b, d - a - b) for d in range(6) for a in range(d, -1, -1) for b in range(d - a, -1, -1)]
+    exact = np.stack([np.prod((q / 2.0) ** np.array(p), axis=1) for p in powers], axis=1)
+    assert every.shape == (7, 56)
+    np.testing.assert_allclose(every, exact, rtol=1e-13)
+    assert (every[:, : terms_of(3)] == aperture_terms(q, 2.0)).all()
+
+
+def test_kernel_deposit_is_the_direct_sum_to_the_fifth_degree() -> None:
+    found = traced(ROMANIS, POSE, 5)
+    assert found.delay_terms.shape == found.amplitude_terms.shape == (1, 56)
+    part = replace(subarray(ROMANIS, FAR).elements, position=ROMANIS.position[FAR])
+    together = found.select(np.zeros(2, int))  # alone it is its own tile
+    for some in (found, replace(together, delay=together.delay + [0.0, 1e-4])):
+        fast, slow = (heard(m, some, part) for m in (KernelDeposit(tolerance=1e-6, precision="float64"), DirectSum()))
+        assert np.linalg.norm(fast - slow) < 2e-5 * np.linalg.norm(slow)
+
+
+def heard(method: KernelDeposit | DirectSum, found: Arrivals, part: Elements) -> Floats:
+    make = method.pressure if isinstance(method, KernelDeposit) else exact_signals
+    return np.asarray(make(found, (SNAP,), part, SONAR, None, 0.002, 800)[0])
+
+
+@pytest.mark.parametrize(("signal", "degree"), [(1e-3, 3), (1e-5, 5)])
+def test_a_planner_takes_the_fifth_degree_before_it_cuts_the_array(signal: float, degree: int) -> None:
+    made = planning.plan(config.recipe_of(config.read(TANK, [f"accuracy.signal={signal}"])))
+    assert made.choices.subarrays == 1 and made.choices.degree == degree
+    measured = Expansion.of(made, 0)
+    assert measured.error(1, degree=made.choices.degree) < signal
+    if degree == 5:
+        assert measured.error(1, degree=3) > signal
+        (stage,) = (s for s in made.stages if s.stage == "trace")
+        assert "to the degree 5" in stage.method
+
+
+def test_choices_of_before_are_cubic() -> None:
+    without = {k: v for k, v in planning.Choices().as_json().items() if k != "degree"}
+    assert planning.choices_from(without).degree == 3
+    with pytest.raises(ValueError, match="degree"):
+        planning.choices_from(without | {"degree": 4})
