@@ -79,6 +79,7 @@ class _Doppler(NamedTuple):
     """Of paths, at the array centre."""
 
     velocity: Floats  # (path, xyz) m/s of the target, world
+    mirrored: Floats  # (path, xyz) m/s of where it seems to be
     rate_out: Floats  # (path,) of the way to it,
     rate_in: Floats  # (path,) and from there
     of_array: Floats  # (path,) by the motion of the array
@@ -88,19 +89,33 @@ class _Doppler(NamedTuple):
 def _over_aperture(
     of: _Doppler, legs: Legs, sonar_pose: Pose, profile: Profile, sonar: Floats, elements: Elements,
     departure: Callable[[], Floats] | None, enough: float,
-) -> Floats:  # fmt: skip
-    """Polynomials (path, term) of the second degree of Doppler over the aperture; none where that errs less."""
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Polynomials (path, term) of the second degree over the aperture: of Doppler; and of what bent rays change faster
+    than straight ones to a place that moves (s a second). None where that errs less."""
     c_array = float(profile.at(depth(sonar_pose.position)))
     turning = np.sqrt(dot(of.velocity, of.velocity)) / legs.length + np.sqrt(sonar @ sonar) / legs.radius  # rad/s
     if not CHANGED * float(turning.max()) * elements.aperture / c_array > enough:
-        return np.empty((len(of.stretch), 0))
+        return np.empty((len(of.stretch), 0)), np.empty((len(of.stretch), 0))
     probe = probes(elements)
-    of_array = turned(legs, probe.position[:FEW]) @ -sonar_pose.turn_to_body(sonar) / c_array + of.of_array[:, None]
+    turn = turned(legs, probe.position[:FEW])
+    of_array = turn @ -sonar_pose.turn_to_body(sonar) / c_array + of.of_array[:, None]
     rate_in = of.rate_in[:, None]
     if departure is not None:
         rate_in = -np.einsum("px,pqx->pq", of.velocity, departure()) / profile.at(depth(legs.point))[:, None]
     there = (1.0 + rate_in) / ((1.0 - of.rate_out[:, None]) * (1.0 - of_array)) - 1.0
-    return probe.fit_few(there - of.stretch[:, None])[0]
+    straight = np.einsum("px,pqx->pq", sonar_pose.turn_to_body(of.mirrored), turn) / c_array
+    return probe.fit_few(there - of.stretch[:, None])[0], probe.fit_few(rate_in - of.rate_in[:, None] - straight)[0]
+
+
+def _later(terms: Floats, late: Floats, along: Floats | None) -> Floats:
+    """Delay terms (path, term) of bent rays, if there are any, with what is late, and without what is along the motion
+    of the array (path, xyz)."""
+    if terms.shape[1] and late.shape[1]:
+        terms = np.concatenate([terms[:, : late.shape[1]] + late, terms[:, late.shape[1] :]], axis=1)
+    if along is not None:
+        terms = terms.copy() if terms.shape[1] else np.zeros((len(terms), TERMS))
+        terms[:, 1:4] -= along
+    return terms
 
 
 def carried(
@@ -137,19 +152,19 @@ def carried(
         heard = (gone + aside(legs.length, legs.arrival, apart) / c_array) / (1.0 - of_array)
     stretch = (1.0 + rate_in) / ((1.0 - rate_out) * (1.0 - of_array)) - 1.0
     # where the target was when the sound met it, from where the array is when it comes; as seen in straight rays
-    doppler = _Doppler(velocity, rate_out, rate_in, of_array, stretch)
+    doppler = _Doppler(velocity, mirrored, rate_out, rate_in, of_array, stretch)
     moved = sonar_pose.turn_to_body(mirrored * met[:, None] - moving.sonar * heard[:, None])
     seen = legs.radius[:, None] * legs.direction + moved
     radius = np.sqrt(dot(seen, seen))
-    direction, terms = seen / radius[:, None], made.delay_terms
-    if moving.sonar.any() and elements.aperture > 0.0:
-        terms = terms.copy() if terms.shape[1] else np.zeros((len(heard), TERMS))
-        terms[:, 1:4] -= (of_array / (1.0 - of_array) * elements.aperture / c_array)[:, None] * direction
+    direction = seen / radius[:, None]
+    over, faster = _over_aperture(doppler, legs, sonar_pose, profile, moving.sonar, elements, departure, enough)
+    along = (of_array / (1.0 - of_array) * elements.aperture / c_array)[:, None] * direction
+    terms = _later(made.delay_terms, met[:, None] * faster, along if moving.sonar.any() and elements.aperture else None)
     nearer = legs.radius / radius
     there, back = (nearer, 1.0) if out is None else (1.0, nearer)
     return replace(
         made, delay=heard, stretch=stretch, direction=direction, radius=radius, delay_terms=terms,
-        stretch_terms=_over_aperture(doppler, legs, sonar_pose, profile, moving.sonar, elements, departure, enough),
+        stretch_terms=over,
         spreading_out=made.spreading_out * there, spreading_in=made.spreading_in * back,
         amplitude=made.amplitude * nearer,
     )  # fmt: skip

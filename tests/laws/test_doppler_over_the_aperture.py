@@ -16,7 +16,8 @@ from sonarsynth.sonar import Elements, Romanis, Sonar, elements
 from sonarsynth.sonar.subarrays import subarray
 from sonarsynth.synthesis import DirectSum, KernelDeposit
 from sonarsynth.synthesis.direct_sum import exact_signals
-from sonarsynth.tracing import AutoTracing
+from sonarsynth.synthesis.wavefront import delay_and_gain, fronts
+from sonarsynth.tracing import Refracted, Straight
 from sonarsynth.tracing.arrivals import trace
 from sonarsynth.tracing.moving import Moving
 from sonarsynth.tracing.variation import ENOUGH
@@ -42,7 +43,9 @@ FAR = np.array([int(np.argmax(np.linalg.norm(ROMANIS.position, axis=1))), int(np
 START, SAMPLES = 0.010, 1600
 
 
-def traced(moving: Moving, array: Elements, pose: Pose, *, bounces: int = 0, enough: float = 0.0) -> Arrivals:
+def traced(
+    moving: Moving, array: Elements, pose: Pose, *, bounces: int = 0, enough: float = 0.0, profile: Profile = PROFILE
+) -> Arrivals:
     water = Environment(
         depth=10.0,
         sound_speed=Isovelocity(speed=C),
@@ -50,18 +53,21 @@ def traced(moving: Moving, array: Elements, pose: Pose, *, bounces: int = 0, eno
         bed=SeaBed(reflection=Rigid()),
     )
     panel = Body("panel", PANEL, Pose(np.array([12.0, 1.5, -4.8]), quaternion(0.6)), moving.targets[0])
+    rays = Straight if profile.uniform else Refracted
     found = trace(
-        water, PROFILE, Moment(0.0, (panel,), (SNAP,)), pose, array, 0.0, AutoTracing(bounces=bounces), (Isotropic(),),
+        water, profile, Moment(0.0, (panel,), (SNAP,)), pose, array, 0.0, rays(bounces=bounces), (Isotropic(),),
         band=BAND, moving=moving, enough=enough, negligible=0.0,
     )  # fmt: skip
     return found.select(found.direct | np.isin(found.facet, FRONT))  # those that no hydrophone sees from their edge
 
 
-def alone(moving: Moving, sensor: int, array: Elements = ROMANIS, *, bounces: int = 0) -> tuple[Arrivals, Elements]:
+def alone(
+    moving: Moving, sensor: int, array: Elements = ROMANIS, *, bounces: int = 0, profile: Profile = PROFILE
+) -> tuple[Arrivals, Elements]:
     """Traced to a hydrophone by itself, the middle of an array of its own."""
     part = subarray(array, np.array([sensor]))
     pose = Pose(POSE.to_world(part.centre[None])[0], POSE.orientation)
-    return traced(moving, part.elements, pose, bounces=bounces), part.elements
+    return traced(moving, part.elements, pose, bounces=bounces, profile=profile), part.elements
 
 
 def stretch(found: Arrivals, array: Elements, sensor: int) -> Floats:
@@ -161,3 +167,23 @@ def test_nothing_is_carried_where_it_would_not_be_heard() -> None:
     assert traced(slow, ROMANIS, POSE, enough=ENOUGH).stretch_terms.shape[1] == 0
     assert traced(Moving(STILL[None], STILL), ROMANIS, POSE).stretch_terms.shape[1] == 0
     assert traced(MOVING["target"], ROMANIS, POSE, enough=ENOUGH).stretch_terms.shape[1] > 0
+
+
+def test_delays_of_bent_rays_from_what_moves_are_those_of_each_hydrophone() -> None:
+    """Where bent rays turn otherwise over the aperture than straight ones, what moves is heard at another time too."""
+    sloped, errors = Profile(np.array([0.0, 10.0]), np.array([1480.0, 1580.0])), []
+    one, straight = (traced(MOVING["target"], ROMANIS, POSE, profile=sloped, enough=enough) for enough in (0.0, 1.0))
+    for sensor in FAR:
+        own, element = alone(MOVING["target"], int(sensor), profile=sloped)
+        (exact,) = delays(own, element, [0])
+        errors.append([np.abs(delays(f, ROMANIS, [int(sensor)])[0] - exact).max() for f in (one, straight)])
+    mine, without = np.array(errors).max(axis=0)
+    assert without > 1e-8
+    assert mine < 0.1 * without
+
+
+def delays(found: Arrivals, array: Elements, sensors: list[int]) -> list[Floats]:
+    """Delay (path,) of echoes at each of some hydrophones."""
+    front = fronts(found.select(~found.direct), (SNAP,), array)
+    delay, _ = delay_and_gain(front, array.position)
+    return [front.delay + delay[:, sensor] for sensor in sensors]
