@@ -30,7 +30,7 @@ from sonarsynth.sonar import Elements
 from sonarsynth.tracing.legs import Legs
 from sonarsynth.tracing.paths import Outward
 from sonarsynth.tracing.probe_legs import TERMS
-from sonarsynth.tracing.wavefront import FEW, probes
+from sonarsynth.tracing.wavefront import FEW, SECOND_DEGREE, probes
 from sonarsynth.world.environment import Profile
 from sonarsynth.world.moment import Snap
 
@@ -104,7 +104,9 @@ def _over_aperture(
         rate_in = -np.einsum("px,pqx->pq", of.velocity, departure()) / profile.at(depth(legs.point))[:, None]
     there = (1.0 + rate_in) / ((1.0 - of.rate_out[:, None]) * (1.0 - of_array)) - 1.0
     straight = np.einsum("px,pqx->pq", sonar_pose.turn_to_body(of.mirrored), turn) / c_array
-    return probe.fit_few(there - of.stretch[:, None])[0], probe.fit_few(rate_in - of.rate_in[:, None] - straight)[0]
+    both = there - of.stretch[:, None], rate_in - of.rate_in[:, None] - straight
+    stretch, faster = (probe.fit_few(values)[0][:, :SECOND_DEGREE] for values in both)
+    return stretch, faster
 
 
 def _later(terms: Floats, late: Floats, along: Floats | None) -> Floats:
