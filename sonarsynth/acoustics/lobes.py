@@ -13,9 +13,9 @@ def dot(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2])
 
 
-def lit_and_seen(incident: Floats, scattered: Floats, normal: Floats) -> Bools:
-    """Where a facet is lit by the incident wave and seen from where the scattered one goes (...)."""
-    return np.asarray((dot(normal, incident) < 0) & (dot(normal, scattered) > 0))
+def lit_and_seen(incident: Floats, scattered: Floats, normal: Floats, beyond: bool = False) -> Bools:
+    """Where a facet is lit by the incident wave and, unless `beyond`, seen from where the scattered one goes (...)."""
+    return np.asarray((dot(normal, incident) < 0) & ((dot(normal, scattered) > 0) | beyond))
 
 
 def slope_of_width(width: npt.ArrayLike) -> Floats:
@@ -44,9 +44,17 @@ def slope_lobe(incident: Floats, scattered: Floats, normal: Floats, slope: float
 
 
 def lobe_amplitude(
-    incident: Floats, scattered: Floats, normal: Floats, area: Floats, slope: float, share: float, albedo: float
+    incident: Floats,
+    scattered: Floats,
+    normal: Floats,
+    area: Floats,
+    slope: float,
+    share: float,
+    albedo: float,
+    beyond: bool = False,
 ) -> Floats:
-    """Amplitude sqrt(area (share sigma0 + albedo/pi cos_i cos_s)) (...) in m of facets lit and seen, 0 of others.
+    """Amplitude sqrt(area (share sigma0 + albedo/pi cos_i cos_s)) (...) in m of facets lit and seen, 0 of others;
+    `beyond` that, it goes on where they are lit and not seen.
 
     Unit vectors (..., xyz) and area (...) m2 broadcast; slope as for `slope_lobe`, albedo as for `lambert`.
     """
@@ -56,7 +64,7 @@ def lobe_amplitude(
     (a, b, n), shape = _rows(incident, scattered, np.broadcast_to(normal, (*parts[:-1], 3)))
     size = np.broadcast_to(area, shape).reshape(a.shape[:2])
     out = np.empty(a.shape[:2])
-    lobes_kernels.amplitudes(a, b, n, size, slope, share, albedo, out)
+    lobes_kernels.amplitudes(a, b, n, size, slope, share, albedo, beyond, out)
     return out.reshape(shape)
 
 

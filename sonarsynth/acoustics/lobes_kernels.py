@@ -32,15 +32,16 @@ def slope_lobes(incident: Floats, scattered: Floats, normal: Floats, slope: floa
 @njit(cache=True, error_model="numpy", nogil=True)
 def amplitudes(
     incident: Floats, scattered: Floats, normal: Floats, area: Floats, slope: float, share: float, albedo: float,
-    out: Floats,
+    beyond: bool, out: Floats,
 ) -> None:  # fmt: skip
-    """sqrt(area (share sigma0 + albedo/pi cos cos)) where lit and seen, of vectors (row, column, xyz) into out."""
+    """sqrt(area (share sigma0 + albedo/pi cos cos)) where lit and seen, or `beyond` that lit alone, of vectors (row,
+    column, xyz) into out."""
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             a, b, n = incident[i, j], scattered[i, j], normal[i, j]
             inward = -(a[0] * n[0] + a[1] * n[1] + a[2] * n[2])
             outward = b[0] * n[0] + b[1] * n[1] + b[2] * n[2]
             out[i, j] = 0.0
-            if inward > 0.0 and outward > 0.0:
+            if inward > 0.0 and (outward > 0.0 or beyond):
                 power = share * slope_lobe(a, b, n, slope) + albedo / math.pi * inward * outward
-                out[i, j] = math.sqrt(area[i, j] * power)
+                out[i, j] = math.sqrt(area[i, j] * max(power, 0.0))

@@ -27,9 +27,11 @@ class Isotropic:
         """Of an echo: one, in the shape of the snap."""
         return (Plain(self),)
 
-    def amplitude(self, incident: Floats, scattered: Floats, normal: Floats, area: Floats) -> Floats:
-        """Far-field scattering amplitude (...) in m; arguments as in `ScatteringLaw`."""
-        return np.where(lit_and_seen(incident, scattered, normal), self.strength, 0.0)
+    def amplitude(
+        self, incident: Floats, scattered: Floats, normal: Floats, area: Floats, beyond: bool = False
+    ) -> Floats:
+        """Far-field scattering amplitude (...) in m, directions in and away; `beyond`: as in `parts.Plain`."""
+        return np.where(lit_and_seen(incident, scattered, normal, beyond), self.strength, 0.0)
 
     def polarity(self, mesh: Mesh) -> Floats:
         """Sign (facet,) of the echo of each facet: all alike."""

@@ -52,10 +52,12 @@ class MirrorLobe:
         """Of an echo: one, in the shape of the snap."""
         return (Plain(self),)
 
-    def amplitude(self, incident: Floats, scattered: Floats, normal: Floats, area: Floats) -> Floats:
-        """Far-field scattering amplitude (...) in m; arguments as in `ScatteringLaw`."""
+    def amplitude(
+        self, incident: Floats, scattered: Floats, normal: Floats, area: Floats, beyond: bool = False
+    ) -> Floats:
+        """Far-field scattering amplitude (...) in m, directions in and away; `beyond`: as in `parts.Plain`."""
         slope = float(slope_of_width(self.width))
-        return lobe_amplitude(incident, scattered, normal, area, slope, self.reflectivity**2, self.diffuse)
+        return lobe_amplitude(incident, scattered, normal, area, slope, self.reflectivity**2, self.diffuse, beyond)
 
     def polarity(self, mesh: Mesh) -> Floats:
         """Sign (facet,) of the echo of each facet, by `phases`."""

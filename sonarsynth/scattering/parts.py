@@ -50,10 +50,13 @@ class Plain:
     """A law that repeats the pulse."""
 
     law: MirrorLobe | Isotropic
+    beyond: bool = False
+    """Whether the amplitude goes on where a facet is lit but not seen: for arrays of which some hydrophones see it, and
+    are told from those that do not."""
 
     def amplitude(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
         """As `Part.amplitude`: the same at all wavenumbers."""
-        return self.law.amplitude(incident, scattered, patch.normal, patch.area)
+        return self.law.amplitude(incident, scattered, patch.normal, patch.area, self.beyond)
 
     def pulses(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Pulses:
         """As `Part.pulses`: none."""
@@ -73,8 +76,7 @@ class Smooth:
 
     law: Kirchhoff
     beyond: bool = False
-    """Whether the amplitude goes on, below 0 perhaps, where a facet is lit but not seen: for arrays of which some
-    hydrophones see it, and are told from those that do not."""
+    """As of `Plain`; it may be below 0 there."""
 
     def amplitude(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
         """As `Part.amplitude`: |V| k A n.(ks - ki)/(4 pi), by the factor `Kirchhoff.lit`."""
@@ -135,10 +137,12 @@ class Rough:
     """
 
     law: Kirchhoff
+    beyond: bool = False
+    """As of `Plain`."""
 
     def _powers(self, incident: Floats, scattered: Floats, patch: Patches) -> tuple[Floats, Floats]:
         """Cross-sections per area (...) (1/sr) of the lobe, where heights are large, and of the floor."""
-        on = lit_and_seen(incident, scattered, patch.normal)
+        on = lit_and_seen(incident, scattered, patch.normal, self.beyond)
         returned = np.where(on, np.abs(reflection(self.law, incident, scattered)) ** 2, 0.0)
         lobe = slope_lobe(incident, scattered, patch.normal, self.law.slope) if self.law.roughness > 0 else 0.0
         floor = lambert(incident, scattered, patch.normal, self.law.diffuse)

@@ -144,7 +144,9 @@ def groups_of(array: ArrayLegs, out: Outward, leg: Ints, parts: tuple[tuple[Part
         scattered = body.pose.turn_to_body(array.legs.departure[leg[row]])
         speed = array.profile.at(depth(array.legs.point[leg[row]]))
         wavenumber = 2.0 * np.pi * array.centre / speed
-        for part in (replace(p, beyond=True) if looked_for and isinstance(p, Smooth) else p for p in of_law):
+        for part in (
+            replace(p, beyond=True) if looked_for and isinstance(p, Plain | Smooth | Rough) else p for p in of_law
+        ):
             patch = patches(body.mesh, not isinstance(part, Plain)).select(facet)
             amplitude = part.amplitude(incident, scattered, patch, wavenumber)
             sign = part.polarity(body.mesh)[facet]

@@ -44,5 +44,5 @@ def delayed_by_spots(over: Terms, array: ArrayLegs, leg: Ints, spot: Floats) -> 
     speed = array.profile.at(depth(array.legs.point[leg[some]]))
     late = -dot(spot[some, None], away) / speed[:, None]
     delay = over.delay.copy()
-    delay[some] += probes(array.elements).fit(late)
+    delay[some] += probes(array.elements, array.degree).fit(late)
     return over._replace(delay=delay)
