@@ -32,7 +32,7 @@ from sonarsynth.synthesis import AutoSynthesis, DirectSum, KernelDeposit
 from sonarsynth.synthesis.auto import deposit_error, deposit_for
 from sonarsynth.tracing import Visibility
 
-FAINT, SYNTHESIS, EXPANSION = 0.1, 0.1, 0.8
+FAINT, SYNTHESIS, EXPANSION = 0.1, 0.4, 0.5
 """Shares of the square of the error allowed to signals: of paths left out, of the synthesis, of expansions."""
 HEARD_AT = 6
 """Hydrophones that are traced by themselves to measure what expansions err by."""

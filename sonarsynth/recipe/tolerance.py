@@ -19,7 +19,7 @@ class Accuracy:
     taken at its word: its facets, its band and its beams are not errors.
     """
 
-    signal: Annotated[Number, Ge(1e-7), Le(0.3)] = 0.02
+    signal: Annotated[Number, Ge(1e-7), Le(0.3)] = 1e-3
     """Error of the echoes, and of the direct arrivals, relative: root of the summed squares, over the array."""
     range_m: Annotated[Number, Gt(0)] = 0.01
     """Error of ranges by the method that turns delays into places, in m."""

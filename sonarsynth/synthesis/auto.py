@@ -21,6 +21,8 @@ ROUNDING: Final[dict[str, float]] = {"float32": 3e-6, "float64": 1e-9}
 """What the precision of the grid and its table of the kernel leave."""
 SPENT = 0.4
 """Error of the signals over the tolerance of each other approximation of `KernelDeposit`, at most (its table)."""
+LEFT = 0.3
+"""Share of the error allowed that kernel and precision must leave to the other approximations."""
 LEAST_TOLERANCE, MOST_TOLERANCE = 1e-10, 1e-2
 
 
@@ -45,7 +47,7 @@ def deposit_for(error: float) -> KernelDeposit:
         kernel = kernel_error(width, KernelDeposit().oversampling)
         for precision in PRECISIONS:
             left = (error - kernel - ROUNDING[precision]) / SPENT
-            if left >= 0.5 * error / SPENT:
+            if left >= LEFT * error / SPENT:
                 tolerance = min(left, MOST_TOLERANCE)
                 digit = 10.0 ** np.floor(np.log10(tolerance))
                 down = float(f"{np.floor(tolerance / digit) * digit:.1g}")

@@ -109,7 +109,7 @@ def test_choices_of_the_scene_are_kept_and_their_error_is_said() -> None:
     made = planning.plan(replace(remus(1), scene=replace(scene, physics=physics)))
     assert made.choices.subarrays == 1 and made.choices.synthesis == physics.synthesis
     assert made.choices.negligible == pytest.approx(0.01)
-    assert any("accuracy.signal allows 0.02" in note for note in made.warnings)
+    assert any("accuracy.signal allows 0.001" in note for note in made.warnings)
 
 
 def test_subarrays_make_the_signals_that_the_whole_array_hears() -> None:
@@ -168,7 +168,7 @@ def _frame(made: Plan) -> list[bytes]:
 
 def test_a_frame_in_uniform_water_is_made_without_any_code_for_rays_that_bend(monkeypatch: pytest.MonkeyPatch) -> None:
     uniform = planning.plan(config.load(CONFIGS / "remus.yaml"))
-    bending = planning.plan(config.load(CONFIGS / "thermocline.yaml"))
+    bending = planning.plan(config.load(CONFIGS / "tank.yaml"))
     whole = _frame(uniform)
     for name in BENT:
         importlib.import_module(f"sonarsynth.{name}")
