@@ -168,7 +168,7 @@ def _frame(made: Plan) -> list[bytes]:
 
 def test_a_frame_in_uniform_water_is_made_without_any_code_for_rays_that_bend(monkeypatch: pytest.MonkeyPatch) -> None:
     uniform = planning.plan(config.load(CONFIGS / "remus.yaml"))
-    bending = planning.plan(config.load(CONFIGS / "tank.yaml"))
+    bending = planning.plan(config.load(CONFIGS / "thermocline.yaml", RECIPES["thermocline.yaml"]), {"cloud"})
     whole = _frame(uniform)
     for name in BENT:
         importlib.import_module(f"sonarsynth.{name}")
