@@ -30,5 +30,5 @@ class Accuracy:
 
     @property
     def cheap(self) -> float:
-        """Error of signals that is allowed to what costs little to do better: never more than 1e-3."""
-        return min(self.signal, 1e-3)
+        """Error of signals that is allowed to what costs little to do better: never more than 3e-3."""
+        return min(self.signal, 3e-3)

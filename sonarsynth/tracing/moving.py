@@ -91,22 +91,26 @@ def _over_aperture(
     departure: Callable[[], Floats] | None, enough: float,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Polynomials (path, term) of the second degree over the aperture: of Doppler; and of what bent rays change faster
-    than straight ones to a place that moves (s a second). None where that errs less."""
+    than straight ones to a place that moves (s a second). None of paths where that errs less, whatever the others."""
     c_array = float(profile.at(depth(sonar_pose.position)))
     turning = np.sqrt(dot(of.velocity, of.velocity)) / legs.length + np.sqrt(sonar @ sonar) / legs.radius  # rad/s
-    if not CHANGED * float(turning.max()) * elements.aperture / c_array > enough:
+    some = np.flatnonzero(CHANGED * turning * elements.aperture / c_array > enough)
+    if not len(some):
         return np.empty((len(of.stretch), 0)), np.empty((len(of.stretch), 0))
-    probe = probes(elements)
-    turn = turned(legs, probe.position[:FEW])
-    of_array = turn @ -sonar_pose.turn_to_body(sonar) / c_array + of.of_array[:, None]
-    rate_in = of.rate_in[:, None]
+    probe, doppler, leg = probes(elements), _Doppler(*(value[some] for value in of)), legs.select(some)
+    turn = turned(leg, probe.position[:FEW])
+    of_array = turn @ -sonar_pose.turn_to_body(sonar) / c_array + doppler.of_array[:, None]
+    rate_in = doppler.rate_in[:, None]
     if departure is not None:
-        rate_in = -np.einsum("px,pqx->pq", of.velocity, departure()) / profile.at(depth(legs.point))[:, None]
-    there = (1.0 + rate_in) / ((1.0 - of.rate_out[:, None]) * (1.0 - of_array)) - 1.0
-    straight = np.einsum("px,pqx->pq", sonar_pose.turn_to_body(of.mirrored), turn) / c_array
-    both = there - of.stretch[:, None], rate_in - of.rate_in[:, None] - straight
-    stretch, faster = (probe.fit_few(values)[0][:, :SECOND_DEGREE] for values in both)
-    return stretch, faster
+        away = departure()[some]
+        rate_in = -np.einsum("px,pqx->pq", doppler.velocity, away) / profile.at(depth(leg.point))[:, None]
+    there = (1.0 + rate_in) / ((1.0 - doppler.rate_out[:, None]) * (1.0 - of_array)) - 1.0
+    straight = np.einsum("px,pqx->pq", sonar_pose.turn_to_body(doppler.mirrored), turn) / c_array
+    both = there - doppler.stretch[:, None], rate_in - doppler.rate_in[:, None] - straight
+    found = np.zeros((2, len(of.stretch), SECOND_DEGREE))
+    for terms, values in zip(found, both, strict=True):
+        terms[some] = probe.fit_few(values)[0][:, :SECOND_DEGREE]
+    return found[0], found[1]
 
 
 def _later(terms: Floats, late: Floats, along: Floats | None) -> Floats:

@@ -203,8 +203,12 @@ def test_signals_end_a_build_and_its_workers_in_10_s_and_it_goes_on(
 ) -> None:
     path = tmp_path / "s.zarr"
     small_file.write_text(small_file.read_text().replace("frames: 20, interval: 0.1", "frames: 4000, interval: 2e-4"))
+    code = (  # what runs in the background of a shell ignores SIGINT, and what it starts
+        "import signal, sys\nfrom sonarsynth.cli import main\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\nmain(sys.argv[1:])"
+    )
     building = subprocess.Popen(
-        [sys.executable, "-m", "sonarsynth", "build", str(small_file), str(path), "--workers", "1", "--no-predict"],
+        [sys.executable, "-c", code, "build", str(small_file), str(path), "--workers", "1", "--no-predict"],
         stderr=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(HERE)}, start_new_session=True,
     )  # fmt: skip
     while not any((path / ".marks").glob("[0-9]*.json")):
