@@ -91,7 +91,7 @@ class ArrayLegs:
     def view(self, bodies: tuple[Body, ...]) -> View:
         """Who looks, and which bodies stand in between."""
         lookout = self.elements if self.visibility == "hydrophones" else None
-        return View(bodies, self.environment, self.bending, self.sonar_pose, lookout)
+        return View(bodies, self.environment, self.bending, self.sonar_pose, lookout, self.propagation, self.degree)
 
     @property
     def bending(self) -> Profile:
@@ -185,7 +185,7 @@ def array_legs(
     bent, centre = bending(profile, propagation, sonar_pose), 0.5 * (band[0] + band[1])
     lookout = elements if visibility == "hydrophones" else None
     slack = elements.aperture if lookout is not None else 0.0
-    view = View(bodies, environment, bent, sonar_pose, lookout)
+    view = View(bodies, environment, bent, sonar_pose, lookout, propagation, degree)
     found: tuple[list[Legs], list[Facets]] = [], []
     seen = 0
     for some in in_blocks(sum(len(body.mesh.faces) for body in bodies)):

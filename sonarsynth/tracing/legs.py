@@ -13,6 +13,7 @@ from sonarsynth.conventions import Bools, Bytes, Floats, Ints, depth
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Paths
 from sonarsynth.tracing.reflections import Reflections, reflections
+from sonarsynth.tracing.shadows import most_swerve
 from sonarsynth.world.casting import OFFSET
 from sonarsynth.world.environment import Environment, Profile
 from sonarsynth.world.meshes import in_blocks
@@ -61,6 +62,11 @@ class Legs:
     def bounces(self) -> Ints:
         """(leg,) reflections from surface and bed."""
         return np.asarray(self.surface + self.bottom)
+
+    def swerve(self, environment: Environment, profile: Profile, sonar_pose: Pose, spread: Floats | float) -> Floats:
+        """(leg,) rad as `shadows.most_swerve`, of those to within `spread` (m) of the array centre."""
+        ray = self.departure, self.length, self.spreading, self.surface, self.bottom, self.turning
+        return most_swerve(environment.depth, profile, self.point, float(depth(sonar_pose.position)), *ray, spread)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,10 +178,12 @@ def legs_from(
 ) -> Legs:
     """Facet to array: rays that leave a facet on its outer side, whether or not a body stands in them; rows are facets.
 
-    Or that would on their way to a point within `slack` (m) of the array centre.
+    Or that may on their way to a point within `slack` (m) of the array centre.
     """
     legs = rays_to_centre(environment, profile, facets.point, sonar_pose, propagation, centre)
     ahead = np.einsum("ij,ij->i", facets.normal[legs.row], legs.departure) * legs.length
+    if slack and propagation.bends:
+        ahead += legs.swerve(environment, profile, sonar_pose, slack) * (legs.length + slack)
     return legs.select(np.flatnonzero(ahead > -slack))
 
 

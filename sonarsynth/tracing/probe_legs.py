@@ -68,7 +68,9 @@ def traced(legs: Legs, place: Place) -> Made:
         if not legs.bounces.any():
             return replace(made, departure=departure)
     else:
-        left, gain, departure = _to_probes(legs, environment, profile, place.sonar_pose, place.probe, place.propagation)
+        left, gain, departure = rays_to_probes(
+            legs, environment, profile, place.sonar_pose, place.probe, place.propagation
+        )
     probe, rate = place.probe, 2.0 * np.pi * band[1]
     turned, loss, softer = _boundaries(legs, departure, environment, profile, 0.5 * (band[0] + band[1]))
     turned, softer = (np.where(np.isnan(left), np.nan, value) for value in (turned, softer))
@@ -108,7 +110,7 @@ def _boundaries(
     return shift, ratio, softer
 
 
-def _to_probes(
+def rays_to_probes(
     legs: Legs, environment: Environment, profile: Profile, sonar_pose: Pose, probe: Probes, propagation: Propagation
 ) -> tuple[Floats, Floats, Floats]:
     """Delay over the sphere's (s), gain over it (leg, probe), departure (leg, probe, xyz): rays to every probe."""

@@ -5,18 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from sonarsynth.acoustics.lobes import dot
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.geometry import Pose
 from sonarsynth.sonar import Elements
 from sonarsynth.tracing.legs import Legs
 from sonarsynth.tracing.shadows import bundles, hidden
+from sonarsynth.tracing.swerves import swerves
 from sonarsynth.world.cones import CLOSED, UNKNOWN, look
 from sonarsynth.world.environment import Environment, Profile
 from sonarsynth.world.moment import Body
+
+if TYPE_CHECKING:
+    from sonarsynth.tracing import Propagation
 
 RAYS = 30_000
 """Rays that are looked at together."""
@@ -43,6 +48,8 @@ class View:
     bending: Profile
     sonar_pose: Pose
     elements: Elements | None  # None: the array centre looks for all
+    propagation: Propagation
+    degree: int = 3  # of polynomials over the aperture
 
     def visible(self, legs: Legs, start: Floats, normal: Floats | None) -> Legs:
         """The legs that no body hides from the array centre; or, with elements, from every hydrophone, some of them
@@ -56,12 +63,14 @@ class View:
             return legs.select(~self._hides(start, end, legs.departure, legs.length, legs.bounces, legs.turning))
         certain = self._certain(legs, start, normal)
         kept, mixed = certain != CLOSED, certain == UNKNOWN
-        rows, first = np.flatnonzero(certain >= UNKNOWN), np.append(0, 1 + rim(self.elements))
-        for some in _parts(rows, len(first)):
-            leg, point = np.repeat(some, len(first)), np.tile(first, len(some))
-            unseen = self._unseen(legs, start, normal, leg, point).reshape(len(some), len(first))
-            kept[some] = ~unseen.all(axis=1)
-            mixed[some] |= unseen.any(axis=1)
+        first = np.append(0, 1 + rim(self.elements))
+        for kind in (UNKNOWN, NO_CONE):
+            for some in _parts(np.flatnonzero(certain == kind), len(first)):
+                leg, point = np.repeat(some, len(first)), np.tile(first, len(some))
+                swerve = self._swerve(legs.select(some), first) if kind == NO_CONE else None  # others stay open
+                unseen = self._unseen(legs, start, normal, leg, point, swerve).reshape(len(some), len(first))
+                kept[some] = ~unseen.all(axis=1)
+                mixed[some] |= unseen.any(axis=1)
         for some in _parts(np.flatnonzero(mixed & ~kept & (certain == UNKNOWN)), len(self._points)):
             kept[some] = ~self._dark(legs, start, normal, some).all(axis=1)
         none = np.zeros((np.count_nonzero(kept), 1 + self.elements.count // 8), np.uint8)
@@ -90,29 +99,33 @@ class View:
         points = self._points
         spread = np.full(len(start), 1.001 * float(np.linalg.norm(points, axis=1).max()))
         middle = np.zeros((len(start), 3))
+        swerve = legs.swerve(self.environment, self.bending, self.sonar_pose, spread)
         if normal is None:
-            return self._cones(legs, start, middle, spread, None)
-        least, most = _within(legs, normal, spread)
+            return self._cones(legs, start, middle, spread, None, swerve)
+        least, most = _within(legs, normal, spread, swerve)
         rows = np.flatnonzero((least <= 0.0) & (most >= 0.0))
         flip = np.where(legs.bounces[rows] % 2 == 1, -1.0, 1.0)  # of the mirrored array
         across = self.sonar_pose.turn_to_body(normal[rows] * np.column_stack([np.ones((len(rows), 2)), flip]))
         beside, ahead = across @ points.T, 0.5 * (least + most)[rows]
-        least[rows] = ahead + beside.min(axis=1, initial=np.inf) - 1e-9 * legs.length[rows]
-        most[rows] = ahead + beside.max(axis=1, initial=-np.inf) + 1e-9 * legs.length[rows]
-        return self._cones(legs, start, middle, spread, (least, most))
+        margin = 1e-9 * legs.length[rows] + (swerve * (legs.length + spread))[rows]
+        least[rows] = ahead + beside.min(axis=1, initial=np.inf) - margin
+        most[rows] = ahead + beside.max(axis=1, initial=-np.inf) + margin
+        return self._cones(legs, start, middle, spread, (least, most), swerve)
 
     def _cones(
-        self, legs: Legs, start: Floats, offset: Floats, spread: Floats, ahead: tuple[Floats, Floats] | None
-    ) -> Ints:
+        self, legs: Legs, start: Floats, offset: Floats, spread: Floats, ahead: tuple[Floats, Floats] | None,
+        swerve: Floats,
+    ) -> Ints:  # fmt: skip
         """(leg,) as `_certain`, of the hydrophones within `spread` (leg,) of places beside the centre (leg, xyz); ahead
-        (leg,): how far (m) they are on the outer side of the facet, at least and at most."""
+        (leg,): how far (m) they are on the outer side of the facet, at least and at most; swerve (leg,) rad: by how
+        much rays to them leave beside their images, at most."""
         away, length = _towards(legs, offset)
         found, rows = np.full(len(start), UNKNOWN), np.arange(len(start))
         if ahead is not None:
             found[ahead[1] < 0.0] = CLOSED
             rows = np.flatnonzero(ahead[0] > 0.0)
         end, counts = (self.sonar_pose.position + offset)[rows], (legs.bounces[rows], legs.turning[rows])
-        ray = start[rows], end, away[rows], length[rows], spread[rows], *counts
+        ray = start[rows], end, away[rows], length[rows], spread[rows], *counts, swerve[rows]
         slope, reach, far = bundles(self.bodies, self.environment, self.bending, *ray)
         sure = np.flatnonzero(np.isfinite(slope))
         found[rows], rows = NO_CONE, rows[sure]
@@ -125,23 +138,42 @@ class View:
         parts = cells(self.elements)
         row, cell = np.repeat(rows, len(parts.radius)), np.tile(np.arange(len(parts.radius)), len(rows))
         some, offset, spread = legs.select(row), self.sonar_pose.turn_to_world(parts.centre)[cell], parts.radius[cell]
-        ahead = None if normal is None else _within(some, normal[row], spread, offset)
-        found = self._cones(some, start[row], offset, spread, ahead)
+        swerve = self._swerve(legs.select(rows), np.arange(len(self._points)))
+        beside = np.zeros(len(row))
+        if swerve is not None:
+            order = np.argsort(parts.cell, kind="stable")
+            first = np.searchsorted(parts.cell[order], np.arange(len(parts.radius)))
+            beside = np.maximum.reduceat(np.sqrt(dot(swerve, swerve))[:, order], first, axis=1).ravel()
+        ahead = None if normal is None else _within(some, normal[row], spread, beside, offset)
+        found = self._cones(some, start[row], offset, spread, ahead, beside)
         found = found.reshape(len(rows), len(parts.radius))[:, parts.cell]
         dark = np.asarray(found == CLOSED)
         one, point = np.nonzero(found >= UNKNOWN)
-        dark[one, point] = self._unseen(legs, start, normal, rows[one], point)
+        some_of = None if swerve is None else swerve[one, point]
+        dark[one, point] = self._unseen(legs, start, normal, rows[one], point, some_of)
         return dark
 
-    def _unseen(self, legs: Legs, start: Floats, normal: Floats | None, leg: Ints, point: Ints) -> Bools:
+    def _swerve(self, legs: Legs, point: Ints) -> Floats | None:
+        """(leg, point, xyz) as `swerves`, of the centre, or the hydrophones from 1; None where rays are straight."""
+        if self.bending.uniform or self.elements is None:
+            return None
+        where = self.environment, self.bending, self.sonar_pose, self.elements
+        return swerves(legs, self._points[point], *where, self.propagation, self.degree)
+
+    def _unseen(
+        self, legs: Legs, start: Floats, normal: Floats | None, leg: Ints, point: Ints, swerve: Floats | None
+    ) -> Bools:
         """(ray,) which legs (ray,) leave the back of their facets, or meet a body, on the way to points (ray,): the
         centre, or the hydrophones from 1.
 
-        To each point a ray leaves for where it is beside the image of the array centre: exact for straight rays, and
-        for bent ones to the second order in the size of the array.
+        To each point a ray leaves for where it is beside the image of the array centre, which is exact for straight
+        rays; bent ones off that by `swerve`, some for each ray.
         """
         legs, offset = legs.select(leg), self.sonar_pose.turn_to_world(self._points)[point]
         ahead, length = _towards(legs, offset)
+        if swerve is not None:
+            ahead += swerve.reshape(ahead.shape)
+            ahead /= np.linalg.norm(ahead, axis=1)[:, None]
         unseen = np.zeros(len(leg), bool)
         if normal is not None:
             unseen = np.einsum("rx,rx->r", ahead, normal[leg]) <= 0.0
@@ -164,12 +196,15 @@ def _towards(legs: Legs, offset: Floats) -> tuple[Floats, Floats]:
     return ahead / np.maximum(length, 1e-300)[:, None], length
 
 
-def _within(legs: Legs, normal: Floats, spread: Floats, offset: Floats | None = None) -> tuple[Floats, Floats]:
+def _within(
+    legs: Legs, normal: Floats, spread: Floats, swerve: Floats, offset: Floats | None = None
+) -> tuple[Floats, Floats]:
     """(leg,) how far (m) on the outer side of a facet what is within `spread` (leg,) of a place beside the centre is,
-    at least and at most."""
+    at least and at most, where rays to there leave beside its image by `swerve` (leg,) rad at most."""
     away, length = (legs.departure, legs.length) if offset is None else _towards(legs, offset)
     ahead = np.einsum("ij,ij->i", normal, away) * length
-    return ahead - spread, ahead + spread
+    room = spread + swerve * (length + spread)
+    return ahead - room, ahead + room
 
 
 class Cells(NamedTuple):

@@ -14,6 +14,7 @@ from sonarsynth.tracing.arrivals import bending
 from sonarsynth.tracing.legs import Legs, facets_of, legs_from
 from sonarsynth.tracing.shading import View, cells, rim
 from sonarsynth.tracing.shadows import hidden
+from sonarsynth.tracing.swerves import swerves
 from sonarsynth.world.casting import occluded
 from sonarsynth.world.cones import CLOSED, EMPTY, UNKNOWN, look
 from sonarsynth.world.environment import Environment, Profile
@@ -47,6 +48,10 @@ def seen_alone(view: View, legs: Legs, start: Floats, normal: Floats, sensor: in
     ahead = legs.length[:, None] * legs.departure + image
     length = np.linalg.norm(ahead, axis=1)
     ahead /= length[:, None]
+    if not view.bending.uniform:
+        where = view.environment, view.bending, view.sonar_pose, view.elements, view.propagation, view.degree
+        ahead += swerves(legs, view.elements.position[[sensor]], *where)[:, 0]
+        ahead /= np.linalg.norm(ahead, axis=1)[:, None]
     end = np.broadcast_to(view.sonar_pose.position + offset, start.shape)
     ray = start, end, ahead, length, legs.bounces, legs.turning
     blocked = hidden(view.bodies, view.environment, view.bending, *ray)
@@ -57,7 +62,7 @@ def shaded(bodies: tuple[Body, ...], array: Elements, rays: Propagation, profile
     """Hold every leg against each hydrophone by itself: (leg, sensor) which do not see it."""
     facets = facets_of(bodies, slice(0, sum(len(b.mesh.faces) for b in bodies)))
     legs = legs_from(facets, WATER, profile, SONAR, rays, 50e3, array.aperture)
-    view = View(bodies, WATER, bending(profile, rays, SONAR), SONAR, array)
+    view = View(bodies, WATER, bending(profile, rays, SONAR), SONAR, array, rays)
     side = facets.clear[legs.row], facets.normal[legs.row]
     alone = np.stack([seen_alone(view, legs, *side, sensor) for sensor in range(array.count)], axis=1)
     numbered = replace(legs, caustics=np.arange(len(legs.row)))

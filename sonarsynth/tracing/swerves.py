@@ -1,0 +1,96 @@
+"""Where bent rays leave for hydrophones: beside the directions towards the images of these, beside that of the centre.
+
+Those directions are what straight rays have. In water that bends rays they are off by the size of the array over the
+distance, times what the rays' spreading differs from that of straight ones.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.acoustics.arrays import aperture_terms
+from sonarsynth.acoustics.lobes import dot
+from sonarsynth.conventions import Floats, Ints, depth
+from sonarsynth.geometry import Pose
+from sonarsynth.sonar import Elements
+from sonarsynth.tracing.legs import Legs
+from sonarsynth.tracing.probe_legs import rays_to_probes
+from sonarsynth.tracing.wavefront import probes, terms_of
+from sonarsynth.world.environment import Environment, Profile
+
+if TYPE_CHECKING:
+    from sonarsynth.tracing import Propagation
+
+SAME = 1e-9
+"""Largest distance of two directions of one ray, found in two ways."""
+
+
+def swerves(
+    legs: Legs, points: Floats, environment: Environment, profile: Profile, sonar_pose: Pose, elements: Elements,
+    propagation: Propagation, degree: int,
+) -> Floats:  # fmt: skip
+    """(leg, point, xyz) what is between the directions in which rays leave for points (point, xyz) m of the sonar
+    frame, on the aperture, and those towards their images; profile: what bends them.
+
+    Rays that do not leave a layer of constant gradient are arcs; others are traced to the probes of the aperture, with
+    polynomials of a degree in between. Where a probe has no ray, it is taken to be where straight ones are.
+    """
+    offset = sonar_pose.turn_to_world(points)
+    made, arc = _arcs(legs, sonar_pose.position, offset, environment, profile)
+    made[arc] -= towards(legs.select(arc), offset)
+    rest = np.flatnonzero(~np.isin(np.arange(len(legs.row)), arc))
+    if not len(rest):
+        return made
+    some, probe = legs.select(rest), probes(elements, degree)
+    left, _, away = rays_to_probes(some, environment, profile, sonar_pose, probe, propagation)
+    away -= towards(some, sonar_pose.turn_to_world(probe.position))
+    away[np.isnan(left)] = 0.0
+    basis = aperture_terms(points, probe.aperture, terms_of(degree))
+    for axis in range(3):
+        made[rest, :, axis] = probe.fit(np.ascontiguousarray(away[..., axis])) @ basis.T
+    return made
+
+
+def towards(legs: Legs, offset: Floats) -> Floats:
+    """Unit vectors (leg, point, xyz) from the starts of legs to the images of places beside the centre (point, xyz),
+    world."""
+    ahead = (legs.length[:, None] * legs.departure)[:, None] + offset
+    odd = np.asarray(legs.bounces % 2 == 1)
+    ahead[odd, :, 2] -= 2.0 * offset[:, 2]  # of the mirrored array
+    return np.asarray(ahead / np.maximum(np.sqrt(dot(ahead, ahead)), 1e-300)[..., None])
+
+
+def _arcs(
+    legs: Legs, centre: Floats, offset: Floats, environment: Environment, profile: Profile
+) -> tuple[Floats, Ints]:
+    """Directions (leg, point, xyz) of rays to places beside the centre (point, xyz) m, world, of legs that keep to one
+    layer, with some room; and which legs these are.
+
+    In a layer of constant gradient g the centre of the circle is at the depth where c would be 0 and equally far from
+    both ends, so the tangent of the grazing angle at the start, down positive, is (dz (c + c') / X + g X) / 2 c.
+    """
+    made = np.zeros((len(legs.row), len(offset), 3))
+    nodes, speed = profile.depth, profile.speed
+    ends = np.append(depth(centre + offset), depth(centre))
+    layer = np.searchsorted(nodes, ends.min(), "right") - 1
+    if layer < 0 or layer + 1 >= len(nodes):
+        return made, np.empty(0, int)
+    top, low = float(nodes[layer]), min(float(nodes[layer + 1]), environment.depth)
+    gradient = float((speed[layer + 1] - speed[layer]) / (nodes[layer + 1] - top))
+    z = depth(legs.point)
+    bow = abs(gradient) / float(speed[layer : layer + 2].min()) * (legs.length + np.abs(offset).sum(axis=1).max()) ** 2
+    within = (np.minimum(z, ends.min()) - bow >= top) & (np.maximum(z, ends.max()) + bow <= low)
+    some = np.flatnonzero(within & (legs.bounces == 0))
+    to = np.concatenate([np.zeros((1, 3)), offset])[None] + (centre - legs.point[some])[:, None]
+    level = np.hypot(to[..., 0], to[..., 1])
+    c = (float(speed[layer]) + gradient * (z[some] - top))[:, None]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        down = 0.5 * (-to[..., 2] * (2.0 - gradient * to[..., 2] / c) / level + gradient * level / c)
+        cosine = 1.0 / np.hypot(1.0, down)
+        ahead = np.concatenate([to[..., :2] * (cosine / level)[..., None], (-down * cosine)[..., None]], axis=2)
+        known = np.abs(ahead[:, 0] - legs.departure[some]).max(axis=1) <= SAME
+    known &= np.isfinite(ahead).all(axis=(1, 2))
+    made[some[known]] = ahead[known, 1:]
+    return made, some[known]
