@@ -1,0 +1,104 @@
+"""Through water that bends rays, off surface and bed: the array sees what each hydrophone, traced by itself, sees."""
+
+import numpy as np
+import pytest
+
+from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.geometry import Pose
+from sonarsynth.sonar import Elements
+from sonarsynth.tracing import Propagation, Refracted
+from sonarsynth.tracing.legs import Facets, Legs, facets_of, legs_from
+from sonarsynth.tracing.shading import View
+from sonarsynth.tracing.swerves import swerves, towards
+from sonarsynth.world.environment import Profile
+from sonarsynth.world.moment import Body
+from sonarsynth.world.shapes import Sphere
+from tests.laws.test_shading_by_cones import SONAR, WATER, array_of, body, some_bodies
+
+DEPTHS = np.array([0.0, 8.0, 12.0, 17.0, 22.0, 30.0])
+PROFILES = {
+    "a steep gradient": Profile(DEPTHS[[0, -1]], np.array([1560.0, 1480.0])),
+    "over the array": Profile(DEPTHS, np.array([1550.0, 1549.0, 1520.0, 1519.0, 1518.0, 1517.0])),
+    "at the array and under it": Profile(DEPTHS, np.array([1540.0, 1539.0, 1538.0, 1528.0, 1500.0, 1501.0])),
+}
+BENT = pytest.mark.parametrize("profile", PROFILES.values(), ids=PROFILES.keys())
+ARRAY = array_of(61)
+
+
+def names(legs: Legs) -> Ints:
+    """(leg,) facet and family; which side direct ones leave on may differ over the array."""
+    up = (legs.departure[:, 2] > 0.0) & (legs.bounces > 0)
+    return np.asarray(9 * (2 * legs.row + up) + 3 * legs.surface + legs.bottom)
+
+
+def seen_by(bodies: tuple[Body, ...], facets: Facets, rays: Propagation, profile: Profile, place: Floats) -> Ints:
+    """Names of the legs to one place that no body hides."""
+    pose = Pose(place, SONAR.orientation)
+    legs = legs_from(facets, WATER, profile, pose, rays, 50e3)
+    view = View(bodies, WATER, profile, pose, None, rays)
+    return names(view.visible(legs, facets.clear[legs.row], facets.normal[legs.row]))
+
+
+def seen_by_all(
+    bodies: tuple[Body, ...], facets: Facets, rays: Propagation, profile: Profile, array: Elements, degree: int
+) -> tuple[Ints, Bools]:
+    """Names of the legs that any hydrophone sees, and from which they are hidden (leg, sensor)."""
+    legs = legs_from(facets, WATER, profile, SONAR, rays, 50e3, array.aperture)
+    view = View(bodies, WATER, profile, SONAR, array, rays, degree)
+    legs = view.visible(legs, facets.clear[legs.row], facets.normal[legs.row])
+    legs = view.settled(legs, facets.clear[legs.row], facets.normal[legs.row])
+    hidden = np.unpackbits(legs.hidden_from, axis=1, count=1 + array.count)[:, 1:]
+    return names(legs), hidden.astype(bool)
+
+
+def some_facets(seed: int) -> tuple[tuple[Body, ...], Facets]:
+    """Bodies, some before others, and some of their facets; of a ball many near its limb."""
+    ball = body(Sphere(radius=0.5, edge=0.05), (12.0, 0.9, -14.5), 0.0)
+    bodies = (*some_bodies(seed), ball)
+    count = [len(b.mesh.faces) for b in bodies]
+    every = facets_of(bodies, slice(0, sum(count)))
+    return bodies, every.select(np.unique(np.linspace(0, sum(count) - 1, 1500).astype(int)))
+
+
+@BENT
+@pytest.mark.parametrize(("bounces", "degree", "seed"), [(0, 3, 0), (0, 3, 1), (2, 3, 1), (2, 5, 2)])
+def test_the_array_sees_what_each_hydrophone_sees(profile: Profile, bounces: int, degree: int, seed: int) -> None:
+    bodies, facets = some_facets(seed)
+    rays = Refracted(bounces=bounces)
+    found, hidden = seen_by_all(bodies, facets, rays, profile, ARRAY, degree)
+    assert (hidden.any(axis=1) & ~hidden.all(axis=1)).sum() > 100
+    for sensor in range(0, ARRAY.count, 4):
+        place = SONAR.to_world(ARRAY.position[[sensor]])[0]
+        alone = np.sort(seen_by(bodies, facets, rays, profile, place))
+        np.testing.assert_array_equal(np.sort(found[~hidden[:, sensor]]), alone)
+
+
+@BENT
+def test_rays_leave_for_hydrophones_as_those_traced_from_them(profile: Profile) -> None:
+    """The directions themselves, and that they are within what is allowed for; towards the images they are not."""
+    _, facets = some_facets(1)
+    rays = Refracted(bounces=2)
+    legs = legs_from(facets, WATER, profile, SONAR, rays, 50e3, ARRAY.aperture)
+    where = WATER, profile, SONAR, ARRAY, rays, 5
+    swerve = swerves(legs, ARRAY.position, *where)
+    size = np.linalg.norm(swerve, axis=2).max(axis=1)
+    bound = legs.swerve(WATER, profile, SONAR, ARRAY.aperture)
+    assert (size <= bound).all()
+    assert size.max() > 2e-4
+    away = towards(legs, SONAR.turn_to_world(ARRAY.position)) + swerve
+    for sensor in (0, 17, 44):
+        pose = Pose(SONAR.to_world(ARRAY.position[[sensor]])[0], SONAR.orientation)
+        own = legs_from(facets, WATER, profile, pose, rays, 50e3, 2.0 * ARRAY.aperture)
+        _, first, second = np.intersect1d(names(legs), names(own), return_indices=True)
+        assert len(first) > 0.95 * len(legs.row)
+        np.testing.assert_allclose(away[first, sensor], own.departure[second], atol=1e-6)
+
+
+def test_straight_rays_leave_for_images() -> None:
+    _, facets = some_facets(1)
+    uniform = Profile(DEPTHS[[0, -1]], np.array([1500.0, 1500.0]))
+    rays = Refracted(bounces=2)
+    legs = legs_from(facets, WATER, uniform, SONAR, rays, 50e3, ARRAY.aperture)
+    assert not legs.swerve(WATER, uniform, SONAR, ARRAY.aperture).any()
+    found = swerves(legs, ARRAY.position, WATER, uniform, SONAR, ARRAY, rays, 3)
+    np.testing.assert_allclose(found, 0.0, atol=1e-9)
