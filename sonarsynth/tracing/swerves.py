@@ -12,7 +12,7 @@ import numpy as np
 
 from sonarsynth.acoustics.arrays import aperture_terms
 from sonarsynth.acoustics.lobes import dot
-from sonarsynth.conventions import Floats, Ints, depth
+from sonarsynth.conventions import Bools, Floats, depth
 from sonarsynth.geometry import Pose
 from sonarsynth.sonar import Elements
 from sonarsynth.tracing.legs import Legs
@@ -34,23 +34,21 @@ def swerves(
     """(leg, point, xyz) what is between the directions in which rays leave for points (point, xyz) m of the sonar
     frame, on the aperture, and those towards their images; profile: what bends them.
 
-    Rays that do not leave a layer of constant gradient are arcs; others are traced to the probes of the aperture, with
-    polynomials of a degree in between. Where a probe has no ray, it is taken to be where straight ones are.
+    Polynomials of a degree through rays to the probes of the aperture: arcs where these do not leave a layer of
+    constant gradient, others traced. Where a probe has no ray, it is taken to be where straight ones are.
     """
-    offset = sonar_pose.turn_to_world(points)
-    made, arc = _arcs(legs, sonar_pose.position, offset, environment, profile)
-    made[arc] -= towards(legs.select(arc), offset)
-    rest = np.flatnonzero(~np.isin(np.arange(len(legs.row)), arc))
-    if not len(rest):
-        return made
-    some, probe = legs.select(rest), probes(elements, degree)
-    left, _, away = rays_to_probes(some, environment, profile, sonar_pose, probe, propagation)
-    away -= towards(some, sonar_pose.turn_to_world(probe.position))
-    away[np.isnan(left)] = 0.0
+    probe = probes(elements, degree)
+    offset = sonar_pose.turn_to_world(probe.position)
+    away, arc = _arcs(legs, sonar_pose.position, offset, environment, profile)
+    image = towards(legs, offset)
+    rest = np.flatnonzero(~arc)
+    if len(rest):
+        left, _, bent = rays_to_probes(legs.select(rest), environment, profile, sonar_pose, probe, propagation)
+        away[rest] = np.where(np.isnan(left)[..., None], image[rest], bent)
+    away -= image
     basis = aperture_terms(points, probe.aperture, terms_of(degree))
-    for axis in range(3):
-        made[rest, :, axis] = probe.fit(np.ascontiguousarray(away[..., axis])) @ basis.T
-    return made
+    coefficients = np.einsum("tp,lpx->ltx", probe.solve, away[:, : probe.fitted], optimize=True)
+    return np.asarray(np.matmul(basis, coefficients))
 
 
 def towards(legs: Legs, offset: Floats) -> Floats:
@@ -64,9 +62,9 @@ def towards(legs: Legs, offset: Floats) -> Floats:
 
 def _arcs(
     legs: Legs, centre: Floats, offset: Floats, environment: Environment, profile: Profile
-) -> tuple[Floats, Ints]:
+) -> tuple[Floats, Bools]:
     """Directions (leg, point, xyz) of rays to places beside the centre (point, xyz) m, world, of legs that keep to one
-    layer, with some room; and which legs these are.
+    layer, with some room; and which (leg,) legs these are.
 
     In a layer of constant gradient g the centre of the circle is at the depth where c would be 0 and equally far from
     both ends, so the tangent of the grazing angle at the start, down positive, is (dz (c + c') / X + g X) / 2 c.
@@ -76,7 +74,7 @@ def _arcs(
     ends = np.append(depth(centre + offset), depth(centre))
     layer = np.searchsorted(nodes, ends.min(), "right") - 1
     if layer < 0 or layer + 1 >= len(nodes):
-        return made, np.empty(0, int)
+        return made, np.zeros(len(legs.row), bool)
     top, low = float(nodes[layer]), min(float(nodes[layer + 1]), environment.depth)
     gradient = float((speed[layer + 1] - speed[layer]) / (nodes[layer + 1] - top))
     z = depth(legs.point)
@@ -93,4 +91,6 @@ def _arcs(
         known = np.abs(ahead[:, 0] - legs.departure[some]).max(axis=1) <= SAME
     known &= np.isfinite(ahead).all(axis=(1, 2))
     made[some[known]] = ahead[known, 1:]
-    return made, some[known]
+    found = np.zeros(len(legs.row), bool)
+    found[some[known]] = True
+    return made, found
