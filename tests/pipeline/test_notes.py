@@ -19,7 +19,8 @@ def warnings(distance: float, law: ss.Kirchhoff | ss.MirrorLobe) -> str:
         targets=(ball,),
         shrimp=(ss.SnappingShrimp(name="rock", position=(3.0, 6.0)),),
     )
-    return "\n".join(ss.plan(ss.Recipe(scene=ss.Scene(world=world))).warnings)
+    quick = ss.Accuracy(signal=0.02)
+    return "\n".join(ss.plan(ss.Recipe(scene=ss.Scene(world=world), accuracy=quick)).warnings)
 
 
 @pytest.mark.parametrize(("distance", "said"), [(2.0, True), (6.0, False)])
