@@ -45,7 +45,7 @@ EVERY = 1e-3
 MANY = 1_000_000
 """Facets over which errors are measured in one frame only, at half as many hydrophones."""
 BETTER = 0.7
-"""Of the error where the middle of the array sees for all, that must be left where each hydrophone sees for itself."""
+"""Of an error, that must be left for each hydrophone's own view, or the fifth degree, to be taken for it."""
 GOLDEN = 0.03
 """Error of the synthesis that measures, over what is allowed."""
 
