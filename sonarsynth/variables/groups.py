@@ -1,19 +1,11 @@
-"""The stored schema: each variable with dimensions, type, units and meaning. The store is laid out from it alone."""
+"""Every variable that a frame may have: its dimensions, type, units and meaning."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
-from sonarsynth.planning import Plan
-from sonarsynth.products import FAMILIES
 from sonarsynth.recipe import SPLITS
-from sonarsynth.recipe.columns import columns
-
-FORMAT_VERSION = "2"
-"""Version of the layout of a store."""
 
 
 @dataclass(frozen=True)
@@ -192,102 +184,3 @@ _LEDGER = _group(
 
 VARIABLES: tuple[Variable, ...] = (*_ROOT, *_SIGNALS, *_IMAGE, *_CLOUD, *_BEARINGS, *_TRUTH, *_LEDGER)
 """Every variable that a frame may have."""
-
-
-def variables(plan: Plan) -> tuple[Variable, ...]:
-    """The variables of a build: of the products asked for, and int16 pressure where a converter is described."""
-    wanted = {"truth", *plan.products}
-    if plan.products & {"image", "cloud"}:
-        wanted.add("bearings")
-    chosen = [v for v in VARIABLES if v.product in wanted]
-    converter = plan.scene.sonar.converter
-    if converter is not None and converter.bits <= 16:
-        counts: dict[str, Any] = {
-            "dtype": "int16",
-            "fill": -(2**15),
-            "attributes": (("scale_factor", converter.quantum),),
-        }
-        chosen = [replace(v, **counts) if (v.group, v.name) == ("/signals", "pressure") else v for v in chosen]
-    return tuple(chosen)
-
-
-def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
-    """Static variables of a store: {(group, name): (dims, values, attributes)}."""
-    scene, sizes = plan.scene, plan.sizes
-    names = [t.name for t in scene.world.targets]
-    static: dict[tuple[str, str], tuple[tuple[str, ...], np.ndarray, dict[str, Any]]] = {}
-
-    def add(
-        groups: str, name: str, dims: tuple[str, ...], values: Any, units: str, long_name: str, **more: Any
-    ) -> None:
-        for group in groups.split():
-            static[group, name] = (dims, np.asarray(values), {"units": units, "long_name": long_name, **more})
-
-    beams = scene.sonar.beams
-    add("/", "frame", ("frame",), np.arange(sizes["frame"]), "1", "frame of the dataset")
-    on_grid = "/truth" + "".join(f" /{p}" for p in ("image", "cloud") if p in plan.products)
-    degrees = {"comment": "as the sonar looks"}
-    add(on_grid, "azimuth", ("azimuth",), np.rad2deg(beams.azimuth), "degree", "azimuth, port positive", **degrees)
-    add(
-        on_grid, "elevation", ("elevation",), np.rad2deg(beams.elevation), "degree", "elevation, up positive", **degrees
-    )
-    named = "/truth" + (" /bearings" if plan.products & {"image", "cloud"} else "")
-    add(named, "xyz", ("xyz",), list("xyz"), "1", "axis")
-    add("/truth", "wxyz", ("wxyz",), list("wxyz"), "1", "part of a unit quaternion, scalar first")
-    add("/truth", "target_name", ("target",), np.array(names, dtype=np.str_), "1", "name of the target")
-    bounds = ["azimuth_min", "azimuth_max", "elevation_min", "elevation_max"]
-    add("/truth", "bound", ("bound",), bounds, "1", "which bound of the image box")
-    add("/ledger", "echo", ("echo",), [*names, "direct"], "1", "target of the echo; direct: snap to array")
-    add("/ledger", "family", ("family",), list(FAMILIES), "1", "path family: boundaries touched on the whole way")
-    touched = "boundaries touched on the way from the target to the array"
-    add("/truth", "family", ("family",), list(FAMILIES), "1", touched)
-    if "signals" in plan.products:
-        _add_sensors(plan, add)
-    for column in columns(plan.recipe.spanned):
-        static["/", column.name] = (("frame",), np.repeat(column.values, plan.recipe.steps), column.attributes)
-    _add_meshes(plan, add)
-    return static
-
-
-def _add_meshes(plan: Plan, add: Any) -> None:
-    """The mesh of each target in its group; where its shape varies, its meshes in groups 0, 1, ... of that."""
-    meshes = plan.recipe.meshes
-    for target, some in zip(plan.scene.world.targets, meshes, strict=True):
-        for n, (_, mesh) in enumerate(some):
-            group = f"/targets/{target.name}" + (f"/{n}" if len(some) > 1 else "")
-            add(group, "vertices", ("vertex", "xyz"), mesh.vertices, "m", "vertices in the target's frame")
-            add(group, "faces", ("face", "corner"), mesh.faces, "1", "vertex indices of each facet, outward")
-    if any(len(some) > 1 for some in meshes):
-        numbers = np.repeat(plan.recipe.mesh_numbers().astype(np.int32), plan.recipe.steps, axis=0)
-        add("/truth", "mesh", _TARGET, numbers, "1", "which mesh the target has: its group under /targets/<name>")
-
-
-def _add_sensors(plan: Plan, add: Any) -> None:
-    sensors, rate = plan.elements, plan.scene.sonar.sampling_frequency
-    add("/signals", "position", ("sensor", "xyz"), sensors.position, "m", "element positions in the sonar frame")
-    add("/signals", "gain", ("sensor",), sensors.gain, "1", "element gain: 0 for a dead element")
-    time = np.arange(plan.sizes["sample"]) / rate
-    add("/signals", "time", ("sample",), time, "s", "time of each sample after the start of the window")
-    add("/signals", "sampling_frequency", (), rate, "Hz", "sampling frequency")
-
-
-def attributes(plan: Plan) -> dict[str, Any]:
-    """Root attributes of a store that any builder of this plan writes the same."""
-    recipe = plan.recipe
-    return {
-        "title": recipe.title,
-        "Conventions": "CF-1.11",
-        "sonarsynth_format": FORMAT_VERSION,
-        "licence": recipe.licence,
-        "seed": recipe.seed,
-        "recipe_digest": plan.digest,
-        "band_low": plan.scene.sonar.band.low,
-        "band_high": plan.scene.sonar.band.high,
-        "assumed_sound_speed": plan.scene.sonar.assumed_sound_speed,
-        "aperture_radius": plan.elements.aperture,
-        "choices": plan.choices.as_json(),
-        "frames_conventions": (
-            "World: x east, y north, z up, z = 0 mean surface. Sonar and target frames: x forward, y port, z up. "
-            "Quaternions (w, x, y, z) from body to world. Levels re 1 uPa, source levels at 1 m."
-        ),
-    }
