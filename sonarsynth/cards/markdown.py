@@ -38,11 +38,16 @@ def markdown(facts: Facts) -> str:
     return "\n\n".join(part for part in sections if part) + "\n"
 
 
+def _holds(facts: Facts) -> list[str]:
+    products = [str(product) for product in facts.attributes.get("products", [])]
+    return [*products, "truth", *(["ledger"] if products else [])]
+
+
 def _head(facts: Facts) -> str:
     rows = [
         ("frames", f"{facts.complete} of {facts.frames} are there"),
         ("sequences", str(facts.plan.get("sequences", ""))),
-        ("holds", ", ".join([*map(str, facts.attributes.get("products", [])), "truth, ledger"])),
+        ("holds", ", ".join(_holds(facts))),
         ("size", f"{size(facts.bytes)} in {facts.files} files"),
         ("format", "Zarr 3, one folder; one chunk a frame, CRC-32C on each"),
         ("version", str(facts.dataset.get("version", ""))),

@@ -43,7 +43,8 @@ Settings = Annotated[
     ),
 ]
 Products = Annotated[
-    str, typer.Option(metavar="LIST", help="What to store: any of signals, image, cloud, with commas.")
+    str,
+    typer.Option(metavar="LIST", help="What to store beside the truth: signals, image, cloud; or truth for it alone."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")]
 ALL_PRODUCTS = "signals,image,cloud"

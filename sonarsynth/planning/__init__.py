@@ -102,11 +102,11 @@ def _mean_stages(made: Plan, looks: Sequence[Look]) -> tuple[Stage, ...]:
 
 
 def chosen_products(names: Iterable[str]) -> frozenset[str]:
-    """Products by name, one or several. Raises ValueError for a name that is none."""
-    chosen = frozenset([names] if isinstance(names, str) else names)
+    """Products by name, one or several; none, or "truth", for truth alone. Raises ValueError for another name."""
+    chosen = frozenset([names] if isinstance(names, str) else names) - {"truth"}
     unknown = sorted(chosen - set(PRODUCTS))
     if unknown:
-        raise ValueError(f"'{unknown[0]}' is not a product; known: {', '.join(PRODUCTS)}")
+        raise ValueError(f"'{unknown[0]}' is not a product; known: {', '.join((*PRODUCTS, 'truth'))}")
     return chosen
 
 

@@ -53,6 +53,8 @@ GOLDEN = 0.03
 def choose(plan: Plan, looks: Sequence[Look]) -> Plan:
     """A plan whose windows are laid, with its choices made. Nothing in them depends on how fast this machine is."""
     scene, accuracy = plan.scene, plan.recipe.accuracy
+    if not plan.products:  # nothing is traced
+        return plan
     some = _some(looks, 1 if _facets(scene) > MANY else MEASURED)
     bent = max((ranging_error(look.scene, look.profile, look.frames) for look in some), default=0.0)
     synthesis, imaged = _synthesis(scene, accuracy), bool(plan.products & {"image", "cloud"})

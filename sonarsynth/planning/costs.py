@@ -32,6 +32,7 @@ SECONDS = {
     "synthesise path sensor steradian": 3.6e-6,  # the wider a target, the more nodes and tiles
     "synthesise sensor sample": 4.5e-9,
     "noise sensor sample": 10e-9,
+    "measure path": 1.3e-3,  # alone, at one hydrophone
     "locate sensor": 8e-6,
     "transform sensor sample": 1.6e-9,
     "image beam bin": 1.2e-9,
@@ -111,7 +112,8 @@ def _synthesis(plan: Plan) -> tuple[str, str, str, str, float, int]:
         work += sensor_samples * SECONDS["noise sensor sample"]
     stored = sensor_samples * (2 if scene.sonar.converter else 4) if "signals" in plan.products else 0
     error = f"{plan.errors.synthesis:.1g} of the peak" if plan.errors.synthesis > 0.0 else "rounding"
-    return ("synthesise", _synthesised(plan), "asked for, or needed by the image", error, work, stored)
+    why = "asked for" if "signals" in plan.products else f"needed by the {' and the '.join(sorted(plan.products))}"
+    return ("synthesise", _synthesised(plan), why, error, work, stored)
 
 
 def _synthesised(plan: Plan) -> str:
@@ -177,32 +179,31 @@ def stages(plan: Plan) -> tuple[Stage, ...]:
     bins = (sonar.band.high - sonar.band.low) * gate
     straight = isinstance(plan.propagation, Straight)
     kind = "" if straight else "refracted "
-    rows: list[tuple[str, str, str, str, float, int]] = [
-        (
-            "trace",
-            _traced(plan),
-            "rays bend by less than the accuracy allows" if straight else "the sound speed varies with depth",
-            _expanded(plan),
-            _tracing(plan, kind) * snaps * _ways(plan) * traced,
-            0,
-        ),
-        (
-            "label",
-            "one ray a beam",
-            "always",
-            "none",
-            beams * SECONDS["label beam"] + _facets(plan) * SECONDS[f"label {kind}facet"],
-            beams * 10 + 4096,
-        ),
-    ]
+    rows: list[tuple[str, str, str, str, float, int]] = []
+    if plan.products:
+        rows.append(
+            (
+                "trace",
+                _traced(plan),
+                "rays bend by less than the accuracy allows" if straight else "the sound speed varies with depth",
+                _expanded(plan),
+                _tracing(plan, kind) * snaps * _ways(plan) * traced,
+                0,
+            )
+        )
+    seconds = beams * SECONDS["label beam"] + _facets(plan) * SECONDS[f"label {kind}facet"]
+    rows.append(("label", "one ray a beam", "always", "none", seconds, beams * 10 + 4096))
     if plan.products:
         rows.append(_synthesis(plan))
+    if "signals" in plan.products:
+        alone = snaps * (sizes["target"] + 1) * SECONDS["measure path"]
+        rows.append(("measure", "the loudest path of each kind alone", "verify compares levels", "none", alone, 0))
     if plan.products & {"image", "cloud"}:
         rows.append(
             (
                 "locate",
                 processing.locating.kind,
-                "ranging needs the snap",
+                "the echo window begins at the snap",
                 "predicted, /bearings",
                 sizes["sensor"] * SECONDS["locate sensor"],
                 512,
@@ -211,7 +212,16 @@ def stages(plan: Plan) -> tuple[Stage, ...]:
         transform = sizes["sensor"] * gate * sonar.sampling_frequency * SECONDS["transform sensor sample"]
         image = transform + beams * bins * SECONDS["image beam bin"]
         stored = 4 * beams if "image" in plan.products else 0
-        rows.append(("beamform", _beams(plan), "asked for, or needed by the cloud", _steered(plan), image, stored))
+        rows.append(
+            (
+                "beamform",
+                _beams(plan),
+                "asked for" if "image" in plan.products else "needed by the cloud",
+                _steered(plan),
+                image,
+                stored,
+            )
+        )
     if "cloud" in plan.products:
         rows.append(
             (

@@ -24,6 +24,8 @@ ENOUGH = 10_000
 
 def left_out(plan: Plan) -> tuple[Omission, ...]:
     """What is not computed, why, and the bound on what that costs."""
+    if not plan.products:
+        return (Omission("sound: paths, levels, signals, image, cloud", "truth alone is asked for", "0"),)
     scene, frame = plan.recipe.frame(0)
     environment, products = scene.world.environment, plan.products
     rows = []
@@ -49,7 +51,10 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
         rows.append(Omission("turning of targets in a frame", "velocities move them", "its rate times travel time"))
     if environment.noise is None:
         rows.append(Omission("ambient noise", "the scene describes none", "signals are free of noise"))
-    if scene.sonar.converter is None and "signals" in products:
+    if "signals" not in products:
+        why = "signals are not stored, so that nothing is compared with it"
+        rows.append(Omission("the loudest path of each kind by itself", why, "0"))
+    elif scene.sonar.converter is None:
         rows.append(Omission("converter", "the sonar describes none", "0: pressure is stored as float32"))
     for name in ("signals", "image", "cloud"):
         if name not in products:
@@ -71,7 +76,7 @@ def _not_traced(plan: Plan) -> list[Omission]:
     """Paths that are not traced by themselves, or not kept."""
     rows: list[Omission] = []
     choices, count = plan.choices, plan.elements.count
-    if choices.subarrays < count and plan.products:
+    if choices.subarrays < count:
         parts = "the array" if choices.subarrays == 1 else f"each of {choices.subarrays} subarrays"
         known = np.isfinite(plan.errors.expansion)
         bound = f"{plan.errors.expansion:.1g} of the signals, measured" if known else "not measured"
@@ -87,8 +92,6 @@ def _not_heard(plan: Plan) -> list[Omission]:
     """Hydrophones and frequencies that are not computed."""
     rows: list[Omission] = []
     dead, sonar = int((plan.elements.gain == 0.0).sum()), plan.scene.sonar
-    if not plan.products:
-        return rows
     if dead:
         rows.append(Omission(f"{dead} dead hydrophones", "they hear nothing", "0"))
     chosen = sonar.antialias

@@ -21,7 +21,7 @@ from sonarsynth.world.environment import Profile
 from sonarsynth.world.water import absorption_db_per_m
 
 PRODUCTS = ("signals", "image", "cloud")
-"""What a build can be asked for; truth and ledger are always written."""
+"""What a build can be asked for. Truth is always written; with any of these, levels of what is traced too."""
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@
     beamform_frame    Traced -> Heard: Signals, Bearings, EnergyImage
     range_frame       Traced, Heard -> Values: everything that is stored, the PointCloud with it
 
-The three are the tasks that the scheduler runs; what nobody asked for is not computed.
+The three are the tasks that the scheduler runs; what nobody asked for is not computed: of truth alone, `truth_frame`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.description import FieldError
 from sonarsynth.labelling import SLICES, Band, echoes, label, ledger, path_powers
 from sonarsynth.planning import Plan, arrivals_of, check_unseen, plan
 from sonarsynth.products import Arrivals, Bearings, Echoes, EnergyImage, Ledger, Signals, Truth
@@ -23,10 +22,12 @@ from sonarsynth.randomness import stream
 from sonarsynth.recipe import Recipe
 from sonarsynth.render.hearing import hear
 from sonarsynth.render.laps import LAPS, counted, lap
+from sonarsynth.render.rays import follow_rays
 from sonarsynth.render.stored import (
     Values,
     bearing_values,
     cloud_values,
+    echo_values,
     ledger_values,
     of_isolated,
     signal_values,
@@ -41,8 +42,6 @@ from sonarsynth.world.moment import Snap
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from sonarsynth.tracing.fan import RayFan
 
 __all__ = [
     "LAPS",
@@ -62,6 +61,8 @@ __all__ = [
     "render",
     "trace_at",
     "trace_frame",
+    "truth_at",
+    "truth_frame",
     "variables",
 ]
 
@@ -81,35 +82,64 @@ class Traced:
 class Heard:
     """What the beamform task gives; None where no product needs it."""
 
-    signals: Signals | None
+    signals: Signals
     bearings: Bearings | None
     image: EnergyImage | None
     imaged: Signals | None = None  # what the image was made of: without the snap's own reflections, where these go
-    isolated: Floats | None = None  # (snap, target + 1, family) dB: isolated paths of the ledger as signals have them
+    isolated: Floats | None = None  # (snap, target + 1, family) dB: isolated paths of the ledger as signals have them;
+    # None where signals are not stored
+
+
+def truth_frame(plan: Plan, index: int) -> Values:
+    """Every stored value of a frame of which truth alone is wanted: no path is traced, no sound made."""
+    return truth_at(*_checked(plan, index))
+
+
+def truth_at(plan: Plan, frame: Frame) -> Values:
+    """The same of a frame that is at hand; `plan` is that of its sequence."""
+    truth = _label(plan, frame, snap_levels(frame.moment.snaps))
+    lap("label")
+    return _of_frame(plan, frame) | truth_values(truth)
 
 
 def trace_frame(plan: Plan, index: int) -> Traced:
     """Every path of a frame, and its truth."""
+    return trace_at(*_checked(plan, index))
+
+
+def _checked(plan: Plan, index: int) -> tuple[Plan, Frame]:
+    """The plan of a frame's sequence, and the frame, which was looked at now or before."""
     plan = plan.at(index)
     frame = plan.recipe.frame(index)[1]
     check_unseen(plan, frame)
-    return trace_at(plan, frame)
+    return plan, frame
 
 
 def trace_at(plan: Plan, frame: Frame) -> Traced:
     """Every path of a frame that is at hand, and its truth; `plan` is that of its sequence."""
-    sonar, arrivals = plan.scene.sonar, arrivals_of(plan, frame)
+    arrivals = arrivals_of(plan, frame)
     lap("trace")
     seen = arrivals.at_centre
     levels = snap_levels(frame.moment.snaps)
-    straight = isinstance(plan.propagation, Straight)
-    truth = label(frame.moment, frame.sonar_pose, sonar.beams, plan.connect, levels, straight)
+    truth = _label(plan, frame, levels)
     band, targets = _band(plan, frame.moment.snaps), len(frame.moment.bodies)
     powers = path_powers(seen, band)
     book = ledger(seen, powers, band, targets, levels, _expansion_error(plan, seen))
     heard = echoes(seen, powers, targets, levels)
     lap("label")
     return Traced(frame, arrivals, truth, book, heard)
+
+
+def _label(plan: Plan, frame: Frame, levels: Floats) -> Truth:
+    """Truth of a frame; levels: (snap,) dB re 1 uPa at 1 m."""
+    straight = isinstance(plan.propagation, Straight)
+    return label(frame.moment, frame.sonar_pose, plan.scene.sonar.beams, plan.connect, levels, straight)
+
+
+def _of_frame(plan: Plan, frame: Frame) -> Values:
+    """Which frame it is."""
+    split = plan.recipe.split(frame.index)
+    return table("/", trajectory=frame.trajectory, step=frame.step, time=frame.time, split=split)
 
 
 def _band(plan: Plan, snaps: tuple[Snap, ...]) -> Band:
@@ -134,38 +164,13 @@ def _expansion_error(plan: Plan, arrivals: Arrivals) -> float:
     return float(20 * np.log10((1.0 + arrivals.amplitude_error) / np.cos(phase)))
 
 
-def follow_rays(plan: Plan, index: int) -> RayFan:
-    """The rays that the recipe asks for, followed through a frame. Raises FieldError where it asks for none."""
-    from sonarsynth.tracing.fan import fan
-
-    request = plan.recipe.rays
-    if request is None:
-        raise FieldError((), "the recipe asks for no rays: add 'rays:', with directions or a grid")
-    plan = plan.at(index)
-    scene, frame = plan.recipe.frame(index)
-    if request.towards_shrimp and not frame.moment.snaps:
-        raise FieldError(("rays", "towards_shrimp"), "the scene has no shrimp")
-    return fan(
-        scene.world.environment,
-        plan.profile,
-        frame.moment.bodies,
-        frame.sonar_pose.position,
-        frame.sonar_pose.turn_to_world(request.rays()),
-        request.duration,
-        request.bounces,
-        towards=frame.moment.snaps[0].position if request.towards_shrimp else None,
-        laws=scene.laws,
-        centre=scene.sonar.band.centre,
-        propagation=plan.propagation,
-    )
-
-
 def beamform_frame(plan: Plan, index: int, traced: Traced) -> Heard:
     """What the array hears: signals, where the snap is, and the energy image of the echo window."""
-    if not plan.products:
-        return Heard(None, None, None)
-    signals, isolated = synthesise(plan, traced), measure_isolated(plan, traced)
+    signals, isolated = synthesise(plan, traced), None
     lap("synthesise")
+    if "signals" in plan.products:
+        isolated = measure_isolated(plan, traced)
+        lap("measure")
     if not plan.products & {"image", "cloud"}:
         return Heard(signals, None, None, isolated=isolated)
     return replace(process(plan, traced.frame, signals), isolated=isolated)
@@ -227,9 +232,9 @@ def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
     """The point cloud, and every stored value of the frame."""
     plan = plan.at(index)
     frame = traced.frame
-    values = table("/", trajectory=frame.trajectory, step=frame.step, time=frame.time, split=plan.recipe.split(index))
-    values |= truth_values(traced.truth, traced.echoes, traced.arrivals) | ledger_values(traced.ledger, heard.isolated)
-    if heard.signals is not None and "signals" in plan.products:
+    values = _of_frame(plan, frame) | truth_values(traced.truth) | echo_values(traced.echoes, traced.arrivals)
+    values |= ledger_values(traced.ledger, heard.isolated)
+    if "signals" in plan.products:
         counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
         values |= signal_values(heard.signals, counts)
     if heard.image is None or heard.bearings is None or heard.imaged is None:
@@ -255,13 +260,20 @@ def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
     return values
 
 
+def _values(plan: Plan, index: int) -> Values:
+    """Every stored value of a frame."""
+    if not plan.products:
+        return truth_frame(plan, index)
+    traced = trace_frame(plan, index)
+    return range_frame(plan, index, traced, beamform_frame(plan, index, traced))
+
+
 def render(recipe: Recipe | Plan, index: int) -> xr.DataTree:
     """One frame of a recipe as a labelled DataTree: groups and names as in a store, without the frame axis. Pure."""
     import xarray as xr
 
     made = plan(recipe) if isinstance(recipe, Recipe) else recipe
-    traced = trace_frame(made, index)
-    values = range_frame(made, index, traced, beamform_frame(made, index, traced))
+    values = _values(made, index)
     groups: dict[str, xr.Dataset] = {"/": xr.Dataset(attrs=attributes(made))}
     for (group, name), (dims, array, attrs) in coordinates(made).items():
         one = (dims[1:], array[index], attrs) if "frame" in dims else (dims, array, attrs)

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Final
 
-LAPS: Final = ("trace", "label", "synthesise", "locate", "beamform", "range", "collect")
+LAPS: Final = ("trace", "label", "synthesise", "measure", "locate", "beamform", "range", "collect")
 """Stages that are counted, in order: names of rows of a plan, and `collect`, values made ready to be stored."""
 
 

@@ -16,12 +16,16 @@ def table(group: str, **columns: object) -> Values:
     return {(group, name): np.asarray(value) for name, value in columns.items()}
 
 
-def truth_values(truth: Truth, echoes: Echoes, arrivals: Arrivals) -> Values:
-    """Truth, and the errors of the expansions of its arrivals: NaN, not infinite, where a sensor has no ray."""
+def truth_values(truth: Truth) -> Values:
+    """Truth."""
     stored = {name.removeprefix("beam_"): value for name, value in vars(truth).items()}
     stored["image_box"] = np.rad2deg(truth.image_box)
-    for name in ("azimuth", "elevation"):
-        stored[f"echo_{name}"] = np.rad2deg(getattr(echoes, name))
+    return table("/truth", **stored)
+
+
+def echo_values(echoes: Echoes, arrivals: Arrivals) -> Values:
+    """Echoes of targets, and the errors of the expansions of arrivals: NaN, not infinite, where a sensor has no ray."""
+    stored: dict[str, object] = {f"echo_{name}": np.rad2deg(getattr(echoes, name)) for name in ("azimuth", "elevation")}
     stored["echo_level"] = echoes.level
     for name in ("wavefront_error", "amplitude_error"):
         error = float(getattr(arrivals, name))
@@ -30,12 +34,11 @@ def truth_values(truth: Truth, echoes: Echoes, arrivals: Arrivals) -> Values:
 
 
 def ledger_values(book: Ledger, measured: Floats | None) -> Values:
-    """Levels; measured (snap, target + 1, family) in dB, or None where there were no signals.
+    """Levels; measured (snap, target + 1, family) in dB, or None where signals are not stored.
 
     A path so faint that single precision holds nothing of it (hundreds of dB down a lobe) has no measured level: NaN.
     """
-    if measured is not None:
-        measured = np.where(np.isneginf(measured), np.nan, measured)
+    measures = {} if measured is None else {"measured_level": np.where(np.isneginf(measured), np.nan, measured)}
     return table(
         "/ledger",
         **{name: book.level[..., n] for n, name in enumerate(LEDGER)},
@@ -43,7 +46,7 @@ def ledger_values(book: Ledger, measured: Floats | None) -> Values:
         error_bound=book.error_bound,
         isolated_facet=of_isolated(book, book.isolated.facet, NO_TARGET),
         isolated_level=book.isolated_level,
-        measured_level=np.full(book.isolated_level.shape, np.nan) if measured is None else measured,
+        **measures,
     )
 
 

@@ -168,24 +168,20 @@ class _Builder:
         future.add_done_callback(self.landed.put)
 
     def _submit(self, flight: _Flight) -> Future[Any]:
-        """The tasks of a shard, all on its worker, later stages of earlier frames first; small frames in one task."""
+        """The tasks of a shard, all on its worker, later stages of earlier frames first."""
         self.submitted += 1
-        token, steps = f"{self.token}.{self.submitted}", []
-        name = f"shard-{token}-{flight.shard}"
-        if self.job.together:
-            self.frames += len(flight.frames)
-            return self._task(
-                tasks.make_shard, flight.shard, flight.frames, key=name, priority=-self.frames, flight=flight
-            )
+        token, blocks = f"{self.token}.{self.submitted}", []
         made: Any
-        for frame in flight.frames:
-            self.frames += 1
-            first, made = -len(tasks.STAGES) * self.frames, frame
+        for at in range(0, len(flight.frames), self.job.block):
+            made = flight.frames[at : at + self.job.block]
+            self.frames += len(made)
+            first, number = -len(tasks.STAGES) * self.frames, made[0]
             for n, stage in enumerate(tasks.tasks_of(self.job.products)):
-                key = f"{stage}-{token}-{frame}"
+                key = f"{stage}-{token}-{number}"
                 made = self._task(tasks.RUN[stage], made, key=key, priority=first + n, flight=flight)
-            steps.append(made)
-        return self._task(tasks.write, flight.shard, steps, key=name, priority=1, flight=flight)
+            blocks.append(made)
+        key = f"shard-{token}-{flight.shard}"
+        return self._task(tasks.write, flight.shard, blocks, key=key, priority=1, flight=flight)
 
     def _task(
         self, function: Callable[..., Any], *arguments: Any, key: str, priority: int, flight: _Flight

@@ -15,8 +15,10 @@ from sonarsynth.store import Folder, Remote, Unreachable
 PATIENCE: Final = 600.0
 """Seconds that a stage of a frame may always take (a first one compiles), and a worker to start again."""
 
-SHORT: Final = 0.3
-"""Frames of fewer seconds are not worth tasks of their own."""
+BLOCK_SECONDS: Final = 3.0
+"""A task is of as many frames as take so long in all stages, by counts of work: each costs some ms to schedule."""
+BLOCK_BYTES: Final = 64e6
+"""Signals that the frames of a task hold at most."""
 
 
 def seen_by(path: Folder, workers: int | None) -> Folder:
@@ -33,7 +35,10 @@ def job_of(path: Folder, made: Plan, build: str, frame_timeout: float | None = N
     """
     predicted = made.predicted_seconds / max(made.recipe.frames, 1)
     limit = PATIENCE + 20 * predicted if frame_timeout is None else frame_timeout
-    return Job(str(path), made.digest, tuple(sorted(made.products)), build, limit, made.shard_frames, predicted < SHORT)
+    signals = 8 * made.sizes["sensor"] * made.sizes["sample"]  # float32, and as they are without reflections
+    frames = min(BLOCK_SECONDS / max(predicted, 1e-6), BLOCK_BYTES / max(signals, 1), made.shard_frames)
+    products = tuple(sorted(made.products))
+    return Job(str(path), made.digest, products, build, limit, made.shard_frames, max(int(frames), 1))
 
 
 def make_shards(
@@ -58,7 +63,7 @@ def make_shards(
     diary.close_folder(job.path)  # of a build that was killed
     if scheduler is None and workers == 0:
         for shard, frames in todo.items():
-            done(tasks.make_shard(job, shard, frames))
+            done(tasks.write(job, shard, [[tasks.render_frame(job, frame) for frame in frames]]))
         return
     from sonarsynth.schedule import cluster, connecting
 

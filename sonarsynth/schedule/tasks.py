@@ -1,7 +1,8 @@
-"""What runs for a frame and for a shard, in whatever process: the same functions without a scheduler and on a cluster.
+"""What runs for frames and for a shard, in whatever process: the same functions without a scheduler and on a cluster.
 
-A task knows the store and the recipe's digest, and finds the recipe in the store: nothing large travels to it. A stage
-that raises gives its failure as its result, so that one bad frame costs only itself.
+A task is one stage of a block of frames: of one frame where they take long, of several where they are short. It knows
+the store and the recipe's digest, and finds the recipe in the store: nothing large travels to it. A stage that raises
+gives its failure as its result, so that one bad frame costs only itself.
 """
 
 from __future__ import annotations
@@ -21,14 +22,14 @@ from sonarsynth.schedule import diary
 from sonarsynth.store.layout import layout_of
 
 STAGES = ("trace", "beamform", "range")
-"""Tasks of a frame, in order."""
+"""Tasks of a block of frames, in order."""
 
 WARM_UP: Final = 300.0
 """Seconds that the first stage of its kind may take longer."""
 
 
 def tasks_of(products: Sequence[str]) -> tuple[str, ...]:
-    """Those of a frame of such products: no beamform where only truth is wanted, no range without a cloud."""
+    """Those of frames with such products: no beamform where only truth is wanted, no range without a cloud."""
     return STAGES[: 1 if not products else 3 if "cloud" in products else 2]
 
 
@@ -42,7 +43,7 @@ class Job:
     build: str = ""  # the build that this is for, as its lock names it; "": not under a lock
     frame_timeout: float = 0.0  # s that a stage of a frame may take; 0: no limit
     shard_frames: int = 0  # frames of a shard; 0: as planned
-    together: bool = False  # frames so short that a shard of them is one task
+    block: int = 1  # frames of a task
 
 
 @dataclass(frozen=True)
@@ -85,31 +86,33 @@ class Written:
     peak_bytes: int  # of memory of this process so far
 
 
-def trace(job: Job, frame: int) -> Step:
-    """Task trace-<digest>-<frame>. Gives what was traced; the frame's values where nothing else is wanted."""
+def trace(job: Job, frames: Sequence[int]) -> list[Step]:
+    """Task trace-<token>-<first frame>. Gives what was traced; truth where nothing else is wanted."""
 
-    def work() -> Any:
-        traced = render.trace_frame(plan_of(job), frame)
-        return traced if job.products else _values(job, frame, traced, render.Heard(None, None, None))
+    def work(before: Step) -> Any:
+        made = plan_of(job)
+        if job.products:
+            return render.trace_frame(made, before.frame)
+        return layout_of(made).check(render.truth_frame(made, before.frame))
 
-    return _stage(job, "trace", Step(frame), work)
+    return [_stage(job, "trace", Step(frame), work) for frame in frames]
 
 
-def beamform(job: Job, traced: Step) -> Step:
-    """Task beamform-<digest>-<frame>. Gives what it heard together with what was traced; values without a cloud."""
+def beamform(job: Job, traced: Sequence[Step]) -> list[Step]:
+    """Task beamform-<token>-<first frame>. Gives what was heard with what was traced; values without a cloud."""
 
-    def work() -> Any:
-        heard = render.beamform_frame(plan_of(job), traced.frame, traced.made)
+    def work(before: Step) -> Any:
+        heard = render.beamform_frame(plan_of(job), before.frame, before.made)
         if "cloud" in job.products:
-            return traced.made, heard
-        return _values(job, traced.frame, traced.made, heard)
+            return before.made, heard
+        return _values(job, before.frame, before.made, heard)
 
-    return _stage(job, "beamform", traced, work)
+    return [_stage(job, "beamform", before, work) for before in traced]
 
 
-def range_(job: Job, heard: Step) -> Step:
-    """Task range-<digest>-<frame>: the values of the frame, in the types of the store."""
-    return _stage(job, "range", heard, lambda: _values(job, heard.frame, *heard.made))
+def range_(job: Job, heard: Sequence[Step]) -> list[Step]:
+    """Task range-<token>-<first frame>: the values of the frames, in the types of the store."""
+    return [_stage(job, "range", before, lambda step: _values(job, step.frame, *step.made)) for before in heard]
 
 
 def _values(job: Job, frame: int, traced: render.Traced, heard: render.Heard) -> render.Values:
@@ -117,22 +120,23 @@ def _values(job: Job, frame: int, traced: render.Traced, heard: render.Heard) ->
     return layout_of(made).check(render.range_frame(made, frame, traced, heard))
 
 
-RUN: Mapping[str, Callable[[Job, Any], Step]] = {"trace": trace, "beamform": beamform, "range": range_}
-"""What each task runs: the first of a frame is given its number, each other what the one before it made."""
+RUN: Mapping[str, Callable[[Job, Any], list[Step]]] = {"trace": trace, "beamform": beamform, "range": range_}
+"""What each task runs: the first of a block is given the numbers of its frames, each other what the one before made."""
 
 
 def render_frame(job: Job, frame: int) -> Step:
     """All stages of a frame, here and now."""
-    made: Any = frame
+    made: Any = [frame]
     for name in tasks_of(job.products):
         made = RUN[name](job, made)
-    step: Step = made
+    step: Step = made[0]
     return step
 
 
-def write(job: Job, shard: int, steps: Sequence[Step]) -> Written:
-    """Task shard-<digest>-<shard>: one whole shard of every array, from the frames that came out well."""
+def write(job: Job, shard: int, blocks: Sequence[Sequence[Step]]) -> Written:
+    """Task shard-<token>-<shard>: one whole shard of every array, from the frames that came out well."""
     start = time.perf_counter()
+    steps = [step for block in blocks for step in block]
     good = {step.frame: step.made for step in steps if step.failure is None}
     size = 0
     if good:
@@ -150,11 +154,6 @@ def write(job: Job, shard: int, steps: Sequence[Step]) -> Written:
         bytes=size,
         peak_bytes=peak_memory(),
     )
-
-
-def make_shard(job: Job, shard: int, frames: Sequence[int]) -> Written:
-    """Task shard-<digest>-<shard> where frames are short: its frames and the writing at once."""
-    return write(job, shard, [render_frame(job, frame) for frame in frames])
 
 
 def plan_of(job: Job) -> Plan:
@@ -195,14 +194,14 @@ def peak_memory() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-def _stage(job: Job, name: str, before: Step, work: Callable[[], Any]) -> Step:
+def _stage(job: Job, name: str, before: Step, work: Callable[[Step], Any]) -> Step:
     if before.failure is not None:
         return before
     wall, cpu = time.perf_counter(), time.thread_time()
     with render.counted() as parts:
         try:
             with diary.noted(job.path, before.frame, name, _limit(job, name)):
-                made, failure = work(), None
+                made, failure = work(before), None
             _warm.add(name)
         except Exception as error:
             made, failure = None, failure_of(before.frame, name, error)

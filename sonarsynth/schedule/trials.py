@@ -19,7 +19,7 @@ import numpy as np
 
 from sonarsynth import store
 from sonarsynth.planning import Plan, check_unseen
-from sonarsynth.render import Values, beamform_frame, counted, range_frame, trace_at
+from sonarsynth.render import Values, beamform_frame, counted, range_frame, trace_at, truth_at
 from sonarsynth.render.hearing import hear_part
 from sonarsynth.scene import Frame
 from sonarsynth.sonar.subarrays import subarrays
@@ -191,9 +191,7 @@ def _make(plan: Plan, index: int, every: int = 1) -> _Made:
             frame = _thinned(frame, every)
         parts = plan.choices.subarrays
         one = replace(plan, choices=replace(plan.choices, subarrays=1)) if parts > PARTS else plan
-        traced = trace_at(one, frame)
-        values = range_frame(one, index, traced, beamform_frame(one, index, traced))
-        values = layout_of(one).check(values)
+        values = layout_of(one).check(_stages(one, frame) if plan.products else truth_at(one, frame))
     if one is not plan and plan.products:
         every_part = subarrays(plan.elements, parts)
         some = every_part[:: -(-len(every_part) // PARTS)]
@@ -202,6 +200,12 @@ def _make(plan: Plan, index: int, every: int = 1) -> _Made:
             hear_part(plan, frame, part)
         cpu["synthesise"] += (time.thread_time() - start) * len(every_part) / len(some)
     return _Made(index, values, dict(cpu), time.perf_counter() - began, time.thread_time() - before, _others())
+
+
+def _stages(plan: Plan, frame: Frame) -> Values:
+    """All stages of a frame that is at hand."""
+    traced = trace_at(plan, frame)
+    return range_frame(plan, frame.index, traced, beamform_frame(plan, frame.index, traced))
 
 
 def _others() -> int:

@@ -18,6 +18,8 @@ FORMAT_VERSION = "2"
 def variables(plan: Plan) -> tuple[Variable, ...]:
     """The variables of a build: of the products asked for, and int16 pressure where a converter is described."""
     wanted = {"truth", *plan.products}
+    if plan.products:
+        wanted.add("levels")
     if plan.products & {"image", "cloud"}:
         wanted.add("bearings")
     chosen = [v for v in VARIABLES if v.product in wanted]

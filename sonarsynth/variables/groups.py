@@ -20,7 +20,7 @@ class Variable:
     long_name: str
     fill: float | int = float("nan")
     attributes: tuple[tuple[str, Any], ...] = ()
-    product: str = "truth"  # which product of a build it belongs to
+    product: str = ""  # of a build; "truth": always there; "levels": of what is traced, there with any other product
 
 
 _BEAMS = ("frame", "elevation", "azimuth")
@@ -32,7 +32,7 @@ _NONE = (("flag_values", [-1]), ("flag_meanings", "none"))
 
 
 def _group(group: str, product: str, *rows: Variable) -> tuple[Variable, ...]:
-    return tuple(replace(row, group=group, product=product) for row in rows)
+    return tuple(replace(row, group=group, product=row.product or product) for row in rows)
 
 
 def _comment(text: str) -> tuple[tuple[str, Any], ...]:
@@ -118,9 +118,30 @@ _TRUTH = _group(
     _v("box", (*_TARGET, "corner", "xyz"), "float64", "m", "corners of the oriented bounding box, sonar frame"),
     _v("image_box", (*_TARGET, "bound"), "float64", "degree", "bounds of the visible part in azimuth and elevation"),
     _v("visible_fraction", _TARGET, "float64", "1", "share of the area facing the array that the array sees"),
-    _v("echo_azimuth", _ECHO, "float64", "degree", "azimuth that the target's echoes come from, weighted by power"),
-    _v("echo_elevation", _ECHO, "float64", "degree", "elevation that they come from: ghosts by surface and bed"),
-    _v("echo_level", _ECHO, "float64", "dB", "level of the target's echoes re 1 uPa, of their energy in the band"),
+    _v(
+        "echo_azimuth",
+        _ECHO,
+        "float64",
+        "degree",
+        "azimuth that the target's echoes come from, weighted by power",
+        product="levels",
+    ),
+    _v(
+        "echo_elevation",
+        _ECHO,
+        "float64",
+        "degree",
+        "elevation that they come from: ghosts by surface and bed",
+        product="levels",
+    ),
+    _v(
+        "echo_level",
+        _ECHO,
+        "float64",
+        "dB",
+        "level of the target's echoes re 1 uPa, of their energy in the band",
+        product="levels",
+    ),
     _v("snap_position", (*_SNAP, "xyz"), "float64", "m", "position of the snap in the world"),
     _v("snap_time", _SNAP, "float64", "s", "time of the snap after the instant of the frame"),
     _v("snap_level", _SNAP, "float64", "dB", "peak source level of the snap re 1 uPa at 1 m"),
@@ -133,6 +154,7 @@ _TRUTH = _group(
         "float64",
         "s",
         "largest error of wavefronts measured at probes over the aperture; NaN where one has no ray",
+        product="levels",
     ),
     _v(
         "amplitude_error",
@@ -140,6 +162,7 @@ _TRUTH = _group(
         "float64",
         "1",
         "largest error of amplitudes measured at those probes, relative to the strongest echo",
+        product="levels",
     ),
 )
 LEDGER_COMMENT = (
@@ -160,7 +183,7 @@ _LEVELS = {
 }
 _LEDGER = _group(
     "/ledger",
-    "truth",
+    "levels",
     *(_v(name, _CELL, "float64", "dB", text, attributes=_comment(LEDGER_COMMENT)) for name, text in _LEVELS.items()),
     _v("paths", _CELL, "int32", "1", "number of paths"),
     _v("isolated_level", _CELL, "float64", "dB", "received level of the loudest path of the family alone, predicted"),
@@ -169,8 +192,9 @@ _LEDGER = _group(
         _CELL,
         "float64",
         "dB",
-        "level of that path measured in its signals; NaN where none were made",
+        "level of that path measured in its signals",
         attributes=_comment("the path alone, synthesised at one ideal hydrophone in the array centre"),
+        product="signals",
     ),
     _v("isolated_facet", _CELL, "int32", "1", "facet of that path in the mesh of its target", attributes=_NONE),
     _v(

@@ -39,10 +39,11 @@ def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.n
     add("/truth", "target_name", ("target",), np.array(names, dtype=np.str_), "1", "name of the target")
     bounds = ["azimuth_min", "azimuth_max", "elevation_min", "elevation_max"]
     add("/truth", "bound", ("bound",), bounds, "1", "which bound of the image box")
-    add("/ledger", "echo", ("echo",), [*names, "direct"], "1", "target of the echo; direct: snap to array")
-    add("/ledger", "family", ("family",), list(FAMILIES), "1", "path family: boundaries touched on the whole way")
-    touched = "boundaries touched on the way from the target to the array"
-    add("/truth", "family", ("family",), list(FAMILIES), "1", touched)
+    if plan.products:
+        add("/ledger", "echo", ("echo",), [*names, "direct"], "1", "target of the echo; direct: snap to array")
+        add("/ledger", "family", ("family",), list(FAMILIES), "1", "path family: boundaries touched on the whole way")
+        touched = "boundaries touched on the way from the target to the array"
+        add("/truth", "family", ("family",), list(FAMILIES), "1", touched)
     if "signals" in plan.products:
         _add_sensors(plan, add)
     for column in columns(plan.recipe.spanned):

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 import zarr
-from distributed import LocalCluster
+from distributed import Client, Future, LocalCluster
 
-from sonarsynth import render, store
+from sonarsynth import render, store, verification
 from sonarsynth.planning import Plan
 from sonarsynth.recipe import Recipe
 from sonarsynth.schedule import build, cluster, tasks
+from sonarsynth.schedule.making import job_of
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +85,39 @@ def test_a_worker_of_a_running_scheduler_makes_the_same_arrays(
     assert seen[0] == (0, 20, 0)
     assert seen[-1] == (20, 20, 0)
     assert_same(tmp_path / "s.zarr", reference)
+
+
+@pytest.mark.parametrize(
+    ("products", "stages"), [("cloud", tasks.STAGES), ("image", tasks.STAGES[:2]), ("truth", ["trace"])]
+)
+def test_dask_runs_each_stage_of_a_block_of_short_frames_as_a_task(
+    tmp_path: Path, small: Recipe, here: str, monkeypatch: pytest.MonkeyPatch, products: str, stages: Sequence[str]
+) -> None:
+    keys: list[str] = []
+    submit = Client.submit
+
+    def noted(client: Client, *arguments: Any, key: str, **options: Any) -> Future[Any]:
+        keys.append(key)
+        return submit(client, *arguments, key=key, **options)
+
+    monkeypatch.setattr(Client, "submit", noted)
+    assert build(small, tmp_path / "s.zarr", products=products, scheduler=here).ok
+    kinds = [(key.split("-")[0], int(key.split("-")[-1])) for key in keys]
+    assert sorted(kinds) == sorted(  # shards of 8 of 20 frames, named by their first frames
+        [(stage, first) for stage in stages for first in (0, 8, 16)] + [("shard", n) for n in range(3)]
+    )
+
+
+def test_a_task_is_of_one_frame_where_they_are_long(small_plan: Plan) -> None:
+    def block(seconds: float, plan: Plan = small_plan) -> int:
+        stages = tuple(replace(stage, seconds=seconds / len(plan.stages)) for stage in plan.stages)
+        return job_of(Path("s"), replace(plan, stages=stages, shard_frames=64), "").block
+
+    assert block(20.0) == block(2.0) == 1
+    assert block(1.0) == 3
+    assert block(1e-9) == 64
+    large = replace(small_plan, sizes=small_plan.sizes | {"sensor": 4096, "sample": 1000})
+    assert block(1e-9, large) == 1  # 33 MB of signals a frame
 
 
 def test_a_part_and_then_the_whole_is_the_whole_at_once(tmp_path: Path, small: Recipe, reference: Path) -> None:
@@ -207,10 +244,29 @@ def test_products_decide_what_is_stored(tmp_path: Path, small: Recipe, reference
     assert {"image/energy", "truth/target", "ledger/paths", "step"} <= ours.keys()
     assert not any(name.startswith(("signals/", "cloud/")) for name in ours)
     assert [name for name in ours if ours[name] != all_of_it[name]] == []
+    assert "ledger/measured_level" not in ours  # nothing to compare it with
     with pytest.raises(store.Mismatch, match="products"):
         build(small, path, workers=0)
     with pytest.raises(ValueError, match="'film' is not a product"):
         build(small, path, products=["film"], workers=0)
+
+
+def test_truth_alone_is_made_without_sound(
+    tmp_path: Path, small: Recipe, reference: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def never(*_: object, **__: object) -> None:
+        raise AssertionError("nothing of sound is needed")
+
+    for name in ("tracing.arrivals.trace", "synthesis.KernelDeposit.signals", "planning.choosing.arrivals_of"):
+        monkeypatch.setattr(f"sonarsynth.{name}", never)
+    path = tmp_path / "s.zarr"
+    assert build(small, path, products="truth", workers=0).ok
+    ours, all_of_it = arrays(path), arrays(reference)
+    assert {"truth/target", "truth/box", "truth/snap_position", "step"} <= ours.keys()
+    assert not any(name.startswith(("signals/", "image/", "ledger/", "truth/echo_")) for name in ours)
+    assert [name for name in ours if ours[name] != all_of_it[name]] == []
+    assert all(check.ok for check in verification.check(xr.open_datatree(path, engine="zarr")))
+    assert "holds | truth" in store.beside(path, "card.md").read_text()
 
 
 def test_a_restart_begins_anew(tmp_path: Path, small: Recipe, reference: Path) -> None:

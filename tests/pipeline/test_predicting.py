@@ -23,14 +23,16 @@ from sonarsynth.store import creating
 TASKS = {
     "signals,image,cloud": ["trace", "beamform", "range"],
     "image": ["trace", "beamform"],
+    "cloud": ["trace", "beamform", "range"],
     "signals": ["trace", "beamform"],
-    "": ["trace"],
+    "truth": ["trace"],
 }
 PARTS = {
-    "signals,image,cloud": {"trace", "label", "synthesise", "locate", "beamform", "collect", "range"},
+    "signals,image,cloud": {"trace", "label", "synthesise", "measure", "locate", "beamform", "collect", "range"},
     "image": {"trace", "label", "synthesise", "locate", "beamform", "collect"},
-    "signals": {"trace", "label", "synthesise", "collect"},
-    "": {"trace", "label", "collect"},
+    "cloud": {"trace", "label", "synthesise", "locate", "beamform", "collect", "range"},
+    "signals": {"trace", "label", "synthesise", "measure", "collect"},
+    "truth": {"label"},
 }
 
 
@@ -50,6 +52,8 @@ def test_only_what_was_asked_for_runs(small: Recipe, tmp_path: Path, products: s
     assert list(row["seconds"]) == list(row["cpu"]) == list(report.stage_cpu) == TASKS[products]
     assert row["parts"].keys() == PARTS[products]
     assert row["parts"].keys() <= set(render.LAPS)
+    planned = {stage.stage for stage in plan(small, split(products)).stages}
+    assert planned - {"write"} == PARTS[products] - {"collect"}
     assert math.fsum(row["parts"].values()) == pytest.approx(math.fsum(row["cpu"].values()), abs=0.01)
 
 
