@@ -149,9 +149,9 @@ def plan_report(plan: Plan, prediction: Prediction) -> None:
     p = prediction
     out.print(
         f"predicted: {duration(p.seconds)} for {p.frames} frames with {p.workers} workers, {duration(p.core_seconds)} "
-        f"of the processor; {size(p.bytes)} on the disk, {size(p.file_bytes)} of it files, {size(p.raw_bytes)} before "
-        "compression"
+        f"of CPU time; {size(p.bytes)} on the disk, {size(p.raw_bytes)} before compression"
     )
+    out.print(f"at most {p.files} files and folders for all frames, {plan.shard_frames} frames in a file")
     out.print(f"known from {p.how}", markup=False)
 
 

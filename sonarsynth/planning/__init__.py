@@ -40,10 +40,10 @@ __all__ = [
 ]
 
 SHARD_BYTES = 64e6
-"""A shard holds about this much of the largest array, and at most so many frames:"""
+"""A shard holds about this much before compression, and at most so many frames:"""
 SHARD_FRAMES = 8
-MANY_FRAMES = 64
-"""Frames of a shard of a large dataset of short frames: a shard costs some 30 ms, whatever it holds, and 60 files."""
+MANY_FRAMES = 256
+"""Frames of a shard of a large dataset of short frames: a shard costs some 30 ms, whatever it holds, and 80 files."""
 SHARDS = 128
 """Shards of a dataset, at least, for there to be more than SHARD_FRAMES frames in one."""
 SHARD_SECONDS = 10.0
@@ -85,7 +85,7 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS, choices: Choices | 
 
 def _shard_frames(made: Plan) -> int:
     """Frames of a shard: the same on every machine, so that a build can go on elsewhere."""
-    frame_bytes = made.sizes["sensor"] * made.sizes["sample"] * (2 if made.scene.sonar.converter else 4)
+    frame_bytes = sum(stage.bytes for stage in made.stages)
     seconds = max(sum(stage.seconds for stage in made.stages) / machine_factor(), 1e-6)
     many = min(SHARD_SECONDS / seconds, made.recipe.frames / SHARDS, MANY_FRAMES)
     frames = max(2 ** int(np.log2(max(many, 1.0))), SHARD_FRAMES)

@@ -14,7 +14,7 @@ from sonarsynth.schedule.log import append_lines, read_lines, write_lines
 from sonarsynth.schedule.making import job_of, make_shards, seen_by, usable_cores
 from sonarsynth.schedule.predicting import Prediction, predict
 from sonarsynth.schedule.report import BuildReport, Course, Progress
-from sonarsynth.schedule.space import TooLarge, check_space, told_when_full
+from sonarsynth.schedule.space import Room, TooLarge, check_space, told_when_full
 from sonarsynth.schedule.tasks import Failure
 from sonarsynth.store import Folder
 
@@ -73,9 +73,9 @@ def build(
     path = seen_by(store.absolute(path), workers)
     chosen = range(made.recipe.frames) if frames is None else sorted(set(frames))
     if not path.exists() and not agreed:
-        check_space(path, _bytes(made, len(chosen)))
+        check_space(path, _room(made, len(chosen)))
     report = BuildReport(str(path), made.recipe.frames, len(chosen), 0)
-    still = lambda: _bytes(made, max(len(chosen) - report.there - report.written, 1))  # noqa: E731
+    still = lambda: _room(made, max(len(chosen) - report.there - report.written, 1))  # noqa: E731
     with told_when_full(path, still), store.lock(path) as name:
         made = made if restart else _as_begun(path, made)
         report.notes = made.warnings
@@ -85,7 +85,7 @@ def build(
         todo = store.missing(path, made, [frame for frame in chosen if frame not in left])
         lacking = {frame for some in todo.values() for frame in some}
         if not agreed:
-            check_space(path, _bytes(made, len(lacking)))
+            check_space(path, _room(made, len(lacking)))
         report.there = sum(frame not in lacking and frame not in left for frame in chosen)
         report.failures = [earlier[frame] for frame in sorted(left)]
         _tidy(path, lacking, earlier, restart)
@@ -137,9 +137,10 @@ def _check(
         connecting.check_address(scheduler, insecure)
 
 
-def _bytes(made: Plan, frames: int) -> float:
-    """Bytes that so many frames need at most."""
-    return made.predicted_bytes * frames / max(made.recipe.frames, 1)
+def _room(made: Plan, frames: int) -> Room:
+    """What so many frames need at most."""
+    bytes_ = made.predicted_bytes * frames / max(made.recipe.frames, 1)
+    return Room(bytes_, store.layout_of(made).files(-(-frames // made.shard_frames)))
 
 
 def _set_aside(path: Folder) -> dict[int, Failure]:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sonarsynth import store
 from sonarsynth.planning import Plan, Stage
 from sonarsynth.planning.costs import machine_factor
 from sonarsynth.schedule.trials import Sizes, Trial, disk_use, try_frames
@@ -62,6 +63,7 @@ class Prediction:
     sharing: float  # processor time of work where all workers run, over that of one alone
     laying_out: tuple[float, float]  # s: processor, wall clock
     sizes: tuple[Sizes, Sizes]  # of the store without frames; that a whole shard adds
+    files: int  # and folders, at most
     failures: tuple[str, ...] = ()  # frames that could not be tried, a line each
 
     def of(self, *, frames: int | None = None, workers: int | None = None) -> Prediction:
@@ -154,6 +156,7 @@ class Prediction:
             "predicted_frame_seconds": self.frame_seconds,
             "predicted_file_bytes": self.file_bytes,
             "predicted_raw_bytes": self.raw_bytes,
+            "predicted_files": self.files,
             "predicted_for": {"frames": self.frames, "workers": self.workers, "cores": self.cores},
             "predicted_from": self.how,
             "not_tried": list(self.failures),
@@ -219,6 +222,7 @@ def predict(
         writing_wait=0.0,
         sharing=1.0,
         laying_out=(LAYING_OUT, LAYING_OUT),
+        files=store.layout_of(plan).files(),
         sizes=(Sizes(3e5, 1.1e6), Sizes(1.0, 1.6) * (COMPRESSED * raw * plan.shard_frames)),
     )
     try:

@@ -1,4 +1,4 @@
-"""Room on the disk: asked for before a build starts, and told when it runs out."""
+"""Room on the disk, in bytes and in files: asked for before a build starts, and told when it runs out."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import os
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Final
+from typing import Final, NamedTuple
 
 from sonarsynth.conventions import size
 from sonarsynth.store import Folder, Remote
@@ -29,36 +29,50 @@ class TooLarge(ValueError):
     """A build needs more than is free, or very much, and nobody agreed to it; str() is one line."""
 
 
-def free_bytes(path: Folder) -> float:
-    """Free bytes where a path is, or is to be; nobody knows of an object store."""
+class Room(NamedTuple):
+    """What a store takes of a disk, or a disk has free."""
+
+    bytes: float
+    files: float  # and folders: inodes
+
+
+def free_room(path: Folder) -> Room:
+    """What is free where a path is, or is to be; nobody knows of an object store, or where files are not counted."""
     if isinstance(path, Remote):
-        return math.inf
+        return Room(math.inf, math.inf)
     place = path
     while not place.exists() and place != place.parent:
         place = place.parent
-    return shutil.disk_usage(place).free
+    found = os.statvfs(place)
+    return Room(shutil.disk_usage(place).free, found.f_favail if found.f_files else math.inf)
 
 
-def check_space(path: Folder, needed: float) -> None:
-    """Raise TooLarge where a build that needs so many bytes should not start unasked."""
-    free = free_bytes(path)
-    if needed > free:
-        raise TooLarge(f"{path}: needs up to {size(needed)} and {size(free)} are free there: --yes builds all the same")
-    if needed > LARGE:
-        known = f" ({size(free)} are free there)" if math.isfinite(free) else ""
-        raise TooLarge(f"{path}: needs up to {size(needed)}{known}: --yes builds it")
+def check_space(path: Folder, needed: Room) -> None:
+    """Raise TooLarge where a build that needs so much should not start unasked."""
+    free = free_room(path)
+    if needed.bytes > free.bytes:
+        line = f"needs up to {size(needed.bytes)} and {size(free.bytes)} are free there"
+    elif needed.files > free.files:
+        line = f"needs up to {needed.files:.0f} files and folders and {free.files:.0f} more fit there"
+    elif needed.bytes > LARGE:
+        known = f" ({size(free.bytes)} are free there)" if math.isfinite(free.bytes) else ""
+        line = f"needs up to {size(needed.bytes)}{known}"
+    else:
+        return
+    raise TooLarge(f"{path}: {line}: --yes builds all the same")
 
 
 @contextmanager
-def told_when_full(path: Folder, needed: Callable[[], float]) -> Iterator[None]:
-    """Turn the error of a disk that takes no more into one line with the bytes still needed and those free."""
+def told_when_full(path: Folder, needed: Callable[[], Room]) -> Iterator[None]:
+    """Turn the error of a disk that takes no more into one line with what is still needed and what is free."""
     try:
         yield
     except OSError as error:
         if error.errno not in FULL or isinstance(path, Remote):
             raise
-        line = (
-            f"{FULL[error.errno]}: up to {size(needed())} more are needed, {size(free_bytes(path))} are free; "
-            "with room made, the same command goes on"
-        )
+        more, free = needed(), free_room(path)
+        lacking = f"up to {size(more.bytes)} more are needed, {size(free.bytes)} are free"
+        if more.files > free.files:
+            lacking = f"up to {more.files:.0f} more files and folders are needed, {free.files:.0f} more fit"
+        line = f"{FULL[error.errno]}: {lacking}; with room made, the same command goes on"
         raise OSError(error.errno, line, os.fspath(path)) from error

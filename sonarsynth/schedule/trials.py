@@ -233,17 +233,11 @@ def _write(plan: Plan, tried: Sequence[Values], folder: Path | None) -> tuple[Ti
     with tempfile.TemporaryDirectory(prefix=".sonarsynth-", dir=folder) as scratch:
         path = Path(scratch) / "store"
         laying_out = _timed(partial(store.create, path, plan))
-        fixed, shared = disk_use(path), _shared(path)
+        fixed = disk_use(path)
         frames = {frame: tried[frame % len(tried)] for frame in layout_of(plan).region(0)}
         writing = min(_timed(partial(store.write_shard, path, plan, 0, frames)) for _ in range(2))
         whole = disk_use(path)
-        fixed += Sizes(0.0, _shared(path) - shared)
         return laying_out, fixed, writing, whole + fixed * -1.0
-
-
-def _shared(path: Path) -> float:
-    """Bytes on the disk of the folders that hold the shards of an array: there once, however many these are."""
-    return float(sum(folder.lstat().st_blocks * 512 for folder in path.rglob("c")))
 
 
 def _timed(work: Callable[[], object]) -> Times:

@@ -14,11 +14,12 @@ import warnings
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import zarr
 from zarr.codecs import BloscCodec, Crc32cCodec
+from zarr.core.chunk_key_encodings import ChunkKeyEncodingParams
 from zarr.errors import ZarrUserWarning
 
 from sonarsynth.config import dump
@@ -43,6 +44,9 @@ from sonarsynth.store.remote import Remote
 if TYPE_CHECKING:
     from sonarsynth.config import Source
     from sonarsynth.planning import Plan
+
+FLAT: Final[ChunkKeyEncodingParams] = {"name": "default", "separator": "."}
+"""Shards lie in the folder of their array: with the usual "/", each has as many folders of its own as axes."""
 
 
 class Mismatch(ValueError):
@@ -262,6 +266,7 @@ def _create_array(root: zarr.Group, array: ArrayLayout) -> None:
         dtype=array.dtype,
         chunks=(array.chunk, *inner),
         shards=(array.shard, *inner) if array.chunk != array.shard else None,
+        chunk_key_encoding=FLAT,
         compressors=_codecs(array.dtype),
         fill_value=variable.fill,
         dimension_names=variable.dims,
@@ -279,6 +284,7 @@ def _write_static(
         shape=values.shape,
         dtype="str" if text else values.dtype,
         chunks=tuple(max(1, n) for n in values.shape),
+        chunk_key_encoding=FLAT,
         compressors=(Crc32cCodec(),) if text else _codecs(values.dtype),
         dimension_names=dims,
         attributes=attrs,

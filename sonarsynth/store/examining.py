@@ -189,11 +189,11 @@ def _strangers(
 
 def shard_of(path: Folder, name: str) -> int | None:
     """The shard that a file of an array would be of by its name, None for other files."""
-    parts = name.split("/")
-    at = len(parts) - 1 - parts[::-1].index("c") if "c" in parts else -1
-    if at < 1 or at + 1 >= len(parts) or not all(p.isascii() and p.isdecimal() for p in parts[at + 1 :]):
+    array, _, key = name.rpartition("/")
+    head, *numbers = key.split(".")
+    if head != "c" or not array or not numbers or not all(n.isascii() and n.isdecimal() for n in numbers):
         return None
-    return int(parts[at + 1]) if (path / "/".join(parts[:at])).is_dir() else None
+    return int(numbers[0]) if (path / array).is_dir() else None
 
 
 def shown(name: str) -> str:

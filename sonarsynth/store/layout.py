@@ -1,7 +1,8 @@
 """The layout of a store, from a plan alone: every array with its shape, chunks and type. No frame is rendered for it.
 
-A frame is one chunk, and a shard of frames is one file of each array. Variables so small that a chunk would be mostly
-overhead (positions, counts) put a whole shard of frames into one chunk; the rule "one task, one file" is the same.
+A frame is one chunk, and a shard of frames is one file of each array, in the array's own folder (image/energy/c.3.0.0).
+Variables so small that a chunk would be mostly overhead (positions, counts) put a whole shard of frames into one chunk;
+the rule "one task, one file" is the same.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ class ArrayLayout:
 
     def file(self, shard: int) -> str:
         """Path in the store of the file of a shard."""
-        return "/".join([self.path, "c", str(shard), *["0"] * (len(self.shape) - 1)])
+        return f"{self.path}/" + ".".join(["c", str(shard), *["0"] * (len(self.shape) - 1)])
 
     def is_fill(self, block: np.ndarray) -> bool:
         """True where every number is the fill value."""
@@ -89,6 +90,7 @@ class Layout:
     arrays: tuple[ArrayLayout, ...]
     frames: int
     shard_frames: int
+    static: int  # arrays that no frame changes
 
     @property
     def shards(self) -> int:
@@ -106,6 +108,12 @@ class Layout:
         shard, rest = divmod(start, self.shard_frames)
         if rest or not 0 <= shard < self.shards or stop != self.region(shard).stop:
             raise ValueError(f"frames {start}:{stop} are not one whole shard of {self.shard_frames}")
+
+    def files(self, shards: int | None = None) -> int:
+        """Files and folders of a store with so many shards (left out: all) at most: each array has a file of each."""
+        shards = self.shards if shards is None else shards
+        arrays, groups = len(self.arrays), len({a.variable.group for a in self.arrays})
+        return 8 + 2 * groups + 5 * self.static + 2 * arrays + shards * (arrays + 1)
 
     @cached_property
     def keys(self) -> frozenset[tuple[str, str]]:
@@ -141,7 +149,7 @@ def layout_of(plan: Plan) -> Layout:
         inner = tuple(_size(plan, static, variable.group, dim) for dim in variable.dims[1:])
         small = np.dtype(variable.dtype).itemsize * int(np.prod(inner)) < SMALL_BYTES
         arrays.append(ArrayLayout(variable, (frames, *inner), shard, shard if small else 1))
-    return Layout(tuple(arrays), frames, shard)
+    return Layout(tuple(arrays), frames, shard, len(static))
 
 
 def _size(plan: Plan, static: Mapping[tuple[str, str], Any], group: str, dim: str) -> int:

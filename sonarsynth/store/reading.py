@@ -27,7 +27,7 @@ def read_back(path: Folder, mark: Mark) -> Iterator[Problem]:
     root = zarr.open_group(opens(path), mode="r")
     shard, step = int(mark.name), int(root_attributes(path)["shard_frames"])
     digest = hashlib.sha256()
-    for name in sorted({file.partition("/c/")[0] for file in mark.files}):
+    for name in sorted({file.rpartition("/")[0] for file in mark.files}):
         try:
             array = root[name]
             assert isinstance(array, zarr.Array)

@@ -65,10 +65,10 @@ def test_build_verify_and_build_again(command: Command, small_file: Path, tmp_pa
     other = command("build", small_file, path, "--workers", "0", "--set", "seed=4")
     assert other.status == 2
     assert "(seed is 3 there and 4 now)" in one_line(other)
-    (path / "image/energy/c/0/0/0").unlink()
+    (path / "image/energy/c.0.0.0").unlink()
     damaged = command("verify", path)
     assert damaged.status == 4
-    assert "DAMAGE image/energy/c/0/0/0: the file is missing" in damaged.out
+    assert "DAMAGE image/energy/c.0.0.0: the file is missing" in damaged.out
 
 
 def test_frames_set_aside_are_status_3(

@@ -59,7 +59,7 @@ def test_a_flipped_bit_is_found_wherever_it_is(copy: Path) -> None:
     files = sorted(f for f in copy.rglob("*") if f.is_file())
     chosen = [
         f
-        for name in ("zarr.json", "signals/pressure/c/1/0/0", "time/c/0", "truth/azimuth/c/0", ".marks/0.json")
+        for name in ("zarr.json", "signals/pressure/c.1.0.0", "time/c.0", "truth/azimuth/c.0", ".marks/0.json")
         if (f := copy / name).exists()
     ]
     chosen += [files[i] for i in random.choice(len(files), 10, replace=False)]
@@ -74,15 +74,15 @@ def test_a_flipped_bit_is_found_wherever_it_is(copy: Path) -> None:
 @pytest.mark.parametrize(
     ("damage", "where", "what"),
     [
-        (lambda p: (p / "image/energy/c/0/0/0").unlink(), "image/energy/c/0/0/0", "missing"),
-        (lambda p: (p / "image/energy/c/0/0/0").write_bytes(b""), "image/energy/c/0/0/0", "has 0 bytes"),
+        (lambda p: (p / "image/energy/c.0.0.0").unlink(), "image/energy/c.0.0.0", "missing"),
+        (lambda p: (p / "image/energy/c.0.0.0").write_bytes(b""), "image/energy/c.0.0.0", "has 0 bytes"),
         (
-            lambda p: (p / "image/energy/c/0/0/0").chmod(0o644) or flip(p / "image/energy/c/0/0/0", 99),
-            "image/energy/c/0/0/0",
+            lambda p: (p / "image/energy/c.0.0.0").chmod(0o644) or flip(p / "image/energy/c.0.0.0", 99),
+            "image/energy/c.0.0.0",
             "changed",
         ),
         (lambda p: (p / "image/energy/zarr.json").unlink(), "image/energy/zarr.json", "missing"),
-        (lambda p: (p / "targets/box/faces/c/0/0").unlink(), "targets/box/faces/c/0/0", "missing"),
+        (lambda p: (p / "targets/box/faces/c.0.0").unlink(), "targets/box/faces/c.0.0", "missing"),
         (lambda p: (p / ".marks/1.json").unlink(), "shard 1", "without a completion mark"),
         (lambda p: (p / ".marks/layout.json").unlink(), ".marks/layout.json", "missing"),
         (lambda p: (p / ".marks/0.json").write_text("{}"), ".marks/0.json", "damaged"),
@@ -100,7 +100,7 @@ def test_a_flipped_bit_is_found_wherever_it_is(copy: Path) -> None:
         (lambda p: (p / "image/x").symlink_to("/"), "image/x", "does not belong"),
         (lambda p: (p / "two\nlines").write_text("hello"), "two\\nlines", "does not belong"),
         (
-            lambda p: shutil.copytree(p / "image/energy/c/0", p / "image/energy/c/7"),
+            lambda p: shutil.copy(p / "image/energy/c.0.0.0", p / "image/energy/c.7.0.0"),
             "shard 7",
             "without a completion mark",
         ),
@@ -112,9 +112,9 @@ def test_damage_is_named(copy: Path, damage: Callable[[Path], object], where: st
 
 
 def test_a_truncated_file_is_found(copy: Path) -> None:
-    file = copy / "signals/pressure/c/0/0/0"
+    file = copy / "signals/pressure/c.0.0.0"
     file.write_bytes(file.read_bytes()[:-1])
-    assert "bytes, not" in found(copy)["signals/pressure/c/0/0/0"]
+    assert "bytes, not" in found(copy)["signals/pressure/c.0.0.0"]
 
 
 def test_values_that_are_not_finite_are_found(
@@ -170,12 +170,12 @@ def test_no_store_at_all(tmp_path: Path) -> None:
 
 
 def test_frames_that_a_damage_spoils_are_named(copy: Path) -> None:
-    (copy / "image/energy/c/1/0/0").unlink()
+    (copy / "image/energy/c.1.0.0").unlink()
     (copy / "truth/zarr.json").unlink()
     answer = store.verify(copy).as_json()
     assert answer["frames"] == 20
     assert answer["frames_whole"] == "0:8"
-    damage = ["image/energy/c/1/0/0: the file is missing"]
+    damage = ["image/energy/c.1.0.0: the file is missing"]
     assert answer["frame_report"] == [{"frame": f, "damage": damage, "checks": []} for f in range(8, 13)]
     assert [p["frames"] for p in answer["problems"]] == ["", "8:13"]
     (copy / ".marks/1.json").write_text("{}")
@@ -197,7 +197,7 @@ def test_a_quick_look_compares_files_only(copy: Path) -> None:
     store.marks.save_mark(copy, store.Mark("0", mark.frames, "0" * 64, mark.files))
     assert store.verify(copy, quick=True).ok
     assert not store.verify(copy).ok
-    (copy / "image/energy/c/1/0/0").unlink()
+    (copy / "image/energy/c.1.0.0").unlink()
     assert not store.verify(copy, quick=True).ok
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,10 +10,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from sonarsynth import config, planning, schedule
+from sonarsynth import config, planning, schedule, store
 from sonarsynth.description import FieldError
-from sonarsynth.planning import looks
+from sonarsynth.planning import Plan, looks
 from sonarsynth.recipe import Recipe
+from sonarsynth.render import Values
 
 
 def large(small_text: str) -> Recipe:
@@ -84,3 +86,25 @@ def test_a_single_long_trajectory_is_looked_at_from_end_to_end(
     monkeypatch.setattr(looks, "LOOKED_AT", 7)
     made = planning.plan(config.loads(small_text))
     assert np.flatnonzero(np.isfinite(made.windows.start)).tolist() == [0, 3, 6, 10, 13, 16, 19]
+
+
+def test_a_million_frames_take_under_a_million_files() -> None:
+    remus = config.load(Path(__file__).resolve().parents[2] / "configs" / "remus.yaml")
+    made = planning.plan(remus, ("image", "cloud"))
+    many = replace(remus, repeats=15625)
+    million = replace(made, recipe=many, sizes=made.sizes | {"frame": many.frames})
+    laid = store.layout_of(replace(million, shard_frames=planning._shard_frames(million)))
+    assert laid.frames == 10**6
+    assert laid.files() < 10**6
+
+
+def test_a_store_has_no_more_files_than_its_layout_says(
+    tmp_path: Path, small_plan: Plan, made_up: Callable[[Plan, int], Values]
+) -> None:
+    store.create(tmp_path / "s.zarr", small_plan)
+    laid = store.layout_of(small_plan)
+    for shard in range(laid.shards):
+        values = {frame: made_up(small_plan, frame) for frame in laid.region(shard)}
+        store.write_shard(tmp_path / "s.zarr", small_plan, shard, values)
+    there = len(list((tmp_path / "s.zarr").rglob("*")))
+    assert there <= laid.files() < 1.5 * there

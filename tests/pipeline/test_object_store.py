@@ -96,13 +96,13 @@ def test_what_workers_build_is_what_a_folder_would_hold(bucket: str, small_plan:
 def test_damage_in_a_bucket_is_found_and_mended(bucket: str, whole: Path) -> None:
     place = Remote(f"{bucket}/damaged/s.zarr")
     place.write_each(contents(whole))
-    flipped = bytearray((place / "image/energy/c/1/0/0").read_bytes())
+    flipped = bytearray((place / "image/energy/c.1.0.0").read_bytes())
     flipped[3] ^= 1
-    (place / "image/energy/c/1/0/0").write_bytes(bytes(flipped))
-    (place / "truth/range/c/0/0/0").unlink()
+    (place / "image/energy/c.1.0.0").write_bytes(bytes(flipped))
+    (place / "truth/range/c.0.0.0").unlink()
     (place / "stranger").write_bytes(b"mine")
     where = {problem.where for problem in store.verify(place, quick=True).problems}
-    assert where == {"image/energy/c/1/0/0", "truth/range/c/0/0/0", "stranger"}
+    assert where == {"image/energy/c.1.0.0", "truth/range/c.0.0.0", "stranger"}
     assert repair(place, workers=0, quick=True).ok
     assert contents(place) == contents(whole)
 
@@ -111,7 +111,7 @@ def reached(place: Remote, point: str) -> bool:
     names = place.sizes()
     if point == "layout":
         return ".marks/layout.json" in names
-    return any("/c/0/" in name and name.startswith("ledger/") for name in names)
+    return any("/c.0." in name and name.startswith("ledger/") for name in names)
 
 
 def test_killed_builds_are_resumed_to_the_same(bucket: str, small_file: Path, whole: Path) -> None:

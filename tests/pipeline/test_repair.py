@@ -20,7 +20,7 @@ from sonarsynth.schedule.repairing import repair
 from sonarsynth.store.marks import load_layout, load_mark, save_mark
 
 NO_MARKS = ("3.json", "99.json", "7")
-SHARD = "image/energy/c/1/0/0"
+SHARD = "image/energy/c.1.0.0"
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +91,7 @@ DAMAGES: dict[str, Callable[[Path], object]] = {
     "both copies of the manifest": lambda p: [m.unlink() for m in (p / ".marks").glob("layout*")],
     "both copies, and a static array": lambda p: (
         [m.write_text("{}") for m in (p / ".marks").glob("layout*")],
-        (p / "targets/box/faces/c/0/0").unlink(),
+        (p / "targets/box/faces/c.0.0").unlink(),
         (p / "notes.txt").write_text("hello"),
     ),
     "all marks": lambda p: shutil.rmtree(p / ".marks"),
@@ -100,9 +100,9 @@ DAMAGES: dict[str, Callable[[Path], object]] = {
     "an array": lambda p: shutil.rmtree(p / "image/energy"),
     "a group": lambda p: shutil.rmtree(p / "targets"),
     "a group is a file": lambda p: in_place_of(p / "cloud", "hello"),
-    "the short last shard": lambda p: os.truncate(p / "signals/pressure/c/2/0/0", 1000),
+    "the short last shard": lambda p: os.truncate(p / "signals/pressure/c.2.0.0", 1000),
     "the mark of a shard": lambda p: (p / ".marks/2.json").unlink(),
-    "the mark of a shard, and its steps": lambda p: ((p / ".marks/2.json").write_text("{}"), (p / "step/c/2").unlink()),
+    "the mark of a shard, and its steps": lambda p: ((p / ".marks/2.json").write_text("{}"), (p / "step/c.2").unlink()),
     "the mark of another shard": lambda p: shutil.copy(p / ".marks/0.json", p / ".marks/1.json"),
     "a blank after a mark": lambda p: append(p / ".marks/1.json", " "),
     "a folder where a file was": lambda p: folder_at(p / SHARD),
@@ -113,12 +113,12 @@ DAMAGES: dict[str, Callable[[Path], object]] = {
     "a pipe": lambda p: ((p / SHARD).unlink(), os.mkfifo(p / SHARD)),
     "a broken link": lambda p: ((p / "image/zarr.json").unlink(), (p / "image/zarr.json").symlink_to("nowhere")),
     "a linked folder that nobody made": lambda p: (p / "image/more").symlink_to("/"),
-    "a shard past the end": lambda p: shutil.copytree(p / "image/energy/c/0", p / "image/energy/c/7"),
-    "a shard that was not built": lambda p: (p / "image/energy/c/1").rename(p / "image/energy/c/5"),
+    "a shard past the end": lambda p: shutil.copy(p / "image/energy/c.0.0.0", p / "image/energy/c.7.0.0"),
+    "a shard that was not built": lambda p: (p / "image/energy/c.1.0.0").rename(p / "image/energy/c.5.0.0"),
     "marks of shards that are not there": lambda p: copies(p / ".marks/0.json", *NO_MARKS),
     "a name that no line holds": lambda p: (p / "two\nlines \udcff").write_text("hello"),
     "an empty folder": lambda p: (p / "image/empty").mkdir(),
-    "everything of frames": lambda p: [f.write_bytes(b"") for f in p.rglob("c/*/0/0") if f.is_file()],
+    "everything of frames": lambda p: [f.write_bytes(b"") for f in p.rglob("c.*.0.0")],
 }  # fmt: skip
 
 
@@ -136,14 +136,14 @@ def test_a_repaired_store_is_the_one_that_was_built(copy: Path, whole: Path, nam
 def test_only_what_is_damaged_is_made_again(copy: Path, whole: Path) -> None:
     before = {f: f.stat().st_mtime_ns for f in copy.rglob("*") if f.is_file()}
     os.truncate(copy / SHARD, 10)
-    (copy / "image/azimuth/c/0").write_bytes(b"")
+    (copy / "image/azimuth/c.0").write_bytes(b"")
     report = repair(copy, workers=0)
-    assert (report.restored, report.shards, report.frames) == (("image/azimuth/c/0",), (1,), tuple(range(8, 16)))
+    assert (report.restored, report.shards, report.frames) == (("image/azimuth/c.0",), (1,), tuple(range(8, 16)))
     touched = {f.relative_to(copy).as_posix() for f in before if f.stat().st_mtime_ns != before[f]}
     layout, mark = load_layout(whole), load_mark(whole, 1)
     assert layout is not None
     assert mark is not None
-    assert touched <= {"image/azimuth/c/0", ".marks/1.json", *mark.files}
+    assert touched <= {"image/azimuth/c.0", ".marks/1.json", *mark.files}
     assert_identical(copy, whole)
 
 
@@ -223,7 +223,7 @@ def test_numbers_that_are_not_the_ones_of_their_mark_are_made_again(copy: Path, 
 
 
 def test_an_interrupted_repair_goes_on(copy: Path, whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    truncate(copy, *(f"signals/pressure/c/{shard}/0/0" for shard in range(3)))
+    truncate(copy, *(f"signals/pressure/c.{shard}.0.0" for shard in range(3)))
     with monkeypatch.context() as patch:
         patch.setattr("sonarsynth.store.writing.save_mark", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
@@ -233,7 +233,7 @@ def test_an_interrupted_repair_goes_on(copy: Path, whole: Path, monkeypatch: pyt
 
 
 def test_a_worker_process_repairs_too(copy: Path, whole: Path) -> None:
-    truncate(copy, *(f"signals/pressure/c/{shard}/0/0" for shard in range(3)))
+    truncate(copy, *(f"signals/pressure/c.{shard}.0.0" for shard in range(3)))
     assert repair(copy, workers=1).shards == (0, 1, 2)
     assert_identical(copy, whole)
 
@@ -245,7 +245,7 @@ def test_a_mesh_that_has_changed_is_refused(tmp_path: Path, small_text: str) -> 
     text = small_text.replace("{kind: box, size: [1, 1, 1], edge: 0.25}", "{kind: mesh_file, path: box.stl}")
     build(config.loads(text, folder=tmp_path), path, frames=[0], workers=0)
     whole = contents(path)
-    (path / "step/c/0").unlink()
+    (path / "step/c.0").unlink()
     kept = mesh.read_bytes()
     trimesh.creation.box((1, 1, 2)).export(mesh)
     with pytest.raises(store.Mismatch, match="a file that its recipe names has changed"):

@@ -108,7 +108,7 @@ def test_values_that_do_not_fit_the_layout_are_refused_before_anything_is_writte
     change(values)
     with pytest.raises(ValueError, match=message):
         store.write_shard(laid_out, small_plan, 0, {0: values})
-    assert not list(laid_out.glob("*/*/c/0/0/0"))
+    assert not list(laid_out.glob("*/*/c.0.0.0"))
     assert store.frames_there(laid_out) == []
 
 

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import dask
 import numpy as np
@@ -203,6 +204,9 @@ def test_what_does_not_fit_is_refused_before_anything_is_written_unless_agreed(
     huge = replace(small_plan, stages=tuple(replace(s, bytes=10**12) for s in small_plan.stages))
     with pytest.raises(TooLarge, match="TB"):
         build(huge, tmp_path / "h.zarr", workers=0)
+    monkeypatch.setattr(space.os, "statvfs", lambda place: SimpleNamespace(f_files=100, f_favail=3))
+    with pytest.raises(TooLarge, match=r"needs up to \d+ files and folders and 3 more fit there: --yes"):
+        build(small_plan, tmp_path / "i.zarr", workers=0)
 
 
 def in_namespace(script: str) -> subprocess.CompletedProcess[str]:
@@ -284,16 +288,22 @@ def test_another_code_is_shown_and_refused(tmp_path: Path, small: Recipe, monkey
         build(small, tmp_path / "s.zarr", workers=0)
 
 
-def test_a_disk_error_that_is_not_about_room_stays_as_it_is(tmp_path: Path) -> None:
-    with pytest.raises(OSError, match="I/O") as raised, space.told_when_full(tmp_path, lambda: 1.0):
+def test_a_disk_error_that_is_not_about_room_stays_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(OSError, match="I/O") as raised, space.told_when_full(tmp_path, lambda: space.Room(1.0, 1)):
         raise OSError(errno.EIO, "I/O error")
     assert raised.value.errno == errno.EIO
     for number in space.FULL:
         with (
             pytest.raises(OSError, match=r"up to 5 GB more are needed, .* are free"),
-            space.told_when_full(tmp_path, lambda: 5e9),
+            space.told_when_full(tmp_path, lambda: space.Room(5e9, 1)),
         ):
             raise OSError(number, os.strerror(number))
+    monkeypatch.setattr(space.os, "statvfs", lambda place: SimpleNamespace(f_files=100, f_favail=3))
+    with (
+        pytest.raises(OSError, match="up to 80 more files and folders are needed, 3 more fit"),
+        space.told_when_full(tmp_path, lambda: space.Room(1.0, 80)),
+    ):
+        raise OSError(errno.ENOSPC, "No space left")
 
 
 def test_threads_of_this_process_are_not_limited(tmp_path: Path, small_plan: Plan, reference: Path) -> None:

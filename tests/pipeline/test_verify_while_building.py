@@ -14,7 +14,7 @@ from sonarsynth.cli import main
 from sonarsynth.planning import Plan
 from sonarsynth.schedule import build
 
-FILE = "image/energy/c/1/0/0"
+FILE = "image/energy/c.1.0.0"
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def test_what_a_build_has_in_hand_is_no_damage_and_it_is_said(copy: Path, capfd:
 
 
 @pytest.mark.parametrize("quick", [False, True])
-@pytest.mark.parametrize("name", ["signals/pressure/c/0/0/0", ".marks/0.json"])
+@pytest.mark.parametrize("name", ["signals/pressure/c.0.0.0", ".marks/0.json"])
 def test_damage_to_what_is_complete_is_found_all_the_same(copy: Path, name: str, quick: bool) -> None:
     content = bytearray((copy / name).read_bytes())
     content[len(content) // 2] ^= 4
