@@ -146,6 +146,26 @@ def velocity(motion: Motion, time: float) -> Floats:
             return np.asarray(motion.speed * np.array([-np.sin(angle), np.cos(angle), 0.0]))
 
 
+def spin(motion: Motion, time: float) -> Floats:
+    """Angular velocity (3,) in the world at a time (rad/s): headings alone change; at a waypoint, of the leg that
+    begins."""
+    match motion:
+        case Circle():
+            return np.array([0.0, 0.0, motion.speed / motion.radius])
+        case Waypoints():
+            a, b = _leg(motion, time)
+            if not motion.points[0].time <= time < motion.points[-1].time:
+                return np.zeros(3)
+            return np.array([0.0, 0.0, -_turn(motion, a, b) / (b.time - a.time)])
+        case Still() | Line() | Course():
+            return np.zeros(3)
+
+
+def straight(motion: Motion) -> bool:
+    """Whether a body keeps its velocity and its heading for ever."""
+    return isinstance(motion, Still | Line | Course)
+
+
 def _angle(motion: Circle, time: float) -> float:
     """Polar angle of the body about the centre, from x (rad)."""
     return 0.5 * np.pi - motion.bearing + motion.speed / motion.radius * time
@@ -177,9 +197,14 @@ def _pose_on_waypoints(motion: Waypoints, time: float) -> Pose:
     position = (1 - part) * np.array(a.position) + part * np.array(b.position)
     i = motion.points.index(a)
     start = _heading_at(motion, i)
+    if a.heading is None and b.heading is None and part >= 1.0:
+        start = _heading_at(motion, i + 1)
+    return Pose(position, quaternion(start + part * _turn(motion, a, b), motion.pitch, motion.roll))
+
+
+def _turn(motion: Waypoints, a: Waypoint, b: Waypoint) -> float:
+    """By how much (rad) the heading changes on the leg from a to b, clockwise."""
     if a.heading is None and b.heading is None:
-        turn = 0.0  # along each leg, turning at the waypoint
-        start = _heading_at(motion, i + 1) if part >= 1.0 else start
-    else:
-        turn = (_heading_at(motion, i + 1) - start + np.pi) % (2 * np.pi) - np.pi
-    return Pose(position, quaternion(start + part * turn, motion.pitch, motion.roll))
+        return 0.0  # along each leg, turning at the waypoint
+    i = motion.points.index(a)
+    return float((_heading_at(motion, i + 1) - _heading_at(motion, i) + np.pi) % (2 * np.pi) - np.pi)
