@@ -13,7 +13,7 @@ from sonarsynth.products import Paths, Truth
 from sonarsynth.sonar import BeamGrid
 from sonarsynth.world.casting import OFFSET, first_hit, occluded
 from sonarsynth.world.meshes import Mesh, in_blocks
-from sonarsynth.world.moment import Body, Moment, meeting_times, met_positions
+from sonarsynth.world.moment import Body, Moment, meeting_times, positions
 
 Connect = Callable[[Floats, Floats], Paths]
 """Rays from (pair, xyz) to (pair, xyz) in the world: a propagation model bound to its water."""
@@ -39,8 +39,8 @@ def label(
     boxes = [
         _visible(body, corners, moment.bodies, sonar_pose) for body, corners in zip(moment.bodies, seen, strict=True)
     ]
-    bodies = moment.bodies if doppler else tuple(body.frozen for body in moment.bodies)
-    met = meeting_times(bodies, moment.snaps, partial(_direct_times, connect))
+    tracks = [body.track if doppler else body.frozen.track for body in moment.bodies]
+    met = meeting_times(tracks, moment.snaps, partial(_direct_times, connect))
     return Truth(
         sonar_position=sonar_pose.position,
         sonar_orientation=sonar_pose.orientation,
@@ -48,7 +48,7 @@ def label(
         target_orientation=_rows([b.pose.orientation for b in moment.bodies], 4),
         target_velocity=_rows([b.velocity for b in moment.bodies], 3),
         meeting_time=met,
-        position_at_echo=met_positions(bodies, met),
+        position_at_echo=positions(tracks, met),
         box=np.array([_box(b, sonar_pose) for b in moment.bodies]).reshape(-1, 8, 3),
         image_box=_rows([box for box, _ in boxes], 4),
         visible_fraction=np.array([fraction for _, fraction in boxes]),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose
 from sonarsynth.world.meshes import Mesh
-from sonarsynth.world.motion import Motion, pose, spin, straight, velocity
+from sonarsynth.world.motion import Motion, Track
 from sonarsynth.world.snap_pulses import Scales, Waveform, at_depth, waveform
 from sonarsynth.world.sources import SnapModel, SnappingShrimp
 
@@ -32,30 +32,20 @@ class Body:
     motion: Motion | None = None  # that brought it here; None: it goes on at its velocity, and does not turn
     time: float = 0.0  # s: of the motion
 
+    @property
+    def track(self) -> Track:
+        """Of its origin."""
+        return Track(self.pose, self.velocity, self.motion, self.time)
+
     def later(self, seconds: float) -> Body:
         """The body where it will be, or was, so many seconds (s) after."""
-        if self.motion is None:
-            moved = Pose(self.pose.position + self.velocity * seconds, self.pose.orientation)
-            return replace(self, pose=moved, time=self.time + seconds)
-        time = self.time + seconds
-        return replace(self, pose=pose(self.motion, time), velocity=velocity(self.motion, time), time=time)
-
-    def positions(self, seconds: Floats) -> Floats:
-        """Where its origin is (..., xyz) m, world, so many seconds (...) s after."""
-        if self.motion is None or straight(self.motion):
-            return np.asarray(self.pose.position + seconds[..., None] * self.velocity)
-        places = [pose(self.motion, self.time + late).position for late in seconds.ravel().tolist()]
-        return np.array(places).reshape(*seconds.shape, 3)
+        there = self.track.later(seconds)
+        return replace(self, pose=there.pose, velocity=there.velocity, time=there.time)
 
     @property
     def frozen(self) -> Body:
         """The body at rest where it is."""
         return replace(self, velocity=np.zeros(3), motion=None)
-
-    @property
-    def spin(self) -> Floats:
-        """(xyz) rad/s: angular velocity, world."""
-        return np.zeros(3) if self.motion is None else spin(self.motion, self.time)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,29 +92,28 @@ def snaps_of(shrimp: SnappingShrimp, bed: float, scales: Scales) -> tuple[Snap, 
     return tuple(Snap(position, time, model, shrimp.source_level, gain, width) for time, gain, width in drawn)
 
 
-def meeting_times(bodies: tuple[Body, ...], snaps: tuple[Snap, ...], travel_time: TravelTime) -> Floats:
-    """When the sound of each snap meets each body's origin (snap, target), s on the clock of the frame.
+def meeting_times(tracks: Sequence[Track], snaps: tuple[Snap, ...], travel_time: TravelTime) -> Floats:
+    """When the sound of each snap meets what is on each track (snap, track), s on the clock of the frame.
 
-    bodies: where they are at the instant of the frame; travel_time: of direct paths. Solves t = t_snap + T(x(t)), x the
-    body's way, by iteration; NaN where no sound arrives.
+    tracks: from the instant of the frame on; travel_time: of direct paths. Solves t = t_snap + T(x(t)), x the track, by
+    iteration; NaN where no sound arrives.
     """
-    emitted = np.array([snap.time for snap in snaps])[:, None] + np.zeros((len(snaps), len(bodies)))
-    start = np.array([snap.position for snap in snaps]).reshape(-1, 1, 3) + np.zeros((len(bodies), 3))
+    emitted = np.array([snap.time for snap in snaps])[:, None] + np.zeros((len(snaps), len(tracks)))
+    start = np.array([snap.position for snap in snaps]).reshape(-1, 1, 3) + np.zeros((len(tracks), 3))
     met, arrives = emitted, np.ones(emitted.shape, bool)
     for _ in range(MEETINGS if emitted.size else 0):
-        there = np.stack([body.positions(met[:, n]) for n, body in enumerate(bodies)], axis=1)
-        found = emitted + travel_time(start.reshape(-1, 3), there.reshape(-1, 3)).reshape(met.shape)
+        found = emitted + travel_time(start.reshape(-1, 3), positions(tracks, met).reshape(-1, 3)).reshape(met.shape)
         arrives = np.isfinite(found)
         late = np.abs(found - met)[arrives].max(initial=0.0)
         met = np.where(arrives, found, met)
-        if late <= MET or not any(body.velocity.any() or body.motion is not None for body in bodies):
+        if late <= MET or all(track.still for track in tracks):
             break
     return np.where(arrives, met, np.nan)
 
 
-def met_positions(bodies: tuple[Body, ...], met: Floats) -> Floats:
-    """Where bodies are (snap, target, xyz) m, world, at times (snap, target) s of the frame; NaN where these are."""
-    places = np.empty((*met.shape, 3))
-    for number, body in enumerate(bodies):
-        places[:, number] = body.positions(np.nan_to_num(met[:, number]))
-    return np.where(np.isnan(met)[..., None], np.nan, places)
+def positions(tracks: Sequence[Track], times: Floats) -> Floats:
+    """Where tracks are (snap, track, xyz) m, world, at times (snap, track) s of the frame; NaN where these are."""
+    places = np.empty((*times.shape, 3))
+    for number, track in enumerate(tracks):
+        places[:, number] = track.positions(np.nan_to_num(times[:, number]))
+    return np.where(np.isnan(times)[..., None], np.nan, places)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Literal
 
@@ -161,9 +162,48 @@ def spin(motion: Motion, time: float) -> Floats:
             return np.zeros(3)
 
 
-def straight(motion: Motion) -> bool:
-    """Whether a body keeps its velocity and its heading for ever."""
-    return isinstance(motion, Still | Line | Course)
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Where something that moves is about an instant."""
+
+    pose: Pose
+    velocity: Floats  # (xyz) m/s, world
+    motion: Motion | None = None  # that brought it here; None: it goes on at its velocity, and does not turn
+    time: float = 0.0  # s: of the motion
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m, own frame, from what the motion moves
+
+    @property
+    def spin(self) -> Floats:
+        """(xyz) rad/s: angular velocity, world."""
+        return np.zeros(3) if self.motion is None else spin(self.motion, self.time)
+
+    @property
+    def still(self) -> bool:
+        """Whether it stays where it is."""
+        return (self.motion is None and not self.velocity.any()) or isinstance(self.motion, Still)
+
+    def part(self, offset: Floats) -> Track:
+        """The track of a point of it, offset (xyz) m in its own frame."""
+        turned = self.pose.turn_to_world(offset)
+        place = Pose(self.pose.position + turned, self.pose.orientation)
+        x, y, z = (np.asarray(self.offset) + offset).tolist()
+        return Track(place, self.velocity + np.cross(self.spin, turned), self.motion, self.time, (x, y, z))
+
+    def later(self, seconds: float) -> Track:
+        """The same so many seconds (s) after, or before."""
+        time = self.time + seconds
+        if self.motion is None:
+            moved = Pose(self.pose.position + self.velocity * seconds, self.pose.orientation)
+            return Track(moved, self.velocity, None, time, self.offset)
+        whole = Track(pose(self.motion, time), velocity(self.motion, time), self.motion, time)
+        return whole.part(np.array(self.offset))
+
+    def positions(self, seconds: Floats) -> Floats:
+        """Where it is (..., xyz) m, world, so many seconds (...) s after."""
+        if self.motion is None or isinstance(self.motion, Still | Line | Course):
+            return np.asarray(self.pose.position + seconds[..., None] * self.velocity)
+        places = [self.later(late).pose.position for late in seconds.ravel().tolist()]
+        return np.array(places).reshape(*seconds.shape, 3)
 
 
 def _angle(motion: Circle, time: float) -> float:
