@@ -23,7 +23,7 @@ from sonarsynth.tracing import AutoTracing, Tracing
 from sonarsynth.world.environment import Environment
 from sonarsynth.world.meshes import Mesh
 from sonarsynth.world.moment import Body, Moment, Snap, snaps_of
-from sonarsynth.world.motion import Motion, Still, pose, velocity
+from sonarsynth.world.motion import Motion, Still, Track, pose, velocity
 from sonarsynth.world.snap_pulses import scales
 from sonarsynth.world.sources import SnappingShrimp
 
@@ -187,6 +187,7 @@ class Scene:
             key=key,
             sonar_pose=pose(self.trajectory.sonar, time),
             sonar_velocity=velocity(self.trajectory.sonar, time),
+            sonar_motion=self.trajectory.sonar,
             moment=self.moment(time, key=key, step=step, seed=seed),
         )
 
@@ -203,6 +204,12 @@ class Frame:
     sonar_pose: Pose
     sonar_velocity: Floats  # (xyz) m/s, world
     moment: Moment
+    sonar_motion: Motion | None = None  # None: it goes on at its velocity, and does not turn
+
+    @property
+    def sonar_track(self) -> Track:
+        """Where the sonar is about the instant of the frame."""
+        return Track(self.sonar_pose, self.sonar_velocity, self.sonar_motion, self.time)
 
     @property
     def time(self) -> float:
