@@ -133,7 +133,8 @@ def trace_at(plan: Plan, frame: Frame) -> Traced:
 def _label(plan: Plan, frame: Frame, levels: Floats) -> Truth:
     """Truth of a frame; levels: (snap,) dB re 1 uPa at 1 m."""
     straight = isinstance(plan.propagation, Straight)
-    return label(frame.moment, frame.sonar_pose, plan.scene.sonar.beams, plan.connect, levels, straight)
+    beams, doppler = plan.scene.sonar.beams, plan.scene.physics.doppler
+    return label(frame.moment, frame.sonar_pose, beams, plan.connect, levels, straight, doppler)
 
 
 def _of_frame(plan: Plan, frame: Frame) -> Values:
