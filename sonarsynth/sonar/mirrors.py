@@ -24,7 +24,7 @@ def mirror_normal(elements: Elements, wavelength: float) -> Floats | None:
     if len(live) < 2:
         return None
     about = live - live.mean(axis=0)
-    axes = np.linalg.svd(about, full_matrices=True)[2]
+    axes = np.linalg.svd(np.linalg.qr(about, mode="r"), full_matrices=True)[2]
     near = np.abs(about @ axes.T).max(axis=0) * (4.0 * np.pi / wavelength) < ALIKE
     if near[0] or not near[2]:
         return None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+from sonarsynth.labelling.views import MEANINGS, View
 from sonarsynth.recipe import SPLITS
 
 
@@ -116,8 +117,30 @@ _TRUTH = _group(
     ),
     _v("target_velocity", (*_TARGET, "xyz"), "float64", "m s-1", "velocity of the target in the world"),
     _v("box", (*_TARGET, "corner", "xyz"), "float64", "m", "corners of the oriented bounding box, sonar frame"),
-    _v("image_box", (*_TARGET, "bound"), "float64", "degree", "bounds of the visible part in azimuth and elevation"),
-    _v("visible_fraction", _TARGET, "float64", "1", "share of the area facing the array that the array sees"),
+    _v(
+        "image_box",
+        (*_TARGET, "bound"),
+        "float64",
+        "degree",
+        "bounds in azimuth and elevation of the visible part in view",
+        attributes=_comment("cut at the first and last beam each way; NaN where nothing is in view, see view"),
+    ),
+    _v(
+        "view",
+        _TARGET,
+        "int8",
+        "1",
+        "how much of the visible part is in the view of the beams",
+        attributes=(("flag_values", [int(v) for v in View]), ("flag_meanings", MEANINGS)),
+    ),
+    _v(
+        "visible_fraction",
+        _TARGET,
+        "float64",
+        "1",
+        "share of the area facing the array that the array sees",
+        attributes=_comment("whether it is in the view of the beams or not"),
+    ),
     _v("echo_azimuth", _ECHO, "float64", "degree", "azimuth that the target's echoes come from, weighted by power"),
     _v("echo_elevation", _ECHO, "float64", "degree", "elevation that they come from: ghosts by surface and bed"),
     _v("echo_level", _ECHO, "float64", "dB", "level of the target's echoes re 1 uPa, of their energy in the band"),
