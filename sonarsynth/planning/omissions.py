@@ -8,7 +8,7 @@ import numpy as np
 
 from sonarsynth.planning.bending import bending_error
 from sonarsynth.planning.plans import Omission, Plan
-from sonarsynth.scattering import Kirchhoff, MirrorLobe
+from sonarsynth.scattering import MirrorLobe
 from sonarsynth.scattering.fineness import expected_error
 from sonarsynth.scene import Frame
 from sonarsynth.sonar import stop_frequency
@@ -106,7 +106,7 @@ def _facets_leave_out(plan: Plan) -> list[Omission]:
     """What coherent facets do not have of an echo."""
     scene, rows = plan.scene, []
     for target, law, mesh in zip(scene.world.targets, scene.laws, scene.meshes, strict=True):
-        if isinstance(law, Kirchhoff):
+        if law.coherent:
             error = expected_error(mesh, scene.sonar.shortest_wavelength)
             bound = f"about {100.0 * error:.2g} % of the echo at the top of the band"
             if error > 0.995:
@@ -151,7 +151,7 @@ def reflected_bound(plan: Plan) -> str:
         plan.elements,
         float(plan.absorption(sonar.band.centre)),
         replace(plan.propagation, bounces=bounces + 1),
-        tuple(MirrorLobe() if isinstance(law, Kirchhoff) else law for law in scene.laws),
+        tuple(MirrorLobe() if law.coherent else law for law in scene.laws),
         band=(sonar.band.low, sonar.band.high),
     )
     blur = np.exp(-0.5 * (2 * np.pi * sonar.band.centre * found.blur) ** 2)

@@ -93,6 +93,7 @@ class Plan:
     stages: tuple[Stage, ...] = ()
     left_out: tuple[Omission, ...] = ()
     warnings: tuple[str, ...] = ()
+    validity: tuple[str, ...] = ()  # where formulas and laws hold and do not, as the store has it
     sizes: dict[str, int] = field(default_factory=dict)
     shard_frames: int = 1
     sequence: int = 0  # whose scene, profile and propagation these are
@@ -153,6 +154,7 @@ class Plan:
             "stages": [vars(s) for s in self.stages],
             "left_out": [vars(o) for o in self.left_out],
             "warnings": list(self.warnings),
+            "validity": list(self.validity),
             "predicted_seconds": self.predicted_seconds,
             "predicted_bytes": self.predicted_bytes,
             "sizes": self.sizes,
