@@ -126,6 +126,12 @@ def _accuracy(made: Plan) -> list[str]:
             f"signals err by {errors.expansion:.2g} (paths over the array) and {errors.synthesis:.2g} (synthesis): "
             f"accuracy.signal allows {allowed.signal:g}, but the scene says how they are made (scene.physics)"
         )
+    tolerance = 20.0 * np.log10(1.0 + allowed.signal)
+    if made.absorption_error > tolerance:
+        found.append(
+            f"the spectrum of absorption is one for all paths, of their mean depth: {made.absorption_error:.2g} dB off "
+            f"at most at the ends of the band, where accuracy.signal allows {tolerance:.2g} dB"
+        )
     if errors.ranging > allowed.range_m:
         found.append(
             f"ranges err by {errors.ranging:.2g} m where rays bend: accuracy.range_m allows {allowed.range_m:g}, but "

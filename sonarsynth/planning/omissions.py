@@ -41,6 +41,9 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
                 "the energy that roughness takes from them is scattered, and not simulated",
             )
         )
+    if environment.absorption.formula != "none":
+        bound = f"{plan.absorption_error:.1g} dB of any path in the band; at its centre each loses by its own depths"
+        rows.append(Omission("absorption over the band at each depth", "one spectrum for all paths", bound))
     rows += _facets_leave_out(plan)
     moving = any(b.velocity.any() for b in frame.moment.bodies) or frame.sonar_velocity.any()
     if moving and not scene.physics.doppler:
@@ -149,7 +152,7 @@ def reflected_bound(plan: Plan) -> str:
         _rough_moment(plan, frame),
         frame.sonar_pose,
         plan.elements,
-        float(plan.absorption(sonar.band.centre)),
+        plan.absorption_at_depths,
         replace(plan.propagation, bounces=bounces + 1),
         tuple(MirrorLobe() if law.coherent else law for law in scene.laws),
         band=(sonar.band.low, sonar.band.high),

@@ -15,8 +15,10 @@ from sonarsynth.scattering.validity import Scatterer
 class ScatteringLaw(Protocol):
     """A law of scattering by facets."""
 
-    kind: str
-    """Its name in recipes."""
+    @property
+    def kind(self) -> str:
+        """Its name in recipes."""
+        ...
 
     @property
     def parts(self) -> tuple[Part, ...]:

@@ -14,6 +14,7 @@ from sonarsynth.products import Arrivals
 from sonarsynth.scattering import ScatteringLaw
 from sonarsynth.scattering.patches import Pulses
 from sonarsynth.sonar import Elements
+from sonarsynth.tracing.absorbing import path_loss
 from sonarsynth.tracing.aperture import Fronts, Wavefronts, fronts, wavefronts
 from sonarsynth.tracing.echoes import echoes
 from sonarsynth.tracing.forward import forward_legs, opaque, shadow_parts
@@ -34,6 +35,7 @@ from sonarsynth.tracing.variation import ALIKE, ENOUGH, fitted
 from sonarsynth.world.environment import Environment, Profile
 from sonarsynth.world.meshes import in_blocks
 from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.water import DepthAbsorption
 
 if TYPE_CHECKING:
     from sonarsynth.tracing import Propagation, Visibility
@@ -123,7 +125,7 @@ def trace(
     moment: Moment,
     sonar_pose: Pose,
     elements: Elements,
-    absorption: float,
+    absorption: float | DepthAbsorption,
     propagation: Propagation,
     laws: tuple[ScatteringLaw, ...],
     *,
@@ -138,13 +140,13 @@ def trace(
     """The arrivals of a frame, sorted by snap; of each first those that met no target, then echoes by target, then the
     shadow waves of targets that scatter forward.
 
-    environment, profile: the water; moment: bodies and snaps; sonar_pose, elements: the array; absorption: dB/m at the
-    centre of the band; propagation: how sound travels, and how many bounces are followed; laws: how the facets of each
-    body scatter; band: Hz; moving: velocities, where they count; negligible: see `NEGLIGIBLE`; enough:
-    `variation.ENOUGH`; alike: `variation.ALIKE`; degree: of polynomials over the aperture. A facet counts where it is
-    lit by the snap and seen, with no body in between, by the array centre; or, with `visibility`, by some hydrophone
-    that it faces, and is heard by those. The snap itself is heard if no body stands in between, but for those that
-    scatter forward (`tracing.forward`). Raises ValueError for anything outside the water.
+    environment, profile: the water; moment: bodies and snaps; sonar_pose, elements: the array; absorption: at the
+    centre of the band, at every depth or the same (dB/m) at all; propagation: how sound travels, and how many bounces
+    are followed; laws: how the facets of each body scatter; band: Hz; moving: velocities, where they count; negligible:
+    see `NEGLIGIBLE`; enough: `variation.ENOUGH`; alike: `variation.ALIKE`; degree: of polynomials over the aperture. A
+    facet counts where it is lit by the snap and seen, with no body in between, by the array centre; or, with
+    `visibility`, by some hydrophone that it faces, and is heard by those. The snap itself is heard if no body stands in
+    between, but for those that scatter forward (`tracing.forward`). Raises ValueError for anything outside the water.
     """
     legs = array_legs(
         environment,
@@ -218,7 +220,7 @@ def bending(profile: Profile, propagation: Propagation, sonar_pose: Pose) -> Pro
 def arrivals(
     array: ArrayLegs,
     snaps: tuple[Snap, ...],
-    absorption: float,
+    absorption: float | DepthAbsorption,
     laws: tuple[ScatteringLaw, ...],
     moving: Moving | None = None,
 ) -> Arrivals:
@@ -237,7 +239,12 @@ def arrivals(
 
 
 def _direct(
-    array: ArrayLegs, solid: tuple[Body, ...], index: int, snap: Snap, absorption: float, moving: Moving | None
+    array: ArrayLegs,
+    solid: tuple[Body, ...],
+    index: int,
+    snap: Snap,
+    absorption: float | DepthAbsorption,
+    moving: Moving | None,
 ) -> Arrivals:
     """Snap to array, where none of the solid bodies stands in between."""
     environment, profile, sonar_pose = array.environment, array.profile, array.sonar_pose
@@ -259,10 +266,8 @@ def _direct(
     plain = Pulses.plain(len(legs.row))
     one, none = np.ones(len(legs.row)), np.full(len(legs.row), NO_TARGET)
     variation = fitted(array, over.gain(np.arange(len(legs.row))), legs.spreading)
-    made = assemble(
-        legs, over.terms, Outward.none(len(one)), index, snap.time, absorption, none, none, one,
-        variation, plain,
-    )  # fmt: skip
+    loss = path_loss(array, absorption, snap, legs)
+    made = assemble(legs, over.terms, Outward.none(len(one)), index, snap.time, loss, none, none, one, variation, plain)
     if moving is None:
         return made
     return carried(made, legs, None, snap, sonar_pose, profile, moving, array.elements, None, array.enough)

@@ -13,6 +13,7 @@ from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.products import Arrivals
 from sonarsynth.scattering import Part
 from sonarsynth.scattering.patches import Pulses
+from sonarsynth.tracing.absorbing import path_loss
 from sonarsynth.tracing.echo_groups import Group, groups_of, heard
 from sonarsynth.tracing.legs import may_face, usable
 from sonarsynth.tracing.moving import Moving, carried
@@ -24,6 +25,7 @@ from sonarsynth.tracing.variation import variations
 from sonarsynth.tracing.wavefront import FEW, Terms, probes
 from sonarsynth.world.meshes import in_blocks
 from sonarsynth.world.moment import Body, Snap
+from sonarsynth.world.water import DepthAbsorption
 
 if TYPE_CHECKING:
     from sonarsynth.tracing.arrivals import ArrayLegs
@@ -107,7 +109,7 @@ def echoes(
     array: ArrayLegs,
     index: int,
     snap: Snap,
-    absorption: float,
+    absorption: float | DepthAbsorption,
     parts: tuple[tuple[Part, ...], ...],
     moving: Moving | None,
 ) -> Arrivals:
@@ -134,7 +136,8 @@ def echoes(
         target, facet = array.facets.target[out.facet], array.facets.facet[out.facet]
         amplitude, sign = _columns(some.groups, "amplitude", "sign")
         scattered, vary = sign * amplitude, (variation, error)
-        one = assemble(legs, over, out, index, snap.time, absorption, target, facet, scattered, vary, some.pulses)
+        loss = path_loss(array, absorption, snap, legs, out)
+        one = assemble(legs, over, out, index, snap.time, loss, target, facet, scattered, vary, some.pulses)
         if moving is not None:
             view = partial(array.fronts.departure, some.leg, FEW)
             place = array.sonar_pose, array.profile, moving, array.elements

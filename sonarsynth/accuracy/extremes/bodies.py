@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from functools import partial
+from typing import Literal
 
 import numpy as np
 
@@ -48,7 +49,9 @@ def _law(law: MirrorLobe | Kirchhoff) -> Got:
     """Each sphere is as exact as the law says without a word, or as far off as its note says."""
     from sonarsynth.acoustics.modal import sphere_amplitude
 
-    boundary, parts = "soft" if isinstance(law, Kirchhoff) and law.surface == "soft" else "rigid", []
+    soft = isinstance(law, Kirchhoff) and law.surface == "soft"
+    boundary: Literal["rigid", "soft"] = "soft" if soft else "rigid"
+    parts = []
     for radius, low in SPHERES:
         frequency = np.geomspace(low, 3.4 * low, 9)
         shape = Sphere(radius=radius, edge=radius / 8.0)
