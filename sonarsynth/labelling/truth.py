@@ -7,8 +7,9 @@ from functools import partial
 
 import numpy as np
 
-from sonarsynth.conventions import NO_TARGET, Bools, Floats, azimuth_elevation, direction
+from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints, direction
 from sonarsynth.geometry import Pose
+from sonarsynth.labelling.views import box_in_view
 from sonarsynth.products import Paths, Truth
 from sonarsynth.sonar import BeamGrid
 from sonarsynth.world.casting import OFFSET, first_hit, occluded
@@ -32,12 +33,18 @@ def label(
     doppler: bodies move while sound is under way, so that it meets them elsewhere (`position_at_echo`).
     A beam's label is the first surface that a ray launched from the array centre in the beam's direction meets; its
     range is the distance of that point from the array centre. `label` traces the bent ray by casting a straight one
-    against the bodies as they appear: each vertex moved to (its arrival direction) * (its distance).
+    against the bodies as they appear: each vertex moved to (its arrival direction) * (its distance). A target's
+    `image_box` bounds what the array sees of it within the spans of the beams; NaN where that is nothing, and `view`
+    says why (`labelling.views.View`).
     """
     seen = [_as_seen(body, sonar_pose, connect, straight) for body in moment.bodies]
     target, facet, distance = _label_beams(moment.bodies, seen, beams, sonar_pose, straight)
-    boxes = [
+    visible = [
         _visible(body, corners, moment.bodies, sonar_pose) for body, corners in zip(moment.bodies, seen, strict=True)
+    ]
+    boxes = [
+        box_in_view(corners, body.mesh.faces[facets], beams)
+        for body, corners, (facets, _) in zip(moment.bodies, seen, visible, strict=True)
     ]
     tracks = [body.track if doppler else body.frozen.track for body in moment.bodies]
     met = meeting_times(tracks, moment.snaps, partial(_direct_times, connect))
@@ -50,8 +57,9 @@ def label(
         meeting_time=met,
         position_at_echo=positions(tracks, met),
         box=np.array([_box(b, sonar_pose) for b in moment.bodies]).reshape(-1, 8, 3),
-        image_box=_rows([box for box, _ in boxes], 4),
-        visible_fraction=np.array([fraction for _, fraction in boxes]),
+        image_box=_rows([box.bounds for box in boxes], 4),
+        view=np.array([box.view for box in boxes], np.int8),
+        visible_fraction=np.array([fraction for _, fraction in visible]),
         snap_position=_rows([s.position for s in moment.snaps], 3),
         snap_time=np.array([s.time for s in moment.snaps]),
         snap_level=np.asarray(snap_level, float),
@@ -139,8 +147,8 @@ def _beams_near(points: Floats, rays: Floats) -> tuple[np.ndarray, np.ndarray]:
     return rows, columns
 
 
-def _visible(body: Body, seen: Floats, bodies: tuple[Body, ...], sonar_pose: Pose) -> tuple[Floats, float]:
-    """Azimuth and elevation bounds (4,) of the visible facets, and the seen share of the area that faces the array."""
+def _visible(body: Body, seen: Floats, bodies: tuple[Body, ...], sonar_pose: Pose) -> tuple[Ints, float]:
+    """The visible facets, in the view of the beams or not, and their share of the area that faces the array."""
     mesh = body.mesh
     facing, farthest = np.zeros(len(mesh.faces), bool), 0.0
     for some in in_blocks(len(mesh.faces)):
@@ -155,13 +163,8 @@ def _visible(body: Body, seen: Floats, bodies: tuple[Body, ...], sonar_pose: Pos
         start = body.pose.to_world(mesh.centroid[rows]) + offset * body.pose.turn_to_world(mesh.normal[rows])
         clear = ~occluded(bodies, start, np.broadcast_to(sonar_pose.position, start.shape))
         visible[rows] = clear & _finite(seen, mesh.faces[rows])
-    if not visible.any():
-        return np.full(4, np.nan), 0.0
-    named = np.zeros(len(seen), bool)
-    named[mesh.faces[visible]] = True
-    azimuth, elevation = azimuth_elevation(seen[named])
-    fraction = float(mesh.area[visible].sum() / mesh.area[facing].sum())
-    return np.array([azimuth.min(), azimuth.max(), elevation.min(), elevation.max()]), fraction
+    fraction = float(mesh.area[visible].sum() / mesh.area[facing].sum()) if visible.any() else 0.0
+    return np.flatnonzero(visible), fraction
 
 
 def _finite(points: Floats, faces: np.ndarray) -> Bools:

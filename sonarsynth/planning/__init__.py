@@ -14,7 +14,7 @@ from sonarsynth.planning.choices import Choices, choices_from
 from sonarsynth.planning.choosing import choose
 from sonarsynth.planning.costs import machine_factor, stages
 from sonarsynth.planning.looks import Look, check_alike, survey
-from sonarsynth.planning.notes import notes
+from sonarsynth.planning.notes import notes, stored_validity
 from sonarsynth.planning.omissions import left_out
 from sonarsynth.planning.plans import PRODUCTS, Errors, Omission, Plan, Stage, Windows
 from sonarsynth.planning.windows import frame_start, lay_windows
@@ -80,7 +80,8 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS, choices: Choices | 
     made = Plan(recipe, products, profile, paths, windows, sizes=sizes)
     made = choose(made, looks) if choices is None else replace(made, choices=choices)
     made = replace(made, stages=_mean_stages(made, looks))
-    return replace(made, shard_frames=_shard_frames(made), left_out=left_out(made), warnings=notes(made, looks))
+    made = replace(made, shard_frames=_shard_frames(made), validity=stored_validity(looks))
+    return replace(made, left_out=left_out(made), warnings=notes(made, looks))
 
 
 def _shard_frames(made: Plan) -> int:

@@ -31,7 +31,7 @@ def arrivals_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Arriv
         frame.moment,
         frame.sonar_pose if part is None else moved_to(frame.sonar_pose, part),
         plan.elements if part is None else part.elements,
-        float(plan.absorption(sonar.band.centre)),
+        plan.absorption_at_depths,
         plan.propagation,
         scene.laws,
         band=(sonar.band.low, sonar.band.high),

@@ -6,26 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from sonarsynth.planning.bodies import held, law_notes, mirror_notes, overlap_notes
 from sonarsynth.planning.looks import Look
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.validity import validity
 from sonarsynth.planning.windows import SUPPORT, extreme_waveforms
 from sonarsynth.recipe import Recipe
-from sonarsynth.scattering import Kirchhoff
-from sonarsynth.scattering.notes import concave_note, small_note
 from sonarsynth.scene import Scene
-from sonarsynth.sonar import elements
 from sonarsynth.synthesis.pulse import LONGEST_TAIL, cut_tail
-from sonarsynth.world.casting import enclosing
 from sonarsynth.world.environment import Profile
-from sonarsynth.world.refinement import longest_edge
 from sonarsynth.world.sound_speed import Cast, Tabulated, TemperatureSalinity
-
-NEAR = 4.0
-"""Distances, over the radius of the aperture, under which facets should be finer (measured: 2 to 5 % at 2.3)."""
-COARSE = 0.1
-"""Facets longer than this (m) are noted: range errors of points are a few centimetres."""
-
 
 UNKNOWN = 0.1
 """Part of the water, at an end, that a profile may leave out without a word."""
@@ -50,14 +40,27 @@ def notes(made: Plan, looks: Sequence[Look]) -> tuple[str, ...]:
     cancelled = scene.processing.cancelling is not None
     if made.propagation.bounces and not cancelled and made.products & {"image", "cloud"} and made.sizes["snap"]:
         found.append("the snap's own reflections enter the image: processing.cancelling takes them out before")
-    found += _accuracy(made) + list(_behind(recipe))
-    real = [look for look in looks if look.real]
-    for look in real[:: -(-len(real) // NOTED)]:
+    found += _accuracy(made)
+    for look in noted(looks):
+        found += mirror_notes(look) + overlap_notes(look)
         found += _extent(look.scene, look.profile)
         found += _cut(look.scene, look.profile.uniform)
         found += validity(look.scene, look.profile)
-        found += _meshes(look.scene, look.profile)
-        found += _near(look)
+        found += law_notes(look)
+    return tuple(dict.fromkeys(found))
+
+
+def noted(looks: Sequence[Look]) -> list[Look]:
+    """The sequences that notes are from."""
+    real = [look for look in looks if look.real]
+    return real[:: -(-len(real) // NOTED)]
+
+
+def stored_validity(looks: Sequence[Look]) -> tuple[str, ...]:
+    """Where formulas and laws of the scenes hold and do not, one line each: as the store has them."""
+    found: list[str] = []
+    for look in noted(looks):
+        found += [*held(look), *validity(look.scene, look.profile)]
     return tuple(dict.fromkeys(found))
 
 
@@ -123,6 +126,12 @@ def _accuracy(made: Plan) -> list[str]:
             f"signals err by {errors.expansion:.2g} (paths over the array) and {errors.synthesis:.2g} (synthesis): "
             f"accuracy.signal allows {allowed.signal:g}, but the scene says how they are made (scene.physics)"
         )
+    tolerance = 20.0 * np.log10(1.0 + allowed.signal)
+    if made.absorption_error > tolerance:
+        found.append(
+            f"the spectrum of absorption is one for all paths, of their mean depth: {made.absorption_error:.2g} dB off "
+            f"at most at the ends of the band, where accuracy.signal allows {tolerance:.2g} dB"
+        )
     if errors.ranging > allowed.range_m:
         found.append(
             f"ranges err by {errors.ranging:.2g} m where rays bend: accuracy.range_m allows {allowed.range_m:g}, but "
@@ -133,50 +142,4 @@ def _accuracy(made: Plan) -> list[str]:
             f"beams err by {errors.image:.2g} dB where the focus is not theirs: accuracy.image_db allows "
             f"{allowed.image_db:g}; more scene.processing.beamforming.zones, or kind dense"
         )
-    return found
-
-
-def _behind(recipe: Recipe) -> tuple[str, ...]:
-    """Which snaps of the first and last frame come from behind the array."""
-    found = []
-    for step in sorted({0, recipe.frames - 1}):
-        frame = recipe.frame(step)[1]
-        count = sum(bool(frame.sonar_pose.to_body(snap.position)[0] < 0) for snap in frame.moment.snaps)
-        if count:
-            found.append(
-                f"frame {step}: {count} snaps come from behind the array, which takes them for their mirror images"
-            )
-    return tuple(found)
-
-
-def _near(look: Look) -> list[str]:
-    """Which coherent targets come so near that a facet is not in one direction from all hydrophones."""
-    nearest = NEAR * elements(look.scene.sonar.array).aperture
-    found = []
-    for number, (target, law) in enumerate(zip(look.scene.world.targets, look.scene.laws, strict=True)):
-        if not isinstance(law, Kirchhoff):
-            continue
-        distances = [np.inf]
-        for frame in look.frames:
-            centre, radius = enclosing(frame.moment.bodies[number])
-            distances.append(float(np.linalg.norm(centre - frame.sonar_pose.position)) - radius)
-        if min(distances) < nearest:
-            found.append(
-                f"{target.name}: nearer than {nearest:.2g} m, where the echo may be some per cent off at the rim of "
-                "the array: facets have one direction to all hydrophones (shape.edge: a quarter wavelength helps)"
-            )
-    return found
-
-
-def _meshes(scene: Scene, profile: Profile) -> list[str]:
-    """What meshes stand for: how coarse they are, what was repaired, what the law leaves out."""
-    found: list[str] = []
-    for target, law, mesh in zip(scene.world.targets, scene.laws, scene.meshes, strict=True):
-        said = list(mesh.notes)
-        if isinstance(law, Kirchhoff):
-            longest = float(profile.speed.max()) / scene.sonar.band.low
-            said += [line for line in (small_note(mesh, longest), concave_note(mesh)) if line]
-        elif (edge := longest_edge((mesh.vertices, mesh.faces))) > COARSE:
-            said.append(f"facets up to {edge:.2g} m long, each echoing from its middle: set shape.edge to refine")
-        found += [f"{target.name}: {line}" for line in said]
     return found

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from sonarsynth.planning.bending import bending_error
-from sonarsynth.planning.plans import Omission, Plan
-from sonarsynth.scattering import Kirchhoff, MirrorLobe
+from sonarsynth.planning.plans import PRODUCTS, Omission, Plan
+from sonarsynth.scattering import MirrorLobe
 from sonarsynth.scattering.fineness import expected_error
 from sonarsynth.scene import Frame
 from sonarsynth.sonar import stop_frequency
@@ -27,7 +27,7 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
     if not plan.products:
         return (Omission("sound: paths, levels, signals, image, cloud", "truth alone is asked for", "0"),)
     scene, frame = plan.recipe.frame(0)
-    environment, products = scene.world.environment, plan.products
+    environment = scene.world.environment
     rows = []
     if isinstance(plan.propagation, Straight):
         rows.append(Omission("refraction", "straight rays", _refraction_bound(plan, frame)))
@@ -43,6 +43,9 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
                 "the energy that roughness takes from them is scattered, and not simulated",
             )
         )
+    if environment.absorption.formula != "none":
+        bound = f"{plan.absorption_error:.1g} dB of any path in the band; at its centre each loses by its own depths"
+        rows.append(Omission("absorption over the band at each depth", "one spectrum for all paths", bound))
     rows += _facets_leave_out(plan)
     moving = any(b.velocity.any() for b in frame.moment.bodies) or frame.sonar_velocity.any()
     if moving and not scene.physics.doppler:
@@ -51,15 +54,18 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
         rows.append(Omission("turning of targets in a frame", "velocities move them", "its rate times travel time"))
     if environment.noise is None:
         rows.append(Omission("ambient noise", "the scene describes none", "signals are free of noise"))
-    if "signals" not in products:
+    return tuple(rows + _not_asked_for(plan) + _not_traced(plan) + _not_heard(plan))
+
+
+def _not_asked_for(plan: Plan) -> list[Omission]:
+    """What the products of this build do not need."""
+    rows = [Omission(name, "not asked for", "0") for name in PRODUCTS if name not in plan.products]
+    if "signals" not in plan.products:
         why = "signals are not stored, so that nothing is compared with it"
         rows.append(Omission("the loudest path of each kind by itself", why, "0"))
-    elif scene.sonar.converter is None:
+    elif plan.scene.sonar.converter is None:
         rows.append(Omission("converter", "the sonar describes none", "0: pressure is stored as float32"))
-    for name in ("signals", "image", "cloud"):
-        if name not in products:
-            rows.append(Omission(name, "not asked for", "0"))
-    return tuple(rows + _not_traced(plan) + _not_heard(plan))
+    return rows
 
 
 def _refraction_bound(plan: Plan, frame: Frame) -> str:
@@ -109,7 +115,7 @@ def _facets_leave_out(plan: Plan) -> list[Omission]:
     """What coherent facets do not have of an echo."""
     scene, rows = plan.scene, []
     for target, law, mesh in zip(scene.world.targets, scene.laws, scene.meshes, strict=True):
-        if isinstance(law, Kirchhoff):
+        if law.coherent:
             error = expected_error(mesh, scene.sonar.shortest_wavelength)
             bound = f"about {100.0 * error:.2g} % of the echo at the top of the band"
             if error > 0.995:
@@ -152,9 +158,9 @@ def reflected_bound(plan: Plan) -> str:
         _rough_moment(plan, frame),
         frame.sonar_pose,
         plan.elements,
-        float(plan.absorption(sonar.band.centre)),
+        plan.absorption_at_depths,
         replace(plan.propagation, bounces=bounces + 1),
-        tuple(MirrorLobe() if isinstance(law, Kirchhoff) else law for law in scene.laws),
+        tuple(MirrorLobe() if law.coherent else law for law in scene.laws),
         band=(sonar.band.low, sonar.band.high),
     )
     blur = np.exp(-0.5 * (2 * np.pi * sonar.band.centre * found.blur) ** 2)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.planning.absorbing import Passed, mean_absorption, passed_by, shape_error
 from sonarsynth.planning.bending import propagation
 from sonarsynth.planning.checks import check_shrimp, read_inputs
 from sonarsynth.planning.choices import Choices
@@ -18,7 +19,7 @@ from sonarsynth.scene import Scene
 from sonarsynth.sonar import Elements, elements
 from sonarsynth.tracing import Refracted, Straight
 from sonarsynth.world.environment import Profile
-from sonarsynth.world.water import absorption_db_per_m
+from sonarsynth.world.water import DepthAbsorption
 
 PRODUCTS = ("signals", "image", "cloud")
 """What a build can be asked for. Truth is always written; with any of these, levels of what is traced too."""
@@ -93,6 +94,7 @@ class Plan:
     stages: tuple[Stage, ...] = ()
     left_out: tuple[Omission, ...] = ()
     warnings: tuple[str, ...] = ()
+    validity: tuple[str, ...] = ()  # where formulas and laws hold and do not, as the store has it
     sizes: dict[str, int] = field(default_factory=dict)
     shard_frames: int = 1
     sequence: int = 0  # whose scene, profile and propagation these are
@@ -123,9 +125,31 @@ class Plan:
         return self.recipe.digest
 
     def absorption(self, frequency: np.ndarray | float) -> Floats:
-        """Absorption in dB/m at frequencies (Hz), at mid depth."""
+        """Absorption in dB/m at frequencies (Hz): the mean over the depths of the sequence's paths.
+
+        That gives the spectrum its shape; at the centre of the band each path has its own (`absorption_at_depths`).
+        """
+        return mean_absorption(self.scene.world.environment.absorption, self._passed, frequency)
+
+    @cached_property
+    def absorption_at_depths(self) -> DepthAbsorption:
+        """Absorption at the centre of the band, which each path loses by the depths that it passes."""
         environment = self.scene.world.environment
-        return absorption_db_per_m(environment.absorption, frequency, 0.5 * environment.depth)
+        return DepthAbsorption.of(environment.absorption, self.scene.sonar.band.centre, environment.depth)
+
+    @cached_property
+    def _passed(self) -> Passed:
+        """The depths of the paths of the sequence, in its first, middle and last frame."""
+        first = self.sequence * self.recipe.steps
+        steps = sorted({0, self.recipe.steps // 2, self.recipe.steps - 1})
+        return passed_by([self.recipe.frame(first + step)[1] for step in steps])
+
+    @cached_property
+    def absorption_error(self) -> float:
+        """Largest error (dB) of any path, anywhere in the band, from the one shape of spectrum for all."""
+        environment, band = self.scene.world.environment, self.scene.sonar.band
+        ends, bounces = (band.low, band.high), self.propagation.bounces
+        return shape_error(environment.absorption, self._passed, ends, environment.depth, bounces)
 
     def connect(self, start: Floats, end: Floats) -> Paths:
         """Rays between pairs of points in this plan's water, those of the direct family."""
@@ -153,6 +177,7 @@ class Plan:
             "stages": [vars(s) for s in self.stages],
             "left_out": [vars(o) for o in self.left_out],
             "warnings": list(self.warnings),
+            "validity": list(self.validity),
             "predicted_seconds": self.predicted_seconds,
             "predicted_bytes": self.predicted_bytes,
             "sizes": self.sizes,

@@ -9,18 +9,49 @@ from sonarsynth.scattering.isotropic import Isotropic
 from sonarsynth.scattering.kirchhoff import Kirchhoff, PartlyReflecting
 from sonarsynth.scattering.mirror_lobe import MirrorLobe
 from sonarsynth.scattering.parts import Part
+from sonarsynth.scattering.validity import Scatterer
 
 
 class ScatteringLaw(Protocol):
     """A law of scattering by facets."""
 
     @property
+    def kind(self) -> str:
+        """Its name in recipes."""
+        ...
+
+    @property
     def parts(self) -> tuple[Part, ...]:
         """What an echo is made of, each a path of its own (`scattering.parts`)."""
+        ...
+
+    @property
+    def coherent(self) -> bool:
+        """Whether the echoes of facets add with their phases."""
+        ...
+
+    def too_small(self, body: Scatterer) -> str | None:
+        """One line if the body is too small against the wavelengths for this law, and by how many dB; None if not."""
+        ...
+
+    def validity(self, body: Scatterer) -> tuple[str, ...]:
+        """Where this law does not hold for a body in a band, one line each: ka, facets against the wavelength, angles.
+
+        `plan` says these, and the store has them (root attribute `validity`).
+        """
         ...
 
 
 Scattering = Annotated[MirrorLobe | Isotropic | Kirchhoff, BY_KIND]
 """Laws of scattering."""
 
-__all__ = ["Isotropic", "Kirchhoff", "MirrorLobe", "Part", "PartlyReflecting", "Scattering", "ScatteringLaw"]
+__all__ = [
+    "Isotropic",
+    "Kirchhoff",
+    "MirrorLobe",
+    "Part",
+    "PartlyReflecting",
+    "Scatterer",
+    "Scattering",
+    "ScatteringLaw",
+]

@@ -11,6 +11,7 @@ from sonarsynth.acoustics.lobes import lit_and_seen
 from sonarsynth.conventions import Floats, Metres
 from sonarsynth.description import description
 from sonarsynth.scattering.parts import Part, Plain
+from sonarsynth.scattering.validity import COARSE, Scatterer, facets_note
 from sonarsynth.world.meshes import Mesh
 
 
@@ -26,6 +27,25 @@ class Isotropic:
     def parts(self) -> tuple[Part, ...]:
         """Of an echo: one, in the shape of the snap."""
         return (Plain(self),)
+
+    @property
+    def coherent(self) -> bool:
+        """False: each facet is a point of its own."""
+        return False
+
+    def too_small(self, body: Scatterer) -> str | None:
+        """None: the level is what is asked for."""
+        return None
+
+    def validity(self, body: Scatterer) -> tuple[str, ...]:
+        """As `ScatteringLaw.validity`: it is the echo of no body, whatever ka and angle."""
+        level, count = 20.0 * np.log10(self.strength), len(body.mesh.faces)
+        said = (
+            f"each of {count} facets echoes by {level:.3g} dB re 1 m2, whatever its area, ka and angle: that is for "
+            "calibration, and not the level of a body"
+        )
+        notes = said, facets_note(body, COARSE)
+        return tuple(note for note in notes if note)
 
     def amplitude(
         self, incident: Floats, scattered: Floats, normal: Floats, area: Floats, beyond: bool = False

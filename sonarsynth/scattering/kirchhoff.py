@@ -12,7 +12,9 @@ from sonarsynth.acoustics.lobes import lit_and_seen
 from sonarsynth.acoustics.roughness import incoherent_power, roughness_parameter
 from sonarsynth.conventions import Bools, Floats, NonNegativeMetres, Number
 from sonarsynth.description import description
+from sonarsynth.scattering.notes import concave_note
 from sonarsynth.scattering.parts import Part, Rough, Smooth, reflection
+from sonarsynth.scattering.validity import NEAR, Scatterer, aside_note, lit_half, size_note, slopes_note
 
 
 @description
@@ -71,6 +73,28 @@ class Kirchhoff:
         """Of an echo: the coherent one, and what a rough or diffuse surface scatters."""
         rough = self.roughness > 0 or self.diffuse > 0
         return (*((Smooth(self),) if self.diffuse < 1 else ()), *((Rough(self),) if rough else ()))
+
+    @property
+    def coherent(self) -> bool:
+        """True, but for what a rough surface scatters."""
+        return True
+
+    def too_small(self, body: Scatterer) -> str | None:
+        """As `ScatteringLaw.too_small`."""
+        return size_note(body, lit_half, "Kirchhoff's integral", "soft" if self.surface == "soft" else "rigid")
+
+    def validity(self, body: Scatterer) -> tuple[str, ...]:
+        """As `ScatteringLaw.validity`; how fine its facets are is for the mesh to say (`fineness.frame_mesh`)."""
+        near = (
+            f"nearer than {NEAR * body.aperture:.2g} m, where the echo may be some per cent off at the rim of the "
+            "array: facets have one direction to all hydrophones (shape.edge: a quarter wavelength helps)"
+        )
+        found = [self.too_small(body), concave_note(body.mesh), slopes_note(self.roughness, self.slope, body)]
+        if self.forward == "blocked":
+            found.append(aside_note(body))
+        if body.distance < NEAR * body.aperture:
+            found.append(near)
+        return tuple(note for note in found if note)
 
     def reflection(self, incident: Floats, scattered: Floats) -> complex:
         """Plane-wave coefficient of the facets that would mirror one unit vector (xyz) of propagation into the other.

@@ -13,6 +13,15 @@ from sonarsynth.conventions import Floats, Number, Radians
 from sonarsynth.description import description
 from sonarsynth.scattering.parts import Part, Plain
 from sonarsynth.scattering.polarity import random_polarity
+from sonarsynth.scattering.validity import (
+    COARSE,
+    Scatterer,
+    aside_note,
+    facets_note,
+    geometric,
+    grazing_note,
+    size_note,
+)
 from sonarsynth.world.meshes import Mesh
 
 
@@ -51,6 +60,26 @@ class MirrorLobe:
     def parts(self) -> tuple[Part, ...]:
         """Of an echo: one, in the shape of the snap."""
         return (Plain(self),)
+
+    @property
+    def coherent(self) -> bool:
+        """False: facets have signs, not phases."""
+        return False
+
+    def too_small(self, body: Scatterer) -> str | None:
+        """As `ScatteringLaw.too_small`: of a sphere it is that of geometry at every frequency."""
+        return size_note(body, geometric)
+
+    def validity(self, body: Scatterer) -> tuple[str, ...]:
+        """As `ScatteringLaw.validity`."""
+        wide = grazing_note(float(slope_of_width(self.width))) if self.reflectivity > 0.0 else None
+        alike = (
+            "with phases alike, facets within a wavelength of path add in phase: the level depends on their number"
+            if self.phases == "alike"
+            else None
+        )
+        notes = self.too_small(body), facets_note(body, COARSE), aside_note(body), wide, alike
+        return tuple(note for note in notes if note)
 
     def amplitude(
         self, incident: Floats, scattered: Floats, normal: Floats, area: Floats, beyond: bool = False

@@ -12,9 +12,6 @@ from sonarsynth.world.meshes import Mesh
 
 RAYS: Final = 4096
 """Rays by which a mesh is searched for facets that face each other."""
-NARROW: Final = 1.3
-"""Wavelengths across: rigid and soft spheres as wide, ka = 4, are within 1.3 dB at backscatter; narrower ones, to
-ka = 1, within 4.3; at ka = 0.3 rigid ones are 6 dB too loud, soft ones 16 dB too faint."""
 LEAST: Final = 0.003
 """Share of them that must meet the mesh again for a note: the grooves of a cast hull are not worth one."""
 
@@ -55,22 +52,6 @@ def _across(normal: Floats) -> Floats:
 
 class SmallBody(UserWarning):
     """A body is too small against the wavelength for facets that scatter as pieces of mirrors."""
-
-
-def small_note(mesh: Mesh, wavelength: float) -> str | None:
-    """One line if a body is narrower than `NARROW` wavelengths (m), the longest that count; None if not.
-
-    Its width is the middle one of its lengths along the axes of its frame: plates may be thin, and rods long.
-    """
-    if not len(mesh.faces):
-        return None
-    width = float(np.sort(mesh.box[1] - mesh.box[0])[1])
-    if width >= NARROW * wavelength:
-        return None
-    return (
-        f"{width:.3g} m across is {width / wavelength:.2g} of the longest wavelength: too small for facets that "
-        "scatter as mirrors; a sphere one wavelength across is up to 4 dB off, a tenth across 16 dB"
-    )
 
 
 def concave_note(mesh: Mesh) -> str | None:

@@ -12,8 +12,9 @@ from sonarsynth.conventions import FASTEST, SLOWEST, Bools, Floats
 from sonarsynth.scattering import Scattering
 from sonarsynth.scattering.fineness import checked, convex, fine_mesh
 from sonarsynth.scattering.kirchhoff import Kirchhoff
-from sonarsynth.scattering.notes import SmallBody, small_note
+from sonarsynth.scattering.notes import SmallBody
 from sonarsynth.scattering.targets import Target
+from sonarsynth.scattering.validity import Scatterer
 from sonarsynth.world.meshes import Mesh, mesh_of
 from sonarsynth.world.shapes import Box, Cylinder, LShape, MeshFile, Myring, Remus100, Shape, Sphere
 
@@ -80,8 +81,7 @@ class _Body:
             raise ValueError(
                 f"target must be a Mesh, a shape such as Sphere(radius=0.25), or a Target, not {shape!r:.60}"
             )
-        small = small_note(self.mesh, longest) if coherent else None
-        if small:
+        if small := law.too_small(Scatterer(self.mesh, wavelength, longest)):
             warnings.warn(small, SmallBody, stacklevel=3)
         self.law = law
         self.convex = convex(None if isinstance(shape, Mesh) else shape, self.mesh)

@@ -167,7 +167,7 @@ def _legs(plan: Plan, bodies: tuple[Body, ...], vertices: int, pairs: list[tuple
     distance = np.hypot(*(end - start)[:, :2].T)
     rays = eigenrays(layers, depth(start), depth(end), distance, vertices, vertices)
     lines = polylines(layers, start, end, rays, sagitta=1e-4 * environment.depth)
-    loss = _transmission_loss(plan, layers, rays)
+    loss = _transmission_loss(plan, layers, rays, depth(start), depth(end))
     row = np.searchsorted(lines.ray, np.arange(len(rays.pair) + 1))
     made: list[list[RayLine]] = [[] for _ in pairs]
     for i, pair in enumerate(rays.pair):
@@ -176,8 +176,8 @@ def _legs(plan: Plan, bodies: tuple[Body, ...], vertices: int, pairs: list[tuple
     return made
 
 
-def _transmission_loss(plan: Plan, layers: Water, rays: Eigenrays) -> Floats:
-    """Transmission loss (ray,) in dB at the centre of the band: spreading, boundaries, absorption."""
+def _transmission_loss(plan: Plan, layers: Water, rays: Eigenrays, start: Floats, end: Floats) -> Floats:
+    """Transmission loss (ray,) in dB at the centre of the band: spreading, boundaries, absorption; depths (pair,)."""
     environment, frequency = plan.scene.world.environment, plan.scene.sonar.band.centre
     met: list[tuple[SeaSurface | SeaBed, Ints, float]] = [
         (environment.surface, rays.surface, layers.speed[0]),
@@ -187,8 +187,13 @@ def _transmission_loss(plan: Plan, layers: Water, rays: Eigenrays) -> Floats:
     for boundary, count, c in met:
         effect = bounces(boundary, np.arccos(np.minimum(rays.slowness * c, 1.0)), count, c, frequency)
         factor *= effect.modulus * np.exp(-0.5 * (2.0 * np.pi * frequency * effect.blur) ** 2)
+    vertices = rays.surface + rays.bottom + rays.turning
+    climb = np.nan_to_num(rays.start_sine)
+    lost = rays.length * plan.absorption_at_depths.along(
+        plan.profile, start[rays.pair], end[rays.pair], climb, vertices
+    )
     with np.errstate(divide="ignore"):
-        return np.asarray(-20.0 * np.log10(factor) + rays.length * plan.absorption(frequency))
+        return np.asarray(-20.0 * np.log10(factor) + lost)
 
 
 def _leg(lines: Polylines, mine: slice, rays: Eigenrays, i: int, loss: float, others: tuple[Body, ...]) -> RayLine:

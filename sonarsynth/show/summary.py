@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sonarsynth.labelling.views import View
 from sonarsynth.show.reading import built, bytes_of, echo_levels, mesh_group, needed, read
 from sonarsynth.store import Folder
 from sonarsynth.verification import brightest_beam_on_target, range_errors, snap_located
@@ -53,12 +54,15 @@ def _targets(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
     sonar, where = needed(tree, "truth/sonar_position"), needed(tree, "truth/target_position")
     away = np.linalg.norm(where[frames] - sonar[frames, None], axis=2)
     seen = (needed(tree, "truth/visible_fraction")[frames] > 0).sum(axis=0)
+    view = read(tree, "truth/view")
+    inside = None if view is None else np.isin(view[frames], (View.IN_VIEW, View.PARTLY_IN_VIEW)).sum(axis=0)
     lines = []
     for i, name in enumerate(map(str, names)):
         faces = read(tree, f"{mesh_group(tree, name, i, int(frames[0]))}/faces")
         facets = f"{len(faces)} facets, " if faces is not None else ""
         reach = f"{away[:, i].min():.2f} to {away[:, i].max():.2f} m away"
-        lines.append(f"  target     {name}: {facets}{reach}, in sight in {seen[i]} frames")
+        within = "" if inside is None or inside[i] == seen[i] else f" ({inside[i]} within the beams)"
+        lines.append(f"  target     {name}: {facets}{reach}, in sight in {seen[i]} frames{within}")
     return [*lines, *_ghosts(tree, frames, list(map(str, names)))]
 
 

@@ -14,6 +14,7 @@ from sonarsynth.products import Arrivals
 from sonarsynth.scattering import ScatteringLaw
 from sonarsynth.scattering.patches import Pulses
 from sonarsynth.sonar import Elements
+from sonarsynth.tracing.absorbing import path_loss
 from sonarsynth.tracing.aperture import Fronts, Wavefronts, fronts, wavefronts
 from sonarsynth.tracing.echoes import echoes
 from sonarsynth.tracing.forward import forward_legs, opaque, shadow_parts
@@ -36,6 +37,7 @@ from sonarsynth.world.environment import Environment, Profile
 from sonarsynth.world.meshes import in_blocks
 from sonarsynth.world.moment import Body, Moment, Snap
 from sonarsynth.world.motion import Track
+from sonarsynth.world.water import DepthAbsorption
 
 if TYPE_CHECKING:
     from sonarsynth.tracing import Propagation, Visibility
@@ -127,7 +129,7 @@ def trace(
     moment: Moment,
     sonar_pose: Pose,
     elements: Elements,
-    absorption: float,
+    absorption: float | DepthAbsorption,
     propagation: Propagation,
     laws: tuple[ScatteringLaw, ...],
     *,
@@ -143,14 +145,15 @@ def trace(
     """The arrivals of a frame, sorted by snap; of each first those that met no target, then echoes by target, then the
     shadow waves of targets that scatter forward.
 
-    environment, profile: the water; moment: bodies and snaps; sonar_pose, elements: the array; absorption: dB/m at the
-    centre of the band; propagation: how sound travels, and how many bounces are followed; laws: how the facets of each
-    body scatter; band: Hz; moving: the track of the array, where it and bodies move while sound is under way (left out:
-    all is where it is at the instant of the frame); shared: `meetings.SHARED`; negligible: see `NEGLIGIBLE`; enough:
-    `variation.ENOUGH`; alike: `variation.ALIKE`; degree: of polynomials over the aperture. A facet counts where it is
-    lit by the snap and seen, with no body in between, by the array centre; or, with `visibility`, by some hydrophone
-    that it faces, and is heard by those. The snap itself is heard if no body stands in between, but for those that
-    scatter forward (`tracing.forward`). Raises ValueError for anything outside the water.
+    environment, profile: the water; moment: bodies and snaps; sonar_pose, elements: the array; absorption: at the
+    centre of the band, at every depth or the same (dB/m) at all; propagation: how sound travels, and how many bounces
+    are followed; laws: how the facets of each body scatter; band: Hz; moving: the track of the array, where it and
+    bodies move while sound is under way (left out: all is where it is at the instant of the frame); shared:
+    `meetings.SHARED`; negligible: see `NEGLIGIBLE`; enough: `variation.ENOUGH`; alike: `variation.ALIKE`; degree: of
+    polynomials over the aperture. A facet counts where it is lit by the snap and seen, with no body in between, by the
+    array centre; or, with `visibility`, by some hydrophone that it faces, and is heard by those. The snap itself is
+    heard if no body stands in between, but for those that scatter forward (`tracing.forward`). Raises ValueError for
+    anything outside the water.
     """
 
     def legs_to(pose: Pose, bodies: tuple[Body, ...], targets: tuple[int, ...] | None = None) -> ArrayLegs:
@@ -242,7 +245,9 @@ def bending(profile: Profile, propagation: Propagation, sonar_pose: Pose) -> Pro
     return Profile(profile.depth, np.full(len(profile.depth), float(profile.at(depth(sonar_pose.position)))))
 
 
-def arrivals(array: ArrayLegs, snaps: tuple[Snap, ...], absorption: float, laws: tuple[ScatteringLaw, ...]) -> Arrivals:
+def arrivals(
+    array: ArrayLegs, snaps: tuple[Snap, ...], absorption: float | DepthAbsorption, laws: tuple[ScatteringLaw, ...]
+) -> Arrivals:
     """The arrivals of any snaps from legs that are traced already: as `trace`, of what is at rest, without tracing the
     array side again.
 
@@ -258,7 +263,7 @@ def arrivals(array: ArrayLegs, snaps: tuple[Snap, ...], absorption: float, laws:
 
 
 def _echoes(
-    array: ArrayLegs, snaps: dict[int, Snap], absorption: float, laws: tuple[ScatteringLaw, ...]
+    array: ArrayLegs, snaps: dict[int, Snap], absorption: float | DepthAbsorption, laws: tuple[ScatteringLaw, ...]
 ) -> list[tuple[tuple[int, int], Arrivals]]:
     """Echoes (1) and shadow waves (2) of numbered snaps, each with the number of its snap."""
     parts, through = [], forward_legs(array, laws)
@@ -271,7 +276,9 @@ def _echoes(
     return parts
 
 
-def _direct(array: ArrayLegs, index: int, snap: Snap, absorption: float, laws: tuple[ScatteringLaw, ...]) -> Arrivals:
+def _direct(
+    array: ArrayLegs, index: int, snap: Snap, absorption: float | DepthAbsorption, laws: tuple[ScatteringLaw, ...]
+) -> Arrivals:
     """Snap to array, where no body stands in between that sound does not pass."""
     environment, profile, sonar_pose = array.environment, array.profile, array.sonar_pose
     legs = rays_to_centre(environment, profile, snap.position[None, :], sonar_pose, array.propagation, array.centre)
@@ -295,9 +302,8 @@ def _direct(array: ArrayLegs, index: int, snap: Snap, absorption: float, laws: t
     none_out, meeting, count = Outward.none(len(one)), array.meeting, len(one)
     rest = Carried.at_rest(count, snap.time)
     legs = legs if meeting is None else received(legs, rest, meeting, profile)
-    made = assemble(
-        legs, over.terms, none_out, index, snap.time, absorption, none, none, one, variation, plain
-    )  # fmt: skip
+    loss = path_loss(array, absorption, snap, legs)
+    made = assemble(legs, over.terms, none_out, index, snap.time, loss, none, none, one, variation, plain)
     if meeting is None:
         return made
     return stretched(made, legs, none_out, rest, meeting, profile, array.elements, None, array.enough)

@@ -13,6 +13,7 @@ from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.products import Arrivals
 from sonarsynth.scattering import Part
 from sonarsynth.scattering.patches import Pulses
+from sonarsynth.tracing.absorbing import path_loss
 from sonarsynth.tracing.echo_groups import Group, groups_of, heard
 from sonarsynth.tracing.legs import Legs, may_face, usable
 from sonarsynth.tracing.moving import Carried, carry, meets, received, stretched, velocities
@@ -24,6 +25,7 @@ from sonarsynth.tracing.variation import variations
 from sonarsynth.tracing.wavefront import FEW, Terms, probes
 from sonarsynth.world.meshes import in_blocks
 from sonarsynth.world.moment import Body, Snap
+from sonarsynth.world.water import DepthAbsorption
 
 if TYPE_CHECKING:
     from sonarsynth.tracing.arrivals import ArrayLegs
@@ -112,7 +114,7 @@ def echoes(
     array: ArrayLegs,
     index: int,
     snap: Snap,
-    absorption: float,
+    absorption: float | DepthAbsorption,
     parts: tuple[tuple[Part, ...], ...],
 ) -> Arrivals:
     """Snap `index` to facet to array, over every facet of the legs that is lit; parts: of the law of each body.
@@ -141,7 +143,8 @@ def echoes(
         target, facet = array.facets.target[out.facet], array.facets.facet[out.facet]
         amplitude, sign = _columns(some.groups, "amplitude", "sign")
         scattered, vary = sign * amplitude, (variation, error)
-        one = assemble(legs, over, out, index, snap.time, absorption, target, facet, scattered, vary, some.pulses)
+        loss = path_loss(array, absorption, snap, legs, out)
+        one = assemble(legs, over, out, index, snap.time, loss, target, facet, scattered, vary, some.pulses)
         if meeting is not None and some.carried is not None:
             place = meeting, array.profile, array.elements
             one = stretched(one, legs, out, some.carried, *place, view, array.enough)

@@ -76,13 +76,12 @@ class Outward:
 
 
 def assemble(
-    legs: Legs, over: Terms, out: Outward, index: int, time: float, absorption: float,
+    legs: Legs, over: Terms, out: Outward, index: int, time: float, loss: Floats,
     target: Ints, facet: Ints, scattering: Floats, variation: tuple[Floats, float], pulses: Pulses,
 ) -> Arrivals:  # fmt: skip
-    """Arrivals of snap `index` at `time` (s) from both halves of their paths; over: the wavefronts; variation: terms of
-    the amplitude and their error; pulses: what facets make of the snap."""
+    """Arrivals of snap `index` at `time` (s) from both halves of their paths; over: the wavefronts; loss: absorption of
+    each (dB); variation: terms of the amplitude and their error; pulses: what facets make of the snap."""
     length = out.length + legs.length
-    loss = absorption * length
     sign, phase = as_sign(out.phase + legs.phase + pulses.phase)
     boundary = sign * out.boundary * legs.boundary
     direct = target < 0
@@ -132,7 +131,7 @@ def silence(legs: Legs) -> Arrivals:
     """No arrivals at all: what a frame without a snap has."""
     none, zero = np.empty(0), np.empty(0, int)
     empty = legs.select(zero), Terms.none(0), Outward.none(0)
-    return assemble(*empty, 0, 0.0, 0.0, zero, zero, none, (np.empty((0, 0)), 0.0), Pulses.plain(0))
+    return assemble(*empty, 0, 0.0, none, zero, zero, none, (np.empty((0, 0)), 0.0), Pulses.plain(0))
 
 
 def join(parts: list[Arrivals], sound_speed: float, centre: float) -> Arrivals:

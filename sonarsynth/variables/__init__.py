@@ -49,6 +49,7 @@ def attributes(plan: Plan) -> dict[str, Any]:
         "assumed_sound_speed": plan.scene.sonar.assumed_sound_speed,
         "aperture_radius": plan.elements.aperture,
         "choices": plan.choices.as_json(),
+        "validity": list(plan.validity),
         "frames_conventions": (
             "World: x east, y north, z up, z = 0 mean surface. Sonar and target frames: x forward, y port, z up. "
             "Quaternions (w, x, y, z) from body to world. Levels re 1 uPa, source levels at 1 m."

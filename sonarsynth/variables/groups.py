@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+from sonarsynth.labelling.views import MEANINGS, View
 from sonarsynth.recipe import SPLITS
 
 
@@ -161,10 +162,25 @@ _TRUTH = _group(
         (*_TARGET, "bound"),
         "float64",
         "degree",
-        "bounds of the visible part in azimuth and elevation",
-        attributes=_INSTANT,
+        "bounds in azimuth and elevation of the visible part in view, at the instant of the frame",
+        attributes=_comment("cut at the first and last beam each way; NaN where nothing is in view, see view"),
     ),
-    _v("visible_fraction", _TARGET, "float64", "1", "share of the area facing the array that the array sees"),
+    _v(
+        "view",
+        _TARGET,
+        "int8",
+        "1",
+        "how much of the visible part is in the view of the beams",
+        attributes=(("flag_values", [int(v) for v in View]), ("flag_meanings", MEANINGS)),
+    ),
+    _v(
+        "visible_fraction",
+        _TARGET,
+        "float64",
+        "1",
+        "share of the area facing the array that the array sees",
+        attributes=_comment("whether it is in the view of the beams or not"),
+    ),
     _v(
         "echo_azimuth",
         _ECHO,

@@ -46,7 +46,11 @@ __all__ = [
 
 @description
 class Absorption:
-    """Absorption of sound in sea water (Francois and Garrison 1982, or Ainslie and McColm 1998), or none."""
+    """Absorption of sound in sea water (Francois and Garrison 1982, or Ainslie and McColm 1998), or none.
+
+    It falls with depth, by its pressure: each path loses its mean over the depths that it passes. Temperature, salinity
+    and pH are one value for all of the water.
+    """
 
     formula: Literal["francois_garrison", "ainslie_mccolm", "none"] = "francois_garrison"
     temperature: WaterTemperature = 27.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from sonarsynth.acoustics import seawater
 from sonarsynth.acoustics.ranges import noted
-from sonarsynth.conventions import Floats
-from sonarsynth.world.environment import Absorption
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.world.environment import Absorption, Profile
 
 
 def absorption_db_per_m(absorption: Absorption, frequency: npt.ArrayLike, depth: npt.ArrayLike) -> Floats:
@@ -21,6 +21,38 @@ def absorption_db_per_m(absorption: Absorption, frequency: npt.ArrayLike, depth:
     """
     with noted():
         return _formula(absorption, frequency, depth)
+
+
+NODES = 513
+"""Depths that absorption is taken at: linear in between, it errs by 4e-6 of itself in 12 km of water."""
+
+
+@dataclass(frozen=True, eq=False)
+class DepthAbsorption:
+    """Absorption at one frequency at every depth: each path loses its mean over the depths that it passes."""
+
+    depth: Floats  # (node,) m, from the surface to the bed
+    value: Floats  # (node,) dB/m
+
+    @staticmethod
+    def of(absorption: Absorption, frequency: float, bed: float) -> DepthAbsorption:
+        """That of a description at a frequency (Hz), in water so deep (m)."""
+        depth = np.linspace(0.0, bed, NODES)
+        return DepthAbsorption(depth, absorption_db_per_m(absorption, frequency, depth))
+
+    def along(self, profile: Profile, start: Floats, end: Floats, climb: Floats, vertices: Ints) -> Floats:
+        """Mean (path,) in dB/m along rays from depths start to end (path,) m.
+
+        profile: what bends them, a uniform one if nothing does; climb (path,): upward component of the unit vector in
+        which each leaves; vertices (path,): reflections and turning points.
+        """
+        from sonarsynth.acoustics import path_means
+
+        out = np.empty(len(start))
+        water, table = (profile.depth, profile.speed), (self.depth, self.value)
+        bent = not profile.uniform
+        path_means.means(start, end, climb, vertices, bent, float(self.depth[-1]), water, table, out)
+        return out
 
 
 def absorption_notes(absorption: Absorption, frequency: npt.ArrayLike, depth: npt.ArrayLike) -> tuple[str, ...]:

@@ -11,12 +11,13 @@ __all__ = ["Case", "Extreme", "extremes", "groups", "outcome"]
 
 def groups() -> dict[str, tuple[Case, ...]]:
     """All cases, by what they are about."""
-    from sonarsynth.accuracy.extremes import bubbles, chain, facets, rays, signals, targets
+    from sonarsynth.accuracy.extremes import bodies, bubbles, chain, facets, rays, signals, targets
 
     return {
         "rays": rays.CASES,
         "signals": signals.CASES,
         "targets": targets.CASES,
+        "bodies": bodies.CASES,
         "facets": facets.CASES,
         "bubbles": bubbles.CASES,
         "chain": chain.CASES,

@@ -9,6 +9,7 @@ import numpy as np
 
 from sonarsynth.accuracy.extremes.outcomes import Case, Got, holds, off, together
 from sonarsynth.beamforming import DenseDelayAndSum
+from sonarsynth.labelling.views import View
 from sonarsynth.products import LEDGER
 from sonarsynth.recipe import Recipe
 from sonarsynth.scattering.targets import Target
@@ -58,7 +59,7 @@ def frame(of: Recipe, products: tuple[str, ...] = ("signals", "image", "cloud"))
 
 REASONS: dict[str, tuple[str, Callable[[Any], Any]]] = {
     "/truth/range": ("target", lambda target: target < 0),
-    "/truth/image_box": ("visible_fraction", lambda share: share == 0),
+    "/truth/image_box": ("view", lambda view: view > View.PARTLY_IN_VIEW),
     "/ledger/error_bound": ("paths", lambda paths: paths == 0),
     "/ledger/measured_level": ("paths", lambda paths: paths == 0),
     "/ledger/isolated_level": ("paths", lambda paths: paths == 0),

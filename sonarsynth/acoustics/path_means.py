@@ -1,0 +1,91 @@
+"""Means over the depths that a ray passes, of what depends on depth alone: absorption."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from sonarsynth.conventions import Floats, Ints
+
+_X, _W = np.polynomial.legendre.leggauss(24)
+NODE, WEIGHT = 0.5 - 0.5 * np.cos(0.5 * np.pi * (1.0 + _X)), 0.25 * np.pi * _W * np.sin(0.5 * np.pi * (1.0 + _X))
+"""Where of a leg (0 to 1) a bent ray is looked at, closest at its ends, where it may turn; and the weights of depth."""
+_X, _W = np.polynomial.legendre.leggauss(4)
+EVEN_NODE, EVEN_WEIGHT = 0.5 + 0.5 * _X, 0.5 * _W
+"""The same of a straight ray."""
+LEAST_SINE = 1e-6
+"""rad: of a ray that turns."""
+
+
+@njit(cache=True, nogil=True)
+def at(x: float, xs: Floats, ys: Floats) -> float:
+    """Linear interpolation, constant beyond the ends."""
+    n = len(xs)
+    if x <= xs[0]:
+        return float(ys[0])
+    if x >= xs[n - 1]:
+        return float(ys[n - 1])
+    i = np.searchsorted(xs, x)
+    return float(ys[i - 1] + (ys[i] - ys[i - 1]) * (x - xs[i - 1]) / (xs[i] - xs[i - 1]))
+
+
+@njit(cache=True, nogil=True)
+def vertex(z: float, down: bool, fastest: float, bed: float, depth: Floats, speed: Floats) -> float:
+    """Depth (m) at which a ray that goes down, or up, from z meets its turning speed (m/s), or the boundary."""
+    last_z, last_c = z, at(z, depth, speed)
+    step = 1 if down else -1
+    i = np.searchsorted(depth, z, side="right") if down else np.searchsorted(depth, z) - 1
+    while 0 <= i < len(depth) and 0.0 < depth[i] < bed:
+        if speed[i] >= fastest:
+            share = (fastest - last_c) / (speed[i] - last_c) if speed[i] > last_c else 0.0
+            return float(last_z + min(max(share, 0.0), 1.0) * (depth[i] - last_z))
+        last_z, last_c = depth[i], speed[i]
+        i += step
+    edge = bed if down else 0.0
+    c = at(edge, depth, speed)
+    if c >= fastest and c > last_c:
+        return float(last_z + min(max((fastest - last_c) / (c - last_c), 0.0), 1.0) * (edge - last_z))
+    return edge
+
+
+@njit(cache=True, nogil=True)
+def leg(a: float, b: float, p: float, bent: bool, water: tuple[Floats, Floats], table: tuple[Floats, Floats],
+        times: float, sums: Floats) -> None:  # fmt: skip
+    """Add a monotone leg between two depths, so many times: its length, and the value along it, to sums (2,)."""
+    nodes, weights = (NODE, WEIGHT) if bent else (EVEN_NODE, EVEN_WEIGHT)
+    for n in range(len(nodes)):
+        z = a + (b - a) * nodes[n]
+        length = times * abs(b - a) * weights[n]
+        if bent:
+            c = at(z, water[0], water[1])
+            length /= max(np.sqrt(max(1.0 - (p * c) ** 2, 0.0)), LEAST_SINE)
+        sums[0] += length
+        sums[1] += length * at(z, table[0], table[1])
+
+
+@njit(cache=True, nogil=True)
+def means(start: Floats, end: Floats, climb: Floats, vertices: Ints, bent: bool, bed: float,
+          water: tuple[Floats, Floats], table: tuple[Floats, Floats], out: Floats) -> None:  # fmt: skip
+    """Mean (ray,) along rays from depths start to end (ray,) m of a value of depth.
+
+    climb (ray,): upward component of the unit vector in which each leaves; vertices (ray,): how many times it turns or
+    is reflected; bent: whether it follows Snell's law in water, depth and sound speed (node,), or is straight; bed (m);
+    table: depth and value (node,), both ascending in depth. A ray with vertices goes to and fro between two depths.
+    """
+    sums = np.zeros(2)
+    for r in range(len(start)):
+        z, other, n = start[r], end[r], vertices[r]
+        sums[:] = 0.0
+        p = np.sqrt(max(1.0 - climb[r] ** 2, 0.0)) / at(z, water[0], water[1])
+        if n == 0:
+            leg(z, other, p, bent, water, table, 1.0, sums)
+        else:
+            fastest = 1.0 / max(p, 1e-300) if bent else np.inf
+            upper = vertex(z, False, fastest, bed, water[0], water[1])
+            lower = vertex(z, True, fastest, bed, water[0], water[1])
+            first_down = climb[r] < 0.0
+            last_down = first_down == (n % 2 == 1)
+            leg(z, lower if first_down else upper, p, bent, water, table, 1.0, sums)
+            leg(upper, lower, p, bent, water, table, n - 1.0, sums)
+            leg(lower if last_down else upper, other, p, bent, water, table, 1.0, sums)
+        out[r] = sums[1] / sums[0] if sums[0] > 0.0 else at(z, table[0], table[1])
