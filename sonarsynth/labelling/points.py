@@ -17,7 +17,7 @@ import numpy as np
 
 from sonarsynth.acoustics.arrays import live_gain
 from sonarsynth.acoustics.facet_pulses import facet_response
-from sonarsynth.conventions import NO_TARGET, Floats, Ints, direction
+from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints, direction
 from sonarsynth.geometry import Pose
 from sonarsynth.labelling import points_kernels as kernels
 from sonarsynth.labelling.band import Band
@@ -39,6 +39,9 @@ WHITENING = 0.03
 """Share of the pulse's largest power density below which ranging flattens it no more (`ranging.echoes`)."""
 FIRST_NULL = 1.9
 """rad of phase, root mean square over the aperture, at the first null of a beam: 1.915 of a disc, 1.81 of a line."""
+FAINT = 1e-3
+"""Of the power of all paths of a snap, target and way that the faintest may bring together, and are left out: 30 dB
+under echoes of which ranging takes the loudest 12 dB."""
 EXPLAINED = 0.01
 """Of the energy of its beam that the paths of a frame must bring a point, or noise made it: one resolution in a hundred
 of the echo window. A peak of noise that is ranged has 0.03 of all noise in the window of shipped scenes."""
@@ -113,18 +116,20 @@ def attribution(
     elements, width = listening.elements, band.high - band.low
     gate, reach = GATE / width, elements.aperture / listening.sound_speed
     moment = _clock(arrivals, listening.clock, gate) + late
-    longer = np.abs(arrivals.corners).max(axis=1)
-    window = np.array([[-1.0], [1.0]]) * (gate + 3.0 * reach + float(longer.max(initial=0.0)))
+    longer = float(np.abs(arrivals.corners).max(initial=0.0))
+    slowness = listening.sound_speed / arrivals.sound_speed
+    across = gate + reach * _apart(slowness * arrivals.direction, beam)
+    window = np.array([[-1.0], [1.0]]) * (across + longer)
     ends = np.searchsorted(np.sort(moment), arrivals.delay + window)
-    some = np.flatnonzero(ends[1] > ends[0])
+    some = np.flatnonzero(_loud(arrivals, len(band.energy)) & (ends[1] > ends[0]))
     paths = arrivals.select(some[np.argsort(arrivals.delay[some], kind="stable")])
     first, last = np.searchsorted(paths.delay, moment + window)
-    code = (paths.target + 1) * len(band.energy) * len(FAMILIES) + paths.snap * len(FAMILIES) + paths.arrives_by
-    _, example, group = np.unique(code, return_index=True, return_inverse=True)
+    _, example, group = np.unique(_code(paths, len(band.energy)), return_index=True, return_inverse=True)
     groups = paths.target[example], paths.snap[example], paths.arrives_by[example]
     if not len(some):
         return Attribution(paths, first, *groups, *_silence(len(beam)))
-    fine = band.sliced(min(2.0 * width * (gate + 2.0 * reach), MOST_BINS))
+    across = gate + reach * _apart(slowness * paths.direction, beam)
+    fine = band.sliced(min(2.0 * width * across, MOST_BINS))
     focus = 0.0 if listening.focus is None else 1.0 / listening.focus
     curvature, pulse = 1.0 / paths.radius, fine.energy[groups[1]]
     found = kernels.attribute(
@@ -134,7 +139,7 @@ def attribution(
         first,
         last,
         paths.direction,
-        listening.sound_speed / paths.sound_speed,
+        slowness,
         paths.delay,
         curvature,
         np.abs(paths.corners).max(axis=1),
@@ -151,6 +156,31 @@ def attribution(
         pattern_of(elements, listening.sound_speed, curvature, focus, band.high),
     )
     return Attribution(paths, first, *groups, found[0], 2.0 * found[1], *found[2:])
+
+
+def _code(paths: Arrivals, snaps: int) -> Ints:
+    """Number (path,) of the target, snap and way to the array of each."""
+    return np.asarray(((paths.target + 1) * snaps + paths.snap) * len(FAMILIES) + paths.arrives_by)
+
+
+def _loud(arrivals: Arrivals, snaps: int) -> Bools:
+    """(path,) without those that together bring `FAINT` of the power of their group at most."""
+    power, code = arrivals.amplitude**2, _code(arrivals, snaps)
+    order = np.lexsort((power, code))
+    up_to = np.cumsum(power[order])
+    start = np.searchsorted(code[order], code[order])  # the first of each group
+    total = np.bincount(code, power)[code[order]]
+    loud = np.empty(len(power), bool)
+    loud[order] = up_to - up_to[start] + power[order][start] > FAINT * total
+    return loud
+
+
+def _apart(one: Floats, other: Floats) -> float:
+    """Bound on how far vectors (row, xyz) are from others, two at most."""
+    if not (len(one) and len(other)):
+        return 0.0
+    far = np.maximum(one.max(axis=0) - other.min(axis=0), other.max(axis=0) - one.min(axis=0))
+    return min(float(np.linalg.norm(far)), 2.0)
 
 
 def _silence(points: int) -> tuple[Floats, Floats, Ints, Floats]:
@@ -241,22 +271,33 @@ def _on_grid(values: np.ndarray, row: Ints, column: Ints, shape: tuple[int, ...]
 def _origins(paths: Arrivals, beam: Floats, listening: Listening, band: Band) -> Ints:
     """Index into ORIGINS (point,) of what beams (point, xyz) hear of the paths (point,) that bring most."""
     elements, centre = listening.elements, 0.5 * (band.low + band.high)
-    live = elements.position[elements.gain != 0]
-    spread = np.linalg.cholesky(np.cov(live.T, bias=True) + 1e-18 * np.eye(3))  # phase: rms over the aperture
+    spread = _spread(elements)
     apart = paths.direction / paths.sound_speed - beam / listening.sound_speed  # s/m
-    found = np.full(len(beam), ORIGINS.index("side lobe"))
-    if elements.on_lattice:
-        period = np.array([0.0, 1.0, 1.0]) / elements.pitch
-        for frequency in np.linspace(band.low, band.high, MOST_BINS):
-            order = np.rint(apart * frequency * elements.pitch) * (period > 0)
-            rest = 2.0 * np.pi * np.linalg.norm((apart * frequency - order * period) @ spread, axis=1)
-            found[(rest < FIRST_NULL) & order.any(axis=1)] = ORIGINS.index("grating lobe")
-    found[2.0 * np.pi * centre * np.linalg.norm(apart @ spread, axis=1) < FIRST_NULL] = ORIGINS.index("main lobe")
-    normal = mirror_normal(elements, listening.sound_speed / centre)
+    found = np.full(len(beam), ORIGINS.index("main lobe"))
+    beside = np.flatnonzero(2.0 * np.pi * centre * np.linalg.norm(apart @ spread, axis=1) > FIRST_NULL)
+    found[beside] = ORIGINS.index("side lobe")
+    if elements.on_lattice and len(beside):
+        waves = np.linspace(band.low, band.high, MOST_BINS)[:, None, None] * apart[beside]
+        order = np.rint(waves * elements.pitch) * np.array([0.0, 1.0, 1.0])
+        rest = 2.0 * np.pi * np.linalg.norm((waves - order / elements.pitch) @ spread, axis=2)
+        grating = ((rest < FIRST_NULL) & order.any(axis=2)).any(axis=0)
+        found[beside[grating]] = ORIGINS.index("grating lobe")
+    normal = _normal(elements, listening.sound_speed / centre)
     if normal is not None:
         found[(paths.direction @ normal) * (beam @ normal) < 0.0] = ORIGINS.index("mirror image")
     found[paths.target < 0] = ORIGINS.index("snap itself")
     return found
+
+
+_normal = lru_cache(maxsize=16)(mirror_normal)
+
+
+@lru_cache(maxsize=16)
+def _spread(elements: Elements) -> Floats:
+    """Matrix (xyz, 3) m: a vector times it is as long as the rms, over the aperture, of its product with positions."""
+    live = elements.position[elements.gain != 0]
+    about = live - live.mean(axis=0)
+    return np.linalg.cholesky(about.T @ about / len(live) + 1e-18 * np.eye(3))
 
 
 def _from_targets(
@@ -264,20 +305,23 @@ def _from_targets(
 ) -> tuple[Floats, Floats]:
     """Range (point,) of where the echoes of points were made, and distance (point,) of the places (point, xyz) that the
     sonar gives them from the target, where sound met it and the array (m)."""
-    paths, ranges, distance = found.paths, np.empty(len(points)), np.empty(len(points))
-    speed = paths.sound_speed
-    for n, point in enumerate(points.tolist()):
-        share = found.share[point]
-        rows = np.flatnonzero(share)
-        weight, some = share[rows] / share[rows].sum(), found.first[point] + rows
-        heard = float(weight @ paths.delay[some])
-        met = heard - float(weight @ paths.radius[some]) / speed
-        body = moment.bodies[found.target[found.owner[point]]]
-        there, array = _later(body, met), listening.pose.position + heard * listening.velocity
-        made = there.pose.to_world(body.pose.to_body(weight @ paths.point[some]))
-        ranges[n] = np.linalg.norm(made - array)
-        distance[n] = surface_distance(there, array + listening.pose.turn_to_world(places[n]))
-    return ranges, distance
+    paths, share = found.paths, found.share[points]
+    row = np.minimum(found.first[points, None] + np.arange(share.shape[1]), len(paths.delay) - 1)
+    weight = share / share.sum(axis=1, keepdims=True)
+    heard = np.einsum("pe,pe->p", weight, paths.delay[row])
+    met = heard - np.einsum("pe,pe->p", weight, paths.radius[row]) / paths.sound_speed
+    made = np.einsum("pe,pex->px", weight, paths.point[row])
+    array = listening.pose.position + heard[:, None] * listening.velocity
+    place = array + listening.pose.turn_to_world(places)
+    distance, owner = np.empty(len(points)), found.owner[points]
+    for group in np.unique(owner):
+        some = owner == group
+        body = moment.bodies[found.target[group]]
+        mean = float(met[some].mean())
+        there = _later(body, mean)
+        made[some] = there.pose.to_world(body.pose.to_body(made[some])) + (met[some, None] - mean) * there.velocity
+        distance[some] = surface_distances(there, place[some] - (met[some, None] - mean) * there.velocity)
+    return np.linalg.norm(made - array, axis=1), distance
 
 
 def _later(body: Body, seconds: float) -> Body:
@@ -285,9 +329,9 @@ def _later(body: Body, seconds: float) -> Body:
     return replace(body, pose=Pose(body.pose.position + seconds * body.velocity, body.pose.orientation))
 
 
-def surface_distance(body: Body, point: Floats) -> float:
-    """Distance (m) of a point (xyz) of the world from the surface of a body, inside or outside it: exact."""
+def surface_distances(body: Body, points: Floats) -> Floats:
+    """Distances (point,) m of points (point, xyz) of the world from the surface of a body, inside or outside: exact."""
     ready = casting_mesh(body.mesh)
-    at, found = (body.pose.to_body(point) - ready.centre) / ready.size, np.empty(1)
-    kernels.distances(at[None], ready.vertices, ready.faces, *ready.tree, found)
-    return float(found[0]) * ready.size
+    at, found = (body.pose.to_body(points) - ready.centre) / ready.size, np.empty(len(points))
+    kernels.distances(at, ready.vertices, ready.faces, *ready.tree, found)
+    return found * ready.size

@@ -156,9 +156,11 @@ def attribute(
     for p in range(len(beam)):
         sums[:], whole[:] = 0.0, 0.0
         for e in range(first[p], last[p]):
-            apart[:] = slowness * direction[e] - beam[p]
-            late = moment[p] - delay[e]
-            if abs(late) > gate + longer[e] + reach * math.sqrt(apart[0] ** 2 + apart[1] ** 2 + apart[2] ** 2):
+            late, away = moment[p] - delay[e], 0.0
+            for x in range(3):
+                apart[x] = slowness * direction[e, x] - beam[p, x]
+                away += apart[x] ** 2
+            if abs(late) > gate + longer[e] + reach * math.sqrt(away):
                 continue
             if pattern.table.shape[0]:
                 _tabulated(heard, apart, curvature[e], focus, frequency, pattern)
@@ -216,8 +218,9 @@ def distances(points: Floats, vertices: Floats, faces: Int32s, nodes: Floats, or
                 continue
             if node >= leaves:
                 for i in range((node - leaves) * count // leaves, (node - leaves + 1) * count // leaves):
-                    a, b, c = faces[order[i]]
-                    best = min(best, _to_triangle(points[p], vertices[a], vertices[b], vertices[c]))
+                    f = order[i]
+                    a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
+                    best = min(best, _to_triangle(points[p], a, b, c))
                 continue
             one, other = _to_box(points[p], nodes[2 * node]), _to_box(points[p], nodes[2 * node + 1])
             far = 2 * node + (1 if other > one else 0)
@@ -240,25 +243,27 @@ def _to_box(point: Floats, node: Floats) -> float:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _to_triangle(p: Floats, a: Floats, b: Floats, c: Floats) -> float:
-    """Square of the distance to a triangle: to its plane where the foot is inside, else to its edges.
+    """Square of the distance to a triangle: to its plane where the foot is inside all edges, else to the nearest edge.
 
-    Source: Ericson (2005), Real-Time Collision Detection, section 5.1.5, with the inside told by signed areas.
+    Source: Ericson (2005), Real-Time Collision Detection, section 5.1.5.
     """
-    ab, ac, ap = b - a, c - a, p - a
-    n = np.cross(ab, ac)
-    square = n @ n
-    if square > 0.0:
-        v = np.cross(ap, ac) @ n
-        w = np.cross(ab, ap) @ n
-        if v >= 0.0 and w >= 0.0 and v + w <= square:
-            return float((ap @ n) ** 2 / square)
+    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    x, y, z = p[0] - a[0], p[1] - a[1], p[2] - a[2]
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    square = nx * nx + ny * ny + nz * nz
+    beyond_v = (y * vz - z * vy) * nx + (z * vx - x * vz) * ny + (x * vy - y * vx) * nz
+    beyond_u = (uy * z - uz * y) * nx + (uz * x - ux * z) * ny + (ux * y - uy * x) * nz
+    if square > 0.0 and beyond_v >= 0.0 and beyond_u >= 0.0 and beyond_v + beyond_u <= square:
+        return (x * nx + y * ny + z * nz) ** 2 / square
     return min(_to_edge(p, a, b), _to_edge(p, b, c), _to_edge(p, c, a))
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _to_edge(p: Floats, a: Floats, b: Floats) -> float:
-    along, to = b - a, p - a
-    square = along @ along
-    t = min(max((to @ along) / square, 0.0), 1.0) if square > 0.0 else 0.0
-    apart = to - t * along
-    return float(apart @ apart)
+    """Square of the distance to an edge."""
+    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    x, y, z = p[0] - a[0], p[1] - a[1], p[2] - a[2]
+    square = ux * ux + uy * uy + uz * uz
+    t = min(max((x * ux + y * uy + z * uz) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    return (x - t * ux) ** 2 + (y - t * uy) ** 2 + (z - t * uz) ** 2
