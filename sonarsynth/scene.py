@@ -157,7 +157,9 @@ class Scene:
     def moment(self, time: float, *, key: int | str = 0, step: int = 0, seed: int = 0) -> Moment:
         """The world at a time (s), with the snaps that a frame of the sequence of this key, step and seed draws."""
         placed = zip(self.world.targets, self.meshes, strict=True)
-        bodies = tuple(Body(t.name, mesh, pose(t.motion, time), velocity(t.motion, time)) for t, mesh in placed)
+        bodies = tuple(
+            Body(t.name, mesh, pose(t.motion, time), velocity(t.motion, time), t.motion, time) for t, mesh in placed
+        )
         bed = self.world.environment.depth
         snaps: list[Snap] = []
         for i, shrimp in enumerate(self.world.shrimp):
