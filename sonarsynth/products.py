@@ -210,7 +210,9 @@ class PointLabels:
 
     target: npt.NDArray[np.int16]  # (elevation, azimuth) -1 for none: the snap itself
     emission: npt.NDArray[np.int16]  # (elevation, azimuth) which snap
-    family: npt.NDArray[np.int8]  # (elevation, azimuth) index into FAMILIES: how it reached the array; no direct: a ghost
+    family: npt.NDArray[
+        np.int8
+    ]  # (elevation, azimuth) index into FAMILIES: how it reached the array; no direct: a ghost
     facet: npt.NDArray[np.int32]  # (elevation, azimuth) that brings most; -1 for none
     true_range: npt.NDArray[np.float32]  # (elevation, azimuth) m from the array centre to where the echo was made
     distance: npt.NDArray[np.float32]  # (elevation, azimuth) m from the point to the nearest surface of the target

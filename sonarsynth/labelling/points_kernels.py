@@ -64,11 +64,11 @@ def _tabulated(
     """Response (bin,) on a lattice: bilinear in tables of the nearest defocus."""
     levels, size = pattern.table.shape[0], pattern.table.shape[1]
     for k in range(len(frequency)):
-        level = int(round(frequency[k] * (curvature - focus) / pattern.step)) - pattern.first
+        level = round(frequency[k] * (curvature - focus) / pattern.step) - pattern.first
         level = min(max(level, 0), levels - 1)
         across = frequency[k] * pattern.pitch * apart[1] * (0.5 * size)
         up = frequency[k] * pattern.pitch * apart[2] * (0.5 * size)
-        i, j = int(math.floor(up)), int(math.floor(across))
+        i, j = math.floor(up), math.floor(across)
         y, x = up - i, across - j
         i, j = i % size, j % size
         below, beside = (i + 1) % size, (j + 1) % size
@@ -82,7 +82,7 @@ def _tabulated(
 def _delay(q: Floats, square: float, u: Floats, curvature: float) -> float:
     """Delay (s) of a sphere after the middle of the array: (sqrt(R^2 - 2 R u.q + q^2) - R)/c, q over c."""
     bulge = curvature * square - 2.0 * (u[0] * q[0] + u[1] * q[1] + u[2] * q[2])
-    return bulge / (1.0 + math.sqrt(max(1.0 + curvature * bulge, 0.0)))
+    return float(bulge / (1.0 + math.sqrt(max(1.0 + curvature * bulge, 0.0))))
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -255,7 +255,7 @@ def _to_triangle(p: Floats, a: Floats, b: Floats, c: Floats) -> float:
     beyond_v = (y * vz - z * vy) * nx + (z * vx - x * vz) * ny + (x * vy - y * vx) * nz
     beyond_u = (uy * z - uz * y) * nx + (uz * x - ux * z) * ny + (ux * y - uy * x) * nz
     if square > 0.0 and beyond_v >= 0.0 and beyond_u >= 0.0 and beyond_v + beyond_u <= square:
-        return (x * nx + y * ny + z * nz) ** 2 / square
+        return float((x * nx + y * ny + z * nz) ** 2 / square)
     return min(_to_edge(p, a, b), _to_edge(p, b, c), _to_edge(p, c, a))
 
 
@@ -266,4 +266,4 @@ def _to_edge(p: Floats, a: Floats, b: Floats) -> float:
     x, y, z = p[0] - a[0], p[1] - a[1], p[2] - a[2]
     square = ux * ux + uy * uy + uz * uz
     t = min(max((x * ux + y * uy + z * uz) / square, 0.0), 1.0) if square > 0.0 else 0.0
-    return (x - t * ux) ** 2 + (y - t * uy) ** 2 + (z - t * uz) ** 2
+    return float((x - t * ux) ** 2 + (y - t * uy) ** 2 + (z - t * uz) ** 2)

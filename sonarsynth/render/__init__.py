@@ -37,7 +37,7 @@ from sonarsynth.scene import Frame
 from sonarsynth.synthesis.pulse import snap_levels
 from sonarsynth.tracing import Straight
 from sonarsynth.variables import VARIABLES, Variable, attributes, coordinates, variables
-from sonarsynth.world.moment import Body, Snap
+from sonarsynth.world.moment import Snap
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -261,7 +261,7 @@ def _point_labels(plan: Plan, traced: Traced, bearings: Bearings, cloud: PointCl
     """Whose echo each point of a cloud is."""
     frame, sonar = traced.frame, plan.scene.sonar
     moves = plan.scene.physics.doppler
-    moment = frame.moment if moves else replace(frame.moment, bodies=tuple(_still(b) for b in frame.moment.bodies))
+    moment = frame.moment if moves else replace(frame.moment, bodies=tuple(body.frozen for body in frame.moment.bodies))
     listening = Listening(
         plan.elements,
         sonar.assumed_sound_speed,
@@ -272,10 +272,6 @@ def _point_labels(plan: Plan, traced: Traced, bearings: Bearings, cloud: PointCl
     )
     band = _band(plan, frame.moment.snaps)
     return label_points(cloud, sonar.beams.azimuth, sonar.beams.elevation, traced.arrivals, band, moment, listening)
-
-
-def _still(body: Body) -> Body:
-    return replace(body, velocity=np.zeros(3))
 
 
 def render(recipe: Recipe | Plan, index: int) -> xr.DataTree:

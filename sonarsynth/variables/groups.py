@@ -46,8 +46,8 @@ def _flags(meanings: tuple[str, ...]) -> tuple[tuple[str, Any], ...]:
 
 
 _WHOSE = _comment(
-    "of the paths that bring most energy in the beam of the point at its delay. Targets are where the sound met them. A "
-    "range is wrong where the point's emission is not that of the first bearing"
+    "of the paths that bring most energy in the beam of the point at its delay. A range is wrong where the emission is "
+    "not that of the first bearing. Targets are where the sound met them"
 )
 
 
@@ -99,7 +99,9 @@ _CLOUD = _group(
     _v("z", _BEAMS, "float32", "m", "position of the point, up, in the sonar frame"),
     _v("target", _BEAMS, "int16", "1", "target whose echo the point is", attributes=(*_NONE, *_WHOSE)),
     _v("emission", _BEAMS, "int16", "1", "snap that lit the point", attributes=(*_NONE, *_WHOSE)),
-    _v("family", _BEAMS, "int8", "1", "how the echo reached the array: a ghost but direct", attributes=_flags(FAMILIES)),
+    _v(
+        "family", _BEAMS, "int8", "1", "how the echo reached the array: a ghost but direct", attributes=_flags(FAMILIES)
+    ),
     _v("facet", _BEAMS, "int32", "1", "facet that brought most of the echo", attributes=_NONE),
     _v("true_range", _BEAMS, "float32", "m", "distance of the array centre from where the echo was made"),
     _v("distance", _BEAMS, "float32", "m", "distance of the point from the nearest surface of its target"),
