@@ -194,6 +194,31 @@ class PointCloud:
     position: npt.NDArray[np.float32]  # (elevation, azimuth, xyz) m
 
 
+ORIGINS = ("main lobe", "side lobe", "grating lobe", "mirror image", "snap itself", "unexplained")
+"""How the array came to hear what made a point: in the beam, beside it, through a lobe that a lattice has in other
+directions, from behind a planar array, from no target but the snap (its direct pulse, or one that surface or bed
+reflects), or from no path of the frame: noise, or what cancelling leaves."""
+
+
+@dataclass(frozen=True, eq=False)
+class PointLabels:
+    """Whose echo each point is: the target, snap and family whose paths bring most energy in the beam at its delay.
+
+    -1 and NaN where there is no point, or nothing explains it. The emission of a point is not that of the sonar's clock
+    where another snap lit it: its range is wrong then.
+    """
+
+    target: npt.NDArray[np.int16]  # (elevation, azimuth) -1 for none: the snap itself
+    emission: npt.NDArray[np.int16]  # (elevation, azimuth) which snap
+    family: npt.NDArray[
+        np.int8
+    ]  # (elevation, azimuth) index into FAMILIES: how it reached the array; no direct: a ghost
+    facet: npt.NDArray[np.int32]  # (elevation, azimuth) that brings most; -1 for none
+    true_range: npt.NDArray[np.float32]  # (elevation, azimuth) m from the array centre to where the echo was made
+    distance: npt.NDArray[np.float32]  # (elevation, azimuth) m from the point to the nearest surface of the target
+    origin: npt.NDArray[np.int8]  # (elevation, azimuth) index into ORIGINS
+
+
 @dataclass(frozen=True, eq=False)
 class Truth:
     """Exact ground truth of a frame, from the same arrivals that made the signals.

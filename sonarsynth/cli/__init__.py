@@ -112,7 +112,7 @@ def build(
     as_json: Json = False,
 ) -> None:
     """Build a dataset, or the part of it that is missing. Interrupted, the same command goes on."""
-    from sonarsynth import config, planning, schedule
+    from sonarsynth import config, planning, schedule, verification
     from sonarsynth import store as stores
     from sonarsynth.cli import printing
 
@@ -136,6 +136,7 @@ def build(
             announce=printing.announce, **bounds,
             prediction=prediction, source=source,
         )  # fmt: skip
+    report.warnings = tuple(verification.warnings(store))
     if as_json:
         _print_json(report.as_json())
     else:

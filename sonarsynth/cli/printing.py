@@ -113,6 +113,8 @@ def build_report(report: BuildReport) -> None:
             out.print(line)
     for note in report.notes:
         out.print(f"note: {note}", markup=False)
+    for warning in report.warnings:
+        out.print(f"warning: {warning}", markup=False)
     for failure in report.failures[:10]:
         out.print(f"frame {failure.frame} set aside in {failure.stage}: {failure.error}", markup=False)
     if report.failures:
@@ -191,6 +193,9 @@ def verify_report(report: StoreReport) -> None:
             from sonarsynth.store import ranges
 
             out.print(f"    in frames {ranges(check.frames)}", markup=False)
+    for check in report.checks:
+        if check.warning:
+            out.print(f"warning: {check.warning}", markup=False)
     if report.building:
         out.print(f"it is being built by {report.building}: what is complete was looked at, the rest not", markup=False)
     if report.ok:

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.labelling import SLICES, Band, echoes, label, ledger, path_powers
+from sonarsynth.labelling import SLICES, Band, Listening, echoes, label, label_points, ledger, path_powers
 from sonarsynth.planning import Plan, arrivals_of, check_unseen, plan
-from sonarsynth.products import Arrivals, Bearings, Echoes, EnergyImage, Ledger, Signals, Truth
+from sonarsynth.products import Arrivals, Bearings, Echoes, EnergyImage, Ledger, PointCloud, PointLabels, Signals, Truth
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import Recipe
 from sonarsynth.render.hearing import hear
@@ -256,8 +256,9 @@ def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
             frame.sonar_pose,
             plan.profile,
         )
-        values |= cloud_values(cloud)
         lap("range")
+        values |= cloud_values(cloud, _point_labels(plan, traced, heard.bearings, cloud))
+        lap("label")
     return values
 
 
@@ -267,6 +268,23 @@ def _values(plan: Plan, index: int) -> Values:
         return truth_frame(plan, index)
     traced = trace_frame(plan, index)
     return range_frame(plan, index, traced, beamform_frame(plan, index, traced))
+
+
+def _point_labels(plan: Plan, traced: Traced, bearings: Bearings, cloud: PointCloud) -> PointLabels:
+    """Whose echo each point of a cloud is."""
+    frame, sonar = traced.frame, plan.scene.sonar
+    moves = plan.scene.physics.doppler
+    moment = frame.moment if moves else replace(frame.moment, bodies=tuple(body.frozen for body in frame.moment.bodies))
+    listening = Listening(
+        plan.elements,
+        sonar.assumed_sound_speed,
+        getattr(plan.choices.ranging, "focus", None),
+        float(bearings.time[0]) if len(bearings.time) else np.nan,
+        frame.sonar_pose,
+        frame.sonar_velocity * moves,
+    )
+    band = _band(plan, frame.moment.snaps)
+    return label_points(cloud, sonar.beams.azimuth, sonar.beams.elevation, traced.arrivals, band, moment, listening)
 
 
 def render(recipe: Recipe | Plan, index: int) -> xr.DataTree:

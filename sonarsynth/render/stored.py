@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonarsynth.conventions import NO_TARGET, Floats
-from sonarsynth.products import LEDGER, Arrivals, Bearings, Echoes, Ledger, PointCloud, Signals, Truth
+from sonarsynth.products import LEDGER, Arrivals, Bearings, Echoes, Ledger, PointCloud, PointLabels, Signals, Truth
 
 Values = dict[tuple[str, str], np.ndarray]
 """(group, name) to the array of one frame, without the frame axis."""
@@ -71,8 +71,8 @@ def bearing_values(bearings: Bearings) -> Values:
     return table("/bearings", **columns)
 
 
-def cloud_values(cloud: PointCloud) -> Values:
-    """The cloud, each coordinate apart."""
+def cloud_values(cloud: PointCloud, labels: PointLabels) -> Values:
+    """The cloud, each coordinate apart, and whose echo each point is."""
     x, y, z = np.moveaxis(cloud.position, -1, 0)
     columns = {name: value for name, value in vars(cloud).items() if name != "position"}
-    return table("/cloud", **columns, x=x, y=y, z=z)
+    return table("/cloud", **columns, x=x, y=y, z=z, **vars(labels))

@@ -14,6 +14,7 @@ from sonarsynth.pictures.frames import Hull
 from sonarsynth.pictures.ghosts import Ghost
 from sonarsynth.store import Folder, Remote, folder_of
 from sonarsynth.store.place import opens
+from sonarsynth.verification.points import has_labels, points
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -93,7 +94,7 @@ class Stored:
     sonar: Pose
     energy: Floats | None  # (elevation, azimuth) Pa2 s; None where there is no image or the frame has none
     points: Floats  # (elevation, azimuth, xyz) m; NaN where there is no point
-    range_error: Floats  # (elevation, azimuth) m: range less true range on a target; NaN elsewhere
+    range_error: Floats  # (elevation, azimuth) m: range less true range of direct echoes of targets; NaN elsewhere
     point_energy: Floats  # (elevation, azimuth) Pa2 s
     delay: Floats  # (elevation, azimuth) s after the direct arrival
     target: np.ndarray  # (elevation, azimuth) true target; -1 for none
@@ -113,7 +114,9 @@ def stored(tree: xr.DataTree, index: int) -> Stored:
     target = needed(tree, "truth/target", index)
     true_range = needed(tree, "truth/range", index).astype(float)
     nowhere = np.full(target.shape, np.nan)
-    cloud = {name: read(tree, f"cloud/{name}", index) for name in ("x", "y", "z", "range", "energy", "delay")}
+    cloud = {
+        name: read(tree, f"cloud/{name}", index) for name in ("x", "y", "z", "range", "true_range", "energy", "delay")
+    }
     layers = {name: nowhere if values is None else values.astype(float) for name, values in cloud.items()}
     energy = read(tree, "image/energy", index)
     pose = _sonar(tree, index)
@@ -124,7 +127,7 @@ def stored(tree: xr.DataTree, index: int) -> Stored:
         sonar=pose,
         energy=None if energy is None or not np.isfinite(energy).any() else energy.astype(float),
         points=np.stack([layers["x"], layers["y"], layers["z"]], axis=-1),
-        range_error=np.where(target >= 0, layers["range"] - true_range, np.nan),
+        range_error=_range_errors(tree, index, np.where(target >= 0, layers["range"] - true_range, np.nan)),
         point_energy=layers["energy"],
         delay=layers["delay"],
         target=target,
@@ -133,6 +136,15 @@ def stored(tree: xr.DataTree, index: int) -> Stored:
         hulls=hulls(tree, index),
         ghosts=ghosts(tree, index),
     )
+
+
+def _range_errors(tree: xr.DataTree, index: int, by_beam: Floats) -> Floats:
+    """Range errors (elevation, azimuth) by the labels of points; of a store without them by what beams point at."""
+    if not has_labels(tree):
+        return by_beam
+    errors, found = np.full(by_beam.shape, np.nan), points(tree, [index])
+    errors[tuple(found.beam[found.judged].T)] = found.error[found.judged]
+    return errors
 
 
 def _sonar(tree: xr.DataTree, index: int) -> Pose:

@@ -12,9 +12,11 @@ import numpy as np
 
 from sonarsynth.conventions import REFERENCE_PRESSURE, Floats, Ints
 from sonarsynth.pictures.style import decibels
-from sonarsynth.show.reading import needed, read
+from sonarsynth.show.reading import needed
 from sonarsynth.store import Folder, here
 from sonarsynth.verification import brightest_beam_on_target, range_errors
+from sonarsynth.verification.points import has_labels
+from sonarsynth.verification.points import points as points_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,7 +37,7 @@ class Heard:
 
     peak: float  # Pa2 s: the brightest beam of all; 0 where nothing is heard
     on_target: Floats  # (frame,) Pa2 s: mean over the beams that point at a target; NaN where none does
-    points: Ints  # (frame,) points of the cloud on a target
+    points: Ints  # (frame,) points of the cloud that are direct echoes of a target
     beams: Ints  # (frame,) beams that point at a target
 
     @property
@@ -50,10 +52,10 @@ def heard(tree: xr.DataTree, frames: Sequence[int]) -> Heard:
     for frame in frames:
         energy = needed(tree, "image/energy", frame).astype(float)
         on = needed(tree, "truth/target", frame) >= 0
-        found = read(tree, "cloud/range", frame)
+        judged = points_of(tree, [frame]).judged if has_labels(tree) else np.zeros(0, bool)
         peaks.append(np.max(energy, initial=0.0, where=np.isfinite(energy)))
         means.append(energy[on].mean() if on.any() else np.nan)
-        points.append(0 if found is None else np.count_nonzero(np.isfinite(found) & on))
+        points.append(np.count_nonzero(judged))
         beams.append(np.count_nonzero(on))
     return Heard(float(max(peaks)), np.array(means), np.array(points), np.array(beams))
 
@@ -80,8 +82,8 @@ def _ranges(tree: xr.DataTree, frames: np.ndarray) -> dict[str, str]:
     return {
         "median range error": UNKNOWN if median is None else f"{100 * median:.3g} cm",
         "within 3 predicted errors": UNKNOWN if share is None else f"{100 * share:.3g} %",
-        "points on target": f"{numbers.get('points', 0)}" if checks else UNKNOWN,
-        "points off target": f"{numbers['off_target']}" if checks else UNKNOWN,
+        "points on target": f"{numbers['points']}" if "points" in numbers else UNKNOWN,
+        "points off target": f"{numbers['off_target']}" if "off_target" in numbers else UNKNOWN,
     }
 
 

@@ -43,6 +43,10 @@ class CheckRow(Protocol):
     def frames(self) -> tuple[int, ...]:
         """Frames that are not as they should be, where that can be said of a frame."""
 
+    @property
+    def warning(self) -> str:
+        """One line where data are of no use though they are what they claim; else empty."""
+
 
 Check = Callable[["xr.DataTree"], Sequence[CheckRow]]
 
@@ -88,6 +92,7 @@ class Report:
                     "ok": c.ok,
                     "frames": ranges(c.frames),
                     "numbers": dict(c.numbers),
+                    "warning": c.warning,
                 }
                 for c in self.checks
             ],

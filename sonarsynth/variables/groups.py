@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from sonarsynth.labelling.views import MEANINGS, View
+from sonarsynth.products import FAMILIES, ORIGINS
 from sonarsynth.recipe import SPLITS
 
 
@@ -38,6 +39,17 @@ def _group(group: str, product: str, *rows: Variable) -> tuple[Variable, ...]:
 
 def _comment(text: str) -> tuple[tuple[str, Any], ...]:
     return (("comment", text),)
+
+
+def _flags(meanings: tuple[str, ...]) -> tuple[tuple[str, Any], ...]:
+    words = " ".join(meaning.replace(" ", "_") for meaning in meanings)
+    return (("flag_values", list(range(len(meanings)))), ("flag_meanings", words))
+
+
+_WHOSE = _comment(
+    "of the paths that bring most energy in the beam of the point at its delay. A range is wrong where the emission is "
+    "not that of the first bearing. Targets are where the sound met them"
+)
 
 
 def _v(name: str, dims: tuple[str, ...], dtype: str, units: str, long_name: str, **more: Any) -> Variable:
@@ -86,6 +98,15 @@ _CLOUD = _group(
     _v("x", _BEAMS, "float32", "m", "position of the point, forward, in the sonar frame"),
     _v("y", _BEAMS, "float32", "m", "position of the point, to port, in the sonar frame"),
     _v("z", _BEAMS, "float32", "m", "position of the point, up, in the sonar frame"),
+    _v("target", _BEAMS, "int16", "1", "target whose echo the point is", attributes=(*_NONE, *_WHOSE)),
+    _v("emission", _BEAMS, "int16", "1", "snap that lit the point", attributes=(*_NONE, *_WHOSE)),
+    _v(
+        "family", _BEAMS, "int8", "1", "how the echo reached the array: a ghost but direct", attributes=_flags(FAMILIES)
+    ),
+    _v("facet", _BEAMS, "int32", "1", "facet that brought most of the echo", attributes=_NONE),
+    _v("true_range", _BEAMS, "float32", "m", "distance of the array centre from where the echo was made"),
+    _v("distance", _BEAMS, "float32", "m", "distance of the point from the nearest surface of its target"),
+    _v("origin", _BEAMS, "int8", "1", "how the array came to hear the point", attributes=_flags(ORIGINS)),
 )
 _BEARINGS = _group(
     "/bearings",

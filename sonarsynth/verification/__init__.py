@@ -6,8 +6,10 @@ import numpy as np
 import xarray as xr
 
 from sonarsynth.verification.beams import beam_width, brightest_beam_on_target, near_target
+from sonarsynth.verification.bounds import bounds, warnings
 from sonarsynth.verification.ledger import INAUDIBLE, LEDGER_TOLERANCE, ledger_adds_up, ledger_measured
-from sonarsynth.verification.places import range_errors, snap_located
+from sonarsynth.verification.places import snap_located
+from sonarsynth.verification.points import kinds, points, range_errors
 from sonarsynth.verification.reading import Check, every, numbered
 
 __all__ = [
@@ -17,15 +19,19 @@ __all__ = [
     "LEDGER_TOLERANCE",
     "Check",
     "beam_width",
+    "bounds",
     "brightest_beam_on_target",
     "check",
     "expansions_hold",
+    "kinds",
     "ledger_adds_up",
     "ledger_measured",
     "near_target",
     "nothing_outside",
+    "points",
     "range_errors",
     "snap_located",
+    "warnings",
 ]
 
 EXPANSION_PHASE = 0.2  # rad: costs a beam 0.09 dB at worst
@@ -50,7 +56,7 @@ def check(tree: xr.DataTree) -> list[Check]:
         checks.append(snap_located(tree, built))
     if "cloud" in tree.children:
         checks.extend(range_errors(tree, built))
-    return checks
+    return checks + bounds(tree, built)
 
 
 def nothing_outside(tree: xr.DataTree, frames: np.ndarray) -> Check:

@@ -22,6 +22,7 @@ class Check:
     ok: bool | None
     numbers: dict[str, float]
     frames: tuple[int, ...] = ()
+    warning: str = ""
 
 
 def every(tree: xr.DataTree, name: str) -> np.ndarray:

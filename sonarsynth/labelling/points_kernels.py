@@ -1,0 +1,269 @@
+"""Whose energy a beam holds at a delay, compiled: paths heard through the pattern of the array, and summed by group."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from sonarsynth.conventions import Bools, Floats, Ints
+
+Complexes = npt.NDArray[np.complex128]
+Int32s = npt.NDArray[np.int32]
+RIM_STEP = 0.35
+"""rad at the rim of the aperture between two tables of the pattern: the nearest one errs by 0.1 rad rms at most."""
+
+
+class Pattern(NamedTuple):
+    """The pattern of an array: tabulated over the slowness across a lattice, or the sensors themselves."""
+
+    table: npt.NDArray[np.complex64]  # (defocus, row step, column step) over twice the period of the lattice; (0, 0, 0)
+    first: int  # defocus of the first table, in steps
+    step: float  # defocus (1/m times Hz) of one step
+    pitch: float  # s: of the lattice, over the sound speed
+    position: Floats  # (sensor, xyz) s: of live sensors, over the sound speed
+    weight: Floats  # (sensor,) of sum one
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def path_spectra(
+    amplitude: Floats,
+    phase: Floats,
+    blur: Floats,
+    loss: Floats,
+    sine: Floats,
+    frequency: Floats,
+    relative: Floats,
+) -> Complexes:
+    """Spectra (path, bin) of paths as an element of the array hears them, over that of the snap at 1 m; no delay.
+
+    phase rad, blur s, loss dB at the centre of the band, relative (bin,) more at the others; sine (path, 2): those of
+    the direction along y and z times the side of the square face over the sound speed (s).
+    """
+    spectrum = np.empty((len(amplitude), len(frequency)), np.complex128)
+    for e in range(len(amplitude)):
+        turn = complex(math.cos(phase[e]), math.sin(phase[e])) * amplitude[e]
+        for k in range(len(frequency)):
+            f = frequency[k]
+            gain = math.exp(-0.5 * (2.0 * math.pi * f * blur[e]) ** 2 - math.log(10.0) / 20.0 * loss[e] * relative[k])
+            for axis in range(2):
+                x = math.pi * f * sine[e, axis]
+                if abs(x) > 1e-6:
+                    gain *= math.sin(x) / x
+            spectrum[e, k] = turn * gain
+    return spectrum
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _tabulated(
+    heard: Complexes, apart: Floats, curvature: float, focus: float, frequency: Floats, pattern: Pattern
+) -> None:
+    """Response (bin,) on a lattice: bilinear in tables of the nearest defocus."""
+    levels, size = pattern.table.shape[0], pattern.table.shape[1]
+    for k in range(len(frequency)):
+        level = round(frequency[k] * (curvature - focus) / pattern.step) - pattern.first
+        level = min(max(level, 0), levels - 1)
+        across = frequency[k] * pattern.pitch * apart[1] * (0.5 * size)
+        up = frequency[k] * pattern.pitch * apart[2] * (0.5 * size)
+        i, j = math.floor(up), math.floor(across)
+        y, x = up - i, across - j
+        i, j = i % size, j % size
+        below, beside = (i + 1) % size, (j + 1) % size
+        table = pattern.table[level]
+        heard[k] = (1.0 - y) * ((1.0 - x) * table[i, j] + x * table[i, beside]) + y * (
+            (1.0 - x) * table[below, j] + x * table[below, beside]
+        )
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _delay(q: Floats, square: float, u: Floats, curvature: float) -> float:
+    """Delay (s) of a sphere after the middle of the array: (sqrt(R^2 - 2 R u.q + q^2) - R)/c, q over c."""
+    bulge = curvature * square - 2.0 * (u[0] * q[0] + u[1] * q[1] + u[2] * q[2])
+    return float(bulge / (1.0 + math.sqrt(max(1.0 + curvature * bulge, 0.0))))
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _summed(
+    heard: Complexes,
+    path: Floats,
+    curvature: float,
+    slowness: float,
+    beam: Floats,
+    focus: float,
+    speed: float,
+    frequency: Floats,
+    pattern: Pattern,
+) -> None:
+    """Response (bin,) of sensors anywhere, one by one; curvatures in 1/m, positions over `speed` (m/s)."""
+    heard[:] = 0.0
+    spacing = frequency[1] - frequency[0] if len(frequency) > 1 else 0.0
+    for q in range(len(pattern.weight)):
+        place = pattern.position[q]
+        square = place[0] ** 2 + place[1] ** 2 + place[2] ** 2
+        late = _delay(place, square, beam, focus * speed) - slowness * _delay(place, square, path, curvature * speed)
+        angle, turn = 2.0 * math.pi * frequency[0] * late, 2.0 * math.pi * spacing * late
+        phasor = complex(math.cos(angle), math.sin(angle)) * pattern.weight[q]
+        turned = complex(math.cos(turn), math.sin(turn))
+        for k in range(len(frequency)):
+            heard[k] += phasor
+            phasor *= turned
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def attribute(
+    beam: Floats,
+    moment: Floats,
+    most: Floats,
+    first: Ints,
+    last: Ints,
+    direction: Floats,
+    slowness: float,
+    delay: Floats,
+    curvature: Floats,
+    longer: Floats,
+    group: Ints,
+    pulse: Bools,
+    spectrum: Complexes,
+    matched: Floats,
+    energy: Floats,
+    frequency: Floats,
+    focus: float,
+    speed: float,
+    gate: float,
+    reach: float,
+    pattern: Pattern,
+) -> tuple[Floats, Floats, Ints, Floats]:
+    """Power (point, group) at the delay of each point, energy (point, group) within the gate, the loudest group
+    (point,), -1 without any, and what each path (point, path from `first` on) of it brings of that power.
+
+    beam (point, xyz); moment (point,) s when the point's echo reaches the array centre; most (point,): energy of the
+    beam; first, last (point,): the paths that may be heard then, ascending in delay (path,) s. A path counts within
+    `gate` (s), longer by `longer` (path,) s and by reach (s) times how far its direction is from the beam's: a pulse is
+    heard through side lobes as long as it takes to cross the array. slowness: of the water over that of the beams.
+    spectrum (path, bin), of the pulse at 1 m; matched (group, bin): amplitude of the group's pulse in what ranges it;
+    energy (group, bin): of the pulse; pulse (group,): of no target, which brings no more energy than echoes leave of
+    `most`, for the sonar may have taken it out; focus, curvature: 1/m.
+    """
+    bins, groups = len(frequency), len(pulse)
+    power, total = np.zeros((len(beam), groups)), np.zeros((len(beam), groups))
+    owner, share = np.full(len(beam), -1), np.zeros((len(beam), max(1, (last - first).max())))
+    sums, whole = np.empty((groups, bins), np.complex128), np.empty(groups, np.complex128)
+    heard, apart = np.empty(bins, np.complex128), np.empty(3)
+    spacing = frequency[1] - frequency[0] if bins > 1 else 0.0
+    for p in range(len(beam)):
+        sums[:], whole[:] = 0.0, 0.0
+        for e in range(first[p], last[p]):
+            late, away = moment[p] - delay[e], 0.0
+            for x in range(3):
+                apart[x] = slowness * direction[e, x] - beam[p, x]
+                away += apart[x] ** 2
+            if abs(late) > gate + longer[e] + reach * math.sqrt(away):
+                continue
+            if pattern.table.shape[0]:
+                _tabulated(heard, apart, curvature[e], focus, frequency, pattern)
+            else:
+                _summed(heard, direction[e], curvature[e], slowness, beam[p], focus, speed, frequency, pattern)
+            angle, turn = 2.0 * math.pi * frequency[0] * late, 2.0 * math.pi * spacing * late
+            phasor, turned = complex(math.cos(angle), math.sin(angle)), complex(math.cos(turn), math.sin(turn))
+            peak = 0j
+            for k in range(bins):
+                value = spectrum[e, k] * heard[k] * phasor
+                sums[group[e], k] += value
+                peak += matched[group[e], k] * value
+                phasor *= turned
+            share[p, e - first[p]] = abs(peak) ** 2
+            whole[group[e]] += peak
+        _compare(power[p], total[p], sums, whole, energy, pulse, most[p])
+        owner[p] = power[p].argmax() if power[p].max() > 0.0 else -1
+        for e in range(first[p], last[p]):
+            if group[e] != owner[p]:
+                share[p, e - first[p]] = 0.0
+    return power, total, owner, share
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _compare(
+    power: Floats, total: Floats, sums: Complexes, whole: Complexes, energy: Floats, pulse: Bools, most: float
+) -> None:
+    """Powers and energies (group,) of a point."""
+    echoes = 0.0
+    for g in range(len(power)):
+        power[g] = abs(whole[g]) ** 2
+        for k in range(sums.shape[1]):
+            total[g] += energy[g, k] * abs(sums[g, k]) ** 2
+        if not pulse[g]:
+            echoes += total[g]
+    left = max(most - echoes, 0.0)
+    for g in range(len(power)):
+        if pulse[g] and total[g] > left:
+            power[g] *= left / total[g]
+            total[g] = left
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def distances(points: Floats, vertices: Floats, faces: Int32s, nodes: Floats, order: Int32s, distance: Floats) -> None:
+    """Distance (point,) of points (point, xyz) to the nearest facet of a mesh, exact; nodes, order: `facet_tree`."""
+    leaves, count = len(nodes) // 2, len(order)
+    stack, near = np.empty(128, np.int64), np.empty(128)
+    for p in range(len(points)):
+        best, depth = np.inf, 1
+        stack[0], near[0] = 1, _to_box(points[p], nodes[1])
+        while depth:
+            depth -= 1
+            node = stack[depth]
+            if near[depth] >= best:
+                continue
+            if node >= leaves:
+                for i in range((node - leaves) * count // leaves, (node - leaves + 1) * count // leaves):
+                    f = order[i]
+                    a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
+                    best = min(best, _to_triangle(points[p], a, b, c))
+                continue
+            one, other = _to_box(points[p], nodes[2 * node]), _to_box(points[p], nodes[2 * node + 1])
+            far = 2 * node + (1 if other > one else 0)
+            stack[depth], near[depth] = far, max(one, other)
+            stack[depth + 1], near[depth + 1] = 4 * node + 1 - far, min(one, other)
+            depth += 2
+        distance[p] = math.sqrt(best)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _to_box(point: Floats, node: Floats) -> float:
+    """Square of the distance to a box; infinite to an empty one."""
+    square = 0.0
+    for x in range(3):
+        if node[3 + x] < 0.0:
+            return np.inf
+        square += max(abs(point[x] - node[x]) - node[3 + x], 0.0) ** 2
+    return square
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _to_triangle(p: Floats, a: Floats, b: Floats, c: Floats) -> float:
+    """Square of the distance to a triangle: to its plane where the foot is inside all edges, else to the nearest edge.
+
+    Source: Ericson (2005), Real-Time Collision Detection, section 5.1.5.
+    """
+    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    x, y, z = p[0] - a[0], p[1] - a[1], p[2] - a[2]
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    square = nx * nx + ny * ny + nz * nz
+    beyond_v = (y * vz - z * vy) * nx + (z * vx - x * vz) * ny + (x * vy - y * vx) * nz
+    beyond_u = (uy * z - uz * y) * nx + (uz * x - ux * z) * ny + (ux * y - uy * x) * nz
+    if square > 0.0 and beyond_v >= 0.0 and beyond_u >= 0.0 and beyond_v + beyond_u <= square:
+        return float((x * nx + y * ny + z * nz) ** 2 / square)
+    return min(_to_edge(p, a, b), _to_edge(p, b, c), _to_edge(p, c, a))
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _to_edge(p: Floats, a: Floats, b: Floats) -> float:
+    """Square of the distance to an edge."""
+    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    x, y, z = p[0] - a[0], p[1] - a[1], p[2] - a[2]
+    square = ux * ux + uy * uy + uz * uz
+    t = min(max((x * ux + y * uy + z * uz) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    return float((x - t * ux) ** 2 + (y - t * uy) ** 2 + (z - t * uz) ** 2)
