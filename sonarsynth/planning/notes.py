@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from sonarsynth.planning.looks import Look
+from sonarsynth.planning.lost_echoes import lost_echoes
 from sonarsynth.planning.plans import Plan
+from sonarsynth.planning.supports import SUPPORT, extreme_waveforms
 from sonarsynth.planning.validity import validity
-from sonarsynth.planning.windows import SUPPORT, extreme_waveforms
 from sonarsynth.recipe import Recipe
 from sonarsynth.scattering import Kirchhoff
 from sonarsynth.scattering.notes import concave_note, small_note
@@ -50,7 +51,7 @@ def notes(made: Plan, looks: Sequence[Look]) -> tuple[str, ...]:
     cancelled = scene.processing.cancelling is not None
     if made.propagation.bounces and not cancelled and made.products & {"image", "cloud"} and made.sizes["snap"]:
         found.append("the snap's own reflections enter the image: processing.cancelling takes them out before")
-    found += _accuracy(made) + list(_behind(recipe))
+    found += lost_echoes(made) + _accuracy(made) + list(_behind(recipe))
     real = [look for look in looks if look.real]
     for look in real[:: -(-len(real) // NOTED)]:
         found += _extent(look.scene, look.profile)
