@@ -181,6 +181,7 @@ class EnergyImage:
     elevation: Floats  # (elevation,) rad, ascending
     start: float  # s: the echo window that was imaged
     stop: float  # s
+    remainder: float = float("nan")  # share of the loudest beam that may be left of the direct pulse, once taken out
 
 
 @dataclass(frozen=True, eq=False)

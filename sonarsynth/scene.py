@@ -124,6 +124,10 @@ class Processing:
     """How the snap is located."""
     cancelling: Cancelling | None = None
     """How the snap's own reflections are taken out of the signals before imaging; left out: they stay in."""
+    direct_pulse: Literal["auto", "keep", "remove"] = "auto"
+    """Whether the direct pulse of the loudest snap is taken out of the signals before imaging, and the echo window
+    opens while it lasts. `auto`: where the echo window would otherwise cut echoes; `keep`: the window opens after it.
+    """
     beamforming: Beamformer = Field(default_factory=AutoBeamforming)
     """How the energy image is made."""
     ranging: Ranging = Field(default_factory=AutoRange)

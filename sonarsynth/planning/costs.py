@@ -34,6 +34,7 @@ SECONDS = {
     "noise sensor sample": 10e-9,
     "measure path": 1.3e-3,  # alone, at one hydrophone
     "locate sensor": 8e-6,
+    "remove sensor": 36e-6,
     "transform sensor sample": 1.6e-9,
     "image beam bin": 1.2e-9,
     "range beam": 70e-6,
@@ -141,10 +142,10 @@ def _traced(plan: Plan) -> str:
 
 def _beams(plan: Plan) -> str:
     """The beamformer in words."""
-    method = plan.choices.beamforming
+    method, without = plan.choices.beamforming, ", direct pulse taken out" if plan.windows.direct_removed else ""
     if isinstance(method, FocusedDelayAndSum) and method.zones != "auto" and method.zones > 1:
-        return f"{method.kind}, {method.zones} zones"
-    return method.kind
+        return f"{method.kind}, {method.zones} zones{without}"
+    return method.kind + without
 
 
 def _steered(plan: Plan) -> str:
@@ -211,6 +212,8 @@ def stages(plan: Plan) -> tuple[Stage, ...]:
         )
         transform = sizes["sensor"] * gate * sonar.sampling_frequency * SECONDS["transform sensor sample"]
         image = transform + beams * bins * SECONDS["image beam bin"]
+        if plan.windows.direct_removed:  # and what is left of it imaged
+            image = 2 * image + sizes["sensor"] * SECONDS["remove sensor"]
         stored = 4 * beams if "image" in plan.products else 0
         rows.append(
             (

@@ -75,7 +75,8 @@ def _heard(plan: Plan, index: int) -> tuple[Signals, float, float] | None:
     start, samples = frame_start(plan, frame), plan.windows.samples
     sonar = plan.scene.sonar
     # Not by the plan's own method: direct sums would take minutes, and the same signals go into both images.
-    signals = deposit_for(USUAL).signals(arrivals, snaps, plan.elements, sonar, plan.absorption, start, samples)
+    imaged = arrivals.select(~arrivals.direct) if plan.windows.direct_removed else arrivals
+    signals = deposit_for(USUAL).signals(imaged, snaps, plan.elements, sonar, plan.absorption, start, samples)
     direct, levels = arrivals.select(arrivals.direct), np.array(snap_levels(snaps))
     loudest = np.argmax(levels[direct.snap] + 20.0 * np.log10(np.abs(direct.amplitude)))
     clock = float(direct.delay[loudest])

@@ -8,9 +8,10 @@ import numpy as np
 
 from sonarsynth.planning.bodies import held, law_notes, mirror_notes, overlap_notes
 from sonarsynth.planning.looks import Look
+from sonarsynth.planning.lost_echoes import lost_echoes
 from sonarsynth.planning.plans import Plan
+from sonarsynth.planning.supports import SUPPORT, extreme_waveforms
 from sonarsynth.planning.validity import validity
-from sonarsynth.planning.windows import SUPPORT, extreme_waveforms
 from sonarsynth.recipe import Recipe
 from sonarsynth.scene import Scene
 from sonarsynth.synthesis.pulse import LONGEST_TAIL, cut_tail
@@ -40,7 +41,7 @@ def notes(made: Plan, looks: Sequence[Look]) -> tuple[str, ...]:
     cancelled = scene.processing.cancelling is not None
     if made.propagation.bounces and not cancelled and made.products & {"image", "cloud"} and made.sizes["snap"]:
         found.append("the snap's own reflections enter the image: processing.cancelling takes them out before")
-    found += _accuracy(made)
+    found += lost_echoes(made) + _accuracy(made)
     for look in noted(looks):
         found += mirror_notes(look) + overlap_notes(look)
         found += _extent(look.scene, look.profile)

@@ -54,7 +54,8 @@ class Supports:
     after: float
     echo_before: float  # the part that the echo window must hold
     echo_after: float
-    clear: float  # after the direct arrival: no echo window begins earlier
+    clear: float  # after the direct arrival: no echo window begins earlier, unless the direct pulse is taken out
+    foot: float  # either side: what is farther out may be cut off an echo
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +68,9 @@ class Windows:
     echo_stop: float  # s after the direct arrival
     supports: Supports
     disturbed: int  # of the frames looked at: in whose echo window other snaps, or their echoes, are heard as well
+    direct_removed: bool = False  # the direct pulse is taken out of what the image is made of
+    cut: bool = False  # more of some echo than its feet is outside of the echo window
+    tight: tuple[int, ...] = ()  # frames of the dataset whose echoes come soonest, and latest
 
 
 @dataclass(frozen=True)

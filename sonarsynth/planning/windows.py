@@ -8,35 +8,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sonarsynth.acoustics.rays import mean_slowness, water
-from sonarsynth.conventions import SLOWEST, Floats, depth
+from sonarsynth.conventions import Floats, Ints, depth
 from sonarsynth.description import FieldError
 from sonarsynth.planning.checks import CORNERS
 from sonarsynth.planning.looks import Look
 from sonarsynth.planning.plans import Plan, Supports, Windows
+from sonarsynth.planning.supports import blur_of, supports_of
 from sonarsynth.products import Paths
 from sonarsynth.recipe import Recipe
-from sonarsynth.scattering import Kirchhoff, PartlyReflecting
 from sonarsynth.scene import Frame, Scene
-from sonarsynth.sonar import elements
-from sonarsynth.synthesis import pulse_support
-from sonarsynth.synthesis.pulse import FEET, at_longest, silencing_blur, snap_levels
+from sonarsynth.synthesis.pulse import snap_levels
 from sonarsynth.tracing import Straight
 from sonarsynth.world.environment import Profile
-from sonarsynth.world.meshes import farthest_corner, in_blocks
-from sonarsynth.world.moment import model_of
-from sonarsynth.world.reflection import rms_height
-from sonarsynth.world.snap_pulses import Waveform, largest_scales, waveform
+from sonarsynth.world.meshes import in_blocks
 
 MARGIN = 0.1e-3
 """Seconds added at both ends of every window. Covers what straight rays leave out of an arrival time: under 2 us at
 20 m in a gradient of 4 per second. Arrivals that still fall outside are counted in `/signals/outside`."""
 
-SUPPORT = 1e-7
-"""The sample window holds every pulse down to this part of its peak; so long after the direct one begin the echoes."""
-TAIL = 1e-3
-"""s after the direct pulse in its plain shape: echoes are heard from then on, though a turned one has a longer tail."""
-ECHO_SUPPORT = 1e-4
-"""The echo window holds every echo down to this part of its peak: its feet, under -80 dB, are cut."""
 UNSEEN = 0.1
 """Windows of datasets of which not every frame is looked at are wider by this part of themselves."""
 
@@ -50,7 +39,7 @@ def lay_windows(recipe: Recipe, looks: Sequence[Look]) -> Windows:
     windows are wider by UNSEEN, and each other frame is asked whether it fits when it is rendered.
     """
     sonar, gate = looks[0].scene.sonar, looks[0].scene.processing.echo_window
-    supports = _supports(looks)
+    supports = supports_of(looks)
     real = np.array([frame.index if look.real else -1 for look in looks for frame in look.frames])
     spans = [span for look in looks for span in _spans(look)]
     times = np.array([(s.first, s.last_direct, s.first_echo, s.last_echo, s.last) for s in spans])
@@ -59,11 +48,10 @@ def lay_windows(recipe: Recipe, looks: Sequence[Look]) -> Windows:
     shortest = float(np.nanmin(first_echo)) if echoes else np.nan
     longest = float(np.nanmax(last_echo)) if echoes else np.nan
     unseen = UNSEEN * (longest - shortest) if (real >= 0).sum() < recipe.frames else 0.0
-    earliest = shortest - supports.echo_before - MARGIN - unseen
+    removed, start = _opening(looks[0].scene, shortest, supports, MARGIN + unseen)
     latest = longest + supports.echo_after + MARGIN + unseen
-    if not np.isfinite(latest - earliest):  # nothing echoes: listen for a moment after the snap
-        earliest, latest = supports.after, supports.after + 2e-3
-    start = gate.start if gate.start is not None else max(earliest, supports.clear)
+    if not echoes:  # listen for a moment after the snap
+        latest = supports.after + 2e-3
     stop = gate.stop if gate.stop is not None else max(latest, start + 1e-3)
     if stop <= start:
         raise FieldError(("scene", "processing", "echo_window", "stop"), f"must be after start ({start:g} s)")
@@ -74,7 +62,32 @@ def lay_windows(recipe: Recipe, looks: Sequence[Look]) -> Windows:
     disturbed = sum(_disturbed(span, start - supports.before, stop + supports.before) for span in spans)
     starts = np.full(recipe.frames, np.nan)
     starts[real[real >= 0]] = first[real >= 0]
-    return Windows(starts, samples, float(start), float(stop), supports, disturbed)
+    cut = echoes and (start > shortest - supports.foot or stop < longest + supports.foot)
+    tight = tuple(int(n) for n in dict.fromkeys(real[[*_first(first_echo, real), *_first(-last_echo, real)]]))
+    return Windows(starts, samples, float(start), float(stop), supports, disturbed, removed, cut, tight)
+
+
+def _first(times: Floats, real: Ints, count: int = 2) -> Ints:
+    """Indices of the smallest of times (frame,) in frames of the dataset, at most so many; NaN counts as late."""
+    order = np.argsort(times, kind="stable")
+    return np.asarray(order[(real[order] >= 0) & np.isfinite(times[order])][:count])
+
+
+def _opening(scene: Scene, first_echo: float, supports: Supports, margin: float) -> tuple[bool, float]:
+    """Whether the direct pulse is taken out, and when the echo window opens (s), both after it.
+
+    first_echo (s): NaN where nothing echoes. The window opens when the direct pulse is over. Where that cuts more than
+    the feet of an echo the direct pulse is taken out, and the window opens with the echoes, which never come before it.
+    """
+    gate, chosen = scene.processing.echo_window.start, scene.processing.direct_pulse
+    earliest, whole = first_echo - supports.echo_before - margin, first_echo - supports.foot - margin
+    overlap = (whole if gate is None else gate) < supports.clear
+    removed = chosen == "remove" or (chosen == "auto" and overlap)
+    if gate is not None:
+        return removed, gate
+    if np.isnan(first_echo):
+        return removed, supports.after
+    return removed, max(whole, 0.0) if removed and overlap else max(earliest, supports.clear)
 
 
 def _first_sample(first_heard: Floats, supports: Supports, rate: float) -> Floats:
@@ -97,57 +110,12 @@ def frame_start(plan: Plan, frame: Frame) -> float:
     path, advice = ("scene", "processing", "echo_window"), "give its start and stop, or fewer frames"
     if np.ceil((last - first) * rate) + 1 > windows.samples:
         raise FieldError(path, f"frame {frame.index} lasts {last - first:.3g} s, more than those looked at: {advice}")
-    early = gate.start is None and max(span.first_echo - supports.echo_before, supports.clear) < windows.echo_start
+    removed, opens = _opening(scene, span.first_echo, supports, 0.0)
+    early = opens < windows.echo_start or (removed and not windows.direct_removed)
     late = gate.stop is None and span.last_echo + supports.echo_after > windows.echo_stop
     if early or late:
         raise FieldError(path, f"frame {frame.index} echoes outside the window of those looked at: {advice}")
     return first
-
-
-def _supports(looks: Sequence[Look]) -> Supports:
-    """How long pulses are, over all scenes."""
-    rows = []
-    for look in looks:
-        scene, profile = look.scene, look.profile
-        across = elements(scene.sonar.array).aperture / profile.speed.min()  # of a wave, from the centre to the edge
-        lossy = any(isinstance(law, Kirchhoff) and isinstance(law.surface, PartlyReflecting) for law in scene.laws)
-        turned = lossy or scene.physics.tracing.bounces > 0 or not profile.uniform  # also caustics turn the phase
-        before, after = _support(scene, SUPPORT, turned=turned) + across
-        plain = _support(scene, SUPPORT, turned=False)[1]
-        clear = min(after, plain + across + TAIL)  # a turned pulse may never end: what echoes meanwhile must be heard
-        rows.append((before, after, *(_support(scene, ECHO_SUPPORT, turned=turned) + across), clear))
-    return Supports(*(float(n) for n in np.max(rows, axis=0)))
-
-
-def _support(scene: Scene, tolerance: float, *, turned: bool) -> Floats:
-    """Longest time (s) before and after its collapse that any filtered snap exceeds `tolerance` of its peak, and the
-    echo of any facet."""
-    chosen, waveforms = scene.sonar.antialias, extreme_waveforms(scene)
-    supports = [(0.0, 0.0), *(pulse_support(w, chosen, tolerance, turned=turned) for w in waveforms)]
-    for law, mesh in zip(scene.laws, scene.meshes, strict=True):
-        if isinstance(law, Kirchhoff):
-            smooth = [pulse_support(w, chosen, tolerance, turned=turned, sloped=True) for w in waveforms]
-            rough = [
-                pulse_support(w, chosen, tolerance, turned=turned, rough=2.0 * law.roughness / SLOWEST)
-                for w in waveforms
-                if law.roughness > 0
-            ]
-            corner = 2.0 * farthest_corner(mesh) / SLOWEST
-            supports += [(before + corner, after + corner) for before, after in smooth + rough]
-    return np.asarray(np.max(supports, axis=0))
-
-
-def _blurred(scene: Scene) -> float:
-    """By how much (s) rough boundaries and bodies lengthen the pulses that they reflect and leave anything of."""
-    environment, bounces = scene.world.environment, scene.physics.tracing.bounces
-    heights = [law.roughness for law in scene.laws if isinstance(law, Kirchhoff)]
-    roughest = max(rms_height(environment.surface), rms_height(environment.bed))
-    most = np.hypot(max(heights, default=0.0), roughest * np.sqrt(bounces))
-    if not most > 0.0:
-        return 0.0
-    blur = 2.0 * most / SLOWEST  # at the steepest grazing angle
-    silent = max((silencing_blur(w, scene.sonar.antialias) for w in extreme_waveforms(scene)), default=0.0)
-    return float(FEET * min(blur, silent))
 
 
 def _slack(doppler: bool, frame: Frame, span: _Span, profile: Profile) -> float:
@@ -172,15 +140,6 @@ def _slack(doppler: bool, frame: Frame, span: _Span, profile: Profile) -> float:
     return moved + min(bent, way / slowest - way / float(profile.speed.max()))
 
 
-def extreme_waveforms(scene: Scene) -> list[Waveform]:
-    """What each shrimp may sound like at the most: as its model, as long as it may become, and as short."""
-    found = []
-    for shrimp in scene.world.shrimp:
-        model, longest = model_of(shrimp, scene.world.environment.depth), largest_scales(shrimp.variation)[1]
-        found += [at_longest(waveform(model, width)) for width in sorted({1.0, longest, 1.0 / longest})]
-    return found
-
-
 @dataclass(frozen=True)
 class _Span:
     """When a frame is heard at the array centre (s)."""
@@ -198,7 +157,7 @@ def _spans(look: Look) -> list[_Span]:
     """When each frame is heard, with what straight lines between things at rest leave out."""
     scene, profile = look.scene, look.profile
     bounces, bed = scene.physics.tracing.bounces, scene.world.environment.depth
-    blurred, spans = _blurred(scene), []
+    blurred, spans = blur_of(scene), []
     for frame in look.frames:
         span = _span(frame, profile, bed, bounces)
         slack = _slack(scene.physics.doppler, frame, span, profile)

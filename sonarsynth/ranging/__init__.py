@@ -82,10 +82,12 @@ class RangingMethod(Protocol):
         sonar: Sonar,
         sonar_pose: Pose,
         profile: Profile,
+        direct: Signals | None = None,
     ) -> PointCloud:
         """Points on the beam grid from the first snap of `bearings`; NaN where there is none, or none to be trusted.
 
-        profile: the sound speed of the water, for methods that trace rays and were given none of their own.
+        profile: the sound speed of the water, for methods that trace rays and were given none of their own. direct:
+        signals with the direct pulse in them, where it was taken out of `signals`.
         """
 
 

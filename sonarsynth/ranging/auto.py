@@ -42,7 +42,9 @@ class AutoRange:
         sonar: Sonar,
         sonar_pose: Pose,
         profile: Profile,
+        direct: Signals | None = None,
     ) -> PointCloud:
         """See `RangingMethod`. With no plan: the closed form where the sound speed is the assumed one everywhere."""
         straight = profile.uniform and profile.speed[0] == sonar.assumed_sound_speed
-        return self.resolve(straight=straight).cloud(signals, image, bearings, elements, sonar, sonar_pose, profile)
+        method = self.resolve(straight=straight)
+        return method.cloud(signals, image, bearings, elements, sonar, sonar_pose, profile, direct)

@@ -49,15 +49,17 @@ def point_cloud(
     locality: float,
     focus: float | None,
     solve: Solve,
+    direct: Signals | None = None,
 ) -> PointCloud:
-    """Echoes of the beams over threshold, placed by `solve`."""
+    """Echoes of the beams over threshold, placed by `solve`; `direct`: signals with the direct pulse in them, where
+    it was taken out of `signals`."""
     shape = image.energy.shape
     grids = {name: np.full(shape, np.nan, np.float32) for name in ("range", "range_error", "delay", "energy")}
     position = np.full((*shape, 3), np.nan, np.float32)
     beams = over_threshold(image, threshold, float(np.abs(signals.pressure).max(initial=0.0)))
     located = len(bearings.time) > 0 and np.isfinite(bearings.time[0]) and np.isfinite(bearings.position[0]).all()
     if located and len(beams[0]) > 0:
-        profiles = range_profiles(signals, image, bearings, elements, sonar, beams, focus)
+        profiles = range_profiles(signals, image, bearings, elements, sonar, beams, focus, direct or signals)
         echoes = pick(profiles, image, locality)
         own = np.isfinite(echoes.delay)
         solution = solve(echoes.delay[own], profiles.direction[own], bearings.position[0])

@@ -14,11 +14,11 @@ from scipy.fft import ifft, next_fast_len
 from scipy.ndimage import maximum_filter1d
 
 from sonarsynth.acoustics.beams import beam_spectra, lattice_beam_spectra
-from sonarsynth.acoustics.bearings import wavefront_delays
 from sonarsynth.acoustics.gates import fast_length, frequency_spacing, gate_samples, gated_spectra
 from sonarsynth.conventions import Floats, Ints, direction
 from sonarsynth.products import Bearings, EnergyImage, Signals
 from sonarsynth.ranging import kernels, pulses
+from sonarsynth.ranging.fronts import Front
 from sonarsynth.ranging.pulses import Complexes
 from sonarsynth.sonar import Elements, Sonar
 
@@ -89,15 +89,9 @@ def direct_spectrum(signals: Signals, bearings: Bearings, elements: Elements, so
 
     At the frequencies of an FFT of `length` samples.
     """
-    c, time = sonar.assumed_sound_speed, float(bearings.time[0])
-    u = direction(bearings.azimuth[0], bearings.elevation[0])
-    radius = bearings.range_from_curvature[0]
-    if not np.isfinite(radius):
-        radius = np.linalg.norm(bearings.position[0])
-    curvature = float(1 / radius) if np.isfinite(radius) else 0.0
-    expected = time + wavefront_delays(elements.position, u, curvature, c)
-    aligned = pulses.align(signals, elements, sonar.band, expected, whole=True)
-    wave = pulses.waveform(aligned, elements, c, u, curvature, time)
+    c, front = sonar.assumed_sound_speed, Front.of(bearings)
+    aligned = pulses.align(signals, elements, sonar.band, front.delays(elements, c), whole=True)
+    wave = pulses.waveform(aligned, elements, c, front.direction, front.curvature, front.time)
     return pulses.template_spectrum(wave.template, length)
 
 
@@ -109,12 +103,14 @@ def range_profiles(
     sonar: Sonar,
     beams: tuple[Ints, Ints],
     focus: float | None,
+    direct: Signals,
 ) -> Profiles:
     """Profiles of the beams (row, column): matched to the direct pulse as this beam would hear it, whitened, tapered.
 
     With W the direct pulse at the array centre and D the face directivity towards the beam, the profile is the envelope
     of the inverse transform of B conj(W) D/(|W|^2 + w max|W|^2): all of the band counts alike, which is as sharp as the
-    band allows in delay, and sharper in angle than the snap's own falling spectrum.
+    band allows in delay, and sharper in angle than the snap's own falling spectrum. `direct`: signals with the direct
+    pulse in them.
     """
     rate, c = signals.sampling_frequency, sonar.assumed_sound_speed
     first, count = gate_samples(image.start, image.stop, signals.start, rate, signals.pressure.shape[1])
@@ -122,7 +118,7 @@ def range_profiles(
     f, spectra = gated_spectra(signals.pressure, rate, first, count, band)
     spacing = frequency_spacing(count, rate)
     lowest = round(f[0] / spacing)
-    wave = direct_spectrum(signals, bearings, elements, sonar, fast_length(count))[lowest : lowest + len(f)]
+    wave = direct_spectrum(direct, bearings, elements, sonar, fast_length(count))[lowest : lowest + len(f)]
     density = np.abs(wave) ** 2
     place = (f - band[0]) / (band[1] - band[0])
     taper = np.sin(np.pi * np.clip(place, 0.0, 1.0)) ** 2
@@ -173,7 +169,8 @@ def pick(profiles: Profiles, image: EnergyImage, locality: float) -> Echoes:
 
     At the delay of its peak, no beam within a beam width may hold `locality` dB more, or the echo comes from there; and
     no beam at all `GHOST` dB more, or it comes through a side lobe or a grating lobe; and it must stand out of the
-    noise.
+    noise. Nearer to an end of the profile than half a pulse (`pulses.PULSE_HALF`) a peak is what the window left of an
+    echo, whose own peak may be outside: that is none.
     """
     power, count = profiles.power, len(profiles.power)
     rows = np.arange(count)
@@ -187,6 +184,7 @@ def pick(profiles: Profiles, image: EnergyImage, locality: float) -> Echoes:
         excess = 10 * np.log10(near / own)
         good = (own > 0) & (excess <= locality) & (own * 10 ** (GHOST / 10) >= anywhere)
         good &= own >= noise * 10 ** (NOISE / 10)
+        good &= np.minimum(top, power.shape[1] - 1 - top) * profiles.step >= pulses.PULSE_HALF
         off_beam = profiles.width * np.hypot(np.sqrt(excess / 3), OWN_WIDTH)
         jitter = profiles.resolution * np.hypot(np.sqrt(0.5 * noise / own), INTERFERENCE)
     delay = profiles.first + (top + place) * profiles.step

@@ -9,9 +9,9 @@ import numpy as np
 from scipy.fft import ifft, irfft, next_fast_len, rfft
 
 from sonarsynth.acoustics.bearings import plane_wavefront, tangent_plane, wavefront_delays
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Floats, direction
 from sonarsynth.geometry import unit
-from sonarsynth.products import Signals
+from sonarsynth.products import Bearings, Signals
 from sonarsynth.ranging import fronts_kernels, kernels, pulses
 from sonarsynth.ranging.locating import fit_wave
 from sonarsynth.ranging.pulses import Aligned
@@ -34,6 +34,15 @@ class Front:
     direction: Floats  # (xyz) unit vector towards its source, sonar frame
     curvature: float  # 1/m
     time: float  # s at the array centre
+
+    @staticmethod
+    def of(bearings: Bearings) -> Front:
+        """The direct pulse of the first located snap; plane where nothing says how far away that is."""
+        radius = float(bearings.range_from_curvature[0])
+        if not np.isfinite(radius):
+            radius = float(np.linalg.norm(bearings.position[0]))
+        curvature = 1 / radius if np.isfinite(radius) else 0.0
+        return Front(direction(bearings.azimuth[0], bearings.elevation[0]), curvature, float(bearings.time[0]))
 
     def delays(self, elements: Elements, sound_speed: float) -> Floats:
         """When each sensor hears it (sensor,), in s."""
@@ -123,8 +132,18 @@ def brightness(signals: Signals, elements: Elements, sonar: Sonar, front: Front)
     return 10 * float(np.log10(max(middle, 1e-30))), 2 * aligned.spacing * float(own.sum()) / count
 
 
-def part_of(signals: Signals, elements: Elements, sonar: Sonar, front: Front) -> Part:
-    """What each sensor hears of the wave that a wavefront carries.
+def part_of(
+    signals: Signals,
+    elements: Elements,
+    sonar: Sonar,
+    front: Front,
+    half: float = HALF,
+    lag: Floats | float = 0.0,
+    gain: Floats | float = 1.0,
+) -> Part:
+    """What each sensor hears of the wave that a wavefront carries, within `half` (s) of it, flanks included.
+
+    lag, gain (sensor,): how much later (s) than the front, and how many times as loud, a sensor hears it.
 
     The sensors' windows, moved onto the front, are projected bin by bin on the response of the sensors to one wave.
     With the window once more on what is taken out, that is W Q W with Q an orthogonal projection and 0 <= W <= 1: all
@@ -132,13 +151,13 @@ def part_of(signals: Signals, elements: Elements, sonar: Sonar, front: Front) ->
     there are sensors.
     """
     c, rate = sonar.assumed_sound_speed, signals.sampling_frequency
-    time = front.delays(elements, c)
-    aligned = cut(signals, elements, time, HALF, None)
+    time = front.delays(elements, c) + lag
+    aligned = cut(signals, elements, time, half, None)
     toward = front.direction - front.curvature * elements.position
     distance = np.sqrt(np.sum(toward * toward, axis=1))
     sine = toward * (elements.face / (c * distance))[:, None]
     response = kernels.face_responses(sine[:, 1], sine[:, 2], 0.0, aligned.spacing, len(aligned.frequency))
-    response *= (elements.gain / distance)[:, None]
+    response *= (gain * elements.gain / distance)[:, None]
     heard = fronts_kernels.explained(aligned.spectrum, response) * rate
     heard[:, -1] = 0.0  # half the sampling frequency cannot be moved by parts of a sample
     samples = heard.shape[1] - 1

@@ -51,6 +51,7 @@ class IsovelocityRange:
         sonar: Sonar,
         sonar_pose: Pose,
         profile: Profile,
+        direct: Signals | None = None,
     ) -> PointCloud:
         """See `RangingMethod`."""
         from sonarsynth.ranging.clouds import isovelocity_solution, point_cloud
@@ -65,4 +66,5 @@ class IsovelocityRange:
             self.locality,
             self.focus,
             lambda delay, beam, source: isovelocity_solution(delay, beam, source, sonar.assumed_sound_speed),
+            direct,
         )

@@ -38,6 +38,7 @@ class RefractedRange:
         sonar: Sonar,
         sonar_pose: Pose,
         profile: Profile,
+        direct: Signals | None = None,
     ) -> PointCloud:
         """See `RangingMethod`. Positions lie where the rays lead; a range is the straight distance to there."""
         from sonarsynth.ranging.clouds import point_cloud
@@ -56,4 +57,5 @@ class RefractedRange:
             self.locality,
             self.focus,
             lambda delay, beam, source: refracted_solution(delay, beam, source, speed, sonar_pose, believed),
+            direct,
         )

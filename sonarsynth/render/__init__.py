@@ -21,6 +21,7 @@ from sonarsynth.products import Arrivals, Bearings, Echoes, EnergyImage, Ledger,
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import Recipe
 from sonarsynth.render.hearing import hear
+from sonarsynth.render.imaging import image_of, no_image
 from sonarsynth.render.laps import LAPS, counted, lap
 from sonarsynth.render.rays import follow_rays
 from sonarsynth.render.stored import (
@@ -28,6 +29,7 @@ from sonarsynth.render.stored import (
     bearing_values,
     cloud_values,
     echo_values,
+    image_values,
     ledger_values,
     of_isolated,
     signal_values,
@@ -193,10 +195,9 @@ def process(plan: Plan, frame: Frame, signals: Signals) -> Heard:
         if processing.cancelling is not None:
             bed, pose = environment.depth, frame.sonar_pose
             imaged = processing.cancelling.cancel(signals, bearings, plan.elements, sonar, pose, bed, (start, stop))
-        image = plan.choices.beamforming.image(imaged, plan.elements, sonar, start, stop)
+        imaged, image = image_of(plan, imaged, bearings, (start, stop))
     else:  # no direct pulse was found, or an echo was taken for it: no clock, so no image, rather than an arbitrary one
-        silent = np.full((sonar.beams.elevations, sonar.beams.azimuths), np.nan, np.float32)
-        image = EnergyImage(silent, sonar.beams.azimuth, sonar.beams.elevation, np.nan, np.nan)
+        image = no_image(sonar, np.nan, np.nan)
     lap("beamform")
     return Heard(signals, bearings, image, imaged)
 
@@ -243,7 +244,7 @@ def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
         return values
     values |= bearing_values(heard.bearings)
     if "image" in plan.products:
-        values |= table("/image", energy=heard.image.energy, start=heard.image.start, stop=heard.image.stop)
+        values |= image_values(heard.image, plan.windows.direct_removed)
     lap("collect")
     if "cloud" in plan.products:
         scene = plan.scene
@@ -255,6 +256,7 @@ def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
             scene.sonar,
             frame.sonar_pose,
             plan.profile,
+            heard.signals,
         )
         lap("range")
         values |= cloud_values(cloud, _point_labels(plan, traced, heard.bearings, cloud))

@@ -5,7 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from sonarsynth.conventions import NO_TARGET, Floats
-from sonarsynth.products import LEDGER, Arrivals, Bearings, Echoes, Ledger, PointCloud, PointLabels, Signals, Truth
+from sonarsynth.products import (
+    LEDGER,
+    Arrivals,
+    Bearings,
+    Echoes,
+    EnergyImage,
+    Ledger,
+    PointCloud,
+    PointLabels,
+    Signals,
+    Truth,
+)
 
 Values = dict[tuple[str, str], np.ndarray]
 """(group, name) to the array of one frame, without the frame axis."""
@@ -69,6 +80,12 @@ def bearing_values(bearings: Bearings) -> Values:
     for name in ("azimuth", "azimuth_error", "elevation", "elevation_error"):
         columns[name] = np.rad2deg(columns[name])
     return table("/bearings", **columns)
+
+
+def image_values(image: EnergyImage, direct_removed: bool) -> Values:
+    """The image and its window; what may be left in it of the direct pulse, where that is taken out."""
+    values = table("/image", energy=image.energy, start=image.start, stop=image.stop)
+    return values | table("/image", remainder=np.float32(image.remainder)) if direct_removed else values
 
 
 def cloud_values(cloud: PointCloud, labels: PointLabels) -> Values:

@@ -23,6 +23,8 @@ def variables(plan: Plan) -> tuple[Variable, ...]:
     if plan.products & {"image", "cloud"}:
         wanted.add("bearings")
     chosen = [v for v in VARIABLES if v.product in wanted]
+    if not plan.windows.direct_removed:
+        chosen = [v for v in chosen if (v.group, v.name) != ("/image", "remainder")]
     converter = plan.scene.sonar.converter
     if converter is not None and converter.bits <= 16:
         counts: dict[str, Any] = {

@@ -87,6 +87,14 @@ _IMAGE = _group(
     _v("energy", _BEAMS, "float32", "Pa2 s", "energy of the beam in the echo window"),
     _v("start", ("frame",), "float64", "s", "start of the echo window after the instant of the frame"),
     _v("stop", ("frame",), "float64", "s", "end of the echo window after the instant of the frame"),
+    _v(
+        "remainder",
+        ("frame",),
+        "float32",
+        "1",
+        "share of the loudest beam's energy that may be left of the direct pulse",
+        attributes=_comment("the direct pulse is taken out; beams with more than a quarter of this are NaN"),
+    ),
 )
 _CLOUD = _group(
     "/cloud",

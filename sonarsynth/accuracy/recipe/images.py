@@ -123,7 +123,14 @@ def cloud_of(plan: Plan, frame: Frame, heard: Heard, method: IsovelocityRange | 
     assert heard.image is not None and heard.imaged is not None and heard.bearings is not None
     bearings: Bearings = heard.bearings
     return method.cloud(
-        heard.imaged, heard.image, bearings, plan.elements, plan.scene.sonar, frame.sonar_pose, plan.profile
+        heard.imaged,
+        heard.image,
+        bearings,
+        plan.elements,
+        plan.scene.sonar,
+        frame.sonar_pose,
+        plan.profile,
+        heard.signals,
     )
 
 
