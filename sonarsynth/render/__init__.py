@@ -21,6 +21,7 @@ from sonarsynth.planning import Plan, arrivals_of, check_unseen, plan
 from sonarsynth.products import Arrivals, Bearings, Echoes, EnergyImage, Ledger, Signals, Truth
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import Recipe
+from sonarsynth.render.estimates import emission_values, estimate_truth, heard_directly
 from sonarsynth.render.hearing import hear
 from sonarsynth.render.laps import LAPS, counted, lap
 from sonarsynth.render.stored import (
@@ -229,13 +230,15 @@ def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
     frame = traced.frame
     values = table("/", trajectory=frame.trajectory, step=frame.step, time=frame.time, split=plan.recipe.split(index))
     values |= truth_values(traced.truth, traced.echoes, traced.arrivals) | ledger_values(traced.ledger, heard.isolated)
+    direct = heard_directly(plan, traced.arrivals, frame.moment.snaps)
+    values |= estimate_truth(direct, len(frame.moment.snaps))
     if heard.signals is not None and "signals" in plan.products:
         counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
         values |= signal_values(heard.signals, counts)
     if heard.image is None or heard.bearings is None or heard.imaged is None:
         lap("collect")
         return values
-    values |= bearing_values(heard.bearings)
+    values |= bearing_values(heard.bearings) | emission_values(plan, direct, heard.bearings)
     if "image" in plan.products:
         values |= table("/image", energy=heard.image.energy, start=heard.image.start, stop=heard.image.stop)
     lap("collect")

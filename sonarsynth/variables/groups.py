@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+from sonarsynth.products import REASONS
 from sonarsynth.recipe import SPLITS
 
 
@@ -90,7 +91,12 @@ _BEARINGS = _group(
     "/bearings",
     "bearings",
     _v(
-        "time", _SNAP, "float64", "s", "arrival of the direct pulse at the array centre, after the instant of the frame"
+        "time",
+        _SNAP,
+        "float64",
+        "s",
+        "arrival at the array centre of the direct pulse, the peak of its envelope in the band, after the instant of "
+        "the frame",
     ),
     _v("time_error", _SNAP, "float64", "s", "predicted standard error of time"),
     _v("azimuth", _SNAP, "float64", "degree", "azimuth of the snap as the array hears it, port positive"),
@@ -104,6 +110,34 @@ _BEARINGS = _group(
     _v("position", (*_SNAP, "xyz"), "float64", "m", "position of the snap in the sonar frame"),
     _v("position_covariance", (*_SNAP, "xyz", "xyz_other"), "float64", "m2", "predicted covariance of position"),
     _v("residual", _SNAP, "float64", "s", "root mean square residual of the sensor delays"),
+    _v(
+        "bottom_used",
+        _SNAP,
+        "int8",
+        "1",
+        "whether the depth of the bottom entered the position",
+        attributes=(("flag_values", [-1, 0, 1]), ("flag_meanings", "no_position no yes")),
+    ),
+    _v(
+        "reason",
+        _SNAP,
+        "int8",
+        "1",
+        "why an estimate was not accepted",
+        attributes=(
+            ("flag_values", list(range(len(REASONS)))),
+            ("flag_meanings", " ".join(REASONS)),
+            ("comment", "of range_unknown the position alone is missing, of all others but accepted everything"),
+        ),
+    ),
+    _v(
+        "emission",
+        _SNAP,
+        "int16",
+        "1",
+        "index along snap of the true snap that the estimate came from: a label",
+        attributes=_NONE,
+    ),
 )
 _TRUTH = _group(
     "/truth",
@@ -124,6 +158,16 @@ _TRUTH = _group(
     _v("snap_position", (*_SNAP, "xyz"), "float64", "m", "position of the snap in the world"),
     _v("snap_time", _SNAP, "float64", "s", "time of the snap after the instant of the frame"),
     _v("snap_level", _SNAP, "float64", "dB", "peak source level of the snap re 1 uPa at 1 m"),
+    _v(
+        "snap_arrival",
+        _SNAP,
+        "float64",
+        "s",
+        "arrival at the array centre of the snap's direct pulse, the peak of its envelope in the band, after the "
+        "instant of the frame; NaN without a direct path",
+    ),
+    _v("snap_azimuth", _SNAP, "float64", "degree", "azimuth that the direct pulse arrives from, port positive"),
+    _v("snap_elevation", _SNAP, "float64", "degree", "elevation that the direct pulse arrives from, up positive"),
     _v("target", _BEAMS, "int16", "1", "target that the beam points at", attributes=_NONE),
     _v("facet", _BEAMS, "int32", "1", "facet that the beam points at", attributes=_NONE),
     _v("range", _BEAMS, "float32", "m", "distance to the first surface in the beam's direction"),
