@@ -8,6 +8,7 @@ import numpy as np
 
 from sonarsynth.planning.looks import Look
 from sonarsynth.planning.plans import Plan
+from sonarsynth.planning.sources import standing_off
 from sonarsynth.planning.validity import validity
 from sonarsynth.planning.windows import SUPPORT, extreme_waveforms
 from sonarsynth.recipe import Recipe
@@ -50,7 +51,7 @@ def notes(made: Plan, looks: Sequence[Look]) -> tuple[str, ...]:
     cancelled = scene.processing.cancelling is not None
     if made.propagation.bounces and not cancelled and made.products & {"image", "cloud"} and made.sizes["snap"]:
         found.append("the snap's own reflections enter the image: processing.cancelling takes them out before")
-    found += _accuracy(made) + list(_behind(recipe))
+    found += _accuracy(made) + list(_behind(recipe)) + _standing_off(scene)
     real = [look for look in looks if look.real]
     for look in real[:: -(-len(real) // NOTED)]:
         found += _extent(look.scene, look.profile)
@@ -134,6 +135,15 @@ def _accuracy(made: Plan) -> list[str]:
             f"{allowed.image_db:g}; more scene.processing.beamforming.zones, or kind dense"
         )
     return found
+
+
+def _standing_off(scene: Scene) -> list[str]:
+    """Which shrimp the sonar does not find where it may look for them."""
+    if not (names := standing_off(scene)) or scene.processing.locating.on_bottom is False:
+        return []
+    told = scene.processing.locating.on_bottom is True
+    then = "the sonar takes it for being there" if told else "snaps are located by their wavefronts alone"
+    return [f"{', '.join(names)}: not on the bottom; {then} (scene.processing.locating.on_bottom)"]
 
 
 def _behind(recipe: Recipe) -> tuple[str, ...]:

@@ -96,7 +96,7 @@ class Candidates:
         if extra < -speed * error or row.amplitude > loudest:
             return False
         if extra <= speed * error:  # no longer on its way than from the source itself
-            return cosine > np.cos(SIGMAS * float(np.hypot(*row.angle_error)) + ALLOWED)
+            return cosine > float(np.cos(SIGMAS * float(np.hypot(*row.angle_error)) + ALLOWED))
         range_ = extra * (extra + 2 * distance) / (2 * (extra + distance * (1 - cosine)))
         k, slack = row.curvature[0], SIGMAS * row.curvature[1] + ALLOWED / range_
         if not 1 / mirrored - slack <= k <= 1 / range_ + slack:

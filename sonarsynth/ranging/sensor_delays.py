@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 from sonarsynth.description import description
@@ -30,6 +31,10 @@ class SensorDelays:
     on_bottom: bool | None = None
     """Whether sources are known to be on the bottom. True: its depth is used where the wavefront agrees;
     false (pingers, vehicles, fish): places are those of the wavefront alone. Left out: as the sources of the recipe."""
+
+    def resolve(self, *, on_bottom: bool) -> SensorDelays:
+        """With what the recipe says of its sources, where this is left out."""
+        return self if self.on_bottom is not None else replace(self, on_bottom=on_bottom)
 
     def locate(
         self,

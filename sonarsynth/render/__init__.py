@@ -18,6 +18,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.description import FieldError
 from sonarsynth.labelling import SLICES, Band, echoes, label, ledger, path_powers
 from sonarsynth.planning import Plan, arrivals_of, check_unseen, plan
+from sonarsynth.planning.sources import standing_off
 from sonarsynth.products import Arrivals, Bearings, Echoes, EnergyImage, Ledger, Signals, Truth
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import Recipe
@@ -176,9 +177,8 @@ def process(plan: Plan, frame: Frame, signals: Signals) -> Heard:
     """What the sonar makes of signals: where the snap is, and the energy image of the echo window."""
     processing, sonar, environment = plan.scene.processing, plan.scene.sonar, plan.scene.world.environment
     snaps = plan.sizes["snap"]
-    bearings = processing.locating.locate(
-        signals, plan.elements, sonar, frame.sonar_pose, environment.depth, snaps, plan.profile
-    )
+    locating = processing.locating.resolve(on_bottom=not standing_off(plan.scene))
+    bearings = locating.locate(signals, plan.elements, sonar, frame.sonar_pose, environment.depth, snaps, plan.profile)
     lap("locate")
     heard = float(bearings.time[0]) if snaps else np.nan
     start, stop = heard + plan.windows.echo_start, heard + plan.windows.echo_stop

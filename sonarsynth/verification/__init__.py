@@ -6,8 +6,9 @@ import numpy as np
 import xarray as xr
 
 from sonarsynth.verification.beams import beam_width, brightest_beam_on_target, near_target
+from sonarsynth.verification.estimates import snap_located
 from sonarsynth.verification.ledger import INAUDIBLE, LEDGER_TOLERANCE, ledger_adds_up, ledger_measured
-from sonarsynth.verification.places import range_errors, snap_located
+from sonarsynth.verification.places import range_errors
 from sonarsynth.verification.reading import Check, every, numbered
 
 __all__ = [
