@@ -150,16 +150,33 @@ class Signals:
     outside: int  # arrivals that fell outside the window: counted, never wrapped
 
 
+REASONS = (
+    "accepted",
+    "nothing_heard",
+    "array_tells_no_direction",
+    "band_too_narrow",
+    "not_one_wavefront",
+    "not_resolved",
+    "outside_the_water",
+    "may_be_an_echo",
+    "range_unknown",
+)
+"""Why a row of `Bearings` is not accepted: `Bearings.reason` is an index. Of "range_unknown" the position alone is NaN:
+when and from where the pulse came is known; of all others nothing."""
+
+
 @dataclass(frozen=True, eq=False)
 class Bearings:
     """Where the array hears each snap: one row a snap, the loudest direct pulse first; NaN where none was found.
 
-    Standard errors are predicted from the data and the instrument alone (one sigma).
+    Rows of what was found come first, then those of pulses that were refused, `reason` says why. Standard errors are
+    predicted from the data and the instrument alone (one sigma). Which true snap a row comes from is a label:
+    `labelling.estimates`.
     """
 
-    time: Floats  # (snap,) s: arrival of the direct pulse at the array centre
+    time: Floats  # (snap,) s: arrival at the array centre of the peak of the pulse's envelope in the band
     time_error: Floats  # (snap,) s
-    azimuth: Floats  # (snap,) rad, sonar frame, of the arriving wave
+    azimuth: Floats  # (snap,) rad, sonar frame, of the arriving wave as it is heard, whatever else is known
     azimuth_error: Floats  # (snap,) rad
     elevation: Floats  # (snap,) rad
     elevation_error: Floats  # (snap,) rad
@@ -167,9 +184,13 @@ class Bearings:
     range_from_depth_error: Floats  # (snap,) m
     range_from_curvature: Floats  # (snap,) m: from the curvature of the wavefront
     range_from_curvature_error: Floats  # (snap,) m
-    position: Floats  # (snap, xyz) m, sonar frame: both ranges weighted by their errors
+    position: Floats  # (snap, xyz) m, sonar frame: of the wavefront, and of the bottom's depth where it was used
     position_covariance: Floats  # (snap, xyz, xyz) m2
     residual: Floats  # (snap,) s: root mean square residual of the sensor delays
+    bottom_used: (
+        Ints  # (snap,) 1 where the depth of the bottom entered the position, 0 where it did not, -1 without one
+    )
+    reason: Ints  # (snap,) index into REASONS
 
 
 @dataclass(frozen=True, eq=False)

@@ -154,6 +154,40 @@ def _inverse(normal: Floats, curved: bool) -> Floats | None:
     return inverse if curved else np.insert(np.insert(inverse, 2, 0.0, axis=0), 2, 0.0, axis=1)
 
 
+def envelope_peak(
+    frequency: npt.ArrayLike, spectrum: npt.ArrayLike, low: float, high: float, noise: npt.ArrayLike = 0.0
+) -> tuple[float, float]:
+    """Time (s) at which the envelope of a pulse in a band is largest, and its standard error (s); NaN without one.
+
+    frequency (bin,) in Hz, evenly spaced; spectrum (bin,) and noise, the mean power of noise in each bin, in the same
+    unit, squared. The band (low to high, Hz) is tapered by sin^2, so that bins at its edges do not count. With
+    a = |z| the envelope of z = sum g S exp(i w t) and w0 = Im(z'/z), the noise of its slope is that of
+    sum (w - w0) g n / sqrt 2, and the peak moves by that over a'' = Re(z'' conj z)/a + w0^2 a.
+    """
+    f, wave = np.asarray(frequency, float), np.asarray(spectrum, complex)
+    nothing = float("nan"), float("nan")
+    taper = np.sin(np.pi * np.clip((f - low) / (high - low), 0.0, 1.0)) ** 2
+    if len(f) < 3 or not np.any(taper * np.abs(wave) > 0):
+        return nothing
+    count, spacing, omega = 16 * len(f), f[1] - f[0], 2 * np.pi * f
+    top = int(np.abs(np.fft.ifft(taper * wave, count)).argmax())
+    time = float((top if top < count / 2 else top - count) / (count * spacing))
+    longest, curve, carrier = 0.5 / (count * spacing), 0.0, 0.0
+    for _ in range(8):
+        turned = taper * wave * np.exp(1j * omega * time)
+        z, slope, bend = turned.sum(), (1j * omega * turned).sum(), -(omega**2 * turned).sum()
+        height, carrier = abs(z), float((slope / z).imag)
+        curve = float((bend * np.conj(z)).real / height + carrier**2 * height)
+        if not curve < 0:
+            return nothing
+        step = float(np.clip(-(slope * np.conj(z)).real / height / curve, -longest, longest))
+        time += step
+        if abs(step) < 1e-15:
+            break
+    power = np.broadcast_to(np.asarray(noise, float), f.shape)
+    return time, float(np.sqrt(0.5 * np.sum(((omega - carrier) * taper) ** 2 * power)) / abs(curve))
+
+
 def delay_bound(energy_to_noise: npt.ArrayLike, bandwidth: npt.ArrayLike) -> Floats:
     """Cramer-Rao bound (s) on the standard error of a delay: 1/(2 pi beta d), d^2 = `energy_to_noise` = 2 E/N0.
 

@@ -102,7 +102,7 @@ def _solid_angle(plan: Plan) -> float:
     return max(angles)
 
 
-def _synthesis(plan: Plan) -> tuple[str, str, str, str, float, int]:
+def _synthesis(plan: Plan) -> Row:
     """The row of the synthesis, in seconds of the reference machine."""
     scene, sizes = plan.scene, plan.sizes
     sensor_samples = sizes["sensor"] * sizes["sample"]
@@ -169,73 +169,58 @@ def _expanded(plan: Plan) -> str:
     return f"{plan.errors.expansion:.1g} of the signals, measured at some hydrophones"
 
 
+Row = tuple[str, str, str, str, float, int]
+"""A stage as `Stage` has it, in seconds of the reference machine."""
+
+
+def _trace_rows(plan: Plan) -> list[Row]:
+    """Paths, where any product needs them, and truth."""
+    sizes = plan.sizes
+    straight = isinstance(plan.propagation, Straight)
+    kind, rows = "" if straight else "refracted ", list[Row]()
+    if plan.products:
+        traced = 1 if plan.choices.subarrays == 1 else 1 + plan.choices.subarrays
+        why = "rays bend by less than the accuracy allows" if straight else "the sound speed varies with depth"
+        seconds = _tracing(plan, kind) * max(sizes["snap"], 1) * _ways(plan) * traced
+        rows.append(("trace", _traced(plan), why, _expanded(plan), seconds, 0))
+    beams = sizes["azimuth"] * sizes["elevation"]
+    seconds = beams * SECONDS["label beam"] + _facets(plan) * SECONDS[f"label {kind}facet"]
+    return [*rows, ("label", "one ray a beam", "always", "none", seconds, beams * 10 + 4096)]
+
+
+def _signal_rows(plan: Plan) -> list[Row]:
+    """Signals, where any product needs them, and paths measured in signals of their own."""
+    rows = [_synthesis(plan)] if plan.products else []
+    if "signals" in plan.products:
+        seconds = max(plan.sizes["snap"], 1) * (plan.sizes["target"] + 1) * SECONDS["measure path"]
+        rows.append(("measure", "the loudest path of each kind alone", "verify compares levels", "none", seconds, 0))
+    return rows
+
+
+def _sonar_rows(plan: Plan) -> list[Row]:
+    """What the sonar makes of signals."""
+    if not plan.products & {"image", "cloud"}:
+        return []
+    sonar, sizes = plan.scene.sonar, plan.sizes
+    beams, gate = sizes["azimuth"] * sizes["elevation"], plan.windows.echo_stop - plan.windows.echo_start
+    kind, seconds = plan.scene.processing.locating.kind, sizes["sensor"] * SECONDS["locate sensor"]
+    rows: list[Row] = [("locate", kind, "the echo window begins at the snap", "predicted, /bearings", seconds, 512)]
+    image = sizes["sensor"] * gate * sonar.sampling_frequency * SECONDS["transform sensor sample"]
+    image += beams * (sonar.band.high - sonar.band.low) * gate * SECONDS["image beam bin"]
+    if plan.windows.direct_removed:  # and what is left of it imaged
+        image = 2 * image + sizes["sensor"] * SECONDS["remove sensor"]
+    asked = "image" in plan.products
+    why = "asked for" if asked else "needed by the cloud"
+    rows.append(("beamform", _beams(plan), why, _steered(plan), image, 4 * beams * asked))
+    if "cloud" in plan.products:
+        error, seconds = "predicted, /cloud/range_error" + _bent(plan), RANGED_BEAMS * SECONDS["range beam"]
+        rows.append(("range", plan.choices.ranging.kind, "asked for", error, seconds, 46 * beams))
+    return rows
+
+
 def stages(plan: Plan) -> tuple[Stage, ...]:
     """What each stage will do, why, its error, and what it costs in one frame."""
-    scene, sizes, factor = plan.scene, plan.sizes, machine_factor()
-    sonar, processing = scene.sonar, scene.processing
-    traced = 1 if plan.choices.subarrays == 1 else 1 + plan.choices.subarrays
-    snaps = max(sizes["snap"], 1)
-    beams = sizes["azimuth"] * sizes["elevation"]
-    gate = plan.windows.echo_stop - plan.windows.echo_start
-    bins = (sonar.band.high - sonar.band.low) * gate
-    straight = isinstance(plan.propagation, Straight)
-    kind = "" if straight else "refracted "
-    rows: list[tuple[str, str, str, str, float, int]] = []
-    if plan.products:
-        rows.append(
-            (
-                "trace",
-                _traced(plan),
-                "rays bend by less than the accuracy allows" if straight else "the sound speed varies with depth",
-                _expanded(plan),
-                _tracing(plan, kind) * snaps * _ways(plan) * traced,
-                0,
-            )
-        )
-    seconds = beams * SECONDS["label beam"] + _facets(plan) * SECONDS[f"label {kind}facet"]
-    rows.append(("label", "one ray a beam", "always", "none", seconds, beams * 10 + 4096))
-    if plan.products:
-        rows.append(_synthesis(plan))
-    if "signals" in plan.products:
-        alone = snaps * (sizes["target"] + 1) * SECONDS["measure path"]
-        rows.append(("measure", "the loudest path of each kind alone", "verify compares levels", "none", alone, 0))
-    if plan.products & {"image", "cloud"}:
-        rows.append(
-            (
-                "locate",
-                processing.locating.kind,
-                "the echo window begins at the snap",
-                "predicted, /bearings",
-                sizes["sensor"] * SECONDS["locate sensor"],
-                512,
-            )
-        )
-        transform = sizes["sensor"] * gate * sonar.sampling_frequency * SECONDS["transform sensor sample"]
-        image = transform + beams * bins * SECONDS["image beam bin"]
-        if plan.windows.direct_removed:  # and what is left of it imaged
-            image = 2 * image + sizes["sensor"] * SECONDS["remove sensor"]
-        stored = 4 * beams if "image" in plan.products else 0
-        rows.append(
-            (
-                "beamform",
-                _beams(plan),
-                "asked for" if "image" in plan.products else "needed by the cloud",
-                _steered(plan),
-                image,
-                stored,
-            )
-        )
-    if "cloud" in plan.products:
-        rows.append(
-            (
-                "range",
-                plan.choices.ranging.kind,
-                "asked for",
-                "predicted, /cloud/range_error" + _bent(plan),
-                RANGED_BEAMS * SECONDS["range beam"],
-                28 * beams,
-            )
-        )
+    rows, factor = [*_trace_rows(plan), *_signal_rows(plan), *_sonar_rows(plan)], machine_factor()
     total = sum(row[5] for row in rows)
     rows.append(("write", "zarr, blosc-zstd, crc32c", "always", "none", total * SECONDS["write byte"], 0))
     return tuple(Stage(a, b, c, d, seconds * factor, size) for a, b, c, d, seconds, size in rows)

@@ -10,6 +10,7 @@ from sonarsynth.planning.bodies import held, law_notes, mirror_notes, overlap_no
 from sonarsynth.planning.looks import Look
 from sonarsynth.planning.lost_echoes import lost_echoes
 from sonarsynth.planning.plans import Plan
+from sonarsynth.planning.sources import standing_off
 from sonarsynth.planning.supports import SUPPORT, extreme_waveforms
 from sonarsynth.planning.validity import validity
 from sonarsynth.recipe import Recipe
@@ -41,7 +42,7 @@ def notes(made: Plan, looks: Sequence[Look]) -> tuple[str, ...]:
     cancelled = scene.processing.cancelling is not None
     if made.propagation.bounces and not cancelled and made.products & {"image", "cloud"} and made.sizes["snap"]:
         found.append("the snap's own reflections enter the image: processing.cancelling takes them out before")
-    found += lost_echoes(made) + _accuracy(made)
+    found += lost_echoes(made) + _accuracy(made) + _standing_off(scene)
     for look in noted(looks):
         found += mirror_notes(look) + overlap_notes(look)
         found += _extent(look.scene, look.profile)
@@ -144,3 +145,12 @@ def _accuracy(made: Plan) -> list[str]:
             f"{allowed.image_db:g}; more scene.processing.beamforming.zones, or kind dense"
         )
     return found
+
+
+def _standing_off(scene: Scene) -> list[str]:
+    """Which shrimp the sonar does not find where it may look for them."""
+    if not (names := standing_off(scene)) or scene.processing.locating.on_bottom is False:
+        return []
+    told = scene.processing.locating.on_bottom is True
+    then = "the sonar takes it for being there" if told else "snaps are located by their wavefronts alone"
+    return [f"{', '.join(names)}: not on the bottom; {then} (scene.processing.locating.on_bottom)"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -18,7 +19,20 @@ from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Bearings, Signals
 from sonarsynth.ranging import pulses
-from sonarsynth.ranging.placing import Known, Row, as_bearings, place
+from sonarsynth.ranging.candidates import Candidate, Candidates
+from sonarsynth.ranging.placing import (
+    ACCEPTED,
+    ARRAY,
+    BAND,
+    RANGE,
+    UNFIT,
+    UNRESOLVED,
+    Known,
+    Row,
+    as_bearings,
+    place,
+    refused,
+)
 from sonarsynth.ranging.pulses import Pulse
 from sonarsynth.sonar import Elements, Sonar
 
@@ -28,11 +42,21 @@ ROBUST_ROUNDS = 3
 """Reweightings that turn outliers out of the first fit."""
 FIRST_STEPS = 3
 """Steps from the plane wave to the first sphere; a step each after that."""
+SHARED = 0.05
+"""Share of a pulse's power at the sensors that its wavefront may leave unexplained, unless it is the noise's own:"""
+AUDIBLE = 4.0
+"""no more than this factor over the power of the quiet."""
 MAX_LAG = 0.15
 """A pulse whose lags exceed this share of a period (root mean square, band centre) is not one wavefront."""
 
-Bend = Callable[[Floats], tuple[Floats, Floats]]
-"""Of a source position (xyz), sonar frame: delays (sensor,) beyond straight paths (s), and arrival direction (xyz)."""
+
+@dataclass(frozen=True, eq=False)
+class Bend:
+    """What bent rays do."""
+
+    delays: Callable[[Floats], Floats]  # of a source (xyz), sonar frame: beyond those of straight paths (sensor,), in s
+    sound_speed: float  # m/s of the water at the array
+    gradient: float  # 1/s: what is allowed for before a place is known
 
 
 @lru_cache(maxsize=16)
@@ -56,53 +80,71 @@ def locate(
     snaps: int,
     bend: Bend | None = None,
     gradient: float = 0.0,
+    on_bottom: bool = True,
 ) -> Bearings:
     """The `snaps` loudest direct pulses, loudest first; see `ranging.SensorDelays`.
 
     Paths bend as `bend` says; without it they are taken for straight, and the errors hold what a `gradient` (1/s) of
-    the sound speed may do.
+    the sound speed may do. Pulses that are refused follow those that are not, loudest first.
     """
-    rows: list[Row] = []
-    if unlocatable(elements) is None and signals.pressure.shape[1] > 0:
-        live = elements.gain != 0
-        half = pulses.transit(elements, sonar.assumed_sound_speed) + 2 * pulses.PULSE_HALF
-        width = int(2 * half * signals.sampling_frequency) | 1
-        loud = pulses.loudness(signals, live, width)
-        known = Known(elements, sonar, pose, bed_depth, gradient, pulses.rounding(signals, loud.peak))
-        track = loud.track.copy()
-        for _ in range(4 * snaps):
-            top = int(track.argmax())
-            if len(rows) == snaps or not track[top] > pulses.QUIET * loud.quiet:
-                break
-            row = _row(signals, known, signals.start + top / signals.sampling_frequency, half, bend)
-            if row is not None:
-                rows.append(row)
-            track[max(top - width, 0) : top + width + 1] = 0.0
-    return as_bearings(rows, snaps)
+    if unlocatable(elements) is not None:
+        return as_bearings([], snaps, ARRAY)
+    if pulses.half_length(sonar.band) > pulses.LONGEST_HALF:
+        return as_bearings([], snaps, BAND)
+    if not signals.pressure.shape[1] or not snaps:
+        return as_bearings([], snaps)
+    live = elements.gain != 0
+    half = pulses.transit(elements, sonar.assumed_sound_speed) + 2 * pulses.half_length(sonar.band)
+    width = int(2 * half * signals.sampling_frequency) | 1
+    loud = pulses.loudness(signals, live, width)
+    rounding = pulses.rounding(signals, loud.peak, pulses.half_length(sonar.band))
+    quiet = pulses.quiet_bin(loud.quiet, int(live.sum()), sonar.band, pulses.half_length(sonar.band))
+    known = Known(elements, sonar, pose, bed_depth, gradient, rounding, quiet, on_bottom)
+    track, heard = loud.track.copy(), Candidates(known)
+    for _ in range(4 * snaps):
+        top = _loudest(track, heard, signals, snaps)
+        if top is None or not track[top] > pulses.QUIET * loud.quiet:
+            break
+        centre = signals.start + top / signals.sampling_frequency
+        heard.found.append(Candidate(centre, float(track[top]), candidate(signals, known, centre, half, bend)))
+        track[max(top - width, 0) : top + width + 1] = 0.0
+    return as_bearings(heard.rows, snaps)
 
 
-def _row(signals: Signals, known: Known, centre: float, half: float, bend: Bend | None) -> Row | None:
-    elements, sonar, pose = known.elements, known.sonar, known.pose
+def _loudest(track: Floats, heard: Candidates, signals: Signals, snaps: int) -> int | None:
+    """Where the signals are loudest; once enough snaps are found, before the first of them: it may be an echo."""
+    if heard.accepted < snaps:
+        return int(track.argmax())
+    first = min(each.centre for each in heard.found if each.row.reason in (ACCEPTED, RANGE))
+    before = track[: max(round((first - signals.start) * signals.sampling_frequency), 0)]
+    return int(before.argmax()) if before.any() else None
+
+
+def candidate(signals: Signals, known: Known, centre: float, half: float, bend: Bend | None) -> Row:
+    """The loudest pulse about `centre` (s) by itself; refused where its data do not support a place."""
+    elements, sonar = known.elements, known.sonar
     found = fit_pulse(signals, elements, sonar, centre, half)
-    if found is None:
-        return None
+    if isinstance(found, int):
+        return refused(found)
     wave, pulse = found
-    row = place(wave, pulse, known)
-    if bend is not None and np.all(np.isfinite(row.position)):
-        for _ in range(3):  # delays beyond straight ones change little with the place: this settles at once
-            extra, arrival = bend(row.position)
-            row = place(_refit(pulse, wave, elements, sonar, extra), pulse, known, arrival)
-    height = pose.to_world(row.position)[2]
-    reach = 3 * np.sqrt(max(pose.rotation[2] @ row.covariance @ pose.rotation[2], 0.0))
-    if height > reach:  # the image of a snap in the surface
-        return None
+    if pulse.share > SHARED and pulse.noise > AUDIBLE * known.quiet:
+        return refused(UNRESOLVED)
+    if bend is None:
+        return place(wave, pulse, known)
+    heard = _refit(pulse, wave, elements, bend.sound_speed, 0.0, sonar.assumed_sound_speed)
+    row = place(wave, pulse, replace(known, gradient=bend.gradient), heard)
+    for _ in range(3):  # delays beyond straight ones change little with the place: this settles at once
+        extra = bend.delays(row.position)
+        if not np.all(np.isfinite(extra)):
+            break
+        row = place(_refit(pulse, wave, elements, sonar.assumed_sound_speed, extra), pulse, known, heard)
     return row
 
 
 def fit_pulse(
     signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float
-) -> tuple[Wavefront, Pulse] | None:
-    """Wavefront of the pulse about `centre` (s), and the pulse as measured last; None where it is no single wavefront.
+) -> tuple[Wavefront, Pulse] | int:
+    """Wavefront of the pulse about `centre` (s), and the pulse as measured last; or why it is refused, of REASONS.
 
     Envelope peaks of the sensors give eq. 6 in closed form, then the sphere, robustly; then the sensors are aligned
     and their lags measured coherently, until these settle.
@@ -112,7 +154,7 @@ def fit_pulse(
     delay, height = pulses.envelope_peaks(cut, signals.sampling_frequency, sonar.band)
     wave = _robust_wave(start + delay, height * (elements.gain != 0), q, c)
     if wave is None:
-        return None
+        return UNFIT
     expected = wave.time + wavefront_delays(q, wave.direction, wave.curvature, c)
     aligned = pulses.align(signals, elements, sonar.band, expected)
     for _ in range(ROUNDS):
@@ -120,11 +162,11 @@ def fit_pulse(
         delay = wave.time + wavefront_delays(q, wave.direction, wave.curvature, c) + pulse.lag
         better = fit_wave(delay, q, c, pulse.weight, wave, 1)
         if better is None:
-            return None
+            return UNFIT
         wave = better
     rms = np.sqrt(pulse.weight @ wave.residual**2 / pulse.weight.sum())
     if not rms < MAX_LAG / sonar.band.centre:
-        return None
+        return UNFIT
     return wave, pulse
 
 
@@ -162,8 +204,18 @@ def _robust_wave(delay: Floats, height: Floats, position: Floats, sound_speed: f
     return wave
 
 
-def _refit(pulse: Pulse, wave: Wavefront, elements: Elements, sonar: Sonar, extra: Floats) -> Wavefront:
-    """The straight wave that is left when the delays `extra` (sensor,) of bending are taken away."""
-    q, c = elements.position, sonar.assumed_sound_speed
-    delay = wave.time + wavefront_delays(q, wave.direction, wave.curvature, c) + wave.residual - extra
-    return fit_wave(delay, q, c, pulse.weight, wave) or wave
+def _refit(
+    pulse: Pulse,
+    wave: Wavefront,
+    elements: Elements,
+    speed: float,
+    extra: Floats | float,
+    measured: float | None = None,
+) -> Wavefront:
+    """The straight wave at `speed` (m/s) that is left when delays `extra` (sensor,) in s are taken away.
+
+    measured: the speed (m/s) that `wave` was fitted with, where it is another.
+    """
+    q = elements.position
+    own = wavefront_delays(q, wave.direction, wave.curvature, measured or speed)
+    return fit_wave(wave.time + own + wave.residual - extra, q, speed, pulse.weight, wave) or wave

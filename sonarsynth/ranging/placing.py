@@ -1,4 +1,4 @@
-"""From a wavefront and the depth of the bed to a place, with the errors to expect."""
+"""From a wavefront, and the depth of the bottom where it agrees, to a place, with the errors to expect."""
 
 from __future__ import annotations
 
@@ -6,13 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import next_fast_len
 
-from sonarsynth.acoustics.bearings import Wavefront, rms_bandwidth
+from sonarsynth.acoustics.bearings import Wavefront, envelope_peak
 from sonarsynth.conventions import Floats, azimuth_elevation
 from sonarsynth.geometry import Pose
-from sonarsynth.products import Bearings
-from sonarsynth.ranging import pulses
+from sonarsynth.products import REASONS, Bearings
 from sonarsynth.ranging.pulses import Pulse
 from sonarsynth.sonar import Elements, Sonar
 from sonarsynth.world.environment import Profile
@@ -20,6 +18,19 @@ from sonarsynth.world.environment import Profile
 FLOOR = 1e-9
 """Standard error (s) of a lag without any noise: what cutting the pulse's tail off does. Biases of 0.01 to 0.2 ns of
 curvature at the rim have been seen, which is what independent errors six times as large would leave."""
+TIME_FLOOR = 0.01
+"""Standard error of the time without any noise, in units of 1/bandwidth: absorption, and what is cut, skew a pulse."""
+AGREES = 9.0
+"""The bottom is used where innovation squared over variance is no more: three standard errors, since a source that
+stands off the bottom by less than the wavefront can tell is pulled there."""
+FARTHEST = 0.2
+"""Standard error of the range, in ranges, above which the range is unknown: errors of such a place are no ellipsoid."""
+STEPS = 5
+"""Linear steps to where wavefront and bottom meet, at most."""
+SETTLED = 0.01
+"""A step, in standard errors, after which no other is taken."""
+
+ACCEPTED, SILENT, ARRAY, BAND, UNFIT, UNRESOLVED, OUTSIDE, ECHO, RANGE = range(len(REASONS))
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +46,11 @@ class Row:
     position: Floats
     covariance: Floats
     residual: float
+    bottom_used: int
+    reason: int
+    curvature: tuple[float, float]  # 1/m: value, error; of the straight wave over the array
+    chord: Floats  # (xyz) unit vector towards the source, where the wavefront alone puts it
+    amplitude: float  # Pa: of the pulse at the array centre, peak of the envelope, the face's response removed
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +63,18 @@ class Known:
     bed_depth: float  # m
     gradient: float  # 1/s: size of the gradient of sound speed that rays taken for straight may have met; 0 for none
     rounding: float  # (Pa s)^2: power in a bin of what the converter and single precision round off
+    quiet: float  # (Pa s)^2: power in a bin of the noise at a sensor
+    on_bottom: bool = True  # whether sources may be taken to be on the bottom, where the wavefront agrees
+
+
+@dataclass(frozen=True, eq=False)
+class Fix:
+    """Direction and curvature of a source with their errors, in the tangents of the wavefront."""
+
+    direction: Floats  # (xyz)
+    curvature: float
+    covariance: Floats  # (3, 3) of (along tangents, curvature)
+    used: bool  # whether the bottom was
 
 
 def mean_gradient(profile: Profile, depth: float, other: float, least: float) -> float:
@@ -86,102 +114,169 @@ def bending_covariance(
     return covariance
 
 
-def place(wave: Wavefront, pulse: Pulse, known: Known, arrival: Floats | None = None) -> Row:
-    """Ranges and position from a wavefront and the depth of the bed; errors through the Jacobians.
+def place(wave: Wavefront, pulse: Pulse, known: Known, heard: Wavefront | None = None) -> Row:
+    """Ranges and position from a wavefront, and the depth of the bottom where it agrees; errors through the Jacobians.
 
-    arrival: the direction (xyz) of the arriving wave, where `wave` is the straight one that is left without bending.
+    heard: the wave as the array hears it, where `wave` is the straight one that is left without bending. The direction
+    is always that of the wave as heard.
     """
     elements, sonar, pose = known.elements, known.sonar, known.pose
+    heard = heard or wave
     timing = _variance(wave, pulse, known.rounding) * wave.covariance
     full = timing + np.outer(wave.by_sound_speed, wave.by_sound_speed) * sonar.sound_speed_error**2
     if not np.isfinite(full[2, 2]):  # too few sensors to tell the curvature: anything outside the array
         full[2, 2] = 1 / elements.aperture**2
-    u, t, k = wave.direction, wave.tangents, wave.curvature
-    up = pose.rotation[2]
-    fall = -known.bed_depth - pose.position[2]  # the snap stands this much above the sonar (negative: below it)
-    slope = float(up @ u)
-    by_angle = t @ up
-    fused = _fuse(wave, full, fall, slope, by_angle, sonar.bed_depth_error)
+    spread = full[:2, :2]
+    around = spread[0, 0] / max(1 - heard.direction[2] ** 2, 1e-300)
+    fall = -known.bed_depth - pose.position[2]  # the bottom is this much above the sonar (negative: below it)
+    slope, by_angle = float(pose.rotation[2] @ wave.direction), wave.tangents @ pose.rotation[2]
+    from_depth = fall / slope if slope * fall > 0 else np.nan
     straight = full
+    fix = _fuse(wave, straight, fall, known)
     for _ in range(2 * (known.gradient > 0)):  # what bending does depends on the distance, and that a little on bending
-        distance = float(np.linalg.norm(fused[0]))
+        likely = [1 / fix.curvature if fix.curvature > 0 else np.nan, from_depth, elements.aperture]
+        distance = next(d for d in likely if np.isfinite(d))
         full = straight + bending_covariance(
             by_angle, slope, distance, known.gradient, sonar.assumed_sound_speed, elements.aperture
         )
-        fused = _fuse(wave, full, fall, slope, by_angle, sonar.bed_depth_error)
-    spread = full[:2, :2]
+        fix = _fuse(wave, full, fall, known)
     with np.errstate(divide="ignore", invalid="ignore"):
-        from_depth = fall / slope if slope * fall > 0 else np.nan
-        depth_error = np.hypot(from_depth * np.sqrt(by_angle @ spread @ by_angle), sonar.bed_depth_error) / abs(slope)
-        from_curvature = 1 / k if k > 0 else np.nan
+        depth_error = np.hypot(from_depth * np.sqrt(by_angle @ full[:2, :2] @ by_angle), sonar.bed_depth_error)
+        from_curvature = 1 / wave.curvature if wave.curvature > 0 else np.nan
         curvature_error = np.sqrt(full[2, 2]) * from_curvature**2
-    offset, width = _envelope_time(pulse)
-    seen = u if arrival is None else arrival
-    around = spread[0, 0] / max(1 - u[2] ** 2, 1e-300)
+    reason = RANGE if not np.sqrt(fix.covariance[2, 2]) <= FARTHEST * fix.curvature else ACCEPTED
+    if not _in_water(wave, full, slope, by_angle, fall, known):
+        reason = OUTSIDE
+    time, time_error = _arrival(pulse, full, timing[3, 3] / max(wave.covariance[3, 3], 1e-300), sonar, known.rounding)
+    if not np.isfinite(time):
+        reason = BAND
+    position, covariance = _position(wave, fix)
+    known_place = reason == ACCEPTED
     return Row(
-        time=pulse.time + offset,
-        time_error=float(np.hypot(np.sqrt(timing[3, 3]), width)),
-        direction=seen,
+        time=pulse.time + time,
+        time_error=time_error,
+        direction=heard.direction,
         angle_error=np.sqrt([around, spread[1, 1]]),
-        range_from_depth=(from_depth, depth_error),
+        range_from_depth=(from_depth, float(depth_error) / abs(slope) if np.isfinite(from_depth) else np.nan),
         range_from_curvature=(from_curvature, curvature_error),
-        position=fused[0],
-        covariance=fused[1],
+        position=position if known_place else np.full(3, np.nan),
+        covariance=covariance if known_place else np.full((3, 3), np.nan),
         residual=float(np.sqrt(pulse.weight @ wave.residual**2 / pulse.weight.sum())),
+        bottom_used=int(fix.used) if known_place else -1,
+        reason=reason,
+        curvature=(wave.curvature, float(np.sqrt(full[2, 2]))),
+        chord=wave.direction,
+        amplitude=float(np.sqrt(np.sum(np.abs(pulse.template) ** 2))),
     )
 
 
-def _fuse(
-    wave: Wavefront, covariance: Floats, fall: float, slope: float, by_angle: Floats, depth_error: float
-) -> tuple[Floats, Floats]:
-    """Position and covariance from the wavefront and from the depth: slope - k fall = 0 within |k| depth_error.
+def _fuse(wave: Wavefront, covariance: Floats, fall: float, known: Known) -> Fix:
+    """The wavefront, and where it agrees the depth: slope - k fall = 0 within |k| times the error of the depth.
 
-    slope is the sine of the bearing's elevation in the world, by_angle (2,) its derivatives along the tangents, fall
-    (m) the height of the snap above the sonar. In (tangents, curvature) the condition is linear and the far field is
-    no special case. Where depth and curvature disagree by more than their errors the covariance is scaled up by the
-    disagreement (Birge's ratio).
+    slope is the sine of the bearing's elevation in the world, fall (m) the height of the bottom above the sonar. In
+    (tangents, curvature) the far field is no special case, and the condition is nearly linear: it is made linear anew
+    where each step has led (Gauss and Newton), and not used where that does not settle.
     """
-    u, k, p = wave.direction, wave.curvature, covariance[:3, :3]
-    step = np.zeros(3)
-    if slope * fall > 0:
-        row = np.array([*by_angle, -fall])
-        innovation = k * fall - slope
-        noise = (max(abs(k), slope / fall) * depth_error) ** 2  # near the horizontal the depth says nothing of k
-        variance = float(row @ p @ row) + noise
-        gain = p @ row / variance
-        step = gain * innovation
-        keep = np.eye(3) - np.outer(gain, row)  # Joseph's form: no variance can come out negative
-        p = (keep @ p @ keep.T + np.outer(gain, gain) * noise) * max(1.0, innovation**2 / variance)
-    k = k + step[2]
+    u, k, p, up = wave.direction, wave.curvature, covariance[:3, :3], known.pose.rotation[2]
+    alone = Fix(u, k, p, False)
+    slope, by_angle = float(up @ u), wave.tangents @ up
+    if not (known.on_bottom and slope * fall > 0):
+        return alone
+    # near the horizontal the depth says nothing of k
+    noise = (max(abs(k), slope / fall) * known.sonar.bed_depth_error) ** 2
+    row = np.array([*by_angle, -fall])
+    variance = float(row @ p @ row) + noise
+    if not (k * fall - slope) ** 2 <= AGREES * variance:
+        return alone
+    step, scale = np.zeros(3), np.sqrt(np.maximum(np.diag(p), 1e-300))
+    for _ in range(STEPS):
+        u = _turned(wave, step)
+        row = np.array([*(wave.tangents @ up) / np.linalg.norm(wave.direction + step[:2] @ wave.tangents), -fall])
+        missed = (k + step[2]) * fall - float(up @ u)
+        gain = p @ row / (float(row @ p @ row) + noise)
+        last, step = step, gain * (missed + row @ step)
+        if np.max(np.abs(step - last) / scale) < SETTLED:
+            break
+    else:
+        return alone
+    keep = np.eye(3) - np.outer(gain, row)  # Joseph's form: no variance can come out negative
+    return Fix(_turned(wave, step), k + float(step[2]), keep @ p @ keep.T + np.outer(gain, gain) * noise, True)
+
+
+def _turned(wave: Wavefront, step: Floats) -> Floats:
+    u = wave.direction + step[:2] @ wave.tangents
+    return np.asarray(u / np.linalg.norm(u))
+
+
+def _position(wave: Wavefront, fix: Fix) -> tuple[Floats, Floats]:
+    """Position (xyz) and covariance of a fix."""
+    u, k = fix.direction, fix.curvature
     if not k > 0:
         return np.full(3, np.nan), np.full((3, 3), np.nan)
-    u = u + step[:2] @ wave.tangents
-    u = u / np.linalg.norm(u)
     jacobian = np.stack([wave.tangents[0] / k, wave.tangents[1] / k, -u / k**2], axis=1)
-    return u / k, jacobian @ p @ jacobian.T
+    return u / k, jacobian @ fix.covariance @ jacobian.T
 
 
-def _envelope_time(pulse: Pulse) -> tuple[float, float]:
-    """Where the pulse's envelope peaks, s after the template's time 0, and the pulse's own width 1/(2 pi beta) (s)."""
-    f, w = pulse.frequency, pulse.template
-    spacing = f[1] - f[0] if len(f) > 1 else 0.5 / pulses.PULSE_HALF
-    count = next_fast_len(16 * len(f))
-    envelope = np.abs(np.fft.ifft(w, count))
-    top = int(envelope.argmax())
-    place, _ = pulses.parabola(envelope[top - 1], envelope[top], envelope[(top + 1) % count])
-    index = (top + float(place) + count / 2) % count - count / 2
-    beta = rms_bandwidth(f, w, centred=True)
-    return index / (count * spacing), 1 / (2 * np.pi * beta) if beta > 0 else 1 / spacing
+def _in_water(wave: Wavefront, covariance: Floats, slope: float, by_angle: Floats, fall: float, known: Known) -> bool:
+    """Whether the wavefront alone can come from between surface and bottom, within three standard errors.
+
+    The images of a snap in surface and bottom lie beyond them. Asked of the curvature: the source may be anywhere on
+    the bearing this side of the boundary, k room >= slope. An array under the bottom (a shelf overhead) knows none.
+    """
+    k, p = wave.curvature, covariance[:3, :3]
+    room = fall if slope < 0 else -float(known.pose.position[2])
+    if fall > 0 or slope * room <= 0:
+        return True
+    row = np.array([*by_angle, -room])
+    slack = (max(abs(k), slope / room) * known.sonar.bed_depth_error) ** 2 if slope < 0 else 0.0
+    beyond = (slope - k * room) * np.sign(room)
+    return bool(beyond <= 3 * np.sqrt(float(row @ p @ row) + slack))
 
 
-def as_bearings(rows: list[Row], snaps: int) -> Bearings:
-    """Rows as `Bearings` of `snaps` rows, NaN beyond those there are."""
+def _arrival(pulse: Pulse, full: Floats, unit: float, sonar: Sonar, rounding: float) -> tuple[float, float]:
+    """Where the pulse's envelope peaks, s after the template's time 0, and the standard error of that time (s).
+
+    The error is that of the envelope of the mean pulse, and what direction and curvature add at the array centre: of
+    the fitted time's variance all but the least, that of the mean of the lags; `unit` is the variance of a lag of
+    weight one.
+    """
+    noise = max(pulse.noise, rounding) / np.maximum(pulse.power, 1e-300)
+    time, error = envelope_peak(pulse.frequency, pulse.template, sonar.band.low, sonar.band.high, noise)
+    tilted = max(float(full[3, 3]) - unit / float(np.sum(pulse.weight)), 0.0)
+    floor = TIME_FLOOR / (sonar.band.high - sonar.band.low)
+    return time, float(np.sqrt(error**2 + tilted + floor**2))
+
+
+def refused(reason: int) -> Row:
+    """A row of which nothing is known but why."""
+    none, pair = np.full(3, np.nan), (np.nan, np.nan)
+    return Row(
+        np.nan,
+        np.nan,
+        none,
+        none[:2],
+        pair,
+        pair,
+        none,
+        np.full((3, 3), np.nan),
+        np.nan,
+        -1,
+        reason,
+        pair,
+        none,
+        np.nan,
+    )
+
+
+def as_bearings(rows: list[Row], snaps: int, reason: int = SILENT) -> Bearings:
+    """Rows as `Bearings` of `snaps` rows; NaN beyond those there are, for a reason."""
+    rows = [*rows[:snaps], *[refused(reason)] * (snaps - len(rows))]
 
     def column(get: Callable[[Row], object], *shape: int) -> Floats:
-        values = np.full((snaps, *shape), np.nan)
-        for i, row in enumerate(rows):
-            values[i] = get(row)
-        return values
+        return np.array([get(row) for row in rows], float).reshape(snaps, *shape)
+
+    def ints(get: Callable[[Row], int]) -> np.ndarray:
+        return np.array([get(row) for row in rows], np.int64)
 
     return Bearings(
         time=column(lambda r: r.time),
@@ -197,4 +292,6 @@ def as_bearings(rows: list[Row], snaps: int) -> Bearings:
         position=column(lambda r: r.position, 3),
         position_covariance=column(lambda r: r.covariance, 3, 3),
         residual=column(lambda r: r.residual),
+        bottom_used=ints(lambda r: r.bottom_used),
+        reason=ints(lambda r: r.reason),
     )

@@ -19,6 +19,10 @@ Complexes = npt.NDArray[np.complex128]
 
 PULSE_HALF = 160e-6
 """Half length (s) of what is kept round a pulse after alignment: the snap in band and the ringing of its filter."""
+LONGEST_HALF = 2e-3
+"""The same at most (s): bands whose pulses last longer tell no direct pulse from its echoes."""
+PERIODS = 2.0
+"""The same in units of the inverse of the bandwidth, where that is more."""
 DEAF = 1e-4
 """Mean square response (of one sensor on its axis) below which a bin counts as not heard at all."""
 QUIET = 2.0
@@ -35,6 +39,8 @@ class Pulse:
     lag: Floats  # (sensor,) s: delay of each sensor after the wavefront
     weight: Floats  # (sensor,) (Pa s/s)^2: sum over bins of |2 pi f M|^2, inverse variance of a lag per noise power
     noise: float  # (Pa s)^2: mean power in a bin of what the model does not explain
+    power: Floats  # (bin,) sum over sensors of their responses squared: so much less noise is in the template
+    share: float  # of the power of the pulse at the sensors: what the model does not explain
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +64,23 @@ def loudness(signals: Signals, live: npt.NDArray[np.bool_], length: int) -> Loud
     return Loudness(np.maximum(track, 0.0), float(max(quiet, 0.0)), peak)
 
 
-def rounding(signals: Signals, peak: float) -> float:
-    """Mean power in a bin, (Pa s)^2, of what the converter (a count) and single precision (of `peak`, Pa) round off."""
+def quiet_bin(quiet: float, live: int, band: Band, half: float) -> float:
+    """Mean power in a bin, (Pa s)^2, of noise at a sensor, at most: `quiet` (Pa2) of `live` sensors, in the band."""
+    return quiet / max(live, 1) * half / (band.high - band.low)
+
+
+def half_length(band: Band) -> float:
+    """Half length (s) of what is kept round a pulse: a band's narrowest pulse lasts 1/bandwidth."""
+    return max(PULSE_HALF, PERIODS / (band.high - band.low))
+
+
+def rounding(signals: Signals, peak: float, half: float = PULSE_HALF) -> float:
+    """Mean power in a bin, (Pa s)^2, of what the converter (a count) and single precision (of `peak`, Pa) round off.
+
+    Of spectra of 2 `half` (s).
+    """
     step = signals.quantum**2 + (float(np.finfo(np.float32).eps) * peak) ** 2
-    return step / 12 * 2 * PULSE_HALF / signals.sampling_frequency
+    return step / 12 * 2 * half / signals.sampling_frequency
 
 
 def transit(elements: Elements, sound_speed: float) -> float:
@@ -124,7 +143,7 @@ def align(signals: Signals, elements: Elements, band: Band, time: Floats, *, who
     time, not with the samples, so that every sensor's pulse is cut alike.
     """
     rate = signals.sampling_frequency
-    half = max(int(PULSE_HALF * rate), 4)
+    half = max(int((PULSE_HALF if whole else half_length(band)) * rate), 4)
     place = (time - signals.start) * rate
     cut = kernels.cut_out(signals.pressure, place, half, elements.gain / rate)
     f = _frequencies(2 * half, rate)
@@ -141,6 +160,7 @@ class Wave:
     template: Complexes  # (bin,) Pa s: the wave at the array centre, face directivity removed
     heard: Complexes  # (sensor, bin) Pa s, moved to the centre
     response: Floats  # (sensor, bin) of a sensor to the wave at the centre
+    power: Floats  # (bin,) sum over sensors of the response squared
 
 
 def waveform(
@@ -161,7 +181,7 @@ def waveform(
     shift = time + wavefront_delays(elements.position, direction, curvature, sound_speed) - aligned.time
     heard = kernels.turned(aligned.spectrum, shift, first, aligned.spacing)
     total, power = kernels.template_sums(heard, response)
-    return Wave(total / (power + DEAF * elements.count), heard, response)
+    return Wave(total / (power + DEAF * elements.count), heard, response, power)
 
 
 def measure(
@@ -178,8 +198,10 @@ def measure(
     lag = slope / np.where(weight > 0, weight, np.inf)
     live = elements.gain != 0
     freedom = max(2 * (np.sum(live) - 1) * len(omega) - np.sum(live), 1)
-    noise = 2 * float(np.sum(rest[live])) / freedom
-    return Pulse(aligned.frequency, wave.template, time, lag, weight, noise)
+    left = float(np.sum(rest[live]))
+    held = float(wave.power @ np.abs(wave.template) ** 2)
+    share = left / (held + left) if held + left > 0 else 1.0
+    return Pulse(aligned.frequency, wave.template, time, lag, weight, 2 * left / freedom, wave.power, share)
 
 
 def template_spectrum(template: Complexes, length: int) -> Complexes:

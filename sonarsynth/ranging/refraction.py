@@ -52,17 +52,17 @@ def first_rays(profile: Profile, start: Floats, end: Floats) -> FirstRays:
     return FirstRays(time, departure, arrival)
 
 
-def bending(profile: Profile, elements: Elements, pose: Pose, sound_speed: float) -> Bend:
-    """What rays through the profile add to straight delays at `sound_speed` (m/s) over the array (`locating.Bend`)."""
+def bending(profile: Profile, elements: Elements, pose: Pose, sound_speed: float, gradient: float) -> Bend:
+    """What rays through the profile add to straight delays at `sound_speed` (m/s) over the array."""
     sensors = np.vstack([elements.position, np.zeros(3)])
 
-    def bend(source: Floats) -> tuple[Floats, Floats]:
+    def delays(source: Floats) -> Floats:
         rays = first_rays(profile, pose.to_world(source)[None], pose.to_world(sensors))
         straight = np.linalg.norm(source - sensors, axis=1) / sound_speed
         extra = rays.travel_time - straight
-        return extra[:-1] - extra[-1], -pose.turn_to_body(rays.arrival[-1])
+        return np.asarray(extra[:-1] - extra[-1])
 
-    return bend
+    return Bend(delays, float(profile.at(-pose.position[2])), gradient)
 
 
 def refracted_solution(

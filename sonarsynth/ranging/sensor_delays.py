@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 from sonarsynth.description import description
@@ -27,6 +28,14 @@ class SensorDelays:
     """Trace the bearing through the sound-speed profile of the water; otherwise paths are straight, at the sonar's
     assumed sound speed, and predicted errors hold what a gradient g may do: r g/(2c) in angle, r^2 g/(2c) in place."""
 
+    on_bottom: bool | None = None
+    """Whether sources are known to be on the bottom. True: its depth is used where the wavefront agrees;
+    false (pingers, vehicles, fish): places are those of the wavefront alone. Left out: as the sources of the recipe."""
+
+    def resolve(self, *, on_bottom: bool) -> SensorDelays:
+        """With what the recipe says of its sources, where this is left out."""
+        return self if self.on_bottom is not None else replace(self, on_bottom=on_bottom)
+
     def locate(
         self,
         signals: Signals,
@@ -41,10 +50,12 @@ class SensorDelays:
         from sonarsynth.ranging.locating import locate
         from sonarsynth.ranging.placing import mean_gradient
 
+        on_bottom = self.on_bottom is not False
+        gradient = mean_gradient(profile, -float(sonar_pose.position[2]), bed_depth, elements.aperture)
+        where = signals, elements, sonar, sonar_pose, bed_depth, snaps
         if not self.refraction:
-            gradient = mean_gradient(profile, -float(sonar_pose.position[2]), bed_depth, elements.aperture)
-            return locate(signals, elements, sonar, sonar_pose, bed_depth, snaps, gradient=gradient)
+            return locate(*where, gradient=gradient, on_bottom=on_bottom)
         from sonarsynth.ranging.refraction import bending
 
-        bend = bending(profile, elements, sonar_pose, sonar.assumed_sound_speed)
-        return locate(signals, elements, sonar, sonar_pose, bed_depth, snaps, bend=bend)
+        bend = bending(profile, elements, sonar_pose, sonar.assumed_sound_speed, gradient)
+        return locate(*where, bend=bend, on_bottom=on_bottom)

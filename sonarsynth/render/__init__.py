@@ -17,9 +17,11 @@ import numpy as np
 from sonarsynth.conventions import Floats
 from sonarsynth.labelling import SLICES, Band, Listening, echoes, label, label_points, ledger, path_powers
 from sonarsynth.planning import Plan, arrivals_of, check_unseen, plan
+from sonarsynth.planning.sources import standing_off
 from sonarsynth.products import Arrivals, Bearings, Echoes, EnergyImage, Ledger, PointCloud, PointLabels, Signals, Truth
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import Recipe
+from sonarsynth.render.estimates import emission_values, estimate_truth, heard_directly
 from sonarsynth.render.hearing import hear
 from sonarsynth.render.imaging import image_of, no_image
 from sonarsynth.render.laps import LAPS, counted, lap
@@ -183,9 +185,8 @@ def process(plan: Plan, frame: Frame, signals: Signals) -> Heard:
     """What the sonar makes of signals: where the snap is, and the energy image of the echo window."""
     processing, sonar, environment = plan.scene.processing, plan.scene.sonar, plan.scene.world.environment
     snaps = plan.sizes["snap"]
-    bearings = processing.locating.locate(
-        signals, plan.elements, sonar, frame.sonar_pose, environment.depth, snaps, plan.profile
-    )
+    locating = processing.locating.resolve(on_bottom=not standing_off(plan.scene))
+    bearings = locating.locate(signals, plan.elements, sonar, frame.sonar_pose, environment.depth, snaps, plan.profile)
     lap("locate")
     heard = float(bearings.time[0]) if snaps else np.nan
     start, stop = heard + plan.windows.echo_start, heard + plan.windows.echo_stop
@@ -236,13 +237,15 @@ def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
     frame = traced.frame
     values = _of_frame(plan, frame) | truth_values(traced.truth) | echo_values(traced.echoes, traced.arrivals)
     values |= ledger_values(traced.ledger, heard.isolated)
+    direct = heard_directly(plan, traced.arrivals, frame.moment.snaps)
+    values |= estimate_truth(direct, len(frame.moment.snaps))
     if "signals" in plan.products:
         counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
         values |= signal_values(heard.signals, counts)
     if heard.image is None or heard.bearings is None or heard.imaged is None:
         lap("collect")
         return values
-    values |= bearing_values(heard.bearings)
+    values |= bearing_values(heard.bearings) | emission_values(plan, direct, heard.bearings)
     if "image" in plan.products:
         values |= image_values(heard.image, plan.windows.direct_removed)
     lap("collect")

@@ -9,7 +9,7 @@ import numpy as np
 from sonarsynth.labelling.views import View
 from sonarsynth.show.reading import built, bytes_of, echo_levels, mesh_group, needed, read
 from sonarsynth.store import Folder
-from sonarsynth.verification import bounds, brightest_beam_on_target, range_errors, snap_located
+from sonarsynth.verification import bounds, brightest_beam_on_target, range_errors
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -89,9 +89,8 @@ def _agreement(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
     checks = []
     if "image" in tree.children:
         checks.append(brightest_beam_on_target(tree, frames))
-    if "bearings" in tree.children:
-        checks.append(snap_located(tree, frames))
     if "cloud" in tree.children:
         checks += range_errors(tree, frames)
-    warnings = [check.warning for check in [*checks, *bounds(tree, frames)] if check.warning]
+    checks += bounds(tree, frames)
+    warnings = [check.warning for check in checks if check.warning]
     return [*(f"  {check.name}: {check.got}" for check in checks), *(f"  warning: {warning}" for warning in warnings)]

@@ -6,8 +6,10 @@ from dataclasses import replace
 from typing import Any
 
 from sonarsynth.planning import Plan
-from sonarsynth.variables.groups import LEDGER_COMMENT, VARIABLES, Variable
+from sonarsynth.variables.groups import VARIABLES
 from sonarsynth.variables.static import coordinates
+from sonarsynth.variables.truth import LEDGER_COMMENT
+from sonarsynth.variables.variable import Variable
 
 __all__ = ["FORMAT_VERSION", "LEDGER_COMMENT", "VARIABLES", "Variable", "attributes", "coordinates", "variables"]
 

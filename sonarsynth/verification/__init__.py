@@ -7,8 +7,8 @@ import xarray as xr
 
 from sonarsynth.verification.beams import beam_width, brightest_beam_on_target, near_target
 from sonarsynth.verification.bounds import bounds, warnings
+from sonarsynth.verification.estimates import snap_located
 from sonarsynth.verification.ledger import INAUDIBLE, LEDGER_TOLERANCE, ledger_adds_up, ledger_measured
-from sonarsynth.verification.places import snap_located
 from sonarsynth.verification.points import kinds, points, range_errors
 from sonarsynth.verification.reading import Check, every, numbered
 
@@ -52,8 +52,6 @@ def check(tree: xr.DataTree) -> list[Check]:
         checks.append(nothing_outside(tree, built))
     if "image" in tree.children:
         checks.append(brightest_beam_on_target(tree, built))
-    if "bearings" in tree.children:
-        checks.append(snap_located(tree, built))
     if "cloud" in tree.children:
         checks.extend(range_errors(tree, built))
     return checks + bounds(tree, built)

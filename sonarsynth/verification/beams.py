@@ -38,6 +38,15 @@ def near_target(tree: xr.DataTree, truth: np.ndarray) -> np.ndarray:
     return np.asarray(binary_dilation(truth >= 0, x * x + y * y <= steps * steps))
 
 
+def refused(tree: xr.DataTree, frame: int) -> bool:
+    """Whether the snap that would be the clock was refused, and says why."""
+    if "bearings" not in tree.children or "reason" not in tree["bearings"].dataset:
+        return False
+    return bool(of_frame(tree, "bearings/reason", frame)[0] > 0) and not np.isfinite(
+        of_frame(tree, "bearings/time", frame)[0]
+    )
+
+
 def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
     """The brightest beam of each frame lies on a target, or within one beam width of its outline.
 
@@ -48,8 +57,8 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
         energy, truth = of_frame(tree, "image/energy", i), of_frame(tree, "truth/target", i)
         if not ((truth >= 0).any() and echoes_heard(tree, i)):
             continue
-        if not np.isfinite(energy).any():  # no clock, no image: a miss, unless no snap could be heard
-            hit, counts = False, bool(snaps_heard(tree, i).any())
+        if not np.isfinite(energy).any():  # no clock, no image: a miss, unless no snap could be heard or made out
+            hit, counts = False, bool(snaps_heard(tree, i).any()) and not refused(tree, i)
         else:
             hit, counts = bool(near_target(tree, truth)[np.unravel_index(np.nanargmax(energy), energy.shape)]), True
         seen += counts

@@ -8,15 +8,12 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from sonarsynth.geometry import Pose
 from sonarsynth.store import Folder, Remote, folder_of
 from sonarsynth.store.place import opens
 from sonarsynth.verification.beams import beam_width
+from sonarsynth.verification.estimates import snap_located
 from sonarsynth.verification.points import has_labels, points, range_errors
-from sonarsynth.verification.reading import Check, every, numbered, of_frame
-
-HALF = 0.5
-"""Of its distance: a snap that is further off its place than this is not located."""
+from sonarsynth.verification.reading import Check, every, numbered
 
 FRAMES, FRAMES_REMOTE, CELLS = 200, 24, 20_000_000
 """Frames that are looked at after a build, of a store on this machine and elsewhere, and cells of their beam grids."""
@@ -48,45 +45,11 @@ def useful_ranges(tree: xr.DataTree, frames: np.ndarray) -> Check:
     return Check(name, expected, got, None, numbers, numbered(np.unique(frame[over[0] | over[1]])), warning)
 
 
-def useful_snaps(tree: xr.DataTree, frames: np.ndarray) -> Check:
-    """Whether snaps are located to half of their distance at least, by their errors and by predicted ones."""
-    name, expected = "snaps useful", "reported"
-    shares, predicted, where = [], [], []
-    for i in frames:
-        pose = Pose(of_frame(tree, "truth/sonar_position", i), of_frame(tree, "truth/sonar_orientation", i))
-        true = pose.to_body(of_frame(tree, "truth/snap_position", i))
-        found, covariance = of_frame(tree, "bearings/position", i), of_frame(tree, "bearings/position_covariance", i)
-        for row in np.flatnonzero(np.isfinite(found).all(axis=1)):
-            error = np.linalg.norm(true - found[row], axis=1)
-            which = _emission(tree, i, int(row), error)
-            if which < 0:
-                continue
-            shares.append(error[which] / np.linalg.norm(true[which]))
-            predicted.append(np.sqrt(np.trace(covariance[row])) / np.linalg.norm(found[row]))
-            where.append(i)
-    if not shares:
-        return Check(name, expected, "no snap located", None, {})
-    middle = float(np.median(shares)), float(np.median(predicted))
-    numbers = {"share": middle[0], "predicted_share": middle[1]}
-    got = f"error {100 * middle[0]:.2g} % of the distance, predicted {100 * middle[1]:.2g} %, medians"
-    if max(middle) <= HALF:
-        return Check(name, expected, got, None, numbers)
-    spoiled = np.unique(np.array(where)[np.fmax(shares, predicted) > HALF])
-    return Check(name, expected, got, None, numbers, numbered(spoiled), f"snaps are not located: {got}")
-
-
-def _emission(tree: xr.DataTree, frame: int, row: int, error: np.ndarray) -> int:
-    """The snap that a bearing is of: as stored, -1 for none; the nearest in a store that does not say."""
-    if "emission" in tree["bearings"].dataset:
-        return int(of_frame(tree, "bearings/emission", frame)[row])
-    return int(np.argmin(error))
-
-
 def bounds(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
     """What of a store is of use, whatever it claims."""
     checks = []
     if "bearings" in tree.children:
-        checks.append(useful_snaps(tree, frames))
+        checks.append(snap_located(tree, frames))
     if has_labels(tree):
         checks.append(useful_ranges(tree, frames))
     return checks

@@ -13,7 +13,8 @@ import xarray as xr
 class Check:
     """One line of the report. `ok` is None where a figure is reported, or the store has nothing to check.
 
-    `frames` are those that are not as they should be, where that can be said of a frame.
+    `frames` are those that are not as they should be, where that can be said of a frame. `warning`: a line on data that
+    are as they say, but of little use; the check holds all the same.
     """
 
     name: str

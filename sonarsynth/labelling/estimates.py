@@ -1,0 +1,78 @@
+"""Which true snap each estimate came from: a label, found from the paths of the frame. Locating knows nothing of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints, azimuth_elevation
+from sonarsynth.conventions import direction as towards
+from sonarsynth.products import Arrivals, Bearings
+
+SIGMAS = 4.0
+"""Standard errors within which an estimate may miss its snap."""
+PULSES = 1.0
+"""The same in units of 1/bandwidth: arrivals nearer in time are one to the array."""
+BEAMS = 0.25
+"""The same in half-power beam widths at the centre of the band."""
+
+
+@dataclass(frozen=True, eq=False)
+class Direct:
+    """Direct paths of snaps, that met neither surface nor bottom nor target, as the array centre hears them."""
+
+    snap: Ints  # (path,)
+    time: Floats  # (path,) s: of the peak of the pulse's envelope in the band
+    direction: Floats  # (path, xyz) unit vector towards where it comes from, sonar frame
+
+
+def direct_paths(arrivals: Arrivals, envelope: Callable[[int, float], float]) -> Direct:
+    """The direct paths of a frame.
+
+    envelope: of the index of a snap, and the absorption on its way (dB at the centre of the band): when the envelope of
+    its pulse peaks in the band, s after its collapse.
+    """
+    chosen = arrivals.at_centre
+    kept = chosen.direct & (chosen.surface == 0) & (chosen.bottom == 0)
+    some = chosen.select(kept)
+    order = np.lexsort((some.delay, some.snap))
+    snap = some.snap[order]
+    late = [envelope(int(n), float(loss)) for n, loss in zip(snap, some.absorption[order], strict=True)]
+    return Direct(snap, some.delay[order] + np.array(late), some.direction[order])
+
+
+def heard_first(direct: Direct, snaps: int) -> tuple[Floats, Floats, Floats]:
+    """Arrival (s), azimuth and elevation (rad) of the first direct path of each snap (snap,); NaN without one."""
+    time, azimuth, elevation = np.full((3, snaps), np.nan)
+    snap, first = np.unique(direct.snap, return_index=True)  # sorted by time
+    time[snap] = direct.time[first]
+    azimuth[snap], elevation[snap] = azimuth_elevation(direct.direction[first])
+    return time, azimuth, elevation
+
+
+def emissions(bearings: Bearings, direct: Direct, bandwidth: float, beam: float) -> Ints:
+    """Index of the snap that each estimate (row,) came from, by time and direction; -1 for none.
+
+    An estimate comes from the nearest direct path within its predicted errors and what the array resolves in time
+    (1/`bandwidth`, Hz) and direction (`beam`, rad: half-power beam width). Nearest: by both, in those units. An image
+    in surface or bottom, or an echo, is no snap.
+    """
+    found = np.full(len(bearings.time), NO_TARGET)
+    if not len(direct.snap):
+        return found
+    with np.errstate(invalid="ignore"):
+        seen = towards(bearings.azimuth, bearings.elevation)
+        late = np.abs(bearings.time[:, None] - direct.time)
+        aside = np.linalg.norm(seen[:, None] - direct.direction, axis=2)
+        turned = np.hypot(bearings.azimuth_error * np.cos(bearings.elevation), bearings.elevation_error)
+        far = np.hypot(
+            late / (SIGMAS * bearings.time_error + PULSES / bandwidth)[:, None],
+            aside / (SIGMAS * turned + BEAMS * beam)[:, None],
+        )
+    far = np.where(np.isfinite(far), far, np.inf)
+    nearest = far.argmin(axis=1)
+    near: Bools = far[np.arange(len(found)), nearest] <= 1.0
+    found[near] = direct.snap[nearest[near]]
+    return found
