@@ -214,7 +214,7 @@ def _text(text: str) -> str:
 
 def _paragraphs(text: str) -> str:
     """A text of several paragraphs."""
-    parts = (_BEGINS.sub(r"\1\\\2", _text(part)) for part in re.split(r"\n\s*\n", str(text)))
+    parts = (_begun(_text(part)) for part in re.split(r"\n\s*\n", str(text)))
     return "\n\n".join(part for part in parts if part)
 
 
@@ -223,7 +223,12 @@ def _code(text: str) -> str:
 
 
 def _quoted(text: str) -> str:
-    return "\n".join(f"> {_BEGINS.sub(r'\1\\\2', _text(line))}".rstrip() for line in str(text).splitlines())
+    return "\n".join(f"> {_begun(_text(line))}".rstrip() for line in str(text).splitlines())
+
+
+def _begun(line: str) -> str:
+    """A line that begins as plain text."""
+    return _BEGINS.sub(r"\1\\\2", line)
 
 
 def _mapping(value: Any) -> Mapping[str, Any]:
