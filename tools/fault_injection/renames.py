@@ -66,7 +66,6 @@ def _go_on(ground: Ground, what: str, moved: Path) -> None:
         or not store.verify(moved, quick=True).ok
     ):
         ground.wrong.append(f"{what}: not the same under its new name")
-    shutil.rmtree(moved.parent if how == "the folder above" else moved)
 
 
 def _move(ground: Ground, how: str, moved: Path) -> None:
