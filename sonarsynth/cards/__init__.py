@@ -11,8 +11,8 @@ from pathlib import Path
 from sonarsynth.cards.croissant import croissant
 from sonarsynth.cards.facts import Facts, facts_of
 from sonarsynth.cards.markdown import markdown
-from sonarsynth.store import Folder, absolute, beside, folder_of
-from sonarsynth.store.place import write_atomically
+from sonarsynth.store import Damage, Folder, Mismatch, absolute, beside, folder_of
+from sonarsynth.store.place import read_beside, write_atomically
 
 __all__ = ["Facts", "croissant", "facts_of", "markdown", "write"]
 
@@ -26,7 +26,11 @@ def write(store: Folder | str, folder: Folder | str | None = None) -> tuple[Fold
     """
     store = absolute(store)
     facts = facts_of(store)
-    texts = {"card.md": markdown(facts), "croissant.json": json.dumps(croissant(facts), indent=2) + "\n"}
+    try:
+        texts = {"card.md": markdown(facts), "croissant.json": json.dumps(croissant(facts), indent=2) + "\n"}
+    except (TypeError, ValueError, KeyError, AttributeError, IndexError, RecursionError) as error:
+        kind = type(error).__name__
+        raise Damage(f"{store}: what it says of itself is not of the types that a store has ({kind})") from None
     files = [beside(store, suffix) for suffix in texts]
     if folder is not None:
         folder = folder_of(folder)
@@ -34,5 +38,14 @@ def write(store: Folder | str, folder: Folder | str | None = None) -> tuple[Fold
             folder.mkdir(parents=True, exist_ok=True)
         files = [folder / file.name for file in files]
     for file, text in zip(files, texts.values(), strict=True):
-        write_atomically(file, text.encode())
+        if _there(file) != text.encode():
+            write_atomically(file, text.encode())
     return files[0], files[1]
+
+
+def _there(file: Folder) -> bytes:
+    """What a file holds; nothing where it is none that we wrote."""
+    try:
+        return read_beside(file)
+    except (OSError, Mismatch):
+        return b""

@@ -81,7 +81,7 @@ def croissant(facts: Facts) -> dict[str, Any]:
         "name": facts.title,
         "description": facts.summary,
         "license": _licence(str(facts.attributes.get("licence", ""))),
-        "url": str(dataset.get("url", "")) or facts.url or f"./{facts.name}",
+        "url": _address(dataset.get("url")) or facts.url or f"./{facts.name}",
         "creator": _creators(facts),
         "datePublished": created or "1970-01-01",
         "dateCreated": facts.created,
@@ -94,6 +94,11 @@ def croissant(facts: Facts) -> dict[str, Any]:
         "recordSet": [*_split_set(facts), *_records(facts)],
     }
     return {name: value for name, value in found.items() if value not in ("", [])}
+
+
+def _address(url: Any) -> str:
+    """An address of a page; "" for what does something else where it is followed."""
+    return str(url) if str(url).startswith(("https://", "http://")) else ""
 
 
 def _licence(text: str) -> str:
@@ -110,7 +115,7 @@ def _creators(facts: Facts) -> list[dict[str, Any]]:
         entry = {
             "@type": "sc:Organization" if creator.get("organisation") else "sc:Person",
             "name": creator.get("name", ""),
-            "url": creator.get("url", ""),
+            "url": _address(creator.get("url")),
         }
         if creator.get("affiliation"):
             entry["affiliation"] = {"@type": "sc:Organization", "name": creator["affiliation"]}

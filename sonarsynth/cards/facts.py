@@ -10,7 +10,7 @@ from typing import Any
 
 from sonarsynth.store import Folder, Remote, beside, must_be_store, root_attributes
 from sonarsynth.store.marks import Damage, Mark, load_layout, load_marks, marked
-from sonarsynth.store.place import FileRecord
+from sonarsynth.store.place import FileRecord, read, read_beside
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,7 @@ class Facts:
     files: int
     bytes: int
     aside: Mapping[str, int]  # frames set aside, by what went wrong
+    mixed: Mapping[str, int]  # frames made with other libraries than the rest, by these
 
     @property
     def frames(self) -> int:
@@ -129,6 +130,7 @@ def facts_of(store: Folder) -> Facts:
     """Read what there is to say. Raises Mismatch where there is no store of ours, Damage where it cannot be read."""
     must_be_store(store)
     complete = files = size = 0
+    mixed: Counter[str] = Counter()
     layout = load_layout(store)
     records = {} if layout is None else dict(layout.files)
     for _, mark in load_marks(store, marked(store)):
@@ -137,6 +139,9 @@ def facts_of(store: Folder) -> Facts:
             there = [bytes_ for bytes_, _ in mark.files.values() if bytes_ >= 0]
             files += len(there)
             size += sum(there)
+            others = _mapping(mark.attributes.get("versions"))
+            if others:
+                mixed[", ".join(f"{name} {number}" for name, number in others.items())] += len(mark.frames)
     return Facts(
         name=store.name,
         url=str(store) if isinstance(store, Remote) else "",
@@ -147,12 +152,13 @@ def facts_of(store: Folder) -> Facts:
         files=files + len(records),
         bytes=size + sum(bytes_ for bytes_, _ in records.values()),
         aside=_aside(store),
+        mixed=mixed,
     )
 
 
 def _arrays(store: Folder) -> tuple[Array, ...]:
     try:
-        members = json.loads((store / "zarr.json").read_bytes())["consolidated_metadata"]["metadata"]
+        members = json.loads(read(store, "zarr.json"))["consolidated_metadata"]["metadata"]
         found = [
             Array(
                 path, tuple(m.get("dimension_names") or ()), tuple(m["shape"]), _type(m["data_type"]), m["attributes"]
@@ -173,7 +179,7 @@ def _aside(store: Folder) -> dict[str, int]:
     """Frames that were set aside, counted by the kind of what went wrong."""
     last: dict[int, str] = {}
     try:
-        lines = beside(store, "aside.jsonl").read_text("utf-8", errors="replace").splitlines()
+        lines = read_beside(beside(store, "aside.jsonl")).decode("utf-8", errors="replace").splitlines()
     except OSError:
         return {}
     for line in lines:

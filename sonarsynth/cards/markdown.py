@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
@@ -17,8 +18,21 @@ LIMITS: Final = (
 )
 """What holds of every dataset."""
 
+DIGESTS: Final = (
+    "That finds damage, not forgery: who changes a store can write its digests anew. For that, compare `SHA-256` of "
+    "what you have with a list from its makers."
+)
+"""What digests prove, and what they do not."""
+
 _MOST_LINES: Final = 400
 """Lines of a recipe that a card shows."""
+
+
+_MARKUP: Final = re.compile(r"([\\`*\[\]|~$])")
+"""What has a meaning within a line; `_` within a word has none."""
+
+_BEGINS: Final = re.compile(r"^(\d*)([#>+\-=:.)_])")
+"""What has one at its beginning."""
 
 
 def markdown(facts: Facts) -> str:
@@ -54,18 +68,21 @@ def _head(facts: Facts) -> str:
         ("begun", facts.created),
         ("licence", str(facts.attributes.get("licence", ""))),
     ]
-    return "\n\n".join([f"# {_text(facts.title)}", facts.summary, _table(("", ""), [r for r in rows if r[1]])])
+    title, summary = _text(facts.title), _paragraphs(facts.summary)
+    return "\n\n".join([f"# {title}", summary, _table(("", ""), [r for r in rows if r[1]])])
 
 
 def _loading(facts: Facts) -> str:
     example = next((a for a in facts.arrays if a.framed and a.group == "image"), None) or next(
         (a for a in facts.arrays if a.framed and a.group), None
     )
-    lines = ["import xarray as xr", f'tree = xr.open_datatree("{facts.url or facts.name}", engine="zarr")']
+    where = facts.url or facts.name
+    lines = ["import xarray as xr", f'tree = xr.open_datatree({json.dumps(where)}, engine="zarr")']
     if example is not None:
-        lines.append(f'first = tree["{example.path}"].isel(frame=0)  # {example.meaning}, {example.units}')
-    code = "```python\n" + "\n".join(lines) + "\n```"
-    return f"{code}\n\n`sonarsynth verify {facts.url or facts.name}` compares every file with its digest."
+        said = f"{example.meaning}, {example.units}"
+        lines.append(f"first = tree[{json.dumps(example.path)}].isel(frame=0)  # {' '.join(said.split())}")
+    code = "```python\n" + "\n".join(lines).replace("`", "'") + "\n```"
+    return f"{code}\n\n{_code(f'sonarsynth verify {where}')} compares every file with its digest. {DIGESTS}"
 
 
 def _variables(facts: Facts) -> str:
@@ -73,7 +90,7 @@ def _variables(facts: Facts) -> str:
     for group, arrays in groupby(facts.arrays, key=lambda a: a.group):
         rows = [
             (
-                f"`{a.path.rpartition('/')[2]}`",
+                Cell(_code(a.path.rpartition("/")[2])),
                 ", ".join(f"{d} {n}" for d, n in zip(a.dims, a.shape, strict=True)) or "one value",
                 a.dtype,
                 a.units,
@@ -81,7 +98,7 @@ def _variables(facts: Facts) -> str:
             )
             for a in arrays
         ]
-        parts.append(f"### `/{group}`\n\n" + _table(("name", "dimensions", "type", "units", "meaning"), rows))
+        parts.append(f"### {_code(f'/{group}')}\n\n" + _table(("name", "dimensions", "type", "units", "meaning"), rows))
     return "\n\n".join(parts)
 
 
@@ -117,6 +134,10 @@ def _limits(facts: Facts) -> str:
     if facts.complete < facts.frames:
         lines.append(f"{facts.frames - facts.complete} of {facts.frames} frames are not there.")
     lines += [f"{count} frames were set aside ({why})." for why, count in facts.aside.items()]
+    lines += [
+        f"{count} frames were made with other libraries than the rest ({which}): last digits may differ."
+        for which, count in facts.mixed.items()
+    ]
     return "\n".join(f"- {_text(line)}" for line in lines)
 
 
@@ -182,21 +203,37 @@ def _rows(found: Any, names: Sequence[str]) -> list[tuple[str, ...]]:
     return [tuple(str(_mapping(row).get(name, "")) for name in names) for row in rows]
 
 
+class Cell(str):
+    """A text that is markup already."""
+
+
 def _cell(text: str) -> str:
-    return _text(text).replace("|", "\\|")
+    return text.replace("|", "\\|") if isinstance(text, Cell) else _text(text)
 
 
 def _text(text: str) -> str:
-    """A text of the recipe as a part of a line: no tags, no new lines."""
-    return " ".join(text.split()).replace("<", "&lt;")
+    """A text of the store as a part of a line, and nothing else: no tags, links, code or tables, no new lines."""
+    plain = _MARKUP.sub(r"\\\1", " ".join(str(text).split()))
+    return plain.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+
+
+def _paragraphs(text: str) -> str:
+    """A text of several paragraphs."""
+    parts = (_begun(_text(part)) for part in re.split(r"\n\s*\n", str(text)))
+    return "\n\n".join(part for part in parts if part)
 
 
 def _code(text: str) -> str:
-    return "`" + " ".join(text.split()).replace("`", "'") + "`"
+    return "`" + " ".join(str(text).split()).replace("`", "'") + "`"
 
 
 def _quoted(text: str) -> str:
-    return "\n".join(f"> {line}".rstrip() for line in text.replace("<", "&lt;").splitlines())
+    return "\n".join(f"> {_begun(_text(line))}".rstrip() for line in str(text).splitlines())
+
+
+def _begun(line: str) -> str:
+    """A line that begins as plain text."""
+    return _BEGINS.sub(r"\1\\\2", line)
 
 
 def _mapping(value: Any) -> Mapping[str, Any]:

@@ -106,6 +106,13 @@ def build(
     insecure: Annotated[
         bool, typer.Option("--insecure", help="Use a scheduler on another machine without TLS.")
     ] = False,
+    mixed_versions: Annotated[
+        bool,
+        typer.Option("--mixed-versions", help="Resume with other numeric libraries, and mark those frames."),
+    ] = False,
+    dashboard: Annotated[
+        bool, typer.Option("--dashboard", help="Start Dask's dashboard; every user of this machine can read it.")
+    ] = False,
     predicting: Annotated[
         bool, typer.Option("--predict/--no-predict", help="Predict time and size first, and compare afterwards.")
     ] = True,
@@ -132,8 +139,8 @@ def build(
     with printing.progress() as progress:
         report = schedule.build(
             plan, store, frames=wanted, workers=workers, scheduler=scheduler, restart=restart,
-            retry_failed=retry_failed, agreed=agreed, insecure=insecure, progress=progress,
-            announce=printing.announce, **bounds,
+            retry_failed=retry_failed, agreed=agreed, insecure=insecure, mixed_versions=mixed_versions,
+            dashboard=dashboard, progress=progress, announce=printing.announce, **bounds,
             prediction=prediction, source=source,
         )  # fmt: skip
     report.warnings = tuple(verification.warnings(store))

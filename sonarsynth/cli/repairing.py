@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -25,6 +26,10 @@ def repair(
     anyway: Annotated[
         bool, typer.Option("--anyway", help="Though another version of sonarsynth built it: says if numbers differ.")
     ] = False,
+    files: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Where files that the recipe names are; none is opened outside of it."),
+    ] = None,
     quick: Annotated[
         bool, typer.Option("--quick", help="Compare files with their digests; do not read every number back.")
     ] = False,
@@ -48,6 +53,7 @@ def repair(
             anyway=anyway,
             quick=quick,
             insecure=insecure,
+            files=files,
             progress=progress,
         )
     if as_json:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, fields, replace
 from typing import Final
 
@@ -16,7 +17,8 @@ from sonarsynth.schedule.predicting import Prediction, predict
 from sonarsynth.schedule.report import BuildReport, Course, Progress
 from sonarsynth.schedule.space import Room, TooLarge, check_space, told_when_full
 from sonarsynth.schedule.tasks import Failure
-from sonarsynth.store import Folder
+from sonarsynth.store import Damage, Folder, Mismatch, provenance
+from sonarsynth.store.creating import plain_recipe, spelled
 
 __all__ = ["BuildReport", "Failure", "Prediction", "Progress", "TooLarge", "build", "predict", "usable_cores"]
 
@@ -38,6 +40,8 @@ def build(
     worker_memory: int | None = None,
     agreed: bool = False,
     insecure: bool = False,
+    mixed_versions: bool = False,
+    dashboard: bool = False,
     progress: Progress | None = None,
     announce: Callable[[str], None] | None = None,
     prediction: Prediction | None = None,
@@ -55,8 +59,10 @@ def build(
     A frame that raises is set aside, and on worker processes one that crashes, that takes `frame_timeout` seconds for a
     stage (left out: by the plan; 0: no limit), or whose worker takes more than `worker_memory` bytes (left out: its
     share of the machine's); `retry_failed` tries those of earlier builds again. `agreed` builds what needs more than is
-    free, or over 1 TB; `insecure` uses a scheduler on another machine without TLS. `announce` gets the dashboard's
-    address. A `prediction` of `schedule.predicting.predict` is compared with what is measured. The text of the recipe
+    free, or over 1 TB; `insecure` uses a scheduler on another machine without TLS; `mixed_versions` goes on with other
+    versions of libraries that touch numbers than the store was begun with, and marks those frames. `dashboard` starts
+    that of Dask on 127.0.0.1, where every user of this machine can read it; `announce` gets its address. A `prediction`
+    of `schedule.predicting.predict` is compared with what is measured. The text of the recipe
     is kept where its `source` is given (`config.read`).
 
     `path` may be a URL that fsspec knows, such as s3://bucket/remus.zarr: the files beside it are objects there, but
@@ -78,8 +84,10 @@ def build(
     still = lambda: _room(made, max(len(chosen) - report.there - report.written, 1))  # noqa: E731
     with told_when_full(path, still), store.lock(path) as name:
         made = made if restart else _as_begun(path, made)
-        report.notes = made.warnings
-        store.create(path, made, restart=restart, source=source)
+        store.create(path, made, restart=restart, source=source, mixed_versions=mixed_versions)
+        report.notes = (*made.warnings, *_notes(path, scheduler))
+        if workers != 0:
+            _check_files(path, made)
         earlier = {} if restart else _set_aside(path)
         left = set() if retry_failed else earlier.keys() & set(chosen)
         todo = store.missing(path, made, [frame for frame in chosen if frame not in left])
@@ -90,7 +98,7 @@ def build(
         report.failures = [earlier[frame] for frame in sorted(left)]
         _tidy(path, lacking, earlier, restart)
         course = Course(path, report, len(lacking), progress, announce)
-        with course.logged(made):
+        with course.logged(made), _dashboard(dashboard):
             job = job_of(path, made, name, frame_timeout)
             make_shards(
                 job, made, todo, course.done, workers=workers, scheduler=scheduler, memory=worker_memory,
@@ -101,12 +109,39 @@ def build(
 
 
 def _describe(path: Folder, report: BuildReport, prediction: Prediction | None) -> None:
-    """Put the card beside the store, and what was predicted into its times."""
-    if report.written or not store.beside(path, "card.md").exists():
-        cards.write(path)
+    """Put the card beside the store, whoever wrote what it tells of, and what was predicted into its times."""
+    cards.write(path)
     if prediction is not None:
         report.prediction = prediction.against(report)
         append_lines(store.here(path, "times.jsonl"), [{"build": report.prediction}])
+
+
+def _notes(path: Folder, scheduler: str | None) -> list[str]:
+    """What a user should know of a build that goes on all the same."""
+    odd = provenance.other_versions(store.root_attributes(path))
+    notes = [f"frames written now are by other libraries than the store was begun with ({spelled(odd)})"] if odd else []
+    if scheduler is not None and not scheduler.startswith(("tls://", "wss://", "inproc://")):
+        notes.append(f"{scheduler} is not encrypted: whoever reaches it can run code on it and here")
+    return notes
+
+
+def _check_files(path: Folder, made: Plan) -> None:
+    """Raise Mismatch where a store's recipe, which worker processes follow, names files that this one does not."""
+    stored = set(provenance.paths(plain_recipe(store.root_attributes(path))))
+    odd = sorted(stored - set(provenance.paths(made.recipe.as_json())))
+    if odd:
+        raise Mismatch(
+            f"{path}: its recipe names {odd[0]}, which this one does not: --workers 0 goes on without opening it, "
+            "--restart begins anew"
+        )
+
+
+def _dashboard(shown: bool) -> AbstractContextManager[None]:
+    if not shown:
+        return nullcontext()
+    from sonarsynth.schedule import connecting
+
+    return connecting.dashboard_shown()
 
 
 def _as_begun(path: Folder, made: Plan) -> Plan:
@@ -114,7 +149,10 @@ def _as_begun(path: Folder, made: Plan) -> Plan:
     there = store.root_attributes(path)
     if there.get("recipe_digest") != made.digest or "choices" not in there:
         return made
-    return replace(made, choices=choices_from(there["choices"]))
+    try:
+        return replace(made, choices=choices_from(there["choices"]))
+    except ValueError:
+        raise Damage(f"{path}: its choices cannot be read: --restart begins anew") from None
 
 
 def _check(
@@ -157,6 +195,8 @@ def _tidy(path: Folder, again: set[int], earlier: Mapping[int, Failure], restart
     if restart:
         for old in ("times.jsonl", "log.jsonl"):
             store.here(path, old).unlink(missing_ok=True)
+        for old in ("card.md", "croissant.json"):  # of what was there before
+            store.beside(path, old).unlink(missing_ok=True)
     aside = store.beside(path, "aside.jsonl")
     kept = [asdict(failure) for frame, failure in earlier.items() if frame not in again]
     if aside.exists():

@@ -1,4 +1,9 @@
-"""Dask clients: of fresh processes on this machine, on loopback alone, or of a running scheduler."""
+"""Dask clients: of fresh processes on this machine, on loopback alone, or of a running scheduler.
+
+Whoever reaches a Dask scheduler can run code as the one who started it, and every user of a machine reaches its
+loopback. So scheduler, workers and client of ours speak TLS, with a key that is made for the run and asked of both
+sides; it is handed from process to process through pipes. There is no web server either, unless it is asked for.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +15,16 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from multiprocessing import resource_tracker
-from typing import Final
+from typing import Any, Final
 from urllib.parse import urlsplit
 
 import dask
 from distributed import Client, LocalCluster, Security, Worker, WorkerPlugin
 from distributed.system import MEMORY_LIMIT
+
+from sonarsynth.store.provenance import differing, numeric_versions
 
 ONE_THREAD: Final = dict.fromkeys(
     ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
@@ -53,6 +61,36 @@ CLOSING_IN_HASTE: Final = 4.0
 
 HEAP: Final = 0.9
 """Part of a worker's memory that its arrays may take: beyond it a frame gets a MemoryError, and the worker lives on."""
+
+
+NO_PAGES: Final[dict[str, Any]] = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
+"""Settings of a cluster without a dashboard."""
+
+_dashboard: ContextVar[bool] = ContextVar("dashboard", default=False)
+
+
+@contextmanager
+def dashboard_shown() -> Iterator[None]:
+    """Clusters that are started meanwhile have Dask's dashboard: HTTP on 127.0.0.1, for every user of the machine."""
+    before = _dashboard.set(True)
+    try:
+        yield
+    finally:
+        _dashboard.reset(before)
+
+
+class NoPages(WorkerPlugin):
+    """Closes the web server that every worker starts."""
+
+    def setup(self, worker: Worker) -> None:
+        """Close it."""
+        worker.http_server.stop()
+
+
+class _Client(Client):
+    """A client of a cluster without a dashboard."""
+
+    dashboard_link = ""
 
 
 class MemoryLimit(WorkerPlugin):
@@ -107,7 +145,7 @@ def _loopback(host: str) -> bool:
 
 @contextmanager
 def connected(workers: int, scheduler: str | None = None, memory: int | None = None) -> Iterator[Client]:
-    """A client of the scheduler at an address, or of `workers` fresh processes on this machine (loopback only).
+    """A client of the scheduler at an address, or of `workers` fresh processes on this machine (loopback only, TLS).
 
     Each of these may take `memory` bytes (None: its share of the machine's). Raises NoScheduler.
     """
@@ -116,13 +154,15 @@ def connected(workers: int, scheduler: str | None = None, memory: int | None = N
             yield client
         return
     each = memory or MEMORY_LIMIT // max(workers, 1)
-    with dask.config.set(_SETTINGS):
+    shown = _dashboard.get()
+    with dask.config.set(_SETTINGS | ({} if shown else NO_PAGES)):
         with _interrupts_put_off() as interrupted:
             try:
-                cluster = _local_cluster(workers, each)
+                cluster = _local_cluster(workers, each, shown)
             except RuntimeError:  # a worker was killed while it started; or none can, and the second says so
-                cluster = _local_cluster(workers, each)
-            client = Client(cluster, set_as_default=False)
+                cluster = _local_cluster(workers, each, shown)
+            kind: Any = Client if shown else _Client
+            client = kind(cluster, set_as_default=False)
         patience = CLOSING_IN_HASTE
         try:
             if interrupted:
@@ -139,22 +179,32 @@ def connected(workers: int, scheduler: str | None = None, memory: int | None = N
 
 def _client_of(scheduler: str) -> Client:
     try:
-        return Client(scheduler, set_as_default=False)
+        client = Client(scheduler, set_as_default=False)
     except (OSError, ValueError) as error:
         raise NoScheduler(f"{scheduler}: no Dask scheduler answers there: {' '.join(str(error).split())}") from error
+    ours = numeric_versions()
+    for worker, theirs in client.run(numeric_versions).items():
+        odd = differing(theirs, ours)
+        if odd:
+            client.close()
+            raise NoScheduler(f"{worker} has other libraries than this process: {odd}: frames would differ")
+    return client
 
 
-def _local_cluster(workers: int, memory: int) -> LocalCluster:
+def _local_cluster(workers: int, memory: int, dashboard: bool) -> LocalCluster:
+    limit = MemoryLimit(int(HEAP * memory))
     try:
-        return LocalCluster(
+        cluster = LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
             processes=True,
             host="127.0.0.1",
+            security=Security.temporary(),
             dashboard_address="127.0.0.1:0",
             worker_dashboard_address="127.0.0.1:0",
+            scheduler_kwargs={"dashboard": dashboard},
             memory_limit=memory,
-            plugins=(MemoryLimit(int(HEAP * memory)),),
+            plugins=(limit,) if dashboard else (limit, NoPages()),
             silence_logs=logging.CRITICAL,
             env=ONE_THREAD,
         )
@@ -162,6 +212,14 @@ def _local_cluster(workers: int, memory: int) -> LocalCluster:
         raise RuntimeError(
             'no worker process could start: in a script, build under `if __name__ == "__main__":`, or with workers=0'
         ) from error
+    if not dashboard:
+        _close_pages(cluster)
+    return cluster
+
+
+def _close_pages(cluster: Any) -> None:
+    """Close the web server that every scheduler starts."""
+    cluster.loop.add_callback(cluster.scheduler.http_server.stop)
 
 
 @contextmanager

@@ -9,16 +9,16 @@ from __future__ import annotations
 
 import faulthandler
 import json
+import os
 import re
-import shutil
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TextIO
 
-from sonarsynth.store import here
+from sonarsynth.store import here, scratch
 
 LONGEST: Final = 20_000
 """Characters of a traceback that are kept."""
@@ -35,14 +35,14 @@ class Entry:
 
 
 def open_folder(store: str) -> None:
-    """Make the folder for the workers of a build, empty."""
-    close_folder(store)
-    here(store, "doing").mkdir()
+    """Make the folder for the workers of a build, empty. Raises Mismatch where something that is not ours is there."""
+    scratch.make(here(store, "doing"))
 
 
 def close_folder(store: str) -> None:
-    """Remove the folder."""
-    shutil.rmtree(here(store, "doing"), ignore_errors=True)
+    """Remove the folder. Raises Mismatch where something that is not ours is in its place."""
+    with suppress(OSError):  # a worker that is still about may write there
+        scratch.clear(here(store, "doing"))
 
 
 def read(store: str, worker: str) -> Entry | None:
@@ -97,7 +97,8 @@ def _mine(store: str) -> TextIO | None:
             old.close()
         _open.clear()
         try:
-            _open[file] = file.open("w+", encoding="utf-8")
+            handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o666)
+            _open[file] = os.fdopen(handle, "w+", encoding="utf-8")
         except OSError:  # the build has ended
             return None
         faulthandler.enable(_open[file])

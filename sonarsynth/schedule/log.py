@@ -10,8 +10,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
-from sonarsynth.store.place import Folder, remove, write_atomically
+from sonarsynth.store.place import Folder, read_beside, write_atomically
 from sonarsynth.store.remote import Remote
+from sonarsynth.store.within import open_own
 
 PROGRESS_EVERY: Final = 10.0
 """Seconds between two events `progress`."""
@@ -24,8 +25,7 @@ def append_lines(file: Folder, rows: Sequence[Mapping[str, Any]]) -> None:
     if isinstance(file, Remote):
         write_lines(file, [*read_lines(file), *rows])
         return
-    handle = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
-    with os.fdopen(handle, "ab", buffering=0) as out:
+    with os.fdopen(open_own(file, os.O_WRONLY | os.O_CREAT | os.O_APPEND), "ab", buffering=0) as out:
         out.write("".join(json.dumps(row) + "\n" for row in rows).encode())
 
 
@@ -34,20 +34,20 @@ def write_lines(file: Folder, rows: Sequence[Mapping[str, Any]]) -> None:
     if rows:
         write_atomically(file, "".join(json.dumps(row) + "\n" for row in rows).encode())
     else:
-        remove(file)
+        file.unlink(missing_ok=True)
 
 
 def read_lines(file: Folder) -> list[dict[str, Any]]:
     """Rows of a file of JSON lines, [] where there is none; a line cut off by a crash is left out."""
     try:
-        lines = file.read_text("utf-8", errors="replace").splitlines()
+        lines = read_beside(file).decode("utf-8", errors="replace").splitlines()
     except FileNotFoundError:
         return []
     rows = []
     for line in lines:
         try:
             row = json.loads(line)
-        except ValueError:
+        except (ValueError, RecursionError):
             continue
         if isinstance(row, dict):
             rows.append(row)

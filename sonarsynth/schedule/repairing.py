@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
-from sonarsynth import config, store
+from sonarsynth import cards, store
 from sonarsynth.description import FieldError
 from sonarsynth.planning import Plan, choices_from, plan
+from sonarsynth.schedule.consent import files_of, recipe_with
 from sonarsynth.schedule.log import append_lines
 from sonarsynth.schedule.making import job_of, make_shards, seen_by
 from sonarsynth.schedule.report import Progress
 from sonarsynth.schedule.tasks import Failure, Written
-from sonarsynth.store import Findings, Folder, Mismatch, Problem
-from sonarsynth.store.creating import identity
+from sonarsynth.store import Findings, Folder, Mismatch, Problem, Remote, provenance, scratch
+from sonarsynth.store.creating import identity, plain_recipe, spelled
 from sonarsynth.store.examining import shard_of
 from sonarsynth.store.layout import layout_of
 from sonarsynth.store.marks import MARKS, Damage, Mark, all_files, load_layout, load_mark
+from sonarsynth.store.place import there
 from sonarsynth.store.reading import read_back
 from sonarsynth.store.restoring import drop_empty_folders, frames_written, move_out, obstacles, restore
 
@@ -54,17 +57,20 @@ def repair(
     anyway: bool = False,
     quick: bool = False,
     insecure: bool = False,
+    files: Path | str | None = None,
     progress: Progress | None = None,
 ) -> RepairReport:
     """Make what is damaged in a store again, from the recipe in it, so that it is what it was, bit for bit.
 
     Metadata and fixed arrays are laid out again; damaged shards are computed again, those frames that they had, on
     `workers` processes as in `build`; files that do not belong there move to `<store>.foreign`. What was set aside
-    when the store was built is not tried. Ended in whatever way, the same call goes on.
+    when the store was built is not tried. Ended in whatever way, the same call goes on. Where the recipe names files,
+    they are looked for in the folder `files`, and opened nowhere else.
 
     `quick` trusts files that have the digest of their mark; else every number is read back, as `verify` does.
     Raises Mismatch where there is no store of ours, or where it cannot be made again as it was: the version of
-    sonarsynth or its code is another (unless `anyway`), or files that the recipe names have changed or are gone; Damage
+    sonarsynth, its code or its libraries are others (unless `anyway`), or files that the recipe names have changed, are
+    gone, or need `files`; Damage
     where the recipe cannot be read any more; store.Locked while a build runs; OSError where the store cannot be
     written; ValueError for a scheduler on another machine without TLS, unless `insecure`.
     """
@@ -75,10 +81,12 @@ def repair(
     path = seen_by(store.absolute(path), workers)
     store.must_be_store(path)
     with store.lock(path) as name:
+        if not isinstance(path, Remote):
+            scratch.sweep(path, links=True)
         found = store.examine(path)
         laid = found.layout is not None and not found.fixed
         unlike = _unlike(path, found) if laid and not quick else []
-        made = _plan_of(path, found, anyway) if not laid or found.shards or unlike else None
+        made = _plan_of(path, found, anyway, files) if not laid or found.shards or unlike else None
         report = RepairReport(str(path))
         report.moved = move_out(path, found.foreign)
         report.restored, in_the_way = restore(path, found, made)
@@ -89,19 +97,32 @@ def repair(
             report.moved += move_out(path, _in_the_way(path, found, made, todo))
             report.shards, report.frames = tuple(todo), tuple(f for frames in todo.values() for f in frames)
             written = {n: mark for n, mark in found.marks.items() if n not in unlike}
-            here = 0 if workers is None and len(todo) == 1 else workers
+            here = 0 if (workers is None and len(todo) == 1) or _elsewhere(path, made) else workers
             done = _counter(path, written, report, progress)
             make_shards(job_of(path, made, name), made, todo, done, workers=here, scheduler=scheduler)
-        left = store.examine(path)
-        if left.foreign:  # known only now, if the layout was not
-            report.moved += move_out(path, left.foreign)
-            left = store.examine(path)
-        drop_empty_folders(path)
-        report.problems = left.problems
+        _finish(path, report)
     return report
 
 
-def _plan_of(path: Folder, found: Findings, anyway: bool) -> Plan:
+def _finish(path: Folder, report: RepairReport) -> None:
+    """Look at the store once more, and put what is left to say into the report; its card, if it has one, anew."""
+    left = store.examine(path)
+    if left.foreign:  # known only now, if the layout was not
+        report.moved += move_out(path, left.foreign)
+        left = store.examine(path)
+    drop_empty_folders(path)
+    report.problems = left.problems
+    if not left.problems and there(store.beside(path, "card.md")):
+        cards.write(path)
+
+
+def _elsewhere(path: Folder, made: Plan) -> bool:
+    """Whether files are elsewhere than where the recipe in the store, which worker processes follow, has them."""
+    stored = provenance.paths(plain_recipe(store.root_attributes(path)))
+    return set(stored) != set(provenance.paths(made.recipe.as_json()))
+
+
+def _plan_of(path: Folder, found: Findings, anyway: bool, files: Path | str | None) -> Plan:
     """The plan that the store was built by. Raises Mismatch where it cannot be had again, Damage without a recipe."""
     attrs = found.attributes or store.root_attributes(path)
     try:
@@ -112,10 +133,12 @@ def _plan_of(path: Folder, found: Findings, anyway: bool) -> Plan:
         ) from None
     try:
         choices = choices_from(attrs["choices"]) if "choices" in attrs else None
-        made = plan(config.loads(text, str(path)), products, choices)
+        made = plan(recipe_with(text, str(path), files_of(path, attrs, files)), products, choices)
+    except Mismatch:
+        raise
     except OSError as error:
         raise Mismatch(f"{path}: {error.filename}, which its recipe names, cannot be read: {error.strerror}") from None
-    except (ValueError, FieldError) as error:
+    except (ValueError, TypeError, FieldError, MemoryError) as error:
         raise Mismatch(f"{path}: its recipe cannot be followed any more: {error}") from None
     if made.digest != digest:
         raise Mismatch(f"{path}: a file that its recipe names has changed since the store was built")
@@ -129,6 +152,9 @@ def _plan_of(path: Folder, found: Findings, anyway: bool) -> Plan:
         raise Mismatch(f"{path} was built by sonarsynth {old}, and this is {new}: use that one, or --anyway")
     if attrs.get("code_digest") != now["code_digest"] and not anyway:
         raise Mismatch(f"{path} was built by another state of the code of sonarsynth {new}: use that one, or --anyway")
+    odd = provenance.other_versions(attrs)
+    if odd and not anyway:
+        raise Mismatch(f"{path} was built with other libraries ({spelled(odd)}): use those, or --anyway")
     return made
 
 
@@ -173,9 +199,14 @@ def _counter(
         report.failures.extend(again.failures)
         append_lines(store.beside(path, "aside.jsonl"), [asdict(f) for f in again.failures])
         mark, old = load_mark(path, again.shard), written.get(again.shard)
-        if mark is not None and old is not None and not again.failures and mark != old:
+        if mark is not None and old is not None and not again.failures and _written(mark) != _written(old):
             report.differing.append(again.shard)
         if progress is not None:
             progress(done_frames, len(report.frames), len(report.failures))
 
     return done
+
+
+def _written(mark: Mark) -> tuple[object, ...]:
+    """What is in a shard, whoever wrote it."""
+    return mark.frames, mark.content, mark.files

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import tempfile
 import warnings
 from collections.abc import Mapping
@@ -22,7 +21,8 @@ from zarr.codecs import BloscCodec, Crc32cCodec
 from zarr.core.chunk_key_encodings import ChunkKeyEncodingParams
 from zarr.errors import ZarrUserWarning
 
-from sonarsynth.config import dump
+from sonarsynth.config import RecipeError, dump
+from sonarsynth.config.source import read_text
 from sonarsynth.render import attributes, coordinates
 from sonarsynth.store.code import code_digest
 from sonarsynth.store.encoding import CODEC, LEVEL
@@ -37,9 +37,11 @@ from sonarsynth.store.marks import (
     marked,
     save_mark,
 )
-from sonarsynth.store.place import Folder, folder_of, record, records, upload
-from sonarsynth.store.provenance import begun, made_of
+from sonarsynth.store.place import Folder, absolute, read, record, records, upload
+from sonarsynth.store.provenance import begun, made_of, other_versions
 from sonarsynth.store.remote import Remote
+from sonarsynth.store.scratch import clear, hidden, made, sweep
+from sonarsynth.store.within import Mismatch
 
 if TYPE_CHECKING:
     from sonarsynth.config import Source
@@ -49,55 +51,66 @@ FLAT: Final[ChunkKeyEncodingParams] = {"name": "default", "separator": "."}
 """Shards lie in the folder of their array: with the usual "/", each has as many folders of its own as axes."""
 
 
-class Mismatch(ValueError):
-    """The store holds something else than what is wanted, or is none; str() is one line."""
-
-
-def create(path: Folder | str, plan: Plan, *, restart: bool = False, source: Source | None = None) -> Layout:
+def create(
+    path: Folder | str,
+    plan: Plan,
+    *,
+    restart: bool = False,
+    source: Source | None = None,
+    mixed_versions: bool = False,
+) -> Layout:
     """Lay the store out, or make ready to go on with the one that is there. Returns its layout.
 
-    Raises Mismatch where the store that is there belongs to another recipe, other products or another version, or is
-    no store of ours; `restart` begins anew instead (and never removes what is not a store of ours). Raises Damage
+    Raises Mismatch where the store that is there belongs to another recipe, other products or another version, was
+    begun with other versions of libraries that touch numbers (unless `mixed_versions`), or is no store of ours;
+    `restart` begins anew instead (and never removes what is not a store of ours). Raises Damage
     where the store that is there is not as it was laid out. The text of the recipe is kept where its `source` is given.
     """
-    path, layout = folder_of(path), layout_of(plan)
+    path, layout = absolute(path), layout_of(plan)
     if isinstance(path, Remote):
-        return _create_there(path, plan, layout, restart, source)
-    scratch, old = hidden(path, "new"), hidden(path, "old")
-    for leftover in (scratch, old):
-        shutil.rmtree(leftover, ignore_errors=True)
+        return _create_there(path, plan, layout, restart, source, mixed_versions)
+    clear(hidden(path))
     if path.is_dir() and not any(path.iterdir()):
         path.rmdir()
     there = path.exists()
     if there:
         stored = _identity_of(path)
         if not restart:
-            _go_on(path, stored, plan)
-            _sweep(path)
+            sweep(path)
+            _go_on(path, stored, plan, mixed_versions)
             return layout
-    lay_out(scratch, plan, layout, {**described(plan), **begun(source)})
-    save_mark(scratch, layout_mark(scratch, sync=True))
-    if there:
-        os.rename(path, old)
-    os.rename(scratch, path)
-    shutil.rmtree(old, ignore_errors=True)
+    with made(path) as scratch:
+        new = scratch / "new"
+        lay_out(new, plan, layout, {**described(plan), **begun(source)})
+        save_mark(new, layout_mark(new, sync=True))
+        if there:
+            os.rename(path, scratch / "old")
+        os.rename(new, path)
     return layout
 
 
-def _go_on(path: Folder, stored: Mapping[str, Any], plan: Plan) -> None:
+def _go_on(path: Folder, stored: Mapping[str, Any], plan: Plan, mixed_versions: bool) -> None:
     """Raise Mismatch or Damage unless a plan's build may go on in the store that is there."""
     _compare(path, stored, identity(plan))
     _check_layout(path)
+    odd = other_versions(stored)
+    if odd and not mixed_versions:
+        raise Mismatch(
+            f"{path} was begun with other libraries ({spelled(odd)}), and the frames still to come would differ from "
+            "those that are there: use the former, or --mixed-versions to go on and have these frames marked"
+        )
 
 
-def _create_there(path: Remote, plan: Plan, layout: Layout, restart: bool, source: Source | None) -> Layout:
+def _create_there(
+    path: Remote, plan: Plan, layout: Layout, restart: bool, source: Source | None, mixed_versions: bool
+) -> Layout:
     """The same at a URL."""
     if path.is_dir():
         unfinished = not (path / "zarr.json").is_file() and load_layout(path) is not None and not marked(path)
         if not unfinished:
             stored = _identity_of(path)
             if not restart:
-                _go_on(path, stored, plan)
+                _go_on(path, stored, plan, mixed_versions)
                 return layout
         (path / "zarr.json").unlink(missing_ok=True)
         path.unlink_each(path.sizes())
@@ -108,12 +121,6 @@ def _create_there(path: Remote, plan: Plan, layout: Layout, restart: bool, sourc
         files = {name: (scratch / name).read_bytes() for name in (*all_files(scratch), *MANIFESTS)}
         upload(path, files, MANIFESTS, "zarr.json")
     return layout
-
-
-def hidden(path: Path, suffix: str) -> Path:
-    """A folder beside a store for what is not yet, or no more, in it."""
-    path = Path(os.path.abspath(path))
-    return path.with_name(f".{path.name}.{suffix}")
 
 
 def layout_mark(path: Path, *, sync: bool = False) -> Mark:
@@ -155,8 +162,8 @@ def identity(plan: Plan) -> dict[str, Any]:
 def root_attributes(path: Folder | str) -> dict[str, Any]:
     """Root attributes of a store, {} where there is none."""
     try:
-        found = json.loads((folder_of(path) / "zarr.json").read_text("utf-8"))["attributes"]
-    except (OSError, ValueError, KeyError, TypeError):
+        found = json.loads(read(absolute(path), "zarr.json"))["attributes"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return {}
     return found if isinstance(found, dict) else {}
 
@@ -179,7 +186,7 @@ def _compare(path: Folder, stored: Mapping[str, Any], wanted: Mapping[str, Any])
     """Raise Mismatch with the first difference between what is there and what is to be built."""
     if all(stored.get(key) == value for key, value in wanted.items() if key != "recipe"):
         return
-    old, new = _flat(_plain_recipe(stored)), _flat(_plain_recipe(wanted))
+    old, new = _flat(plain_recipe(stored)), _flat(plain_recipe(wanted))
     differing = [key for key in [*new, *old] if old.get(key) != new.get(key)]
     if differing:
         key = differing[0]
@@ -200,19 +207,22 @@ def _compare(path: Folder, stored: Mapping[str, Any], wanted: Mapping[str, Any])
     raise Mismatch(f"{path} was begun differently ({difference}): use --restart to begin anew, or another place")
 
 
+def spelled(odd: Mapping[str, tuple[str, str]]) -> str:
+    """Versions that differ, in words."""
+    return ", ".join(f"{name} {before} then and {now} now" for name, (before, now) in odd.items())
+
+
 def _short(value: Any) -> str:
     """A value as people compare it: a digest by its beginning."""
     text = str(value)
     return text if len(text) < 64 else text[:12]
 
 
-def _plain_recipe(attrs: Mapping[str, Any]) -> Any:
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
+def plain_recipe(attrs: Mapping[str, Any]) -> Any:
+    """The recipe that root attributes hold, as plain values; None where it cannot be read."""
     try:
-        return YAML(typ="safe", pure=True).load(str(attrs.get("recipe", "")))
-    except (YAMLError, ValueError):
+        return read_text(str(attrs.get("recipe", "")), "", Path()).data
+    except RecipeError:
         return None
 
 
@@ -222,14 +232,6 @@ def _flat(value: Any, where: str = "") -> dict[str, Any]:
     if items is None:
         return {where: value}
     return {k: v for key, inner in items for k, v in _flat(inner, f"{where}.{key}" if where else str(key)).items()}
-
-
-def _sweep(path: Path) -> None:
-    """Remove the scratch files that a killed writer left."""
-    for folder, _, names in os.walk(path):
-        for name in names:
-            if name.endswith(".partial"):
-                (Path(folder) / name).unlink(missing_ok=True)
 
 
 def lay_out(path: Path, plan: Plan, layout: Layout, attrs_of_root: Mapping[str, Any]) -> None:

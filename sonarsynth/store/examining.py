@@ -6,9 +6,9 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import Any, Final
 
-from sonarsynth.store.creating import Mismatch, root_attributes
+from sonarsynth.store.creating import root_attributes
 from sonarsynth.store.marks import (
     ABSENT,
     LAYOUT,
@@ -22,8 +22,12 @@ from sonarsynth.store.marks import (
     marked,
     read_mark,
 )
-from sonarsynth.store.place import FileRecord, Folder, entries, read, records, there
+from sonarsynth.store.place import FileRecord, Folder, entries, is_folder, read, records, there
 from sonarsynth.store.remote import Remote
+from sonarsynth.store.within import Mismatch
+
+MOST_FRAMES: Final = 1_000_000
+"""Frames of a shard that are counted, whatever a store says of itself."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +122,9 @@ def _regions(path: Folder, layout: Mark | None) -> Callable[[int], tuple[int, ..
     """The frames of a shard."""
     step = (root_attributes(path) if layout is None else layout.attributes).get("shard_frames")
     count = frame_count(path)
-    return lambda shard: tuple(range(shard * step, min((shard + 1) * step, count))) if isinstance(step, int) else ()
+    if not isinstance(step, int) or not 0 < step <= MOST_FRAMES:
+        return lambda shard: ()
+    return lambda shard: tuple(range(shard * step, min((shard + 1) * step, count)))
 
 
 def _marks(
@@ -168,7 +174,7 @@ def _strangers(
     for name in files:
         while name := name.rpartition("/")[0]:
             folders.add(name)
-    folders = {name for name in folders if isinstance(path, Path) and (path / name).is_dir()}
+    folders = {name for name in folders if isinstance(path, Path) and is_folder(path, name)}
     lost: dict[int, list[str]] = {}
     foreign: list[str] = []
     for name in sorted(set(all_files(path)) - set(files) - folders):
@@ -182,7 +188,7 @@ def _strangers(
         what = "data without a completion mark: build again, or repair, to finish it"
         problems.append(Problem(f"shard {shard}", what, region(shard)))
     ours = {f"{number}.json" for number in marked(path)} | {PurePosixPath(m).name for m in MANIFESTS}
-    foreign += sorted(f"{MARKS}/{name}" for name in entries(path / MARKS) if name not in ours)
+    foreign += sorted(f"{MARKS}/{name}" for name in entries(path, MARKS) if name not in ours)
     problems.extend(Problem(shown(name), "the file does not belong here") for name in foreign)
     return set(lost), frozenset(foreign)
 
@@ -193,7 +199,7 @@ def shard_of(path: Folder, name: str) -> int | None:
     head, *numbers = key.split(".")
     if head != "c" or not array or not numbers or not all(n.isascii() and n.isdecimal() for n in numbers):
         return None
-    return int(numbers[0]) if (path / array).is_dir() else None
+    return int(numbers[0]) if is_folder(path, array) else None
 
 
 def shown(name: str) -> str:

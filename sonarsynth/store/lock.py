@@ -18,8 +18,9 @@ from pathlib import Path
 from typing import Final
 
 from sonarsynth.store import lease
-from sonarsynth.store.place import Folder, absolute, beside
+from sonarsynth.store.place import Folder, absolute, beside, read_beside
 from sonarsynth.store.remote import Remote
+from sonarsynth.store.within import Mismatch, open_own
 
 WAIT: Final = 60.0
 """Seconds that a build waits for a writer of an earlier one."""
@@ -38,7 +39,8 @@ def lock(store: Folder | str, *, wait: float = WAIT) -> Iterator[str]:
     """Hold a store for building; gives the name of this build, which its writers must know.
 
     Raises Locked when someone else does, or when a writer of an earlier build has not ended after `wait` seconds;
-    OSError when the folder cannot be written, Unreachable where a URL cannot.
+    Mismatch where a link or no plain file is in the place of the lock, OSError when the folder cannot be written,
+    Unreachable where a URL cannot.
     """
     store = absolute(store)
     file = beside(store, "lock")
@@ -58,7 +60,7 @@ def lock(store: Folder | str, *, wait: float = WAIT) -> Iterator[str]:
         _wait_for_writers(file, wait)
         yield name
     finally:
-        with suppress(OSError):
+        with suppress(OSError, Mismatch):
             _drop_writers(file)
         file.unlink(missing_ok=True)
         os.close(handle)
@@ -70,7 +72,7 @@ def held_by(store: Folder | str) -> str:
     if isinstance(file, Remote):
         return lease.who(file)
     try:
-        handle = os.open(file, os.O_RDONLY)
+        handle = open_own(file, os.O_RDONLY)
     except OSError:
         return ""
     try:
@@ -113,7 +115,7 @@ def _holder(store: Folder) -> str:
     if isinstance(file, Remote):
         return lease.holder(file)
     try:
-        return file.read_text().rpartition(" ")[2].strip()
+        return read_beside(file).decode(errors="replace").rpartition(" ")[2].strip()
     except OSError:
         return ""
 
@@ -147,7 +149,7 @@ def _drop_writers(held: Path) -> None:
 def _take(file: Path, how: int = fcntl.LOCK_EX | fcntl.LOCK_NB) -> int:
     """Open and lock the file that is there now: one that its last holder removed meanwhile is not it."""
     while True:
-        handle = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)
+        handle = open_own(file, os.O_RDWR | os.O_CREAT)
         try:
             fcntl.flock(handle, how)
         except BlockingIOError:

@@ -4,6 +4,8 @@ A mark is written last and atomically, and removed before its shard is written a
 Marks carry their own digest. They lie in `.marks`, which readers of the store do not see. The mark of the layout is the
 manifest of everything that no frame changes: the digest of each file, and the attributes of the root with the recipe;
 there are two copies of it, so that one damage never takes what a repair needs.
+
+Digests find damage. They have no key: who forges a store forges them too.
 """
 
 from __future__ import annotations
@@ -17,8 +19,9 @@ from typing import Any, Final
 import numpy as np
 
 from sonarsynth.store import place
-from sonarsynth.store.place import FileRecord, Folder, entries, read, read_each, remove, write_atomically
+from sonarsynth.store.place import FileRecord, Folder, entries, read, read_each, remove, write_in
 from sonarsynth.store.remote import Remote
+from sonarsynth.store.within import parts_of
 
 MARKS: Final = ".marks"
 LAYOUT: Final = "layout"
@@ -46,16 +49,10 @@ class Mark:
     attributes: Mapping[str, Any] = field(default_factory=dict)  # of the root, in the mark of the layout
 
 
-def mark_file(store: Folder, name: str | int) -> Folder:
-    """Where a mark lies."""
-    return store / MARKS / f"{name}.json"
-
-
 def save_mark(store: Folder, mark: Mark) -> None:
     """Write a mark: all of it or nothing, on the disk when this returns. That of the layout is written twice."""
-    places = [store / m for m in MANIFESTS] if mark.name == LAYOUT else [mark_file(store, mark.name)]
-    for file in places:
-        write_atomically(file, _encode(mark))
+    for file in MANIFESTS if mark.name == LAYOUT else (f"{MARKS}/{mark.name}.json",):
+        write_in(store, file, _encode(mark))
 
 
 def load_mark(store: Folder, name: str | int) -> Mark | None:
@@ -91,11 +88,20 @@ def parsed(file: str, name: str, text: bytes | OSError) -> Mark | None:
         body: dict[str, Any] = json.loads(text)
         files = {path: (int(size), str(digest)) for path, (size, digest) in body["files"].items()}
         mark = Mark(body["name"], tuple(body["frames"]), body["content"], files, body.get("attributes", {}))
-        if mark.name == name and _encode(mark) == text:  # to the byte, its seal included
+        if mark.name == name and _encode(mark) == text and _plain(mark):  # to the byte, its seal included
             return mark
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         pass
     raise Damage(f"{file}: the mark is damaged")
+
+
+def _plain(mark: Mark) -> bool:
+    """Whether a mark is of the types that we write. Raises OSError for a name that leaves the store: a seal proves that
+    nothing was damaged, not who wrote it."""
+    for file in mark.files:
+        parts_of(file)
+    types = {type(value) for value in (*mark.frames, 0)}, type(mark.content), type(mark.attributes)
+    return types == ({int}, str, dict) and min(mark.frames, default=0) >= 0
 
 
 def load_layout(store: Folder) -> Mark | None:
@@ -114,7 +120,7 @@ def marked(store: Folder) -> list[int]:
     """Numbers of the shards that have a mark."""
     if isinstance(store, Remote) and not store.listed:
         return _marks_asked_for(store)
-    names = [name.removesuffix(".json") for name in entries(store / MARKS) if name.endswith(".json")]
+    names = [name.removesuffix(".json") for name in entries(store, MARKS) if name.endswith(".json")]
     return sorted(int(name) for name in names if name.isascii() and name.isdecimal() and str(int(name)) == name)
 
 
@@ -136,7 +142,7 @@ def all_files(store: Folder) -> Iterator[str]:
 
 def drop_mark(store: Folder, name: str | int) -> None:
     """Remove a mark, before its shard is written again."""
-    remove(mark_file(store, name))
+    remove(store, f"{MARKS}/{name}.json")
 
 
 def add_to_digest(digest: hashlib._Hash, name: str, block: np.ndarray) -> None:

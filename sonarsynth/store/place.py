@@ -1,7 +1,7 @@
 """Where a store is: a folder of this machine, or a URL. All that the rest needs to do there is here.
 
-On a disk a file is written beside its place and moved there, or written once and synchronised. An object store has
-neither; there an object is written whole.
+On a disk a file is written beside its place and moved there, or written once and synchronised, and nothing is read or
+written through a link in the store (`within`). An object store has neither; there an object is written whole.
 """
 
 from __future__ import annotations
@@ -11,13 +11,11 @@ import hashlib
 import os
 import re
 import stat
-import uuid
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
-from io import BufferedReader
 from pathlib import Path
 from typing import Any, Final
 
+from sonarsynth.store import within
 from sonarsynth.store.remote import Remote
 
 Folder = Path | Remote
@@ -27,6 +25,9 @@ FileRecord = tuple[int, str]
 """Size and SHA-256 of a file."""
 
 _AT_ONCE_BYTES: Final = 256_000_000
+
+MOST_METADATA: Final = 1 << 28
+"""Bytes of a mark or of metadata, at most: a file of a store may say that it is larger than memory."""
 
 
 def folder_of(where: Folder | str) -> Folder:
@@ -39,9 +40,15 @@ def folder_of(where: Folder | str) -> Folder:
 
 
 def absolute(where: Folder | str) -> Folder:
-    """The same wherever this process goes."""
+    """The same wherever this process goes. Where it is a link, what that leads to: the lock and all that is beside a
+    store is beside its folder, by whatever way it was named. Raises OSError for links in a circle."""
     folder = folder_of(where)
-    return folder if isinstance(folder, Remote) else Path(os.path.abspath(folder))
+    if isinstance(folder, Remote):
+        return folder
+    found = Path(os.path.realpath(folder))
+    if found.is_symlink():
+        raise OSError(errno.ELOOP, "is a link that leads nowhere", str(folder))
+    return found
 
 
 def beside(store: Folder | str, suffix: str) -> Folder:
@@ -75,16 +82,23 @@ def try_writing(folder: Folder) -> None:
 
 
 def opens(folder: Folder) -> Any:
-    """What zarr and xarray open, to read."""
-    return folder.zarr_store() if isinstance(folder, Remote) else folder
+    """What zarr and xarray open, to read: Zarr 3 alone, and of a disk no link."""
+    if isinstance(folder, Remote):
+        return folder.zarr_store()
+    from sonarsynth.store.guarded import Guarded
+
+    return Guarded(folder, read_only=True)
 
 
 def read(folder: Folder, name: str) -> bytes:
-    """A whole file of a store. Raises OSError."""
+    """A whole file of metadata of a store. Raises OSError."""
     if isinstance(folder, Remote):
         return (folder / name).read_bytes()
-    with opened(f"{folder}/{name}") as file:
-        return file.read()
+    with within.opened(folder, name) as file:
+        content = file.read(MOST_METADATA + 1)
+    if len(content) > MOST_METADATA:
+        raise OSError(errno.EFBIG, f"is larger than {MOST_METADATA >> 20} MiB", f"{folder}/{name}")
+    return content
 
 
 def read_each(folder: Folder, names: Iterable[str]) -> Iterator[tuple[str, bytes | OSError]]:
@@ -103,7 +117,7 @@ def record(folder: Folder, name: str, *, sync: bool = False) -> FileRecord:
     """Size and SHA-256 of a file of a store; with `sync`, it is on the disk first. Raises OSError."""
     if isinstance(folder, Remote):
         return record_of((folder / name).read_bytes())
-    with opened(f"{folder}/{name}") as file:
+    with within.opened(folder, name) as file:
         if sync:
             os.fsync(file.fileno())
         digest = hashlib.file_digest(file, "sha256").hexdigest()
@@ -159,93 +173,76 @@ def all_files(folder: Folder, apart: str = "") -> Iterator[str]:
             yield from (f"{inside}/{name}" if inside else name for name in names + links)
 
 
-def entries(folder: Folder) -> list[str]:
-    """Names right beneath, [] where there is nothing."""
+def entries(folder: Folder, name: str) -> list[str]:
+    """Names right beneath a folder of a store, [] where there is nothing."""
     if isinstance(folder, Remote):
-        return sorted({name.partition("/")[0] for name in folder.sizes()})
-    try:
-        return [entry.name for entry in os.scandir(folder)]
-    except (FileNotFoundError, NotADirectoryError):
-        return []
+        return sorted({inner.partition("/")[0] for inner in (folder / name).sizes()})
+    return within.listed(folder, name)
 
 
-def stamps(folder: Folder) -> dict[str, object]:
-    """What tells of each file right beneath whether it was written again, even with the same contents."""
+def stamps(folder: Folder, name: str) -> dict[str, object]:
+    """What tells of each file right beneath a folder of a store whether it was written again, even with the same
+    contents."""
     if isinstance(folder, Remote):
-        return folder.stamps()
-    try:
-        found = {entry.name: entry.stat() for entry in os.scandir(folder)}
-    except OSError:
-        return {}
-    return {name: (stat.st_ino, stat.st_mtime_ns) for name, stat in found.items()}
+        return (folder / name).stamps()
+    found = {inner: within.status(folder, f"{name}/{inner}") for inner in within.listed(folder, name)}
+    return {inner: (status.st_ino, status.st_mtime_ns) for inner, status in found.items() if status is not None}
 
 
 def there(folder: Folder, name: str = "") -> bool:
     """True where something has this name, whatever it is."""
-    place = folder / name if name else folder
-    return place.exists() if isinstance(place, Remote) else os.path.lexists(place)
+    if isinstance(folder, Remote):
+        return (folder / name if name else folder).exists()
+    return within.status(folder, name) is not None if name else os.path.lexists(folder)
 
 
-def write_new(file: Folder, content: bytes) -> FileRecord:
-    """Write a file that is not there, with its folders: on the disk when this returns. Its record."""
-    if isinstance(file, Remote):
-        file.write_bytes(content)
-        return record_of(content)
-    try:
-        out = open(file, "xb")  # noqa: SIM115
-    except FileNotFoundError:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        out = open(file, "xb")  # noqa: SIM115
-    with out:
-        out.write(content)
-        os.fsync(out.fileno())
+def is_folder(folder: Folder, name: str) -> bool:
+    """True for a folder in a store."""
+    if isinstance(folder, Remote):
+        return (folder / name).is_dir()
+    status = within.status(folder, name)
+    return status is not None and stat.S_ISDIR(status.st_mode)
+
+
+def write_new(folder: Folder, name: str, content: bytes) -> FileRecord:
+    """Write a file of a store, with its folders: on the disk when this returns. Its record."""
+    if isinstance(folder, Remote):
+        (folder / name).write_bytes(content)
+    else:
+        within.write_new(folder, name, content)
     return record_of(content)
 
 
+def write_in(folder: Folder, name: str, content: bytes) -> None:
+    """Write a file of a store so that it is there whole or not at all."""
+    if isinstance(folder, Remote):
+        (folder / name).write_bytes(content)
+    else:
+        within.write_atomically(folder, name, content)
+
+
 def write_atomically(file: Folder, content: bytes) -> None:
-    """Write a file so that it is there whole or not at all."""
+    """Write a file beside a store so that it is there whole or not at all."""
     if isinstance(file, Remote):
         file.write_bytes(content)
-        return
-    file.parent.mkdir(exist_ok=True)
-    scratch = file.with_name(f".{file.name}.{uuid.uuid4().hex}.partial")
-    try:
-        with scratch.open("xb") as out:
-            out.write(content)
-            out.flush()
-            os.fsync(out.fileno())
-        scratch.replace(file)
-    except BaseException:
-        scratch.unlink(missing_ok=True)
-        raise
-    sync_folder(file.parent)
+    else:
+        within.write_atomically(Path(os.path.realpath(file.parent)), file.name, content)
 
 
-def remove(file: Folder) -> None:
-    """Remove a file if it is there, for good."""
+def read_beside(file: Folder) -> bytes:
+    """A file beside a store. Raises FileNotFoundError, and Mismatch for what is no plain file."""
     if isinstance(file, Remote):
-        file.unlink(missing_ok=True)
-    elif file.exists():
-        file.unlink()
-        sync_folder(file.parent)
+        return file.read_bytes()
+    with open(within.open_own(file, os.O_RDONLY), "rb") as found:
+        return found.read()
 
 
-def sync_folder(folder: Path) -> None:
-    """Put what a folder lists on the disk."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
-
-
-@contextmanager
-def opened(file: str) -> Iterator[BufferedReader]:
-    """A file to read. Raises OSError for what is no file: reading a pipe would wait for ever."""
-    with open(file, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as found:
-        if not stat.S_ISREG(os.fstat(found.fileno()).st_mode):
-            raise OSError(errno.EINVAL, "it is no plain file", file)
-        yield found
+def remove(folder: Folder, name: str, *, sync: bool = True) -> None:
+    """Remove a file of a store if it is there; with `sync`, for good."""
+    if isinstance(folder, Remote):
+        (folder / name).unlink(missing_ok=True)
+    else:
+        within.remove(folder, name, sync=sync)
 
 
 def upload(folder: Remote, files: Mapping[str, bytes], first: Iterable[str], last: str) -> None:

@@ -49,6 +49,11 @@ LIBRARIES: Final = (
 )
 """What touches numbers on their way from the recipe to the disk; those that are not installed are left out."""
 
+NUMERIC: Final = ("python", "numpy", "scipy", "numba", "llvmlite", "trimesh", "embreex", "open3d", "gsw", "blas")
+"""Those whose next version may change the last digits of a number: what sums and transforms, what compiles kernels
+(numba reads the bytecode of a minor version of Python), what reads and cleans meshes, what casts rays, what has the
+equation of state. The others of `LIBRARIES` carry numbers or pack them; the digest of a shard is of numbers alone."""
+
 _GIT_SECONDS: Final = 10.0
 
 
@@ -75,7 +80,7 @@ def inputs(plan: Plan) -> dict[str, Any]:
         target.name: [mesh.digest for _, mesh in some]
         for target, some in zip(recipe.scene.world.targets, recipe.meshes, strict=True)
     }
-    files = {(Path(path).name, digest(path)) for path in _paths(recipe.as_json())}
+    files = {(Path(path).name, digest(path)) for path in paths(recipe.as_json())}
     return {"meshes": meshes, "files": [{"name": name, "sha256": found} for name, found in sorted(files)]}
 
 
@@ -105,6 +110,34 @@ def versions() -> dict[str, str]:
 
     blas = np.show_config(mode="dicts").get("Build Dependencies", {}).get("blas", {})
     return found | {"blas": f"{blas.get('name', 'unknown')} {blas.get('version', '')}".strip()}
+
+
+def numeric_versions() -> dict[str, str]:
+    """Versions of what may change the last digits of a number, in this process."""
+    return _numeric(versions())
+
+
+def _numeric(found: Mapping[str, Any]) -> dict[str, str]:
+    """Those of `NUMERIC`; of Python the minor version."""
+    some = {name: str(found[name]) for name in NUMERIC if name in found}
+    if "python" in some:
+        some["python"] = ".".join(some["python"].split(".")[:2])
+    return some
+
+
+def other_versions(stored: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
+    """What may change last digits and is another here than where a store was begun, by its root attributes: the version
+    there and here. What only one of them has is not compared: a store that needs it cannot be built without."""
+    begun = stored.get(PROVENANCE)
+    there = begun.get("versions") if isinstance(begun, Mapping) else None
+    before, now = _numeric(there) if isinstance(there, Mapping) else {}, numeric_versions()
+    return {name: (old, now[name]) for name, old in before.items() if now.get(name, old) != old}
+
+
+def differing(there: Mapping[str, str], here: Mapping[str, str]) -> str:
+    """What differs between two sets of versions, in words; "" where nothing does."""
+    odd = [name for name in here if there.get(name, here[name]) != here[name]]
+    return ", ".join(f"{name} {there[name]} there and {here[name]} here" for name in odd)
 
 
 def machine() -> dict[str, Any]:
@@ -152,16 +185,16 @@ def _git(folder: Path, *arguments: str) -> str | None:
     return done.stdout.strip()
 
 
-def _paths(value: Any) -> Iterator[str]:
+def paths(value: Any) -> Iterator[str]:
     """Paths of files in a recipe."""
     if isinstance(value, Mapping):
-        if value.get("kind") in FILE_KINDS and isinstance(value.get("path"), str):
+        if any(value.get("kind") == kind for kind in FILE_KINDS) and isinstance(value.get("path"), str):
             yield value["path"]
         for inner in value.values():
-            yield from _paths(inner)
+            yield from paths(inner)
     elif isinstance(value, list):
         for inner in value:
-            yield from _paths(inner)
+            yield from paths(inner)
 
 
 def _cpu_model() -> str:

@@ -25,7 +25,10 @@ def read_back(path: Folder, mark: Mark) -> Iterator[Problem]:
     import zarr
 
     root = zarr.open_group(opens(path), mode="r")
-    shard, step = int(mark.name), int(root_attributes(path)["shard_frames"])
+    shard, step = int(mark.name), root_attributes(path).get("shard_frames")
+    if not isinstance(step, int) or step < 1:
+        yield Problem(f"shard {shard}", "the store does not say how many frames are in one", mark.frames)
+        return
     digest = hashlib.sha256()
     for name in sorted({file.rpartition("/")[0] for file in mark.files}):
         try:

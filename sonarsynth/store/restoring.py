@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-import shutil
+import stat
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
@@ -13,12 +13,14 @@ import numpy as np
 import zarr
 
 from sonarsynth.render import attributes
-from sonarsynth.store.creating import Mismatch, described, hidden, identity, lay_out, layout_mark, root_attributes
+from sonarsynth.store.creating import described, identity, lay_out, layout_mark, root_attributes
 from sonarsynth.store.examining import Findings
 from sonarsynth.store.layout import ArrayLayout, layout_of
 from sonarsynth.store.marks import Mark, save_mark
-from sonarsynth.store.place import Folder, opens, record, there, write_atomically
+from sonarsynth.store.place import Folder, opens, record, there, write_in
 from sonarsynth.store.remote import Remote
+from sonarsynth.store.scratch import made
+from sonarsynth.store.within import Mismatch, parts_of, status
 
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan
@@ -38,10 +40,9 @@ def restore(path: Folder, found: Findings, plan: Plan | None) -> tuple[tuple[str
         if found.manifests:
             save_mark(path, found.layout)
         return tuple(sorted(found.manifests)), moved
-    folder = tempfile.mkdtemp(prefix="sonarsynth-") if isinstance(path, Remote) else ""
-    scratch = Path(folder) / "new" if isinstance(path, Remote) else hidden(path, "new")
-    shutil.rmtree(scratch, ignore_errors=True)
-    try:
+    there = tempfile.TemporaryDirectory(prefix="sonarsynth-") if isinstance(path, Remote) else made(path)
+    with there as folder:
+        scratch = Path(folder) / "new"
         attrs = found.attributes or {
             **described(plan),
             **root_attributes(path),  # how it was begun, and as what was planned then
@@ -53,13 +54,9 @@ def restore(path: Folder, found: Findings, plan: Plan | None) -> tuple[tuple[str
         bad = _to_put_back(path, found, laid)
         moved = move_out(path, obstacles(path, [*bad, *found.manifests]))
         for name in bad:
-            if isinstance(path, Path):
-                (path / name).parent.mkdir(parents=True, exist_ok=True)
-            write_atomically(path / name, (scratch / name).read_bytes())
+            write_in(path, name, (scratch / name).read_bytes())
         if found.manifests:
             save_mark(path, found.layout or laid)
-    finally:
-        shutil.rmtree(folder or scratch, ignore_errors=True)
     return (*bad, *sorted(found.manifests)), moved
 
 
@@ -118,16 +115,13 @@ def move_out(path: Folder, names: Iterable[str]) -> tuple[str, ...]:
     moved = []
     outside = path.with_name(f"{path.name}.foreign")
     for name in sorted(names):
-        if not os.path.lexists(path / name):
+        if status(path, name) is None:
             continue
         target = outside / name
         for parent in reversed(target.relative_to(outside).parents):
             _make_folder(outside / parent)
-        count = 0
-        while os.path.lexists(target):
-            count += 1
-            target = target.with_name(f"{Path(name).name}.{count}")
-        shutil.move(path / name, target)
+        target = _free(target)
+        os.rename(path / name, target)
         moved.append(str(target))
     return tuple(moved)
 
@@ -150,24 +144,37 @@ def _move_out_there(path: Remote, names: Iterable[str]) -> tuple[str, ...]:
 
 
 def _make_folder(folder: Path) -> None:
-    """Make a folder; what has its name and is none goes out of the way."""
-    if os.path.lexists(folder) and not folder.is_dir():
-        folder.rename(folder.with_name(f"{folder.name}.file"))
-    folder.mkdir(parents=True, exist_ok=True)
+    """Make a folder; what has its name and is none goes out of the way, a link too."""
+    if os.path.lexists(folder) and (folder.is_symlink() or not folder.is_dir()):
+        folder.rename(_free(folder.with_name(f"{folder.name}.file")))
+    folder.mkdir(exist_ok=True)
+
+
+def _free(file: Path) -> Path:
+    """A name that nothing has."""
+    count, found = 0, file
+    while os.path.lexists(found):
+        count += 1
+        found = file.with_name(f"{file.name}.{count}")
+    return found
 
 
 def obstacles(path: Folder, names: Iterable[str]) -> set[str]:
     """What lies where files are to be written and cannot be written over: folders, links and pipes in the place of the
-    file, files in the place of a folder."""
+    file, files and links in the place of a folder."""
     found: set[str] = set()
     if isinstance(path, Remote):
         return found  # an object is in nobody's way
     for name in names:
-        if (path / name).is_symlink() or ((path / name).exists() and not (path / name).is_file()):
-            found.add(name)
-        while name := name.rpartition("/")[0]:
-            if os.path.lexists(path / name) and not (path / name).is_dir():
-                found.add(name)
+        parts = parts_of(name)
+        for count in range(1, len(parts) + 1):
+            some = "/".join(parts[:count])
+            mode = status(path, some)
+            if mode is None:
+                break
+            if not (stat.S_ISREG if count == len(parts) else stat.S_ISDIR)(mode.st_mode):
+                found.add(some)
+                break
     return found
 
 

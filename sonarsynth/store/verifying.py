@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from sonarsynth.store.examining import Findings, Problem, examine, frame_count, ranges
 from sonarsynth.store.lock import held_by
 from sonarsynth.store.marks import LAYOUT, MARKS
-from sonarsynth.store.place import Folder, folder_of, opens, stamps
+from sonarsynth.store.place import Folder, absolute, opens, stamps
 from sonarsynth.store.reading import read_back, structure
 
 if TYPE_CHECKING:
@@ -117,16 +117,16 @@ def verify(path: Folder | str, checks: Sequence[Check] = (), *, quick: bool = Fa
     `quick` compares files with their digests and no more. Of a store that is being built, what is complete is looked
     at, and no checks are run. Raises Mismatch where there is no store of ours.
     """
-    path = folder_of(path)
-    building, stamped = held_by(path), stamps(path / MARKS)
+    path = absolute(path)
+    building, stamped = held_by(path), stamps(path, MARKS)
     found, problems = _look(path, quick)
     building = building or held_by(path)
     if problems and (
-        building or stamped != stamps(path / MARKS)
+        building or stamped != stamps(path, MARKS)
     ):  # a build's own doing is over, or has another mark, by now
         before = {problem.where for problem in problems}
         found, problems = _look(path, quick)
-        changed = {name for name, _ in stamped.items() ^ stamps(path / MARKS).items()}
+        changed = {name for name, _ in stamped.items() ^ stamps(path, MARKS).items()}
         problems = [p for p in problems if p.where in before and _lasting(p, found, changed)]
     rows = [] if problems or building or quick else _run(path, checks)
     spoiled = {frame for problem in problems for frame in problem.frames}

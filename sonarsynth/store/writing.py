@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
+import os
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -12,13 +14,21 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sonarsynth.render import Values
+from sonarsynth.store import within
+from sonarsynth.store.creating import root_attributes
 from sonarsynth.store.encoding import encoded
 from sonarsynth.store.layout import ArrayLayout, Layout, layout_of
-from sonarsynth.store.marks import ABSENT, Mark, add_to_digest, drop_mark, load_marks, marked, save_mark
-from sonarsynth.store.place import FileRecord, Folder, folder_of, write_new
+from sonarsynth.store.marks import ABSENT, Damage, Mark, add_to_digest, drop_mark, load_marks, marked, save_mark
+from sonarsynth.store.place import FileRecord, Folder, absolute, folder_of, remove, write_new
+from sonarsynth.store.provenance import other_versions
 
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan
+
+GONE: Final = (
+    "the store was moved, removed or exchanged while it was built: with it back in its place, or under its new name, "
+    "the same command goes on"
+)
 
 AT_ONCE: Final = 8
 """Files of a shard that are on their way at once: each waits for the disk, which takes several in the time of one."""
@@ -34,9 +44,22 @@ def write_shard(
     """Write one whole shard of every array, then its completion mark. Frames not given read as fill values.
 
     `still` is called before the mark is written, and may raise. Raises ValueError, before anything is written, where a
-    frame is not of this shard or its values do not fit.
+    frame is not of this shard or its values do not fit; Damage where the store is not there any more, or is another.
+    The mark names what is of another version in this process than where the store was begun, and may change numbers.
     """
-    path, layout = folder_of(path), layout_of(plan)
+    path = folder_of(path)
+    try:
+        return _write(path, plan, shard, frames, still)
+    except OSError as error:
+        if isinstance(path, Path) and not os.path.lexists(path):
+            raise Damage(f"{path}: {GONE}") from None
+        if error.errno in (errno.ELOOP, errno.ENOTDIR):
+            raise Damage(f"{error.filename or path}: {error.strerror}: 'sonarsynth repair' moves it out") from None
+        raise
+
+
+def _write(path: Folder, plan: Plan, shard: int, frames: Mapping[int, Values], still: Callable[[], None]) -> Mark:
+    layout, versions = layout_of(plan), _other_versions(path, plan)
     region = layout.region(shard)
     outside = sorted(set(frames) - set(region))
     if outside:
@@ -57,9 +80,30 @@ def write_shard(
             under_way.append((array.file(shard), writers.submit(_put, path, array.file(shard), packed)))
         files |= {name: rest.result() for name, rest in under_way}
     still()
-    mark = Mark(str(shard), tuple(checked), content.hexdigest(), files)
+    mark = Mark(str(shard), tuple(checked), content.hexdigest(), files, {"versions": versions} if versions else {})
     save_mark(path, mark)
     return mark
+
+
+def _other_versions(path: Folder, plan: Plan) -> dict[str, str]:
+    """What is of another version in this process than where the store was begun. Raises Damage unless the store is
+    there, and of this plan."""
+    key = None
+    if isinstance(path, Path):
+        status = within.status(path, "zarr.json")
+        if status is None:
+            raise Damage(f"{path}: {GONE}")
+        key = (path, plan.digest, status.st_dev, status.st_ino, status.st_mtime_ns)
+    if key is None or key not in _seen:
+        attrs = root_attributes(path)
+        if attrs.get("recipe_digest") != plan.digest:
+            raise Damage(f"{path}: {GONE}")
+        _seen.clear()
+        _seen[key] = {name: now for name, (_, now) in other_versions(attrs).items()}
+    return _seen[key]
+
+
+_seen: dict[tuple[object, ...] | None, dict[str, str]] = {}
 
 
 def write_region(path: Folder, layout: Layout, array: ArrayLayout, start: int, block: np.ndarray) -> FileRecord:
@@ -77,9 +121,10 @@ def _content(layout: Layout, array: ArrayLayout, start: int, block: np.ndarray) 
 
 
 def _put(path: Folder, name: str, content: bytes | None) -> FileRecord:
-    if content is None or isinstance(path, Path):  # an object is written over
-        (path / name).unlink(missing_ok=True)
-    return ABSENT if content is None else write_new(path / name, content)
+    if content is not None:
+        return write_new(path, name, content)
+    remove(path, name, sync=False)
+    return ABSENT
 
 
 def missing(path: Folder | str, plan: Plan, frames: Iterable[int] | None = None) -> dict[int, tuple[int, ...]]:
@@ -88,7 +133,7 @@ def missing(path: Folder | str, plan: Plan, frames: Iterable[int] | None = None)
     A shard is written whole, so one that has some of its frames is rendered again with those and the wanted ones.
     Raises IndexError for a frame outside the dataset.
     """
-    path, layout = folder_of(path), layout_of(plan)
+    path, layout = absolute(path), layout_of(plan)
     wanted: dict[int, set[int]] = {}
     for frame in range(layout.frames) if frames is None else frames:
         if not 0 <= frame < layout.frames:
@@ -105,7 +150,7 @@ def missing(path: Folder | str, plan: Plan, frames: Iterable[int] | None = None)
 
 def frames_there(path: Folder | str) -> list[int]:
     """Frames that are complete in the store, by their marks."""
-    path = folder_of(path)
+    path = absolute(path)
     return sorted(frame for have in _have(path, marked(path)).values() for frame in have)
 
 

@@ -201,3 +201,57 @@ def test_the_reference_reader_of_croissant_finds_nothing_wrong(built: Path) -> N
     del broken["recordSet"][1]["field"][0]["dataType"]
     with pytest.raises(mlcroissant.ValidationError):
         mlcroissant.Dataset(broken)
+
+
+def test_a_build_that_was_killed_before_its_card_gets_it_when_it_is_resumed(
+    tmp_path: Path, small_text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, recipe = tmp_path / "s.zarr", config.loads(small_text)
+    schedule.build(recipe, path, frames=range(8), workers=0)
+    with monkeypatch.context() as patch:
+        patch.setattr(cards, "write", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            schedule.build(recipe, path, frames=range(16), workers=0)
+    assert "8 of 20 are there" in card_of(path)
+    assert schedule.build(recipe, path, frames=range(16), workers=0).written == 0
+    assert "16 of 20 are there" in card_of(path)
+    before = store.beside(path, "card.md").stat().st_mtime_ns
+    schedule.build(recipe, path, frames=range(16), workers=0)
+    assert store.beside(path, "card.md").stat().st_mtime_ns == before
+
+
+MARKUP = """\
+<script>alert(1)</script> <img src=x onerror=alert(2)> [click](javascript:alert(3)) ![p](https://x.org/p.png)
+
+# heading ```
+---
+<javascript:alert(4)> | a | b | [x]: javascript:alert(5) &#106;avascript: `code` ~~~
+"""
+
+
+def test_what_a_store_says_of_itself_is_text_in_its_card(built: Path, tmp_path: Path) -> None:
+    path = Path(shutil.copytree(built, tmp_path / "s.zarr"))
+    root = json.loads((path / "zarr.json").read_bytes())
+    attributes = root["attributes"]
+    urls = {"url": "javascript:alert(6)"}
+    attributes["title"] = attributes["licence"] = attributes["provenance"]["created"] = MARKUP
+    attributes["dataset"] = {"description": MARKUP, "citation": MARKUP, "creators": [{"name": MARKUP, **urls}], **urls}
+    attributes["plan"]["warnings"], attributes["products"] = [MARKUP], [MARKUP]
+    array = root["consolidated_metadata"]["metadata"]["image/energy"]
+    array["attributes"] |= {"long_name": MARKUP, "units": MARKUP}
+    root["consolidated_metadata"]["metadata"]["image/`x`\n# y"] = array
+    (path / "zarr.json").write_text(json.dumps(root))
+    card, data = (file.read_text() for file in cards.write(path))
+    outside = re.sub(r"(?ms)^(```+)\w+$.*?^\1$", "", card)  # without code, where nothing has a meaning
+    assert not re.search(r"<\s*(script|img|javascript)", outside)
+    assert not re.search(r"(?<!\\)\[", outside)
+    assert "&#106;" not in outside
+    assert not re.search(r"(?m)^(# heading|---$|\[x\])", outside)
+    assert [line for line in outside.splitlines() if line.startswith("# ")] == [outside.splitlines()[0]]
+    assert outside.count("```") == outside.count("\\`\\`\\`") * 0
+    assert len(re.search(r"```python\n(.*?)```", card, re.DOTALL)[1].strip().splitlines()) == 3  # type: ignore[index]
+    assert '"javascript:' not in data
+
+
+def test_the_card_says_what_digests_do_not_prove(built: Path) -> None:
+    assert "finds damage, not forgery" in card_of(built)

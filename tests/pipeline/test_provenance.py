@@ -169,3 +169,37 @@ def test_a_wrong_field_is_one_line(tmp_path: Path, small_text: str, line: str, f
     file.write_text(f"{line}\n{small_text}")
     with pytest.raises(config.RecipeError, match=f"wrong.yaml:1: {field}"):
         config.load(file)
+
+
+def test_a_build_with_other_numeric_libraries_goes_on_only_where_told_and_marks_its_frames(
+    tmp_path: Path, small_plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, here = tmp_path / "s.zarr", provenance.versions()
+    schedule.build(small_plan, path, frames=range(8), workers=0)
+    card = store.beside(path, "card.md")
+    assert "other libraries" not in card.read_text()
+    for name, other in (("numpy", "2.0.1"), ("python", "CPython 3.9.1"), ("blas", "mkl 1")):
+        monkeypatch.setattr(provenance, "versions", lambda name=name, other=other: here | {name: other})
+        with pytest.raises(store.Mismatch, match=f"{name} .* then and {other.removesuffix('.1')}"):
+            schedule.build(small_plan, path, frames=range(16), workers=0)
+    for name in ("zarr", "dask"):  # which carry numbers
+        monkeypatch.setattr(provenance, "versions", lambda name=name: here | {name: "0"})
+        schedule.build(small_plan, path, frames=range(8), workers=0)
+    monkeypatch.setattr(provenance, "versions", lambda: here | {"numpy": "2.0.1"})
+    report = schedule.build(small_plan, path, frames=range(16), workers=0, mixed_versions=True)
+    assert any("other libraries" in note for note in report.notes)
+    marks = [store.marks.load_mark(path, shard) for shard in (0, 1)]
+    assert [mark.attributes for mark in marks if mark] == [{}, {"versions": {"numpy": "2.0.1"}}]
+    assert "8 frames were made with other libraries than the rest (numpy 2.0.1)" in card.read_text()
+    monkeypatch.undo()
+    assert store.verify(path).ok
+    assert schedule.build(small_plan, path, frames=range(16), workers=0).there == 16
+
+
+def test_python_counts_by_its_minor_version(monkeypatch: pytest.MonkeyPatch) -> None:
+    stored = {provenance.PROVENANCE: {"versions": {"python": "CPython 3.11.7", "gsw": "1", "numpy": "2.4.0"}}}
+    monkeypatch.setattr(provenance, "versions", lambda: {"python": "CPython 3.11.9", "numpy": "2.4.0"})
+    assert provenance.other_versions(stored) == {}
+    monkeypatch.setattr(provenance, "versions", lambda: {"python": "CPython 3.12.7", "numpy": "2.4.0"})
+    assert provenance.other_versions(stored) == {"python": ("CPython 3.11", "CPython 3.12")}
+    assert provenance.other_versions({}) == provenance.other_versions({provenance.PROVENANCE: 5}) == {}

@@ -89,7 +89,7 @@ def test_frames_that_end_their_worker_are_named_with_why_and_the_rest_goes_on(
         addresses.update(listening())
 
     with dask.config.set({"distributed.worker.preload": [str(faults)]}):
-        report = build(small_plan, path, workers=1, frame_timeout=10.0, announce=look)
+        report = build(small_plan, path, workers=1, frame_timeout=10.0, dashboard=True, announce=look)
     found = {failure.frame: failure for failure in report.failures}
     assert sorted(found) == [2, 5, 9, 17]
     assert {failure.stage for failure in found.values()} == {"beamform"}

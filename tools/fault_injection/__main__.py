@@ -12,6 +12,9 @@ KINDS = {
     "corrupt": "damage files of a store, verify, repair, compare",
     "fuzz": "change recipes and their files, plan them",
     "meshes": "change mesh files, plan with them",
+    "links": "put links into a store, beside it and in front of it",
+    "hostile": "forge stores, digests and all, and run every command on them",
+    "renames": "move stores while they are built",
 }
 """Modules beside this one; each has a function `run(count, seed) -> dict` with "ok" in what it gives."""
 

@@ -1,0 +1,172 @@
+"""Files within a folder of this machine, and nowhere else: no name leads out of it, and no link is followed.
+
+A store may come from anybody. Its folder is resolved once, where it is named (`place.absolute`); from there each folder
+on the way to a file is opened by itself, from the one before it, and a link in its place is an error.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+import uuid
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from io import BufferedReader
+from pathlib import Path
+from typing import Final
+
+IS_LINK: Final = "is a link, which is not followed"
+
+_FOLDER: Final = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
+_NEW: Final = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+
+
+class Mismatch(ValueError):
+    """What is there is something else than what is wanted, or is none of ours; str() is one line."""
+
+
+def parts_of(name: str) -> list[str]:
+    """The folders of a name, and the file. Raises OSError for a name that leaves the folder or is of no file."""
+    parts = name.split("/")
+    if any(part in ("", ".", "..") or "\0" in part for part in parts):
+        raise OSError(errno.EINVAL, "is no name of a file in a store", name)
+    return parts
+
+
+@contextmanager
+def opened(root: Path, name: str) -> Iterator[BufferedReader]:
+    """A file to read. Raises OSError for a link on the way, and for what is no file: a pipe would wait for ever."""
+    with folder_of(root, name) as (folder, last):
+        handle = _open(folder, last, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW | os.O_CLOEXEC, f"{root}/{name}")
+    with open(handle, "rb") as file:
+        mode = os.fstat(handle).st_mode
+        if not stat.S_ISREG(mode):
+            kind = errno.EISDIR if stat.S_ISDIR(mode) else errno.EINVAL
+            raise OSError(kind, "it is no plain file", f"{root}/{name}")
+        yield file
+
+
+def write_new(root: Path, name: str, content: bytes) -> None:
+    """Write a file anew, with its folders: on the disk when this returns. What had its name is another file's now.
+
+    The folder `root` itself is never made.
+    """
+    with folder_of(root, name, make=True) as (folder, last):
+        try:
+            handle = os.open(last, _NEW, 0o666, dir_fd=folder)
+        except FileExistsError:
+            os.unlink(last, dir_fd=folder)
+            handle = os.open(last, _NEW, 0o666, dir_fd=folder)
+        with open(handle, "wb") as out:
+            out.write(content)
+            out.flush()
+            os.fsync(handle)
+
+
+def write_atomically(root: Path, name: str, content: bytes) -> None:
+    """Write a file so that it is there whole or not at all. The folder `root` itself is never made."""
+    with folder_of(root, name, make=True) as (folder, last):
+        scratch = f".{last}.{uuid.uuid4().hex}.partial"
+        try:
+            with open(os.open(scratch, _NEW, 0o666, dir_fd=folder), "wb") as out:
+                out.write(content)
+                out.flush()
+                os.fsync(out.fileno())
+            os.replace(scratch, last, src_dir_fd=folder, dst_dir_fd=folder)
+        except BaseException:
+            with suppress(FileNotFoundError):
+                os.unlink(scratch, dir_fd=folder)
+            raise
+        os.fsync(folder)
+
+
+def remove(root: Path, name: str, *, sync: bool = True) -> None:
+    """Remove a file if it is there; with `sync`, for good."""
+    try:
+        with folder_of(root, name) as (folder, last):
+            os.unlink(last, dir_fd=folder)
+            if sync:
+                os.fsync(folder)
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+
+
+def status(root: Path, name: str) -> os.stat_result | None:
+    """What has a name, a link as itself; None where nothing has it, or a link is on the way."""
+    try:
+        with folder_of(root, name) as (folder, last):
+            return os.stat(last, dir_fd=folder, follow_symlinks=False)
+    except OSError:
+        return None
+
+
+def listed(root: Path, name: str) -> list[str]:
+    """Names right beneath a folder in `root`; [] where there is no such folder."""
+    try:
+        with _walked(root, parts_of(name)) as folder:
+            return os.listdir(folder)
+    except OSError:
+        return []
+
+
+def open_own(file: Path, flags: int) -> int:
+    """A handle of a file beside a store that is written where it stands. Raises Mismatch for a link, a second name of
+    another file, and what is no file: what is written there would be written elsewhere."""
+    try:
+        handle = os.open(file, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o644)
+    except OSError as error:
+        if error.errno in (errno.ELOOP, errno.ENXIO, errno.EISDIR):
+            raise Mismatch(f"{file}: is a link or no plain file, and is not written or read: move it away") from None
+        raise
+    found = os.fstat(handle)
+    if not stat.S_ISREG(found.st_mode) or found.st_nlink > 1:
+        os.close(handle)
+        raise Mismatch(f"{file}: is a second name of another file, or none: move it away")
+    return handle
+
+
+@contextmanager
+def folder_of(root: Path, name: str, *, make: bool = False) -> Iterator[tuple[int, str]]:
+    """A handle of the folder that a name is in, and the last part of the name."""
+    *folders, last = parts_of(name)
+    with _walked(root, folders, make) as handle:
+        yield handle, last
+
+
+@contextmanager
+def _walked(root: Path, folders: Sequence[str], make: bool = False) -> Iterator[int]:
+    """A handle of a folder in `root`, made where it is to be."""
+    handle, where = _open(None, str(root), _FOLDER, str(root)), str(root)
+    try:
+        for part in folders:
+            where = f"{where}/{part}"
+            try:
+                inner = _open(handle, part, _FOLDER, where)
+            except FileNotFoundError:
+                if not make:
+                    raise
+                with suppress(FileExistsError):
+                    os.mkdir(part, dir_fd=handle)
+                inner = _open(handle, part, _FOLDER, where)
+            os.close(handle)
+            handle = inner
+        yield handle
+    finally:
+        os.close(handle)
+
+
+def _open(folder: int | None, name: str, flags: int, where: str) -> int:
+    """A handle; OSError says where a link was met."""
+    try:
+        return os.open(name, flags, dir_fd=folder)
+    except OSError as error:
+        link = _is_link(folder, name)
+        raise OSError(errno.ELOOP if link else error.errno, IS_LINK if link else error.strerror, where) from None
+
+
+def _is_link(folder: int | None, name: str) -> bool:
+    try:
+        return stat.S_ISLNK(os.stat(name, dir_fd=folder, follow_symlinks=False).st_mode)
+    except OSError:
+        return False
