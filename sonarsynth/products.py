@@ -196,13 +196,19 @@ class PointCloud:
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """Exact ground truth of a frame, from the same arrivals that made the signals."""
+    """Exact ground truth of a frame, from the same arrivals that made the signals.
+
+    Poses, boxes and beams are those of the frame's instant. What is heard is of when the sound met the target: where it
+    was then is `position_at_echo`, which echoes, images and points are to be judged by.
+    """
 
     sonar_position: Floats  # (xyz) m, world
     sonar_orientation: Floats  # (wxyz)
     target_position: Floats  # (target, xyz) m, world
     target_orientation: Floats  # (target, wxyz)
     target_velocity: Floats  # (target, xyz) m/s, world
+    meeting_time: Floats  # (snap, target) s: when the sound of each snap, by the direct path, meets the target's origin
+    position_at_echo: Floats  # (snap, target, xyz) m, world: the origin then; NaN where no direct path leads to it
     box: Floats  # (target, corner 8, xyz) m: oriented bounding box, sonar frame
     image_box: Floats  # (target, 4): azimuth min, max, elevation min, max (rad) of the visible part; NaN if unseen
     visible_fraction: Floats  # (target,) share of the area facing the array that the array sees

@@ -23,7 +23,7 @@ from sonarsynth.tracing import AutoTracing, Tracing
 from sonarsynth.world.environment import Environment
 from sonarsynth.world.meshes import Mesh
 from sonarsynth.world.moment import Body, Moment, Snap, snaps_of
-from sonarsynth.world.motion import Motion, Still, pose, velocity
+from sonarsynth.world.motion import Motion, Still, Track, pose, velocity
 from sonarsynth.world.snap_pulses import scales
 from sonarsynth.world.sources import SnappingShrimp
 
@@ -157,7 +157,9 @@ class Scene:
     def moment(self, time: float, *, key: int | str = 0, step: int = 0, seed: int = 0) -> Moment:
         """The world at a time (s), with the snaps that a frame of the sequence of this key, step and seed draws."""
         placed = zip(self.world.targets, self.meshes, strict=True)
-        bodies = tuple(Body(t.name, mesh, pose(t.motion, time), velocity(t.motion, time)) for t, mesh in placed)
+        bodies = tuple(
+            Body(t.name, mesh, pose(t.motion, time), velocity(t.motion, time), t.motion, time) for t, mesh in placed
+        )
         bed = self.world.environment.depth
         snaps: list[Snap] = []
         for i, shrimp in enumerate(self.world.shrimp):
@@ -185,6 +187,7 @@ class Scene:
             key=key,
             sonar_pose=pose(self.trajectory.sonar, time),
             sonar_velocity=velocity(self.trajectory.sonar, time),
+            sonar_motion=self.trajectory.sonar,
             moment=self.moment(time, key=key, step=step, seed=seed),
         )
 
@@ -201,6 +204,12 @@ class Frame:
     sonar_pose: Pose
     sonar_velocity: Floats  # (xyz) m/s, world
     moment: Moment
+    sonar_motion: Motion | None = None  # None: it goes on at its velocity, and does not turn
+
+    @property
+    def sonar_track(self) -> Track:
+        """Where the sonar is about the instant of the frame."""
+        return Track(self.sonar_pose, self.sonar_velocity, self.sonar_motion, self.time)
 
     @property
     def time(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from sonarsynth.products import Paths, Truth
 from sonarsynth.sonar import BeamGrid
 from sonarsynth.world.casting import OFFSET, first_hit, occluded
 from sonarsynth.world.meshes import Mesh, in_blocks
-from sonarsynth.world.moment import Body, Moment
+from sonarsynth.world.moment import Body, Moment, meeting_times, positions
 
 Connect = Callable[[Floats, Floats], Paths]
 """Rays from (pair, xyz) to (pair, xyz) in the world: a propagation model bound to its water."""
@@ -21,12 +22,14 @@ _CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 
 
 def label(
-    moment: Moment, sonar_pose: Pose, beams: BeamGrid, connect: Connect, snap_level: Floats, straight: bool
-) -> Truth:
+    moment: Moment, sonar_pose: Pose, beams: BeamGrid, connect: Connect, snap_level: Floats, straight: bool,
+    doppler: bool = True,
+) -> Truth:  # fmt: skip
     """Truth of a frame.
 
     moment: the world; sonar_pose: of the array; beams: the grid that beams are labelled on; connect: the propagation
-    model of the frame; snap_level: (snap,) dB re 1 uPa at 1 m; straight: rays are straight, so bodies look as they are.
+    model of the frame; snap_level: (snap,) dB re 1 uPa at 1 m; straight: rays are straight, so bodies look as they are;
+    doppler: bodies move while sound is under way, so that it meets them elsewhere (`position_at_echo`).
     A beam's label is the first surface that a ray launched from the array centre in the beam's direction meets; its
     range is the distance of that point from the array centre. `label` traces the bent ray by casting a straight one
     against the bodies as they appear: each vertex moved to (its arrival direction) * (its distance).
@@ -36,12 +39,16 @@ def label(
     boxes = [
         _visible(body, corners, moment.bodies, sonar_pose) for body, corners in zip(moment.bodies, seen, strict=True)
     ]
+    tracks = [body.track if doppler else body.frozen.track for body in moment.bodies]
+    met = meeting_times(tracks, moment.snaps, partial(_direct_times, connect))
     return Truth(
         sonar_position=sonar_pose.position,
         sonar_orientation=sonar_pose.orientation,
         target_position=_rows([b.pose.position for b in moment.bodies], 3),
         target_orientation=_rows([b.pose.orientation for b in moment.bodies], 4),
         target_velocity=_rows([b.velocity for b in moment.bodies], 3),
+        meeting_time=met,
+        position_at_echo=positions(tracks, met),
         box=np.array([_box(b, sonar_pose) for b in moment.bodies]).reshape(-1, 8, 3),
         image_box=_rows([box for box, _ in boxes], 4),
         visible_fraction=np.array([fraction for _, fraction in boxes]),
@@ -52,6 +59,15 @@ def label(
         beam_facet=facet,
         beam_range=distance,
     )
+
+
+def _direct_times(connect: Connect, start: Floats, end: Floats) -> Floats:
+    """Travel times (pair,) s of the direct paths; NaN where there is none."""
+    paths = connect(start, end)
+    times = np.full(len(start), np.nan)
+    pairs, first = np.unique(paths.pair, return_index=True)  # the earliest: paths are sorted by time
+    times[pairs] = paths.travel_time[first]
+    return times
 
 
 def _rows(rows: list[Floats], width: int) -> Floats:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from sonarsynth.geometry import Pose
 from sonarsynth.planning.plans import Plan
 from sonarsynth.products import Arrivals
@@ -24,10 +22,9 @@ def arrivals_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Arriv
     the frame's sequence. Raises ValueError for anything outside the water.
     """
     from sonarsynth.tracing.arrivals import trace
-    from sonarsynth.tracing.moving import Moving
 
     scene, sonar = plan.scene, plan.scene.sonar
-    velocities = np.array([body.velocity for body in frame.moment.bodies]).reshape(-1, 3)
+    sonar_track = frame.sonar_track if part is None else frame.sonar_track.part(part.centre)
     return trace(
         scene.world.environment,
         plan.profile,
@@ -38,7 +35,8 @@ def arrivals_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Arriv
         plan.propagation,
         scene.laws,
         band=(sonar.band.low, sonar.band.high),
-        moving=Moving(velocities, frame.sonar_velocity) if scene.physics.doppler else None,
+        moving=sonar_track if scene.physics.doppler else None,
+        shared=plan.recipe.accuracy.signal,
         negligible=plan.choices.negligible,
         enough=AMPLITUDES * plan.recipe.accuracy.cheap,
         alike=FACETS * plan.recipe.accuracy.signal,

@@ -103,7 +103,8 @@ def trace_at(plan: Plan, frame: Frame) -> Traced:
     seen = arrivals.at_centre
     levels = snap_levels(frame.moment.snaps)
     straight = isinstance(plan.propagation, Straight)
-    truth = label(frame.moment, frame.sonar_pose, sonar.beams, plan.connect, levels, straight)
+    doppler = plan.scene.physics.doppler
+    truth = label(frame.moment, frame.sonar_pose, sonar.beams, plan.connect, levels, straight, doppler)
     band, targets = _band(plan, frame.moment.snaps), len(frame.moment.bodies)
     powers = path_powers(seen, band)
     book = ledger(seen, powers, band, targets, levels, _expansion_error(plan, seen))

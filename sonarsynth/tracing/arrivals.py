@@ -27,13 +27,15 @@ from sonarsynth.tracing.legs import (
     rays_to_centre,
     require_in_water,
 )
-from sonarsynth.tracing.moving import Moving, carried
-from sonarsynth.tracing.paths import Outward, assemble, join, silence
+from sonarsynth.tracing.meetings import SHARED, hearing_times, occasions
+from sonarsynth.tracing.moving import Carried, Meeting, received, stretched
+from sonarsynth.tracing.paths import Outward, assemble, by_target, join, silence
 from sonarsynth.tracing.shading import View
 from sonarsynth.tracing.variation import ALIKE, ENOUGH, fitted
 from sonarsynth.world.environment import Environment, Profile
 from sonarsynth.world.meshes import in_blocks
 from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.motion import Track
 
 if TYPE_CHECKING:
     from sonarsynth.tracing import Propagation, Visibility
@@ -66,6 +68,8 @@ class ArrayLegs:
     visibility: Visibility = "centre"  # from where facets must be seen
     first: int = 0  # of the legs, in the wavefronts
     degree: int = 3  # of polynomials over the aperture
+    targets: tuple[int, ...] | None = None  # whose facets these are; None: all bodies'
+    meeting: Meeting | None = None  # when bodies and array are where they are here; None: nothing moves
 
     @property
     def fronts(self) -> Fronts:
@@ -128,7 +132,8 @@ def trace(
     laws: tuple[ScatteringLaw, ...],
     *,
     band: tuple[float, float],
-    moving: Moving | None = None,
+    moving: Track | None = None,
+    shared: float = SHARED,
     negligible: float = NEGLIGIBLE,
     enough: float = ENOUGH,
     alike: float = ALIKE,
@@ -140,27 +145,45 @@ def trace(
 
     environment, profile: the water; moment: bodies and snaps; sonar_pose, elements: the array; absorption: dB/m at the
     centre of the band; propagation: how sound travels, and how many bounces are followed; laws: how the facets of each
-    body scatter; band: Hz; moving: velocities, where they count; negligible: see `NEGLIGIBLE`; enough:
+    body scatter; band: Hz; moving: the track of the array, where it and bodies move while sound is under way (left out:
+    all is where it is at the instant of the frame); shared: `meetings.SHARED`; negligible: see `NEGLIGIBLE`; enough:
     `variation.ENOUGH`; alike: `variation.ALIKE`; degree: of polynomials over the aperture. A facet counts where it is
     lit by the snap and seen, with no body in between, by the array centre; or, with `visibility`, by some hydrophone
     that it faces, and is heard by those. The snap itself is heard if no body stands in between, but for those that
     scatter forward (`tracing.forward`). Raises ValueError for anything outside the water.
     """
-    legs = array_legs(
-        environment,
-        profile,
-        moment.bodies,
-        sonar_pose,
-        elements,
-        propagation,
-        band,
-        negligible,
-        enough,
-        alike,
-        visibility,
-        degree,
+
+    def legs_to(pose: Pose, bodies: tuple[Body, ...], targets: tuple[int, ...] | None = None) -> ArrayLegs:
+        return array_legs(
+            environment, profile, bodies, pose, elements, propagation, band, negligible, enough, alike, visibility,
+            degree, targets,
+        )  # fmt: skip
+
+    if moving is None or (moving.still and all(body.track.still for body in moment.bodies)) or not moment.snaps:
+        return arrivals(legs_to(sonar_pose, moment.bodies), moment.snaps, absorption, laws)
+    parts: list[tuple[tuple[int, int], Arrivals]] = []
+    met = occasions(
+        moment.bodies, moment.snaps, moving, profile, highest=band[1], aperture=elements.aperture, shared=shared
     )
-    return arrivals(legs, moment.snaps, absorption, laws, moving)
+    begun = set[int]()
+    for some in met:
+        array = replace(legs_to(some.meeting.sonar.pose, some.bodies, some.targets), meeting=some.meeting)
+        snaps = {index: moment.snaps[index] for index in some.snaps}
+        for index in snaps.keys() - begun:
+            parts.append(
+                ((index, 0), _direct(_hearing(array, snaps[index], moving), index, snaps[index], absorption, laws))
+            )
+        parts += _echoes(array, snaps, absorption, laws)
+        begun |= snaps.keys()
+    return by_target(parts, float(profile.at(depth(sonar_pose.position))), 0.5 * (band[0] + band[1]))
+
+
+def _hearing(array: ArrayLegs, snap: Snap, sonar: Track) -> ArrayLegs:
+    """The array where it hears a snap itself."""
+    speed = float(array.profile.at(depth(sonar.pose.position)))
+    heard = float(hearing_times(snap.position, np.asarray(snap.time), sonar, speed))
+    there = sonar.later(heard)
+    return replace(array, sonar_pose=there.pose, meeting=Meeting(np.zeros(0), heard, there))
 
 
 def array_legs(
@@ -176,8 +199,10 @@ def array_legs(
     alike: float = ALIKE,
     visibility: Visibility = "centre",
     degree: int = 3,
+    targets: tuple[int, ...] | None = None,
 ) -> ArrayLegs:
-    """Facet to array, for every facet of every body that leaves a ray for the array that no body hides.
+    """Facet to array, for every facet of every body, or of some targets, that leaves a ray for the array that no body
+    hides.
 
     Raises ValueError for a body or an array that reaches out of the water.
     """
@@ -190,6 +215,8 @@ def array_legs(
     seen = 0
     for some in in_blocks(sum(len(body.mesh.faces) for body in bodies)):
         every = facets_of(bodies, some)
+        if targets is not None and len(targets) < len(bodies):
+            every = every.select(np.isin(every.target, targets))
         reached = may_face(every, sonar_pose.position, propagation.bounces, profile, environment.depth, slack)
         every = every.select(reached)
         part = legs_from(every, environment, profile, sonar_pose, propagation, centre, slack)
@@ -204,7 +231,7 @@ def array_legs(
     over = wavefronts(legs, group, environment, bent, sonar_pose, elements, propagation, band, degree)
     return ArrayLegs(
         legs, over, facets, bodies, environment, profile, propagation, sonar_pose, elements, band, negligible, enough,
-        alike, visibility, degree=degree,
+        alike, visibility, degree=degree, targets=targets,
     )  # fmt: skip
 
 
@@ -215,34 +242,40 @@ def bending(profile: Profile, propagation: Propagation, sonar_pose: Pose) -> Pro
     return Profile(profile.depth, np.full(len(profile.depth), float(profile.at(depth(sonar_pose.position)))))
 
 
-def arrivals(
-    array: ArrayLegs,
-    snaps: tuple[Snap, ...],
-    absorption: float,
-    laws: tuple[ScatteringLaw, ...],
-    moving: Moving | None = None,
-) -> Arrivals:
-    """The arrivals of any snaps from legs that are traced already: as `trace`, without tracing the array side again.
+def arrivals(array: ArrayLegs, snaps: tuple[Snap, ...], absorption: float, laws: tuple[ScatteringLaw, ...]) -> Arrivals:
+    """The arrivals of any snaps from legs that are traced already: as `trace`, of what is at rest, without tracing the
+    array side again.
 
     But for targets that scatter forward, whose shadows have legs of their own.
     """
-    parts, through = [silence(array.legs)], forward_legs(array, laws)
-    for index, snap in enumerate(snaps):
-        solid = opaque(array.bodies, laws, snap.position)
-        parts.append(_direct(array, solid, index, snap, absorption, moving))
-        parts.append(echoes(array, index, snap, absorption, tuple(law.parts for law in laws), moving))
+    numbered = dict(enumerate(snaps))
+    parts = [((index, 0), _direct(array, index, snap, absorption, laws)) for index, snap in numbered.items()]
+    parts += _echoes(array, numbered, absorption, laws)
+    parts.sort(key=lambda part: part[0])
+    heard = [silence(array.legs), *(part for _, part in parts)]
+    parts.clear()
+    return join(heard, float(array.profile.at(depth(array.sonar_pose.position))), array.centre)
+
+
+def _echoes(
+    array: ArrayLegs, snaps: dict[int, Snap], absorption: float, laws: tuple[ScatteringLaw, ...]
+) -> list[tuple[tuple[int, int], Arrivals]]:
+    """Echoes (1) and shadow waves (2) of numbered snaps, each with the number of its snap."""
+    parts, through = [], forward_legs(array, laws)
+    for index, snap in snaps.items():
+        law_parts = tuple(law.parts for law in laws)
+        parts.append(((index, 1), echoes(array, index, snap, absorption, law_parts)))
         if through is not None:
-            parts.append(echoes(through, index, snap, absorption, tuple(shadow_parts(law) for law in laws), moving))
-    return join(parts, float(array.profile.at(depth(array.sonar_pose.position))), array.centre)
+            shadows = tuple(shadow_parts(law) for law in laws)
+            parts.append(((index, 2), echoes(through, index, snap, absorption, shadows)))
+    return parts
 
 
-def _direct(
-    array: ArrayLegs, solid: tuple[Body, ...], index: int, snap: Snap, absorption: float, moving: Moving | None
-) -> Arrivals:
-    """Snap to array, where none of the solid bodies stands in between."""
+def _direct(array: ArrayLegs, index: int, snap: Snap, absorption: float, laws: tuple[ScatteringLaw, ...]) -> Arrivals:
+    """Snap to array, where no body stands in between that sound does not pass."""
     environment, profile, sonar_pose = array.environment, array.profile, array.sonar_pose
     legs = rays_to_centre(environment, profile, snap.position[None, :], sonar_pose, array.propagation, array.centre)
-    view = array.view(solid)
+    view = array.view(opaque(array.bodies, laws, snap.position))
     legs = view.visible(legs, legs.point, None)
     legs = view.settled(legs, legs.point, None)
     over = fronts(
@@ -259,10 +292,12 @@ def _direct(
     plain = Pulses.plain(len(legs.row))
     one, none = np.ones(len(legs.row)), np.full(len(legs.row), NO_TARGET)
     variation = fitted(array, over.gain(np.arange(len(legs.row))), legs.spreading)
+    none_out, meeting, count = Outward.none(len(one)), array.meeting, len(one)
+    rest = Carried.at_rest(count, snap.time)
+    legs = legs if meeting is None else received(legs, rest, meeting, profile)
     made = assemble(
-        legs, over.terms, Outward.none(len(one)), index, snap.time, absorption, none, none, one,
-        variation, plain,
+        legs, over.terms, none_out, index, snap.time, absorption, none, none, one, variation, plain
     )  # fmt: skip
-    if moving is None:
+    if meeting is None:
         return made
-    return carried(made, legs, None, snap, sonar_pose, profile, moving, array.elements, None, array.enough)
+    return stretched(made, legs, none_out, rest, meeting, profile, array.elements, None, array.enough)

@@ -12,6 +12,7 @@ from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.scattering import Part
 from sonarsynth.scattering.parts import Plain, Rough, Shadow, Smooth
 from sonarsynth.scattering.patches import Patches, Pulses, patches
+from sonarsynth.tracing.moving import Carried
 from sonarsynth.tracing.paths import Outward
 from sonarsynth.world.moment import Body
 
@@ -132,16 +133,23 @@ class Group:
         return self.part.pulses(self.incident, self.scattered, self.patch, sound_speed)
 
 
-def groups_of(array: ArrayLegs, out: Outward, leg: Ints, parts: tuple[tuple[Part, ...], ...]) -> list[Group]:
-    """Echoes of pairs of a way and a leg (pair,), by body and part; those that are nothing are left out."""
+def groups_of(
+    array: ArrayLegs, out: Outward, leg: Ints, parts: tuple[tuple[Part, ...], ...], carried: Carried | None
+) -> list[Group]:
+    """Echoes of pairs of a way and a leg (pair,), by body and part; those that are nothing are left out; carried: by
+    how much pairs differ from those that were traced, where anything moves."""
     facets, found = array.facets, []
     looked_for = array.visibility == "hydrophones" and array.elements.count > 1
     target = facets.target[out.facet]
     for number, (body, of_law) in enumerate(zip(array.bodies, parts, strict=True)):
         row = np.flatnonzero(target == number)
         facet = facets.facet[out.facet[row]]
-        incident = body.pose.turn_to_body(out.arrival[row])
-        scattered = body.pose.turn_to_body(array.legs.departure[leg[row]])
+        arrival, departure = out.arrival[row], array.legs.departure[leg[row]]
+        if carried is not None:
+            mine = carried.select(row)
+            arrival = mine.turned_back(arrival)
+            departure = mine.turned_back(mine.departure(array.legs.length[leg[row]], departure))
+        incident, scattered = body.pose.turn_to_body(arrival), body.pose.turn_to_body(departure)
         speed = array.profile.at(depth(array.legs.point[leg[row]]))
         wavenumber = 2.0 * np.pi * array.centre / speed
         for part in (

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.products import Arrivals
 from sonarsynth.scattering import Part
 from sonarsynth.scattering.patches import Pulses
 from sonarsynth.tracing.echo_groups import Group, groups_of, heard
-from sonarsynth.tracing.legs import may_face, usable
-from sonarsynth.tracing.moving import Moving, carried
+from sonarsynth.tracing.legs import Legs, may_face, usable
+from sonarsynth.tracing.moving import Carried, carry, meets, received, stretched, velocities
 from sonarsynth.tracing.paths import Outward, assemble, ordered, silence
 from sonarsynth.tracing.reflections import reflections
 from sonarsynth.tracing.shadows import hidden, overlapping
@@ -49,6 +49,7 @@ class _Found:
     gain: Floats  # (echo, FEW) of the legs there
     terms: Terms  # (echo,) of the wavefronts
     pulses: Pulses  # (echo,)
+    carried: Carried | None  # (pair,); None: nothing moves
 
     def select(self, loud: Bools) -> _Found:
         """The echoes picked by a mask, each with a pair of its own."""
@@ -59,7 +60,8 @@ class _Found:
         groups = [replace(g, row=mine) for g, mine in zip(groups, number, strict=True)]
         out, leg, factor = self.out.select(row), self.leg[row], self.factor[row]
         terms, pulses = self.terms.select(loud), self.pulses.select(loud)
-        return _Found(self.array, groups, out, leg, factor, self.few[loud], self.gain[loud], terms, pulses)
+        carried = None if self.carried is None else self.carried.select(row)
+        return _Found(self.array, groups, out, leg, factor, self.few[loud], self.gain[loud], terms, pulses, carried)
 
     @property
     def amplitude(self) -> Floats:
@@ -81,9 +83,12 @@ class _Found:
         """Amplitude of the law (echo, probe) at all probes or the first few, and the gain of the legs there."""
         if few is not None:
             return self.few, self.gain
-        fronts = self.array.fronts
-        law = np.concatenate([g.over(fronts.departure(self.leg[g.row])) for g in self.groups])
-        return law, fronts.gain(self.leg[_columns(self.groups, "row")[0]])
+        law = np.concatenate([g.over(self.departure(g.row)) for g in self.groups])
+        return law, self.array.fronts.gain(self.leg[_columns(self.groups, "row")[0]])
+
+    def departure(self, rows: Ints, few: int | None = None) -> Floats:
+        """Where each probe, or the first few, is seen from the facets of pairs (row, probe, xyz), as `_departure`."""
+        return _departure(self.array, self.leg[rows], None if self.carried is None else self.carried.select(rows), few)
 
     def seen(self) -> _Seen:
         """What decides which of them are kept."""
@@ -109,7 +114,6 @@ def echoes(
     snap: Snap,
     absorption: float,
     parts: tuple[tuple[Part, ...], ...],
-    moving: Moving | None,
 ) -> Arrivals:
     """Snap `index` to facet to array, over every facet of the legs that is lit; parts: of the law of each body.
 
@@ -130,15 +134,17 @@ def echoes(
         spot = np.concatenate([g.spot for g in some.groups])
         if spot.any() and not some.array.bending.uniform:
             over = delayed_by_spots(over, some.array, some.leg, spot)
-        array, out, legs = some.array, some.out, some.array.settled(some.leg)
+        array, out, legs, meeting = some.array, some.out, some.array.settled(some.leg), some.array.meeting
+        view = partial(_away, array, legs, some.leg, some.carried)
+        if meeting is not None and some.carried is not None:
+            legs = received(legs, some.carried, meeting, array.profile)
         target, facet = array.facets.target[out.facet], array.facets.facet[out.facet]
         amplitude, sign = _columns(some.groups, "amplitude", "sign")
         scattered, vary = sign * amplitude, (variation, error)
         one = assemble(legs, over, out, index, snap.time, absorption, target, facet, scattered, vary, some.pulses)
-        if moving is not None:
-            view = partial(array.fronts.departure, some.leg, FEW)
-            place = array.sonar_pose, array.profile, moving, array.elements
-            one = carried(one, legs, out, snap, *place, view, array.enough)
+        if meeting is not None and some.carried is not None:
+            place = meeting, array.profile, array.elements
+            one = stretched(one, legs, out, some.carried, *place, view, array.enough)
         if spot.any() and array.bending.uniform:
             one = from_spots(one, legs, spot, array.sonar_pose)
         made.append(replace(one, delay=one.delay + some.pulses.late))
@@ -186,13 +192,44 @@ def _found(array: ArrayLegs, snap: Snap, parts: tuple[tuple[Part, ...], ...]) ->
     out, fronts = _ways(array, snap), array.fronts
     way, leg = _pairs(out.facet, array.legs.row, len(array.facets.facet))
     kept = np.flatnonzero(out.bounces[way] + array.legs.bounces[leg] <= array.propagation.bounces)
-    out, leg = out.select(way[kept]), leg[kept]
-    groups = groups_of(array, out, leg, parts)
+    out, leg, carried = out.select(way[kept]), leg[kept], None
+    if array.meeting is not None:
+        out, carried = _carried(array, snap, out, leg)
+    groups = groups_of(array, out, leg, parts, carried)
     factor = array.legs.spreading[leg] * array.legs.boundary[leg] * out.spreading * out.boundary
-    few = np.concatenate([g.over(fronts.departure(leg[g.row], FEW)) for g in groups])
+    few = np.concatenate(
+        [g.over(_departure(array, leg[g.row], carried and carried.select(g.row), FEW)) for g in groups]
+    )
     pulses = Pulses.join([g.pulses(array.centre) for g in groups])
     rows = leg[_columns(groups, "row")[0]]
-    return _Found(array, groups, out, leg, factor, few, fronts.gain(rows, FEW), fronts.terms.select(rows), pulses)
+    gain, terms = fronts.gain(rows, FEW), fronts.terms.select(rows)
+    return _Found(array, groups, out, leg, factor, few, gain, terms, pulses, carried)
+
+
+def _carried(array: ArrayLegs, snap: Snap, out: Outward, leg: Ints) -> tuple[Outward, Carried]:
+    """Ways (pair,) when and where the sound meets what moves, and the remainder of the motion."""
+    meeting, facets = array.meeting, array.facets
+    assert meeting is not None
+    target, point = facets.target[out.facet], facets.point[out.facet]
+    velocity, spin = velocities(array.bodies, target, point)
+    met = meeting.met[target]
+    there, late = meets(out, met, velocity, snap.time, array.profile.at(depth(point)))
+    return there, carry(array.legs, leg, met, late, velocity, spin, meeting)
+
+
+def _departure(array: ArrayLegs, leg: Ints, carried: Carried | None, few: int | None) -> Floats:
+    """Where each probe, or the first few, is seen from facets (row, probe, xyz): world, in axes that turn with what
+    turns."""
+    away = array.fronts.departure(leg, few)
+    if carried is None:
+        return away
+    return carried.turned_back(carried.departure(array.legs.length[leg], away))
+
+
+def _away(array: ArrayLegs, legs: Legs, leg: Ints, carried: Carried | None) -> Floats:
+    """Where the first few probes are seen from facets (row, probe, xyz): world."""
+    away = array.fronts.departure(leg, FEW)
+    return away if carried is None else carried.departure(legs.length, away)
 
 
 def _columns(groups: list[Group], *names: str) -> list[np.ndarray]:
@@ -260,8 +297,7 @@ def _turned(found: _Found, most: float) -> Terms:
     over, array = found.terms, found.array
     if not any(g.turns for g in found.groups):
         return over
-    fronts = array.fronts
-    shift = np.concatenate([g.turned(fronts.departure(found.leg[g.row])) for g in found.groups])
+    shift = np.concatenate([g.turned(found.departure(g.row)) for g in found.groups])
     leaps = np.abs(shift).max(axis=1, initial=0.0) > LEAP
     if not shift.any():
         return over
@@ -292,7 +328,7 @@ def _spread(found: _Found, over: Terms, most: float) -> Terms:
     it is more.
     """
     array, share = found.array, np.abs(found.strength) / max(most, 1e-300)
-    more = np.concatenate([g.spread(array.fronts.departure(found.leg[g.row], FEW), array.centre) for g in found.groups])
+    more = np.concatenate([g.spread(found.departure(g.row, FEW), array.centre) for g in found.groups])
     terms, misfit = probes(array.elements, array.degree).fit_few(more)
     blur = over.blur + terms if over.blur.shape[1] else terms
     return over._replace(blur=blur, error=over.error + share * np.pi * array.band[1] * misfit)

@@ -47,7 +47,8 @@ def forward_legs(array: ArrayLegs, laws: tuple[ScatteringLaw, ...]) -> ArrayLegs
         return None
     environment, profile, pose, propagation = array.environment, array.profile, array.sonar_pose, array.propagation
     every = facets_of(array.bodies, slice(0, sum(len(body.mesh.faces) for body in array.bodies)))
-    scatters = np.array([bool(shadow_parts(law)) for law in laws])
+    mine = range(len(laws)) if array.targets is None else array.targets
+    scatters = np.array([bool(shadow_parts(law)) and number in mine for number, law in enumerate(laws)])
     every = every.select(scatters[every.target])
     legs = rays_to_centre(environment, profile, every.point, pose, propagation, array.centre)
     view = array.view(solid)

@@ -144,6 +144,20 @@ def join(parts: list[Arrivals], sound_speed: float, centre: float) -> Arrivals:
     return replace(_stacked(parts, None if heard.all() else heard), sound_speed=sound_speed, centre=centre)
 
 
+def by_target(parts: list[tuple[tuple[int, int], Arrivals]], sound_speed: float, centre: float) -> Arrivals:
+    """As `join`, of parts of numbered snaps and kinds (snap, kind), sorted by these, then by target."""
+    parts.sort(key=lambda part: part[0])
+    number = np.repeat(np.arange(len(parts)), [len(part.delay) for _, part in parts])
+    key = np.array([snap * 3 + kind for (snap, kind), _ in parts])[number]
+    target = np.concatenate([part.target for _, part in parts])
+    heard = [part for _, part in parts]
+    parts.clear()
+    order = np.lexsort((target, key))
+    if (np.diff(order) == 1).all():
+        return join(heard, sound_speed, centre)
+    return join([_stacked(heard, order)], sound_speed, centre)
+
+
 def ordered(parts: list[Arrivals], group: list[Ints]) -> Arrivals:
     """Arrivals of all parts, sorted by group (path,) of each; the list is emptied."""
     if len(parts) == 1:

@@ -105,18 +105,65 @@ _BEARINGS = _group(
     _v("position_covariance", (*_SNAP, "xyz", "xyz_other"), "float64", "m2", "predicted covariance of position"),
     _v("residual", _SNAP, "float64", "s", "root mean square residual of the sensor delays"),
 )
+_INSTANT = _comment("at the instant of the frame; what is heard is of when sound met the target: position_at_echo")
+_MEETING = _comment(
+    "what echoes, images and points show is where the sound met the target; poses, boxes and beams of the truth are "
+    "those of the instant of the frame. Sound by surface or bed meets it later. NaN where no direct path leads to it"
+)
 _TRUTH = _group(
     "/truth",
     "truth",
     _v("sonar_position", ("frame", "xyz"), "float64", "m", "position of the array centre in the world"),
     _v("sonar_orientation", ("frame", "wxyz"), "float64", "1", "unit quaternion from the sonar frame to the world"),
-    _v("target_position", (*_TARGET, "xyz"), "float64", "m", "position of the target's origin in the world"),
     _v(
-        "target_orientation", (*_TARGET, "wxyz"), "float64", "1", "unit quaternion from the target's frame to the world"
+        "target_position",
+        (*_TARGET, "xyz"),
+        "float64",
+        "m",
+        "position of the target's origin in the world at the instant of the frame",
+        attributes=_INSTANT,
+    ),
+    _v(
+        "position_at_echo",
+        (*_SNAP, "target", "xyz"),
+        "float64",
+        "m",
+        "position of the target's origin in the world when the sound of the snap, by the direct path, met it",
+        attributes=_MEETING,
+    ),
+    _v(
+        "meeting_time",
+        (*_SNAP, "target"),
+        "float64",
+        "s",
+        "time after the instant of the frame when the sound of the snap, by the direct path, met the target's origin",
+        attributes=_MEETING,
+    ),
+    _v(
+        "target_orientation",
+        (*_TARGET, "wxyz"),
+        "float64",
+        "1",
+        "unit quaternion from the target's frame to the world",
+        attributes=_INSTANT,
     ),
     _v("target_velocity", (*_TARGET, "xyz"), "float64", "m s-1", "velocity of the target in the world"),
-    _v("box", (*_TARGET, "corner", "xyz"), "float64", "m", "corners of the oriented bounding box, sonar frame"),
-    _v("image_box", (*_TARGET, "bound"), "float64", "degree", "bounds of the visible part in azimuth and elevation"),
+    _v(
+        "box",
+        (*_TARGET, "corner", "xyz"),
+        "float64",
+        "m",
+        "corners of the oriented bounding box, sonar frame",
+        attributes=_INSTANT,
+    ),
+    _v(
+        "image_box",
+        (*_TARGET, "bound"),
+        "float64",
+        "degree",
+        "bounds of the visible part in azimuth and elevation",
+        attributes=_INSTANT,
+    ),
     _v("visible_fraction", _TARGET, "float64", "1", "share of the area facing the array that the array sees"),
     _v("echo_azimuth", _ECHO, "float64", "degree", "azimuth that the target's echoes come from, weighted by power"),
     _v("echo_elevation", _ECHO, "float64", "degree", "elevation that they come from: ghosts by surface and bed"),
@@ -124,9 +171,9 @@ _TRUTH = _group(
     _v("snap_position", (*_SNAP, "xyz"), "float64", "m", "position of the snap in the world"),
     _v("snap_time", _SNAP, "float64", "s", "time of the snap after the instant of the frame"),
     _v("snap_level", _SNAP, "float64", "dB", "peak source level of the snap re 1 uPa at 1 m"),
-    _v("target", _BEAMS, "int16", "1", "target that the beam points at", attributes=_NONE),
-    _v("facet", _BEAMS, "int32", "1", "facet that the beam points at", attributes=_NONE),
-    _v("range", _BEAMS, "float32", "m", "distance to the first surface in the beam's direction"),
+    _v("target", _BEAMS, "int16", "1", "target that the beam points at", attributes=(*_NONE, *_INSTANT)),
+    _v("facet", _BEAMS, "int32", "1", "facet that the beam points at", attributes=(*_NONE, *_INSTANT)),
+    _v("range", _BEAMS, "float32", "m", "distance to the first surface in the beam's direction", attributes=_INSTANT),
     _v(
         "wavefront_error",
         ("frame",),

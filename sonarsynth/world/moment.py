@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose
 from sonarsynth.world.meshes import Mesh
+from sonarsynth.world.motion import Motion, Track
 from sonarsynth.world.snap_pulses import Scales, Waveform, at_depth, waveform
 from sonarsynth.world.sources import SnapModel, SnappingShrimp
+
+TravelTime = Callable[[Floats, Floats], Floats]
+"""Travel times (pair,) in s from points (pair, xyz) to points (pair, xyz) of the world; NaN where no sound arrives."""
+
+MEETINGS, MET = 20, 1e-9
+"""Rounds of solving for when sound meets what moves, at most; s: enough. Each round leaves v/c of the error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +29,23 @@ class Body:
     mesh: Mesh
     pose: Pose
     velocity: Floats  # (xyz) m/s, world
+    motion: Motion | None = None  # that brought it here; None: it goes on at its velocity, and does not turn
+    time: float = 0.0  # s: of the motion
+
+    @property
+    def track(self) -> Track:
+        """Of its origin."""
+        return Track(self.pose, self.velocity, self.motion, self.time)
+
+    def later(self, seconds: float) -> Body:
+        """The body where it will be, or was, so many seconds (s) after."""
+        there = self.track.later(seconds)
+        return replace(self, pose=there.pose, velocity=there.velocity, time=there.time)
+
+    @property
+    def frozen(self) -> Body:
+        """The body at rest where it is."""
+        return replace(self, velocity=np.zeros(3), motion=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,3 +90,30 @@ def snaps_of(shrimp: SnappingShrimp, bed: float, scales: Scales) -> tuple[Snap, 
     position, model = place(shrimp, bed), model_of(shrimp, bed)
     drawn = zip(shrimp.snap_times, scales.gain.tolist(), scales.width.tolist(), strict=True)
     return tuple(Snap(position, time, model, shrimp.source_level, gain, width) for time, gain, width in drawn)
+
+
+def meeting_times(tracks: Sequence[Track], snaps: tuple[Snap, ...], travel_time: TravelTime) -> Floats:
+    """When the sound of each snap meets what is on each track (snap, track), s on the clock of the frame.
+
+    tracks: from the instant of the frame on; travel_time: of direct paths. Solves t = t_snap + T(x(t)), x the track, by
+    iteration; NaN where no sound arrives.
+    """
+    emitted = np.array([snap.time for snap in snaps])[:, None] + np.zeros((len(snaps), len(tracks)))
+    start = np.array([snap.position for snap in snaps]).reshape(-1, 1, 3) + np.zeros((len(tracks), 3))
+    met, arrives = emitted, np.ones(emitted.shape, bool)
+    for _ in range(MEETINGS if emitted.size else 0):
+        found = emitted + travel_time(start.reshape(-1, 3), positions(tracks, met).reshape(-1, 3)).reshape(met.shape)
+        arrives = np.isfinite(found)
+        late = np.abs(found - met)[arrives].max(initial=0.0)
+        met = np.where(arrives, found, met)
+        if late <= MET or all(track.still for track in tracks):
+            break
+    return np.where(arrives, met, np.nan)
+
+
+def positions(tracks: Sequence[Track], times: Floats) -> Floats:
+    """Where tracks are (snap, track, xyz) m, world, at times (snap, track) s of the frame; NaN where these are."""
+    places = np.empty((*times.shape, 3))
+    for number, track in enumerate(tracks):
+        places[:, number] = track.positions(np.nan_to_num(times[:, number]))
+    return np.where(np.isnan(times)[..., None], np.nan, places)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Literal
 
@@ -146,6 +147,65 @@ def velocity(motion: Motion, time: float) -> Floats:
             return np.asarray(motion.speed * np.array([-np.sin(angle), np.cos(angle), 0.0]))
 
 
+def spin(motion: Motion, time: float) -> Floats:
+    """Angular velocity (3,) in the world at a time (rad/s): headings alone change; at a waypoint, of the leg that
+    begins."""
+    match motion:
+        case Circle():
+            return np.array([0.0, 0.0, motion.speed / motion.radius])
+        case Waypoints():
+            a, b = _leg(motion, time)
+            if not motion.points[0].time <= time < motion.points[-1].time:
+                return np.zeros(3)
+            return np.array([0.0, 0.0, -_turn(motion, a, b) / (b.time - a.time)])
+        case Still() | Line() | Course():
+            return np.zeros(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Where something that moves is about an instant."""
+
+    pose: Pose
+    velocity: Floats  # (xyz) m/s, world
+    motion: Motion | None = None  # that brought it here; None: it goes on at its velocity, and does not turn
+    time: float = 0.0  # s: of the motion
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m, own frame, from what the motion moves
+
+    @property
+    def spin(self) -> Floats:
+        """(xyz) rad/s: angular velocity, world."""
+        return np.zeros(3) if self.motion is None else spin(self.motion, self.time)
+
+    @property
+    def still(self) -> bool:
+        """Whether it stays where it is."""
+        return (self.motion is None and not self.velocity.any()) or isinstance(self.motion, Still)
+
+    def part(self, offset: Floats) -> Track:
+        """The track of a point of it, offset (xyz) m in its own frame."""
+        turned = self.pose.turn_to_world(offset)
+        place = Pose(self.pose.position + turned, self.pose.orientation)
+        x, y, z = (np.asarray(self.offset) + offset).tolist()
+        return Track(place, self.velocity + np.cross(self.spin, turned), self.motion, self.time, (x, y, z))
+
+    def later(self, seconds: float) -> Track:
+        """The same so many seconds (s) after, or before."""
+        time = self.time + seconds
+        if self.motion is None:
+            moved = Pose(self.pose.position + self.velocity * seconds, self.pose.orientation)
+            return Track(moved, self.velocity, None, time, self.offset)
+        whole = Track(pose(self.motion, time), velocity(self.motion, time), self.motion, time)
+        return whole.part(np.array(self.offset))
+
+    def positions(self, seconds: Floats) -> Floats:
+        """Where it is (..., xyz) m, world, so many seconds (...) s after."""
+        if self.motion is None or isinstance(self.motion, Still | Line | Course):
+            return np.asarray(self.pose.position + seconds[..., None] * self.velocity)
+        places = [self.later(late).pose.position for late in seconds.ravel().tolist()]
+        return np.array(places).reshape(*seconds.shape, 3)
+
+
 def _angle(motion: Circle, time: float) -> float:
     """Polar angle of the body about the centre, from x (rad)."""
     return 0.5 * np.pi - motion.bearing + motion.speed / motion.radius * time
@@ -177,9 +237,14 @@ def _pose_on_waypoints(motion: Waypoints, time: float) -> Pose:
     position = (1 - part) * np.array(a.position) + part * np.array(b.position)
     i = motion.points.index(a)
     start = _heading_at(motion, i)
+    if a.heading is None and b.heading is None and part >= 1.0:
+        start = _heading_at(motion, i + 1)
+    return Pose(position, quaternion(start + part * _turn(motion, a, b), motion.pitch, motion.roll))
+
+
+def _turn(motion: Waypoints, a: Waypoint, b: Waypoint) -> float:
+    """By how much (rad) the heading changes on the leg from a to b, clockwise."""
     if a.heading is None and b.heading is None:
-        turn = 0.0  # along each leg, turning at the waypoint
-        start = _heading_at(motion, i + 1) if part >= 1.0 else start
-    else:
-        turn = (_heading_at(motion, i + 1) - start + np.pi) % (2 * np.pi) - np.pi
-    return Pose(position, quaternion(start + part * turn, motion.pitch, motion.roll))
+        return 0.0  # along each leg, turning at the waypoint
+    i = motion.points.index(a)
+    return float((_heading_at(motion, i + 1) - _heading_at(motion, i) + np.pi) % (2 * np.pi) - np.pi)

@@ -14,11 +14,11 @@ from sonarsynth.scattering import Kirchhoff, MirrorLobe, PartlyReflecting, Scatt
 from sonarsynth.sonar import BeamGrid, Romanis, elements
 from sonarsynth.tracing import AutoTracing, Refracted, Straight, echoes
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.tracing.moving import Moving
 from sonarsynth.world import meshes
 from sonarsynth.world.environment import Environment, Isovelocity, Profile
 from sonarsynth.world.meshes import Mesh, in_blocks
 from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.motion import Track
 from sonarsynth.world.sources import LogarithmicBubble
 
 ENVIRONMENT = Environment(depth=30.0, sound_speed=Isovelocity(speed=1540.0))
@@ -54,7 +54,7 @@ CASES: dict[str, tuple[Profile, int, Scattering]] = {
 
 
 def found(profile: Profile, bounces: int, law: Scattering) -> Arrivals:
-    moving = Moving(np.array([body.velocity for body in BODIES]), np.array([0.5, 0.0, 0.0]))
+    moving = Track(SONAR, np.array([0.5, 0.0, 0.0]))
     tracing = AutoTracing(bounces=bounces)
     laws = (law, MirrorLobe())
     return trace(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -19,12 +20,12 @@ from sonarsynth.synthesis.direct_sum import exact_signals
 from sonarsynth.synthesis.wavefront import delay_and_gain, fronts
 from sonarsynth.tracing import Refracted, Straight
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.tracing.moving import Moving
 from sonarsynth.tracing.variation import ENOUGH
 from sonarsynth.world.boundaries import Rigid, SeaBed
 from sonarsynth.world.environment import Absorption, Environment, Isovelocity, Profile
 from sonarsynth.world.meshes import mesh_of
 from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.motion import Track
 from sonarsynth.world.shapes import Box
 from sonarsynth.world.sources import LogarithmicBubble
 
@@ -38,7 +39,16 @@ BAND = (SONAR.band.low, SONAR.band.high)
 PANEL = mesh_of(Box(size=(0.006, 0.3, 0.2), edge=0.05))
 FRONT = np.flatnonzero(PANEL.normal[:, 0] < -0.9)
 STILL, FAST = np.zeros(3), np.array([1.0, 6.0, -2.0])
-MOVING = {"target": Moving(FAST[None], STILL), "array": Moving(STILL[None], FAST), "both": Moving(FAST[None], -FAST)}
+
+
+class Moving(NamedTuple):
+    """Velocities (xyz), m/s."""
+
+    target: Floats
+    sonar: Floats
+
+
+MOVING = {"target": Moving(FAST, STILL), "array": Moving(STILL, FAST), "both": Moving(FAST, -FAST)}
 FAR = np.array([int(np.argmax(np.linalg.norm(ROMANIS.position, axis=1))), int(np.argmin(ROMANIS.position[:, 1])), 300])
 START, SAMPLES = 0.010, 1600
 
@@ -52,11 +62,11 @@ def traced(
         absorption=Absorption(formula="none"),
         bed=SeaBed(reflection=Rigid()),
     )
-    panel = Body("panel", PANEL, Pose(np.array([12.0, 1.5, -4.8]), quaternion(0.6)), moving.targets[0])
+    panel = Body("panel", PANEL, Pose(np.array([12.0, 1.5, -4.8]), quaternion(0.6)), moving.target)
     rays = Straight if profile.uniform else Refracted
     found = trace(
         water, profile, Moment(0.0, (panel,), (SNAP,)), pose, array, 0.0, rays(bounces=bounces), (Isotropic(),),
-        band=BAND, moving=moving, enough=enough, negligible=0.0,
+        band=BAND, moving=Track(pose, moving.sonar), enough=enough, negligible=0.0,
     )  # fmt: skip
     return found.select(found.direct | np.isin(found.facet, FRONT))  # those that no hydrophone sees from their edge
 
@@ -100,7 +110,7 @@ def test_doppler_is_that_of_each_hydrophone_to_the_third_order_of_the_aperture(w
     assert centre > 5e-5  # v/c of the angle that the array takes up
     assert whole < 0.02 * centre
     assert 0.4 < centre_of_half / centre < 0.6
-    assert half < whole / 5.0  # 8 in the limit
+    assert half < max(whole / 5.0, 4e-4 * centre)  # 8 in the limit, down to squares of v/c
 
 
 def test_signals_of_one_expansion_are_those_of_each_hydrophone() -> None:
@@ -163,9 +173,9 @@ def test_one_path_alone_is_the_direct_sum() -> None:
 
 
 def test_nothing_is_carried_where_it_would_not_be_heard() -> None:
-    slow = Moving(0.1 * FAST[None], STILL)
+    slow = Moving(0.1 * FAST, STILL)
     assert traced(slow, ROMANIS, POSE, enough=ENOUGH).stretch_terms.shape[1] == 0
-    assert traced(Moving(STILL[None], STILL), ROMANIS, POSE).stretch_terms.shape[1] == 0
+    assert traced(Moving(STILL, STILL), ROMANIS, POSE).stretch_terms.shape[1] == 0
     assert traced(MOVING["target"], ROMANIS, POSE, enough=ENOUGH).stretch_terms.shape[1] > 0
 
 

@@ -17,9 +17,9 @@ from sonarsynth.synthesis.direct_sum import exact_signals
 from sonarsynth.synthesis.wavefront import faced, fronts, towards
 from sonarsynth.tracing import Refracted
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.tracing.moving import Moving
 from sonarsynth.world.environment import Absorption, Environment, Isovelocity, Profile
 from sonarsynth.world.moment import Moment, Snap
+from sonarsynth.world.motion import Track
 from sonarsynth.world.sources import LogarithmicBubble
 
 C = 1500.0
@@ -37,7 +37,7 @@ def profile(gradient: float) -> Profile:
     return Profile(np.array([0.0, 10.0]), np.array([C, C + 10.0 * gradient]))
 
 
-def traced(gradient: float, array: Elements, pose: Pose, moving: Moving | None = None) -> Arrivals:
+def traced(gradient: float, array: Elements, pose: Pose, moving: Track | None = None) -> Arrivals:
     return trace(
         WATER, profile(gradient), Moment(0.0, (), SNAPS), pose, array, 0.0, Refracted(bounces=0), (),
         band=(SONAR.band.low, SONAR.band.high), moving=moving,
@@ -85,7 +85,7 @@ def test_the_straight_limit_is_that_of_straight_rays() -> None:
 
 def test_the_motion_of_the_array_turns_no_wave() -> None:
     """It makes delays longer, not what a face hears of them."""
-    moving = Moving(np.zeros((0, 3)), np.array([1.0, 2.0, 0.0]))
+    moving = Track(POSE, np.array([1.0, 2.0, 0.0]))
     front = fronts(traced(0.0, ROMANIS, POSE, moving), SNAPS, ROMANIS)
     assert front.delay_terms.any()
     assert np.abs(faced(front, ROMANIS.position) - towards(front, ROMANIS.position)[0]).max() < 1e-12

@@ -17,10 +17,10 @@ from sonarsynth.scattering import Kirchhoff, MirrorLobe, PartlyReflecting
 from sonarsynth.sonar import Romanis, elements
 from sonarsynth.tracing import AutoTracing
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.tracing.moving import Moving
 from sonarsynth.world.environment import Absorption, Environment, Isovelocity, Profile
 from sonarsynth.world.meshes import Mesh, mesh_of
 from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.motion import Track
 from sonarsynth.world.shapes import Box, Sphere
 from sonarsynth.world.sources import LogarithmicBubble
 from tests.spheres import exact_sphere
@@ -48,7 +48,7 @@ def heard(
     array: Floats = ARRAY,
     bounces: int = 0,
     profile: Profile = PROFILE,
-    moving: Moving | None = None,
+    moving: Track | None = None,
 ) -> Arrivals:
     snaps = (Snap(np.array(source, float), 0.0, LogarithmicBubble(), None),)
     return trace(
@@ -253,10 +253,11 @@ def test_the_hydrophones_hear_the_shadow_each_where_it_is() -> None:
 def test_a_body_that_moves_keeps_its_shadow() -> None:
     """Along the line of sight nothing changes but where it is when the sound passes it."""
     mesh, source = ball(0.3, 0.25), ARRAY + [20.0, 0.0, 0.0]
-    velocity = np.array([[2.0, 0.0, 0.0]])
+    velocity = np.array([2.0, 0.0, 0.0])
     place = ARRAY + [10.0, 0.1, 0.0]
-    moved = heard((body(mesh, place),), source, moving=Moving(velocity, np.zeros(3)))
-    met = place + velocity[0] * 10.0 / C
+    swimmer = replace(body(mesh, place), velocity=velocity)
+    moved = heard((swimmer,), source, moving=Track(Pose(ARRAY, EAST), np.zeros(3)))
+    met = place + velocity * 10.0 / C
     still = heard((body(mesh, met),), source)
     np.testing.assert_allclose(transfer(moved), transfer(still), atol=2e-3 * np.abs(straight(source)).max())
     assert np.abs(moved.stretch).max() < 1e-5  # ahead there is no Doppler

@@ -37,8 +37,12 @@ def ball(place=(15.0, 1.0, -6.0), radius: float = 0.3, subdivisions: int = 2) ->
     return Body("ball", mesh, Pose(np.array(place), quaternion(0.0)), np.zeros(3))
 
 
+def snap(time: float = 0.0) -> Snap:
+    return Snap(SOURCE, time, LogarithmicBubble(), None)
+
+
 def run(bodies=None, profile=UNIFORM, environment=RIGID, bounces=2, law=None, array=ONE, **more) -> Arrivals:
-    snaps = (Snap(SOURCE, more.pop("time", 0.0), LogarithmicBubble(), None),)
+    snaps = (snap(more.pop("time", 0.0)),)
     bodies = (ball(),) if bodies is None else bodies
     tracing = more.pop("tracing", AutoTracing(bounces=bounces))
     return trace(

@@ -1,0 +1,120 @@
+"""When and where the sound of each snap meets each body and the array: the poses that a frame is traced between.
+
+A body that moves is met elsewhere by each snap, and an array that moves hears the echoes of each body elsewhere. Snaps
+and bodies for which that is nearly the same are traced together; by what is left paths are carried (`tracing.moving`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, depth
+from sonarsynth.tracing.moving import Meeting
+from sonarsynth.world.environment import Profile
+from sonarsynth.world.moment import Body, Snap, meeting_times, positions
+from sonarsynth.world.motion import Track
+
+SHARED = 1e-2
+"""What moves by less than this part of the radius of a body from one snap to another, and keeps as near to what its
+velocity and spin say, in radians of the highest frequency, is traced for both together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Occasion:
+    """What is traced together: some snaps, and the bodies whose echoes of them are heard at about one place."""
+
+    snaps: tuple[int, ...]
+    targets: tuple[int, ...]
+    bodies: tuple[Body, ...]  # all of them, where the sound meets them
+    meeting: Meeting
+
+
+@dataclass(frozen=True, eq=False)
+class _Times:
+    """When the sound of each snap meets the middle of bodies, and when the array hears that."""
+
+    bodies: tuple[Body, ...]
+    sonar: Track
+    met: Floats  # (snap, body) s
+    heard: Floats  # (snap, body) s
+    shared: float
+    wavenumber: float  # rad/m at the highest frequency
+    aperture: float  # m
+
+    def classes(self, snap: int) -> list[tuple[int, ...]]:
+        """Bodies, ascending, whose echoes of a snap the array hears at about one place."""
+        left, found = np.argsort(self.heard[snap], kind="stable").tolist(), []
+        while left:
+            first = float(self.heard[snap, left[0]])
+            there = self.sonar.later(first)
+            near = [n for n in left if self._array_near(there, float(self.heard[snap, n]) - first)]
+            found.append(tuple(sorted(near)))
+            left = [n for n in left if n not in near]
+        return found or [()]
+
+    def serves(self, occasion: Occasion, snap: int) -> bool:
+        """Whether what is traced on an occasion serves another snap as well."""
+        for body, late in zip(occasion.bodies, (self.met[snap] - occasion.meeting.met).tolist(), strict=True):
+            if not self._near(body.track, late, body.mesh.radius, body.mesh.radius):
+                return False
+        late = self.heard[snap, list(occasion.targets)] - occasion.meeting.heard
+        return all(self._array_near(occasion.meeting.sonar, seconds) for seconds in late.tolist())
+
+    def _array_near(self, sonar: Track, seconds: float) -> bool:
+        smallest = min((body.mesh.radius for body in self.bodies), default=np.inf)
+        return self._near(sonar, seconds, smallest, self.aperture)
+
+    def _near(self, track: Track, seconds: float, reach: float, size: float) -> bool:
+        """Whether what is `size` m large moves by little in some seconds, and that as its velocity and spin say."""
+        if track.still or seconds == 0.0:
+            return True
+        way = track.velocity * seconds
+        if np.linalg.norm(way) > self.shared * reach:
+            return False
+        then, turn = track.later(seconds).pose, track.pose.rotation.T
+        off = np.linalg.norm(then.position - track.pose.position - way)
+        turned = turn + np.cross(track.spin * seconds, turn)  # rows: the axes
+        return bool((off + size * np.linalg.norm(then.rotation.T - turned)) * self.wavenumber <= self.shared)
+
+
+def occasions(
+    bodies: tuple[Body, ...],
+    snaps: tuple[Snap, ...],
+    sonar: Track,
+    profile: Profile,
+    *,
+    highest: float,
+    aperture: float,
+    shared: float = SHARED,
+) -> list[Occasion]:
+    """Poses to trace the echoes of each snap from each body between, by the times of straight lines.
+
+    bodies, sonar: at the instant of the frame; highest: frequency, Hz; aperture: m of the array; shared: see `SHARED`.
+    """
+    speed = float(profile.at(depth(sonar.pose.position)))
+    tracks = [body.track.part(0.5 * np.sum(body.mesh.box, axis=0)) for body in bodies]
+    met = meeting_times(tracks, snaps, lambda start, end: np.linalg.norm(end - start, axis=1) / speed)
+    heard = hearing_times(positions(tracks, met), met, sonar, speed)
+    times = _Times(bodies, sonar, met, heard, shared, 2.0 * np.pi * highest / speed, aperture)
+    found: list[Occasion] = []
+    for snap in range(len(snaps)):
+        for targets in times.classes(snap):
+            for number, other in enumerate(found):
+                if other.targets == targets and times.serves(other, snap):
+                    found[number] = replace(other, snaps=(*other.snaps, snap))
+                    break
+            else:
+                there = tuple(body.later(late) for body, late in zip(bodies, met[snap].tolist(), strict=True))
+                late = float(heard[snap, list(targets)].mean()) if targets else 0.0
+                found.append(Occasion((snap,), targets, there, Meeting(met[snap], late, sonar.later(late))))
+    return found
+
+
+def hearing_times(place: Floats, sent: Floats, sonar: Track, speed: float) -> Floats:
+    """When an array on a track hears what was sent from places (..., xyz) m at times (...) s, by straight lines."""
+    heard = sent
+    for _ in range(1 if sonar.still else 6):
+        heard = sent + np.linalg.norm(sonar.positions(heard) - place, axis=-1) / speed
+    return np.asarray(heard)

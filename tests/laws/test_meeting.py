@@ -1,0 +1,87 @@
+"""Where targets are when sound meets them: the retarded equation, on tracks that are straight and that bend."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from sonarsynth.labelling import label
+from sonarsynth.sonar import BeamGrid
+from sonarsynth.tracing import Refracted, Straight
+from sonarsynth.world.moment import Moment
+from sonarsynth.world.motion import Circle, Course, Still, Waypoint, Waypoints, pose, spin, velocity
+from tests.laws.test_traced_families import BED, SONAR, THERMOCLINE, UNIFORM, C, ball
+from tests.laws.test_traced_families import snap as snap_at
+
+TIMES = (-0.1, 0.0, 0.1)
+NOW = 2.0
+MOTIONS = {
+    "still": Still(position=(15.0, 1.0, -6.0)),
+    "course": Course(start=(15.0, -50.0, -6.0), heading=0.3, speed=30.0, climb=0.5),
+    "circle": Circle(centre=(18.0, 0.0, -5.0), radius=6.0, speed=-9.0, bearing=4.0),
+    "waypoints": Waypoints(
+        points=(
+            Waypoint(time=0.0, position=(20.0, 8.0, -6.0), heading=0.1),
+            Waypoint(time=2.01, position=(18.0, -6.0, -5.0), heading=2.1),
+            Waypoint(time=4.0, position=(10.0, -8.0, -5.0), heading=-2.9),
+        )
+    ),
+}
+"""The last passes a waypoint while sound is under way."""
+
+
+def truth(motion, straight: bool = True, doppler: bool = True):
+    body = replace(ball(), pose=pose(motion, NOW), velocity=velocity(motion, NOW), motion=motion, time=NOW)
+    moment = Moment(NOW, (body,), tuple(snap_at(time) for time in TIMES))
+    rays, water = (Straight(), UNIFORM) if straight else (Refracted(), THERMOCLINE)
+    beams = BeamGrid(azimuth_span=0.2, azimuths=3, elevation_span=0.2, elevations=3)
+    levels = np.zeros(len(TIMES))
+    return label(moment, SONAR, beams, lambda a, b: rays.connect(water, BED, a, b), levels, straight, doppler)
+
+
+@pytest.mark.parametrize("kind", MOTIONS)
+def test_a_snap_meets_a_target_at_the_root_of_the_retarded_equation(kind: str) -> None:
+    motion, found = MOTIONS[kind], truth(MOTIONS[kind])
+    for n, time in enumerate(TIMES):
+        source = found.snap_position[n]
+        met = brentq(
+            lambda t, s=source, e=time: t - e - np.linalg.norm(pose(motion, NOW + t).position - s) / C,
+            time,
+            time + 0.1,
+            xtol=1e-14,
+        )
+        assert found.meeting_time[n, 0] == pytest.approx(met, abs=1e-9)
+        np.testing.assert_allclose(found.position_at_echo[n, 0], pose(motion, NOW + met).position, atol=1e-7)
+
+
+def test_through_bent_water_the_direct_ray_says_when() -> None:
+    found = truth(MOTIONS["course"], straight=False)
+    for n, time in enumerate(TIMES):
+        there = found.position_at_echo[n]
+        rays = Refracted().connect(THERMOCLINE, BED, found.snap_position[n][None], there)
+        assert found.meeting_time[n, 0] == pytest.approx(time + rays.travel_time[0], abs=1e-9)
+        np.testing.assert_allclose(
+            there[0], pose(MOTIONS["course"], NOW + found.meeting_time[n, 0]).position, atol=1e-9
+        )
+
+
+def test_where_nothing_moves_while_sound_is_under_way_a_target_is_met_where_it_is() -> None:
+    for kind, doppler in (("still", True), ("course", False), ("circle", False)):
+        found = truth(MOTIONS[kind], doppler=doppler)
+        assert np.array_equal(found.position_at_echo, np.broadcast_to(found.target_position, (3, 1, 3)))
+        straight = np.linalg.norm(found.target_position - found.snap_position, axis=1) / C
+        np.testing.assert_allclose(found.meeting_time[:, 0], straight + TIMES, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", MOTIONS)
+def test_the_spin_of_a_motion_is_the_rate_of_its_orientation(kind: str) -> None:
+    motion, step = MOTIONS[kind], 1e-5
+    for time in (0.5, 1.9, 2.5):
+        turned = (pose(motion, time + step).rotation - pose(motion, time - step).rotation) / (2 * step)
+        rate = turned @ pose(motion, time).rotation.T
+        np.testing.assert_allclose(
+            spin(motion, time), [rate[2, 1], rate[0, 2], rate[1, 0]], atol=1e-7 * (1 + np.abs(rate).max())
+        )
