@@ -80,7 +80,7 @@ class Arrivals:
     snap: Ints  # (path,) index of the snap
     target: Ints  # (path,) index of the target, -1 for the direct path
     facet: Ints  # (path,) index of the facet in its target's mesh, -1 for the direct path
-    point: Floats  # (path, xyz) world position of the scattering point (of the snap for the direct path)
+    point: Floats  # (path, xyz) m, world: scattering point where the sound met it (direct path: the snap)
     surface: Ints  # (path,) surface reflections
     bottom: Ints  # (path,) bed reflections
     turning: Ints  # (path,) turning points

@@ -21,7 +21,7 @@ from sonarsynth.world.casting import inside
 from sonarsynth.world.casts import profile_of
 from sonarsynth.world.environment import Profile
 from sonarsynth.world.meshes import in_blocks, mesh_of
-from sonarsynth.world.moment import Body, model_of
+from sonarsynth.world.moment import Body, meeting_times, model_of
 from sonarsynth.world.motion import pose
 from sonarsynth.world.shapes import MeshFile
 from sonarsynth.world.snap_pulses import largest_scales, pulse, waveform
@@ -147,9 +147,27 @@ def check_frame(scene: Scene, frame: Frame) -> None:
             _check_depth(path, f"target '{body.name}'", _places(body), bed, when)
         if scene.physics.doppler:
             _check_speed(scene, frame, i)
+            _check_met(scene, frame, i)
         if inside(body, frame.sonar_pose.position):
             raise FieldError(path, f"target '{body.name}' has the sonar inside at frame {frame.index}")
     _check_snaps(scene, frame)
+
+
+def _check_met(scene: Scene, frame: Frame, number: int) -> None:
+    """A body must be in the water where the sound of each snap meets it, and no snap inside it when it sounds."""
+    body, slowest = frame.moment.bodies[number], float(profile_of(scene.world.environment.sound_speed).speed.min())
+    snaps, path = frame.moment.snaps, ("scene", "world", "targets", number, "motion")
+    if body.track.still or not snaps:
+        return
+    met = meeting_times([body.track], snaps, lambda start, end: np.linalg.norm(end - start, axis=1) / slowest)
+    bed, what = scene.world.environment.depth, f"target '{body.name}', where sound meets it,"
+    for late in {float(met.min()), float(met.max())}:
+        there = body.later(late)
+        if not _box_in_water(there, bed):
+            _check_depth(path, what, _places(there), bed, f"frame {frame.index}")
+    for snap in snaps:
+        if snap.time and inside(body.later(snap.time), snap.position):
+            raise FieldError(path, f"{what} has a snap inside at frame {frame.index}")
 
 
 def _check_speed(scene: Scene, frame: Frame, number: int) -> None:

@@ -70,7 +70,7 @@ class ArrayLegs:
     visibility: Visibility = "centre"  # from where facets must be seen
     first: int = 0  # of the legs, in the wavefronts
     degree: int = 3  # of polynomials over the aperture
-    targets: tuple[int, ...] | None = None  # whose facets these are; None: all bodies'
+    targets: tuple[int, ...] | None = None  # of the facets; None: all
     meeting: Meeting | None = None  # when bodies and array are where they are here; None: nothing moves
 
     @property
@@ -286,16 +286,9 @@ def _direct(
     legs = view.visible(legs, legs.point, None)
     legs = view.settled(legs, legs.point, None)
     over = fronts(
-        legs,
-        np.zeros(len(legs.row), int),
-        environment,
-        array.bending,
-        sonar_pose,
-        array.elements,
-        array.propagation,
-        array.band,
-        array.degree,
-    )
+        legs, np.zeros(len(legs.row), int), environment, array.bending, sonar_pose, array.elements, array.propagation,
+        array.band, array.degree,
+    )  # fmt: skip
     plain = Pulses.plain(len(legs.row))
     one, none = np.ones(len(legs.row)), np.full(len(legs.row), NO_TARGET)
     variation = fitted(array, over.gain(np.arange(len(legs.row))), legs.spreading)

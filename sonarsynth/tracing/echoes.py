@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import product
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from sonarsynth.scattering.patches import Pulses
 from sonarsynth.tracing.absorbing import path_loss
 from sonarsynth.tracing.echo_groups import Group, groups_of, heard
 from sonarsynth.tracing.legs import Legs, may_face, usable
+from sonarsynth.tracing.loudness import Seen, loud_of_all, loud_ones
 from sonarsynth.tracing.moving import Carried, carry, meets, received, stretched, velocities
 from sonarsynth.tracing.paths import Outward, assemble, ordered, silence
 from sonarsynth.tracing.reflections import reflections
@@ -92,22 +92,13 @@ class _Found:
         """Where each probe, or the first few, is seen from the facets of pairs (row, probe, xyz), as `_departure`."""
         return _departure(self.array, self.leg[rows], None if self.carried is None else self.carried.select(rows), few)
 
-    def seen(self) -> _Seen:
+    def seen(self) -> Seen:
         """What decides which of them are kept."""
         row, amplitude = _columns(self.groups, "row", "amplitude")
         most = np.maximum(np.abs(self.few).max(axis=1, initial=0.0), np.abs(amplitude)) * self.factor[row]
         target = self.array.facets.target[self.out.facet[row]]
         number = np.repeat(np.arange(len(self.groups)), [len(g.row) for g in self.groups])
-        return _Seen(most * heard(self.pulses, self.array.band), self.pulses.coherent, target, number)
-
-
-class _Seen(NamedTuple):
-    """Echoes, and how loud they are."""
-
-    strength: Floats  # (echo,) the largest amplitude that it has anywhere on the array
-    coherent: Bools  # (echo,)
-    target: Ints  # (echo,)
-    group: Ints  # (echo,)
+        return Seen(most * heard(self.pulses, self.array.band), self.pulses.coherent, target, number)
 
 
 def echoes(
@@ -163,31 +154,21 @@ def _loudest(array: ArrayLegs, snap: Snap, parts: tuple[tuple[Part, ...], ...]) 
     blocks = in_blocks(len(array.facets.facet))
     if len(blocks) == 1:
         found = _found(array, snap, parts)
-        return [found.select(_loud(found.seen(), array.negligible))]
+        return [found.select(loud_ones(found.seen(), array.negligible))]
     held: list[_Found] = []
-    seen: list[_Seen] = []
+    seen: list[Seen] = []
     kept: list[Bools] = []
     for some in blocks:
         found = _found(array.part(some), snap, parts)
         seen.append(found.seen())
-        kept.append(_loud_of_all(seen, FAINTER * array.negligible)[-1])
+        kept.append(loud_of_all(seen, FAINTER * array.negligible)[-1])
         held.append(found.select(kept[-1]))
-    for n, wanted in enumerate(_loud_of_all(seen, array.negligible)):
+    for n, wanted in enumerate(loud_of_all(seen, array.negligible)):
         if (wanted & ~kept[n]).any():
             held[n] = _found(array.part(blocks[n]), snap, parts).select(wanted)
         else:
             held[n] = held[n].select(wanted[kept[n]])
     return held
-
-
-def _loud_of_all(seen: list[_Seen], negligible: float) -> list[Bools]:
-    """Which echoes of each block are kept, by all of them in the order of one block."""
-    columns = [np.concatenate(column) for column in zip(*seen, strict=True)]
-    order = np.argsort(columns[-1], kind="stable")
-    keep = np.empty(len(order), bool)
-    in_order: Any = [column[order] for column in columns]
-    keep[order] = _loud(_Seen(*in_order), negligible)
-    return np.split(keep, np.cumsum([len(some.strength) for some in seen])[:-1])
 
 
 def _found(array: ArrayLegs, snap: Snap, parts: tuple[tuple[Part, ...], ...]) -> _Found:
@@ -200,13 +181,12 @@ def _found(array: ArrayLegs, snap: Snap, parts: tuple[tuple[Part, ...], ...]) ->
         out, carried = _carried(array, snap, out, leg)
     groups = groups_of(array, out, leg, parts, carried)
     factor = array.legs.spreading[leg] * array.legs.boundary[leg] * out.spreading * out.boundary
-    few = np.concatenate(
-        [g.over(_departure(array, leg[g.row], carried and carried.select(g.row), FEW)) for g in groups]
-    )
+    away = [_departure(array, leg[g.row], carried and carried.select(g.row), FEW) for g in groups]
+    few = np.concatenate([g.over(of) for g, of in zip(groups, away, strict=True)])
     pulses = Pulses.join([g.pulses(array.centre) for g in groups])
     rows = leg[_columns(groups, "row")[0]]
-    gain, terms = fronts.gain(rows, FEW), fronts.terms.select(rows)
-    return _Found(array, groups, out, leg, factor, few, gain, terms, pulses, carried)
+    gain, over = fronts.gain(rows, FEW), fronts.terms.select(rows)
+    return _Found(array, groups, out, leg, factor, few, gain, over, pulses, carried)
 
 
 def _carried(array: ArrayLegs, snap: Snap, out: Outward, leg: Ints) -> tuple[Outward, Carried]:
@@ -273,20 +253,6 @@ def _pairs(facet: Ints, row: Ints, facets: int) -> tuple[Ints, Ints]:
     way = np.repeat(np.arange(len(facet)), count)
     within = np.arange(len(way)) - np.repeat(np.cumsum(count) - count, count)
     return way, begin[facet[way]] + within
-
-
-def _loud(seen: _Seen, negligible: float) -> Bools:
-    """Which (path,) are kept: all but the faintest of each target, by `arrivals.NEGLIGIBLE`."""
-    strength, coherent, target, _ = seen
-    keep = np.ones(len(strength), bool)
-    for number, exponent in product(np.unique(target), (1, 2)):
-        some = np.flatnonzero((target == number) & (coherent == (exponent == 1)))
-        loudest = strength[some].max(initial=0.0)
-        size = (strength[some] / (loudest or 1.0)) ** exponent  # amplitudes may be too small to be squared
-        order = np.argsort(size, kind="stable")
-        least = negligible * size.sum() if exponent == 2 else np.sqrt(negligible)
-        keep[some[order[np.cumsum(size[order]) <= least]]] = False
-    return keep
 
 
 def _turned(found: _Found, most: float) -> Terms:

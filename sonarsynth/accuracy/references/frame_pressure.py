@@ -42,6 +42,10 @@ SLANT = 0.3
 """Bent rays leave a facet by less than this (rad) beside straight ones: others are not looked for."""
 
 
+STOPPED = 2e-5
+"""What the filter lets through may be so little, and be left out."""
+
+
 @dataclass(frozen=True, eq=False)
 class Body:
     """A target: its facets in its own frame, and how it moves."""
@@ -212,20 +216,28 @@ class FramePressure:
         """Pressure (sample,) of what arrives."""
         rate, chosen = self.scene.sonar.sampling_frequency, self.scene.sonar.antialias
         pad = int(np.ceil(1.2 * duration(snap, chosen) * rate))
+        signal = np.zeros(samples)
         if not found:
-            return np.zeros(samples)
+            return signal
         every = Contributions.join(found)
-        first, last = start - pad / rate, start + (samples + pad) / rate
-        every = every.select(np.flatnonzero((every.time > first) & (every.time < last)))
+        sample = (every.time - start) * rate
+        every = every.select(np.flatnonzero((sample > -pad) & (sample < samples + pad)))
         if not len(every.time):
-            return np.zeros(samples)
-        length = next_fast_len(samples + 2 * pad, real=True)
-        frequency = np.arange(length // 2 + 1) * rate / length
+            return signal
+        first, last = (int(np.floor((f(every.time) - start) * rate)) for f in (np.min, np.max))
+        first, length = first - pad, next_fast_len(last - first + 2 * pad + 1, real=True)
+        step = rate / length
+        frequency = np.arange(length // 2 + 1) * step
+        passed = filter_response(chosen, frequency)
+        low, high = np.flatnonzero(np.abs(passed) > STOPPED)[[0, -1]]
         node, weight = stretches(every.longer)
-        total = transfer(every, weight, first, rate / length, self._loss(frequency))
-        pulses = np.array([(1.0 + s) * spectrum(snap, (1.0 + s) * frequency) for s in node])
-        heard = (total * pulses).sum(axis=0) * filter_response(chosen, frequency)
-        return np.fft.irfft(heard, length)[pad : pad + samples] * rate
+        total = transfer(every, weight, start + first / rate, step, int(low), self._loss(frequency[low : high + 1]))
+        out = np.zeros(len(frequency), complex)
+        for one, of_node in zip(node, total, strict=True):
+            out[low : high + 1] += of_node * spectrum(snap, step, len(frequency), float(one))[low : high + 1]
+        within = slice(max(first, 0), min(first + length, samples))
+        signal[within] = np.fft.irfft(out * passed, length)[within.start - first : within.stop - first] * rate
+        return signal
 
     def _loss(self, frequency: Floats) -> Floats:
         """Absorption (bin, 3) in dB/m, and its first two powers of depth: a parabola through three depths."""

@@ -11,8 +11,13 @@ from sonarsynth.conventions import Floats
 
 NEPER = np.log(10.0) / 20.0
 """Of a dB."""
-NODES = ((1e-9, 1), (1e-4, 3), (3e-3, 5), (1.0, 9))
+NODES = ((1e-9, 1), (1e-5, 2), (1e-3, 3), (1e-2, 5), (1.0, 9))
 """Of spectra at so many Chebyshev nodes, where Doppler varies by as much."""
+
+BLOCK = 8
+"""Bins over which the exponent of losses is linear: to 1e-8 of a neper at 100 Hz apart."""
+FLAT = 1e-12
+"""s: faces over which a wave is as late as this, or less, hear it as a point."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,32 +55,61 @@ def stretches(longer: Floats) -> tuple[Floats, Floats]:
     return node, weight
 
 
-def transfer(some: Contributions, weight: Floats, origin: float, step: float, loss: Floats) -> np.ndarray:
-    """Sum (node, bin) at frequencies bin * step (Hz), delays from `origin` (s) on; loss (bin, 3): absorption in dB/m
-    and its first two powers of depth."""
-    out = np.zeros((weight.shape[1], len(loss)), complex)
-    delay = np.ascontiguousarray(some.time - origin)
-    _sum(delay, some.size, weight, some.length * NEPER, some.blur, some.face, step, np.ascontiguousarray(loss), out)
-    return out
+def transfer(some: Contributions, weight: Floats, origin: float, step: float, first: int, loss: Floats) -> np.ndarray:
+    """Sum (node, bin) at frequencies (first + bin) * step (Hz), delays from `origin` (s) on; loss (bin, 3): absorption
+    in dB/m and its first two powers of depth there."""
+    out = np.zeros((weight.shape[1], len(loss), 2))
+    delay, bins = np.ascontiguousarray(some.time - origin), np.ascontiguousarray(loss * NEPER)
+    with np.errstate(divide="ignore"):
+        inverse = 1.0 / (np.pi * step * (first + np.arange(len(loss))))
+    _sum(delay, some.size, weight, some.length, some.blur, some.face, step, first, bins, inverse, out)
+    return out[..., 0] + 1j * out[..., 1]
+
+
+def point_spectrum(time: Floats, strength: Floats, step: float, bins: int) -> np.ndarray:
+    """sum_n strength_n exp(-i 2 pi f time_n) (bin,) at frequencies bin * step (Hz) of any pulse."""
+    out = np.zeros((bins, 2))
+    _points(np.ascontiguousarray(time), np.ascontiguousarray(strength), step, out)
+    return out[:, 0] + 1j * out[:, 1]
 
 
 @njit(cache=True, nogil=True)
-def _sum(delay, size, weight, length, blur, face, step, loss, out):  # type: ignore[no-untyped-def] # pragma: no cover
-    nodes, bins = out.shape
+def _points(time, strength, step, out):  # type: ignore[no-untyped-def] # pragma: no cover
+    for n in range(len(time)):
+        turn, phasor = np.exp(-2j * np.pi * step * time[n]), strength[n] + 0.0j
+        for k in range(len(out)):
+            out[k, 0] += phasor.real
+            out[k, 1] += phasor.imag
+            phasor *= turn
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _sum(delay, size, weight, length, blur, face, step, first, loss, inverse, out):  # type: ignore[no-untyped-def] # pragma: no cover
+    nodes, bins = out.shape[:2]
     for n in range(len(delay)):
-        turn = np.exp(-2j * np.pi * step * delay[n])
         one, other = np.pi * step * face[n, 0], np.pi * step * face[n, 1]
-        turn_y, turn_z = np.exp(1j * one), np.exp(1j * other)
-        phasor, y, z = size[n], 1.0 + 0.0j, 1.0 + 0.0j
+        turn, turn_y, turn_z = np.exp(-2j * np.pi * step * delay[n]), np.exp(1j * one), np.exp(1j * other)
+        phasor = size[n] * np.exp(-2j * np.pi * step * first * delay[n])
+        y, z = np.exp(1j * one * first), np.exp(1j * other * first)
         spread = 0.5 * (2.0 * np.pi * step) ** 2 * blur[n]
-        for k in range(bins):
-            lost = length[n, 0] * loss[k, 0] + length[n, 1] * loss[k, 1] + length[n, 2] * loss[k, 2] + spread * k * k
-            gain = np.exp(-lost)
-            if k > 0 and abs(one * k) > 1e-9:
-                gain *= y.imag / (one * k)
-            if k > 0 and abs(other * k) > 1e-9:
-                gain *= z.imag / (other * k)
-            value = phasor * gain
-            for m in range(nodes):
-                out[m, k] += weight[n, m] * value
-            phasor, y, z = phasor * turn, y * turn_y, z * turn_z
+        flat_y, flat_z = abs(face[n, 0]) < FLAT, abs(face[n, 1]) < FLAT
+        for block in range(0, bins, BLOCK):
+            end = min(block + BLOCK, bins)
+            low, high = 0.0, 0.0
+            for c in range(3):
+                low += length[n, c] * loss[block, c]
+                high += length[n, c] * loss[end - 1, c]
+            low += spread * (first + block) ** 2
+            high += spread * (first + end - 1) ** 2
+            gain, ratio = np.exp(-low), np.exp((low - high) / max(end - 1 - block, 1))
+            for k in range(block, end):
+                value = gain
+                if not flat_y:
+                    value *= y.imag * inverse[k] / face[n, 0]
+                if not flat_z:
+                    value *= z.imag * inverse[k] / face[n, 1]
+                real, imaginary = phasor.real * value, phasor.imag * value
+                for m in range(nodes):
+                    out[m, k, 0] += weight[n, m] * real
+                    out[m, k, 1] += weight[n, m] * imaginary
+                phasor, y, z, gain = phasor * turn, y * turn_y, z * turn_z, gain * ratio

@@ -6,6 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from sonarsynth.accuracy.references.path_sum import point_spectrum
 from sonarsynth.conventions import Floats
 from sonarsynth.sonar import Filter, LowPass
 from sonarsynth.world.environment import Absorption
@@ -15,17 +16,13 @@ from sonarsynth.world.snap_pulses import pulse
 MICROPASCAL = 1e-6
 
 
-def spectrum(snap: Snap, frequency: Floats) -> np.ndarray:
-    """Spectrum (frequency,) in Pa s of a snap at 1 m, of positive frequencies (Hz): of gain p(t/width), its collapse
-    at 0."""
-    made = pulse(snap.model, 0.0, float(frequency.max(initial=1.0)) * snap.width)
+def spectrum(snap: Snap, step: float, bins: int, longer: float = 0.0) -> np.ndarray:
+    """Spectrum (bin,) in Pa s, at frequencies bin * step (Hz), of a snap at 1 m that lasts 1 + longer times as long:
+    of gain p(t/width), its collapse at 0."""
+    made = pulse(snap.model, 0.0, step * bins * snap.width * (1.0 + max(longer, 0.1)))
     level = 1.0 if snap.source_level is None else MICROPASCAL * 10.0 ** (snap.source_level / 20.0) / made.peak
-    out = np.empty(len(frequency), complex)
-    for n in range(0, len(frequency), 256):
-        out[n : n + 256] = (
-            np.exp(-2j * np.pi * snap.width * np.outer(frequency[n : n + 256], made.time)) @ made.strength
-        )
-    return snap.gain * level * snap.width * out
+    times = snap.width * (1.0 + longer)
+    return snap.gain * level * times * point_spectrum(times * made.time, made.strength, step, bins)
 
 
 @lru_cache(maxsize=8)

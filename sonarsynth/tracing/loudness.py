@@ -1,0 +1,43 @@
+"""Which echoes of a snap are loud enough to be kept."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sonarsynth.conventions import Bools, Floats, Ints
+
+
+class Seen(NamedTuple):
+    """Echoes, and how loud they are."""
+
+    strength: Floats  # (echo,) the largest amplitude that it has anywhere on the array
+    coherent: Bools  # (echo,)
+    target: Ints  # (echo,)
+    group: Ints  # (echo,)
+
+
+def loud_of_all(seen: list[Seen], negligible: float) -> list[Bools]:
+    """Which echoes of each block are kept, by all of them in the order of one block."""
+    columns = [np.concatenate(column) for column in zip(*seen, strict=True)]
+    order = np.argsort(columns[-1], kind="stable")
+    keep = np.empty(len(order), bool)
+    in_order: Any = [column[order] for column in columns]
+    keep[order] = loud_ones(Seen(*in_order), negligible)
+    return np.split(keep, np.cumsum([len(some.strength) for some in seen])[:-1])
+
+
+def loud_ones(seen: Seen, negligible: float) -> Bools:
+    """Which (path,) are kept: all but the faintest of each target, by `arrivals.NEGLIGIBLE`."""
+    strength, coherent, target, _ = seen
+    keep = np.ones(len(strength), bool)
+    for number, exponent in product(np.unique(target), (1, 2)):
+        some = np.flatnonzero((target == number) & (coherent == (exponent == 1)))
+        loudest = strength[some].max(initial=0.0)
+        size = (strength[some] / (loudest or 1.0)) ** exponent  # amplitudes may be too small to be squared
+        order = np.argsort(size, kind="stable")
+        least = negligible * size.sum() if exponent == 2 else np.sqrt(negligible)
+        keep[some[order[np.cumsum(size[order]) <= least]]] = False
+    return keep

@@ -1,0 +1,141 @@
+"""Whole frames against a computation that shares nothing with the fast one: every path to every hydrophone from the
+description alone, in float64 (`accuracy.references.frame_pressure`)."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sonarsynth import config
+from sonarsynth.accuracy.comparing import Rays
+from sonarsynth.accuracy.references.frame_pressure import FramePressure
+from sonarsynth.accuracy.references.gradient import Gradient, gradient_rays
+from sonarsynth.accuracy.references.layered_rays import Water, families, rays
+from sonarsynth.accuracy.references.line_of_sight import Surface
+from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start, plan
+from sonarsynth.recipe import Accuracy, Recipe
+from sonarsynth.render.hearing import hear
+from sonarsynth.scattering.targets import Target
+from sonarsynth.scene import Physics, Scene, Trajectory, World
+from sonarsynth.sonar import PlanarLattice, Sonar
+from sonarsynth.world.environment import Environment, Isovelocity
+from sonarsynth.world.motion import Circle, Course, Motion, Still
+from sonarsynth.world.shapes import Box
+from sonarsynth.world.sources import SnappingShrimp
+
+ALLOWED = 1e-3  # of the largest pressure
+
+
+def away(made: Plan, sensors: list[int]) -> tuple[float, float]:
+    """How far echoes, and what comes without a target, are from the independent computation, over its peak."""
+    frame = made.recipe.frame(0)[1]
+    start, samples = frame_start(made, frame), made.windows.samples
+    arrivals = arrivals_of(made, frame)
+    exact = FramePressure(made.scene, frame, made.profile).pressure(sensors, start, samples)
+    found = []
+    for some, right in zip((~arrivals.direct, arrivals.direct), exact, strict=True):
+        heard = hear(made, frame, arrivals.select(some)).pressure[sensors]
+        assert np.abs(right).max() > 0.0
+        found.append(float(np.abs(heard - right).max() / np.abs(right).max()))
+    return found[0], found[1]
+
+
+@pytest.mark.parametrize(
+    ("name", "sensors", "choices"),
+    [
+        ("remus", [3, 140, 327, 504], None),
+        ("tank", [0, 38, 90, 127], None),
+        ("crowd", [5, 300], None),
+        ("deep", [17, 200], None),
+        ("thermocline", [140], Choices(visibility="hydrophones")),  # what its plan chooses, in 14 s
+    ],
+)
+def test_a_frame_of_a_shipped_recipe_is_what_its_description_says(
+    name: str, sensors: list[int], choices: Choices | None
+) -> None:
+    recipe = config.load(Path(__file__).parents[2] / "configs" / f"{name}.yaml")
+    way = recipe.scene.trajectory
+    scene = replace(recipe.scene, trajectory=replace(way, frames=1, start=way.time(way.frames // 3)))
+    recipe = replace(recipe, scene=scene, accuracy=replace(recipe.accuracy, signal=min(recipe.accuracy.signal, 1e-3)))
+    made = plan(recipe, ("signals",), choices)
+    assert made.choices.subarrays == 1  # else `hear` traces again
+    assert max(away(made, sensors)) < ALLOWED
+
+
+def crossing(target: Motion, sonar: Motion) -> Plan:
+    """A crate before a small array, with snaps 100 ms before the instant, at it and 100 ms after it."""
+    made = Scene(
+        world=World(
+            environment=Environment(depth=60.0, sound_speed=Isovelocity(speed=1500.0)),
+            targets=(Target(name="crate", shape=Box(size=(1.2, 0.7, 0.6), edge=0.1), motion=target),),
+            shrimp=(SnappingShrimp(position=(12.0, -7.0, -33.0), snap_times=(-0.1, 0.0, 0.1)),),
+        ),
+        sonar=Sonar(array=PlanarLattice(columns=8, rows=6, pitch=0.05), assumed_sound_speed=1500.0),
+        trajectory=Trajectory(start=1.0, sonar=sonar),
+        physics=Physics(),
+    )
+    return plan(Recipe(title="crossing", scene=made, accuracy=Accuracy(signal=1e-3)), ("signals",), Choices())
+
+
+@pytest.mark.parametrize("sonar", [0.0, 5.0])
+@pytest.mark.parametrize("speed", [0.0, 1.4, 30.0])
+def test_what_moves_is_heard_where_the_sound_met_it(speed: float, sonar: float) -> None:
+    """At any speed, before the instant of the frame and after it, by a sonar that moves too."""
+    heading, drift = np.deg2rad(200.0), np.deg2rad(60.0)
+    start = np.array([22.0, 1.0, -29.0]) - speed * np.array([np.sin(heading), np.cos(heading), 0.05])
+    body = Course(start=tuple(start), heading=heading, speed=speed, climb=0.05 * speed)
+    ours = Course(start=(0.0, 0.0, -30.0), heading=drift, speed=sonar)
+    made = crossing(body, ours)
+    assert max(away(made, [0, 29, 47])) < ALLOWED
+
+
+def test_what_turns_is_heard_as_it_stood_when_the_sound_met_it() -> None:
+    """A crate on a circle at 20 degrees a second."""
+    circle = Circle(centre=(22.0, 3.0, -29.0), radius=4.0, speed=1.4, bearing=0.3)
+    assert away(crossing(circle, Still(position=(0.0, 0.0, -30.0), heading=0.5 * np.pi)), [0, 47])[0] < ALLOWED
+
+
+@pytest.mark.parametrize("slope", [-6.0, -0.016, 0.016, 5.0])
+def test_rays_by_images_are_circles_where_the_speed_is_linear(slope: float) -> None:
+    """Times, amplitudes and directions against circles in arithmetic of many digits, turning rays among them."""
+    generator, bottom = np.random.default_rng(3), 10.0
+    first, last, far = generator.uniform(0.0, bottom, (2, 24)).tolist() + [generator.uniform(15.0, 30.0, 24)]
+    first, last = np.array(first), np.array(last)
+    other = gradient_rays(Gradient(1500.0, slope, bottom), first, last, far, 1)
+    start, end = np.column_stack([0.0 * far, 0.0 * far, -first]), np.column_stack([far, 0.0 * far, -last])
+    water = Water(np.array([0.0, bottom]), np.array([1500.0, 1500.0 + slope * bottom]), bottom)
+    seen = 0
+    for family in families(1):
+        found = rays(water, start, end, family)
+        mine = other.select(_family(other, family.bounces, family.bottom))
+        row = mine.pair
+        both = np.isfinite(found.time[row])
+        seen += int(both.sum())
+        row, mine = row[both], mine.select(both)
+        np.testing.assert_allclose(found.time[row], mine.travel_time, rtol=1e-13)
+        np.testing.assert_allclose(found.spreading[row], mine.amplitude, rtol=1e-9)
+        np.testing.assert_allclose(np.arcsin(found.departure[row, 2]), mine.start_angle, atol=1e-11)
+        np.testing.assert_allclose(np.arcsin(found.arrival[row, 2]), mine.end_angle, atol=1e-11)
+    assert seen > 20
+
+
+def _family(some: Rays, bounces: int, bottom: int) -> np.ndarray:
+    return np.asarray((some.surface + some.bottom == bounces) & (some.bottom == bottom))
+
+
+def test_a_line_of_sight_is_cut_by_any_triangle_and_by_no_sphere_around_it() -> None:
+    generator = np.random.default_rng(5)
+    corners = generator.uniform(-1.0, 1.0, (200, 1, 3)) + generator.normal(0.0, 0.1, (200, 3, 3))
+    start, end = generator.uniform(-3.0, 3.0, (2, 400, 3))
+    across = end - start
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    part = np.einsum("tx,ltx->lt", normal, corners[:, 0] - start[:, None]) / (across @ normal.T)
+    point = start[:, None] + part[..., None] * across[:, None]
+    inside = (part > 0.0) & (part < 1.0)
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        side = np.cross(corners[:, b] - corners[:, a], point - corners[:, a])
+        inside &= np.einsum("ltx,tx->lt", side, normal) >= 0.0
+    found = Surface.of(corners).between(start, end)
+    np.testing.assert_array_equal(found, inside.any(axis=1))
+    assert 20 < found.sum() < 380
