@@ -119,7 +119,7 @@ def _from_targets(
         some, body = owner == group, moment.bodies[found.target[group]]
         there = body.later(float(met[some].mean()))
         moved = (met[some, None] - met[some].mean()) * there.velocity
-        middle = body.mesh.centroid[paths.facet[row[some]]]
+        middle = body.mesh.centroid[np.where(weight[some] > 0.0, paths.facet[row[some]], 0)]
         made[some] = there.pose.to_world(np.einsum("pe,pex->px", weight[some], middle)) + moved
         distance[some] = surface_distances(there, place[some] - moved)
     return np.linalg.norm(made - array, axis=1), distance

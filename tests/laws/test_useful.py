@@ -1,0 +1,136 @@
+"""What verify says of data that are as good as they claim, and of no use, and of data that are not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from sonarsynth.products import ORIGINS
+from sonarsynth.verification import bounds, range_errors
+
+BEAMS = (4, 10, 10)
+
+
+def tree(
+    error: float = 0.02,
+    predicted: float = 0.02,
+    snap_error: float = 0.1,
+    snap_predicted: float = 0.1,
+    **labels: Any,
+) -> xr.DataTree:
+    """A store of four frames: a point in each of 100 beams 20 m away, on a target of 2 m, and a snap 15 m away."""
+    random = np.random.default_rng(0)
+    grids = {
+        "range": 20.0 + error * random.normal(size=BEAMS),
+        "range_error": np.full(BEAMS, predicted),
+        "true_range": np.full(BEAMS, 20.0),
+        **{name: np.zeros(BEAMS, np.int16) for name in ("target", "emission", "family", "origin")},
+    }
+    for name, (count, value) in labels.items():
+        grids[name].reshape(4, -1)[:, :count] = value
+    rows = np.arange(4.0)[:, None, None]
+    truth = {
+        "sonar_position": (("frame", "xyz"), np.zeros((4, 3))),
+        "sonar_orientation": (("frame", "wxyz"), np.tile([1.0, 0, 0, 0], (4, 1))),
+        "snap_position": (("frame", "snap", "xyz"), np.tile([[[15.0, 0, 0]]], (4, 1, 1))),
+        "box": (("frame", "target", "corner", "xyz"), np.tile(np.linspace(-0.577, 0.577, 8)[:, None], (4, 1, 1, 3))),
+    }
+    bearings = {
+        "position": (("frame", "snap", "xyz"), 15.0 * np.array([[[1.0, 0, 0]]]) + snap_error * (1 + 0 * rows)),
+        "position_covariance": (
+            ("frame", "snap", "xyz", "xyz_other"),
+            np.tile(snap_predicted**2 * np.eye(3) / 3.0, (4, 1, 1, 1)),
+        ),
+        "emission": (("frame", "snap"), np.zeros((4, 1), np.int16)),
+    }
+    dims = ("frame", "elevation", "azimuth")
+    cloud = xr.Dataset({name: (dims, values) for name, values in grids.items()})
+    made = xr.DataTree.from_dict({"truth": xr.Dataset(truth), "bearings": xr.Dataset(bearings), "cloud": cloud})
+    made.attrs = {"band_low": 25e3, "band_high": 85e3, "assumed_sound_speed": 1500.0, "aperture_radius": 0.6}
+    return made
+
+
+def row(checks: list[Any], name: str) -> Any:
+    return next(check for check in checks if check.name == name)
+
+
+ALL = np.arange(4)
+
+
+def test_good_data_pass_without_a_warning() -> None:
+    checks = [*range_errors(tree(), ALL), *bounds(tree(), ALL)]
+    assert all(check.ok is not False and not check.warning for check in checks)
+    numbers = row(checks, "predicted range errors").numbers
+    assert numbers["points"] == 400 and numbers["off_target"] == 0
+    assert numbers["pull_std"] == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("given", "which"),
+    [
+        ({"error": 5.0, "predicted": 5.0}, "ranges"),
+        ({"error": 0.01, "predicted": 5.0}, "ranges"),
+        ({"snap_error": 9.0, "snap_predicted": 9.0}, "snaps"),
+        ({"snap_predicted": 9.0}, "snaps"),
+    ],
+)
+def test_honest_data_of_no_use_are_warned_of_and_do_not_fail(given: dict[str, float], which: str) -> None:
+    """Errors as predicted, but larger than the target and the beam, or than half of the distance of the snap."""
+    checks = [*range_errors(tree(**given), ALL), *bounds(tree(**given), ALL)]
+    assert all(check.ok is not False for check in checks)
+    assert [check.warning.split()[0] for check in checks if check.warning] == [which]
+
+
+def test_errors_that_contradict_their_predictions_fail() -> None:
+    check = row(range_errors(tree(error=0.05, predicted=0.01), ALL), "predicted range errors")
+    assert check.ok is False and check.frames == (0, 1, 2, 3)
+    few = tree(error=0.01)
+    few["cloud/range"].values[2, :2, :1] = 30.0  # two of 400: half a per cent
+    assert row(range_errors(few, ALL), "predicted range errors").ok
+    few["cloud/range"].values[2, :, 3] = 30.0  # twelve: three per cent
+    check = row(range_errors(few, ALL), "predicted range errors")
+    assert check.ok is False and 2 in check.frames
+    absent = tree(error=0.01)
+    absent["cloud/range_error"].values[:, 0] = np.nan  # no prediction keeps no promise
+    assert row(range_errors(absent, ALL), "predicted range errors").ok is False
+
+
+@pytest.mark.parametrize(
+    ("labels", "said"),
+    [
+        ({"emission": (60, 1)}, "240 lit by another snap"),
+        ({"family": (60, 1)}, "240 ghosts by surface"),
+        ({"family": (60, 2)}, "240 ghosts by bed"),
+        ({"origin": (60, ORIGINS.index("mirror image"))}, "240 mirror images"),
+        ({"origin": (60, ORIGINS.index("grating lobe"))}, "240 in grating lobes"),
+        ({"origin": (60, ORIGINS.index("unexplained")), "target": (60, -1)}, "240 unexplained"),
+        ({"origin": (60, ORIGINS.index("snap itself")), "target": (60, -1)}, "240 the snap itself"),
+    ],
+)
+def test_what_no_range_is_judged_of_is_named_counted_and_warned_of(labels: dict[str, Any], said: str) -> None:
+    """However wrong the ranges of ghosts and strangers are, no error of the target's range is made of them."""
+    store = tree(**labels)
+    store["cloud/range"].values.reshape(4, -1)[:, :60] += 3.0
+    checks = range_errors(store, ALL)
+    assert all(check.ok is not False for check in checks)
+    whose = row(checks, "whose echoes points are")
+    assert said in whose.got and "160 direct echoes of targets" in whose.got
+    assert said in whose.warning and whose.warning.startswith("of 400 points only 160")
+    assert row(checks, "range of points on target").numbers["points"] == 160
+
+
+def test_a_store_whose_points_have_no_labels_is_not_judged_by_them() -> None:
+    old = tree()
+    del old["cloud"]["origin"]
+    (check,) = range_errors(old, ALL)
+    assert check.ok is None and "no labels" in check.got
+    assert [c.name for c in bounds(old, ALL)] == ["snaps useful"]
+
+
+def test_a_bearing_of_no_snap_says_nothing_of_how_snaps_are_located() -> None:
+    store = tree(snap_error=14.0)
+    store["bearings/emission"].values[:] = -1
+    assert row(bounds(store, ALL), "snaps useful").got == "no snap located"
