@@ -112,7 +112,7 @@ def _plan_of(path: Folder, found: Findings, anyway: bool) -> Plan:
         ) from None
     try:
         choices = choices_from(attrs["choices"]) if "choices" in attrs else None
-        made = plan(config.loads(text, str(path)), products, choices)
+        made = plan(config.loads(text, str(path), resolved=True), products, choices)
     except OSError as error:
         raise Mismatch(f"{path}: {error.filename}, which its recipe names, cannot be read: {error.strerror}") from None
     except (ValueError, FieldError) as error:
