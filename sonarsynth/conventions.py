@@ -6,6 +6,8 @@ Body and sonar   x forward (the acoustic axis), y port, z up. A `Pose` maps body
 Directions       azimuth = atan2(y, x), port positive; elevation = asin(z), up positive. Pictures are drawn as the
                  sonar looks: port on the left. Heading is the compass heading: clockwise from north.
 Units            SI and radians inside. Descriptions accept a text with a unit where people write ("50 deg", "25 kHz").
+                 A bare number in a recipe is in the unit that the schema names (`x-unit`), which is SI; but of an
+                 angle it is refused, unless it is 0: 90 may be 90 deg or 90 rad. In Python numbers are SI, radians too.
                  Pressure in Pa; levels in dB re 1 uPa; source level in dB re 1 uPa at 1 m.
 Time dependence  exp(+i 2 pi f t): a delay tau multiplies a spectrum by exp(-i 2 pi f tau). Spectra are `rfft` spectra.
 Instrument       the sample grid, the beam grid and the assumed sound speed belong to the sonar, never to the water.
@@ -19,7 +21,7 @@ from typing import Annotated, Any, Final
 import numpy as np
 import numpy.typing as npt
 from annotated_types import Ge, Gt, Le
-from pydantic import BeforeValidator, GetJsonSchemaHandler
+from pydantic import BeforeValidator, GetJsonSchemaHandler, PlainSerializer, ValidationInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import core_schema
 
@@ -36,6 +38,9 @@ SLOWEST, FASTEST = 100.0, 10e3
 
 NO_TARGET: Final = -1
 """Index of "no target", "no facet": never 0, which is a target."""
+
+SMALLEST, LARGEST = 1e-60, 1e15
+"""Sizes of numbers that people write, in SI units, but for 0: outside, a square or a quotient of them overflows."""
 
 UNITS: Final[dict[str, dict[str, float]]] = {
     "m": {"m": 1.0, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "ft": 0.3048, "in": 0.0254},
@@ -59,14 +64,32 @@ class Unit:
 
     symbol: str
 
+    @property
+    def ambiguous(self) -> bool:
+        """True where people write another unit than the one inside: a bare number could be either."""
+        return self.symbol in ("rad", "rad/s")
+
+    def validate(self, value: Any, info: ValidationInfo) -> Any:
+        """`parse`, where bare numbers are refused in recipes (JSON) that could be of two units.
+
+        The context `resolved` takes them for SI, as recipes in stores were once written. Raises ValueError.
+        """
+        bare = self.ambiguous and isinstance(value, (int, float)) and not isinstance(value, bool) and value != 0
+        if bare and info.mode == "json" and not (info.context or {}).get("resolved"):
+            degrees = self.symbol.replace("rad", "deg")
+            raise ValueError(f"{value} could be {value} {degrees} or {value} {self.symbol}: write the unit")
+        return self.parse(value)
+
+    def write(self, value: float) -> str | float:
+        """The value as a recipe (JSON) holds it: with its unit where a bare number would be refused."""
+        return f"{value!r} {self.symbol}" if self.ambiguous and value != 0 else value
+
     def parse(self, value: Any) -> Any:
         """A number in SI units from a number or from a text with a unit; raises ValueError in one clear line."""
         if isinstance(value, bool):
             raise ValueError(f"must be a number in {self.symbol}, not {str(value).lower()}")
-        if isinstance(value, np.generic):
-            return value.item()
         if not isinstance(value, str):
-            return value
+            return bounded(value, f" {self.symbol}")
         accepted = UNITS[self.symbol]
         number, _, symbol = value.strip().partition(" ")
         symbol = symbol.strip()
@@ -75,16 +98,20 @@ class Unit:
         except ValueError:
             raise ValueError(f"must be a number in {self.symbol}, or a text such as '1 {self.symbol}'") from None
         if symbol not in accepted:
-            raise ValueError(f"has unit '{symbol}'; use one of {', '.join(accepted)}")
-        return size * accepted[symbol]
+            raise ValueError(
+                (f"has unit '{symbol}'" if symbol else "has no unit") + f"; use one of {', '.join(accepted)}"
+            )
+        return bounded(size * accepted[symbol], f" {self.symbol}")
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         number = _bounded(handler(schema)) | {"description": f"in {self.symbol}"}
+        if self.ambiguous:
+            number = {"const": 0, "description": "0 needs no unit; any other angle does"}
         units = "|".join(UNITS[self.symbol])
         text = {"type": "string", "pattern": rf"^[-+0-9.eE]+ ({units})$", "description": "with a unit"}
-        return {"anyOf": [number, text]}
+        return {"anyOf": [number, text], "x-unit": self.symbol}
 
 
 _BOUNDS: Final = {"ge": "minimum", "gt": "exclusiveMinimum", "le": "maximum", "lt": "exclusiveMaximum"}
@@ -95,9 +122,9 @@ def _bounded(number: JsonSchemaValue) -> JsonSchemaValue:
     return {_BOUNDS.get(key, key): value for key, value in number.items()}
 
 
-def _in(symbol: str) -> tuple[Unit, BeforeValidator]:
+def _in(symbol: str) -> tuple[Unit, BeforeValidator, PlainSerializer]:
     unit = Unit(symbol)
-    return unit, BeforeValidator(unit.parse)
+    return unit, BeforeValidator(unit.validate), PlainSerializer(unit.write, when_used="json")
 
 
 class _PlainSchema:
@@ -110,7 +137,17 @@ class _PlainSchema:
 def _plain(value: Any) -> Any:
     if isinstance(value, (bool, str)):
         raise ValueError("must be a plain number")
-    return value.item() if isinstance(value, np.generic) else value
+    return bounded(value)
+
+
+def bounded(value: Any, unit: str = "") -> Any:
+    """A number, NumPy's as Python's, as it is; anything else too. Raises ValueError for a size that nothing has."""
+    value = value.item() if isinstance(value, np.generic) else value
+    number = isinstance(value, (int, float)) and 0 < abs(value) < np.inf
+    if number and not SMALLEST <= abs(value) <= LARGEST:
+        bound = f"more than {LARGEST:g}" if abs(value) > LARGEST else f"less than {SMALLEST:g}, and not 0"
+        raise ValueError(f"is {bound}{unit} in size, which is no number of this world: {str(value)[:30]}")
+    return value
 
 
 Metres = Annotated[float, *_in("m")]

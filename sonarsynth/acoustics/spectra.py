@@ -22,6 +22,10 @@ SUPPORT_TOLERANCE = 1e-7
 """What a filtered snap may be, relative to its peak, outside of its support."""
 
 
+TOGETHER = 1 << 22
+"""Products of a frequency and a time that are made at once: a window of a second has as many as fill any memory."""
+
+
 class Fir(NamedTuple):
     """A zero-phase FIR filter: pass band low to high (Hz, at -6 dB; low = 0 is a low pass)."""
 
@@ -72,7 +76,10 @@ def _transform(f: Floats, fir: Fir) -> Floats:
     node, weight = np.polynomial.legendre.leggauss(24)
     t = ((np.arange(panels)[:, None] + 0.5 + 0.5 * node) * (half / panels)).ravel()
     h = _unscaled(t, fir) * np.tile(weight * half / panels, panels)
-    return np.asarray(np.cos(2.0 * np.pi * np.outer(f, t)) @ h)
+    many = max(TOGETHER // t.size, 1)
+    return np.concatenate(
+        [np.empty(0), *(np.cos(2.0 * np.pi * np.outer(f[n : n + many], t)) @ h for n in range(0, f.size, many))]
+    )
 
 
 def response(frequency: npt.ArrayLike, fir: Fir) -> Floats:

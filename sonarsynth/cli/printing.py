@@ -124,9 +124,9 @@ def build_report(report: BuildReport) -> None:
 def _compared(found: dict[str, Any]) -> Iterator[str]:
     """Prediction and measurement of a build, a line each."""
     for name, what, said in (("seconds", "took", duration), ("bytes", "the store takes", size)):
-        ratio, predicted = found[f"{name}_ratio"], said(found[f"predicted_{name}"])
-        if ratio is not None:
-            yield f"predicted {predicted}, {what} {said(found[f'measured_{name}'])}: {ratio:.2f} of it"
+        if found[f"{name}_ratio"] is not None:
+            measured, predicted = (said(found[f"{which}_{name}"]) for which in ("measured", "predicted"))
+            yield f"{what} {measured} (predicted {predicted})"
 
 
 def plan_report(plan: Plan, prediction: Prediction) -> None:

@@ -1,8 +1,8 @@
 """YAML and recipes: the same classes as in Python, with errors that name file, line and field.
 
 A value is checked as strictly as JSON: a number is a number (or a text with a unit), a whole number has no point,
-true is no 1. Paths inside a file are relative to it and stay in its folder; paths given by `--set` are relative to the
-working directory.
+true is no 1. A bare number is in the SI unit that the schema names; of an angle it is refused, unless it is 0. Paths
+inside a file are relative to it and stay in its folder; paths given by `--set` are relative to the working directory.
 """
 
 from __future__ import annotations
@@ -35,9 +35,13 @@ def load(path: Path | str, sets: Sequence[str] = ()) -> Recipe:
     return recipe_of(read(path, sets))
 
 
-def loads(text: str, name: str = "recipe", folder: Path | str = ".") -> Recipe:
-    """The recipe of a YAML text; its paths are relative to `folder`. Raises RecipeError."""
-    return recipe_of(read_text(text, name, Path(folder).absolute()), check_files=False)
+def loads(text: str, name: str = "recipe", folder: Path | str = ".", *, resolved: bool = False) -> Recipe:
+    """The recipe of a YAML text; its paths are relative to `folder`.
+
+    `resolved` says that `dump` wrote the text, maybe before it gave angles their unit: bare ones are then in rad.
+    Raises RecipeError.
+    """
+    return recipe_of(read_text(text, name, Path(folder).absolute()), check_files=False, resolved=resolved)
 
 
 def read(path: Path | str, sets: Sequence[str] = ()) -> Source:
@@ -48,11 +52,11 @@ def read(path: Path | str, sets: Sequence[str] = ()) -> Source:
     return source
 
 
-def recipe_of(source: Source, *, check_files: bool = True) -> Recipe:
+def recipe_of(source: Source, *, check_files: bool = True, resolved: bool = False) -> Recipe:
     """The recipe that a source describes, files resolved to absolute paths. Raises RecipeError."""
     data = _resolved(source, source.data, (), check_files)
     try:
-        return _ADAPTER.validate_json(json.dumps(data), strict=True)
+        return _ADAPTER.validate_json(json.dumps(data), strict=True, context={"resolved": resolved})
     except ValidationError as error:
         raise explain(error, Recipe, source) from None
 
@@ -81,8 +85,24 @@ def dump(recipe: Recipe) -> str:
 
 
 def schema() -> dict[str, Any]:
-    """JSON schema of a recipe, for editors: titles, descriptions, units and kinds."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **_ADAPTER.json_schema(schema_generator=_Schema)}
+    """JSON schema of a recipe, for editors: titles, descriptions, kinds, and the unit of each number (`x-unit`)."""
+    found = _ADAPTER.json_schema(schema_generator=_Schema)
+    _write_defaults(found)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **found}
+
+
+def _write_defaults(part: Any) -> str | None:
+    """Give defaults that are angles their unit, as people write it. Returns the unit of a number, None for others."""
+    if isinstance(part, list):
+        return next((unit for unit in [_write_defaults(one) for one in part] if unit), None)
+    if not isinstance(part, dict):
+        return None
+    inner = {name: _write_defaults(value) for name, value in part.items()}
+    unit = part.get("x-unit") or inner.get("anyOf")
+    value = part.get("default")
+    if unit in ("rad", "rad/s") and isinstance(value, float) and value != 0:
+        part["default"] = f"{round(float(np.rad2deg(value)), 10):.12g} {unit.replace('rad', 'deg')}"
+    return unit
 
 
 class _Schema(GenerateJsonSchema):

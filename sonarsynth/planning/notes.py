@@ -42,7 +42,7 @@ def notes(made: Plan, looks: Sequence[Look]) -> tuple[str, ...]:
     cancelled = scene.processing.cancelling is not None
     if made.propagation.bounces and not cancelled and made.products & {"image", "cloud"} and made.sizes["snap"]:
         found.append("the snap's own reflections enter the image: processing.cancelling takes them out before")
-    found += lost_echoes(made) + _accuracy(made) + _standing_off(scene)
+    found += lost_echoes(made) + _accuracy(made, looks) + _standing_off(scene)
     for look in noted(looks):
         found += mirror_notes(look) + overlap_notes(look)
         found += _extent(look.scene, look.profile)
@@ -110,7 +110,7 @@ def _cut(scene: Scene, uniform: bool) -> tuple[str, ...]:
     )
 
 
-def _accuracy(made: Plan) -> list[str]:
+def _accuracy(made: Plan, looks: Sequence[Look]) -> list[str]:
     """Where the accuracy of the recipe costs a lot, or what the scene chooses does not keep within it."""
     found, allowed, errors, parts = [], made.recipe.accuracy, made.errors, made.choices.subarrays
     if parts > 1 and errors.whole > 0.0:
@@ -136,8 +136,8 @@ def _accuracy(made: Plan) -> list[str]:
         )
     if errors.ranging > allowed.range_m:
         found.append(
-            f"ranges err by {errors.ranging:.2g} m where rays bend: accuracy.range_m allows {allowed.range_m:g}, but "
-            f"the scene asks for '{made.choices.ranging.kind}' (scene.processing.ranging)"
+            f"ranges err by {errors.ranging:.2g} m{_why_ranges_err(made.scene, looks)}: accuracy.range_m allows "
+            f"{allowed.range_m:g}, but the scene asks for '{made.choices.ranging.kind}' (scene.processing.ranging)"
         )
     if errors.image > allowed.image_db:
         found.append(
@@ -154,3 +154,12 @@ def _standing_off(scene: Scene) -> list[str]:
     told = scene.processing.locating.on_bottom is True
     then = "the sonar takes it for being there" if told else "snaps are located by their wavefronts alone"
     return [f"{', '.join(names)}: not on the bottom; {then} (scene.processing.locating.on_bottom)"]
+
+
+def _why_ranges_err(scene: Scene, looks: Sequence[Look]) -> str:
+    """What the closed form of ranges leaves out of the water: bent rays, or only that it assumes another speed."""
+    if not all(look.profile.uniform for look in looks):
+        return " where rays bend"
+    assumed = scene.sonar.assumed_sound_speed
+    speed = max((float(look.profile.speed[0]) for look in looks), key=lambda real: abs(real - assumed))
+    return f", for sound travels at {speed:g} m/s and scene.sonar.assumed_sound_speed is {assumed:g} m/s"

@@ -10,6 +10,8 @@ from typing import Annotated, Any
 
 from pydantic import PlainSerializer, PlainValidator, TypeAdapter, WithJsonSchema
 
+from sonarsynth.conventions import bounded
+
 Where = tuple[str | int, ...]
 """A path into a recipe: field names and indices from the top."""
 
@@ -67,7 +69,7 @@ def number_and_unit(value: float | str) -> tuple[float, str]:
         number, unit = float(value), ""
     if not math.isfinite(number):
         raise ValueError(f"must be a number, or a text such as '1 m', not '{value}'")
-    return number, unit.strip()
+    return float(bounded(number)), unit.strip()
 
 
 def with_unit(number: float, unit: str) -> Plain:

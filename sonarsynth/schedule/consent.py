@@ -68,7 +68,7 @@ def _found(path: Folder, name: str, root: Path, digests: set[str]) -> str:
 def recipe_with(text: str, name: str, files: Mapping[str, str]) -> Recipe:
     """The recipe of a text, with its files where they are. Raises RecipeError."""
     source = read_text(text, name, Path())
-    return recipe_of(replace(source, data=_placed(source.data, files)), check_files=False)
+    return recipe_of(replace(source, data=_placed(source.data, files)), check_files=False, resolved=True)
 
 
 def _placed(value: Any, files: Mapping[str, str]) -> Any:

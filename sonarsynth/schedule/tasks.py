@@ -163,7 +163,7 @@ def plan_of(job: Job) -> Plan:
     """
     if job not in _plans:
         stored = store.root_attributes(job.path)
-        recipe = config.loads(stored.get("recipe", ""), job.path)
+        recipe = config.loads(stored.get("recipe", ""), job.path, resolved=True)
         made = plan(recipe, frozenset(job.products), choices_from(stored.get("choices")))
         if made.digest != job.digest:
             raise store.Damage(f"{job.path}: a file that the recipe names is not the same on this worker")

@@ -154,7 +154,7 @@ def _plain(text: str) -> Any:
 def _loaded(text: str) -> Any:
     """A recipe, for the units of its fields; None for one of another version."""
     try:
-        return loads(text)
+        return loads(text, resolved=True)
     except (RecipeError, ValueError):
         return None
 

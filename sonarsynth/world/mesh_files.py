@@ -1,7 +1,7 @@
-"""Reading mesh files (STL, OBJ, PLY, OFF, GLB) through trimesh, and refusing what it would let pass.
+"""Reading mesh files: OBJ, OFF, PLY and text STL by our own readers, binary STL and GLB through trimesh.
 
-trimesh gives an empty mesh for a damaged STL, fewer facets for a text file that was cut off, and the last vertex for
-the index 0 of an OBJ, all without an error: what a file promises is checked here first.
+trimesh misreads legal files of the former without an error (`mesh_text`, `mesh_ply`), and gives an empty mesh for a
+damaged STL; of a GLB it leaves out what it does not know. What a file promises is checked here first.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import io
 import json
 import logging
 import os
-import re
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -20,11 +19,15 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.world import files
+from sonarsynth.world.mesh_ply import read_ply
+from sonarsynth.world.mesh_text import read_obj, read_off, read_text_stl
 from sonarsynth.world.refinement import MeshError, Surface
 from sonarsynth.world.room import most_facets
 
 MAX_BYTES = {"stl": 4 << 30, "glb": 1 << 30, "ply": 1 << 30, "obj": 1 << 29, "off": 1 << 29}
 """Text takes several times its size in memory to read."""
+FANS = 6
+"""The mode of a primitive in a GLB."""
 
 
 def read_surface(path: Path) -> Surface:
@@ -33,17 +36,18 @@ def read_surface(path: Path) -> Surface:
     Raises MeshError in one line that names the file and the reason.
     """
     kind = path.suffix.lower().removeprefix(".")
-    if kind not in PROMISES:
-        raise MeshError(f"{path}: is not one of {', '.join(k.upper() for k in PROMISES)} (by its ending)")
+    if kind not in READERS:
+        raise MeshError(f"{path}: is not one of {', '.join(k.upper() for k in READERS)} (by its ending)")
     try:
         data = _content(path, kind)
     except files.FileError as error:
         raise MeshError(f"{path}: {error}") from None
     if not data.strip():
         raise MeshError(f"{path}: is empty")
-    if reason := PROMISES[kind](data):
-        raise MeshError(f"{path}: {reason}")
-    vertices, faces = _load(path, kind, data)
+    try:
+        vertices, faces = READERS[kind](data)
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from None
     if vertices.ndim != 2 or vertices.shape[1:] != (3,):
         raise MeshError(f"{path}: has vertices without three coordinates")
     if faces.size == 0:
@@ -62,7 +66,7 @@ def _content(path: Path, kind: str) -> bytes:
     return files.read(path, MAX_BYTES[kind])
 
 
-def _load(path: Path, kind: str, data: bytes) -> Surface:
+def _by_trimesh(kind: str, data: bytes) -> Surface:
     import trimesh
 
     try:
@@ -70,9 +74,9 @@ def _load(path: Path, kind: str, data: bytes) -> Surface:
             # bytes without a name: what the file may name in turn (materials, pictures, URLs) is not looked for
             mesh = trimesh.load_mesh(io.BytesIO(data), file_type=kind, process=False, skip_materials=True)
             return np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
-    except Exception as error:  # whatever a reader of five formats may meet in a damaged file
+    except Exception as error:  # whatever a reader may meet in a damaged file
         text = " ".join(str(error).split())[:120]
-        raise MeshError(f"{path}: cannot be read as {kind.upper()} ({type(error).__name__}: {text})") from None
+        raise MeshError(f"cannot be read as {kind.upper()} ({type(error).__name__}: {text})") from None
 
 
 @contextmanager
@@ -88,79 +92,49 @@ def _silent() -> Iterator[None]:
         log.disabled = before
 
 
-def _stl(data: bytes) -> str | None:
-    """Why an STL file cannot be whole: a binary one says its length, a text one has an end."""
+def _stl(data: bytes) -> Surface:
+    """A binary STL says its length, a text one has an end."""
     size = 84 + 50 * int.from_bytes(data[80:84], "little") if len(data) >= 84 else None
     if size == len(data):
-        return None
-    if data.lstrip()[:5].lower() == b"solid" and b"facet" in data:
-        return None if b"endsolid" in data.lower() else "is cut off: the text STL has no 'endsolid'"
+        return _by_trimesh("stl", data)
+    if data.lstrip(b"\xef\xbb\xbf \t\r\n")[:5].lower() == b"solid" and b"facet" in data.lower():
+        if b"endsolid" not in data.lower():
+            raise MeshError("is cut off: the text STL has no 'endsolid'")
+        return read_text_stl(data)
     if size is None:
-        return "is no STL file, or cut off"
-    return f"is no STL file, or damaged: {len(data)} bytes where its header says {size}"
+        raise MeshError("is no STL file, or cut off")
+    raise MeshError(f"is no STL file, or damaged: {len(data)} bytes where its header says {size}")
 
 
-def _obj(data: bytes) -> str | None:
-    """Why the facets of an OBJ file cannot be right: indices out of range (0 among them), or too few corners."""
-    lines = data.decode("utf-8", "replace").replace("\\\n", " ").splitlines()
-    count = sum(line.lstrip().startswith(("v ", "v\t")) for line in lines)
-    seen = 0
-    for number, line in enumerate(lines, start=1):
-        kind, *words = line.split("#")[0].split() or [""]
-        if kind == "v":
-            seen += 1
-            if len(words) < 3:
-                return f"line {number}: a vertex without three coordinates"
-        if kind == "f":
-            try:
-                corners = [int(word.split("/")[0]) for word in words]
-            except ValueError:
-                return f"line {number}: a facet whose corners are not numbers"
-            if len(corners) < 3:
-                return f"line {number}: a facet with fewer than three corners"
-            if wrong := [c for c in corners if c == 0 or c > count or c < -seen]:
-                return f"line {number}: index {wrong[0]} is out of range, there are {count} vertices"
-    return None
-
-
-def _off(data: bytes) -> str | None:
-    """Why an OFF file cannot be whole: it says how many vertices and facets follow."""
-    lines = [w for line in data.decode("utf-8", "replace").splitlines() if (w := line.split("#")[0].strip())]
-    if not (match := re.match(r"[A-Z]*OFF\b\s*(.*)", lines[0])):
-        return "is no OFF file"
-    rest = ([match[1]] if match[1] else []) + lines[1:]
-    counts = re.match(r"(\d+)\s+(\d+)", rest[0]) if rest else None
-    if counts is None:
-        return "has no counts of vertices and facets"
-    promised = int(counts[1]) + int(counts[2])
-    return None if len(rest) - 1 >= promised else f"is cut off: {len(rest) - 1} lines where its header says {promised}"
-
-
-def _ply(data: bytes) -> str | None:
-    """Why a text PLY file cannot be whole: it says how many lines follow. (A binary one is checked by its reader.)"""
-    header, end, body = data.partition(b"end_header")
-    if not data.startswith(b"ply") or not end:
-        return "is no PLY file, or cut off in its header"
-    if b"format ascii" not in header:
-        return None
-    promised = sum(int(n) for n in re.findall(rb"^\s*element\s+\S+\s+(\d+)", header, re.MULTILINE))
-    found = sum(bool(line.strip()) for line in body.splitlines())
-    return None if found >= promised else f"is cut off: {found} lines where its header says {promised}"
-
-
-def _glb(data: bytes) -> str | None:
-    """Why a GLB file cannot be whole: it says its length."""
+def _glb(data: bytes) -> Surface:
+    """A GLB file says its length, and describes what it holds."""
     if data[:4] != b"glTF" or len(data) < 12:
-        return "is no GLB file"
+        raise MeshError("is no GLB file")
     size = int.from_bytes(data[8:12], "little")
     if len(data) < size:
-        return f"is cut off: {len(data)} bytes where its header says {size}"
+        raise MeshError(f"is cut off: {len(data)} bytes where its header says {size}")
     length = int.from_bytes(data[12:16], "little")
     try:
         tree = json.loads(data[20 : 20 + length])
-        return _absurd(tree)
+        reason = _unread(tree) or _absurd(tree)
     except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
-        return f"cannot be read as GLB ({type(error).__name__} in its description)"
+        reason = f"cannot be read as GLB ({type(error).__name__} in its description)"
+    if reason:
+        raise MeshError(reason)
+    return _by_trimesh("glb", data)
+
+
+def _unread(tree: dict[str, Any]) -> str | None:
+    """What a GLB file needs and trimesh leaves out without a word."""
+    if needed := [e for e in tree.get("extensionsRequired", []) if not str(e).startswith(("KHR_materials", "KHR_tex"))]:
+        return f"needs the extension {str(needed[0])[:40]}, which is not read"
+    for number, accessor in enumerate(tree.get("accessors", [])):
+        if "sparse" in accessor:
+            return f"accessor {number} is sparse, which is not read"
+    modes = {p.get("mode") for mesh in tree.get("meshes", []) for p in mesh["primitives"]}
+    if FANS in modes:
+        return "holds fans of triangles, which are not read"
+    return None
 
 
 def _absurd(tree: dict[str, Any]) -> str | None:
@@ -180,5 +154,11 @@ def _absurd(tree: dict[str, Any]) -> str | None:
     return f"places {total} corners, more than of {most_facets()} facets" if total > 3 * most_facets() else None
 
 
-PROMISES: dict[str, Callable[[bytes], str | None]] = {"stl": _stl, "obj": _obj, "ply": _ply, "off": _off, "glb": _glb}
-"""Per format: the reason why a file is not what it says, or None."""
+READERS: dict[str, Callable[[bytes], Surface]] = {
+    "stl": _stl,
+    "obj": read_obj,
+    "ply": read_ply,
+    "off": read_off,
+    "glb": _glb,
+}
+"""Per format: vertices and triangles of a file's bytes, or MeshError with the reason."""

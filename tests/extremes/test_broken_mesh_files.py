@@ -56,12 +56,15 @@ BROKEN = {
     "corner.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\n", "line 4: a facet with fewer than three corners"),
     "words.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf a b c\n", "line 4: a facet whose corners are not numbers"),
     "plane.obj": (b"v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "line 1: a vertex without three coordinates"),
-    "number.obj": (b"v 0 0 x\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "cannot be read as OBJ"),
+    "number.obj": (b"v 0 0 x\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "line 1: a vertex whose coordinates are not numbers"),
     "nan.obj": (b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "vertex 0 is not finite"),
     "lines.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\n", "holds no facets"),
     "no.off": (b"FOO\n3 1 0\n", "is no OFF file"),
     "counts.off": (b"OFF\nmany\n", "has no counts of vertices and facets"),
-    "index.off": (f"OFF\n3 1 0\n{CORNERS}3 0 1 7\n".encode(), "cannot be read as OFF"),
+    "index.off": (
+        f"OFF\n3 1 0\n{CORNERS}3 0 1 7\n".encode(),
+        "facet 0 has index 7, out of range: there are 3 vertices",
+    ),
     "huge.off": (
         f"OFF\n3 {HUGE} 0\n{CORNERS}3 0 1 2\n".encode(),
         "is cut off: 4 lines where its header says 1000000000003",
@@ -72,8 +75,14 @@ BROKEN = {
         "facet 0 has index 9, out of range: there are 3 vertices",
     ),
     "minus.ply": ((PLY.format("ascii", 3, 1) + CORNERS + "3 0 1 -2\n").encode(), "facet 0 has index -2, out of range"),
-    "huge.ply": ((PLY.format("ascii", HUGE, 1) + CORNERS).encode(), "is cut off: 3 lines where its header says"),
-    "huge_b.ply": ((PLY.format("binary_little_endian", HUGE, HUGE) + "abc").encode(), "cannot be read as PLY"),
+    "huge.ply": (
+        (PLY.format("ascii", HUGE, 1) + CORNERS).encode(),
+        "is cut off, or damaged, in its element 'vertex' .3 of 1000000000000 are there",
+    ),
+    "huge_b.ply": (
+        (PLY.format("binary_little_endian", HUGE, HUGE) + "abc").encode(),
+        "is cut off, or damaged, in its element 'vertex'",
+    ),
     "cloud.ply": ((PLY.format("ascii", 3, 0) + CORNERS).encode(), "holds no facets"),
     "no.glb": (b"glTX" + bytes(40), "is no GLB file"),
     "cut.glb": (

@@ -12,6 +12,7 @@ import pytest
 from sonarsynth.acoustics import rays
 from sonarsynth.conventions import Floats
 from tests.following import families, family, follow, images, nodes, range_only, solve_again, textbook
+from tests.waiting import HANGING
 
 CHANNEL = rays.water(np.array([0.0, 20.0, 50.0]), np.array([1510.0, 1500.0, 1515.0]), 50.0)
 FALLING = rays.water(np.array([0.0, 100.0]), np.array([1530.0, 1500.0]), 100.0)
@@ -90,7 +91,7 @@ def test_coincident_ends_on_a_boundary_or_a_jump_take_no_time_to_search(
         f"found = rays.eigenrays(water, np.array([{at}]), np.array([{at}]), np.array([0.0]), 4, 4)\n"
         "print(len(found.pair), np.isfinite(found.travel_time).all(), (found.flag == rays.COINCIDENT).sum())"
     )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=HANGING, check=True)
     rays_found, finite, coincident = run.stdout.split()
     assert finite == "True"
     assert int(coincident) in (1, 9 - count)

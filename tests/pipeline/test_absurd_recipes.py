@@ -18,6 +18,7 @@ from sonarsynth.cli import printing
 from sonarsynth.cli.running import run
 from sonarsynth.config import RecipeError
 from sonarsynth.recipe import Recipe
+from tests.waiting import HANGING
 
 ROOT = Path(__file__).resolve().parents[2]
 WATER = "scene.world.environment.sound_speed"
@@ -162,7 +163,7 @@ def test_a_few_random_changes(tmp_path: Path) -> None:
         "TMPDIR": str(tmp_path),
         "PYTHONPATH": os.pathsep.join([str(ROOT / "tools"), str(ROOT)]),
     }
-    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=300, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=HANGING, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     found = json.loads(done.stdout)
     for kind, count in (("fuzz", 30), ("meshes", 20)):

@@ -14,6 +14,7 @@ import sonarsynth
 from sonarsynth import cli, config, render
 from sonarsynth.cli.running import run
 from sonarsynth.recipe import Recipe
+from tests.waiting import HANGING
 
 Command = Callable[..., tuple[int, str, str]]
 
@@ -159,7 +160,7 @@ def test_a_script_without_a_main_guard_is_told_so(small_file: Path, tmp_path: Pa
         f"import sonarsynth\nsonarsynth.build(sonarsynth.load({str(small_file)!r}), 's.zarr', workers=1)\n"
     )
     done = subprocess.run(
-        [sys.executable, str(script)], capture_output=True, text=True, cwd=tmp_path, timeout=60, check=False
+        [sys.executable, str(script)], capture_output=True, text=True, cwd=tmp_path, timeout=HANGING, check=False
     )
     assert done.returncode == 1
     assert done.stderr.endswith(

@@ -8,7 +8,6 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from sonarsynth import config, render, schedule, store
 from sonarsynth.cli import app
 from sonarsynth.cli.running import BadOption, run
 from sonarsynth.cli.selecting import frame_numbers, product_names
+from tests.waiting import HANGING, wait_until
 
 HERE = Path(__file__).parents[2]
 
@@ -211,16 +211,14 @@ def test_signals_end_a_build_and_its_workers_in_10_s_and_it_goes_on(
         [sys.executable, "-c", code, "build", str(small_file), str(path), "--workers", "1", "--no-predict"],
         stderr=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(HERE)}, start_new_session=True,
     )  # fmt: skip
-    while not any((path / ".marks").glob("[0-9]*.json")):
-        assert building.poll() is None
-        time.sleep(0.05)
+    wait_until(lambda: any((path / ".marks").glob("[0-9]*.json")), lambda: building.poll() is None)
     family = psutil.Process(building.pid).children(recursive=True)
     assert family
     os.killpg(building.pid, number)  # as Ctrl-C, or a batch system, does
-    _, err = building.communicate(timeout=10 if os.getloadavg()[0] < 2 * (os.cpu_count() or 1) else 120)
+    _, err = building.communicate(timeout=HANGING)
     assert building.returncode == 130
     assert err.endswith("sonarsynth: interrupted; the same command goes on from here\n") and "Traceback" not in err
-    assert psutil.wait_procs(family, timeout=30)[1] == []
+    assert psutil.wait_procs(family, timeout=HANGING)[1] == []
     assert not store.beside(path, "lock").exists()
     there = store.frames_there(path)
     assert len(there) >= 8
@@ -235,16 +233,14 @@ def test_sigterm_ends_a_build_that_can_go_on(small_file: Path, tmp_path: Path) -
     code = (
         "from sonarsynth import render\nfrom sonarsynth.cli import main\nimport time\n"
         "whole = render.trace_frame\n"
-        "def slow(made, i):\n    time.sleep(60 if i > 9 else 0)\n    return whole(made, i)\n"
+        "def slow(made, i):\n    time.sleep(1e4 if i > 9 else 0)\n    return whole(made, i)\n"
         f"render.trace_frame = slow\nmain(['build', {str(small_file)!r}, {str(path)!r}, '--workers', '0'])"
     )
     environment = {**os.environ, "PYTHONPATH": str(HERE)}
     building = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True, env=environment)
-    while not (path / ".marks/0.json").exists():
-        assert building.poll() is None
-        time.sleep(0.05)
+    wait_until((path / ".marks/0.json").exists, lambda: building.poll() is None)
     building.send_signal(signal.SIGTERM)
-    _, err = building.communicate(timeout=10)
+    _, err = building.communicate(timeout=HANGING)
     assert building.returncode == 130
     assert err.endswith("sonarsynth: interrupted; the same command goes on from here\n")
     assert not store.beside(path, "lock").exists()

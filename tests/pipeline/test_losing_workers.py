@@ -14,9 +14,7 @@ from sonarsynth.planning import Plan
 from sonarsynth.schedule import build
 from sonarsynth.store.marks import all_files, load_mark, marked
 from sonarsynth.store.place import record
-
-LONGEST = 300.0
-"""Seconds that nothing here takes."""
+from tests.waiting import HANGING, wait_until
 
 
 def workers() -> list[psutil.Process]:
@@ -34,9 +32,7 @@ class Striking:
     def __call__(self, done: int, total: int, aside: int) -> None:
         if self.struck or not done:
             return
-        until = time.monotonic() + LONGEST
-        while len(marked(self.path)) < self.shards and time.monotonic() < until:
-            time.sleep(0.01)
+        wait_until(lambda: len(marked(self.path)) >= self.shards)
         time.sleep(0.5)  # the scheduler hears that they are done
         (worker,) = workers()
         worker.send_signal(signal.SIGSTOP)
@@ -56,7 +52,7 @@ def test_a_worker_that_dies_with_what_its_last_shards_gave_does_not_hold_the_bui
         target=lambda: reports.append(build(small_plan, path, workers=1, progress=strike)), daemon=True
     )
     thread.start()
-    thread.join(LONGEST)
+    thread.join(HANGING)
     assert not thread.is_alive(), "the build hangs"
     assert strike.struck
     assert reports[0].ok

@@ -27,3 +27,25 @@ def warnings(distance: float, law: ss.Kirchhoff | ss.MirrorLobe) -> str:
 def test_a_coherent_target_close_by_is_noted(distance: float, said: bool) -> None:
     assert ("ball: nearer than 2.5 m" in warnings(distance, ss.Kirchhoff())) == said
     assert "nearer than" not in warnings(distance, ss.MirrorLobe())
+
+
+@pytest.mark.parametrize(
+    ("water", "why"),
+    [
+        (ss.Isovelocity(speed=1530.0), "for sound travels at 1530 m/s and scene.sonar.assumed_sound_speed is 1540 m/s"),
+        (ss.Linear(surface_speed=1530.0, gradient=-1.0), "where rays bend"),
+    ],
+)
+def test_ranges_that_err_are_blamed_on_what_makes_them_err(water: ss.Isovelocity | ss.Linear, why: str) -> None:
+    """In water of one speed no ray bends: there it is the speed that the sonar assumes."""
+    world = ss.World(
+        environment=ss.Environment(depth=20.0, sound_speed=water),
+        targets=(
+            ss.Target(name="ball", shape=ss.Sphere(radius=0.3, edge=0.1), motion=ss.Still(position=(20.0, 0.0, -5.0))),
+        ),
+        shrimp=(ss.SnappingShrimp(name="rock", position=(3.0, 6.0)),),
+    )
+    scene = ss.Scene(world=world, processing=ss.Processing(ranging=ss.IsovelocityRange()))
+    (note,) = [line for line in ss.plan(ss.Recipe(scene=scene)).warnings if line.startswith("ranges err by")]
+    assert why in note
+    assert ("bend" in note) == (not isinstance(water, ss.Isovelocity))

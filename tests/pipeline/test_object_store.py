@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ from sonarsynth.planning import Plan
 from sonarsynth.schedule.repairing import repair
 from sonarsynth.store import Remote
 from tests.places import contents
+from tests.waiting import wait_until
 
 pytest.importorskip("s3fs")
 pytest.importorskip("moto")
@@ -121,9 +121,7 @@ def test_killed_builds_are_resumed_to_the_same(bucket: str, small_file: Path, wh
     env = os.environ | {"PYTHONPATH": str(ROOT)}
     for point in KILLED_AT:
         with subprocess.Popen(command, env=env, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as child:
-            until = time.monotonic() + 120
-            while child.poll() is None and time.monotonic() < until and not reached(place, point):
-                time.sleep(0.01)
+            wait_until(lambda place=place, child=child, point=point: child.poll() is not None or reached(place, point))
             child.send_signal(signal.SIGKILL)
             said = child.stderr.read() if child.stderr is not None else b""
         assert child.returncode in (-signal.SIGKILL, 0), said

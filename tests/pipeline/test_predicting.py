@@ -207,8 +207,8 @@ def test_the_commands_predict_and_compare(small_file: Path, tmp_path: Path, capf
     again = json.loads(command("build", small_file, tmp_path / "s", "--workers", 0, "--frames", "0:8", "--json"))
     assert again["prediction"] == {}
     said = command("build", small_file, tmp_path / "s", "--workers", 0)
-    assert re.search(r"^predicted .*, took .*: [\d.]+ of it$", said, re.M)
-    assert re.search(r"^predicted .*, the store takes .*: [\d.]+ of it$", said, re.M)
+    assert re.search(r"^took [\d.]+ \w+ \(predicted [\d.]+ \w+\)$", said, re.M)
+    assert re.search(r"^the store takes [\d.]+ \w+ \(predicted [\d.]+ \w+\)$", said, re.M)
     quiet = command("build", small_file, tmp_path / "t", "--workers", 0, "--frames", "0:1", "--no-predict")
     assert "predicted" not in quiet
     assert store.verify(tmp_path / "s", quick=True).ok

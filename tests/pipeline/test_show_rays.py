@@ -28,6 +28,7 @@ from sonarsynth.world.environment import Absorption, Environment, Isovelocity, T
 from sonarsynth.world.motion import Still
 from sonarsynth.world.shapes import Box
 from sonarsynth.world.sources import SnappingShrimp
+from tests.waiting import HANGING
 
 SNAP, ARRAY, TARGET = np.array([30.0, 10.0, -14.0]), np.array([0.0, 0.0, -6.0]), np.array([40.0, -8.0, -9.0])
 BED = FluidHalfSpace(density_ratio=1.9, speed_ratio=1.15, loss_tangent=0.01)
@@ -243,7 +244,7 @@ def test_a_page_draws_a_part_of_the_facets_of_large_meshes(shown: tuple[dict[str
 def test_the_program_of_the_page_draws_turns_and_answers(shown: tuple[dict[str, Path], str, Any]) -> None:
     browser = Path(__file__).with_name("page_in_node.js")
     done = subprocess.run(
-        ["node", str(browser), str(shown[0]["rays.html"])], capture_output=True, text=True, check=False, timeout=60
+        ["node", str(browser), str(shown[0]["rays.html"])], capture_output=True, text=True, check=False, timeout=HANGING
     )
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)

@@ -1,4 +1,4 @@
-"""Real recipes with their files, and what may be wrong with them: by structure, by text, by bytes, by their files."""
+"""Real recipes with their files, and what may be wrong with them: by their schema, structure, text, bytes and files."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ import numpy as np
 import trimesh
 from ruamel.yaml import YAML
 from scipy.io import wavfile
+
+from fault_injection.schemas import drawn, spots, whole
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 SMALL_ARRAY = "{kind: planar_lattice, columns: 6, rows: 4, pitch: 5 cm}"
@@ -104,7 +106,7 @@ def bases() -> list[Case]:
 
 def mutated(case: Case, random: np.random.Generator) -> Case:
     """The case with one to three things changed."""
-    ways = [by_structure] * 8 + [by_token] * 2 + [by_lines, by_bytes]
+    ways = [by_schema] * 8 + [by_structure] * 6 + [by_token] * 2 + [by_lines, by_bytes]
     for _ in range(pick((1, 1, 2, 3), random)):
         way = ways[int(random.integers(len(ways)))]
         if case.files and random.random() < 0.5:
@@ -116,6 +118,18 @@ def mutated(case: Case, random: np.random.Generator) -> Case:
 def pick(some: Any, random: np.random.Generator) -> Any:
     """One of several, by number: numpy would turn them into an array."""
     return some[int(random.integers(len(some)))]
+
+
+def by_schema(case: Case, random: np.random.Generator) -> Case:
+    """A field of the whole schema, there or left out, set to a value that its schema allows."""
+    try:
+        data = YAML(typ="safe", pure=True).load(case.text.decode())
+        holder, key, schema = pick(spots(data, whole(), random), random)
+        holder[key] = drawn(schema, random)
+        text = json.dumps(data, indent=1)
+    except Exception:  # an earlier mutation left no YAML
+        return by_bytes(case, random)
+    return replace(case, text=text.encode("utf-8", "replace"), done=(*case.done, f"schema {key}"[:60]))
 
 
 def by_structure(case: Case, random: np.random.Generator) -> Case:
