@@ -135,8 +135,7 @@ def echoes(
         array, out, legs = some.array, some.out, some.array.settled(some.leg)
         target, facet = array.facets.target[out.facet], array.facets.facet[out.facet]
         amplitude, sign = _columns(some.groups, "amplitude", "sign")
-        scattered, vary = sign * amplitude, (variation, error)
-        loss = path_loss(array, absorption, snap, legs, out)
+        scattered, vary, loss = sign * amplitude, (variation, error), path_loss(array, absorption, snap, legs, out)
         one = assemble(legs, over, out, index, snap.time, loss, target, facet, scattered, vary, some.pulses)
         if moving is not None:
             view = partial(array.fronts.departure, some.leg, FEW)
