@@ -133,8 +133,7 @@ def echoes(
             legs = received(legs, some.carried, meeting, array.profile)
         target, facet = array.facets.target[out.facet], array.facets.facet[out.facet]
         amplitude, sign = _columns(some.groups, "amplitude", "sign")
-        scattered, vary = sign * amplitude, (variation, error)
-        loss = path_loss(array, absorption, snap, legs, out)
+        scattered, vary, loss = sign * amplitude, (variation, error), path_loss(array, absorption, snap, legs, out)
         one = assemble(legs, over, out, index, snap.time, loss, target, facet, scattered, vary, some.pulses)
         if meeting is not None and some.carried is not None:
             place = meeting, array.profile, array.elements
