@@ -23,7 +23,7 @@ HELP = (
 def accuracy(
     recipe: Annotated[
         Path | None,
-        typer.Argument(help="A recipe: every knob is walked about what the plan chooses for it.", show_default=False),
+        typer.Argument(help="A recipe: each setting is varied with all others exact.", show_default=False),
     ] = None,
     reference: Annotated[str | None, typer.Option(metavar="NAME", help=HELP, show_default="rays")] = None,
     extremes: Annotated[
@@ -38,7 +38,7 @@ def accuracy(
     ] = None,
     hydrophones: Annotated[
         str | None,
-        typer.Option(metavar="all|N", help="Hydrophones heard exactly. Left out: all, or 24 where that takes long."),
+        typer.Option(metavar="all|N", help="Hydrophones computed exactly. Left out: 4 to 24, by how long one takes."),
     ] = None,
     seed: Annotated[
         int | None, typer.Option(min=0, help="Draw the frames anew from this seed, by the choices of the recipe's.")

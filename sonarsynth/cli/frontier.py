@@ -26,6 +26,9 @@ SECOND = (
 )
 """Numbers that are shown beside the errors: names, words, units; the file has the others too."""
 
+WIDEST = 120
+"""Columns of the table, whatever it is printed on."""
+
 
 def recipe_table(
     recipe: Path,
@@ -90,7 +93,7 @@ def show(measured: Measured) -> None:
     table.add_column("setting")
     for name in ("error", "allowed", "ms a frame"):
         table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("", no_wrap=True)
+    table.add_column("", min_width=6)
     table.add_column("also")
     stage = ""
     for point in measured.points:
@@ -99,8 +102,8 @@ def show(measured: Measured) -> None:
         cells = (point.knob, point.setting, *_numbers(point), _mark(point), _also(point))
         table.add_row("" if point.stage == stage else point.stage, *cells, style="bold" if point.chosen else None)
         stage = point.stage
-    console().print(table, markup=False)
-    console().print(_verdict_table(measured.verdicts), markup=False)
+    for one in (table, _verdict_table(measured.verdicts)):
+        console().print(one, markup=False, soft_wrap=False, width=min(console().width, WIDEST))
     frames = ", ".join(str(n) for n in measured.frames)
     console().print(f"frames {frames}, {measured.hydrophones} hydrophones; {'all good' if measured.ok else 'FAILED'}")
 

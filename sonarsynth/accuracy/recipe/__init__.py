@@ -1,4 +1,5 @@
-"""Error against run time on a recipe of one's own: every knob walked about the plan's choices, frame by frame."""
+"""Error against run time on a recipe of one's own: every knob varied, frame by frame, and the plan's choices among
+them."""
 
 from __future__ import annotations
 
@@ -31,7 +32,7 @@ class Measured:
     title: str
     frames: tuple[int, ...]
     hydrophones: int
-    """Hydrophones of the array that were heard exactly."""
+    """Hydrophones that were computed exactly."""
     points: tuple[Point, ...]
     verdicts: tuple[Verdict, ...]
     choices: dict[str, Any] = field(default_factory=dict)
@@ -64,11 +65,11 @@ def measure(
     peers: bool = True,
     say: Say = lambda text: None,
 ) -> Measured:
-    """Walk every knob of a recipe about the plan's choices.
+    """Vary every knob of a recipe, and measure the plan's choices.
 
-    frames: which; left out: `usual_frames`. hydrophones: so many are heard exactly; left out: all, where that takes
-    half a minute a frame at most, else 24. seed: frames are drawn anew from this one, by the choices of the recipe's.
-    peers: whether they are measured too, in the first frame.
+    frames: which; left out: `usual_frames`. hydrophones: so many are computed exactly, from the description alone;
+    left out: from 4 to 24, by how long one takes. seed: frames are drawn anew from this one, by the
+    choices of the recipe's. peers: whether they are measured too, in the first frame.
     Raises FieldError as `plan` does.
     """
     say("planning")

@@ -1,4 +1,6 @@
-"""A frame the slow, exact way: every hydrophone traced by itself, echoes and direct arrivals apart, in float64."""
+"""A frame the slow, exact way, echoes and direct arrivals apart, in float64: from its description alone, by code that
+shares nothing with tracing and synthesis (`references.frame_pressure`), which all errors of signals are against; and
+every hydrophone traced by itself, every path, which is where every knob of tracing tends to."""
 
 from __future__ import annotations
 
@@ -9,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sonarsynth.accuracy.recipe.points import Point
+from sonarsynth.accuracy.references.frame_pressure import FramePressure
 from sonarsynth.beamforming import DenseDelayAndSum
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start
@@ -26,7 +29,9 @@ SMALL = 1e-3
 """Error of the exact way's synthesis, over what is allowed."""
 AFFORDED = 30.0
 """s: where tracing to every hydrophone would take longer, only `SOME` are."""
-SOME = 24
+COMPUTED = 10.0
+"""s: so many hydrophones are computed from the description alone as this affords, from `FEWEST` to `SOME`."""
+FEWEST, SOME = 4, 24
 TRIED = 3
 """Hydrophones that are timed first."""
 CHECKED_HYDROPHONES, CHECKED_PATHS = 2, 200
@@ -37,25 +42,47 @@ Heard = tuple[Floats, Floats]
 
 
 @dataclass(frozen=True, eq=False)
+class Each:
+    """What hydrophones hear, each traced by itself."""
+
+    sensor: Ints  # (heard,) live hydrophones, ascending
+    heard: Heard
+    seconds: tuple[float, float]  # tracing and synthesis of all live hydrophones; estimated where not all are heard
+
+    def at(self, sensor: Ints) -> Heard:
+        """What some of them hear."""
+        rows = np.searchsorted(self.sensor, sensor)
+        return self.heard[0][rows], self.heard[1][rows]
+
+
+@dataclass(frozen=True, eq=False)
 class Exact:
     """What hydrophones of a frame hear, exactly."""
 
     plan: Plan  # that of the frame's sequence
     frame: Frame
-    sensor: Ints  # (heard,) live hydrophones, ascending
-    heard: Heard
-    seconds: tuple[float, float]  # tracing and synthesis of all live hydrophones; estimated where not all are heard
+    sensor: Ints  # (heard,) live hydrophones, ascending; some of those of `each`
+    heard: Heard  # from the description alone, where its laws are known there
+    seconds: float  # of that, of all live hydrophones: estimated
+    each: Each
+    note: str = ""  # why it is not from the description alone
 
     @property
     def whole(self) -> bool:
-        """Whether every live hydrophone is heard."""
-        return len(self.sensor) == int(np.count_nonzero(self.plan.elements.gain))
+        """Whether every live hydrophone is traced by itself."""
+        return len(self.each.sensor) == int(np.count_nonzero(self.plan.elements.gain))
+
+    @property
+    def partly(self) -> str:
+        """At how many hydrophones signals are compared; nothing where at all."""
+        all_of_them = len(self.sensor) == int(np.count_nonzero(self.plan.elements.gain))
+        return "; ".join(n for n in ("" if all_of_them else f"at {len(self.sensor)} hydrophones", self.note) if n)
 
     @property
     def pressure(self) -> Floats:
-        """(sensor, sample) Pa: everything, at all hydrophones; 0 at dead ones."""
+        """(sensor, sample) Pa: everything, at all hydrophones, each traced by itself; 0 at dead ones."""
         out = np.zeros((self.plan.elements.count, self.plan.windows.samples))
-        out[self.sensor] = self.heard[0] + self.heard[1]
+        out[self.each.sensor] = self.each.heard[0] + self.each.heard[1]
         return out
 
 
@@ -67,6 +94,8 @@ def exact_plan(plan: Plan) -> Plan:
     profile = range_.profile if isinstance(range_, RefractedRange) else None
     choices = Choices(
         subarrays=plan.elements.count,
+        degree=5,
+        visibility="hydrophones",
         negligible=0.0,
         synthesis=golden(plan),
         beamforming=DenseDelayAndSum(focus=image.focus, shading=image.shading),
@@ -85,7 +114,32 @@ def golden(plan: Plan, finer: float = 1.0) -> KernelDeposit:
 def exact_frame(plan: Plan, index: int, hydrophones: int | None = None) -> Exact:
     """A frame at so many hydrophones, spread over the array; left out: at all, or those that can be afforded."""
     plan = plan.at(index)
-    frame, slow = plan.recipe.frame(index)[1], exact_plan(plan)
+    frame = plan.recipe.frame(index)[1]
+    each = each_hydrophone(exact_plan(plan), frame, hydrophones)
+    alone = FramePressure(plan.scene, frame, plan.profile)
+    if alone.unknown:
+        return Exact(plan, frame, each.sensor, each.heard, sum(each.seconds), each, alone.unknown)
+    start, samples, live = frame_start(plan, frame), plan.windows.samples, int(np.count_nonzero(plan.elements.gain))
+    rows: dict[int, Heard] = {}
+    began = time.process_time()
+    for sensor in spread(each.sensor, min(TRIED, len(each.sensor))):
+        rows[int(sensor)] = alone.pressure([int(sensor)], start, samples)
+    mean = (time.process_time() - began) / len(rows)
+    wanted = len(each.sensor)
+    if hydrophones is None:
+        wanted = min(wanted, int(np.clip(COMPUTED / max(mean, 1e-3), FEWEST, SOME)))
+    chosen = each.sensor if wanted == len(each.sensor) else np.union1d(list(rows), spread(each.sensor, wanted))
+    for sensor in chosen:
+        if int(sensor) not in rows:
+            rows[int(sensor)] = alone.pressure([int(sensor)], start, samples)
+    seconds = (time.process_time() - began) / len(rows) * live
+    heard = (np.vstack([rows[int(n)][0] for n in chosen]), np.vstack([rows[int(n)][1] for n in chosen]))
+    return Exact(plan, frame, chosen, heard, seconds, each)
+
+
+def each_hydrophone(plan: Plan, frame: Frame, hydrophones: int | None = None, some: Ints | None = None) -> Each:
+    """So many hydrophones of a frame, each traced by itself with the choices of a plan, by the exact synthesis; left
+    out: all, or those that can be afforded. some (heard,): these."""
     live = np.flatnonzero(plan.elements.gain)
     rows: dict[int, tuple[Heard, float, float]] = {}
 
@@ -93,24 +147,26 @@ def exact_frame(plan: Plan, index: int, hydrophones: int | None = None) -> Exact
         if sensor not in rows:
             part = subarray(plan.elements, np.array([sensor]))
             began = time.process_time()
-            arrivals = arrivals_of(slow, frame, part)
+            arrivals = arrivals_of(plan, frame, part)
             traced = time.process_time()
-            made = pressures(slow, frame, arrivals, part.elements, golden(plan))
+            made = pressures(plan, frame, arrivals, part.elements, golden(plan))
             rows[sensor] = made, traced - began, time.process_time() - traced
 
-    wanted = len(live) if hydrophones is None else min(hydrophones, len(live))
-    first = spread(live, min(TRIED, wanted))
-    for sensor in first:
-        hear(int(sensor))
-    if hydrophones is None and _mean(rows) * len(live) > AFFORDED:
-        wanted = min(SOME, len(live))
-    chosen = live if wanted == len(live) else np.union1d(first, spread(live, wanted))
+    chosen = some
+    if chosen is None:
+        wanted = len(live) if hydrophones is None else min(hydrophones, len(live))
+        first = spread(live, min(TRIED, wanted))
+        for sensor in first:
+            hear(int(sensor))
+        if hydrophones is None and _mean(rows) * len(live) > AFFORDED:
+            wanted = min(SOME, len(live))
+        chosen = live if wanted == len(live) else np.union1d(first, spread(live, wanted))
     for sensor in chosen:
         hear(int(sensor))
-    some = [rows[int(sensor)] for sensor in chosen]
-    heard = (np.vstack([r[0][0] for r in some]), np.vstack([r[0][1] for r in some]))
-    typical = (float(np.median([r[n] for r in some])) * len(live) for n in (1, 2))  # the first may compile
-    return Exact(plan, frame, chosen, heard, (next(typical), next(typical)))
+    found = [rows[int(sensor)] for sensor in chosen]
+    heard = (np.vstack([r[0][0] for r in found]), np.vstack([r[0][1] for r in found]))
+    typical = (float(np.median([r[n] for r in found])) * len(live) for n in (1, 2))  # the first may compile
+    return Each(chosen, heard, (next(typical), next(typical)))
 
 
 def _mean(rows: dict[int, tuple[Heard, float, float]]) -> float:
@@ -168,7 +224,7 @@ def synthesis_check(exact: Exact) -> Point:
         error=error,
         unit="relative",
         allowed=0.1 * plan.recipe.accuracy.signal,
-        seconds=exact.seconds[1],
+        seconds=exact.each.seconds[1],
         role="check",
         also={"largest": largest, "hydrophones": len(sensor), "paths": len(arrivals.delay)},
     )

@@ -20,7 +20,8 @@ long is measured once."""
 
 @dataclass(frozen=True)
 class Point:
-    """One setting of one knob, all else as the planner chose it: what it errs by, and what it costs."""
+    """One setting of one knob: what it errs by, and what it costs. In tracing all else is exact, but for what is chosen
+    and what is cheaper than that; in other stages all else is as chosen."""
 
     stage: str
     knob: str

@@ -1,4 +1,9 @@
-"""Knobs of tracing: into how many parts the array is cut, how faint paths may be, and whether rays bend."""
+"""Knobs of tracing: into how many parts the array is cut, how faint paths may be, and whether rays bend.
+
+A knob is varied with all others exact, so that what they leave out does not hide it: its errors, against the frame from
+its description alone, tend to that of every hydrophone traced by itself. What would cost less than the plan's choice is
+measured with the rest as chosen, too.
+"""
 
 from __future__ import annotations
 
@@ -7,18 +12,26 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import takewhile
-from typing import Literal
 
 import numpy as np
 
-from sonarsynth.accuracy.recipe.exact import Exact, Heard, differences, golden, pressures
+from sonarsynth.accuracy.recipe.exact import (
+    Each,
+    Exact,
+    Heard,
+    differences,
+    each_hydrophone,
+    exact_plan,
+    golden,
+    pressures,
+)
 from sonarsynth.accuracy.recipe.points import Point, timed
 from sonarsynth.conventions import Ints
 from sonarsynth.planning import Plan, arrivals_of, frame_start
 from sonarsynth.products import Arrivals
 from sonarsynth.scene import Frame
 from sonarsynth.sonar.subarrays import Subarray, subarrays, with_rim
-from sonarsynth.tracing import Refracted, Straight, Visibility
+from sonarsynth.tracing import Refracted, Straight
 
 FAINTEST = (30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 100.0)
 """dB: levels under which the faintest echoes of each target are left out."""
@@ -26,6 +39,8 @@ TIMED = 6
 """Parts that the synthesis is timed on."""
 FINER = 0.05
 """Where a cut errs by so much of what is allowed, finer ones are not walked."""
+EACH = 3
+"""Hydrophones at which what is traced to each by itself is compared."""
 LONGEST, SLOWER = 3.0, 4.0
 """Cuts that would take longer a frame than so many s, and so many times the plan's own, are not walked."""
 
@@ -87,27 +102,81 @@ class Traced:
 def trace_points(exact: Exact, traced: Traced) -> Iterator[Point]:
     """Walk the knobs of tracing; `traced`: by the plan's own choices."""
     plan = exact.plan
-    yield _point(exact, traced, "subarrays", _cut(plan), chosen=True)
-    for count in _counts(plan):
-        if count != plan.choices.subarrays:
-            if count / traced.parts * traced.seconds > max(LONGEST, SLOWER * traced.seconds):
-                break
-            yield (point := _walked(exact, replace(plan, choices=replace(plan.choices, subarrays=count)), "subarrays"))
-            if count > plan.choices.subarrays and point.error < FINER * point.allowed:
-                break
-    view: Visibility = "centre" if plan.choices.visibility == "hydrophones" else "hydrophones"
-    yield _walked(exact, replace(plan, choices=replace(plan.choices, visibility=view)), "visibility")
+    yield _point(exact, traced, "subarrays", f"{_cut(plan)}, as chosen", chosen=True)
+    for setting, cheaper in _cheaper(plan):
+        yield _point(exact, Traced.of(cheaper, exact.frame, exact.sensor), "cheaper", setting)
+    yield from _cuts(exact, traced)
+    best = exact_plan(plan)
+    usual = replace(best, choices=replace(best.choices, subarrays=plan.choices.subarrays))
     if plan.choices.subarrays < plan.elements.count:
-        degree: Literal[3, 5] = 3 if plan.choices.degree == 5 else 5
-        yield _walked(exact, replace(plan, choices=replace(plan.choices, degree=degree)), "degree")
+        degree, view = replace(usual.choices, degree=3), replace(usual.choices, visibility="centre")
+        for knob, choices, setting in (("degree", degree, "of degree 3"), ("visibility", view, "from the centre")):
+            of = Traced.of(replace(usual, choices=choices), exact.frame, exact.sensor)
+            yield _point(exact, of, knob, f"{setting}, {_cut(plan)}")
     for level in FAINTEST:
         share = 10.0 ** (-level / 10.0)
-        if not np.isclose(share, plan.choices.negligible, rtol=1e-6):
-            yield _walked(exact, replace(plan, choices=replace(plan.choices, negligible=share)), "faintest")
+        some = replace(best, choices=replace(best.choices, negligible=share))
+        yield _each_point(exact, some, "faintest", f"{level:.0f} dB")
     if not plan.profile.uniform:
-        other = Straight if isinstance(plan.propagation, Refracted) else Refracted
-        yield _walked(exact, replace(plan, propagation=other(bounces=plan.propagation.bounces)), "rays")
+        some = replace(best, propagation=Straight(bounces=plan.propagation.bounces))
+        yield _each_point(exact, some, "rays", "straight")
     yield exact_point(exact)
+
+
+def _cheaper(plan: Plan) -> Iterator[tuple[str, Plan]]:
+    """What would cost less than the choices of a plan, one at a time."""
+    choices = plan.choices
+    for count in _counts(plan):
+        if count < choices.subarrays:
+            yield f"{count} part{'s' if count > 1 else ''}", replace(plan, choices=replace(choices, subarrays=count))
+    if choices.visibility == "hydrophones":
+        yield "seen from the centre", replace(plan, choices=replace(choices, visibility="centre"))
+    if choices.degree == 5:
+        yield "of degree 3", replace(plan, choices=replace(choices, degree=3))
+    for level in FAINTEST:
+        share = 10.0 ** (-level / 10.0)
+        if share > 1.001 * choices.negligible:
+            yield f"faintest {level:.0f} dB", replace(plan, choices=replace(choices, negligible=share))
+    if isinstance(plan.propagation, Refracted):
+        yield "straight rays", replace(plan, propagation=Straight(bounces=plan.propagation.bounces))
+
+
+def _cuts(exact: Exact, traced: Traced) -> Iterator[Point]:
+    """The array cut into more and more parts, all else exact, and at last into hydrophones."""
+    best = exact_plan(exact.plan)
+    for count in _counts(exact.plan)[:-1]:
+        if count > exact.plan.choices.subarrays and count / traced.parts * traced.seconds > max(
+            LONGEST, SLOWER * traced.seconds
+        ):
+            break
+        some = replace(best, choices=replace(best.choices, subarrays=count))
+        yield (point := _point(exact, Traced.of(some, exact.frame, exact.sensor), "subarrays", _cut(some)))
+        if point.error < FINER * point.allowed:
+            break
+    yield _of_each(exact, exact.each, exact.sensor, "subarrays", "each hydrophone, every path")
+
+
+def _each_point(exact: Exact, plan: Plan, knob: str, setting: str) -> Point:
+    """Of a plan that traces each hydrophone by itself: at a few."""
+    few = exact.sensor[:: max(len(exact.sensor) // EACH, 1)][:EACH]
+    return _of_each(exact, each_hydrophone(plan, exact.frame, some=few), few, knob, setting)
+
+
+def _of_each(exact: Exact, each: Each, sensor: Ints, knob: str, setting: str) -> Point:
+    rows = np.searchsorted(exact.sensor, sensor)
+    error, largest = differences(each.at(sensor), [part[rows] for part in exact.heard])
+    few = f"at {len(sensor)} hydrophones" if len(sensor) < len(exact.sensor) else exact.partly
+    return Point(
+        stage="trace",
+        knob=knob,
+        setting=setting,
+        error=error,
+        unit="relative",
+        allowed=exact.plan.recipe.accuracy.signal,
+        seconds=sum(each.seconds),
+        also={"trace_s": each.seconds[0], "synthesis_s": each.seconds[1], "largest": largest},
+        note=few,
+    )
 
 
 def _counts(plan: Plan) -> list[int]:
@@ -117,30 +186,18 @@ def _counts(plan: Plan) -> list[int]:
 
 
 def exact_point(exact: Exact) -> Point:
-    """Everything exact: no error, and what it costs."""
+    """What all are compared with: no error, and what it costs."""
     return Point(
         stage="trace",
         knob="exact",
-        setting="every hydrophone, every path",
+        setting=exact.note or "from the description alone",
         error=0.0,
         unit="relative",
         allowed=exact.plan.recipe.accuracy.signal,
-        seconds=sum(exact.seconds),
-        also={"trace_s": exact.seconds[0], "synthesis_s": exact.seconds[1], "largest": 0.0},
-        note="" if exact.whole else f"cost from {len(exact.sensor)} hydrophones",
+        seconds=exact.seconds,
+        also={"trace_s": exact.seconds, "synthesis_s": 0.0, "largest": 0.0},
+        note=f"cost from {len(exact.sensor)} hydrophones" if exact.partly else "",
     )
-
-
-def _walked(exact: Exact, plan: Plan, knob: str) -> Point:
-    traced = Traced.of(plan, exact.frame, exact.sensor)
-    setting = {
-        "subarrays": _cut(plan),
-        "degree": f"of degree {plan.choices.degree} over the aperture",
-        "visibility": f"seen from the {plan.choices.visibility}",
-        "faintest": _faint(plan),
-        "rays": type(plan.propagation).__name__.lower(),
-    }
-    return _point(exact, traced, knob, setting[knob])
 
 
 def _point(exact: Exact, traced: Traced, knob: str, setting: str, *, chosen: bool = False) -> Point:
@@ -164,14 +221,10 @@ def _point(exact: Exact, traced: Traced, knob: str, setting: str, *, chosen: boo
             "paths": paths,
             "hydrophones": len(exact.sensor),
         },
-        note="" if exact.whole else f"at {len(exact.sensor)} hydrophones{several}",
+        note=f"{exact.partly}{several}",
     )
 
 
 def _cut(plan: Plan) -> str:
     count = plan.choices.subarrays
     return "each hydrophone" if count >= plan.elements.count else f"{count} part{'s' if count > 1 else ''}"
-
-
-def _faint(plan: Plan) -> str:
-    return f"{-10.0 * np.log10(plan.choices.negligible):.0f} dB"

@@ -50,12 +50,12 @@ class Whole:
 def whole_points(whole: Whole, traced: Traced, seconds: float) -> Iterator[Point]:
     """Signals, image and cloud of the plan against exact ones; seconds: of the plan's whole frame.
 
-    Image and cloud only where all hydrophones were heard exactly. Noise is the same in both.
+    Image and cloud are compared with those of every hydrophone traced by itself, where all were. Noise is the same in
+    both.
     """
     exact, plan, accuracy = whole.exact, whole.exact.plan, whole.exact.plan.recipe.accuracy
     found = _signals(exact, traced)
     error, largest = differences(found, exact.heard)
-    partly = "" if exact.whole else f"at {len(exact.sensor)} hydrophones"
     yield Point(
         stage="frame",
         knob="signals",
@@ -66,7 +66,7 @@ def whole_points(whole: Whole, traced: Traced, seconds: float) -> Iterator[Point
         seconds=seconds,
         chosen=True,
         also={"largest": largest, "hydrophones": len(exact.sensor)},
-        note=partly,
+        note=exact.partly,
     )
     if not (exact.whole and imaged(whole.heard)):
         return
@@ -78,7 +78,7 @@ def whole_points(whole: Whole, traced: Traced, seconds: float) -> Iterator[Point
     if not imaged(best):
         return
     cloud = cloud_of(slow, frame, best, slow.choices.ranging)
-    slowest = time.process_time() - began + sum(exact.seconds)
+    slowest = time.process_time() - began + sum(exact.each.seconds)
     yield Point("frame", "exact", "everything exact", 0.0, "relative", accuracy.signal, slowest)
     assert whole.heard.image is not None and best.image is not None
     off = off_by(whole.heard.image.energy, best.image.energy)

@@ -60,14 +60,15 @@ def _smooth(boundary: SeaSurface | SeaBed, sine: Floats) -> np.ndarray:
         return np.full(len(sine), 1.0 + 0j)
     if isinstance(of, ReflectionTable):
         angle = np.arcsin(sine)
-        loss = -20.0 * np.log10(np.maximum(of.modulus, 1e-30)) if of.modulus is not None else np.array(of.loss)
-        size = np.interp(angle, of.grazing, of.modulus) if of.modulus is not None else None
-        size = 10.0 ** (-np.interp(angle, of.grazing, loss) / 20.0) if size is None else size
-        return size * np.exp(1j * np.interp(angle, of.grazing, of.phase))
+        if of.modulus is not None:
+            size = np.interp(angle, of.grazing, of.modulus)
+        else:
+            size = 10.0 ** (-np.interp(angle, of.grazing, of.loss or ()) / 20.0)
+        return np.asarray(size * np.exp(1j * np.interp(angle, of.grazing, of.phase)))
     ratio = (
         (of.density_ratio, of.speed_ratio, of.loss_tangent) if isinstance(of, FluidHalfSpace) else SEDIMENTS[of.name]
     )
     m, speed, loss_tangent = ratio  # Brekhovskikh and Lysanov (2003), section 3.1
     below = np.emath.sqrt(((1.0 - 1j * loss_tangent) / speed) ** 2 - (1.0 - sine**2))
     below = np.where(below.imag > 0.0, -below, below)
-    return (m * sine - below) / (m * sine + below)
+    return np.asarray((m * sine - below) / (m * sine + below))

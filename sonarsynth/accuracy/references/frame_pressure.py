@@ -149,7 +149,7 @@ class FramePressure:
         image = family.image(np.array([-place[2]]), self.water.bottom)[0]
         away = np.array([place[0], place[1], -image]) - point
         margin = SLANT if np.ptp(self.water.speed) > 0.0 else 0.05
-        return rows[np.einsum("nx,nx->n", normal, away) > -margin * np.linalg.norm(away, axis=1)]
+        return np.asarray(rows[np.einsum("nx,nx->n", normal, away) > -margin * np.linalg.norm(away, axis=1)])
 
     def _echoes(self, lit: list[_Lit], place: Floats) -> list[Contributions]:
         """What one hydrophone hears of the facets."""
@@ -242,9 +242,8 @@ class FramePressure:
     def _loss(self, frequency: Floats) -> Floats:
         """Absorption (bin, 3) in dB/m, and its first two powers of depth: a parabola through three depths."""
         depth = np.array([0.0, 0.5, 1.0]) * self.water.bottom
-        return np.linalg.solve(
-            np.vander(depth, increasing=True), absorption(self.scene.world.environment.absorption, frequency, depth)
-        ).T
+        loss = absorption(self.scene.world.environment.absorption, frequency, depth)
+        return np.asarray(np.linalg.solve(np.vander(depth, increasing=True), loss), float).T
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,11 +17,14 @@ section 3.3), with dX for the change of the horizontal distance X by the sine si
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats
+from sonarsynth.conventions import Bools, Floats, Ints
+
+if TYPE_CHECKING:
+    from sonarsynth.accuracy.references.layers_crossed import Crossed
 
 ROUNDS = 60
 CLOSE = 1e-13
@@ -91,7 +94,7 @@ class Rays:
     level: Floats  # (ray, 2) unfolded depths of the ends
     sine: Floats  # (ray,) at the start, down positive in the unfolded water
 
-    def select(self, rows: Floats | Bools) -> Rays:
+    def select(self, rows: Bools | Ints) -> Rays:
         """Some of them."""
         return Rays(*(getattr(self, f.name)[rows] for f in fields(self)))
 
@@ -115,13 +118,17 @@ def rays(water: Water, start: Floats, end: Floats, family: Family) -> Rays:
     return Rays(time, length, spreading, departure, arrival, p, np.column_stack([first, last]), slope[0])
 
 
-def _straight(water: Water, r: Floats, first: Floats, last: Floats) -> tuple[Floats, tuple[Floats, ...], tuple]:  # type: ignore[type-arg]
+Found = tuple[Floats, tuple[Floats, Floats], tuple[Floats, Floats, Floats]]
+"""p, signed sines at both ends, and time, length and spreading of rays."""
+
+
+def _straight(water: Water, r: Floats, first: Floats, last: Floats) -> Found:
     length = np.hypot(r, last - first)
     c, sine = water.speed[0], (last - first) / length
     return r / length / c, (sine, sine), (length / c, length, 1.0 / length)
 
 
-def _bent(water: Water, r: Floats, first: Floats, last: Floats) -> tuple[Floats, tuple[Floats, ...], tuple]:  # type: ignore[type-arg]
+def _bent(water: Water, r: Floats, first: Floats, last: Floats) -> Found:
     from sonarsynth.accuracy.references.layers_crossed import crossed
 
     pieces = crossed(water, first, last)
@@ -135,7 +142,7 @@ def _bent(water: Water, r: Floats, first: Floats, last: Floats) -> tuple[Floats,
     return p, pieces.signed(sigma, s1, s2), (time, pieces.length(sigma), np.sqrt(size / tube))
 
 
-def _root(pieces, r: Floats) -> Floats:  # type: ignore[no-untyped-def]
+def _root(pieces: Crossed, r: Floats) -> Floats:
     """Sines at the fastest level whose rays cover distances r (ray,): Newton's, on 1/X, within a bracket."""
     low, high = pieces.lowest(), np.ones(len(r))
     sigma = np.clip(pieces.rise / np.hypot(pieces.rise, r), low, 1.0 - 1e-9)

@@ -92,14 +92,16 @@ class Crossed:
         ratio = np.where(small, ratio, np.arcsinh(bend) / np.where(small, 1.0, bend))
         turn = (sigma < 0.0) & (self.beyond > 0.0)
         back = np.arcsinh(np.abs(sigma) / np.maximum(self.cosine(sigma) * self.fastest, 1e-300))
-        return (chord / middle * ratio).sum(axis=1) + np.where(turn, 2.0 * back / np.where(turn, self.beyond, 1.0), 0.0)
+        beyond = np.where(turn, 2.0 * back / np.where(turn, self.beyond, 1.0), 0.0)
+        return np.asarray((chord / middle * ratio).sum(axis=1) + beyond)
 
     def length(self, sigma: Floats) -> Floats:
         """Length (ray,) in m, of chords."""
         x, _, _ = self._across(sigma)
         a, p = np.abs(sigma), np.maximum(self.cosine(sigma), 1e-300)
         turn = (sigma < 0.0) & (self.beyond > 0.0)
-        return np.hypot(x, self.thick).sum(axis=1) + np.where(turn, 2.0 * a / (p * np.where(turn, self.beyond, 1.0)), 0)
+        back = np.where(turn, 2.0 * a / (p * np.where(turn, self.beyond, 1.0)), 0)
+        return np.asarray(np.hypot(x, self.thick).sum(axis=1) + back)
 
 
 def crossed(water: Water, first: Floats, last: Floats) -> Crossed:

@@ -34,16 +34,16 @@ class Mover:
     def points(self, body: Floats, time: Floats) -> Floats:
         """Points of the body (time, xyz), given in its own frame, in the world, each at its own time (time,)."""
         position, rotation = self.places(time)
-        return position + np.einsum("nij,nj->ni", rotation, body)
+        return np.asarray(position + np.einsum("nij,nj->ni", rotation, body))
 
     def turned(self, body: Floats, time: Floats) -> Floats:
         """Directions in the frame of the body (time, xyz) in that of the world, at times (time,)."""
-        return np.einsum("nij,nj->ni", self.places(time)[1], body)
+        return np.asarray(np.einsum("nij,nj->ni", self.places(time)[1], body))
 
     def own(self, world: Floats, time: Floats) -> Floats:
         """Points of the world (time, xyz) in the frame of the body as it is at times (time,)."""
         position, rotation = self.places(time)
-        return np.einsum("nji,nj->ni", rotation, world - position)
+        return np.asarray(np.einsum("nji,nj->ni", rotation, world - position))
 
     def velocity(self, body: Floats, time: Floats) -> Floats:
         """Velocity (time, xyz) m/s of points of the body (time, xyz) at times (time,)."""

@@ -54,13 +54,13 @@ def filter_response(chosen: Filter, frequency: Floats) -> Floats:
     f, whole, low, high = _passed(chosen)
 
     def up_to(x: Floats) -> Floats:
-        return np.sign(x) * np.interp(np.abs(x), f, whole)
+        return np.asarray(np.sign(x) * np.interp(np.abs(x), f, whole))
 
     def band(x: Floats) -> Floats:
         return up_to(x + high) - up_to(x + low) + up_to(x - low) - up_to(x - high)
 
     middle = np.array([0.0 if low == 0.0 else 0.5 * (low + high)])
-    return band(np.asarray(frequency, float)) / band(middle)
+    return np.asarray(band(np.asarray(frequency, float)) / band(middle))
 
 
 def absorption(described: Absorption, frequency: Floats, depth: Floats) -> Floats:
@@ -75,7 +75,7 @@ def absorption(described: Absorption, frequency: Floats, depth: Floats) -> Float
         f1, f2 = 0.78 * np.sqrt(s / 35.0) * np.exp(t / 26.0), 42.0 * np.exp(t / 17.0)
         boron = 0.106 * f1 * f**2 / (f1**2 + f**2) * np.exp((ph - 8.0) / 0.56)
         salt = 0.52 * (1.0 + t / 43.0) * (s / 35.0) * f2 * f**2 / (f2**2 + f**2) * np.exp(-z / 6.0)
-        return (boron + salt + 0.00049 * f**2 * np.exp(-(t / 27.0 + z / 17.0))) / 1e3
+        return np.asarray((boron + salt + 0.00049 * f**2 * np.exp(-(t / 27.0 + z / 17.0))) / 1e3)
     c = 1412.0 + 3.21 * t + 1.19 * s + 0.0167 * z
     f1 = 2.8 * np.sqrt(s / 35.0) * 10.0 ** (4.0 - 1245.0 / (273.0 + t))
     f2 = 8.17 * 10.0 ** (8.0 - 1990.0 / (273.0 + t)) / (1.0 + 0.0018 * (s - 35.0))
@@ -85,4 +85,4 @@ def absorption(described: Absorption, frequency: Floats, depth: Floats) -> Float
         pure = 4.937e-4 - 2.59e-5 * t + 9.11e-7 * t**2 - 1.5e-8 * t**3
     else:
         pure = 3.964e-4 - 1.146e-5 * t + 1.45e-7 * t**2 - 6.5e-10 * t**3
-    return (boron + salt + pure * (1.0 - 3.83e-5 * z + 4.9e-10 * z**2) * f**2) / 1e3
+    return np.asarray((boron + salt + pure * (1.0 - 3.83e-5 * z + 4.9e-10 * z**2) * f**2) / 1e3)
