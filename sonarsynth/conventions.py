@@ -74,7 +74,7 @@ class Unit:
 
         The context `resolved` takes them for SI, as recipes in stores were once written. Raises ValueError.
         """
-        bare = self.ambiguous and isinstance(value, (int, float)) and not isinstance(value, bool) and value != 0
+        bare = self.ambiguous and type(value) in (int, float) and value != 0  # a default comes as NumPy's float64
         if bare and info.mode == "json" and not (info.context or {}).get("resolved"):
             degrees = self.symbol.replace("rad", "deg")
             raise ValueError(f"{value} could be {value} {degrees} or {value} {self.symbol}: write the unit")

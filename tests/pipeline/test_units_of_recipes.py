@@ -140,3 +140,20 @@ def test_numbers_that_overflow_somewhere_are_refused_in_every_field(small_file, 
             )
     with pytest.raises(RecipeError, match=r"--set: scene\.world\.environment\.depth: is more than"):
         config.load(small_file, [f"scene.world.environment.depth={number} m"])
+
+
+def test_angles_that_are_left_out_need_no_unit(small_file) -> None:
+    """Defaults are checked as what is written is: those that are angles must not be taken for written ones."""
+    seen: set[Any] = set()
+    list(leaves(Recipe, "", seen))
+    defaults = [kind.__pydantic_fields__[name].default for kind in seen for name in kind.__pydantic_fields__
+                if f"{kind.__name__}.{name}" in ANGLES]  # fmt: skip
+    stated = [d for d in defaults if isinstance(d, (int, float)) and d != 0]
+    assert len(stated) >= 6
+    assert {type(d) for d in stated} == {np.float64}
+    shape = "{kind: myring, nose: 0.2, middle: 1, tail: 0.5, diameter: 0.3}"
+    sets = [f"scene.world.targets.0.shape={shape}", "scene.sonar.beams={azimuths: 5, elevations: 5}"]
+    sets += ["scene.processing.cancelling={kind: wavefront}", "scene.physics.scattering={kind: mirror_lobe}"]
+    recipe = config.load(small_file, sets)
+    assert recipe.scene.sonar.beams.azimuth_span == np.deg2rad(50.0)
+    assert config.loads(config.dump(recipe)) == recipe
