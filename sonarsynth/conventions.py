@@ -39,8 +39,8 @@ SLOWEST, FASTEST = 100.0, 10e3
 NO_TARGET: Final = -1
 """Index of "no target", "no facet": never 0, which is a target."""
 
-SMALLEST, LARGEST = 1e-60, 1e15
-"""Sizes of numbers that people write, in SI units, but for 0: outside, a square or a quotient of them overflows."""
+LARGEST: Final = 1e15
+"""Size of a number in a recipe, in SI units: powers of larger ones overflow."""
 
 UNITS: Final[dict[str, dict[str, float]]] = {
     "m": {"m": 1.0, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "ft": 0.3048, "in": 0.0254},
@@ -74,11 +74,12 @@ class Unit:
 
         The context `resolved` takes them for SI, as recipes in stores were once written. Raises ValueError.
         """
-        bare = self.ambiguous and isinstance(value, (int, float)) and not isinstance(value, bool) and value != 0
+        bare = self.ambiguous and type(value) in (int, float) and value != 0  # a default comes as NumPy's float64
         if bare and info.mode == "json" and not (info.context or {}).get("resolved"):
             degrees = self.symbol.replace("rad", "deg")
             raise ValueError(f"{value} could be {value} {degrees} or {value} {self.symbol}: write the unit")
-        return self.parse(value)
+        number = self.parse(value)
+        return bounded(number, f" {self.symbol}") if info.mode == "json" else number
 
     def write(self, value: float) -> str | float:
         """The value as a recipe (JSON) holds it: with its unit where a bare number would be refused."""
@@ -88,8 +89,10 @@ class Unit:
         """A number in SI units from a number or from a text with a unit; raises ValueError in one clear line."""
         if isinstance(value, bool):
             raise ValueError(f"must be a number in {self.symbol}, not {str(value).lower()}")
+        if isinstance(value, np.generic):
+            return value.item()
         if not isinstance(value, str):
-            return bounded(value, f" {self.symbol}")
+            return value
         accepted = UNITS[self.symbol]
         number, _, symbol = value.strip().partition(" ")
         symbol = symbol.strip()
@@ -101,7 +104,7 @@ class Unit:
             raise ValueError(
                 (f"has unit '{symbol}'" if symbol else "has no unit") + f"; use one of {', '.join(accepted)}"
             )
-        return bounded(size * accepted[symbol], f" {self.symbol}")
+        return size * accepted[symbol]
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
@@ -134,19 +137,17 @@ class _PlainSchema:
         return _bounded(handler(schema))
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: Any, info: ValidationInfo) -> Any:
     if isinstance(value, (bool, str)):
         raise ValueError("must be a plain number")
-    return bounded(value)
+    value = value.item() if isinstance(value, np.generic) else value
+    return bounded(value) if info.mode == "json" else value
 
 
 def bounded(value: Any, unit: str = "") -> Any:
-    """A number, NumPy's as Python's, as it is; anything else too. Raises ValueError for a size that nothing has."""
-    value = value.item() if isinstance(value, np.generic) else value
-    number = isinstance(value, (int, float)) and 0 < abs(value) < np.inf
-    if number and not SMALLEST <= abs(value) <= LARGEST:
-        bound = f"more than {LARGEST:g}" if abs(value) > LARGEST else f"less than {SMALLEST:g}, and not 0"
-        raise ValueError(f"is {bound}{unit} in size, which is no number of this world: {str(value)[:30]}")
+    """A number of a recipe as it is, and anything else. Raises ValueError for a size that nothing has."""
+    if isinstance(value, (int, float)) and LARGEST < abs(value) < np.inf:
+        raise ValueError(f"is more than {LARGEST:g}{unit} in size, which is no number of this world: {str(value)[:30]}")
     return value
 
 

@@ -26,6 +26,7 @@ VENV = ROOT / ".venv"
 LOCK = ROOT / "tools" / "requirements.lock"
 STAMP = VENV / "setup.stamp"
 PYTHON = VENV / "bin" / "python"
+PIP = (PYTHON, "-m", "pip", "--disable-pip-version-check", "--no-input", "install", "--quiet", "--retries", "2")
 LIBRARIES = VENV / "lib"  # Open3D's run path leads here
 
 
@@ -71,10 +72,24 @@ def make_environment() -> None:
     usable = f"import pip, sys; sys.exit(sys.version_info < {OLDEST})"
     if PYTHON.exists() and made_here() and run(PYTHON, "-c", usable).returncode == 0:
         return
+    check_writable()
     say(f"making {VENV.name} with Python {sys.version.split()[0]}")
     result = run(sys.executable, "-m", "venv", "--clear", VENV)
     if result.returncode != 0:
         raise CannotSetUp(f"cannot make a virtual environment (Debian: apt install python3-venv): {reason(result)}")
+
+
+def check_writable() -> None:
+    """The environment stands in the checkout. Raises CannotSetUp where nothing can be written there."""
+    try:
+        with tempfile.TemporaryFile(dir=ROOT):
+            pass
+    except OSError as problem:
+        place = Path(tempfile.gettempdir()) / "sonarsynth"
+        raise CannotSetUp(
+            f"{ROOT} cannot be written ({problem.strerror}), where the environment is made: work in a copy, such as "
+            f"cp -r {ROOT} {place} && {place}/tools/setup.py"
+        ) from None
 
 
 def made_here() -> bool:
@@ -87,17 +102,21 @@ def install_packages() -> None:
     with tempfile.TemporaryDirectory() as folder:
         only_uv = Path(folder) / "uv.lock"
         only_uv.write_text(locked("uv"))
-        pip = [PYTHON, "-m", "pip", "--disable-pip-version-check", "--no-input", "install", "--quiet", "--retries", "2"]
-        result = run(*pip, "--require-hashes", "-r", only_uv)
+        result = run(*PIP, "--require-hashes", "-r", only_uv)
         if result.returncode != 0:
             raise CannotSetUp(f"pip cannot get uv from a package registry: {reason(result)}")
     say("installing the locked packages")
-    result = run(*uv("install"), "--require-hashes", "-r", LOCK)
+    install("the locked packages", "--require-hashes", "-r", LOCK)
+
+
+def install(what: str, *arguments: str | Path) -> None:
+    """By uv; by pip where that cannot: it needs a home for its cache, pip goes on without."""
+    result = run(*uv("install"), *arguments)
     if result.returncode != 0:
         say(f"uv could not ({reason(result)}); trying pip")
-        result = run(*pip, "--require-hashes", "-r", LOCK)
+        result = run(*PIP, *arguments)
     if result.returncode != 0:
-        raise CannotSetUp(f"cannot install the locked packages: {reason(result)}")
+        raise CannotSetUp(f"cannot install {what}: {reason(result)}")
 
 
 def uv(command: str) -> list[str | Path]:
@@ -114,9 +133,7 @@ def locked(name: str) -> str:
 
 def install_project() -> None:
     """The project where it stands, with the locked build back end."""
-    result = run(*uv("install"), "--no-deps", "--no-build-isolation", "--editable", ROOT)
-    if result.returncode != 0:
-        raise CannotSetUp(f"cannot install the project: {reason(result)}")
+    install("the project", "--no-deps", "--no-build-isolation", "--editable", ROOT)
 
 
 def open3d_module() -> Path | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
+import numpy as np
 from annotated_types import Ge, Le
 
 from sonarsynth.conventions import Decibels, PositiveRadians
@@ -43,7 +44,7 @@ class WavefrontCancelling:
     kind: Literal["wavefront"] = "wavefront"
     bounces: Annotated[int, Ge(1), Le(16)] = 2
     """Reflections up to so many at surface and bed are looked for."""
-    search: Annotated[PositiveRadians, Le(0.5)] = 0.03
+    search: Annotated[PositiveRadians, Le(0.5)] = np.float64(0.03)
     """How far from where straight paths lead an arrival is looked for."""
     excess: Annotated[Decibels, Ge(6)] = 12.0
     """An arrival is cancelled if, in the better half of the band, a beam on it stands so far above all else in its

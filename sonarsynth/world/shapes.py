@@ -38,7 +38,7 @@ class MeshFile:
     smooth: bool = False
     """The file stands for a curved surface: facets that are too long are cut along curves through their corners, with
     smooth normals. For Kirchhoff scattering, too long is what the wavelength says."""
-    crease: Annotated[Radians, Gt(0), Lt(np.pi)] = float(np.radians(40.0))
+    crease: Annotated[Radians, Gt(0), Lt(np.pi)] = np.deg2rad(40.0)
     """Edges that turn by more stay sharp. Nothing where not smooth."""
 
 
@@ -126,7 +126,7 @@ class Myring:
     diameter: Size
     exponent: Annotated[Number, Ge(0.5), Le(10)] = 2.0
     """Of the nose: 2 is an ellipse, more is blunter."""
-    tail_angle: Annotated[Radians, Ge(0), Le(1.5)] = 0.436
+    tail_angle: Annotated[Radians, Ge(0), Le(1.5)] = np.float64(0.436)
     """Half the angle included at the tip of the tail."""
     nose_offset: NonNegativeMetres = 0.0
     """Length of the nose that is missing."""

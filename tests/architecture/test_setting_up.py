@@ -92,3 +92,35 @@ def test_an_unreachable_registry_is_told_in_one_line(
     assert setup.main() == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert line.endswith("pip cannot get uv from a package registry: ERROR: Could not find a version of uv")
+
+
+def test_a_home_that_cannot_be_written_stops_neither_the_packages_nor_the_project(
+    setup: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """uv needs a cache there; what it cannot do pip does."""
+    ran: list[list[str]] = []
+
+    def run(*command: object, **_: object) -> subprocess.CompletedProcess[str]:
+        ran.append(list(map(str, command)))
+        by_uv = str(command[0]).endswith("/uv")
+        return subprocess.CompletedProcess(ran[-1], int(by_uv), "", "error: failed to create directory `/.cache/uv`")
+
+    monkeypatch.setattr(setup, "run", run)
+    setup.install_packages()
+    setup.install_project()
+    by_pip = [command for command in ran if "pip" in command[:3] and not command[0].endswith("/uv")]
+    assert [command[-1] for command in by_pip[1:]] == [str(setup.LOCK), str(setup.ROOT)]
+    assert "--editable" in by_pip[-1]
+
+
+def test_a_checkout_that_cannot_be_written_is_told_so_with_another_place(
+    setup: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refused(**_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(setup.tempfile, "TemporaryFile", refused)
+    assert setup.main() == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"{setup.ROOT} cannot be written (Permission denied)" in line
+    assert "work in a copy" in line and "apt install" not in line

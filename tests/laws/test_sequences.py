@@ -178,7 +178,10 @@ def test_sobol_draws_cover_evenly_in_all_dimensions_together() -> None:
 
 def test_what_varies_survives_yaml() -> None:
     made = recipe(
-        grid=(RANGES, Together(zip=(HEADINGS, Axis(path=f"{MOTION}.pitch", values=(0, "1 deg", 2e-3, "3 mrad"))))),
+        grid=(
+            RANGES,
+            Together(zip=(HEADINGS, Axis(path=f"{MOTION}.pitch", values=(0, "1 deg", "0.002 rad", "3 mrad")))),
+        ),
         variations=DRAWN,
         repeats=2,
         splits={"train": 0.75, "test": 0.25, "stratify": "heading"},

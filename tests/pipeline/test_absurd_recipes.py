@@ -52,7 +52,7 @@ ABSURD = [
     ),
     (
         SHAPE,
-        "kind: sphere, radius: 1e300",
+        "kind: sphere, radius: 1e9",
         "8: scene.world.targets.0.shape.radius: must be less than or equal to 10000",
     ),
     (SHAPE, "kind: sphere, radius: 1e-300", "8: scene.world.targets.0.shape.radius: must be greater than or equal to"),
