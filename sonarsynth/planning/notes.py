@@ -51,7 +51,7 @@ def notes(made: Plan, looks: Sequence[Look]) -> tuple[str, ...]:
     cancelled = scene.processing.cancelling is not None
     if made.propagation.bounces and not cancelled and made.products & {"image", "cloud"} and made.sizes["snap"]:
         found.append("the snap's own reflections enter the image: processing.cancelling takes them out before")
-    found += _accuracy(made) + list(_behind(recipe)) + _standing_off(scene)
+    found += _accuracy(made) + list(_behind(recipe)) + off_the_bottom(scene)
     real = [look for look in looks if look.real]
     for look in real[:: -(-len(real) // NOTED)]:
         found += _extent(look.scene, look.profile)
@@ -137,7 +137,7 @@ def _accuracy(made: Plan) -> list[str]:
     return found
 
 
-def _standing_off(scene: Scene) -> list[str]:
+def off_the_bottom(scene: Scene) -> list[str]:
     """Which shrimp the sonar does not find where it may look for them."""
     if not (names := standing_off(scene)) or scene.processing.locating.on_bottom is False:
         return []
