@@ -243,7 +243,7 @@ def test_errors_of_straight_rays_are_honest_in_bending_water(kind):
         elevations.append((found.elevation[0] - azimuth_elevation(seen)[1]) / found.elevation_error[0])
     assert np.mean(np.array(scaled) < 3.76) >= 0.9
     assert np.mean(np.abs(elevations) < 3) >= 0.9
-    assert np.median(predicted) < 8 * np.median(miss)
+    assert np.nanmedian(predicted) < 8 * np.nanmedian(miss)  # of those that have a place
 
 
 @pytest.mark.parametrize("gradient", [0.02, -0.3, 1.5])
