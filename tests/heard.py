@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonarsynth.acoustics.bearings import envelope_peak
 from sonarsynth.products import Signals
 from sonarsynth.sonar import Elements
 
@@ -14,6 +15,12 @@ def pulse_spectrum(f):
     """A pulse that falls as a snap does, -10 dB from 25 to 85 kHz, cut to that band with 5 kHz flanks."""
     low, high = (np.clip((f - edge) / 5e3, -0.5, 0.5) for edge in (25e3, 85e3))
     return 1e-3 / (1 + 1j * f / 24e3) ** 2 * (0.5 + 0.5 * np.sin(np.pi * low)) * (0.5 - 0.5 * np.sin(np.pi * high))
+
+
+def envelope_late() -> float:
+    """Time (s) after which the envelope of the pulse peaks in the band of the default sonar."""
+    f = np.linspace(22e3, 88e3, 1321)
+    return envelope_peak(f, pulse_spectrum(f), 25e3, 85e3)[0]
 
 
 def silence(elements: Elements, start: float, samples: int, quantum: float = 0.0) -> Signals:

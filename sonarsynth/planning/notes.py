@@ -42,7 +42,7 @@ def notes(made: Plan, looks: Sequence[Look]) -> tuple[str, ...]:
     cancelled = scene.processing.cancelling is not None
     if made.propagation.bounces and not cancelled and made.products & {"image", "cloud"} and made.sizes["snap"]:
         found.append("the snap's own reflections enter the image: processing.cancelling takes them out before")
-    found += lost_echoes(made) + _accuracy(made, looks) + _standing_off(scene)
+    found += lost_echoes(made) + _accuracy(made, looks) + off_the_bottom(scene)
     for look in noted(looks):
         found += mirror_notes(look) + overlap_notes(look)
         found += _extent(look.scene, look.profile)
@@ -147,7 +147,7 @@ def _accuracy(made: Plan, looks: Sequence[Look]) -> list[str]:
     return found
 
 
-def _standing_off(scene: Scene) -> list[str]:
+def off_the_bottom(scene: Scene) -> list[str]:
     """Which shrimp the sonar does not find where it may look for them."""
     if not (names := standing_off(scene)) or scene.processing.locating.on_bottom is False:
         return []

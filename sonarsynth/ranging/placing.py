@@ -11,14 +11,14 @@ from sonarsynth.acoustics.bearings import Wavefront, envelope_peak
 from sonarsynth.conventions import Floats, azimuth_elevation
 from sonarsynth.geometry import Pose
 from sonarsynth.products import REASONS, Bearings
-from sonarsynth.ranging.pulses import Pulse
+from sonarsynth.ranging.pulses import DEAF, Pulse
 from sonarsynth.sonar import Elements, Sonar
 from sonarsynth.world.environment import Profile
 
 FLOOR = 1e-9
 """Standard error (s) of a lag without any noise: what cutting the pulse's tail off does. Biases of 0.01 to 0.2 ns of
 curvature at the rim have been seen, which is what independent errors six times as large would leave."""
-TIME_FLOOR = 0.01
+TIME_FLOOR = 0.002
 """Standard error of the time without any noise, in units of 1/bandwidth: absorption, and what is cut, skew a pulse."""
 AGREES = 9.0
 """The bottom is used where innovation squared over variance is no more: three standard errors, since a source that
@@ -240,10 +240,12 @@ def _arrival(pulse: Pulse, full: Floats, unit: float, sonar: Sonar, rounding: fl
     the fitted time's variance all but the least, that of the mean of the lags; `unit` is the variance of a lag of
     weight one.
     """
+    whole = np.minimum(1 + DEAF * len(pulse.lag) / np.maximum(pulse.power, 1e-300), 2.0)  # `waveform` holds it down
     noise = max(pulse.noise, rounding) / np.maximum(pulse.power, 1e-300)
-    time, error = envelope_peak(pulse.frequency, pulse.template, sonar.band.low, sonar.band.high, noise)
+    low, high = sonar.band.low, sonar.band.high
+    time, error = envelope_peak(pulse.frequency, pulse.template * whole, low, high, noise)
     tilted = max(float(full[3, 3]) - unit / float(np.sum(pulse.weight)), 0.0)
-    floor = TIME_FLOOR / (sonar.band.high - sonar.band.low)
+    floor = TIME_FLOOR / (high - low)
     return time, float(np.sqrt(error**2 + tilted + floor**2))
 
 

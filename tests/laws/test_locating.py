@@ -17,7 +17,7 @@ from sonarsynth.ranging.placing import bending_covariance, mean_gradient
 from sonarsynth.ranging.refraction import first_rays
 from sonarsynth.sonar import PlanarLattice, Romanis, Sonar, elements
 from sonarsynth.world.environment import Profile
-from tests.heard import RATE, hear, hear_direct, silence
+from tests.heard import RATE, envelope_late, hear, hear_direct, silence
 
 C = 1540.0
 ROMANIS = elements(Romanis())
@@ -49,7 +49,7 @@ def test_four_quadrants(azimuth, elevation):
         assert np.linalg.norm(found.position[0] - source) < 1e-3
         assert found.range_from_depth[0] == pytest.approx(12.0, abs=1e-3)
         assert found.range_from_curvature[0] == pytest.approx(12.0, abs=2e-3)
-        assert found.time[0] == pytest.approx(12.0 / C, abs=3 * found.time_error[0])
+        assert found.time[0] == pytest.approx(12.0 / C + envelope_late(), abs=3 * found.time_error[0])
 
 
 def test_a_planar_array_hears_what_is_behind_it_in_front():
@@ -160,7 +160,7 @@ def test_snaps_are_found_loudest_first():
     found = locate(signals, ROMANIS, near, snaps=3)
     assert np.linalg.norm(found.position[0] - near) < 0.01
     assert np.linalg.norm(found.position[1] - far) < 0.02
-    assert found.time[0] == pytest.approx(1e-3 + np.linalg.norm(near) / C, abs=3e-5)
+    assert found.time[0] == pytest.approx(1e-3 + np.linalg.norm(near) / C + envelope_late(), abs=1e-6)
     assert np.isnan(found.position[2]).all()
     assert np.isnan(found.time[2])
 
@@ -232,7 +232,7 @@ def test_errors_of_straight_rays_are_honest_in_bending_water(kind):
         across, along = random.uniform(-0.4, 0.4), random.uniform(10.0, 30.0)
         ahead = pose.turn_to_world(np.array([1.0, across, 0.0]))[:2]
         source = pose.to_body(np.array([*(pose.position[:2] + along * ahead), -20.0]))
-        signals, _ = refracted_signals(array, source, pose, profile)
+        signals, seen = refracted_signals(array, source, pose, profile)
         speed = float(profile.at(-pose.position[2]))
         sonar = Sonar(array=SMALL_ARRAY, assumed_sound_speed=speed, sound_speed_error=0.1, bed_depth_error=0.01)
         found = locate(signals, array, source, pose, sonar, profile=profile)
@@ -240,10 +240,10 @@ def test_errors_of_straight_rays_are_honest_in_bending_water(kind):
         miss.append(np.linalg.norm(error))
         predicted.append(np.sqrt(np.trace(found.position_covariance[0])))
         scaled.append(np.sqrt(error @ np.linalg.solve(found.position_covariance[0], error)))
-        elevations.append((found.elevation[0] - azimuth_elevation(source)[1]) / found.elevation_error[0])
+        elevations.append((found.elevation[0] - azimuth_elevation(seen)[1]) / found.elevation_error[0])
     assert np.mean(np.array(scaled) < 3.76) >= 0.9
     assert np.mean(np.abs(elevations) < 3) >= 0.9
-    assert np.median(predicted) < 8 * np.median(miss)
+    assert np.nanmedian(predicted) < 8 * np.nanmedian(miss)  # of those that have a place
 
 
 @pytest.mark.parametrize("gradient", [0.02, -0.3, 1.5])

@@ -11,11 +11,12 @@ __all__ = ["Case", "Extreme", "extremes", "groups", "outcome"]
 
 def groups() -> dict[str, tuple[Case, ...]]:
     """All cases, by what they are about."""
-    from sonarsynth.accuracy.extremes import bodies, bubbles, chain, facets, rays, signals, targets
+    from sonarsynth.accuracy.extremes import bodies, bubbles, chain, facets, rays, signals, sources, targets
 
     return {
         "rays": rays.CASES,
         "signals": signals.CASES,
+        "sources": sources.CASES,
         "targets": targets.CASES,
         "bodies": bodies.CASES,
         "facets": facets.CASES,

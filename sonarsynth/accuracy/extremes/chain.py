@@ -66,7 +66,15 @@ REASONS: dict[str, tuple[str, Callable[[Any], Any]]] = {
     **{f"/ledger/{term}": ("paths", lambda paths: paths == 0) for term in LEDGER},
 }
 """Where numbers may be none, what stands beside them, and what that says then."""
-ELSEWHERE = "/image", "/cloud", "/bearings", "/truth/echo_", "/truth/wavefront_error"
+ELSEWHERE = (
+    "/image",
+    "/cloud",
+    "/bearings",
+    "/truth/echo_",
+    "/truth/snap_a",
+    "/truth/snap_elev",
+    "/truth/wavefront_error",
+)
 """Where the reason is another: no snap was found, no point; echoes from no side, or several."""
 
 

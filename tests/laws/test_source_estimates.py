@@ -1,0 +1,243 @@
+"""Estimates of sources: in mid-water, among echoes, in narrow bands; their pulls; and the snap that each came from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.stats import chi2
+
+from sonarsynth.conventions import azimuth_elevation, direction
+from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.labelling.estimates import Direct, emissions
+from sonarsynth.planning.notes import off_the_bottom
+from sonarsynth.planning.sources import standing_off
+from sonarsynth.products import REASONS, Bearings, Signals
+from sonarsynth.ranging import SensorDelays
+from sonarsynth.sonar import Band, PlanarLattice, Sonar, elements
+from sonarsynth.verification import snap_located
+from sonarsynth.world.environment import Profile
+from tests.heard import RATE, add_noise, envelope_late, hear, hear_direct, silence
+from tests.scenes import point_scene
+
+C = 1540.0
+WIDE = PlanarLattice(columns=12, rows=12, pitch=0.1, face=0.04953)
+SHORT = PlanarLattice(columns=12, rows=8, pitch=0.025)
+WATER = Profile(np.array([0.0]), np.array([C]))
+POSE = Pose(np.array([0.0, 0.0, -40.0]), quaternion(np.pi / 2))
+
+
+def locate(signals: Signals, bottom: float, snaps: int = 1, method: SensorDelays | None = None, **sonar) -> Bearings:
+    described = Sonar(array=WIDE, assumed_sound_speed=C, **sonar)
+    return (method or SensorDelays()).locate(signals, elements(WIDE), described, POSE, bottom, snaps, WATER)
+
+
+@pytest.mark.parametrize("refraction", [False, True])
+@pytest.mark.parametrize("distance", [10.0, 200.0, 5000.0])
+def test_a_source_in_mid_water_is_where_its_wavefront_says(distance: float, refraction: bool) -> None:
+    """Whatever the depth of the bottom; its bearing is the one that is heard, and the bottom was not used."""
+    source = distance * direction(0.3, -0.2 if distance < 1000.0 else -0.004)
+    signals = hear_direct(elements(WIDE), source)
+    for bottom in (60.0 + 0.25 * distance, 6000.0):
+        method = SensorDelays(refraction=refraction, on_bottom=None if distance < 1000.0 else False)
+        found = locate(signals, bottom, method=method)
+        azimuth, elevation = azimuth_elevation(source)
+        assert abs(found.azimuth[0] - azimuth) < 1e-6 and abs(found.elevation[0] - elevation) < 1e-6
+        assert found.bottom_used[0] < 1
+        error = found.position[0] - source
+        if np.isfinite(error).all():
+            assert error @ np.linalg.solve(found.position_covariance[0], error) < 14.16
+        else:
+            assert found.reason[0] == REASONS.index("range_unknown") and distance > 1000.0
+
+
+def test_a_bearing_is_the_one_that_is_heard_whatever_the_depth() -> None:
+    source = np.array([14.0, -5.0, -5.0])
+    signals = hear_direct(elements(WIDE), source)
+    found = [locate(signals, depth) for depth in (45.0, 45.1, 46.0, 120.0)]
+    for each in found:
+        assert each.azimuth[0] == found[0].azimuth[0] and each.elevation[0] == found[0].elevation[0]
+
+
+def echoed(strength: float, late: float = 0.0) -> tuple[Signals, np.ndarray]:
+    """A snap on the bottom and the echo of a point in the water, `late` (s) after it ought to come."""
+    source, target = np.array([14.0, -5.0, -5.0]), np.array([20.0, 3.0, 1.0])
+    start = round(8e-3 * RATE) / RATE
+    signals = hear(silence(elements(WIDE), start, 3600), elements(WIDE), source, 0.0, 1.0)
+    out = float(np.linalg.norm(target - source))
+    return hear(signals, elements(WIDE), target, out / C + late, strength / out), target
+
+
+def test_an_echo_does_not_pass_for_a_snap() -> None:
+    """That of a point is a perfect wave; only its time and place tell. As loud and earlier, no snap could cause it."""
+    signals, target = echoed(0.5)
+    found = locate(signals, 45.0, snaps=2)
+    assert list(found.reason) == [0, REASONS.index("may_be_an_echo")]
+    assert np.isnan(found.time[1]) and np.isnan(found.position[1]).all()
+    early, _ = echoed(20.0, late=-4e-3)
+    found = locate(early, 45.0, snaps=2)
+    assert list(found.reason) == [0, 0]
+    assert min(np.linalg.norm(found.position - target, axis=1)) < 0.02
+
+
+def test_snaps_at_one_instant_on_the_bottom_are_all_found() -> None:
+    places = np.array([[14.0, -5.0, -5.0], [11.0, 2.0, -5.0], [18.0, -1.0, -5.0]])
+    signals = silence(elements(WIDE), round(6e-3 * RATE) / RATE, 2400)
+    for place in places:
+        signals = hear(signals, elements(WIDE), place, 0.0, 1.0)
+    found = locate(signals, 45.0, snaps=4)
+    for place in places:
+        assert np.linalg.norm(found.position[:3] - place, axis=1).min() < 0.01
+    assert found.reason[3] > 0 and np.isnan(found.position[3]).all()
+
+
+@pytest.mark.parametrize("width", [100.0, 300.0, 1e3, 4e3, 16e3])
+def test_narrow_bands_give_a_place_within_its_errors_or_a_reason(width: float) -> None:
+    """With an echo 26 dB down that overlaps a long pulse; never a time less certain than the pulse is long."""
+    band = Band(low=40e3 - 0.5 * width, high=40e3 + 0.5 * width)
+    signals, _ = echoed(0.1)
+    found = locate(add_noise(signals, 1e-5, np.random.default_rng(3)), 45.0, band=band)
+    error = found.position[0] - [14.0, -5.0, -5.0]
+    if found.reason[0] == 0:
+        assert error @ np.linalg.solve(found.position_covariance[0], error) < 22.1
+        assert found.time_error[0] < 1 / width
+    else:
+        assert width < 4e3 and np.isnan(found.time[0]) and np.isnan(found.position[0]).all()
+
+
+SCENES = ((WIDE, (6.0, 25.0), 0.0), (WIDE, (8.0, 30.0), 12.0), (SHORT, (4.0, 9.0), 0.0))
+"""Array, distances (m), and the height of the sources above the bottom (m)."""
+
+
+def pulls(draws: int) -> tuple[np.ndarray, np.ndarray]:
+    """Squares over predicted ones: azimuth, elevation, time (draw, 3); position (draw,) over three.
+
+    Noise, the speed of sound and the depth of the bottom are drawn as large as the sonar is told that they may be: the
+    predicted errors hold all three.
+    """
+    rows = []
+    for number, (array, reach, above) in enumerate(SCENES):
+        sonar = Sonar(array=array, assumed_sound_speed=C, sound_speed_error=0.5, bed_depth_error=0.05)
+        for n in range(draws):
+            random = np.random.default_rng([7, number, n])
+            distance, speed = random.uniform(*reach), C + 0.5 * random.standard_normal()
+            source = distance * direction(random.uniform(-0.5, 0.5), random.uniform(-0.6, -0.1))
+            signals = hear_direct(elements(array), source, speed, 0.2 / distance, random, samples=700)
+            pose = Pose(np.array([0.0, 0.0, -5.0]), quaternion(np.pi / 2))
+            bottom = 5.0 - source[2] + above + 0.05 * random.standard_normal()
+            found = SensorDelays().locate(signals, elements(array), sonar, pose, float(bottom), 1, WATER)
+            azimuth, elevation = azimuth_elevation(source)
+            error = found.position[0] - source
+            rows.append(
+                [
+                    (found.azimuth[0] - azimuth) / found.azimuth_error[0],
+                    (found.elevation[0] - elevation) / found.elevation_error[0],
+                    (found.time[0] - distance / speed - envelope_late()) / found.time_error[0],
+                    np.sqrt(error @ np.linalg.solve(found.position_covariance[0], error) / 3),
+                ]
+            )
+    squares = np.square(rows)
+    return squares[:, :3], squares[:, 3]
+
+
+def test_pulls_of_estimates_have_unit_variance() -> None:
+    """The 95 % intervals of their variances meet 0.64 to 1.44; errors are neither too small nor too large."""
+    single, place = pulls(15)
+    for square, freedom in (*((single[:, n], 1) for n in range(3)), (place, 3)):
+        known = square[np.isfinite(square)]
+        assert len(known) >= 0.9 * len(square)
+        count = freedom * len(known)
+        low, high = (count * known.mean() / chi2.ppf(p, count) for p in (0.975, 0.025))
+        assert low <= 1.44 and high >= 0.64
+    assert np.mean(single < 16.0) >= 0.99
+
+
+def estimate(time: float, azimuth: float, elevation: float = -0.2) -> Bearings:
+    found = locate(silence(elements(WIDE), 0.0, 600), 45.0)
+    return replace(
+        found,
+        time=np.array([time]),
+        azimuth=np.array([azimuth]),
+        elevation=np.array([elevation]),
+        time_error=np.array([1e-7]),
+        azimuth_error=np.array([1e-4]),
+        elevation_error=np.array([1e-4]),
+    )
+
+
+def test_each_estimate_has_the_snap_that_it_came_from_or_none() -> None:
+    direct = Direct(np.array([0, 1]), np.array([0.010, 0.012]), direction([-0.3, 0.4], [-0.2, -0.2]))
+    for time, azimuth, elevation, snap in (
+        (0.010, -0.3, -0.2, 0),
+        (0.012, 0.4, -0.2, 1),
+        (0.012, -0.3, -0.2, -1),  # when the one comes, from where the other does
+        (0.010, -0.3, 0.2, -1),  # the image in the surface
+        (0.015, 0.4, -0.2, -1),  # an echo
+    ):
+        assert emissions(estimate(time, azimuth, elevation), direct, 60e3, 0.03)[0] == snap
+    assert emissions(locate(silence(elements(WIDE), 0.0, 600), 45.0, 3), direct, 60e3, 0.03).tolist() == [-1] * 3
+
+
+def store(**changed: float) -> xr.DataTree:
+    """Two frames with one estimate each, right by one predicted error in everything, but for what is changed."""
+    one, frames = np.ones((2, 1)), ("frame", "snap")
+    found: dict[str, object] = {
+        "time": 0.01 * one + 1e-7,
+        "time_error": 1e-7 * one,
+        "azimuth": 20.0 * one + 0.01,
+        "azimuth_error": 0.01 * one,
+        "elevation": -10.0 * one + 0.01,
+        "elevation_error": 0.01 * one,
+        "emission": np.zeros((2, 1), int),
+        "reason": np.zeros((2, 1), int),
+    }
+    spread = changed.pop("spread", 0.05)
+    found |= {name: np.full((2, 1), value) for name, value in changed.items()}
+    bearings = {name: (frames, value) for name, value in found.items()}
+    bearings["position"] = ((*frames, "xyz"), np.full((2, 1, 3), [14.05, 5.0, -2.0]))
+    bearings["position_covariance"] = ((*frames, "xyz", "xyz_other"), np.tile(spread**2 * np.eye(3), (2, 1, 1, 1)))
+    truth = {
+        "sonar_position": (("frame", "xyz"), np.zeros((2, 3))),
+        "sonar_orientation": (("frame", "wxyz"), np.tile(quaternion(0.0), (2, 1))),
+        "snap_arrival": (frames, 0.01 * one),
+        "snap_azimuth": (frames, 20.0 * one),
+        "snap_elevation": (frames, -10.0 * one),
+    }
+    pose = Pose(np.zeros(3), quaternion(0.0))
+    truth["snap_position"] = ((*frames, "xyz"), np.tile(pose.to_world(np.array([14.0, 5.0, -2.0])), (2, 1, 1)))
+    ledger = {"paths": (("frame", "snap", "echo", "family"), np.ones((2, 1, 1, 4), int))}
+    root = xr.Dataset(attrs={"band_low": 25e3, "band_high": 85e3, "assumed_sound_speed": C, "aperture_radius": 0.6})
+    groups = {"bearings": xr.Dataset(bearings), "truth": xr.Dataset(truth), "ledger": xr.Dataset(ledger)}
+    return xr.DataTree.from_dict({"/": root, **groups})
+
+
+def test_each_quantity_is_verified_by_its_own_errors() -> None:
+    frames = np.arange(2)
+    right = snap_located(store(), frames)
+    assert right.ok and not right.warning and not right.frames
+    for wrong in ({"azimuth": 20.05}, {"elevation": -9.9}, {"time": 0.01 + 1e-6}, {"emission": -1}):
+        check = snap_located(store(**wrong), frames)
+        assert check.ok is False and check.frames == (0, 1)
+    assert "no snap" in snap_located(store(emission=-1), frames).got
+    assert snap_located(store(spread=0.01), frames).ok is False
+
+
+@pytest.mark.parametrize("useless", [{"spread": 9.0}, {"azimuth_error": 20.0}, {"time_error": 1.0}])
+def test_errors_as_large_as_what_is_sought_are_a_warning(useless: dict[str, float]) -> None:
+    check = snap_located(store(**useless), np.arange(2))
+    assert check.ok and "2 of 2 estimates" in check.warning
+
+
+def test_a_snap_that_is_refused_is_a_warning_with_its_reason() -> None:
+    tree = store(time=np.nan, emission=-1, reason=float(REASONS.index("not_resolved")))
+    tree["bearings/reason"] = tree["bearings/reason"].astype(int)
+    check = snap_located(tree, np.arange(2))
+    assert check.ok is None and "not_resolved 2" in check.warning
+
+
+def test_the_plan_names_what_stands_off_the_bottom() -> None:
+    above, on = (point_scene((20.0, 0.0, -50.0), (12.0, 5.0, -depth)).scene for depth in (60.0, 100.0))
+    assert standing_off(above) == ("shrimp",) and standing_off(on) == ()
+    assert "not on the bottom" in off_the_bottom(above)[0] and off_the_bottom(on) == []
