@@ -8,13 +8,17 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from sonarsynth.description import FieldError
 from sonarsynth.labelling import label
+from sonarsynth.planning import Choices, plan
+from sonarsynth.planning.checks import check_frame
 from sonarsynth.sonar import BeamGrid
 from sonarsynth.tracing import Refracted, Straight
 from sonarsynth.world.moment import Moment
 from sonarsynth.world.motion import Circle, Course, Still, Waypoint, Waypoints, pose, spin, velocity
 from tests.laws.test_traced_families import BED, SONAR, THERMOCLINE, UNIFORM, C, ball
 from tests.laws.test_traced_families import snap as snap_at
+from tests.scenes import remus
 
 TIMES = (-0.1, 0.0, 0.1)
 NOW = 2.0
@@ -85,3 +89,33 @@ def test_the_spin_of_a_motion_is_the_rate_of_its_orientation(kind: str) -> None:
         np.testing.assert_allclose(
             spin(motion, time), [rate[2, 1], rate[0, 2], rate[1, 0]], atol=1e-7 * (1 + np.abs(rate).max())
         )
+
+
+def moved(motion, times: tuple[float, ...] = (0.0,)):
+    """A frame of a vehicle on a motion, lit by snaps at some times."""
+    recipe = remus(1)
+    world = recipe.scene.world
+    target = replace(world.targets[0], motion=motion)
+    shrimp = replace(world.shrimp[0], snap_times=times)
+    scene = replace(recipe.scene, world=replace(world, targets=(target,), shrimp=(shrimp,)))
+    return replace(recipe, scene=scene)
+
+
+def test_a_target_that_sound_would_meet_out_of_the_water_is_refused() -> None:
+    rising = Course(start=(20.0, 0.0, -0.5), climb=10.0)
+    for time in (0.0, 0.1):
+        scene, frame = moved(rising, (time,)).frame(0)
+        if time:
+            with pytest.raises(
+                FieldError, match=r"'remus', where sound meets it, is .* m above the surface at frame 0"
+            ):
+                check_frame(scene, frame)
+        else:
+            check_frame(scene, frame)
+
+
+def test_a_plan_bounds_what_turning_leaves_out() -> None:
+    """By less than a phase that can be heard for a vehicle that turns at 20 degrees a second."""
+    turning = Circle(centre=(20.0, 0.0, -4.5), radius=4.0, speed=1.4)
+    (row,) = (o for o in plan(moved(turning), frozenset(), Choices()).left_out if "motion" in o.what)
+    assert 0.0 < float(row.bound.split(" rad")[0]) < 0.02
