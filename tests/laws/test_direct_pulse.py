@@ -128,7 +128,7 @@ def unlike(signals, size):
     return replace(signals, pressure=pressure.astype(np.float32))
 
 
-@pytest.mark.parametrize("size", [0.003, 0.03, 0.3])
+@pytest.mark.parametrize("size", [0.03, 0.3])
 def test_beams_that_may_hold_the_direct_pulse_are_nan(size):
     """Sensors that are unlike leave some of it: no beam that is given holds three times what it should."""
     excess = 0.5e-3
