@@ -67,7 +67,8 @@ def measured_levels(
 
     The energy in the band of the sonar at `ideal_hydrophone`, over that of the snap at 1 m, through the same filter and
     stretched by the same Doppler. Paths are moved by whole samples into slots of time of their own, so far apart that
-    none is heard in another's; NaN for a snap that is silent in the band. Raises ValueError as the method does.
+    none is heard in another's, and made about equally loud (exactly: by powers of two), so that single precision rounds
+    none away beside another; NaN for a snap that is silent in the band. Raises ValueError as the method does.
     """
     count, fs = len(paths.delay), sonar.sampling_frequency
     if not count:
@@ -79,7 +80,8 @@ def measured_levels(
     lead = int(np.ceil(before.max() * fs)) + GUARD
     slot = fast_length(lead + int(np.ceil(after.max() * fs)) + GUARD)
     place = lead + slot * np.arange(count)
-    moved = replace(paths, delay=(paths.delay * fs % 1.0 + place) / fs)
+    mantissa, exponent = np.frexp(paths.amplitude)
+    moved = replace(paths, delay=(paths.delay * fs % 1.0 + place) / fs, amplitude=mantissa)
     signals = method.signals(moved, snaps, hydrophone, sonar, absorption, 0.0, slot * count)
     spectrum = rfft(np.asarray(signals.pressure[0], float).reshape(count, slot), axis=1) / fs
     at = np.arange(spectrum.shape[1]) - 0.5
@@ -92,7 +94,7 @@ def measured_levels(
     ])  # fmt: skip
     heard = np.abs(spectrum) ** 2 @ inside
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(10.0 * np.log10(heard / sent))
+        return np.asarray(10.0 * np.log10(heard / sent) + 20.0 * np.log10(2.0) * exponent)
 
 
 def _sent(waveform: Waveform, sonar: Sonar, samples: int, doppler: float) -> np.ndarray:

@@ -1,5 +1,7 @@
 """The recipes in configs/, each as its users run it."""
 
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +9,8 @@ import pytest
 import xarray as xr
 
 from sonarsynth import config, planning, schedule, verification
+from sonarsynth.cli import app
+from sonarsynth.cli.running import run
 from sonarsynth.planning import Plan
 from sonarsynth.products import ORIGINS
 from sonarsynth.render import follow_rays, render
@@ -20,6 +24,112 @@ REAL = ROOT.parent / "shared" / "data"
 needs_real_input = pytest.mark.skipif(not REAL.is_dir(), reason="the real cast and hull lie beside the repository")
 
 
+FRAMES = {
+    "remus.yaml": range(0, 64, 9),
+    "thermocline.yaml": (9, 36, 63),
+    "grid.yaml": (0, 5, 72, 77, 138, 143),  # ends of the first sequence, of one between, and of the last
+    "harbour.yaml": (0, 8),
+    "deep.yaml": (0, 15),
+    "crowd.yaml": (0,),
+}
+"""Frames of a recipe that are built; of others all."""
+CAST = """\
+% Device,CC1449004
+% Start latitude,-36.2199169
+% Start longitude,150.2301061
+%
+Pressure (Decibar),Depth (Meter),Temperature (Celsius),Salinity (PSS),Sound velocity (Meters per Second)
+0.15,0.149,16.446,35.608,1511.860
+5.00,4.97,16.2,35.64,1511.30
+12.0,11.9,16.05,35.65,1511.05
+25.0,24.8,15.9,35.66,1510.60
+"""
+"""As the instrument of `configs/harbour.yaml` exports it."""
+
+
+def _written_hull(path: Path, size: tuple[float, float, float] = (2.6, 1.5, 1.6)) -> Path:
+    """A box of the size (m) of the vehicle of `configs/harbour.yaml`, in the format that it names."""
+    corners = (np.array([[i >> 2 & 1, i >> 1 & 1, i & 1] for i in range(8)]) - 0.5) * size
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    lines = ["solid hull"]
+    for a, b, c, d in quads:
+        for triangle in ((a, b, c), (a, c, d)):
+            lines += ["facet normal 0 0 0", "outer loop"]
+            lines += ["vertex " + " ".join(f"{x:g}" for x in corners[v]) for v in triangle]
+            lines += ["endloop", "endfacet"]
+    path.write_text("\n".join([*lines, "endsolid hull"]))
+    return path
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """The store of some frames of a shipped recipe, each built once."""
+    folder = tmp_path_factory.mktemp("shipped")
+
+    @cache
+    def build(name: str) -> Path:
+        sets: tuple[str, ...] = ()
+        if name == "harbour.yaml":
+            cast = folder / "cast.csv"
+            cast.write_text(CAST)
+            sets = _harbour(cast, _written_hull(folder / "hull.stl"))
+        made = _plan(name, sets)
+        report = schedule.build(made, folder / f"{name}.zarr", frames=FRAMES.get(name), workers=0)
+        assert report.ok and report.written == len(FRAMES.get(name, range(made.sizes["frame"])))
+        return folder / f"{name}.zarr"
+
+    return build
+
+
+def _harbour(cast: Path, hull: Path) -> tuple[str, ...]:
+    return (
+        f"scene.world.environment.sound_speed.path={cast}",
+        f"scene.world.targets.0.shape.path={hull}",
+        "scene.world.targets.0.shape.edge=0.2",
+    )
+
+
+DISTURBED = pytest.mark.xfail(strict=True, reason="the direct pulse of its second snap is brighter than the echoes")
+SHIPPED = [
+    pytest.param(file.name, marks=[DISTURBED] if file.name == "crowd.yaml" else [])
+    for file in sorted(CONFIGS.glob("*.yaml"))
+]
+
+
+def test_the_crowd_fails_its_verification_by_the_second_snap_only(built: Callable[[str], Path]) -> None:
+    """What is heard of the second snap directly is louder than the echoes by the first; all else holds."""
+    failed = {name for name, check in _checks(built("crowd.yaml")).items() if check.ok is False}
+    assert failed <= {"brightest beam on target"}
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_every_shipped_recipe_builds_and_verifies(name: str, built: Callable[[str], Path]) -> None:
+    store = built(name)
+    assert run(app, ["verify", str(store)]) == 0
+    with xr.open_datatree(store, engine="zarr") as tree:
+        frames = list(FRAMES.get(name, range(tree.sizes["frame"])))
+        energy = tree["image/energy"].values[frames]
+        assert np.isfinite(energy).all() and (energy.max(axis=(1, 2)) > 0).all()
+        assert np.isfinite(tree["cloud/range"].values[frames]).any(axis=(1, 2)).all()
+        assert ("remainder" in tree["image"]) == (name == "tank.yaml")  # what is clear of echoes is left alone
+
+
+def test_the_echo_of_the_tank_is_ranged_through_the_direct_pulse(built: Callable[[str], Path]) -> None:
+    """It comes 0.45 ms after the direct pulse, whose ringing lasts 0.5 ms."""
+    ranges = _checks(built("tank.yaml"))["range of points on target"].numbers
+    assert ranges["points"] >= 20 and ranges["median_m"] < 0.02
+    with xr.open_datatree(built("tank.yaml"), engine="zarr") as tree:
+        assert tree["image/remainder"].item() < 1e-6
+
+
+def test_the_tank_without_the_echo_says_so() -> None:
+    """Kept, the direct pulse hides the echo: no point is made of its edge, and the plan names frame, target, share."""
+    made = _plan("tank.yaml", ("scene.processing.direct_pulse=keep",))
+    (note,) = (line for line in made.warnings if "lost" in line)
+    assert note.startswith("cylinder: 100 % of its echo") and note.endswith("is lost to the echo window in frame 0")
+    assert not np.isfinite(render(made, 0)["cloud/range"].values).any()
+
+
 def _plan(name: str, sets: tuple[str, ...] = ()) -> Plan:
     return planning.plan(config.load(CONFIGS / name, sets))
 
@@ -29,14 +139,12 @@ def _checks(store: Path) -> dict[str, verification.Check]:
         return {c.name: c for c in verification.check(tree.load())}
 
 
-def test_the_thesis_scene_is_imaged_ranged_and_located(tmp_path: Path) -> None:
+def test_the_thesis_scene_is_imaged_ranged_and_located(built: Callable[[str], Path]) -> None:
     """Every ninth frame of the crossing, from the first to the last, by the numbers that the data set is built for."""
     made = _plan("remus.yaml")
     assert made.sizes["frame"] == 64 and made.sizes["sensor"] == 508
     assert made.sizes["azimuth"] == made.sizes["elevation"] == 101
-    report = schedule.build(made, tmp_path / "remus.zarr", frames=range(0, 64, 9), workers=0)
-    assert report.ok and report.written == 8
-    checks = _checks(tmp_path / "remus.zarr")
+    checks = _checks(built("remus.yaml"))
     assert all(check.ok for name, check in checks.items() if name not in REPORTED), checks
     assert checks["brightest beam on target"].numbers == {"hits": 8, "frames": 8}
     ranges = checks["range of points on target"].numbers
@@ -50,15 +158,14 @@ def test_the_thesis_scene_is_imaged_ranged_and_located(tmp_path: Path) -> None:
     assert (distance < beam).all() and np.median(distance) < 0.3 * beam.mean()
 
 
-def test_ghosts_by_surface_and_bed_are_imaged_where_the_truth_says(tmp_path: Path) -> None:
+def test_ghosts_by_surface_and_bed_are_imaged_where_the_truth_says(built: Callable[[str], Path]) -> None:
     """Three frames of the crossing over a thermocline, with every path of up to two bounces."""
     made = _plan("thermocline.yaml")
     assert made.sizes["frame"] == 64 and made.sizes["elevation"] == 129
-    assert schedule.build(made, tmp_path / "ghosts.zarr", frames=(9, 36, 63), workers=0).ok
-    checks = _checks(tmp_path / "ghosts.zarr")
+    checks = _checks(built("thermocline.yaml"))
     assert all(check.ok for name, check in checks.items() if name not in REPORTED), checks
     assert checks["brightest beam on target"].numbers == {"hits": 3, "frames": 3}
-    with xr.open_datatree(tmp_path / "ghosts.zarr", engine="zarr") as tree:
+    with xr.open_datatree(built("thermocline.yaml"), engine="zarr") as tree:
         for frame in (9, 36, 63):
             energy, truth = tree["image/energy"][frame], tree["truth"].dataset.isel(frame=frame, target=0)
             for family in ("surface", "bed"):
@@ -94,17 +201,17 @@ def test_points_lit_by_another_snap_say_so_and_are_warned_of(tmp_path: Path) -> 
     assert any("only" in line for line in told) == (found.judged.mean() < 0.5)
 
 
-def test_a_grid_of_ranges_headings_and_hulls(tmp_path: Path) -> None:
+def test_a_grid_of_ranges_headings_and_hulls(built: Callable[[str], Path]) -> None:
     """Of its 24 sequences the first, the last and one between."""
     made = _plan("grid.yaml")
     assert (made.recipe.sequences, made.sizes["frame"]) == (24, 144) and made.looked_at == 144
     steps = made.recipe.steps
     frames = [frame for n in (0, 12, 23) for frame in (n * steps, (n + 1) * steps - 1)]
-    assert schedule.build(made, tmp_path / "grid.zarr", frames=frames, workers=0).ok
-    checks = _checks(tmp_path / "grid.zarr")
+    assert frames == list(FRAMES["grid.yaml"])
+    checks = _checks(built("grid.yaml"))
     assert all(check.ok is not False for check in checks.values()), checks
     assert checks["brightest beam on target"].numbers["hits"] == len(frames)
-    with xr.open_datatree(tmp_path / "grid.zarr", engine="zarr") as tree:
+    with xr.open_datatree(built("grid.yaml"), engine="zarr") as tree:
         root = tree.to_dataset().isel(frame=slice(0, None, steps))
         assert np.bincount(root.split.values[[0, 12, 23]], minlength=3).sum() == 3
         assert np.unique(root.start_range.values).tolist() == [10.0, 12.0, 15.0]
@@ -151,23 +258,10 @@ def test_rays_from_the_l_shape_go_on_to_the_shrimp() -> None:
     assert coefficient.min() >= 0 and coefficient.max() <= 1 and np.ptp(coefficient) > 0.3
 
 
-@pytest.mark.parametrize("name", ["tank.yaml", "l_shape.yaml"])
-def test_the_thesis_test_scenes_render(name: str) -> None:
-    tree = render(_plan(name), 0)
-    assert np.isfinite(tree["image/energy"].values).all()
-    truth = tree["truth/target"].values
-    brightest = np.unravel_index(np.argmax(tree["image/energy"].values), truth.shape)
-    assert verification.near_target(tree, truth)[brightest]
-
-
 @needs_real_input
 def test_real_water_and_a_real_hull(tmp_path: Path) -> None:
-    sets = (
-        f"scene.world.environment.sound_speed.path={REAL / 'castaway_ctd.csv'}",
-        f"scene.world.targets.0.shape.path={REAL / 'rexrov.stl'}",
-        "scene.world.targets.0.shape.edge=0.2",
-    )
-    report = schedule.build(_plan("harbour.yaml", sets), tmp_path / "harbour.zarr", frames=range(0, 16, 5), workers=0)
+    made = _plan("harbour.yaml", _harbour(REAL / "castaway_ctd.csv", REAL / "rexrov.stl"))
+    report = schedule.build(made, tmp_path / "harbour.zarr", frames=range(0, 16, 5), workers=0)
     assert report.ok
     checks = _checks(tmp_path / "harbour.zarr")
     assert all(check.ok for name, check in checks.items() if name not in REPORTED), checks
