@@ -221,7 +221,7 @@ def test_a_build_that_was_killed_before_its_card_gets_it_when_it_is_resumed(
 
 
 MARKUP = """\
-<script>alert(1)</script> <img src=x onerror=alert(2)> [click](javascript:alert(3)) ![p](https://x.org/p.png)
+<script>alert(1)</script> <img src=x onerror=alert(2)> [click](javascript:alert(3)) ![p](https://doi.org/p.png)
 
 # heading ```
 ---
