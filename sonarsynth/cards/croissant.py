@@ -98,7 +98,7 @@ def croissant(facts: Facts) -> dict[str, Any]:
 
 def _address(url: Any) -> str:
     """An address of a page; "" for what does something else where it is followed."""
-    return str(url) if str(url).startswith(("https://", "http://")) else ""
+    return str(url) if str(url).partition("://")[0] in ("https", "http") else ""
 
 
 def _licence(text: str) -> str:

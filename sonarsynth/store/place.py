@@ -113,11 +113,15 @@ def read_each(folder: Folder, names: Iterable[str]) -> Iterator[tuple[str, bytes
             yield name, error
 
 
-def record(folder: Folder, name: str, *, sync: bool = False) -> FileRecord:
-    """Size and SHA-256 of a file of a store; with `sync`, it is on the disk first. Raises OSError."""
+def record(folder: Folder, name: str, *, sync: bool = False, size: int | None = None) -> FileRecord:
+    """Size and SHA-256 of a file of a store; with `sync`, it is on the disk first. A file of another size than `size`
+    is not read: its digest is "". Raises OSError."""
     if isinstance(folder, Remote):
         return record_of((folder / name).read_bytes())
     with within.opened(folder, name) as file:
+        found = os.fstat(file.fileno()).st_size
+        if size is not None and found != size:
+            return found, ""
         if sync:
             os.fsync(file.fileno())
         digest = hashlib.file_digest(file, "sha256").hexdigest()
@@ -136,7 +140,7 @@ def records(folder: Folder, expected: Mapping[str, FileRecord]) -> Iterator[tupl
         return
     for name in sorted(expected):
         try:
-            yield name, record(folder, name)
+            yield name, record(folder, name, size=expected[name][0])
         except OSError as error:
             yield name, error
 

@@ -72,7 +72,7 @@ def _to_put_back(path: Folder, found: Findings, laid: Mark) -> list[str]:
 
 def _is(path: Folder, name: str, expected: tuple[int, str]) -> bool:
     try:
-        return record(path, name) == expected
+        return record(path, name, size=expected[0]) == expected
     except OSError:
         return False
 
