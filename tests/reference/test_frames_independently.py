@@ -44,8 +44,8 @@ def away(made: Plan, sensors: list[int]) -> tuple[float, float]:
 @pytest.mark.parametrize(
     ("name", "sensors", "choices"),
     [
-        ("remus", [3, 140, 327, 504], None),
-        ("tank", [0, 38, 90, 127], None),
+        ("remus", [140, 504], None),
+        ("tank", [0, 90], None),
         ("crowd", [5, 300], None),
         ("deep", [17, 200], None),
         ("thermocline", [140], Choices(visibility="hydrophones")),  # what its plan chooses, in 14 s

@@ -143,14 +143,13 @@ def _cheaper(plan: Plan) -> Iterator[tuple[str, Plan]]:
 
 def _cuts(exact: Exact, traced: Traced) -> Iterator[Point]:
     """The array cut into more and more parts, all else exact, and at last into hydrophones."""
-    best = exact_plan(exact.plan)
+    best, spent = exact_plan(exact.plan), 0.0
     for count in _counts(exact.plan)[:-1]:
-        if count > exact.plan.choices.subarrays and count / traced.parts * traced.seconds > max(
-            LONGEST, SLOWER * traced.seconds
-        ):
+        if 2.0 * spent > max(LONGEST, SLOWER * traced.seconds):
             break
         some = replace(best, choices=replace(best.choices, subarrays=count))
         yield (point := _point(exact, Traced.of(some, exact.frame, exact.sensor), "subarrays", _cut(some)))
+        spent = point.seconds
         if point.error < FINER * point.allowed:
             break
     yield _of_each(exact, exact.each, exact.sensor, "subarrays", "each hydrophone, every path")
