@@ -127,7 +127,7 @@ class Processing:
     direct_pulse: Literal["auto", "keep", "remove"] = "auto"
     """Whether the direct pulse of the loudest snap is taken out of the signals before imaging, and the echo window
     opens while it lasts. `auto`: where the echo window would otherwise cut echoes; `keep`: the window opens after it.
-    """
+    But for `keep`, direct pulses of other located snaps are taken out wherever they are heard in the echo window."""
     beamforming: Beamformer = Field(default_factory=AutoBeamforming)
     """How the energy image is made."""
     ranging: Ranging = Field(default_factory=AutoRange)

@@ -1,4 +1,4 @@
-"""The direct pulse of the located snap: taken out of the signals where echoes come before it is over."""
+"""Direct pulses of located snaps: taken out of the signals where they and echoes are heard at the same time."""
 
 from __future__ import annotations
 
@@ -30,8 +30,31 @@ Imaging = Callable[[Signals, float, float], EnergyImage]
 """The energy image of signals from start to stop (s)."""
 
 
-def remove(signals: Signals, bearings: Bearings, elements: Elements, sonar: Sonar, length: float) -> Signals | None:
-    """Signals without the direct pulse of the first located snap; None where that is not one wavefront.
+def remove_others(
+    signals: Signals,
+    bearings: Bearings,
+    elements: Elements,
+    sonar: Sonar,
+    length: float,
+    window: tuple[float, float],
+) -> Signals:
+    """Signals without the direct pulses, of `length` (s), of later snaps that are heard in a window (start, stop) in s.
+
+    Of those alone that are located, which no echo is; the same signals where there are none.
+    """
+    reach = length + pulses.transit(elements, sonar.assumed_sound_speed)
+    for row in range(1, len(bearings.time)):
+        near = window[0] - reach < bearings.time[row] < window[1] + reach
+        if near and np.isfinite(bearings.position[row]).all():
+            left = remove(signals, bearings, elements, sonar, length, row)
+            signals = signals if left is None else left
+    return signals
+
+
+def remove(
+    signals: Signals, bearings: Bearings, elements: Elements, sonar: Sonar, length: float, row: int = 0
+) -> Signals | None:
+    """Signals without the direct pulse of a located snap; None where that is not one wavefront.
 
     The sphere that fits the sensors' lags, and then each sensor's own lag and gain as far as its signal supports them
     (rays that bend make no sphere), say how each hears the wave. What all sensors have of that wave (`fronts.part_of`)
@@ -44,7 +67,7 @@ def remove(signals: Signals, bearings: Bearings, elements: Elements, sonar: Sona
     window; an echo that comes 0.45 ms later from 24 degrees beside it loses 0.13 dB. 5 ms on one core; 17 ms of 508
     sensors.
     """
-    fitted = refine(signals, elements, sonar, Front.of(bearings))
+    fitted = refine(signals, elements, sonar, Front.of(bearings, row))
     if fitted is None or not fitted[1] < MAX_LAG / sonar.band.centre:
         return None
     front, _ = fitted

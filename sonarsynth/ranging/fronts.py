@@ -36,13 +36,14 @@ class Front:
     time: float  # s at the array centre
 
     @staticmethod
-    def of(bearings: Bearings) -> Front:
-        """The direct pulse of the first located snap; plane where nothing says how far away that is."""
-        radius = float(bearings.range_from_curvature[0])
+    def of(bearings: Bearings, row: int = 0) -> Front:
+        """The direct pulse of a located snap; plane where nothing says how far away that is."""
+        radius = float(bearings.range_from_curvature[row])
         if not np.isfinite(radius):
-            radius = float(np.linalg.norm(bearings.position[0]))
+            radius = float(np.linalg.norm(bearings.position[row]))
         curvature = 1 / radius if np.isfinite(radius) else 0.0
-        return Front(direction(bearings.azimuth[0], bearings.elevation[0]), curvature, float(bearings.time[0]))
+        towards = direction(bearings.azimuth[row], bearings.elevation[row])
+        return Front(towards, curvature, float(bearings.time[row]))
 
     def delays(self, elements: Elements, sound_speed: float) -> Floats:
         """When each sensor hears it (sensor,), in s."""

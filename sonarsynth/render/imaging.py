@@ -6,7 +6,7 @@ import numpy as np
 
 from sonarsynth.planning import Plan
 from sonarsynth.products import Bearings, EnergyImage, Signals
-from sonarsynth.ranging.direct_pulse import remove, trusted
+from sonarsynth.ranging.direct_pulse import remove, remove_others, trusted
 from sonarsynth.sonar import Sonar
 
 
@@ -15,12 +15,15 @@ def image_of(
 ) -> tuple[Signals, EnergyImage]:
     """The image of an echo window (start, stop) in s, and the signals that it was made of.
 
-    Where the plan takes the direct pulse out, what may be left of it is asked for in every beam.
+    The direct pulses of later snaps that are heard in the window are taken out; of the first one, where the plan says
+    so. Where the plan takes the direct pulse out, what may be left of it is asked for in every beam.
     """
     method, elements, sonar = plan.choices.beamforming, plan.elements, plan.scene.sonar
+    length = plan.windows.supports.clear
+    if plan.scene.processing.direct_pulse != "keep":
+        signals = remove_others(signals, bearings, elements, sonar, length, window)
     if not plan.windows.direct_removed:
         return signals, method.image(signals, elements, sonar, *window)
-    length = plan.windows.supports.clear
     left = remove(signals, bearings, elements, sonar, length)
     if left is None:  # what was located is no wave that could be taken out: no echo is told from it
         return signals, no_image(sonar, *window, remainder=1.0)

@@ -12,8 +12,9 @@ from sonarsynth.conventions import direction
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.planning import plan
 from sonarsynth.planning.lost_echoes import losses
+from sonarsynth.products import Bearings
 from sonarsynth.ranging import IsovelocityRange, SensorDelays
-from sonarsynth.ranging.direct_pulse import remove, trusted
+from sonarsynth.ranging.direct_pulse import remove, remove_others, trusted
 from sonarsynth.scene import Processing
 from sonarsynth.sonar import BeamGrid, PlanarLattice, Sonar, elements
 from sonarsynth.world.environment import Profile
@@ -110,6 +111,20 @@ def test_an_echo_loses_what_a_beam_on_the_snap_hears_of_it(target):
     weight = np.abs(pulse_spectrum(f)) ** 2
     expected = weight @ heard / (weight @ np.sum(np.abs(wave) ** 2, axis=1))
     assert 1 - energy(kept) / energy(echo) == pytest.approx(expected, rel=0.1, abs=0.01)
+
+
+def test_a_later_snap_in_the_echo_window_is_taken_out_and_what_is_not_located_stays():
+    first, excess = direct(), 1.2e-3
+    later = hear(silence(ARRAY, START, 1000), ARRAY, 7.0 * direction(0.3, 0.1), CLOCK + excess - 7.0 / C, 0.5, C)
+    both = replace(first, pressure=first.pressure + later.pressure)
+    rows = vars(located(first)), vars(located(later))
+    bearings = Bearings(**{name: np.concatenate([row[name] for row in rows]) for name in rows[0]})
+    window = CLOCK + 0.8e-3, CLOCK + 1.6e-3
+    left = remove_others(both, bearings, ARRAY, SONAR, 0.5e-3, window)
+    assert energy(left.pressure - first.pressure) < 1e-5 * energy(later.pressure)
+    assert remove_others(both, bearings, ARRAY, SONAR, 0.5e-3, (window[0] - 2e-3, window[1] - 2e-3)) is both
+    nowhere = replace(bearings, position=np.where([[True], [False]], bearings.position, np.nan))
+    assert remove_others(both, nowhere, ARRAY, SONAR, 0.5e-3, window) is both
 
 
 def test_noise_is_left_as_it_is():
