@@ -15,15 +15,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.labelling import SLICES, Band, Listening, echoes, label, label_points, ledger, path_powers
+from sonarsynth.labelling import echoes, label, ledger, path_powers
 from sonarsynth.planning import Plan, arrivals_of, check_unseen, plan
 from sonarsynth.planning.sources import standing_off
-from sonarsynth.products import Arrivals, Bearings, Echoes, EnergyImage, Ledger, PointCloud, PointLabels, Signals, Truth
+from sonarsynth.products import Arrivals, Bearings, Echoes, EnergyImage, Ledger, Signals, Truth
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import Recipe
 from sonarsynth.render.estimates import emission_values, estimate_truth, heard_directly
 from sonarsynth.render.hearing import hear
 from sonarsynth.render.imaging import image_of, no_image
+from sonarsynth.render.labels import band_of, expansion_error, point_labels
 from sonarsynth.render.laps import LAPS, counted, lap
 from sonarsynth.render.rays import follow_rays
 from sonarsynth.render.stored import (
@@ -42,7 +43,6 @@ from sonarsynth.scene import Frame
 from sonarsynth.synthesis.pulse import snap_levels
 from sonarsynth.tracing import Straight
 from sonarsynth.variables import VARIABLES, Variable, attributes, coordinates, variables
-from sonarsynth.world.moment import Snap
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -126,9 +126,9 @@ def trace_at(plan: Plan, frame: Frame) -> Traced:
     seen = arrivals.at_centre
     levels = snap_levels(frame.moment.snaps)
     truth = _label(plan, frame, levels)
-    band, targets = _band(plan, frame.moment.snaps), len(frame.moment.bodies)
+    band, targets = band_of(plan, frame.moment.snaps), len(frame.moment.bodies)
     powers = path_powers(seen, band)
-    book = ledger(seen, powers, band, targets, levels, _expansion_error(plan, seen))
+    book = ledger(seen, powers, band, targets, levels, expansion_error(plan, seen))
     heard = echoes(seen, powers, targets, levels)
     lap("label")
     return Traced(frame, arrivals, truth, book, heard)
@@ -145,28 +145,6 @@ def _of_frame(plan: Plan, frame: Frame) -> Values:
     """Which frame it is."""
     split = plan.recipe.split(frame.index)
     return table("/", trajectory=frame.trajectory, step=frame.step, time=frame.time, split=split)
-
-
-def _band(plan: Plan, snaps: tuple[Snap, ...]) -> Band:
-    """The band that levels are taken in."""
-    from sonarsynth.synthesis.direct_sum import relative_absorption
-    from sonarsynth.synthesis.isolated import energy_in_slices
-
-    sonar = plan.scene.sonar
-    energy = np.array([energy_in_slices(snap.waveform, sonar, SLICES) for snap in snaps]).reshape(-1, SLICES)
-    band = Band(sonar.band.low, sonar.band.high, energy, np.zeros(SLICES))
-    return replace(band, relative=relative_absorption(plan.absorption, band.frequency, sonar.band.centre))
-
-
-def _expansion_error(plan: Plan, arrivals: Arrivals) -> float:
-    """Error (dB) of a level from expanding wavefronts and amplitudes over the aperture, as measured at its probes.
-
-    A beam of sensors that are up to phi out of phase loses at most 20 log10 cos phi. NaN where a sensor has no ray.
-    """
-    if not np.isfinite([arrivals.wavefront_error, arrivals.amplitude_error]).all():
-        return float("nan")
-    phase = min(2 * np.pi * plan.scene.sonar.band.high * arrivals.wavefront_error, 1.5)
-    return float(20 * np.log10((1.0 + arrivals.amplitude_error) / np.cos(phase)))
 
 
 def beamform_frame(plan: Plan, index: int, traced: Traced) -> Heard:
@@ -262,7 +240,7 @@ def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
             heard.signals,
         )
         lap("range")
-        values |= cloud_values(cloud, _point_labels(plan, traced, heard.bearings, cloud))
+        values |= cloud_values(cloud, point_labels(plan, frame, traced.arrivals, heard.bearings, cloud))
         lap("label")
     return values
 
@@ -273,23 +251,6 @@ def _values(plan: Plan, index: int) -> Values:
         return truth_frame(plan, index)
     traced = trace_frame(plan, index)
     return range_frame(plan, index, traced, beamform_frame(plan, index, traced))
-
-
-def _point_labels(plan: Plan, traced: Traced, bearings: Bearings, cloud: PointCloud) -> PointLabels:
-    """Whose echo each point of a cloud is."""
-    frame, sonar = traced.frame, plan.scene.sonar
-    moves = plan.scene.physics.doppler
-    moment = frame.moment if moves else replace(frame.moment, bodies=tuple(body.frozen for body in frame.moment.bodies))
-    listening = Listening(
-        plan.elements,
-        sonar.assumed_sound_speed,
-        getattr(plan.choices.ranging, "focus", None),
-        float(bearings.time[0]) if len(bearings.time) else np.nan,
-        frame.sonar_pose,
-        frame.sonar_velocity * moves,
-    )
-    band = _band(plan, frame.moment.snaps)
-    return label_points(cloud, sonar.beams.azimuth, sonar.beams.elevation, traced.arrivals, band, moment, listening)
 
 
 def render(recipe: Recipe | Plan, index: int) -> xr.DataTree:

@@ -52,12 +52,7 @@ FLAT: Final[ChunkKeyEncodingParams] = {"name": "default", "separator": "."}
 
 
 def create(
-    path: Folder | str,
-    plan: Plan,
-    *,
-    restart: bool = False,
-    source: Source | None = None,
-    mixed_versions: bool = False,
+    path: Folder | str, plan: Plan, *, restart: bool = False, source: Source | None = None, mixed_versions: bool = False
 ) -> Layout:
     """Lay the store out, or make ready to go on with the one that is there. Returns its layout.
 

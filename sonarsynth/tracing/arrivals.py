@@ -248,11 +248,7 @@ def bending(profile: Profile, propagation: Propagation, sonar_pose: Pose) -> Pro
 def arrivals(
     array: ArrayLegs, snaps: tuple[Snap, ...], absorption: float | DepthAbsorption, laws: tuple[ScatteringLaw, ...]
 ) -> Arrivals:
-    """The arrivals of any snaps from legs that are traced already: as `trace`, of what is at rest, without tracing the
-    array side again.
-
-    But for targets that scatter forward, whose shadows have legs of their own.
-    """
+    """As `trace`, of what is at rest, from legs that are traced already; shadows of targets have legs of their own."""
     numbered = dict(enumerate(snaps))
     parts = [((index, 0), _direct(array, index, snap, absorption, laws)) for index, snap in numbered.items()]
     parts += _echoes(array, numbered, absorption, laws)

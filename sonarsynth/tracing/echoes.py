@@ -102,11 +102,7 @@ class _Found:
 
 
 def echoes(
-    array: ArrayLegs,
-    index: int,
-    snap: Snap,
-    absorption: float | DepthAbsorption,
-    parts: tuple[tuple[Part, ...], ...],
+    array: ArrayLegs, index: int, snap: Snap, absorption: float | DepthAbsorption, parts: tuple[tuple[Part, ...], ...]
 ) -> Arrivals:
     """Snap `index` to facet to array, over every facet of the legs that is lit; parts: of the law of each body.
 

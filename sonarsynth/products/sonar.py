@@ -1,0 +1,90 @@
+"""What the sonar hears and makes of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.conventions import Floats, Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """Pressure at each hydrophone, as the converter gives it."""
+
+    pressure: npt.NDArray[
+        np.float32
+    ]  # (sensor, sample) Pa; as converted, a whole number of `quantum` where there is one
+    start: float  # s: time of sample 0
+    sampling_frequency: float  # Hz
+    quantum: float  # Pa of one count; 0 without a converter
+    clipped: int  # samples at full scale
+    outside: int  # arrivals that fell outside the window: counted, never wrapped
+
+
+REASONS = (
+    "accepted",
+    "nothing_heard",
+    "array_tells_no_direction",
+    "band_too_narrow",
+    "not_one_wavefront",
+    "not_resolved",
+    "outside_the_water",
+    "may_be_an_echo",
+    "range_unknown",
+)
+"""Why a row of `Bearings` is not accepted: `Bearings.reason` is an index. Of "range_unknown" the position alone is NaN:
+when and from where the pulse came is known; of all others nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bearings:
+    """Where the array hears each snap: one row a snap, the loudest direct pulse first; NaN where none was found.
+
+    Rows of what was found come first, then those of pulses that were refused, `reason` says why. Standard errors are
+    predicted from the data and the instrument alone (one sigma). Which true snap a row comes from is a label:
+    `labelling.estimates`.
+    """
+
+    time: Floats  # (snap,) s: arrival at the array centre of the peak of the pulse's envelope in the band
+    time_error: Floats  # (snap,) s
+    azimuth: Floats  # (snap,) rad, sonar frame, of the arriving wave as it is heard, whatever else is known
+    azimuth_error: Floats  # (snap,) rad
+    elevation: Floats  # (snap,) rad
+    elevation_error: Floats  # (snap,) rad
+    range_from_depth: Floats  # (snap,) m: where the bearing meets the known depth of the bed
+    range_from_depth_error: Floats  # (snap,) m
+    range_from_curvature: Floats  # (snap,) m: from the curvature of the wavefront
+    range_from_curvature_error: Floats  # (snap,) m
+    position: Floats  # (snap, xyz) m, sonar frame: of the wavefront, and of the bottom's depth where it was used
+    position_covariance: Floats  # (snap, xyz, xyz) m2
+    residual: Floats  # (snap,) s: root mean square residual of the sensor delays
+    bottom_used: (
+        Ints  # (snap,) 1 where the depth of the bottom entered the position, 0 where it did not, -1 without one
+    )
+    reason: Ints  # (snap,) index into REASONS
+
+
+@dataclass(frozen=True, eq=False)
+class EnergyImage:
+    """Energy in each steered direction, in the echo window."""
+
+    energy: npt.NDArray[np.float32]  # (elevation, azimuth) Pa2 s: a plane wave of pressure p gives int p2 dt
+    azimuth: Floats  # (azimuth,) rad, ascending
+    elevation: Floats  # (elevation,) rad, ascending
+    start: float  # s: the echo window that was imaged
+    stop: float  # s
+    remainder: float = float("nan")  # share of the loudest beam that may be left of the direct pulse, once taken out
+
+
+@dataclass(frozen=True, eq=False)
+class PointCloud:
+    """One organised cloud on the beam grid; NaN where there is no point. Sonar frame."""
+
+    range: npt.NDArray[np.float32]  # (elevation, azimuth) m from the array centre
+    range_error: npt.NDArray[np.float32]  # (elevation, azimuth) m, predicted standard error
+    delay: npt.NDArray[np.float32]  # (elevation, azimuth) s after the direct arrival
+    energy: npt.NDArray[np.float32]  # (elevation, azimuth) Pa2 s of the beam
+    position: npt.NDArray[np.float32]  # (elevation, azimuth, xyz) m

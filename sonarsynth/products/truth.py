@@ -1,0 +1,112 @@
+"""Labels: truth of a frame, whose echoes its points are, and levels that add up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.products.paths import Arrivals
+
+ORIGINS = ("main lobe", "side lobe", "grating lobe", "mirror image", "snap itself", "unexplained")
+"""How the array came to hear what made a point: in the beam, beside it, through a lobe that a lattice has in other
+directions, from behind a planar array, from no target but the snap (its direct pulse, or one that surface or bed
+reflects), or from no path of the frame: noise, or what cancelling leaves."""
+
+
+@dataclass(frozen=True, eq=False)
+class PointLabels:
+    """Whose echo each point is: the target, snap and family whose paths bring most energy in the beam at its delay.
+
+    -1 and NaN where there is no point, or nothing explains it. The emission of a point is not that of the sonar's clock
+    where another snap lit it: its range is wrong then.
+    """
+
+    target: npt.NDArray[np.int16]  # (elevation, azimuth) -1 for none: the snap itself
+    emission: npt.NDArray[np.int16]  # (elevation, azimuth) which snap
+    family: npt.NDArray[
+        np.int8
+    ]  # (elevation, azimuth) index into FAMILIES: how it reached the array; no direct: a ghost
+    facet: npt.NDArray[np.int32]  # (elevation, azimuth) that brings most; -1 for none
+    true_range: npt.NDArray[np.float32]  # (elevation, azimuth) m from the array centre to where the echo was made
+    distance: npt.NDArray[np.float32]  # (elevation, azimuth) m from the point to the nearest surface of the target
+    origin: npt.NDArray[np.int8]  # (elevation, azimuth) index into ORIGINS
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """Exact ground truth of a frame, from the same arrivals that made the signals.
+
+    Poses, boxes and beams are those of the frame's instant. What is heard is of when the sound met the target: where it
+    was then is `position_at_echo`, which echoes, images and points are to be judged by.
+    """
+
+    sonar_position: Floats  # (xyz) m, world
+    sonar_orientation: Floats  # (wxyz)
+    target_position: Floats  # (target, xyz) m, world
+    target_orientation: Floats  # (target, wxyz)
+    target_velocity: Floats  # (target, xyz) m/s, world
+    meeting_time: Floats  # (snap, target) s: when the sound of each snap, by the direct path, meets the target's origin
+    position_at_echo: Floats  # (snap, target, xyz) m, world: the origin then; NaN where no direct path leads to it
+    box: Floats  # (target, corner 8, xyz) m: oriented bounding box, sonar frame
+    image_box: Floats  # (target, 4): azimuth min, max, elevation min, max (rad) of what is seen and in view; or NaN
+    view: npt.NDArray[np.int8]  # (target,) how much of it is in the view of the beams: `labelling.views.View`
+    visible_fraction: Floats  # (target,) share of the area facing the array that the array sees, in view or not
+    snap_position: Floats  # (snap, xyz) m, world
+    snap_time: Floats  # (snap,) s
+    snap_level: Floats  # (snap,) dB re 1 uPa at 1 m
+    beam_target: npt.NDArray[np.int16]  # (elevation, azimuth) -1 for none
+    beam_facet: npt.NDArray[np.int32]  # (elevation, azimuth) -1 for none
+    beam_range: npt.NDArray[np.float32]  # (elevation, azimuth) m to the first surface in the beam's direction
+
+
+@dataclass(frozen=True, eq=False)
+class Echoes:
+    """Where the echoes of each target come from, by the boundaries that they touched on their way to the array.
+
+    What comes by surface or bed is a ghost: the array sees the target mirrored there. Levels are of the energy in the
+    band: phases count among the coherent paths of a snap and family (`LEDGER`), powers of all else are summed.
+    Directions are weighted by the share of each path in that. NaN where no path comes that way, directions also where
+    echoes come from several sides, as by surface and bed both from above and from below.
+    """
+
+    azimuth: Floats  # (target, family) rad, sonar frame
+    elevation: Floats  # (target, family) rad
+    level: Floats  # (target, family) dB re 1 uPa: peak of a snap, times what the echoes bring of its energy in the band
+
+
+LEDGER = (
+    "source_level",
+    "transmission_loss_out",
+    "scattering",
+    "transmission_loss_in",
+    "absorption_loss",
+    "boundary_loss",
+    "received_level",
+)
+"""Ledger terms in dB: received = source - loss_out + scattering - loss_in - absorption - boundary.
+
+Source is the peak level of the snap at 1 m before any filter. Received is that, and the ratio of the energy in the band
+of the sonar that the paths of the family bring to the array centre over the energy that the snap has there at 1 m:
+10 log10(sum_f |H S|^2 / sum_f |S|^2), S the spectrum of the snap through the anti-alias filter, H the transfer function
+of the paths: coherent ones are summed with their phases, the powers of the others are added. Losses are ratios of sums
+of the powers of the paths with and without one factor: means of the losses of the paths, weighted by power. Scattering
+is what is left: the target strength, with what phases add or cancel; 0 dB of paths from snap to array.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Ledger:
+    """Levels of each (snap, target, family) in dB that add up, and those of one path of it alone.
+
+    The isolated path is the loudest of its family. Its level is predicted from the columns of `Arrivals`, over the band
+    like the others; what is measured in the signals of that path alone must agree (`verification`).
+    """
+
+    level: Floats  # (snap, target + 1, family, LEDGER) dB; the last target row is the direct path; NaN without paths
+    paths: Ints  # (snap, target + 1, family)
+    error_bound: Floats  # (snap, target + 1, family) dB
+    isolated_level: Floats  # (snap, target + 1, family) dB re 1 uPa at the array centre; NaN without a path
+    isolated: Arrivals  # the isolated paths, in the order of the levels that are not NaN
