@@ -153,7 +153,10 @@ def plan_report(plan: Plan, prediction: Prediction) -> None:
         f"predicted: {duration(p.seconds)} for {p.frames} frames with {p.workers} workers, {duration(p.core_seconds)} "
         f"of CPU time; {size(p.bytes)} on the disk, {size(p.raw_bytes)} before compression"
     )
-    out.print(f"at most {p.files} files and folders for all frames, {plan.shard_frames} frames in a file")
+    out.print(
+        f"at most {p.files} files and folders for all frames, {plan.shard_frames} frames in a file; "
+        f"a worker takes up to {size(plan.memory_bytes)} of memory"
+    )
     out.print(f"known from {p.how}", markup=False)
 
 

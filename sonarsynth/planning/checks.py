@@ -10,7 +10,7 @@ import numpy as np
 from sonarsynth.acoustics.rays import TOLERANCE
 from sonarsynth.acoustics.snap import onset
 from sonarsynth.beamforming import FocusedDelayAndSum
-from sonarsynth.conventions import FASTEST, REFERENCE_PRESSURE, SLOWEST, Floats, depth
+from sonarsynth.conventions import FASTEST, REFERENCE_PRESSURE, SLOWEST, Floats, depth, size
 from sonarsynth.description import FieldError
 from sonarsynth.scattering.targets import mesh_for
 from sonarsynth.scene import Frame, Scene
@@ -23,6 +23,7 @@ from sonarsynth.world.environment import Profile
 from sonarsynth.world.meshes import in_blocks, mesh_of
 from sonarsynth.world.moment import Body, meeting_times, model_of
 from sonarsynth.world.motion import pose
+from sonarsynth.world.room import frame_bytes, free_bytes
 from sonarsynth.world.shapes import MeshFile
 from sonarsynth.world.snap_pulses import largest_scales, pulse, waveform
 from sonarsynth.world.sound_speed import Cast, Tabulated, TemperatureSalinity
@@ -46,8 +47,6 @@ IN_WATER = (1000.0, 2500.0)
 """m/s: what may be measured in water, warm or cold, in depths or in a tank."""
 STEEPEST = 1e6
 """m/s a metre: more is a jump, which is written as two speeds at one depth."""
-FRAME_BYTES = 2e9
-"""Signals of a frame may take so much memory."""
 
 
 def read_inputs(scene: Scene) -> Profile:
@@ -205,17 +204,18 @@ def check_methods(scene: Scene, products: frozenset[str]) -> None:
 
 
 def check_windows(scene: Scene, windows: Windows) -> None:
-    """The echo window must hold a period of the band, and the signals of a frame must fit in memory."""
+    """The echo window must hold a period of the band, and a frame must fit in the memory that is free here."""
     path = ("scene", "processing", "echo_window")
     length, period = windows.echo_stop - windows.echo_start, 1.0 / scene.sonar.band.high
     if length < period:
         raise FieldError(path, f"is {length:.3g} s long, less than a period of the highest frequency, {period:.3g} s")
-    sensors = elements(scene.sonar.array).count
-    if 4.0 * sensors * windows.samples > FRAME_BYTES:
+    sensors, facets = elements(scene.sonar.array).count, sum(len(mesh.faces) for mesh in scene.meshes)
+    needed, free = frame_bytes(facets, sensors * windows.samples), free_bytes()
+    if needed > max(free, frame_bytes(facets, 0)):  # meshes are checked by themselves
         seconds = windows.samples / scene.sonar.sampling_frequency
         raise FieldError(
             path,
-            f"signals of a frame would take {4e-9 * sensors * windows.samples:.3g} GB ({sensors} hydrophones for "
+            f"a frame would take {size(needed)} of memory, and {size(free)} are free here ({sensors} hydrophones for "
             f"{seconds:.3g} s): the arrivals are too far apart in time",
         )
 

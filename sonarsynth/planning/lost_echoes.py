@@ -9,6 +9,7 @@ import numpy as np
 from sonarsynth.conventions import Floats
 from sonarsynth.planning.arriving import arrivals_of
 from sonarsynth.planning.plans import Plan
+from sonarsynth.planning.sources import standing_off
 from sonarsynth.planning.windows import frame_start
 from sonarsynth.products import Bearings, Signals
 from sonarsynth.ranging.direct_pulse import remove
@@ -84,7 +85,8 @@ def losses(plan: Plan, index: int) -> Losses | None:
     if not whole.sum() > 0:
         return None
     heard = replace(direct, pressure=direct.pressure + sum(echo.pressure for echo in echoes))
-    bearings = plan.scene.processing.locating.locate(
+    locating = plan.scene.processing.locating.resolve(on_bottom=not standing_off(plan.scene))
+    bearings = locating.locate(
         heard, plan.elements, sonar, frame.sonar_pose, plan.scene.world.environment.depth, 1, plan.profile
     )
     clock = float(bearings.time[0]) if np.isfinite(bearings.time[0]) else float(arrivals.delay[first])
@@ -96,7 +98,7 @@ def losses(plan: Plan, index: int) -> Losses | None:
         both = _without(plan, replace(direct, pressure=direct.pressure + echo.pressure), bearings)
         kept[target] = _energy((both - alone)[:, window])
     lost = np.where(whole > FAINTEST * whole.sum(), 1 - kept / np.maximum(whole, 1e-300), np.nan)
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         fall = 10 * float(np.log10(_energy(direct.pressure) / _energy(alone)))
         below = 10 * float(np.log10(kept.sum() / _energy(alone[:, window])))
     return Losses(index, np.clip(lost, 0.0, 1.0), fall, below)

@@ -19,6 +19,7 @@ from sonarsynth.scene import Scene
 from sonarsynth.sonar import Elements, elements
 from sonarsynth.tracing import Refracted, Straight
 from sonarsynth.world.environment import Profile
+from sonarsynth.world.room import frame_bytes
 from sonarsynth.world.water import DepthAbsorption
 
 PRODUCTS = ("signals", "image", "cloud")
@@ -167,6 +168,13 @@ class Plan:
         return self.recipe.frames * sum(s.seconds for s in self.stages)
 
     @property
+    def memory_bytes(self) -> float:
+        """Bytes of memory that a process takes to make its largest frame."""
+        return frame_bytes(
+            sum(len(mesh.faces) for mesh in self.scene.meshes), self.sizes["sensor"] * self.sizes["sample"]
+        )
+
+    @property
     def predicted_bytes(self) -> int:
         """Bytes of the whole dataset before compression."""
         return self.recipe.frames * sum(s.bytes for s in self.stages)
@@ -184,6 +192,7 @@ class Plan:
             "validity": list(self.validity),
             "predicted_seconds": self.predicted_seconds,
             "predicted_bytes": self.predicted_bytes,
+            "memory_bytes": self.memory_bytes,
             "sizes": self.sizes,
             "choices": self.choices.as_json(),
             "errors": {name: None if np.isnan(value) else value for name, value in vars(self.errors).items()},

@@ -9,6 +9,7 @@ from typing import Final
 
 from sonarsynth import cards, store
 from sonarsynth.config import Source
+from sonarsynth.conventions import size
 from sonarsynth.planning import PRODUCTS, Plan, choices_from, chosen_products, plan
 from sonarsynth.recipe import Recipe
 from sonarsynth.schedule.log import append_lines, read_lines, write_lines
@@ -19,6 +20,7 @@ from sonarsynth.schedule.space import Room, TooLarge, check_space, told_when_ful
 from sonarsynth.schedule.tasks import Failure
 from sonarsynth.store import Damage, Folder, Mismatch, provenance
 from sonarsynth.store.creating import plain_recipe, spelled
+from sonarsynth.world.room import free_bytes
 
 __all__ = ["BuildReport", "Failure", "Prediction", "Progress", "TooLarge", "build", "predict", "usable_cores"]
 
@@ -78,6 +80,8 @@ def build(
     _check(workers, scheduler, frame_timeout, worker_memory, insecure)
     path = seen_by(store.absolute(path), workers)
     chosen = range(made.recipe.frames) if frames is None else sorted(set(frames))
+    if scheduler is None and not agreed:
+        _check_memory(made, usable_cores() if workers is None else workers, worker_memory)
     if not path.exists() and not agreed:
         check_space(path, _room(made, len(chosen)))
     report = BuildReport(str(path), made.recipe.frames, len(chosen), 0)
@@ -173,6 +177,16 @@ def _check(
         from sonarsynth.schedule import connecting
 
         connecting.check_address(scheduler, insecure)
+
+
+def _check_memory(made: Plan, workers: int, worker_memory: int | None) -> None:
+    """Raise TooLarge where a frame does not fit in the memory of a worker of this machine."""
+    each = free_bytes() / max(workers, 1) if worker_memory is None else worker_memory
+    if made.memory_bytes > each:
+        raise TooLarge(
+            f"a frame takes up to {size(made.memory_bytes)} of memory, and each of {workers} workers has {size(each)}: "
+            "fewer --workers, or more --worker-memory (--yes builds all the same)"
+        )
 
 
 def _room(made: Plan, frames: int) -> Room:

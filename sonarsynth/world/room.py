@@ -1,4 +1,4 @@
-"""How large a mesh may be: what fits into the memory that is free here."""
+"""How large a mesh and the signals of a frame may be: what fits into the memory that is free here."""
 
 from __future__ import annotations
 
@@ -11,13 +11,24 @@ MAX_FACETS: Final = 20_000_000
 BYTES: Final = 600
 """Of memory that a facet takes while a frame is made; measured 550 (`tools/bench memory`)."""
 
+SAMPLE_BYTES: Final = 24
+"""Of memory that a sample of a hydrophone takes while a frame is made, spectra and copies with it; measured 23 over
+3000 to 40 000 samples of 508 hydrophones."""
+PROCESS_BYTES: Final = 300e6
+"""Of memory that a process takes before it makes a frame; measured 250 MB."""
+
+
+def frame_bytes(facets: int, samples: int) -> float:
+    """Bytes of memory of a process that makes frames of so many facets, and samples of all hydrophones together."""
+    return PROCESS_BYTES + BYTES * facets + SAMPLE_BYTES * samples
+
 
 def most_facets() -> int:
     """Facets that a mesh may have here."""
-    return int(min(MAX_FACETS, _free() / BYTES))
+    return int(min(MAX_FACETS, free_bytes() / BYTES))
 
 
-def _free() -> float:
+def free_bytes() -> float:
     """Bytes of memory that this process may still take; infinite where nothing tells."""
     free = [float("inf")]
     with suppress(OSError, ValueError, IndexError):
