@@ -54,7 +54,8 @@ def remove_others(
 def remove(
     signals: Signals, bearings: Bearings, elements: Elements, sonar: Sonar, length: float, row: int = 0
 ) -> Signals | None:
-    """Signals without the direct pulse of a located snap; None where that is not one wavefront.
+    """Signals without the direct pulse of a located snap; None where none is located, or it is not
+    one wavefront.
 
     The sphere that fits the sensors' lags, and then each sensor's own lag and gain as far as its signal supports them
     (rays that bend make no sphere), say how each hears the wave. What all sensors have of that wave (`fronts.part_of`)
@@ -67,6 +68,8 @@ def remove(
     window; an echo that comes 0.45 ms later from 24 degrees beside it loses 0.13 dB. 5 ms on one core; 17 ms of 508
     sensors.
     """
+    if not np.isfinite(bearings.time[row]):
+        return None
     fitted = refine(signals, elements, sonar, Front.of(bearings, row))
     if fitted is None or not fitted[1] < MAX_LAG / sonar.band.centre:
         return None

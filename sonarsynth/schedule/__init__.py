@@ -78,10 +78,9 @@ def build(
     """
     made = what if isinstance(what, Plan) else plan(what, chosen_products(products))
     _check(workers, scheduler, frame_timeout, worker_memory, insecure)
+    _check_memory(made, scheduler, workers, worker_memory, agreed)
     path = seen_by(store.absolute(path), workers)
     chosen = range(made.recipe.frames) if frames is None else sorted(set(frames))
-    if scheduler is None and not agreed:
-        _check_memory(made, usable_cores() if workers is None else workers, worker_memory)
     if not path.exists() and not agreed:
         check_space(path, _room(made, len(chosen)))
     report = BuildReport(str(path), made.recipe.frames, len(chosen), 0)
@@ -179,10 +178,13 @@ def _check(
         connecting.check_address(scheduler, insecure)
 
 
-def _check_memory(made: Plan, workers: int, worker_memory: int | None) -> None:
+def _check_memory(
+    made: Plan, scheduler: str | None, workers: int | None, worker_memory: int | None, agreed: bool
+) -> None:
     """Raise TooLarge where a frame does not fit in the memory of a worker of this machine."""
-    each = free_bytes() / max(workers, 1) if worker_memory is None else worker_memory
-    if made.memory_bytes > each:
+    workers = usable_cores() if workers is None else max(workers, 1)
+    each = free_bytes() / workers if worker_memory is None else worker_memory
+    if scheduler is None and not agreed and made.memory_bytes > each:
         raise TooLarge(
             f"a frame takes up to {size(made.memory_bytes)} of memory, and each of {workers} workers has {size(each)}: "
             "fewer --workers, or more --worker-memory (--yes builds all the same)"

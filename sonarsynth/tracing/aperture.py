@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.acoustics.arrays import aperture_terms
+from sonarsynth.acoustics.row_products import row_products
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.geometry import Pose
 from sonarsynth.sonar import Elements
@@ -34,8 +35,6 @@ SMOOTH_BLUR = 4e-15
 """s2: largest error of a squared blur from facet to facet: 5e-4 of the amplitude at 85 kHz."""
 SMOOTH_GAIN = 1e-3
 """Largest relative error of an amplitude from facet to facet."""
-ROUNDED_ALIKE = 1024
-"""Rows of a matrix from which on each row of its product is rounded the same way, whatever their number."""
 SMOOTH_DIRECTION = 1e-4
 """Largest error of a direction from facet to facet."""
 
@@ -85,7 +84,7 @@ class Wavefronts:
             if kept is None:
                 made.put(rows, traced(legs.select(rows), self.place))
             elif isinstance(kept, _Smooth):
-                made.put(rows, kept.at(legs.point[rows], len(members)))
+                made.put(rows, kept.at(legs.point[rows]))
             else:
                 made.put(rows, Made(**{name: value[first:last] for name, value in vars(kept).items()}))
         none = np.empty((count, 0))
@@ -172,15 +171,9 @@ class _Smooth:
     parts: Ints  # (4,) where phases, blurs, gains and departures begin among them
     error: float  # s
 
-    def at(self, point: Floats, members: int) -> Made:
-        """Legs from points (point, xyz), some of so many of the family.
-
-        Small products of matrices are rounded otherwise than large ones: part of a large family is made as such.
-        """
-        basis = aperture_terms((point - self.middle) / self.half, 1.0)
-        if len(point) < ROUNDED_ALIKE <= members:
-            basis = np.concatenate([basis, np.zeros((ROUNDED_ALIKE - len(point), basis.shape[1]))])
-        found = (basis @ self.coefficients)[: len(point)]
+    def at(self, point: Floats) -> Made:
+        """Legs from points (point, xyz), some of the family."""
+        found = row_products(aperture_terms((point - self.middle) / self.half, 1.0), self.coefficients)
         terms, phase, blur, gain, away = np.split(found, self.parts, axis=1)
         towards = away.reshape(*gain.shape, 3)
         return Made(terms, phase, blur, gain, towards, np.full(len(point), self.error))

@@ -151,7 +151,7 @@ def received(legs: Legs, of: Carried, meeting: Meeting, profile: Profile) -> Leg
     """Legs from facets that move to an array that does: from where they are met to where they are heard."""
     pose, u = meeting.sonar.pose, meeting.sonar.velocity
     c_facet, c_array = profile.at(depth(legs.point)), float(profile.at(depth(pose.position)))
-    moved, of_array = of.velocity * of.late[:, None], legs.arrival @ u / c_array
+    moved, of_array = of.velocity * of.late[:, None], dot(legs.arrival, u) / c_array
     begun = of.met + of.late
     gone = begun - meeting.heard + legs.travel_time - dot(moved, legs.departure) / c_facet
     image = mirrored(moved, legs.bounces)
@@ -207,7 +207,7 @@ def _over_aperture(
         return np.empty((len(of.stretch), 0)), np.empty((len(of.stretch), 0))
     probe, doppler, leg = probes(elements), of.select(some), legs.select(some)
     turn = turned(leg, probe.position[:FEW], pose.turn_to_body(sonar) / c_array)
-    of_array = turn @ -pose.turn_to_body(sonar) / c_array + doppler.of_array[:, None]
+    of_array = -dot(turn, pose.turn_to_body(sonar)) / c_array + doppler.of_array[:, None]
     rate_in = doppler.rate_in[:, None]
     if departure is not None:
         away = departure()[some]
@@ -248,7 +248,7 @@ def stretched(
     array = meeting.sonar
     c, c_array = profile.at(depth(legs.point)), float(profile.at(depth(array.pose.position)))
     rate_out, rate_in = dot(of.velocity, out.arrival) / c, -dot(of.velocity, legs.departure) / c
-    of_array = legs.arrival @ array.velocity / c_array
+    of_array = dot(legs.arrival, array.velocity) / c_array
     stretch = (1.0 + rate_in) / ((1.0 - rate_out) * (1.0 - of_array)) - 1.0
     doppler = _Doppler(of.velocity, mirrored(of.velocity, legs.bounces), rate_out, rate_in, of_array, stretch)
     over, faster = _over_aperture(doppler, legs, array, profile, elements, departure, enough)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sonarsynth.acoustics.arrays import aperture_terms
+from sonarsynth.acoustics.row_products import row_products
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.products import Paths
 from sonarsynth.sonar import Elements
@@ -41,7 +42,7 @@ class Probes:
         Values that are NaN (no ray there) are left out.
         """
         fitted = values[:, : self.fitted]
-        terms = np.nan_to_num(fitted) @ self.solve.T
+        terms = row_products(np.nan_to_num(fitted), self.solve.T)
         for i in np.flatnonzero(np.isnan(fitted).any(axis=1)):
             there = np.isfinite(fitted[i])
             terms[i, 1:] = np.linalg.lstsq(self.basis[: self.fitted][there, 1:], fitted[i, there], rcond=1e-10)[0]
@@ -49,7 +50,7 @@ class Probes:
 
     def fit_few(self, values: Floats) -> tuple[Floats, Floats]:
         """Coefficients (path, term) of the second degree through values (path, FEW), and misfit (path,) there."""
-        few = values[:, : self.solve_few.shape[1]] @ self.solve_few.T
+        few = row_products(values[:, : self.solve_few.shape[1]], self.solve_few.T)
         terms = np.concatenate([few, np.zeros((len(few), self.basis.shape[1] - few.shape[1]))], axis=1)
         return terms, self.misfit(values, terms)
 
@@ -60,7 +61,7 @@ class Probes:
         between the probes.
         """
         basis = self.basis[: values.shape[1], : terms.shape[1]]
-        error = np.abs(values - terms @ basis.T).max(axis=1, initial=0.0)
+        error = np.abs(values - row_products(terms, basis.T)).max(axis=1, initial=0.0)
         return np.where(np.isnan(values).any(axis=1), np.inf, error)
 
 
@@ -117,7 +118,7 @@ def sphere(direction: Floats, radius: Floats, position: Floats) -> Floats:
     |R d - q| - R = (q.q - 2 R d.q)/(|R d - q| + R).
     """
     source = radius[:, None] * direction
-    square = (position * position).sum(axis=1) - 2.0 * source @ position.T
+    square = (position * position).sum(axis=1) - row_products(2.0 * source, position.T)
     return np.asarray(square / (np.sqrt(radius[:, None] ** 2 + square) + radius[:, None]))
 
 

@@ -11,7 +11,7 @@ from scipy.integrate import quad
 
 import sonarsynth as ss
 from sonarsynth.acoustics.seawater import francois_garrison
-from sonarsynth.planning import Plan, arrivals_of, plan
+from sonarsynth.planning import Choices, Plan, arrivals_of, plan
 from sonarsynth.synthesis.direct_sum import relative_absorption
 from sonarsynth.tracing import Refracted
 from sonarsynth.world.environment import Absorption, Profile
@@ -64,7 +64,7 @@ def planned() -> dict[str, Plan]:
         "straight up 3 km": scene(3100.0, (1.0, 2.0, -3050.0), (0.0, 0.0, -50.0), (40.0, 5.0, -3000.0)),
         "slant": scene(4000.0, (1500.0, 0.0, -100.0), (0.0, 0.0, -2500.0), (1400.0, 60.0, -200.0)),
     }
-    return {name: plan(recipe, ()) for name, recipe in scenes.items()}
+    return {name: plan(recipe, ("signals",), Choices()) for name, recipe in scenes.items()}
 
 
 @pytest.mark.parametrize("name", ["shallow in 5 km", "straight up 3 km", "slant"])
@@ -108,7 +108,7 @@ def test_sources_far_apart_in_depth_are_noted_where_one_spectrum_does_not_serve_
     made = replace(planned["straight up 3 km"], recipe=tight)
     assert made.absorption_error > 0.2
     said = "spectrum of absorption is one for all paths"
-    assert any(said in note for note in plan(tight, ()).warnings)
+    assert any(said in note for note in plan(tight, ("signals",), Choices()).warnings)
     assert not any(said in note for note in planned["slant"].warnings)
 
 

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from sonarsynth.labelling import family
-from sonarsynth.planning import plan
+from sonarsynth.planning import Choices, plan
 from sonarsynth.render import Traced, beamform_frame, measure_isolated, range_frame, trace_frame
 from sonarsynth.scattering import Kirchhoff
 from sonarsynth.synthesis import DirectSum, KernelDeposit
@@ -106,11 +106,11 @@ def test_a_frame_has_the_levels_that_its_ledger_says_until_one_is_changed(law: K
     assert ledger_adds_up(good, np.array([0])).ok is False
 
 
-def test_truth_alone_is_not_measured_and_a_missing_level_is_a_fault() -> None:
-    made = plan(point_scene((20.0, 4.0, -47.0), (15.0, -6.0, -56.0)), frozenset())
+def test_a_missing_level_is_a_fault_where_signals_are_stored() -> None:
+    made = plan(point_scene((20.0, 4.0, -47.0), (15.0, -6.0, -56.0)), ("signals",), Choices())
     traced = trace_frame(made, 0)
     tree = ledger_tree(range_frame(made, 0, traced, beamform_frame(made, 0, traced)))
-    assert ledger_measured(tree, np.array([0])).ok is None
+    assert ledger_measured(tree, np.array([0])).ok
     assert np.isfinite(tree["ledger/isolated_level"].values).sum() == 2
     tree["ledger/measured_level"].values[:] = np.where(
         np.arange(2)[:, None] > 0, measure_isolated(made, traced), np.nan

@@ -241,7 +241,8 @@ def test_errors_of_straight_rays_are_honest_in_bending_water(kind):
         predicted.append(np.sqrt(np.trace(found.position_covariance[0])))
         scaled.append(np.sqrt(error @ np.linalg.solve(found.position_covariance[0], error)))
         elevations.append((found.elevation[0] - azimuth_elevation(seen)[1]) / found.elevation_error[0])
-    assert np.mean(np.array(scaled) < 3.76) >= 0.9
+    placed = np.isfinite(scaled)  # a place that is known to a fifth of its range is given
+    assert placed.mean() > 0.5 and np.mean(np.array(scaled)[placed] < 3.76) >= 0.9
     assert np.mean(np.abs(elevations) < 3) >= 0.9
     assert np.nanmedian(predicted) < 8 * np.nanmedian(miss)  # of those that have a place
 

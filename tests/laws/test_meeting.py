@@ -117,5 +117,5 @@ def test_a_target_that_sound_would_meet_out_of_the_water_is_refused() -> None:
 def test_a_plan_bounds_what_turning_leaves_out() -> None:
     """By less than a phase that can be heard for a vehicle that turns at 20 degrees a second."""
     turning = Circle(centre=(20.0, 0.0, -4.5), radius=4.0, speed=1.4)
-    (row,) = (o for o in plan(moved(turning), frozenset(), Choices()).left_out if "motion" in o.what)
+    (row,) = (o for o in plan(moved(turning), ("signals",), Choices()).left_out if "motion" in o.what)
     assert 0.0 < float(row.bound.split(" rad")[0]) < 0.02

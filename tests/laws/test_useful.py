@@ -35,6 +35,7 @@ def tree(
     truth = {
         "sonar_position": (("frame", "xyz"), np.zeros((4, 3))),
         "sonar_orientation": (("frame", "wxyz"), np.tile([1.0, 0, 0, 0], (4, 1))),
+        **{f"snap_{name}": (("frame", "snap"), np.zeros((4, 1))) for name in ("arrival", "azimuth", "elevation")},
         "snap_position": (("frame", "snap", "xyz"), np.tile([[[15.0, 0, 0]]], (4, 1, 1))),
         "box": (("frame", "target", "corner", "xyz"), np.tile(np.linspace(-0.577, 0.577, 8)[:, None], (4, 1, 1, 3))),
     }
@@ -44,7 +45,9 @@ def tree(
             ("frame", "snap", "xyz", "xyz_other"),
             np.tile(snap_predicted**2 * np.eye(3) / 3.0, (4, 1, 1, 1)),
         ),
-        "emission": (("frame", "snap"), np.zeros((4, 1), np.int16)),
+        **{name: (("frame", "snap"), np.zeros((4, 1), np.int16)) for name in ("emission", "reason")},
+        **{name: (("frame", "snap"), np.zeros((4, 1))) for name in ("time", "azimuth", "elevation")},
+        **{f"{name}_error": (("frame", "snap"), np.full((4, 1), 1e-7)) for name in ("time", "azimuth", "elevation")},
     }
     dims = ("frame", "elevation", "azimuth")
     cloud = xr.Dataset({name: (dims, values) for name, values in grids.items()})
@@ -73,15 +76,16 @@ def test_good_data_pass_without_a_warning() -> None:
     [
         ({"error": 5.0, "predicted": 5.0}, "ranges"),
         ({"error": 0.01, "predicted": 5.0}, "ranges"),
-        ({"snap_error": 9.0, "snap_predicted": 9.0}, "snaps"),
-        ({"snap_predicted": 9.0}, "snaps"),
+        ({"snap_error": 9.0, "snap_predicted": 9.0}, "4 of 4 estimates"),
+        ({"snap_predicted": 9.0}, "4 of 4 estimates"),
     ],
 )
 def test_honest_data_of_no_use_are_warned_of_and_do_not_fail(given: dict[str, float], which: str) -> None:
     """Errors as predicted, but larger than the target and the beam, or than half of the distance of the snap."""
     checks = [*range_errors(tree(**given), ALL), *bounds(tree(**given), ALL)]
     assert all(check.ok is not False for check in checks)
-    assert [check.warning.split()[0] for check in checks if check.warning] == [which]
+    (warning,) = [check.warning for check in checks if check.warning]
+    assert warning.startswith(which)
 
 
 def test_errors_that_contradict_their_predictions_fail() -> None:
@@ -127,10 +131,12 @@ def test_a_store_whose_points_have_no_labels_is_not_judged_by_them() -> None:
     del old["cloud"]["origin"]
     (check,) = range_errors(old, ALL)
     assert check.ok is None and "no labels" in check.got
-    assert [c.name for c in bounds(old, ALL)] == ["snaps useful"]
+    assert [c.name for c in bounds(old, ALL)] == ["snap located"]
 
 
-def test_a_bearing_of_no_snap_says_nothing_of_how_snaps_are_located() -> None:
-    store = tree(snap_error=14.0)
+def test_a_bearing_of_no_snap_is_a_miss_however_near_it_is() -> None:
+    store = tree()
+    assert row(bounds(store, ALL), "snap located").ok
     store["bearings/emission"].values[:] = -1
-    assert row(bounds(store, ALL), "snaps useful").got == "no snap located"
+    found = row(bounds(store, ALL), "snap located")
+    assert found.ok is False and "4 come from no snap" in found.got

@@ -161,10 +161,10 @@ def test_the_ledger_adds_up_and_matches_the_arrivals() -> None:
 
 
 def test_what_nobody_asked_for_is_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = plan(remus(), frozenset())
-    monkeypatch.setattr("sonarsynth.render.synthesise", lambda *_: pytest.fail("signals were synthesised"))
+    made = plan(remus(), ("signals",))
+    monkeypatch.setattr("sonarsynth.render.process", lambda *_: pytest.fail("signals were processed"))
     heard = beamform_frame(made, 0, trace_frame(made, 0))
-    assert heard.signals is None and heard.image is None
+    assert heard.image is None and heard.bearings is None
 
 
 def _brightest(edge: float, phases: str) -> float:

@@ -143,7 +143,9 @@ def test_memory_that_is_not_there(small_file: Path) -> None:
 def test_a_title_is_printed_as_it_is(small: Recipe, capsys: pytest.CaptureFixture[str]) -> None:
     made = planning.plan(config.loads(config.dump(small).replace("title: small", "title: 'a [/b] [bold]c'")),
                          choices=planning.Choices())  # fmt: skip
-    numbers = dict.fromkeys(("seconds", "frames", "workers", "core_seconds", "bytes", "file_bytes", "raw_bytes"), 1)
+    numbers = dict.fromkeys(
+        ("seconds", "frames", "workers", "core_seconds", "bytes", "file_bytes", "raw_bytes", "files"), 1
+    )
     printing.plan_report(made, SimpleNamespace(**numbers, how="nothing"))  # type: ignore[arg-type]
     assert "a [/b] [bold]c" in capsys.readouterr().out
 

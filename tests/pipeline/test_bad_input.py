@@ -46,8 +46,8 @@ WRONG = [
     ("kind: isovelocity, speed: 1540", "kind: cast, path: small.yaml", f"5: {WATER}.sound_speed: "),
     ("kind: box, size: [1, 1, 1], edge: 0.25", "kind: mesh_file, path: small.yaml", f"8: {TARGET}.shape: "),
     ("kind: box, size: [1, 1, 1], edge: 0.25", "kind: mesh_file, path: bad.stl", f"8: {TARGET}.shape: "),
-    ("stop: [10, 1, -5]", "stop: [10, 1, 0]", f"9: {TARGET}.motion: target 'box' is "),
-    ("stop: [10, 1, -5]", "stop: [10, 1, -12]", f"9: {TARGET}.motion: target 'box' is "),
+    ("stop: [10, 1, -5]", "stop: [10, 1, 0]", f"9: {TARGET}.motion: target 'box'"),
+    ("stop: [10, 1, -5]", "stop: [10, 1, -12]", f"9: {TARGET}.motion: target 'box'"),
     ("pitch: 5 cm", "pitch: 5 km", "15: scene.trajectory.sonar: the array is "),
     ("pitch: 5 cm", "pitch: 5 cm, dead: [20]", "13: scene.sonar.array: dead names an element outside 0..19"),
     (

@@ -58,8 +58,8 @@ def state(folder: Path) -> dict[str, tuple[int, bytes]]:
 
 
 LINKED = (
-    "image/energy/c/1",
-    "image/energy/c/1/0/0",
+    "image/energy",
+    "image/energy/c.1.0.0",
     "image",
     ".marks",
     ".marks/1.json",
@@ -196,8 +196,8 @@ def test_a_link_to_a_store_is_the_store(path: Path, tmp_path: Path, made: Plan, 
         assert link.is_symlink() and not path.is_symlink()
         assert store.root_attributes(path)["recipe_digest"] == again.digest
     assert store.root_attributes(link) == store.root_attributes(path)
-    shards = {name: text for name, text in contents(path).items() if "/c/" in name}
-    assert shards == {name: text for name, text in contents(whole).items() if "/c/" in name}
+    shards = {name: text for name, text in contents(path).items() if "/c." in name}
+    assert shards == {name: text for name, text in contents(whole).items() if "/c." in name}
     assert {file.name for file in link.parent.iterdir()} == {"link.zarr"}
     with store.lock(link), pytest.raises(store.Locked), store.lock(path):
         pass
@@ -241,7 +241,7 @@ def test_a_store_that_is_renamed_while_it_is_built_is_whole_under_its_new_name(
     report = build(made, moved, frames=range(16), workers=0)
     assert report.there == 8 and report.ok
     assert store.verify(moved).ok
-    shards = [{n: text for n, text in contents(p).items() if "/c/" in n} for p in (moved, whole)]
+    shards = [{n: text for n, text in contents(p).items() if "/c." in n} for p in (moved, whole)]
     assert shards[0] == shards[1]
 
 
@@ -264,7 +264,7 @@ def test_files_that_a_stored_recipe_names_are_opened_only_where_their_folder_is_
 ) -> None:
     path, mesh, _ = with_mesh
     before = contents(path)
-    (path / "step/c/0").unlink()
+    (path / "step/c.0").unlink()
     with watched(mesh.parent) as seen:
         with pytest.raises(store.Mismatch, match=f"--files {mesh.parent}"):
             repair(path, workers=0)
@@ -281,7 +281,7 @@ def test_a_file_without_the_digest_of_the_store_is_not_read_as_anything(
     with_mesh: tuple[Path, Path, Plan], capfd: pytest.CaptureFixture[str]
 ) -> None:
     path, mesh, _ = with_mesh
-    (path / "step/c/0").unlink()
+    (path / "step/c.0").unlink()
     mesh.write_text("root:x:0:0:secret\n")
     with pytest.raises(store.Mismatch, match="has changed") as raised:
         repair(path, workers=0, files=mesh.parent)

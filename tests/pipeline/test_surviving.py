@@ -201,9 +201,7 @@ def test_what_does_not_fit_is_refused_before_anything_is_written_unless_agreed(
     with pytest.raises(TooLarge, match="TB"):
         build(huge, tmp_path / "h.zarr", workers=0)
     long = replace(small_plan, sizes=small_plan.sizes | {"sample": 10**8})
-    with pytest.raises(
-        TooLarge, match=r"a frame takes up to 48.3 GB of memory, and each of 2 workers has .*"
-    ):
+    with pytest.raises(TooLarge, match=r"a frame takes up to 48.3 GB of memory, and each of 2 workers has .*"):
         build(long, tmp_path / "l.zarr", workers=2)
     assert not (tmp_path / "l.zarr").exists()
     monkeypatch.setattr(space.os, "statvfs", lambda place: SimpleNamespace(f_files=100, f_favail=3))

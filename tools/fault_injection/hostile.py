@@ -111,7 +111,7 @@ def _recipe(ground: Ground) -> str:
     forged = f"{shape}{'shape: ' if 'shape:' in line else ''}{{kind: mesh_file, path: {name}}}"
     root["attributes"]["recipe"] = text.replace(line, forged)
     _sealed(path, root)
-    (path / "image/energy/c/0/0/0").unlink(missing_ok=True)
+    (path / "image/energy/c.0.0.0").unlink(missing_ok=True)
     return f"recipe: {name}"
 
 

@@ -76,7 +76,7 @@ class Trial:
             case "laid out":
                 return (path / ".marks/layout.json").exists()
             case "first file of a shard":
-                return any(path.glob(f"*/*/c/{shard}"))
+                return any(path.glob(f"*/*/c.{shard}.*"))
             case "mark":
                 return (path / f".marks/{shard}.json").exists()
             case _:

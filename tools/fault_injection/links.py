@@ -88,7 +88,7 @@ def _to_it(ground: Ground) -> None:
     link = first if random.random() < 0.5 else second
     how = str(random.choice(["go on", "restart", "repair", "lock"]))
     what = f"to the store, {how}: {link.name}"
-    shutil.rmtree(path / "image/energy/c/0")
+    (path / "image/energy/c.0.0.0").unlink()
     with ground.untouched(what):
         if how == "lock":
             with store.lock(link if random.random() < 0.5 else path):

@@ -24,7 +24,7 @@ def run(count: int, seed: int, folder: Path | None = None) -> dict[str, Any]:
 
 
 def _trial(ground: Ground, number: int) -> None:
-    how, files = HOW[number % len(HOW)], sum("/c/" in name for name in ground.whole)
+    how, files = HOW[number % len(HOW)], sum("/c." in name for name in ground.whole)
     at, path = int(ground.random.integers(files)), ground.path
     what = f"{how}: at file {at}"
     moved = path.with_name("moved.zarr") if how != "the folder above" else ground.folder / "away/s.zarr"

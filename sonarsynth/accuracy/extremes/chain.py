@@ -87,7 +87,12 @@ def reasoned(tree: xr.DataTree) -> Got:
             if variable.dtype.kind == "f":
                 wrong += [path] if not _explained(path, variable.values, node) else []
     if "cloud" in tree.children:
-        points = [np.isnan(v.values) for v in tree["cloud"].data_vars.values()]
+        grids = {str(name): v.values for name, v in tree["cloud"].data_vars.items()}
+        of_targets = [np.isnan(grids.pop(name)) for name in ("true_range", "distance")]
+        wrong += ["/cloud"] if not all((none == (grids["target"] < 0)).all() for none in of_targets) else []
+        whose = np.isnan(grids["range"]) & np.any([grids[name] >= 0 for name in ("target", "origin")], axis=0)
+        wrong += ["/cloud"] if whose.any() else []
+        points = [np.isnan(grid) for grid in grids.values() if grid.dtype.kind == "f"]
         clock = np.isfinite(float(tree["image"].start))
         unheard = bool(np.isnan(tree["image"].energy.values).any())
         wrong += ["/cloud"] if not all((p == points[0]).all() for p in points) else []
