@@ -80,12 +80,14 @@ def locate(
     snaps: int,
     bend: Bend | None = None,
     gradient: float = 0.0,
+    kink: float = 0.0,
     on_bottom: bool = True,
 ) -> Bearings:
     """The `snaps` loudest direct pulses, loudest first; see `ranging.SensorDelays`.
 
     Paths bend as `bend` says; without it they are taken for straight, and the errors hold what a `gradient` (1/s) of
-    the sound speed may do. Pulses that are refused follow those that are not, loudest first.
+    the sound speed may do, and those of directions what its change over the array does, a `kink` (1/s). Pulses that are
+    refused follow those that are not, loudest first.
     """
     if unlocatable(elements) is not None:
         return as_bearings([], snaps, ARRAY)
@@ -99,7 +101,7 @@ def locate(
     loud = pulses.loudness(signals, live, width)
     rounding = pulses.rounding(signals, loud.peak, pulses.half_length(sonar.band))
     quiet = pulses.quiet_bin(loud.quiet, int(live.sum()), sonar.band, pulses.half_length(sonar.band))
-    known = Known(elements, sonar, pose, bed_depth, gradient, rounding, quiet, on_bottom)
+    known = Known(elements, sonar, pose, bed_depth, gradient, rounding, quiet, on_bottom, kink)
     track, heard = loud.track.copy(), Candidates(known)
     for _ in range(4 * snaps):
         top = _loudest(track, heard, signals, snaps)

@@ -13,7 +13,6 @@ from sonarsynth.geometry import Pose
 from sonarsynth.products import REASONS, Bearings
 from sonarsynth.ranging.pulses import DEAF, Pulse
 from sonarsynth.sonar import Elements, Sonar
-from sonarsynth.world.environment import Profile
 
 FLOOR = 1e-9
 """Standard error (s) of a lag without any noise: what cutting the pulse's tail off does. Biases of 0.01 to 0.2 ns of
@@ -29,6 +28,10 @@ STEPS = 5
 """Linear steps to where wavefront and bottom meet, at most."""
 SETTLED = 0.01
 """A step, in standard errors, after which no other is taken."""
+
+KINKED = 3 / 16
+"""A sphere fitted to a wavefront through a kink at the middle of an array of radius a, where the gradient of the sound
+speed changes by dg, is tilted by 3 dg a/(16 c): least squares of z|z| by z over -a..a."""
 
 ACCEPTED, SILENT, ARRAY, BAND, UNFIT, UNRESOLVED, OUTSIDE, ECHO, RANGE = range(len(REASONS))
 
@@ -65,6 +68,7 @@ class Known:
     rounding: float  # (Pa s)^2: power in a bin of what the converter and single precision round off
     quiet: float  # (Pa s)^2: power in a bin of the noise at a sensor
     on_bottom: bool = True  # whether sources may be taken to be on the bottom, where the wavefront agrees
+    kink: float = 0.0  # 1/s: change of the gradient of the sound speed over the array
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,14 +79,6 @@ class Fix:
     curvature: float
     covariance: Floats  # (3, 3) of (along tangents, curvature)
     used: bool  # whether the bottom was
-
-
-def mean_gradient(profile: Profile, depth: float, other: float, least: float) -> float:
-    """Mean of |dc/dz| (1/s) between two depths (m), over no less than `least` (m) about them; jumps count."""
-    middle, half = 0.5 * (depth + other), 0.5 * max(abs(depth - other), least)
-    between = np.abs(profile.depth - middle) < half
-    speed = [profile.at(middle - half), *profile.speed[between], profile.at(middle + half)]
-    return float(np.sum(np.abs(np.diff(speed)))) / (2 * half)
 
 
 def _variance(wave: Wavefront, pulse: Pulse, rounding: float) -> float:
@@ -126,12 +122,12 @@ def place(wave: Wavefront, pulse: Pulse, known: Known, heard: Wavefront | None =
     full = timing + np.outer(wave.by_sound_speed, wave.by_sound_speed) * sonar.sound_speed_error**2
     if not np.isfinite(full[2, 2]):  # too few sensors to tell the curvature: anything outside the array
         full[2, 2] = 1 / elements.aperture**2
-    spread = full[:2, :2]
-    around = spread[0, 0] / max(1 - heard.direction[2] ** 2, 1e-300)
     fall = -known.bed_depth - pose.position[2]  # the bottom is this much above the sonar (negative: below it)
     slope, by_angle = float(pose.rotation[2] @ wave.direction), wave.tangents @ pose.rotation[2]
     from_depth = fall / slope if slope * fall > 0 else np.nan
-    straight = full
+    tilt = by_angle * (KINKED * known.kink * elements.aperture / sonar.assumed_sound_speed)
+    straight, spread = full, full[:2, :2] + np.outer(tilt, tilt)
+    around = spread[0, 0] / max(1 - heard.direction[2] ** 2, 1e-300)
     fix = _fuse(wave, straight, fall, known)
     for _ in range(2 * (known.gradient > 0)):  # what bending does depends on the distance, and that a little on bending
         likely = [1 / fix.curvature if fix.curvature > 0 else np.nan, from_depth, elements.aperture]

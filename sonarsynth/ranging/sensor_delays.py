@@ -48,14 +48,13 @@ class SensorDelays:
     ) -> Bearings:
         """See `LocatingMethod`. An array that cannot locate gives NaN rows (`locating.unlocatable` says why)."""
         from sonarsynth.ranging.locating import locate
-        from sonarsynth.ranging.placing import mean_gradient
+        from sonarsynth.ranging.refraction import bending, kink, mean_gradient
 
         on_bottom = self.on_bottom is not False
         gradient = mean_gradient(profile, -float(sonar_pose.position[2]), bed_depth, elements.aperture)
         where = signals, elements, sonar, sonar_pose, bed_depth, snaps
+        kinked = kink(profile, -float(sonar_pose.position[2]), elements.aperture) if elements.aperture else 0.0
         if not self.refraction:
-            return locate(*where, gradient=gradient, on_bottom=on_bottom)
-        from sonarsynth.ranging.refraction import bending
-
+            return locate(*where, gradient=gradient, kink=kinked, on_bottom=on_bottom)
         bend = bending(profile, elements, sonar_pose, sonar.assumed_sound_speed, gradient)
-        return locate(*where, bend=bend, on_bottom=on_bottom)
+        return locate(*where, bend=bend, kink=kinked, on_bottom=on_bottom)

@@ -64,9 +64,9 @@ def energy(pressure):
     return float(np.sum(np.square(pressure, dtype=float)))
 
 
-def imaged(signals, excess):
+def imaged(signals, excess, bearings=None):
     """The image of what is left from `excess` less half a pulse on, NaN where it may hold the direct pulse."""
-    left = without(signals)
+    left = without(signals, bearings)
     window = CLOCK + excess - 2.5e-4, CLOCK + excess + 6e-4
 
     def imaging(some, start, stop):
@@ -148,13 +148,13 @@ def test_beams_that_may_hold_the_direct_pulse_are_nan(size):
     """Sensors that are unlike leave some of it: no beam that is given holds three times what it should."""
     excess = 0.5e-3
     clean = imaged(with_echo(direct(), excess, amplitude=1e-3), excess)
-    image = imaged(with_echo(unlike(direct(), size), excess, amplitude=1e-3), excess)
+    image = imaged(with_echo(unlike(direct(), size), excess, amplitude=1e-3), excess, located(direct()))
     given = np.isfinite(image.energy)
     assert np.isfinite(clean.energy).all() and clean.remainder < 1e-6
     assert given[np.unravel_index(clean.energy.argmax(), given.shape)]
     assert (image.energy[given] < 3 * clean.energy[given]).all()
     assert given.all() == (size < 0.1)
-    fainter = imaged(with_echo(unlike(direct(), size), excess, amplitude=3e-5 * size), excess)
+    fainter = imaged(with_echo(unlike(direct(), size), excess, amplitude=3e-5 * size), excess, located(direct()))
     assert fainter.remainder > 0.25 and not np.isfinite(fainter.energy).all()
 
 

@@ -13,8 +13,8 @@ from sonarsynth.conventions import azimuth_elevation, direction
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.products import Bearings, Signals
 from sonarsynth.ranging import SensorDelays
-from sonarsynth.ranging.placing import bending_covariance, mean_gradient
-from sonarsynth.ranging.refraction import first_rays
+from sonarsynth.ranging.placing import bending_covariance
+from sonarsynth.ranging.refraction import first_rays, mean_gradient
 from sonarsynth.sonar import PlanarLattice, Romanis, Sonar, elements
 from sonarsynth.world.environment import Profile
 from tests.heard import RATE, envelope_late, hear, hear_direct, silence

@@ -76,7 +76,7 @@ def test_good_data_pass_without_a_warning() -> None:
     [
         ({"error": 5.0, "predicted": 5.0}, "ranges"),
         ({"error": 0.01, "predicted": 5.0}, "ranges"),
-        ({"snap_error": 9.0, "snap_predicted": 9.0}, "4 of 4 estimates"),
+        ({"snap_error": 9.0, "snap_predicted": 15.0}, "4 of 4 estimates"),
         ({"snap_predicted": 9.0}, "4 of 4 estimates"),
     ],
 )

@@ -206,6 +206,7 @@ def joined(one: Mesh, other: Mesh) -> Mesh:
     return Mesh(np.concatenate([one.vertices, other.vertices]), faces)
 
 
+@pytest.mark.filterwarnings("ignore::sonarsynth.scattering.notes.SmallBody")
 def test_powers_of_a_lobe_are_summed_and_do_not_depend_on_frequency() -> None:
     box = ss.Box(size=(1.0, 1.0, 1.0))
     coarse = ss.target_strength(box, [1e3, 1e5], (-1, 0, 0), (1, 0, 0), 1500.0, ss.MirrorLobe())
