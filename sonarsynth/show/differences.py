@@ -130,6 +130,8 @@ def _number(value: Any, unit: str) -> str:
     """A number in the largest preferred unit in which it is not small; other values as YAML writes them."""
     if value is None or isinstance(value, bool):
         return "null" if value is None else str(value).lower()
+    if unit in UNITS and isinstance(value, str) and value.endswith(f" {unit}"):  # as angles are written
+        value = float(value.removesuffix(unit))
     if isinstance(value, str):
         return value.replace("_", " ")
     if not isinstance(value, int | float):

@@ -57,7 +57,7 @@ def test_a_body_too_small_for_the_lowest_frequency_is_noted(tmp_path: Path, caps
     assert run(app, ["target-strength", "{kind: sphere, radius: 20 mm}", *options]) == 0
     noted = capsys.readouterr().err.splitlines()
     assert len(noted) == 1
-    assert noted[0].startswith("note: 0.04 m across is 0.027 of the longest wavelength: too small")
+    assert noted[0].startswith("note: 0.04 m across is ka 0.084 to 8.5 in the band: too small")
 
 
 @pytest.mark.parametrize(

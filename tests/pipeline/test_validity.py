@@ -165,7 +165,7 @@ def test_teos10_without_gsw_names_the_field_and_the_extra(monkeypatch: pytest.Mo
         ("temperature: [-40, 1]", r"temperature\.0: must be greater than or equal to -5, not -40"),
         ("depth: [-3, 12]", r"depth\.0: must be greater than or equal to 0, not -3"),
         ("salinity: [35, -1]", r"salinity\.1: must be greater than or equal to 0, not -1"),
-        ("latitude: 36", r"latitude: must be less than or equal to 1\.57"),
+        ("latitude: 36", "latitude: 36 could be 36 deg or 36 rad: write the unit"),
         (
             "formula: eos80",
             r"formula: must be 'mackenzie', 'medwin', 'chen_millero', 'del_grosso' or 'teos10', not 'eos80'",
