@@ -12,6 +12,7 @@ import logging
 import os
 import resource
 import signal
+import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -193,6 +194,7 @@ def _client_of(scheduler: str) -> Client:
 
 def _local_cluster(workers: int, memory: int, dashboard: bool) -> LocalCluster:
     limit = MemoryLimit(int(HEAP * memory))
+    _require_loopback()
     try:
         cluster = LocalCluster(
             n_workers=workers,
@@ -215,6 +217,17 @@ def _local_cluster(workers: int, memory: int, dashboard: bool) -> LocalCluster:
     if not dashboard:
         _close_pages(cluster)
     return cluster
+
+
+def _require_loopback() -> None:
+    """Raise NoScheduler where this machine has no 127.0.0.1, as containers without a network do not."""
+    try:
+        socket.create_server(("127.0.0.1", 0)).close()
+    except OSError as error:
+        raise NoScheduler(
+            f"worker processes need a loopback interface, and 127.0.0.1 is not there ({error.strerror}): bring it up "
+            "('ip link set lo up'), or build with --workers 0"
+        ) from None
 
 
 def _close_pages(cluster: Any) -> None:

@@ -89,7 +89,7 @@ WRONG = [
     (
         "position: [30, 1]",
         "position: [30, 1]\n        snap_times: [0, 1e5]",
-        "scene.processing.echo_window: signals of a frame",
+        "scene.processing.echo_window: a frame would take",
     ),
     ("position: [30, 1]", "position: [1e9, 1]", "11: scene.world.shrimp.0.position: is more than 1e+06 m"),
     ("depth: 12 m", "depth: 120 km", "5: scene.world.environment.depth: must be less than or equal to 12000"),

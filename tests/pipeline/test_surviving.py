@@ -314,3 +314,14 @@ def test_threads_of_this_process_are_not_limited(tmp_path: Path, small_plan: Pla
         report = build(small_plan, tmp_path / "s.zarr", scheduler=threads.scheduler_address, frame_timeout=1e-3)
     assert report.ok
     assert different(tmp_path / "s.zarr", reference) == []
+
+
+def test_a_machine_without_loopback_is_told_so(
+    tmp_path: Path, small_plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def none(*_: object, **__: object) -> None:
+        raise OSError(errno.EADDRNOTAVAIL, "Cannot assign requested address")
+
+    monkeypatch.setattr(connecting.socket, "create_server", none)
+    with pytest.raises(connecting.NoScheduler, match="need a loopback interface.*--workers 0"):
+        build(small_plan, tmp_path / "s.zarr", workers=1)
