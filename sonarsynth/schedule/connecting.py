@@ -222,7 +222,8 @@ def _local_cluster(workers: int, memory: int, dashboard: bool) -> LocalCluster:
 def _require_loopback() -> None:
     """Raise NoScheduler where this machine has no 127.0.0.1, as containers without a network do not."""
     try:
-        socket.create_server(("127.0.0.1", 0)).close()
+        with socket.create_server(("127.0.0.1", 0)) as server:  # one that is down takes an address, and no connection
+            socket.create_connection(server.getsockname(), timeout=10.0).close()
     except OSError as error:
         raise NoScheduler(
             f"worker processes need a loopback interface, and 127.0.0.1 is not there ({error.strerror}): bring it up "

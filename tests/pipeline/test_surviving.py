@@ -323,5 +323,5 @@ def test_a_machine_without_loopback_is_told_so(
         raise OSError(errno.EADDRNOTAVAIL, "Cannot assign requested address")
 
     monkeypatch.setattr(connecting.socket, "create_server", none)
-    with pytest.raises(connecting.NoScheduler, match="need a loopback interface.*--workers 0"):
+    with pytest.raises(connecting.NoScheduler, match=r"need a loopback interface.*--workers 0"):
         build(small_plan, tmp_path / "s.zarr", workers=1)
