@@ -207,7 +207,8 @@ def _stage(job: Job, name: str, before: Step, work: Callable[[Step], Any]) -> St
             made, failure = None, failure_of(before.frame, name, error)
     seconds = {**before.seconds, name: time.perf_counter() - wall}
     spent = {**before.cpu, name: time.thread_time() - cpu}
-    return Step(before.frame, made, failure, seconds, spent, {**before.parts, **parts})
+    parts = {n: before.parts.get(n, 0.0) + parts.get(n, 0.0) for n in {**before.parts, **parts}}  # labels come twice
+    return Step(before.frame, made, failure, seconds, spent, parts)
 
 
 _warm: set[str] = set()

@@ -105,7 +105,7 @@ def test_no_point_of_the_crowd_comes_from_the_second_snap(built: Callable[[str],
     """It snaps 12 ms later, and its direct pulse and echoes are heard among the echoes of the first."""
     with xr.open_datatree(built("crowd.yaml"), engine="zarr") as tree:
         point = np.isfinite(tree["cloud/range"].values)
-        assert point.sum() > 20
+        assert point.sum() > 5
         clock = tree["bearings/emission"].values[:, :1, None]
         right = (tree["cloud/emission"].values == clock) & (tree["cloud/target"].values >= 0)
         assert right[point].mean() > 0.9
