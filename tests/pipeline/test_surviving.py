@@ -298,6 +298,7 @@ def test_a_disk_error_that_is_not_about_room_stays_as_it_is(tmp_path: Path, monk
             space.told_when_full(tmp_path, lambda: space.Room(5e9, 1)),
         ):
             raise OSError(number, os.strerror(number))
+    monkeypatch.setattr(space.shutil, "disk_usage", lambda place: shutil._ntuple_diskusage(10**15, 0, 10**15))
     monkeypatch.setattr(space.os, "statvfs", lambda place: SimpleNamespace(f_files=100, f_favail=3))
     with (
         pytest.raises(OSError, match="up to 80 more files and folders are needed, 3 more fit"),

@@ -1,4 +1,4 @@
-"""Stores that are moved, removed or exchanged while they are built: nothing is made in their place, nothing is lost."""
+"""Stores that are moved or removed while they are built: nothing is made in their place, nothing is lost."""
 
 from __future__ import annotations
 
