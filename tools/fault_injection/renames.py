@@ -1,4 +1,4 @@
-"""Stores that are moved or removed while they are built: nothing is made in their place, nothing is lost."""
+"""Stores that are moved, removed or exchanged while they are built: nothing is made in their place, nothing is lost."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from typing import Any
 from unittest.mock import patch
 
 from sonarsynth import store
+from sonarsynth.planning import plan
 from sonarsynth.schedule import build
 from sonarsynth.store import writing
 
 from .corrupt import contents
 from .ground import FRAMES, Ground, on_ground
 
-HOW = ("renamed", "a link", "a file", "the folder above")
+HOW = ("renamed", "a link", "a file", "the folder above", "exchanged")
 
 
 def run(count: int, seed: int, folder: Path | None = None) -> dict[str, Any]:
@@ -28,6 +29,10 @@ def _trial(ground: Ground, number: int) -> None:
     what = f"{how}: at file {at}"
     moved = path.with_name("moved.zarr") if how != "the folder above" else ground.folder / "away/s.zarr"
     shutil.rmtree(path)
+    other = plan(ground.plan.recipe, frozenset())
+    if how == "exchanged":
+        store.create(path.with_name("other.zarr"), other)
+        before = contents(path.with_name("other.zarr"))
     count = 0
 
     def counted(*arguments: Any) -> Any:
@@ -45,6 +50,8 @@ def _trial(ground: Ground, number: int) -> None:
             ground.wrong.append(f"{what}: the build ended well")
     if how in ("renamed", "the folder above") and path.exists():
         ground.wrong.append(f"{what}: made again under the old name")
+    if how == "exchanged" and contents(path) != before:
+        ground.wrong.append(f"{what}: the other store has changed")
     _go_on(ground, what, moved)
     shutil.rmtree(moved.parent if how == "the folder above" else moved)
 
@@ -67,7 +74,9 @@ def _move(ground: Ground, how: str, moved: Path) -> None:
         path.parent.rename(moved.parent)
         return
     path.rename(moved)
-    if how == "a link":
+    if how == "exchanged":
+        path.with_name("other.zarr").rename(path)
+    elif how == "a link":
         path.symlink_to(ground.outside)
     elif how == "a file":
         path.write_text("mine")
