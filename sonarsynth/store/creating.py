@@ -37,7 +37,7 @@ from sonarsynth.store.marks import (
     marked,
     save_mark,
 )
-from sonarsynth.store.place import Folder, absolute, read, record, records, upload
+from sonarsynth.store.place import Folder, Opened, absolute, read, record, records, upload
 from sonarsynth.store.provenance import begun, made_of, other_versions
 from sonarsynth.store.remote import Remote
 from sonarsynth.store.scratch import clear, hidden, made, sweep
@@ -156,8 +156,13 @@ def identity(plan: Plan) -> dict[str, Any]:
 
 def root_attributes(path: Folder | str) -> dict[str, Any]:
     """Root attributes of a store, {} where there is none."""
+    return attributes_in(absolute(path))
+
+
+def attributes_in(store: Opened) -> dict[str, Any]:
+    """The same of a store that is open."""
     try:
-        found = json.loads(read(absolute(path), "zarr.json"))["attributes"]
+        found = json.loads(read(store, "zarr.json"))["attributes"]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return {}
     return found if isinstance(found, dict) else {}

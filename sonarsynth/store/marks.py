@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from sonarsynth.store import place
-from sonarsynth.store.place import FileRecord, Folder, entries, read, read_each, remove, write_in
+from sonarsynth.store.place import FileRecord, Folder, Opened, entries, read, read_each, remove, write_in
 from sonarsynth.store.remote import Remote
 from sonarsynth.store.within import parts_of
 
@@ -49,7 +49,7 @@ class Mark:
     attributes: Mapping[str, Any] = field(default_factory=dict)  # of the root, in the mark of the layout
 
 
-def save_mark(store: Folder, mark: Mark) -> None:
+def save_mark(store: Opened, mark: Mark) -> None:
     """Write a mark: all of it or nothing, on the disk when this returns. That of the layout is written twice."""
     for file in MANIFESTS if mark.name == LAYOUT else (f"{MARKS}/{mark.name}.json",):
         write_in(store, file, _encode(mark))
@@ -140,7 +140,7 @@ def all_files(store: Folder) -> Iterator[str]:
     return place.all_files(store, apart=MARKS)
 
 
-def drop_mark(store: Folder, name: str | int) -> None:
+def drop_mark(store: Opened, name: str | int) -> None:
     """Remove a mark, before its shard is written again."""
     remove(store, f"{MARKS}/{name}.json")
 

@@ -12,14 +12,19 @@ import os
 import re
 import stat
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
 from sonarsynth.store import within
 from sonarsynth.store.remote import Remote
+from sonarsynth.store.within import Held
 
 Folder = Path | Remote
 """A place of a store, or of something in it."""
+
+Opened = Path | Held | Remote
+"""A store that is read or written, by its name or held."""
 
 FileRecord = tuple[int, str]
 """Size and SHA-256 of a file."""
@@ -73,6 +78,16 @@ def state_folder(store: Folder) -> Path:
     return folder
 
 
+@contextmanager
+def held(folder: Folder) -> Iterator[Opened]:
+    """A store of a disk that stays the same one meanwhile, whatever takes its name. Raises OSError."""
+    if isinstance(folder, Remote):
+        yield folder
+        return
+    with within.held(folder) as store:
+        yield store
+
+
 def try_writing(folder: Folder) -> None:
     """Raise Unreachable where nothing can be written at a URL; on a disk nothing is tried."""
     probe = beside(folder, "probe") if isinstance(folder, Remote) else None
@@ -90,7 +105,7 @@ def opens(folder: Folder) -> Any:
     return Guarded(folder, read_only=True)
 
 
-def read(folder: Folder, name: str) -> bytes:
+def read(folder: Opened, name: str) -> bytes:
     """A whole file of metadata of a store. Raises OSError."""
     if isinstance(folder, Remote):
         return (folder / name).read_bytes()
@@ -208,7 +223,7 @@ def is_folder(folder: Folder, name: str) -> bool:
     return status is not None and stat.S_ISDIR(status.st_mode)
 
 
-def write_new(folder: Folder, name: str, content: bytes) -> FileRecord:
+def write_new(folder: Opened, name: str, content: bytes) -> FileRecord:
     """Write a file of a store, with its folders: on the disk when this returns. Its record."""
     if isinstance(folder, Remote):
         (folder / name).write_bytes(content)
@@ -217,7 +232,7 @@ def write_new(folder: Folder, name: str, content: bytes) -> FileRecord:
     return record_of(content)
 
 
-def write_in(folder: Folder, name: str, content: bytes) -> None:
+def write_in(folder: Opened, name: str, content: bytes) -> None:
     """Write a file of a store so that it is there whole or not at all."""
     if isinstance(folder, Remote):
         (folder / name).write_bytes(content)
@@ -241,7 +256,7 @@ def read_beside(file: Folder) -> bytes:
         return found.read()
 
 
-def remove(folder: Folder, name: str, *, sync: bool = True) -> None:
+def remove(folder: Opened, name: str, *, sync: bool = True) -> None:
     """Remove a file of a store if it is there; with `sync`, for good."""
     if isinstance(folder, Remote):
         (folder / name).unlink(missing_ok=True)

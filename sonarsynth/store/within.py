@@ -12,6 +12,7 @@ import stat
 import uuid
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from io import BufferedReader
 from pathlib import Path
 from typing import Final
@@ -26,6 +27,38 @@ class Mismatch(ValueError):
     """What is there is something else than what is wanted, or is none of ours; str() is one line."""
 
 
+@dataclass(frozen=True)
+class Held:
+    """A folder that was opened: it stays the same one wherever it is moved, and whatever takes its name."""
+
+    path: Path
+    handle: int
+
+    def __str__(self) -> str:
+        return str(self.path)
+
+    def in_its_place(self) -> bool:
+        """Whether its name still leads to it."""
+        try:
+            return os.path.samestat(os.stat(self.path, follow_symlinks=False), os.fstat(self.handle))
+        except OSError:
+            return False
+
+
+Root = Path | Held
+"""Where files are: by the name of a folder, or a folder that is held."""
+
+
+@contextmanager
+def held(root: Path) -> Iterator[Held]:
+    """Hold a folder: what is read and written in it meanwhile is all in the same one. Raises OSError."""
+    handle = _open(None, str(root), _FOLDER, str(root))
+    try:
+        yield Held(root, handle)
+    finally:
+        os.close(handle)
+
+
 def parts_of(name: str) -> list[str]:
     """The folders of a name, and the file. Raises OSError for a name that leaves the folder or is of no file."""
     parts = name.split("/")
@@ -35,7 +68,7 @@ def parts_of(name: str) -> list[str]:
 
 
 @contextmanager
-def opened(root: Path, name: str) -> Iterator[BufferedReader]:
+def opened(root: Root, name: str) -> Iterator[BufferedReader]:
     """A file to read. Raises OSError for a link on the way, and for what is no file: a pipe would wait for ever."""
     with folder_of(root, name) as (folder, last):
         handle = _open(folder, last, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW | os.O_CLOEXEC, f"{root}/{name}")
@@ -47,7 +80,7 @@ def opened(root: Path, name: str) -> Iterator[BufferedReader]:
         yield file
 
 
-def write_new(root: Path, name: str, content: bytes) -> None:
+def write_new(root: Root, name: str, content: bytes) -> None:
     """Write a file anew, with its folders: on the disk when this returns. What had its name is another file's now.
 
     The folder `root` itself is never made.
@@ -64,7 +97,7 @@ def write_new(root: Path, name: str, content: bytes) -> None:
             os.fsync(handle)
 
 
-def write_atomically(root: Path, name: str, content: bytes) -> None:
+def write_atomically(root: Root, name: str, content: bytes) -> None:
     """Write a file so that it is there whole or not at all. The folder `root` itself is never made."""
     with folder_of(root, name, make=True) as (folder, last):
         scratch = f".{last}.{uuid.uuid4().hex}.partial"
@@ -81,7 +114,7 @@ def write_atomically(root: Path, name: str, content: bytes) -> None:
         os.fsync(folder)
 
 
-def remove(root: Path, name: str, *, sync: bool = True) -> None:
+def remove(root: Root, name: str, *, sync: bool = True) -> None:
     """Remove a file if it is there; with `sync`, for good."""
     try:
         with folder_of(root, name) as (folder, last):
@@ -92,7 +125,7 @@ def remove(root: Path, name: str, *, sync: bool = True) -> None:
         pass
 
 
-def status(root: Path, name: str) -> os.stat_result | None:
+def status(root: Root, name: str) -> os.stat_result | None:
     """What has a name, a link as itself; None where nothing has it, or a link is on the way."""
     try:
         with folder_of(root, name) as (folder, last):
@@ -101,7 +134,7 @@ def status(root: Path, name: str) -> os.stat_result | None:
         return None
 
 
-def listed(root: Path, name: str) -> list[str]:
+def listed(root: Root, name: str) -> list[str]:
     """Names right beneath a folder in `root`; [] where there is no such folder."""
     try:
         with _walked(root, parts_of(name)) as folder:
@@ -127,7 +160,7 @@ def open_own(file: Path, flags: int) -> int:
 
 
 @contextmanager
-def folder_of(root: Path, name: str, *, make: bool = False) -> Iterator[tuple[int, str]]:
+def folder_of(root: Root, name: str, *, make: bool = False) -> Iterator[tuple[int, str]]:
     """A handle of the folder that a name is in, and the last part of the name."""
     *folders, last = parts_of(name)
     with _walked(root, folders, make) as handle:
@@ -135,9 +168,10 @@ def folder_of(root: Path, name: str, *, make: bool = False) -> Iterator[tuple[in
 
 
 @contextmanager
-def _walked(root: Path, folders: Sequence[str], make: bool = False) -> Iterator[int]:
+def _walked(root: Root, folders: Sequence[str], make: bool = False) -> Iterator[int]:
     """A handle of a folder in `root`, made where it is to be."""
-    handle, where = _open(None, str(root), _FOLDER, str(root)), str(root)
+    handle = os.dup(root.handle) if isinstance(root, Held) else _open(None, str(root), _FOLDER, str(root))
+    where = str(root)
     try:
         for part in folders:
             where = f"{where}/{part}"

@@ -15,12 +15,14 @@ import numpy as np
 
 from sonarsynth.render import Values
 from sonarsynth.store import within
-from sonarsynth.store.creating import root_attributes
+from sonarsynth.store.creating import attributes_in
 from sonarsynth.store.encoding import encoded
 from sonarsynth.store.layout import ArrayLayout, Layout, layout_of
 from sonarsynth.store.marks import ABSENT, Damage, Mark, add_to_digest, drop_mark, load_marks, marked, save_mark
-from sonarsynth.store.place import FileRecord, Folder, absolute, folder_of, remove, write_new
+from sonarsynth.store.place import FileRecord, Folder, Opened, absolute, folder_of, held, remove, write_new
 from sonarsynth.store.provenance import other_versions
+from sonarsynth.store.remote import Remote
+from sonarsynth.store.within import Held
 
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan
@@ -49,7 +51,8 @@ def write_shard(
     """
     path = folder_of(path)
     try:
-        return _write(path, plan, shard, frames, still)
+        with held(path) as opened:
+            return _write(opened, plan, shard, frames, still)
     except OSError as error:
         if isinstance(path, Path) and not os.path.lexists(path):
             raise Damage(f"{path}: {GONE}") from None
@@ -58,14 +61,14 @@ def write_shard(
         raise
 
 
-def _write(path: Folder, plan: Plan, shard: int, frames: Mapping[int, Values], still: Callable[[], None]) -> Mark:
-    layout, versions = layout_of(plan), _other_versions(path, plan)
+def _write(store: Opened, plan: Plan, shard: int, frames: Mapping[int, Values], still: Callable[[], None]) -> Mark:
+    layout, versions = layout_of(plan), _other_versions(store, plan)
     region = layout.region(shard)
     outside = sorted(set(frames) - set(region))
     if outside:
         raise ValueError(f"frame {outside[0]} is not in shard {shard} (frames {region.start} to {region.stop - 1})")
     checked = {frame: layout.check(values) for frame, values in sorted(frames.items())}
-    drop_mark(path, shard)
+    drop_mark(store, shard)
     content = hashlib.sha256()
     files: dict[str, FileRecord] = {}
     under_way: deque[tuple[str, Future[FileRecord]]] = deque()
@@ -77,27 +80,29 @@ def _write(path: Folder, plan: Plan, shard: int, frames: Mapping[int, Values], s
             block = layout.block(array, shard, checked)
             add_to_digest(content, array.path, block)
             packed = _content(layout, array, region.start, block)  # here: threads keep the memory that they allocate
-            under_way.append((array.file(shard), writers.submit(_put, path, array.file(shard), packed)))
+            under_way.append((array.file(shard), writers.submit(_put, store, array.file(shard), packed)))
         files |= {name: rest.result() for name, rest in under_way}
+    if isinstance(store, Held) and not store.in_its_place():
+        raise Damage(f"{store}: {GONE}")
     still()
     mark = Mark(str(shard), tuple(checked), content.hexdigest(), files, {"versions": versions} if versions else {})
-    save_mark(path, mark)
+    save_mark(store, mark)
     return mark
 
 
-def _other_versions(path: Folder, plan: Plan) -> dict[str, str]:
+def _other_versions(store: Opened, plan: Plan) -> dict[str, str]:
     """What is of another version in this process than where the store was begun. Raises Damage unless the store is
     there, and of this plan."""
     key = None
-    if isinstance(path, Path):
-        status = within.status(path, "zarr.json")
+    if not isinstance(store, Remote):
+        status = within.status(store, "zarr.json")
         if status is None:
-            raise Damage(f"{path}: {GONE}")
-        key = (path, plan.digest, status.st_dev, status.st_ino, status.st_mtime_ns)
+            raise Damage(f"{store}: {GONE}")
+        key = (str(store), plan.digest, status.st_dev, status.st_ino, status.st_mtime_ns)
     if key is None or key not in _seen:
-        attrs = root_attributes(path)
+        attrs = attributes_in(store)
         if attrs.get("recipe_digest") != plan.digest:
-            raise Damage(f"{path}: {GONE}")
+            raise Damage(f"{store}: {GONE}")
         _seen.clear()
         _seen[key] = {name: now for name, (_, now) in other_versions(attrs).items()}
     return _seen[key]
@@ -106,24 +111,16 @@ def _other_versions(path: Folder, plan: Plan) -> dict[str, str]:
 _seen: dict[tuple[object, ...] | None, dict[str, str]] = {}
 
 
-def write_region(path: Folder, layout: Layout, array: ArrayLayout, start: int, block: np.ndarray) -> FileRecord:
-    """Write frames start:start+len(block) of an array: their file, on the disk when this returns, and its record.
-
-    Raises ValueError unless they are exactly one shard.
-    """
-    return _put(path, array.file(start // layout.shard_frames), _content(layout, array, start, block))
-
-
 def _content(layout: Layout, array: ArrayLayout, start: int, block: np.ndarray) -> bytes | None:
     """What the file of a shard is to hold."""
     layout.check_region(start, start + len(block))
     return encoded(array, block)
 
 
-def _put(path: Folder, name: str, content: bytes | None) -> FileRecord:
+def _put(store: Opened, name: str, content: bytes | None) -> FileRecord:
     if content is not None:
-        return write_new(path, name, content)
-    remove(path, name, sync=False)
+        return write_new(store, name, content)
+    remove(store, name, sync=False)
     return ABSENT
 
 
