@@ -21,9 +21,10 @@ from sonarsynth.sonar import Sonar
 from sonarsynth.synthesis import AutoSynthesis, Synthesis
 from sonarsynth.tracing import AutoTracing, Tracing
 from sonarsynth.world.environment import Environment
-from sonarsynth.world.meshes import Mesh
-from sonarsynth.world.moment import Body, Moment, Snap, snaps_of
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.moment import Moment, Snap, snaps_of
 from sonarsynth.world.motion import Motion, Still, Track, pose, velocity
+from sonarsynth.world.placed import Body
 from sonarsynth.world.snap_pulses import scales
 from sonarsynth.world.sources import SnappingShrimp
 

@@ -16,7 +16,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.randomness import stream
 
 if TYPE_CHECKING:
-    from sonarsynth.world.meshes import Mesh
+    from sonarsynth.world.mesh import Mesh
 
 Complexes = npt.NDArray[np.complex128]
 T = TypeVar("T")

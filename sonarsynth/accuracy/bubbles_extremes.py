@@ -8,16 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from sonarsynth.accuracy.bubbles import (
-    SERIES,
-    TOLERANCE,
-    exact,
-    exact_spectrum,
-    row,
-    spectrum,
-    timed,
-    waveform,
-)
+from sonarsynth.accuracy.bubbles import SERIES, TOLERANCE, exact, exact_spectrum, row, spectrum, timed, waveform
 from sonarsynth.accuracy.rows import Row
 from sonarsynth.world.snap_pulses import cavity, pulse
 from sonarsynth.world.snaps import KellerMiksis

@@ -28,7 +28,8 @@ from sonarsynth.acoustics.modal import cylinder_amplitude
 from sonarsynth.conventions import Floats
 from sonarsynth.scattering.fineness import fine_mesh
 from sonarsynth.scattering.strength import target_strength
-from sonarsynth.world.meshes import Mesh, mesh_of
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.meshes import mesh_of
 from sonarsynth.world.shapes import Cylinder
 
 SERIES, INTEGRAL = "modal series (Stanton)", "Kirchhoff integral"

@@ -38,7 +38,8 @@ from sonarsynth.conventions import Floats
 from sonarsynth.scattering import Kirchhoff, PartlyReflecting
 from sonarsynth.scattering.fineness import CoarseMesh, expected_error, fine_mesh
 from sonarsynth.scattering.strength import target_strength
-from sonarsynth.world.meshes import Mesh, mesh_of
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.meshes import mesh_of
 from sonarsynth.world.shapes import Sphere
 
 SERIES, INTEGRAL = "modal series", "Kirchhoff integral"

@@ -14,7 +14,8 @@ from sonarsynth.products import ORIGINS, Arrivals, PointCloud, PointLabels
 from sonarsynth.sonar import Elements
 from sonarsynth.sonar.mirrors import mirror_normal
 from sonarsynth.world.casting import casting_mesh
-from sonarsynth.world.moment import Body, Moment
+from sonarsynth.world.moment import Moment
+from sonarsynth.world.placed import Body
 
 FIRST_NULL = 1.9
 """rad of phase, root mean square over the aperture, at the first null of a beam: 1.915 of a disc, 1.81 of a line."""

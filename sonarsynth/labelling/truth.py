@@ -13,8 +13,9 @@ from sonarsynth.labelling.views import box_in_view
 from sonarsynth.products import Paths, Truth
 from sonarsynth.sonar import BeamGrid
 from sonarsynth.world.casting import OFFSET, first_hit, occluded
-from sonarsynth.world.meshes import Mesh, in_blocks
-from sonarsynth.world.moment import Body, Moment, meeting_times, positions
+from sonarsynth.world.mesh import Mesh, in_blocks
+from sonarsynth.world.moment import Moment, meeting_times, positions
+from sonarsynth.world.placed import Body
 
 Connect = Callable[[Floats, Floats], Paths]
 """Rays from (pair, xyz) to (pair, xyz) in the world: a propagation model bound to its water."""

@@ -20,9 +20,11 @@ from sonarsynth.synthesis.wavefront import MOST_STRETCH
 from sonarsynth.world.casting import inside
 from sonarsynth.world.casts import profile_of
 from sonarsynth.world.environment import Profile
-from sonarsynth.world.meshes import in_blocks, mesh_of
-from sonarsynth.world.moment import Body, meeting_times, model_of
+from sonarsynth.world.mesh import in_blocks
+from sonarsynth.world.meshes import mesh_of
+from sonarsynth.world.moment import meeting_times, model_of
 from sonarsynth.world.motion import pose
+from sonarsynth.world.placed import Body
 from sonarsynth.world.room import frame_bytes, free_bytes
 from sonarsynth.world.shapes import MeshFile
 from sonarsynth.world.snap_pulses import largest_scales, pulse, waveform

@@ -14,7 +14,8 @@ from sonarsynth.scene import Frame
 from sonarsynth.sonar import stop_frequency
 from sonarsynth.tracing import Straight
 from sonarsynth.tracing.bounces import MOST_BOUNCES
-from sonarsynth.world.meshes import Mesh, mesh_of
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.meshes import mesh_of
 from sonarsynth.world.moment import Moment
 from sonarsynth.world.reflection import rms_height
 

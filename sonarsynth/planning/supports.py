@@ -14,7 +14,7 @@ from sonarsynth.scene import Scene
 from sonarsynth.sonar import elements
 from sonarsynth.synthesis import pulse_support
 from sonarsynth.synthesis.pulse import FEET, at_longest, silencing_blur
-from sonarsynth.world.meshes import farthest_corner
+from sonarsynth.world.mesh import farthest_corner
 from sonarsynth.world.moment import model_of
 from sonarsynth.world.reflection import rms_height
 from sonarsynth.world.snap_pulses import Waveform, largest_scales, waveform

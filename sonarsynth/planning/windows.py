@@ -20,7 +20,7 @@ from sonarsynth.scene import Frame, Scene
 from sonarsynth.synthesis.pulse import snap_levels
 from sonarsynth.tracing import Straight
 from sonarsynth.world.environment import Profile
-from sonarsynth.world.meshes import in_blocks
+from sonarsynth.world.mesh import in_blocks
 
 MARGIN = 0.1e-3
 """Seconds added at both ends of every window. Covers what straight rays leave out of an arrival time: under 2 us at

@@ -8,13 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from sonarsynth.acoustics.bearings import (
-    Wavefront,
-    plane_wave,
-    plane_wavefront,
-    spherical_wave,
-    wavefront_delays,
-)
+from sonarsynth.acoustics.bearings import Wavefront, plane_wave, plane_wavefront, spherical_wave, wavefront_delays
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Bearings, Signals

@@ -10,7 +10,7 @@ from sonarsynth.conventions import Ints
 from sonarsynth.description import FieldError
 from sonarsynth.recipe.sequences import Sequences
 from sonarsynth.recipe.values import Where, where
-from sonarsynth.world.meshes import Mesh
+from sonarsynth.world.mesh import Mesh
 
 MOST_VARIANTS = 1000
 """Different meshes of a target that a dataset may have."""

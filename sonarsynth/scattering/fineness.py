@@ -12,7 +12,8 @@ from sonarsynth.acoustics.facets import FIVE_PERCENT
 from sonarsynth.conventions import Floats
 from sonarsynth.world.curvature import bend
 from sonarsynth.world.keeping import kept
-from sonarsynth.world.meshes import Mesh, file_stamp, mesh_of, refined_mesh
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.meshes import file_stamp, mesh_of, refined_mesh
 from sonarsynth.world.refinement import longest_edge
 from sonarsynth.world.shapes import Box, Cylinder, LShape, MeshFile, Remus100, Shape, Sphere
 

@@ -12,7 +12,7 @@ from sonarsynth.conventions import Floats, Metres
 from sonarsynth.description import description
 from sonarsynth.scattering.parts import Part, Plain
 from sonarsynth.scattering.validity import COARSE, Scatterer, facets_note
-from sonarsynth.world.meshes import Mesh
+from sonarsynth.world.mesh import Mesh
 
 
 @description

@@ -22,7 +22,7 @@ from sonarsynth.scattering.validity import (
     grazing_note,
     size_note,
 )
-from sonarsynth.world.meshes import Mesh
+from sonarsynth.world.mesh import Mesh
 
 
 @description

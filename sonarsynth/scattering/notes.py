@@ -8,7 +8,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.world.casting import OFFSET, first_hit
-from sonarsynth.world.meshes import Mesh
+from sonarsynth.world.mesh import Mesh
 
 RAYS: Final = 4096
 """Rays by which a mesh is searched for facets that face each other."""

@@ -14,7 +14,7 @@ from sonarsynth.acoustics.lobes import dot, lambert, lit_and_seen, slope_lobe
 from sonarsynth.conventions import Bools, Floats
 from sonarsynth.scattering.patches import Patches, Pulses
 from sonarsynth.scattering.polarity import random_polarity
-from sonarsynth.world.meshes import Mesh
+from sonarsynth.world.mesh import Mesh
 
 if TYPE_CHECKING:
     from sonarsynth.scattering import ScatteringLaw

@@ -11,7 +11,7 @@ from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.randomness import stream
 from sonarsynth.world.curvature import curvature_radius
 from sonarsynth.world.keeping import kept
-from sonarsynth.world.meshes import Mesh
+from sonarsynth.world.mesh import Mesh
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ import numpy as np
 from sonarsynth.conventions import Floats
 from sonarsynth.randomness import stream
 from sonarsynth.world.keeping import kept
-from sonarsynth.world.meshes import Mesh
+from sonarsynth.world.mesh import Mesh
 
 
 def random_polarity(mesh: Mesh) -> Floats:

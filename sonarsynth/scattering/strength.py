@@ -15,7 +15,8 @@ from sonarsynth.scattering.kirchhoff import Kirchhoff
 from sonarsynth.scattering.notes import SmallBody
 from sonarsynth.scattering.targets import Target
 from sonarsynth.scattering.validity import Scatterer
-from sonarsynth.world.meshes import Mesh, mesh_of
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.meshes import mesh_of
 from sonarsynth.world.shapes import Box, Cylinder, LShape, MeshFile, Myring, Remus100, Shape, Sphere
 
 SHAPES: Final = (MeshFile, Sphere, Cylinder, Box, LShape, Remus100, Myring)

@@ -9,7 +9,8 @@ from pydantic import StringConstraints
 from sonarsynth.description import description
 from sonarsynth.scattering import Kirchhoff, Scattering
 from sonarsynth.scattering.fineness import frame_mesh
-from sonarsynth.world.meshes import Mesh, mesh_of
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.meshes import mesh_of
 from sonarsynth.world.motion import Motion
 from sonarsynth.world.shapes import Shape
 

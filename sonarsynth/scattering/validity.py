@@ -9,7 +9,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.world.meshes import Mesh
+from sonarsynth.world.mesh import Mesh
 from sonarsynth.world.refinement import longest_edge
 
 OFF: Final = 2.2

@@ -24,7 +24,7 @@ from sonarsynth.render.hearing import hear_part
 from sonarsynth.scene import Frame
 from sonarsynth.sonar.subarrays import subarrays
 from sonarsynth.store.layout import layout_of
-from sonarsynth.world.meshes import Mesh
+from sonarsynth.world.mesh import Mesh
 
 WHOLE: Final = 0.9
 """Seconds that a frame may take, by counts of its work, for it to be tried whole."""

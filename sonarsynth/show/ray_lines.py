@@ -19,7 +19,7 @@ from sonarsynth.tracing.polylines import Polylines, polylines
 from sonarsynth.tracing.ray_request import EigenrayRequest
 from sonarsynth.world.boundaries import SeaBed, SeaSurface
 from sonarsynth.world.casting import OFFSET, occluded
-from sonarsynth.world.moment import Body
+from sonarsynth.world.placed import Body
 from sonarsynth.world.reflection import bounces
 
 WORDS = {GOOD: "good", COINCIDENT: "coincident ends", CAUSTIC: "near a caustic", PASSED: "past a caustic"}

@@ -27,16 +27,7 @@ from sonarsynth.render import attributes, coordinates
 from sonarsynth.store.code import code_digest
 from sonarsynth.store.encoding import CODEC, LEVEL
 from sonarsynth.store.layout import ArrayLayout, Layout, layout_of
-from sonarsynth.store.marks import (
-    LAYOUT,
-    MANIFESTS,
-    Damage,
-    Mark,
-    all_files,
-    load_layout,
-    marked,
-    save_mark,
-)
+from sonarsynth.store.marks import LAYOUT, MANIFESTS, Damage, Mark, all_files, load_layout, marked, save_mark
 from sonarsynth.store.place import Folder, Opened, absolute, read, record, records, upload
 from sonarsynth.store.provenance import begun, made_of, other_versions
 from sonarsynth.store.remote import Remote

@@ -34,9 +34,10 @@ from sonarsynth.tracing.paths import Outward, assemble, by_target, join, silence
 from sonarsynth.tracing.shading import View
 from sonarsynth.tracing.variation import ALIKE, ENOUGH, fitted
 from sonarsynth.world.environment import Environment, Profile
-from sonarsynth.world.meshes import in_blocks
-from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.mesh import in_blocks
+from sonarsynth.world.moment import Moment, Snap
 from sonarsynth.world.motion import Track
+from sonarsynth.world.placed import Body
 from sonarsynth.world.water import DepthAbsorption
 
 if TYPE_CHECKING:

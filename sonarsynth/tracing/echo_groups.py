@@ -14,7 +14,7 @@ from sonarsynth.scattering.parts import Plain, Rough, Shadow, Smooth
 from sonarsynth.scattering.patches import Patches, Pulses, patches
 from sonarsynth.tracing.moving import Carried
 from sonarsynth.tracing.paths import Outward
-from sonarsynth.world.moment import Body
+from sonarsynth.world.placed import Body
 
 if TYPE_CHECKING:
     from sonarsynth.tracing.arrivals import ArrayLegs

@@ -23,8 +23,9 @@ from sonarsynth.tracing.shadows import hidden, overlapping
 from sonarsynth.tracing.spots import delayed_by_spots, from_spots
 from sonarsynth.tracing.variation import variations
 from sonarsynth.tracing.wavefront import FEW, Terms, probes
-from sonarsynth.world.meshes import in_blocks
-from sonarsynth.world.moment import Body, Snap
+from sonarsynth.world.mesh import in_blocks
+from sonarsynth.world.moment import Snap
+from sonarsynth.world.placed import Body
 from sonarsynth.world.water import DepthAbsorption
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from sonarsynth.scattering.patches import patches
 from sonarsynth.tracing.marching import ARRIVAL, END, EVENTS, FACET, LAUNCH, Rays, launch, reflect, step
 from sonarsynth.tracing.shadows import hidden
 from sonarsynth.world.environment import Environment, Profile
-from sonarsynth.world.moment import Body
+from sonarsynth.world.placed import Body
 
 if TYPE_CHECKING:
     from sonarsynth.tracing import Propagation

@@ -20,7 +20,7 @@ from sonarsynth.scattering.parts import Shadow
 from sonarsynth.tracing.aperture import wavefronts
 from sonarsynth.tracing.legs import facets_of, rays_to_centre
 from sonarsynth.world.casting import inside
-from sonarsynth.world.moment import Body
+from sonarsynth.world.placed import Body
 
 if TYPE_CHECKING:
     from sonarsynth.tracing.arrivals import ArrayLegs

@@ -16,8 +16,8 @@ from sonarsynth.tracing.reflections import Reflections, reflections
 from sonarsynth.tracing.shadows import most_swerve
 from sonarsynth.world.casting import OFFSET
 from sonarsynth.world.environment import Environment, Profile
-from sonarsynth.world.meshes import in_blocks
-from sonarsynth.world.moment import Body
+from sonarsynth.world.mesh import in_blocks
+from sonarsynth.world.placed import Body
 
 if TYPE_CHECKING:
     from sonarsynth.tracing import Propagation

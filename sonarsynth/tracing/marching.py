@@ -10,7 +10,7 @@ from sonarsynth.acoustics.rays import Water
 from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints, depth
 from sonarsynth.geometry import unit
 from sonarsynth.world.casting import OFFSET, first_hit
-from sonarsynth.world.moment import Body
+from sonarsynth.world.placed import Body
 
 EVENTS = ("on the way", "turning point", "surface", "bed", "end", "facet", "launch", "arrival")
 ON, TURN, SURFACE, BED, END, FACET, LAUNCH, ARRIVAL = range(len(EVENTS))

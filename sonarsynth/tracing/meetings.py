@@ -13,8 +13,9 @@ import numpy as np
 from sonarsynth.conventions import Floats, depth
 from sonarsynth.tracing.moving import Meeting
 from sonarsynth.world.environment import Profile
-from sonarsynth.world.moment import Body, Snap, meeting_times, positions
+from sonarsynth.world.moment import Snap, meeting_times, positions
 from sonarsynth.world.motion import Track
+from sonarsynth.world.placed import Body
 
 SHARED = 1e-2
 """What moves by less than this part of the radius of a body from one snap to another, and keeps as near to what its

@@ -32,8 +32,8 @@ from sonarsynth.tracing.paths import Outward
 from sonarsynth.tracing.probe_legs import TERMS
 from sonarsynth.tracing.wavefront import FEW, SECOND_DEGREE, probes, sphere
 from sonarsynth.world.environment import Profile
-from sonarsynth.world.moment import Body
 from sonarsynth.world.motion import Track
+from sonarsynth.world.placed import Body
 
 ROUNDS = 3
 """Of solving for times that depend on themselves: each leaves v/c of the error, or v t/r of that."""

@@ -18,7 +18,7 @@ from sonarsynth.tracing.shadows import bundles, hidden
 from sonarsynth.tracing.swerves import swerves
 from sonarsynth.world.cones import CLOSED, UNKNOWN, look
 from sonarsynth.world.environment import Environment, Profile
-from sonarsynth.world.moment import Body
+from sonarsynth.world.placed import Body
 
 if TYPE_CHECKING:
     from sonarsynth.tracing import Propagation

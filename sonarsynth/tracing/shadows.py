@@ -8,7 +8,7 @@ from sonarsynth.acoustics.rays import water
 from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.world.casting import enclosing, occluded
 from sonarsynth.world.environment import Environment, Profile
-from sonarsynth.world.moment import Body
+from sonarsynth.world.placed import Body
 
 BOW = 1e-3
 """Largest distance (m) of a bent ray from the chords that stand for it when it is tested against bodies."""

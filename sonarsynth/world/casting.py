@@ -18,8 +18,8 @@ import numpy.typing as npt
 
 from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints
 from sonarsynth.world.keeping import kept
-from sonarsynth.world.meshes import Mesh
-from sonarsynth.world.moment import Body
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.placed import Body
 
 Int32s = npt.NDArray[np.int32]
 Backend = Literal["embree", "open3d"]

@@ -6,7 +6,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.world.casting import casting_mesh
-from sonarsynth.world.moment import Body
+from sonarsynth.world.placed import Body
 
 EMPTY, CLOSED, UNKNOWN = range(3)
 """As `cone_kernels`."""

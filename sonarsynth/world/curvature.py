@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.world.keeping import kept
-from sonarsynth.world.meshes import Mesh
+from sonarsynth.world.mesh import Mesh
 from sonarsynth.world.refinement import sides, weld
 
 CREASE: Final = 1.0

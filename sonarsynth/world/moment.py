@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.geometry import Pose
-from sonarsynth.world.meshes import Mesh
-from sonarsynth.world.motion import Motion, Track
+from sonarsynth.world.motion import Track
+from sonarsynth.world.placed import Body
 from sonarsynth.world.snap_pulses import Scales, Waveform, at_depth, waveform
 from sonarsynth.world.sources import SnapModel, SnappingShrimp
 
@@ -19,33 +18,6 @@ TravelTime = Callable[[Floats, Floats], Floats]
 
 MEETINGS, MET = 20, 1e-9
 """Rounds of solving for when sound meets what moves, at most; s: enough. Each round leaves v/c of the error."""
-
-
-@dataclass(frozen=True, eq=False)
-class Body:
-    """A target where it is."""
-
-    name: str
-    mesh: Mesh
-    pose: Pose
-    velocity: Floats  # (xyz) m/s, world
-    motion: Motion | None = None  # that brought it here; None: it goes on at its velocity, and does not turn
-    time: float = 0.0  # s: of the motion
-
-    @property
-    def track(self) -> Track:
-        """Of its origin."""
-        return Track(self.pose, self.velocity, self.motion, self.time)
-
-    def later(self, seconds: float) -> Body:
-        """The body where it will be, or was, so many seconds (s) after."""
-        there = self.track.later(seconds)
-        return replace(self, pose=there.pose, velocity=there.velocity, time=there.time)
-
-    @property
-    def frozen(self) -> Body:
-        """The body at rest where it is."""
-        return replace(self, velocity=np.zeros(3), motion=None)
 
 
 @dataclass(frozen=True, eq=False)

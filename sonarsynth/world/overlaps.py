@@ -9,8 +9,8 @@ import numpy as np
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.geometry import Pose
 from sonarsynth.world.casting import first_hit, occluded
-from sonarsynth.world.meshes import Mesh, in_blocks
-from sonarsynth.world.moment import Body
+from sonarsynth.world.mesh import Mesh, in_blocks
+from sonarsynth.world.placed import Body
 
 INSET: Final = 1e-5
 """Of the smaller body: how far under its surface it is looked at, so that bodies that touch do not overlap."""

@@ -18,7 +18,8 @@ from sonarsynth.world import keeping
 from sonarsynth.world.casting import casting_mesh
 from sonarsynth.world.curvature import bend
 from sonarsynth.world.keeping import Kept, kept, size_of
-from sonarsynth.world.meshes import Mesh, mesh_of
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.meshes import mesh_of
 from sonarsynth.world.shapes import Sphere
 
 REMUS = Path(__file__).resolve().parents[2] / "configs" / "remus.yaml"

@@ -16,9 +16,10 @@ from sonarsynth.tracing import AutoTracing, Refracted, Straight, echoes
 from sonarsynth.tracing.arrivals import trace
 from sonarsynth.world import meshes
 from sonarsynth.world.environment import Environment, Isovelocity, Profile
-from sonarsynth.world.meshes import Mesh, in_blocks
-from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.mesh import Mesh, in_blocks
+from sonarsynth.world.moment import Moment, Snap
 from sonarsynth.world.motion import Track
+from sonarsynth.world.placed import Body
 from sonarsynth.world.sources import LogarithmicBubble
 
 ENVIRONMENT = Environment(depth=30.0, sound_speed=Isovelocity(speed=1540.0))

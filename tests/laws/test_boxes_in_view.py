@@ -11,8 +11,10 @@ from sonarsynth.labelling import label
 from sonarsynth.labelling.views import MEANINGS, View, box_in_view
 from sonarsynth.products import Truth
 from sonarsynth.sonar import BeamGrid
-from sonarsynth.world.meshes import Mesh, mesh_of
-from sonarsynth.world.moment import Body, Moment
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.meshes import mesh_of
+from sonarsynth.world.moment import Moment
+from sonarsynth.world.placed import Body
 from sonarsynth.world.shapes import Box, Sphere
 
 BEAMS = BeamGrid(azimuth_span=np.deg2rad(50.0), azimuths=11, elevation_span=np.deg2rad(30.0), elevations=11)

@@ -13,18 +13,7 @@ from sonarsynth.conventions import direction
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.planning import plan
 from sonarsynth.ranging import IsovelocityRange, SensorDelays, WavefrontCancelling
-from sonarsynth.ranging.multipath import (
-    CANCELLED,
-    DIRECT,
-    FAINT,
-    OUTSIDE,
-    SEEN,
-    WEAK,
-    Limits,
-    cancel,
-    images,
-    in_view,
-)
+from sonarsynth.ranging.multipath import CANCELLED, DIRECT, FAINT, OUTSIDE, SEEN, WEAK, Limits, cancel, images, in_view
 from sonarsynth.render import beamform_frame, trace_frame
 from sonarsynth.scene import EchoWindow, Physics, Processing
 from sonarsynth.sonar import BeamGrid, Romanis, Sonar, elements

@@ -17,8 +17,10 @@ from sonarsynth.sonar import Romanis, elements
 from sonarsynth.tracing import AutoTracing
 from sonarsynth.tracing.arrivals import trace
 from sonarsynth.world.environment import Absorption, Environment, Isovelocity, Profile
-from sonarsynth.world.meshes import Mesh, mesh_of
-from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.meshes import mesh_of
+from sonarsynth.world.moment import Moment, Snap
+from sonarsynth.world.placed import Body
 from sonarsynth.world.shapes import Box, Sphere
 from sonarsynth.world.sources import LogarithmicBubble
 from tests.spheres import exact_sphere

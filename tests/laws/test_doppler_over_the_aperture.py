@@ -24,8 +24,9 @@ from sonarsynth.tracing.variation import ENOUGH
 from sonarsynth.world.boundaries import Rigid, SeaBed
 from sonarsynth.world.environment import Absorption, Environment, Isovelocity, Profile
 from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.moment import Moment, Snap
 from sonarsynth.world.motion import Track
+from sonarsynth.world.placed import Body
 from sonarsynth.world.shapes import Box
 from sonarsynth.world.sources import LogarithmicBubble
 

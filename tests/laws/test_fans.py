@@ -12,8 +12,8 @@ from sonarsynth.scattering import MirrorLobe
 from sonarsynth.tracing import AutoTracing, Refracted
 from sonarsynth.tracing.fan import EVENTS, RayFan, fan
 from sonarsynth.world.environment import Environment, Isovelocity, Profile
-from sonarsynth.world.meshes import Mesh
-from sonarsynth.world.moment import Body
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.placed import Body
 
 TANK = Environment(depth=0.3, sound_speed=Isovelocity(speed=1480.0))
 TANK_PROFILE = Profile(np.array([0.0, 0.1, 0.2, 0.3]), np.array([1482.0, 1481.0, 1478.0, 1477.5]))

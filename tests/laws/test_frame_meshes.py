@@ -7,7 +7,8 @@ import trimesh
 from sonarsynth.scattering import fineness
 from sonarsynth.scattering.fineness import ROWS, expected_error, fine_mesh, frame_mesh, mesh_report
 from sonarsynth.world.generation import sphere
-from sonarsynth.world.meshes import Mesh, mesh_of
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.meshes import mesh_of
 from sonarsynth.world.refinement import halve_longest_edges, longest_edge, sides, split_long_edges, volume
 from sonarsynth.world.shapes import Box, Cylinder, LShape, MeshFile, Myring, Remus100, Sphere
 

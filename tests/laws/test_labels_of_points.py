@@ -17,7 +17,8 @@ from sonarsynth.labelling.points import surface_distances
 from sonarsynth.planning import plan
 from sonarsynth.products import FAMILIES, ORIGINS, Arrivals, PointCloud, PointLabels
 from sonarsynth.recipe import Recipe
-from sonarsynth.render import _band, trace_frame
+from sonarsynth.render import trace_frame
+from sonarsynth.render.labels import band_of
 from sonarsynth.scattering.targets import Target
 from sonarsynth.scene import Frame
 from sonarsynth.sonar import BeamGrid, PlanarLattice
@@ -27,8 +28,8 @@ from sonarsynth.synthesis import KernelDeposit
 from sonarsynth.synthesis.pulse import pulse_spectrum
 from sonarsynth.tracing import AutoTracing
 from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.moment import Body
 from sonarsynth.world.motion import Course, Still
+from sonarsynth.world.placed import Body
 from sonarsynth.world.shapes import Box, Sphere
 from sonarsynth.world.sources import SnappingShrimp
 from tests.scenes import point_scene, remus
@@ -53,7 +54,7 @@ def made(recipe: Recipe, focus: float | None = 20.0, snap: int = 0) -> Made:
     clock = arrivals.delay[arrivals.direct & (arrivals.snap == snap)].min()
     pose, velocity = traced.frame.sonar_pose, traced.frame.sonar_velocity
     listening = Listening(resolved.elements, sonar.assumed_sound_speed, focus, float(clock), pose, velocity)
-    return Made(resolved, traced.frame, arrivals, _band(resolved, traced.frame.moment.snaps), listening)
+    return Made(resolved, traced.frame, arrivals, band_of(resolved, traced.frame.moment.snaps), listening)
 
 
 def several(**more: Any) -> Recipe:

@@ -6,7 +6,8 @@ import pytest
 from sonarsynth.acoustics.facets import kirchhoff_edge, kirchhoff_error
 from sonarsynth.scattering.fineness import expected_error
 from sonarsynth.world.generation import sphere
-from sonarsynth.world.meshes import Mesh, mesh_of
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.meshes import mesh_of
 from sonarsynth.world.refinement import split_long_edges
 from sonarsynth.world.shapes import Cylinder
 

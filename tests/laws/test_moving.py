@@ -14,8 +14,9 @@ from sonarsynth.products import Arrivals
 from sonarsynth.scattering import Isotropic, MirrorLobe
 from sonarsynth.tracing import AutoTracing
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.world.moment import Body, Moment
+from sonarsynth.world.moment import Moment
 from sonarsynth.world.motion import Circle, Motion, Track, Waypoint, Waypoints, pose, velocity
+from sonarsynth.world.placed import Body
 from tests.laws.test_traced_families import (
     ARRAY,
     BAND,

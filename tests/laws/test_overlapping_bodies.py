@@ -11,9 +11,10 @@ import sonarsynth as ss
 from sonarsynth.geometry import Pose
 from sonarsynth.planning.bodies import mirror_notes, overlap_notes
 from sonarsynth.planning.looks import survey
-from sonarsynth.world.meshes import Mesh, mesh_of
-from sonarsynth.world.moment import Body
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.meshes import mesh_of
 from sonarsynth.world.overlaps import overlap
+from sonarsynth.world.placed import Body
 from sonarsynth.world.shapes import Box, LShape, Shape, Sphere
 
 UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])

@@ -20,7 +20,8 @@ from sonarsynth.tracing.arrivals import trace
 from sonarsynth.world.boundaries import Rigid, SeaBed, SeaSurface, Sediment
 from sonarsynth.world.environment import Absorption, Environment, Isovelocity, Profile
 from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.moment import Moment, Snap
+from sonarsynth.world.placed import Body
 from sonarsynth.world.shapes import Box
 from sonarsynth.world.sources import LogarithmicBubble
 

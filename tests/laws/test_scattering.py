@@ -10,7 +10,8 @@ from sonarsynth.acoustics.lobes import lambert, slope_lobe
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import unit
 from sonarsynth.scattering import Isotropic, MirrorLobe, Scattering
-from sonarsynth.world.meshes import Mesh, mesh_of
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.meshes import mesh_of
 from sonarsynth.world.shapes import Sphere
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -19,7 +19,7 @@ from sonarsynth.world.casting import occluded
 from sonarsynth.world.cones import CLOSED, EMPTY, UNKNOWN, look
 from sonarsynth.world.environment import Environment, Profile
 from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.moment import Body
+from sonarsynth.world.placed import Body
 from sonarsynth.world.shapes import Box, Cylinder, LShape, Remus100, Shape, Sphere
 from sonarsynth.world.sound_speed import Isovelocity
 

@@ -11,7 +11,7 @@ from sonarsynth.tracing.legs import Facets, Legs, facets_of, legs_from
 from sonarsynth.tracing.shading import View
 from sonarsynth.tracing.swerves import swerves, towards
 from sonarsynth.world.environment import Profile
-from sonarsynth.world.moment import Body
+from sonarsynth.world.placed import Body
 from sonarsynth.world.shapes import Sphere
 from tests.laws.test_shading_by_cones import SONAR, WATER, array_of, body, some_bodies
 

@@ -16,8 +16,9 @@ from sonarsynth.tracing import AutoTracing, Refracted, Straight
 from sonarsynth.tracing.arrivals import trace
 from sonarsynth.world.boundaries import FluidHalfSpace, Rigid, SeaBed, SeaSurface
 from sonarsynth.world.environment import Environment, Isovelocity, Profile
-from sonarsynth.world.meshes import Mesh
-from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.moment import Moment, Snap
+from sonarsynth.world.placed import Body
 from sonarsynth.world.sources import LogarithmicBubble
 
 BED, C = 12.0, 1530.0

@@ -18,8 +18,9 @@ from sonarsynth.tracing import AutoTracing, Refracted, Straight
 from sonarsynth.tracing.arrivals import array_legs, arrivals, trace
 from sonarsynth.tracing.wavefront import probes
 from sonarsynth.world.environment import Environment, Isovelocity, Profile
-from sonarsynth.world.meshes import Mesh
-from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.moment import Moment, Snap
+from sonarsynth.world.placed import Body
 from sonarsynth.world.sources import LogarithmicBubble
 
 ENVIRONMENT = Environment(depth=30.0, sound_speed=Isovelocity(speed=1540.0))

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.boundaries import (
-    SEDIMENTS as HANDBOOK,
-)
+from sonarsynth.acoustics.boundaries import SEDIMENTS as HANDBOOK
 from sonarsynth.acoustics.boundaries import (
     bubble_loss,
     critical_grazing,

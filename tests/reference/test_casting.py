@@ -10,8 +10,8 @@ from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose, quaternion, unit
 from sonarsynth.world import casting
 from sonarsynth.world.casting import OFFSET, Backend, first_hit, occluded
-from sonarsynth.world.meshes import Mesh
-from sonarsynth.world.moment import Body
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.placed import Body
 
 
 def mesh_from(shape: trimesh.Trimesh, scale: float = 1.0) -> Mesh:

@@ -30,7 +30,8 @@ from sonarsynth.acoustics.roughness import coherent_factor, roughness_parameter
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import unit
 from sonarsynth.world.generation import sphere
-from sonarsynth.world.meshes import Mesh, mesh_of
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.meshes import mesh_of
 from sonarsynth.world.shapes import Box, Cylinder
 
 C = 1500.0

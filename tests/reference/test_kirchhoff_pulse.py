@@ -8,13 +8,7 @@ import pytest
 
 from sonarsynth.acoustics import snap
 from sonarsynth.acoustics.kirchhoff import facet_amplitude
-from sonarsynth.acoustics.kirchhoff_pulse import (
-    Waveform,
-    divided_impulse,
-    facet_echo,
-    sampled_waveform,
-    snap_waveform,
-)
+from sonarsynth.acoustics.kirchhoff_pulse import Waveform, divided_impulse, facet_echo, sampled_waveform, snap_waveform
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import unit
 from sonarsynth.world.sources import LogarithmicBubble

@@ -14,7 +14,8 @@ from sonarsynth.acoustics.kirchhoff import rectangular_plate
 from sonarsynth.acoustics.modal import sphere_amplitude
 from sonarsynth.scattering.fineness import CoarseMesh, expected_error, fine_mesh
 from sonarsynth.world.curvature import curvature_radius
-from sonarsynth.world.meshes import Mesh, mesh_of
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.meshes import mesh_of
 
 BAND = np.arange(25e3, 110.1e3, 2.5e3)
 FLAT = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))

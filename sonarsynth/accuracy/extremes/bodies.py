@@ -15,7 +15,8 @@ from sonarsynth.scattering import Isotropic, Kirchhoff, MirrorLobe, Scatterer, S
 from sonarsynth.scattering.targets import mesh_for
 from sonarsynth.scattering.validity import OFF
 from sonarsynth.sonar import BeamGrid, PositionTable, elements
-from sonarsynth.world.meshes import Mesh, mesh_of
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.meshes import mesh_of
 from sonarsynth.world.shapes import Box, Sphere
 
 ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))

@@ -11,8 +11,9 @@ from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.sonar import Elements, LowPass, Sonar
 from sonarsynth.world.environment import Absorption, Environment, Isovelocity, Profile
-from sonarsynth.world.meshes import Mesh
-from sonarsynth.world.moment import Body, Moment, Snap
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.moment import Moment, Snap
+from sonarsynth.world.placed import Body
 from sonarsynth.world.snaps import Ricker
 from sonarsynth.world.sources import SnapModel
 

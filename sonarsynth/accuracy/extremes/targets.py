@@ -12,7 +12,8 @@ from sonarsynth.scattering.isotropic import Isotropic
 from sonarsynth.scattering.kirchhoff import Kirchhoff
 from sonarsynth.scattering.mirror_lobe import MirrorLobe
 from sonarsynth.sonar import PositionTable, elements
-from sonarsynth.world.meshes import Mesh, mesh_of, refined_mesh
+from sonarsynth.world.mesh import Mesh
+from sonarsynth.world.meshes import mesh_of, refined_mesh
 from sonarsynth.world.shapes import Box, Shape, Sphere
 
 ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))

@@ -7,7 +7,7 @@ import numpy as np
 from sonarsynth.conventions import Floats
 from sonarsynth.randomness import stream
 from sonarsynth.scattering import Isotropic, MirrorLobe, Scattering
-from sonarsynth.world.meshes import Mesh
+from sonarsynth.world.mesh import Mesh
 
 
 def known(law: Scattering) -> bool:
