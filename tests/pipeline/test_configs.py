@@ -15,6 +15,7 @@ from sonarsynth.planning import Plan
 from sonarsynth.products import ORIGINS
 from sonarsynth.render import follow_rays, render
 from sonarsynth.tracing.fan import EVENTS
+from tools.same_numbers import harbour
 
 ROOT = Path(__file__).resolve().parents[2]
 CONFIGS = ROOT / "configs"
@@ -33,32 +34,6 @@ FRAMES = {
     "crowd.yaml": (0,),
 }
 """Frames of a recipe that are built; of others all."""
-CAST = """\
-% Device,CC1449004
-% Start latitude,-36.2199169
-% Start longitude,150.2301061
-%
-Pressure (Decibar),Depth (Meter),Temperature (Celsius),Salinity (PSS),Sound velocity (Meters per Second)
-0.15,0.149,16.446,35.608,1511.860
-5.00,4.97,16.2,35.64,1511.30
-12.0,11.9,16.05,35.65,1511.05
-25.0,24.8,15.9,35.66,1510.60
-"""
-"""As the instrument of `configs/harbour.yaml` exports it."""
-
-
-def _written_hull(path: Path, size: tuple[float, float, float] = (2.6, 1.5, 1.6)) -> Path:
-    """A box of the size (m) of the vehicle of `configs/harbour.yaml`, in the format that it names."""
-    corners = (np.array([[i >> 2 & 1, i >> 1 & 1, i & 1] for i in range(8)]) - 0.5) * size
-    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    lines = ["solid hull"]
-    for a, b, c, d in quads:
-        for triangle in ((a, b, c), (a, c, d)):
-            lines += ["facet normal 0 0 0", "outer loop"]
-            lines += ["vertex " + " ".join(f"{x:g}" for x in corners[v]) for v in triangle]
-            lines += ["endloop", "endfacet"]
-    path.write_text("\n".join([*lines, "endsolid hull"]))
-    return path
 
 
 @pytest.fixture(scope="module")
@@ -70,23 +45,13 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     def build(name: str) -> Path:
         sets: tuple[str, ...] = ()
         if name == "harbour.yaml":
-            cast = folder / "cast.csv"
-            cast.write_text(CAST)
-            sets = _harbour(cast, _written_hull(folder / "hull.stl"))
+            sets = harbour.written(folder)
         made = _plan(name, sets)
         report = schedule.build(made, folder / f"{name}.zarr", frames=FRAMES.get(name), workers=0)
         assert report.ok and report.written == len(FRAMES.get(name, range(made.sizes["frame"])))
         return folder / f"{name}.zarr"
 
     return build
-
-
-def _harbour(cast: Path, hull: Path) -> tuple[str, ...]:
-    return (
-        f"scene.world.environment.sound_speed.path={cast}",
-        f"scene.world.targets.0.shape.path={hull}",
-        "scene.world.targets.0.shape.edge=0.2",
-    )
 
 
 @pytest.mark.parametrize("name", sorted(file.name for file in CONFIGS.glob("*.yaml")))
@@ -257,7 +222,7 @@ def test_rays_from_the_l_shape_go_on_to_the_shrimp() -> None:
 
 @needs_real_input
 def test_real_water_and_a_real_hull(tmp_path: Path) -> None:
-    made = _plan("harbour.yaml", _harbour(REAL / "castaway_ctd.csv", REAL / "rexrov.stl"))
+    made = _plan("harbour.yaml", harbour.settings(REAL / "castaway_ctd.csv", REAL / "rexrov.stl"))
     report = schedule.build(made, tmp_path / "harbour.zarr", frames=range(0, 16, 5), workers=0)
     assert report.ok
     checks = _checks(tmp_path / "harbour.zarr")
