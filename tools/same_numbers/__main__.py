@@ -68,11 +68,14 @@ def _build(tree: Path, name: str, place: Path, frames: int) -> Path:
         raise SystemExit(f"{tree}: the code of another checkout runs ({found.strip()})")
     sets = [part for value in (harbour.written(place) if name == "harbour" else ()) for part in ("--set", value)]
     recipe = str(tree / "configs" / f"{name}.yaml")
-    command = [*python, "-m", "sonarsynth", "build", recipe, str(store), "--frames", f"0:{frames}", "--workers", "0"]
-    done = subprocess.run([*command, *sets], env=environment, cwd=tree, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise SystemExit(f"{name} by {tree}: status {done.returncode}\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
-    return store
+    command = [*python, "-m", "sonarsynth", "build", recipe, str(store), "--workers", "0", *sets]
+    for some in (f"0:{frames}", "0"):  # a recipe may have one frame only
+        done = subprocess.run(
+            [*command, "--frames", some], env=environment, cwd=tree, capture_output=True, text=True, check=False
+        )
+        if done.returncode == 0:
+            return store
+    raise SystemExit(f"{name} by {tree}: status {done.returncode}\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
 
 
 def _compare(name: str, old: Path, new: Path, renamed: Mapping[str, str]) -> bool:
