@@ -4,7 +4,7 @@
 
     recipe = ss.load("configs/remus.yaml")          # or ss.Recipe(scene=ss.Scene(world=ss.World(...)))
     print(ss.plan(recipe).stages)
-    tree = sonarsynth.render.render(recipe, 0)      # one frame, without a store
+    tree = sonarsynth.pipeline.render(recipe, 0)      # one frame, without a store
     if __name__ == "__main__":                      # worker processes import the script again
         ss.build(recipe, "remus.zarr", frames=range(8))
         print(ss.verify("remus.zarr").ok)
@@ -18,35 +18,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sonarsynth.beamforming import DenseDelayAndSum, FocusedDelayAndSum
-    from sonarsynth.config import RecipeError, dump, load, loads, schema
     from sonarsynth.description import FieldError
-    from sonarsynth.planning import Plan, plan
-    from sonarsynth.ranging import AutoRange, IsovelocityRange, RefractedRange, SensorDelays, WavefrontCancelling
-    from sonarsynth.recipe import Accuracy, Axis, Choice, Normal, Recipe, Sobol, Splits, Together, Uniform
-    from sonarsynth.scattering import Isotropic, Kirchhoff, MirrorLobe, PartlyReflecting
-    from sonarsynth.scattering.strength import target_strength
-    from sonarsynth.scattering.targets import Target
-    from sonarsynth.scene import EchoWindow, Physics, Processing, Scene, Trajectory, World
-    from sonarsynth.schedule import BuildReport, build
-    from sonarsynth.schedule.repairing import RepairReport, repair
-    from sonarsynth.sonar import (
-        Band,
-        BandPass,
-        BeamGrid,
-        Converter,
-        LowPass,
-        PlanarLattice,
-        PositionTable,
-        Romanis,
-        Sonar,
-    )
-    from sonarsynth.store import verify
-    from sonarsynth.synthesis import AutoSynthesis, DirectSum, KernelDeposit
-    from sonarsynth.tracing import AutoTracing, Refracted, Straight
-    from sonarsynth.tracing.eigenrays import RayArrivals, eigenrays, eigenrays_between
-    from sonarsynth.tracing.ray_request import EigenrayRequest, RayRequest
-    from sonarsynth.world.boundaries import (
+    from sonarsynth.environment.boundaries import (
         FluidHalfSpace,
         PressureRelease,
         ReflectionTable,
@@ -55,7 +28,7 @@ if TYPE_CHECKING:
         SeaSurface,
         Sediment,
     )
-    from sonarsynth.world.environment import (
+    from sonarsynth.environment.sea import (
         Absorption,
         Cast,
         Catenary,
@@ -69,10 +42,37 @@ if TYPE_CHECKING:
         Thermocline,
         WenzNoise,
     )
-    from sonarsynth.world.motion import Circle, Course, Line, Still, Waypoint, Waypoints
-    from sonarsynth.world.shapes import Box, Cylinder, LShape, MeshFile, Myring, Remus100, Sphere
-    from sonarsynth.world.snaps import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
-    from sonarsynth.world.sources import LogarithmicBubble, SnappingShrimp
+    from sonarsynth.geometry.motion import Circle, Course, Line, Still, Waypoint, Waypoints
+    from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
+    from sonarsynth.planning import Plan, plan
+    from sonarsynth.propagation import AutoTracing, Refracted, Straight
+    from sonarsynth.propagation.eigenrays import RayArrivals, eigenrays, eigenrays_between
+    from sonarsynth.propagation.ray_request import EigenrayRequest, RayRequest
+    from sonarsynth.ranging import AutoRange, IsovelocityRange, RefractedRange, SensorDelays, WavefrontCancelling
+    from sonarsynth.receiver import (
+        Band,
+        BandPass,
+        BeamGrid,
+        Converter,
+        LowPass,
+        PlanarLattice,
+        PositionTable,
+        Romanis,
+        Sonar,
+    )
+    from sonarsynth.recipe import Accuracy, Axis, Choice, Normal, Recipe, Sobol, Splits, Together, Uniform
+    from sonarsynth.recipe.reading import RecipeError, dump, load, loads, schema
+    from sonarsynth.recipe.scene import EchoWindow, Physics, Processing, Scene, Trajectory, World
+    from sonarsynth.scattering import Isotropic, Kirchhoff, MirrorLobe, PartlyReflecting
+    from sonarsynth.schedule import BuildReport, build
+    from sonarsynth.schedule.repairing import RepairReport, repair
+    from sonarsynth.signals import AutoSynthesis, DirectSum, KernelDeposit
+    from sonarsynth.sources.shrimp import LogarithmicBubble, SnappingShrimp
+    from sonarsynth.sources.snap_models import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
+    from sonarsynth.store import verify
+    from sonarsynth.targets.shapes import Box, Cylinder, LShape, MeshFile, Myring, Remus100, Sphere
+    from sonarsynth.targets.target import Target
+    from sonarsynth.targets.target_strength import target_strength
 
 __all__ = [
     "Absorption",

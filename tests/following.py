@@ -14,8 +14,8 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 
-from sonarsynth.acoustics import rays
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.rays import ray_solutions
 
 Family = tuple[int, int, int, int, int]
 """(launch sign, surface, bottom, turning, arrival sign), up positive: no two rays of one such path cross."""
@@ -34,7 +34,7 @@ class Visit:
     lower: Any
 
 
-def nodes(water: rays.Water, ends: tuple[float, float], number: Any) -> tuple[list[Any], list[Any]]:
+def nodes(water: ray_solutions.Water, ends: tuple[float, float], number: Any) -> tuple[list[Any], list[Any]]:
     """Depths and speeds of the profile in a type of number, with nodes at the two ends."""
     z, c = [number(float(v)) for v in water.depth], [number(float(v)) for v in water.speed]
     for end in map(number, ends):
@@ -119,7 +119,7 @@ def range_only(p: Any, dz: Any, c1: Any, c2: Any) -> Any:
 
 
 def solve_again(
-    water: rays.Water, start: float, end: float, r: mp.mpf, found: rays.Eigenrays, i: int
+    water: ray_solutions.Water, start: float, end: float, r: mp.mpf, found: ray_solutions.Eigenrays, i: int
 ) -> tuple[mp.mpf, Visit]:
     """Slowness and visit of found ray i, solved again for the distance r in many digits along its own path."""
     z, c = nodes(water, (start, end), mp.mpf)
@@ -145,7 +145,7 @@ def fan(critical: list[Any], count: int = 600) -> Iterator[Floats]:
 
 
 def families(
-    water: rays.Water, start: float, end: float, distances: Floats, vertices: int, reflections: int
+    water: ray_solutions.Water, start: float, end: float, distances: Floats, vertices: int, reflections: int
 ) -> list[list[tuple[Family, float, float]]]:
     """For each distance, every ray that a dense fan finds: its family and two slownesses that bracket it.
 
@@ -197,7 +197,7 @@ def straddling(p: Any, miss: Any, at: Any, depth: int = 3) -> list[tuple[float, 
     return pairs
 
 
-def family(found: rays.Eigenrays, i: int) -> Family:
+def family(found: ray_solutions.Eigenrays, i: int) -> Family:
     """The family of a found ray."""
     counts = int(found.surface[i]), int(found.bottom[i]), int(found.turning[i])
     return int(np.sign(found.start_sine[i])), *counts, int(np.sign(found.end_sine[i]))
@@ -216,7 +216,7 @@ def images(bed: float, start: float, end: float, reflections: int) -> list[tuple
     return sorted(rows, key=lambda row: row[4])
 
 
-def random_water(rng: np.random.Generator, layers: int, spread: float) -> rays.Water:
+def random_water(rng: np.random.Generator, layers: int, spread: float) -> ray_solutions.Water:
     """A random profile over a bed at 100 m; some layers of one speed, some jumps."""
     depth = np.sort(rng.uniform(0.0, 100.0, layers))
     speed = 1500.0 + spread * rng.normal(size=layers)
@@ -224,4 +224,4 @@ def random_water(rng: np.random.Generator, layers: int, spread: float) -> rays.W
         speed[2] = speed[1]
     if layers > 4 and rng.random() < 0.5:
         depth[4] = depth[3]
-    return rays.water(depth, speed, 100.0)
+    return ray_solutions.water(depth, speed, 100.0)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonarsynth.acoustics.bearings import envelope_peak
+from sonarsynth.equations.arrays.spherical_wave import envelope_peak
 from sonarsynth.products import Signals
-from sonarsynth.sonar import Elements
+from sonarsynth.receiver import Elements
 
 RATE = 196e3
 

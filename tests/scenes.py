@@ -6,16 +6,16 @@ from typing import Any
 
 import numpy as np
 
+from sonarsynth.environment.sea import Absorption, Environment, Isovelocity
+from sonarsynth.geometry.motion import Line, Still
+from sonarsynth.receiver import Band, BandPass, BeamGrid, Romanis, Sonar
 from sonarsynth.recipe import Recipe
+from sonarsynth.recipe.scene import Physics, Processing, Scene, Trajectory, World
 from sonarsynth.scattering import Isotropic
-from sonarsynth.scattering.targets import Target
-from sonarsynth.scene import Physics, Processing, Scene, Trajectory, World
-from sonarsynth.sonar import Band, BandPass, BeamGrid, Romanis, Sonar
-from sonarsynth.synthesis import KernelDeposit
-from sonarsynth.world.environment import Absorption, Environment, Isovelocity
-from sonarsynth.world.motion import Line, Still
-from sonarsynth.world.shapes import Remus100, Sphere
-from sonarsynth.world.sources import SnappingShrimp
+from sonarsynth.signals import KernelDeposit
+from sonarsynth.sources.shrimp import SnappingShrimp
+from sonarsynth.targets.shapes import Remus100, Sphere
+from sonarsynth.targets.target import Target
 
 
 def remus(frames: int = 2, **sonar: Any) -> Recipe:

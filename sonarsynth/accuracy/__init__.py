@@ -1,48 +1,119 @@
-"""Error against run time: what is computed fast, against the same computed slowly, exactly and independently.
-
-Each reference is a function that gives rows; `REFERENCES` names them.
-"""
+"""Error against run time on a recipe of one's own: every knob varied, frame by frame, and the plan's choices among
+them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Final
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
-from sonarsynth.accuracy.rays import ray_accuracy
-from sonarsynth.accuracy.rows import Row
+from sonarsynth.accuracy.exact_frame import Exact, exact_frame, synthesis_check
+from sonarsynth.accuracy.full_frame import Whole, whole_points
+from sonarsynth.accuracy.image_knobs import image_points, range_points
+from sonarsynth.accuracy.peer_rows import image_peers, synthesis_peers
+from sonarsynth.accuracy.rows import Point, Verdict, finite, merged
+from sonarsynth.accuracy.signal_knobs import synthesis_points
+from sonarsynth.accuracy.tracing_knobs import Traced, trace_points
+from sonarsynth.accuracy.verdicts import set_by_recipe, verdicts
+from sonarsynth.pipeline.synthesis import hear
+from sonarsynth.planning import Plan, arrivals_of
+from sonarsynth.planning import plan as plan_of
+from sonarsynth.recipe import Recipe
 
+__all__ = ["Exact", "Measured", "Point", "Verdict", "exact_frame", "measure", "usual_frames"]
 
-def _sphere(quick: bool) -> list[Row]:
-    from sonarsynth.accuracy.sphere import sphere_accuracy
-
-    return sphere_accuracy(quick)
-
-
-def _cylinder(quick: bool) -> list[Row]:
-    from sonarsynth.accuracy.cylinder import cylinder_accuracy
-
-    return cylinder_accuracy(quick)
-
-
-def _plate(quick: bool) -> list[Row]:
-    from sonarsynth.accuracy.plate import plate_accuracy
-
-    return plate_accuracy(quick)
+Say = Callable[[str], None]
 
 
-def _bubble(quick: bool) -> list[Row]:
-    from sonarsynth.accuracy.bubbles import bubble_accuracy
+@dataclass(frozen=True)
+class Measured:
+    """The rows of a recipe's accuracy."""
 
-    return bubble_accuracy(quick)
+    title: str
+    frames: tuple[int, ...]
+    hydrophones: int
+    """Hydrophones that were computed exactly."""
+    points: tuple[Point, ...]
+    verdicts: tuple[Verdict, ...]
+    choices: dict[str, Any] = field(default_factory=dict)
+    own: tuple[str, ...] = ()
+    """Stages whose method the recipe sets itself."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether every verdict is good, and the exact way itself right."""
+        return all(v.ok for v in self.verdicts) and all(p.meets for p in self.points if p.role == "check")
+
+    def as_json(self) -> list[dict[str, Any]]:
+        """A list of rows, for programs: points, peers and checks, then verdicts."""
+        common = {"frames": list(self.frames), "recipe": self.title}
+        rows = [p.as_json() for p in self.points] + [v.as_json() for v in self.verdicts]
+        return [finite(row | common) for row in rows]
 
 
-REFERENCES: Final[dict[str, Callable[[bool], list[Row]]]] = {
-    "rays": ray_accuracy,
-    "sphere": _sphere,
-    "cylinder": _cylinder,
-    "plate": _plate,
-    "bubble": _bubble,
-}
-"""Rows of each reference; the argument is whether to be quick about it."""
+def usual_frames(frames: int) -> tuple[int, ...]:
+    """Frames to measure: a third and two thirds of the way; a plan measures at the ends and in the middle."""
+    return tuple(sorted({frames // 3, (2 * frames) // 3} - ({0} if frames > 1 else set())))
 
-__all__ = ["REFERENCES", "Row", "ray_accuracy"]
+
+def measure(
+    recipe: Recipe,
+    frames: Sequence[int] | None = None,
+    *,
+    hydrophones: int | None = None,
+    seed: int | None = None,
+    peers: bool = True,
+    say: Say = lambda text: None,
+) -> Measured:
+    """Vary every knob of a recipe, and measure the plan's choices.
+
+    frames: which; left out: `usual_frames`. hydrophones: so many are computed exactly, from the description alone;
+    left out: from 4 to 24, by how long one takes. seed: frames are drawn anew from this one, by the
+    choices of the recipe's. peers: whether they are measured too, in the first frame.
+    Raises FieldError as `plan` does.
+    """
+    say("planning")
+    made = plan_of(recipe)
+    if seed is not None:
+        made = replace(plan_of(replace(recipe, seed=seed), choices=made.choices), errors=made.errors)
+    chosen = usual_frames(recipe.frames) if frames is None else tuple(frames)
+    points: list[Point] = []
+    rests, heard = [], 0
+    for index in chosen:
+        found, rest, count = _frame(made, index, hydrophones, say, peers=peers and index == chosen[0])
+        points += found
+        rests.append(rest)
+        heard = count
+    rows = merged(points)
+    rest = sum(rests) / len(rests)
+    own = tuple(sorted(set_by_recipe(made.scene)))
+    return Measured(
+        recipe.title, chosen, heard, tuple(rows), tuple(verdicts(rows, made.scene, rest)), made.choices.as_json(), own
+    )
+
+
+def _frame(made: Plan, index: int, hydrophones: int | None, say: Say, *, peers: bool) -> tuple[list[Point], float, int]:
+    """The points of one frame; seconds of what nothing is chosen for; and hydrophones heard exactly."""
+    say(f"frame {index}: exactly")
+    exact = exact_frame(made, index, hydrophones)
+    plan, frame = exact.plan, exact.frame
+    points = [synthesis_check(exact)]
+    say(f"frame {index}: tracing, {len(exact.sensor)} hydrophones")
+    traced = Traced.of(plan, frame, exact.sensor)
+    points += trace_points(exact, traced)
+    say(f"frame {index}: synthesis")
+    points += synthesis_points(traced)
+    arrivals = arrivals_of(plan, frame)
+    signals = hear(plan, frame, arrivals)
+    whole = Whole.of(exact, signals)
+    say(f"frame {index}: image and range")
+    points += image_points(plan, whole.heard)
+    points += range_points(plan, frame, whole.heard)
+    if peers:
+        say(f"frame {index}: peers")
+        points += synthesis_peers(plan, frame, arrivals.at_centre)  # peers know no shade
+        points += image_peers(plan, frame, arrivals.at_centre, whole.heard)
+    say(f"frame {index}: everything exact")
+    spent = whole.seconds + sum(p.seconds for p in points if p.chosen and p.stage != "synthesis")
+    points += whole_points(whole, traced, spent)
+    return points, whole.seconds, len(exact.sensor)

@@ -1,42 +1,113 @@
-"""Rows of an accuracy table: one case, one quantity, the error that was allowed, the error that was found, the cost."""
+"""Rows of the table of a recipe: settings of a knob with their error and cost, and what they say of the choice."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from math import isnan
-from typing import Any
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from math import isfinite, nan
+from typing import Any, Final, Literal, TypeVar
+
+STAGES: Final = ("trace", "synthesis", "image", "range", "frame")
+"""Parts of a frame that are walked, and the whole."""
+Role = Literal["point", "peer", "check"]
+T = TypeVar("T")
+
+REPEATS, ENOUGH, LONG = 3, 1.0, 5.0
+"""Times that something is measured at most; after so many s together it has been measured enough, and what takes this
+long is measured once."""
 
 
 @dataclass(frozen=True)
-class Row:
-    """The largest error of one quantity in one case, against a computation that shares no code with what it checks."""
+class Point:
+    """One setting of one knob: what it errs by, and what it costs. In tracing all else is exact, but for what is chosen
+    and what is cheaper than that; in other stages all else is as chosen."""
 
-    case: str
-    reference: str
-    """What it was compared with."""
-    quantity: str
+    stage: str
+    knob: str
+    setting: str
+    error: float
+    """Against the exact way, in `unit`: what the accuracy of the recipe is about. Largest of the frames."""
     unit: str
-    expected: float
-    """Bound of the error, in `unit`: at the place where the error is largest against its bound."""
-    got: float
-    """The error there."""
-    cost: float
-    """CPU time of one core, in `cost_unit`."""
-    cost_unit: str
-    """Of what, too: "us a ray", "ms an aspect"."""
-    counts: Mapping[str, int]
-    """How much of it there was, each number with its name: {"pairs": 60, "rays": 540}, {"facets": 20480}."""
-    knob: str | None = None
-    """Name of the trade of error for time that the case is one point of."""
+    allowed: float
+    seconds: float
+    """CPU time of one core a frame, of this stage; mean of the frames."""
+    chosen: bool = False
+    """Whether it is what the plan has."""
+    role: Role = "point"
+    """`peer`: another program or method; `check`: of the exact way itself."""
+    also: Mapping[str, float] = field(default_factory=dict)
+    """More numbers, by name with unit."""
     note: str = ""
-    """What the bound is, where it is not the one that is aimed at; one line."""
 
     @property
-    def ok(self) -> bool:
-        """Whether the error is within its bound; an error that is not a number is not."""
-        return self.got <= self.expected
+    def meets(self) -> bool:
+        """Whether the error is within what is allowed; one that is not a number is not."""
+        return self.error <= self.allowed
 
     def as_json(self) -> dict[str, Any]:
-        """The row with its verdict, for programs: counts by their names; an error that is not a number is None."""
-        return asdict(self) | dict(self.counts) | {"got": None if isnan(self.got) else self.got, "ok": self.ok}
+        """The row for programs; numbers that are none are None."""
+        rows = {"row": self.role} | asdict(self) | dict(self.also) | {"meets": self.meets}
+        return finite({k: v for k, v in rows.items() if k not in ("role", "also")})
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether the choice of a stage, or of the whole frame, keeps within the accuracy at little more than it need."""
+
+    stage: str
+    choice: str
+    error: float
+    unit: str
+    allowed: float
+    seconds: float
+    cheapest: str
+    """The cheapest setting of the walk that keeps within the accuracy too."""
+    cheapest_seconds: float
+    ok: bool
+    note: str = ""
+
+    @property
+    def ratio(self) -> float:
+        """How many times as long the choice takes as the cheapest setting; NaN where none keeps within."""
+        return self.seconds / self.cheapest_seconds if self.cheapest_seconds > 0.0 else nan
+
+    def as_json(self) -> dict[str, Any]:
+        """The row for programs."""
+        return finite({"row": "verdict"} | asdict(self) | {"ratio": self.ratio})
+
+
+def finite(row: dict[str, Any]) -> dict[str, Any]:
+    """A row with None for numbers that are not finite: JSON has none."""
+    return {k: None if isinstance(v, float) and not isfinite(v) else v for k, v in row.items()}
+
+
+def timed(function: Callable[[], T]) -> tuple[T, float]:
+    """What a function gives, and the CPU seconds of its fastest call: compiled, and with its tables made."""
+    best, total, calls = float("inf"), 0.0, 0
+    while True:
+        began = time.process_time()
+        made = function()
+        seconds = time.process_time() - began
+        best, total, calls = min(best, seconds), total + seconds, calls + 1
+        if calls == REPEATS or total > LONG or (calls > 1 and total > ENOUGH):
+            return made, best
+
+
+def merged(points: Iterable[Point]) -> list[Point]:
+    """One point for each setting, of those of several frames: the largest errors, the mean cost."""
+    alike: dict[tuple[str, str, str, str], list[Point]] = {}
+    for point in points:
+        alike.setdefault((point.stage, point.role, point.knob, point.setting), []).append(point)
+    return [_merged(group) for group in alike.values()]
+
+
+def _merged(group: Sequence[Point]) -> Point:
+    errors = [p.error for p in group]
+    names = dict.fromkeys(name for p in group for name in p.also)
+    return replace(
+        group[0],
+        error=max(errors) if all(isfinite(e) for e in errors) else nan,
+        seconds=sum(p.seconds for p in group) / len(group),
+        also={name: max(p.also[name] for p in group if name in p.also) for name in names},
+    )

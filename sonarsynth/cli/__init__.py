@@ -14,13 +14,13 @@ from typing import Annotated, Any
 
 import typer
 
-from sonarsynth.cli.accuracy import accuracy
-from sonarsynth.cli.card import card
-from sonarsynth.cli.repairing import repair
+from sonarsynth.cli.accuracy_command import accuracy
+from sonarsynth.cli.card_command import card
+from sonarsynth.cli.repair_command import repair
 from sonarsynth.cli.running import BadOption, run
 from sonarsynth.cli.selecting import chosen_frames, product_names
-from sonarsynth.cli.target_strength import target_strength
-from sonarsynth.cli.workers import worker_bounds
+from sonarsynth.cli.target_strength_command import target_strength
+from sonarsynth.cli.worker_options import worker_bounds
 
 __all__ = ["app", "main"]
 
@@ -119,17 +119,18 @@ def build(
     as_json: Json = False,
 ) -> None:
     """Build a dataset, or the part of it that is missing. Interrupted, the same command goes on."""
-    from sonarsynth import config, planning, schedule, verification
+    from sonarsynth import evaluation, planning, schedule
     from sonarsynth import store as stores
     from sonarsynth.cli import printing
+    from sonarsynth.recipe import reading
 
     if scheduler is not None and workers is not None:
         raise BadOption("--workers is for worker processes of our own, --scheduler for those of another: give one")
     bounds = worker_bounds(workers, scheduler, frame_timeout, worker_memory, insecure)
     chosen = product_names(products)
-    source = config.read(recipe, settings)
-    made_from = config.recipe_of(source)
-    with config.locating(source):
+    source = reading.read(recipe, settings)
+    made_from = reading.recipe_of(source)
+    with reading.locating(source):
         plan = planning.plan(made_from, chosen)
     wanted = chosen_frames(frames, sequences, made_from.sequences, made_from.steps)
     stores.try_writing(stores.folder_of(store))
@@ -143,7 +144,7 @@ def build(
             dashboard=dashboard, progress=progress, announce=printing.announce, **bounds,
             prediction=prediction, source=source,
         )  # fmt: skip
-    report.warnings = tuple(verification.warnings(store))
+    report.warnings = tuple(evaluation.warnings(store))
     if as_json:
         _print_json(report.as_json())
     else:
@@ -158,13 +159,14 @@ def plan(recipe: RecipeFile, settings: Settings = [], products: Products = ALL_P
 
     Time and size are of a build with as many workers as this machine has cores, known from frames made here.
     """
-    from sonarsynth import config, planning, schedule
+    from sonarsynth import planning, schedule
     from sonarsynth.cli import printing
+    from sonarsynth.recipe import reading
 
     chosen = product_names(products)
-    source = config.read(recipe, settings)
-    made_from = config.recipe_of(source)
-    with config.locating(source):
+    source = reading.read(recipe, settings)
+    made_from = reading.recipe_of(source)
+    with reading.locating(source):
         made = planning.plan(made_from, chosen)
     prediction = schedule.predict(made, prepared=time.process_time())
     made = replace(made, stages=prediction.rows(made))
@@ -181,11 +183,11 @@ def verify(
     as_json: Json = False,
 ) -> None:
     """Check a store: every file against its digest, every number read back, ground truth against the data."""
+    from sonarsynth import evaluation
     from sonarsynth import store as stores
-    from sonarsynth import verification
     from sonarsynth.cli import printing
 
-    report = stores.verify(store, [verification.check], quick=quick)
+    report = stores.verify(store, [evaluation.check], quick=quick)
     if as_json:
         _print_json(report.as_json())
     else:
@@ -212,8 +214,8 @@ def show(
 
     Several stores: their films side by side, each with its range error, levels and cost.
     """
-    from sonarsynth.show import show as draw
-    from sonarsynth.show.beside import show_beside
+    from sonarsynth.pictures import show as draw
+    from sonarsynth.pictures.compare import show_beside
 
     if len(stores) == 1:
         files = draw(stores[0], out, frame=frame, film=film, say=typer.echo)
@@ -239,14 +241,15 @@ def rays(
     settings: Settings = [],  # noqa: B006
 ) -> None:
     """Draw rays through a frame in a section, in space and as a page: eigenrays, or what the recipe asks for."""
-    from sonarsynth import config, planning
-    from sonarsynth.show.rays import show_rays
+    from sonarsynth import planning
+    from sonarsynth.pictures.ray_pictures import show_rays
+    from sonarsynth.recipe import reading
 
-    source = config.read(recipe, settings)
-    made_from = config.recipe_of(source)
+    source = reading.read(recipe, settings)
+    made_from = reading.recipe_of(source)
     if frame >= made_from.frames:
         raise BadOption(f"--frame {frame} is outside 0..{made_from.frames - 1}")
-    with config.locating(source):
+    with reading.locating(source):
         files, table = show_rays(planning.plan(made_from), frame, out or Path(f"{recipe.stem}.rays"))
     typer.echo(table)
     for file in files:
@@ -260,21 +263,21 @@ def snap(
     settings: Settings = [],  # noqa: B006
 ) -> None:
     """Draw the snap of a recipe: waveform and spectrum, as made and as heard, and the sonar's filter."""
-    from sonarsynth import config
-    from sonarsynth.show.snaps import show_snap
+    from sonarsynth.pictures.snap_pictures import show_snap
+    from sonarsynth.recipe import reading
 
-    source = config.read(recipe, settings)
-    with config.locating(source):
-        show_snap(config.recipe_of(source), out)
+    source = reading.read(recipe, settings)
+    with reading.locating(source):
+        show_snap(reading.recipe_of(source), out)
     typer.echo(str(out))
 
 
 @app.command()
 def schema() -> None:
     """Print the JSON schema of a recipe, for editors."""
-    from sonarsynth import config
+    from sonarsynth.recipe import reading
 
-    _print_json(config.schema())
+    _print_json(reading.schema())
 
 
 def _print_json(value: Any) -> None:

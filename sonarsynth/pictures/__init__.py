@@ -1,1 +1,112 @@
-"""Functions from arrays to matplotlib figures. Nothing here reads a store; matplotlib is imported when drawing."""
+"""Pictures of a store, from the store alone: a film of all frames, a sheet of one, and a summary."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.pictures.figures.frame_figure import FramePicture, View, window
+from sonarsynth.pictures.figures.sheet import Errors, sheet
+from sonarsynth.pictures.figures.style import decibels
+from sonarsynth.pictures.film import thinned, write_film
+from sonarsynth.pictures.steered_beams import beams
+from sonarsynth.pictures.store_reading import NothingToDraw, Stored, beam_grid, built, opened, pictures_of, stored
+from sonarsynth.pictures.summary import summary
+from sonarsynth.store import Folder, folder_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def show(
+    store: str | Folder,
+    out: str | Path | None = None,
+    *,
+    frame: int | None = None,
+    film: bool = True,
+    frames_per_second: float = 10.0,
+    say: Callable[[str], None] = print,
+) -> list[Path]:
+    """Draw a store into the folder `out` (left out: `<store>.pictures`), say a summary, return the files written.
+
+    film.mp4 (film.gif without ffmpeg): every frame that was built. sheet.png: frame number `frame` (left out: the one
+    with most points on a target). What the store does not hold is left out of the pictures and said. Raises
+    NothingToDraw, a ValueError, where there is no store, or not that frame.
+    """
+    path = folder_of(store)
+    tree = opened(path)
+    frames = built(tree)
+    if not len(frames):
+        say(summary(tree, path))
+        raise NothingToDraw(f"{path}: no frame has been built yet")
+    if frame is not None and frame not in frames:
+        raise NothingToDraw(
+            f"{path}: frame {frame} has not been built; there are {len(frames)}, {frames[0]} to {frames[-1]}"
+        )
+    say(summary(tree, path))
+    folder = pictures_of(path) if out is None else Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    filmed = thinned(frames.tolist())
+    read = {i: stored(tree, i) for i in filmed}
+    if frame is not None and frame not in read:
+        read[frame] = stored(tree, frame)
+    chosen = frame if frame is not None else max(read, key=lambda i: _interest(read[i]))
+    files = [_write_sheet(tree, read[chosen], folder, say)]
+    if film and len(frames) > 1:
+        if len(filmed) < len(frames):
+            say(f"film: {len(filmed)} of {len(frames)} frames")
+        in_order = [read[i] for i in filmed]
+        reference = _reference(in_order)
+        views = [_view(tree, one, reference) for one in in_order]
+        picture = FramePicture(*beam_grid(tree), window(views), "energy re the brightest beam of all frames (dB)")
+        files.append(write_film(picture, views, folder, frames_per_second))
+    return files
+
+
+def _interest(frame: Stored) -> tuple[int, int]:
+    """Points on a target, then beams on a target."""
+    return int(np.isfinite(frame.range_error).sum()), int((frame.target >= 0).sum())
+
+
+def _reference(frames: list[Stored]) -> float:
+    """The brightest beam of frames (Pa2 s); 1 where nothing is heard."""
+    energies = [f.energy if f.energy is not None else f.point_energy for f in frames]
+    peaks = [float(np.nanmax(e)) for e in energies if np.isfinite(e).any()]
+    return max([p for p in peaks if p > 0], default=1.0)
+
+
+def _view(tree: xr.DataTree, frame: Stored, reference: float) -> View:
+    found = frame.found
+    title = tree.attrs.get("title") or "untitled"
+    clock = f"   t = {frame.time:.2f} s" if np.isfinite(frame.time) else ""
+    return View(
+        title=f"{title}   frame {frame.index} (0 to {tree['truth'].sizes['frame'] - 1}){clock}",
+        level=None if frame.energy is None else decibels(frame.energy, reference),
+        points=frame.points[found],
+        point_level=decibels(frame.point_energy[found], reference),
+        hulls=frame.hulls,
+        ghosts=frame.ghosts,
+    )
+
+
+def _write_sheet(
+    tree: xr.DataTree,
+    frame: Stored,
+    folder: Path,
+    say: Callable[[str], None],
+) -> Path:
+    heard = beams(tree, frame)
+    missing = [name for name in ("signals", "image", "cloud") if name not in tree.children]
+    if missing:
+        say(f"sheet: without {', '.join(missing)}, which the store does not hold")
+    elif not heard:
+        say("sheet: without beam signals, for no beam of the frame points at a target")
+    errors = Errors(points=frame.points[frame.found], error=frame.range_error[frame.found])
+    view = _view(tree, frame, _reference([frame]))
+    made = sheet(*beam_grid(tree), view, errors, heard, window([view]), "energy re the brightest beam (dB)")
+    path = folder / "sheet.png"
+    made.savefig(path)
+    return path

@@ -7,12 +7,12 @@ from typing import Annotated, Any, Literal
 from annotated_types import Ge, Lt
 from pydantic import TypeAdapter
 
-from sonarsynth.beamforming import DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.conventions import Number
 from sonarsynth.description import BY_KIND, description
+from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
+from sonarsynth.propagation import Visibility
 from sonarsynth.ranging import IsovelocityRange, RefractedRange
-from sonarsynth.synthesis import DirectSum, KernelDeposit
-from sonarsynth.tracing import Visibility
+from sonarsynth.signals import DirectSum, KernelDeposit
 
 Degree = Literal[3, 5]
 

@@ -13,24 +13,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonarsynth.beamforming import DenseDelayAndSum
 from sonarsynth.conventions import Floats, Ints
-from sonarsynth.planning.arriving import arrivals_of
-from sonarsynth.planning.bending import ranging_error
+from sonarsynth.imaging import DenseDelayAndSum
 from sonarsynth.planning.choices import Choices, Degree
-from sonarsynth.planning.imaging import beamformer
-from sonarsynth.planning.looks import Look
+from sonarsynth.planning.listening_windows import frame_start
+from sonarsynth.planning.measured.focus_zones import beamformer
+from sonarsynth.planning.measured.ray_bending import ranging_error
+from sonarsynth.planning.measured.sampled_arrivals import arrivals_of
+from sonarsynth.planning.measured.sampled_frames import Look
 from sonarsynth.planning.plans import Errors, Plan
-from sonarsynth.planning.windows import frame_start
 from sonarsynth.products import Arrivals
+from sonarsynth.propagation import Visibility
 from sonarsynth.ranging import AutoRange, IsovelocityRange, RefractedRange
+from sonarsynth.receiver import Elements
+from sonarsynth.receiver.subarrays import subarray, subarrays, with_rim
 from sonarsynth.recipe import Accuracy
-from sonarsynth.scene import Frame, Scene
-from sonarsynth.sonar import Elements
-from sonarsynth.sonar.subarrays import subarray, subarrays, with_rim
-from sonarsynth.synthesis import AutoSynthesis, DirectSum, KernelDeposit
-from sonarsynth.synthesis.auto import deposit_error, deposit_for
-from sonarsynth.tracing import Visibility
+from sonarsynth.recipe.scene import Frame, Scene
+from sonarsynth.signals import AutoSynthesis, DirectSum, KernelDeposit
+from sonarsynth.signals.auto_synthesis import deposit_error, deposit_for
 
 FAINT, SYNTHESIS, EXPANSION = 0.1, 0.4, 0.5
 """Shares of the square of the error allowed to signals: of paths left out, of the synthesis, of expansions."""

@@ -12,11 +12,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from sonarsynth.beamforming import DenseDelayAndSum, FocusedDelayAndSum
+from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.planning.plans import Plan, Stage
+from sonarsynth.propagation import Straight
 from sonarsynth.scattering import Kirchhoff
-from sonarsynth.synthesis import DirectSum
-from sonarsynth.tracing import Straight
+from sonarsynth.signals import DirectSum
 
 REFERENCE_TRANSFORM = 1.42e-3
 """Seconds of the transforms in `machine_factor` on the machine where the constants below were measured."""

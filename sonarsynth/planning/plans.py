@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.planning.absorbing import Passed, mean_absorption, passed_by, shape_error
-from sonarsynth.planning.bending import propagation
-from sonarsynth.planning.checks import check_shrimp, read_inputs
+from sonarsynth.description.memory import frame_bytes
+from sonarsynth.environment.absorption import DepthAbsorption
+from sonarsynth.environment.sea import Profile
 from sonarsynth.planning.choices import Choices
+from sonarsynth.planning.measured.absorption_error import Passed, mean_absorption, passed_by, shape_error
+from sonarsynth.planning.measured.ray_bending import propagation
+from sonarsynth.planning.notes.scene_checks import check_shrimp, read_inputs
 from sonarsynth.products import Paths
+from sonarsynth.propagation import Refracted, Straight
+from sonarsynth.receiver import Elements, elements
 from sonarsynth.recipe import Recipe
-from sonarsynth.scene import Scene
-from sonarsynth.sonar import Elements, elements
-from sonarsynth.tracing import Refracted, Straight
-from sonarsynth.world.environment import Profile
-from sonarsynth.world.room import frame_bytes
-from sonarsynth.world.water import DepthAbsorption
+from sonarsynth.recipe.scene import Scene
 
 PRODUCTS = ("signals", "image", "cloud")
 """What a build can be asked for. Truth is always written; with any of these, levels of what is traced too."""

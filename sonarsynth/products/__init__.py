@@ -5,9 +5,9 @@ Unless said otherwise arrays are float64, positions in m in the sonar frame, tim
 the instant of the frame; a snap at `Snap.time` is heard a travel time later).
 """
 
+from sonarsynth.products.labels import LEDGER, ORIGINS, Echoes, Ledger, PointLabels, Truth
 from sonarsynth.products.paths import FAMILIES, Arrivals, Paths
-from sonarsynth.products.sonar import REASONS, Bearings, EnergyImage, PointCloud, Signals
-from sonarsynth.products.truth import LEDGER, ORIGINS, Echoes, Ledger, PointLabels, Truth
+from sonarsynth.products.results import REASONS, Bearings, EnergyImage, PointCloud, Signals
 
 __all__ = [
     "FAMILIES",

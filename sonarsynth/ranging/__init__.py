@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import Annotated, Protocol
 
 from sonarsynth.description import BY_KIND
+from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Bearings, EnergyImage, PointCloud, Signals
-from sonarsynth.ranging.auto import AutoRange
-from sonarsynth.ranging.cancelling import WavefrontCancelling
+from sonarsynth.ranging.auto_ranging import AutoRange
+from sonarsynth.ranging.cancelling.reflection_cancelling import WavefrontCancelling
 from sonarsynth.ranging.isovelocity import IsovelocityRange
-from sonarsynth.ranging.refracted import RefractedRange
-from sonarsynth.ranging.sensor_delays import SensorDelays
-from sonarsynth.sonar import Elements, Sonar
-from sonarsynth.world.environment import Profile
+from sonarsynth.ranging.location.sensor_delays import SensorDelays
+from sonarsynth.ranging.refracted_ranging import RefractedRange
+from sonarsynth.receiver import Elements, Sonar
 
 __all__ = [
     "AutoRange",

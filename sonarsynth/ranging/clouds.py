@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonarsynth.acoustics.bistatic import bistatic_range
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.arrays.bistatic_range import bistatic_range
 from sonarsynth.products import Bearings, EnergyImage, PointCloud, Signals
-from sonarsynth.ranging.echoes import over_threshold, pick, range_profiles
-from sonarsynth.sonar import Elements, Sonar
+from sonarsynth.ranging.beam_echoes import over_threshold, pick, range_profiles
+from sonarsynth.receiver import Elements, Sonar
 
 SLOPE = 0.7
 """Standard slope of a surface against the beam: its range changes by this share of the distance across the beam."""

@@ -8,10 +8,10 @@ from annotated_types import Ge, Gt
 
 from sonarsynth.conventions import Decibels, PositiveMetres
 from sonarsynth.description import description
+from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Bearings, EnergyImage, PointCloud, Signals
-from sonarsynth.sonar import Elements, Sonar
-from sonarsynth.world.environment import Profile
+from sonarsynth.receiver import Elements, Sonar
 
 
 @description

@@ -11,21 +11,20 @@ from annotated_types import Ge, Le
 from pydantic import Discriminator, Tag, TypeAdapter
 
 from sonarsynth.conventions import Ints
-from sonarsynth.description import description
-from sonarsynth.recipe.attribution import Attribution, Creator
-from sonarsynth.recipe.grid import Axis, Together, entry_tag
+from sonarsynth.description import description, named_files
+from sonarsynth.environment.sound_speed import Cast
+from sonarsynth.propagation.ray_request import RayRequest
+from sonarsynth.recipe.citation import Attribution, Creator
+from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.recipe.sequences import MOST_SEQUENCES, Sequences
 from sonarsynth.recipe.splits import SPLITS, Splits
 from sonarsynth.recipe.tolerance import Accuracy
-from sonarsynth.recipe.values import Plain
-from sonarsynth.recipe.variants import Variants, target_meshes, variant_numbers
-from sonarsynth.recipe.variations import Choice, Normal, Sobol, Uniform, Variation
-from sonarsynth.scene import Frame, Scene
-from sonarsynth.tracing.ray_request import RayRequest
-from sonarsynth.world import files
-from sonarsynth.world.shapes import MeshFile
-from sonarsynth.world.snaps import RecordedSnap
-from sonarsynth.world.sound_speed import Cast
+from sonarsynth.recipe.variation.grid import Axis, Together, entry_tag
+from sonarsynth.recipe.variation.mesh_variants import Variants, target_meshes, variant_numbers
+from sonarsynth.recipe.variation.random_variations import Choice, Normal, Sobol, Uniform, Variation
+from sonarsynth.recipe.variation.values import Plain
+from sonarsynth.sources.snap_models import RecordedSnap
+from sonarsynth.targets.shapes import MeshFile
 
 __all__ = [
     "FILE_KINDS",
@@ -146,7 +145,7 @@ def _by_content(value: Any) -> Any:
     """The same JSON value with the path of each file replaced by the digest of what it holds."""
     if isinstance(value, dict):
         path = value.get("path") if value.get("kind") in FILE_KINDS else None
-        held = {"path": files.digest(path)} if isinstance(path, str) else {}
+        held = {"path": named_files.digest(path)} if isinstance(path, str) else {}
         return {name: _by_content(v) for name, v in value.items()} | held
     return [_by_content(v) for v in value] if isinstance(value, list) else value
 

@@ -20,12 +20,12 @@ import numpy as np
 from sonarsynth.conventions import Ints
 from sonarsynth.description import FieldError
 from sonarsynth.randomness import number
-from sonarsynth.recipe.grid import Axis, Together, axes
-from sonarsynth.recipe.setting import Setting, plain_scene, with_settings
+from sonarsynth.recipe.scene import Scene
 from sonarsynth.recipe.splits import SPLITS, Splits, assign
-from sonarsynth.recipe.values import Plain, Where, default_name, where
-from sonarsynth.recipe.variations import Choice, Sobol, Variation
-from sonarsynth.scene import Scene
+from sonarsynth.recipe.variation.grid import Axis, Together, axes
+from sonarsynth.recipe.variation.random_variations import Choice, Sobol, Variation
+from sonarsynth.recipe.variation.setting import Setting, plain_scene, with_settings
+from sonarsynth.recipe.variation.values import Plain, Where, default_name, where
 
 MOST_FRAMES = 10_000_000
 MOST_SEQUENCES = 1_000_000

@@ -11,7 +11,7 @@ from pydantic import model_validator
 
 from sonarsynth.conventions import Ints, Number
 from sonarsynth.description import description
-from sonarsynth.recipe.values import Name
+from sonarsynth.recipe.variation.values import Name
 
 SPLITS = ("train", "validation", "test")
 """Names of the splits, in the order of their numbers in the store."""

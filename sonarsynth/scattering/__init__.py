@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Annotated, Protocol
 
 from sonarsynth.description import BY_KIND
+from sonarsynth.scattering.components import Part
 from sonarsynth.scattering.isotropic import Isotropic
 from sonarsynth.scattering.kirchhoff import Kirchhoff, PartlyReflecting
+from sonarsynth.scattering.law_validity import Scatterer
 from sonarsynth.scattering.mirror_lobe import MirrorLobe
-from sonarsynth.scattering.parts import Part
-from sonarsynth.scattering.validity import Scatterer
 
 
 class ScatteringLaw(Protocol):

@@ -7,12 +7,12 @@ from typing import Annotated, Literal
 import numpy as np
 from annotated_types import Gt
 
-from sonarsynth.acoustics.lobes import lit_and_seen
 from sonarsynth.conventions import Floats, Metres
 from sonarsynth.description import description
-from sonarsynth.scattering.parts import Part, Plain
-from sonarsynth.scattering.validity import COARSE, Scatterer, facets_note
-from sonarsynth.world.mesh import Mesh
+from sonarsynth.equations.scattering.lobes import lit_and_seen
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.scattering.components import Part, Plain
+from sonarsynth.scattering.law_validity import COARSE, Scatterer, facets_note
 
 
 @description

@@ -7,14 +7,14 @@ from typing import Annotated, Literal
 import numpy as np
 from annotated_types import Ge, Gt, Le
 
-from sonarsynth.acoustics.kirchhoff import shadow_taper
-from sonarsynth.acoustics.lobes import lit_and_seen
-from sonarsynth.acoustics.roughness import incoherent_power, roughness_parameter
 from sonarsynth.conventions import Bools, Floats, NonNegativeMetres, Number
 from sonarsynth.description import description
-from sonarsynth.scattering.notes import concave_note
-from sonarsynth.scattering.parts import Part, Rough, Smooth, reflection
-from sonarsynth.scattering.validity import NEAR, Scatterer, aside_note, lit_half, size_note, slopes_note
+from sonarsynth.equations.scattering.kirchhoff_integral import shadow_taper
+from sonarsynth.equations.scattering.lobes import lit_and_seen
+from sonarsynth.equations.scattering.roughness import incoherent_power, roughness_parameter
+from sonarsynth.scattering.components import Part, Rough, Smooth, reflection
+from sonarsynth.scattering.law_notes import concave_note
+from sonarsynth.scattering.law_validity import NEAR, Scatterer, aside_note, lit_half, size_note, slopes_note
 
 
 @description
@@ -131,8 +131,8 @@ class Kirchhoff:
         whether the surface is curved there (facet,); wavenumber (frequency,) rad/m. shape: `convex.shape_operators`
         (facet, xyz, xyz) of a smooth convex body, all of whose facets are given: its light, shadow and what creeps.
         """
-        from sonarsynth.acoustics.convex_kernels import convex_amplitude
-        from sonarsynth.acoustics.kirchhoff_kernels import mesh_amplitude
+        from sonarsynth.equations.scattering.convex_kernels import convex_amplitude
+        from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
 
         coefficient = self.reflection(incident, scattered)
         factor = self.lit(incident, scattered, normal, curved)

@@ -8,12 +8,12 @@ import numpy as np
 from annotated_types import Ge, Gt, Le
 from pydantic import ValidationInfo, field_validator
 
-from sonarsynth.acoustics.lobes import lobe_amplitude, slope_of_width
 from sonarsynth.conventions import Floats, Number, Radians
 from sonarsynth.description import description
-from sonarsynth.scattering.parts import Part, Plain
-from sonarsynth.scattering.polarity import random_polarity
-from sonarsynth.scattering.validity import (
+from sonarsynth.equations.scattering.lobes import lobe_amplitude, slope_of_width
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.scattering.components import Part, Plain
+from sonarsynth.scattering.law_validity import (
     COARSE,
     Scatterer,
     aside_note,
@@ -22,7 +22,7 @@ from sonarsynth.scattering.validity import (
     grazing_note,
     size_note,
 )
-from sonarsynth.world.mesh import Mesh
+from sonarsynth.scattering.random_signs import random_polarity
 
 
 @description

@@ -7,20 +7,20 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, fields, replace
 from typing import Final
 
-from sonarsynth import cards, store
-from sonarsynth.config import Source
+from sonarsynth import store
 from sonarsynth.conventions import size
+from sonarsynth.description.memory import free_bytes
 from sonarsynth.planning import PRODUCTS, Plan, choices_from, chosen_products, plan
 from sonarsynth.recipe import Recipe
-from sonarsynth.schedule.log import append_lines, read_lines, write_lines
+from sonarsynth.recipe.reading import Source
+from sonarsynth.schedule.build_log import append_lines, read_lines, write_lines
+from sonarsynth.schedule.build_report import BuildReport, Course, Progress
+from sonarsynth.schedule.disk_space import Room, TooLarge, check_space, told_when_full
 from sonarsynth.schedule.making import job_of, make_shards, seen_by, usable_cores
 from sonarsynth.schedule.predicting import Prediction, predict
-from sonarsynth.schedule.report import BuildReport, Course, Progress
-from sonarsynth.schedule.space import Room, TooLarge, check_space, told_when_full
 from sonarsynth.schedule.tasks import Failure
-from sonarsynth.store import Damage, Folder, Mismatch, provenance
+from sonarsynth.store import Damage, Folder, Mismatch, cards, provenance
 from sonarsynth.store.creating import plain_recipe, spelled
-from sonarsynth.world.room import free_bytes
 
 __all__ = ["BuildReport", "Failure", "Prediction", "Progress", "TooLarge", "build", "predict", "usable_cores"]
 

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from distributed import Client, Future, KilledWorker
 
-from sonarsynth.schedule import diary, tasks
+from sonarsynth.schedule import tasks, worker_status
 from sonarsynth.schedule.tasks import Failure, Job, Step, Written
 
 SHARDS_AHEAD: Final = 3
@@ -41,7 +41,7 @@ class _Flight:
     last: bool = False  # it does not come again
 
 
-def _without(flight: _Flight, entry: diary.Entry | None) -> _Flight:
+def _without(flight: _Flight, entry: worker_status.Entry | None) -> _Flight:
     """A shard after its worker ended."""
     if entry is not None and entry.frame not in flight.frames:
         return flight
@@ -129,7 +129,7 @@ class _Builder:
 
         Where it only tells what the worker was doing, that shard has lost a worker; where not even that, all have.
         """
-        entry = diary.read(self.job.path, worker)
+        entry = worker_status.read(self.job.path, worker)
         doing = "doing nothing" if entry is None else f"frame {entry.frame}, {entry.stage}: {entry.error or 'killed'}"
         self.lost(worker, doing)
         again = []
@@ -205,7 +205,9 @@ class _Builder:
             return None
         if not isinstance(error, KilledWorker):
             raise error
-        found = [entry for worker in before if (entry := diary.read(self.job.path, worker)) and entry.frame == frame]
+        found = [
+            entry for worker in before if (entry := worker_status.read(self.job.path, worker)) and entry.frame == frame
+        ]
         for entry in found:
             if entry.error:
                 return Failure(frame, entry.stage, entry.error, entry.traceback)
@@ -232,8 +234,8 @@ def run(
     Raises what writing raises, ConnectionError where the scheduler is gone, RuntimeError where there is no worker for
     `patience` seconds.
     """
-    diary.open_folder(job.path)
+    worker_status.open_folder(job.path)
     try:
         _Builder(client, job, done, lost, patience).run(todo)
     finally:
-        diary.close_folder(job.path)
+        worker_status.close_folder(job.path)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from sonarsynth.planning import Plan
-from sonarsynth.schedule import diary, tasks
+from sonarsynth.schedule import tasks, worker_status
 from sonarsynth.schedule.tasks import Job, Written
 from sonarsynth.store import Folder, Remote, Unreachable
 
@@ -60,7 +60,7 @@ def make_shards(
     if not todo:
         return
     tasks.remember(job, made)
-    diary.close_folder(job.path)  # of a build that was killed
+    worker_status.close_folder(job.path)  # of a build that was killed
     if scheduler is None and workers == 0:
         for shard, frames in todo.items():
             done(tasks.write(job, shard, [[tasks.render_frame(job, frame) for frame in frames]]))

@@ -19,7 +19,7 @@ import numpy as np
 from sonarsynth import store
 from sonarsynth.planning import Plan, Stage
 from sonarsynth.planning.costs import machine_factor
-from sonarsynth.schedule.trials import Sizes, Trial, disk_use, try_frames
+from sonarsynth.schedule.benchmark_frames import Sizes, Trial, disk_use, try_frames
 
 if TYPE_CHECKING:
     from sonarsynth.schedule import BuildReport

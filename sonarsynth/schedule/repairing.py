@@ -7,22 +7,23 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from sonarsynth import cards, store
+from sonarsynth import store
 from sonarsynth.description import FieldError
 from sonarsynth.planning import Plan, choices_from, plan
-from sonarsynth.schedule.consent import files_of, recipe_with
-from sonarsynth.schedule.log import append_lines
+from sonarsynth.schedule.build_log import append_lines
+from sonarsynth.schedule.build_report import Progress
 from sonarsynth.schedule.making import job_of, make_shards, seen_by
-from sonarsynth.schedule.report import Progress
 from sonarsynth.schedule.tasks import Failure, Written
-from sonarsynth.store import Findings, Folder, Mismatch, Problem, Remote, provenance, scratch
+from sonarsynth.store import Findings, Folder, Mismatch, Problem, Remote, cards, provenance
+from sonarsynth.store.checking.examining import shard_of
+from sonarsynth.store.checking.reading_back import read_back
+from sonarsynth.store.checking.recipe_files import files_of, recipe_with
+from sonarsynth.store.checking.restoring import drop_empty_folders, frames_written, move_out, obstacles, restore
 from sonarsynth.store.creating import identity, plain_recipe, spelled
-from sonarsynth.store.examining import shard_of
+from sonarsynth.store.files import scratch
+from sonarsynth.store.files.place import there
 from sonarsynth.store.layout import layout_of
 from sonarsynth.store.marks import MARKS, Damage, Mark, all_files, load_layout, load_mark
-from sonarsynth.store.place import there
-from sonarsynth.store.reading import read_back
-from sonarsynth.store.restoring import drop_empty_folders, frames_written, move_out, obstacles, restore
 
 
 @dataclass

@@ -16,9 +16,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
-from sonarsynth import config, render, store
+from sonarsynth import pipeline, store
 from sonarsynth.planning import Plan, choices_from, plan
-from sonarsynth.schedule import diary
+from sonarsynth.recipe import reading
+from sonarsynth.schedule import worker_status
 from sonarsynth.store.layout import layout_of
 
 STAGES = ("trace", "beamform", "range")
@@ -92,8 +93,8 @@ def trace(job: Job, frames: Sequence[int]) -> list[Step]:
     def work(before: Step) -> Any:
         made = plan_of(job)
         if job.products:
-            return render.trace_frame(made, before.frame)
-        return layout_of(made).check(render.truth_frame(made, before.frame))
+            return pipeline.trace_frame(made, before.frame)
+        return layout_of(made).check(pipeline.truth_frame(made, before.frame))
 
     return [_stage(job, "trace", Step(frame), work) for frame in frames]
 
@@ -102,7 +103,7 @@ def beamform(job: Job, traced: Sequence[Step]) -> list[Step]:
     """Task beamform-<token>-<first frame>. Gives what was heard with what was traced; values without a cloud."""
 
     def work(before: Step) -> Any:
-        heard = render.beamform_frame(plan_of(job), before.frame, before.made)
+        heard = pipeline.beamform_frame(plan_of(job), before.frame, before.made)
         if "cloud" in job.products:
             return before.made, heard
         return _values(job, before.frame, before.made, heard)
@@ -115,9 +116,9 @@ def range_(job: Job, heard: Sequence[Step]) -> list[Step]:
     return [_stage(job, "range", before, lambda step: _values(job, step.frame, *step.made)) for before in heard]
 
 
-def _values(job: Job, frame: int, traced: render.Traced, heard: render.Heard) -> render.Values:
+def _values(job: Job, frame: int, traced: pipeline.Traced, heard: pipeline.Heard) -> pipeline.Values:
     made = plan_of(job)
-    return layout_of(made).check(render.range_frame(made, frame, traced, heard))
+    return layout_of(made).check(pipeline.range_frame(made, frame, traced, heard))
 
 
 RUN: Mapping[str, Callable[[Job, Any], list[Step]]] = {"trace": trace, "beamform": beamform, "range": range_}
@@ -163,7 +164,7 @@ def plan_of(job: Job) -> Plan:
     """
     if job not in _plans:
         stored = store.root_attributes(job.path)
-        recipe = config.loads(stored.get("recipe", ""), job.path, resolved=True)
+        recipe = reading.loads(stored.get("recipe", ""), job.path, resolved=True)
         made = plan(recipe, frozenset(job.products), choices_from(stored.get("choices")))
         if made.digest != job.digest:
             raise store.Damage(f"{job.path}: a file that the recipe names is not the same on this worker")
@@ -198,9 +199,9 @@ def _stage(job: Job, name: str, before: Step, work: Callable[[Step], Any]) -> St
     if before.failure is not None:
         return before
     wall, cpu = time.perf_counter(), time.thread_time()
-    with render.counted() as parts:
+    with pipeline.counted() as parts:
         try:
-            with diary.noted(job.path, before.frame, name, _limit(job, name)):
+            with worker_status.noted(job.path, before.frame, name, _limit(job, name)):
                 made, failure = work(before), None
             _warm.add(name)
         except Exception as error:

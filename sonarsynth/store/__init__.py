@@ -5,15 +5,15 @@ Laid out whole from the plan, written one whole shard at a time, each shard with
 
 from __future__ import annotations
 
+from sonarsynth.store.checking.examining import Findings, Problem, examine, must_be_store, ranges
+from sonarsynth.store.checking.verifying import Report, verify
 from sonarsynth.store.creating import create, identity, root_attributes
-from sonarsynth.store.examining import Findings, Problem, examine, must_be_store, ranges
+from sonarsynth.store.files.lock import Ended, Locked, lock, shared_lock
+from sonarsynth.store.files.place import Folder, absolute, beside, folder_of, here, try_writing
+from sonarsynth.store.files.remote import Remote, Unreachable
+from sonarsynth.store.files.within import Mismatch
 from sonarsynth.store.layout import Layout, layout_of
-from sonarsynth.store.lock import Ended, Locked, lock, shared_lock
 from sonarsynth.store.marks import Damage, Mark
-from sonarsynth.store.place import Folder, absolute, beside, folder_of, here, try_writing
-from sonarsynth.store.remote import Remote, Unreachable
-from sonarsynth.store.verifying import Report, verify
-from sonarsynth.store.within import Mismatch
 from sonarsynth.store.writing import frames_there, missing, write_shard
 
 __all__ = [

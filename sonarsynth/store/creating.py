@@ -21,22 +21,22 @@ from zarr.codecs import BloscCodec, Crc32cCodec
 from zarr.core.chunk_key_encodings import ChunkKeyEncodingParams
 from zarr.errors import ZarrUserWarning
 
-from sonarsynth.config import RecipeError, dump
-from sonarsynth.config.source import read_text
-from sonarsynth.render import attributes, coordinates
-from sonarsynth.store.code import code_digest
+from sonarsynth.pipeline import attributes, coordinates
+from sonarsynth.recipe.reading import RecipeError, dump
+from sonarsynth.recipe.reading.yaml_source import read_text
+from sonarsynth.store.code_digest import code_digest
 from sonarsynth.store.encoding import CODEC, LEVEL
+from sonarsynth.store.files.place import Folder, Opened, absolute, read, record, records, upload
+from sonarsynth.store.files.remote import Remote
+from sonarsynth.store.files.scratch import clear, hidden, made, sweep
+from sonarsynth.store.files.within import Mismatch
 from sonarsynth.store.layout import ArrayLayout, Layout, layout_of
 from sonarsynth.store.marks import LAYOUT, MANIFESTS, Damage, Mark, all_files, load_layout, marked, save_mark
-from sonarsynth.store.place import Folder, Opened, absolute, read, record, records, upload
 from sonarsynth.store.provenance import begun, made_of, other_versions
-from sonarsynth.store.remote import Remote
-from sonarsynth.store.scratch import clear, hidden, made, sweep
-from sonarsynth.store.within import Mismatch
 
 if TYPE_CHECKING:
-    from sonarsynth.config import Source
     from sonarsynth.planning import Plan
+    from sonarsynth.recipe.reading import Source
 
 FLAT: Final[ChunkKeyEncodingParams] = {"name": "default", "separator": "."}
 """Shards lie in the folder of their array: with the usual "/", each has as many folders of its own as axes."""

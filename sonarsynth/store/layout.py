@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sonarsynth.render import Values, Variable, coordinates, variables
+from sonarsynth.pipeline import Values, Variable, coordinates, variables
 
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan

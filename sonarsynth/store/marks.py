@@ -18,10 +18,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from sonarsynth.store import place
-from sonarsynth.store.place import FileRecord, Folder, Opened, entries, read, read_each, remove, write_in
-from sonarsynth.store.remote import Remote
-from sonarsynth.store.within import parts_of
+from sonarsynth.store.files import place
+from sonarsynth.store.files.place import FileRecord, Folder, Opened, entries, read, read_each, remove, write_in
+from sonarsynth.store.files.remote import Remote
+from sonarsynth.store.files.within import parts_of
 
 MARKS: Final = ".marks"
 LAYOUT: Final = "layout"

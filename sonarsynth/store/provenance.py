@@ -19,12 +19,12 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from sonarsynth.description.named_files import digest
 from sonarsynth.recipe import FILE_KINDS
-from sonarsynth.world.files import digest
 
 if TYPE_CHECKING:
-    from sonarsynth.config import Source
     from sonarsynth.planning import Plan
+    from sonarsynth.recipe.reading import Source
 
 PROVENANCE: Final = "provenance"
 """The attribute of the root that differs between two builds of one plan."""

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sonarsynth.render import Values
-from sonarsynth.store import within
+from sonarsynth.pipeline import Values
 from sonarsynth.store.creating import attributes_in
 from sonarsynth.store.encoding import encoded
+from sonarsynth.store.files import within
+from sonarsynth.store.files.place import FileRecord, Folder, Opened, absolute, folder_of, held, remove, write_new
+from sonarsynth.store.files.remote import Remote
+from sonarsynth.store.files.within import Held
 from sonarsynth.store.layout import ArrayLayout, Layout, layout_of
 from sonarsynth.store.marks import ABSENT, Damage, Mark, add_to_digest, drop_mark, load_marks, marked, save_mark
-from sonarsynth.store.place import FileRecord, Folder, Opened, absolute, folder_of, held, remove, write_new
 from sonarsynth.store.provenance import other_versions
-from sonarsynth.store.remote import Remote
-from sonarsynth.store.within import Held
 
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan

@@ -9,16 +9,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import NO_TARGET, Ints, depth
+from sonarsynth.environment.absorption import DepthAbsorption
+from sonarsynth.environment.sea import Environment, Profile
 from sonarsynth.geometry import Pose
+from sonarsynth.geometry.mesh import in_blocks
+from sonarsynth.geometry.motion import Track
+from sonarsynth.geometry.placed_target import Body
 from sonarsynth.products import Arrivals
+from sonarsynth.receiver import Elements
 from sonarsynth.scattering import ScatteringLaw
-from sonarsynth.scattering.patches import Pulses
-from sonarsynth.sonar import Elements
-from sonarsynth.tracing.absorbing import path_loss
-from sonarsynth.tracing.aperture import Fronts, Wavefronts, fronts, wavefronts
+from sonarsynth.scattering.facet_geometry import Pulses
+from sonarsynth.state import Moment, Snap
+from sonarsynth.tracing.doppler import Carried, Meeting, received, stretched
 from sonarsynth.tracing.echoes import echoes
-from sonarsynth.tracing.forward import forward_legs, opaque, shadow_parts
-from sonarsynth.tracing.legs import (
+from sonarsynth.tracing.expansion.amplitude_polynomials import ALIKE, ENOUGH, fitted
+from sonarsynth.tracing.expansion.array_expansion import Fronts, Wavefronts, fronts, wavefronts
+from sonarsynth.tracing.meetings import SHARED, hearing_times, occasions
+from sonarsynth.tracing.occlusion.forward_scattering import forward_legs, opaque, shadow_parts
+from sonarsynth.tracing.occlusion.sensor_occlusion import View
+from sonarsynth.tracing.path_absorption import path_loss
+from sonarsynth.tracing.receive_paths import (
     Facets,
     Legs,
     facets_of,
@@ -28,20 +38,10 @@ from sonarsynth.tracing.legs import (
     rays_to_centre,
     require_in_water,
 )
-from sonarsynth.tracing.meetings import SHARED, hearing_times, occasions
-from sonarsynth.tracing.moving import Carried, Meeting, received, stretched
-from sonarsynth.tracing.paths import Outward, assemble, by_target, join, silence
-from sonarsynth.tracing.shading import View
-from sonarsynth.tracing.variation import ALIKE, ENOUGH, fitted
-from sonarsynth.world.environment import Environment, Profile
-from sonarsynth.world.mesh import in_blocks
-from sonarsynth.world.moment import Moment, Snap
-from sonarsynth.world.motion import Track
-from sonarsynth.world.placed import Body
-from sonarsynth.world.water import DepthAbsorption
+from sonarsynth.tracing.transmit_paths import Outward, assemble, by_target, join, silence
 
 if TYPE_CHECKING:
-    from sonarsynth.tracing import Propagation, Visibility
+    from sonarsynth.propagation import Propagation, Visibility
 
 
 NEGLIGIBLE = 1e-7

@@ -9,24 +9,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints, depth
+from sonarsynth.environment.absorption import DepthAbsorption
+from sonarsynth.geometry.mesh import in_blocks
+from sonarsynth.geometry.placed_target import Body
 from sonarsynth.products import Arrivals
+from sonarsynth.propagation.reflections import reflections
 from sonarsynth.scattering import Part
-from sonarsynth.scattering.patches import Pulses
-from sonarsynth.tracing.absorbing import path_loss
-from sonarsynth.tracing.echo_groups import Group, groups_of, heard
-from sonarsynth.tracing.legs import Legs, may_face, usable
-from sonarsynth.tracing.loudness import Seen, loud_of_all, loud_ones
-from sonarsynth.tracing.moving import Carried, carry, meets, received, stretched, velocities
-from sonarsynth.tracing.paths import Outward, assemble, ordered, silence
-from sonarsynth.tracing.reflections import reflections
-from sonarsynth.tracing.shadows import hidden, overlapping
-from sonarsynth.tracing.spots import delayed_by_spots, from_spots
-from sonarsynth.tracing.variation import variations
-from sonarsynth.tracing.wavefront import FEW, Terms, probes
-from sonarsynth.world.mesh import in_blocks
-from sonarsynth.world.moment import Snap
-from sonarsynth.world.placed import Body
-from sonarsynth.world.water import DepthAbsorption
+from sonarsynth.scattering.facet_geometry import Pulses
+from sonarsynth.state import Snap
+from sonarsynth.tracing.doppler import Carried, carry, meets, received, stretched, velocities
+from sonarsynth.tracing.echo_batches import Group, groups_of, heard
+from sonarsynth.tracing.expansion.amplitude_polynomials import variations
+from sonarsynth.tracing.expansion.scattering_points import delayed_by_spots, from_spots
+from sonarsynth.tracing.expansion.wavefront_polynomials import FEW, Terms, probes
+from sonarsynth.tracing.occlusion.ray_cones import hidden, overlapping
+from sonarsynth.tracing.path_absorption import path_loss
+from sonarsynth.tracing.pruning import Seen, loud_of_all, loud_ones
+from sonarsynth.tracing.receive_paths import Legs, may_face, usable
+from sonarsynth.tracing.transmit_paths import Outward, assemble, ordered, silence
 
 if TYPE_CHECKING:
     from sonarsynth.tracing.arrivals import ArrayLegs

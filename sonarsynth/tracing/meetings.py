@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sonarsynth.conventions import Floats, depth
-from sonarsynth.tracing.moving import Meeting
-from sonarsynth.world.environment import Profile
-from sonarsynth.world.moment import Snap, meeting_times, positions
-from sonarsynth.world.motion import Track
-from sonarsynth.world.placed import Body
+from sonarsynth.environment.sea import Profile
+from sonarsynth.geometry.motion import Track
+from sonarsynth.geometry.placed_target import Body
+from sonarsynth.state import Snap, meeting_times, positions
+from sonarsynth.tracing.doppler import Meeting
 
 SHARED = 1e-2
 """What moves by less than this part of the radius of a body from one snap to another, and keeps as near to what its

@@ -25,10 +25,10 @@ def test_help_needs_no_library_and_no_scene(command: list[str]) -> None:
     loaded = loaded_by(*command)
     assert "sonarsynth.cli" in loaded
     assert loaded & LIBRARIES == set()
-    assert loaded & {"sonarsynth.scene", "sonarsynth.recipe", "sonarsynth.render"} == set()
+    assert loaded & {"sonarsynth.recipe.scene", "sonarsynth.recipe", "sonarsynth.pipeline"} == set()
 
 
 def test_a_schema_needs_no_compiler_store_or_scheduler() -> None:
     loaded = loaded_by("schema")
-    assert "sonarsynth.scene" in loaded
+    assert "sonarsynth.recipe.scene" in loaded
     assert loaded & {"numba", "llvmlite", "xarray", "dask", "distributed", "zarr", "matplotlib", "embreex"} == set()

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.arrays import focus_delay
-from sonarsynth.beamforming import DenseDelayAndSum, FocusedDelayAndSum
-from sonarsynth.beamforming.dense import dense_energies
-from sonarsynth.beamforming.lattice import focused_energies
 from sonarsynth.conventions import direction
+from sonarsynth.equations.arrays.apertures import focus_delay
+from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
+from sonarsynth.imaging.dense import dense_energies
+from sonarsynth.imaging.lattice_image import focused_energies
 from sonarsynth.products import Signals
-from sonarsynth.sonar import BeamGrid, PlanarLattice, Romanis, Sonar, elements
+from sonarsynth.receiver import BeamGrid, PlanarLattice, Romanis, Sonar, elements
 
 SPEED = 1540.0
 RATE = 196e3

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from sonarsynth.world.meshes import MeshError, mesh_of
-from sonarsynth.world.shapes import MeshFile, Sphere
+from sonarsynth.targets.meshes import MeshError, mesh_of
+from sonarsynth.targets.shapes import MeshFile, Sphere
 
 PLY = (
     "ply\nformat {} 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"

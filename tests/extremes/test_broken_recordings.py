@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
-from sonarsynth.acoustics import waveforms
-from sonarsynth.world.recordings import RecordingError, read_recording
-from sonarsynth.world.snaps import RecordedSnap
+from sonarsynth.equations.bubble import waveforms
+from sonarsynth.sources.recordings import RecordingError, read_recording
+from sonarsynth.sources.snap_models import RecordedSnap
 
 ROWS = "0 0\n1e-6 0\n2e-6 5\n3e-6 1\n4e-6 0\n5e-6 0\n"
 

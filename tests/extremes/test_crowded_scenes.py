@@ -5,28 +5,28 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.facet_pulses import facet_response
 from sonarsynth.conventions import Bools, Floats
 from sonarsynth.description import FieldError
+from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
+from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.geometry.motion import Still
+from sonarsynth.geometry.placed_target import Body
 from sonarsynth.planning import plan
 from sonarsynth.products import Arrivals
+from sonarsynth.propagation import AutoTracing
+from sonarsynth.receiver import PlanarLattice, Romanis, Sonar, elements
 from sonarsynth.recipe import Recipe
+from sonarsynth.recipe.scene import Scene, World
 from sonarsynth.scattering import Isotropic, Kirchhoff, MirrorLobe
-from sonarsynth.scattering.notes import concave_note, facing_share
-from sonarsynth.scattering.targets import Target
-from sonarsynth.scene import Scene, World
-from sonarsynth.sonar import PlanarLattice, Romanis, Sonar, elements
-from sonarsynth.tracing import AutoTracing
+from sonarsynth.scattering.law_notes import concave_note, facing_share
+from sonarsynth.sources.shrimp import LogarithmicBubble, SnappingShrimp
+from sonarsynth.state import Moment, Snap
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Box, Cylinder, LShape, Remus100, Sphere
+from sonarsynth.targets.target import Target
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.world.environment import Absorption, Environment, Isovelocity, Profile
-from sonarsynth.world.mesh import Mesh
-from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.moment import Moment, Snap
-from sonarsynth.world.motion import Still
-from sonarsynth.world.placed import Body
-from sonarsynth.world.shapes import Box, Cylinder, LShape, Remus100, Sphere
-from sonarsynth.world.sources import LogarithmicBubble, SnappingShrimp
 
 C = 1500.0
 BED = 30.0

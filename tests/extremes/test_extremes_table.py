@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonarsynth.accuracy import extremes
-from sonarsynth.accuracy.extremes import Case, groups, outcome
-from sonarsynth.accuracy.extremes.outcomes import Got, holds, off, refused, relative, together
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
+from sonarsynth.validation import extremes
+from sonarsynth.validation.extremes import Case, groups, outcome
+from sonarsynth.validation.extremes.outcomes import Got, holds, off, refused, relative, together
 
 QUICK = [(group, case) for group, cases in groups().items() for case in cases if not case.slow]
 

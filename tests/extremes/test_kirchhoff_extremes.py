@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.kirchhoff import (
+from sonarsynth.conventions import Floats
+from sonarsynth.equations.bubble.snap_pressure import Bubble
+from sonarsynth.equations.scattering.kirchhoff_integral import (
     circular_plate,
     divided_exponential,
     facet_amplitude,
@@ -15,14 +17,17 @@ from sonarsynth.acoustics.kirchhoff import (
     shadow_taper,
     triangle_integral,
 )
-from sonarsynth.acoustics.kirchhoff_kernels import facet_amplitudes, mesh_amplitude
-from sonarsynth.acoustics.kirchhoff_pulse import divided_impulse, facet_echo, snap_waveform
-from sonarsynth.acoustics.modal import Fluid, cylinder_amplitude, sphere_amplitude, sphere_coefficients
-from sonarsynth.acoustics.roughness import coherent_factor, incoherent_power, roughness_parameter
-from sonarsynth.acoustics.snap import Bubble
-from sonarsynth.conventions import Floats
+from sonarsynth.equations.scattering.kirchhoff_kernels import facet_amplitudes, mesh_amplitude
+from sonarsynth.equations.scattering.kirchhoff_pulse import divided_impulse, facet_echo, snap_waveform
+from sonarsynth.equations.scattering.modal_series import (
+    Fluid,
+    cylinder_amplitude,
+    sphere_amplitude,
+    sphere_coefficients,
+)
+from sonarsynth.equations.scattering.roughness import coherent_factor, incoherent_power, roughness_parameter
 from sonarsynth.geometry import unit
-from sonarsynth.world.sources import LogarithmicBubble
+from sonarsynth.sources.shrimp import LogarithmicBubble
 
 DOWN, UP = np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 1.0])
 NEEDLE = np.array([[0.0, 0, 0], [1.0, 0, 0], [0.5, 1e-12, 0]])

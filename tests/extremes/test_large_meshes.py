@@ -10,17 +10,18 @@ import numpy as np
 import pytest
 import trimesh
 
-from sonarsynth import FieldError, config
-from sonarsynth.planning import checks
-from sonarsynth.scattering.patches import patches
-from sonarsynth.scattering.polarity import random_polarity
-from sonarsynth.world import keeping
-from sonarsynth.world.casting import casting_mesh
-from sonarsynth.world.curvature import bend
-from sonarsynth.world.keeping import Kept, kept, size_of
-from sonarsynth.world.mesh import Mesh
-from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.shapes import Sphere
+from sonarsynth import FieldError
+from sonarsynth.casting.ray_casting import casting_mesh
+from sonarsynth.description import byte_bounded_cache
+from sonarsynth.description.byte_bounded_cache import Kept, kept, size_of
+from sonarsynth.geometry.curvature import bend
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.planning.notes import scene_checks
+from sonarsynth.recipe import reading
+from sonarsynth.scattering.facet_geometry import patches
+from sonarsynth.scattering.random_signs import random_polarity
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Sphere
 
 REMUS = Path(__file__).resolve().parents[2] / "configs" / "remus.yaml"
 
@@ -31,21 +32,21 @@ def test_a_file_in_millimetres_is_refused_before_it_is_meshed(tmp_path: Path, mo
     def meshed(*_: object) -> Mesh:
         raise AssertionError("meshed")
 
-    monkeypatch.setattr(checks, "mesh_for", meshed)
+    monkeypatch.setattr(scene_checks, "mesh_for", meshed)
     shape = f"{{kind: mesh_file, path: {tmp_path / 'hull.stl'}}}"
     sets = (f"scene.world.targets.0.shape={shape}", "scene.physics.scattering={kind: kirchhoff}")
-    scene = config.load(REMUS, sets).scene_of(0)
+    scene = reading.load(REMUS, sets).scene_of(0)
     with pytest.raises(FieldError, match=r"'remus', 1\.6e\+03 m long with numbers in m, is .* m above the surface"):
-        checks.read_inputs(scene)
-    scene = config.load(REMUS, (sets[0].replace("}", ", unit: mm}"), sets[1])).scene_of(0)
+        scene_checks.read_inputs(scene)
+    scene = reading.load(REMUS, (sets[0].replace("}", ", unit: mm}"), sets[1])).scene_of(0)
     with pytest.raises(AssertionError, match="meshed"):
-        checks.read_inputs(scene)
+        scene_checks.read_inputs(scene)
 
 
 def test_bodies_in_the_water_that_their_boxes_leave() -> None:
     """A corner of the box round a turned sphere is out of the water, the sphere is not; then it is too."""
     for shape, height in ((Sphere(radius=1.0), 0.0), (Sphere(radius=1.0), 0.1)):
-        recipe = config.load(
+        recipe = reading.load(
             REMUS,
             (
                 f"scene.world.targets.0.shape={{kind: sphere, radius: {shape.radius}}}",
@@ -55,14 +56,14 @@ def test_bodies_in_the_water_that_their_boxes_leave() -> None:
         )
         scene, frame = recipe.frame(0)
         if height == 0.0:
-            checks.check_frame(scene, frame)
+            scene_checks.check_frame(scene, frame)
         else:
             with pytest.raises(FieldError, match=r"'remus' is 0\.[01][0-9]* m above the surface at frame 0"):
-                checks.check_frame(scene, frame)
+                scene_checks.check_frame(scene, frame)
 
 
 def test_caches_of_meshes_are_bounded_whatever_was_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(keeping, "MOST_BYTES", 4_000_000)
+    monkeypatch.setattr(byte_bounded_cache, "MOST_BYTES", 4_000_000)
     caches = [one for one in gc.get_objects() if isinstance(one, Kept) and one.__module__.startswith("sonarsynth")]
     for cache in caches:
         cache.cache_clear()  # what was kept under the real bound
@@ -75,7 +76,7 @@ def test_caches_of_meshes_are_bounded_whatever_was_seen(monkeypatch: pytest.Monk
     assert len(caches) >= 7
     grown = size_of(mesh, casting_mesh(mesh))  # the last mesh has grown since it was kept
     for cache in caches:
-        assert cache.nbytes <= 4_000_000 + grown or len(cache) <= keeping.LEAST, cache.__qualname__
+        assert cache.nbytes <= 4_000_000 + grown or len(cache) <= byte_bounded_cache.LEAST, cache.__qualname__
     assert max(len(cache) for cache in caches) < 50 < 2 * sum(len(cache) for cache in caches)
 
 
@@ -83,7 +84,7 @@ def test_no_cache_of_the_package_grows_without_bound() -> None:
     """All are bounded in number; those without a bound take no arguments."""
     for one in gc.get_objects():
         if isinstance(one, functools._lru_cache_wrapper) and str(one.__module__).startswith("sonarsynth"):
-            if str(one.__module__).startswith("sonarsynth.accuracy"):
+            if str(one.__module__).startswith("sonarsynth.validation"):
                 continue  # a table of one run
             assert one.cache_info().maxsize is not None or one.__wrapped__.__code__.co_argcount == 0, one.__qualname__
 
@@ -96,16 +97,16 @@ def test_kept_results_are_the_last_ones(monkeypatch: pytest.MonkeyPatch) -> None
         made.append(count)
         return np.zeros(count)
 
-    monkeypatch.setattr(keeping, "MOST_BYTES", 8 * 1000)
+    monkeypatch.setattr(byte_bounded_cache, "MOST_BYTES", 8 * 1000)
     for count in (100, 101, 102, 103, 104, 100):
         assert len(zeros(count)) == count
     assert made == [100, 101, 102, 103, 104]  # all fit
     zeros(900)
-    assert len(zeros) == keeping.LEAST  # type: ignore[arg-type]
+    assert len(zeros) == byte_bounded_cache.LEAST  # type: ignore[arg-type]
     assert zeros(100) is zeros(100) and made[-1] == 900  # the last stay
     zeros(101)
     assert made[-1] == 101  # the first went
-    monkeypatch.setattr(keeping, "MOST_BYTES", 10**9)
+    monkeypatch.setattr(byte_bounded_cache, "MOST_BYTES", 10**9)
     for count in range(20):
         zeros(count)
     assert len(zeros) == 8  # type: ignore[arg-type]

@@ -7,15 +7,15 @@ import warnings
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.bearings import plane_wave, spherical_wave, wavefront_delays
-from sonarsynth.acoustics.bistatic import bistatic_range, excess_path
 from sonarsynth.conventions import direction
+from sonarsynth.environment.sea import Profile
+from sonarsynth.equations.arrays.bistatic_range import bistatic_range, excess_path
+from sonarsynth.equations.arrays.spherical_wave import plane_wave, spherical_wave, wavefront_delays
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.products import REASONS, EnergyImage
 from sonarsynth.ranging import IsovelocityRange, RefractedRange, SensorDelays
-from sonarsynth.ranging.locating import unlocatable
-from sonarsynth.sonar import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
-from sonarsynth.world.environment import Profile
+from sonarsynth.ranging.location.locating import unlocatable
+from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
 from tests.heard import add_noise, hear_direct, hear_echoes, silence
 
 C = 1540.0

@@ -9,40 +9,42 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics import rays
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.rays import ray_solutions
 from tests.following import families, family, follow, images, nodes, range_only, solve_again, textbook
 from tests.waiting import HANGING
 
-CHANNEL = rays.water(np.array([0.0, 20.0, 50.0]), np.array([1510.0, 1500.0, 1515.0]), 50.0)
-FALLING = rays.water(np.array([0.0, 100.0]), np.array([1530.0, 1500.0]), 100.0)
-JUMPS = rays.water(np.array([0.0, 15.0, 15.0, 30.0]), np.array([1510.0, 1505.0, 1500.0, 1503.0]), 40.0)
+CHANNEL = ray_solutions.water(np.array([0.0, 20.0, 50.0]), np.array([1510.0, 1500.0, 1515.0]), 50.0)
+FALLING = ray_solutions.water(np.array([0.0, 100.0]), np.array([1530.0, 1500.0]), 100.0)
+JUMPS = ray_solutions.water(np.array([0.0, 15.0, 15.0, 30.0]), np.array([1510.0, 1505.0, 1500.0, 1503.0]), 40.0)
 WATERS = {"channel": CHANNEL, "falling": FALLING, "jumps": JUMPS}
 
 
 def one(
-    water: rays.Water, start: float, end: float, distance: float, vertices: int = 4, hits: int = 4
-) -> rays.Eigenrays:
-    return rays.eigenrays(water, np.array([start]), np.array([end]), np.array([distance]), vertices, hits)
+    water: ray_solutions.Water, start: float, end: float, distance: float, vertices: int = 4, hits: int = 4
+) -> ray_solutions.Eigenrays:
+    return ray_solutions.eigenrays(water, np.array([start]), np.array([end]), np.array([distance]), vertices, hits)
 
 
-def names(found: rays.Eigenrays) -> list[tuple[int, ...]]:
+def names(found: ray_solutions.Eigenrays) -> list[tuple[int, ...]]:
     return sorted(family(found, i)[1:4] for i in range(len(found.pair)))
 
 
-def check(water: rays.Water, found: rays.Eigenrays, start: float, end: float, distance: float, some: int = 8) -> None:
+def check(
+    water: ray_solutions.Water, found: ray_solutions.Eigenrays, start: float, end: float, distance: float, some: int = 8
+) -> None:
     """All is finite and in order; some rays are what they are when followed in many digits."""
     for name in ("travel_time", "length", "slowness", "start_sine", "end_sine", "amplitude"):
         assert np.isfinite(getattr(found, name)).all(), name
     assert (np.diff(found.travel_time) >= 0).all()
-    assert np.isin(found.flag, list(rays.REASONS)).all()
+    assert np.isin(found.flag, list(ray_solutions.REASONS)).all()
     above, below = found.surface + found.turning > 0, found.bottom + found.turning > 0
     assert (np.isfinite(found.upper) | np.isfinite(found.lower))[above | below].all()
     assert (found.upper[found.surface > 0] == 0).all()
     assert (found.lower[found.bottom > 0] == water.depth[-1]).all()
     assert (found.amplitude > 0).all()
     assert len({(*family(found, i), found.travel_time[i]) for i in range(len(found.pair))}) == len(found.pair)
-    sharp = (found.start_sine != 0) & (found.flag != rays.CAUSTIC) & (found.slowness > 1e-12)
+    sharp = (found.start_sine != 0) & (found.flag != ray_solutions.CAUSTIC) & (found.slowness > 1e-12)
     for i in np.random.default_rng(0).permutation(np.flatnonzero(sharp))[:some]:
         with mp.workdps(60):
             _, visit = solve_again(water, start, end, mp.mpf(distance), found, int(i))
@@ -56,8 +58,8 @@ def test_straight_up_and_down(name: str, start: float, end: float) -> None:
     water = WATERS[name]
     bed = water.depth[-1]
     found = one(water, start, end, 0.0, 5, 5)
-    whole = float(rays.mean_slowness(water, np.array([0.0]), np.array([bed]))[0]) * bed
-    down = [float(rays.mean_slowness(water, np.array([0.0]), np.array([z]))[0]) * z for z in (start, end)]
+    whole = float(ray_solutions.mean_slowness(water, np.array([0.0]), np.array([bed]))[0]) * bed
+    down = [float(ray_solutions.mean_slowness(water, np.array([0.0]), np.array([z]))[0]) * z for z in (start, end)]
     expected = images(whole, *down, 5)
     tall = images(bed, start, end, 5)
     keep = [i for i, row in enumerate(tall) if row[4] > 0]
@@ -67,7 +69,7 @@ def test_straight_up_and_down(name: str, start: float, end: float) -> None:
     np.testing.assert_array_equal(found.slowness[moving], 0.0)
     np.testing.assert_array_equal(np.abs(found.start_sine[moving]), 1.0)
     np.testing.assert_array_equal(found.turning, 0)
-    assert (found.flag[~moving] == rays.COINCIDENT).all()
+    assert (found.flag[~moving] == ray_solutions.COINCIDENT).all()
     assert np.isfinite(found.amplitude[moving]).all()
     np.testing.assert_array_equal(found.upper[moving & (found.surface > 0)], 0.0)
     np.testing.assert_array_equal(found.lower[moving & (found.bottom > 0)], bed)
@@ -86,7 +88,7 @@ def test_coincident_ends_on_a_boundary_or_a_jump_take_no_time_to_search(
 ) -> None:
     """In a process of its own: a search without an end could not be interrupted."""
     code = (
-        "import numpy as np; from sonarsynth.acoustics import rays\n"
+        "import numpy as np; from sonarsynth.equations import rays\n"
         f"water = rays.water(np.array({depths}), np.array({speeds}), 50.0)\n"
         f"found = rays.eigenrays(water, np.array([{at}]), np.array([{at}]), np.array([0.0]), 4, 4)\n"
         "print(len(found.pair), np.isfinite(found.travel_time).all(), (found.flag == rays.COINCIDENT).sum())"
@@ -114,7 +116,7 @@ def test_nearly_straight_up_and_down(name: str, distance: float) -> None:
 @pytest.mark.parametrize("depth", [1e-9, 1e-6, 1e-3, 5.0, 10.0 - 1e-3, 10.0 - 1e-6])
 def test_between_two_points_of_one_depth_there_is_always_a_ray(gradient: float, depth: float) -> None:
     """However little the water bends it, and however near the surface: level, or turning where there is room for it."""
-    water = rays.water(np.array([0.0, 10.0]), np.array([1500.0, 1500.0 + 10 * gradient]), 10.0)
+    water = ray_solutions.water(np.array([0.0, 10.0]), np.array([1500.0, 1500.0 + 10 * gradient]), 10.0)
     for distance in (1e-6, 1e-3, 1.0, 5.0):
         room = depth if gradient < 0 else 10.0 - depth
         if distance**2 * abs(gradient) / 12000 < 0.9 * room:
@@ -127,7 +129,7 @@ def test_between_two_points_of_one_depth_there_is_always_a_ray(gradient: float, 
 @pytest.mark.parametrize("depth", [0.0, 10.0])
 def test_on_a_boundary_a_level_ray_has_its_reflection_with_it(depth: float) -> None:
     """As it has a micrometre away: the two cancel at a pressure-release surface."""
-    water = rays.water(np.array([0.0]), np.array([1500.0]), 10.0)
+    water = ray_solutions.water(np.array([0.0]), np.array([1500.0]), 10.0)
     on, off = one(water, depth, depth, 7.0, 2, 2), one(water, abs(depth - 1e-9), abs(depth - 1e-9), 7.0, 2, 2)
     assert names(on) == names(off)
     np.testing.assert_allclose(on.travel_time, off.travel_time, rtol=1e-9)
@@ -138,7 +140,7 @@ def test_weak_to_violent_gradients(gradient: float) -> None:
     """A layer of that gradient, at most 20 m/s across, between two others."""
     thickness = min(10.0, 20.0 / abs(gradient))
     speed = 1500.0 + np.array([0.0, 0.0, gradient * thickness, gradient * thickness + 1.0])
-    water = rays.water(np.array([0.0, 20.0, 20.0 + thickness, 50.0]), speed, 50.0)
+    water = ray_solutions.water(np.array([0.0, 20.0, 20.0 + thickness, 50.0]), speed, 50.0)
     for start, end in (
         (5.0, 45.0),
         (20.0, 20.0 + thickness),
@@ -158,7 +160,7 @@ def test_weak_to_violent_gradients(gradient: float) -> None:
 def test_layers_of_a_micrometre_to_ten_kilometres(thickness: float, change: float) -> None:
     top = 2 * thickness
     depth = np.array([0.0, top, top + thickness, 1.1e4 + 3 * thickness])
-    water = rays.water(depth, np.array([1500.0, 1500.0, 1500.0 + change, 1500.0 + change]), depth[-1])
+    water = ray_solutions.water(depth, np.array([1500.0, 1500.0, 1500.0 + change, 1500.0 + change]), depth[-1])
     for start, end, r in (
         (top / 2, top + 1.5 * thickness, 5 * thickness),
         (top, top + thickness, 1e3),
@@ -168,7 +170,7 @@ def test_layers_of_a_micrometre_to_ten_kilometres(thickness: float, change: floa
 
 
 def test_a_millimetre_of_water() -> None:
-    water = rays.water(np.array([0.0, 4e-4, 6e-4, 1e-3]), np.array([1500.0, 1502.0, 1499.0, 1501.0]), 1e-3)
+    water = ray_solutions.water(np.array([0.0, 4e-4, 6e-4, 1e-3]), np.array([1500.0, 1502.0, 1499.0, 1501.0]), 1e-3)
     for start, end, distance in ((2e-4, 5e-4, 1e-3), (0.0, 1e-3, 0.02), (5e-4, 5e-4, 1e-5), (1e-4, 9e-4, 0.3)):
         found = one(water, start, end, distance, 4, 4)
         check(water, found, start, end, distance)
@@ -178,7 +180,7 @@ def test_a_millimetre_of_water() -> None:
 
 def test_a_hundred_kilometres_in_eleven_kilometres_of_water_and_twelve_vertices() -> None:
     depth = np.array([0.0, 50.0, 200.0, 1000.0, 1300.0, 4000.0, 11000.0])
-    water = rays.water(depth, np.array([1540.0, 1539.0, 1515.0, 1483.0, 1482.0, 1522.0, 1645.0]), 11000.0)
+    water = ray_solutions.water(depth, np.array([1540.0, 1539.0, 1515.0, 1483.0, 1482.0, 1522.0, 1645.0]), 11000.0)
     for start, end in ((1000.0, 1300.0), (10.0, 4000.0), (0.0, 11000.0)):
         found = one(water, start, end, 1e5, 12, 12)
         assert len(found.pair) > 10
@@ -190,7 +192,7 @@ def test_a_hundred_kilometres_in_eleven_kilometres_of_water_and_twelve_vertices(
 def test_a_cast_of_a_thousand_noisy_nodes() -> None:
     rng = np.random.default_rng(1)
     depth = np.linspace(0, 60, 1001)
-    water = rays.water(depth, 1540 - 0.1 * depth + 0.2 * rng.normal(size=1001), 60.0)
+    water = ray_solutions.water(depth, 1540 - 0.1 * depth + 0.2 * rng.normal(size=1001), 60.0)
     start, end, distance = 22.2, 41.7, 150.0
     found, back = one(water, start, end, distance, 3, 3), one(water, end, start, distance, 3, 3)
     check(water, found, start, end, distance, 4)
@@ -198,7 +200,7 @@ def test_a_cast_of_a_thousand_noisy_nodes() -> None:
     for surface, bottom in ((0, 0), (1, 0), (0, 1), (1, 2), (2, 1)):  # which no gradient turns back
         mine = (found.surface == surface) & (found.bottom == bottom)
         assert mine.sum() >= 1
-    fine = rays.water(np.linspace(0, 60, 41), water.speed[::25], 60.0)  # few enough for a dense fan
+    fine = ray_solutions.water(np.linspace(0, 60, 41), water.speed[::25], 60.0)  # few enough for a dense fan
     few = one(fine, start, end, distance, 3, 3)
     fan = families(fine, start, end, np.array([distance]), 3, 3)[0]
     assert sorted(family(few, i) for i in range(len(few.pair))) == sorted(row[0] for row in fan)
@@ -219,7 +221,7 @@ def test_ends_on_nodes_and_boundaries_are_the_limit_of_ends_beside_them(name: st
         on, off = one(water, a, b, distance), one(water, *inwards, distance)
         assert names(on) == names(off)
         np.testing.assert_allclose(on.travel_time, off.travel_time, rtol=1e-9, atol=1e-11)
-        sharp = (on.flag != rays.CAUSTIC) & (off.flag != rays.CAUSTIC)
+        sharp = (on.flag != ray_solutions.CAUSTIC) & (off.flag != ray_solutions.CAUSTIC)
         np.testing.assert_allclose(on.length[sharp], off.length[sharp], rtol=1e-5)
 
 
@@ -231,7 +233,7 @@ def test_ends_a_micrometre_apart(gap: float, distance: float) -> None:
             found = one(water, depth, depth + gap, distance)
             far = np.hypot(depth + gap - depth, distance)
             assert found.travel_time[0] * 1500 == pytest.approx(far, rel=0.03, abs=1e-13)
-            same = found.flag == rays.COINCIDENT
+            same = found.flag == ray_solutions.COINCIDENT
             assert same.sum() == (far == 0)
             assert np.isfinite(found.amplitude[~same]).all()
             hits = found.surface + found.bottom
@@ -242,14 +244,16 @@ def test_nodes_named_twice_change_nothing() -> None:
     once = np.array([0.0, 10.0, 20.0, 50.0]), np.array([1510.0, 1505.0, 1500.0, 1515.0])
     twice = [np.repeat(v, [1, 2, 3, 1]) for v in once]
     for start, end, distance in ((3.0, 44.0, 200.0), (10.0, 20.0, 30.0), (20.0, 20.0, 90.0), (0.0, 10.0, 400.0)):
-        a, b = (one(rays.water(*v, 50.0), start, end, distance) for v in (once, twice))
+        a, b = (one(ray_solutions.water(*v, 50.0), start, end, distance) for v in (once, twice))
         assert names(a) == names(b)
         np.testing.assert_allclose(a.travel_time, b.travel_time, rtol=1e-15)
         np.testing.assert_allclose(a.amplitude, b.amplitude, rtol=1e-9)
         np.testing.assert_array_equal(a.flag, b.flag)
 
 
-def reach(water: rays.Water, start: float, end: float, fastest: float, name: tuple[int, int, int, int]) -> float:
+def reach(
+    water: ray_solutions.Water, start: float, end: float, fastest: float, name: tuple[int, int, int, int]
+) -> float:
     """Range of the ray of a family (launch sign, surface, bottom, turning) that just does not reach this speed."""
     with mp.workdps(50):
         z, c = nodes(water, (start, end), mp.mpf)
@@ -259,7 +263,7 @@ def reach(water: rays.Water, start: float, end: float, fastest: float, name: tup
 
 
 def test_turning_exactly_at_a_node_is_one_ray() -> None:
-    water = rays.water(np.array([0.0, 30.0, 50.0]), np.array([1500.0, 1512.0, 1516.0]), 50.0)
+    water = ray_solutions.water(np.array([0.0, 30.0, 50.0]), np.array([1500.0, 1512.0, 1516.0]), 50.0)
     r = reach(water, 5.0, 12.0, 1512.0, (-1, 0, 0, 1))
     for step in (0.0, 1e-15, -1e-15, 1e-12, -1e-12, 1e-9, -1e-9, 1e-6, -1e-6):
         found = one(water, 5.0, 12.0, r * (1 + step), 1, 0)
@@ -296,9 +300,9 @@ def test_the_edge_of_a_shadow(gap: float) -> None:
     assert len(lit.pair) > 0
 
 
-def fold() -> tuple[rays.Water, float, float, float, tuple[int, int, int, int]]:
+def fold() -> tuple[ray_solutions.Water, float, float, float, tuple[int, int, int, int]]:
     """Rays that turn below a uniform layer over rising speed: their range has a minimum. Water, ends, range, family."""
-    water = rays.water(np.array([0.0, 30.0, 100.0]), np.array([1500.0, 1500.0, 1535.0]), 100.0)
+    water = ray_solutions.water(np.array([0.0, 30.0, 100.0]), np.array([1500.0, 1500.0, 1535.0]), 100.0)
     start, end, name = 10.0, 18.0, (-1, 0, 0, 1)
     z, c = nodes(water, (start, end), np.longdouble)
     low, high = 1 / np.longdouble(1535.0), 1 / np.longdouble(1500.0)
@@ -331,15 +335,15 @@ def test_near_a_fold_amplitudes_grow_as_the_fourth_root_and_are_flagged() -> Non
     np.testing.assert_allclose(growth, 0.25, atol=5e-3)
     gap = np.array([np.ptp(f.slowness[f.turning > 0]) for f in found])
     np.testing.assert_allclose(np.diff(np.log10(gap)), -0.5, atol=5e-3)
-    assert (found[-1].flag[found[-1].turning > 0] == rays.CAUSTIC).all()
+    assert (found[-1].flag[found[-1].turning > 0] == ray_solutions.CAUSTIC).all()
     near = one(water, start, end, limit * (1 + 1e-13), 1, 0)
     assert np.isfinite(near.amplitude).all()
     exact = one(water, start, end, limit, 1, 0)
-    assert (exact.flag[exact.turning > 0] == rays.CAUSTIC).all()
+    assert (exact.flag[exact.turning > 0] == ray_solutions.CAUSTIC).all()
 
 
 def test_no_vertices_and_no_reflections() -> None:
-    found = rays.eigenrays(CHANNEL, np.array([5.0]), np.array([30.0]), np.array([40.0]), 0, 5)
+    found = ray_solutions.eigenrays(CHANNEL, np.array([5.0]), np.array([30.0]), np.array([40.0]), 0, 5)
     assert names(found) == [(0, 0, 0)]
     assert len(one(CHANNEL, 5.0, 5.0, 40.0, 0, 0).pair) == 0
     with pytest.raises(ValueError, match="negative"):
@@ -348,4 +352,4 @@ def test_no_vertices_and_no_reflections() -> None:
 
 def test_nothing_to_trace() -> None:
     empty: Floats = np.empty(0)
-    assert len(rays.eigenrays(CHANNEL, empty, empty, empty, 3, 3).pair) == 0
+    assert len(ray_solutions.eigenrays(CHANNEL, empty, empty, empty, 3, 3).pair) == 0

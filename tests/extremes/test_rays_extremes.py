@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics import rays
+from sonarsynth.equations.rays import ray_solutions
 
-UNIFORM = rays.water(np.array([0.0]), np.array([1500.0]), 50.0)
-CHANNEL = rays.water(np.array([0.0, 20.0, 50.0]), np.array([1510.0, 1500.0, 1515.0]), 50.0)
+UNIFORM = ray_solutions.water(np.array([0.0]), np.array([1500.0]), 50.0)
+CHANNEL = ray_solutions.water(np.array([0.0, 20.0, 50.0]), np.array([1510.0, 1500.0, 1515.0]), 50.0)
 
 
-def one(water: rays.Water, start: float, end: float, distance: float) -> rays.Eigenrays:
-    return rays.eigenrays(water, np.array([start]), np.array([end]), np.array([distance]))
+def one(water: ray_solutions.Water, start: float, end: float, distance: float) -> ray_solutions.Eigenrays:
+    return ray_solutions.eigenrays(water, np.array([start]), np.array([end]), np.array([distance]))
 
 
 @pytest.mark.parametrize("water", [UNIFORM, CHANNEL])
 @pytest.mark.parametrize("depth", [0.0, 20.0, 33.0, 50.0])
-def test_coincident_ends_are_said_to_be_so(water: rays.Water, depth: float) -> None:
+def test_coincident_ends_are_said_to_be_so(water: ray_solutions.Water, depth: float) -> None:
     found = one(water, depth, depth, 0.0)
-    assert list(found.flag) == [rays.COINCIDENT]
+    assert list(found.flag) == [ray_solutions.COINCIDENT]
     assert found.travel_time[0] == found.length[0] == 0
     assert np.isnan(found.start_sine[0])
     assert np.isnan(found.end_sine[0])
@@ -51,8 +51,8 @@ def test_ends_on_nodes_and_boundaries(start: float, end: float) -> None:
 
 
 def test_layers_without_thickness_that_jump_there_and_back_are_not_there() -> None:
-    plain = rays.water(np.array([0.0, 30.0]), np.array([1500.0, 1503.0]), 30.0)
-    spiked = rays.water(
+    plain = ray_solutions.water(np.array([0.0, 30.0]), np.array([1500.0, 1503.0]), 30.0)
+    spiked = ray_solutions.water(
         np.array([0.0, 10.0, 10.0, 10.0, 30.0]), np.array([1500.0, 1501.0, 1400.0, 1501.0, 1503.0]), 30.0
     )
     a, b = one(plain, 2.0, 25.0, 60.0), one(spiked, 2.0, 25.0, 60.0)
@@ -61,7 +61,7 @@ def test_layers_without_thickness_that_jump_there_and_back_are_not_there() -> No
 
 
 def test_a_fast_sheet_without_thickness_turns_flat_rays_back_and_lets_steep_ones_through() -> None:
-    water = rays.water(
+    water = ray_solutions.water(
         np.array([0.0, 10.0, 10.0, 10.0, 30.0]), np.array([1500.0, 1500.0, 1600.0, 1500.0, 1500.0]), 30.0
     )
     assert len(one(water, 5.0, 15.0, 5.0).pair) == 1
@@ -73,9 +73,9 @@ def test_a_fast_sheet_without_thickness_turns_flat_rays_back_and_lets_steep_ones
 def test_a_very_fine_noisy_profile() -> None:
     rng = np.random.default_rng(0)
     depth = np.linspace(0, 40, 2001)
-    water = rays.water(depth, 1530 + rng.normal(size=2001), 40.0)
+    water = ray_solutions.water(depth, 1530 + rng.normal(size=2001), 40.0)
     z1, z2 = rng.uniform(0, 40, (2, 200))
-    found = rays.eigenrays(water, z1, z2, np.full(200, 20.0))
+    found = ray_solutions.eigenrays(water, z1, z2, np.full(200, 20.0))
     d = np.hypot(20.0, z2 - z1)
     steep = np.abs(z2 - z1) > 3
     assert set(np.flatnonzero(steep)) <= set(found.pair)
@@ -87,7 +87,7 @@ def test_a_very_fine_noisy_profile() -> None:
 def test_weak_and_violent_gradients(gradient: float) -> None:
     rise = min(5.0, 45.0 * gradient)
     speed = np.array([1500.0, 1500.0, 1500.0 + rise, 1500.0 + rise])
-    water = rays.water(np.array([0.0, 5.0, 5.0 + rise / gradient, 50.0]), speed, 50.0)
+    water = ray_solutions.water(np.array([0.0, 5.0, 5.0 + rise / gradient, 50.0]), speed, 50.0)
     found = one(water, 5.0, 5.0, 100.0)
     assert (np.diff(found.travel_time) >= 0).all()
     assert np.isfinite(found.travel_time).all()
@@ -126,4 +126,4 @@ def test_what_cannot_be_is_refused(start: float, end: float, distance: float, me
 )
 def test_profiles_that_cannot_be_are_refused(depth: list[float], speed: list[float], bed: float) -> None:
     with pytest.raises(ValueError, match="profile"):
-        rays.water(np.array(depth), np.array(speed), bed)
+        ray_solutions.water(np.array(depth), np.array(speed), bed)

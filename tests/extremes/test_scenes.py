@@ -9,22 +9,22 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from sonarsynth import store, verification
-from sonarsynth.beamforming import DenseDelayAndSum, FocusedDelayAndSum
+from sonarsynth import evaluation, store
 from sonarsynth.description import FieldError
+from sonarsynth.environment.sea import Environment, FlatNoise, Isovelocity, Tabulated, WenzNoise
+from sonarsynth.geometry.motion import Circle, Still
+from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
+from sonarsynth.pipeline import render
 from sonarsynth.planning import Plan, plan
+from sonarsynth.propagation import Straight
+from sonarsynth.receiver import BeamGrid, Converter, LowPass, PlanarLattice, PositionTable, Sonar
 from sonarsynth.recipe import Recipe
-from sonarsynth.render import render
+from sonarsynth.recipe.scene import EchoWindow, Physics, Processing, Scene, Trajectory, World
 from sonarsynth.scattering import Kirchhoff
-from sonarsynth.scattering.targets import Target
-from sonarsynth.scene import EchoWindow, Physics, Processing, Scene, Trajectory, World
 from sonarsynth.schedule import build
-from sonarsynth.sonar import BeamGrid, Converter, LowPass, PlanarLattice, PositionTable, Sonar
-from sonarsynth.tracing import Straight
-from sonarsynth.world.environment import Environment, FlatNoise, Isovelocity, Tabulated, WenzNoise
-from sonarsynth.world.motion import Circle, Still
-from sonarsynth.world.shapes import Box, Sphere
-from sonarsynth.world.sources import LogarithmicBubble, SnappingShrimp
+from sonarsynth.sources.shrimp import LogarithmicBubble, SnappingShrimp
+from sonarsynth.targets.shapes import Box, Sphere
+from sonarsynth.targets.target import Target
 
 LATTICE = PlanarLattice(columns=12, rows=12, pitch=0.05)
 BEAMS = BeamGrid(azimuths=11, elevations=11)
@@ -206,7 +206,7 @@ BUILT = ("one beam", "no targets", "500 m", "no shrimp", "one hydrophone", "the 
 def test_odd_stores_are_whole(which: str, tmp_path: Path) -> None:
     recipe = (HEARD | UNHEARD)[which]
     assert build(recipe, tmp_path / "odd.zarr", workers=0).ok
-    report = store.verify(tmp_path / "odd.zarr", [verification.check])
+    report = store.verify(tmp_path / "odd.zarr", [evaluation.check])
     assert not report.problems
     rows = {row.name: row for row in report.checks}
     assert rows["ledger adds up"].ok

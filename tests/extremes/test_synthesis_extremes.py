@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics import snap
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.bubble import snap_pressure
 from sonarsynth.products import Arrivals
-from sonarsynth.sonar import Elements, LowPass, PositionTable, Sonar, elements
-from sonarsynth.synthesis import DirectSum, KernelDeposit, pulse_support
-from sonarsynth.synthesis.direct_sum import exact_signals
-from sonarsynth.world.moment import Snap
-from sonarsynth.world.snap_pulses import waveform
-from sonarsynth.world.sources import LogarithmicBubble
+from sonarsynth.receiver import Elements, LowPass, PositionTable, Sonar, elements
+from sonarsynth.signals import DirectSum, KernelDeposit, pulse_support
+from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.sources.snap_pulses import waveform
+from sonarsynth.state import Snap
 
 MODEL = LogarithmicBubble()
 SNAPS = (Snap(np.zeros(3), 0.0, MODEL, None),)
@@ -262,9 +262,9 @@ def test_an_empty_window_is_refused() -> None:
 def test_a_snap_of_other_scales() -> None:
     """A bubble ten times slower and one ten times faster: peak, support and spectrum follow."""
     for factor in (0.1, 10.0):
-        scaled = snap.Bubble(MODEL.a, MODEL.k * factor, MODEL.m / factor, MODEL.q * factor, MODEL.density)
-        same = snap.Bubble(MODEL.a, MODEL.k, MODEL.m, MODEL.q, MODEL.density)
-        assert snap.peak(scaled)[0] == pytest.approx(snap.peak(same)[0] / factor, rel=1e-5)
-        assert snap.peak(scaled)[1] == pytest.approx(snap.peak(same)[1] * factor**2, rel=1e-9)
-        S = snap.spectrum(np.array([1e3, 5e4]) * factor, scaled)
-        np.testing.assert_allclose(S, factor * snap.spectrum(np.array([1e3, 5e4]), same), rtol=1e-9)
+        scaled = snap_pressure.Bubble(MODEL.a, MODEL.k * factor, MODEL.m / factor, MODEL.q * factor, MODEL.density)
+        same = snap_pressure.Bubble(MODEL.a, MODEL.k, MODEL.m, MODEL.q, MODEL.density)
+        assert snap_pressure.peak(scaled)[0] == pytest.approx(snap_pressure.peak(same)[0] / factor, rel=1e-5)
+        assert snap_pressure.peak(scaled)[1] == pytest.approx(snap_pressure.peak(same)[1] * factor**2, rel=1e-9)
+        S = snap_pressure.spectrum(np.array([1e3, 5e4]) * factor, scaled)
+        np.testing.assert_allclose(S, factor * snap_pressure.spectrum(np.array([1e3, 5e4]), same), rtol=1e-9)

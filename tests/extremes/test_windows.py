@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sonarsynth.environment.boundaries import SeaSurface
+from sonarsynth.environment.sea import Environment, Isovelocity, Tabulated
+from sonarsynth.geometry.motion import Line, Still
+from sonarsynth.pipeline import synthesise, trace_frame
 from sonarsynth.planning import plan
+from sonarsynth.propagation import AutoTracing
+from sonarsynth.receiver import PlanarLattice, Sonar
 from sonarsynth.recipe import Recipe
-from sonarsynth.render import synthesise, trace_frame
-from sonarsynth.scattering.targets import Target
-from sonarsynth.scene import Physics, Scene, Trajectory, World
-from sonarsynth.sonar import PlanarLattice, Sonar
-from sonarsynth.tracing import AutoTracing
-from sonarsynth.world.boundaries import SeaSurface
-from sonarsynth.world.environment import Environment, Isovelocity, Tabulated
-from sonarsynth.world.motion import Line, Still
-from sonarsynth.world.shapes import Sphere
-from sonarsynth.world.sources import SnappingShrimp
+from sonarsynth.recipe.scene import Physics, Scene, Trajectory, World
+from sonarsynth.sources.shrimp import SnappingShrimp
+from sonarsynth.targets.shapes import Sphere
+from sonarsynth.targets.target import Target
 
 UNIFORM = Isovelocity(speed=1530.0)
 BENDING = Tabulated(depth=(0.0, 60.0), speed=(1540.0, 1500.0))

@@ -10,12 +10,12 @@ import pytest
 from scipy.integrate import quad
 
 import sonarsynth as ss
-from sonarsynth.acoustics.seawater import francois_garrison
+from sonarsynth.environment.absorption import DepthAbsorption
+from sonarsynth.environment.sea import Absorption, Profile
+from sonarsynth.equations.water.seawater import francois_garrison
 from sonarsynth.planning import Choices, Plan, arrivals_of, plan
-from sonarsynth.synthesis.direct_sum import relative_absorption
-from sonarsynth.tracing import Refracted
-from sonarsynth.world.environment import Absorption, Profile
-from sonarsynth.world.water import DepthAbsorption
+from sonarsynth.propagation import Refracted
+from sonarsynth.signals.direct_sum import relative_absorption
 
 COLD = Absorption(temperature=4.0, salinity=35.0, ph=8.0)
 FLAT = Profile(np.array([0.0]), np.array([1500.0]))

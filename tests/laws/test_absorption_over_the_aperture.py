@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.seawater import ainslie_mccolm
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.water.seawater import ainslie_mccolm
 from sonarsynth.products import Arrivals
-from sonarsynth.sonar import Elements, PositionTable, Romanis, Sonar, elements
-from sonarsynth.synthesis import DirectSum, KernelDeposit
-from sonarsynth.synthesis.direct_sum import exact_signals
-from sonarsynth.world.moment import Snap
-from sonarsynth.world.sources import LogarithmicBubble
+from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, elements
+from sonarsynth.signals import DirectSum, KernelDeposit
+from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.state import Snap
 
 C = 1540.0
 SONAR = Sonar()

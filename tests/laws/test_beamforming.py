@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonarsynth.beamforming import DenseDelayAndSum, FocusedDelayAndSum
-from sonarsynth.beamforming.lattice import focused_energies
 from sonarsynth.conventions import direction
+from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
+from sonarsynth.imaging.lattice_image import focused_energies
 from sonarsynth.products import Signals
-from sonarsynth.sonar import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
+from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
 
 SPEED = 1540.0
 RATE = 196e3

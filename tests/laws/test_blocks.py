@@ -7,20 +7,21 @@ import pytest
 import trimesh
 
 from sonarsynth.conventions import NO_TARGET
+from sonarsynth.environment.sea import Environment, Isovelocity, Profile
 from sonarsynth.geometry import Pose, quaternion
-from sonarsynth.labelling import label
+from sonarsynth.geometry.mesh import Mesh, in_blocks
+from sonarsynth.geometry.motion import Track
+from sonarsynth.geometry.placed_target import Body
+from sonarsynth.labels import label
 from sonarsynth.products import Arrivals
+from sonarsynth.propagation import AutoTracing, Refracted, Straight
+from sonarsynth.receiver import BeamGrid, Romanis, elements
 from sonarsynth.scattering import Kirchhoff, MirrorLobe, PartlyReflecting, Scattering
-from sonarsynth.sonar import BeamGrid, Romanis, elements
-from sonarsynth.tracing import AutoTracing, Refracted, Straight, echoes
+from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.state import Moment, Snap
+from sonarsynth.targets import meshes
+from sonarsynth.tracing import echoes
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.world import meshes
-from sonarsynth.world.environment import Environment, Isovelocity, Profile
-from sonarsynth.world.mesh import Mesh, in_blocks
-from sonarsynth.world.moment import Moment, Snap
-from sonarsynth.world.motion import Track
-from sonarsynth.world.placed import Body
-from sonarsynth.world.sources import LogarithmicBubble
 
 ENVIRONMENT = Environment(depth=30.0, sound_speed=Isovelocity(speed=1540.0))
 UNIFORM = Profile(np.array([0.0, 30.0]), np.array([1540.0, 1540.0]))

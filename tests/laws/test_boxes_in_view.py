@@ -7,15 +7,15 @@ import pytest
 
 from sonarsynth.conventions import azimuth_elevation, direction
 from sonarsynth.geometry import Pose
-from sonarsynth.labelling import label
-from sonarsynth.labelling.views import MEANINGS, View, box_in_view
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.geometry.placed_target import Body
+from sonarsynth.labels import label
+from sonarsynth.labels.views import MEANINGS, View, box_in_view
 from sonarsynth.products import Truth
-from sonarsynth.sonar import BeamGrid
-from sonarsynth.world.mesh import Mesh
-from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.moment import Moment
-from sonarsynth.world.placed import Body
-from sonarsynth.world.shapes import Box, Sphere
+from sonarsynth.receiver import BeamGrid
+from sonarsynth.state import Moment
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Box, Sphere
 
 BEAMS = BeamGrid(azimuth_span=np.deg2rad(50.0), azimuths=11, elevation_span=np.deg2rad(30.0), elevations=11)
 HALF = np.deg2rad([25.0, 25.0, 15.0, 15.0]) * [-1, 1, -1, 1]

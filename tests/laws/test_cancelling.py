@@ -7,18 +7,29 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.rays import eigenrays, water
-from sonarsynth.beamforming import FocusedDelayAndSum
 from sonarsynth.conventions import direction
+from sonarsynth.environment.sea import Profile
+from sonarsynth.equations.rays.ray_solutions import eigenrays, water
 from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.imaging import FocusedDelayAndSum
+from sonarsynth.pipeline import beamform_frame, trace_frame
 from sonarsynth.planning import plan
+from sonarsynth.propagation import AutoTracing
 from sonarsynth.ranging import IsovelocityRange, SensorDelays, WavefrontCancelling
-from sonarsynth.ranging.multipath import CANCELLED, DIRECT, FAINT, OUTSIDE, SEEN, WEAK, Limits, cancel, images, in_view
-from sonarsynth.render import beamform_frame, trace_frame
-from sonarsynth.scene import EchoWindow, Physics, Processing
-from sonarsynth.sonar import BeamGrid, Romanis, Sonar, elements
-from sonarsynth.tracing import AutoTracing
-from sonarsynth.world.environment import Profile
+from sonarsynth.ranging.cancelling.multipath import (
+    CANCELLED,
+    DIRECT,
+    FAINT,
+    OUTSIDE,
+    SEEN,
+    WEAK,
+    Limits,
+    cancel,
+    images,
+    in_view,
+)
+from sonarsynth.receiver import BeamGrid, Romanis, Sonar, elements
+from sonarsynth.recipe.scene import EchoWindow, Physics, Processing
 from tests.heard import add_noise, hear, silence
 from tests.scenes import remus
 

@@ -8,23 +8,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonarsynth import config, planning
-from sonarsynth.acoustics.arrays import aperture_terms
+from sonarsynth import planning
 from sonarsynth.conventions import Floats
+from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
+from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.planning.choosing import Expansion
 from sonarsynth.products import Arrivals
-from sonarsynth.sonar import Elements, Romanis, Sonar, elements
-from sonarsynth.sonar.subarrays import subarray
-from sonarsynth.synthesis import DirectSum, KernelDeposit
-from sonarsynth.synthesis.direct_sum import exact_signals
-from sonarsynth.synthesis.wavefront import delay_and_gain, fronts
-from sonarsynth.tracing import Refracted
+from sonarsynth.propagation import Refracted
+from sonarsynth.receiver import Elements, Romanis, Sonar, elements
+from sonarsynth.receiver.subarrays import subarray
+from sonarsynth.recipe import reading
+from sonarsynth.signals import DirectSum, KernelDeposit
+from sonarsynth.signals.array_paths import delay_and_gain, fronts
+from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.state import Moment, Snap
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.tracing.wavefront import terms_of
-from sonarsynth.world.environment import Absorption, Environment, Isovelocity, Profile
-from sonarsynth.world.moment import Moment, Snap
-from sonarsynth.world.sources import LogarithmicBubble
+from sonarsynth.tracing.expansion.wavefront_polynomials import terms_of
 
 POSE = Pose(np.array([0.0, 0.0, -5.0]), quaternion(0.5 * np.pi))
 ROMANIS = elements(Romanis())
@@ -90,7 +91,7 @@ def heard(method: KernelDeposit | DirectSum, found: Arrivals, part: Elements) ->
 
 @pytest.mark.parametrize(("signal", "degree"), [(1e-3, 3), (1e-5, 5)])
 def test_a_planner_takes_the_fifth_degree_before_it_cuts_the_array(signal: float, degree: int) -> None:
-    made = planning.plan(config.recipe_of(config.read(TANK, [f"accuracy.signal={signal}"])))
+    made = planning.plan(reading.recipe_of(reading.read(TANK, [f"accuracy.signal={signal}"])))
     assert made.choices.subarrays == 1 and made.choices.degree == degree
     measured = Expansion.of(made, 0)
     assert measured.error(1, degree=made.choices.degree) < signal

@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonarsynth.beamforming import FocusedDelayAndSum
 from sonarsynth.conventions import direction
+from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.planning import plan
-from sonarsynth.planning.lost_echoes import losses
+from sonarsynth.planning.measured.lost_echoes import losses
 from sonarsynth.products import Bearings
 from sonarsynth.ranging import IsovelocityRange, SensorDelays
-from sonarsynth.ranging.direct_pulse import remove, remove_others, trusted
-from sonarsynth.scene import Processing
-from sonarsynth.sonar import BeamGrid, PlanarLattice, Sonar, elements
-from sonarsynth.world.environment import Profile
+from sonarsynth.ranging.cancelling.direct_pulse import remove, remove_others, trusted
+from sonarsynth.receiver import BeamGrid, PlanarLattice, Sonar, elements
+from sonarsynth.recipe.scene import Processing
 from tests.heard import add_noise, hear, pulse_spectrum, silence
 from tests.scenes import point_scene
 

@@ -8,27 +8,27 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.arrays import aperture_terms
 from sonarsynth.conventions import Floats
+from sonarsynth.environment.boundaries import Rigid, SeaBed
+from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
+from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.geometry.motion import Track
+from sonarsynth.geometry.placed_target import Body
 from sonarsynth.products import Arrivals
+from sonarsynth.propagation import Refracted, Straight
+from sonarsynth.receiver import Elements, Romanis, Sonar, elements
+from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.scattering import Isotropic
-from sonarsynth.sonar import Elements, Romanis, Sonar, elements
-from sonarsynth.sonar.subarrays import subarray
-from sonarsynth.synthesis import DirectSum, KernelDeposit
-from sonarsynth.synthesis.direct_sum import exact_signals
-from sonarsynth.synthesis.wavefront import delay_and_gain, fronts
-from sonarsynth.tracing import Refracted, Straight
+from sonarsynth.signals import DirectSum, KernelDeposit
+from sonarsynth.signals.array_paths import delay_and_gain, fronts
+from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.state import Moment, Snap
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Box
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.tracing.variation import ENOUGH
-from sonarsynth.world.boundaries import Rigid, SeaBed
-from sonarsynth.world.environment import Absorption, Environment, Isovelocity, Profile
-from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.moment import Moment, Snap
-from sonarsynth.world.motion import Track
-from sonarsynth.world.placed import Body
-from sonarsynth.world.shapes import Box
-from sonarsynth.world.sources import LogarithmicBubble
+from sonarsynth.tracing.expansion.amplitude_polynomials import ENOUGH
 
 C = 1500.0
 PROFILE = Profile(np.array([0.0]), np.array([C]))

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from sonarsynth.conventions import Floats
+from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
 from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.geometry.motion import Track
 from sonarsynth.products import Arrivals
-from sonarsynth.sonar import Elements, Romanis, Sonar, elements
-from sonarsynth.sonar.subarrays import subarray
-from sonarsynth.synthesis import DirectSum, KernelDeposit
-from sonarsynth.synthesis.direct_sum import exact_signals
-from sonarsynth.synthesis.wavefront import faced, fronts, towards
-from sonarsynth.tracing import Refracted
+from sonarsynth.propagation import Refracted
+from sonarsynth.receiver import Elements, Romanis, Sonar, elements
+from sonarsynth.receiver.subarrays import subarray
+from sonarsynth.signals import DirectSum, KernelDeposit
+from sonarsynth.signals.array_paths import faced, fronts, towards
+from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.state import Moment, Snap
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.world.environment import Absorption, Environment, Isovelocity, Profile
-from sonarsynth.world.moment import Moment, Snap
-from sonarsynth.world.motion import Track
-from sonarsynth.world.sources import LogarithmicBubble
 
 C = 1500.0
 POSE = Pose(np.array([0.0, 0.0, -5.0]), quaternion(0.5 * np.pi))

@@ -8,18 +8,18 @@ from math import factorial
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.facet_pulses import facet_mean, facet_response, mean_powers, rough_factor
-from sonarsynth.acoustics.kirchhoff import facet_amplitude
-from sonarsynth.acoustics.kirchhoff_pulse import Waveform, facet_echo
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.scattering.facet_pulses import facet_mean, facet_response, mean_powers, rough_factor
+from sonarsynth.equations.scattering.kirchhoff_integral import facet_amplitude
+from sonarsynth.equations.scattering.kirchhoff_pulse import Waveform, facet_echo
 from sonarsynth.products import Arrivals
-from sonarsynth.sonar import BandPass, LowPass, PositionTable, Romanis, Sonar, elements
-from sonarsynth.synthesis import DirectSum, KernelDeposit, pulse_support
-from sonarsynth.synthesis.direct_sum import exact_signals
-from sonarsynth.synthesis.pulse import pulse_spectrum
-from sonarsynth.world.moment import Snap
-from sonarsynth.world.snap_pulses import waveform
-from sonarsynth.world.sources import LogarithmicBubble
+from sonarsynth.receiver import BandPass, LowPass, PositionTable, Romanis, Sonar, elements
+from sonarsynth.signals import DirectSum, KernelDeposit, pulse_support
+from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.signals.filtered_pulse import pulse_spectrum
+from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.sources.snap_pulses import waveform
+from sonarsynth.state import Snap
 from tests.laws.test_synthesis import C, absorption, arrivals, error, some_of, target_at
 
 MODEL = LogarithmicBubble()

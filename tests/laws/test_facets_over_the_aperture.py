@@ -7,23 +7,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.arrays import aperture_terms
-from sonarsynth.acoustics.facet_pulses import facet_response
 from sonarsynth.conventions import Floats
+from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
+from sonarsynth.equations.arrays.apertures import aperture_terms
+from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.geometry.placed_target import Body
 from sonarsynth.products import Arrivals
+from sonarsynth.propagation import AutoTracing
+from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, elements
 from sonarsynth.scattering import Kirchhoff
-from sonarsynth.sonar import Elements, PositionTable, Romanis, Sonar, elements
-from sonarsynth.synthesis import KernelDeposit
-from sonarsynth.synthesis.direct_sum import exact_signals
-from sonarsynth.tracing import AutoTracing
+from sonarsynth.signals import KernelDeposit
+from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.state import Moment, Snap
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Box
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.world.environment import Absorption, Environment, Isovelocity, Profile
-from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.moment import Moment, Snap
-from sonarsynth.world.placed import Body
-from sonarsynth.world.shapes import Box
-from sonarsynth.world.sources import LogarithmicBubble
 
 C = 1500.0
 PROFILE = Profile(np.array([0.0]), np.array([C]))

@@ -7,13 +7,13 @@ import pytest
 import trimesh
 
 from sonarsynth.conventions import Floats
+from sonarsynth.environment.sea import Environment, Isovelocity, Profile
 from sonarsynth.geometry import Pose, quaternion, unit
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.geometry.placed_target import Body
+from sonarsynth.propagation import AutoTracing, Refracted
 from sonarsynth.scattering import MirrorLobe
-from sonarsynth.tracing import AutoTracing, Refracted
-from sonarsynth.tracing.fan import EVENTS, RayFan, fan
-from sonarsynth.world.environment import Environment, Isovelocity, Profile
-from sonarsynth.world.mesh import Mesh
-from sonarsynth.world.placed import Body
+from sonarsynth.tracing.ray_fan import EVENTS, RayFan, fan
 
 TANK = Environment(depth=0.3, sound_speed=Isovelocity(speed=1480.0))
 TANK_PROFILE = Profile(np.array([0.0, 0.1, 0.2, 0.3]), np.array([1482.0, 1481.0, 1478.0, 1477.5]))

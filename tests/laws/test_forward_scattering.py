@@ -8,23 +8,23 @@ import numpy as np
 import pytest
 from scipy.special import fresnel
 
-from sonarsynth.acoustics.arrays import aperture_terms
-from sonarsynth.acoustics.facet_pulses import facet_response
 from sonarsynth.conventions import Floats
+from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
+from sonarsynth.equations.arrays.apertures import aperture_terms
+from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.geometry.motion import Track
+from sonarsynth.geometry.placed_target import Body
 from sonarsynth.products import Arrivals
+from sonarsynth.propagation import AutoTracing
+from sonarsynth.receiver import Romanis, elements
 from sonarsynth.scattering import Kirchhoff, MirrorLobe, PartlyReflecting
-from sonarsynth.sonar import Romanis, elements
-from sonarsynth.tracing import AutoTracing
+from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.state import Moment, Snap
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.world.environment import Absorption, Environment, Isovelocity, Profile
-from sonarsynth.world.mesh import Mesh
-from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.moment import Moment, Snap
-from sonarsynth.world.motion import Track
-from sonarsynth.world.placed import Body
-from sonarsynth.world.shapes import Box, Sphere
-from sonarsynth.world.sources import LogarithmicBubble
 from tests.spheres import exact_sphere
 
 C = 1500.0

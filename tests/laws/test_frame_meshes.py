@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from sonarsynth.scattering import fineness
-from sonarsynth.scattering.fineness import ROWS, expected_error, fine_mesh, frame_mesh, mesh_report
-from sonarsynth.world.generation import sphere
-from sonarsynth.world.mesh import Mesh
-from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.refinement import halve_longest_edges, longest_edge, sides, split_long_edges, volume
-from sonarsynth.world.shapes import Box, Cylinder, LShape, MeshFile, Myring, Remus100, Sphere
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.geometry.surfaces import halve_longest_edges, longest_edge, sides, split_long_edges, volume
+from sonarsynth.targets import mesh_resolution
+from sonarsynth.targets.generated.generation import sphere
+from sonarsynth.targets.mesh_resolution import ROWS, expected_error, fine_mesh, frame_mesh, mesh_report
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Box, Cylinder, LShape, MeshFile, Myring, Remus100, Sphere
 
 WAVELENGTH = 0.05
 BLUNT = Myring(nose=0.2, middle=0.0, tail=0.5, diameter=0.2, exponent=10.0, tail_angle=0.5)
@@ -132,7 +132,7 @@ def test_the_longest_edges_first_makes_fewer_and_no_thinner_facets() -> None:
 
 
 def test_beyond_the_most_facets_it_is_coarser_and_says_so(monkeypatch) -> None:
-    monkeypatch.setattr(fineness, "MOST_FACETS", 3000)
+    monkeypatch.setattr(mesh_resolution, "MOST_FACETS", 3000)
     ball = frame_mesh(Sphere(radius=3.0), 0.0501)
     assert 500 < len(ball.faces) < 6000
     assert "facets are too few for waves of 50.1 mm: their rows" in ball.notes[1]

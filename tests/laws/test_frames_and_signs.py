@@ -5,8 +5,8 @@ import pytest
 
 from sonarsynth.conventions import Unit, azimuth_elevation, depth, direction, level, pressure
 from sonarsynth.geometry import Pose, quaternion, quaternion_product, rotation_matrix
+from sonarsynth.geometry.motion import Circle, Line, Still, Waypoint, Waypoints, pose, velocity
 from sonarsynth.randomness import stream
-from sonarsynth.world.motion import Circle, Line, Still, Waypoint, Waypoints, pose, velocity
 
 NORTH, EAST, SOUTH, WEST = 0.0, 0.5 * np.pi, np.pi, -0.5 * np.pi
 

@@ -7,11 +7,11 @@ import pytest
 from pydantic import ValidationError
 from scipy.integrate import quad
 
-from sonarsynth.world.generation import generate
-from sonarsynth.world.meshes import MeshError, mesh_of
-from sonarsynth.world.myring import hull_length, hull_radius
-from sonarsynth.world.refinement import longest_edge, split_long_edges, volume
-from sonarsynth.world.shapes import Box, Cylinder, LShape, Myring, Remus100, Sphere
+from sonarsynth.geometry.surfaces import longest_edge, split_long_edges, volume
+from sonarsynth.targets.generated.generation import generate
+from sonarsynth.targets.generated.myring import hull_length, hull_radius
+from sonarsynth.targets.meshes import MeshError, mesh_of
+from sonarsynth.targets.shapes import Box, Cylinder, LShape, Myring, Remus100, Sphere
 
 TORPEDO = {"nose": 0.2, "middle": 0.6, "tail": 0.5, "diameter": 0.2}
 SHAPES = [

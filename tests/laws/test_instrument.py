@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.noise import power_density, wenz_level
-from sonarsynth.acoustics.spectra import response
+from sonarsynth.environment.sea import FlatNoise, WenzNoise
+from sonarsynth.equations.noise.ambient_noise import power_density, wenz_level
+from sonarsynth.equations.noise.filters import response
 from sonarsynth.products import Signals
 from sonarsynth.randomness import stream
-from sonarsynth.sonar import BandPass, Converter, PlanarLattice, Sonar, elements
-from sonarsynth.synthesis import add_noise, convert
-from sonarsynth.synthesis.pulse import fir
-from sonarsynth.world.environment import FlatNoise, WenzNoise
+from sonarsynth.receiver import BandPass, Converter, PlanarLattice, Sonar, elements
+from sonarsynth.signals import add_noise, convert
+from sonarsynth.signals.filtered_pulse import fir
 
 SONAR = Sonar()
 ARRAY = elements(PlanarLattice(columns=16, rows=16, pitch=0.05))

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from sonarsynth.labelling import family
+from sonarsynth.evaluation import ledger_adds_up, ledger_measured
+from sonarsynth.labels import family
+from sonarsynth.pipeline import Traced, beamform_frame, measure_isolated, range_frame, trace_frame
 from sonarsynth.planning import Choices, plan
-from sonarsynth.render import Traced, beamform_frame, measure_isolated, range_frame, trace_frame
 from sonarsynth.scattering import Kirchhoff
-from sonarsynth.synthesis import DirectSum, KernelDeposit
-from sonarsynth.synthesis.isolated import measured_levels
-from sonarsynth.verification import ledger_adds_up, ledger_measured
+from sonarsynth.signals import DirectSum, KernelDeposit
+from sonarsynth.signals.isolated_paths import measured_levels
 from tests.laws.test_ledger import LEVEL, SNAPS, SONAR, assert_it_adds_up, booked, some_paths, the_band, transfer
 from tests.laws.test_synthesis import absorption
 from tests.scenes import point_scene, remus

@@ -11,27 +11,27 @@ import trimesh
 
 from sonarsynth.conventions import azimuth_elevation, direction
 from sonarsynth.geometry import Pose
-from sonarsynth.labelling import Band, Listening, label_points
-from sonarsynth.labelling.attributing import attribution
-from sonarsynth.labelling.points import surface_distances
+from sonarsynth.geometry.motion import Course, Still
+from sonarsynth.geometry.placed_target import Body
+from sonarsynth.labels import Band, Listening, label_points
+from sonarsynth.labels.attribution_of_points import attribution
+from sonarsynth.labels.point_labels import surface_distances
+from sonarsynth.pipeline import trace_frame
+from sonarsynth.pipeline.labelling import band_of
 from sonarsynth.planning import plan
 from sonarsynth.products import FAMILIES, ORIGINS, Arrivals, PointCloud, PointLabels
+from sonarsynth.propagation import AutoTracing
+from sonarsynth.receiver import BeamGrid, PlanarLattice
+from sonarsynth.receiver import elements as elements_of
+from sonarsynth.receiver.hydrophones import PositionTable
 from sonarsynth.recipe import Recipe
-from sonarsynth.render import trace_frame
-from sonarsynth.render.labels import band_of
-from sonarsynth.scattering.targets import Target
-from sonarsynth.scene import Frame
-from sonarsynth.sonar import BeamGrid, PlanarLattice
-from sonarsynth.sonar import elements as elements_of
-from sonarsynth.sonar.hydrophones import PositionTable
-from sonarsynth.synthesis import KernelDeposit
-from sonarsynth.synthesis.pulse import pulse_spectrum
-from sonarsynth.tracing import AutoTracing
-from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.motion import Course, Still
-from sonarsynth.world.placed import Body
-from sonarsynth.world.shapes import Box, Sphere
-from sonarsynth.world.sources import SnappingShrimp
+from sonarsynth.recipe.scene import Frame
+from sonarsynth.signals import KernelDeposit
+from sonarsynth.signals.filtered_pulse import pulse_spectrum
+from sonarsynth.sources.shrimp import SnappingShrimp
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Box, Sphere
+from sonarsynth.targets.target import Target
 from tests.scenes import point_scene, remus
 
 ARRAY = PlanarLattice(columns=12, rows=10, pitch=0.05)

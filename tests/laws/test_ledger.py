@@ -7,19 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.facet_pulses import facet_response
 from sonarsynth.conventions import Floats
-from sonarsynth.labelling import SLICES, Band, echoes, family, ledger, path_powers
+from sonarsynth.equations.scattering.facet_pulses import facet_response
+from sonarsynth.labels import SLICES, Band, echoes, family, ledger, path_powers
 from sonarsynth.products import LEDGER, Arrivals, Ledger
-from sonarsynth.sonar import Band as SonarBand
-from sonarsynth.sonar import BandPass, Sonar
-from sonarsynth.synthesis import KernelDeposit
-from sonarsynth.synthesis.direct_sum import exact_signals, relative_absorption
-from sonarsynth.synthesis.isolated import energy_in_slices, ideal_hydrophone, measured_levels
-from sonarsynth.synthesis.pulse import pulse_spectrum
-from sonarsynth.world.moment import Snap
-from sonarsynth.world.snap_pulses import waveform
-from sonarsynth.world.sources import LogarithmicBubble
+from sonarsynth.receiver import Band as SonarBand
+from sonarsynth.receiver import BandPass, Sonar
+from sonarsynth.signals import KernelDeposit
+from sonarsynth.signals.direct_sum import exact_signals, relative_absorption
+from sonarsynth.signals.filtered_pulse import pulse_spectrum
+from sonarsynth.signals.isolated_paths import energy_in_slices, ideal_hydrophone, measured_levels
+from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.sources.snap_pulses import waveform
+from sonarsynth.state import Snap
 from tests.laws.test_synthesis import absorption, arrivals
 
 MODEL = LogarithmicBubble()

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics import bubble, bubble_pulse, pulses, spectra
-from sonarsynth.acoustics.bubble import Cavity, Collapse
-from sonarsynth.acoustics.spectra import Fir
 from sonarsynth.conventions import level
-from sonarsynth.synthesis.pulse import snap_gains, snap_levels
-from sonarsynth.world.moment import Snap
-from sonarsynth.world.snap_pulses import pulse
-from sonarsynth.world.snaps import KellerMiksis
+from sonarsynth.equations.bubble import bubble_collapse, bubble_pulse, pulses
+from sonarsynth.equations.bubble.bubble_collapse import Cavity, Collapse
+from sonarsynth.equations.noise import filters
+from sonarsynth.equations.noise.filters import Fir
+from sonarsynth.signals.filtered_pulse import snap_gains, snap_levels
+from sonarsynth.sources.snap_models import KellerMiksis
+from sonarsynth.sources.snap_pulses import pulse
+from sonarsynth.state import Snap
 
 GASES = (300.0, 1000.0, 3000.0)
 EAR = Fir(0.0, 200e3, 20e3, 60.0)
@@ -20,7 +21,7 @@ EAR = Fir(0.0, 200e3, 20e3, 60.0)
 
 
 def collapsed(gas: float, depth: float = 5.0) -> Collapse:
-    return bubble.collapse(Cavity(3.5e-3, gas, bubble.ambient_pressure(depth)), 1)
+    return bubble_collapse.collapse(Cavity(3.5e-3, gas, bubble_collapse.ambient_pressure(depth)), 1)
 
 
 def heard(model: KellerMiksis, source_level: float) -> float:
@@ -37,7 +38,7 @@ def test_the_peak_is_that_of_the_filtered_spectrum(gas: float, depth: float, fre
     low_pass = Fir(0.0, frequency, 0.2 * frequency, 80.0)
     top = pulses.reach(low_pass)
     f = np.arange(0.0, top, 500.0)
-    S = pulses.spectrum(f, bubble_pulse.pulse(found, top)) * spectra.response(f, low_pass)
+    S = pulses.spectrum(f, bubble_pulse.pulse(found, top)) * filters.response(f, low_pass)
     n = 1 << 17
     assert bubble_pulse.peak_below(found, frequency) == pytest.approx((np.fft.irfft(S, n) * n * 500.0).max(), rel=3e-4)
 
@@ -79,7 +80,7 @@ def test_a_point_has_a_level_in_a_band_and_one_that_settles_has_none() -> None:
     assert bubble_pulse.peak(point)[1] == np.inf
     assert 190.0 < float(level(bubble_pulse.peak_below(point, 200e3))) < 210.0
     with pytest.raises(ValueError, match="settles"):
-        bubble_pulse.peak_below(bubble.collapse(Cavity(3.5e-3, 1000.0, 150e3, viscosity=100.0)), 200e3)
+        bubble_pulse.peak_below(bubble_collapse.collapse(Cavity(3.5e-3, 1000.0, 150e3, viscosity=100.0)), 200e3)
 
 
 @pytest.mark.parametrize("wrong", [0.0, 500.0, 3e6, np.nan])

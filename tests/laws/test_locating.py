@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.bearings import tangent_plane
-from sonarsynth.acoustics.rays import eigenrays, water
 from sonarsynth.conventions import azimuth_elevation, direction
+from sonarsynth.environment.sea import Profile
+from sonarsynth.equations.arrays.spherical_wave import tangent_plane
+from sonarsynth.equations.rays.ray_solutions import eigenrays, water
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.products import Bearings, Signals
 from sonarsynth.ranging import SensorDelays
-from sonarsynth.ranging.placing import bending_covariance
-from sonarsynth.ranging.refraction import first_rays, mean_gradient
-from sonarsynth.sonar import PlanarLattice, Romanis, Sonar, elements
-from sonarsynth.world.environment import Profile
+from sonarsynth.ranging.location.refraction import first_rays, mean_gradient
+from sonarsynth.ranging.location.source_position import bending_covariance
+from sonarsynth.receiver import PlanarLattice, Romanis, Sonar, elements
 from tests.heard import RATE, envelope_late, hear, hear_direct, silence
 
 C = 1540.0

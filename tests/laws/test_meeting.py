@@ -9,13 +9,13 @@ import pytest
 from scipy.optimize import brentq
 
 from sonarsynth.description import FieldError
-from sonarsynth.labelling import label
+from sonarsynth.geometry.motion import Circle, Course, Still, Waypoint, Waypoints, pose, spin, velocity
+from sonarsynth.labels import label
 from sonarsynth.planning import Choices, plan
-from sonarsynth.planning.checks import check_frame
-from sonarsynth.sonar import BeamGrid
-from sonarsynth.tracing import Refracted, Straight
-from sonarsynth.world.moment import Moment
-from sonarsynth.world.motion import Circle, Course, Still, Waypoint, Waypoints, pose, spin, velocity
+from sonarsynth.planning.notes.scene_checks import check_frame
+from sonarsynth.propagation import Refracted, Straight
+from sonarsynth.receiver import BeamGrid
+from sonarsynth.state import Moment
 from tests.laws.test_traced_families import BED, SONAR, THERMOCLINE, UNIFORM, C, ball
 from tests.laws.test_traced_families import snap as snap_at
 from tests.scenes import remus

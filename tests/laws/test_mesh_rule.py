@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.facets import kirchhoff_edge, kirchhoff_error
-from sonarsynth.scattering.fineness import expected_error
-from sonarsynth.world.generation import sphere
-from sonarsynth.world.mesh import Mesh
-from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.refinement import split_long_edges
-from sonarsynth.world.shapes import Cylinder
+from sonarsynth.equations.scattering.facet_size import kirchhoff_edge, kirchhoff_error
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.geometry.surfaces import split_long_edges
+from sonarsynth.targets.generated.generation import sphere
+from sonarsynth.targets.mesh_resolution import expected_error
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Cylinder
 
 
 def triangle_integral(corners: np.ndarray, w: np.ndarray) -> np.ndarray:

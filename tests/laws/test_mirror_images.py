@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonarsynth.sonar import PlanarLattice, PositionTable, Romanis, elements
-from sonarsynth.sonar.mirrors import mirror_image, mirror_normal
+from sonarsynth.receiver import PlanarLattice, PositionTable, Romanis, elements
+from sonarsynth.receiver.mirror_images import mirror_image, mirror_normal
 
 WAVELENGTH = 0.018
 RNG = np.random.default_rng(5)

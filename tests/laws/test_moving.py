@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.arrays import aperture_terms
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.geometry import Pose
+from sonarsynth.geometry.motion import Circle, Motion, Track, Waypoint, Waypoints, pose, velocity
+from sonarsynth.geometry.placed_target import Body
 from sonarsynth.products import Arrivals
+from sonarsynth.propagation import AutoTracing
 from sonarsynth.scattering import Isotropic, MirrorLobe
-from sonarsynth.tracing import AutoTracing
+from sonarsynth.state import Moment
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.world.moment import Moment
-from sonarsynth.world.motion import Circle, Motion, Track, Waypoint, Waypoints, pose, velocity
-from sonarsynth.world.placed import Body
 from tests.laws.test_traced_families import (
     ARRAY,
     BAND,

@@ -9,13 +9,13 @@ import pytest
 
 import sonarsynth as ss
 from sonarsynth.geometry import Pose
-from sonarsynth.planning.bodies import mirror_notes, overlap_notes
-from sonarsynth.planning.looks import survey
-from sonarsynth.world.mesh import Mesh
-from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.overlaps import overlap
-from sonarsynth.world.placed import Body
-from sonarsynth.world.shapes import Box, LShape, Shape, Sphere
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.geometry.placed_target import Body
+from sonarsynth.planning.measured.sampled_frames import survey
+from sonarsynth.planning.notes.target_notes import mirror_notes, overlap_notes
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.overlaps import overlap
+from sonarsynth.targets.shapes import Box, LShape, Shape, Sphere
 
 UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
 TILTED = np.array([0.6, 0.0, 0.64, 0.48])

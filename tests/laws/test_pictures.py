@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.spectra import Fir
-from sonarsynth.pictures.frames import FramePicture, Hull, View, Window
-from sonarsynth.pictures.outlines import CELLS, union_outline, view_outline
-from sonarsynth.pictures.rays import section_figure, space_figure
-from sonarsynth.pictures.snap import snap_figure
-from sonarsynth.world.snap_pulses import pulse
-from sonarsynth.world.sources import LogarithmicBubble
+from sonarsynth.equations.noise.filters import Fir
+from sonarsynth.pictures.figures.frame_figure import FramePicture, Hull, View, Window
+from sonarsynth.pictures.figures.outlines import CELLS, union_outline, view_outline
+from sonarsynth.pictures.figures.ray_figure import section_figure, space_figure
+from sonarsynth.pictures.figures.snap_figure import snap_figure
+from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.sources.snap_pulses import pulse
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 SQUARE_FACES = np.array([[0, 1, 2], [0, 2, 3]])

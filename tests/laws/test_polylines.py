@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.rays import Eigenrays, Water, eigenrays, water
 from sonarsynth.conventions import Floats, depth
-from sonarsynth.tracing.fan import EVENTS, fan
-from sonarsynth.tracing.polylines import Polylines, polylines
-from sonarsynth.world.environment import Environment, Isovelocity, Profile
+from sonarsynth.environment.sea import Environment, Isovelocity, Profile
+from sonarsynth.equations.rays.ray_solutions import Eigenrays, Water, eigenrays, water
+from sonarsynth.propagation.polylines import Polylines, polylines
+from sonarsynth.tracing.ray_fan import EVENTS, fan
 
 MISS = 1e-12
 """Of the length of a ray: how far its polyline ends from the receiver. Measured on 40 000 rays: 1e-15."""

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 import sonarsynth.tracing.eigenrays
+
 from sonarsynth import (
     Isovelocity,
     Linear,
@@ -21,8 +21,8 @@ from sonarsynth import (
     eigenrays,
     eigenrays_between,
 )
-from sonarsynth.world.casts import profile_of
-from sonarsynth.world.environment import SoundSpeed
+from sonarsynth.environment.casts import profile_of
+from sonarsynth.environment.sea import SoundSpeed
 
 WATER = Isovelocity(speed=1540.0)
 LAYERS = Tabulated(depth=(0.0, 5.0, 6.5, 20.0), speed=(1540.0, 1540.0, 1533.55, 1533.8))
@@ -202,7 +202,7 @@ def test_the_product_is_frozen_and_prints_a_short_table() -> None:
 
 
 def test_the_examples_in_the_docstrings_are_true() -> None:
-    tried = doctest.testmod(sonarsynth.tracing.eigenrays)
+    tried = doctest.testmod(sonarsynth.propagation.eigenrays)
     assert tried.attempted >= 4 and tried.failed == 0
 
 

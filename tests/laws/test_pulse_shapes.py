@@ -8,19 +8,26 @@ import numpy as np
 import pytest
 from scipy.signal import hilbert
 
-from sonarsynth.acoustics import spectra
-from sonarsynth.acoustics.snap import Bubble, ComplexArray
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.bubble.snap_pressure import Bubble, ComplexArray
+from sonarsynth.equations.noise import filters
 from sonarsynth.products import Arrivals
-from sonarsynth.sonar import BandPass, LowPass, PositionTable, Romanis, Sonar, elements
-from sonarsynth.synthesis import DirectSum, KernelDeposit, pulse_support
-from sonarsynth.synthesis.direct_sum import exact_signals
-from sonarsynth.synthesis.pulse import bubble, fir, pulse_spectrum, silencing_blur, stretch_sizes, stretched_spectra
-from sonarsynth.synthesis.shapes import shape_modes
-from sonarsynth.synthesis.wavefront import folded, fronts
-from sonarsynth.world.moment import Snap
-from sonarsynth.world.snap_pulses import waveform
-from sonarsynth.world.sources import LogarithmicBubble
+from sonarsynth.receiver import BandPass, LowPass, PositionTable, Romanis, Sonar, elements
+from sonarsynth.signals import DirectSum, KernelDeposit, pulse_support
+from sonarsynth.signals.array_paths import folded, fronts
+from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.signals.filtered_pulse import (
+    bubble,
+    fir,
+    pulse_spectrum,
+    silencing_blur,
+    stretch_sizes,
+    stretched_spectra,
+)
+from sonarsynth.signals.pulse_shapes import shape_modes
+from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.sources.snap_pulses import waveform
+from sonarsynth.state import Snap
 from tests.laws.test_synthesis import absorption, arrivals, error, some_of, target_at
 
 MODEL = LogarithmicBubble()
@@ -80,7 +87,7 @@ def test_a_blur_is_a_gaussian_in_time() -> None:
     t, got = alone(SHARP, blur=blur)
     near = np.abs(t) < 3e-4
     x, w = np.polynomial.hermite_e.hermegauss(24)
-    delayed = [spectra.filtered_pulse(t[near] - blur * late, bubble(MODEL), fir(SHARP.antialias)) for late in x]
+    delayed = [filters.filtered_pulse(t[near] - blur * late, bubble(MODEL), fir(SHARP.antialias)) for late in x]
     expected = w @ delayed / w.sum()
     assert error(got[near], expected) < 1e-8
 
@@ -93,7 +100,7 @@ def test_a_stretched_snap_is_that_of_a_slower_bubble(stretch: float) -> None:
     longer = 1.0 + stretch
     slower = Bubble(one.a, one.k / longer, one.m * longer, one.q / longer, one.density)
     near = np.abs(t) < 3e-4
-    expected = longer**2 * spectra.filtered_pulse(t[near], slower, fir(SHARP.antialias))
+    expected = longer**2 * filters.filtered_pulse(t[near], slower, fir(SHARP.antialias))
     assert error(got[near], expected) < 1e-7
 
 

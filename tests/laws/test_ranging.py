@@ -7,13 +7,13 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from sonarsynth.beamforming import FocusedDelayAndSum
 from sonarsynth.conventions import azimuth_elevation, direction
+from sonarsynth.environment.sea import Profile, Tabulated
 from sonarsynth.geometry import Pose, quaternion, unit
+from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.ranging import IsovelocityRange, RefractedRange, SensorDelays
-from sonarsynth.ranging.refraction import first_rays, refracted_solution
-from sonarsynth.sonar import Romanis, Sonar, elements
-from sonarsynth.world.environment import Profile, Tabulated
+from sonarsynth.ranging.location.refraction import first_rays, refracted_solution
+from sonarsynth.receiver import Romanis, Sonar, elements
 from tests.heard import add_noise, hear, hear_echoes
 
 C = 1540.0

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics import rays
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.rays import ray_solutions
 
 
-def linear(gradient: float, deep: float = 20e3, middle: float = 1500.0) -> rays.Water:
+def linear(gradient: float, deep: float = 20e3, middle: float = 1500.0) -> ray_solutions.Water:
     """Water of one gradient (1/s), 1500 m/s half way down."""
     half = 0.5 * deep * gradient
-    return rays.water(np.array([0.0, deep]), np.array([middle - half, middle + half]), deep)
+    return ray_solutions.water(np.array([0.0, deep]), np.array([middle - half, middle + half]), deep)
 
 
-def closed_form(water: rays.Water, z1: Floats, z2: Floats, r: Floats) -> tuple[Floats, Floats]:
+def closed_form(water: ray_solutions.Water, z1: Floats, z2: Floats, r: Floats) -> tuple[Floats, Floats]:
     """Travel time and length in one gradient layer: an arc through both points, centred where the speed would be 0."""
     g = (water.speed[1] - water.speed[0]) / water.depth[1]
     c1, c2 = (water.speed[0] + g * z for z in (z1, z2))
@@ -32,7 +32,7 @@ def test_one_layer_has_the_closed_form_whether_or_not_the_ray_turns(gradient: fl
     water = linear(gradient)
     z1, z2 = rng.uniform(9e3, 11e3, (2, 3000))
     r = 10 ** rng.uniform(1, 4.3, 3000)
-    found = rays.eigenrays(water, z1, z2, r)
+    found = ray_solutions.eigenrays(water, z1, z2, r)
     assert np.array_equal(found.pair, np.arange(3000))
     assert 0 < np.isfinite(np.fmax(found.upper, found.lower)).sum() < 3000
     time, length = closed_form(water, z1, z2, r)
@@ -42,12 +42,12 @@ def test_one_layer_has_the_closed_form_whether_or_not_the_ray_turns(gradient: fl
 
 def test_uniform_water_has_straight_rays() -> None:
     rng = np.random.default_rng(1)
-    water = rays.water(np.array([0.0, 13.0, 40.0]), np.full(3, 1540.0), 100.0)
+    water = ray_solutions.water(np.array([0.0, 13.0, 40.0]), np.full(3, 1540.0), 100.0)
     z1, z2, r = rng.uniform(0, 100, 500), rng.uniform(0, 100, 500), 10 ** rng.uniform(-3, 5, 500)
     z2[:100] = z1[:100]
     z2[100:200] = z1[100:200] + 10 ** rng.uniform(-14, -3, 100)
     z2 = np.minimum(z2, 100.0)
-    found = rays.eigenrays(water, z1, z2, r)
+    found = ray_solutions.eigenrays(water, z1, z2, r)
     d = np.hypot(r, z2 - z1)
     assert np.array_equal(found.pair, np.arange(500))
     np.testing.assert_allclose(found.travel_time, d / 1540.0, rtol=1e-15)
@@ -55,19 +55,19 @@ def test_uniform_water_has_straight_rays() -> None:
     np.testing.assert_allclose(found.amplitude, 1 / d, rtol=4e-15)
     np.testing.assert_allclose(found.start_sine, (z1 - z2) / d, rtol=1e-12, atol=1e-300)
     np.testing.assert_allclose(found.end_sine, found.start_sine, rtol=1e-15)
-    assert (found.flag == rays.GOOD).all()
+    assert (found.flag == ray_solutions.GOOD).all()
 
 
-def thermocline() -> rays.Water:
+def thermocline() -> ray_solutions.Water:
     """A surface layer, 1.5 m of -4.3 per second, a slower layer of slight gradient."""
-    return rays.water(np.array([0.0, 5.0, 6.5, 20.0]), np.array([1540.0, 1540.0, 1533.55, 1533.2]), 20.0)
+    return ray_solutions.water(np.array([0.0, 5.0, 6.5, 20.0]), np.array([1540.0, 1540.0, 1533.55, 1533.2]), 20.0)
 
 
 def test_a_path_is_the_same_from_both_ends() -> None:
     rng = np.random.default_rng(2)
     water = thermocline()
     z1, z2, r = rng.uniform(0, 20, 400), rng.uniform(0, 20, 400), 10 ** rng.uniform(0, 3, 400)
-    there, back = rays.eigenrays(water, z1, z2, r), rays.eigenrays(water, z2, z1, r)
+    there, back = ray_solutions.eigenrays(water, z1, z2, r), ray_solutions.eigenrays(water, z2, z1, r)
     assert np.array_equal(there.pair, back.pair)
     for name in ("travel_time", "length", "slowness", "amplitude", "upper", "lower"):
         np.testing.assert_allclose(getattr(there, name), getattr(back, name), rtol=1e-12, err_msg=name)
@@ -80,7 +80,7 @@ def test_snell_and_the_slope_of_the_travel_time() -> None:
     rng = np.random.default_rng(3)
     water = thermocline()
     z1, z2, r = rng.uniform(0, 20, 200), rng.uniform(0, 20, 200), 10 ** rng.uniform(0.5, 2, 200)
-    here, near, far = (rays.eigenrays(water, z1, z2, r * s) for s in (1.0, 1 - 1e-5, 1 + 1e-5))
+    here, near, far = (ray_solutions.eigenrays(water, z1, z2, r * s) for s in (1.0, 1 - 1e-5, 1 + 1e-5))
     one = [np.bincount(f.pair, minlength=200) == 1 for f in (here, near, far)]
     keep = np.flatnonzero(one[0] & one[1] & one[2])
     here, near, far = (select(f, keep) for f in (here, near, far))
@@ -92,9 +92,9 @@ def test_snell_and_the_slope_of_the_travel_time() -> None:
     assert same.sum() > 100
 
 
-def select(found: rays.Eigenrays, pairs: np.ndarray) -> rays.Eigenrays:
+def select(found: ray_solutions.Eigenrays, pairs: np.ndarray) -> ray_solutions.Eigenrays:
     keep = np.isin(found.pair, pairs)
-    return rays.Eigenrays(**{name: value[keep] for name, value in vars(found).items()})
+    return ray_solutions.Eigenrays(**{name: value[keep] for name, value in vars(found).items()})
 
 
 def test_the_amplitude_is_that_of_a_ray_tube() -> None:
@@ -102,7 +102,7 @@ def test_the_amplitude_is_that_of_a_ray_tube() -> None:
     water = thermocline()
     z1, z2, r = rng.uniform(7, 20, 200), rng.uniform(7, 20, 200), 10 ** rng.uniform(0.5, 1.5, 200)
     z1[:60] = rng.uniform(0, 20, 60)
-    here, near, far = (rays.eigenrays(water, z1, z2, r * s) for s in (1.0, 1 - 1e-5, 1 + 1e-5))
+    here, near, far = (ray_solutions.eigenrays(water, z1, z2, r * s) for s in (1.0, 1 - 1e-5, 1 + 1e-5))
     pairs = [i for i in range(200) if all((f.pair == i).sum() == 1 for f in (here, near, far))]
     here, near, far = (select(f, np.array(pairs)) for f in (here, near, far))
     r = r[pairs]
@@ -122,21 +122,21 @@ def test_a_vanishing_gradient_goes_over_into_uniform_water(gradient: float) -> N
     z1, z2, r = rng.uniform(90, 110, 300), rng.uniform(90, 110, 300), 10 ** rng.uniform(0, 2, 300)
     for sign in (1, -1):
         water = linear(sign * gradient, 200.0)
-        found = rays.eigenrays(water, z1, z2, r)
+        found = ray_solutions.eigenrays(water, z1, z2, r)
         d = np.hypot(r, z2 - z1)
         c1, c2 = np.interp(z1, water.depth, water.speed), np.interp(z2, water.depth, water.speed)
         x = 0.5 * gradient * d / np.sqrt(c1 * c2)
         assert np.array_equal(found.pair, np.arange(300))
         np.testing.assert_allclose(found.travel_time, d / np.sqrt(c1 * c2) * (1 - x * x / 6), rtol=2e-15)
         np.testing.assert_allclose(found.amplitude * d, 1.0, rtol=1e-14 + 1e-3 * gradient * 200)
-    level = rays.eigenrays(linear(gradient, 200.0), z1, z1, r)
+    level = ray_solutions.eigenrays(linear(gradient, 200.0), z1, z1, r)
     np.testing.assert_allclose(level.travel_time, r / np.interp(z1, [0, 200], linear(gradient, 200.0).speed), rtol=1e-9)
 
 
 def test_steep_rays_go_over_into_the_vertical_one() -> None:
     water = thermocline()
     distance = np.array([0.0, 1e-300, 1e-100, 1e-15, 1e-9, 1e-4])
-    found = rays.eigenrays(water, np.full(6, 1.0), np.full(6, 19.0), distance)
+    found = ray_solutions.eigenrays(water, np.full(6, 1.0), np.full(6, 19.0), distance)
     depth = np.array([1.0, 5.0, 6.5, 19.0])
     c = np.interp(depth, water.depth, water.speed)
     drop = c[:-1] - c[1:]
@@ -155,7 +155,7 @@ def test_the_last_straight_ray_and_the_first_turning_one_meet() -> None:
     limit = np.sqrt((c2 - c1) * (c2 + c1)) / g  # the ray that arrives level
     offset = np.array([-1e-2, -1e-6, -1e-10, -1e-13, 0.0, 1e-13, 1e-10, 1e-6, 1e-2])
     r = limit * (1 + offset)
-    found = rays.eigenrays(water, np.full(9, 100.0), np.full(9, 200.0), r)
+    found = ray_solutions.eigenrays(water, np.full(9, 100.0), np.full(9, 200.0), r)
     assert np.array_equal(found.pair, np.arange(9))
     assert np.isnan(np.fmax(found.upper, found.lower)[:3]).all()
     assert np.isfinite(np.fmax(found.upper, found.lower)[6:]).all()
@@ -166,36 +166,42 @@ def test_the_last_straight_ray_and_the_first_turning_one_meet() -> None:
 
 
 def test_a_thermocline_bends_with_a_radius_of_350_m() -> None:
-    found = rays.eigenrays(thermocline(), np.array([5.1]), np.array([6.4]), np.array([20.0]))
+    found = ray_solutions.eigenrays(thermocline(), np.array([5.1]), np.array([6.4]), np.array([20.0]))
     turn = np.arcsin(found.start_sine[0]) - np.arcsin(found.end_sine[0])
     radius = found.length[0] / turn
     assert radius == pytest.approx(1537.0 / 4.3, rel=5e-3)
 
 
 def test_a_shadow_zone_has_no_path_and_its_edge_is_where_the_grazing_ray_goes() -> None:
-    water = rays.water(np.array([0.0, 50.0]), np.array([1540.0, 1530.0]), 50.0)
+    water = ray_solutions.water(np.array([0.0, 50.0]), np.array([1540.0, 1530.0]), 50.0)
     limit = (
         np.sqrt(1540.0**2 - 1538.0**2) / 0.2 + np.sqrt(1540.0**2 - 1534.0**2) / 0.2
     )  # from 10 m over the surface to 30 m
-    found = rays.eigenrays(water, np.full(2, 10.0), np.full(2, 30.0), limit * np.array([1 - 1e-9, 1 + 1e-9]))
+    found = ray_solutions.eigenrays(water, np.full(2, 10.0), np.full(2, 30.0), limit * np.array([1 - 1e-9, 1 + 1e-9]))
     assert list(found.pair) == [0]
     assert np.fmax(found.upper, found.lower)[0] == pytest.approx(0.0, abs=1e-4)
 
 
 def test_the_bed_ends_the_water_that_a_ray_may_turn_in() -> None:
     profile = np.array([0.0, 100.0]), np.array([1500.0, 1520.0])
-    vertex = rays.eigenrays(rays.water(*profile, 100.0), np.array([40.0]), np.array([40.0]), np.array([400.0])).lower[0]
+    vertex = ray_solutions.eigenrays(
+        ray_solutions.water(*profile, 100.0), np.array([40.0]), np.array([40.0]), np.array([400.0])
+    ).lower[0]
     for bed, paths in ((vertex + 1e-6, 1), (vertex - 1e-6, 0)):
-        found = rays.eigenrays(rays.water(*profile, bed), np.array([40.0]), np.array([40.0]), np.array([400.0]))
+        found = ray_solutions.eigenrays(
+            ray_solutions.water(*profile, bed), np.array([40.0]), np.array([40.0]), np.array([400.0])
+        )
         assert len(found.pair) == paths
 
 
 def test_a_jump_is_the_limit_of_a_thin_layer() -> None:
-    jump = rays.water(np.array([0.0, 10.0, 10.0, 30.0]), np.array([1500.0, 1502.0, 1520.0, 1521.0]), 30.0)
+    jump = ray_solutions.water(np.array([0.0, 10.0, 10.0, 30.0]), np.array([1500.0, 1502.0, 1520.0, 1521.0]), 30.0)
     rng = np.random.default_rng(6)
     z1, z2, r = rng.uniform(0, 30, 200), rng.uniform(0, 30, 200), 10 ** rng.uniform(0, 2.3, 200)
-    sharp = rays.eigenrays(jump, z1, z2, r)
-    thin = rays.eigenrays(rays.water(np.array([0.0, 10.0, 10.0 + 1e-10, 30.0]), jump.speed, 30.0), z1, z2, r)
+    sharp = ray_solutions.eigenrays(jump, z1, z2, r)
+    thin = ray_solutions.eigenrays(
+        ray_solutions.water(np.array([0.0, 10.0, 10.0 + 1e-10, 30.0]), jump.speed, 30.0), z1, z2, r
+    )
     assert np.array_equal(sharp.pair, thin.pair)
     np.testing.assert_allclose(sharp.travel_time, thin.travel_time, rtol=1e-11)
     assert np.isfinite(np.fmax(sharp.upper, sharp.lower)).sum() > 5
@@ -204,29 +210,27 @@ def test_a_jump_is_the_limit_of_a_thin_layer() -> None:
 def test_splitting_a_layer_changes_nothing() -> None:
     whole = thermocline()
     depth = np.sort(np.concatenate([whole.depth, np.linspace(0.5, 19.5, 58)]))
-    split = rays.water(depth, np.interp(depth, whole.depth, whole.speed), 20.0)
+    split = ray_solutions.water(depth, np.interp(depth, whole.depth, whole.speed), 20.0)
     rng = np.random.default_rng(7)
     z1, z2, r = rng.uniform(0, 20, 200), rng.uniform(0, 20, 200), 10 ** rng.uniform(0, 2, 200)
-    a, b = rays.eigenrays(whole, z1, z2, r), rays.eigenrays(split, z1, z2, r)
+    a, b = ray_solutions.eigenrays(whole, z1, z2, r), ray_solutions.eigenrays(split, z1, z2, r)
     assert np.array_equal(a.pair, b.pair)
     np.testing.assert_allclose(a.travel_time, b.travel_time, rtol=1e-14)
     np.testing.assert_allclose(a.amplitude, b.amplitude, rtol=1e-6)
 
 
 def test_a_ray_followed_arc_by_arc_ends_where_the_eigenray_does() -> None:
-    from sonarsynth.acoustics import rays_march
+    from sonarsynth.equations.rays import ray_arcs
 
     rng = np.random.default_rng(8)
     depth = np.sort(rng.uniform(0, 100, 9))
     depth[4] = depth[5]
-    water = rays.water(depth, 1500 + 8 * rng.normal(size=9), 100.0)
+    water = ray_solutions.water(depth, 1500 + 8 * rng.normal(size=9), 100.0)
     z1, z2, r = rng.uniform(0, 100, 800), rng.uniform(0, 100, 800), 10 ** rng.uniform(0, 3.3, 800)
-    found = rays.eigenrays(water, z1, z2, r)
+    found = ray_solutions.eigenrays(water, z1, z2, r)
     nodes = np.empty((200 * len(found.pair), 3))
     angle = -np.arctan2(found.start_sine, found.slowness * found.start_speed)
-    count = rays_march.chords(
-        water.depth, water.speed, z1[found.pair], angle, found.slowness, found.length, 1e-3, nodes
-    )
+    count = ray_arcs.chords(water.depth, water.speed, z1[found.pair], angle, found.slowness, found.length, 1e-3, nodes)
     last = np.flatnonzero(np.diff(nodes[:count, 0], append=-1))
     _, x, z = nodes[last].T
     assert np.isfinite(np.fmax(found.upper, found.lower)).sum() > 50
@@ -241,7 +245,7 @@ def test_mean_slowness_is_the_integral_of_the_slowness() -> None:
         [[0], np.cumsum(np.diff(nodes) / np.interp(0.5 * (nodes[1:] + nodes[:-1]), water.depth, water.speed))]
     )
     z1, z2 = np.array([0.0, 3.0, 6.0, 20.0]), np.array([20.0, 5.5, 6.0, 1.0])
-    mean = rays.mean_slowness(water, z1, z2)
+    mean = ray_solutions.mean_slowness(water, z1, z2)
     i, j = np.rint(z1 * 1e4).astype(int), np.rint(z2 * 1e4).astype(int)
     expected = np.where(
         i == j, 1 / np.interp(z1, water.depth, water.speed), (total[j] - total[i]) / np.where(i == j, 1, z2 - z1)

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from sonarsynth import config
-from sonarsynth.recipe import Recipe
+from sonarsynth.recipe import Recipe, reading
 from tests.scenes import remus
 
 TEXT = """\
@@ -29,7 +28,7 @@ def _recipe(folder: Path, speed: float = 1540.0, corner: str = "v 0 0 1") -> Rec
     (folder / "cast.csv").write_text(f"depth,sound_speed\n0,{speed}\n20,{speed}\n")
     (folder / "thing.obj").write_text(TETRAHEDRON.replace("v 0 0 1", corner))
     (folder / "recipe.yaml").write_text(TEXT)
-    return config.load(folder / "recipe.yaml")
+    return reading.load(folder / "recipe.yaml")
 
 
 def test_where_files_lie_does_not_matter_and_what_they_hold_does(tmp_path: Path) -> None:

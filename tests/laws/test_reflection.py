@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.boundaries import bubble_loss, eckart, rayleigh, roughness_blur, wind_wave_height
-from sonarsynth.world.boundaries import (
+from sonarsynth.environment.boundaries import (
     NORMAL,
     FluidHalfSpace,
     PressureRelease,
@@ -17,7 +16,14 @@ from sonarsynth.world.boundaries import (
     SeaSurface,
     Sediment,
 )
-from sonarsynth.world.reflection import blur, bounces, coefficient, rms_height
+from sonarsynth.environment.boundary_numbers import blur, bounces, coefficient, rms_height
+from sonarsynth.equations.water.boundary_reflection import (
+    bubble_loss,
+    eckart,
+    rayleigh,
+    roughness_blur,
+    wind_wave_height,
+)
 
 GRAZING = np.linspace(0.0, NORMAL, 181)
 TABLE = ReflectionTable(grazing=(0.0, 0.3, 0.5, NORMAL), modulus=(1.0, 0.9, 0.4, 0.35), phase=(np.pi, 1.0, 0.2, 0.1))

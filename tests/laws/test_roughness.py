@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.boundaries import eckart
-from sonarsynth.acoustics.kirchhoff import rectangular_plate
-from sonarsynth.acoustics.lobes import lambert, slope_lobe
-from sonarsynth.acoustics.roughness import coherent_factor, incoherent_power, roughness_parameter
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.scattering.kirchhoff_integral import rectangular_plate
+from sonarsynth.equations.scattering.lobes import lambert, slope_lobe
+from sonarsynth.equations.scattering.roughness import coherent_factor, incoherent_power, roughness_parameter
+from sonarsynth.equations.water.boundary_reflection import eckart
 from sonarsynth.geometry import unit
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from sonarsynth.acoustics.lobes import lambert, slope_lobe
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.scattering.lobes import lambert, slope_lobe
 from sonarsynth.geometry import unit
+from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.scattering import Isotropic, MirrorLobe, Scattering
-from sonarsynth.world.mesh import Mesh
-from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.shapes import Sphere
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Sphere
 
 UP = np.array([0.0, 0.0, 1.0])
 

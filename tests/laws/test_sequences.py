@@ -12,14 +12,13 @@ import pytest
 from scipy.stats import kstest, norm
 from scipy.stats.qmc import discrepancy
 
-from sonarsynth import config
-from sonarsynth.recipe import Axis, Choice, Normal, Recipe, Sobol, Together, Uniform
-from sonarsynth.scattering.targets import Target
-from sonarsynth.scene import Scene, Trajectory, World
-from sonarsynth.world.environment import Environment, Isovelocity
-from sonarsynth.world.motion import Course, Line, pose, velocity
-from sonarsynth.world.shapes import Box, Sphere
-from sonarsynth.world.sources import SnappingShrimp
+from sonarsynth.environment.sea import Environment, Isovelocity
+from sonarsynth.geometry.motion import Course, Line, pose, velocity
+from sonarsynth.recipe import Axis, Choice, Normal, Recipe, Sobol, Together, Uniform, reading
+from sonarsynth.recipe.scene import Scene, Trajectory, World
+from sonarsynth.sources.shrimp import SnappingShrimp
+from sonarsynth.targets.shapes import Box, Sphere
+from sonarsynth.targets.target import Target
 
 MOTION = "scene.world.targets.0.motion"
 SHRIMP = "scene.world.shrimp.0.position"
@@ -186,7 +185,7 @@ def test_what_varies_survives_yaml() -> None:
         repeats=2,
         splits={"train": 0.75, "test": 0.25, "stratify": "heading"},
     )
-    again = config.loads(config.dump(made))
+    again = reading.loads(reading.dump(made))
     assert again == made and hash(again) == hash(made) and again.digest == made.digest
     assert by_content(again) == by_content(made)
 
@@ -194,7 +193,7 @@ def test_what_varies_survives_yaml() -> None:
 def test_the_digest_knows_the_files_of_the_grid_wherever_they_lie(tmp_path: Path) -> None:
     import shutil
 
-    from sonarsynth.world.meshes import mesh_of
+    from sonarsynth.targets.meshes import mesh_of
 
     for folder in ("a", "b"):
         (tmp_path / folder).mkdir()

@@ -6,21 +6,21 @@ import numpy as np
 import pytest
 
 from sonarsynth import planning
-from sonarsynth.accuracy.recipe import measure
+from sonarsynth.accuracy import measure
+from sonarsynth.environment.sea import Profile
+from sonarsynth.geometry.motion import Still
+from sonarsynth.pipeline import trace_frame
 from sonarsynth.planning import arrivals_of
 from sonarsynth.planning.choosing import Expansion
 from sonarsynth.products import Arrivals
+from sonarsynth.propagation import Refracted, Straight
+from sonarsynth.receiver import BeamGrid
+from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.recipe import Recipe
-from sonarsynth.render import trace_frame
-from sonarsynth.scattering.targets import Target
-from sonarsynth.sonar import BeamGrid
-from sonarsynth.sonar.subarrays import subarray
-from sonarsynth.synthesis import KernelDeposit
-from sonarsynth.synthesis.direct_sum import exact_signals
-from sonarsynth.tracing import Refracted, Straight
-from sonarsynth.world.environment import Profile
-from sonarsynth.world.motion import Still
-from sonarsynth.world.shapes import Box, Sphere
+from sonarsynth.signals import KernelDeposit
+from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.targets.shapes import Box, Sphere
+from sonarsynth.targets.target import Target
 from tests.laws.test_synthesis import FACES, SNAPS, SONAR, absorption, error, some_of, target_at, window
 from tests.scenes import point_scene, remus
 

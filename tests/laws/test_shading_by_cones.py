@@ -5,23 +5,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sonarsynth.casting.cones import CLOSED, EMPTY, UNKNOWN, look
+from sonarsynth.casting.ray_casting import occluded
 from sonarsynth.conventions import Bools, Floats
+from sonarsynth.environment.sea import Environment, Profile
+from sonarsynth.environment.sound_speed import Isovelocity
 from sonarsynth.geometry import Pose, quaternion
-from sonarsynth.sonar import Elements, Romanis, elements
-from sonarsynth.sonar.subarrays import subarray
-from sonarsynth.tracing import Propagation, Refracted, Straight
+from sonarsynth.geometry.placed_target import Body
+from sonarsynth.propagation import Propagation, Refracted, Straight
+from sonarsynth.receiver import Elements, Romanis, elements
+from sonarsynth.receiver.subarrays import subarray
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Box, Cylinder, LShape, Remus100, Shape, Sphere
 from sonarsynth.tracing.arrivals import bending
-from sonarsynth.tracing.legs import Legs, facets_of, legs_from
-from sonarsynth.tracing.shading import View, cells, rim
-from sonarsynth.tracing.shadows import hidden
-from sonarsynth.tracing.swerves import swerves
-from sonarsynth.world.casting import occluded
-from sonarsynth.world.cones import CLOSED, EMPTY, UNKNOWN, look
-from sonarsynth.world.environment import Environment, Profile
-from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.placed import Body
-from sonarsynth.world.shapes import Box, Cylinder, LShape, Remus100, Shape, Sphere
-from sonarsynth.world.sound_speed import Isovelocity
+from sonarsynth.tracing.occlusion.launch_deviation import swerves
+from sonarsynth.tracing.occlusion.ray_cones import hidden
+from sonarsynth.tracing.occlusion.sensor_occlusion import View, cells, rim
+from sonarsynth.tracing.receive_paths import Legs, facets_of, legs_from
 
 BED = 30.0
 WATER = Environment(depth=BED, sound_speed=Isovelocity(speed=1500.0))

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose
-from sonarsynth.sonar import Elements
-from sonarsynth.tracing import Propagation, Refracted
-from sonarsynth.tracing.legs import Facets, Legs, facets_of, legs_from
-from sonarsynth.tracing.shading import View
-from sonarsynth.tracing.swerves import swerves, towards
-from sonarsynth.world.environment import Profile
-from sonarsynth.world.placed import Body
-from sonarsynth.world.shapes import Sphere
+from sonarsynth.geometry.placed_target import Body
+from sonarsynth.propagation import Propagation, Refracted
+from sonarsynth.receiver import Elements
+from sonarsynth.targets.shapes import Sphere
+from sonarsynth.tracing.occlusion.launch_deviation import swerves, towards
+from sonarsynth.tracing.occlusion.sensor_occlusion import View
+from sonarsynth.tracing.receive_paths import Facets, Legs, facets_of, legs_from
 from tests.laws.test_shading_by_cones import SONAR, WATER, array_of, body, some_bodies
 
 DEPTHS = np.array([0.0, 8.0, 12.0, 17.0, 22.0, 30.0])

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from sonarsynth.world.generation import generate, sphere
-from sonarsynth.world.myring import hull_length, hull_radius
-from sonarsynth.world.refinement import longest_edge, sides, volume
-from sonarsynth.world.remus import HULL
-from sonarsynth.world.shapes import Box, LShape, Remus100
-from sonarsynth.world.smoothing import corner_normals, curved
+from sonarsynth.geometry.surfaces import longest_edge, sides, volume
+from sonarsynth.targets.generated.generation import generate, sphere
+from sonarsynth.targets.generated.myring import hull_length, hull_radius
+from sonarsynth.targets.generated.remus import HULL
+from sonarsynth.targets.generated.smoothing import corner_normals, curved
+from sonarsynth.targets.shapes import Box, LShape, Remus100
 
 CREASE = np.radians(40.0)
 

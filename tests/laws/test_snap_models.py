@@ -8,17 +8,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics import pulses, spectra
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.bubble import pulses
+from sonarsynth.equations.noise import filters
+from sonarsynth.receiver import LowPass, PositionTable, Romanis, Sonar, elements
 from sonarsynth.recipe import Recipe
-from sonarsynth.sonar import LowPass, PositionTable, Romanis, Sonar, elements
-from sonarsynth.synthesis import KernelDeposit, pulse_support
-from sonarsynth.synthesis.direct_sum import exact_signals
-from sonarsynth.synthesis.pulse import LONGEST_TAIL, at_longest, cut_tail, fir, pulse_spectrum, snap_gains, snap_levels
-from sonarsynth.world.moment import Snap, model_of
-from sonarsynth.world.snap_pulses import largest_scales, pulse, waveform
-from sonarsynth.world.snaps import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
-from sonarsynth.world.sources import LogarithmicBubble, SnapModel, SnappingShrimp
+from sonarsynth.signals import KernelDeposit, pulse_support
+from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.signals.filtered_pulse import (
+    LONGEST_TAIL,
+    at_longest,
+    cut_tail,
+    fir,
+    pulse_spectrum,
+    snap_gains,
+    snap_levels,
+)
+from sonarsynth.sources.shrimp import LogarithmicBubble, SnapModel, SnappingShrimp
+from sonarsynth.sources.snap_models import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
+from sonarsynth.sources.snap_pulses import largest_scales, pulse, waveform
+from sonarsynth.state import Snap, model_of
 from tests.laws.test_synthesis import absorption, arrivals, error, some_of, target_at
 from tests.scenes import remus
 
@@ -80,7 +89,7 @@ def test_a_width_stretches_the_pulse_before_the_filter(model: SnapModel) -> None
     rate, samples, width = SONAR.sampling_frequency, 600, 1.2
     f, got = pulse_spectrum(waveform(model, width), SONAR.antialias, rate, samples)
     made = pulse(model, 0.0, 1.5 * f[-1])
-    exact = width * pulses.spectrum(width * f, made) * spectra.response(f, fir(SONAR.antialias))
+    exact = width * pulses.spectrum(width * f, made) * filters.response(f, fir(SONAR.antialias))
     size = np.abs(exact).max()
     assert np.abs(got - exact)[f < 0.5 * rate].max() < 1e-9 * size
     _, product = pulse_spectrum(waveform(model, width / 1.05), SONAR.antialias, rate, samples, 0.05)

@@ -10,15 +10,15 @@ import xarray as xr
 from scipy.stats import chi2
 
 from sonarsynth.conventions import azimuth_elevation, direction
+from sonarsynth.environment.sea import Profile
+from sonarsynth.evaluation import snap_located
 from sonarsynth.geometry import Pose, quaternion
-from sonarsynth.labelling.estimates import Direct, emissions
-from sonarsynth.planning.notes import off_the_bottom
-from sonarsynth.planning.sources import standing_off
+from sonarsynth.labels.estimate_labels import Direct, emissions
+from sonarsynth.planning.notes.plan_notes import off_the_bottom
+from sonarsynth.planning.notes.source_notes import standing_off
 from sonarsynth.products import REASONS, Bearings, Signals
 from sonarsynth.ranging import SensorDelays
-from sonarsynth.sonar import Band, PlanarLattice, Sonar, elements
-from sonarsynth.verification import snap_located
-from sonarsynth.world.environment import Profile
+from sonarsynth.receiver import Band, PlanarLattice, Sonar, elements
 from tests.heard import RATE, add_noise, envelope_late, hear, hear_direct, silence
 from tests.scenes import point_scene
 

@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sonarsynth import config
-from sonarsynth.recipe import Recipe, Splits
+from sonarsynth.recipe import Recipe, Splits, reading
 from tests.laws.test_sequences import recipe
 from tests.laws.test_splits import HULLS, VARIED
 
@@ -39,7 +38,7 @@ def shared(made: Recipe) -> dict[str, int]:
 
 @pytest.mark.parametrize("name", ["grid.yaml"])
 def test_no_scene_mesh_pose_or_snap_of_a_config_is_in_several_splits(name: str) -> None:
-    made = config.load(CONFIGS / name)
+    made = reading.load(CONFIGS / name)
     assert {made.split(index) for index in range(made.frames)} == {0, 1, 2}
     assert shared(made) == {"scene": 0, "mesh pose": 0, "snap": 0}
 

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 import trimesh
 
-from sonarsynth.acoustics.arrays import aperture_terms
-from sonarsynth.acoustics.boundaries import rayleigh
+from sonarsynth.environment.boundaries import FluidHalfSpace, Rigid, SeaBed, SeaSurface
+from sonarsynth.environment.sea import Environment, Isovelocity, Profile
+from sonarsynth.equations.arrays.apertures import aperture_terms
+from sonarsynth.equations.water.boundary_reflection import rayleigh
 from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.geometry.placed_target import Body
 from sonarsynth.products import Arrivals
+from sonarsynth.propagation import AutoTracing, Refracted, Straight
+from sonarsynth.receiver import PositionTable, Romanis, elements
 from sonarsynth.scattering import Isotropic, MirrorLobe
-from sonarsynth.sonar import PositionTable, Romanis, elements
-from sonarsynth.tracing import AutoTracing, Refracted, Straight
+from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.state import Moment, Snap
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.world.boundaries import FluidHalfSpace, Rigid, SeaBed, SeaSurface
-from sonarsynth.world.environment import Environment, Isovelocity, Profile
-from sonarsynth.world.mesh import Mesh
-from sonarsynth.world.moment import Moment, Snap
-from sonarsynth.world.placed import Body
-from sonarsynth.world.sources import LogarithmicBubble
 
 BED, C = 12.0, 1530.0
 SOURCE, ARRAY = np.array([6.0, 5.0, -9.0]), np.array([0.0, 0.0, -5.0])

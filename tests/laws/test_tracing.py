@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 import trimesh
 
-from sonarsynth.acoustics.arrays import aperture_terms
 from sonarsynth.conventions import Floats
+from sonarsynth.environment.sea import Environment, Isovelocity, Profile
+from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.geometry import Pose, quaternion, unit
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.geometry.placed_target import Body
 from sonarsynth.products import Arrivals
+from sonarsynth.propagation import AutoTracing, Refracted, Straight
+from sonarsynth.receiver import Elements, PositionTable, Romanis, elements
 from sonarsynth.scattering import Isotropic, MirrorLobe
-from sonarsynth.sonar import Elements, PositionTable, Romanis, elements
-from sonarsynth.tracing import AutoTracing, Refracted, Straight
+from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.state import Moment, Snap
 from sonarsynth.tracing.arrivals import array_legs, arrivals, trace
-from sonarsynth.tracing.wavefront import probes
-from sonarsynth.world.environment import Environment, Isovelocity, Profile
-from sonarsynth.world.mesh import Mesh
-from sonarsynth.world.moment import Moment, Snap
-from sonarsynth.world.placed import Body
-from sonarsynth.world.sources import LogarithmicBubble
+from sonarsynth.tracing.expansion.wavefront_polynomials import probes
 
 ENVIRONMENT = Environment(depth=30.0, sound_speed=Isovelocity(speed=1540.0))
 UNIFORM = Profile(np.array([0.0, 30.0]), np.array([1540.0, 1540.0]))

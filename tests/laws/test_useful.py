@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from sonarsynth.evaluation import bounds, range_errors
 from sonarsynth.products import ORIGINS
-from sonarsynth.verification import bounds, range_errors
 
 BEAMS = (4, 10, 10)
 

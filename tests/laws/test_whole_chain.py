@@ -6,18 +6,18 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.arrays import element_directivity
-from sonarsynth.acoustics.snap import spectrum
-from sonarsynth.acoustics.spectra import response
 from sonarsynth.conventions import azimuth_elevation
+from sonarsynth.equations.arrays.apertures import element_directivity
+from sonarsynth.equations.bubble.snap_pressure import spectrum
+from sonarsynth.equations.noise.filters import response
+from sonarsynth.pipeline import beamform_frame, render, synthesise, trace_frame
 from sonarsynth.planning import PRODUCTS, plan
 from sonarsynth.products import FAMILIES, LEDGER
+from sonarsynth.receiver import PositionTable
 from sonarsynth.recipe import Recipe
-from sonarsynth.render import beamform_frame, render, synthesise, trace_frame
 from sonarsynth.scattering import MirrorLobe
-from sonarsynth.sonar import PositionTable
-from sonarsynth.synthesis.pulse import bubble, fir
-from sonarsynth.world.shapes import Remus100
+from sonarsynth.signals.filtered_pulse import bubble, fir
+from sonarsynth.targets.shapes import Remus100
 from tests.scenes import point_scene, remus
 
 SIGNALS = frozenset({"signals"})
@@ -162,7 +162,7 @@ def test_the_ledger_adds_up_and_matches_the_arrivals() -> None:
 
 def test_what_nobody_asked_for_is_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     made = plan(remus(), ("signals",))
-    monkeypatch.setattr("sonarsynth.render.process", lambda *_: pytest.fail("signals were processed"))
+    monkeypatch.setattr("sonarsynth.pipeline.process", lambda *_: pytest.fail("signals were processed"))
     heard = beamform_frame(made, 0, trace_frame(made, 0))
     assert heard.image is None and heard.bearings is None
 

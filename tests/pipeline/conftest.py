@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonarsynth import config
+from sonarsynth.pipeline import Values
 from sonarsynth.planning import Plan, plan
-from sonarsynth.recipe import Recipe
-from sonarsynth.render import Values
+from sonarsynth.recipe import Recipe, reading
 from sonarsynth.store import layout_of
 
 SMALL = """\
@@ -40,7 +39,7 @@ def small_text() -> str:
 
 @pytest.fixture(scope="session")
 def small() -> Recipe:
-    return config.loads(SMALL)
+    return reading.loads(SMALL)
 
 
 @pytest.fixture(scope="session")

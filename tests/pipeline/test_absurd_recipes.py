@@ -13,11 +13,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from sonarsynth import cli, config, planning
+from sonarsynth import cli, planning
 from sonarsynth.cli import printing
 from sonarsynth.cli.running import run
-from sonarsynth.config import RecipeError
-from sonarsynth.recipe import Recipe
+from sonarsynth.recipe import Recipe, reading
+from sonarsynth.recipe.reading import RecipeError
 from tests.waiting import HANGING
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -127,21 +127,21 @@ def test_it_is_refused_in_one_line_soon(
 )
 def test_water_that_is_not_known_to_the_bed_is_noted(small_text: str, water: str, known: str) -> None:
     text = small_text.replace(SPEED, f"kind: tabulated, {water}")
-    made = planning.plan(config.loads(text), choices=planning.Choices())
+    made = planning.plan(reading.loads(text), choices=planning.Choices())
     assert any(f"the sound speed is given {known}" in note and "of 12 m of water" in note for note in made.warnings)
     whole = small_text.replace(SPEED, "kind: tabulated, depth: [0.1, 11], speed: [1500, 1501]")
-    made = planning.plan(config.loads(whole), choices=planning.Choices())
+    made = planning.plan(reading.loads(whole), choices=planning.Choices())
     assert not any("is given" in note for note in made.warnings)
 
 
 def test_memory_that_is_not_there(small_file: Path) -> None:
-    source = config.read(small_file)
-    with pytest.raises(RecipeError, match=r"small\.yaml: needs more memory than there is$"), config.locating(source):
+    source = reading.read(small_file)
+    with pytest.raises(RecipeError, match=r"small\.yaml: needs more memory than there is$"), reading.locating(source):
         raise MemoryError
 
 
 def test_a_title_is_printed_as_it_is(small: Recipe, capsys: pytest.CaptureFixture[str]) -> None:
-    made = planning.plan(config.loads(config.dump(small).replace("title: small", "title: 'a [/b] [bold]c'")),
+    made = planning.plan(reading.loads(reading.dump(small).replace("title: small", "title: 'a [/b] [bold]c'")),
                          choices=planning.Choices())  # fmt: skip
     numbers = dict.fromkeys(
         ("seconds", "frames", "workers", "core_seconds", "bytes", "file_bytes", "raw_bytes", "files"), 1

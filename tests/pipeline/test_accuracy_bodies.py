@@ -14,18 +14,18 @@ import typer
 from scipy.integrate import quad
 from scipy.special import j1
 
-from sonarsynth.accuracy import REFERENCES, Row
-from sonarsynth.accuracy.bodies import BAND, SOUND_SPEED, Point, order, trade_rows, wavenumber
-from sonarsynth.accuracy.plate import DOWN, SIDES, UP, echoes, points_echo, polygon, rectangle, split, tiles
-from sonarsynth.accuracy.references.cylinder_integral import lit_cylinder
-from sonarsynth.accuracy.references.front_echo import front_echo
-from sonarsynth.accuracy.references.triangles import exact_triangle
-from sonarsynth.accuracy.report import PICTURES, write
-from sonarsynth.accuracy.triangles import triangle_rows
-from sonarsynth.acoustics.modal import Fluid, cylinder_amplitude, sphere_amplitude
-from sonarsynth.cli.accuracy import HELP, accuracy
+from sonarsynth.cli.accuracy_command import HELP, accuracy
 from sonarsynth.cli.running import run
-from sonarsynth.pictures.accuracy_bodies import Curve, Panel, Trade, bodies_figure
+from sonarsynth.equations.scattering.modal_series import Fluid, cylinder_amplitude, sphere_amplitude
+from sonarsynth.pictures.accuracy_figures.bodies_figure import Curve, Panel, Trade, bodies_figure
+from sonarsynth.validation import REFERENCES, Row
+from sonarsynth.validation.bodies.body_cases import BAND, SOUND_SPEED, Point, order, trade_rows, wavenumber
+from sonarsynth.validation.bodies.facet_integral import triangle_rows
+from sonarsynth.validation.bodies.plate import DOWN, SIDES, UP, echoes, points_echo, polygon, rectangle, split, tiles
+from sonarsynth.validation.references.cylinder_integral import lit_cylinder
+from sonarsynth.validation.references.front_echo import front_echo
+from sonarsynth.validation.references.triangle_integral import exact_triangle
+from sonarsynth.validation.report import PICTURES, write
 
 BODIES = ("sphere", "cylinder", "plate")
 PART: Mapping[str, set[str]] = {
@@ -140,10 +140,11 @@ def test_what_is_wrong_is_seen() -> None:
 
 
 def test_a_wrong_integral_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    from sonarsynth.acoustics.kirchhoff import triangle_integral
+    from sonarsynth.equations.scattering.kirchhoff_integral import triangle_integral
 
     monkeypatch.setattr(
-        "sonarsynth.accuracy.triangles.triangle_integral", lambda x, w: triangle_integral(x, w) * (1 + 1e-11)
+        "sonarsynth.validation.bodies.facet_integral.triangle_integral",
+        lambda x, w: triangle_integral(x, w) * (1 + 1e-11),
     )
     assert not any(row.ok for row in triangle_rows(True) if row.quantity == "1e-8 off the mirror angle")
 
@@ -198,7 +199,7 @@ def test_without_mpmath_one_line_says_how_to_get_it(
 ) -> None:
     app = typer.Typer()
     app.command()(accuracy)
-    monkeypatch.setattr("sonarsynth.accuracy.triangles.find_spec", lambda name: None)
+    monkeypatch.setattr("sonarsynth.validation.bodies.facet_integral.find_spec", lambda name: None)
     assert run(app, ["--reference", "sphere", "--out", str(tmp_path)]) == 2
     said = capfd.readouterr().err
     assert said.count("\n") == 1

@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 import typer
 
-from sonarsynth.accuracy import REFERENCES, Row, ray_accuracy
-from sonarsynth.accuracy.comparing import Bounds, Rays, errors, matched, miscounted, nearest
-from sonarsynth.accuracy.references.digits import Layers, exact_rays
-from sonarsynth.accuracy.references.fan import count_rays
-from sonarsynth.accuracy.references.following import followed_rays
-from sonarsynth.accuracy.references.gradient import Gradient, gradient_rays
-from sonarsynth.accuracy.references.images import image_rays
-from sonarsynth.accuracy.references.shooting import munk, shooting_rays
-from sonarsynth.accuracy.report import write
-from sonarsynth.cli.accuracy import accuracy
+from sonarsynth.cli.accuracy_command import accuracy
 from sonarsynth.cli.running import run
+from sonarsynth.validation import REFERENCES, Row, ray_accuracy
+from sonarsynth.validation.rays.ray_matching import Bounds, Rays, errors, matched, miscounted, nearest
+from sonarsynth.validation.references.rays.image_rays import image_rays
+from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays
+from sonarsynth.validation.references.rays.ode import followed_rays
+from sonarsynth.validation.references.rays.one_gradient import Gradient, gradient_rays
+from sonarsynth.validation.references.rays.shooting import munk, shooting_rays
+from sonarsynth.validation.references.rays.slowness_fan import count_rays
+from sonarsynth.validation.report import write
 
 
 def ends(bed: float, farthest: float, pairs: int = 6) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -162,7 +162,7 @@ def test_without_mpmath_one_line_says_how_to_get_it(
 ) -> None:
     app = typer.Typer()
     app.command()(accuracy)
-    monkeypatch.setattr("sonarsynth.accuracy.rays.find_spec", lambda name: None)
+    monkeypatch.setattr("sonarsynth.validation.rays.eigenray_checks.find_spec", lambda name: None)
     assert run(app, ["--out", str(tmp_path)]) == 2
     said = capfd.readouterr().err
     assert said.count("\n") == 1

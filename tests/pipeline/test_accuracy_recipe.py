@@ -11,23 +11,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonarsynth import config
-from sonarsynth.accuracy.recipe import Measured, Point, exact_frame, measure, usual_frames
-from sonarsynth.accuracy.recipe.exact import differences, each_hydrophone, exact_plan, spread
-from sonarsynth.accuracy.recipe.images import off_by
-from sonarsynth.accuracy.recipe.points import merged
-from sonarsynth.accuracy.recipe.report import write
-from sonarsynth.accuracy.recipe.verdicts import cheapest, verdicts
-from sonarsynth.beamforming import AutoBeamforming, FocusedDelayAndSum
+from sonarsynth.accuracy import Measured, Point, exact_frame, measure, usual_frames
+from sonarsynth.accuracy.exact_frame import differences, each_hydrophone, exact_plan, spread
+from sonarsynth.accuracy.frontier_report import write
+from sonarsynth.accuracy.image_knobs import off_by
+from sonarsynth.accuracy.rows import merged
+from sonarsynth.accuracy.verdicts import cheapest, verdicts
 from sonarsynth.cli import app
-from sonarsynth.cli.frontier import show
+from sonarsynth.cli.frontier_table import show
 from sonarsynth.cli.running import run
+from sonarsynth.environment.boundaries import SeaBed, Sediment
+from sonarsynth.imaging import AutoBeamforming, FocusedDelayAndSum
 from sonarsynth.planning import Choices, plan
-from sonarsynth.recipe import Accuracy, Recipe
-from sonarsynth.sonar import BeamGrid, PlanarLattice
-from sonarsynth.synthesis import KernelDeposit
-from sonarsynth.tracing import AutoTracing
-from sonarsynth.world.boundaries import SeaBed, Sediment
+from sonarsynth.propagation import AutoTracing
+from sonarsynth.receiver import BeamGrid, PlanarLattice
+from sonarsynth.recipe import Accuracy, Recipe, reading
+from sonarsynth.signals import KernelDeposit
 from tests.scenes import remus
 
 STAGES = {"trace", "synthesis", "image", "range", "frame"}
@@ -45,7 +44,7 @@ def small(signal: float = 1e-2, frames: int = 2) -> Recipe:
 def alone() -> pytest.MonkeyPatch:
     """Without libraries of others: they compile for long."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sonarsynth.accuracy.recipe.beside.installed", lambda library: False)
+        patch.setattr("sonarsynth.accuracy.peer_rows.installed", lambda library: False)
         yield patch
 
 
@@ -225,8 +224,8 @@ def test_another_seed_keeps_the_choices(alone: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("bounces", [0, 1])
 def test_finufft_and_ours_agree(bounces: int, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("finufft")
-    monkeypatch.setattr("sonarsynth.accuracy.recipe.beside.installed", lambda library: True)
-    from sonarsynth.accuracy.recipe.beside import synthesis_peers
+    monkeypatch.setattr("sonarsynth.accuracy.peer_rows.installed", lambda library: True)
+    from sonarsynth.accuracy.peer_rows import synthesis_peers
     from sonarsynth.planning import arrivals_of
 
     recipe, bed = small(1e-4), SeaBed(reflection=Sediment(name="medium sand"))
@@ -246,7 +245,7 @@ def test_the_command(
     alone: pytest.MonkeyPatch, measured: Measured, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "scene.yaml"
-    file.write_text(config.dump(small()))
+    file.write_text(reading.dump(small()))
     asked: list[object] = []
 
     def measures(recipe: Recipe, frames: object = None, **more: object) -> Measured:
@@ -254,7 +253,7 @@ def test_the_command(
         return replace(measured, verdicts=tuple(replace(v, ok=True) for v in measured.verdicts))
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sonarsynth.accuracy.recipe.measure", measures)
+        patch.setattr("sonarsynth.accuracy.measure", measures)
         options = ["--set", "accuracy.signal=0.003", "--frames", "1", "--hydrophones", "7", "--seed", "5", "--no-peers"]
         assert run(app, ["accuracy", str(file), *options, "--out", str(tmp_path)]) == 0
     assert asked == [0.003, (1,), 7, 5, False]
@@ -262,11 +261,11 @@ def test_the_command(
     assert "verdicts" in said and "faintest" in said and "not installed" in said
     assert str(tmp_path / "scene.json") in said and (tmp_path / "scene.png").exists()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sonarsynth.accuracy.recipe.measure", lambda *a, **k: replace(measured, verdicts=()))
+        patch.setattr("sonarsynth.accuracy.measure", lambda *a, **k: replace(measured, verdicts=()))
         assert run(app, ["accuracy", str(file), "--json", "--out", str(tmp_path)]) == 0
         assert len(json.loads(capsys.readouterr().out)) == len(measured.points)
         wrong = (replace(measured.verdicts[0], ok=False),)
-        patch.setattr("sonarsynth.accuracy.recipe.measure", lambda *a, **k: replace(measured, verdicts=wrong))
+        patch.setattr("sonarsynth.accuracy.measure", lambda *a, **k: replace(measured, verdicts=wrong))
         assert run(app, ["accuracy", str(file), "--out", str(tmp_path)]) == 1
         assert "FAILED" in capsys.readouterr().out
 
@@ -289,7 +288,7 @@ def test_bad_options_are_one_line(
     options: list[str], says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "scene.yaml"
-    file.write_text(config.dump(small()))
+    file.write_text(reading.dump(small()))
     named = [str(file) if option == "FILE" else option for option in options]
     assert run(app, ["accuracy", *named, "--out", str(tmp_path)]) in (1, 2)
     said = capsys.readouterr().err

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 import sonarsynth
-from sonarsynth import cli, config, render
+from sonarsynth import cli, pipeline
 from sonarsynth.cli.running import run
-from sonarsynth.recipe import Recipe
+from sonarsynth.recipe import Recipe, reading
 from tests.waiting import HANGING
 
 Command = Callable[..., tuple[int, str, str]]
@@ -34,7 +34,7 @@ def nothing_is_rendered(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> None:
         raise AssertionError("a frame was rendered")
 
-    monkeypatch.setattr(render, "trace_frame", refuse)
+    monkeypatch.setattr(pipeline, "trace_frame", refuse)
 
 
 WATER = "scene.world.environment"
@@ -101,7 +101,7 @@ WRONG = [
 ]
 
 
-@pytest.mark.filterwarnings("ignore::sonarsynth.acoustics.seawater.OutOfRange")
+@pytest.mark.filterwarnings("ignore::sonarsynth.equations.water.seawater.OutOfRange")
 @pytest.mark.parametrize(("right", "wrong", "message"), WRONG)
 @pytest.mark.usefixtures("nothing_is_rendered")
 def test_it_is_one_line_with_file_line_and_field(
@@ -173,7 +173,7 @@ def test_the_schema_takes_every_recipe_there_is_and_no_misspelt_one() -> None:
     jsonschema = pytest.importorskip("jsonschema")
     from ruamel.yaml import YAML
 
-    check = jsonschema.Draft202012Validator(config.schema())
+    check = jsonschema.Draft202012Validator(reading.schema())
     check.check_schema(check.schema)
     files = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
     assert files

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sonarsynth.schedule.log import append_lines, read_lines
+from sonarsynth.schedule.build_log import append_lines, read_lines
 
 
 def test_lines_cut_off_by_a_crash_are_left_out(tmp_path: Path) -> None:

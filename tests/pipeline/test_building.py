@@ -14,7 +14,7 @@ import xarray as xr
 import zarr
 from distributed import Client, Future, LocalCluster
 
-from sonarsynth import render, store, verification
+from sonarsynth import evaluation, pipeline, store
 from sonarsynth.planning import Plan
 from sonarsynth.recipe import Recipe
 from sonarsynth.schedule import build, cluster, tasks
@@ -188,7 +188,7 @@ def test_frames_that_raise_are_set_aside_and_the_rest_goes_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     path = tmp_path / "s.zarr"
-    works = getattr(render, stage)
+    works = getattr(pipeline, stage)
 
     def fails(made: Plan, index: int, *parts: object) -> object:
         if index in (3, 16):
@@ -197,7 +197,7 @@ def test_frames_that_raise_are_set_aside_and_the_rest_goes_on(
 
     where = {"scheduler": here} if distributed else {"workers": 0}
     with monkeypatch.context() as patch:
-        patch.setattr(render, stage, fails)
+        patch.setattr(pipeline, stage, fails)
         report = build(small, path, **where)
     assert sorted(f.frame for f in report.failures) == [3, 16]
     assert {(f.stage, f.error) for f in report.failures} == {(stage.partition("_")[0], "ZeroDivisionError: no way")}
@@ -216,8 +216,8 @@ def test_frames_that_raise_are_set_aside_and_the_rest_goes_on(
 def test_values_that_do_not_fit_set_their_frame_aside(
     tmp_path: Path, small: Recipe, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    works = render.range_frame
-    monkeypatch.setattr(render, "range_frame", lambda made, i, *parts: {} if i == 2 else works(made, i, *parts))
+    works = pipeline.range_frame
+    monkeypatch.setattr(pipeline, "range_frame", lambda made, i, *parts: {} if i == 2 else works(made, i, *parts))
     report = build(small, tmp_path / "s.zarr", workers=0)
     assert [(f.frame, f.stage) for f in report.failures] == [(2, "range")]
 
@@ -225,7 +225,7 @@ def test_values_that_do_not_fit_set_their_frame_aside(
 def test_a_shard_with_no_good_frame_is_not_marked(
     tmp_path: Path, small: Recipe, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(render, "trace_frame", lambda made, i: 1 / 0)
+    monkeypatch.setattr(pipeline, "trace_frame", lambda made, i: 1 / 0)
     report = build(small, tmp_path / "s.zarr", frames=range(10), workers=0)
     assert (report.written, report.shards, len(report.failures)) == (0, 0, 10)
     assert store.frames_there(tmp_path / "s.zarr") == []
@@ -265,7 +265,7 @@ def test_truth_alone_is_made_without_sound(
     assert {"truth/target", "truth/box", "truth/snap_position", "step"} <= ours.keys()
     assert not any(name.startswith(("signals/", "image/", "ledger/", "truth/echo_")) for name in ours)
     assert [name for name in ours if ours[name] != all_of_it[name]] == []
-    assert all(check.ok for check in verification.check(xr.open_datatree(path, engine="zarr")))
+    assert all(check.ok for check in evaluation.check(xr.open_datatree(path, engine="zarr")))
     assert "holds | truth" in store.beside(path, "card.md").read_text()
 
 

@@ -11,9 +11,11 @@ from typing import Any
 import pytest
 import xarray as xr
 
-from sonarsynth import cards, config, schedule, store
-from sonarsynth.cards.croissant import CONTEXT
+from sonarsynth import schedule, store
 from sonarsynth.cli import main
+from sonarsynth.recipe import reading
+from sonarsynth.store import cards
+from sonarsynth.store.cards.croissant import CONTEXT
 
 SAID = """\
 dataset:
@@ -31,8 +33,8 @@ def built(tmp_path_factory: pytest.TempPathFactory, small_text: str) -> Path:
     path = tmp_path_factory.mktemp("cards") / "small.zarr"
     file = path.with_name("small.yaml")
     file.write_text(SAID + small_text)
-    source = config.read(file)
-    assert schedule.build(config.recipe_of(source), path, frames=range(8), workers=0, source=source).ok
+    source = reading.read(file)
+    assert schedule.build(reading.recipe_of(source), path, frames=range(8), workers=0, source=source).ok
     return path
 
 
@@ -97,9 +99,9 @@ def test_texts_of_the_recipe_are_no_markup(built: Path, small_text: str, tmp_pat
     odd = 'title: "a | <script>b</script>"\ndataset: {citation: "line <one>\\n# two"}\n'
     file = tmp_path / "odd.yaml"
     file.write_text(odd + small_text.partition("\n")[2] + "# ```\n# ````\n")
-    source = config.read(file)
+    source = reading.read(file)
     path = tmp_path / "odd.zarr"
-    schedule.build(config.recipe_of(source), path, frames=[0], workers=0, source=source)
+    schedule.build(reading.recipe_of(source), path, frames=[0], workers=0, source=source)
     text = card_of(path)
     outside = re.sub(r"(?ms)^(`````+)yaml$.*^\1$", "", text)
     assert "# ````" not in outside
@@ -206,7 +208,7 @@ def test_the_reference_reader_of_croissant_finds_nothing_wrong(built: Path) -> N
 def test_a_build_that_was_killed_before_its_card_gets_it_when_it_is_resumed(
     tmp_path: Path, small_text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path, recipe = tmp_path / "s.zarr", config.loads(small_text)
+    path, recipe = tmp_path / "s.zarr", reading.loads(small_text)
     schedule.build(recipe, path, frames=range(8), workers=0)
     with monkeypatch.context() as patch:
         patch.setattr(cards, "write", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))

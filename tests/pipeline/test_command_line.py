@@ -14,10 +14,11 @@ from pathlib import Path
 import psutil
 import pytest
 
-from sonarsynth import config, render, schedule, store
+from sonarsynth import pipeline, schedule, store
 from sonarsynth.cli import app
 from sonarsynth.cli.running import BadOption, run
 from sonarsynth.cli.selecting import frame_numbers, product_names
+from sonarsynth.recipe import reading
 from tests.waiting import HANGING, wait_until
 
 HERE = Path(__file__).parents[2]
@@ -74,7 +75,7 @@ def test_build_verify_and_build_again(command: Command, small_file: Path, tmp_pa
 def test_frames_set_aside_are_status_3(
     command: Command, small_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(render, "trace_frame", lambda made, i: 1 / 0)
+    monkeypatch.setattr(pipeline, "trace_frame", lambda made, i: 1 / 0)
     answer = command("build", small_file, tmp_path / "s.zarr", "--workers", "0", "--frames", "3")
     assert answer.status == 3
     assert "frame 3 set aside in trace: ZeroDivisionError: division by zero" in answer.out
@@ -86,7 +87,7 @@ def test_an_interrupted_build_is_status_130(
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(render, "trace_frame", stop)
+    monkeypatch.setattr(pipeline, "trace_frame", stop)
     answer = command("build", small_file, tmp_path / "s.zarr", "--workers", "0")
     assert answer.status == 130
     assert one_line(answer) == "interrupted; the same command goes on from here"
@@ -224,7 +225,7 @@ def test_signals_end_a_build_and_its_workers_in_10_s_and_it_goes_on(
     assert len(there) >= 8
     report = store.verify(path, quick=True)
     assert all("without a completion mark" in problem.what for problem in report.problems)
-    again = schedule.build(config.load(small_file), path, frames=range(len(there) + 1), workers=0)
+    again = schedule.build(reading.load(small_file), path, frames=range(len(there) + 1), workers=0)
     assert again.ok and set(there) <= set(store.frames_there(path))
 
 

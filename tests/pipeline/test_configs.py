@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from sonarsynth import config, planning, schedule, verification
+from sonarsynth import evaluation, planning, schedule
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
+from sonarsynth.pipeline import follow_rays, render
 from sonarsynth.planning import Plan
 from sonarsynth.products import ORIGINS
-from sonarsynth.render import follow_rays, render
-from sonarsynth.tracing.fan import EVENTS
+from sonarsynth.recipe import reading
+from sonarsynth.tracing.ray_fan import EVENTS
 from tools.same_numbers import harbour
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -93,12 +94,12 @@ def test_the_tank_without_the_echo_says_so() -> None:
 
 
 def _plan(name: str, sets: tuple[str, ...] = ()) -> Plan:
-    return planning.plan(config.load(CONFIGS / name, sets))
+    return planning.plan(reading.load(CONFIGS / name, sets))
 
 
-def _checks(store: Path) -> dict[str, verification.Check]:
+def _checks(store: Path) -> dict[str, evaluation.Check]:
     with xr.open_datatree(store, engine="zarr") as tree:
-        return {c.name: c for c in verification.check(tree.load())}
+        return {c.name: c for c in evaluation.check(tree.load())}
 
 
 def test_the_thesis_scene_is_imaged_ranged_and_located(built: Callable[[str], Path]) -> None:
@@ -111,10 +112,10 @@ def test_the_thesis_scene_is_imaged_ranged_and_located(built: Callable[[str], Pa
     assert checks["brightest beam on target"].numbers == {"hits": 8, "frames": 8}
     ranges = checks["range of points on target"].numbers
     assert ranges["points"] >= 8 and ranges["median_m"] < 0.05 and ranges["share_within_3"] >= 0.99
-    assert not any(check.warning for check in checks.values()) and not verification.warnings(built("remus.yaml"))
+    assert not any(check.warning for check in checks.values()) and not evaluation.warnings(built("remus.yaml"))
     with xr.open_datatree(built("remus.yaml"), engine="zarr") as tree:
-        found = verification.points(tree, range(0, 64, 9))
-        beam = verification.beam_width(tree) * found.true_range[found.judged]
+        found = evaluation.points(tree, range(0, 64, 9))
+        beam = evaluation.beam_width(tree) * found.true_range[found.judged]
         distance = tree["cloud/distance"].values[found.frame, *found.beam.T][found.judged]
     assert found.judged.mean() > 0.9 and (found.target == 0).all()  # nothing else is in the water
     assert (distance < beam).all() and np.median(distance) < 0.3 * beam.mean()
@@ -138,7 +139,7 @@ def test_ghosts_by_surface_and_bed_are_imaged_where_the_truth_says(built: Callab
                 assert abs(peak.elevation.item() - elevation) < 1.5
                 assert abs(peak.azimuth.item() - azimuth) < 3.0  # the hull is up to 3.6 degrees long
                 assert 10 * np.log10(peak.item() / energy.median().item()) > 15.0
-        found = verification.points(tree, (9, 36, 63))
+        found = evaluation.points(tree, (9, 36, 63))
         elevation = tree["truth/elevation"].values[found.beam[:, 0]]
         at = tree["truth/echo_elevation"].values[found.frame, 0, found.family]
     ghosts = found.family > 0
@@ -154,12 +155,12 @@ def test_points_lit_by_another_snap_say_so_and_are_warned_of(tmp_path: Path) -> 
     checks = _checks(tmp_path / "crowd.zarr")
     assert checks["predicted range errors"].ok
     with xr.open_datatree(tmp_path / "crowd.zarr", engine="zarr") as tree:
-        found = verification.points(tree, (0,))
+        found = evaluation.points(tree, (0,))
         late = tree["cloud/delay"].values[found.frame, *found.beam.T]
     echo = found.target >= 0
     assert echo.any() and (found.emission[echo] == 0).all()
     assert (found.emission[late > 13e-3] == 1).all()  # the far snap is heard 14.5 ms after the near one
-    told = verification.warnings(tmp_path / "crowd.zarr")
+    told = evaluation.warnings(tmp_path / "crowd.zarr")
     assert any("only" in line for line in told) == (found.judged.mean() < 0.5)
 
 
@@ -230,7 +231,7 @@ def test_real_water_and_a_real_hull(tmp_path: Path) -> None:
 
 
 def test_the_snap_is_drawn(tmp_path: Path) -> None:
-    from sonarsynth.show.snaps import show_snap
+    from sonarsynth.pictures.snap_pictures import show_snap
 
-    show_snap(config.load(CONFIGS / "remus.yaml"), tmp_path / "pictures" / "snap.png")
+    show_snap(reading.load(CONFIGS / "remus.yaml"), tmp_path / "pictures" / "snap.png")
     assert (tmp_path / "pictures" / "snap.png").read_bytes().startswith(b"\x89PNG")

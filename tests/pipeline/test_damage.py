@@ -13,10 +13,10 @@ import pytest
 import xarray as xr
 
 from sonarsynth import store
+from sonarsynth.evaluation import Check
+from sonarsynth.pipeline import Values
 from sonarsynth.planning import Plan
-from sonarsynth.render import Values
-from sonarsynth.store.reading import described
-from sonarsynth.verification import Check
+from sonarsynth.store.checking.reading_back import described
 
 
 @pytest.fixture(scope="module")

@@ -12,17 +12,17 @@ import numpy as np
 import pytest
 import trimesh
 
-from sonarsynth import config
-from sonarsynth.config import RecipeError
-from sonarsynth.world import files
-from sonarsynth.world.casts import CastError, profile_of
-from sonarsynth.world.mesh_files import MAX_BYTES, read_surface
-from sonarsynth.world.meshes import MeshError, mesh_of
-from sonarsynth.world.recordings import RecordingError, read_recording
-from sonarsynth.world.room import MAX_FACETS
-from sonarsynth.world.shapes import MeshFile
-from sonarsynth.world.snaps import RecordedSnap
-from sonarsynth.world.sound_speed import Cast
+from sonarsynth.description import named_files
+from sonarsynth.description.memory import MAX_FACETS
+from sonarsynth.environment.casts import CastError, profile_of
+from sonarsynth.environment.sound_speed import Cast
+from sonarsynth.recipe import reading
+from sonarsynth.recipe.reading import RecipeError
+from sonarsynth.sources.recordings import RecordingError, read_recording
+from sonarsynth.sources.snap_models import RecordedSnap
+from sonarsynth.targets.mesh_readers.mesh_files import MAX_BYTES, read_surface
+from sonarsynth.targets.meshes import MeshError, mesh_of
+from sonarsynth.targets.shapes import MeshFile
 
 SHAPE = "kind: box, size: [1, 1, 1], edge: 0.25"
 FIELD = "scene.world.targets.0.shape.path"
@@ -83,27 +83,27 @@ ELSEWHERE = {
 def test_a_recipe_opens_no_file_out_of_its_folder(home: Path, path: str) -> None:
     file = recipe(home, path)
     with pytest.raises(RecipeError) as error:
-        config.load(file)
+        reading.load(file)
     text = str(error.value)
     assert text.startswith(f"{file}:8: {FIELD}: ") and ELSEWHERE[path] in text and "\n" not in text
 
 
 def test_it_opens_those_that_are_in_it(home: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     for path in ("here.stl", "./here.stl", "inner/link.stl"):
-        (target,) = config.load(recipe(home, path)).scene.world.targets
+        (target,) = reading.load(recipe(home, path)).scene.world.targets
         assert len(mesh_of(target.shape).faces) == 12
     (tmp_path / "elsewhere").symlink_to(home)  # the folder itself may be a link
-    config.load(recipe(tmp_path / "elsewhere", "inner/link.stl"))
+    reading.load(recipe(tmp_path / "elsewhere", "inner/link.stl"))
 
 
 def test_who_gives_the_path_by_hand_may_name_any_file(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file, good = recipe(home, "none.stl"), home.parent / "outside" / "good.stl"
     monkeypatch.chdir(home)
     for path in (good, "../outside/good.stl", "link.stl"):
-        (target,) = config.load(file, [f"{FIELD}={path}"]).scene.world.targets
+        (target,) = reading.load(file, [f"{FIELD}={path}"]).scene.world.targets
         assert len(mesh_of(target.shape).faces) == 12
     with pytest.raises(RecipeError, match=r"--set: .*: is not a file: /dev/zero"):
-        config.load(file, [f"{FIELD}=/dev/zero"])
+        reading.load(file, [f"{FIELD}=/dev/zero"])
 
 
 def test_what_varies_opens_no_other_file_either(home: Path) -> None:
@@ -112,12 +112,12 @@ def test_what_varies_opens_no_other_file_either(home: Path) -> None:
     for value in ("{kind: mesh_file, path: /etc/passwd}", "{kind: mesh_file, path: link.stl}"):
         (home / "recipe.yaml").write_text(text + grid % value)
         with pytest.raises(RecipeError, match=r"grid\.0\.values\.1\.path: is a"):
-            config.load(home / "recipe.yaml")
+            reading.load(home / "recipe.yaml")
     for part, message in ((".kind", "cannot vary by itself"), (".path", "is the name of a file")):
         entry = f"grid: [{{path: scene.world.targets.0.shape{part}, values: [mesh_file, box]}}]\n"
         (home / "recipe.yaml").write_text(text + entry)
         with pytest.raises(RecipeError, match=message):
-            config.load(home / "recipe.yaml")
+            reading.load(home / "recipe.yaml")
 
 
 @pytest.mark.parametrize("ending", ["stl", "obj", "ply", "off", "glb", "csv", "wav"])
@@ -144,14 +144,14 @@ def read_as(ending: str, path: Path) -> object:
 def test_files_are_read_up_to_a_size(tmp_path: Path) -> None:
     file = tmp_path / "x"
     file.write_bytes(b"1234")
-    assert files.read(file, 4) == b"1234"
-    with pytest.raises(files.FileError, match="is larger than 0 MiB"):
-        files.read(file, 3)
-    with pytest.raises(files.FileError, match="no such file"):
-        files.digest(tmp_path / "none")
-    with pytest.raises(files.FileError, match="not the path"):
-        files.stamp("a\0b")
-    assert files.digest(file) == "03ac674216f3e15c761ee1a5e255f067953623c8b388b4459e13f978d7c846f4"
+    assert named_files.read(file, 4) == b"1234"
+    with pytest.raises(named_files.FileError, match="is larger than 0 MiB"):
+        named_files.read(file, 3)
+    with pytest.raises(named_files.FileError, match="no such file"):
+        named_files.digest(tmp_path / "none")
+    with pytest.raises(named_files.FileError, match="not the path"):
+        named_files.stamp("a\0b")
+    assert named_files.digest(file) == "03ac674216f3e15c761ee1a5e255f067953623c8b388b4459e13f978d7c846f4"
 
 
 def test_files_too_large_are_not_read(tmp_path: Path) -> None:
@@ -252,10 +252,10 @@ def test_reading_a_damaged_mesh_says_nothing_by_itself(tmp_path: Path, capfd: py
 
 
 def test_the_digest_of_a_recipe_is_of_what_its_files_hold(home: Path) -> None:
-    made = config.load(recipe(home, "here.stl"))
+    made = reading.load(recipe(home, "here.stl"))
     other = home / "other.stl"
     other.write_bytes((home / "here.stl").read_bytes())
-    assert config.load(recipe(home, "other.stl")).digest == made.digest
+    assert reading.load(recipe(home, "other.stl")).digest == made.digest
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
     trimesh.Trimesh(vertices, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]).export(other)
-    assert config.load(recipe(home, "other.stl")).digest != made.digest
+    assert reading.load(recipe(home, "other.stl")).digest != made.digest

@@ -10,12 +10,13 @@ import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sonarsynth import config, schedule
-from sonarsynth.pictures.frames import FramePicture, Hull, View, Window
-from sonarsynth.pictures.ghosts import Ghost, place
+from sonarsynth import schedule
+from sonarsynth.pictures import show
+from sonarsynth.pictures.figures.frame_figure import FramePicture, Hull, View, Window
+from sonarsynth.pictures.figures.ghost_rings import Ghost, place
+from sonarsynth.pictures.store_reading import FAINTEST, ghosts, opened, stored
 from sonarsynth.planning import plan
-from sonarsynth.show import show
-from sonarsynth.show.reading import FAINTEST, ghosts, opened, stored
+from sonarsynth.recipe import reading
 
 FAMILIES = ["direct", "surface", "bed", "surface and bed"]
 FRAME = np.array([100.0, 50.0, 500.0, 650.0])
@@ -158,7 +159,7 @@ def test_stored_ghosts_lie_where_the_mirror_images_are(
     The images are 10 m above and 14 m below, and by two bounces 24 m above and below.
     """
     text = small_text.replace("elevation_span: 30 deg", "elevation_span: 140 deg").replace("[30, 1]", f"[{shrimp}, 1]")
-    made = plan(config.loads(text + "  physics: {tracing: {kind: auto, bounces: 2}}\n"))
+    made = plan(reading.loads(text + "  physics: {tracing: {kind: auto, bounces: 2}}\n"))
     assert schedule.build(made, tmp_path / "small.zarr", frames=range(1), workers=0).ok
     said: list[str] = []
     files = show(tmp_path / "small.zarr", tmp_path / "pictures", say=said.append)

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from sonarsynth import cli, config, planning, schedule, store, verification
+from sonarsynth import cli, evaluation, planning, schedule, store
 from sonarsynth.cli.running import run
-from sonarsynth.config import RecipeError
-from sonarsynth.render import render
+from sonarsynth.pipeline import render
+from sonarsynth.recipe import reading
+from sonarsynth.recipe.reading import RecipeError
 
 SPAN = """\
 grid:
@@ -51,11 +52,11 @@ def said(capfd: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, st
 
 def test_a_store_holds_every_value_and_every_mesh(spanning: Path, tmp_path: Path) -> None:
     """Read with plain xarray; alike in any order and on its own."""
-    recipe = config.load(spanning)
+    recipe = reading.load(spanning)
     whole, part = tmp_path / "whole.zarr", tmp_path / "part.zarr"
     assert schedule.build(recipe, whole, workers=0).ok
     assert schedule.build(recipe, part, frames=(13,), workers=0).ok
-    assert not store.verify(whole, [verification.check]).problems
+    assert not store.verify(whole, [evaluation.check]).problems
     with xr.open_datatree(whole, engine="zarr") as tree, xr.open_datatree(part, engine="zarr") as other:
         root = tree.to_dataset()
         assert {"away", "heading", "hull", "shrimp_x", "water", "repeat"} < set(root.coords)
@@ -90,9 +91,9 @@ def test_a_sequence_more_changes_no_number_of_the_others(spanning: Path, tmp_pat
     for repeats, rows in ((2, [0, 1, 2, 3, 4, 5, 6, 7]), (3, [0, 1, 2, 3, 6, 7, 8, 9])):
         spanning.write_text(f"{text}repeats: {repeats}\n")
         path = tmp_path / f"{repeats}.zarr"
-        assert schedule.build(config.load(spanning), path, workers=0).ok
+        assert schedule.build(reading.load(spanning), path, workers=0).ok
         with xr.open_datatree(path, engine="zarr", chunks=None) as tree:
-            for array in store.layout_of(planning.plan(config.load(spanning))).arrays:
+            for array in store.layout_of(planning.plan(reading.load(spanning))).arrays:
                 kept.setdefault(array.path, []).append(np.asarray(tree[array.path].values)[rows])
     differing = [name for name, (few, more) in kept.items() if few.tobytes() != more.tobytes()]
     assert set(differing) <= {"trajectory"}
@@ -100,7 +101,7 @@ def test_a_sequence_more_changes_no_number_of_the_others(spanning: Path, tmp_pat
 
 
 def test_the_sound_speed_of_a_sequence_is_the_one_its_rays_go_through(spanning: Path) -> None:
-    made = planning.plan(config.load(spanning))
+    made = planning.plan(reading.load(spanning))
     kinds = {made.at(f).propagation.kind for f in range(16)}
     assert kinds == {"straight", "refracted"}
     for frame in range(0, 16, 2):
@@ -126,7 +127,7 @@ def test_sequences_and_frames_are_selected(spanning: Path, tmp_path: Path, capfd
 
 def test_settings_override_the_grid(spanning: Path) -> None:
     sets = ("grid.0.values=[12 m]", "repeats=3", "variations.0.high=21 m")
-    recipe = config.load(spanning, sets)
+    recipe = reading.load(spanning, sets)
     assert recipe.sequences == 6
     assert all(20 <= recipe.scene_of(n).world.shrimp[0].position[0] <= 21 for n in range(6))
 
@@ -144,7 +145,7 @@ def test_plan_says_what_is_spanned(spanning: Path, capfd: pytest.CaptureFixture[
 
 
 def test_the_schema_covers_the_grid() -> None:
-    schema = config.schema()
+    schema = reading.schema()
     assert {"grid", "variations", "repeats", "splits"} <= schema["properties"].keys()
     assert {"Axis", "Together", "Uniform", "Normal", "Choice", "Sobol", "Splits"} <= schema["$defs"].keys()
     assert all("description" in schema["$defs"][name] for name in ("Axis", "Sobol", "Splits"))
@@ -226,9 +227,9 @@ def test_a_drawn_value_that_cannot_be_is_named(spanning: Path) -> None:
             "scene.world.targets.0.motion.start.2, kind: uniform, low: -8 m, high: 6 m",
         )
     )
-    source = config.read(spanning)
-    with pytest.raises(RecipeError) as caught, config.locating(source):
-        planning.plan(config.recipe_of(source))
+    source = reading.read(spanning)
+    with pytest.raises(RecipeError) as caught, reading.locating(source):
+        planning.plan(reading.recipe_of(source))
     assert f"{spanning}:24: variations.0: scene.world.targets.0.motion: target 'box' is " in str(caught.value)
     assert "(sequence " in str(caught.value) and "shrimp_x = " in str(caught.value)
 
@@ -240,16 +241,16 @@ def test_a_target_that_one_sequence_lacks_is_refused(spanning: Path) -> None:
     )
     names = "path: scene.world.targets.0.name, values: [box, crate]"
     spanning.write_text(text.replace(f"path: {START}.0, values: [9 m, 1100 cm]", names))
-    source = config.read(spanning)
+    source = reading.read(spanning)
     told = r"targets\.0\.name: must be the same in all sequences: 'box' and 'crate'"
-    with pytest.raises(RecipeError, match=told), config.locating(source):
-        planning.plan(config.recipe_of(source))
+    with pytest.raises(RecipeError, match=told), reading.locating(source):
+        planning.plan(reading.recipe_of(source))
 
 
 def test_too_many_meshes_are_refused(spanning: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from sonarsynth.recipe import variants
+    from sonarsynth.recipe.variation import mesh_variants
 
-    monkeypatch.setattr(variants, "MOST_VARIANTS", 3)
+    monkeypatch.setattr(mesh_variants, "MOST_VARIANTS", 3)
     radius = f"path: {SHAPE}, kind: uniform, low: 1, high: 2"
     text = spanning.read_text().replace(
         "path: scene.world.shrimp.0.position.0, kind: uniform, low: 20 m, high: 30 m", radius
@@ -261,20 +262,20 @@ def test_too_many_meshes_are_refused(spanning: Path, monkeypatch: pytest.MonkeyP
         .replace(SPAN[SPAN.index("  - zip") : SPAN.index("variations")], "")
     )
     spanning.write_text(text.replace("stratify: hull", "stratify: away"))
-    source = config.read(spanning)
+    source = reading.read(spanning)
     with (
         pytest.raises(RecipeError, match=r"19: variations.0: makes more than 3 different meshes"),
-        config.locating(source),
+        reading.locating(source),
     ):
-        _ = config.recipe_of(source).meshes
+        _ = reading.recipe_of(source).meshes
 
 
 def test_a_path_too_faint_for_single_precision_has_no_measured_level() -> None:
     """-inf would be an infinite number in the store, which verify takes for damage."""
     from types import SimpleNamespace
 
+    from sonarsynth.pipeline.stored_values import ledger_values
     from sonarsynth.products import LEDGER
-    from sonarsynth.render.stored import ledger_values
 
     level = np.full((1, 1, 1), -1274.0)
     isolated = SimpleNamespace(facet=np.array([3]), level=np.array([-1274.0]))

@@ -11,10 +11,12 @@ from pathlib import Path
 import pytest
 import zarr
 
-from sonarsynth import cards, config, planning, store
+from sonarsynth import planning, store
 from sonarsynth.planning import Plan
+from sonarsynth.recipe import reading
 from sonarsynth.schedule import build
 from sonarsynth.schedule.repairing import repair
+from sonarsynth.store import cards
 from sonarsynth.store.marks import Mark, load_layout, load_mark, save_mark
 from tools.fault_injection.corrupt import RECIPE, contents
 from tools.fault_injection.watching import watched
@@ -22,7 +24,7 @@ from tools.fault_injection.watching import watched
 
 @pytest.fixture(scope="module")
 def made() -> Plan:
-    return planning.plan(config.loads(RECIPE), frozenset({"image"}))
+    return planning.plan(reading.loads(RECIPE), frozenset({"image"}))
 
 
 @pytest.fixture(scope="module")
@@ -190,7 +192,7 @@ def test_a_link_to_a_store_is_the_store(path: Path, tmp_path: Path, made: Plan, 
     link = tmp_path / "elsewhere" / "link.zarr"
     link.parent.mkdir()
     link.symlink_to(path)
-    other = planning.plan(config.loads(RECIPE.replace("seed: 3", "seed: 4")), made.products)
+    other = planning.plan(reading.loads(RECIPE.replace("seed: 3", "seed: 4")), made.products)
     for again in (other, other, made):
         assert build(again, link, workers=0, restart=True, frames=range(16)).ok
         assert link.is_symlink() and not path.is_symlink()
@@ -223,7 +225,7 @@ def test_a_store_that_is_renamed_while_it_is_built_is_whole_under_its_new_name(
 ) -> None:
     """Nothing is made under the old name, and nothing is written into what is put there."""
     path, moved = tmp_path / "s.zarr", tmp_path / "moved.zarr"
-    other = planning.plan(config.loads(RECIPE.replace("seed: 3", "seed: 4")), made.products)
+    other = planning.plan(reading.loads(RECIPE.replace("seed: 3", "seed: 4")), made.products)
     if exchanged:
         store.create(tmp_path / "other.zarr", other)
 
@@ -253,7 +255,7 @@ def with_mesh(tmp_path: Path) -> tuple[Path, Path, Plan]:
     mesh.parent.mkdir(parents=True)
     trimesh.creation.box((1, 1, 1)).export(mesh)
     text = RECIPE.replace("{kind: box, size: [1, 1, 1], edge: 0.5}", "{kind: mesh_file, path: meshes/box.stl}")
-    made = planning.plan(config.loads(text, folder=tmp_path / "project"), frozenset({"image"}))
+    made = planning.plan(reading.loads(text, folder=tmp_path / "project"), frozenset({"image"}))
     path = tmp_path / "s.zarr"
     assert build(made, path, frames=[0], workers=0).ok
     return path, mesh, made

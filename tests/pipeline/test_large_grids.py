@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from sonarsynth import config, planning, schedule, store
+from sonarsynth import planning, schedule, store
 from sonarsynth.description import FieldError
-from sonarsynth.planning import Plan, looks
-from sonarsynth.recipe import Recipe
-from sonarsynth.render import Values
+from sonarsynth.pipeline import Values
+from sonarsynth.planning import Plan
+from sonarsynth.planning.measured import sampled_frames
+from sonarsynth.recipe import Recipe, reading
 
 
 def large(small_text: str) -> Recipe:
@@ -29,13 +30,13 @@ def large(small_text: str) -> Recipe:
         "  - {name: deep, path: scene.world.targets.0.motion.start.2, kind: normal, mean: -6 m, deviation: 1.4 m}\n"
         "repeats: 10000\n"
     )
-    return config.loads(text + varied)
+    return reading.loads(text + varied)
 
 
 def test_of_a_large_dataset_a_part_is_looked_at_and_the_rest_checked_when_rendered(
     small_text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(looks, "LOOKED_AT", 60)
+    monkeypatch.setattr(sampled_frames, "LOOKED_AT", 60)
     recipe = large(small_text)
     made = planning.plan(recipe)
     assert made.looked_at == 60
@@ -58,7 +59,7 @@ def test_of_a_large_dataset_a_part_is_looked_at_and_the_rest_checked_when_render
 def test_unseen_frames_are_laid_as_they_would_be_if_seen(small_text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first sample of a frame is the same whether or not the plan looked at it."""
     recipe = large(small_text)
-    monkeypatch.setattr(looks, "LOOKED_AT", 60)
+    monkeypatch.setattr(sampled_frames, "LOOKED_AT", 60)
     few = planning.plan(recipe)
     frame = recipe.frame(0)[1]
     known = few.windows.start[0]
@@ -67,7 +68,7 @@ def test_unseen_frames_are_laid_as_they_would_be_if_seen(small_text: str, monkey
 
 
 def test_a_frame_that_does_not_fit_is_refused(small_text: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(looks, "LOOKED_AT", 60)
+    monkeypatch.setattr(sampled_frames, "LOOKED_AT", 60)
     recipe = large(small_text)
     made = planning.plan(recipe)
     unseen = next(f for f in range(0, 30000, 3) if not np.isfinite(made.windows.start[f]))
@@ -83,13 +84,13 @@ def test_a_frame_that_does_not_fit_is_refused(small_text: str, monkeypatch: pyte
 def test_a_single_long_trajectory_is_looked_at_from_end_to_end(
     small_text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(looks, "LOOKED_AT", 7)
-    made = planning.plan(config.loads(small_text))
+    monkeypatch.setattr(sampled_frames, "LOOKED_AT", 7)
+    made = planning.plan(reading.loads(small_text))
     assert np.flatnonzero(np.isfinite(made.windows.start)).tolist() == [0, 3, 6, 10, 13, 16, 19]
 
 
 def test_a_million_frames_take_under_a_million_files() -> None:
-    remus = config.load(Path(__file__).resolve().parents[2] / "configs" / "remus.yaml")
+    remus = reading.load(Path(__file__).resolve().parents[2] / "configs" / "remus.yaml")
     made = planning.plan(remus, ("image", "cloud"))
     many = replace(remus, repeats=15625)
     million = replace(made, recipe=many, sizes=made.sizes | {"frame": many.frames})

@@ -12,8 +12,8 @@ import psutil
 
 from sonarsynth.planning import Plan
 from sonarsynth.schedule import build
+from sonarsynth.store.files.place import record
 from sonarsynth.store.marks import all_files, load_mark, marked
-from sonarsynth.store.place import record
 from tests.waiting import HANGING, wait_until
 
 

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from sonarsynth import config, planning
+from sonarsynth import planning
+from sonarsynth.recipe import reading
 
 REMUS = Path(__file__).resolve().parents[2] / "configs" / "remus.yaml"
 
@@ -12,7 +13,7 @@ REMUS = Path(__file__).resolve().parents[2] / "configs" / "remus.yaml"
 @pytest.mark.parametrize("law", ["{kind: kirchhoff}", "{kind: kirchhoff, roughness: 2 mm, slope: 0.2}"])
 def test_a_thousandth_takes_one_expansion(law: str) -> None:
     sets = ("accuracy.signal=1e-3", f"scene.physics.scattering={law}", "scene.trajectory.frames=8")
-    made = planning.plan(config.load(REMUS, sets), {"signals"})
+    made = planning.plan(reading.load(REMUS, sets), {"signals"})
     assert made.choices.subarrays == 1
     assert made.choices.visibility == "hydrophones"
     assert made.errors.expansion < 5e-4

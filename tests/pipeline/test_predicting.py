@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonarsynth import config, render, schedule, store
+from sonarsynth import pipeline, schedule, store
 from sonarsynth.planning import Plan, plan
 from sonarsynth.products import Signals
-from sonarsynth.recipe import Recipe
-from sonarsynth.scene import Frame
-from sonarsynth.schedule import predicting, trials
-from sonarsynth.sonar.subarrays import Subarray
+from sonarsynth.receiver.subarrays import Subarray
+from sonarsynth.recipe import Recipe, reading
+from sonarsynth.recipe.scene import Frame
+from sonarsynth.schedule import benchmark_frames, predicting
 from sonarsynth.store import creating
 
 TASKS = {
@@ -51,7 +51,7 @@ def test_only_what_was_asked_for_runs(small: Recipe, tmp_path: Path, products: s
     (row,) = map(json.loads, (tmp_path / "s.times.jsonl").read_text().splitlines())
     assert list(row["seconds"]) == list(row["cpu"]) == list(report.stage_cpu) == TASKS[products]
     assert row["parts"].keys() == PARTS[products]
-    assert row["parts"].keys() <= set(render.LAPS)
+    assert row["parts"].keys() <= set(pipeline.LAPS)
     planned = {stage.stage for stage in plan(small, split(products)).stages}
     assert planned - {"write"} == PARTS[products] - {"collect"}
     assert math.fsum(row["parts"].values()) == pytest.approx(math.fsum(row["cpu"].values()), abs=0.01)
@@ -64,18 +64,18 @@ def test_only_what_was_asked_for_is_submitted(small: Recipe, tmp_path: Path) -> 
 
 
 def test_laps_count_to_the_innermost_and_nowhere_else(small_plan: Plan) -> None:
-    with render.counted() as outer:
-        with render.counted() as inner:
-            render.trace_frame(small_plan, 0)
+    with pipeline.counted() as outer:
+        with pipeline.counted() as inner:
+            pipeline.trace_frame(small_plan, 0)
         assert outer == {}
     assert inner.keys() == {"trace", "label"}
-    render.trace_frame(small_plan, 0)
+    pipeline.trace_frame(small_plan, 0)
     assert inner.keys() == {"trace", "label"}
 
 
 def test_the_size_of_a_store_is_foreseen(small_plan: Plan, prediction: schedule.Prediction, tmp_path: Path) -> None:
     report = schedule.build(small_plan, tmp_path / "s", workers=0, prediction=prediction)
-    found = trials.disk_use(tmp_path / "s")
+    found = benchmark_frames.disk_use(tmp_path / "s")
     assert report.prediction["measured_file_bytes"] == found.files
     assert prediction.file_bytes == pytest.approx(found.files, rel=0.1)
     assert prediction.bytes == pytest.approx(found.disk, rel=0.1)
@@ -114,20 +114,20 @@ def test_where_nothing_can_be_tried_counts_serve(
     def fails(plan: Plan, frame: object) -> None:
         raise ValueError("no such\nwater")
 
-    monkeypatch.setattr(trials, "trace_at", fails)
+    monkeypatch.setattr(benchmark_frames, "trace_at", fails)
     made = schedule.predict(small_plan)
     assert made.failures[0].endswith("ValueError: no such water")
 
 
 def test_a_frame_that_fails_is_named_and_the_others_serve(small_plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
-    real = trials.trace_at
+    real = benchmark_frames.trace_at
 
     def fails(plan: Plan, frame: object) -> object:
         if frame.index == 12:  # type: ignore[attr-defined]
             raise ValueError("no water")
         return real(plan, frame)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(trials, "trace_at", fails)
+    monkeypatch.setattr(benchmark_frames, "trace_at", fails)
     made = schedule.predict(small_plan)
     assert made.failures == ("frame 12: ValueError: no water",)
     assert made.how.startswith("frames ")
@@ -152,9 +152,9 @@ def test_predictions_grow_as_they_must(prediction: schedule.Prediction) -> None:
 def test_slow_frames_are_tried_with_few_facets(small_plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
     """By straight lines, where a whole one takes long; a whole frame where counts made too much of it."""
     hours = replace(small_plan, stages=tuple(replace(stage, seconds=0.4) for stage in small_plan.stages))
-    assert trials.try_frames(hours).every == 1
-    monkeypatch.setattr(trials, "WHOLE", 0.0)
-    trial = trials.try_frames(hours)
+    assert benchmark_frames.try_frames(hours).every == 1
+    monkeypatch.setattr(benchmark_frames, "WHOLE", 0.0)
+    trial = benchmark_frames.try_frames(hours)
     assert trial.every > 1
     assert len(trial.frames) == 1
     assert {"trace", "label", "synthesise", "locate", "beamform", "range"} <= trial.cpu.keys()
@@ -167,15 +167,15 @@ def test_some_parts_of_the_array_stand_for_all(small: Recipe, monkeypatch: pytes
     def cut(parts: object) -> Plan:
         return plan(replace(small, scene=replace(small.scene, physics=replace(small.scene.physics, subarrays=parts))))
 
-    real, heard = trials.hear_part, []
+    real, heard = benchmark_frames.hear_part, []
 
     def hears(made: Plan, frame: Frame, part: Subarray) -> Signals:
         heard.append(int(part.sensor[0]))
         return real(made, frame, part)
 
-    monkeypatch.setattr(trials, "hear_part", hears)
-    alone, whole = trials.try_frames(cut("sensors")), trials.try_frames(cut(1))
-    assert 2 <= len(set(heard)) <= trials.PARTS
+    monkeypatch.setattr(benchmark_frames, "hear_part", hears)
+    alone, whole = benchmark_frames.try_frames(cut("sensors")), benchmark_frames.try_frames(cut(1))
+    assert 2 <= len(set(heard)) <= benchmark_frames.PARTS
     assert alone.shard.files == pytest.approx(whole.shard.files, rel=0.05)
 
 
@@ -212,4 +212,4 @@ def test_the_commands_predict_and_compare(small_file: Path, tmp_path: Path, capf
     quiet = command("build", small_file, tmp_path / "t", "--workers", 0, "--frames", "0:1", "--no-predict")
     assert "predicted" not in quiet
     assert store.verify(tmp_path / "s", quick=True).ok
-    assert config.load(small_file).frames == 20
+    assert reading.load(small_file).frames == 20

@@ -16,9 +16,10 @@ from typing import Any
 
 import pytest
 
-from sonarsynth import config, planning, schedule, store
+from sonarsynth import planning, schedule, store
 from sonarsynth.cli import main
 from sonarsynth.planning import Plan
+from sonarsynth.recipe import reading
 from sonarsynth.store import provenance, writing
 from sonarsynth.store.marks import MARKS, all_files
 
@@ -39,12 +40,12 @@ def rest_of_root(path: Path) -> Any:
 def test_two_builds_differ_in_one_attribute(
     tmp_path: Path, small_text: str, small_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    schedule.build(config.loads(small_text), tmp_path / "a.zarr", frames=range(8), workers=0)
+    schedule.build(reading.loads(small_text), tmp_path / "a.zarr", frames=range(8), workers=0)
     monkeypatch.setattr(provenance, "machine", lambda: {"cpu": "another"})
     monkeypatch.setattr(provenance, "git_state", lambda: None)
     monkeypatch.setattr(provenance, "versions", lambda: {"numpy": "another"})
-    source = config.read(small_file)
-    recipe = config.recipe_of(source)
+    source = reading.read(small_file)
+    recipe = reading.recipe_of(source)
     schedule.build(recipe, tmp_path / "b.zarr", frames=range(8), workers=0, source=source)
     assert contents(tmp_path / "a.zarr") == contents(tmp_path / "b.zarr")
     assert rest_of_root(tmp_path / "a.zarr") == rest_of_root(tmp_path / "b.zarr")
@@ -77,14 +78,14 @@ def test_the_command_line_keeps_the_recipe_as_written_and_what_was_set(tmp_path:
     found = store.root_attributes(tmp_path / "s.zarr")
     assert found["provenance"]["recipe_as_written"] == small_file.read_text()
     assert found["provenance"]["recipe_settings"] == ["scene.trajectory.frames=2", "title=two"]
-    assert config.loads(found["recipe"]).title == "two"
+    assert reading.loads(found["recipe"]).title == "two"
 
 
 def test_the_plan_meshes_and_files_are_there(tmp_path: Path, small_text: str) -> None:
     cast = tmp_path / "cast.csv"
     cast.write_text("depth (m),sound speed (m/s)\n0,1500\n20,1490\n")
     speed = f"{{kind: cast, path: {cast}}}"
-    recipe = config.loads(small_text.replace("{kind: isovelocity, speed: 1540}", speed))
+    recipe = reading.loads(small_text.replace("{kind: isovelocity, speed: 1540}", speed))
     made = planning.plan(recipe)
     found = store.creating.described(made)
     assert found["inputs"]["files"] == [{"name": "cast.csv", "sha256": hashlib.sha256(cast.read_bytes()).hexdigest()}]
@@ -142,7 +143,7 @@ def test_the_commit_is_of_the_checkout_that_holds_the_code(tmp_path: Path, monke
 
 def test_what_is_said_of_a_dataset_changes_no_identity(tmp_path: Path, small_text: str) -> None:
     said = "dataset: {creators: [{name: A. Author}], citation: 'cite me', url: 'https://doi.org/10.1000/d'}\n"
-    plain, told = config.loads(small_text), config.loads(said + small_text)
+    plain, told = reading.loads(small_text), reading.loads(said + small_text)
     assert told.dataset.creators[0].name == "A. Author"
     assert plain.digest == told.digest
     path = tmp_path / "s.zarr"
@@ -167,8 +168,8 @@ def test_what_is_said_of_a_dataset_changes_no_identity(tmp_path: Path, small_tex
 def test_a_wrong_field_is_one_line(tmp_path: Path, small_text: str, line: str, field: str) -> None:
     file = tmp_path / "wrong.yaml"
     file.write_text(f"{line}\n{small_text}")
-    with pytest.raises(config.RecipeError, match=f"wrong.yaml:1: {field}"):
-        config.load(file)
+    with pytest.raises(reading.RecipeError, match=f"wrong.yaml:1: {field}"):
+        reading.load(file)
 
 
 def test_a_build_with_other_numeric_libraries_goes_on_only_where_told_and_marks_its_frames(

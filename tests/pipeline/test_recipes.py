@@ -8,16 +8,26 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sonarsynth import config
-from sonarsynth.config import RecipeError
 from sonarsynth.description import FieldError
-from sonarsynth.recipe import Recipe
-from sonarsynth.scattering.targets import Target
-from sonarsynth.scene import Scene, Trajectory, World
-from sonarsynth.sonar import Band, BandPass, BeamGrid, Converter, LowPass, PlanarLattice, PositionTable, Romanis, Sonar
-from sonarsynth.world import environment as water
-from sonarsynth.world import motion, shapes
-from sonarsynth.world.sources import SnappingShrimp
+from sonarsynth.environment import sea as water
+from sonarsynth.geometry import motion
+from sonarsynth.receiver import (
+    Band,
+    BandPass,
+    BeamGrid,
+    Converter,
+    LowPass,
+    PlanarLattice,
+    PositionTable,
+    Romanis,
+    Sonar,
+)
+from sonarsynth.recipe import Recipe, reading
+from sonarsynth.recipe.reading import RecipeError
+from sonarsynth.recipe.scene import Scene, Trajectory, World
+from sonarsynth.sources.shrimp import SnappingShrimp
+from sonarsynth.targets import shapes
+from sonarsynth.targets.target import Target
 
 WRONG = [
     ("beams:", "beems:", "14: scene.sonar.beems: 'beems' is not a field here; did you mean 'beams'?"),
@@ -76,7 +86,7 @@ WRONG = [
 
 def refused(file: Path, sets: tuple[str, ...] = ()) -> str:
     with pytest.raises(RecipeError) as caught:
-        config.load(file, sets)
+        reading.load(file, sets)
     message = str(caught.value)
     assert "\n" not in message
     assert message.startswith(str(file))
@@ -126,7 +136,7 @@ def test_files_that_are_not_there(tmp_path: Path) -> None:
 
 def test_settings_reach_into_lists_and_make_mappings(small_file: Path) -> None:
     sets = ("scene.world.targets.0.name=crate", "scene.sonar.converter.full_scale=20 kPa", "seed=0o17")
-    recipe = config.load(small_file, sets)
+    recipe = reading.load(small_file, sets)
     assert recipe.scene.world.targets[0].name == "crate"
     assert recipe.scene.sonar.converter == Converter(full_scale=20e3)
     assert recipe.seed == 15
@@ -169,27 +179,27 @@ def test_paths_in_a_file_are_relative_to_it_and_those_of_settings_to_the_working
     monkeypatch.chdir(tmp_path / "elsewhere")
     text = small_file.read_text().replace("{kind: isovelocity, speed: 1540}", "{kind: cast, path: cast.csv}")
     small_file.write_text(text)
-    speed = config.load(Path("..") / small_file.name).scene.world.environment.sound_speed
+    speed = reading.load(Path("..") / small_file.name).scene.world.environment.sound_speed
     assert Path(speed.path).resolve() == tmp_path / "cast.csv"
-    speed = config.load(small_file, ("scene.world.environment.sound_speed.path=cast.csv",)).scene.world.environment
+    speed = reading.load(small_file, ("scene.world.environment.sound_speed.path=cast.csv",)).scene.world.environment
     assert Path(speed.sound_speed.path) == tmp_path / "elsewhere" / "cast.csv"
 
 
 def test_errors_of_planning_are_named_with_file_line_and_field(small_file: Path) -> None:
-    source = config.read(small_file)
-    with pytest.raises(RecipeError) as caught, config.locating(source):
+    source = reading.read(small_file)
+    with pytest.raises(RecipeError) as caught, reading.locating(source):
         raise FieldError(("scene", "world", "targets", 0, "motion"), "is above the surface at frame 3")
     assert str(caught.value) == f"{small_file}:9: scene.world.targets.0.motion: is above the surface at frame 3"
 
 
 def test_yaml_is_1_2() -> None:
     scene = "scene: {world: {environment: {depth: 1e2, sound_speed: {kind: isovelocity, speed: 15e2}}}}"
-    recipe = config.loads(f"title: no\nseed: 010\n{scene}\n")
+    recipe = reading.loads(f"title: no\nseed: 010\n{scene}\n")
     assert (recipe.title, recipe.seed, recipe.scene.world.environment.depth) == ("no", 10, 100.0)
 
 
 def test_the_schema_keeps_units_kinds_and_descriptions() -> None:
-    schema = config.schema()
+    schema = reading.schema()
     assert schema["title"] == "Recipe"
     named = schema["$defs"]
     assert {"Scene", "Tabulated", "Romanis", "Box"} <= named.keys()
@@ -269,4 +279,4 @@ recipes = st.builds(
 @settings(max_examples=25)
 @given(recipes)
 def test_a_recipe_survives_yaml(recipe: Recipe) -> None:
-    assert config.loads(config.dump(recipe)) == recipe
+    assert reading.loads(reading.dump(recipe)) == recipe

@@ -17,7 +17,8 @@ from sonarsynth import schedule, store
 from sonarsynth.cli import main
 from sonarsynth.planning import Plan
 from sonarsynth.schedule.repairing import repair
-from sonarsynth.store import Remote, creating, lease
+from sonarsynth.store import Remote, creating
+from sonarsynth.store.files import lease
 from tests.places import contents, web_server
 from tests.waiting import HANGING, wait_until
 
@@ -127,9 +128,10 @@ def test_what_is_not_ours_stays(small_plan: Plan, place: Remote) -> None:
 
 
 def test_another_recipe_is_refused_and_restart_begins_anew(small_plan: Plan, copy: Remote, small_text: str) -> None:
-    from sonarsynth import config, planning
+    from sonarsynth import planning
+    from sonarsynth.recipe import reading
 
-    other = planning.plan(config.loads(small_text.replace("seed: 3", "seed: 4")))
+    other = planning.plan(reading.loads(small_text.replace("seed: 3", "seed: 4")))
     with pytest.raises(store.Mismatch, match="seed is 3 there and 4 now"):
         schedule.build(other, copy, frames=range(8), workers=0)
     schedule.build(other, copy, frames=range(8), workers=0, restart=True)
@@ -140,11 +142,11 @@ def test_another_recipe_is_refused_and_restart_begins_anew(small_plan: Plan, cop
 def test_frames_set_aside_are_known_the_next_time(
     small_plan: Plan, place: Remote, whole: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from sonarsynth import render
+    from sonarsynth import pipeline
 
-    trace = render.trace_frame
+    trace = pipeline.trace_frame
     with monkeypatch.context() as patch:
-        patch.setattr(render, "trace_frame", lambda plan, i: 1 / 0 if i == 3 else trace(plan, i))
+        patch.setattr(pipeline, "trace_frame", lambda plan, i: 1 / 0 if i == 3 else trace(plan, i))
         assert not schedule.build(small_plan, place, frames=FRAMES, workers=0).ok
     assert store.beside(place, "aside.jsonl").exists()
     again = schedule.build(small_plan, place, frames=FRAMES, workers=0)
@@ -219,7 +221,7 @@ def test_verify_says_that_it_is_being_built_and_by_whom(copy: Remote) -> None:
 
 
 def test_pictures_of_a_url_go_to_the_working_directory(copy: Remote, tmp_path: Path) -> None:
-    from sonarsynth.show.reading import pictures_of
+    from sonarsynth.pictures.store_reading import pictures_of
 
     assert pictures_of(copy) == Path("s.zarr.pictures")
     assert pictures_of(tmp_path / "s.zarr") == tmp_path / "s.zarr.pictures"

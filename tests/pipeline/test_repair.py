@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from sonarsynth import config, render, store
+from sonarsynth import pipeline, store
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
-from sonarsynth.recipe import Recipe
+from sonarsynth.recipe import Recipe, reading
 from sonarsynth.schedule import build
 from sonarsynth.schedule.repairing import repair
 from sonarsynth.store.marks import load_layout, load_mark, save_mark
@@ -148,7 +148,7 @@ def test_only_what_is_damaged_is_made_again(copy: Path, whole: Path) -> None:
 
 
 def test_a_store_without_damage_needs_no_recipe(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(config, "loads", lambda *_: 1 / 0)
+    monkeypatch.setattr(reading, "loads", lambda *_: 1 / 0)
     (copy / ".marks/layout.copy.json").unlink()
     (copy / "notes.txt").write_text("hello")
     report = repair(copy, workers=0)
@@ -191,8 +191,8 @@ def test_another_version_is_refused_unless_told_otherwise(
 
 
 def test_numbers_that_come_out_differently_are_said(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    works = render.trace_frame
-    monkeypatch.setattr(render, "trace_frame", lambda made, i: works(made, i - i % 2))
+    works = pipeline.trace_frame
+    monkeypatch.setattr(pipeline, "trace_frame", lambda made, i: works(made, i - i % 2))
     os.truncate(copy / SHARD, 10)
     report = repair(copy, workers=0)
     assert report.differing == [1]
@@ -202,10 +202,10 @@ def test_numbers_that_come_out_differently_are_said(copy: Path, monkeypatch: pyt
 def test_a_frame_that_cannot_be_made_again_is_set_aside(
     copy: Path, whole: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    works = render.trace_frame
+    works = pipeline.trace_frame
     os.truncate(copy / SHARD, 10)
     with monkeypatch.context() as patch:
-        patch.setattr(render, "trace_frame", lambda made, i: 1 / 0 if i == 9 else works(made, i))
+        patch.setattr(pipeline, "trace_frame", lambda made, i: 1 / 0 if i == 9 else works(made, i))
         report = repair(copy, workers=0)
     assert [f.frame for f in report.failures] == [9]
     assert not report.ok
@@ -243,7 +243,7 @@ def test_a_mesh_that_has_changed_is_refused(tmp_path: Path, small_text: str) -> 
     mesh, path = tmp_path / "box.stl", tmp_path / "s.zarr"
     trimesh.creation.box((1, 1, 1)).export(mesh)
     text = small_text.replace("{kind: box, size: [1, 1, 1], edge: 0.25}", "{kind: mesh_file, path: box.stl}")
-    build(config.loads(text, folder=tmp_path), path, frames=[0], workers=0)
+    build(reading.loads(text, folder=tmp_path), path, frames=[0], workers=0)
     whole = contents(path)
     (path / "step/c.0").unlink()
     kept = mesh.read_bytes()

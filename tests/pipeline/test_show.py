@@ -12,9 +12,9 @@ import xarray as xr
 
 from sonarsynth.conventions import direction
 from sonarsynth.geometry import Pose, quaternion
-from sonarsynth.show import show
-from sonarsynth.show.listening import beams, choose
-from sonarsynth.show.reading import built, opened, stored
+from sonarsynth.pictures import show
+from sonarsynth.pictures.steered_beams import beams, choose
+from sonarsynth.pictures.store_reading import built, opened, stored
 
 SPEED = 1540.0
 RATE = 196e3

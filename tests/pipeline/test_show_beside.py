@@ -10,16 +10,17 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from sonarsynth import config, schedule, store
+from sonarsynth import schedule, store
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
-from sonarsynth.pictures.beside import BesidePicture, Column, Moment, Panel
+from sonarsynth.evaluation import range_errors
+from sonarsynth.pictures.compare import moment, show_beside
+from sonarsynth.pictures.figures.compared_images import BesidePicture, Column, Moment, Panel
+from sonarsynth.pictures.recipe_diff import names_of
+from sonarsynth.pictures.scores import as_table, heard, standing
+from sonarsynth.pictures.store_reading import opened
 from sonarsynth.planning import plan
-from sonarsynth.show.beside import moment, show_beside
-from sonarsynth.show.differences import names_of
-from sonarsynth.show.reading import opened
-from sonarsynth.show.standing import as_table, heard, standing
-from sonarsynth.verification import range_errors
+from sonarsynth.recipe import reading
 
 LOBE = "scene.physics.scattering={kind: mirror_lobe, width: 30 deg}"
 MIRRORS = "scene.physics.scattering={kind: kirchhoff}"
@@ -39,17 +40,17 @@ def stores(tmp_path_factory: pytest.TempPathFactory, small_text: str) -> dict[st
     made = {}
     for (name, frames), setting in zip(FRAMES.items(), (LOBE, MIRRORS, ROUGH), strict=True):
         made[name] = folder / f"{name}.zarr"
-        recipe = config.load(folder / "small.yaml", [setting, *BALL])
+        recipe = reading.load(folder / "small.yaml", [setting, *BALL])
         assert schedule.build(plan(recipe), made[name], frames=frames, workers=0).ok
     return made
 
 
 def yaml(text: str, *settings: str) -> str:
-    return config.dump(config.recipe_of(_set(text, settings)))
+    return reading.dump(reading.recipe_of(_set(text, settings)))
 
 
-def _set(text: str, settings: tuple[str, ...]) -> config.Source:
-    from sonarsynth.config.source import override, read_text
+def _set(text: str, settings: tuple[str, ...]) -> reading.Source:
+    from sonarsynth.recipe.reading.yaml_source import override, read_text
 
     source = read_text(text, "small", Path())
     for setting in settings:
@@ -238,9 +239,9 @@ def test_stores_that_do_not_fit_are_refused_in_one_line(
 
     lobe = stores["lobe"]
     other, imageless, empty = (tmp_path / f"{name}.zarr" for name in ("other", "imageless", "empty"))
-    store.create(other, plan(config.recipe_of(_set(small_text, ("scene.sonar.beams.azimuths=9",)))))
-    store.create(imageless, plan(config.loads(small_text), frozenset({"signals"})))
-    store.create(empty, plan(config.loads(small_text)))
+    store.create(other, plan(reading.recipe_of(_set(small_text, ("scene.sonar.beams.azimuths=9",)))))
+    store.create(imageless, plan(reading.loads(small_text), frozenset({"signals"})))
+    store.create(empty, plan(reading.loads(small_text)))
     assert "its beams (9 x 9 over 30 x 30 deg) are not those of" in refused(lobe, other)
     assert "imageless.zarr: the store has no image" in refused(lobe, imageless)
     assert "no frame has been built in all of them" in refused(lobe, empty)

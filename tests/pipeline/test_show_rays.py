@@ -13,21 +13,21 @@ import numpy as np
 import pytest
 
 from sonarsynth import planning
-from sonarsynth.acoustics.boundaries import rayleigh
 from sonarsynth.description import FieldError
-from sonarsynth.pictures.frames import Hull
-from sonarsynth.pictures.page import MOST_FACETS, page
-from sonarsynth.pictures.rays import COLOURS
+from sonarsynth.environment.boundaries import FluidHalfSpace, SeaBed
+from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Tabulated
+from sonarsynth.equations.water.boundary_reflection import rayleigh
+from sonarsynth.geometry.motion import Still
+from sonarsynth.pictures.figures.frame_figure import Hull
+from sonarsynth.pictures.figures.ray_figure import COLOURS
+from sonarsynth.pictures.figures.ray_page import MOST_FACETS, page
+from sonarsynth.pictures.ray_pictures import ray_lines, show_rays, table
+from sonarsynth.propagation.ray_request import EigenrayRequest, RayRequest
 from sonarsynth.recipe import Recipe
-from sonarsynth.scattering.targets import Target
-from sonarsynth.scene import Scene, Trajectory, World
-from sonarsynth.show.rays import ray_lines, show_rays, table
-from sonarsynth.tracing.ray_request import EigenrayRequest, RayRequest
-from sonarsynth.world.boundaries import FluidHalfSpace, SeaBed
-from sonarsynth.world.environment import Absorption, Environment, Isovelocity, Tabulated
-from sonarsynth.world.motion import Still
-from sonarsynth.world.shapes import Box
-from sonarsynth.world.sources import SnappingShrimp
+from sonarsynth.recipe.scene import Scene, Trajectory, World
+from sonarsynth.sources.shrimp import SnappingShrimp
+from sonarsynth.targets.shapes import Box
+from sonarsynth.targets.target import Target
 from tests.waiting import HANGING
 
 SNAP, ARRAY, TARGET = np.array([30.0, 10.0, -14.0]), np.array([0.0, 0.0, -6.0]), np.array([40.0, -8.0, -9.0])

@@ -9,14 +9,14 @@ import pytest
 from numpy.random import default_rng
 from ruamel.yaml import YAML
 
-from sonarsynth import config, schedule
+from sonarsynth import schedule
 from sonarsynth.description import FieldError
+from sonarsynth.pictures.snap_pictures import show_snap
+from sonarsynth.pipeline import render
 from sonarsynth.planning import plan
-from sonarsynth.recipe import Recipe
-from sonarsynth.render import render
-from sonarsynth.show.snaps import show_snap
+from sonarsynth.recipe import Recipe, reading
+from sonarsynth.sources.snap_models import RecordedSnap
 from sonarsynth.store import verify
-from sonarsynth.world.snaps import RecordedSnap
 
 TEXT = """\
 seed: 3
@@ -52,7 +52,7 @@ def recipe_with(folder: Path, snap: str, *, more: str = "", loudness: float = 3e
     table = np.c_[1e6 * time, wave + 1e-3 * default_rng(1).standard_normal(300)]
     np.savetxt(folder / "sounds" / "snap.csv", table, delimiter=",", header="time (us),pressure (Pa)", comments="")
     (folder / "recipe.yaml").write_text(TEXT.replace("SNAP", snap) + more)
-    return config.load(folder / "recipe.yaml")
+    return reading.load(folder / "recipe.yaml")
 
 
 @EVERY
@@ -60,7 +60,7 @@ def test_a_dataset_with_each_model_verifies(tmp_path: Path, kind: str) -> None:
     """The image is brightest on the target, its ranges are right and the snap is where it is heard."""
     recipe = recipe_with(tmp_path, SNAPS[kind])
     assert recipe.scene.world.shrimp[0].snap.kind == kind
-    assert config.loads(config.dump(recipe)) == recipe
+    assert reading.loads(reading.dump(recipe)) == recipe
     assert schedule.build(plan(recipe), tmp_path / "s.zarr", workers=0).ok
     report = verify(tmp_path / "s.zarr")
     assert report.ok, report
@@ -99,7 +99,7 @@ def test_slow_tails_are_among_the_warnings(tmp_path: Path) -> None:
     recipe = recipe_with(tmp_path, text, more=low)
     sets = ("scene.sonar.filter={kind: low_pass, cutoff: 80 kHz}",)
     assert not any("falls off slowly" in note for note in plan(recipe).warnings)
-    loud = config.load(tmp_path / "recipe.yaml", sets)
+    loud = reading.load(tmp_path / "recipe.yaml", sets)
     made = plan(loud)
     assert any("falls off slowly: it is cut 0.02 s" in note for note in made.warnings)
     assert made.windows.echo_start < 3e-3  # the echoes, from 7 ms on, are heard in spite of the tail
@@ -123,16 +123,16 @@ WRONG = [
 def test_snaps_that_cannot_be_are_refused_in_one_line(tmp_path: Path, snap: str, message: str) -> None:
     with pytest.raises(ValueError, match=message) as caught:  # noqa: PT012
         recipe_with(tmp_path, snap)
-        source = config.read(tmp_path / "recipe.yaml")
-        with config.locating(source):
-            plan(config.recipe_of(source))
-    assert isinstance(caught.value, (config.RecipeError, FieldError))
+        source = reading.read(tmp_path / "recipe.yaml")
+        with reading.locating(source):
+            plan(reading.recipe_of(source))
+    assert isinstance(caught.value, (reading.RecipeError, FieldError))
     assert "\n" not in str(caught.value)
 
 
 def test_the_schema_knows_every_kind() -> None:
     jsonschema = pytest.importorskip("jsonschema")
-    check = jsonschema.Draft202012Validator(config.schema())
+    check = jsonschema.Draft202012Validator(reading.schema())
     for snap in SNAPS.values():
         data = YAML(typ="safe", pure=True).load(TEXT.replace("SNAP", snap))
         assert not list(check.iter_errors(data))

@@ -15,9 +15,9 @@ import xarray as xr
 import zarr
 
 from sonarsynth import store
-from sonarsynth.config import loads
+from sonarsynth.pipeline import Values
 from sonarsynth.planning import Plan, plan
-from sonarsynth.render import Values
+from sonarsynth.recipe.reading import loads
 from sonarsynth.store import layout_of
 
 MadeUp = Callable[[Plan, int], Values]
@@ -182,7 +182,7 @@ def test_two_builders_exclude_each_other(tmp_path: Path) -> None:
     with store.lock(path):
         with pytest.raises(store.Locked, match=r"s\.zarr is being built by process \d+ on "), store.lock(path):
             raise AssertionError
-        other = "import sys; from sonarsynth.store.lock import lock\nwith lock(sys.argv[1]): pass"
+        other = "import sys; from sonarsynth.store.files.lock import lock\nwith lock(sys.argv[1]): pass"
         done = subprocess.run([sys.executable, "-c", other, path], capture_output=True, text=True, check=False)
         assert "is being built by process" in done.stderr
     with store.lock(path):
@@ -192,7 +192,7 @@ def test_two_builders_exclude_each_other(tmp_path: Path) -> None:
 
 def test_a_holder_that_dies_leaves_no_lock(tmp_path: Path) -> None:
     path = tmp_path / "s.zarr"
-    dying = "import os, sys; from sonarsynth.store.lock import lock\nwith lock(sys.argv[1]): os._exit(9)"
+    dying = "import os, sys; from sonarsynth.store.files.lock import lock\nwith lock(sys.argv[1]): os._exit(9)"
     assert subprocess.run([sys.executable, "-c", dying, path], check=False).returncode == 9
     assert (tmp_path / "s.zarr.lock").exists()
     with store.lock(path):

@@ -14,8 +14,9 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from sonarsynth import config, store
+from sonarsynth import store
 from sonarsynth.planning import Plan, plan
+from sonarsynth.recipe import reading
 from sonarsynth.schedule import build
 from sonarsynth.schedule.repairing import repair
 from sonarsynth.store.layout import layout_of
@@ -27,7 +28,7 @@ SOME = st.sets(st.integers(0, FRAMES - 1), min_size=1, max_size=6)
 
 @cache
 def made() -> Plan:
-    return plan(config.loads(RECIPE))
+    return plan(reading.loads(RECIPE))
 
 
 @cache

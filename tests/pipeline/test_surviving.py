@@ -25,8 +25,8 @@ from distributed import LocalCluster
 from sonarsynth import store
 from sonarsynth.planning import Plan
 from sonarsynth.recipe import Recipe
-from sonarsynth.schedule import TooLarge, build, connecting, space
-from sonarsynth.schedule.log import read_lines
+from sonarsynth.schedule import TooLarge, build, connecting, disk_space
+from sonarsynth.schedule.build_log import read_lines
 from tests.waiting import wait_until
 
 FAULTS = """\
@@ -191,12 +191,12 @@ def test_a_scheduler_elsewhere_needs_tls_or_consent(address: str, fine: bool) ->
 def test_what_does_not_fit_is_refused_before_anything_is_written_unless_agreed(
     tmp_path: Path, small_plan: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(space.shutil, "disk_usage", lambda place: shutil._ntuple_diskusage(10**9, 10**9, 1000))
+    monkeypatch.setattr(disk_space.shutil, "disk_usage", lambda place: shutil._ntuple_diskusage(10**9, 10**9, 1000))
     with pytest.raises(TooLarge, match=r"needs up to [\d.]+ [kM]B and 1 kB are free there: --yes"):
         build(small_plan, tmp_path / "s.zarr", workers=0)
     assert list(tmp_path.iterdir()) == []
     assert build(small_plan, tmp_path / "s.zarr", frames=[0], workers=0, agreed=True).ok
-    monkeypatch.setattr(space.shutil, "disk_usage", lambda place: shutil._ntuple_diskusage(10**15, 0, 10**15))
+    monkeypatch.setattr(disk_space.shutil, "disk_usage", lambda place: shutil._ntuple_diskusage(10**15, 0, 10**15))
     huge = replace(small_plan, stages=tuple(replace(s, bytes=10**12) for s in small_plan.stages))
     with pytest.raises(TooLarge, match="TB"):
         build(huge, tmp_path / "h.zarr", workers=0)
@@ -204,7 +204,7 @@ def test_what_does_not_fit_is_refused_before_anything_is_written_unless_agreed(
     with pytest.raises(TooLarge, match=r"a frame takes up to 48.3 GB of memory, and each of 2 workers has .*"):
         build(long, tmp_path / "l.zarr", workers=2)
     assert not (tmp_path / "l.zarr").exists()
-    monkeypatch.setattr(space.os, "statvfs", lambda place: SimpleNamespace(f_files=100, f_favail=3))
+    monkeypatch.setattr(disk_space.os, "statvfs", lambda place: SimpleNamespace(f_files=100, f_favail=3))
     with pytest.raises(TooLarge, match=r"needs up to \d+ files and folders and 3 more fit there: --yes"):
         build(small_plan, tmp_path / "i.zarr", workers=0)
 
@@ -289,20 +289,23 @@ def test_another_code_is_shown_and_refused(tmp_path: Path, small: Recipe, monkey
 
 
 def test_a_disk_error_that_is_not_about_room_stays_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(OSError, match="I/O") as raised, space.told_when_full(tmp_path, lambda: space.Room(1.0, 1)):
+    with (
+        pytest.raises(OSError, match="I/O") as raised,
+        disk_space.told_when_full(tmp_path, lambda: disk_space.Room(1.0, 1)),
+    ):
         raise OSError(errno.EIO, "I/O error")
     assert raised.value.errno == errno.EIO
-    for number in space.FULL:
+    for number in disk_space.FULL:
         with (
             pytest.raises(OSError, match=r"up to 5 GB more are needed, .* are free"),
-            space.told_when_full(tmp_path, lambda: space.Room(5e9, 1)),
+            disk_space.told_when_full(tmp_path, lambda: disk_space.Room(5e9, 1)),
         ):
             raise OSError(number, os.strerror(number))
-    monkeypatch.setattr(space.shutil, "disk_usage", lambda place: shutil._ntuple_diskusage(10**15, 0, 10**15))
-    monkeypatch.setattr(space.os, "statvfs", lambda place: SimpleNamespace(f_files=100, f_favail=3))
+    monkeypatch.setattr(disk_space.shutil, "disk_usage", lambda place: shutil._ntuple_diskusage(10**15, 0, 10**15))
+    monkeypatch.setattr(disk_space.os, "statvfs", lambda place: SimpleNamespace(f_files=100, f_favail=3))
     with (
         pytest.raises(OSError, match="up to 80 more files and folders are needed, 3 more fit"),
-        space.told_when_full(tmp_path, lambda: space.Room(1.0, 80)),
+        disk_space.told_when_full(tmp_path, lambda: disk_space.Room(1.0, 80)),
     ):
         raise OSError(errno.ENOSPC, "No space left")
 

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonarsynth import config, planning
+from sonarsynth import planning
+from sonarsynth.pipeline import beamform_frame, range_frame, synthesise, trace_frame
 from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start
 from sonarsynth.planning.choosing import HEARD_AT, heard_at
-from sonarsynth.recipe import Accuracy
-from sonarsynth.render import beamform_frame, range_frame, synthesise, trace_frame
-from sonarsynth.sonar.subarrays import subarray, subarrays
-from sonarsynth.synthesis import KernelDeposit
+from sonarsynth.receiver.subarrays import subarray, subarrays
+from sonarsynth.recipe import Accuracy, reading
+from sonarsynth.signals import KernelDeposit
 from tests.scenes import remus
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
@@ -34,7 +34,7 @@ EXACT = KernelDeposit(width=16, precision="float64", tolerance=1e-9)
 
 def _planned(name: str, signal: float, seed: int) -> Plan:
     sets = (f"accuracy.signal={signal}", f"seed={seed}", *RECIPES[name])
-    return planning.plan(config.load(CONFIGS / name, sets), {"signals"})
+    return planning.plan(reading.load(CONFIGS / name, sets), {"signals"})
 
 
 def _error(made: Plan, index: int, sensors: np.ndarray) -> float:
@@ -90,9 +90,9 @@ def test_more_accuracy_takes_more_work() -> None:
 def test_bending_that_moves_nothing_is_left_out() -> None:
     """A gradient of 1e-6 per second bends no ray by a thousandth of a wave; one of 1 does."""
     for speed, kind in (("1500.0003", "straight"), ("1800", "refracted")):
-        made = planning.plan(config.load(CONFIGS / "deep.yaml", (DEEP_GRADIENT % speed,)), {"signals"})
+        made = planning.plan(reading.load(CONFIGS / "deep.yaml", (DEEP_GRADIENT % speed,)), {"signals"})
         assert made.propagation.kind == kind
-    made = planning.plan(config.load(CONFIGS / "deep.yaml", (DEEP_GRADIENT % "1500.0003",)), {"signals"})
+    made = planning.plan(reading.load(CONFIGS / "deep.yaml", (DEEP_GRADIENT % "1500.0003",)), {"signals"})
     assert made.errors.expansion <= 1e-3
 
 
@@ -167,8 +167,8 @@ def _frame(made: Plan) -> list[bytes]:
 
 
 def test_a_frame_in_uniform_water_is_made_without_any_code_for_rays_that_bend(monkeypatch: pytest.MonkeyPatch) -> None:
-    uniform = planning.plan(config.load(CONFIGS / "remus.yaml"))
-    bending = planning.plan(config.load(CONFIGS / "thermocline.yaml", RECIPES["thermocline.yaml"]), {"cloud"})
+    uniform = planning.plan(reading.load(CONFIGS / "remus.yaml"))
+    bending = planning.plan(reading.load(CONFIGS / "thermocline.yaml", RECIPES["thermocline.yaml"]), {"cloud"})
     whole = _frame(uniform)
     for name in BENT:
         importlib.import_module(f"sonarsynth.{name}")

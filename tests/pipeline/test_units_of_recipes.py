@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from sonarsynth import config
-from sonarsynth.config import RecipeError
 from sonarsynth.conventions import UNITS, Unit
 from sonarsynth.description import FieldError
-from sonarsynth.recipe import Recipe
-from sonarsynth.world.motion import Still
+from sonarsynth.geometry.motion import Still
+from sonarsynth.recipe import Recipe, reading
+from sonarsynth.recipe.reading import RecipeError
 
 
 def leaves(kind: Any, name: str, seen: set[Any]) -> Iterator[tuple[str, Any, Unit]]:
@@ -50,7 +49,7 @@ def units_in(part: Any) -> Iterator[str]:
 
 
 def test_the_schema_names_the_unit_of_every_dimensioned_field() -> None:
-    schema = config.schema()["$defs"]
+    schema = reading.schema()["$defs"]
     assert len(FIELDS) > 150 and len(ANGLES) > 25
     for name, _, unit in FIELDS:
         owner, _, field = name.partition(".")
@@ -86,22 +85,22 @@ def test_a_bare_number_is_si_or_refused_with_both_readings(name: str) -> None:
 
 def test_ninety_is_not_116_degrees(small_file) -> None:
     with pytest.raises(RecipeError, match=r"--set: scene\.trajectory\.sonar\.heading: 90 could be 90 deg or 90 rad"):
-        config.load(small_file, ["scene.trajectory.sonar={kind: still, position: [0, 0, -5], heading: 90}"])
+        reading.load(small_file, ["scene.trajectory.sonar={kind: still, position: [0, 0, -5], heading: 90}"])
     for zero in ("0", "0.0", "-0.0"):
         setting = f"scene.trajectory.sonar={{kind: still, position: [0, 0, -5], heading: {zero}}}"
-        still = config.load(small_file, [setting]).scene.trajectory.sonar
+        still = reading.load(small_file, [setting]).scene.trajectory.sonar
         assert isinstance(still, Still) and still.heading == 0.0
 
 
 def test_a_grid_and_variations_say_the_unit_of_angles_too(small_file) -> None:
     path = "scene.world.targets.0.motion.pitch"
-    good = config.load(small_file, [f"grid=[{{path: {path}, values: [0, 90 deg]}}]"])
+    good = reading.load(small_file, [f"grid=[{{path: {path}, values: [0, 90 deg]}}]"])
     assert good.scene_of(1).world.targets[0].motion.pitch == pytest.approx(np.pi / 2)
     for entry in (
         f"grid=[{{path: {path}, values: [0, 90]}}]",
         f"variations=[{{path: {path}, kind: uniform, low: 10, high: 20}}]",
     ):
-        wrong = config.load(small_file, [entry])
+        wrong = reading.load(small_file, [entry])
         with pytest.raises(FieldError, match=r"pitch: [\d.]+ could be [\d.]+ deg or [\d.]+ rad"):
             wrong.scene_of(wrong.sequences - 1)
 
@@ -109,19 +108,19 @@ def test_a_grid_and_variations_say_the_unit_of_angles_too(small_file) -> None:
 @pytest.mark.parametrize("angle", [0.1, 1 / 3, np.pi, -2.5e-9, 1e-300])
 def test_a_written_recipe_is_read_back_to_the_last_digit(small_file, angle: float) -> None:
     setting = f"scene.trajectory.sonar={{kind: still, position: [0, 0, -5], heading: {angle!r} rad}}"
-    recipe = config.load(small_file, [setting])
-    again = config.loads(config.dump(recipe))
+    recipe = reading.load(small_file, [setting])
+    again = reading.loads(reading.dump(recipe))
     assert again == recipe and again.digest == recipe.digest
     assert isinstance(again.scene.trajectory.sonar, Still) and again.scene.trajectory.sonar.heading == angle
 
 
 def test_a_store_of_the_time_before_is_read_in_radians(small_file) -> None:
-    text = config.dump(config.load(small_file, ["scene.sonar.beams.azimuth_span=0.5 rad"]))
+    text = reading.dump(reading.load(small_file, ["scene.sonar.beams.azimuth_span=0.5 rad"]))
     bare = text.replace("0.5 rad", "0.5")
     assert bare != text
-    assert config.loads(bare.replace(" rad", ""), resolved=True) == config.loads(text)
+    assert reading.loads(bare.replace(" rad", ""), resolved=True) == reading.loads(text)
     with pytest.raises(RecipeError, match=r"0\.5 could be 0\.5 deg or 0\.5 rad"):
-        config.loads(bare)
+        reading.loads(bare)
 
 
 def test_the_units_that_could_be_taken_for_another_are_those_of_angles() -> None:
@@ -139,7 +138,7 @@ def test_numbers_that_overflow_somewhere_are_refused_in_every_field(small_file, 
                 name in ANGLES and written == number
             )
     with pytest.raises(RecipeError, match=r"--set: scene\.world\.environment\.depth: is more than"):
-        config.load(small_file, [f"scene.world.environment.depth={number} m"])
+        reading.load(small_file, [f"scene.world.environment.depth={number} m"])
 
 
 def test_angles_that_are_left_out_need_no_unit(small_file) -> None:
@@ -154,6 +153,6 @@ def test_angles_that_are_left_out_need_no_unit(small_file) -> None:
     shape = "{kind: myring, nose: 0.2, middle: 1, tail: 0.5, diameter: 0.3}"
     sets = [f"scene.world.targets.0.shape={shape}", "scene.sonar.beams={azimuths: 5, elevations: 5}"]
     sets += ["scene.processing.cancelling={kind: wavefront}", "scene.physics.scattering={kind: mirror_lobe}"]
-    recipe = config.load(small_file, sets)
+    recipe = reading.load(small_file, sets)
     assert recipe.scene.sonar.beams.azimuth_span == np.deg2rad(50.0)
-    assert config.loads(config.dump(recipe)) == recipe
+    assert reading.loads(reading.dump(recipe)) == recipe

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 import sonarsynth as ss
-from sonarsynth.acoustics.modal import sphere_amplitude
+from sonarsynth.equations.scattering.modal_series import sphere_amplitude
+from sonarsynth.pipeline.variables import attributes
 from sonarsynth.planning import arrivals_of, plan
 from sonarsynth.scattering import Scatterer, Scattering
-from sonarsynth.scattering.notes import SmallBody
-from sonarsynth.scattering.strength import target_strength
-from sonarsynth.variables import attributes
-from sonarsynth.world.meshes import mesh_of
+from sonarsynth.scattering.law_notes import SmallBody
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.target_strength import target_strength
 
 C = 1500.0
 BAND = (25e3, 85e3)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from sonarsynth import store, verification
+from sonarsynth import evaluation, store
 from sonarsynth.cli import main
 from sonarsynth.planning import Plan
 from sonarsynth.schedule import build
@@ -35,7 +35,7 @@ def copy(half: Path, tmp_path: Path) -> Path:
 def test_what_a_build_has_in_hand_is_no_damage_and_it_is_said(copy: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert not store.verify(copy).ok
     with store.lock(copy):
-        report = store.verify(copy, [verification.check])
+        report = store.verify(copy, [evaluation.check])
         with pytest.raises(SystemExit) as ended:
             main(["verify", str(copy)])
     assert ended.value.code == 0

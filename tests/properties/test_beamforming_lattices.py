@@ -6,12 +6,12 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sonarsynth.acoustics.arrays import focus_delay
-from sonarsynth.acoustics.gates import gate_samples, gate_taper
-from sonarsynth.beamforming.dense import dense_energies
-from sonarsynth.beamforming.lattice import focused_energies
 from sonarsynth.conventions import direction
-from sonarsynth.sonar import BeamGrid, PlanarLattice, elements
+from sonarsynth.equations.arrays.apertures import focus_delay
+from sonarsynth.equations.arrays.gates import gate_samples, gate_taper
+from sonarsynth.imaging.dense import dense_energies
+from sonarsynth.imaging.lattice_image import focused_energies
+from sonarsynth.receiver import BeamGrid, PlanarLattice, elements
 
 
 @st.composite

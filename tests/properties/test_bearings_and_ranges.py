@@ -6,9 +6,9 @@ import numpy as np
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from sonarsynth.acoustics.bearings import plane_wave, spherical_wave, tangent_plane, wavefront_delays
-from sonarsynth.acoustics.bistatic import bistatic_range, excess_path
 from sonarsynth.conventions import direction
+from sonarsynth.equations.arrays.bistatic_range import bistatic_range, excess_path
+from sonarsynth.equations.arrays.spherical_wave import plane_wave, spherical_wave, tangent_plane, wavefront_delays
 from sonarsynth.geometry import rotation_matrix, unit
 
 angles = st.floats(-1.4, 1.4)

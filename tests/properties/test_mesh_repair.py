@@ -4,10 +4,10 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sonarsynth.world.generation import generate
-from sonarsynth.world.mesh_repair import orient, repair
-from sonarsynth.world.refinement import join, longest_edge, split_long_edges, volume, weld
-from sonarsynth.world.shapes import Box, LShape, Sphere
+from sonarsynth.geometry.surfaces import join, longest_edge, split_long_edges, volume, weld
+from sonarsynth.targets.generated.generation import generate
+from sonarsynth.targets.mesh_readers.mesh_repair import orient, repair
+from sonarsynth.targets.shapes import Box, LShape, Sphere
 
 PARTS = [
     generate(Sphere(radius=0.3, edge=0.2))[0],
@@ -79,7 +79,7 @@ def test_splitting_keeps_volume_area_and_closure(edge, size):
 @settings(max_examples=60, deadline=None)
 @given(seeds, st.floats(0.03, 0.5), st.floats(0.3, 12.0), st.floats(0.5, 10.0), st.floats(0.0, 1.0))
 def test_any_hull_is_closed_and_keeps_to_its_edge(seed, diameter, slenderness, exponent, blunt):
-    from sonarsynth.world.shapes import Myring
+    from sonarsynth.targets.shapes import Myring
 
     rng = np.random.default_rng(seed)
     nose, middle, tail = diameter * slenderness * rng.dirichlet([1, 1, 1]) + [1e-3, 0, 1e-3]

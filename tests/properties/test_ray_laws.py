@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sonarsynth.acoustics import rays
 from sonarsynth.conventions import Floats, Ints
+from sonarsynth.equations.rays import ray_solutions
 from tests.following import families, family, follow, images, nodes, range_only
 
 BED = 100.0
@@ -21,30 +21,32 @@ few = settings(max_examples=60)
 
 
 @st.composite
-def waters(draw: st.DrawFn) -> rays.Water:
+def waters(draw: st.DrawFn) -> ray_solutions.Water:
     """Up to eight nodes on a grid of 0.1 m and 0.1 m/s: jumps and layers of one speed are common."""
     rows = sorted(draw(nodes_of_water), key=lambda row: row[0])
-    return rays.water(np.array([z / 10 for z, _ in rows]), np.array([c / 10 for _, c in rows]), BED)
+    return ray_solutions.water(np.array([z / 10 for z, _ in rows]), np.array([c / 10 for _, c in rows]), BED)
 
 
-def trace(water: rays.Water, ends_and_distances: list[tuple[float, float, float]], vertices: int = 4) -> rays.Eigenrays:
+def trace(
+    water: ray_solutions.Water, ends_and_distances: list[tuple[float, float, float]], vertices: int = 4
+) -> ray_solutions.Eigenrays:
     start, end, distance = np.array(ends_and_distances).T
-    return rays.eigenrays(water, start, end, distance, vertices, 3)
+    return ray_solutions.eigenrays(water, start, end, distance, vertices, 3)
 
 
-def key(found: rays.Eigenrays) -> Ints:
+def key(found: ray_solutions.Eigenrays) -> Ints:
     """Order by pair, family and time: the same for rays that differ by rounding."""
     sign = np.sign(found.start_sine)
     return np.lexsort([found.travel_time, sign, found.turning, found.bottom, found.surface, found.pair])
 
 
-def same(one: rays.Eigenrays, two: rays.Eigenrays, rtol: float = 1e-13) -> None:
+def same(one: ray_solutions.Eigenrays, two: ray_solutions.Eigenrays, rtol: float = 1e-13) -> None:
     """Two sets of rays are the same to rounding; angles and amplitudes where a caustic does not blow rounding up."""
     a, b = key(one), key(two)
     for name in ("pair", "surface", "bottom", "turning"):
         np.testing.assert_array_equal(getattr(one, name)[a], getattr(two, name)[b], err_msg=name)
     np.testing.assert_allclose(one.travel_time[a], two.travel_time[b], rtol=rtol)
-    sharp = (one.flag[a] != rays.CAUSTIC) & (two.flag[b] != rays.CAUSTIC)
+    sharp = (one.flag[a] != ray_solutions.CAUSTIC) & (two.flag[b] != ray_solutions.CAUSTIC)
     np.testing.assert_array_equal(one.caustics[a][sharp], two.caustics[b][sharp])
     for name in ("start_sine", "end_sine"):
         np.testing.assert_allclose(getattr(one, name)[a][sharp], getattr(two, name)[b][sharp], atol=1e-9)
@@ -55,13 +57,13 @@ def same(one: rays.Eigenrays, two: rays.Eigenrays, rtol: float = 1e-13) -> None:
         np.testing.assert_allclose(getattr(one, name)[a][sharp], getattr(two, name)[b][sharp], atol=1e-7)
 
 
-def altered(found: rays.Eigenrays, **changes: Floats | Ints) -> rays.Eigenrays:
-    return rays.Eigenrays(**(vars(found) | changes))
+def altered(found: ray_solutions.Eigenrays, **changes: Floats | Ints) -> ray_solutions.Eigenrays:
+    return ray_solutions.Eigenrays(**(vars(found) | changes))
 
 
 @few
 @given(waters(), pairs)
-def test_there_and_back(water: rays.Water, rows: list[tuple[float, float, float]]) -> None:
+def test_there_and_back(water: ray_solutions.Water, rows: list[tuple[float, float, float]]) -> None:
     there, back = trace(water, rows), trace(water, [(b, a, r) for a, b, r in rows])
     turned = altered(
         back,
@@ -75,8 +77,8 @@ def test_there_and_back(water: rays.Water, rows: list[tuple[float, float, float]
 
 @few
 @given(waters(), pairs)
-def test_upside_down(water: rays.Water, rows: list[tuple[float, float, float]]) -> None:
-    mirrored = rays.Water(BED - water.depth[::-1], water.speed[::-1].copy())
+def test_upside_down(water: ray_solutions.Water, rows: list[tuple[float, float, float]]) -> None:
+    mirrored = ray_solutions.Water(BED - water.depth[::-1], water.speed[::-1].copy())
     above, below = trace(water, rows), trace(mirrored, [(BED - a, BED - b, r) for a, b, r in rows])
     turned = altered(
         below,
@@ -93,23 +95,24 @@ def test_upside_down(water: rays.Water, rows: list[tuple[float, float, float]]) 
 @few
 @given(waters(), pairs, st.lists(st.integers(0, 1000), min_size=1, max_size=6))
 def test_splitting_layers_changes_nothing(
-    water: rays.Water, rows: list[tuple[float, float, float]], cuts: list[int]
+    water: ray_solutions.Water, rows: list[tuple[float, float, float]], cuts: list[int]
 ) -> None:
     extra = np.array([z for z in sorted({k / 10 + 0.03 for k in cuts}) if z < BED])
     depth = np.concatenate([water.depth, extra])
     speed = np.concatenate([water.speed, np.interp(extra, water.depth, water.speed)])
     order = np.argsort(depth, kind="stable")
-    same(trace(water, rows), trace(rays.Water(depth[order], speed[order]), rows))
+    same(trace(water, rows), trace(ray_solutions.Water(depth[order], speed[order]), rows))
 
 
 @few
 @given(waters(), pairs, st.integers(-20, 20), st.integers(-6, 6))
 def test_scales_of_depth_and_of_speed(
-    water: rays.Water, rows: list[tuple[float, float, float]], k: int, m: int
+    water: ray_solutions.Water, rows: list[tuple[float, float, float]], k: int, m: int
 ) -> None:
     size, fast = 2.0**k, 2.0**m
     scaled = trace(
-        rays.Water(water.depth * size, water.speed * fast), [(a * size, b * size, r * size) for a, b, r in rows]
+        ray_solutions.Water(water.depth * size, water.speed * fast),
+        [(a * size, b * size, r * size) for a, b, r in rows],
     )
     back = altered(
         scaled,
@@ -127,7 +130,7 @@ def test_scales_of_depth_and_of_speed(
 
 @few
 @given(waters(), pairs)
-def test_other_pairs_change_no_bit(water: rays.Water, rows: list[tuple[float, float, float]]) -> None:
+def test_other_pairs_change_no_bit(water: ray_solutions.Water, rows: list[tuple[float, float, float]]) -> None:
     together = trace(water, rows)
     alone = [trace(water, [row]) for row in rows]
     for name, values in vars(together).items():
@@ -139,12 +142,12 @@ def test_other_pairs_change_no_bit(water: rays.Water, rows: list[tuple[float, fl
 @few
 @given(waters(), pairs)
 def test_fewer_vertices_give_the_rays_with_fewer_vertices(
-    water: rays.Water, rows: list[tuple[float, float, float]]
+    water: ray_solutions.Water, rows: list[tuple[float, float, float]]
 ) -> None:
     start, end, distance = np.array(rows).T
-    every = rays.eigenrays(water, start, end, distance, 5, 5)
+    every = ray_solutions.eigenrays(water, start, end, distance, 5, 5)
     for vertices, reflections in ((3, 3), (5, 2), (1, 0), (0, 0), (2, 1)):
-        some = rays.eigenrays(water, start, end, distance, vertices, reflections)
+        some = ray_solutions.eigenrays(water, start, end, distance, vertices, reflections)
         hits = every.surface + every.bottom
         keep = (hits + every.turning <= vertices) & (hits <= reflections)
         for name, values in vars(some).items():
@@ -153,7 +156,7 @@ def test_fewer_vertices_give_the_rays_with_fewer_vertices(
 
 @few
 @given(waters(), pairs)
-def test_snell_along_the_whole_ray(water: rays.Water, rows: list[tuple[float, float, float]]) -> None:
+def test_snell_along_the_whole_ray(water: ray_solutions.Water, rows: list[tuple[float, float, float]]) -> None:
     found = trace(water, rows)
     for sine, speed in ((found.start_sine, found.start_speed), (found.end_sine, found.end_speed)):
         np.testing.assert_allclose(np.hypot(sine, found.slowness * speed), 1.0, rtol=1e-14)
@@ -173,7 +176,7 @@ def test_snell_along_the_whole_ray(water: rays.Water, rows: list[tuple[float, fl
 @few
 @given(waters(), ends, ends, st.floats(0.5, 3.5))
 def test_slopes_of_the_travel_time_are_the_slownesses_of_the_ray(
-    water: rays.Water, start: float, end: float, power: float
+    water: ray_solutions.Water, start: float, end: float, power: float
 ) -> None:
     """A slope by differences is the mean of the slowness between the two neighbours."""
     r = 10.0**power
@@ -199,11 +202,11 @@ def test_slopes_of_the_travel_time_are_the_slownesses_of_the_ray(
 
 @few
 @given(waters(), ends, ends, st.floats(0.5, 3.5))
-def test_amplitudes_are_those_of_a_ray_tube(water: rays.Water, start: float, end: float, power: float) -> None:
+def test_amplitudes_are_those_of_a_ray_tube(water: ray_solutions.Water, start: float, end: float, power: float) -> None:
     """Range of two neighbouring rays, followed in long doubles."""
     found = trace(water, [(start, end, 10.0**power)])
     z, c = nodes(water, (start, end), np.longdouble)
-    for i in np.flatnonzero((found.start_sine != 0) & (found.flag != rays.CAUSTIC)):
+    for i in np.flatnonzero((found.start_sine != 0) & (found.flag != ray_solutions.CAUSTIC)):
         up, surface, bottom, turning, _ = family(found, i)
         p = np.longdouble(found.slowness[i])
         x = []
@@ -221,7 +224,9 @@ def test_amplitudes_are_those_of_a_ray_tube(water: rays.Water, start: float, end
 
 @few
 @given(waters(), ends, ends, distances.filter(lambda r: r > 2))
-def test_a_fan_of_rays_finds_the_same_families(water: rays.Water, start: float, end: float, distance: float) -> None:
+def test_a_fan_of_rays_finds_the_same_families(
+    water: ray_solutions.Water, start: float, end: float, distance: float
+) -> None:
     found = trace(water, [(start, end, distance)], 3)
     fan = families(water, start, end, np.array([distance]), 3, 3)[0]
     assert sorted(family(found, i) for i in range(len(found.pair))) == sorted(row[0] for row in fan)
@@ -233,8 +238,8 @@ def test_a_vanishing_gradient_goes_over_into_image_sources(
     power: float, sign: int, start: float, end: float, distance: float
 ) -> None:
     r, g = 10.0**distance, sign * 10.0**power
-    water = rays.water(np.array([0.0, BED]), np.array([1500.0 - 50 * g, 1500.0 + 50 * g]), BED)
-    found = rays.eigenrays(water, np.array([start]), np.array([end]), np.array([r]), 4, 4)
+    water = ray_solutions.water(np.array([0.0, BED]), np.array([1500.0 - 50 * g, 1500.0 + 50 * g]), BED)
+    found = ray_solutions.eigenrays(water, np.array([start]), np.array([end]), np.array([r]), 4, 4)
     rows = images(BED, start, end, 4)
     bend = abs(g) * (r + 5 * BED) / 1500.0
     assert len(found.pair) == len(rows)

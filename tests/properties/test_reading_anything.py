@@ -12,15 +12,15 @@ import trimesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from sonarsynth import config
-from sonarsynth.config import RecipeError
-from sonarsynth.config.source import read_file, read_text
-from sonarsynth.world.casts import CastError, profile_of
-from sonarsynth.world.meshes import MeshError, mesh_of
-from sonarsynth.world.recordings import RecordingError, read_recording
-from sonarsynth.world.shapes import MeshFile
-from sonarsynth.world.snaps import RecordedSnap
-from sonarsynth.world.sound_speed import Cast
+from sonarsynth.environment.casts import CastError, profile_of
+from sonarsynth.environment.sound_speed import Cast
+from sonarsynth.recipe import reading
+from sonarsynth.recipe.reading import RecipeError
+from sonarsynth.recipe.reading.yaml_source import read_file, read_text
+from sonarsynth.sources.recordings import RecordingError, read_recording
+from sonarsynth.sources.snap_models import RecordedSnap
+from sonarsynth.targets.meshes import MeshError, mesh_of
+from sonarsynth.targets.shapes import MeshFile
 
 few = settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 RECIPE = (Path(__file__).parents[2] / "configs" / "grid.yaml").read_text()
@@ -52,7 +52,7 @@ def one_line(error: ValueError, name: object) -> None:
 def test_any_text_is_read_as_a_recipe_or_refused(text: str) -> None:
     try:
         source = read_text(text, "x.yaml", Path())
-        config.recipe_of(source)
+        reading.recipe_of(source)
     except RecipeError as error:
         one_line(error, "x.yaml")
         assert re.match(r"x\.yaml:\d+: ", str(error))
@@ -66,7 +66,7 @@ def test_any_bytes_are_read_as_a_recipe_or_refused(tmp_path: Path, data: bytes) 
     file = tmp_path / "x.yaml"
     file.write_bytes(data)
     with pytest.raises(RecipeError) as error:
-        config.load(file)
+        reading.load(file)
     one_line(error.value, file)
 
 
@@ -83,12 +83,12 @@ def test_what_json_says_is_what_is_read(data: dict[str, object]) -> None:
 def test_a_recipe_with_a_part_exchanged_is_read_or_refused(start: int, length: int, text: str) -> None:
     changed = RECIPE[:start] + text + RECIPE[start + length :]
     try:
-        made = config.loads(changed, "x.yaml")
+        made = reading.loads(changed, "x.yaml")
     except RecipeError as error:
         one_line(error, "x.yaml")
         assert re.match(r"x\.yaml:\d+: ", str(error))
     else:
-        assert config.loads(config.dump(made)) == made
+        assert reading.loads(reading.dump(made)) == made
 
 
 @few

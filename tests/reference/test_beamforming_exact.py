@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf, sqrt
 
-from sonarsynth.acoustics.arrays import focus_delay
-from sonarsynth.acoustics.beams import beam_energy, beam_spectra
-from sonarsynth.acoustics.gates import fast_length, frequency_spacing, gate_samples, gate_taper, gated_spectra
-from sonarsynth.beamforming.dense import dense_energies
-from sonarsynth.beamforming.lattice import focused_energies
 from sonarsynth.conventions import direction
-from sonarsynth.sonar import BeamGrid, PlanarLattice, Romanis, elements
+from sonarsynth.equations.arrays.apertures import focus_delay
+from sonarsynth.equations.arrays.beams import beam_energy, beam_spectra
+from sonarsynth.equations.arrays.gates import fast_length, frequency_spacing, gate_samples, gate_taper, gated_spectra
+from sonarsynth.imaging.dense import dense_energies
+from sonarsynth.imaging.lattice_image import focused_energies
+from sonarsynth.receiver import BeamGrid, PlanarLattice, Romanis, elements
 
 SPEED = 1540.0
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.bearings import (
+from sonarsynth.conventions import direction
+from sonarsynth.equations.arrays.spherical_wave import (
     delay_bound,
     direction_bound,
     plane_wave,
@@ -13,11 +14,10 @@ from sonarsynth.acoustics.bearings import (
     spherical_wave,
     wavefront_delays,
 )
-from sonarsynth.acoustics.snap import Bubble, spectrum
-from sonarsynth.conventions import direction
-from sonarsynth.ranging.locating import fit_pulse
-from sonarsynth.sonar import Band, PlanarLattice, Romanis, Sonar, elements
-from sonarsynth.world.sources import LogarithmicBubble
+from sonarsynth.equations.bubble.snap_pressure import Bubble, spectrum
+from sonarsynth.ranging.location.locating import fit_pulse
+from sonarsynth.receiver import Band, PlanarLattice, Romanis, Sonar, elements
+from sonarsynth.sources.shrimp import LogarithmicBubble
 from tests.heard import RATE, add_noise, hear_direct, pulse_spectrum
 
 C = 1540.0

@@ -6,7 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.bistatic import bistatic_range, excess_path
+from sonarsynth.equations.arrays.bistatic_range import bistatic_range, excess_path
 from sonarsynth.geometry import unit
 
 

@@ -9,9 +9,15 @@ import pytest
 from pydantic import ValidationError
 
 import sonarsynth as ss
-from sonarsynth.acoustics.boundaries import SEDIMENTS, bubble_loss, critical_grazing, eckart, wind_wave_height
-from sonarsynth.world.boundaries import SedimentName
-from sonarsynth.world.reflection import coefficient, rms_height
+from sonarsynth.environment.boundaries import SedimentName
+from sonarsynth.environment.boundary_numbers import coefficient, rms_height
+from sonarsynth.equations.water.boundary_reflection import (
+    SEDIMENTS,
+    bubble_loss,
+    critical_grazing,
+    eckart,
+    wind_wave_height,
+)
 
 GRAZING = np.radians([5, 10, 20, 30, 45, 60, 90])
 MODULUS = {

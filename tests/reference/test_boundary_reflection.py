@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.boundaries import SEDIMENTS as HANDBOOK
-from sonarsynth.acoustics.boundaries import (
+from sonarsynth.equations.water.boundary_reflection import SEDIMENTS as HANDBOOK
+from sonarsynth.equations.water.boundary_reflection import (
     bubble_loss,
     critical_grazing,
     eckart,
@@ -12,7 +12,7 @@ from sonarsynth.acoustics.boundaries import (
     rayleigh,
     wind_wave_height,
 )
-from sonarsynth.acoustics.ranges import OutOfRange
+from sonarsynth.equations.water.formula_ranges import OutOfRange
 
 GRAZING = np.radians([5, 10, 20, 30, 45, 60, 90])
 SEDIMENTS = {  # APL-UW TR 9407: density ratio, speed ratio, loss tangent; |V| at GRAZING

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import trimesh
 
+from sonarsynth.casting import ray_casting
+from sonarsynth.casting.ray_casting import OFFSET, Backend, first_hit, occluded
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose, quaternion, unit
-from sonarsynth.world import casting
-from sonarsynth.world.casting import OFFSET, Backend, first_hit, occluded
-from sonarsynth.world.mesh import Mesh
-from sonarsynth.world.placed import Body
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.geometry.placed_target import Body
 
 
 def mesh_from(shape: trimesh.Trimesh, scale: float = 1.0) -> Mesh:
@@ -127,11 +127,11 @@ def test_what_cannot_be_cast_at_is_refused() -> None:
 
 def test_a_mesh_is_made_ready_for_casting_once() -> None:
     again = Mesh(SPHERE.vertices.copy(), SPHERE.faces.copy())
-    assert casting.casting_mesh(SPHERE) is casting.casting_mesh(again)
+    assert ray_casting.casting_mesh(SPHERE) is ray_casting.casting_mesh(again)
 
 
 def test_a_wrong_proposal_is_passed_over() -> None:
-    ready = casting.casting_mesh(RING)
+    ready = ray_casting.casting_mesh(RING)
 
     class Liar:
         """Proposes facet 0 too early, for three rounds."""
@@ -144,7 +144,7 @@ def test_a_wrong_proposal_is_passed_over() -> None:
                 return np.zeros(len(origin), int), np.full(len(origin), 1e-9)
             return ready.caster.nearest(origin, direction, far)
 
-    lying = casting.CastingMesh(ready.centre, ready.size, ready.vertices, ready.faces, Liar())
+    lying = ray_casting.CastingMesh(ready.centre, ready.size, ready.vertices, ready.faces, Liar())
     origin, direction = rays_at(1.0, 3.0, 300, 5)
     honest, at = ready.cast(origin, direction, np.full(300, np.inf))
     facet, distance = lying.cast(origin, direction, np.full(300, np.inf))

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.seawater import chen_millero, del_grosso, mackenzie, medwin, pressure_of_depth, teos10
-from sonarsynth.world.casts import CastError, profile_of
-from sonarsynth.world.environment import Cast, Isovelocity, Tabulated, TemperatureSalinity
+from sonarsynth.environment.casts import CastError, profile_of
+from sonarsynth.environment.sea import Cast, Isovelocity, Tabulated, TemperatureSalinity
+from sonarsynth.equations.water.seawater import chen_millero, del_grosso, mackenzie, medwin, pressure_of_depth, teos10
 
 REAL = Path(__file__).parents[2].parent / "shared" / "data" / "castaway_ctd.csv"
 

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from sonarsynth.conventions import direction
+from sonarsynth.environment.sea import Absorption, Environment, Tabulated
+from sonarsynth.geometry.motion import Still
+from sonarsynth.pipeline import beamform_frame, range_frame, render, trace_frame
 from sonarsynth.planning import plan
-from sonarsynth.render import beamform_frame, range_frame, render, trace_frame
+from sonarsynth.receiver import BeamGrid, Converter, Sonar
+from sonarsynth.recipe.scene import Scene, Trajectory, World
 from sonarsynth.scattering import MirrorLobe
-from sonarsynth.scattering.targets import Target
-from sonarsynth.scene import Scene, Trajectory, World
-from sonarsynth.sonar import BeamGrid, Converter, Sonar
-from sonarsynth.synthesis import KernelDeposit
-from sonarsynth.synthesis.direct_sum import exact_signals
-from sonarsynth.world.environment import Absorption, Environment, Tabulated
-from sonarsynth.world.motion import Still
-from sonarsynth.world.shapes import Sphere
-from sonarsynth.world.sources import SnappingShrimp
+from sonarsynth.signals import KernelDeposit
+from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.sources.shrimp import SnappingShrimp
+from sonarsynth.targets.shapes import Sphere
+from sonarsynth.targets.target import Target
 from tests.scenes import remus
 
 MOUNT = {"heading": np.deg2rad(88), "pitch": np.deg2rad(10), "roll": np.deg2rad(20)}

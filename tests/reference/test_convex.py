@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy.special import ai_zeros, airy, hankel2, jv
 
-from sonarsynth.acoustics.convex import curvature_along, shape_operators, surface_field
-from sonarsynth.acoustics.convex_kernels import convex_amplitude
-from sonarsynth.acoustics.kirchhoff import facet_amplitude
-from sonarsynth.acoustics.lobes import lit_and_seen
-from sonarsynth.acoustics.modal import sphere_amplitude
 from sonarsynth.conventions import Floats, Ints
+from sonarsynth.equations.scattering.convex_bodies import curvature_along, shape_operators, surface_field
+from sonarsynth.equations.scattering.convex_kernels import convex_amplitude
+from sonarsynth.equations.scattering.kirchhoff_integral import facet_amplitude
+from sonarsynth.equations.scattering.lobes import lit_and_seen
+from sonarsynth.equations.scattering.modal_series import sphere_amplitude
 from sonarsynth.geometry import unit
-from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.shapes import Sphere
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Sphere
 
 C = 1500.0
 Surface = Literal["rigid", "soft"]

@@ -9,19 +9,19 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from sonarsynth.acoustics.facet_pulses import facet_response
-from sonarsynth.acoustics.kirchhoff import shadow_taper
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.scattering.facet_pulses import facet_response
+from sonarsynth.equations.scattering.kirchhoff_integral import shadow_taper
 from sonarsynth.products import Arrivals
-from sonarsynth.sonar import BandPass, LowPass, PositionTable, Romanis, Sonar, elements
-from sonarsynth.synthesis import DirectSum, KernelDeposit, pulse_support
-from sonarsynth.synthesis.direct_sum import exact_signals
-from sonarsynth.synthesis.pulse import pulse_spectrum
-from sonarsynth.synthesis.shapes import MOST_PHASE, shape_modes
-from sonarsynth.synthesis.wavefront import fronts
-from sonarsynth.world.moment import Snap
-from sonarsynth.world.snap_pulses import waveform
-from sonarsynth.world.sources import LogarithmicBubble
+from sonarsynth.receiver import BandPass, LowPass, PositionTable, Romanis, Sonar, elements
+from sonarsynth.signals import DirectSum, KernelDeposit, pulse_support
+from sonarsynth.signals.array_paths import fronts
+from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.signals.filtered_pulse import pulse_spectrum
+from sonarsynth.signals.pulse_shapes import MOST_PHASE, shape_modes
+from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.sources.snap_pulses import waveform
+from sonarsynth.state import Snap
 from tests.laws.test_synthesis import C, absorption, arrivals, error, some_of, target_at
 
 MODEL = LogarithmicBubble()

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from sonarsynth.acoustics import noise, snap, spectra
-from sonarsynth.acoustics.spectra import Fir
-from sonarsynth.world.sources import LogarithmicBubble
+from sonarsynth.equations.bubble import snap_pressure
+from sonarsynth.equations.noise import ambient_noise, filters
+from sonarsynth.equations.noise.filters import Fir
+from sonarsynth.sources.shrimp import LogarithmicBubble
 
 MODEL = LogarithmicBubble()
-BUBBLE = snap.Bubble(MODEL.a, MODEL.k, MODEL.m, MODEL.q, MODEL.density)
+BUBBLE = snap_pressure.Bubble(MODEL.a, MODEL.k, MODEL.m, MODEL.q, MODEL.density)
 LOW = Fir(0.0, 110e3, 10e3, 80.0)
 BAND = Fir(25e3, 85e3, 5e3, 80.0)
 
@@ -19,67 +20,67 @@ BAND = Fir(25e3, 85e3, 5e3, 80.0)
 @pytest.mark.parametrize("fir", [LOW, BAND, Fir(30e3, 40e3, 4e3, 30.0), Fir(0.0, 20e3, 8e3, 140.0)])
 def test_response_is_that_of_firwin_at_a_high_rate(fir: Fir) -> None:
     half = 5000
-    taps, rate = 2 * half + 1, 2 * half / spectra.duration(fir)
+    taps, rate = 2 * half + 1, 2 * half / filters.duration(fir)
     edges = fir.high if fir.low == 0 else [fir.low, fir.high]
     h = signal.firwin(
-        taps, edges, window=("kaiser", spectra.kaiser_beta(fir.attenuation)), pass_zero=fir.low == 0, fs=rate
+        taps, edges, window=("kaiser", filters.kaiser_beta(fir.attenuation)), pass_zero=fir.low == 0, fs=rate
     )
     f = np.linspace(0.0, 2.0 * fir.high, 101)
     lag = (np.arange(taps) - taps // 2) / rate
     exact = np.cos(2 * np.pi * np.outer(f, lag)) @ h
-    np.testing.assert_allclose(spectra.response(f, fir), exact, atol=3e-4 if fir.attenuation < 50 else 3e-6)
+    np.testing.assert_allclose(filters.response(f, fir), exact, atol=3e-4 if fir.attenuation < 50 else 3e-6)
 
 
 @pytest.mark.parametrize("fir", [LOW, BAND])
 def test_length_is_that_of_kaiserord(fir: Fir) -> None:
     rate = 1e9
     taps, beta = signal.kaiserord(fir.attenuation, fir.transition / (0.5 * rate))
-    assert spectra.duration(fir) == pytest.approx((taps - 1) / rate, abs=2 / rate)
-    assert spectra.kaiser_beta(fir.attenuation) == pytest.approx(beta)
+    assert filters.duration(fir) == pytest.approx((taps - 1) / rate, abs=2 / rate)
+    assert filters.kaiser_beta(fir.attenuation) == pytest.approx(beta)
 
 
 @pytest.mark.parametrize("fir", [LOW, BAND])
 def test_pass_band_edge_and_stop_band(fir: Fir) -> None:
-    edge = spectra.response(fir.high, fir)
+    edge = filters.response(fir.high, fir)
     assert float(edge) == pytest.approx(0.5, abs=1e-4)
     half = 0.5 * fir.transition
     inside = np.linspace(fir.low + half if fir.low else 0.0, fir.high - half, 500)
-    assert np.abs(spectra.response(inside, fir) - 1).max() < 1.2 * 10 ** (-fir.attenuation / 20)
+    assert np.abs(filters.response(inside, fir) - 1).max() < 1.2 * 10 ** (-fir.attenuation / 20)
     outside = np.linspace(fir.high + half, 3 * fir.high, 500)
-    assert np.abs(spectra.response(outside, fir)).max() < 1.2 * 10 ** (-fir.attenuation / 20)
+    assert np.abs(filters.response(outside, fir)).max() < 1.2 * 10 ** (-fir.attenuation / 20)
 
 
 def test_filtered_pulse_is_the_inverse_transform_of_the_product() -> None:
     fir = Fir(20e3, 60e3, 8e3, 150.0)  # so little beyond 100 kHz that the integral may end there
     f = np.arange(0.0, 100e3, 100.0)
-    product = snap.spectrum(f, BUBBLE) * spectra.response(f, fir)
+    product = snap_pressure.spectrum(f, BUBBLE) * filters.response(f, fir)
     t = np.array([-4e-4, -1e-4, -2e-5, -3e-6, 0.0, 5e-6, 1.3e-4])
     wave = 2 * 100.0 * np.real(np.exp(2j * np.pi * np.outer(t, f)) @ product)
-    np.testing.assert_allclose(spectra.filtered_pulse(t, BUBBLE, fir), wave, atol=1e-7 * np.abs(wave).max())
+    np.testing.assert_allclose(filters.filtered_pulse(t, BUBBLE, fir), wave, atol=1e-7 * np.abs(wave).max())
 
 
 @pytest.mark.parametrize("fir", [LOW, BAND])
 def test_support_holds_the_pulse_and_no_more(fir: Fir) -> None:
-    peak = np.abs(spectra.filtered_pulse(np.linspace(-2e-5, 2e-5, 201), BUBBLE, fir)).max()
+    peak = np.abs(filters.filtered_pulse(np.linspace(-2e-5, 2e-5, 201), BUBBLE, fir)).max()
     for tolerance in (1e-3, 1e-5, 1e-7):
-        before, after = spectra.pulse_support(BUBBLE, fir, tolerance)
+        before, after = filters.pulse_support(BUBBLE, fir, tolerance)
         outside = np.concatenate([np.linspace(-before - 3e-4, -before, 100), np.linspace(after, after + 2e-4, 60)])
-        assert np.abs(spectra.filtered_pulse(outside, BUBBLE, fir)).max() <= tolerance * peak
+        assert np.abs(filters.filtered_pulse(outside, BUBBLE, fir)).max() <= tolerance * peak
         inside = np.concatenate([-before + np.linspace(0, 2e-5, 40), after - np.linspace(0, 2e-5, 40)])
-        assert np.abs(spectra.filtered_pulse(inside, BUBBLE, fir)).max() > 0.3 * tolerance * peak
-    assert after <= 0.5 * spectra.duration(fir) + 2e-6
+        assert np.abs(filters.filtered_pulse(inside, BUBBLE, fir)).max() > 0.3 * tolerance * peak
+    assert after <= 0.5 * filters.duration(fir) + 2e-6
 
 
 @pytest.mark.parametrize(("width", "oversampling"), [(6, 1.5), (14, 2.0)])
 def test_kernel_transform_is_its_integral(width: int, oversampling: float) -> None:
-    beta = spectra.kaiser_bessel_beta(width, oversampling)
+    beta = filters.kaiser_bessel_beta(width, oversampling)
     node, weight = np.polynomial.legendre.leggauss(200)
     x, w = 0.5 * width * node, 0.5 * width * weight
     for cycles in (0.0, 0.2, 0.37, beta / (np.pi * width), 0.9):
-        integral = np.sum(w * spectra.kaiser_bessel(x, width, beta) * np.cos(2 * np.pi * cycles * x))
-        assert float(spectra.kaiser_bessel_transform(cycles, width, beta)) == pytest.approx(integral, abs=1e-13)
-    assert float(spectra.kaiser_bessel(0.0, width, beta)) == pytest.approx(1.0)
-    assert float(spectra.kaiser_bessel(0.51 * width, width, beta)) == 0.0
+        integral = np.sum(w * filters.kaiser_bessel(x, width, beta) * np.cos(2 * np.pi * cycles * x))
+        assert float(filters.kaiser_bessel_transform(cycles, width, beta)) == pytest.approx(integral, abs=1e-13)
+    assert float(filters.kaiser_bessel(0.0, width, beta)) == pytest.approx(1.0)
+    assert float(filters.kaiser_bessel(0.51 * width, width, beta)) == 0.0
 
 
 WENZ = {  # kHz: turbulence, shipping, wind, thermal, total
@@ -94,23 +95,26 @@ WENZ = {  # kHz: turbulence, shipping, wind, thermal, total
 @pytest.mark.parametrize("kilohertz", WENZ)
 def test_noise_levels_are_the_published(kilohertz: float) -> None:
     f = 1e3 * kilohertz
-    got = [*(float(v) for v in noise.wenz_components(f, 0.5, 5.0).values()), float(noise.wenz_level(f, 0.5, 5.0))]
+    got = [
+        *(float(v) for v in ambient_noise.wenz_components(f, 0.5, 5.0).values()),
+        float(ambient_noise.wenz_level(f, 0.5, 5.0)),
+    ]
     assert got == pytest.approx(WENZ[kilohertz], abs=6e-4)
 
 
 def test_noise_levels_elsewhere() -> None:
-    assert float(noise.wenz_components(1e5, 0.5, 5.0)["wind"]) == pytest.approx(26.701, abs=6e-4)
-    assert float(noise.wenz_level(1e5, 0.5, 5.0)) == pytest.approx(28.944, abs=6e-4)
-    assert float(noise.wenz_level(2e5, 0.5, 5.0)) == pytest.approx(31.408, abs=6e-4)
-    assert float(noise.wenz_level(1e4, 0.5, 0.0)) == pytest.approx(29.355, abs=6e-4)
-    assert float(noise.wenz_level(5e4, 0.5, 0.0)) == pytest.approx(20.712, abs=6e-4)
+    assert float(ambient_noise.wenz_components(1e5, 0.5, 5.0)["wind"]) == pytest.approx(26.701, abs=6e-4)
+    assert float(ambient_noise.wenz_level(1e5, 0.5, 5.0)) == pytest.approx(28.944, abs=6e-4)
+    assert float(ambient_noise.wenz_level(2e5, 0.5, 5.0)) == pytest.approx(31.408, abs=6e-4)
+    assert float(ambient_noise.wenz_level(1e4, 0.5, 0.0)) == pytest.approx(29.355, abs=6e-4)
+    assert float(ambient_noise.wenz_level(5e4, 0.5, 0.0)) == pytest.approx(20.712, abs=6e-4)
     f = np.linspace(25e3, 85e3, 20001)
-    band = np.trapezoid(noise.power_density(noise.wenz_level(f, 0.5, 5.0)), f)
+    band = np.trapezoid(ambient_noise.power_density(ambient_noise.wenz_level(f, 0.5, 5.0)), f)
     assert 10 * np.log10(band / 1e-12) == pytest.approx(81.31, abs=6e-3)
 
 
 def test_quantisation() -> None:
     for bits, ratio in ((12, 74.008), (16, 98.091), (24, 146.255)):
-        assert noise.quantisation_ratio(bits) == pytest.approx(ratio, abs=2e-3)
-    density = noise.quantisation_density(2.0 / 2**16, 196e3)
+        assert ambient_noise.quantisation_ratio(bits) == pytest.approx(ratio, abs=2e-3)
+    density = ambient_noise.quantisation_density(2.0 / 2**16, 196e3)
     assert 10 * np.log10(density) == pytest.approx(-151.01, abs=6e-3)

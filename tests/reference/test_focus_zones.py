@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.arrays import focus_delay
-from sonarsynth.beamforming import AutoBeamforming, DenseDelayAndSum, FocusedDelayAndSum
-from sonarsynth.beamforming.dense import dense_energies
-from sonarsynth.beamforming.focus_error import focus_error, zones_for
-from sonarsynth.beamforming.lattice import focused_energies, steered_zones, zoned_energies
-from sonarsynth.beamforming.zones import corners, heard_by, lens, quadrant, zones_of
 from sonarsynth.conventions import direction
+from sonarsynth.equations.arrays.apertures import focus_delay
+from sonarsynth.imaging import AutoBeamforming, DenseDelayAndSum, FocusedDelayAndSum
+from sonarsynth.imaging.dense import dense_energies
+from sonarsynth.imaging.focus_error import focus_error, zones_for
+from sonarsynth.imaging.lattice_image import focused_energies, steered_zones, zoned_energies
+from sonarsynth.imaging.zones import corners, heard_by, lens, quadrant, zones_of
 from sonarsynth.products import Signals
-from sonarsynth.sonar import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
+from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
 
 SPEED = 1540.0
 BAND = Band(low=25e3, high=85e3)

@@ -7,22 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonarsynth import config
-from sonarsynth.accuracy.comparing import Rays
-from sonarsynth.accuracy.references.frame_pressure import FramePressure
-from sonarsynth.accuracy.references.gradient import Gradient, gradient_rays
-from sonarsynth.accuracy.references.layered_rays import Water, families, rays
-from sonarsynth.accuracy.references.line_of_sight import Surface
+from sonarsynth.environment.sea import Environment, Isovelocity
+from sonarsynth.geometry.motion import Circle, Course, Motion, Still
+from sonarsynth.pipeline.synthesis import hear
 from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start, plan
-from sonarsynth.recipe import Accuracy, Recipe
-from sonarsynth.render.hearing import hear
-from sonarsynth.scattering.targets import Target
-from sonarsynth.scene import Physics, Scene, Trajectory, World
-from sonarsynth.sonar import PlanarLattice, Sonar
-from sonarsynth.world.environment import Environment, Isovelocity
-from sonarsynth.world.motion import Circle, Course, Motion, Still
-from sonarsynth.world.shapes import Box
-from sonarsynth.world.sources import SnappingShrimp
+from sonarsynth.receiver import PlanarLattice, Sonar
+from sonarsynth.recipe import Accuracy, Recipe, reading
+from sonarsynth.recipe.scene import Physics, Scene, Trajectory, World
+from sonarsynth.sources.shrimp import SnappingShrimp
+from sonarsynth.targets.shapes import Box
+from sonarsynth.targets.target import Target
+from sonarsynth.validation.rays.ray_matching import Rays
+from sonarsynth.validation.references.frames.frame_pressure import FramePressure
+from sonarsynth.validation.references.frames.line_of_sight import Surface
+from sonarsynth.validation.references.rays.layered_rays import Water, families, rays
+from sonarsynth.validation.references.rays.one_gradient import Gradient, gradient_rays
 
 ALLOWED = 1e-3  # of the largest pressure
 
@@ -54,7 +53,7 @@ def away(made: Plan, sensors: list[int]) -> tuple[float, float]:
 def test_a_frame_of_a_shipped_recipe_is_what_its_description_says(
     name: str, sensors: list[int], choices: Choices | None
 ) -> None:
-    recipe = config.load(Path(__file__).parents[2] / "configs" / f"{name}.yaml")
+    recipe = reading.load(Path(__file__).parents[2] / "configs" / f"{name}.yaml")
     way = recipe.scene.trajectory
     scene = replace(recipe.scene, trajectory=replace(way, frames=1, start=way.time(way.frames // 3)))
     recipe = replace(recipe, scene=scene, accuracy=replace(recipe.accuracy, signal=min(recipe.accuracy.signal, 1e-3)))

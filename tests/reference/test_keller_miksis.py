@@ -11,12 +11,12 @@ from scipy import signal
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from sonarsynth.acoustics import bubble, bubble_pulse, pulses
-from sonarsynth.acoustics.bubble import Cavity, Collapse
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.bubble import bubble_collapse, bubble_pulse, pulses
+from sonarsynth.equations.bubble.bubble_collapse import Cavity, Collapse
 
 R0 = 3.5e-3
-AMBIENT = bubble.ambient_pressure(5.0)
+AMBIENT = bubble_collapse.ambient_pressure(5.0)
 EMPTY = Cavity(R0, 0.0, 1e5, 0.0, 0.0, 0.0, 1000.0, compressible=False)
 T, U = R0 * np.sqrt(1e3 / 1e5), np.sqrt(1e5 / 1e3)
 
@@ -29,24 +29,24 @@ KM 100  264.646120412 58.5736406583 169198.31  380.7513615 1.516192155
 
 
 def cavity(gas: float, depth: float = 5.0, **other: float) -> Cavity:
-    return Cavity(R0, gas, bubble.ambient_pressure(depth), **other)  # type: ignore[arg-type]
+    return Cavity(R0, gas, bubble_collapse.ambient_pressure(depth), **other)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("row", FROZEN.strip().splitlines())
 def test_frozen_numbers(row: str) -> None:
     name, *numbers = row.split()
     gas, *expected = map(float, numbers)
-    found = bubble.collapse(cavity(gas, compressible=name == "KM"))
+    found = bubble_collapse.collapse(cavity(gas, compressible=name == "KM"))
     time, radius = found.largest[0]
     got = (
         1e6 * found.collapse_time,
         1e6 * found.minimum_radius,
-        float(bubble.pressure(0.0, found)),
+        float(bubble_collapse.pressure(0.0, found)),
         1e6 * (time + found.collapse_time),
         1e3 * radius,
     )
     assert got == pytest.approx(expected, rel=1e-7)
-    tight = bubble.collapse(found.cavity, tolerance=1e-13)
+    tight = bubble_collapse.collapse(found.cavity, tolerance=1e-13)
     assert got[:2] == pytest.approx((1e6 * tight.collapse_time, 1e6 * tight.minimum_radius), rel=1e-9)
 
 
@@ -54,41 +54,41 @@ def test_frozen_numbers(row: str) -> None:
     ("gas", "core", "smallest", "rebound"), [(100, 34.49, 63.0252, 1.51217), (1000, 74.30, 177.360, 2.54434)]
 )
 def test_hard_core(gas: float, core: float, smallest: float, rebound: float) -> None:
-    h = bubble.hard_core(R0, gas, AMBIENT)
-    found = bubble.collapse(cavity(gas, core=h))
+    h = bubble_collapse.hard_core(R0, gas, AMBIENT)
+    found = bubble_collapse.collapse(cavity(gas, core=h))
     assert 1e6 * h == pytest.approx(core, abs=0.005)
     assert 1e6 * found.minimum_radius == pytest.approx(smallest, abs=1e-3 if gas == 1000 else 1e-4)
     assert 1e3 * found.largest[0].radius == pytest.approx(rebound, abs=1e-5)
 
 
 def test_a_core_that_vanishes_is_no_core() -> None:
-    soft, hard = bubble.collapse(cavity(1000)), bubble.collapse(cavity(1000, core=1e-8))
+    soft, hard = bubble_collapse.collapse(cavity(1000)), bubble_collapse.collapse(cavity(1000, core=1e-8))
     assert hard.minimum_radius == pytest.approx(soft.minimum_radius, rel=1e-9)
 
 
 def test_empty_cavity_collapses_in_rayleighs_time() -> None:
-    found = bubble.collapse(EMPTY)
+    found = bubble_collapse.collapse(EMPTY)
     exact = np.sqrt(np.pi / 6) * gamma(5 / 6) / gamma(4 / 3)
     assert exact == pytest.approx(0.914681356501962, rel=1e-14)
     assert found.collapse_time / T == pytest.approx(exact, rel=1e-10)
-    assert found.flag == bubble.SINGULAR and found.minimum_radius == 0.0 and found.mach == np.inf
+    assert found.flag == bubble_collapse.SINGULAR and found.minimum_radius == 0.0 and found.mach == np.inf
 
 
 def test_empty_cavity_obeys_rayleighs_speed_and_the_two_fifths_law() -> None:
-    found = bubble.collapse(EMPTY)
+    found = bubble_collapse.collapse(EMPTY)
     before = np.array([1e-1, 1e-2, 1e-3, 1e-4])
-    wall = bubble.wall(-before * T, found)
+    wall = bubble_collapse.wall(-before * T, found)
     assert wall.speed**2 == pytest.approx(2 / 3 * U**2 * ((R0 / wall.radius) ** 3 - 1), rel=1e-9)
     exponent = wall.speed * -before * T / wall.radius
     assert exponent == pytest.approx([0.38320, 0.39897, 0.399935, 0.399996], abs=1.1e-4)
     assert exponent[1:] == pytest.approx([0.39897, 0.399935, 0.399996], abs=6e-6)
-    end = bubble.wall(-1e-6 * T, bubble.collapse(EMPTY, tolerance=1e-13)).radius / R0 / 1e-6**0.4
+    end = bubble_collapse.wall(-1e-6 * T, bubble_collapse.collapse(EMPTY, tolerance=1e-13)).radius / R0 / 1e-6**0.4
     assert float(end) == pytest.approx((25 / 6) ** 0.2, rel=1e-6)
 
 
 def test_spectrum_of_a_point_falls_as_the_fifth_root() -> None:
     """R = A R0 (-t/T)^(2/5) at the end, so that rho R^2 R' = -0.4 rho R0^2 U A^3 (-t/T)^(1/5)."""
-    pulse = bubble_pulse.pulse(bubble.collapse(EMPTY), 1e7)
+    pulse = bubble_pulse.pulse(bubble_collapse.collapse(EMPTY), 1e7)
     f = np.array([1e5, 1e6, 1e7])
     law = 0.08 * 1000 * R0**2 * U * (25 / 6) ** 0.6 * gamma(0.2) * (2 * np.pi * f * T) ** -0.2 * np.exp(0.1j * np.pi)
     got = pulses.spectrum(f, pulse) / law
@@ -97,33 +97,33 @@ def test_spectrum_of_a_point_falls_as_the_fifth_root() -> None:
 
 @pytest.mark.parametrize("gas", [100.0, 1000.0, 3000.0])
 def test_rayleigh_plesset_conserves_energy(gas: float) -> None:
-    found = bubble.collapse(cavity(gas, viscosity=0.0, compressible=False), 1, tolerance=1e-9)
+    found = bubble_collapse.collapse(cavity(gas, viscosity=0.0, compressible=False), 1, tolerance=1e-9)
     near = np.geomspace(1e-12, 1e-5, 40)
     time = np.concatenate([np.linspace(found.clock[0], found.clock[-1], 1000), near, -near])
-    assert np.abs(bubble.energy(time, found) / bubble.energy(found.clock[0], found) - 1).max() < 1e-8
+    assert np.abs(bubble_collapse.energy(time, found) / bubble_collapse.energy(found.clock[0], found) - 1).max() < 1e-8
 
 
 def test_smallest_radius_follows_from_energy() -> None:
-    found = bubble.collapse(cavity(1000, viscosity=0.0, surface_tension=0.0, compressible=False))
+    found = bubble_collapse.collapse(cavity(1000, viscosity=0.0, surface_tension=0.0, compressible=False))
     drive = AMBIENT - 2339.0
     x = brentq(lambda x: drive * (1 - x**3) - 1000 / 0.4 * (x**-1.2 - 1), 0.01, 0.5, xtol=1e-15)
     assert x == pytest.approx(0.03289765638, abs=1e-11)
     assert found.minimum_radius / R0 == pytest.approx(x, rel=1e-9)
-    isothermal = bubble.collapse(found.cavity._replace(exponent=1.0, gas_pressure=20e3))
+    isothermal = bubble_collapse.collapse(found.cavity._replace(exponent=1.0, gas_pressure=20e3))
     x = brentq(lambda x: drive * (1 - x**3) + 3 * 20e3 * np.log(x), 1e-3, 0.5, xtol=1e-15)
     assert isothermal.minimum_radius / R0 == pytest.approx(x, rel=1e-9)
 
 
-def gauss(found: Collapse) -> tuple[bubble.Motion, Floats]:
+def gauss(found: Collapse) -> tuple[bubble_collapse.Motion, Floats]:
     node, weight = np.polynomial.legendre.leggauss(20)
     a, b = found.steps[:-1, None], found.steps[1:, None]
-    moved = bubble.moving((0.5 * (a + b) + 0.5 * (b - a) * node).ravel(), found)
+    moved = bubble_collapse.moving((0.5 * (a + b) + 0.5 * (b - a) * node).ravel(), found)
     return moved, (0.5 * (b - a) * weight).ravel() * moved.rate
 
 
 def test_viscosity_takes_the_energy_that_is_lost() -> None:
-    found = bubble.collapse(cavity(1000, viscosity=1.0, compressible=False))
-    before, after = bubble.energy(found.clock[[0, -1]], found)
+    found = bubble_collapse.collapse(cavity(1000, viscosity=1.0, compressible=False))
+    before, after = bubble_collapse.energy(found.clock[[0, -1]], found)
     moved, weight = gauss(found)
     assert before - after == pytest.approx(
         16 * np.pi * np.sum(weight * moved.wall.radius * moved.wall.speed**2), rel=1e-8
@@ -133,8 +133,8 @@ def test_viscosity_takes_the_energy_that_is_lost() -> None:
 def test_sound_takes_the_energy_that_is_lost_to_first_order() -> None:
     miss, mach = [], []
     for gas in (3000.0, 10e3, 20e3):
-        found = bubble.collapse(cavity(gas, viscosity=0.0))
-        before, after = bubble.energy(found.clock[[0, -1]], found)
+        found = bubble_collapse.collapse(cavity(gas, viscosity=0.0))
+        before, after = bubble_collapse.energy(found.clock[[0, -1]], found)
         moved, weight = gauss(found)
         radiated = 4 * np.pi / (998.0 * 1482.0) * np.sum(weight * moved.pressure**2)
         miss.append(1 - float((before - after) / radiated))
@@ -145,7 +145,7 @@ def test_sound_takes_the_energy_that_is_lost_to_first_order() -> None:
 
 def test_slow_sound_gone_keller_miksis_is_rayleigh_plesset() -> None:
     swift, still = (
-        bubble.collapse(cavity(1000, sound_speed=c, compressible=k)) for c, k in ((1e9, True), (1482.0, False))
+        bubble_collapse.collapse(cavity(1000, sound_speed=c, compressible=k)) for c, k in ((1e9, True), (1482.0, False))
     )
     assert swift.minimum_radius == pytest.approx(still.minimum_radius, rel=1e-5)
     assert swift.collapse_time == pytest.approx(still.collapse_time, rel=1e-7)
@@ -153,26 +153,28 @@ def test_slow_sound_gone_keller_miksis_is_rayleigh_plesset() -> None:
 
 def test_size_scales_time_and_pressure() -> None:
     """Without viscosity and surface tension a bubble twice as large is twice as slow and, at 1 m, twice as loud."""
-    one, two = (bubble.collapse(Cavity(r, 1000.0, AMBIENT, surface_tension=0, viscosity=0)) for r in (R0, 2 * R0))
+    one, two = (
+        bubble_collapse.collapse(Cavity(r, 1000.0, AMBIENT, surface_tension=0, viscosity=0)) for r in (R0, 2 * R0)
+    )
     assert two.collapse_time == pytest.approx(2 * one.collapse_time, rel=1e-12)
     t = np.linspace(-1e-6, 1e-6, 5)
-    assert bubble.pressure(2 * t, two) == pytest.approx(2 * bubble.pressure(t, one), rel=1e-10)
+    assert bubble_collapse.pressure(2 * t, two) == pytest.approx(2 * bubble_collapse.pressure(t, one), rel=1e-10)
 
 
 def test_derivatives_are_those_of_the_radius() -> None:
-    found = bubble.collapse(cavity(1000.0), tolerance=1e-13)
+    found = bubble_collapse.collapse(cavity(1000.0), tolerance=1e-13)
     t, h = np.array([-2e-4, -1e-5, -2e-6, 3e-6, 1e-4]), 1e-9
-    wall, after, before = (bubble.wall(t + d, found) for d in (0.0, h, -h))
+    wall, after, before = (bubble_collapse.wall(t + d, found) for d in (0.0, h, -h))
     assert wall.speed == pytest.approx((after.radius - before.radius) / (2 * h), rel=1e-5)
     assert wall.acceleration == pytest.approx((after.speed - before.speed) / (2 * h), rel=1e-5)
     flow = [w.radius**2 * w.speed for w in (after, before)]
-    assert bubble.pressure(t, found) == pytest.approx(998.0 * (flow[0] - flow[1]) / (2 * h), rel=1e-4)
+    assert bubble_collapse.pressure(t, found) == pytest.approx(998.0 * (flow[0] - flow[1]) / (2 * h), rel=1e-4)
 
 
 @pytest.mark.parametrize("method", ["RK45", "LSODA", "Radau", "BDF"])
 def test_other_solvers_agree(method: str) -> None:
-    reference = bubble.collapse(cavity(100.0), tolerance=1e-12)
-    found = bubble.collapse(cavity(100.0), tolerance=1e-8, method=method)  # type: ignore[arg-type]
+    reference = bubble_collapse.collapse(cavity(100.0), tolerance=1e-12)
+    found = bubble_collapse.collapse(cavity(100.0), tolerance=1e-8, method=method)  # type: ignore[arg-type]
     assert found.minimum_radius == pytest.approx(reference.minimum_radius, rel=1e-6)
     assert found.collapse_time == pytest.approx(reference.collapse_time, rel=1e-7 if method == "BDF" else 1e-8)
 
@@ -190,7 +192,7 @@ LEVELS = """
 def test_source_levels(row: str) -> None:
     """The filter of the table is a Butterworth filter of order 4, forwards and backwards; the ends are not faded."""
     gas, raw, *limited = map(float, row.split())
-    found = bubble.collapse(cavity(gas))
+    found = bubble_collapse.collapse(cavity(gas))
     assert bubble_pulse.source_level(found) == pytest.approx(raw, abs=0.055)
     f = np.arange(3000) * 1e3
     S = pulses.spectrum(f, bubble_pulse.pulse(found, f[-1], fade=0.0))
@@ -205,7 +207,7 @@ def test_source_levels(row: str) -> None:
     [(0, 1000, 209.7, 0.060), (0, 3000, 199.1, 0.121), (20, 1000, 223.9, 0.038), (20, 3000, 216.6, 0.067)],
 )
 def test_depth(depth: float, gas: float, level: float, x: float) -> None:
-    found = bubble.collapse(cavity(gas, depth))
+    found = bubble_collapse.collapse(cavity(gas, depth))
     assert bubble_pulse.source_level(found) == pytest.approx(level, abs=0.051)
     assert found.minimum_radius / R0 == pytest.approx(x, abs=5.1e-4)
 
@@ -223,7 +225,7 @@ def plain(gas: float) -> tuple[Floats, Floats]:
         push = (1 + v / c) * p / rho + R / (rho * c) * rate - 1.5 * (1 - v / (3 * c)) * v * v
         return [v, push / ((1 - v / c) * R + 4 * mu / (rho * c))]
 
-    found = bubble.collapse(cavity(gas))
+    found = bubble_collapse.collapse(cavity(gas))
     end = found.collapse_time + found.clock[-1]
     atol = [1e-19, 1e-15]
     out = solve_ivp(slope, (0.0, end), [R0, 0.0], "DOP853", rtol=1e-13, atol=atol, dense_output=True)
@@ -239,7 +241,7 @@ def plain(gas: float) -> tuple[Floats, Floats]:
 def test_spectrum_is_that_of_an_independent_solution(gas: float) -> None:
     t, strength = plain(gas)
     f = np.concatenate([[0.0], np.geomspace(100.0, 1e6, 25)])
-    found = bubble.collapse(cavity(gas))
+    found = bubble_collapse.collapse(cavity(gas))
     expected = np.exp(-2j * np.pi * np.outer(f, t - found.collapse_time)) @ strength
     for highest in (110e3, 1e6):
         got = pulses.spectrum(f[f <= highest], bubble_pulse.pulse(found, highest, fade=0.0))
@@ -247,10 +249,10 @@ def test_spectrum_is_that_of_an_independent_solution(gas: float) -> None:
 
 
 def test_width_is_that_of_an_independent_solution() -> None:
-    found = bubble.collapse(cavity(100.0))
+    found = bubble_collapse.collapse(cavity(100.0))
     time, top = bubble_pulse.peak(found)
     t = time + np.linspace(-1.5e-7, 1.5e-7, 6001)
-    p = bubble.pressure(t, found)
+    p = bubble_collapse.pressure(t, found)
     assert top == pytest.approx(p.max(), rel=1e-6)
     assert bubble_pulse.width(found) == pytest.approx(np.ptp(t[p >= 0.5 * top]), abs=2e-10)
     assert bubble_pulse.width(found) == pytest.approx(66.6e-9, abs=1e-10)
@@ -258,12 +260,12 @@ def test_width_is_that_of_an_independent_solution() -> None:
 
 @pytest.mark.parametrize("rebounds", [0, 1, 3])
 def test_a_fade_takes_the_steps_at_the_ends_and_leaves_no_net_impulse(rebounds: int) -> None:
-    found = bubble.collapse(cavity(2000.0), rebounds)
+    found = bubble_collapse.collapse(cavity(2000.0), rebounds)
     f = np.array([0.0, 200e3, 500e3, 1e6])
     faded, cut = (pulses.spectrum(f, bubble_pulse.pulse(found, f[-1], fade)) for fade in (0.5, 0.0))
     assert abs(faded[0]) < 1e-9 * np.abs(cut).max() and abs(cut[0]) < 1e-9 * np.abs(cut).max()
     ends = found.clock[[0, -1]]
-    p = bubble.pressure(ends, found)
+    p = bubble_collapse.pressure(ends, found)
     assert p[0] == pytest.approx(-R0 * (AMBIENT - 2339.0 - 2000.0 + 2 * 0.0725 / R0), rel=1e-6)
     steps = np.exp(-2j * np.pi * np.outer(f[1:], ends)) @ (p * [1, -1]) / (2j * np.pi * f[1:])
     assert np.abs(cut - faded - np.append(0, steps)).max() < 1e-4 * np.abs(cut).max()

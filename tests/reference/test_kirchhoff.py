@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from scipy.special import j1
 
-from sonarsynth.acoustics.boundaries import rayleigh
-from sonarsynth.acoustics.facets import kirchhoff_error
-from sonarsynth.acoustics.kirchhoff import (
+from sonarsynth.conventions import Floats
+from sonarsynth.equations.scattering.facet_size import kirchhoff_error
+from sonarsynth.equations.scattering.kirchhoff_integral import (
     circular_plate,
     divided_exponential,
     facet_amplitude,
@@ -23,16 +23,16 @@ from sonarsynth.acoustics.kirchhoff import (
     shadow_taper,
     triangle_integral,
 )
-from sonarsynth.acoustics.kirchhoff_kernels import facet_amplitudes, mesh_amplitude
-from sonarsynth.acoustics.lobes import lit_and_seen
-from sonarsynth.acoustics.modal import cylinder_amplitude, sphere_amplitude
-from sonarsynth.acoustics.roughness import coherent_factor, roughness_parameter
-from sonarsynth.conventions import Floats
+from sonarsynth.equations.scattering.kirchhoff_kernels import facet_amplitudes, mesh_amplitude
+from sonarsynth.equations.scattering.lobes import lit_and_seen
+from sonarsynth.equations.scattering.modal_series import cylinder_amplitude, sphere_amplitude
+from sonarsynth.equations.scattering.roughness import coherent_factor, roughness_parameter
+from sonarsynth.equations.water.boundary_reflection import rayleigh
 from sonarsynth.geometry import unit
-from sonarsynth.world.generation import sphere
-from sonarsynth.world.mesh import Mesh
-from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.shapes import Box, Cylinder
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.targets.generated.generation import sphere
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Box, Cylinder
 
 C = 1500.0
 

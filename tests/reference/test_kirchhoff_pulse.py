@@ -6,16 +6,22 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics import snap
-from sonarsynth.acoustics.kirchhoff import facet_amplitude
-from sonarsynth.acoustics.kirchhoff_pulse import Waveform, divided_impulse, facet_echo, sampled_waveform, snap_waveform
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.bubble import snap_pressure
+from sonarsynth.equations.scattering.kirchhoff_integral import facet_amplitude
+from sonarsynth.equations.scattering.kirchhoff_pulse import (
+    Waveform,
+    divided_impulse,
+    facet_echo,
+    sampled_waveform,
+    snap_waveform,
+)
 from sonarsynth.geometry import unit
-from sonarsynth.world.sources import LogarithmicBubble
+from sonarsynth.sources.shrimp import LogarithmicBubble
 
 WIDTH, OMEGA = 6e-6, 2 * np.pi * 60e3
 _b = LogarithmicBubble()
-SNAP = snap.Bubble(_b.a, _b.k, _b.m, _b.q, _b.density)
+SNAP = snap_pressure.Bubble(_b.a, _b.k, _b.m, _b.q, _b.density)
 
 
 def _impulse(t: Floats) -> Floats:

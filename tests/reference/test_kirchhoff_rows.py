@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.kirchhoff import facet_amplitude
-from sonarsynth.acoustics.kirchhoff_kernels import facet_amplitudes, spacing
+from sonarsynth.equations.scattering.kirchhoff_integral import facet_amplitude
+from sonarsynth.equations.scattering.kirchhoff_kernels import facet_amplitudes, spacing
 from sonarsynth.geometry import unit
 
 

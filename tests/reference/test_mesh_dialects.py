@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonarsynth.world.mesh_files import read_surface
-from sonarsynth.world.polygons import PolygonError, triangles
-from sonarsynth.world.refinement import MeshError, volume
+from sonarsynth.geometry.surfaces import MeshError, volume
+from sonarsynth.targets.mesh_readers.mesh_files import read_surface
+from sonarsynth.targets.mesh_readers.polygons import PolygonError, triangles
 
 CORNERS = [(0, 0, 0), (2, 0, 0), (2, 1, 0), (0, 1, 0), (0, 0, 1), (2, 0, 1), (2, 1, 1), (0, 1, 1)]
 QUADS = [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (3, 7, 6, 2), (0, 4, 7, 3), (1, 2, 6, 5)]

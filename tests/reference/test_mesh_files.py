@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from sonarsynth.world import refinement
-from sonarsynth.world.generation import generate
-from sonarsynth.world.meshes import MeshError, mesh_of
-from sonarsynth.world.refinement import longest_edge, split_long_edges, volume
-from sonarsynth.world.shapes import Box, LShape, MeshFile, Sphere
+from sonarsynth.geometry import surfaces
+from sonarsynth.geometry.surfaces import longest_edge, split_long_edges, volume
+from sonarsynth.targets.generated.generation import generate
+from sonarsynth.targets.meshes import MeshError, mesh_of
+from sonarsynth.targets.shapes import Box, LShape, MeshFile, Sphere
 
 REAL = Path(__file__).parents[2].parent / "shared" / "data" / "rexrov.stl"
 BODY = LShape(height=1.0, length=2.0, width=0.5, thickness=0.1)
@@ -181,7 +181,7 @@ def test_a_splitting_that_would_take_too_many_is_refused_before_it_is_done(monke
     """A long plate: its area alone does not tell, for facets with one short edge are cut in three."""
     plate = generate(Box(size=(1.0, 30.0, 0.3)))[0]
     assert len(split_long_edges(plate, 0.3)[1]) == 24352  # 3.4 times what its area would need
-    monkeypatch.setattr(refinement, "cut", None)  # nothing is cut
-    monkeypatch.setattr(refinement, "most_facets", lambda: 19_000)
+    monkeypatch.setattr(surfaces, "cut", None)  # nothing is cut
+    monkeypatch.setattr(surfaces, "most_facets", lambda: 19_000)
     with pytest.raises(MeshError, match=r"edges of 0\.3 m would take more than 19000 facets"):
         split_long_edges(plate, 0.3)

@@ -6,7 +6,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.modal import (
+from sonarsynth.equations.scattering.modal_series import (
     Boundary,
     Fluid,
     cylinder_amplitude,

@@ -8,9 +8,9 @@ from scipy.integrate import solve_ivp
 
 from sonarsynth import Cast, Catenary, Environment, Linear, Munk, Tabulated, Thermocline, eigenrays
 from sonarsynth.conventions import Floats, Ints
-from sonarsynth.world.casts import profile_of, smoothed
-from sonarsynth.world.environment import Profile, SoundSpeed
-from sonarsynth.world.profiles import munk, munk_nodes, nearest
+from sonarsynth.environment.casts import profile_of, smoothed
+from sonarsynth.environment.profiles import munk, munk_nodes, nearest
+from sonarsynth.environment.sea import Profile, SoundSpeed
 
 MUNK = munk(1300.0, 1300.0, 0.00737, 1500.0)
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics.arrays import element_directivity, focus_delay
-from sonarsynth.acoustics.beams import beam_energy, beam_spectra, lattice_beam_spectra
-from sonarsynth.beamforming.lattice import focused_energies
 from sonarsynth.conventions import direction
-from sonarsynth.ranging import kernels
-from sonarsynth.ranging.pulses import in_band, template_spectrum
-from sonarsynth.sonar import Band, BeamGrid, PlanarLattice, Romanis, elements
+from sonarsynth.equations.arrays.apertures import element_directivity, focus_delay
+from sonarsynth.equations.arrays.beams import beam_energy, beam_spectra, lattice_beam_spectra
+from sonarsynth.imaging.lattice_image import focused_energies
+from sonarsynth.ranging import ranging_kernels
+from sonarsynth.ranging.location.pulse_times import in_band, template_spectrum
+from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, Romanis, elements
 
 SPEED = 1540.0
 AXIS = np.array([1.0, 0.0, 0.0])
@@ -85,7 +85,7 @@ def test_face_responses_are_sincs_to_the_last_digits(sine):
     frequency = 3125.0 * np.arange(400)
     u = np.stack([np.zeros(3), [sine, -sine, 0.5 * sine], [0.2, 0.0, sine]], axis=-1)
     delay = u * (0.04953 / SPEED)
-    got = kernels.face_responses(delay[:, 1], delay[:, 2], 0.0, 3125.0, 400)
+    got = ranging_kernels.face_responses(delay[:, 1], delay[:, 2], 0.0, 3125.0, 400)
     np.testing.assert_allclose(got, element_directivity(frequency, u[:, None], 0.04953, SPEED), rtol=1e-12, atol=1e-14)
 
 
@@ -94,7 +94,7 @@ def test_turning_delays_a_spectrum():
     spectrum = random.normal(size=(5, 300)) + 1j * random.normal(size=(5, 300))
     delay = random.uniform(-1e-3, 1e-3, 5)
     exact = spectrum * np.exp(2j * np.pi * (25e3 + 200.0 * np.arange(300)) * delay[:, None])
-    np.testing.assert_allclose(kernels.turned(spectrum, delay, 25e3, 200.0), exact, atol=1e-11)
+    np.testing.assert_allclose(ranging_kernels.turned(spectrum, delay, 25e3, 200.0), exact, atol=1e-11)
 
 
 def test_windows_move_with_the_time_and_hold_nothing_beyond_the_ends():
@@ -107,7 +107,7 @@ def test_windows_move_with_the_time_and_hold_nothing_beyond_the_ends():
     into = np.clip(4 * (1 - np.abs(index - place[:, None]) / half), 0, 1)
     window = (0.5 - 0.5 * np.cos(np.pi * into)) * ((index >= 0) & (index < 100)) * gain[:, None]
     exact = np.nan_to_num(np.take_along_axis(pressure, np.clip(index, 0, 99), axis=1)) * window
-    np.testing.assert_allclose(kernels.cut_out(pressure, place, half, gain), exact, atol=1e-14)
+    np.testing.assert_allclose(ranging_kernels.cut_out(pressure, place, half, gain), exact, atol=1e-14)
 
 
 def test_powers_count_who_is_live():
@@ -115,7 +115,7 @@ def test_powers_count_who_is_live():
     pressure = random.normal(size=(7, 50)).astype(np.float32)
     live = np.array([True, True, False, True, True, True, False])
     pressure[2, 10] = -99.0
-    power, peak = kernels.power_and_peak(pressure, live)
+    power, peak = ranging_kernels.power_and_peak(pressure, live)
     np.testing.assert_allclose(power, np.sum(pressure[live].astype(float) ** 2, axis=0), rtol=1e-14)
     assert peak == np.abs(pressure[live]).max()
 
@@ -124,12 +124,12 @@ def test_lags_and_templates_are_the_sums_of_their_formulas():
     random = np.random.default_rng(4)
     heard = random.normal(size=(9, 20)) + 1j * random.normal(size=(9, 20))
     response, omega = random.normal(size=(9, 20)), random.uniform(1, 2, 20)
-    total, power = kernels.template_sums(heard, response)
+    total, power = ranging_kernels.template_sums(heard, response)
     np.testing.assert_allclose(total, np.sum(response * heard, axis=0), rtol=1e-12)
     np.testing.assert_allclose(power, np.sum(response**2, axis=0), rtol=1e-12)
     model = response * (total / power)
     rest = heard - model
-    slope, weight, unexplained = kernels.lag_sums(heard, response, total / power, omega)
+    slope, weight, unexplained = ranging_kernels.lag_sums(heard, response, total / power, omega)
     np.testing.assert_allclose(slope, np.imag(model * rest.conj()) @ omega, atol=1e-12)
     np.testing.assert_allclose(weight, np.abs(model) ** 2 @ omega**2, rtol=1e-12)
     np.testing.assert_allclose(unexplained, np.sum(np.abs(rest) ** 2, axis=1), rtol=1e-12)
@@ -145,7 +145,7 @@ def test_the_loudest_near_is_the_loudest_of_all_pairs():
     power = random.random((len(row), 40)).astype(np.float32)
     top = random.integers(0, 40, len(row))
     reach, about = 0.045, 2
-    got = kernels.loudest_near(power, top, about, row, column, index, 3, 3, u, reach)
+    got = ranging_kernels.loudest_near(power, top, about, row, column, index, 3, 3, u, reach)
     near = np.linalg.norm(u[:, None] - u, axis=2) <= reach
     at = np.abs(np.arange(40) - top[:, None]) <= about
     exact = [power[near[b]][:, at[b]].max() for b in range(len(row))]

@@ -6,8 +6,8 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics import rays
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.rays import ray_solutions
 from tests.following import Visit, families, family, images, nodes, random_water, solve_again
 
 
@@ -15,14 +15,14 @@ from tests.following import Visit, families, family, images, nodes, random_water
 def test_uniform_water_has_image_sources(vertices: int, reflections: int) -> None:
     rng = np.random.default_rng(vertices)
     bed, c, size = 31.0, 1520.0, 60
-    water = rays.water(np.array([0.0, 7.0, 20.0]), np.full(3, c), bed)
+    water = ray_solutions.water(np.array([0.0, 7.0, 20.0]), np.full(3, c), bed)
     z1, z2 = rng.uniform(0, bed, (2, size))
     r = 10 ** rng.uniform(-4, 5, size)
     z1[:20], z2[10:30], r[25:35] = rng.choice([0.0, 7.0, 31.0], 20), rng.choice([0.0, 20.0, 31.0], 20), 0.0
     z2[40:50] = z1[40:50]
     boundary = (z1 == z2) & ((z1 == 0) | (z1 == bed))
     z2[boundary] = 5.0
-    found = rays.eigenrays(water, z1, z2, r, vertices, reflections)
+    found = ray_solutions.eigenrays(water, z1, z2, r, vertices, reflections)
     for i in range(size):
         expected = sorted(images(bed, z1[i], z2[i], min(vertices, reflections)), key=lambda row: (*row[1:3], row[0]))
         mine = np.flatnonzero(found.pair == i)
@@ -33,7 +33,7 @@ def test_uniform_water_has_image_sources(vertices: int, reflections: int) -> Non
             d = np.hypot(height, r[i])
             assert (found.surface[k], found.bottom[k], found.turning[k]) == (surface, bottom, 0)
             assert found.caustics[k] == 0
-            assert found.flag[k] == (rays.GOOD if d > 0 else rays.COINCIDENT)
+            assert found.flag[k] == (ray_solutions.GOOD if d > 0 else ray_solutions.COINCIDENT)
             assert found.start_speed[k] == found.end_speed[k] == c
             assert abs(found.travel_time[k] * c - d) <= 4e-15 * d
             assert abs(found.length[k] - d) <= 4e-15 * d
@@ -51,8 +51,8 @@ def test_hops_along_a_boundary_have_the_closed_form(gradient: float) -> None:
     """Both ends on the surface (or the bed) of water that bends rays back to it: n equal arcs."""
     c, bed, r = 1500.0, 1000.0, 800.0
     speeds = np.array([c, c + gradient * bed]) if gradient > 0 else np.array([c - gradient * bed, c])
-    water, end = rays.water(np.array([0.0, bed]), speeds, bed), 0.0 if gradient > 0 else bed
-    found = rays.eigenrays(water, np.array([end]), np.array([end]), np.array([r]), 11, 11)
+    water, end = ray_solutions.water(np.array([0.0, bed]), speeds, bed), 0.0 if gradient > 0 else bed
+    found = ray_solutions.eigenrays(water, np.array([end]), np.array([end]), np.array([r]), 11, 11)
     g = abs(gradient)
     for hops in range(1, 6):
         hits = found.surface if gradient > 0 else found.bottom
@@ -71,7 +71,7 @@ def test_hops_along_a_boundary_have_the_closed_form(gradient: float) -> None:
         assert sorted(np.sign(found.start_sine[mine])) == [-1, -1, 1, 1]
 
 
-def bare(water: rays.Water, depth: float, up: int) -> mp.mpf:
+def bare(water: ray_solutions.Water, depth: float, up: int) -> mp.mpf:
     """Speed at a depth that is not on a jump, to all digits."""
     z, c = nodes(water, (depth, depth), mp.mpf)
     return c[z.index(mp.mpf(depth))]
@@ -89,11 +89,11 @@ def test_every_number_of_a_ray_to_many_digits(layers: int, spread: float, seed: 
         start, end = rng.uniform(0, 100, (2, 3))
         end[0] = rng.choice(water.depth[:2])
         distance = 10 ** rng.uniform(2, 4, 3) / np.sqrt(min(1.0, spread))
-        found = rays.eigenrays(water, start, end, distance, 5, 4)
+        found = ray_solutions.eigenrays(water, start, end, distance, 5, 4)
         order = rng.permutation(len(found.pair))
         for i in [*order[found.turning[order] > 0][:5], *order[found.turning[order] == 0][:5]]:
             a, b, r = (float(v[found.pair[i]]) for v in (start, end, distance))
-            if found.flag[i] == rays.CAUSTIC or kinked(water, found, i):
+            if found.flag[i] == ray_solutions.CAUSTIC or kinked(water, found, i):
                 continue
             with mp.workdps(60):
                 p, visit = solve_again(water, a, b, mp.mpf(r), found, int(i))
@@ -104,14 +104,20 @@ def test_every_number_of_a_ray_to_many_digits(layers: int, spread: float, seed: 
     assert turned > 5
 
 
-def kinked(water: rays.Water, found: rays.Eigenrays, i: int) -> bool:
+def kinked(water: ray_solutions.Water, found: ray_solutions.Eigenrays, i: int) -> bool:
     """Whether a turning depth is so near to a node that 16 digits cannot tell on which side."""
     vertices = [v for v in (found.upper[i], found.lower[i]) if np.isfinite(v) and 0 < v < water.depth[-1]]
     return any(0 < np.min(np.abs(water.depth - v)) < 1e-9 for v in vertices)
 
 
 def compare(
-    water: rays.Water, start: float, end: float, p: mp.mpf, visit: Visit, found: rays.Eigenrays, i: int
+    water: ray_solutions.Water,
+    start: float,
+    end: float,
+    p: mp.mpf,
+    visit: Visit,
+    found: ray_solutions.Eigenrays,
+    i: int,
 ) -> None:
     x, time, length, slope = visit.sums
     assert abs(found.travel_time[i] - time) <= 1e-13 * min(1, time) + 2e-15 * time
@@ -157,7 +163,7 @@ def test_no_family_is_missed_and_no_ray_comes_twice(
         water = random_water(rng, layers, spread)
         start, end = ends(rng, water, k)
         distance = 10 ** rng.uniform(0.5, 3.8, 16)
-        found = rays.eigenrays(water, np.full(16, start), np.full(16, end), distance, vertices, reflections)
+        found = ray_solutions.eigenrays(water, np.full(16, start), np.full(16, end), distance, vertices, reflections)
         fan = families(water, start, end, distance, vertices, reflections)
         for i in range(16):
             mine = np.flatnonzero(found.pair == i)
@@ -170,7 +176,7 @@ def test_no_family_is_missed_and_no_ray_comes_twice(
         assert (np.diff(found.travel_time)[np.diff(found.pair) == 0] >= 0).all()
 
 
-def ends(rng: np.random.Generator, water: rays.Water, k: int) -> tuple[float, float]:
+def ends(rng: np.random.Generator, water: ray_solutions.Water, k: int) -> tuple[float, float]:
     """Two depths: at random, the same, on surface, bed and nodes."""
     a, b = rng.uniform(0, 100, 2)
     choice: Floats = np.array([[a, b], [a, a], [0, b], [a, 100], [0, 100], [a, water.depth[len(water.depth) // 2]]])

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sonarsynth.acoustics import rays
 from sonarsynth.conventions import Floats, Ints
+from sonarsynth.equations.rays import ray_solutions
 from tests.following import random_water
 
 
@@ -27,9 +27,9 @@ def duct(depth: Floats) -> Floats:
     return 1500.0 + 0.02 * depth - 4.0 * np.exp(-(((depth - 60.0) / 15.0) ** 2))
 
 
-def tabulated(profile: Callable[[Floats], Floats], bed: float, count: int) -> rays.Water:
+def tabulated(profile: Callable[[Floats], Floats], bed: float, count: int) -> ray_solutions.Water:
     depth = np.linspace(0, bed, count)
-    return rays.water(depth, profile(depth), bed)
+    return ray_solutions.water(depth, profile(depth), bed)
 
 
 def event(of: Callable[[Floats], float], direction: int, terminal: bool) -> Callable[[float, Floats], float]:
@@ -64,7 +64,7 @@ def within_layer(
     return which, np.append(state, run.t_events[which][0])
 
 
-def shot(water: rays.Water, start: float, angle: float, counts: list[int], end: float) -> Floats:
+def shot(water: ray_solutions.Water, start: float, angle: float, counts: list[int], end: float) -> Floats:
     """Range, depth, angle, time and length where a ray passes the depth `end` after these reflections and turns."""
     state, length, seen, turns = np.array([0.0, start, angle, 0.0]), 0.0, [0, 0, 0], True
     layer = int(np.searchsorted(water.depth, start, "right" if angle > 0 else "left")) - 1
@@ -102,7 +102,7 @@ def test_an_integrator_shoots_to_the_same_end(
     vertices: int,
 ) -> None:
     water = tabulated(profile, bed, count)
-    found = rays.eigenrays(water, np.array([start]), np.array([end]), np.array([distance]), vertices, vertices)
+    found = ray_solutions.eigenrays(water, np.array([start]), np.array([end]), np.array([distance]), vertices, vertices)
     assert len(found.pair) >= 2 * vertices
     for i in range(len(found.pair)):
         p = found.slowness[i]
@@ -116,7 +116,7 @@ def test_an_integrator_shoots_to_the_same_end(
 
 
 def along(
-    water: rays.Water, z: float, sine: float, p: np.longdouble, times: Floats
+    water: ray_solutions.Water, z: float, sine: float, p: np.longdouble, times: Floats
 ) -> tuple[Floats, Floats, Floats, Ints]:
     """Position (x, z), sine (down positive) and number of reflections at times of a ray: in each layer
     sine(t) = tanh(artanh(sine) - g t) (from d(sine)/dt = -g cos^2), all else by Snell's law. Long doubles.
@@ -166,8 +166,8 @@ def test_caustics_are_where_the_ray_tube_has_no_width(layers: int, spread: float
     for _ in range(6):
         water = random_water(rng, layers, spread)
         start, end = rng.uniform(0, 100, (2, 4))
-        found = rays.eigenrays(water, start, end, 10 ** rng.uniform(2, 3.7, 4), 6, 3)
-        for i in np.flatnonzero((found.turning > 0) & (found.flag != rays.CAUSTIC))[:12]:
+        found = ray_solutions.eigenrays(water, start, end, 10 ** rng.uniform(2, 3.7, 4), 6, 3)
+        for i in np.flatnonzero((found.turning > 0) & (found.flag != ray_solutions.CAUSTIC))[:12]:
             times = np.linspace(0, found.travel_time[i], 6001)[1:].astype(np.longdouble)
             c = np.longdouble(found.start_speed[i])
             angle = np.arctan2(-found.start_sine[i], np.cos(np.arcsin(found.start_sine[i]))).astype(np.longdouble)

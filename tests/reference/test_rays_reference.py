@@ -8,11 +8,11 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics import rays
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.rays import ray_solutions
 
 
-def random_water(rng: np.random.Generator, layers: int, spread: float) -> rays.Water:
+def random_water(rng: np.random.Generator, layers: int, spread: float) -> ray_solutions.Water:
     """A random profile of a bed at 100 m; some layers of one speed, some jumps."""
     depth = np.sort(rng.uniform(0.0, 100.0, layers))
     speed = 1500.0 + spread * rng.normal(size=layers)
@@ -20,10 +20,10 @@ def random_water(rng: np.random.Generator, layers: int, spread: float) -> rays.W
         speed[2] = speed[1]
     if layers > 4 and rng.random() < 0.5:
         depth[4] = depth[3]
-    return rays.water(depth, speed, 100.0)
+    return ray_solutions.water(depth, speed, 100.0)
 
 
-def exact_speed(water: rays.Water, depth: float, below: bool) -> mp.mpf:
+def exact_speed(water: ray_solutions.Water, depth: float, below: bool) -> mp.mpf:
     """Speed just below or just above a depth, to all digits."""
     z = [mp.mpf(float(d)) for d in water.depth]
     c = [mp.mpf(float(s)) for s in water.speed]
@@ -33,7 +33,7 @@ def exact_speed(water: rays.Water, depth: float, below: bool) -> mp.mpf:
     raise AssertionError(depth)
 
 
-def exact_layers(water: rays.Water, top: mp.mpf, bottom: mp.mpf) -> list[tuple[mp.mpf, mp.mpf, mp.mpf]]:
+def exact_layers(water: ray_solutions.Water, top: mp.mpf, bottom: mp.mpf) -> list[tuple[mp.mpf, mp.mpf, mp.mpf]]:
     """(thickness, speed at top, speed at bottom) of the layers between two depths."""
     cuts = [top, *[mp.mpf(float(d)) for d in np.unique(water.depth) if top < d < bottom], bottom]
     return [(b - a, exact_speed(water, a, True), exact_speed(water, b, False)) for a, b in pairwise(cuts) if b > a]
@@ -54,7 +54,9 @@ def exact_sums(p: mp.mpf, layers: list[tuple[mp.mpf, mp.mpf, mp.mpf]]) -> tuple[
     return x, t, s
 
 
-def exact_path(water: rays.Water, p: mp.mpf, start: float, end: float, turn: float) -> tuple[mp.mpf, mp.mpf, mp.mpf]:
+def exact_path(
+    water: ray_solutions.Water, p: mp.mpf, start: float, end: float, turn: float
+) -> tuple[mp.mpf, mp.mpf, mp.mpf]:
     """Range, time and length of the ray with slowness p between two depths; turn: turning depth, roughly, or NaN."""
     top, bottom = mp.mpf(min(start, end)), mp.mpf(max(start, end))
     total = np.array(exact_sums(p, exact_layers(water, top, bottom)))
@@ -79,7 +81,7 @@ def test_times_lengths_and_slownesses_to_many_digits(layers: int, spread: float,
             water = random_water(rng, layers, spread)
             start, end = rng.uniform(0, 100, (2, 6))
             distance = 10 ** rng.uniform(0, 4, 6)
-            found = rays.eigenrays(water, start, end, distance)
+            found = ray_solutions.eigenrays(water, start, end, distance)
             for i, pair in enumerate(found.pair):
                 a, b, r = float(start[pair]), float(end[pair]), mp.mpf(float(distance[pair]))
                 turn = float(np.fmax(found.upper, found.lower)[i])
@@ -88,7 +90,12 @@ def test_times_lengths_and_slownesses_to_many_digits(layers: int, spread: float,
                 p = mp.mpf(float(found.slowness[i]))
 
                 def miss(
-                    q: mp.mpf, water: rays.Water = water, a: float = a, b: float = b, turn: float = turn, r: mp.mpf = r
+                    q: mp.mpf,
+                    water: ray_solutions.Water = water,
+                    a: float = a,
+                    b: float = b,
+                    turn: float = turn,
+                    r: mp.mpf = r,
                 ) -> mp.mpf:
                     return exact_path(water, q, a, b, turn)[0] - r
 
@@ -104,7 +111,7 @@ def test_times_lengths_and_slownesses_to_many_digits(layers: int, spread: float,
     assert seen > 12
 
 
-def fan_counts(water: rays.Water, start: float, end: float, distance: float) -> int:
+def fan_counts(water: ray_solutions.Water, start: float, end: float, distance: float) -> int:
     """How many rays a dense fan finds: sign changes of range - distance over v in every turning layer."""
     top, bottom = min(start, end), max(start, end)
     count = 0
@@ -139,7 +146,7 @@ def fan_counts(water: rays.Water, start: float, end: float, distance: float) -> 
     return count
 
 
-def insert(water: rays.Water, top: float, bottom: float) -> tuple[Floats, Floats]:
+def insert(water: ray_solutions.Water, top: float, bottom: float) -> tuple[Floats, Floats]:
     """The profile with nodes at the two ends."""
     z, c = water.depth, water.speed
     for end in {top, bottom} - set(z):
@@ -168,7 +175,7 @@ def test_no_ray_is_missed_and_none_comes_twice(layers: int, spread: float) -> No
         start, end = rng.uniform(0, 100, (2, 8))
         end[:2] = start[:2]
         distance = 10 ** rng.uniform(0.5, 3.7, 8)
-        found = rays.eigenrays(water, start, end, distance)
+        found = ray_solutions.eigenrays(water, start, end, distance)
         for i in range(8):
             mine = found.pair == i
             assert mine.sum() == fan_counts(water, start[i], end[i], distance[i])

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from sonarsynth.world.meshes import mesh_of
-from sonarsynth.world.myring import hull_length, hull_radius
-from sonarsynth.world.refinement import longest_edge, volume
-from sonarsynth.world.remus import FIN_FOOT, FIN_STATION, HULL, ROOT_CHORD, naca0012
-from sonarsynth.world.shapes import Remus100
+from sonarsynth.geometry.surfaces import longest_edge, volume
+from sonarsynth.targets.generated.myring import hull_length, hull_radius
+from sonarsynth.targets.generated.remus import FIN_FOOT, FIN_STATION, HULL, ROOT_CHORD, naca0012
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Remus100
 
 BOUNDS = [0.0, 0.1745, 0.8285, hull_length(HULL)]
 

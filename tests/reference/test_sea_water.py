@@ -8,11 +8,11 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from sonarsynth.acoustics import seawater
-from sonarsynth.acoustics.ranges import noted
-from sonarsynth.world.environment import Absorption
-from sonarsynth.world.hydrography import SpeedFormula, sea_water_speed
-from sonarsynth.world.water import absorption_db_per_m, absorption_notes
+from sonarsynth.environment.absorption import absorption_db_per_m, absorption_notes
+from sonarsynth.environment.hydrography import SpeedFormula, sea_water_speed
+from sonarsynth.environment.sea import Absorption
+from sonarsynth.equations.water import seawater
+from sonarsynth.equations.water.formula_ranges import noted
 
 SPEEDS = [(25, 35, 1000, 1550.744), (27, 35, 10, 1539.0866), (25, 35, 20, 1534.6204), (10, 35, 1000, 1506.2638)]
 
@@ -64,7 +64,7 @@ SEAS = [place for place in COMPARED if place[1] > 0]
 
 
 @pytest.mark.parametrize("place", COMPARED)
-@pytest.mark.filterwarnings("ignore::sonarsynth.acoustics.seawater.OutOfRange")
+@pytest.mark.filterwarnings("ignore::sonarsynth.equations.water.seawater.OutOfRange")
 def test_each_formula_gives_the_published_comparison(place):
     t, s, z = place
     _, mackenzie, del_grosso, chen_millero = COMPARED[place]

@@ -7,9 +7,9 @@ import pytest
 import trimesh
 
 import sonarsynth as ss
-from sonarsynth.acoustics.modal import sphere_amplitude
-from sonarsynth.scattering.fineness import CoarseMesh
-from sonarsynth.world.meshes import mesh_of
+from sonarsynth.equations.scattering.modal_series import sphere_amplitude
+from sonarsynth.targets.mesh_resolution import CoarseMesh
+from sonarsynth.targets.meshes import mesh_of
 
 BAND = np.linspace(25e3, 110e3, 8)
 

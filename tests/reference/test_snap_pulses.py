@@ -10,14 +10,15 @@ from scipy.integrate import quad
 from scipy.io import wavfile
 from scipy.stats import kstest, truncnorm
 
-from sonarsynth.acoustics import pulses, snap, spectra, waveforms
-from sonarsynth.acoustics.snap import Bubble
-from sonarsynth.acoustics.spectra import Fir
+from sonarsynth.equations.bubble import pulses, snap_pressure, waveforms
+from sonarsynth.equations.bubble.snap_pressure import Bubble
+from sonarsynth.equations.noise import filters
+from sonarsynth.equations.noise.filters import Fir
 from sonarsynth.randomness import stream
-from sonarsynth.world.recordings import read_recording
-from sonarsynth.world.snap_pulses import cavity, collapse, largest_scales, pulse, scales
-from sonarsynth.world.snaps import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
-from sonarsynth.world.sources import LogarithmicBubble
+from sonarsynth.sources.recordings import read_recording
+from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.sources.snap_models import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
+from sonarsynth.sources.snap_pulses import cavity, collapse, largest_scales, pulse, scales
 
 MODEL = LogarithmicBubble()
 BUBBLE = Bubble(MODEL.a, MODEL.k, MODEL.m, MODEL.q, MODEL.density)
@@ -28,15 +29,15 @@ EVERY = (MODEL, KellerMiksis(), Ricker(frequency=40e3), Gabor(frequency=50e3, cy
 
 def test_logarithmic_bubble_is_that_of_its_own_module() -> None:
     got = pulse(MODEL, 5.0, 200e3)
-    own = snap.spectrum(FREQUENCY, BUBBLE)
+    own = snap_pressure.spectrum(FREQUENCY, BUBBLE)
     assert np.abs(pulses.spectrum(FREQUENCY, got) - own).max() < 1e-13 * np.abs(own).max()
     heard = pulse(MODEL, 5.0, pulses.reach(FIR))
     t = np.linspace(-3e-4, 5e-5, 60)
-    exact = spectra.filtered_pulse(t, BUBBLE, FIR)
+    exact = filters.filtered_pulse(t, BUBBLE, FIR)
     assert np.abs(pulses.filtered(t, heard, FIR) - exact).max() < 1e-6 * np.abs(exact).max()
-    for a, b in zip(pulses.support(heard, FIR), spectra.pulse_support(BUBBLE, FIR), strict=True):
+    for a, b in zip(pulses.support(heard, FIR), filters.pulse_support(BUBBLE, FIR), strict=True):
         assert a == pytest.approx(b, abs=5e-6)
-    assert pulses.gain_for_level(heard, 187.0) == pytest.approx(snap.gain_for_level(BUBBLE, 187.0), rel=1e-12)
+    assert pulses.gain_for_level(heard, 187.0) == pytest.approx(snap_pressure.gain_for_level(BUBBLE, 187.0), rel=1e-12)
 
 
 def test_ricker_and_gabor_have_their_exact_spectra() -> None:
@@ -85,7 +86,7 @@ def test_filtered_waveform_is_the_filtered_spectrum(model: LogarithmicBubble) ->
     n, step = 4096, 1e-6
     f = np.fft.rfftfreq(n, step)
     inside = f <= pulses.reach(FIR)
-    S = np.where(inside, pulses.spectrum(np.where(inside, f, 0.0), made) * spectra.response(f, FIR), 0.0)
+    S = np.where(inside, pulses.spectrum(np.where(inside, f, 0.0), made) * filters.response(f, FIR), 0.0)
     p = np.fft.irfft(S, n) / step
     t = np.arange(-450, 600, 7)
     assert np.abs(pulses.filtered(t * step, made, FIR) - p[t]).max() < 2e-5 * np.abs(p).max()

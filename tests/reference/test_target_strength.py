@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 import sonarsynth as ss
-from sonarsynth.acoustics.facets import kirchhoff_error
-from sonarsynth.acoustics.kirchhoff import rectangular_plate
-from sonarsynth.acoustics.modal import sphere_amplitude
-from sonarsynth.scattering.fineness import CoarseMesh, expected_error, fine_mesh
-from sonarsynth.world.curvature import curvature_radius
-from sonarsynth.world.mesh import Mesh
-from sonarsynth.world.meshes import mesh_of
+from sonarsynth.equations.scattering.facet_size import kirchhoff_error
+from sonarsynth.equations.scattering.kirchhoff_integral import rectangular_plate
+from sonarsynth.equations.scattering.modal_series import sphere_amplitude
+from sonarsynth.geometry.curvature import curvature_radius
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.targets.mesh_resolution import CoarseMesh, expected_error, fine_mesh
+from sonarsynth.targets.meshes import mesh_of
 
 BAND = np.arange(25e3, 110.1e3, 2.5e3)
 FLAT = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
@@ -207,7 +207,7 @@ def joined(one: Mesh, other: Mesh) -> Mesh:
     return Mesh(np.concatenate([one.vertices, other.vertices]), faces)
 
 
-@pytest.mark.filterwarnings("ignore::sonarsynth.scattering.notes.SmallBody")
+@pytest.mark.filterwarnings("ignore::sonarsynth.scattering.law_notes.SmallBody")
 def test_powers_of_a_lobe_are_summed_and_do_not_depend_on_frequency() -> None:
     box = ss.Box(size=(1.0, 1.0, 1.0))
     coarse = ss.target_strength(box, [1e3, 1e5], (-1, 0, 0), (1, 0, 0), 1500.0, ss.MirrorLobe())

@@ -18,12 +18,13 @@ from typing import Any
 import numpy as np
 
 from benchmarks.frame import RECIPE
-from sonarsynth import config, planning, render, schedule, store
-from sonarsynth.labelling import label
+from sonarsynth import pipeline, planning, schedule, store
+from sonarsynth.labels import label
 from sonarsynth.planning import Plan
+from sonarsynth.propagation import Straight
+from sonarsynth.recipe import reading
+from sonarsynth.signals.filtered_pulse import snap_levels
 from sonarsynth.store.encoding import encoded
-from sonarsynth.synthesis.pulse import snap_levels
-from sonarsynth.tracing import Straight
 
 WARM, FRAMES, BUILDS, STARTS = 8, 32, 3, 3
 
@@ -54,16 +55,16 @@ class Clock:
         return made
 
 
-def one(plan: Plan, index: int, clock: Clock) -> render.Values:
+def one(plan: Plan, index: int, clock: Clock) -> pipeline.Values:
     """A frame, with its parts again where they are part of a task."""
-    traced = clock("trace, label", lambda: render.trace_frame(plan, index))
+    traced = clock("trace, label", lambda: pipeline.trace_frame(plan, index))
     moment, pose, beams = traced.frame.moment, traced.frame.sonar_pose, plan.scene.sonar.beams
     straight, levels = isinstance(plan.propagation, Straight), snap_levels(traced.frame.moment.snaps)
     clock("label", lambda: label(moment, pose, beams, plan.connect, levels, straight))
-    heard = clock("hear", lambda: render.beamform_frame(plan, index, traced))
-    clock("synthesise", lambda: render.synthesise(plan, traced))
-    clock("measure paths alone", lambda: render.measure_isolated(plan, traced))
-    values = clock("range", lambda: render.range_frame(plan, index, traced, heard))
+    heard = clock("hear", lambda: pipeline.beamform_frame(plan, index, traced))
+    clock("synthesise", lambda: pipeline.synthesise(plan, traced))
+    clock("measure paths alone", lambda: pipeline.measure_isolated(plan, traced))
+    values = clock("range", lambda: pipeline.range_frame(plan, index, traced, heard))
     return clock("write", lambda: store.layout_of(plan).check(values))
 
 
@@ -119,7 +120,7 @@ def started(*command: str) -> float:
 
 def bench() -> dict[str, Any]:
     """Stages; the dataset by 1 and by 2 workers, compared; start-up."""
-    plan = planning.plan(config.load(RECIPE))
+    plan = planning.plan(reading.load(RECIPE))
     with tempfile.TemporaryDirectory() as folder:
         by_stage = stages(plan, Path(folder) / "stages.zarr")
         paths = {workers: Path(folder) / f"{workers}.zarr" for workers in (1, 2)}

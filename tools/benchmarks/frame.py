@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth import config, planning, render
-from sonarsynth.accuracy.recipe.peers import acoular_image, likeness, thesis_image, thesis_pulse
-from sonarsynth.beamforming import DenseDelayAndSum, FocusedDelayAndSum
+from sonarsynth import pipeline, planning
+from sonarsynth.accuracy.peers import acoular_image, likeness, thesis_image, thesis_pulse
+from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.products import Arrivals, EnergyImage, Signals
-from sonarsynth.synthesis import DirectSum
+from sonarsynth.recipe import reading
+from sonarsynth.signals import DirectSum
 
 RECIPE = Path(__file__).resolve().parents[2] / "configs" / "remus.yaml"
 PATHS = 2000
@@ -46,13 +47,13 @@ def relative(got: np.ndarray, exact: np.ndarray) -> float:
 
 def bench(index: int = 32) -> dict[str, Any]:
     """Measure one frame of the remus scene."""
-    plan = planning.plan(config.load(RECIPE))
+    plan = planning.plan(reading.load(RECIPE))
     scene, sonar = plan.scene, plan.scene.sonar
     stages: dict[str, dict[str, Any]] = {}
-    full, seconds = cpu(lambda: render.trace_frame(plan, index))
+    full, seconds = cpu(lambda: pipeline.trace_frame(plan, index))
     stages["trace and label"] = {"ms": 1e3 * seconds, "facets": len(full.frame.moment.bodies[0].mesh.faces)}
     traced = replace(full, arrivals=thin(full.arrivals, PATHS))
-    signals, again = cpu(lambda: render.synthesise(plan, traced))
+    signals, again = cpu(lambda: pipeline.synthesise(plan, traced))
     seconds = synthesis_of_new_frames(plan)
     stages["synthesise"] = {"ms": 1e3 * seconds, "ms_same_frame_again": 1e3 * again, **synthesis_error(plan, traced)}
     located, seconds = cpu(
@@ -123,15 +124,15 @@ def synthesis_of_new_frames(plan: planning.Plan, warm: int = 8) -> float:
     """Median CPU seconds of a synthesis of a frame that was not seen before, after some others: tables are shared."""
     seconds = []
     for index in range(0, plan.recipe.frames, 2):
-        full = render.trace_frame(plan, index)
+        full = pipeline.trace_frame(plan, index)
         traced = replace(full, arrivals=thin(full.arrivals, PATHS))
         began = time.process_time()
-        render.synthesise(plan, traced)
+        pipeline.synthesise(plan, traced)
         seconds.append(time.process_time() - began)
     return float(np.median(seconds[warm:]))
 
 
-def synthesis_error(plan: planning.Plan, traced: render.Traced) -> dict[str, Any]:
+def synthesis_error(plan: planning.Plan, traced: pipeline.Traced) -> dict[str, Any]:
     """Largest error of the signals over their peak, against the direct sum, on every eighth echo (it takes seconds)."""
     share = 8
     some = thin(traced.arrivals, PATHS // share)
@@ -152,7 +153,7 @@ def synthesis_error(plan: planning.Plan, traced: render.Traced) -> dict[str, Any
 
 def peers(
     plan: planning.Plan,
-    traced: render.Traced,
+    traced: pipeline.Traced,
     signals: Signals,
     ours: float,
     image: np.ndarray,

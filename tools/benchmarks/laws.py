@@ -9,12 +9,13 @@ import numpy as np
 
 import sonarsynth as ss
 from benchmarks.frame import RECIPE, cpu, relative
-from sonarsynth import config, planning, render
+from sonarsynth import pipeline, planning
+from sonarsynth.pipeline import Traced
 from sonarsynth.planning import Plan
 from sonarsynth.products import Arrivals, Signals
-from sonarsynth.render import Traced
-from sonarsynth.synthesis import DirectSum
-from sonarsynth.synthesis.direct_sum import exact_signals
+from sonarsynth.recipe import reading
+from sonarsynth.signals import DirectSum
+from sonarsynth.signals.direct_sum import exact_signals
 
 LAWS = {
     "lobe": ss.MirrorLobe(),
@@ -48,7 +49,7 @@ def synthesise(plan: Plan, traced: Traced) -> Signals:
 def synthesis_ms(plan: Plan, index: int) -> tuple[float, float, float]:
     """Processor time (ms) of the synthesis of a frame not seen before, and of its paths without shapes; and the error
     over the echo's peak."""
-    traced = render.trace_frame(plan, index)
+    traced = pipeline.trace_frame(plan, index)
     echoes = replace(traced, arrivals=traced.arrivals.select(~traced.arrivals.direct))
     shaped: Signals = synthesise(plan, echoes)
     elements = plan.elements
@@ -65,7 +66,7 @@ def synthesis_ms(plan: Plan, index: int) -> tuple[float, float, float]:
     for make in (lambda a: a, plain):
         others = []
         for i in range(index + 1, index + 1 + FRAMES):
-            frame = render.trace_frame(plan, i)
+            frame = pipeline.trace_frame(plan, i)
             frame = replace(frame, arrivals=make(frame.arrivals))
             others.append(cpu(lambda frame=frame: synthesise(plan, frame), 1)[1])
         times.append(1e3 * float(np.median(others)))
@@ -74,12 +75,12 @@ def synthesis_ms(plan: Plan, index: int) -> tuple[float, float, float]:
 
 def bench(index: int = 20) -> dict[str, Any]:
     """Facets, paths, cost of tracing and of synthesis, error against direct sums."""
-    recipe = config.load(RECIPE, ("accuracy.signal=0.02",))  # the middle of the array sees for all
+    recipe = reading.load(RECIPE, ("accuracy.signal=0.02",))  # the middle of the array sees for all
     rows = {}
     for name, law in LAWS.items():
         physics = replace(recipe.scene.physics, scattering=law)
         plan = planning.plan(replace(recipe, scene=replace(recipe.scene, physics=physics)))
-        traced, tracing = cpu(lambda plan=plan: render.trace_frame(plan, index))
+        traced, tracing = cpu(lambda plan=plan: pipeline.trace_frame(plan, index))
         shaped, scaled, error = synthesis_ms(plan, index)
         rows[name] = {
             "facets": sum(len(mesh.faces) for mesh in plan.scene.meshes),

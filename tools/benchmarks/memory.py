@@ -65,12 +65,12 @@ class Stages:
 
 def sphere_recipe(facets: int, *changes: tuple[str, Any]) -> Any:
     """The remus scene with a sphere of 1 m, of about so many facets, in place of the vehicle."""
-    from sonarsynth import config
+    from sonarsynth.recipe import reading
 
     edge = 1.0 / np.sqrt(facets / 20.0) * np.arccos(1 / np.sqrt(5)) * 1.178  # the longest is 1.175 times the mean arc
     shape = {"kind": "sphere", "radius": 1.0, "edge": float(edge)}
     sets = {"scene.world.targets.0.shape": shape, "scene.trajectory.frames": 2, **dict(changes)}
-    return config.load(RECIPE, tuple(f"{path}={json.dumps(value)}" for path, value in sets.items()))
+    return reading.load(RECIPE, tuple(f"{path}={json.dumps(value)}" for path, value in sets.items()))
 
 
 def of_mesh(facets: int, refracted: bool = False, choosing: bool = True) -> dict[str, Any]:
@@ -102,36 +102,37 @@ def of_mesh(facets: int, refracted: bool = False, choosing: bool = True) -> dict
 
 def _frame(stages: Stages, plan: Any) -> int:
     """Make the first frame of a plan by stages; how many paths it has."""
-    from sonarsynth import render
-    from sonarsynth.labelling import label
-    from sonarsynth.synthesis.pulse import snap_levels
-    from sonarsynth.tracing import Straight
+    from sonarsynth import pipeline
+    from sonarsynth.labels import label
+    from sonarsynth.propagation import Straight
+    from sonarsynth.signals.filtered_pulse import snap_levels
 
-    traced = stages.run("trace and label", lambda: render.trace_frame(plan, 0))
+    traced = stages.run("trace and label", lambda: pipeline.trace_frame(plan, 0))
     found, frame = traced.arrivals, traced.frame
     straight = isinstance(plan.propagation, Straight)
     levels = snap_levels(frame.moment.snaps)
     beams = plan.scene.sonar.beams
     stages.run("label", lambda: label(frame.moment, frame.sonar_pose, beams, plan.connect, levels, straight))
-    stages.run("synthesise", lambda: render.synthesise(plan, traced))
-    heard = stages.run("beamform", lambda: render.beamform_frame(plan, 0, replace(traced)))
-    stages.run("range", lambda: render.range_frame(plan, 0, traced, heard))
+    stages.run("synthesise", lambda: pipeline.synthesise(plan, traced))
+    heard = stages.run("beamform", lambda: pipeline.beamform_frame(plan, 0, replace(traced)))
+    stages.run("range", lambda: pipeline.range_frame(plan, 0, traced, heard))
     return len(found.delay)
 
 
 def of_worker(frames: int) -> dict[str, Any]:
     """Memory of one process that makes so many frames of the remus scene, none of them twice."""
-    from sonarsynth import config, planning, render
+    from sonarsynth import pipeline, planning
+    from sonarsynth.recipe import reading
 
     interval = 6.3 / frames
     plan = planning.plan(
-        config.load(RECIPE, (f"scene.trajectory.frames={frames}", f"scene.trajectory.interval={interval}"))
+        reading.load(RECIPE, (f"scene.trajectory.frames={frames}", f"scene.trajectory.interval={interval}"))
     )
     read: dict[int, float] = {0: round(resident(), 1)}
     began = time.process_time()
     for index in range(frames):
-        traced = render.trace_frame(plan, index)
-        render.range_frame(plan, index, traced, render.beamform_frame(plan, index, traced))
+        traced = pipeline.trace_frame(plan, index)
+        pipeline.range_frame(plan, index, traced, pipeline.beamform_frame(plan, index, traced))
         if index + 1 in COUNTS or index + 1 == frames:
             read[index + 1] = round(resident(), 1)
     late = [(n, mb) for n, mb in read.items() if n >= min(100, frames // 2)]

@@ -12,19 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth import config, planning
-from sonarsynth.accuracy.cases import random_layers
-from sonarsynth.accuracy.comparing import rays_of
-from sonarsynth.accuracy.references.digits import Layers, exact_rays
-from sonarsynth.acoustics import rays, rays_continue
-from sonarsynth.acoustics.arrays import aperture_terms
+from sonarsynth import planning
 from sonarsynth.conventions import depth
+from sonarsynth.equations.arrays.apertures import aperture_terms
+from sonarsynth.equations.rays import ray_continuation, ray_solutions
 from sonarsynth.planning import Plan
+from sonarsynth.propagation.refracted import Refracted
 from sonarsynth.randomness import stream
-from sonarsynth.tracing.aperture import fronts
+from sonarsynth.recipe import reading
 from sonarsynth.tracing.arrivals import ArrayLegs, array_legs
-from sonarsynth.tracing.refracted import Refracted
-from sonarsynth.tracing.wavefront import sphere
+from sonarsynth.tracing.expansion.array_expansion import fronts
+from sonarsynth.tracing.expansion.wavefront_polynomials import sphere
+from sonarsynth.validation.rays.ray_cases import random_layers
+from sonarsynth.validation.rays.ray_matching import rays_of
+from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays
 
 RECIPE = Path(__file__).resolve().parents[2] / "configs" / "remus.yaml"
 WATER = "scene.world.environment.sound_speed={kind: thermocline}"
@@ -51,7 +52,7 @@ def median(function: Callable[[], Any], repeats: int = 7) -> tuple[Any, float]:
 
 def bench(index: int = 32) -> dict[str, Any]:
     """The complete search in random layers, and one frame of the remus scene in a tropical thermocline."""
-    plan = planning.plan(config.load(RECIPE, [WATER]))
+    plan = planning.plan(reading.load(RECIPE, [WATER]))
     return {
         "search": [searched(layers, name, *most) for layers in LAYERS for name, most in FAMILIES.items()],
         "facets_to_array": {
@@ -66,17 +67,17 @@ def bench(index: int = 32) -> dict[str, Any]:
 def searched(layers: int, family: str, vertices: int, reflections: int) -> dict[str, Any]:
     """Microseconds an eigenray, receivers one at a time and 500 at a time, from sources all over the water."""
     nodes = random_layers(layers, BED, 5.0)
-    water = rays.water(*nodes, BED)
+    water = ray_solutions.water(*nodes, BED)
     rng = stream(1, "bench", "rays", layers)
     sources, receivers = rng.uniform(0.0, BED, SOURCES), rng.uniform(0.0, BED, RECEIVERS)
     distance = np.geomspace(10.0, 3e3, RECEIVERS)
 
-    def many() -> list[rays.Eigenrays]:
-        return [rays.eigenrays(water, z, receivers, distance, vertices, reflections) for z in sources]
+    def many() -> list[ray_solutions.Eigenrays]:
+        return [ray_solutions.eigenrays(water, z, receivers, distance, vertices, reflections) for z in sources]
 
-    def single() -> list[rays.Eigenrays]:
+    def single() -> list[ray_solutions.Eigenrays]:
         ends = zip(receivers[::10], distance[::10], strict=True)
-        return [rays.eigenrays(water, sources[:1], z, r, vertices, reflections) for z, r in ends]
+        return [ray_solutions.eigenrays(water, sources[:1], z, r, vertices, reflections) for z, r in ends]
 
     found, seconds = median(many)
     alone, seconds_alone = median(single)
@@ -85,7 +86,7 @@ def searched(layers: int, family: str, vertices: int, reflections: int) -> dict[
     got = rays_of(first).select(some)
     start = np.full(RECEIVERS, sources[0])
     exact = exact_rays(Layers(water.depth, water.speed), got, first.slowness[some], start, receivers, distance)
-    sound = first.flag[some] != rays.CAUSTIC
+    sound = first.flag[some] != ray_solutions.CAUSTIC
     return {
         "layers": layers,
         "family": family,
@@ -109,11 +110,11 @@ def batch(plan: Plan, index: int, bounces: int) -> dict[str, Any]:
     position = pose.to_world(plan.elements.position)
     flat = position[None, :, :2] - legs.point[:, None, :2]
     distance, sensors = np.hypot(flat[..., 0], flat[..., 1]), len(position)
-    water = rays.water(plan.profile.depth, plan.profile.speed, environment.depth)
+    water = ray_solutions.water(plan.profile.depth, plan.profile.speed, environment.depth)
 
-    def search() -> rays.Eigenrays:
+    def search() -> ray_solutions.Eigenrays:
         start, end = np.repeat(depth(legs.point[some]), sensors), np.tile(depth(position), len(some))
-        return rays.eigenrays(water, start, end, distance[some].ravel(), bounces + 1, bounces)
+        return ray_solutions.eigenrays(water, start, end, distance[some].ravel(), bounces + 1, bounces)
 
     found, seconds = median(search, 3)
     (time_on, gain_on), seconds_on = median(lambda: continued(water, made, position, distance))
@@ -151,7 +152,7 @@ def batch(plan: Plan, index: int, bounces: int) -> dict[str, Any]:
 
 
 def continued(
-    water: rays.Water, made: ArrayLegs, position: np.ndarray, distance: np.ndarray
+    water: ray_solutions.Water, made: ArrayLegs, position: np.ndarray, distance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Times (s) and amplitudes (leg, sensor) of the rays to every sensor, each from the one before, by depth."""
     legs = made.legs
@@ -161,7 +162,7 @@ def continued(
     p = np.hypot(legs.departure[:, 0], legs.departure[:, 1]) / np.interp(start, water.depth, water.speed)
     up, vertices = (legs.departure[:, 2] > 0).astype(np.int64), legs.bounces + legs.turning
     times, sines, gains = (np.empty((len(start), len(order))) for _ in range(3))
-    rays_continue.rays_nearby(
+    ray_continuation.rays_nearby(
         water.depth, water.speed, start, p, up, vertices, place[order], ends,
         np.ascontiguousarray(distance[:, order]), times, sines, gains,
     )  # fmt: skip
@@ -179,7 +180,7 @@ def expanded(plan: Plan, made: ArrayLegs) -> tuple[np.ndarray, np.ndarray]:
 
 
 def of_legs(
-    found: rays.Eigenrays, made: ArrayLegs, some: np.ndarray, sensors: int, near: np.ndarray
+    found: ray_solutions.Eigenrays, made: ArrayLegs, some: np.ndarray, sensors: int, near: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Times and amplitudes (leg, sensor) of the rays found that belong to some legs, or NaN: of their family, and
     nearest to a time (leg, sensor) where there are several."""

@@ -21,7 +21,8 @@ import xarray as xr
 import zarr
 
 from benchmarks.frame import RECIPE
-from sonarsynth import config, planning, schedule
+from sonarsynth import planning, schedule
+from sonarsynth.recipe import reading
 from sonarsynth.store import layout_of
 
 ROUNDS = int(os.environ.get("READING_ROUNDS", "3"))
@@ -120,8 +121,8 @@ def bench(path: Path | None = None) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         if path is None:
             path = Path(folder) / "remus.zarr"
-            schedule.build(planning.plan(config.load(RECIPE)), path)
-        arrays = layout_of(planning.plan(config.load(RECIPE))).arrays
+            schedule.build(planning.plan(reading.load(RECIPE)), path)
+        arrays = layout_of(planning.plan(reading.load(RECIPE))).arrays
         some = {"image, range, target": TRAINING, "signals": ("signals/pressure",)}
         some[f"all {len(arrays)} arrays"] = tuple(a.path for a in arrays if not a.empty)
         wanted = plans(arrays[0].shape[0], np.random.default_rng(1))

@@ -7,9 +7,9 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from sonarsynth import config
+from sonarsynth.pipeline import beamform_frame, range_frame, synthesise, trace_frame
 from sonarsynth.planning import Plan, plan
-from sonarsynth.render import beamform_frame, range_frame, synthesise, trace_frame
+from sonarsynth.recipe import reading
 
 RECIPE, FRAMES, SEEN = "configs/thermocline.yaml", (12, 24, 36, 48, 54), (10, 15, 20, 30, 40, 50)
 DIRECT = ["scene.physics.tracing={kind: auto, bounces: 0}", "scene.processing.cancelling=null"]
@@ -35,7 +35,7 @@ def frame(made: Plan, index: int) -> dict[str, float]:
 
 
 def of(settings: list[str]) -> dict[str, float]:
-    made = plan(config.recipe_of(config.read(RECIPE, settings)))
+    made = plan(reading.recipe_of(reading.read(RECIPE, settings)))
     for index in SEEN:  # compiles, and fills the tables that frames share
         frame(made, index)
     rows = [frame(made, index) for index in FRAMES]

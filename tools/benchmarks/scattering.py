@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 import sonarsynth as ss
-from sonarsynth.acoustics.kirchhoff import facet_amplitude
-from sonarsynth.acoustics.kirchhoff_kernels import facet_amplitudes, mesh_amplitude
-from sonarsynth.acoustics.modal import sphere_amplitude
-from sonarsynth.scattering.fineness import CoarseMesh, fine_mesh
-from sonarsynth.world.meshes import mesh_of
+from sonarsynth.equations.scattering.kirchhoff_integral import facet_amplitude
+from sonarsynth.equations.scattering.kirchhoff_kernels import facet_amplitudes, mesh_amplitude
+from sonarsynth.equations.scattering.modal_series import sphere_amplitude
+from sonarsynth.targets.mesh_resolution import CoarseMesh, fine_mesh
+from sonarsynth.targets.meshes import mesh_of
 
 SOUND_SPEED = 1500.0
 BAND = np.linspace(25e3, 110e3, 18)

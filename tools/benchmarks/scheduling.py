@@ -23,8 +23,9 @@ import psutil
 from fault_injection.cluster import Cluster
 from fault_injection.kills import RECIPE
 
-from sonarsynth import config, planning, schedule
+from sonarsynth import planning, schedule
 from sonarsynth.planning import SHARD_FRAMES, Plan
+from sonarsynth.recipe import reading
 
 FRAMES = int(os.environ.get("SCHEDULING_FRAMES", "10000"))
 LOOKED_AT = sorted({FRAMES // 10, FRAMES // 2, FRAMES})
@@ -131,7 +132,7 @@ def apart(made: Plan) -> dict[str, Any]:
 def bench() -> dict[str, Any]:
     """Overhead by two sizes of shard, and memory of every process."""
     text = RECIPE.replace("frames: 40, interval: 0.02", f"frames: {FRAMES}, interval: {0.8 / FRAMES:g}")
-    made = planning.plan(config.loads(text))
+    made = planning.plan(reading.loads(text))
     sizes = sorted({made.shard_frames, SHARD_FRAMES}, reverse=True)
     rows = {f"30 ms, {size} frames a shard": padded(replace(made, shard_frames=size)) for size in sizes}
     return {"frames": FRAMES, **rows, f"apart, {made.shard_frames} frames a shard": apart(made)}

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth import config, store
+from sonarsynth import store
 from sonarsynth.planning import plan
+from sonarsynth.recipe import reading
 from sonarsynth.schedule import build
 from sonarsynth.schedule.repairing import repair
 
@@ -111,7 +112,7 @@ def run(count: int, seed: int, folder: Path | None = None) -> dict[str, Any]:
     random = np.random.default_rng(seed)
     with tempfile.TemporaryDirectory(dir=folder, prefix="faults-") as there:
         path = Path(there) / "small.zarr"
-        build(plan(config.loads(RECIPE)), path, frames=FRAMES, workers=0)
+        build(plan(reading.loads(RECIPE)), path, frames=FRAMES, workers=0)
         whole, kinds = contents(path), file_kinds(path)
         missed, unlike, seconds = [], [], {"verify": 0.0, "repair": 0.0}
         tried: Counter[str] = Counter()

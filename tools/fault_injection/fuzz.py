@@ -16,7 +16,8 @@ import numpy as np
 
 from fault_injection.judging import ACCEPTED, LONG, RECIPE, REFUSED, judge
 from fault_injection.recipes import Case, bases, mutated
-from sonarsynth import config, planning
+from sonarsynth import planning
+from sonarsynth.recipe import reading
 
 WHOLE = 50
 """One in so many is planned with the choices that are made by trying."""
@@ -35,7 +36,7 @@ def judged(cases: list[Case], change: Mutate, count: int, seed: int, folder: Pat
     fields: Counter[str] = Counter()
     failures, most, began, longest = [], 0, time.perf_counter(), 0.0
     for case in cases:  # what they are made from is good, and fills the caches that the processes share
-        planning.plan(config.load(lay(case, kept / "good") / RECIPE), choices=planning.Choices())
+        planning.plan(reading.load(lay(case, kept / "good") / RECIPE), choices=planning.Choices())
         shutil.rmtree(kept / "good")
         outcome = judge(lay(case, kept / "good"))
         if outcome.verdict != ACCEPTED:

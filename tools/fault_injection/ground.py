@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth import config, store
+from sonarsynth import store
 from sonarsynth.description import FieldError
 from sonarsynth.planning import Plan, plan
+from sonarsynth.recipe import reading
 from sonarsynth.schedule import build
 
 from .corrupt import RECIPE, contents
@@ -24,7 +25,7 @@ from .watching import watched
 FRAMES = range(12)
 """What is built: a whole shard and half of another."""
 
-SAID = (store.Mismatch, store.Damage, store.Locked, FieldError, config.RecipeError, OSError)
+SAID = (store.Mismatch, store.Damage, store.Locked, FieldError, reading.RecipeError, OSError)
 """What the command line says in one line."""
 
 
@@ -93,7 +94,7 @@ def on_ground(
 ) -> dict[str, Any]:
     """Run trials, each on a fresh copy. Returns what came of them."""
     with tempfile.TemporaryDirectory(dir=folder, prefix="faults-") as there:
-        made = plan(config.loads(RECIPE), frozenset({"image"}))
+        made = plan(reading.loads(RECIPE), frozenset({"image"}))
         ground = Ground(Path(there).resolve(), made, np.random.default_rng(seed))
         build(made, ground.folder / "whole.zarr", frames=FRAMES, workers=0)
         ground.whole = contents(ground.folder / "whole.zarr")

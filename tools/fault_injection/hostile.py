@@ -7,11 +7,12 @@ import os
 from pathlib import Path
 from typing import Any
 
-from sonarsynth import cards, store
+from sonarsynth import store
 from sonarsynth.schedule import build
 from sonarsynth.schedule.repairing import repair
+from sonarsynth.store import cards
+from sonarsynth.store.files.place import record
 from sonarsynth.store.marks import Mark, load_layout, load_mark, save_mark
-from sonarsynth.store.place import record
 
 from .ground import FRAMES, Ground, on_ground
 

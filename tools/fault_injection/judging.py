@@ -26,10 +26,11 @@ from typing import Any
 
 import typer
 
-from sonarsynth import cli, config, planning, schedule, store
+from sonarsynth import cli, planning, schedule, store
 from sonarsynth.cli import printing
 from sonarsynth.cli.running import run
 from sonarsynth.description import FieldError
+from sonarsynth.recipe import reading
 
 SECONDS = 10
 """Of the processor until a recipe is accepted or refused; six times as long by the clock: machines are busy."""
@@ -203,7 +204,7 @@ def _planner(plans: list[planning.Plan], told: mmap.mmap, whole: bool) -> Any:
 def _survives(made: planning.Plan) -> bool:
     """Whether the recipe as written into a store is the same when it is read back, and the store can be described."""
     store.layout_of(made)
-    return config.loads(config.dump(made.recipe)) == made.recipe and bool(made.digest)
+    return reading.loads(reading.dump(made.recipe)) == made.recipe and bool(made.digest)
 
 
 def _read(file: Any) -> str:

@@ -24,9 +24,10 @@ from typing import Any
 
 from fault_injection.cluster import Cluster
 from fault_injection.processes import LONGEST, end_hung, ended, fork, kill_worker, strike, wait
-from sonarsynth import config, planning, schedule, store
+from sonarsynth import planning, schedule, store
+from sonarsynth.recipe import reading
+from sonarsynth.store.files.place import record
 from sonarsynth.store.marks import ABSENT, all_files, load_mark, marked
-from sonarsynth.store.place import record
 from sonarsynth.store.provenance import PROVENANCE
 
 RECIPE = """\
@@ -127,7 +128,7 @@ def run(count: int, seed: int) -> dict[str, Any]:
 
 
 def _undisturbed(recipe: Path, path: Path) -> Undisturbed:
-    plan = planning.plan(config.load(recipe))
+    plan = planning.plan(reading.load(recipe))
     schedule.build(plan, path, frames=[0], workers=0)  # compiles
     shutil.rmtree(path)
     report = schedule.build(plan, path, workers=0)

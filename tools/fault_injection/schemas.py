@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth import config
+from sonarsynth.recipe import reading
 
 Schema = dict[str, Any]
 MOST_DEPTH = 6
@@ -18,7 +18,7 @@ EXPONENTS = (-300, -30, -12, -6, -3, -1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 9, 12, 15, 3
 @lru_cache(maxsize=1)
 def whole() -> Schema:
     """The schema of a recipe."""
-    return config.schema()
+    return reading.schema()
 
 
 def resolved(schema: Schema) -> Schema:

@@ -1,0 +1,230 @@
+"""A frame the slow, exact way, echoes and direct arrivals apart, in float64: from its description alone, by code that
+shares nothing with tracing and synthesis (`references.frame_pressure`), which all errors of signals are against; and
+every hydrophone traced by itself, every path, which is where every knob of tracing tends to."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sonarsynth.accuracy.rows import Point
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.imaging import DenseDelayAndSum
+from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start
+from sonarsynth.products import Arrivals
+from sonarsynth.propagation import Refracted, Straight
+from sonarsynth.ranging import RefractedRange
+from sonarsynth.receiver import Elements
+from sonarsynth.receiver.subarrays import subarray
+from sonarsynth.recipe.scene import Frame
+from sonarsynth.signals import DirectSum, KernelDeposit
+from sonarsynth.signals.auto_synthesis import deposit_for
+from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.validation.references.frames.frame_pressure import FramePressure
+
+SMALL = 1e-3
+"""Error of the exact way's synthesis, over what is allowed."""
+AFFORDED = 30.0
+"""s: where tracing to every hydrophone would take longer, only `SOME` are."""
+COMPUTED = 10.0
+"""s: so many hydrophones are computed from the description alone as this affords, from `FEWEST` to `SOME`."""
+FEWEST, SOME = 4, 24
+TRIED = 3
+"""Hydrophones that are timed first."""
+CHECKED_HYDROPHONES, CHECKED_PATHS = 2, 200
+"""What the exact way's synthesis is itself compared with `DirectSum` on."""
+
+Heard = tuple[Floats, Floats]
+"""Echoes, and direct arrivals (hydrophone, sample), Pa."""
+
+
+@dataclass(frozen=True, eq=False)
+class Each:
+    """What hydrophones hear, each traced by itself."""
+
+    sensor: Ints  # (heard,) live hydrophones, ascending
+    heard: Heard
+    seconds: tuple[float, float]  # tracing and synthesis of all live hydrophones; estimated where not all are heard
+
+    def at(self, sensor: Ints) -> Heard:
+        """What some of them hear."""
+        rows = np.searchsorted(self.sensor, sensor)
+        return self.heard[0][rows], self.heard[1][rows]
+
+
+@dataclass(frozen=True, eq=False)
+class Exact:
+    """What hydrophones of a frame hear, exactly."""
+
+    plan: Plan  # that of the frame's sequence
+    frame: Frame
+    sensor: Ints  # (heard,) live hydrophones, ascending; some of those of `each`
+    heard: Heard  # from the description alone, where its laws are known there
+    seconds: float  # of that, of all live hydrophones: estimated
+    each: Each
+    note: str = ""  # why it is not from the description alone
+
+    @property
+    def whole(self) -> bool:
+        """Whether every live hydrophone is traced by itself."""
+        return len(self.each.sensor) == int(np.count_nonzero(self.plan.elements.gain))
+
+    @property
+    def partly(self) -> str:
+        """At how many hydrophones signals are compared; nothing where at all."""
+        all_of_them = len(self.sensor) == int(np.count_nonzero(self.plan.elements.gain))
+        return "; ".join(n for n in ("" if all_of_them else f"at {len(self.sensor)} hydrophones", self.note) if n)
+
+    @property
+    def pressure(self) -> Floats:
+        """(sensor, sample) Pa: everything, at all hydrophones, each traced by itself; 0 at dead ones."""
+        out = np.zeros((self.plan.elements.count, self.plan.windows.samples))
+        out[self.each.sensor] = self.each.heard[0] + self.each.heard[1]
+        return out
+
+
+def exact_plan(plan: Plan) -> Plan:
+    """The plan (that of a sequence) with everything done the slow, exact way."""
+    bounces = plan.propagation.bounces
+    paths = Straight(bounces=bounces) if plan.profile.uniform else Refracted(bounces=bounces)
+    image, range_ = plan.choices.beamforming, plan.choices.ranging
+    profile = range_.profile if isinstance(range_, RefractedRange) else None
+    choices = Choices(
+        subarrays=plan.elements.count,
+        degree=5,
+        visibility="hydrophones",
+        negligible=0.0,
+        synthesis=golden(plan),
+        beamforming=DenseDelayAndSum(focus=image.focus, shading=image.shading),
+        ranging=RefractedRange(
+            threshold=range_.threshold, locality=range_.locality, focus=range_.focus, profile=profile
+        ),
+    )
+    return replace(plan, propagation=paths, choices=choices)
+
+
+def golden(plan: Plan, finer: float = 1.0) -> KernelDeposit:
+    """The synthesis of the exact way: in float64, and checked against `DirectSum`; finer by a factor where wanted."""
+    return replace(deposit_for(finer * SMALL * plan.recipe.accuracy.signal), precision="float64")
+
+
+def exact_frame(plan: Plan, index: int, hydrophones: int | None = None) -> Exact:
+    """A frame at so many hydrophones, spread over the array; left out: at all, or those that can be afforded."""
+    plan = plan.at(index)
+    frame = plan.recipe.frame(index)[1]
+    each = each_hydrophone(exact_plan(plan), frame, hydrophones)
+    alone = FramePressure(plan.scene, frame, plan.profile)
+    if alone.unknown:
+        return Exact(plan, frame, each.sensor, each.heard, sum(each.seconds), each, alone.unknown)
+    start, samples, live = frame_start(plan, frame), plan.windows.samples, int(np.count_nonzero(plan.elements.gain))
+    rows: dict[int, Heard] = {}
+    began = time.process_time()
+    for sensor in spread(each.sensor, min(TRIED, len(each.sensor))):
+        rows[int(sensor)] = alone.pressure([int(sensor)], start, samples)
+    mean = (time.process_time() - began) / len(rows)
+    wanted = len(each.sensor)
+    if hydrophones is None:
+        wanted = min(wanted, int(np.clip(COMPUTED / max(mean, 1e-3), FEWEST, SOME)))
+    chosen = each.sensor if wanted == len(each.sensor) else np.union1d(list(rows), spread(each.sensor, wanted))
+    for sensor in chosen:
+        if int(sensor) not in rows:
+            rows[int(sensor)] = alone.pressure([int(sensor)], start, samples)
+    seconds = (time.process_time() - began) / len(rows) * live
+    heard = (np.vstack([rows[int(n)][0] for n in chosen]), np.vstack([rows[int(n)][1] for n in chosen]))
+    return Exact(plan, frame, chosen, heard, seconds, each)
+
+
+def each_hydrophone(plan: Plan, frame: Frame, hydrophones: int | None = None, some: Ints | None = None) -> Each:
+    """So many hydrophones of a frame, each traced by itself with the choices of a plan, by the exact synthesis; left
+    out: all, or those that can be afforded. some (heard,): these."""
+    live = np.flatnonzero(plan.elements.gain)
+    rows: dict[int, tuple[Heard, float, float]] = {}
+
+    def hear(sensor: int) -> None:
+        if sensor not in rows:
+            part = subarray(plan.elements, np.array([sensor]))
+            began = time.process_time()
+            arrivals = arrivals_of(plan, frame, part)
+            traced = time.process_time()
+            made = pressures(plan, frame, arrivals, part.elements, golden(plan))
+            rows[sensor] = made, traced - began, time.process_time() - traced
+
+    chosen = some
+    if chosen is None:
+        wanted = len(live) if hydrophones is None else min(hydrophones, len(live))
+        first = spread(live, min(TRIED, wanted))
+        for sensor in first:
+            hear(int(sensor))
+        if hydrophones is None and _mean(rows) * len(live) > AFFORDED:
+            wanted = min(SOME, len(live))
+        chosen = live if wanted == len(live) else np.union1d(first, spread(live, wanted))
+    for sensor in chosen:
+        hear(int(sensor))
+    found = [rows[int(sensor)] for sensor in chosen]
+    heard = (np.vstack([r[0][0] for r in found]), np.vstack([r[0][1] for r in found]))
+    typical = (float(np.median([r[n] for r in found])) * len(live) for n in (1, 2))  # the first may compile
+    return Each(chosen, heard, (next(typical), next(typical)))
+
+
+def _mean(rows: dict[int, tuple[Heard, float, float]]) -> float:
+    """Seconds of a hydrophone, without the slowest."""
+    seconds = sorted(traced + made for _, traced, made in rows.values())
+    return sum(seconds[: max(len(seconds) - 1, 1)]) / max(len(seconds) - 1, 1)
+
+
+def spread(live: Ints, count: int) -> Ints:
+    """So many of the live hydrophones, spread by golden ratio, ascending; not those that a planner measures at."""
+    turns = np.mod((np.arange(count) + 0.23) * 0.6180339887498949, 1.0)
+    return np.unique(live[np.floor(turns * len(live)).astype(int)])
+
+
+def pressures(
+    plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements, method: KernelDeposit | DirectSum
+) -> Heard:
+    """Echoes and direct arrivals (element, sample) in Pa, each by itself."""
+    start, samples = frame_start(plan, frame), plan.windows.samples
+    sonar, snaps = plan.scene.sonar, frame.moment.snaps
+    make = method.pressure if isinstance(method, KernelDeposit) else exact_signals
+    echoes, direct = (
+        make(arrivals.select(some), snaps, elements, sonar, plan.absorption, start, samples)[0]
+        for some in (~arrivals.direct, arrivals.direct)
+    )
+    return np.asarray(echoes, float), np.asarray(direct, float)
+
+
+def differences(found: Sequence[Floats], exact: Sequence[Floats]) -> tuple[float, float]:
+    """Errors of echoes or of direct arrivals, whichever errs more: root of the summed squares, relative; and the
+    largest over the peak."""
+    square, largest = 0.0, 0.0
+    for a, b in zip(found, exact, strict=True):
+        if b.any():
+            square = max(square, float(np.linalg.norm(a - b) / np.linalg.norm(b)))
+            largest = max(largest, float(np.abs(a - b).max() / np.abs(b).max()))
+    return square, largest
+
+
+def synthesis_check(exact: Exact) -> Point:
+    """The exact way's synthesis against `DirectSum`: at a few hydrophones, on the loudest path and some others."""
+    plan, frame = exact.plan, exact.frame
+    sensor = exact.sensor[:: max(len(exact.sensor) // CHECKED_HYDROPHONES, 1)][:CHECKED_HYDROPHONES]
+    part = subarray(plan.elements, sensor)
+    arrivals = arrivals_of(exact_plan(plan), frame, part)
+    echoes = np.flatnonzero(~arrivals.direct)
+    some = echoes[np.linspace(0, len(echoes) - 1, min(CHECKED_PATHS, len(echoes))).astype(int)]
+    arrivals = arrivals.select(np.concatenate([np.flatnonzero(arrivals.direct), some]))
+    made = [pressures(plan, frame, arrivals, part.elements, method) for method in (golden(plan), DirectSum())]
+    error, largest = differences(*made)
+    return Point(
+        stage="synthesis",
+        knob="the exact way's",
+        setting="against DirectSum",
+        error=error,
+        unit="relative",
+        allowed=0.1 * plan.recipe.accuracy.signal,
+        seconds=exact.each.seconds[1],
+        role="check",
+        also={"largest": largest, "hydrophones": len(sensor), "paths": len(arrivals.delay)},
+    )

@@ -1,0 +1,54 @@
+"""What the accuracy of a recipe leaves: its rows as JSON, and a picture of the frontiers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from math import isfinite
+from pathlib import Path
+from typing import Final
+
+from sonarsynth.accuracy import Measured
+from sonarsynth.accuracy.rows import Point
+from sonarsynth.pictures.accuracy_figures.frontier_figure import Line, Panel, frontier_figure
+
+TITLES: Final = {
+    "trace": "signals: tracing and synthesis, by how paths are traced",
+    "synthesis": "synthesis of the traced paths",
+    "image": "image: beams within 20 dB of the brightest, root mean square",
+    "range": "cloud: largest error of a range by the method",
+}
+
+
+def write(measured: Measured, out: Path, name: str = "recipe") -> list[Path]:
+    """Write <name>.json and <name>.png into a folder; their paths."""
+    out.mkdir(parents=True, exist_ok=True)
+    files = [out / f"{name}.json", out / f"{name}.png"]
+    files[0].write_text(json.dumps(measured.as_json(), indent=2, allow_nan=False) + "\n")
+    panels = [panel for stage in TITLES if (panel := _panel(stage, measured.points)) is not None]
+    if not panels:
+        return files[:1]
+    frames = ", ".join(str(n) for n in measured.frames)
+    note = (
+        f"Frames {frames}; {measured.hydrophones} hydrophones heard exactly. Errors are the largest of the frames, "
+        "times their mean. What errs by nothing lies on the dotted line."
+    )
+    frontier_figure(f"{measured.title}: error against run time", panels, note).savefig(files[1])
+    return files
+
+
+def _panel(stage: str, points: Sequence[Point]) -> Panel | None:
+    """The panel of a stage; None where it was not walked."""
+    mine = [p for p in points if p.stage == stage and p.role != "check" and isfinite(p.error)]
+    chosen = next((p for p in mine if p.chosen), None)
+    if chosen is None:
+        return None
+    lines = []
+    for role in ("point", "peer"):
+        some = [p for p in mine if p.role == role]
+        for knob in dict.fromkeys(p.knob for p in some if p.knob != "chosen"):
+            of = [p for p in some if p.knob == knob]
+            if role == "point" and not any(p.chosen for p in of) and len(of) > 1 and stage != "synthesis":
+                of = [*of, chosen]
+            lines.append(Line(knob, tuple(1e3 * p.seconds for p in of), tuple(p.error for p in of), role == "peer"))
+    return Panel(TITLES[stage], chosen.unit, chosen.allowed, tuple(lines), (1e3 * chosen.seconds, chosen.error))

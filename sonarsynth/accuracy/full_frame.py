@@ -1,0 +1,125 @@
+"""A whole frame: the plan's choices, all of them, against everything done exactly."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonarsynth.accuracy.exact_frame import Exact, differences, exact_plan, pressures
+from sonarsynth.accuracy.image_knobs import apart, cloud_of, imaged, off_by
+from sonarsynth.accuracy.rows import Point, timed
+from sonarsynth.accuracy.tracing_knobs import Traced
+from sonarsynth.pipeline import Heard, process, record
+from sonarsynth.planning import frame_start
+from sonarsynth.products import Signals
+
+
+@dataclass(frozen=True, eq=False)
+class Whole:
+    """What the sonar makes of a frame, of the plan's signals and of exact ones."""
+
+    exact: Exact
+    heard: Heard  # the plan's way
+    seconds: float  # CPU of locating and all else that nothing is chosen for
+
+    @staticmethod
+    def of(exact: Exact, signals: Signals) -> Whole:
+        """Process the plan's signals (without noise)."""
+        plan, frame = exact.plan, exact.frame
+        recorded = record(plan, frame, signals)
+        heard = process(plan, frame, recorded)
+        locating = plan.scene.processing.locating
+        environment, sonar = plan.scene.world.environment, plan.scene.sonar
+        _, seconds = timed(
+            lambda: locating.locate(
+                recorded,
+                plan.elements,
+                sonar,
+                frame.sonar_pose,
+                environment.depth,
+                plan.sizes["snap"],
+                plan.profile,
+            )
+        )
+        return Whole(exact, heard, seconds)
+
+
+def whole_points(whole: Whole, traced: Traced, seconds: float) -> Iterator[Point]:
+    """Signals, image and cloud of the plan against exact ones; seconds: of the plan's whole frame.
+
+    Image and cloud are compared with those of every hydrophone traced by itself, where all were. Noise is the same in
+    both.
+    """
+    exact, plan, accuracy = whole.exact, whole.exact.plan, whole.exact.plan.recipe.accuracy
+    found = _signals(exact, traced)
+    error, largest = differences(found, exact.heard)
+    yield Point(
+        stage="frame",
+        knob="signals",
+        setting="the plan",
+        error=error,
+        unit="relative",
+        allowed=accuracy.signal,
+        seconds=seconds,
+        chosen=True,
+        also={"largest": largest, "hydrophones": len(exact.sensor)},
+        note=exact.partly,
+    )
+    if not (exact.whole and imaged(whole.heard)):
+        return
+    slow, frame = exact_plan(plan), exact.frame
+    rate, start = plan.scene.sonar.sampling_frequency, frame_start(plan, frame)
+    signals = Signals(exact.pressure.astype(np.float32), start, rate, 0.0, 0, 0)
+    began = time.process_time()
+    best = process(slow, frame, record(plan, frame, signals))
+    if not imaged(best):
+        return
+    cloud = cloud_of(slow, frame, best, slow.choices.ranging)
+    slowest = time.process_time() - began + sum(exact.each.seconds)
+    yield Point("frame", "exact", "everything exact", 0.0, "relative", accuracy.signal, slowest)
+    assert whole.heard.image is not None and best.image is not None
+    off = off_by(whole.heard.image.energy, best.image.energy)
+    yield Point(
+        stage="frame",
+        knob="image",
+        setting="the plan",
+        error=float(np.sqrt(np.mean(off**2))),
+        unit="dB",
+        allowed=accuracy.image_db,
+        seconds=seconds,
+        chosen=True,
+        also={"largest_db": float(np.abs(off).max(initial=0.0)), "beams": len(off)},
+    )
+    metres, angle, alone = apart(cloud_of(plan, frame, whole.heard, plan.choices.ranging), cloud)
+    yield Point(
+        stage="frame",
+        knob="range",
+        setting="the plan",
+        error=float(np.median(metres)) if len(metres) else 0.0,
+        unit="m",
+        allowed=accuracy.range_m,
+        seconds=seconds,
+        chosen=True,
+        also={
+            "largest": float(np.max(metres, initial=0.0)),
+            "direction_rad": float(np.max(angle, initial=0.0)),
+            "points": len(metres),
+            "in_one_alone": alone,
+        },
+        note="median: a beam may take another of its echoes",
+    )
+
+
+def _signals(exact: Exact, traced: Traced) -> tuple[np.ndarray, np.ndarray]:
+    """Echoes and direct arrivals (heard, sample) by the plan's own synthesis."""
+    out = tuple(np.zeros((len(exact.sensor), exact.plan.windows.samples)) for _ in range(2))
+    for part, arrivals in traced.pieces:
+        rows = np.flatnonzero(np.isin(exact.sensor, part.sensor))
+        own = np.searchsorted(part.sensor, exact.sensor[rows])
+        made = pressures(exact.plan, exact.frame, arrivals, part.elements, exact.plan.choices.synthesis)
+        for total, one in zip(out, made, strict=True):
+            total[rows] = one[own]
+    return out[0], out[1]

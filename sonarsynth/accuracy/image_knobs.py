@@ -1,0 +1,169 @@
+"""Knobs of the image and of the cloud: how beams are focused, and how delays become places."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.accuracy.exact_frame import exact_plan
+from sonarsynth.accuracy.rows import Point, timed
+from sonarsynth.conventions import Floats
+from sonarsynth.imaging import FocusedDelayAndSum
+from sonarsynth.pipeline import Heard
+from sonarsynth.planning import Plan
+from sonarsynth.products import Bearings, EnergyImage, PointCloud
+from sonarsynth.ranging import IsovelocityRange, RefractedRange
+from sonarsynth.recipe.scene import Frame
+
+BRIGHT = 20.0
+"""dB under the brightest beam: beams that count."""
+ZONES = (1, 2, 4, 8, 16)
+
+
+def image_points(plan: Plan, heard: Heard) -> Iterator[Point]:
+    """Walk the beamformers on the signals of a frame; nothing where it has no image."""
+    chosen: Any = plan.choices.beamforming
+    slow = exact_plan(plan).choices.beamforming
+    if not imaged(heard):
+        return
+    exact, slowest = timed(lambda: image_of(plan, heard, slow))
+    settings: list[tuple[str, str, Any]] = []
+    if plan.elements.on_lattice:
+        fast: Any = FocusedDelayAndSum(focus=chosen.focus, shading=chosen.shading)
+        if any(f.name == "zones" for f in fields(fast)):
+            settings += [("zones", f"{n} zones", replace(fast, zones=n)) for n in ZONES]
+        else:
+            settings += [("focus", "focused", fast)]
+        if chosen.focus is not None:
+            settings += [("focus", "plane waves", replace(fast, focus=None))]
+    for knob, setting, method in [("chosen", named(chosen), chosen), *settings]:
+        if knob != "chosen" and method == chosen:
+            continue
+        if method == slow:
+            made, seconds = exact, slowest
+        else:
+            made, seconds = timed(partial(image_of, plan, heard, method))
+        yield image_point(plan, made.energy, exact.energy, knob, setting, seconds, chosen=knob == "chosen")
+    if chosen != slow:
+        yield image_point(plan, exact.energy, exact.energy, "exact", "dense", slowest)
+
+
+def named(method: Any) -> str:
+    """A beamformer in a few words."""
+    zones = getattr(method, "zones", None)
+    return f"{method.kind}, {zones} zones" if zones is not None else str(method.kind)
+
+
+def imaged(heard: Heard) -> bool:
+    """Whether a frame has an image."""
+    return heard.image is not None and bool(np.isfinite(heard.image.start))
+
+
+def image_of(plan: Plan, heard: Heard, method: Any) -> EnergyImage:
+    """The image of what a frame heard, by a method."""
+    assert heard.image is not None and heard.imaged is not None
+    made: EnergyImage = method.image(heard.imaged, plan.elements, plan.scene.sonar, heard.image.start, heard.image.stop)
+    return made
+
+
+def off_by(energy: npt.NDArray[Any], exact: npt.NDArray[Any]) -> Floats:
+    """Errors (beam,) in dB of the beams that count: those within `BRIGHT` dB of the brightest."""
+    bright = exact >= 10.0 ** (-BRIGHT / 10.0) * exact.max()
+    with np.errstate(divide="ignore"):
+        return np.asarray(10.0 * np.log10(np.asarray(energy, float)[bright] / np.asarray(exact, float)[bright]))
+
+
+def image_point(
+    plan: Plan,
+    energy: npt.NDArray[Any],
+    exact: npt.NDArray[Any],
+    knob: str,
+    setting: str,
+    seconds: float,
+    *,
+    chosen: bool = False,
+) -> Point:
+    """A row of the image stage."""
+    error = off_by(energy, exact)
+    return Point(
+        stage="image",
+        knob=knob,
+        setting=setting,
+        error=float(np.sqrt(np.mean(error**2))) if len(error) else 0.0,
+        unit="dB",
+        allowed=plan.recipe.accuracy.image_db,
+        seconds=seconds,
+        chosen=chosen,
+        also={"largest_db": float(np.abs(error).max(initial=0.0)), "beams": len(error)},
+    )
+
+
+def range_points(plan: Plan, frame: Frame, heard: Heard) -> Iterator[Point]:
+    """Walk the methods of ranging on the image of a frame; nothing where it has none."""
+    chosen, slow = plan.choices.ranging, exact_plan(plan).choices.ranging
+    if not imaged(heard):
+        return
+    exact, slowest = timed(lambda: cloud_of(plan, frame, heard, slow))
+    closed = IsovelocityRange(threshold=chosen.threshold, locality=chosen.locality, focus=chosen.focus)
+    for method in dict.fromkeys((chosen, closed, slow)):
+        if method == slow:
+            made, seconds = exact, slowest
+        else:
+            made, seconds = timed(partial(cloud_of, plan, frame, heard, method))
+        yield range_point(plan, made, exact, method, seconds, chosen=method == chosen)
+
+
+def cloud_of(plan: Plan, frame: Frame, heard: Heard, method: IsovelocityRange | RefractedRange) -> PointCloud:
+    """The point cloud of what a frame heard, by a method."""
+    assert heard.image is not None and heard.imaged is not None and heard.bearings is not None
+    bearings: Bearings = heard.bearings
+    return method.cloud(
+        heard.imaged,
+        heard.image,
+        bearings,
+        plan.elements,
+        plan.scene.sonar,
+        frame.sonar_pose,
+        plan.profile,
+        heard.signals,
+    )
+
+
+def range_point(
+    plan: Plan, cloud: PointCloud, exact: PointCloud, method: Any, seconds: float, *, chosen: bool = False
+) -> Point:
+    """A row of the range stage."""
+    metres, angle, alone = apart(cloud, exact)
+    return Point(
+        stage="range",
+        knob="method",
+        setting=method.kind,
+        error=float(np.max(metres, initial=0.0)),
+        unit="m",
+        allowed=plan.recipe.accuracy.range_m,
+        seconds=seconds,
+        chosen=chosen,
+        also={
+            "median": float(np.median(metres)) if len(metres) else 0.0,
+            "direction_rad": float(np.max(angle, initial=0.0)),
+            "points": len(metres),
+            "in_one_alone": alone,
+        },
+    )
+
+
+def apart(cloud: PointCloud, exact: PointCloud) -> tuple[Floats, Floats, int]:
+    """Differences of the points that two clouds share, in range (point,) m and direction (point,) rad; and how many
+    points are in one of them alone."""
+    there, here = (np.isfinite(c.range) for c in (exact, cloud))
+    both = there & here
+    a, b = (np.asarray(c.position[both], float) for c in (cloud, exact))
+    across = np.linalg.norm(np.cross(a, b), axis=1)
+    angle = np.arctan2(across, np.einsum("pi,pi->p", a, b))
+    metres = np.abs(np.asarray(cloud.range[both], float) - exact.range[both])
+    return metres, angle, int(np.count_nonzero(there ^ here))

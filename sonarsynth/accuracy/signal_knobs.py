@@ -1,0 +1,142 @@
+"""Knobs of the synthesis: width, tolerance, precision and oversampling of the deposit, and the direct sum."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from sonarsynth.accuracy.exact_frame import Heard, differences, golden, pressures
+from sonarsynth.accuracy.rows import Point
+from sonarsynth.accuracy.tracing_knobs import Traced
+from sonarsynth.planning import frame_start
+from sonarsynth.receiver.subarrays import subarray
+from sonarsynth.signals import DirectSum, KernelDeposit
+from sonarsynth.signals.auto_synthesis import PRECISIONS, deposit_for, kernel_error
+from sonarsynth.signals.direct_sum import exact_signals
+
+WIDEST = 14
+OVER_KERNEL = (1.0, 10.0, 100.0)
+"""Tolerances that are walked with each width, over the error of its kernel."""
+FROM, TO = 1e-3, 30.0
+"""Tolerances are walked from here to there, over the error that is allowed."""
+OVERSAMPLINGS = (1.25, 2.0)
+AUTO = tuple(10.0**e for e in (-1.5, -2, -2.5, -3, -3.5, -4, -5, -6, -7))
+"""Errors that the planner's own choice is walked over."""
+FINER = 0.01
+"""Error of what is compared with, over that of the exact way's synthesis."""
+SUMMED_HYDROPHONES, SUMMED_PATHS = (1, 8), 50
+"""What the direct sum is timed on."""
+
+Method = KernelDeposit | DirectSum
+
+
+def synthesis_points(traced: Traced) -> Iterator[Point]:
+    """Walk the knobs of the synthesis on the arrivals that the plan's choices give."""
+    plan, chosen = traced.plan, traced.plan.choices.synthesis
+    finest = golden(plan, FINER)
+    exact = [_heard(traced, finest, n) for n in range(len(traced.few))]
+    yield _point(traced, exact, chosen, "chosen", chosen=True)
+    if isinstance(chosen, KernelDeposit):
+        for knob, method in _settings(chosen, plan.recipe.accuracy.signal):
+            yield _point(traced, exact, method, knob)
+    if len(traced.few[0][1].delay):
+        yield direct_sum_point(traced)
+
+
+def _settings(chosen: KernelDeposit, allowed: float) -> Iterator[tuple[str, KernelDeposit]]:
+    """Every setting that is walked, with the name of its knob."""
+    seen = {chosen}
+    for knob, method in (
+        *(("auto", deposit_for(error)) for error in AUTO),
+        *(
+            (f"width {width}, {precision}", _rounded(replace(chosen, width=width, precision=precision), times))
+            for precision, least in zip(PRECISIONS, (4, 8), strict=True)
+            for width in range(least, WIDEST + 1, 2)
+            for times in OVER_KERNEL
+        ),
+        *(("oversampling", replace(chosen, oversampling=times)) for times in OVERSAMPLINGS),
+        ("precision", replace(chosen, precision="float64" if chosen.precision == "float32" else "float32")),
+    ):
+        fits = FROM * allowed <= method.tolerance <= TO * allowed
+        if method not in seen and fits and (method.precision == "float64" or method.tolerance > 1e-7):
+            seen.add(method)
+            yield knob, method
+
+
+def _rounded(method: KernelDeposit, times: float) -> KernelDeposit:
+    """A method with a tolerance of so many times the error of its kernel."""
+    wanted = times * kernel_error(method.width, method.oversampling)
+    return replace(method, tolerance=float(f"{min(max(wanted, 1e-10), 0.05):.0e}"))
+
+
+def _heard(traced: Traced, method: Method, n: int) -> Heard:
+    part, arrivals = traced.few[n]
+    return pressures(traced.plan, traced.frame, arrivals, part.elements, method)
+
+
+def _point(traced: Traced, exact: list[Heard], method: Method, knob: str, *, chosen: bool = False) -> Point:
+    plan, few = traced.plan, traced.few
+    made = [_heard(traced, method, n) for n in range(len(few))]
+    error, largest = differences(
+        [np.vstack([m[n] for m in made]) for n in (0, 1)], [np.vstack([e[n] for e in exact]) for n in (0, 1)]
+    )
+    seconds = replace(traced, plan=replace(plan, choices=replace(plan.choices, synthesis=method))).synthesis_seconds()
+    return Point(
+        stage="synthesis",
+        knob=knob,
+        setting=named(method),
+        error=error,
+        unit="relative",
+        allowed=plan.recipe.accuracy.signal,
+        seconds=seconds,
+        chosen=chosen,
+        also={"largest": largest},
+        note="" if len(few) == traced.parts else f"on {len(few)} of {traced.parts} parts",
+    )
+
+
+def named(method: Method) -> str:
+    """A method in a few words."""
+    if not isinstance(method, KernelDeposit):
+        return "direct sum"
+    return f"width {method.width}, {method.tolerance:g}, {method.precision}, x {method.oversampling:g}"
+
+
+def direct_sum_point(traced: Traced) -> Point:
+    """The direct sum: no error; its cost from a few hydrophones and paths."""
+    plan, (part, arrivals) = traced.plan, traced.few[0]
+    arrivals = arrivals.at_centre  # they have as many terms at hydrophones that miss some
+    some = np.linspace(0, len(arrivals.delay) - 1, min(SUMMED_PATHS, len(arrivals.delay))).astype(int)
+    start, samples = frame_start(plan, traced.frame), plan.windows.samples
+    seconds = []
+    for count in SUMMED_HYDROPHONES:
+        elements = subarray(part.elements, np.resize(np.arange(part.elements.count), count)).elements
+        began = time.process_time()
+        exact_signals(
+            arrivals.select(some),
+            traced.frame.moment.snaps,
+            elements,
+            plan.scene.sonar,
+            plan.absorption,
+            start,
+            samples,
+        )
+        seconds.append(time.process_time() - began)
+    few, more = SUMMED_HYDROPHONES
+    each = max(seconds[1] - seconds[0], 0.0) / (more - few)  # of a hydrophone; the pulses' spectra serve all
+    live = int(np.count_nonzero(plan.elements.gain))
+    once = max(seconds[0] - few * each, 0.0)
+    return Point(
+        stage="synthesis",
+        knob="direct sum",
+        setting="direct sum",
+        error=0.0,
+        unit="relative",
+        allowed=plan.recipe.accuracy.signal,
+        seconds=(once * traced.parts + each * live) * len(arrivals.delay) / len(some),
+        chosen=isinstance(plan.choices.synthesis, DirectSum),
+        note=f"cost from {len(some)} paths at {few} and {more} hydrophones",
+    )

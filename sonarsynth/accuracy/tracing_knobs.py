@@ -1,0 +1,229 @@
+"""Knobs of tracing: into how many parts the array is cut, how faint paths may be, and whether rays bend.
+
+A knob is varied with all others exact, so that what they leave out does not hide it: its errors, against the frame from
+its description alone, tend to that of every hydrophone traced by itself. What would cost less than the plan's choice is
+measured with the rest as chosen, too.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import takewhile
+
+import numpy as np
+
+from sonarsynth.accuracy.exact_frame import (
+    Each,
+    Exact,
+    Heard,
+    differences,
+    each_hydrophone,
+    exact_plan,
+    golden,
+    pressures,
+)
+from sonarsynth.accuracy.rows import Point, timed
+from sonarsynth.conventions import Ints
+from sonarsynth.planning import Plan, arrivals_of, frame_start
+from sonarsynth.products import Arrivals
+from sonarsynth.propagation import Refracted, Straight
+from sonarsynth.receiver.subarrays import Subarray, subarrays, with_rim
+from sonarsynth.recipe.scene import Frame
+
+FAINTEST = (30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 100.0)
+"""dB: levels under which the faintest echoes of each target are left out."""
+TIMED = 6
+"""Parts that the synthesis is timed on."""
+FINER = 0.05
+"""Where a cut errs by so much of what is allowed, finer ones are not walked."""
+EACH = 3
+"""Hydrophones at which what is traced to each by itself is compared."""
+LONGEST, SLOWER = 3.0, 4.0
+"""Cuts that would take longer a frame than so many s, and so many times the plan's own, are not walked."""
+
+
+@dataclass(frozen=True, eq=False)
+class Traced:
+    """A frame traced to those parts of an array that hold some hydrophones."""
+
+    plan: Plan
+    frame: Frame
+    pieces: tuple[tuple[Subarray, Arrivals], ...]
+    parts: int  # of the whole array
+    seconds: float  # of all parts; and of the whole array, which truth and ledger need
+
+    @staticmethod
+    def of(plan: Plan, frame: Frame, sensor: Ints) -> Traced:
+        """Trace with the subarrays, the faintest paths and the propagation of a plan (that of the sequence)."""
+        count, elements = plan.choices.subarrays, plan.elements
+        whole, seconds = timed(lambda: arrivals_of(plan, frame))
+        if count == 1:
+            every = Subarray(np.arange(elements.count), np.zeros(3), elements)
+            return Traced(plan, frame, ((every, whole),), 1, seconds)
+        parts = subarrays(elements, count)
+        needed = [part for part in parts if np.isin(part.sensor, sensor).any()]
+        began = time.process_time()
+        pieces = tuple((part, arrivals_of(plan, frame, part)) for part in needed)
+        of_parts = (time.process_time() - began) / len(needed) * len(parts)
+        return Traced(plan, frame, pieces, len(parts), seconds + of_parts)
+
+    def heard(self, sensor: Ints) -> Heard:
+        """Echoes and direct arrivals at some hydrophones, by the exact way's synthesis."""
+        out = tuple(np.zeros((len(sensor), self.plan.windows.samples)) for _ in range(2))
+        for part, traced in self.pieces:
+            rows = np.flatnonzero(np.isin(sensor, part.sensor))
+            own = np.searchsorted(part.sensor, sensor[rows])
+            some, place = with_rim(part, own)
+            arrivals = traced.heard_by(place, part.elements.count)
+            made = pressures(self.plan, self.frame, arrivals, some, golden(self.plan))
+            for total, one in zip(out, made, strict=True):
+                total[rows] = one[: len(rows)]
+        return out[0], out[1]
+
+    @property
+    def few(self) -> list[tuple[Subarray, Arrivals]]:
+        """Some of the parts, spread."""
+        count = len(self.pieces)
+        return [self.pieces[n] for n in np.unique(np.linspace(0, count - 1, min(TIMED, count)).astype(int))]
+
+    def synthesis_seconds(self) -> float:
+        """CPU seconds of the plan's synthesis at all parts."""
+        plan, total = self.plan, 0.0
+        start, samples = frame_start(plan, self.frame), plan.windows.samples
+        for part, arrivals in self.few:
+            make = partial(plan.choices.synthesis.signals, arrivals, self.frame.moment.snaps, part.elements)
+            total += timed(partial(make, plan.scene.sonar, plan.absorption, start, samples))[1]
+        return total * self.parts / len(self.few)
+
+
+def trace_points(exact: Exact, traced: Traced) -> Iterator[Point]:
+    """Walk the knobs of tracing; `traced`: by the plan's own choices."""
+    plan = exact.plan
+    yield _point(exact, traced, "subarrays", f"{_cut(plan)}, as chosen", chosen=True)
+    for setting, cheaper in _cheaper(plan):
+        yield _point(exact, Traced.of(cheaper, exact.frame, exact.sensor), "cheaper", setting)
+    yield from _cuts(exact, traced)
+    best = exact_plan(plan)
+    usual = replace(best, choices=replace(best.choices, subarrays=plan.choices.subarrays))
+    if plan.choices.subarrays < plan.elements.count:
+        degree, view = replace(usual.choices, degree=3), replace(usual.choices, visibility="centre")
+        for knob, choices, setting in (("degree", degree, "of degree 3"), ("visibility", view, "from the centre")):
+            of = Traced.of(replace(usual, choices=choices), exact.frame, exact.sensor)
+            yield _point(exact, of, knob, f"{setting}, {_cut(plan)}")
+    for level in FAINTEST:
+        share = 10.0 ** (-level / 10.0)
+        some = replace(best, choices=replace(best.choices, negligible=share))
+        yield _each_point(exact, some, "faintest", f"{level:.0f} dB")
+    if not plan.profile.uniform:
+        some = replace(best, propagation=Straight(bounces=plan.propagation.bounces))
+        yield _each_point(exact, some, "rays", "straight")
+    yield exact_point(exact)
+
+
+def _cheaper(plan: Plan) -> Iterator[tuple[str, Plan]]:
+    """What would cost less than the choices of a plan, one at a time."""
+    choices = plan.choices
+    for count in _counts(plan):
+        if count < choices.subarrays:
+            yield f"{count} part{'s' if count > 1 else ''}", replace(plan, choices=replace(choices, subarrays=count))
+    if choices.visibility == "hydrophones":
+        yield "seen from the centre", replace(plan, choices=replace(choices, visibility="centre"))
+    if choices.degree == 5:
+        yield "of degree 3", replace(plan, choices=replace(choices, degree=3))
+    for level in FAINTEST:
+        share = 10.0 ** (-level / 10.0)
+        if share > 1.001 * choices.negligible:
+            yield f"faintest {level:.0f} dB", replace(plan, choices=replace(choices, negligible=share))
+    if isinstance(plan.propagation, Refracted):
+        yield "straight rays", replace(plan, propagation=Straight(bounces=plan.propagation.bounces))
+
+
+def _cuts(exact: Exact, traced: Traced) -> Iterator[Point]:
+    """The array cut into more and more parts, all else exact, and at last into hydrophones."""
+    best, spent = exact_plan(exact.plan), 0.0
+    for count in _counts(exact.plan)[:-1]:
+        if 2.0 * spent > max(LONGEST, SLOWER * traced.seconds):
+            break
+        some = replace(best, choices=replace(best.choices, subarrays=count))
+        yield (point := _point(exact, Traced.of(some, exact.frame, exact.sensor), "subarrays", _cut(some)))
+        spent = point.seconds
+        if point.error < FINER * point.allowed:
+            break
+    yield _of_each(exact, exact.each, exact.sensor, "subarrays", "each hydrophone, every path")
+
+
+def _each_point(exact: Exact, plan: Plan, knob: str, setting: str) -> Point:
+    """Of a plan that traces each hydrophone by itself: at a few."""
+    few = exact.sensor[:: max(len(exact.sensor) // EACH, 1)][:EACH]
+    return _of_each(exact, each_hydrophone(plan, exact.frame, some=few), few, knob, setting)
+
+
+def _of_each(exact: Exact, each: Each, sensor: Ints, knob: str, setting: str) -> Point:
+    rows = np.searchsorted(exact.sensor, sensor)
+    error, largest = differences(each.at(sensor), [part[rows] for part in exact.heard])
+    few = f"at {len(sensor)} hydrophones" if len(sensor) < len(exact.sensor) else exact.partly
+    return Point(
+        stage="trace",
+        knob=knob,
+        setting=setting,
+        error=error,
+        unit="relative",
+        allowed=exact.plan.recipe.accuracy.signal,
+        seconds=sum(each.seconds),
+        also={"trace_s": each.seconds[0], "synthesis_s": each.seconds[1], "largest": largest},
+        note=few,
+    )
+
+
+def _counts(plan: Plan) -> list[int]:
+    """Powers of two below the number of hydrophones, and that; without it where there are live ones alone."""
+    count = plan.elements.count
+    return [*takewhile(lambda n: n < count, (2**n for n in range(count))), count]
+
+
+def exact_point(exact: Exact) -> Point:
+    """What all are compared with: no error, and what it costs."""
+    return Point(
+        stage="trace",
+        knob="exact",
+        setting=exact.note or "from the description alone",
+        error=0.0,
+        unit="relative",
+        allowed=exact.plan.recipe.accuracy.signal,
+        seconds=exact.seconds,
+        also={"trace_s": exact.seconds, "synthesis_s": 0.0, "largest": 0.0},
+        note=f"cost from {len(exact.sensor)} hydrophones" if exact.partly else "",
+    )
+
+
+def _point(exact: Exact, traced: Traced, knob: str, setting: str, *, chosen: bool = False) -> Point:
+    error, largest = differences(traced.heard(exact.sensor), exact.heard)
+    made = traced.synthesis_seconds()
+    paths = max(len(arrivals.delay) for _, arrivals in traced.pieces)
+    several = f", {len(traced.pieces)} of {traced.parts} parts" if len(traced.pieces) < traced.parts else ""
+    return Point(
+        stage="trace",
+        knob=knob,
+        setting=setting,
+        error=error,
+        unit="relative",
+        allowed=exact.plan.recipe.accuracy.signal,
+        seconds=traced.seconds + made,
+        chosen=chosen,
+        also={
+            "largest": largest,
+            "trace_s": traced.seconds,
+            "synthesis_s": made,
+            "paths": paths,
+            "hydrophones": len(exact.sensor),
+        },
+        note=f"{exact.partly}{several}",
+    )
+
+
+def _cut(plan: Plan) -> str:
+    count = plan.choices.subarrays
+    return "each hydrophone" if count >= plan.elements.count else f"{count} part{'s' if count > 1 else ''}"

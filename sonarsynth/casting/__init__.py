@@ -1,0 +1,1 @@
+"""Rays and narrow cones cast at triangle meshes."""

@@ -1,0 +1,259 @@
+"""Rays cast at meshes: what is hit first, and what is hidden.
+
+Embree is float32. So a ray is cast in the frame of the mesh, from where it enters the bounding sphere, and the facet
+that Embree proposes (with all facets that share a corner with it) is intersected again in float64, which decides; a
+proposal that does not hold is passed over and the ray goes on. Distances are right to about 1e-15 of the ray's length;
+rays that pass a silhouette closer than 1e-6 of the body's size may go either way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import import_module
+from typing import Any, Literal, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints
+from sonarsynth.description.byte_bounded_cache import kept
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.geometry.placed_target import Body
+
+Int32s = npt.NDArray[np.int32]
+Backend = Literal["embree", "open3d"]
+OFFSET = 1e-6
+"""Of the body's size: how far off a facet, along its normal, a ray starts so as not to meet it."""
+ROUNDS = 8
+"""Proposals tried before the slow exact search."""
+BYTES = 90
+"""Of Embree's own tables for a facet."""
+SLACK = 1e-3
+"""Of the body's size: a hit this much beyond the proposed one is another hit, with others before it perhaps."""
+
+
+class Caster(Protocol):
+    """A float32 ray caster."""
+
+    def nearest(self, origin: Floats, direction: Floats, far: Floats) -> tuple[Ints, Floats]:
+        """Proposed facet (ray,) of the nearest hit within `far`, -1 for none, and its distance."""
+        ...
+
+
+class EmbreeCaster:
+    """Embree by embreex; watertight mode."""
+
+    def __init__(self, vertices: Floats, faces: np.ndarray) -> None:
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
+        self._scene: Any = EmbreeScene(robust=True)
+        TriangleMesh(self._scene, vertices.astype(np.float32), faces.astype(np.int32, copy=False))
+        self.nbytes = BYTES * len(faces)
+
+    def nearest(self, origin: Floats, direction: Floats, far: Floats) -> tuple[Ints, Floats]:
+        """As `Caster.nearest`."""
+        limit = np.minimum(far, 1e30).astype(np.float32)
+        out = self._scene.run(origin.astype(np.float32), direction.astype(np.float32), limit, output=1)
+        return out["primID"].astype(np.int64), out["tfar"].astype(float)
+
+
+class Open3DCaster:
+    """Open3D's RaycastingScene on one thread, to check the other against. Raises ImportError without Open3D."""
+
+    def __init__(self, vertices: Floats, faces: np.ndarray) -> None:
+        try:
+            o3d: Any = import_module("open3d")
+        except (ImportError, OSError) as error:
+            reason = str(error).splitlines()[0]
+            raise ImportError(f"ray casting by Open3D needs Open3D, which does not load: {reason}") from None
+        self._tensor = o3d.core.Tensor
+        self._scene: Any = o3d.t.geometry.RaycastingScene(nthreads=1)
+        self._scene.add_triangles(self._tensor(vertices.astype(np.float32)), self._tensor(faces.astype(np.uint32)))
+
+    def nearest(self, origin: Floats, direction: Floats, far: Floats) -> tuple[Ints, Floats]:
+        """As `Caster.nearest`."""
+        rays = np.concatenate([origin, direction], axis=1).astype(np.float32)
+        out = self._scene.cast_rays(self._tensor(rays), nthreads=1)
+        facet, distance = out["primitive_ids"].numpy().astype(np.int64), out["t_hit"].numpy().astype(float)
+        return np.where(np.isfinite(distance) & (distance <= far), facet, -1), distance
+
+
+@dataclass(frozen=True, eq=False)
+class CastingMesh:
+    """A mesh made ready for casting: centred on its box and of unit size."""
+
+    centre: Floats  # (xyz) m, in the mesh's frame
+    size: float  # m: radius of the bounding sphere about the centre
+    vertices: Floats  # (vertex, xyz) centred, in units of size
+    faces: Int32s  # (facet, 3)
+    caster: Caster
+
+    @cached_property
+    def around(self) -> tuple[Int32s, Int32s]:
+        """Facets round each vertex: (vertex + 1,) where each list begins, and the lists."""
+        from sonarsynth.casting import intersections
+
+        return intersections.round_vertices(self.faces, len(self.vertices))
+
+    @cached_property
+    def tree(self) -> tuple[Floats, Int32s]:
+        """Boxes (node, 6) round facets, and the facets in order of place; see `facet_tree`."""
+        from sonarsynth.casting import facet_tree
+
+        return facet_tree.tree(self.vertices, self.faces)
+
+    def cast(self, origin: Floats, direction: Floats, far: Floats) -> tuple[Ints, Floats]:
+        """Facet (ray,) and distance of the nearest hit for rays in this mesh's frame and unit; -1 and NaN for none."""
+        from sonarsynth.casting import intersections
+
+        facet, distance = np.full(len(origin), NO_TARGET), np.full(len(origin), np.nan)
+        entry, leave = _through_unit_sphere(origin, direction, far)
+        open_rays = np.flatnonzero(entry < leave)
+        start = origin[open_rays] + entry[open_rays, None] * direction[open_rays]
+        heading, limit = direction[open_rays], (far - entry)[open_rays]
+        passed = np.zeros(len(open_rays))
+        for _ in range(ROUNDS):
+            proposed, at = self.caster.nearest(start + passed[:, None] * heading, heading, limit - passed)
+            proposed = np.where((proposed >= 0) & (proposed < len(self.faces)), proposed, -1)
+            found, where = np.empty(len(start), np.int64), np.empty(len(start))
+            from_start, as_proposed = np.zeros(len(start)), np.fmin(limit, passed + at + SLACK)
+            intersections.confirm(
+                start,
+                heading,
+                from_start,
+                as_proposed,
+                proposed,
+                self.vertices,
+                self.faces,
+                *self.around,
+                1.0,
+                found,
+                where,
+            )
+            hit = found >= 0
+            facet[open_rays[hit]], distance[open_rays[hit]] = found[hit], where[hit] + entry[open_rays[hit]]
+            left = ~hit & (proposed >= 0)
+            if not left.any():
+                return facet, distance
+            passed = (passed + at + 2 * OFFSET)[left]
+            open_rays, start, heading, limit = open_rays[left], start[left], heading[left], limit[left]
+        found, where = np.empty(len(start), np.int64), np.empty(len(start))
+        intersections.search(start, heading, np.zeros(len(start)), limit, self.vertices, self.faces, 1.0, found, where)
+        hit = found >= 0
+        facet[open_rays[hit]], distance[open_rays[hit]] = found[hit], where[hit] + entry[open_rays[hit]]
+        return facet, distance
+
+
+def _through_unit_sphere(origin: Floats, direction: Floats, far: Floats) -> tuple[Floats, Floats]:
+    """Where rays enter and leave a sphere a little over the unit sphere, within [0, far]; entry >= leave: a miss."""
+    nearest = -np.einsum("ij,ij->i", origin, direction)
+    foot = origin + nearest[:, None] * direction
+    square = 1.0 + 1e-5 - np.einsum("ij,ij->i", foot, foot)
+    half = np.sqrt(np.maximum(square, 0.0))
+    return np.maximum(nearest - half, 0.0), np.where(square > 0, np.minimum(nearest + half, far), -1.0)
+
+
+@dataclass(frozen=True)
+class _ByContent:
+    """A mesh as the key of a cache: two meshes of one content are one."""
+
+    digest: str
+    mesh: Mesh
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _ByContent) and self.digest == other.digest
+
+
+@kept(16)
+def _casting_mesh(key: _ByContent, backend: Backend) -> CastingMesh:
+    mesh = key.mesh
+    if not np.isfinite(mesh.vertices).all():
+        raise ValueError("a mesh with vertices that are not finite cannot be cast at")
+    if len(mesh.faces) and not (mesh.faces.min() >= 0 and mesh.faces.max() < len(mesh.vertices)):
+        raise ValueError("a mesh with faces that name no vertex cannot be cast at")
+    named = np.zeros(len(mesh.vertices), bool)
+    named[mesh.faces] = True
+    used = mesh.vertices if named.all() else mesh.vertices[named]
+    centre = 0.5 * (used.min(axis=0) + used.max(axis=0))
+    size = float(np.linalg.norm(used - centre, axis=1).max())
+    if not size > 0:
+        raise ValueError("a mesh without extent cannot be cast at")
+    vertices = (mesh.vertices - centre) / size
+    make = EmbreeCaster if backend == "embree" else Open3DCaster
+    faces = np.ascontiguousarray(mesh.faces, np.int32)
+    return CastingMesh(centre, size, np.ascontiguousarray(vertices), faces, make(vertices, faces))
+
+
+def casting_mesh(mesh: Mesh, backend: Backend = "embree") -> CastingMesh:
+    """The mesh made ready for casting, kept by content for the last 16. Raises ValueError for a corrupt mesh."""
+    return _casting_mesh(_ByContent(mesh.digest, mesh), backend)
+
+
+def enclosing(body: Body) -> tuple[Floats, float]:
+    """Centre (xyz) in the world and radius (m) of a sphere a little larger than the body."""
+    ready = casting_mesh(body.mesh)
+    return np.asarray(body.pose.to_world(ready.centre)), (1.0 + 1e-5) * ready.size
+
+
+def inside(body: Body, point: Floats) -> bool:
+    """Whether a point (xyz) of the world is inside a closed body: the facet above it shows its inner side."""
+    centre, radius = enclosing(body)
+    if not len(body.mesh.faces) or np.linalg.norm(point - centre) > radius:
+        return False
+    up = np.array([[1e-3, 2e-3, 1.0]])  # off the edges of boxes
+    facet, _ = first_hit(body.mesh, body.pose.to_body(point[None]), body.pose.turn_to_body(up))
+    return bool(facet[0] >= 0 and body.mesh.normal[facet[0]] @ body.pose.turn_to_body(up)[0] > 0.0)
+
+
+def first_hit(
+    mesh: Mesh, origin: Floats, direction: Floats, far: float = np.inf, backend: Backend = "embree"
+) -> tuple[Ints, Floats]:
+    """Facet (ray,) that each ray meets first, and its distance (m); -1 and NaN where it meets none within `far` (m).
+
+    origin, direction: (ray, xyz) in the frame of the mesh; directions of any length. The point hit is origin +
+    distance * unit direction, its normal mesh.normal[facet]. Raises ValueError for rays that are not finite or have no
+    direction.
+    """
+    o, d = np.asarray(origin, float), np.asarray(direction, float)
+    length = np.linalg.norm(d, axis=1)
+    if not (np.isfinite(o).all() and np.isfinite(length).all() and (length > 0).all()):
+        raise ValueError("rays need a finite origin and a direction")
+    if not len(mesh.faces) or not len(o):
+        return np.full(len(o), NO_TARGET), np.full(len(o), np.nan)
+    ready = casting_mesh(mesh, backend)
+    limit = np.full(len(o), far / ready.size)
+    facet, distance = ready.cast((o - ready.centre) / ready.size, d / length[:, None], limit)
+    return facet, distance * ready.size
+
+
+def occluded(bodies: tuple[Body, ...], start: Floats, end: Floats, backend: Backend = "embree") -> Bools:
+    """Whether any body stands in each straight segment from start (segment, xyz) to end (segment, xyz) in the world.
+
+    A segment that starts on a facet must be moved off it (`OFFSET`). Raises ValueError for ends that are not finite.
+    """
+    a, b = np.asarray(start, float), np.asarray(end, float)
+    if not (np.isfinite(a).all() and np.isfinite(b).all()):
+        raise ValueError("segments need finite ends")
+    from sonarsynth.casting import intersections
+
+    hidden, near = np.zeros(len(a), bool), np.empty(len(a), bool)
+    for body in bodies:
+        if not len(body.mesh.faces):
+            continue
+        ready = casting_mesh(body.mesh, backend)
+        intersections.pass_near(a, b, *enclosing(body), near)
+        free = np.flatnonzero(near & ~hidden)
+        if not len(free):
+            continue
+        o = (body.pose.to_body(a[free]) - ready.centre) / ready.size
+        span = (body.pose.to_body(b[free]) - ready.centre) / ready.size - o
+        length = np.linalg.norm(span, axis=1)
+        going = length > 0
+        facet, _ = ready.cast(o[going], span[going] / length[going, None], length[going])
+        hidden[free[going]] = facet >= 0
+    return hidden

@@ -1,0 +1,153 @@
+"""The table of `accuracy RECIPE`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+from rich.table import Table
+
+from sonarsynth.cli.running import BadOption
+from sonarsynth.cli.selecting import frame_numbers
+
+if TYPE_CHECKING:
+    from sonarsynth.accuracy import Measured, Point, Verdict
+
+
+SECOND = (
+    ("largest", "of the peak ", ""),
+    ("largest_db", "largest ", " dB"),
+    ("direction_rad", "direction ", " rad"),
+    ("correlation", "correlation ", ""),
+)
+"""Numbers that are shown beside the errors: names, words, units; the file has the others too."""
+
+WIDEST = 120
+"""Columns of the table, whatever it is printed on."""
+
+
+def recipe_table(
+    recipe: Path,
+    settings: Sequence[str],
+    frames: str | None,
+    hydrophones: str | None,
+    seed: int | None,
+    out: Path,
+    *,
+    peers: bool,
+    as_json: bool,
+) -> None:
+    """Walk the knobs of a recipe, write <out>/<recipe>.json and .png, print the table; raises typer.Exit(1) where a
+    verdict is not good."""
+    from sonarsynth.accuracy import measure
+    from sonarsynth.accuracy.frontier_report import write
+    from sonarsynth.recipe import reading
+
+    count = _hydrophones(hydrophones)
+    source = reading.read(recipe, settings)
+    made_from = reading.recipe_of(source)
+    chosen = frame_numbers(frames, made_from.frames)
+    with reading.locating(source):
+        measured = measure(made_from, chosen, hydrophones=count, seed=seed, peers=peers, say=_say)
+    _say("")
+    files = write(measured, out, recipe.stem)
+    if as_json:
+        typer.echo(json.dumps(measured.as_json(), indent=2, allow_nan=False))
+    else:
+        show(measured)
+        for file in files:
+            typer.echo(str(file))
+    if not measured.ok:
+        raise typer.Exit(1)
+
+
+def _hydrophones(text: str | None) -> int | None:
+    """How many: None for as many as can be afforded. Raises BadOption."""
+    if text is None:
+        return None
+    if text == "all":
+        return sys.maxsize
+    if not text.isdecimal() or int(text) < 1:
+        raise BadOption(f"--hydrophones {text} is neither 'all' nor a whole number from 1 on")
+    return int(text)
+
+
+def _say(text: str) -> None:
+    """What is being done, on a terminal."""
+    if sys.stderr.isatty():
+        sys.stderr.write(f"\r\033[K{text}")
+        sys.stderr.flush()
+
+
+def show(measured: Measured) -> None:
+    """A section a stage, then the verdicts."""
+    from sonarsynth.cli.printing import console
+
+    table = Table(title=measured.title, title_justify="left")
+    table.add_column("stage", no_wrap=True)
+    table.add_column("knob")
+    table.add_column("setting")
+    for name in ("error", "allowed", "ms a frame"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("", min_width=6)
+    table.add_column("also")
+    stage = ""
+    for point in measured.points:
+        if point.stage != stage:
+            table.add_section()
+        cells = (point.knob, point.setting, *_numbers(point), _mark(point), _also(point))
+        table.add_row("" if point.stage == stage else point.stage, *cells, style="bold" if point.chosen else None)
+        stage = point.stage
+    for one in (table, _verdict_table(measured.verdicts)):
+        console().print(one, markup=False, soft_wrap=False, width=min(console().width, WIDEST))
+    frames = ", ".join(str(n) for n in measured.frames)
+    console().print(f"frames {frames}, {measured.hydrophones} hydrophones; {'all good' if measured.ok else 'FAILED'}")
+
+
+def _numbers(point: Point) -> tuple[str, str, str]:
+    if point.error != point.error:
+        return "", "", ""
+    return f"{point.error:.2g} {point.unit}", f"{point.allowed:g}", f"{1e3 * point.seconds:.3g}"
+
+
+def _mark(point: Point) -> str:
+    if point.role == "peer":
+        return ""
+    if point.role == "check":
+        return "ok" if point.meets else "FAILED"
+    return ("chosen, " if point.chosen else "") + ("within" if point.meets else "beyond")
+
+
+def _also(point: Point) -> str:
+    """The second number of a stage, and the note."""
+    numbers = [f"{words}{point.also[name]:.2g}{unit}" for name, words, unit in SECOND if name in point.also]
+    return "; ".join([*numbers, *([point.note] if point.note else [])])
+
+
+def _verdict_table(verdicts: Sequence[Verdict]) -> Table:
+    table = Table("stage", "chosen", title="verdicts", title_justify="left")
+    for name in ("error", "allowed", "ms"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("cheapest that keeps within")
+    for name in ("ms", "times"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("", no_wrap=True)
+    table.add_column("note")
+    for v in verdicts:
+        table.add_row(
+            v.stage,
+            v.choice,
+            f"{v.error:.2g} {v.unit}",
+            f"{v.allowed:g}",
+            f"{1e3 * v.seconds:.3g}",
+            v.cheapest,
+            f"{1e3 * v.cheapest_seconds:.3g}",
+            f"{v.ratio:.2g}",
+            "ok" if v.ok else "FAILED",
+            v.note,
+        )
+    return table

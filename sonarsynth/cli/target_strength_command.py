@@ -1,0 +1,122 @@
+"""The command `target-strength`."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+
+from sonarsynth.cli.running import BadOption
+
+if TYPE_CHECKING:
+    from sonarsynth.conventions import Floats
+    from sonarsynth.targets.shapes import Shape
+
+MOST: Final = 100_000
+"""Values of one range, and levels of a table in hundreds."""
+
+
+def target_strength(
+    body: Annotated[
+        str,
+        typer.Argument(
+            metavar="MESH", help="A mesh file, or a shape such as '{kind: sphere, radius: 0.25 m}'.", show_default=False
+        ),
+    ],
+    frequency: Annotated[str, typer.Option(metavar="A:B:STEP", help="Hz, both ends included.")] = "25e3:110e3:5e3",
+    aspect: Annotated[
+        str, typer.Option(metavar="A:B:STEP", help="Where the sonar is (deg): 0 ahead, 90 to port.")
+    ] = "0:360:1",
+    scattering: Annotated[
+        str, typer.Option(metavar="LAW", help="Such as '{kind: kirchhoff, surface: soft}' or '{kind: mirror_lobe}'.")
+    ] = "{kind: kirchhoff}",
+    sound_speed: Annotated[float, typer.Option(help="m/s.", metavar="C")] = 1500.0,
+    unit: Annotated[str, typer.Option(metavar="UNIT", help="Of a mesh file: m, cm, mm, in or ft.")] = "m",
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where table and picture go.")] = Path("target_strength"),
+    as_json: Annotated[bool, typer.Option("--json", help="Print the table as JSON.")] = False,
+) -> None:
+    """Backscattered target strength over aspect and frequency, in dB re 1 m2: a table (CSV) and a polar picture."""
+    import numpy as np
+
+    from sonarsynth.conventions import FASTEST, SLOWEST
+    from sonarsynth.pictures.strength_pictures import strength_table, write_strength
+    from sonarsynth.scattering import Scattering
+
+    law = _described(scattering, "--scattering", Scattering)
+    shape = _shape(body, unit)
+    f, degrees = _values(frequency, "--frequency"), _values(aspect, "--aspect")
+    if not f.min() > 0:
+        raise BadOption("--frequency: must be above 0 Hz")
+    if not SLOWEST <= sound_speed <= FASTEST:
+        raise BadOption(f"--sound-speed: must be from {SLOWEST:g} to {FASTEST:g} m/s")
+    if f.size * degrees.size > 100 * MOST:
+        raise BadOption(f"{f.size} frequencies at {degrees.size} aspects are too many: use longer steps")
+    with warnings.catch_warnings(record=True) as notes:
+        warnings.simplefilter("always")
+        try:
+            table = strength_table(shape, f, np.deg2rad(degrees), sound_speed, law)
+        except ValueError as error:
+            raise BadOption(str(error)) from None
+    files = write_strength(table, f"{body}, {scattering}", out)
+    for text in dict.fromkeys(str(note.message) for note in notes):
+        typer.echo(f"note: {text}", err=True)
+    if as_json:
+        typer.echo(json.dumps(table.as_json()))
+        return
+    typer.echo(table.summary())
+    for file in files:
+        typer.echo(str(file))
+
+
+def _shape(text: str, unit: str) -> Shape:
+    """The shape that a text describes: a mapping in YAML, or the path of a mesh file. Raises BadOption, RecipeError."""
+    from sonarsynth.targets.shapes import MeshFile, Shape
+
+    if unit not in ("m", "cm", "mm", "in", "ft"):
+        raise BadOption(f"--unit: {unit} is none of m, cm, mm, in, ft")
+    if text.lstrip().startswith("{"):
+        if unit != "m":
+            raise BadOption(f"--unit: is for a mesh file; write units in the shape, such as 'radius: 25 {unit}'")
+        found: Shape = _described(text, "shape", Shape)
+        return found
+    if not Path(text).is_file():
+        raise BadOption(f"{text}: no such file, and no shape such as '{{kind: sphere, radius: 0.25 m}}'")
+    return MeshFile(path=text, unit=unit)  # type: ignore[arg-type]
+
+
+def _described(text: str, name: str, kind: Any) -> Any:
+    """The description of a YAML text. Raises RecipeError."""
+    from pydantic import TypeAdapter, ValidationError
+
+    from sonarsynth.recipe.reading.messages import explain
+    from sonarsynth.recipe.reading.yaml_source import read_text
+
+    if not text.lstrip().startswith("{"):
+        raise BadOption(f"{name}: must be a mapping such as '{{kind: kirchhoff}}', not '{text}'")
+    source = read_text(text, name, Path.cwd())
+    try:
+        return TypeAdapter(kind).validate_json(json.dumps(source.data), strict=True)
+    except ValidationError as error:
+        raise explain(error, kind, source) from None
+
+
+def _values(text: str, option: str) -> Floats:
+    """Numbers of a text "a:b:step", both ends included, or of a single one. Raises BadOption."""
+    import numpy as np
+
+    try:
+        parts = [float(part) for part in text.split(":")]
+    except ValueError:
+        parts = []
+    if len(parts) not in (1, 3) or not np.isfinite(parts).all():
+        raise BadOption(f"{option}: '{text}' is no number and no range such as 0:90:5")
+    if len(parts) == 1:
+        return np.array(parts)
+    first, last, step = parts
+    count = (last - first) / step if step != 0.0 else np.nan
+    if not 0 <= count < MOST:
+        raise BadOption(f"{option}: '{text}' holds no value or more than {MOST}")
+    return np.asarray(first + step * np.arange(int(count + 1e-9) + 1))

@@ -1,0 +1,1 @@
+"""The sea: depth, sound speed, absorption, surface, bottom and ambient noise."""

@@ -1,0 +1,137 @@
+"""What a boundary does to sound: its description turned into numbers.
+
+Coefficients are for f > 0 in time dependence exp(+i 2 pi f t) and the same at every frequency (absorption in the bed
+goes with frequency, so its loss tangent is a number). Roughness is what depends on frequency: exp(-(2 pi f blur)^2/2).
+Formulas out of their range do not warn here, frame after frame: `boundary_notes` say it once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.conventions import Floats
+from sonarsynth.environment.boundaries import (
+    FluidHalfSpace,
+    PressureRelease,
+    Reflection,
+    ReflectionTable,
+    Rigid,
+    SeaBed,
+    SeaSurface,
+    Sediment,
+)
+from sonarsynth.equations.water import boundary_reflection, formula_ranges
+from sonarsynth.equations.water.boundary_reflection import Complexes
+
+
+@dataclass(frozen=True, eq=False)
+class Bounces:
+    """What all the reflections of each path at one boundary do to it, together."""
+
+    modulus: Floats  # (path,) factor on the amplitude
+    phase: Floats  # (path,) rad: the sum of the phases, of which a change of sign is pi; 0 without a reflection
+    blur: Floats  # (path,) s: the reflections take exp(-(2 pi f blur)^2/2) off the spectrum
+
+
+def bounces(
+    boundary: SeaSurface | SeaBed,
+    grazing: npt.ArrayLike,
+    count: npt.ArrayLike,
+    sound_speed: npt.ArrayLike,
+    frequency: float | None = None,
+) -> Bounces:
+    """The effect of `count` (path,) reflections at the same grazing angle (path,) (rad), of no matter where count is 0.
+
+    sound_speed (m/s) is the water's at the boundary; frequency (Hz) as for `coefficient`. The blur of several bounces
+    adds up by squares: they meet different pieces of the boundary. A reflection at an angle that is NaN gives NaN.
+    """
+    times = np.asarray(count)
+    q = np.where(times > 0, np.asarray(grazing, float), 0.0)
+    once = coefficient(boundary, q, frequency) + 0.0  # no negative zeros: the phase of -1 is pi
+    modulus, phase = np.abs(once) ** times, np.angle(once) * times
+    spread = np.where(times > 0, np.sqrt(times) * blur(boundary, q, sound_speed), 0.0)
+    return Bounces(*(np.where(np.isnan(q), np.nan, x) for x in (modulus, phase, spread)))
+
+
+def coefficient(boundary: SeaSurface | SeaBed, grazing: npt.ArrayLike, frequency: float | None = None) -> Complexes:
+    """Reflection coefficient (path,) of the smooth boundary at grazing angles (path,) in rad; 1 where they are NaN.
+
+    frequency (Hz) is needed for bubbles alone: their loss is taken there, as 10^(-loss/20), for the whole band.
+    Raises ValueError where it is missing.
+    """
+    angle = np.asarray(grazing, float)
+    none = np.isnan(angle)
+    q = np.where(none, 0.5 * np.pi, angle)
+    value = _smooth(boundary.reflection, q)
+    if isinstance(boundary, SeaSurface) and boundary.bubbles and boundary.wind_speed is not None:
+        if frequency is None:
+            raise ValueError("the loss in bubbles needs a frequency")
+        with formula_ranges.noted():
+            value = value * 10.0 ** (-boundary_reflection.bubble_loss(boundary.wind_speed, frequency, q) / 20.0)
+    return np.asarray(np.where(none, 1.0 + 0j, value))
+
+
+def rms_height(boundary: SeaSurface | SeaBed) -> float:
+    """Root-mean-square height (m) of a boundary, as written or as the wind makes it."""
+    if isinstance(boundary, SeaSurface) and boundary.wind_speed is not None:
+        with formula_ranges.noted():
+            return float(boundary_reflection.wind_wave_height(boundary.wind_speed))
+    return boundary.rms_height
+
+
+def blur(boundary: SeaSurface | SeaBed, grazing: npt.ArrayLike, sound_speed: npt.ArrayLike) -> Floats:
+    """Time (path,) in s such that roughness takes exp(-(2 pi f blur)^2/2) off one reflection; 0 where grazing is NaN.
+
+    sound_speed (m/s) is the water's at the boundary. What this takes is scattered, not lost, and is not simulated.
+    """
+    q = np.nan_to_num(np.asarray(grazing, float), nan=0.0)
+    return boundary_reflection.roughness_blur(rms_height(boundary), q, sound_speed)
+
+
+def boundary_notes(boundary: SeaSurface | SeaBed, low: float, high: float) -> tuple[tuple[str, str], ...]:
+    """Field and line for each formula of a boundary that is used outside its range, in a band low to high (Hz)."""
+    notes: list[tuple[str, str]] = []
+    reflection = boundary.reflection
+    with formula_ranges.noted() as found:
+        if isinstance(reflection, Sediment):
+            formula_ranges.APL_SEDIMENTS.check(frequency=[low, high])
+            formula_ranges.FLUID_BED.check(speed_ratio=boundary_reflection.SEDIMENTS[reflection.name][1])
+        elif isinstance(reflection, FluidHalfSpace):
+            formula_ranges.FLUID_BED.check(speed_ratio=reflection.speed_ratio)
+    notes += [("reflection", line) for line in found]
+    if isinstance(boundary, SeaSurface) and boundary.wind_speed is not None:
+        with formula_ranges.noted() as found:
+            boundary_reflection.wind_wave_height(boundary.wind_speed)
+        notes += [("wind_speed", line) for line in found]
+        if boundary.bubbles:
+            with formula_ranges.noted() as found:
+                boundary_reflection.bubble_loss(boundary.wind_speed, 0.5 * (low + high), 0.5 * np.pi)
+            notes += [("bubbles", line) for line in found]
+    return tuple(notes)
+
+
+def _smooth(reflection: Reflection, grazing: Floats) -> Complexes:
+    match reflection:
+        case PressureRelease():
+            return boundary_reflection.pressure_release(grazing)
+        case Rigid():
+            return np.ones(grazing.shape, complex)
+        case FluidHalfSpace():
+            bed = (reflection.density_ratio, reflection.speed_ratio, reflection.loss_tangent)
+            return boundary_reflection.rayleigh(grazing, *bed)
+        case Sediment():
+            return boundary_reflection.rayleigh(grazing, *boundary_reflection.SEDIMENTS[reflection.name])
+        case ReflectionTable():
+            return _tabulated(reflection, grazing)
+
+
+def _tabulated(table: ReflectionTable, grazing: Floats) -> Complexes:
+    phase = np.interp(grazing, table.grazing, table.phase)
+    if table.modulus is not None:
+        modulus = np.interp(grazing, table.grazing, table.modulus)
+    else:
+        modulus = 10.0 ** (-np.interp(grazing, table.grazing, table.loss or ()) / 20.0)
+    return np.asarray(modulus * np.exp(1j * phase))

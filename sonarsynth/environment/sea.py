@@ -1,0 +1,100 @@
+"""The water: depth, sound speed, surface, bed, absorption and ambient noise."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from annotated_types import Ge, Le
+from pydantic import model_validator
+
+from sonarsynth.conventions import Decibels, Number, PositiveMetres, PositiveSpeed
+from sonarsynth.description import BY_KIND, description
+from sonarsynth.environment.boundaries import SeaBed, SeaSurface
+from sonarsynth.environment.hydrography import WaterSalinity, WaterTemperature
+from sonarsynth.environment.sound_speed import (
+    Cast,
+    Catenary,
+    Isovelocity,
+    Linear,
+    Munk,
+    Profile,
+    SoundSpeed,
+    Tabulated,
+    TemperatureSalinity,
+    Thermocline,
+    reaches,
+)
+
+__all__ = [
+    "Absorption",
+    "Cast",
+    "Catenary",
+    "Environment",
+    "FlatNoise",
+    "Isovelocity",
+    "Linear",
+    "Munk",
+    "Noise",
+    "Profile",
+    "SoundSpeed",
+    "Tabulated",
+    "TemperatureSalinity",
+    "Thermocline",
+    "WenzNoise",
+]
+
+
+@description
+class Absorption:
+    """Absorption of sound in sea water (Francois and Garrison 1982, or Ainslie and McColm 1998), or none.
+
+    It falls with depth, by its pressure: each path loses its mean over the depths that it passes. Temperature, salinity
+    and pH are one value for all of the water.
+    """
+
+    formula: Literal["francois_garrison", "ainslie_mccolm", "none"] = "francois_garrison"
+    temperature: WaterTemperature = 27.0
+    salinity: WaterSalinity = 35.0
+    ph: Annotated[Number, Ge(0), Le(14)] = 8.1
+    """pH of the water; it matters under some 10 kHz, where boric acid absorbs."""
+
+
+@description
+class FlatNoise:
+    """Gaussian noise, independent between hydrophones, flat over the band."""
+
+    kind: Literal["flat"] = "flat"
+    level: Annotated[Decibels, Ge(-200), Le(300)]
+    """Spectral level in dB re 1 uPa2/Hz."""
+
+
+@description
+class WenzNoise:
+    """Gaussian noise, independent between hydrophones: turbulence, shipping, wind and thermal (Coates 1989)."""
+
+    kind: Literal["wenz"] = "wenz"
+    shipping: Annotated[Number, Ge(0), Le(1)] = 0.5
+    """How busy the sea is, from 0 to 1."""
+    wind_speed: Annotated[PositiveSpeed, Le(60)] = 5.0
+
+
+Noise = Annotated[FlatNoise | WenzNoise, BY_KIND]
+
+
+@description
+class Environment:
+    """The water and its boundaries."""
+
+    depth: Annotated[PositiveMetres, Le(12e3)]
+    """Depth of the bed below the mean surface."""
+    sound_speed: SoundSpeed
+    surface: SeaSurface = SeaSurface()
+    bed: SeaBed = SeaBed()
+    absorption: Absorption = Absorption()
+    noise: Noise | None = None
+    """Ambient noise at the hydrophones; none if left out."""
+
+    @model_validator(mode="after")
+    def _water_all_the_way(self) -> Environment:
+        reaches(self.sound_speed, self.depth)
+        return self

@@ -1,0 +1,1 @@
+"""Arrays: apertures, beams, and the fit of a spherical wave."""

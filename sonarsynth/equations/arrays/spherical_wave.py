@@ -1,0 +1,215 @@
+"""Direction and distance of a source from the delays of its pulse over an array, and the bounds on their errors.
+
+A wavefront is described by the unit vector u towards its source, its curvature k = 1/R and the time t0 at which it
+passes the array centre; the plane wave is k = 0, no special case. Sensors at q (sonar frame) hear it at
+    t0 + (R |u - k q| - R)/c = t0 + (k |q|^2 - 2 u.q)/(c (1 + |u - k q|)).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.conventions import Floats
+
+RANK_TOLERANCE = 1e-6
+"""Singular values of the sensor positions below this share of the largest count as zero."""
+
+SETTLED = 1e-8
+"""A step (rad) after which Gauss-Newton stops: what is left is its square."""
+
+
+@dataclass(frozen=True, eq=False)
+class Wavefront:
+    """A spherical wave over an array; parameters are (along tangent 0, along tangent 1, curvature, time)."""
+
+    direction: Floats  # (xyz) unit vector towards the source
+    curvature: float  # 1/m
+    time: float  # s at the array centre
+    tangents: Floats  # (2, xyz) unit vectors square to the direction and to each other
+    covariance: Floats  # (4, 4) of the parameters, for independent errors of one second at each sensor of weight one
+    by_sound_speed: Floats  # (4,) change of the fitted parameters per m/s of the assumed sound speed
+    residual: Floats  # (sensor,) s
+
+
+def wavefront_delays(position: npt.ArrayLike, direction: npt.ArrayLike, curvature: float, sound_speed: float) -> Floats:
+    """Delays (sensor,) in s after the array centre of a wave from `direction` at sensors `position` (sensor, xyz)."""
+    q, u = np.asarray(position, float), np.asarray(direction, float)
+    along, square = q @ u, np.sum(q * q, axis=-1)
+    rho = np.sqrt(1 - 2 * curvature * along + curvature**2 * square)
+    return np.asarray((curvature * square - 2 * along) / (sound_speed * (1 + rho)))
+
+
+def tangent_plane(direction: npt.ArrayLike) -> Floats:
+    """Unit vectors (2, xyz) square to a direction: of increasing azimuth and elevation (y first at a pole)."""
+    u = np.asarray(direction, float)
+    flat = np.hypot(u[0], u[1])
+    y, x = (u[1] / flat, u[0] / flat) if flat > 0 else (0.0, 1.0)
+    return np.array([[-y, x, 0.0], [-u[2] * x, -u[2] * y, flat]])
+
+
+def plane_wavefront(direction: Floats, time: float) -> Wavefront:
+    """A plane wave as a `Wavefront` whose errors are not known."""
+    unknown = np.full((4, 4), np.nan)
+    return Wavefront(direction, 0.0, time, tangent_plane(direction), unknown, unknown[0], np.zeros(0))
+
+
+def plane_wave(
+    delay: npt.ArrayLike, position: npt.ArrayLike, sound_speed: float, weight: npt.ArrayLike | None = None
+) -> tuple[Floats, float]:
+    """Direction (xyz) and time (s) of the plane wave that fits delays (sensor,) best: the thesis's eq. 6, corrected.
+
+    The sum of SQUARES of tau_i - t0 + u.q_i/c is least, with the intercept t0 among the unknowns; closed form, no
+    search. (As printed, without the square, the sum does not depend on the angles for a symmetric array.) A planar
+    array gives the two components in its plane; the third follows from |u| = 1 with the sign that faces +x, since
+    such an array cannot tell front from back. NaN where the sensors (those of positive weight) lie on one line or in
+    one point, or where the components in the plane exceed 1 (no plane wave is that slow).
+    """
+    t, q = np.asarray(delay, float), np.asarray(position, float)
+    w = np.ones(len(t)) if weight is None else np.asarray(weight, float)
+    total = w.sum()
+    nothing = np.full(3, np.nan), np.nan
+    if not total > 0:
+        return nothing
+    q0, t0 = w @ q / total, w @ t / total
+    root = np.sqrt(w)[:, None]
+    u_, s, axes = np.linalg.svd(root * (q - q0), full_matrices=False)
+    rank = int(np.sum(s > RANK_TOLERANCE * s[0])) if s[0] > 0 else 0
+    if rank < 2:
+        return nothing
+    component = -sound_speed * (u_[:, :rank].T @ (root[:, 0] * (t - t0))) / s[:rank]
+    u = component @ axes[:rank]
+    if rank == 2:
+        normal = np.cross(axes[0], axes[1])
+        rest = 1 - u @ u
+        if rest < 0:
+            return nothing
+        u = u + np.sqrt(rest) * normal * (1.0 if normal[0] >= 0 else -1.0)
+    u = u / np.linalg.norm(u)
+    return u, float(t0 + q0 @ u / sound_speed)
+
+
+def spherical_wave(
+    delay: npt.ArrayLike,
+    position: npt.ArrayLike,
+    sound_speed: float,
+    weight: npt.ArrayLike,
+    start: npt.ArrayLike,
+    curvature: float = 0.0,
+    curved: bool = True,
+    iterations: int = 20,
+) -> Wavefront | None:
+    """The spherical wave that fits delays (sensor,) best, by Gauss-Newton from direction `start`; None where none does.
+
+    weight (sensor,) >= 0: inverse variances, up to a common factor. Not `curved`: the curvature is held at its start
+    (three sensors cannot tell it), with infinite variance. Derivatives, with rho = |u - k q|:
+        d/du along a tangent e: -(q.e)/(c rho);  d/dk: (|q|^2 - (u.q)^2)/(c rho (rho + 1 - k u.q)).
+    Fisher matrix and bound follow: `covariance` times the variance of a delay of weight one is the Cramer-Rao bound
+    (physics: independent Gaussian errors; Van Trees 2002, section 8.4).
+    """
+    t, q, w = (np.asarray(a, float) for a in (delay, position, weight))
+    u, k = np.asarray(start, float), float(curvature)
+    size = float(np.sqrt(np.einsum("qi,qi->q", q, q).max(initial=0.0)))
+    if not (np.all(np.isfinite(u)) and size > 0):
+        return None
+    from sonarsynth.equations.arrays.spherical_wave_kernel import normal_equations
+
+    for _ in range(iterations):
+        tangents = tangent_plane(u)
+        normal, right, own, late, jacobian = normal_equations(q, t, w, u, k, sound_speed, tangents)
+        inverse = _inverse(normal, curved)
+        if inverse is None:
+            return None
+        covariance = inverse
+        step = covariance @ right
+        turned = u + step[:2] @ tangents
+        bent = min(max(k + float(step[2]), -0.5 / size), 2.0 / size)  # no source among the sensors
+        moved = np.hypot(step[0], step[1]) + abs(bent - k) * size
+        u, k = turned / np.sqrt(turned @ turned), bent
+        if moved < SETTLED:
+            break
+    residual = late - jacobian @ step
+    by_speed = covariance @ own / sound_speed
+    if not curved:
+        covariance[2, 2] = np.inf
+    return Wavefront(u, k, float(step[3]), tangents, covariance, by_speed, residual)
+
+
+def _inverse(normal: Floats, curved: bool) -> Floats | None:
+    """Inverse of J^T W J (4, 4), with columns scaled; None where it is singular.
+
+    Not `curved`: of all but the curvature, whose row and column are zero.
+    """
+    used = normal if curved else np.delete(np.delete(normal, 2, axis=0), 2, axis=1)
+    scale = np.sqrt(used.diagonal())
+    if not scale.min() > 0:
+        return None
+    values, vectors = np.linalg.eigh(used / scale / scale[:, None])
+    if not values[0] > 1e-13 * values[-1]:
+        return None
+    vectors = vectors / scale[:, None]
+    inverse = np.asarray((vectors / values) @ vectors.T)
+    return inverse if curved else np.insert(np.insert(inverse, 2, 0.0, axis=0), 2, 0.0, axis=1)
+
+
+def envelope_peak(
+    frequency: npt.ArrayLike, spectrum: npt.ArrayLike, low: float, high: float, noise: npt.ArrayLike = 0.0
+) -> tuple[float, float]:
+    """Time (s) at which the envelope of a pulse in a band is largest, and its standard error (s); NaN without one.
+
+    frequency (bin,) in Hz, evenly spaced; spectrum (bin,) and noise, the mean power of noise in each bin, in the same
+    unit, squared. The band (low to high, Hz) is tapered by sin^2, so that bins at its edges do not count. With
+    a = |z| the envelope of z = sum g S exp(i w t) and w0 = Im(z'/z), the noise of its slope is that of
+    sum (w - w0) g n / sqrt 2, and the peak moves by that over a'' = Re(z'' conj z)/a + w0^2 a.
+    """
+    f, wave = np.asarray(frequency, float), np.asarray(spectrum, complex)
+    nothing = float("nan"), float("nan")
+    taper = np.sin(np.pi * np.clip((f - low) / (high - low), 0.0, 1.0)) ** 2
+    if len(f) < 3 or not np.any(taper * np.abs(wave) > 0):
+        return nothing
+    count, spacing, omega = 16 * len(f), f[1] - f[0], 2 * np.pi * f
+    top = int(np.abs(np.fft.ifft(taper * wave, count)).argmax())
+    time = float((top if top < count / 2 else top - count) / (count * spacing))
+    longest, curve, carrier = 0.5 / (count * spacing), 0.0, 0.0
+    for _ in range(8):
+        turned = taper * wave * np.exp(1j * omega * time)
+        z, slope, bend = turned.sum(), (1j * omega * turned).sum(), -(omega**2 * turned).sum()
+        height, carrier = abs(z), float((slope / z).imag)
+        curve = float((bend * np.conj(z)).real / height + carrier**2 * height)
+        if not curve < 0:
+            return nothing
+        step = float(np.clip(-(slope * np.conj(z)).real / height / curve, -longest, longest))
+        time += step
+        if abs(step) < 1e-15:
+            break
+    power = np.broadcast_to(np.asarray(noise, float), f.shape)
+    return time, float(np.sqrt(0.5 * np.sum(((omega - carrier) * taper) ** 2 * power)) / abs(curve))
+
+
+def delay_bound(energy_to_noise: npt.ArrayLike, bandwidth: npt.ArrayLike) -> Floats:
+    """Cramer-Rao bound (s) on the standard error of a delay: 1/(2 pi beta d), d^2 = `energy_to_noise` = 2 E/N0.
+
+    bandwidth beta (Hz) is the root mean square frequency of the known pulse, about zero where the carrier phase is
+    known, about the centroid where it is not (`rms_bandwidth`). Source: Van Trees (2002), section 8.2; Kay (1993),
+    section 3.11.
+    """
+    return np.asarray(1 / (2 * np.pi * np.asarray(bandwidth, float) * np.sqrt(np.asarray(energy_to_noise, float))))
+
+
+def rms_bandwidth(frequency: npt.ArrayLike, spectrum: npt.ArrayLike, *, centred: bool = False) -> float:
+    """Root mean square frequency (Hz) of a spectrum, about zero or about its centroid: sqrt(int f^2|S|^2/int |S|^2)."""
+    f, power = np.asarray(frequency, float), np.abs(np.asarray(spectrum)) ** 2
+    mean = float(f @ power / power.sum()) if centred else 0.0
+    return float(np.sqrt((f - mean) ** 2 @ power / power.sum()))
+
+
+def direction_bound(position: npt.ArrayLike, delay_error: float, sound_speed: float) -> Floats:
+    """Cramer-Rao bound (3, 3) on the covariance of a plane wave's direction from delays of equal error (s).
+
+    Unknown emission time: (c delay_error)^2 times the (pseudo-)inverse of sum (q - mean q)(q - mean q)^T.
+    """
+    q = np.asarray(position, float)
+    spread = q - q.mean(axis=0)
+    return np.asarray((sound_speed * delay_error) ** 2 * np.linalg.pinv(spread.T @ spread, hermitian=True))

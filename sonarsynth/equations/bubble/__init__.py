@@ -1,0 +1,1 @@
+"""The collapse of a bubble and the pulse that it radiates; other waveforms."""

@@ -1,0 +1,1 @@
+"""Spectra of noise, filters, and sums of power."""

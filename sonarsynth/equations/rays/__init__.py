@@ -1,0 +1,1 @@
+"""Eigenrays in layered water."""

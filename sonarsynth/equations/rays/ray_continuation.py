@@ -1,0 +1,127 @@
+"""Rays near one that is known: the same family, from the same start to many ends near the end of the known ray.
+
+What an array needs: the ray to its centre is searched for, those to its elements are reached from it by Newton's
+method, each from the last. An end at which the vertices of the family lie in other layers is given up, not
+guessed: the complete search decides there.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.equations.rays.ray_chain import GRAZING, offsets, sweep, time_of
+from sonarsynth.equations.rays.ray_families import ABOVE, BELOW, BETWEEN, COLUMNS, family_of, weigh
+from sonarsynth.equations.rays.ray_search import settled
+from sonarsynth.equations.rays.ray_vertices import (
+    AFTER,
+    DESCENDS,
+    FASTEST,
+    FIRST,
+    GRADIENT_DOWN,
+    GRADIENT_UP,
+    LAST,
+    LOWER_END,
+    UPPER_END,
+    Chain,
+    begin,
+    extend_down,
+    extend_up,
+    new_chain,
+)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def lay_for(depth: Floats, speed: Floats, start: float, end: float, p: float, up: int, vertices: int, chain: Chain,
+            family: Ints) -> tuple[int, int, float, float]:  # fmt: skip
+    """Lay the weighted chain of a family for rays of about this p: first and last node, and its turns."""
+    at, of = chain.at, chain.of
+    begin(depth, speed, start, end, chain)
+    above, between, below = 0, 1, 0
+    if vertices > 0:
+        family_of(up, vertices, at[DESCENDS] == 1, family, 0)
+        above, between, below = family[0, ABOVE], family[0, BETWEEN], family[0, BELOW]
+        while True:
+            of[AFTER] = math.inf
+            extend_up(depth, speed, chain)
+            extend_down(depth, speed, chain)
+            if not of[AFTER] * p < 1.0:
+                break
+            of[FASTEST] = of[AFTER]
+    else:
+        of[AFTER] = math.inf
+    first = at[FIRST] if above > 0 else at[UPPER_END]
+    last = at[LAST] if below > 0 else at[LOWER_END]
+    weigh(above, between, below, first, last, chain)
+    offsets(chain.c, first, last, of[FASTEST], chain.d)
+    return first, last, above * of[GRADIENT_UP], below * of[GRADIENT_DOWN]
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def approach(
+    p: float, distance: float, chain: Chain, first: int, last: int, turn_up: float, turn_down: float
+) -> tuple[float, float, float, float]:
+    """Newton in v = c_m tan(grazing angle) from a p nearby, to within a last step that travel times do not notice.
+
+    Returns (s_m, p, X/p, dX/dp); NaN where it leaves the interval.
+    """
+    fastest, after = chain.of[FASTEST], chain.of[AFTER]
+    extent = math.sqrt((after - fastest) * (after + fastest)) if after < math.inf else math.inf
+    v = math.sqrt(max(1.0 - (p * fastest) ** 2, 0.0)) / max(p, 1e-9 / fastest)
+    for _ in range(12):
+        p = 1.0 / math.sqrt(v * v + fastest * fastest)
+        s_m = max(v * p, GRAZING)
+        over_p, slope = sweep(s_m, p, chain.d, chain.k, first, last, turn_up, turn_down)
+        left = p * over_p - distance
+        if settled(left, distance, p * abs(slope)):
+            return s_m, p, over_p, slope
+        v += left / (slope * s_m * p * p)
+        if not 0.0 < v <= extent:
+            break
+    return math.nan, math.nan, math.nan, math.nan
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def rays_nearby(
+    depth: Floats, speed: Floats,
+    start: Floats, slowness: Floats, up: Ints, vertices: Ints, place: Ints, end: Floats, distance: Floats,
+    time: Floats, sine: Floats, amplitude: Floats,
+) -> None:  # fmt: skip
+    """Times, sines at the start (up positive) and amplitudes (ray, end) of rays of known families; NaN given up.
+
+    start, slowness, up, vertices (ray,): of the known rays; end (depth,): depths of the ends, place (end,): which of
+    them each end has, equal ones next to each other; distance (ray, end).
+    """
+    chain = new_chain(len(depth))
+    family = np.zeros((1, COLUMNS), np.int64)
+    for i in range(len(start)):
+        near, was, first, last, turn_up, turn_down = slowness[i], -1, 0, 0, 0.0, 0.0
+        for j in range(len(place)):
+            if place[j] != was:
+                was = place[j]
+                first, last, turn_up, turn_down = lay_for(
+                    depth, speed, start[i], end[was], near, up[i], vertices[i], chain, family
+                )
+            time[i, j] = sine[i, j] = amplitude[i, j] = math.nan
+            if first == last and turn_up + turn_down == 0.0:
+                continue
+            s_m, p, over_p, slope = approach(near, distance[i, j], chain, first, last, turn_up, turn_down)
+            if math.isnan(p):
+                continue
+            left = distance[i, j] - p * over_p
+            c, d, descends = chain.c, chain.d, chain.at[DESCENDS] == 1
+            here, there = chain.at[UPPER_END], chain.at[LOWER_END]
+            if not descends:
+                here, there = there, here
+            leaves, arrives = math.sqrt(s_m * s_m + p * p * d[here]), math.sqrt(s_m * s_m + p * p * d[there])
+            time[i, j] = time_of(s_m, p, c, d, chain.dz, chain.crossings, first, last, turn_up, turn_down) + p * left
+            amplitude[i, j] = math.sqrt(c[here] * c[there] / (over_p * abs(slope) * leaves * arrives))
+            upward = up[i] == 1 if vertices[i] > 0 else not descends
+            near = p + left / slope  # ds/dp = -p c^2/s
+            leaves -= p * c[here] * c[here] / leaves * left / slope
+            sine[i, j] = leaves if upward else -leaves
+            if j + 1 < len(place):
+                near += (distance[i, j + 1] - distance[i, j]) / slope

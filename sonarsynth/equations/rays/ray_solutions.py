@@ -1,0 +1,137 @@
+"""Eigenrays in horizontally layered water: the rays that join two points, found completely and to rounding.
+
+Sound speed is linear between nodes; two nodes at one depth are a jump, taken as the limit of a thin layer (a ray turns
+in it where the thin layer would turn it). Method: `rays_layers` (one layer), `rays_chain` (sums over layers),
+`rays_families` (which sums), `rays_search` (their roots).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, Ints
+
+GOOD: Final = 0
+COINCIDENT: Final = 1
+CAUSTIC: Final = 2
+PASSED: Final = 3
+REASONS: Final[dict[int, str]] = {
+    GOOD: "good",
+    COINCIDENT: "the ends coincide: no direction, no finite amplitude",
+    CAUSTIC: "near a caustic: 20 dB or more above spherical spreading, where ray theory overestimates",
+    PASSED: "passed a caustic: its phase of a quarter period is not in the amplitude",
+}
+"""What the flag of a ray means."""
+
+TOLERANCE = 1e-9  # m: ends this little outside the water are on its boundary
+
+
+@dataclass(frozen=True, eq=False)
+class Water:
+    """Sound speed (m/s) at depths (m) from the surface to the bed, linear between; two equal depths are a jump."""
+
+    depth: Floats  # (node,) from 0 to the bed
+    speed: Floats  # (node,)
+
+
+@dataclass(frozen=True, eq=False)
+class Eigenrays:
+    """Rays between pairs of points, sorted by pair, then by travel time. Sines of grazing angles: up positive."""
+
+    pair: Ints  # (ray,)
+    travel_time: Floats  # (ray,) s
+    length: Floats  # (ray,) m
+    slowness: Floats  # (ray,) s/m: p = cos(grazing angle)/c, the horizontal slowness
+    start_sine: Floats  # (ray,) NaN for coincident ends
+    end_sine: Floats  # (ray,)
+    start_speed: Floats  # (ray,) m/s
+    end_speed: Floats  # (ray,) m/s
+    amplitude: Floats  # (ray,) 1/m: pressure at the end over that at 1 m from the start
+    upper: Floats  # (ray,) m: depth of its upper vertex, a turning depth or 0 at the surface; NaN without one
+    lower: Floats  # (ray,) m: depth of its lower vertex, a turning depth or that of the bed; NaN without one
+    surface: Ints  # (ray,) reflections from the surface
+    bottom: Ints  # (ray,) reflections from the bed
+    turning: Ints  # (ray,) turning points
+    caustics: Ints  # (ray,) caustics passed
+    flag: Ints  # (ray,) see REASONS
+
+
+def water(depth: Floats, speed: Floats, bed: float) -> Water:
+    """The water down to the bed (m) of a profile at nodes (m, m/s), constant beyond its ends.
+
+    Raises ValueError for nodes that are not finite or not in order, for a speed or a bed depth that is not positive.
+    """
+    z, c = np.asarray(depth, float), np.asarray(speed, float)
+    if z.ndim != 1 or z.shape != c.shape or len(z) == 0:
+        raise ValueError("a profile needs as many speeds as depths, and one at least")
+    if not (np.isfinite(z).all() and np.isfinite(c).all() and np.isfinite(bed)):
+        raise ValueError("a profile and its bed must be finite numbers")
+    if (np.diff(z) < 0).any() or (c <= 0).any() or bed <= 0:
+        raise ValueError("a profile needs depths that do not decrease, positive speeds and a bed below the surface")
+    inside = (z > 0) & (z < bed)
+    at_surface, at_bed = np.interp([0.0, bed], z, c)
+    at_bed = c[np.searchsorted(z, bed)] if bed in z else at_bed  # a jump on the bed: its upper side
+    return Water(np.concatenate([[0.0], z[inside], [bed]]), np.concatenate([[at_surface], c[inside], [at_bed]]))
+
+
+def within(water: Water, depth: Floats, what: str) -> Floats:
+    """Depths, those within rounding of surface or bed put on it; raises ValueError naming the first one outside."""
+    z = np.asarray(depth, float)
+    bed = water.depth[-1]
+    if z.size and z.min() >= 0.0 and z.max() <= bed:
+        return z
+    wrong = ~((z >= -TOLERANCE) & (z <= bed + TOLERANCE))
+    if wrong.any():
+        i = int(np.argmax(wrong))
+        raise ValueError(f"{what} {i} at depth {z.flat[i]:g} m is not in the water, which is {bed:g} m deep")
+    return np.asarray(np.clip(z, 0.0, bed))
+
+
+def eigenrays(
+    water: Water, start: Floats, end: Floats, distance: Floats, vertices: int = 1, reflections: int = 0
+) -> Eigenrays:
+    """All rays from depths start (pair,) to depths end (pair,) at horizontal distances (pair,), in m.
+
+    vertices: most turning points and reflections together; reflections: most from surface and bed together. The default
+    is the direct family. A pair may have no ray (a shadow zone), one or several. Travel times are right to about 1e-15
+    of themselves, and the search is complete (`rays_search`). A ray that turns exactly at an end counts once; an end on
+    a jump is on the side of the other end, on the lower one if both are level. Raises ValueError for ends outside the
+    water, distances that are not finite or negative, and negative numbers of vertices.
+    """
+    from sonarsynth.equations.rays import ray_batches as kernels
+
+    z1, z2, r = np.broadcast_arrays(
+        within(water, start, "start"), within(water, end, "end"), np.asarray(distance, float)
+    )
+    z1, z2, r = (np.ascontiguousarray(a) for a in (z1, z2, r))
+    if r.size and not 0.0 <= r.min() <= r.max() < np.inf:
+        raise ValueError("horizontal distances must be finite and not negative")
+    if vertices < 0 or reflections < 0:
+        raise ValueError("the most vertices and reflections of a ray cannot be negative")
+    pairs, rows, first = [], [], 0
+    room = (1 + min(2 * vertices, 4)) * len(r) + 64
+    while first < len(r):
+        pair, out = np.empty(room, np.int64), np.empty((room, kernels.FIELDS))
+        count, reached = kernels.rays_of_pairs(
+            water.depth, water.speed, z1, z2, r, vertices, min(reflections, vertices), first, pair, out
+        )
+        pairs.append(pair[:count])
+        rows.append(out[:count])
+        room = 2 * room if reached == first else max(64, 2 * (1 + vertices) * (len(r) - reached))
+        first = reached
+    pair = pairs[0] if len(pairs) == 1 else np.concatenate([np.empty(0, np.int64), *pairs])
+    columns = (rows[0] if len(rows) == 1 else np.concatenate([np.empty((0, kernels.FIELDS)), *rows])).T.copy()
+    return Eigenrays(pair, *columns[: kernels.SURFACE], *columns[kernels.SURFACE :].astype(np.int64))
+
+
+def mean_slowness(water: Water, start: Floats, end: Floats) -> Floats:
+    """Mean of 1/c (s/m) over the depths between start (pair,) and end (pair,): one over the harmonic mean speed."""
+    from sonarsynth.equations.rays import ray_batches as kernels
+
+    z1, z2 = np.broadcast_arrays(within(water, start, "start"), within(water, end, "end"))
+    out = np.empty(z1.shape)
+    kernels.mean_slowness(water.depth, water.speed, np.ascontiguousarray(z1), np.ascontiguousarray(z2), out)
+    return out

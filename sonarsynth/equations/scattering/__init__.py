@@ -1,0 +1,1 @@
+"""Scattering by facets, smooth bodies and rough surfaces; exact series."""

@@ -1,0 +1,1 @@
+"""Sea water and its boundaries."""

@@ -1,0 +1,87 @@
+"""Truth against data: what a store says it sees, checked against what was there. Reads plain xarray."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from sonarsynth.evaluation.brightest_beams import beam_width, brightest_beam_on_target, near_target
+from sonarsynth.evaluation.checks import Check, every, numbered
+from sonarsynth.evaluation.error_bounds import bounds, warnings
+from sonarsynth.evaluation.level_checks import INAUDIBLE, LEDGER_TOLERANCE, ledger_adds_up, ledger_measured
+from sonarsynth.evaluation.point_checks import kinds, points, range_errors
+from sonarsynth.evaluation.source_estimates import snap_located
+
+__all__ = [
+    "EXPANSION_AMPLITUDE",
+    "EXPANSION_PHASE",
+    "INAUDIBLE",
+    "LEDGER_TOLERANCE",
+    "Check",
+    "beam_width",
+    "bounds",
+    "brightest_beam_on_target",
+    "check",
+    "expansions_hold",
+    "kinds",
+    "ledger_adds_up",
+    "ledger_measured",
+    "near_target",
+    "nothing_outside",
+    "points",
+    "range_errors",
+    "snap_located",
+    "warnings",
+]
+
+EXPANSION_PHASE = 0.2  # rad: costs a beam 0.09 dB at worst
+EXPANSION_AMPLITUDE = 0.02  # of the strongest echo
+
+
+def check(tree: xr.DataTree) -> list[Check]:
+    """All checks of truth against data, over the frames that were built."""
+    built = np.flatnonzero(np.isfinite(every(tree, "truth/sonar_position")[:, 0]))
+    if not len(built):
+        return [Check("frames", "at least one frame built", "none", False, {"frames": 0})]
+    checks = [Check("frames", "at least one frame built", f"{len(built)}", True, {"frames": len(built)})]
+    if "ledger" in tree.children:
+        checks.append(ledger_adds_up(tree, built))
+        checks.append(ledger_measured(tree, built))
+        checks.append(expansions_hold(tree, built))
+    if "signals" in tree.children:
+        checks.append(nothing_outside(tree, built))
+    if "image" in tree.children:
+        checks.append(brightest_beam_on_target(tree, built))
+    if "cloud" in tree.children:
+        checks.extend(range_errors(tree, built))
+    return checks + bounds(tree, built)
+
+
+def nothing_outside(tree: xr.DataTree, frames: np.ndarray) -> Check:
+    """Arrivals that fell outside the sample window, and samples at full scale."""
+    of_frames = [every(tree, f"signals/{name}")[frames].reshape(len(frames), -1) for name in ("outside", "clipped")]
+    outside, clipped = (int(counts.sum()) for counts in of_frames)
+    spoiled = frames[sum(counts.sum(axis=1) for counts in of_frames) > 0]
+    got = f"{outside} arrivals outside, {clipped} samples clipped"
+    return Check(
+        "signals whole",
+        "none outside, none clipped",
+        got,
+        outside + clipped == 0,
+        {"outside": outside, "clipped": clipped},
+        numbered(spoiled),
+    )
+
+
+def expansions_hold(tree: xr.DataTree, frames: np.ndarray) -> Check:
+    """Wavefronts and amplitudes are expanded over the aperture; what that errs by, as traced to probes."""
+    phases = 2 * np.pi * float(tree.attrs["band_high"]) * every(tree, "truth/wavefront_error")[frames]
+    amplitudes = every(tree, "truth/amplitude_error")[frames]
+    phase, amplitude = float(phases.max()), float(amplitudes.max())
+    good_frames = (phases <= EXPANSION_PHASE) & (amplitudes <= EXPANSION_AMPLITUDE)
+    got = f"{phase:.2g} rad at the top of the band, {100 * amplitude:.2g} % of the strongest echo"
+    good = phase <= EXPANSION_PHASE and amplitude <= EXPANSION_AMPLITUDE
+    expected = f"under {EXPANSION_PHASE} rad and {100 * EXPANSION_AMPLITUDE:g} %"
+    numbers = {"phase_rad": phase, "amplitude": amplitude}
+    bad = numbered(frames[~good_frames.reshape(len(frames), -1).all(axis=1)])
+    return Check("wavefronts over the aperture", expected, got, good, numbers, bad)

@@ -1,0 +1,73 @@
+"""Errors against what they are errors of: data may be as good as they say, and of no use.
+
+What is looked at is small, so that a build can say it at its end.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from sonarsynth.evaluation.brightest_beams import beam_width
+from sonarsynth.evaluation.checks import Check, every, numbered
+from sonarsynth.evaluation.point_checks import has_labels, points, range_errors
+from sonarsynth.evaluation.source_estimates import snap_located
+from sonarsynth.store import Folder, Remote, folder_of
+from sonarsynth.store.files.place import opens
+
+FRAMES, FRAMES_REMOTE, CELLS = 200, 24, 20_000_000
+"""Frames that are looked at after a build, of a store on this machine and elsewhere, and cells of their beam grids."""
+
+
+def useful_ranges(tree: xr.DataTree, frames: np.ndarray) -> Check:
+    """Whether ranges of direct echoes, by their errors and by predicted ones, tell more than the beam alone does.
+
+    They do not where half of them are further off than the target is large and a beam is wide there.
+    """
+    name, expected = "ranges useful", "reported"
+    found = points(tree, frames)
+    if not found.judged.any():
+        return Check(name, expected, "no points on a target", None, {})
+    frame, target = found.frame[found.judged], found.target[found.judged].astype(int)
+    each, row = np.unique(frame, return_inverse=True)
+    corners = np.asarray(tree["truth/box"].isel(frame=each).values)
+    apart = np.linalg.norm(corners[:, :, :, None] - corners[:, :, None, :], axis=-1).max(axis=(2, 3))
+    size = apart[row, target]
+    limit = np.fmax(size, beam_width(tree) * found.true_range[found.judged])
+    error, predicted = (np.abs(x[found.judged]) for x in (found.error, found.range_error))
+    middle = [float(np.median(x)) for x in (error, predicted, limit)]
+    over = error > limit, predicted > limit
+    numbers = {"median_m": middle[0], "predicted_m": middle[1], "limit_m": middle[2]}
+    got = f"error {middle[0]:.2g} m, predicted {middle[1]:.2g} m, medians; target or beam {middle[2]:.2g} m"
+    if not any(np.mean(x) > 0.5 for x in over):
+        return Check(name, expected, got, None, numbers)
+    warning = f"ranges tell nothing: {got}"
+    return Check(name, expected, got, None, numbers, numbered(np.unique(frame[over[0] | over[1]])), warning)
+
+
+def bounds(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
+    """What of a store is of use, whatever it claims."""
+    checks = []
+    if "bearings" in tree.children:
+        checks.append(snap_located(tree, frames))
+    if has_labels(tree):
+        checks.append(useful_ranges(tree, frames))
+    return checks
+
+
+def warnings(store: Folder | str) -> list[str]:
+    """Warnings about a store, a line each, from some frames spread over those that are built; no signals are read.
+
+    None of a store that cannot be read: to say so is for `store.verify`.
+    """
+    path = folder_of(store)
+    try:
+        with xr.open_datatree(opens(path), engine="zarr", chunks=None) as tree:
+            built = np.flatnonzero(np.isfinite(every(tree, "truth/sonar_position")[:, 0]))
+            cells = int(np.prod(tree["cloud/range"].shape[1:])) if "cloud" in tree.children else 1
+            most = min(FRAMES_REMOTE if isinstance(path, Remote) else FRAMES, max(CELLS // cells, 1), len(built))
+            frames = built[np.linspace(0, len(built) - 1, most).round().astype(int)]
+            checks = bounds(tree, frames) + (range_errors(tree, frames) if has_labels(tree) else [])
+    except (OSError, KeyError, ValueError):
+        return []
+    return [check.warning for check in checks if check.warning]

@@ -1,0 +1,154 @@
+"""Points, judged by their labels: how far they are from where their echoes were made, and what else there is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from sonarsynth.evaluation.checks import Check, numbered
+from sonarsynth.products import FAMILIES, ORIGINS
+
+OUTLIERS = 0.01
+"""Share of the points that may be further off than three predicted errors; one may be whatever their number."""
+
+MOST_CELLS = 2_000_000
+"""Cells of beam grids that are read at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """The points of some frames."""
+
+    frame: np.ndarray  # (point,)
+    beam: np.ndarray  # (point, 2) row and column of the beam
+    range: np.ndarray  # (point,) m
+    range_error: np.ndarray  # (point,) m, predicted
+    true_range: np.ndarray  # (point,) m
+    target: np.ndarray  # (point,)
+    emission: np.ndarray  # (point,)
+    family: np.ndarray  # (point,)
+    origin: np.ndarray  # (point,)
+    clock: np.ndarray  # (point,) the emission that delays are counted from; -1: not known
+
+    @property
+    def strange(self) -> np.ndarray:
+        """(point,) lit by another snap than that of the clock."""
+        return np.asarray((self.clock >= 0) & (self.emission >= 0) & (self.emission != self.clock))
+
+    @property
+    def judged(self) -> np.ndarray:
+        """(point,) of a target, directly, in the main lobe, by the right snap: their ranges are claimed to be right."""
+        there = (self.target >= 0) & (self.family == 0) & (self.origin == ORIGINS.index("main lobe"))
+        return np.asarray(there & ~self.strange)
+
+    @property
+    def error(self) -> np.ndarray:
+        """(point,) m: range less true range."""
+        return np.asarray(self.range - self.true_range)
+
+
+def has_labels(tree: xr.DataTree) -> bool:
+    """Whether the points of a store have labels."""
+    return "cloud" in tree.children and "origin" in tree["cloud"].dataset
+
+
+def points(tree: xr.DataTree, frames: Sequence[int] | np.ndarray) -> Points:
+    """The points of some frames of a store whose points have labels."""
+    cloud, at = tree["cloud"].dataset, np.asarray(frames)
+    names = ("range", "range_error", "true_range", "target", "emission", "family", "origin")
+    count = max(MOST_CELLS // max(int(np.prod(cloud["range"].shape[1:])), 1), 1)
+    found: dict[str, list[np.ndarray]] = {name: [] for name in ("frame", "beam", *names)}
+    for start in range(0, len(at), count):
+        some = at[start : start + count]
+        grids = {name: np.asarray(cloud[name].isel(frame=some).values) for name in names}
+        frame, *beam = np.nonzero(np.isfinite(grids["range"]))
+        found["frame"].append(some[frame])
+        found["beam"].append(np.stack(beam, axis=1))
+        for name in names:
+            found[name].append(grids[name][frame, *beam])
+    columns = {name: np.concatenate(parts) if parts else np.zeros(0) for name, parts in found.items()}
+    return Points(**columns, clock=_clocks(tree, columns["frame"].astype(int)))
+
+
+def _clocks(tree: xr.DataTree, frames: np.ndarray) -> np.ndarray:
+    """The emission (row,) of the first bearing in frames (row,); -1 where that is not known."""
+    if "bearings" not in tree.children or "emission" not in tree["bearings"].dataset or not len(frames):
+        return np.full(len(frames), -1)
+    each, row = np.unique(frames, return_inverse=True)
+    return np.asarray(tree["bearings"].dataset["emission"].isel(frame=each, snap=0).values)[row]
+
+
+def range_errors(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
+    """Errors of the ranges of points by their labels, and what the points are that no range can be judged of.
+
+    How large they are depends on the scene (beam width, size of the glints); that they are as predicted does not.
+    """
+    name, reported = "range of points on target", "reported"
+    if not has_labels(tree):
+        return [Check(name, reported, "the points of this store have no labels", None, {})]
+    found = points(tree, frames)
+    numbers: dict[str, float] = {word: int(mask.sum()) for word, mask in kinds(found).items()}
+    numbers |= {"points": int(found.judged.sum()), "off_target": int((~found.judged).sum())}
+    whose = Check("whose echoes points are", reported, _said(numbers), None, numbers, warning=_few(numbers))
+    if not found.judged.any():
+        return [Check(name, reported, "no points on a target", None, numbers), whose]
+    error, ratio = found.error[found.judged], _ratio(found)[found.judged]
+    missed = ~(np.abs(ratio) <= 3.0)
+    finite = ratio[np.isfinite(ratio)]
+    numbers |= {
+        "median_m": float(np.median(np.abs(error))),
+        "largest_m": float(np.abs(error).max()),
+        "share_within_3": float(1.0 - missed.mean()),
+        "pull_std": float(finite.std()) if len(finite) else float("nan"),
+    }
+    spread = f"median error {100 * numbers['median_m']:.2g} cm, at most {100 * numbers['largest_m']:.2g} cm"
+    within = f"{100 * numbers['share_within_3']:.4g} %, errors over predicted ones have standard deviation "
+    return [
+        Check(name, reported, f"{spread}, over {len(error)} points", None, numbers),
+        Check(
+            "predicted range errors",
+            "99 % within three, but one",
+            within + f"{numbers['pull_std']:.2g}",
+            bool(missed.sum() <= max(1, OUTLIERS * len(missed))),
+            numbers,
+            numbered(np.unique(found.frame[found.judged][missed])),
+        ),
+        whose,
+    ]
+
+
+def _ratio(found: Points) -> np.ndarray:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(found.error / found.range_error)
+
+
+def kinds(found: Points) -> dict[str, np.ndarray]:
+    """What points are that are not judged: each (point,) in the first that it belongs to."""
+    of = {word: found.origin == number for number, word in enumerate(ORIGINS)}
+    rows = {
+        "the snap itself": of["snap itself"],
+        "unexplained": of["unexplained"],
+        "lit by another snap": found.strange,
+    }
+    rows |= {"mirror images": of["mirror image"]}
+    rows |= {f"ghosts by {word}": found.family == n for n, word in enumerate(FAMILIES) if n}
+    rows |= {"in side lobes": of["side lobe"], "in grating lobes": of["grating lobe"]}
+    left = ~found.judged
+    for word, mask in rows.items():
+        rows[word] = mask & left
+        left = left & ~mask
+    return rows
+
+
+def _said(numbers: dict[str, float]) -> str:
+    rest = [f"{count:.0f} {word}" for word, count in numbers.items() if count and word not in ("points", "off_target")]
+    return ", ".join([f"{numbers['points']:.0f} direct echoes of targets", *rest])
+
+
+def _few(numbers: dict[str, float]) -> str:
+    """A warning where most points are no direct echoes."""
+    count = numbers["points"] + numbers["off_target"]
+    return f"of {count:.0f} points only {_said(numbers)}" if numbers["points"] < 0.5 * count else ""

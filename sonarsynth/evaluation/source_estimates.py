@@ -1,0 +1,131 @@
+"""Estimates of where snaps are, each against the true snap that it came from; and whether they are of any use."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+import xarray as xr
+
+from sonarsynth.evaluation.brightest_beams import beam_width
+from sonarsynth.evaluation.checks import Check, numbered, of_frame
+from sonarsynth.evaluation.level_checks import snaps_heard
+from sonarsynth.geometry import Pose
+from sonarsynth.products import REASONS
+
+NAME, EXPECTED = "snap located", "within 3 predicted errors in 95 %"
+NEAR = 14.16
+"""Three standard errors in each of three axes: the chi-square of three degrees of freedom that has the probability of
+three sigma (99.73 %)."""
+SHARE = 0.95
+QUANTITIES = ("position", "azimuth", "elevation", "time")
+USELESS_RANGE = 0.5
+"""A place whose predicted error is more of its range than this is of no use; a bearing, of more than a beam width; a
+time, of more than the inverse of the bandwidth."""
+ACCEPTED, PLACELESS = REASONS.index("accepted"), REASONS.index("range_unknown")
+
+
+@dataclass
+class _Tally:
+    """What came of all estimates."""
+
+    within: dict[str, list[bool]] = field(default_factory=lambda: {name: [] for name in QUANTITIES})
+    misses: list[float] = field(default_factory=list)  # m
+    useless: int = 0
+    strays: int = 0  # accepted, and come from no snap
+    rows: int = 0
+    unheard: int = 0  # snaps that reach the array, and were not found
+    reasons: Counter[str] = field(default_factory=Counter)
+    frames: set[int] = field(default_factory=set)
+
+    def add(self, frame: int, within: dict[str, bool]) -> None:
+        for name, good in within.items():
+            self.within[name].append(good)
+        if not all(within.values()):
+            self.frames.add(frame)
+
+
+def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
+    """Each estimate is within three predicted errors of the snap that it came from, in 95 %; each quantity by its own.
+
+    Positions by their Mahalanobis distance. An estimate that is accepted and comes from no snap counts as a miss. A
+    snap that reaches the array and is not found, and errors as large as what is sought, are honest but of no use: a
+    warning.
+    """
+    if "emission" not in tree["bearings"].dataset:
+        return Check(NAME, EXPECTED, "not in this store", None, {})
+    tally = _Tally()
+    for i in frames:
+        _frame(tree, int(i), tally)
+    if not tally.rows:
+        got = f"none of {tally.unheard} found" if tally.unheard else "no snap reaches the array"
+        return Check(NAME, EXPECTED, got, None, {"found": 0}, numbered(sorted(tally.frames)), _warning(tally))
+    shares = {name: float(np.mean(good + [False] * tally.strays)) for name, good in tally.within.items() if good}
+    worst = min(shares, key=lambda name: shares[name]) if shares else "position"
+    good = bool(shares) and shares[worst] >= SHARE
+    places, numbers = tally.within["position"], {f"{name}_share": share for name, share in shares.items()}
+    median = float(np.median(tally.misses)) if tally.misses else float("nan")
+    got = f"{sum(places)} of {len(places) + tally.strays}, median error {median:.3g} m"
+    if not good and worst != "position":
+        got += f"; {worst} in {100 * shares.get(worst, 0.0):.3g} %"
+    if tally.strays:
+        got += f"; {tally.strays} come from no snap"
+    numbers |= {"good": sum(places), "found": tally.rows, "median_m": median, "strays": tally.strays}
+    return Check(NAME, EXPECTED, got, good, numbers, numbered(sorted(tally.frames)), _warning(tally))
+
+
+def _frame(tree: xr.DataTree, i: int, tally: _Tally) -> None:
+    column = {str(name): of_frame(tree, f"bearings/{name}", i) for name in tree["bearings"].dataset.data_vars}
+    found = np.flatnonzero(np.isfinite(column["time"]))
+    reached = int(snaps_heard(tree, i).sum())
+    tally.rows += len(found)
+    missing = max(reached - len(set(column["emission"][found]) - {-1}), 0)
+    if missing:
+        tally.unheard += missing
+        tally.frames.add(i)
+        refused = [REASONS[n] for n in column["reason"] if n not in (ACCEPTED, PLACELESS)]
+        tally.reasons.update(refused[:missing])
+    truth = {name: of_frame(tree, f"truth/snap_{name}", i) for name in ("arrival", "azimuth", "elevation", "position")}
+    pose = Pose(of_frame(tree, "truth/sonar_position", i), of_frame(tree, "truth/sonar_orientation", i))
+    true = pose.to_body(truth["position"])
+    for row in found:
+        emission = int(column["emission"][row])
+        if emission < 0:
+            tally.strays += 1
+            tally.frames.add(i)
+            continue
+        one = {name: values[row] for name, values in column.items()}
+        turned = (one["azimuth"] - truth["azimuth"][emission] + 180.0) % 360.0 - 180.0
+        raised = one["elevation"] - truth["elevation"][emission]
+        within = {
+            "azimuth": bool(abs(turned) <= 3 * one["azimuth_error"]),
+            "elevation": bool(abs(raised) <= 3 * one["elevation_error"]),
+            "time": bool(abs(one["time"] - truth["arrival"][emission]) <= 3 * one["time_error"]),
+        }
+        if np.isfinite(one["position"]).all():
+            error = one["position"] - true[emission]
+            tally.misses.append(float(np.linalg.norm(error)))
+            within["position"] = bool(error @ np.linalg.solve(one["position_covariance"], error) <= NEAR)
+        tally.add(i, within)
+        tally.useless += _useless(tree, one)
+
+
+def _useless(tree: xr.DataTree, one: dict[str, np.ndarray]) -> bool:
+    """Whether the predicted errors of an estimate are as large as what it says."""
+    bandwidth = float(tree.attrs["band_high"] - tree.attrs["band_low"])
+    spread = float(np.sqrt(max(np.trace(one["position_covariance"]), 0.0)))
+    turned = np.deg2rad(np.hypot(one["azimuth_error"] * np.cos(np.deg2rad(one["elevation"])), one["elevation_error"]))
+    placed = spread <= USELESS_RANGE * float(np.linalg.norm(one["position"]))  # not where there is none
+    return not (placed and turned <= beam_width(tree) and one["time_error"] <= 1.0 / bandwidth)
+
+
+def _warning(tally: _Tally) -> str:
+    """What is honest, and of no use."""
+    said = []
+    if tally.unheard:
+        why = ", ".join(f"{name} {count}" for name, count in tally.reasons.most_common(3))
+        said.append(f"{tally.unheard} snaps that reach the array were not located" + (f" ({why})" if why else ""))
+    if tally.useless:
+        said.append(f"{tally.useless} of {tally.rows} estimates err by as much as they say, by their own errors")
+    return "; ".join(said)

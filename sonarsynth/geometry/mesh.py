@@ -1,0 +1,105 @@
+"""A triangle mesh in the frame of its body."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.geometry.surfaces import BLOCK
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A checked triangle mesh in the body frame; facets are counter-clockwise seen from outside."""
+
+    vertices: Floats  # (vertex, xyz) m
+    faces: npt.NDArray[np.int32]  # (facet, 3)
+    notes: tuple[str, ...] = ()  # what was repaired on reading, or how fine the surface is; one line each
+    flat: Bools | None = None  # (facet,) known to be flat in the body itself, so that no finer mesh is nearer to it
+
+    @property
+    def corners(self) -> Floats:
+        """(facet, 3, xyz) m: of large meshes made anew, for they take more room than all else; see `corners_of`."""
+        return self._corners if len(self.faces) <= BLOCK else read_only(self.vertices[self.faces])
+
+    @cached_property
+    def _corners(self) -> Floats:
+        return read_only(self.vertices[self.faces])
+
+    def corners_of(self, some: Ints | slice) -> Floats:
+        """(row, 3, xyz) m: corners of the facets picked by indices or a slice."""
+        return self.vertices[self.faces[some]]
+
+    @cached_property
+    def _sizes(self) -> tuple[Floats, Floats, Floats]:
+        """Area, normal and centroid, by blocks of facets."""
+        count = len(self.faces)
+        area, normal, centroid = np.empty(count), np.empty((count, 3)), np.empty((count, 3))
+        for some in in_blocks(count):
+            corners = self.corners_of(some)
+            a, b, c = np.moveaxis(corners, 1, 0)
+            cross = np.cross(b - a, c - a)
+            area[some] = 0.5 * np.linalg.norm(cross, axis=1)
+            normal[some] = cross / (2.0 * area[some, None])
+            centroid[some] = corners.mean(axis=1)
+        return read_only(area), read_only(normal), read_only(centroid)
+
+    @property
+    def area(self) -> Floats:
+        """(facet,) m2."""
+        return self._sizes[0]
+
+    @property
+    def normal(self) -> Floats:
+        """(facet, xyz) outward unit normals."""
+        return self._sizes[1]
+
+    @property
+    def centroid(self) -> Floats:
+        """(facet, xyz) m."""
+        return self._sizes[2]
+
+    @cached_property
+    def box(self) -> Floats:
+        """(2, xyz) smallest and largest coordinates (m)."""
+        return read_only(np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)]))
+
+    @cached_property
+    def radius(self) -> float:
+        """Largest distance of a vertex from the body's origin (m)."""
+        return float(np.linalg.norm(self.vertices, axis=1).max())
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of vertices and faces: the mesh's identity in caches and in the store."""
+        h = hashlib.sha256(np.ascontiguousarray(self.vertices, "<f8").view(np.uint8).data)
+        h.update(np.ascontiguousarray(self.faces, "<i4").view(np.uint8).data)
+        return h.hexdigest()
+
+
+def in_blocks(count: int) -> list[slice]:
+    """Parts of a table, so that what is needed to make it stays small: as many equal ones as hold BLOCK at most."""
+    parts = max(-(-count // BLOCK), 1)
+    edges = [count * n // parts for n in range(parts + 1)]
+    return [slice(first, last) for first, last in pairwise(edges)]
+
+
+def farthest_corner(mesh: Mesh) -> float:
+    """Largest distance (m) of a corner of a facet from its middle."""
+    far = 0.0
+    for some in in_blocks(len(mesh.faces)):
+        apart = np.linalg.norm(mesh.corners_of(some) - mesh.centroid[some, None, :], axis=-1)
+        far = max(far, float(apart.max(initial=0.0)))
+    return far
+
+
+def read_only(array: Floats) -> Floats:
+    """The array, read-only: it is shared by all who hold the mesh."""
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,39 @@
+"""A target where it is at an instant, and how it moves from there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.geometry import Pose
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.geometry.motion import Motion, Track
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A target where it is."""
+
+    name: str
+    mesh: Mesh
+    pose: Pose
+    velocity: Floats  # (xyz) m/s, world
+    motion: Motion | None = None  # that brought it here; None: it goes on at its velocity, and does not turn
+    time: float = 0.0  # s: of the motion
+
+    @property
+    def track(self) -> Track:
+        """Of its origin."""
+        return Track(self.pose, self.velocity, self.motion, self.time)
+
+    def later(self, seconds: float) -> Body:
+        """The body where it will be, or was, so many seconds (s) after."""
+        there = self.track.later(seconds)
+        return replace(self, pose=there.pose, velocity=there.velocity, time=there.time)
+
+    @property
+    def frozen(self) -> Body:
+        """The body at rest where it is."""
+        return replace(self, velocity=np.zeros(3), motion=None)

@@ -1,0 +1,34 @@
+"""Beamformers: energy in each steered direction, from the signals of a window.
+
+The beam of each direction is the mean over live elements of their spectra, delayed to the array centre at the sound
+speed that the sonar assumes (`acoustics.beams`). Its energy follows by Parseval over the bins of the sonar's band: a
+plane wave p(t) in band, from a steered direction, has int p^2 dt there (Pa2 s).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Protocol
+
+from sonarsynth.description import BY_KIND
+from sonarsynth.imaging.auto_beamformer import AutoBeamforming
+from sonarsynth.imaging.dense import DenseDelayAndSum
+from sonarsynth.imaging.focused import FocusedDelayAndSum
+from sonarsynth.products import EnergyImage, Signals
+from sonarsynth.receiver import Elements, Sonar
+
+__all__ = ["AutoBeamforming", "Beamformer", "BeamformingMethod", "DenseDelayAndSum", "FocusedDelayAndSum"]
+
+
+class BeamformingMethod(Protocol):
+    """One way to make an image from signals."""
+
+    def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
+        """Image of the window from start to stop (s, clock of the signals) on the sonar's beam grid.
+
+        Raises ValueError when the window reaches outside the signals, when it is too short to resolve the sonar's band,
+        when no element is live, or when the method cannot take the array.
+        """
+        ...
+
+
+Beamformer = Annotated[FocusedDelayAndSum | DenseDelayAndSum | AutoBeamforming, BY_KIND]

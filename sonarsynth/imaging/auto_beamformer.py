@@ -1,0 +1,39 @@
+"""The fast beamformer where its error is estimated to be small enough, the dense one elsewhere."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from sonarsynth.conventions import PositiveMetres
+from sonarsynth.description import description
+from sonarsynth.imaging.dense import DenseDelayAndSum
+from sonarsynth.imaging.focused import AUTO_ERROR, FocusedDelayAndSum
+from sonarsynth.imaging.image_window import Shading
+from sonarsynth.products import EnergyImage, Signals
+from sonarsynth.receiver import Elements, Sonar
+
+
+@description
+class AutoBeamforming:
+    """Delay and sum: `focused` with the fewest zones that `focus_error` allows, `dense` where the array is no lattice
+    or 32 do not suffice."""
+
+    kind: Literal["auto"] = "auto"
+    focus: PositiveMetres | None = 20.0
+    """Range at which the array is focused; left out (none), plane waves."""
+    shading: Shading = "uniform"
+    """Weights over the aperture: all alike, or falling off towards the rim (lower side lobes, a wider beam)."""
+
+    def resolve(self, elements: Elements, sonar: Sonar, error_db: float) -> FocusedDelayAndSum | DenseDelayAndSum:
+        """The method whose `focus_error`, an estimate and no bound, is not above `error_db` (dB)."""
+        if elements.on_lattice:
+            from sonarsynth.imaging.focus_error import zones_needed
+
+            zones = zones_needed(elements, self.shading, sonar, self.focus, error_db)
+            if zones is not None:
+                return FocusedDelayAndSum(focus=self.focus, shading=self.shading, zones=zones)
+        return DenseDelayAndSum(focus=self.focus, shading=self.shading)
+
+    def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
+        """Image of the window from start to stop (s), resolved for 0.1 dB."""
+        return self.resolve(elements, sonar, AUTO_ERROR).image(signals, elements, sonar, start, stop)

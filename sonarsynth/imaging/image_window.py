@@ -1,0 +1,40 @@
+"""From signals to the spectra of a window, from sums over bins to an image: how every beamformer begins and ends."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.conventions import Floats
+from sonarsynth.equations.arrays.apertures import hann_shading, live_gain
+from sonarsynth.equations.arrays.beams import spectrum_energy
+from sonarsynth.equations.arrays.gates import frequency_spacing, gate_samples, gated_spectra
+from sonarsynth.products import EnergyImage, Signals
+from sonarsynth.receiver import Elements, Sonar
+
+Shading = Literal["uniform", "hann"]
+"""Weights over the aperture: all alike, or falling off towards the rim (lower side lobes, a wider beam)."""
+
+
+def window_spectra(
+    signals: Signals, sonar: Sonar, start: float, stop: float
+) -> tuple[Floats, npt.NDArray[np.complex64], float]:
+    """Frequencies (bin,) Hz in the sonar's band, spectra (sensor, bin) Pa of the window, Pa2 s of one |spectrum|^2."""
+    rate = signals.sampling_frequency
+    first, count = gate_samples(start, stop, signals.start, rate, signals.pressure.shape[1])
+    frequencies, spectra = gated_spectra(signals.pressure, rate, first, count, (sonar.band.low, sonar.band.high))
+    return frequencies, spectra, spectrum_energy(frequency_spacing(count, rate), rate)
+
+
+def weights(elements: Elements, shading: Shading) -> Floats:
+    """Weight of each element (sensor,), of sum one. Raises ValueError when none is live."""
+    if shading == "uniform":
+        return live_gain(elements.gain)
+    return live_gain(elements.gain * hann_shading(elements.position, elements.aperture + 0.5 * elements.pitch))
+
+
+def energy_image(energy: Floats, sonar: Sonar, start: float, stop: float) -> EnergyImage:
+    """The image of energies (elevation, azimuth) in Pa2 s on the sonar's grid."""
+    return EnergyImage(energy.astype(np.float32), sonar.beams.azimuth, sonar.beams.elevation, start, stop)

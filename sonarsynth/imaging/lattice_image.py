@@ -1,0 +1,163 @@
+"""Energies of beams on a grid, of a lattice folded along both of its axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.equations.arrays.beams import first_and_spacing
+from sonarsynth.equations.arrays.lattices import axial_focus_delay, half_coordinates, mirrored_sensors
+from sonarsynth.imaging.image_window import Shading, weights
+from sonarsynth.imaging.zones import Lens, Zone, heard_by, lens, quadrant, zones_of
+from sonarsynth.receiver import Band, BeamGrid, Elements
+
+
+def check_lattice(elements: Elements) -> None:
+    """Raise ValueError when the elements are not on a lattice."""
+    if not elements.on_lattice:
+        raise ValueError(
+            "beamforming kind 'focused' needs an array on a lattice; use kind 'dense' for a table of positions"
+        )
+
+
+def fold(elements: Elements) -> tuple[Ints, Ints]:
+    """Live elements as `lattices.mirrored_sensors` places them, `count` for none; and rows in use (half column,).
+
+    Raises ValueError when the elements are not on a lattice.
+    """
+    check_lattice(elements)
+    live, nobody = np.flatnonzero(elements.gain), elements.count
+    places = mirrored_sensors(elements.column, elements.row, elements.columns, elements.rows, live, nobody)
+    used = np.min(places, axis=2) < nobody
+    heights = np.where(np.any(used, axis=1), places.shape[1] - np.argmax(used[:, ::-1], axis=1), 0)
+    return places, heights
+
+
+def focused_energies(
+    spectra: np.ndarray,
+    elements: Elements,
+    weight: Floats,
+    frequencies: Floats,
+    azimuth: Floats,
+    elevation: Floats,
+    sound_speed: float,
+    focus: float | None,
+) -> Floats:
+    """Sum over bins of |B|^2 of beams on a grid: (elevation, azimuth), in the unit of spectra (sensor, bin) squared.
+
+    weight (sensor,); frequencies (bin,) Hz, evenly spaced; azimuth, elevation: rad, ascending, exactly
+    antisymmetric; focus in m, None for plane waves. The delay of focusing is that of the middle of the picture,
+    (sqrt(R^2 + q^2) - R)/c in every direction.
+    """
+    from sonarsynth.equations.kernels.lanes import LANES
+    from sonarsynth.equations.kernels.phasors import padded_bins
+    from sonarsynth.imaging.lattice_kernel import lattice_energies
+
+    places, heights = fold(elements)
+    heard = padded_bins(spectra, elements.count + 1, LANES)
+    return np.asarray(
+        lattice_energies(
+            heard.view(np.float32).ravel(),
+            heard.shape[1],
+            places,
+            np.append(weight, 0.0).astype(np.float32),
+            axial_focus_delay(elements.columns, elements.rows, elements.pitch, focus, sound_speed),
+            heights,
+            elements.rows % 2 == 1,
+            elements.columns % 2 == 1,
+            0.5 * elements.pitch / sound_speed,
+            *first_and_spacing(frequencies),
+            azimuth,
+            elevation,
+        )
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class SteeredZone:
+    """How a zone is focused and steered."""
+
+    rows: Ints  # of the image, ascending: those of the zone and of its mirror image
+    columns: Ints
+    shared: bool  # whether it and its mirror images take the same delays
+    delay: Floats  # s: (half column, half row) where shared, else (half column, half row, 4 mirrored sensors)
+    rise: Floats  # (row, side of y, half column) s: half of what a wave is sooner at the next row up
+    across: Floats  # (row, column) s: the same at the next column to port
+    # where shared: (row,) and (column,), elevation and azimuth (rad) of a plane wave with the slopes that are kept
+
+
+def steered(zone: Zone, elements: Elements, beams: BeamGrid, glass: Lens) -> SteeredZone:
+    """The delays and the steps of a zone on a lattice."""
+    y = half_coordinates(elements.columns, elements.pitch)[:, None]
+    z = half_coordinates(elements.rows, elements.pitch)
+    rows, columns = _mirrored(zone.low, zone.high, beams.elevations), _mirrored(zone.near, zone.far, beams.azimuths)
+    if zone.shared:
+        up, port = (np.arcsin(s) for s in zone.sines(glass, beams.elevation[rows], beams.azimuth[columns]))
+        return SteeredZone(rows, columns, True, glass.even(y, z, zone.centre), up, port)
+    delay = np.stack([glass.bulge(b * y, a * z, zone.centre) for a in (1, -1) for b in (1, -1)], axis=-1)
+    u = quadrant(beams)[zone.low : zone.high, zone.near : zone.far]
+    level = np.stack(np.broadcast_arrays(zone.centre[0], u[:, 0, 1]), axis=-1)
+    sides = np.stack([y[:, 0], -y[:, 0]])
+    half = 0.5 * elements.pitch
+    rise = level[:, None, None, 1] / glass.sound_speed
+    rise = half * (rise - glass.slope_along_z(sides, level[:, None, None, :], zone.centre))
+    across = half * (u[..., 0] / glass.sound_speed - glass.slope_along_y(u, level[:, None, :]))
+    return SteeredZone(rows, columns, False, delay, rise, across)
+
+
+@lru_cache(maxsize=16)
+def steered_zones(
+    elements: Elements, shading: Shading, beams: BeamGrid, focus: float, sound_speed: float, band: Band, zones: int
+) -> tuple[SteeredZone, ...]:
+    """The zones of a beam grid cut into zones x zones parts, ready for `zoned_energies`; kept from frame to frame."""
+    glass = lens(elements, focus, sound_speed)
+    cut = zones_of(glass, heard_by(elements, weights(elements, shading), band), beams, zones)
+    return tuple(steered(zone, elements, beams, glass) for zone in cut)
+
+
+def _mirrored(start: int, stop: int, count: int) -> Ints:
+    """Places start ... stop - 1 from the middle of `count` outwards, and their mirror images, ascending, each once."""
+    upper = count // 2 + np.arange(start, stop)
+    return np.unique(np.concatenate([count - 1 - upper, upper]))
+
+
+def zoned_energies(
+    spectra: np.ndarray,
+    elements: Elements,
+    weight: Floats,
+    frequencies: Floats,
+    beams: BeamGrid,
+    sound_speed: float,
+    zones: Sequence[SteeredZone],
+) -> Floats:
+    """As `focused_energies`, each zone with its own delays of focusing: (elevation, azimuth)."""
+    from sonarsynth.equations.kernels.lanes import LANES
+    from sonarsynth.equations.kernels.phasors import padded_bins
+    from sonarsynth.imaging.lattice_kernel import lattice_energies
+    from sonarsynth.imaging.zone_kernel import zone_energies
+
+    places, heights = fold(elements)
+    heard = padded_bins(spectra, elements.count + 1, LANES)
+    array = heard.view(np.float32).ravel(), heard.shape[1], places, np.append(weight, 0.0).astype(np.float32)
+    odd = elements.rows % 2 == 1, elements.columns % 2 == 1
+    band = first_and_spacing(frequencies)
+    image = np.empty((beams.elevations, beams.azimuths))
+    for zone in zones:
+        if zone.shared:
+            half = 0.5 * elements.pitch / sound_speed
+            image[np.ix_(zone.rows, zone.columns)] = lattice_energies(
+                *array, zone.delay, heights, *odd, half, *band, zone.across, zone.rise
+            )
+            continue
+        energy = zone_energies(*array, zone.delay, heights, *odd, zone.rise, zone.across, *band)
+        rows, columns = zone.rows[-energy.shape[1] :], zone.columns[-energy.shape[2] :]
+        # From the far corner on: beams on an axis are their own mirror images, and are taken from the zone itself.
+        image[np.ix_(beams.elevations - 1 - rows, beams.azimuths - 1 - columns)] = energy[3]
+        image[np.ix_(beams.elevations - 1 - rows, columns)] = energy[2]
+        image[np.ix_(rows, beams.azimuths - 1 - columns)] = energy[1]
+        image[np.ix_(rows, columns)] = energy[0]
+    return image

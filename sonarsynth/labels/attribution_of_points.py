@@ -1,0 +1,210 @@
+"""Whose energy a beam holds at a delay: the paths of the frame, as the beam hears them.
+
+A path brings a beam its spectrum times the pattern of the array, with its focus and grating lobes, between the two
+directions; paths of one snap, target and family are summed with their phases over a band of frequencies that is matched
+to the pulse as ranging does it, at the delay of the point. The loudest group there made the point.
+
+Against signals of each group alone, beamformed as the sonar does: the same group in all points whose two loudest are
+3 dB apart (`tests/laws/test_labels_of_points.py`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints
+from sonarsynth.equations.arrays.apertures import live_gain
+from sonarsynth.equations.scattering.facet_pulses import facet_response
+from sonarsynth.geometry import Pose
+from sonarsynth.labels import point_kernels as kernels
+from sonarsynth.labels.level_band import Band
+from sonarsynth.products import FAMILIES, Arrivals
+from sonarsynth.receiver import Elements
+
+GATE = 2.5
+"""Of 1/bandwidth: how far in time from a point a path still adds to it. A raised cosine in frequency is heard for 2."""
+MOST_BINS = 48
+"""Frequencies that paths are summed at: enough for echoes that cross the largest array through its side lobes."""
+OVERSAMPLING = 8
+"""Of the pattern of a lattice: 16 values for each of its columns. Bilinear between them: 0.5 % of the main lobe."""
+WIDEST_DEFOCUS = 40
+"""Tables either side of the focus: what is further out of focus is taken for as far."""
+WHITENING = 0.03
+"""Share of the pulse's largest power density below which ranging flattens it no more (`ranging.echoes`)."""
+FAINT = 1e-3
+"""Of the power of all paths of a snap, target and way that the faintest may bring together, and are left out: 30 dB
+under echoes of which ranging takes the loudest 12 dB."""
+
+
+@dataclass(frozen=True, eq=False)
+class Listening:
+    """How the sonar listens and what it knows of the frame's clock."""
+
+    elements: Elements
+    sound_speed: float  # m/s that beams are steered by
+    focus: float | None  # m
+    clock: float  # s: arrival of the direct pulse that delays are counted from
+    pose: Pose
+    velocity: Floats  # (xyz) m/s of the array, world
+
+
+@lru_cache(maxsize=16)
+def _table(elements: Elements, level: int) -> np.ndarray:
+    """Pattern (row step, column step) of a lattice over two periods of its grating lobes, so far out of focus."""
+    size = OVERSAMPLING * 2 * max(elements.rows, elements.columns)
+    weights = np.zeros((size, size), complex)
+    live = np.flatnonzero(elements.gain)
+    bulge = level * kernels.RIM_STEP * np.sum((elements.position[live] / elements.aperture) ** 2, axis=1)
+    y = (elements.columns - 1 - 2 * elements.column[live]) % size
+    z = (elements.rows - 1 - 2 * elements.row[live]) % size
+    weights[z, y] = live_gain(elements.gain)[live] * np.exp(-1j * bulge)
+    return (np.fft.ifft2(weights) * size**2).astype(np.complex64)
+
+
+@lru_cache(maxsize=16)
+def _tables(elements: Elements, low: int, high: int) -> np.ndarray:
+    return np.stack([_table(elements, level) for level in range(low, high + 1)])
+
+
+def pattern_of(elements: Elements, speed: float, curvature: Floats, focus: float, top: float) -> kernels.Pattern:
+    """Pattern of an array for waves of curvature (path,) 1/m where beams are focused at `focus` (1/m), up to `top`
+    (Hz): tables for a lattice, its sensors elsewhere."""
+    live = np.flatnonzero(elements.gain)
+    sensors = elements.position[live] / speed, live_gain(elements.gain)[live]
+    if not (elements.on_lattice and elements.aperture > 0.0):
+        return kernels.Pattern(np.zeros((0, 0, 0), np.complex64), 0, 1.0, 0.0, *sensors)
+    step = kernels.RIM_STEP * speed / (np.pi * elements.aperture**2)
+    ends = np.clip(np.rint(top * (curvature - focus) / step), -WIDEST_DEFOCUS, WIDEST_DEFOCUS)
+    low, high = int(min(ends.min(initial=0.0), 0.0)), int(max(ends.max(initial=0.0), 0.0))
+    return kernels.Pattern(_tables(elements, low, high), low, step, elements.pitch / speed, *sensors)
+
+
+@dataclass(frozen=True, eq=False)
+class Attribution:
+    """Whose energy beams hold at delays: groups of paths of one target, snap and way to the array."""
+
+    paths: Arrivals  # that may be heard, ascending in delay
+    first: Ints  # (point,) the first path that may be heard then
+    target: Ints  # (group,) -1: the snap itself
+    snap: Ints  # (group,)
+    family: Ints  # (group,) index into FAMILIES
+    power: Floats  # (point, group) at the delay, in any unit
+    energy: Floats  # (point, group) Pa2 s about it
+    owner: Ints  # (point,) the loudest group, -1 without any
+    share: Floats  # (point, path from first on) of the power of the loudest group
+
+
+def attribution(
+    arrivals: Arrivals, band: Band, listening: Listening, beam: Floats, late: Floats, most: Floats
+) -> Attribution:
+    """Whose energy beams (point, xyz) hold at delays (point,) s after the clock; most: (point,) Pa2 s in each beam.
+
+    The snap itself, not by a target, is taken to bring no more than echoes leave of that: the sonar may have taken it
+    out (`ranging.WavefrontCancelling`).
+    """
+    elements, width = listening.elements, band.high - band.low
+    gate, reach = GATE / width, elements.aperture / listening.sound_speed
+    moment = _clock(arrivals, listening.clock, gate) + late
+    longer = float(np.abs(arrivals.corners).max(initial=0.0))
+    slowness = listening.sound_speed / arrivals.sound_speed
+    across = gate + reach * _apart(slowness * arrivals.direction, beam)
+    window = np.array([[-1.0], [1.0]]) * (across + longer)
+    ends = np.searchsorted(np.sort(moment), arrivals.delay + window)
+    some = np.flatnonzero(_loud(arrivals, len(band.energy)) & (ends[1] > ends[0]))
+    paths = arrivals.select(some[np.argsort(arrivals.delay[some], kind="stable")])
+    first, last = np.searchsorted(paths.delay, moment + window)
+    _, example, group = np.unique(_code(paths, len(band.energy)), return_index=True, return_inverse=True)
+    groups = paths.target[example], paths.snap[example], paths.arrives_by[example]
+    if not len(some):
+        none = np.zeros((len(beam), 0))
+        owner, share = np.full(len(beam), NO_TARGET), np.zeros((len(beam), 1))
+        return Attribution(paths, first, *groups, none, none, owner, share)
+    across = gate + reach * _apart(slowness * paths.direction, beam)  # without those that come at other times
+    fine = band.sliced(min(2.0 * width * across, MOST_BINS))
+    focus = 0.0 if listening.focus is None else 1.0 / listening.focus
+    curvature, pulse = 1.0 / paths.radius, fine.energy[groups[1]]
+    found = kernels.attribute(
+        beam,
+        moment,
+        0.5 * most,  # at positive frequencies
+        first,
+        last,
+        paths.direction,
+        slowness,
+        paths.delay,
+        curvature,
+        np.abs(paths.corners).max(axis=1),
+        group,
+        groups[0] < 0,
+        _spectra(paths, elements, fine),
+        _matched(fine)[groups[1]],
+        pulse,
+        fine.frequency,
+        focus,
+        listening.sound_speed,
+        gate,
+        reach,
+        pattern_of(elements, listening.sound_speed, curvature, focus, band.high),
+    )
+    return Attribution(paths, first, *groups, found[0], 2.0 * found[1], *found[2:])
+
+
+def _code(paths: Arrivals, snaps: int) -> Ints:
+    """Number (path,) of the target, snap and way to the array of each."""
+    return np.asarray(((paths.target + 1) * snaps + paths.snap) * len(FAMILIES) + paths.arrives_by)
+
+
+def _loud(arrivals: Arrivals, snaps: int) -> Bools:
+    """(path,) without those that together bring `FAINT` of the power of their group at most."""
+    power, code = arrivals.amplitude**2, _code(arrivals, snaps)
+    order = np.lexsort((power, code))
+    up_to = np.cumsum(power[order])
+    start = np.searchsorted(code[order], code[order])  # the first of each group
+    total = np.bincount(code, power)[code[order]]
+    loud = np.empty(len(power), bool)
+    loud[order] = up_to - up_to[start] + power[order][start] > FAINT * total
+    return loud
+
+
+def _apart(one: Floats, other: Floats) -> float:
+    """Bound on how far vectors (row, xyz) are from others, two at most."""
+    if not (len(one) and len(other)):
+        return 0.0
+    far = np.maximum(one.max(axis=0) - other.min(axis=0), other.max(axis=0) - one.min(axis=0))
+    return min(float(np.linalg.norm(far)), 2.0)
+
+
+def _clock(arrivals: Arrivals, clock: float, gate: float) -> float:
+    """When (s) the direct pulse that delays are counted from arrives: as traced, where one does at that time."""
+    direct = arrivals.delay[arrivals.direct & (arrivals.surface + arrivals.bottom == 0)]
+    if not len(direct):
+        return clock
+    near = float(direct[np.argmin(np.abs(direct - clock))])
+    return near if abs(near - clock) < gate else clock
+
+
+def _spectra(paths: Arrivals, elements: Elements, band: Band) -> kernels.Complexes:
+    """Spectra (path, bin) that elements hear, over that of the snap at 1 m, without delay."""
+    amplitude = paths.amplitude
+    if paths.hidden_from.shape[1]:  # of the array, as much as sees it
+        hidden = np.bitwise_count(paths.hidden_from).sum(axis=1) - (paths.hidden_from[:, 0] >= 128)
+        amplitude = amplitude * (1.0 - hidden / elements.count)
+    sine = paths.direction[:, 1:] * (elements.face / paths.sound_speed)
+    frequency = band.frequency
+    heard = kernels.path_spectra(amplitude, paths.phase, paths.blur, paths.absorption, sine, frequency, band.relative)
+    shaped = paths.coherent | paths.corners.any(axis=1) | (paths.rough_share > 0.0)
+    if shaped.any():
+        some = paths.select(shaped)
+        shape = facet_response(frequency, some.coherent, some.corners, some.rough_share, some.rough_delay, some.centre)
+        heard[shaped] *= shape
+    return heard
+
+
+def _matched(band: Band) -> Floats:
+    """Amplitude (snap, bin) of pulses in what ranges them: flattened by the mean pulse, and a raised cosine."""
+    mean = band.weight.mean(axis=0)
+    taper = np.sin(np.pi * (np.arange(len(mean)) + 0.5) / len(mean)) ** 2
+    return np.asarray(np.sqrt(band.energy * mean) * (taper / (mean + WHITENING * mean.max())))

@@ -1,0 +1,34 @@
+"""Where echoes come from, and how loud they are."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, azimuth_elevation
+from sonarsynth.labels.path_powers import Powers
+from sonarsynth.products import FAMILIES, Arrivals, Echoes
+
+ONE_SIDE = 0.95
+"""Length of the mean direction of echoes, weighted by power, from which on they count as coming from one side."""
+
+
+def echoes(arrivals: Arrivals, powers: Powers, targets: int, snap_level: Floats) -> Echoes:
+    """Where the echoes of each target come from; snap_level: (snap,) dB re 1 uPa at 1 m, peak."""
+    shape = (targets, len(FAMILIES))
+    size = targets * len(FAMILIES)
+    alone = np.flatnonzero(~arrivals.direct & ~arrivals.coherent)
+    path = np.concatenate([alone, powers.part])
+    cell = arrivals.target[path] * len(FAMILIES) + arrivals.arrives_by[path]
+    loud = 10.0 ** (np.asarray(snap_level, float)[arrivals.snap[path]] / 10.0)
+    power = np.concatenate([powers.steps[-1, alone], powers.part_power])
+    along = np.concatenate([powers.steps[-1, alone, None] * arrivals.direction[alone], powers.part_direction])
+    total = np.bincount(cell, power * loud, size)
+    sums = [np.bincount(cell, component * loud, size) for component in along.T]
+    level, azimuth, elevation = np.full(size, np.nan), np.full(size, np.nan), np.full(size, np.nan)
+    heard = total > 0.0
+    level[heard] = 10.0 * np.log10(total[heard])
+    mean = np.stack(sums, axis=1)[heard] / total[heard, None]
+    one = np.linalg.norm(mean, axis=1) > ONE_SIDE
+    sided = np.flatnonzero(heard)[one]
+    azimuth[sided], elevation[sided] = azimuth_elevation(mean[one])
+    return Echoes(azimuth.reshape(shape), elevation.reshape(shape), level.reshape(shape))

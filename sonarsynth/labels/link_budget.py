@@ -1,0 +1,85 @@
+"""The ledger: levels of each snap, target and family of paths that add up, and a path of each that can be checked."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.equations.scattering.facet_pulses import facet_response
+from sonarsynth.labels.level_band import SLICES, Band
+from sonarsynth.labels.path_powers import Powers, family
+from sonarsynth.products import FAMILIES, LEDGER, Arrivals, Ledger
+
+QUIET = 1e-12
+"""A path that rough surfaces leave less of its power than this is not looked for in the signals."""
+
+
+def ledger(arrivals: Arrivals, powers: Powers, band: Band, targets: int, snap_level: Floats, error: float) -> Ledger:
+    """Levels (snap, target + 1, family, LEDGER) in the band that add up exactly, and the loudest path of each family.
+
+    Each loss is the ratio of two sums of the powers of the paths, with one factor more in the second. Received is what
+    they make together, with the phases of coherent paths, and scattering what is left: a target strength with what
+    phases add or cancel. So received = source - loss_out + scattering - loss_in - absorption - boundary whatever the
+    paths. NaN where a family has no path, or nothing comes through. snap_level (snap,) in dB re 1 uPa at 1 m, peak;
+    error: bound (dB) on each level from the approximations of the chain.
+    """
+    shape = (len(snap_level), targets + 1, len(FAMILIES))
+    cell = _cells(arrivals, shape)
+    size = int(np.prod(shape))
+    paths = np.bincount(cell, minlength=size)
+    sums = np.array([np.bincount(cell, step, size) for step in powers.steps])
+    alone = np.where(arrivals.coherent, 0.0, powers.steps[-1])
+    total = np.bincount(cell, alone, size) + np.bincount(cell[powers.whole], powers.whole_power, size)
+    source = np.repeat(np.asarray(snap_level, float), shape[1] * shape[2])
+    direct = np.arange(size) // len(FAMILIES) % (targets + 1) == targets
+    with np.errstate(divide="ignore", invalid="ignore"):
+        out, back, absorption, boundary = -np.diff(10.0 * np.log10(sums), axis=0)
+        received = source + 10.0 * np.log10(total)
+        scattering = received - source + (out + back + absorption + boundary)
+        out = np.where(direct, out - scattering, out)  # nothing scatters: several ways are a smaller loss
+    scattering = np.where(direct, 0.0, scattering)
+    levels = np.stack([source, out, scattering, back, absorption, boundary, received], axis=-1) + 0.0
+    levels[~((sums[-1] > 0.0) & (total > 0.0))] = np.nan
+    best = _loudest(arrivals, powers, band, cell, size)
+    isolated = arrivals.select(best[best >= 0])
+    alone_level = np.full(size, np.nan)
+    alone_level[best >= 0] = source[best >= 0] + 10.0 * np.log10(exact_powers(isolated, band))
+    return Ledger(
+        level=levels.reshape(*shape, len(LEDGER)),
+        paths=paths.reshape(shape),
+        error_bound=np.where(paths > 0, error, np.nan).reshape(shape),
+        isolated_level=alone_level.reshape(shape),
+        isolated=isolated,
+    )
+
+
+def _cells(arrivals: Arrivals, shape: tuple[int, int, int]) -> Ints:
+    """(path,) number of its snap, target (the direct path after them) and family, of a table of that shape."""
+    which = np.where(arrivals.direct, shape[1] - 1, arrivals.target)
+    return np.asarray(np.ravel_multi_index((arrivals.snap, which, family(arrivals)), shape))
+
+
+def _loudest(arrivals: Arrivals, powers: Powers, band: Band, cell: Ints, size: int) -> Ints:
+    """(cell,) the path of most power in each, the first of equals; -1 where there is none, or it is silent."""
+    power = powers.steps[-1]
+    most = np.zeros(size)
+    np.maximum.at(most, cell, power)
+    heard = (power > QUIET * arrivals.amplitude**2) & (band.energy.sum(axis=1) > 0.0)[arrivals.snap]
+    best = np.full(size, -1)
+    rows = np.flatnonzero((power == most[cell]) & heard)[::-1]
+    best[cell[rows]] = rows
+    return best
+
+
+def exact_powers(paths: Arrivals, band: Band) -> Floats:
+    """Power (path,) over that of the snap at 1 m in the band, from the columns of each: for few paths."""
+    if not len(paths.delay):
+        return np.zeros(0)
+    longest = float(np.ptp(paths.corners, axis=1).max())
+    fine = band.sliced(min(max(64.0, 4.0 * (band.high - band.low) * longest), SLICES))
+    f = fine.frequency
+    amplitude = paths.spreading_out * paths.scattering * paths.spreading_in * paths.boundary
+    facet = facet_response(f, paths.coherent, paths.corners, paths.rough_share, paths.rough_delay, paths.centre)
+    lost = 10.0 ** (-np.outer(paths.absorption, 1.0 + fine.relative) / 10.0)
+    blur = np.exp(-((2.0 * np.pi * np.outer(paths.blur, f)) ** 2))
+    return np.asarray(amplitude**2 * (np.abs(facet) ** 2 * lost * blur * fine.weight[paths.snap]).sum(axis=1))

@@ -1,0 +1,134 @@
+"""Labels of the points of a cloud: whose echo each is, how it came to be heard, and where it was made."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from sonarsynth.casting.ray_casting import casting_mesh
+from sonarsynth.conventions import NO_TARGET, Floats, Ints, direction
+from sonarsynth.geometry.placed_target import Body
+from sonarsynth.labels import point_kernels as kernels
+from sonarsynth.labels.attribution_of_points import MOST_BINS, Attribution, Listening, attribution
+from sonarsynth.labels.level_band import Band
+from sonarsynth.products import ORIGINS, Arrivals, PointCloud, PointLabels
+from sonarsynth.receiver import Elements
+from sonarsynth.receiver.mirror_images import mirror_normal
+from sonarsynth.state import Moment
+
+FIRST_NULL = 1.9
+"""rad of phase, root mean square over the aperture, at the first null of a beam: 1.915 of a disc, 1.81 of a line."""
+EXPLAINED = 0.01
+"""Of the energy of its beam that the paths of a frame must bring a point, or noise made it: one resolution in a hundred
+of the echo window. A peak of noise that is ranged has 0.03 of all noise in the window of shipped scenes."""
+
+
+def label_points(
+    cloud: PointCloud,
+    azimuth: Floats,
+    elevation: Floats,
+    arrivals: Arrivals,
+    band: Band,
+    moment: Moment,
+    listening: Listening,
+) -> PointLabels:
+    """Labels of the points of a cloud on a grid of azimuth and elevation (rad).
+
+    arrivals: paths of the frame; band: what each snap sends in the sonar's band; moment: the world at the frame's
+    instant. Bodies and the array are where sound meets them.
+    """
+    row, column = np.nonzero(np.isfinite(cloud.range))
+    beam = direction(azimuth[column], elevation[row])
+    late, most = (grid[row, column].astype(float) for grid in (cloud.delay, cloud.energy))
+    found = attribution(arrivals, band, listening, beam, late, most)
+    explained = (found.owner >= 0) & (found.energy.sum(axis=1) >= EXPLAINED * most)
+    labels: dict[str, np.ndarray] = {
+        "target": np.full(len(row), NO_TARGET, np.int16),
+        "emission": np.full(len(row), NO_TARGET, np.int16),
+        "family": np.full(len(row), NO_TARGET, np.int8),
+        "facet": np.full(len(row), NO_TARGET, np.int32),
+        "true_range": np.full(len(row), np.nan, np.float32),
+        "distance": np.full(len(row), np.nan, np.float32),
+        "origin": np.full(len(row), ORIGINS.index("unexplained"), np.int8),
+    }
+    some = np.flatnonzero(explained)
+    owner, loudest = found.owner[some], found.first[some] + found.share[some].argmax(axis=1)
+    for name in ("target", "emission", "family"):
+        labels[name][some] = getattr(found, "snap" if name == "emission" else name)[owner]
+    labels["facet"][some] = found.paths.facet[loudest]
+    labels["origin"][some] = _origins(found.paths.select(loudest), beam[some], listening, band)
+    echo = np.flatnonzero(labels["target"] >= 0)
+    places = cloud.position[row, column][echo].astype(float)
+    near = _from_targets(found, echo, places, moment, listening)
+    labels["true_range"][echo], labels["distance"][echo] = near
+    return PointLabels(**{name: _on_grid(values, row, column, cloud.range.shape) for name, values in labels.items()})
+
+
+def _on_grid(values: np.ndarray, row: Ints, column: Ints, shape: tuple[int, ...]) -> np.ndarray:
+    grid = np.full(shape, NO_TARGET if values.dtype.kind == "i" else np.nan, values.dtype)
+    grid[row, column] = values
+    return grid
+
+
+def _origins(paths: Arrivals, beam: Floats, listening: Listening, band: Band) -> Ints:
+    """Index into ORIGINS (point,) of what beams (point, xyz) hear of the paths (point,) that bring most."""
+    elements, centre = listening.elements, 0.5 * (band.low + band.high)
+    spread = _spread(elements)
+    apart = paths.direction / paths.sound_speed - beam / listening.sound_speed  # s/m
+    found = np.full(len(beam), ORIGINS.index("main lobe"))
+    beside = np.flatnonzero(2.0 * np.pi * centre * np.linalg.norm(apart @ spread, axis=1) > FIRST_NULL)
+    found[beside] = ORIGINS.index("side lobe")
+    if elements.on_lattice and len(beside):
+        waves = np.linspace(band.low, band.high, MOST_BINS)[:, None, None] * apart[beside]
+        order = np.rint(waves * elements.pitch) * np.array([0.0, 1.0, 1.0])
+        rest = 2.0 * np.pi * np.linalg.norm((waves - order / elements.pitch) @ spread, axis=2)
+        grating = ((rest < FIRST_NULL) & order.any(axis=2)).any(axis=0)
+        found[beside[grating]] = ORIGINS.index("grating lobe")
+    normal = _normal(elements, listening.sound_speed / centre)
+    if normal is not None:
+        found[(paths.direction @ normal) * (beam @ normal) < 0.0] = ORIGINS.index("mirror image")
+    found[paths.target < 0] = ORIGINS.index("snap itself")
+    return found
+
+
+_normal = lru_cache(maxsize=16)(mirror_normal)
+
+
+@lru_cache(maxsize=16)
+def _spread(elements: Elements) -> Floats:
+    """Matrix (xyz, 3) m: a vector times it is as long as the rms, over the aperture, of its product with positions."""
+    live = elements.position[elements.gain != 0]
+    about = live - live.mean(axis=0)
+    return np.linalg.cholesky(about.T @ about / len(live) + 1e-18 * np.eye(3))
+
+
+def _from_targets(
+    found: Attribution, points: Ints, places: Floats, moment: Moment, listening: Listening
+) -> tuple[Floats, Floats]:
+    """Range (point,) of where the echoes of points were made, and distance (point,) of the places (point, xyz) that the
+    sonar gives them from the target, where sound met it and the array (m)."""
+    paths, share = found.paths, found.share[points]
+    row = np.minimum(found.first[points, None] + np.arange(share.shape[1]), len(paths.delay) - 1)
+    weight = share / share.sum(axis=1, keepdims=True)
+    heard = np.einsum("pe,pe->p", weight, paths.delay[row])
+    met = heard - np.einsum("pe,pe->p", weight, paths.radius[row]) / paths.sound_speed
+    array = listening.pose.position + heard[:, None] * listening.velocity
+    place = array + listening.pose.turn_to_world(places)
+    made, distance, owner = np.empty(places.shape), np.empty(len(points)), found.owner[points]
+    for group in np.unique(owner):
+        some, body = owner == group, moment.bodies[found.target[group]]
+        there = body.later(float(met[some].mean()))
+        moved = (met[some, None] - met[some].mean()) * there.velocity
+        middle = body.mesh.centroid[np.where(weight[some] > 0.0, paths.facet[row[some]], 0)]
+        made[some] = there.pose.to_world(np.einsum("pe,pex->px", weight[some], middle)) + moved
+        distance[some] = surface_distances(there, place[some] - moved)
+    return np.linalg.norm(made - array, axis=1), distance
+
+
+def surface_distances(body: Body, points: Floats) -> Floats:
+    """Distances (point,) m of points (point, xyz) of the world from the surface of a body, inside or outside: exact."""
+    ready = casting_mesh(body.mesh)
+    at, found = (body.pose.to_body(points) - ready.centre) / ready.size, np.empty(len(points))
+    kernels.distances(at, ready.vertices, ready.faces, *ready.tree, found)
+    return found * ready.size

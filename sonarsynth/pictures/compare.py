@@ -1,0 +1,195 @@
+"""Several stores side by side: a film of all, and one picture of three frames with what each store errs and costs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.pictures.figures.compared_images import BesidePicture, Column, Moment, Panel
+from sonarsynth.pictures.figures.style import decibels
+from sonarsynth.pictures.film import thinned, write_film
+from sonarsynth.pictures.recipe_diff import names_of
+from sonarsynth.pictures.scores import LEVEL, Heard, as_table, heard, standing
+from sonarsynth.pictures.store_reading import NothingToDraw, beam_grid, built, hulls, needed, opened, pictures_of, read
+from sonarsynth.store import Folder, folder_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from sonarsynth.pictures.figures.frame_figure import Hull
+
+MOST = 4
+"""Stores that fit beside each other."""
+
+EDGE = 8
+"""The early and the late frame stand this part of all frames away from the first and the last."""
+
+NOTE = (
+    f"Echo: mean energy of the beams that point at a target; levels in {LEVEL}. "
+    "Colours: re the brightest beam of each film. CPU: median over frames, of one core."
+)
+
+
+def show_beside(
+    stores: Sequence[str | Folder],
+    out: str | Path | None = None,
+    *,
+    frame: int | None = None,
+    film: bool = True,
+    frames_per_second: float = 10.0,
+    say: Callable[[str], None] = print,
+) -> list[Path]:
+    """Draw two to four stores beside each other into the folder `out`, say their numbers; returns the files written.
+
+    beside.png: an early, the best and a late frame, and the numbers of each store under it; the best is `frame`, left
+    out the one with most points on target in all stores. film.mp4 (film.gif without ffmpeg): the frames that all
+    stores have. Each store is named by what differs in its recipe, and drawn re its own brightest beam. `out` left
+    out: <names of the stores>.pictures beside the first.
+
+    Raises NothingToDraw, a ValueError, where a store is none or has no image, where beam grids differ, where no frame
+    is in all stores, or not that one.
+    """
+    paths = [folder_of(store) for store in stores]
+    if not 2 <= len(paths) <= MOST:
+        raise NothingToDraw(f"{len(paths)} stores: from 2 to {MOST} fit beside each other")
+    trees = [_fit(opened(path), path) for path in paths]
+    frames = _common(trees, paths, frame, say)
+    sounds = [heard(tree, frames) for tree in trees]
+    references = [sound.reference for sound in sounds]
+    names = names_of([str(tree.attrs.get("recipe", "")) for tree in trees], _file_names(paths))
+    numbers = [standing(t, path, frames, sound) for t, path, sound in zip(trees, paths, sounds, strict=True)]
+    say(as_table(names, numbers))
+    say(NOTE)
+    columns = [Column(name, rows) for name, rows in zip(names, numbers, strict=True)]
+    folder = _folder(paths) if out is None else Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    heading = _heading(trees, len(frames))
+    chosen = _three(sounds, frames, frame)
+    sheet = BesidePicture(*beam_grid(trees[0]), columns, heading, NOTE, rows=len(chosen))
+    sheet.show(*(moment(trees, references, *pick) for pick in chosen))
+    files = [folder / "beside.png"]
+    sheet.figure.savefig(files[0], dpi=120)
+    if film and len(frames) > 1:
+        if len(thinned(frames)) < len(frames):
+            say(f"film: {len(thinned(frames))} of {len(frames)} frames")
+        moving = BesideFilm(BesidePicture(*beam_grid(trees[0]), columns, heading, NOTE), trees, references)
+        files.append(write_film(moving, thinned(frames), folder, frames_per_second))
+    return files
+
+
+@dataclass(frozen=True, eq=False)
+class BesideFilm:
+    """Draws frames by their number: what a film of many facets needs is read when its turn comes."""
+
+    picture: BesidePicture
+    trees: Sequence[xr.DataTree]
+    references: Sequence[float]  # Pa2 s
+
+    @property
+    def figure(self) -> Figure:
+        """The figure that is drawn in."""
+        return self.picture.figure
+
+    def show(self, frame: int) -> None:
+        """Draw a frame in place of the last."""
+        self.picture.show(moment(self.trees, self.references, frame))
+
+    def pixels(self) -> np.ndarray:
+        """The figure as drawn: (row, column, rgb) uint8."""
+        return self.picture.pixels()
+
+
+def moment(trees: Sequence[xr.DataTree], references: Sequence[float], frame: int, why: str = "") -> Moment:
+    """A frame of all stores, each in dB re its own reference (Pa2 s)."""
+    panels: list[Panel] = []
+    for tree, reference in zip(trees, references, strict=True):
+        energy = needed(tree, "image/energy", frame)
+        level = decibels(energy, reference) if np.isfinite(energy).any() else None
+        bodies = hulls(tree, frame)
+        panels.append(Panel(level, next((p.hulls for p in panels if _alike(p.hulls, bodies)), bodies)))
+    times = {None if (t := read(tree, "time", frame)) is None else round(float(t), 9) for tree in trees}
+    clock = [f"{t:.2f} s" for t in times if t is not None and np.isfinite(t)] if len(times) == 1 else []
+    return Moment("\n".join([f"frame {frame}", *clock, *([why] if why else [])]), tuple(panels))
+
+
+def _alike(some: tuple[Hull, ...], others: tuple[Hull, ...]) -> bool:
+    """Whether hulls are the same bodies in the same places."""
+    return len(some) == len(others) and all(
+        np.array_equal(a.faces, b.faces) and np.array_equal(a.vertices, b.vertices)
+        for a, b in zip(some, others, strict=True)
+    )
+
+
+def _fit(tree: xr.DataTree, path: Folder) -> xr.DataTree:
+    """The store, if its images can be drawn beside others."""
+    if "image" not in tree.children or "energy" not in tree["image"].dataset:
+        raise NothingToDraw(f"{path}: the store has no image, which is what is drawn side by side")
+    return tree
+
+
+def _common(
+    trees: Sequence[xr.DataTree], paths: Sequence[Folder], frame: int | None, say: Callable[[str], None]
+) -> list[int]:
+    """Frames that all stores have; refuses stores whose images do not fit together."""
+    for tree, path in zip(trees[1:], paths[1:], strict=True):
+        same = [np.array_equal(a, b) for a, b in zip(beam_grid(tree), beam_grid(trees[0]), strict=True)]
+        if not all(same):
+            raise NothingToDraw(
+                f"{path}: its beams ({_grid(tree)}) are not those of {paths[0]} ({_grid(trees[0])}), "
+                "so they cannot be compared"
+            )
+    each = [built(tree) for tree in trees]
+    common: list[int] = reduce(np.intersect1d, each).tolist()
+    if not common:
+        raise NothingToDraw(f"{' and '.join(map(str, paths))}: no frame has been built in all of them")
+    if frame is not None and frame not in common:
+        raise NothingToDraw(
+            f"frame {frame} has not been built in all stores; {len(common)} are, {common[0]} to {common[-1]}"
+        )
+    if any(len(some) > len(common) for some in each):
+        say(f"only the {len(common)} frames that all stores have")
+    return common
+
+
+def _grid(tree: xr.DataTree) -> str:
+    azimuth, elevation = beam_grid(tree)
+    return f"{len(azimuth)} x {len(elevation)} over {np.ptp(azimuth):g} x {np.ptp(elevation):g} deg"
+
+
+def _three(sounds: Sequence[Heard], frames: list[int], wanted: int | None) -> list[tuple[int, str]]:
+    """An early, the best and a late frame, and what they are called; fewer where there are fewer frames."""
+    if len(frames) <= 3 and wanted is None:
+        return [(frame, "") for frame in frames]
+    skipped = max(1, len(frames) // EDGE) - 1
+    early, late = frames[skipped], frames[-1 - skipped]
+    if wanted is not None:
+        return [(frame, "") for frame in sorted({early, wanted, late})]
+    points = np.sum([sound.points for sound in sounds], axis=0)
+    interest = points if points.any() else np.sum([sound.beams for sound in sounds], axis=0)
+    inside = slice(skipped + 1, -1 - skipped)
+    best = frames[inside][int(np.argmax(interest[inside]))]
+    return [(early, ""), (best, "most points" if points.any() else ""), (late, "")]
+
+
+def _heading(trees: Sequence[xr.DataTree], count: int) -> str:
+    titles = list(dict.fromkeys(str(tree.attrs.get("title") or "untitled") for tree in trees))
+    return f"{' / '.join(titles)}   {count} frames"
+
+
+def _file_names(paths: Sequence[Folder]) -> list[str]:
+    """Names that tell stores apart: their own, or else the whole paths, or else with a number."""
+    for names in ([PurePosixPath(path.name).stem for path in paths], [str(path) for path in paths]):
+        if len(set(names)) == len(names):
+            return names
+    return [f"{path} ({n})" for n, path in enumerate(paths, 1)]
+
+
+def _folder(paths: Sequence[Folder]) -> Path:
+    names = [path.name.removesuffix(".zarr") for path in paths]
+    return pictures_of(paths[0], "-".join(names))

@@ -1,0 +1,234 @@
+"""One frame as the sonar looks: the energy image with the targets' true outlines, and the cloud from two sides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.pictures.figures.ghost_rings import Ghost, GhostMarks
+from sonarsynth.pictures.figures.outlines import union_outline, view_outline
+from sonarsynth.pictures.figures.style import BACKDROP, DYNAMIC_RANGE, ENERGY_MAP, INK, OUTLINES, figure, label
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import PathCollection, PolyCollection
+    from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
+    from matplotlib.text import Text
+
+    from sonarsynth.conventions import Ints
+
+ABSENT = "#9b9b9b"
+"""Beams without a number."""
+
+PLAN = (1, 0)
+SIDE = (0, 2)
+"""Coordinates (across, up) of a cloud drawn from above and from starboard."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hull:
+    """A target where it truly is, in the sonar frame."""
+
+    name: str
+    vertices: Floats  # (vertex, xyz) m
+    faces: Ints  # (facet, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What is drawn of one frame. An image or cloud that is not there is None or empty."""
+
+    title: str
+    level: Floats | None  # (elevation, azimuth) dB re the reference of the film
+    points: Floats  # (point, xyz) m, sonar frame
+    point_level: Floats  # (point,) dB re the same
+    hulls: tuple[Hull, ...]
+    ghosts: tuple[Ghost, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """The part of space that a cloud is drawn in: half its size is the same in every frame, its centre follows."""
+
+    half: Floats  # (xyz) m
+
+    def centre(self, view: View) -> Floats:
+        """Centre (xyz) in m: of the targets; without any, of the points."""
+        bodies = [hull.vertices for hull in view.hulls] or ([view.points] if len(view.points) else [])
+        if not bodies:
+            return np.zeros(3)
+        corners = np.concatenate([[b.min(axis=0), b.max(axis=0)] for b in bodies])
+        return np.asarray(0.5 * (corners.min(axis=0) + corners.max(axis=0)))
+
+
+def window(views: list[View], margin: float = 0.35) -> Window:
+    """A window that holds the targets of every frame (without any: the middle 96 % of all points), and `margin` (m)."""
+    half = np.zeros(3)
+    for view in views:
+        if view.hulls:
+            every = np.concatenate([hull.vertices for hull in view.hulls])
+            half = np.maximum(half, 0.5 * np.ptp(every, axis=0))
+    points = np.concatenate([view.points for view in views])
+    if not half.any() and len(points):
+        half = 0.5 * np.ptp(np.percentile(points, [2, 98], axis=0), axis=0)
+    return Window(half=half + margin)
+
+
+class FramePicture:
+    """A figure laid out once, in which `show` draws one frame after another."""
+
+    def __init__(self, azimuth: Floats, elevation: Floats, space: Window, unit: str) -> None:
+        """Lay out for a beam grid (deg, ascending); `unit` says what levels are relative to."""
+        self.figure: Figure = figure(11.0, 5.6, dpi=100)
+        self.window = space
+        parts = self.figure.add_gridspec(2, 2, width_ratios=[1.2, 1.0])
+        self._title: Text = self.figure.suptitle(" ", x=0.01, ha="left", fontsize=11, color=INK)
+        sky = self.figure.add_subplot(parts[:, 0])
+        self._image: AxesImage = image_axes(sky, azimuth, elevation)
+        self._outlines: PolyCollection = outline_artist(sky)
+        self._ghosts = GhostMarks(sky)
+        bar = self.figure.colorbar(self._image, ax=sky, shrink=0.82, pad=0.02, extend="min")
+        bar.set_label(unit, fontsize=9, color=INK)
+        bar.ax.tick_params(labelsize=8)
+        self._clouds = [
+            CloudPanel(self.figure.add_subplot(parts[0, 1]), PLAN, "from above"),
+            CloudPanel(self.figure.add_subplot(parts[1, 1]), SIDE, "from starboard"),
+        ]
+        self._laid_out = False
+
+    def show(self, view: View) -> None:
+        """Draw a frame in place of the last."""
+        self._title.set_text(view.title)
+        shape = self._image.get_array()
+        if view.level is not None:
+            self._image.set_data(np.ma.masked_invalid(clipped(view.level))[:, ::-1])
+        elif shape is not None:
+            self._image.set_data(np.ma.masked_all(shape.shape))
+        outlines = set_outlines(self._outlines, view.hulls)
+        for panel in self._clouds:
+            panel.show(view, self.window)
+        if not self._laid_out:  # arrange once: axes that move from frame to frame are hard to watch
+            self.figure.canvas.draw()
+            self.figure.set_layout_engine("none")
+            self._laid_out = True
+        self._ghosts.show(view.ghosts, outlines)
+
+    def pixels(self) -> np.ndarray:
+        """The figure as drawn: (row, column, rgb) uint8."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+        canvas = self.figure.canvas
+        assert isinstance(canvas, FigureCanvasAgg)
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+
+class CloudPanel:
+    """A cloud and the targets' true hulls, projected along one axis of the sonar frame."""
+
+    def __init__(self, axes: Axes, plane: tuple[int, int], name: str) -> None:
+        """Set up the axes; `plane` is `PLAN` or `SIDE`."""
+        from matplotlib.collections import PolyCollection
+
+        names = ("forward, x (m)", "port, y (m)", "up, z (m)")
+        self.axes, self.plane = axes, plane
+        axes.set_facecolor(BACKDROP)
+        axes.set_aspect("equal", adjustable="box")
+        label(axes, names[plane[0]], names[plane[1]], f"point cloud {name}")
+        self._hulls: PolyCollection = PolyCollection([], linewidths=1.0)
+        axes.add_collection(self._hulls, autolim=False)
+        self._points: PathCollection = axes.scatter(
+            [], [], c=[], s=9, linewidths=0, cmap=ENERGY_MAP, vmin=-DYNAMIC_RANGE, vmax=0
+        )
+        self._note: Text = axes.text(0.02, 0.04, "", transform=axes.transAxes, fontsize=8, color="#e8e8e8")
+
+    def show(self, view: View, space: Window) -> None:
+        """Draw a frame in place of the last."""
+        across, up = self.plane
+        centre, half = space.centre(view), space.half
+        reach = max(half[across], 1.6 * half[up])
+        sign = -1.0 if across == 1 else 1.0  # port on the left
+        self.axes.set_xlim(centre[across] - sign * reach, centre[across] + sign * reach)
+        self.axes.set_ylim(centre[up] - reach / 1.6, centre[up] + reach / 1.6)
+        fill_hulls(self._hulls, view.hulls, self.plane)
+        at = view.points[:, self.plane]
+        self._points.set_offsets(at)
+        self._points.set_array(clipped(view.point_level))
+        outside = int((np.abs(at - centre[[across, up]]) > [reach, reach / 1.6]).any(axis=1).sum())
+        self._note.set_text(f"{len(at)} points" + (f", {outside} of them outside" if outside else ""))
+
+
+def clipped(level: Floats) -> Floats:
+    """Levels (dB) with silence at the end of the scale; NaN stays NaN."""
+    return np.where(np.isneginf(level), -10.0 * DYNAMIC_RANGE, level)
+
+
+def image_axes(axes: Axes, azimuth: Floats, elevation: Floats) -> AxesImage:
+    """Axes of an energy image over a beam grid (deg, ascending), port on the left; returns the empty image."""
+    from matplotlib import colormaps
+
+    colours = colormaps[ENERGY_MAP].with_extremes(bad=ABSENT)
+    (left, right), (low, high) = edges(azimuth), edges(elevation)
+    blank = np.ma.masked_all((len(elevation), len(azimuth)))
+    image = axes.imshow(
+        blank,
+        extent=(right, left, low, high),
+        origin="lower",
+        cmap=colours,
+        vmin=-DYNAMIC_RANGE,
+        vmax=0.0,
+        interpolation="nearest",
+    )
+    label(
+        axes,
+        "azimuth (deg), port on the left",
+        "elevation (deg), up positive",
+        "energy image, true outline of the target",
+    )
+    return image
+
+
+def edges(centres: Floats) -> tuple[float, float]:
+    """Outer edges of the first and the last cell of an even grid."""
+    half = 0.5 * float(centres[1] - centres[0]) if len(centres) > 1 else 0.5
+    return float(centres[0]) - half, float(centres[-1]) + half
+
+
+def outline_artist(axes: Axes) -> PolyCollection:
+    """An empty collection of outlines on an energy image."""
+    from matplotlib.collections import PolyCollection
+
+    artist = PolyCollection([], facecolors="none", linewidths=1.2)
+    axes.add_collection(artist, autolim=False)
+    return artist
+
+
+def set_outlines(artist: PolyCollection, hulls: tuple[Hull, ...]) -> list[Floats]:
+    """Draw the outlines of targets as the sonar sees them; returns them: lines (point, azimuth and elevation), deg."""
+    lines: list[Floats] = []
+    colours: list[str] = []
+    for i, hull in enumerate(hulls):
+        seen = view_outline(hull.vertices, hull.faces)
+        lines += [np.asarray(np.rad2deg(line)) for line in seen]
+        colours += [OUTLINES[i % len(OUTLINES)]] * len(seen)
+    artist.set_verts(lines)
+    artist.set_edgecolor(colours)
+    return lines
+
+
+def fill_hulls(artist: PolyCollection, hulls: tuple[Hull, ...], plane: tuple[int, int]) -> None:
+    """Draw the hulls of targets projected on a plane of the sonar frame (m)."""
+    from matplotlib.colors import to_rgba
+
+    lines, colours = [], []
+    for i, hull in enumerate(hulls):
+        seen = union_outline(hull.vertices[:, plane], hull.faces)
+        lines += seen
+        colours += [OUTLINES[i % len(OUTLINES)]] * len(seen)
+    artist.set_verts(lines)
+    artist.set_edgecolor(colours)
+    artist.set_facecolor([to_rgba(colour, 0.18) for colour in colours])

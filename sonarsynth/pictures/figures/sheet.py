@@ -1,0 +1,167 @@
+"""A sheet of one frame: the image, the cloud against the true hull, and the beams of a hit, a far hit and a miss."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.pictures.figures.frame_figure import View, Window, clipped, image_axes, outline_artist, set_outlines
+from sonarsynth.pictures.figures.ghost_rings import GhostMarks
+from sonarsynth.pictures.figures.style import ERROR_MAP, INK, MARKS, OUTLINES, PALE, figure, grid, label
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WORST_SHOWN = 10.0
+"""Range errors (cm) are coloured up to this."""
+
+BADGES = 22.0
+"""Points around a target that the numbers of its beams take: labels of ghosts stay off."""
+
+LEAD = 1.0e-3
+"""Signals are drawn from this long (s) before the first echo to this long after the last."""
+
+
+@dataclass(frozen=True, eq=False)
+class Beam:
+    """What the array hears when it is steered in one direction."""
+
+    name: str
+    azimuth: float  # deg
+    elevation: float  # deg
+    time: Floats  # (sample,) s after the direct arrival of the snap
+    pressure: Floats  # (sample,) Pa
+    expected: float  # s: delay of the echo by the truth; NaN off the target
+    measured: float  # s: delay of the cloud's point; NaN where there is none
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """The points of a cloud against the truth."""
+
+    points: Floats  # (point, xyz) m, sonar frame
+    error: Floats  # (point,) m: range less true range; NaN off the targets
+
+
+def sheet(
+    azimuth: Floats, elevation: Floats, view: View, errors: Errors, beams: list[Beam], space: Window, unit: str
+) -> Figure:
+    """The sheet as a figure. azimuth, elevation: the beam grid (deg). Without beams the last row is left out."""
+    made = figure(12.0, 8.6 if beams else 5.4, dpi=110)
+    made.suptitle(view.title, x=0.01, ha="left", fontsize=12, color=INK)
+    rows = made.add_gridspec(2 if beams else 1, 1, height_ratios=[1.75, 1.0] if beams else [1.0])
+    top = rows[0].subgridspec(1, 3, width_ratios=[1.12, 0.12, 1.0])
+    sky = made.add_subplot(top[0])
+    image = image_axes(sky, azimuth, elevation)
+    if view.level is not None:
+        image.set_data(np.ma.masked_invalid(clipped(view.level))[:, ::-1])
+    outlines = set_outlines(outline_artist(sky), view.hulls)
+    bar = made.colorbar(image, ax=sky, shrink=0.82, pad=0.02, extend="min")
+    bar.set_label(unit, fontsize=9, color=INK)
+    bar.ax.tick_params(labelsize=8)
+    mark_beams(sky, beams)
+    draw_cloud(made.add_subplot(top[2], projection="3d"), made, view, errors, space)
+    if beams:
+        below = rows[1].subgridspec(1, len(beams))
+        draw_beams([made.add_subplot(below[i]) for i in range(len(beams))], beams)
+    made.draw_without_rendering()  # the axes find their place
+    GhostMarks(sky).show(view.ghosts, outlines, BADGES if beams else 0.0)
+    return made
+
+
+def mark_beams(axes: Axes, beams: list[Beam]) -> None:
+    """Rings at the beams, with their numbers beside them so that the target stays in sight."""
+    beside = ((13, 13), (-13, 13), (-13, -13))
+    for beam, number, colour, offset in zip(beams, "123", MARKS, beside, strict=False):
+        at = (beam.azimuth, beam.elevation)
+        axes.plot(*at, "o", ms=8, mfc="none", mec="white", mew=2.4)
+        axes.plot(*at, "o", ms=8, mfc="none", mec=colour, mew=1.2)
+        badge = {"boxstyle": "circle,pad=0.25", "facecolor": colour, "edgecolor": "white", "linewidth": 0.8}
+        axes.annotate(
+            number,
+            at,
+            offset,
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            color="white",
+            fontsize=8,
+            bbox=badge,
+        )
+
+
+def draw_cloud(axes: Axes, onto: Figure, view: View, errors: Errors, space: Window) -> None:
+    """The cloud in three dimensions, coloured by its range error, in the true hulls (figure 19 of the thesis)."""
+    from mpl_toolkits.mplot3d import Axes3D
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    assert isinstance(axes, Axes3D)
+    centre, half = space.centre(view), np.maximum(space.half, 0.4 * space.half.max())  # one scale on all axes
+    inside = (np.abs(errors.points - centre) <= half).all(axis=1)
+    for i, hull in enumerate(view.hulls):
+        body = Poly3DCollection(
+            hull.vertices[hull.faces], facecolors=OUTLINES[i % len(OUTLINES)], alpha=0.13, linewidths=0
+        )
+        axes.add_collection3d(body, autolim=False)
+    on = inside & np.isfinite(errors.error)
+    off = inside & ~np.isfinite(errors.error)
+    axes.scatter(*errors.points[off].T, s=12, c=PALE, marker="x", linewidths=0.8, depthshade=False)
+    colour = 100.0 * np.abs(errors.error[on])
+    drawn = axes.scatter(
+        *errors.points[on].T, s=10, c=colour, cmap=ERROR_MAP, vmin=0, vmax=WORST_SHOWN, depthshade=False
+    )
+    bar = onto.colorbar(drawn, ax=axes, shrink=0.62, pad=0.12, extend="max")
+    bar.set_label("range error against the truth (cm)", fontsize=9, color=INK)
+    bar.ax.tick_params(labelsize=8)
+    low, high = centre - half, centre + half
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    axes.set_box_aspect(tuple(half), zoom=1.15)
+    axes.view_init(elev=24, azim=-160)  # from behind the sonar, a little to starboard: port is on the left
+    axes.set_xlabel("forward, x (m)", fontsize=8)
+    axes.set_ylabel("port, y (m)", fontsize=8)
+    axes.set_zlabel("up, z (m)", fontsize=8, labelpad=-3)
+    axes.tick_params(labelsize=7)
+    axes.locator_params(nbins=5)
+    outside = int((~inside).sum())
+    counts = f"{int(on.sum())} points on a target, {int(off.sum())} off it" + (
+        f", {outside} outside" if outside else ""
+    )
+    axes.set_title(f"point cloud in the true hull: {counts}", fontsize=10, color=INK, loc="left", y=0.98)
+
+
+def draw_beams(panels: list[Axes], beams: list[Beam]) -> None:
+    """Pressure in the beams on one scale (figure 18 of the thesis)."""
+    peak = max(float(np.abs(beam.pressure).max()) for beam in beams)
+    factor, unit = (1.0, "Pa") if peak >= 1.0 else (1e3, "mPa") if peak >= 1e-3 else (1e6, "uPa")
+    first, last = _span(beams)
+    for axes, beam, number, colour in zip(panels, beams, "123", MARKS, strict=False):
+        grid(axes)
+        axes.plot(1e3 * beam.time, factor * beam.pressure, color=colour, linewidth=0.9)
+        if np.isfinite(beam.expected):
+            axes.axvline(1e3 * beam.expected, color=INK, linewidth=0.9, linestyle="--", label="echo by the truth")
+        if np.isfinite(beam.measured):
+            axes.axvline(1e3 * beam.measured, color=PALE, linewidth=0.9, linestyle=":", label="echo as ranged")
+        if np.isfinite([beam.expected, beam.measured]).any():
+            axes.legend(loc="upper left", fontsize=7, frameon=False)
+        axes.set_xlim(1e3 * first, 1e3 * last)
+        axes.set_ylim(-1.08 * factor * peak, 1.08 * factor * peak)
+        where = f"azimuth {beam.azimuth:+.1f}, elevation {beam.elevation:+.1f} deg"
+        label(
+            axes,
+            "time after the direct snap (ms)",
+            f"beam pressure ({unit})" if number == "1" else "",
+            f"{number}  {beam.name}: {where}",
+        )
+
+
+def _span(beams: list[Beam]) -> tuple[float, float]:
+    """Times (s) to draw: about the echoes, or everything where there are none."""
+    first, last = min(beam.time[0] for beam in beams), max(beam.time[-1] for beam in beams)
+    echoes = [t for beam in beams for t in (beam.expected, beam.measured) if np.isfinite(t)]
+    if not echoes:
+        return float(first), float(last)
+    return float(max(first, min(echoes) - LEAD)), float(min(last, max(echoes) + LEAD))

@@ -1,0 +1,93 @@
+"""Films: an MP4 where ffmpeg is installed, else a GIF."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+import numpy as np
+
+from sonarsynth.pictures.figures.style import BACKDROP, ENERGY_MAP, OUTLINES
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from PIL.Image import Image
+
+LONGEST = 128
+"""Frames of a film at most."""
+
+Item = TypeVar("Item")
+View_contra = TypeVar("View_contra", contravariant=True)
+
+
+class Picture(Protocol[View_contra]):
+    """A figure in which one view after another is drawn."""
+
+    @property
+    def figure(self) -> Figure:
+        """The figure, laid out."""
+        ...
+
+    def show(self, view: View_contra, /) -> None:
+        """Draw a view in place of the last."""
+        ...
+
+    def pixels(self) -> np.ndarray:
+        """The figure as drawn: (row, column, rgb) uint8."""
+        ...
+
+
+def thinned(frames: Sequence[Item]) -> list[Item]:
+    """The frames of a film: all, or of more than `LONGEST` every second, third ... of them."""
+    return list(frames[:: -(-len(frames) // LONGEST) or 1])
+
+
+def write_film(
+    picture: Picture[View_contra], views: Sequence[View_contra], folder: Path, frames_per_second: float
+) -> Path:
+    """Draw views one after another into `folder`/film.mp4 or film.gif; returns its path."""
+    from matplotlib.animation import FFMpegWriter
+
+    if FFMpegWriter.isAvailable():
+        path = folder / "film.mp4"
+        maker = FFMpegWriter(fps=frames_per_second)  # type: ignore[arg-type]  # any number
+        try:
+            with maker.saving(picture.figure, str(path), dpi=100):
+                for view in views:
+                    picture.show(view)
+                    maker.grab_frame()
+            return path
+        except (OSError, subprocess.CalledProcessError):  # an ffmpeg without the codec
+            path.unlink(missing_ok=True)
+    return _gif(picture, views, folder / "film.gif", frames_per_second)
+
+
+def _gif(picture: Picture[View_contra], views: Sequence[View_contra], path: Path, frames_per_second: float) -> Path:
+    from PIL import Image
+
+    colours = _palette()
+    frames = []
+    for view in views:
+        picture.show(view)
+        frames.append(Image.fromarray(picture.pixels()).quantize(palette=colours, dither=Image.Dither.NONE))
+    milliseconds = max(20, round(1000 / frames_per_second))
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=milliseconds, loop=0, optimize=False)
+    return path
+
+
+def _palette() -> Image:
+    """256 colours, the same for all frames: the energy map, greys, and the outlines on their background."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_rgb
+    from PIL import Image
+
+    energy = colormaps[ENERGY_MAP](np.linspace(0.0, 1.0, 184))[:, :3]
+    greys = np.repeat(np.linspace(0.0, 1.0, 39)[:, None], 3, axis=1)
+    blend = np.linspace(0.0, 1.0, 8)[:, None]
+    mixed = [(1 - blend) * to_rgb(BACKDROP) + blend * to_rgb(colour) for colour in OUTLINES]
+    table = np.round(255 * np.concatenate([energy, greys, *mixed, [to_rgb(BACKDROP)]])).astype(np.uint8)
+    made = Image.new("P", (1, 1))
+    made.putpalette(table.tobytes())
+    return made

@@ -1,0 +1,263 @@
+"""Rays to look at: the eigenrays of a frame, and the fan that a recipe asks for, each with what people ask of a ray."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from sonarsynth.casting.ray_casting import OFFSET, occluded
+from sonarsynth.conventions import Floats, Ints, depth
+from sonarsynth.description import FieldError
+from sonarsynth.environment.boundaries import SeaBed, SeaSurface
+from sonarsynth.environment.boundary_numbers import bounces
+from sonarsynth.equations.rays.ray_solutions import (
+    CAUSTIC,
+    COINCIDENT,
+    GOOD,
+    PASSED,
+    Eigenrays,
+    Water,
+    eigenrays,
+    water,
+)
+from sonarsynth.geometry.placed_target import Body
+from sonarsynth.pictures.figures.ray_figure import FAMILIES, FAN
+from sonarsynth.planning import Plan
+from sonarsynth.propagation.polylines import Polylines, polylines
+from sonarsynth.propagation.ray_request import EigenrayRequest
+from sonarsynth.recipe.scene import Frame
+from sonarsynth.signals.filtered_pulse import snap_levels
+from sonarsynth.tracing.ray_fan import EVENTS, RayFan
+
+WORDS = {GOOD: "good", COINCIDENT: "coincident ends", CAUSTIC: "near a caustic", PASSED: "past a caustic"}
+"""Flags of eigenrays, `acoustics.rays.REASONS`, in the words of a table."""
+LETTERS = {"turning point": "T", "surface": "S", "bed": "B", "facet": "X", "target": "X"}
+"""Vertices of a ray, in the order in which it meets them."""
+TARGET = "target"
+"""What happens to an eigenray at the target by way of which it goes."""
+HIDDEN = "hidden by a target"
+AT_END = "reflected at its end"
+"""Of a ray from or to a point on a boundary: the same way as the ray without that reflection."""
+
+
+@dataclass(frozen=True, eq=False)
+class RayLine:
+    """A ray as points, and what is said of it. NaN: not known."""
+
+    name: str  # what it joins
+    family: str  # direct, surface, bed, surface and bed; fan
+    position: Floats  # (point, xyz) m, world
+    direction: Floats  # (point, xyz) unit vector of travel on leaving the point
+    time: Floats  # (point,) s since the launch
+    length: Floats  # (point,) m along the ray
+    event: tuple[str, ...]  # (point,)
+    caustics: int
+    transmission_loss: float  # dB at the centre of the band; of an echo: both ways, off a target of 0 dB
+    level: float  # dB re 1 uPa: peak source level less the transmission loss
+    coefficient: float  # of a ray of the fan sent on from a target: that of the scattering law
+    flags: tuple[str, ...]  # what there is to say against it
+
+    @property
+    def vertices(self) -> str:
+        """Its vertices in order, such as S-B; S surface, B bed, T turning point, X target; a dash without any."""
+        return "-".join(LETTERS[e] for e in self.event if e in LETTERS) or "-"
+
+    @property
+    def elevation(self) -> Floats:
+        """Angle (point,) of travel on leaving each point, rad, up positive."""
+        return np.asarray(np.arcsin(np.clip(self.direction[:, 2], -1.0, 1.0)))
+
+    def as_json(self) -> dict[str, Any]:
+        """The ray for a program: SI units, angles in rad and up positive, null where a number is not known."""
+        lists = {n: getattr(self, n).tolist() for n in ("position", "time", "length")}
+        angles = [_number(a) for a in self.elevation]
+        single = {n: _number(getattr(self, n)) for n in ("transmission_loss", "level", "coefficient")}
+        counts = {what: sum(e == what for e in self.event) for what in ("surface", "bed", "turning point", "facet")}
+        return {
+            "name": self.name,
+            "family": self.family,
+            "vertices": self.vertices,
+            "travel_time": float(self.time[-1]),
+            "launch_elevation": angles[0],
+            "arrival_elevation": angles[-1],
+            "path_length": float(self.length[-1]),
+            **single,
+            "surface": counts["surface"],
+            "bottom": counts["bed"],
+            "turning": counts["turning point"],
+            "caustics": self.caustics,
+            "flags": list(self.flags),
+            **lists,
+            "elevation": angles,
+            "event": list(self.event),
+        }
+
+
+def fan_lines(rays: RayFan) -> list[RayLine]:
+    """The rays of a fan."""
+    lines = []
+    for n in range(int(rays.ray.max()) + 1):
+        mine = rays.ray == n
+        lines.append(
+            RayLine(
+                name=f"ray {n} of the fan",
+                family=FAN,
+                position=rays.position[mine],
+                direction=rays.direction[mine],
+                time=rays.time[mine],
+                length=rays.length[mine],
+                event=tuple(EVENTS[e] for e in rays.event[mine]),
+                caustics=0,
+                transmission_loss=np.nan,
+                level=np.nan,
+                coefficient=float(rays.coefficient[n]),
+                flags=(),
+            )
+        )
+    return lines
+
+
+@dataclass(frozen=True, eq=False)
+class _End:
+    """A point that eigenrays join."""
+
+    position: Floats  # (xyz) m, world
+    inside: Body | None = None  # the body that it is the middle of: it hides nothing of a ray that ends there
+
+
+def eigenray_lines(plan: Plan, frame: Frame, request: EigenrayRequest) -> list[RayLine]:
+    """Every ray from each snap to the array centre, and by way of each target; earliest first for each way.
+
+    The loss of an echo is that of both ways, as if the target had a strength of 0 dB. Raises FieldError without a snap.
+    """
+    levels = snap_levels(frame.moment.snaps)
+    first = {s.position.tobytes(): n for n, s in reversed(list(enumerate(frame.moment.snaps)))}  # each place once
+    snaps = {n: _End(frame.moment.snaps[n].position) for n in sorted(first.values())}
+    if not snaps:
+        raise FieldError(("scene", "world", "shrimp"), "is empty: there are no eigenrays; ask for a fan with 'rays:'")
+    array = _End(frame.sonar_pose.position)
+    targets = _aims(frame, request)
+    pairs = [(s, array) for s in snaps.values()]
+    pairs += [pair for _, aim in targets for pair in [(aim, array), *((s, aim) for s in snaps.values())]]
+    legs = dict(zip(pairs, _legs(plan, frame.moment.bodies, request.vertices, pairs), strict=True))
+    lines = []
+    for n, snap in snaps.items():
+        ways = {f"snap {n} to array": legs[snap, array]}
+        for name, aim in targets:
+            both = [(a, b) for a in legs[snap, aim] for b in legs[aim, array]]
+            echoes = [_joined(a, b) for a, b in both if _bends(a) + _bends(b) <= request.vertices]
+            ways[f"snap {n} to {name} to array"] = sorted(echoes, key=lambda e: float(e.time[-1]))
+        for name, found in ways.items():
+            lines += [replace(ray, name=name, level=float(levels[n]) - ray.transmission_loss) for ray in found]
+    return lines
+
+
+def _aims(frame: Frame, request: EigenrayRequest) -> list[tuple[str, _End]]:
+    """Name of each target and the point of it that rays go to."""
+    aims = []
+    for body in frame.moment.bodies if request.targets != "none" else ():
+        if request.targets == "centre":
+            aims.append((body.name, _End(body.pose.to_world(body.mesh.box.mean(axis=0)), body)))
+            continue
+        place = body.pose.to_world(body.mesh.centroid)
+        facet = int(np.linalg.norm(place - frame.sonar_pose.position, axis=1).argmin())
+        clear = OFFSET * body.mesh.radius * body.pose.turn_to_world(body.mesh.normal[facet])
+        aims.append((body.name, _End(place[facet] + clear)))
+    return aims
+
+
+def _legs(plan: Plan, bodies: tuple[Body, ...], vertices: int, pairs: list[tuple[_End, _End]]) -> list[list[RayLine]]:
+    """The eigenrays of each pair, as lines that have no name yet."""
+    environment = plan.scene.world.environment
+    layers = water(plan.profile.depth, plan.profile.speed, environment.depth)
+    start, end = (np.array([pair[side].position for pair in pairs]) for side in (0, 1))
+    distance = np.hypot(*(end - start)[:, :2].T)
+    rays = eigenrays(layers, depth(start), depth(end), distance, vertices, vertices)
+    lines = polylines(layers, start, end, rays, sagitta=1e-4 * environment.depth)
+    loss = _transmission_loss(plan, layers, rays, depth(start), depth(end))
+    row = np.searchsorted(lines.ray, np.arange(len(rays.pair) + 1))
+    made: list[list[RayLine]] = [[] for _ in pairs]
+    for i, pair in enumerate(rays.pair):
+        others = tuple(b for b in bodies if all(b is not e.inside for e in pairs[pair]))
+        made[pair].append(_leg(lines, slice(row[i], row[i + 1]), rays, i, float(loss[i]), others))
+    return made
+
+
+def _transmission_loss(plan: Plan, layers: Water, rays: Eigenrays, start: Floats, end: Floats) -> Floats:
+    """Transmission loss (ray,) in dB at the centre of the band: spreading, boundaries, absorption; depths (pair,)."""
+    environment, frequency = plan.scene.world.environment, plan.scene.sonar.band.centre
+    met: list[tuple[SeaSurface | SeaBed, Ints, float]] = [
+        (environment.surface, rays.surface, layers.speed[0]),
+        (environment.bed, rays.bottom, layers.speed[-1]),
+    ]
+    factor = rays.amplitude.copy()
+    for boundary, count, c in met:
+        effect = bounces(boundary, np.arccos(np.minimum(rays.slowness * c, 1.0)), count, c, frequency)
+        factor *= effect.modulus * np.exp(-0.5 * (2.0 * np.pi * frequency * effect.blur) ** 2)
+    vertices = rays.surface + rays.bottom + rays.turning
+    climb = np.nan_to_num(rays.start_sine)
+    lost = rays.length * plan.absorption_at_depths.along(
+        plan.profile, start[rays.pair], end[rays.pair], climb, vertices
+    )
+    with np.errstate(divide="ignore"):
+        return np.asarray(-20.0 * np.log10(factor) + lost)
+
+
+def _leg(lines: Polylines, mine: slice, rays: Eigenrays, i: int, loss: float, others: tuple[Body, ...]) -> RayLine:
+    """Eigenray i as a line; others: the bodies that may hide it."""
+    position = lines.position[mine]
+    hidden = bool(occluded(others, position[:-1], position[1:]).any())
+    length = lines.length[mine]
+    at_end = len(length) > 2 and (length[1] == 0.0 or length[-1] == length[-2])
+    return RayLine(
+        name="",
+        family=_family(bool(rays.surface[i]), bool(rays.bottom[i])),
+        position=position,
+        direction=lines.direction[mine],
+        time=lines.time[mine],
+        length=length,
+        event=tuple(EVENTS[e] for e in lines.event[mine]),
+        caustics=int(rays.caustics[i]),
+        transmission_loss=loss,
+        level=np.nan,
+        coefficient=np.nan,
+        flags=_flags(WORDS[int(rays.flag[i])], HIDDEN if hidden else "", AT_END if at_end else ""),
+    )
+
+
+def _joined(first: RayLine, second: RayLine) -> RayLine:
+    """The ray to a target and on from it."""
+    middle = np.s_[1:]
+    return replace(
+        first,
+        family=_family("surface" in first.event + second.event, "bed" in first.event + second.event),
+        position=np.concatenate([first.position, second.position[middle]]),
+        direction=np.concatenate([first.direction[:-1], second.direction]),
+        time=np.concatenate([first.time, first.time[-1] + second.time[middle]]),
+        length=np.concatenate([first.length, first.length[-1] + second.length[middle]]),
+        event=(*first.event[:-1], TARGET, *second.event[1:]),
+        caustics=first.caustics + second.caustics,
+        transmission_loss=first.transmission_loss + second.transmission_loss,
+        flags=_flags(*first.flags, *second.flags),
+    )
+
+
+def _bends(line: RayLine) -> int:
+    """Reflections and turning points of a line."""
+    return sum(event in LETTERS for event in line.event)
+
+
+def _family(surface: bool, bed: bool) -> str:
+    return FAMILIES[surface + 2 * bed]
+
+
+def _flags(*words: str) -> tuple[str, ...]:
+    """What there is to say against a ray, each thing once."""
+    return tuple(dict.fromkeys(w for w in words if w and w != WORDS[GOOD]))
+
+
+def _number(value: Any) -> float | None:
+    """A number for JSON, which knows no NaN and no infinity."""
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,175 @@
+"""Rays through a frame, drawn: a section with the profile beside it, in space, a page to turn; a table and the numbers.
+
+What a recipe asks for under `rays:`; without it the eigenrays of the frame.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.equations.rays.ray_solutions import water
+from sonarsynth.pictures.figures.frame_figure import Hull
+from sonarsynth.pictures.figures.ray_figure import FAN, Look, section_figure, space_figure
+from sonarsynth.pictures.figures.ray_page import page
+from sonarsynth.pictures.ray_lines import HIDDEN, RayLine, eigenray_lines, fan_lines
+from sonarsynth.pipeline import follow_rays
+from sonarsynth.planning import Plan
+from sonarsynth.propagation.ray_request import EigenrayRequest
+from sonarsynth.recipe.scene import Frame
+from sonarsynth.tracing.ray_fan import EVENTS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LONGEST_TABLE = 100
+HEADINGS = (
+    "joins",
+    "family",
+    "vertices",
+    "time (ms)",
+    "launch (deg)",
+    "arrival (deg)",
+    "length (m)",
+    "TL (dB)",
+    "caustics",
+    "flag",
+)
+UNITS = "SI; angles in rad, up positive; positions (east, north, up) with z = 0 the mean surface; levels in dB re 1 uPa"
+
+
+def show_rays(plan: Plan, index: int, out: Path) -> tuple[list[Path], str]:
+    """Write `section.png`, `space.png`, `rays.html` and `rays.json` of a frame's rays; their paths, and a table.
+
+    The section is the vertical plane of the sonar's axis, or the one that the eigenrays spread along where they spread
+    little along that axis. Where rays of a fan are sent on to the shrimp, their colour in space is their coefficient,
+    and only those that met a target are drawn. Raises FieldError where there is nothing to draw.
+    """
+    plan = plan.at(index)
+    frame = plan.recipe.frame(index)[1]
+    lines = ray_lines(plan, frame, index)
+    hulls = [Hull(b.name, b.pose.to_world(b.mesh.vertices), b.mesh.faces.astype(int)) for b in frame.moment.bodies]
+    value = as_json(plan, frame, lines)
+    out.mkdir(parents=True, exist_ok=True)
+    files = [out / name for name in ("section.png", "space.png", "rays.html", "rays.json")]
+    _section(lines, hulls, value).savefig(files[0])
+    _space(lines, hulls, value).savefig(files[1])
+    files[2].write_text(page(value, hulls), encoding="ascii")
+    files[3].write_text(json.dumps(value, allow_nan=False) + "\n", encoding="ascii")
+    return files, table(lines)
+
+
+def ray_lines(plan: Plan, frame: Frame, index: int) -> list[RayLine]:
+    """The rays to draw of a frame: its eigenrays, the fan, or both, as the recipe asks."""
+    request = plan.recipe.rays
+    wanted = EigenrayRequest() if request is None else request.eigenrays
+    lines = eigenray_lines(plan, frame, wanted) if wanted is not None else []
+    if request is not None and request.fan:
+        lines += fan_lines(follow_rays(plan, index))
+    return lines
+
+
+def as_json(plan: Plan, frame: Frame, lines: Sequence[RayLine]) -> dict[str, Any]:
+    """The rays of a frame, and the water that they are in, for a program."""
+    bed = plan.scene.world.environment.depth
+    layers = water(plan.profile.depth, plan.profile.speed, bed)
+    places = {"array": frame.sonar_pose.position} | {f"snap {n}": s.position for n, s in enumerate(frame.moment.snaps)}
+    return {
+        "title": plan.recipe.title,
+        "frame": frame.index,
+        "time": frame.time,
+        "units": UNITS,
+        "bed": bed,
+        "profile": {"depth": layers.depth.tolist(), "speed": layers.speed.tolist()},
+        "places": {name: place.tolist() for name, place in places.items()},
+        "bearing": _bearing(frame, lines),
+        "rays": [line.as_json() for line in lines],
+    }
+
+
+def table(lines: Sequence[RayLine]) -> str:
+    """The eigenrays, a line each, and a line about the fan."""
+    found = [line for line in lines if line.family != FAN]
+    fan = [line for line in lines if line.family == FAN]
+    rows: list[tuple[str, ...]] = [HEADINGS] if found else []
+    for line in found[:LONGEST_TABLE]:
+        ends = np.rad2deg(line.elevation[[0, -1]])
+        numbers = [1e3 * line.time[-1], *ends, line.length[-1], line.transmission_loss]
+        texts = [f"{number:.{digits}f}" for number, digits in zip(numbers, (4, 3, 3, 3, 1), strict=True)]
+        flags = ", ".join(line.flags) or "good"
+        rows.append((line.name, line.family, line.vertices, *texts, str(line.caustics), flags))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    texts = ["  ".join(_aligned(row, widths)).rstrip() for row in rows]
+    if len(found) > LONGEST_TABLE:
+        texts.append(f"... and {len(found) - LONGEST_TABLE} more, in rays.json")
+    if found:
+        texts.append("vertices: S surface, B bed, T turning point, X target; angles of travel, up positive")
+        texts.append("how many vertices at most is for the recipe to say: rays.eigenrays.vertices")
+        texts.append("TL at the centre of the band; of an echo: both ways, off a target of 0 dB")
+    if fan:
+        met = Counter(event for line in fan for event in line.event)
+        words = ", ".join(f"{met[name]} x {name}" for name in EVENTS if met[name])
+        texts.append(f"{len(fan)} rays of a fan: {words}")
+    return "\n".join(texts)
+
+
+def _aligned(row: Sequence[str], widths: Sequence[int]) -> list[str]:
+    """Cells of a table, numbers to the right."""
+    return [c.rjust(w) if 3 <= n <= 8 else c.ljust(w) for n, (c, w) in enumerate(zip(row, widths, strict=True))]
+
+
+def _bearing(frame: Frame, lines: Sequence[RayLine]) -> float:
+    """Direction (rad, from x to y) of the plane to draw: the sonar's axis, or where the eigenrays spread most."""
+    ahead = frame.sonar_pose.turn_to_world([1.0, 0.0, 0.0])
+    axis = float(np.arctan2(ahead[1], ahead[0]))
+    if not lines or any(line.family == FAN for line in lines):
+        return axis
+    flat = np.concatenate([line.position[:, :2] for line in lines]) - frame.sonar_pose.position[:2]
+    along, across = (np.ptp(flat @ [np.cos(a), np.sin(a)]) for a in (axis, axis + 0.5 * np.pi))
+    if along >= 0.5 * across:
+        return axis
+    widest = np.linalg.svd(flat, full_matrices=False)[2][0]  # the array is the origin
+    away = widest if widest @ flat.mean(axis=0) >= 0 else -widest
+    return float(np.arctan2(away[1], away[0]))
+
+
+def _section(lines: Sequence[RayLine], hulls: Sequence[Hull], value: dict[str, Any]) -> Figure:
+    profile = value["profile"]
+    return section_figure(
+        [line.position for line in lines],
+        hulls,
+        np.array(profile["depth"]),
+        np.array(profile["speed"]),
+        value["bed"],
+        value["bearing"],
+        _looks(lines),
+        _places(value),
+    )
+
+
+def _space(lines: Sequence[RayLine], hulls: Sequence[Hull], value: dict[str, Any]) -> Figure:
+    sent = [line for line in lines if np.isfinite(line.coefficient)]
+    others = [line for line in lines if line.family != FAN]
+    drawn = [*others, *sent] if sent else list(lines)
+    strength = np.array([line.coefficient if np.isfinite(line.coefficient) else 1.0 for line in drawn])
+    rays = [line.position for line in drawn]
+    return space_figure(rays, strength, hulls, _places(value), _looks(drawn), value["bearing"])
+
+
+def _looks(lines: Sequence[RayLine]) -> list[Look]:
+    """How each ray is drawn; nothing where all are of the fan: then in turn, or by their coefficients."""
+    if all(line.family == FAN for line in lines):
+        return []
+    return [Look(line.family, HIDDEN in line.flags, line.event) for line in lines]
+
+
+def _places(value: dict[str, Any]) -> dict[str, Floats]:
+    """Points to name; of snaps at one place the first."""
+    first = {tuple(place): name for name, place in reversed(value["places"].items())}
+    return {name: np.array(place) for name, place in value["places"].items() if first[tuple(place)] == name}

@@ -1,0 +1,30 @@
+"""The snap of a recipe, drawn: waveform and spectrum, as it is made and as the sonar hears it, and the filter."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from sonarsynth.description import FieldError
+from sonarsynth.pictures.figures.snap_figure import snap_figure
+from sonarsynth.recipe import Recipe
+from sonarsynth.signals.filtered_pulse import fir
+from sonarsynth.sources.snap_pulses import pulse
+from sonarsynth.state import model_of
+
+
+def show_snap(recipe: Recipe, out: Path) -> None:
+    """Write the picture of the first shrimp's snap, unvaried, through the sonar's filter.
+
+    Raises FieldError without a shrimp, or where its snap cannot be made.
+    """
+    shrimp = recipe.scene.world.shrimp
+    if not shrimp:
+        raise FieldError(("scene", "world", "shrimp"), "is empty: there is no snap to draw")
+    try:
+        model = model_of(shrimp[0], recipe.scene.world.environment.depth)
+        chosen = fir(recipe.scene.sonar.antialias)
+        figure = snap_figure(lambda highest: pulse(model, 0.0, highest), chosen, shrimp[0].source_level)
+    except ValueError as error:
+        raise FieldError(("scene", "world", "shrimp", 0, "snap"), str(error)) from None
+    out.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(out)

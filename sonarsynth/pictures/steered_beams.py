@@ -1,0 +1,136 @@
+"""Steering the stored signals: what the array hears in the direction of a hit, a far hit and a miss."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, direction
+from sonarsynth.evaluation import beam_width
+from sonarsynth.pictures.figures.sheet import Beam
+from sonarsynth.pictures.store_reading import Stored, beam_grid, needed, read
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+CLEAR = 1.5
+"""A miss is at least this many beam widths off every target."""
+
+EXTREME = 0.1
+"""The nearest and the farthest tenth of a target are "near" and "far"."""
+
+
+def beams(tree: xr.DataTree, frame: Stored) -> list[Beam]:
+    """A close hit, a far hit and a close miss on the far side; none without signals or a target in view."""
+    pressure = read(tree, "signals/pressure", frame.index)
+    start = read(tree, "signals/start", frame.index)
+    if pressure is None or start is None or not np.isfinite(start) or not np.isfinite(pressure).any():
+        return []
+    azimuth, elevation = beam_grid(tree)
+    chosen = choose(frame, azimuth, elevation, float(np.rad2deg(beam_width(tree))))
+    if not chosen:
+        return []
+    where = np.array(list(chosen.values()))
+    along = direction(np.deg2rad(azimuth[where[:, 1]]), np.deg2rad(elevation[where[:, 0]]))
+    clock = direct_arrival(tree, frame)
+    time, heard = steer(tree, frame, pressure.astype(float), float(start), along)
+    return [
+        Beam(
+            name=name,
+            azimuth=float(azimuth[column]),
+            elevation=float(elevation[row]),
+            time=time - clock,
+            pressure=heard[i],
+            expected=_expected(tree, frame, along[i] * frame.true_range[row, column]),
+            measured=float(frame.delay[row, column]),
+        )
+        for i, (name, (row, column)) in enumerate(chosen.items())
+    ]
+
+
+def choose(frame: Stored, azimuth: Floats, elevation: Floats, width: float) -> dict[str, tuple[int, int]]:
+    """Beams (row, column) by name; `width` is the beam width (deg). Empty where no beam points at a target.
+
+    Near and far are the brightest beams of the nearest and the farthest tenth of the true ranges; the miss is the beam
+    next to the far hit that is `CLEAR` beam widths off every target.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    on = (frame.target >= 0) & np.isfinite(frame.true_range)
+    if not on.any():
+        return {}
+    bright = np.zeros(on.shape) if frame.energy is None else np.nan_to_num(frame.energy)
+    near, far = np.quantile(frame.true_range[on], [EXTREME, 1.0 - EXTREME])
+    hit = _brightest(bright, on & (frame.true_range <= near))
+    far_hit = _brightest(bright, on & (frame.true_range >= far))
+    step = (_step(elevation), _step(azimuth))
+    off = distance_transform_edt(~on, sampling=step) >= CLEAR * width
+    chosen = {"close hit": hit, "far hit": far_hit}
+    if off.any():
+        row, column = np.indices(on.shape)
+        distance = np.hypot((row - far_hit[0]) * step[0], (column - far_hit[1]) * step[1])
+        towards_hit = (row - far_hit[0]) * (hit[0] - far_hit[0]) + (column - far_hit[1]) * (hit[1] - far_hit[1]) > 0
+        distance = np.where(off, distance + 1e3 * towards_hit, np.inf)
+        miss = np.unravel_index(np.argmin(distance), on.shape)
+        chosen["far miss"] = (int(miss[0]), int(miss[1]))
+    return chosen
+
+
+def _brightest(energy: Floats, among: np.ndarray) -> tuple[int, int]:
+    row, column = np.unravel_index(np.argmax(np.where(among, energy, -1.0)), energy.shape)
+    return int(row), int(column)
+
+
+def _step(centres: Floats) -> float:
+    return float(centres[1] - centres[0]) if len(centres) > 1 else 1.0
+
+
+def direct_arrival(tree: xr.DataTree, frame: Stored) -> float:
+    """When the snap was heard at the array centre (s): as located; without bearings as it truly was."""
+    heard = read(tree, "bearings/time", frame.index)
+    if heard is not None and np.isfinite(heard).any():
+        return float(heard[np.isfinite(heard)][0])
+    snap_time = needed(tree, "truth/snap_time", frame.index)
+    return float(snap_time[0] + np.linalg.norm(frame.snap[0]) / tree.attrs["assumed_sound_speed"])
+
+
+def _expected(tree: xr.DataTree, frame: Stored, point: Floats) -> float:
+    """Delay (s) of the echo from a true point (xyz) after the direct arrival, at the sonar's assumed sound speed."""
+    if not np.isfinite(point).all() or not len(frame.snap):
+        return float("nan")
+    snap = frame.snap[0]
+    path = np.linalg.norm(snap - point) + np.linalg.norm(point) - np.linalg.norm(snap)
+    return float(path / tree.attrs["assumed_sound_speed"])
+
+
+def steer(tree: xr.DataTree, frame: Stored, pressure: Floats, start: float, along: Floats) -> tuple[Floats, Floats]:
+    """Time (sample,) in s and pressure (beam, sample) in Pa of beams in the echo window, in the sonar's band.
+
+    pressure (sensor, sample) from `start` (s); along (beam, xyz). Focused on the middle of the target.
+    """
+    from sonarsynth.equations.arrays.beams import beam_spectra
+    from sonarsynth.equations.arrays.gates import gated_spectra
+
+    rate = float(needed(tree, "signals/sampling_frequency"))
+    band = (float(tree.attrs["band_low"]), float(tree.attrs["band_high"]))
+    first, count = _echo_window(tree, frame, pressure.shape[1], rate, start)
+    frequency, spectra = gated_spectra(pressure, rate, first, count, band)
+    gain, position = needed(tree, "signals/gain"), needed(tree, "signals/position")
+    focus = float(np.median(frame.true_range[frame.target >= 0]))
+    speed = float(tree.attrs["assumed_sound_speed"])
+    heard = beam_spectra(spectra, frequency, position, gain, along, speed, focus)
+    samples = round(rate / float(frequency[1] - frequency[0]))
+    every = np.zeros((len(along), samples // 2 + 1), complex)
+    lowest = round(float(frequency[0]) * samples / rate)
+    every[:, lowest : lowest + len(frequency)] = heard
+    return start + (first + np.arange(count)) / rate, np.fft.irfft(every, samples, axis=1)[:, :count]
+
+
+def _echo_window(tree: xr.DataTree, frame: Stored, samples: int, rate: float, start: float) -> tuple[int, int]:
+    """First sample and number of samples of the echo window; without an image, what follows the direct arrival."""
+    begin, end = read(tree, "image/start", frame.index), read(tree, "image/stop", frame.index)
+    if begin is None or end is None or not np.isfinite(begin) or not np.isfinite(end):
+        begin, end = np.asarray(direct_arrival(tree, frame) + 0.5e-3), np.asarray(start + samples / rate)
+    first = min(max(0, int(np.ceil((float(begin) - start) * rate))), samples - 2)
+    return first, max(2, min(samples, int(np.ceil((float(end) - start) * rate))) - first)

@@ -1,0 +1,224 @@
+"""What pictures need of a store, read with plain xarray. Whatever a store does not hold comes back as None."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, direction
+from sonarsynth.evaluation.point_checks import has_labels, points
+from sonarsynth.geometry import Pose
+from sonarsynth.pictures.figures.frame_figure import Hull
+from sonarsynth.pictures.figures.ghost_rings import Ghost
+from sonarsynth.store import Folder, Remote, folder_of
+from sonarsynth.store.files.place import opens
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FAINTEST = 40.0
+"""Ghosts this many dB under the direct echo of their target are not drawn."""
+
+
+class NothingToDraw(ValueError):
+    """There is no store, or nothing in it to draw; str() is one line."""
+
+
+def opened(store: str | Folder) -> xr.DataTree:
+    """The store as a DataTree. Raises NothingToDraw when it is not one."""
+    import xarray as xr
+
+    path = folder_of(store)
+    if not path.is_dir():
+        raise NothingToDraw(f"{path}: there is no such store")
+    try:
+        tree = xr.open_datatree(opens(path), engine="zarr")
+    except (OSError, ValueError, KeyError) as problem:
+        raise NothingToDraw(f"{path}: not a store that xarray can open ({str(problem).splitlines()[0]})") from None
+    if "truth" not in tree.children or "frame" not in tree["truth"].sizes:
+        raise NothingToDraw(f"{path}: a store has a group /truth with frames; this has none")
+    return tree
+
+
+def pictures_of(store: str | Folder, name: str = "") -> Path:
+    """The folder that the pictures of a store go to: beside it, or in the working directory where it is at a URL."""
+    path = folder_of(store)
+    found = f"{name or path.name}.pictures"
+    return path.with_name(found) if isinstance(path, Path) else Path(found)
+
+
+def bytes_of(store: Folder) -> int:
+    """Bytes of the files of a store; 0 where nobody can list them."""
+    if isinstance(store, Remote):
+        return sum(store.sizes().values()) if store.listed else 0
+    return sum(path.stat().st_size for path in store.rglob("*") if path.is_file())
+
+
+def read(tree: xr.DataTree, name: str, frame: int | None = None) -> np.ndarray | None:
+    """A variable ("image/energy"), of one frame or whole; None where the store does not hold it."""
+    group, _, variable = name.rpartition("/")
+    try:
+        data = (tree[group] if group else tree).dataset[variable]
+    except KeyError:
+        return None
+    return np.asarray((data if frame is None else data.isel(frame=frame)).values)
+
+
+def needed(tree: xr.DataTree, name: str, frame: int | None = None) -> np.ndarray:
+    """As `read`, for what pictures cannot do without. Raises NothingToDraw."""
+    values = read(tree, name, frame)
+    if values is None:
+        raise NothingToDraw(f"the store has no variable {name}")
+    return values
+
+
+def built(tree: xr.DataTree) -> np.ndarray:
+    """Indices of the frames that were built: the others read as NaN."""
+    return np.flatnonzero(np.isfinite(needed(tree, "truth/sonar_position")[:, 0]))
+
+
+def beam_grid(tree: xr.DataTree) -> tuple[Floats, Floats]:
+    """Azimuth and elevation of the beams (deg, ascending)."""
+    return needed(tree, "truth/azimuth").astype(float), needed(tree, "truth/elevation").astype(float)
+
+
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """One frame of a store; sonar frame, m."""
+
+    index: int
+    time: float  # s since the start of the trajectory
+    sonar: Pose
+    energy: Floats | None  # (elevation, azimuth) Pa2 s; None where there is no image or the frame has none
+    points: Floats  # (elevation, azimuth, xyz) m; NaN where there is no point
+    range_error: Floats  # (elevation, azimuth) m: range less true range of direct echoes of targets; NaN elsewhere
+    point_energy: Floats  # (elevation, azimuth) Pa2 s
+    delay: Floats  # (elevation, azimuth) s after the direct arrival
+    target: np.ndarray  # (elevation, azimuth) true target; -1 for none
+    true_range: Floats  # (elevation, azimuth) m
+    snap: Floats  # (snap, xyz) m, true positions
+    hulls: tuple[Hull, ...]
+    ghosts: tuple[Ghost, ...]
+
+    @property
+    def found(self) -> np.ndarray:
+        """(elevation, azimuth) true where there is a point."""
+        return np.asarray(np.isfinite(self.points).all(axis=-1))
+
+
+def stored(tree: xr.DataTree, index: int) -> Stored:
+    """One frame as stored. A frame that was not built comes back full of NaN."""
+    target = needed(tree, "truth/target", index)
+    true_range = needed(tree, "truth/range", index).astype(float)
+    nowhere = np.full(target.shape, np.nan)
+    cloud = {
+        name: read(tree, f"cloud/{name}", index) for name in ("x", "y", "z", "range", "true_range", "energy", "delay")
+    }
+    layers = {name: nowhere if values is None else values.astype(float) for name, values in cloud.items()}
+    energy = read(tree, "image/energy", index)
+    pose = _sonar(tree, index)
+    time = read(tree, "time", index)
+    return Stored(
+        index=index,
+        time=float("nan") if time is None else float(time),
+        sonar=pose,
+        energy=None if energy is None or not np.isfinite(energy).any() else energy.astype(float),
+        points=np.stack([layers["x"], layers["y"], layers["z"]], axis=-1),
+        range_error=_range_errors(tree, index, np.where(target >= 0, layers["range"] - true_range, np.nan)),
+        point_energy=layers["energy"],
+        delay=layers["delay"],
+        target=target,
+        true_range=true_range,
+        snap=pose.to_body(needed(tree, "truth/snap_position", index)),
+        hulls=hulls(tree, index),
+        ghosts=ghosts(tree, index),
+    )
+
+
+def _range_errors(tree: xr.DataTree, index: int, by_beam: Floats) -> Floats:
+    """Range errors (elevation, azimuth) by the labels of points; of a store without them by what beams point at."""
+    if not has_labels(tree):
+        return by_beam
+    errors, found = np.full(by_beam.shape, np.nan), points(tree, [index])
+    errors[tuple(found.beam[found.judged].T)] = found.error[found.judged]
+    return errors
+
+
+def _sonar(tree: xr.DataTree, index: int) -> Pose:
+    return Pose(needed(tree, "truth/sonar_position", index), needed(tree, "truth/sonar_orientation", index))
+
+
+def echo_levels(tree: xr.DataTree, frame: int) -> tuple[Floats, list[str]] | None:
+    """Levels (target, family) in dB re the direct echo of each target, and the families; None where none are stored.
+
+    A target without a direct echo: re its strongest.
+    """
+    level, families = read(tree, "truth/echo_level", frame), read(tree, "truth/family")
+    if level is None or families is None:
+        return None
+    names = [str(name) for name in families]
+    direct = level[:, names.index("direct")]
+    strongest = np.max(level, axis=1, initial=-np.inf, where=np.isfinite(level))
+    return level - np.where(np.isfinite(direct), direct, strongest)[:, None], names
+
+
+def ghosts(tree: xr.DataTree, frame: int) -> tuple[Ghost, ...]:
+    """Ghosts of all targets that are less than `FAINTEST` under the direct echo; none in a store without echoes."""
+    found = echo_levels(tree, frame)
+    azimuth, elevation = (read(tree, f"truth/echo_{name}", frame) for name in ("azimuth", "elevation"))
+    targets = read(tree, "truth/target_name")
+    if found is None or azimuth is None or elevation is None or targets is None:
+        return ()
+    level, families = found
+    drawn = []
+    for target, family in np.argwhere(level > -FAINTEST):
+        if families[family] != "direct" and not _blended(azimuth[target], elevation[target], families, int(family)):
+            whose = f"{targets[target]}: " if len(targets) > 1 else ""
+            where = float(azimuth[target, family]), float(elevation[target, family])
+            drawn.append(Ghost(f"{whose}{families[family]} ghost", int(target), *where, float(level[target, family])))
+    return tuple(drawn)
+
+
+def _blended(azimuth: Floats, elevation: Floats, families: list[str], family: int) -> bool:
+    """True where a direction (deg) is none, or the mean of several that lie apart, where there is nothing to see.
+
+    Echoes by surface and bed come from above (the bed first) and from below (the surface first). Each of the two lies
+    farther from the direct echo than the ghosts by one boundary do; their mean lies between them.
+    """
+    towards = direction(np.deg2rad(azimuth), np.deg2rad(elevation))
+    if not np.isfinite(towards[family]).all():
+        return True
+    if " and " not in families[family]:
+        return False
+    once = [i for i, name in enumerate(families) if name != "direct" and " and " not in name]
+    near = towards @ towards[families.index("direct")]
+    return bool((near[once] <= near[family]).any())
+
+
+def mesh_group(tree: xr.DataTree, name: str, target: int, index: int) -> str:
+    """Where the mesh is that a target has in a frame: its group, or one of those in it where its shape varies."""
+    group = f"targets/{name}"
+    if read(tree, f"{group}/0/faces") is None:
+        return group
+    return f"{group}/{int(needed(tree, 'truth/mesh', index)[target])}"
+
+
+def hulls(tree: xr.DataTree, index: int) -> tuple[Hull, ...]:
+    """The targets of a frame where they truly are; none of a frame that was not built."""
+    sonar = _sonar(tree, index)
+    names = read(tree, "truth/target_name")
+    if names is None or not np.isfinite(sonar.position).all():
+        return ()
+    position = needed(tree, "truth/target_position", index)
+    orientation = needed(tree, "truth/target_orientation", index)
+    made = []
+    for i, name in enumerate(map(str, names)):
+        group = mesh_group(tree, name, i, index)
+        vertices, faces = read(tree, f"{group}/vertices"), read(tree, f"{group}/faces")
+        if vertices is not None and faces is not None and np.isfinite(position[i]).all():
+            there = sonar.to_body(Pose(position[i], orientation[i]).to_world(vertices))
+            made.append(Hull(name, there, faces.astype(np.int64)))
+    return tuple(made)

@@ -1,0 +1,69 @@
+"""Target strength of a body over aspect and frequency: the table, in a file, and its picture."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.pictures.figures.strength_figure import strength_figure
+from sonarsynth.scattering import Scattering
+from sonarsynth.targets.shapes import Shape
+from sonarsynth.targets.target_strength import target_strength
+
+
+@dataclass(frozen=True, eq=False)
+class StrengthTable:
+    """Backscatter of a body round its z axis."""
+
+    aspect: Floats  # (aspect,) rad: where the sonar is, 0 ahead, port positive
+    frequency: Floats  # (frequency,) Hz
+    strength: Floats  # (aspect, frequency) dB re 1 m2; -inf where nothing comes back
+
+    def as_json(self) -> dict[str, Any]:
+        """Numbers for programs: aspects in degrees, null for -inf."""
+        level = [[float(v) if np.isfinite(v) else None for v in row] for row in self.strength]
+        return {
+            "aspect_deg": np.rad2deg(self.aspect).round(9).tolist(),
+            "frequency_hz": self.frequency.tolist(),
+            "target_strength_db": level,
+        }
+
+    def summary(self) -> str:
+        """Highest, lowest and mean, in one line."""
+        finite = np.isfinite(self.strength)
+        if not finite.any():
+            return "nothing comes back at any aspect"
+        high = np.unravel_index(np.argmax(np.where(finite, self.strength, -np.inf)), self.strength.shape)
+        mean = 10.0 * np.log10(np.mean(10.0 ** (self.strength / 10.0)))
+        at = f"{np.rad2deg(self.aspect[high[0]]):g} deg and {self.frequency[high[1]] / 1e3:g} kHz"
+        return (
+            f"{self.strength.size} levels: highest {self.strength[high]:.1f} dB re 1 m2 at {at}, "
+            f"median {np.median(self.strength):.1f}, mean power {mean:.1f}"
+        )
+
+
+def strength_table(
+    shape: Shape, frequency: Floats, aspect: Floats, sound_speed: float, law: Scattering
+) -> StrengthTable:
+    """Backscatter of a shape at frequencies (frequency,) Hz and aspects (aspect,) rad. Raises as `target_strength`."""
+    towards = np.stack([np.cos(aspect), np.sin(aspect), np.zeros(len(aspect))], axis=-1)[:, None]
+    return StrengthTable(aspect, frequency, target_strength(shape, frequency, -towards, towards, sound_speed, law))
+
+
+def write_strength(table: StrengthTable, title: str, out: Path) -> list[Path]:
+    """Write `target_strength.csv` (aspect, frequency, level) and `target_strength.png` into a folder; their paths."""
+    out.mkdir(parents=True, exist_ok=True)
+    files = [out / "target_strength.csv", out / "target_strength.png"]
+    with files[0].open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["aspect_deg", "frequency_hz", "target_strength_db"])
+        for aspect, levels in zip(np.rad2deg(table.aspect), table.strength, strict=True):
+            rows = zip(table.frequency, levels, strict=True)
+            writer.writerows([f"{aspect:.9g}", f"{f:.9g}", f"{level:.4f}"] for f, level in rows)
+    strength_figure(title, table.aspect, table.frequency, table.strength).savefig(files[1])
+    return files

@@ -1,0 +1,96 @@
+"""A store in a few lines of text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.evaluation import bounds, brightest_beam_on_target, range_errors
+from sonarsynth.labels.views import View
+from sonarsynth.pictures.store_reading import built, bytes_of, echo_levels, mesh_group, needed, read
+from sonarsynth.store import Folder
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+VARIABLES = {
+    "signals": "signals/pressure",
+    "image": "image/energy",
+    "cloud": "cloud/range",
+    "bearings": "bearings/position",
+}
+"""The variable that stands for each group in a summary."""
+
+
+def summary(tree: xr.DataTree, store: Folder) -> str:
+    """What a store holds and how well it agrees with its own truth, over the frames that were built."""
+    frames = built(tree)
+    total = tree["truth"].sizes["frame"]
+    size = bytes_of(store)
+    lines = [
+        f"{store.name}: {tree.attrs.get('title') or 'untitled'}",
+        f"  frames     {len(frames)} of {total} built" + (f", {size / 1e6:.1f} MB on disk" if size else ""),
+        *(f"  {name:10s} {_shape(tree, variable)}" for name, variable in VARIABLES.items()),
+    ]
+    if not len(frames):
+        return "\n".join(lines)
+    return "\n".join([*lines, *_targets(tree, frames), *_agreement(tree, frames)])
+
+
+def _shape(tree: xr.DataTree, name: str) -> str:
+    group, variable = name.split("/")
+    if group not in tree.children or variable not in tree[group].dataset:
+        return "not in this store"
+    data = tree[group].dataset[variable]
+    units = data.attrs.get("units", "")
+    return " x ".join(f"{size} {dim}" for dim, size in data.sizes.items()) + f" ({units})"
+
+
+def _targets(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
+    names = read(tree, "truth/target_name")
+    if names is None or not len(names):
+        return ["  targets    none"]
+    sonar, where = needed(tree, "truth/sonar_position"), needed(tree, "truth/target_position")
+    away = np.linalg.norm(where[frames] - sonar[frames, None], axis=2)
+    seen = (needed(tree, "truth/visible_fraction")[frames] > 0).sum(axis=0)
+    view = read(tree, "truth/view")
+    inside = None if view is None else np.isin(view[frames], (View.IN_VIEW, View.PARTLY_IN_VIEW)).sum(axis=0)
+    lines = []
+    for i, name in enumerate(map(str, names)):
+        faces = read(tree, f"{mesh_group(tree, name, i, int(frames[0]))}/faces")
+        facets = f"{len(faces)} facets, " if faces is not None else ""
+        reach = f"{away[:, i].min():.2f} to {away[:, i].max():.2f} m away"
+        within = "" if inside is None or inside[i] == seen[i] else f" ({inside[i]} within the beams)"
+        lines.append(f"  target     {name}: {facets}{reach}, in sight in {seen[i]} frames{within}")
+    return [*lines, *_ghosts(tree, frames, list(map(str, names)))]
+
+
+def _ghosts(tree: xr.DataTree, frames: np.ndarray, names: list[str]) -> list[str]:
+    """Levels of each target's echoes by the boundaries they touched on their way to the array, medians over frames."""
+    found = [levels for frame in frames if (levels := echo_levels(tree, int(frame))) is not None]
+    if not found:
+        return []
+    families, each = found[0][1], np.array([level for level, _ in found])  # (frame, target, family)
+    lines = []
+    for i, name in enumerate(names):
+        heard = [
+            f"{family} {np.nanmedian(each[:, i, k]):+.1f} dB"
+            for k, family in enumerate(families)
+            if family != "direct" and np.isfinite(each[:, i, k]).any()
+        ]
+        seen = np.isfinite(each[:, i, families.index("direct")]).any()
+        if heard:
+            lines.append(f"  ghosts     {name}: {', '.join(heard)} re its {'direct' if seen else 'strongest'} echo")
+    return lines
+
+
+def _agreement(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
+    checks = []
+    if "image" in tree.children:
+        checks.append(brightest_beam_on_target(tree, frames))
+    if "cloud" in tree.children:
+        checks += range_errors(tree, frames)
+    checks += bounds(tree, frames)
+    warnings = [check.warning for check in checks if check.warning]
+    return [*(f"  {check.name}: {check.got}" for check in checks), *(f"  warning: {warning}" for warning in warnings)]

@@ -1,0 +1,272 @@
+"""render(plan, i): one frame from recipe to labelled data, pure. Labels enter here and nowhere below.
+
+    trace_frame       Plan -> Traced: Frame, Arrivals, Truth, Ledger
+    beamform_frame    Traced -> Heard: Signals, Bearings, EnergyImage
+    range_frame       Traced, Heard -> Values: everything that is stored, the PointCloud with it
+
+The three are the tasks that the scheduler runs; what nobody asked for is not computed: of truth alone, `truth_frame`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.labels import echoes, label, ledger, path_powers
+from sonarsynth.pipeline.echo_image import image_of, no_image
+from sonarsynth.pipeline.labelled_estimates import emission_values, estimate_truth, heard_directly
+from sonarsynth.pipeline.labelling import band_of, expansion_error, point_labels
+from sonarsynth.pipeline.requested_rays import follow_rays
+from sonarsynth.pipeline.stage_times import LAPS, counted, lap
+from sonarsynth.pipeline.stored_values import (
+    Values,
+    bearing_values,
+    cloud_values,
+    echo_values,
+    image_values,
+    ledger_values,
+    of_isolated,
+    signal_values,
+    table,
+    truth_values,
+)
+from sonarsynth.pipeline.synthesis import hear
+from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, variables
+from sonarsynth.planning import Plan, arrivals_of, check_unseen, plan
+from sonarsynth.planning.notes.source_notes import standing_off
+from sonarsynth.products import Arrivals, Bearings, Echoes, EnergyImage, Ledger, Signals, Truth
+from sonarsynth.propagation import Straight
+from sonarsynth.randomness import stream
+from sonarsynth.recipe import Recipe
+from sonarsynth.recipe.scene import Frame
+from sonarsynth.signals.filtered_pulse import snap_levels
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "LAPS",
+    "VARIABLES",
+    "Heard",
+    "Traced",
+    "Values",
+    "Variable",
+    "attributes",
+    "beamform_frame",
+    "coordinates",
+    "counted",
+    "follow_rays",
+    "process",
+    "range_frame",
+    "record",
+    "render",
+    "trace_at",
+    "trace_frame",
+    "truth_at",
+    "truth_frame",
+    "variables",
+]
+
+
+@dataclass(frozen=True, eq=False)
+class Traced:
+    """What the trace task gives."""
+
+    frame: Frame
+    arrivals: Arrivals
+    truth: Truth
+    ledger: Ledger
+    echoes: Echoes
+
+
+@dataclass(frozen=True, eq=False)
+class Heard:
+    """What the beamform task gives; None where no product needs it."""
+
+    signals: Signals
+    bearings: Bearings | None
+    image: EnergyImage | None
+    imaged: Signals | None = None  # what the image was made of: without the snap's own reflections, where these go
+    isolated: Floats | None = None  # (snap, target + 1, family) dB: isolated paths of the ledger as signals have them;
+    # None where signals are not stored
+
+
+def truth_frame(plan: Plan, index: int) -> Values:
+    """Every stored value of a frame of which truth alone is wanted: no path is traced, no sound made."""
+    return truth_at(*_checked(plan, index))
+
+
+def truth_at(plan: Plan, frame: Frame) -> Values:
+    """The same of a frame that is at hand; `plan` is that of its sequence."""
+    truth = _label(plan, frame, snap_levels(frame.moment.snaps))
+    lap("label")
+    return _of_frame(plan, frame) | truth_values(truth)
+
+
+def trace_frame(plan: Plan, index: int) -> Traced:
+    """Every path of a frame, and its truth."""
+    return trace_at(*_checked(plan, index))
+
+
+def _checked(plan: Plan, index: int) -> tuple[Plan, Frame]:
+    """The plan of a frame's sequence, and the frame, which was looked at now or before."""
+    plan = plan.at(index)
+    frame = plan.recipe.frame(index)[1]
+    check_unseen(plan, frame)
+    return plan, frame
+
+
+def trace_at(plan: Plan, frame: Frame) -> Traced:
+    """Every path of a frame that is at hand, and its truth; `plan` is that of its sequence."""
+    arrivals = arrivals_of(plan, frame)
+    lap("trace")
+    seen = arrivals.at_centre
+    levels = snap_levels(frame.moment.snaps)
+    truth = _label(plan, frame, levels)
+    band, targets = band_of(plan, frame.moment.snaps), len(frame.moment.bodies)
+    powers = path_powers(seen, band)
+    book = ledger(seen, powers, band, targets, levels, expansion_error(plan, seen))
+    heard = echoes(seen, powers, targets, levels)
+    lap("label")
+    return Traced(frame, arrivals, truth, book, heard)
+
+
+def _label(plan: Plan, frame: Frame, levels: Floats) -> Truth:
+    """Truth of a frame; levels: (snap,) dB re 1 uPa at 1 m."""
+    straight = isinstance(plan.propagation, Straight)
+    beams, doppler = plan.scene.sonar.beams, plan.scene.physics.doppler
+    return label(frame.moment, frame.sonar_pose, beams, plan.connect, levels, straight, doppler)
+
+
+def _of_frame(plan: Plan, frame: Frame) -> Values:
+    """Which frame it is."""
+    split = plan.recipe.split(frame.index)
+    return table("/", trajectory=frame.trajectory, step=frame.step, time=frame.time, split=split)
+
+
+def beamform_frame(plan: Plan, index: int, traced: Traced) -> Heard:
+    """What the array hears: signals, where the snap is, and the energy image of the echo window."""
+    signals, isolated = synthesise(plan, traced), None
+    lap("synthesise")
+    if "signals" in plan.products:
+        isolated = measure_isolated(plan, traced)
+        lap("measure")
+    if not plan.products & {"image", "cloud"}:
+        return Heard(signals, None, None, isolated=isolated)
+    return replace(process(plan, traced.frame, signals), isolated=isolated)
+
+
+def process(plan: Plan, frame: Frame, signals: Signals) -> Heard:
+    """What the sonar makes of signals: where the snap is, and the energy image of the echo window."""
+    processing, sonar, environment = plan.scene.processing, plan.scene.sonar, plan.scene.world.environment
+    snaps = plan.sizes["snap"]
+    locating = processing.locating.resolve(on_bottom=not standing_off(plan.scene))
+    bearings = locating.locate(signals, plan.elements, sonar, frame.sonar_pose, environment.depth, snaps, plan.profile)
+    lap("locate")
+    heard = float(bearings.time[0]) if snaps else np.nan
+    start, stop = heard + plan.windows.echo_start, heard + plan.windows.echo_stop
+    end = signals.start + plan.windows.samples / signals.sampling_frequency
+    imaged = signals
+    if signals.start <= start and stop <= end:
+        if processing.cancelling is not None:
+            bed, pose = environment.depth, frame.sonar_pose
+            imaged = processing.cancelling.cancel(signals, bearings, plan.elements, sonar, pose, bed, (start, stop))
+        imaged, image = image_of(plan, imaged, bearings, (start, stop))
+    else:  # no direct pulse was found, or an echo was taken for it: no clock, so no image, rather than an arbitrary one
+        image = no_image(sonar, np.nan, np.nan)
+    lap("beamform")
+    return Heard(signals, bearings, image, imaged)
+
+
+def synthesise(plan: Plan, traced: Traced) -> Signals:
+    """Pressure at each hydrophone: echoes and direct snap, ambient noise, converter."""
+    plan = plan.at(traced.frame.index)
+    return record(plan, traced.frame, hear(plan, traced.frame, traced.arrivals))
+
+
+def record(plan: Plan, frame: Frame, signals: Signals) -> Signals:
+    """Signals as the sonar has them: with ambient noise, through the converter; `plan` is that of the sequence."""
+    from sonarsynth.signals import add_noise, convert
+
+    sonar, noise = plan.scene.sonar, plan.scene.world.environment.noise
+    if noise is not None:
+        random = stream(frame.seed, "noise", frame.key, frame.step)
+        signals = add_noise(signals, noise, sonar, plan.elements, random)
+    return signals if sonar.converter is None else convert(signals, sonar.converter)
+
+
+def measure_isolated(plan: Plan, traced: Traced) -> Floats:
+    """Levels (snap, target + 1, family) in dB of the isolated paths of the ledger, measured in signals of each."""
+    from sonarsynth.signals.isolated_paths import measured_levels
+
+    plan = plan.at(traced.frame.index)
+    scene, book = plan.scene, traced.ledger
+    method, snaps = plan.choices.synthesis, traced.frame.moment.snaps
+    measured = measured_levels(method, book.isolated, snaps, scene.sonar, plan.absorption)
+    return of_isolated(book, traced.truth.snap_level[book.isolated.snap] + measured)
+
+
+def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
+    """The point cloud, and every stored value of the frame."""
+    plan = plan.at(index)
+    frame = traced.frame
+    values = _of_frame(plan, frame) | truth_values(traced.truth) | echo_values(traced.echoes, traced.arrivals)
+    values |= ledger_values(traced.ledger, heard.isolated)
+    direct = heard_directly(plan, traced.arrivals, frame.moment.snaps)
+    values |= estimate_truth(direct, len(frame.moment.snaps))
+    if "signals" in plan.products:
+        counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
+        values |= signal_values(heard.signals, counts)
+    if heard.image is None or heard.bearings is None or heard.imaged is None:
+        lap("collect")
+        return values
+    values |= bearing_values(heard.bearings) | emission_values(plan, direct, heard.bearings)
+    if "image" in plan.products:
+        values |= image_values(heard.image, plan.windows.direct_removed)
+    lap("collect")
+    if "cloud" in plan.products:
+        scene = plan.scene
+        cloud = plan.choices.ranging.cloud(
+            heard.imaged,
+            heard.image,
+            heard.bearings,
+            plan.elements,
+            scene.sonar,
+            frame.sonar_pose,
+            plan.profile,
+            heard.signals,
+        )
+        lap("range")
+        values |= cloud_values(cloud, point_labels(plan, frame, traced.arrivals, heard.bearings, cloud))
+        lap("label")
+    return values
+
+
+def _values(plan: Plan, index: int) -> Values:
+    """Every stored value of a frame."""
+    if not plan.products:
+        return truth_frame(plan, index)
+    traced = trace_frame(plan, index)
+    return range_frame(plan, index, traced, beamform_frame(plan, index, traced))
+
+
+def render(recipe: Recipe | Plan, index: int) -> xr.DataTree:
+    """One frame of a recipe as a labelled DataTree: groups and names as in a store, without the frame axis. Pure."""
+    import xarray as xr
+
+    made = plan(recipe) if isinstance(recipe, Recipe) else recipe
+    values = _values(made, index)
+    groups: dict[str, xr.Dataset] = {"/": xr.Dataset(attrs=attributes(made))}
+    for (group, name), (dims, array, attrs) in coordinates(made).items():
+        one = (dims[1:], array[index], attrs) if "frame" in dims else (dims, array, attrs)
+        groups.setdefault(group, xr.Dataset()).coords[name] = one
+    for v in variables(made):
+        attrs = {"units": v.units, "long_name": v.long_name, **dict(v.attributes)}
+        data = values[v.group, v.name]
+        if "scale_factor" in attrs:
+            data = (data * attrs.pop("scale_factor")).astype(np.float32)
+        groups.setdefault(v.group, xr.Dataset())[v.name] = (v.dims[1:], data, attrs)
+    return xr.DataTree.from_dict(groups)

@@ -1,0 +1,41 @@
+"""The energy image of the echo window, without the direct pulse where echoes come before it is over."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonarsynth.planning import Plan
+from sonarsynth.products import Bearings, EnergyImage, Signals
+from sonarsynth.ranging.cancelling.direct_pulse import remove, remove_others, trusted
+from sonarsynth.receiver import Sonar
+
+
+def image_of(
+    plan: Plan, signals: Signals, bearings: Bearings, window: tuple[float, float]
+) -> tuple[Signals, EnergyImage]:
+    """The image of an echo window (start, stop) in s, and the signals that it was made of.
+
+    The direct pulses of later snaps that are heard in the window are taken out; of the first one, where the plan says
+    so. Where the plan takes the direct pulse out, what may be left of it is asked for in every beam.
+    """
+    method, elements, sonar = plan.choices.beamforming, plan.elements, plan.scene.sonar
+    length = plan.windows.supports.clear
+    if plan.scene.processing.direct_pulse != "keep":
+        signals = remove_others(signals, bearings, elements, sonar, length, window)
+    if not plan.windows.direct_removed:
+        return signals, method.image(signals, elements, sonar, *window)
+    left = remove(signals, bearings, elements, sonar, length)
+    if left is None:  # what was located is no wave that could be taken out: no echo is told from it
+        return signals, no_image(sonar, *window, remainder=1.0)
+
+    def imaging(some: Signals, start: float, stop: float) -> EnergyImage:
+        return method.image(some, elements, sonar, start, stop)
+
+    image = imaging(left, *window)
+    return left, trusted(image, signals, left, sonar, imaging, float(bearings.time[0]) - length)
+
+
+def no_image(sonar: Sonar, start: float, stop: float, remainder: float = np.nan) -> EnergyImage:
+    """An image of which nothing is known."""
+    silent = np.full((sonar.beams.elevations, sonar.beams.azimuths), np.nan, np.float32)
+    return EnergyImage(silent, sonar.beams.azimuth, sonar.beams.elevation, start, stop, remainder)

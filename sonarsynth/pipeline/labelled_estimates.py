@@ -1,0 +1,51 @@
+"""Labels of the estimates of where snaps are: what they should have found, and which snap each came from."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonarsynth.equations.arrays.spherical_wave import envelope_peak
+from sonarsynth.labels.estimate_labels import Direct, direct_paths, emissions, heard_first
+from sonarsynth.pipeline.stored_values import Values, table
+from sonarsynth.planning import Plan
+from sonarsynth.products import Arrivals, Bearings
+from sonarsynth.signals.direct_sum import relative_absorption
+from sonarsynth.signals.filtered_pulse import pulse_spectrum
+from sonarsynth.state import Snap
+
+LONGEST = 1 << 18
+"""Samples of the pulses whose envelopes are looked at, at most."""
+
+
+def heard_directly(plan: Plan, arrivals: Arrivals, snaps: tuple[Snap, ...]) -> Direct:
+    """The direct paths of a frame, with the time at which the envelope of each pulse peaks in the band."""
+    sonar = plan.scene.sonar
+    band, rate = sonar.band, sonar.sampling_frequency
+    samples = 1 << int(np.ceil(np.log2(max(2048.0, 32 * rate / (band.high - band.low)))))
+
+    def envelope(snap: int, absorption: float) -> float:
+        f, wave = pulse_spectrum(snaps[snap].waveform, sonar.antialias, rate, min(samples, LONGEST))
+        kept = (f >= band.low) & (f <= band.high)
+        f, wave = f[kept], wave[kept]
+        loss = absorption * (1 + relative_absorption(plan.absorption, f, band.centre))
+        return envelope_peak(f, wave * 10.0 ** (-(loss - absorption) / 20), band.low, band.high)[0]
+
+    return direct_paths(arrivals, envelope)
+
+
+def estimate_truth(direct: Direct, snaps: int) -> Values:
+    """When and from where the array hears each snap directly, in degrees."""
+    time, azimuth, elevation = heard_first(direct, snaps)
+    return table("/truth", snap_arrival=time, snap_azimuth=np.rad2deg(azimuth), snap_elevation=np.rad2deg(elevation))
+
+
+def emission_values(plan: Plan, direct: Direct, bearings: Bearings) -> Values:
+    """Which snap each estimate came from."""
+    band = plan.scene.sonar.band
+    return table("/bearings", emission=emissions(bearings, direct, band.high - band.low, beam_width(plan)))
+
+
+def beam_width(plan: Plan) -> float:
+    """Half-power beam width (rad) at the centre of the band, of a disc as wide as the array; no more than 1."""
+    wavelength = plan.scene.sonar.assumed_sound_speed / plan.scene.sonar.band.centre
+    return float(min(1.03 * wavelength / max(2 * plan.elements.aperture, 1e-9), 1.0))

@@ -1,0 +1,52 @@
+"""What labels need of a plan: the band that levels are taken in, and whose echo each point is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sonarsynth.labels import SLICES, Band, Listening, label_points
+from sonarsynth.planning import Plan
+from sonarsynth.products import Arrivals, Bearings, PointCloud, PointLabels
+from sonarsynth.recipe.scene import Frame
+from sonarsynth.state import Snap
+
+
+def expansion_error(plan: Plan, arrivals: Arrivals) -> float:
+    """Error (dB) of a level from expanding wavefronts and amplitudes over the aperture, as measured at its probes.
+
+    A beam of sensors that are up to phi out of phase loses at most 20 log10 cos phi. NaN where a sensor has no ray.
+    """
+    if not np.isfinite([arrivals.wavefront_error, arrivals.amplitude_error]).all():
+        return float("nan")
+    phase = min(2 * np.pi * plan.scene.sonar.band.high * arrivals.wavefront_error, 1.5)
+    return float(20 * np.log10((1.0 + arrivals.amplitude_error) / np.cos(phase)))
+
+
+def band_of(plan: Plan, snaps: tuple[Snap, ...]) -> Band:
+    """The band that levels are taken in."""
+    from sonarsynth.signals.direct_sum import relative_absorption
+    from sonarsynth.signals.isolated_paths import energy_in_slices
+
+    sonar = plan.scene.sonar
+    energy = np.array([energy_in_slices(snap.waveform, sonar, SLICES) for snap in snaps]).reshape(-1, SLICES)
+    band = Band(sonar.band.low, sonar.band.high, energy, np.zeros(SLICES))
+    return replace(band, relative=relative_absorption(plan.absorption, band.frequency, sonar.band.centre))
+
+
+def point_labels(plan: Plan, frame: Frame, arrivals: Arrivals, bearings: Bearings, cloud: PointCloud) -> PointLabels:
+    """Whose echo each point of a cloud is."""
+    sonar = plan.scene.sonar
+    moves = plan.scene.physics.doppler
+    moment = frame.moment if moves else replace(frame.moment, bodies=tuple(body.frozen for body in frame.moment.bodies))
+    listening = Listening(
+        plan.elements,
+        sonar.assumed_sound_speed,
+        getattr(plan.choices.ranging, "focus", None),
+        float(bearings.time[0]) if len(bearings.time) else np.nan,
+        frame.sonar_pose,
+        frame.sonar_velocity * moves,
+    )
+    band = band_of(plan, frame.moment.snaps)
+    return label_points(cloud, sonar.beams.azimuth, sonar.beams.elevation, arrivals, band, moment, listening)

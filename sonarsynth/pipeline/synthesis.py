@@ -1,0 +1,34 @@
+"""What the hydrophones hear of a frame: from one expansion of its paths over the array, or from one for each part."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonarsynth.planning import Plan, arrivals_of, frame_start
+from sonarsynth.products import Arrivals, Signals
+from sonarsynth.receiver.subarrays import Subarray, subarrays
+from sonarsynth.recipe.scene import Frame
+
+
+def hear(plan: Plan, frame: Frame, arrivals: Arrivals) -> Signals:
+    """Pressure at each hydrophone, without noise and converter; arrivals: those of the frame at the whole array.
+
+    Where the array is cut into parts, paths are traced again to each of them. `outside` is that of the part that loses
+    most. Raises ValueError for anything outside the water.
+    """
+    method, sonar, snaps = plan.choices.synthesis, plan.scene.sonar, frame.moment.snaps
+    start, samples = frame_start(plan, frame), plan.windows.samples
+    if plan.choices.subarrays == 1:
+        return method.signals(arrivals, snaps, plan.elements, sonar, plan.absorption, start, samples)
+    pressure, outside = np.zeros((plan.elements.count, samples), np.float32), 0
+    for part in subarrays(plan.elements, plan.choices.subarrays):
+        heard = hear_part(plan, frame, part)
+        pressure[part.sensor], outside = heard.pressure, max(outside, heard.outside)
+    return Signals(pressure, start, sonar.sampling_frequency, 0.0, 0, outside)
+
+
+def hear_part(plan: Plan, frame: Frame, part: Subarray) -> Signals:
+    """What a part of the array hears, of paths that are traced to it."""
+    method, sonar, snaps = plan.choices.synthesis, plan.scene.sonar, frame.moment.snaps
+    own, start = arrivals_of(plan, frame, part), frame_start(plan, frame)
+    return method.signals(own, snaps, part.elements, sonar, plan.absorption, start, plan.windows.samples)

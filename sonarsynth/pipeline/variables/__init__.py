@@ -1,0 +1,61 @@
+"""The stored schema: each variable with dimensions, type, units and meaning. The store is laid out from it alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from sonarsynth.pipeline.variables.static_variables import coordinates
+from sonarsynth.pipeline.variables.truth_variables import LEDGER_COMMENT
+from sonarsynth.pipeline.variables.variable import Variable
+from sonarsynth.pipeline.variables.variable_groups import VARIABLES
+from sonarsynth.planning import Plan
+
+__all__ = ["FORMAT_VERSION", "LEDGER_COMMENT", "VARIABLES", "Variable", "attributes", "coordinates", "variables"]
+
+FORMAT_VERSION = "2"
+"""Version of the layout of a store."""
+
+
+def variables(plan: Plan) -> tuple[Variable, ...]:
+    """The variables of a build: of the products asked for, and int16 pressure where a converter is described."""
+    wanted = {"truth", *plan.products}
+    if plan.products:
+        wanted.add("levels")
+    if plan.products & {"image", "cloud"}:
+        wanted.add("bearings")
+    chosen = [v for v in VARIABLES if v.product in wanted]
+    if not plan.windows.direct_removed:
+        chosen = [v for v in chosen if (v.group, v.name) != ("/image", "remainder")]
+    converter = plan.scene.sonar.converter
+    if converter is not None and converter.bits <= 16:
+        counts: dict[str, Any] = {
+            "dtype": "int16",
+            "fill": -(2**15),
+            "attributes": (("scale_factor", converter.quantum),),
+        }
+        chosen = [replace(v, **counts) if (v.group, v.name) == ("/signals", "pressure") else v for v in chosen]
+    return tuple(chosen)
+
+
+def attributes(plan: Plan) -> dict[str, Any]:
+    """Root attributes of a store that any builder of this plan writes the same."""
+    recipe = plan.recipe
+    return {
+        "title": recipe.title,
+        "Conventions": "CF-1.11",
+        "sonarsynth_format": FORMAT_VERSION,
+        "licence": recipe.licence,
+        "seed": recipe.seed,
+        "recipe_digest": plan.digest,
+        "band_low": plan.scene.sonar.band.low,
+        "band_high": plan.scene.sonar.band.high,
+        "assumed_sound_speed": plan.scene.sonar.assumed_sound_speed,
+        "aperture_radius": plan.elements.aperture,
+        "choices": plan.choices.as_json(),
+        "validity": list(plan.validity),
+        "frames_conventions": (
+            "World: x east, y north, z up, z = 0 mean surface. Sonar and target frames: x forward, y port, z up. "
+            "Quaternions (w, x, y, z) from body to world. Levels re 1 uPa, source levels at 1 m."
+        ),
+    }

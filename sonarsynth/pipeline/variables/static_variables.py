@@ -1,0 +1,81 @@
+"""Variables that all frames share: coordinates, meshes, and the sensors."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sonarsynth.planning import Plan
+from sonarsynth.products import FAMILIES
+from sonarsynth.recipe.varied_columns import columns
+
+WHICH_MESH = "which mesh the target has: its group under /targets/<name>"
+
+
+def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
+    """Static variables of a store: {(group, name): (dims, values, attributes)}."""
+    scene, sizes = plan.scene, plan.sizes
+    names = [t.name for t in scene.world.targets]
+    static: dict[tuple[str, str], tuple[tuple[str, ...], np.ndarray, dict[str, Any]]] = {}
+
+    def add(
+        groups: str, name: str, dims: tuple[str, ...], values: Any, units: str, long_name: str, **more: Any
+    ) -> None:
+        for group in groups.split():
+            static[group, name] = (dims, np.asarray(values), {"units": units, "long_name": long_name, **more})
+
+    beams = scene.sonar.beams
+    add("/", "frame", ("frame",), np.arange(sizes["frame"]), "1", "frame of the dataset")
+    on_grid = "/truth" + "".join(f" /{p}" for p in ("image", "cloud") if p in plan.products)
+    degrees = {"comment": "as the sonar looks"}
+    add(on_grid, "azimuth", ("azimuth",), np.rad2deg(beams.azimuth), "degree", "azimuth, port positive", **degrees)
+    add(
+        on_grid, "elevation", ("elevation",), np.rad2deg(beams.elevation), "degree", "elevation, up positive", **degrees
+    )
+    named = "/truth" + (" /bearings" if plan.products & {"image", "cloud"} else "")
+    add(named, "xyz", ("xyz",), list("xyz"), "1", "axis")
+    add("/truth", "wxyz", ("wxyz",), list("wxyz"), "1", "part of a unit quaternion, scalar first")
+    add("/truth", "target_name", ("target",), np.array(names, dtype=np.str_), "1", "name of the target")
+    bounds = ["azimuth_min", "azimuth_max", "elevation_min", "elevation_max"]
+    add("/truth", "bound", ("bound",), bounds, "1", "which bound of the image box")
+    if plan.products:
+        add("/ledger", "echo", ("echo",), [*names, "direct"], "1", "target of the echo; direct: snap to array")
+        add("/ledger", "family", ("family",), list(FAMILIES), "1", "path family: boundaries touched on the whole way")
+        touched = "boundaries touched on the way from the target to the array"
+        add("/truth", "family", ("family",), list(FAMILIES), "1", touched)
+    if "signals" in plan.products:
+        _add_sensors(plan, add)
+    for column in columns(plan.recipe.spanned):
+        static["/", column.name] = (("frame",), np.repeat(column.values, plan.recipe.steps), column.attributes)
+    _add_meshes(plan, add)
+    return static
+
+
+def _add_meshes(plan: Plan, add: Any) -> None:
+    """The mesh of each target in its group; where its shape varies, its meshes in groups 0, 1, ... of that."""
+    meshes = plan.recipe.meshes
+    for target, some in zip(plan.scene.world.targets, meshes, strict=True):
+        for n, (_, mesh) in enumerate(some):
+            group = f"/targets/{target.name}" + (f"/{n}" if len(some) > 1 else "")
+            add(group, "vertices", ("vertex", "xyz"), mesh.vertices, "m", "vertices in the target's frame")
+            add(group, "faces", ("face", "corner"), mesh.faces, "1", "vertex indices of each facet, outward")
+    if any(len(some) > 1 for some in meshes):
+        numbers = np.repeat(plan.recipe.mesh_numbers().astype(np.int32), plan.recipe.steps, axis=0)
+        add(
+            "/truth",
+            "mesh",
+            ("frame", "target"),
+            numbers,
+            "1",
+            "which mesh the target has: its group under /targets/<name>",
+        )
+
+
+def _add_sensors(plan: Plan, add: Any) -> None:
+    sensors, rate = plan.elements, plan.scene.sonar.sampling_frequency
+    add("/signals", "position", ("sensor", "xyz"), sensors.position, "m", "element positions in the sonar frame")
+    add("/signals", "gain", ("sensor",), sensors.gain, "1", "element gain: 0 for a dead element")
+    time = np.arange(plan.sizes["sample"]) / rate
+    add("/signals", "time", ("sample",), time, "s", "time of each sample after the start of the window")
+    add("/signals", "sampling_frequency", (), rate, "Hz", "sampling frequency")

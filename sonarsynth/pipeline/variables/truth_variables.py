@@ -1,0 +1,194 @@
+"""Stored truth, and the ledger of levels."""
+
+from __future__ import annotations
+
+from sonarsynth.labels.views import MEANINGS, View
+from sonarsynth.pipeline.variables.variable import BEAMS, CELL, ECHO, NONE, SNAP, TARGET, comment, group_of, row
+
+_INSTANT = comment("at the instant of the frame; what is heard is of when sound met the target: position_at_echo")
+_MEETING = comment(
+    "what echoes, images and points show is where the sound met the target; poses, boxes and beams of the truth are "
+    "those of the instant of the frame. Sound by surface or bed meets it later. NaN where no direct path leads to it"
+)
+TRUTH = group_of(
+    "/truth",
+    "truth",
+    row("sonar_position", ("frame", "xyz"), "float64", "m", "position of the array centre in the world"),
+    row("sonar_orientation", ("frame", "wxyz"), "float64", "1", "unit quaternion from the sonar frame to the world"),
+    row(
+        "target_position",
+        (*TARGET, "xyz"),
+        "float64",
+        "m",
+        "position of the target's origin in the world at the instant of the frame",
+        attributes=_INSTANT,
+    ),
+    row(
+        "position_at_echo",
+        (*SNAP, "target", "xyz"),
+        "float64",
+        "m",
+        "position of the target's origin in the world when the sound of the snap, by the direct path, met it",
+        attributes=_MEETING,
+    ),
+    row(
+        "meeting_time",
+        (*SNAP, "target"),
+        "float64",
+        "s",
+        "time after the instant of the frame when the sound of the snap, by the direct path, met the target's origin",
+        attributes=_MEETING,
+    ),
+    row(
+        "target_orientation",
+        (*TARGET, "wxyz"),
+        "float64",
+        "1",
+        "unit quaternion from the target's frame to the world",
+        attributes=_INSTANT,
+    ),
+    row("target_velocity", (*TARGET, "xyz"), "float64", "m s-1", "velocity of the target in the world"),
+    row(
+        "box",
+        (*TARGET, "corner", "xyz"),
+        "float64",
+        "m",
+        "corners of the oriented bounding box, sonar frame",
+        attributes=_INSTANT,
+    ),
+    row(
+        "image_box",
+        (*TARGET, "bound"),
+        "float64",
+        "degree",
+        "bounds in azimuth and elevation of the visible part in view, at the instant of the frame",
+        attributes=comment("cut at the first and last beam each way; NaN where nothing is in view, see view"),
+    ),
+    row(
+        "view",
+        TARGET,
+        "int8",
+        "1",
+        "how much of the visible part is in the view of the beams",
+        attributes=(("flag_values", [int(v) for v in View]), ("flag_meanings", MEANINGS)),
+    ),
+    row(
+        "visible_fraction",
+        TARGET,
+        "float64",
+        "1",
+        "share of the area facing the array that the array sees",
+        attributes=comment("whether it is in the view of the beams or not"),
+    ),
+    row(
+        "echo_azimuth",
+        ECHO,
+        "float64",
+        "degree",
+        "azimuth that the target's echoes come from, weighted by power",
+        product="levels",
+    ),
+    row(
+        "echo_elevation",
+        ECHO,
+        "float64",
+        "degree",
+        "elevation that they come from: ghosts by surface and bed",
+        product="levels",
+    ),
+    row(
+        "echo_level",
+        ECHO,
+        "float64",
+        "dB",
+        "level of the target's echoes re 1 uPa, of their energy in the band",
+        product="levels",
+    ),
+    row("snap_position", (*SNAP, "xyz"), "float64", "m", "position of the snap in the world"),
+    row("snap_time", SNAP, "float64", "s", "time of the snap after the instant of the frame"),
+    row("snap_level", SNAP, "float64", "dB", "peak source level of the snap re 1 uPa at 1 m"),
+    row(
+        "snap_arrival",
+        SNAP,
+        "float64",
+        "s",
+        "arrival at the array centre of the snap's direct pulse, the peak of its envelope in the band, after the "
+        "instant of the frame; NaN without a direct path",
+        product="levels",
+    ),
+    row(
+        "snap_azimuth",
+        SNAP,
+        "float64",
+        "degree",
+        "azimuth that the direct pulse arrives from, port positive",
+        product="levels",
+    ),
+    row(
+        "snap_elevation",
+        SNAP,
+        "float64",
+        "degree",
+        "elevation that the direct pulse arrives from, up positive",
+        product="levels",
+    ),
+    row("target", BEAMS, "int16", "1", "target that the beam points at", attributes=(*NONE, *_INSTANT)),
+    row("facet", BEAMS, "int32", "1", "facet that the beam points at", attributes=(*NONE, *_INSTANT)),
+    row("range", BEAMS, "float32", "m", "distance to the first surface in the beam's direction", attributes=_INSTANT),
+    row(
+        "wavefront_error",
+        ("frame",),
+        "float64",
+        "s",
+        "largest error of wavefronts measured at probes over the aperture; NaN where one has no ray",
+        product="levels",
+    ),
+    row(
+        "amplitude_error",
+        ("frame",),
+        "float64",
+        "1",
+        "largest error of amplitudes measured at those probes, relative to the strongest echo",
+        product="levels",
+    ),
+)
+LEDGER_COMMENT = (
+    "received = source - transmission_loss_out + scattering - transmission_loss_in - absorption - boundary. Ratios of "
+    "energies in the band of the sonar; of coherent paths the pressures are summed, of others the powers. Losses are "
+    "means over the paths, weighted by power; scattering has what phases add or cancel."
+)
+"""Stored with each level of the ledger."""
+
+_LEVELS = {
+    "source_level": "peak source level of the snap re 1 uPa at 1 m",
+    "transmission_loss_out": "spreading loss from snap to target (snap to array for the direct path)",
+    "scattering": "scattering of all facets together: target strength",
+    "transmission_loss_in": "spreading loss from target to array",
+    "absorption_loss": "absorption along the whole path",
+    "boundary_loss": "loss at surface and bed",
+    "received_level": "level at the array centre re 1 uPa: peak of a snap of the energy in the band",
+}
+LEVELS = group_of(
+    "/ledger",
+    "levels",
+    *(row(name, CELL, "float64", "dB", text, attributes=comment(LEDGER_COMMENT)) for name, text in _LEVELS.items()),
+    row("paths", CELL, "int32", "1", "number of paths"),
+    row("isolated_level", CELL, "float64", "dB", "received level of the loudest path of the family alone, predicted"),
+    row(
+        "measured_level",
+        CELL,
+        "float64",
+        "dB",
+        "level of that path measured in its signals",
+        attributes=comment("the path alone, synthesised at one ideal hydrophone in the array centre"),
+        product="signals",
+    ),
+    row("isolated_facet", CELL, "int32", "1", "facet of that path in the mesh of its target", attributes=NONE),
+    row(
+        "error_bound",
+        CELL,
+        "float64",
+        "dB",
+        "bound on the error of each level from the approximations made; NaN without one",
+    ),
+)

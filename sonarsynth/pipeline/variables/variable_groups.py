@@ -1,0 +1,122 @@
+"""Every variable that a frame may have: its dimensions, type, units and meaning."""
+
+from __future__ import annotations
+
+from sonarsynth.pipeline.variables.truth_variables import LEVELS, TRUTH
+from sonarsynth.pipeline.variables.variable import BEAMS, NONE, SNAP, Variable, comment, flags, group_of, row
+from sonarsynth.products import FAMILIES, ORIGINS, REASONS
+from sonarsynth.recipe import SPLITS
+
+_ROOT = group_of(
+    "/",
+    "truth",
+    row("trajectory", ("frame",), "int32", "1", "trajectory (sequence) of the frame"),
+    row("step", ("frame",), "int32", "1", "step of the frame along its trajectory"),
+    row("time", ("frame",), "float64", "s", "time of the frame since the start of its trajectory"),
+    row(
+        "split",
+        ("frame",),
+        "int8",
+        "1",
+        "split of the dataset",
+        attributes=(("flag_values", list(range(len(SPLITS)))), ("flag_meanings", " ".join(SPLITS))),
+    ),
+)
+_SIGNALS = group_of(
+    "/signals",
+    "signals",
+    row("pressure", ("frame", "sensor", "sample"), "float32", "Pa", "sound pressure at each hydrophone"),
+    row("start", ("frame",), "float64", "s", "time of sample 0 after the instant of the frame"),
+    row("clipped", ("frame",), "int32", "1", "samples at full scale of the converter"),
+    row("outside", ("frame",), "int32", "1", "arrivals outside the window: left out, counted"),
+)
+_IMAGE = group_of(
+    "/image",
+    "image",
+    row("energy", BEAMS, "float32", "Pa2 s", "energy of the beam in the echo window"),
+    row("start", ("frame",), "float64", "s", "start of the echo window after the instant of the frame"),
+    row("stop", ("frame",), "float64", "s", "end of the echo window after the instant of the frame"),
+    row(
+        "remainder",
+        ("frame",),
+        "float32",
+        "1",
+        "share of the loudest beam's energy that may be left of the direct pulse",
+        attributes=comment("the direct pulse is taken out; beams with more than a quarter of this are NaN"),
+    ),
+)
+WHOSE = comment(
+    "of the paths that bring most energy in the beam of the point at its delay. A range is wrong where the emission is "
+    "not that of the first bearing. Targets are where the sound met them"
+)
+_CLOUD = group_of(
+    "/cloud",
+    "cloud",
+    row("range", BEAMS, "float32", "m", "distance of the point from the array centre"),
+    row("range_error", BEAMS, "float32", "m", "predicted standard error of range"),
+    row("delay", BEAMS, "float32", "s", "delay of the echo after the direct arrival of the snap"),
+    row("energy", BEAMS, "float32", "Pa2 s", "energy of the beam of the point"),
+    row("x", BEAMS, "float32", "m", "position of the point, forward, in the sonar frame"),
+    row("y", BEAMS, "float32", "m", "position of the point, to port, in the sonar frame"),
+    row("z", BEAMS, "float32", "m", "position of the point, up, in the sonar frame"),
+    row("target", BEAMS, "int16", "1", "target whose echo the point is", attributes=(*NONE, *WHOSE)),
+    row("emission", BEAMS, "int16", "1", "snap that lit the point", attributes=(*NONE, *WHOSE)),
+    row("family", BEAMS, "int8", "1", "how the echo reached the array: a ghost but direct", attributes=flags(FAMILIES)),
+    row("facet", BEAMS, "int32", "1", "facet that brought most of the echo", attributes=NONE),
+    row("true_range", BEAMS, "float32", "m", "distance of the array centre from where the echo was made"),
+    row("distance", BEAMS, "float32", "m", "distance of the point from the nearest surface of its target"),
+    row("origin", BEAMS, "int8", "1", "how the array came to hear the point", attributes=flags(ORIGINS)),
+)
+_BEARINGS = group_of(
+    "/bearings",
+    "bearings",
+    row(
+        "time",
+        SNAP,
+        "float64",
+        "s",
+        "arrival at the array centre of the direct pulse, the peak of its envelope in the band, after the instant of "
+        "the frame",
+    ),
+    row("time_error", SNAP, "float64", "s", "predicted standard error of time"),
+    row("azimuth", SNAP, "float64", "degree", "azimuth of the snap as the array hears it, port positive"),
+    row("azimuth_error", SNAP, "float64", "degree", "predicted standard error of azimuth"),
+    row("elevation", SNAP, "float64", "degree", "elevation of the snap as the array hears it, up positive"),
+    row("elevation_error", SNAP, "float64", "degree", "predicted standard error of elevation"),
+    row("range_from_depth", SNAP, "float64", "m", "distance at which the bearing meets the depth of the bed"),
+    row("range_from_depth_error", SNAP, "float64", "m", "predicted standard error of range_from_depth"),
+    row("range_from_curvature", SNAP, "float64", "m", "distance from the curvature of the wavefront"),
+    row("range_from_curvature_error", SNAP, "float64", "m", "predicted standard error of range_from_curvature"),
+    row("position", (*SNAP, "xyz"), "float64", "m", "position of the snap in the sonar frame"),
+    row("position_covariance", (*SNAP, "xyz", "xyz_other"), "float64", "m2", "predicted covariance of position"),
+    row("residual", SNAP, "float64", "s", "root mean square residual of the sensor delays"),
+    row(
+        "bottom_used",
+        SNAP,
+        "int8",
+        "1",
+        "whether the depth of the bottom entered the position",
+        attributes=(("flag_values", [-1, 0, 1]), ("flag_meanings", "no_position no yes")),
+    ),
+    row(
+        "reason",
+        SNAP,
+        "int8",
+        "1",
+        "why an estimate was not accepted",
+        attributes=(
+            *flags(REASONS),
+            ("comment", "of range_unknown the position alone is missing, of all others but accepted everything"),
+        ),
+    ),
+    row(
+        "emission",
+        SNAP,
+        "int16",
+        "1",
+        "index along snap of the true snap that the estimate came from: a label",
+        attributes=NONE,
+    ),
+)
+VARIABLES: tuple[Variable, ...] = (*_ROOT, *_SIGNALS, *_IMAGE, *_CLOUD, *_BEARINGS, *TRUTH, *LEVELS)
+"""Every variable that a frame may have."""

@@ -1,0 +1,259 @@
+"""When each frame listens: the sample window and the echo window, from geometry alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, Ints, depth
+from sonarsynth.description import FieldError
+from sonarsynth.environment.sea import Profile
+from sonarsynth.equations.rays.ray_solutions import mean_slowness, water
+from sonarsynth.geometry.mesh import in_blocks
+from sonarsynth.planning.measured.sampled_frames import Look
+from sonarsynth.planning.notes.scene_checks import CORNERS
+from sonarsynth.planning.plans import Plan, Supports, Windows
+from sonarsynth.planning.pulse_durations import blur_of, supports_of
+from sonarsynth.products import Paths
+from sonarsynth.propagation import Straight
+from sonarsynth.recipe import Recipe
+from sonarsynth.recipe.scene import Frame, Scene
+from sonarsynth.signals.filtered_pulse import snap_levels
+
+MARGIN = 0.1e-3
+"""Seconds added at both ends of every window. Covers what straight rays leave out of an arrival time: under 2 us at
+20 m in a gradient of 4 per second. Arrivals that still fall outside are counted in `/signals/outside`."""
+
+UNSEEN = 0.1
+"""Windows of datasets of which not every frame is looked at are wider by this part of themselves."""
+
+
+def lay_windows(recipe: Recipe, looks: Sequence[Look]) -> Windows:
+    """The sample window, which holds every arrival of every frame, and the echo window.
+
+    The sonar takes the pulse that it hears best for the start of its clock: the echo window holds the echoes of any
+    snap after its own direct arrival. From geometry alone: the delay of each facet's echo along straight lines at the
+    slowness averaged between its ends, and the support of the filtered snap. Where not every frame was looked at, the
+    windows are wider by UNSEEN, and each other frame is asked whether it fits when it is rendered.
+    """
+    sonar, gate = looks[0].scene.sonar, looks[0].scene.processing.echo_window
+    supports = supports_of(looks)
+    real = np.array([frame.index if look.real else -1 for look in looks for frame in look.frames])
+    spans = [span for look in looks for span in _spans(look)]
+    times = np.array([(s.first, s.last_direct, s.first_echo, s.last_echo, s.last) for s in spans])
+    first_heard, last_direct, first_echo, last_echo, last_heard = times.T
+    echoes = bool(np.isfinite(first_echo).any())
+    shortest = float(np.nanmin(first_echo)) if echoes else np.nan
+    longest = float(np.nanmax(last_echo)) if echoes else np.nan
+    unseen = UNSEEN * (longest - shortest) if (real >= 0).sum() < recipe.frames else 0.0
+    removed, start = _opening(looks[0].scene, shortest, supports, MARGIN + unseen)
+    latest = longest + supports.echo_after + MARGIN + unseen
+    if not echoes:  # listen for a moment after the snap
+        latest = supports.after + 2e-3
+    stop = gate.stop if gate.stop is not None else max(latest, start + 1e-3)
+    if stop <= start:
+        raise FieldError(("scene", "processing", "echo_window", "stop"), f"must be after start ({start:g} s)")
+    rate = sonar.sampling_frequency
+    first = _first_sample(first_heard, supports, rate)
+    last = np.maximum(last_heard + supports.after, last_direct + stop) + MARGIN
+    samples = int(np.ceil(np.max(last - first) * rate * (1.0 + (UNSEEN if unseen else 0.0)))) + 1
+    disturbed = sum(_disturbed(span, start - supports.before, stop + supports.before) for span in spans)
+    starts = np.full(recipe.frames, np.nan)
+    starts[real[real >= 0]] = first[real >= 0]
+    cut = echoes and (start > shortest - supports.foot or stop < longest + supports.foot)
+    tight = tuple(int(n) for n in dict.fromkeys(real[[*_first(first_echo, real), *_first(-last_echo, real)]]))
+    return Windows(starts, samples, float(start), float(stop), supports, disturbed, removed, cut, tight)
+
+
+def _first(times: Floats, real: Ints, count: int = 2) -> Ints:
+    """Indices of the smallest of times (frame,) in frames of the dataset, at most so many; NaN counts as late."""
+    order = np.argsort(times, kind="stable")
+    return np.asarray(order[(real[order] >= 0) & np.isfinite(times[order])][:count])
+
+
+def _opening(scene: Scene, first_echo: float, supports: Supports, margin: float) -> tuple[bool, float]:
+    """Whether the direct pulse is taken out, and when the echo window opens (s), both after it.
+
+    first_echo (s): NaN where nothing echoes. The window opens when the direct pulse is over. Where that cuts more than
+    the feet of an echo the direct pulse is taken out, and the window opens with the echoes, which never come before it.
+    """
+    gate, chosen = scene.processing.echo_window.start, scene.processing.direct_pulse
+    earliest, whole = first_echo - supports.echo_before - margin, first_echo - supports.foot - margin
+    overlap = (whole if gate is None else gate) < supports.clear
+    removed = chosen == "remove" or (chosen == "auto" and overlap)
+    if gate is not None:
+        return removed, gate
+    if np.isnan(first_echo):
+        return removed, supports.after
+    return removed, max(whole, 0.0) if removed and overlap else max(earliest, supports.clear)
+
+
+def _first_sample(first_heard: Floats, supports: Supports, rate: float) -> Floats:
+    return np.asarray(np.floor((first_heard - supports.before - MARGIN) * rate) / rate)
+
+
+def frame_start(plan: Plan, frame: Frame) -> float:
+    """Time (s) of the first sample of a frame, after its instant; `plan` is that of its sequence.
+
+    Raises FieldError for a frame that was not looked at before and does not fit in the windows.
+    """
+    windows, scene = plan.windows, plan.scene
+    known = float(windows.start[frame.index])
+    if np.isfinite(known):
+        return known
+    (span,) = _spans(Look(scene, plan.profile, (frame,)))
+    supports, rate, gate = windows.supports, scene.sonar.sampling_frequency, scene.processing.echo_window
+    first = float(_first_sample(np.asarray(span.first), supports, rate))
+    last = max(span.last + supports.after, span.last_direct + windows.echo_stop) + MARGIN
+    path, advice = ("scene", "processing", "echo_window"), "give its start and stop, or fewer frames"
+    if np.ceil((last - first) * rate) + 1 > windows.samples:
+        raise FieldError(path, f"frame {frame.index} lasts {last - first:.3g} s, more than those looked at: {advice}")
+    removed, opens = _opening(scene, span.first_echo, supports, 0.0)
+    early = opens < windows.echo_start or (removed and not windows.direct_removed)
+    late = gate.stop is None and span.last_echo + supports.echo_after > windows.echo_stop
+    if early or late:
+        raise FieldError(path, f"frame {frame.index} echoes outside the window of those looked at: {advice}")
+    return first
+
+
+def _slack(doppler: bool, frame: Frame, span: _Span, profile: Profile) -> float:
+    """By how much (s) arrivals may come before or after what straight lines between things at rest say.
+
+    What moves at v changes the travel time of each leg at v/c. A ray between two points r apart, in a sound speed that
+    changes by g a metre at most, is faster by r^3 g^2/(24 c^3), and no faster or slower than the extreme speeds let it
+    be.
+    """
+    slowest = float(profile.speed.min())
+    latest = max(abs(span.last), abs(span.first))
+    moved = 0.0
+    if doppler:
+        fastest = max((float(np.linalg.norm(b.velocity)) for b in frame.moment.bodies), default=0.0)
+        moved = 2.0 * (fastest + float(np.linalg.norm(frame.sonar_velocity))) * latest / slowest
+    if profile.uniform:
+        return moved
+    way = slowest * (span.last - min((s.time for s in frame.moment.snaps), default=0.0))  # m, of all legs together
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gradient = float(np.nanmax(np.abs(np.diff(profile.speed)) / np.diff(profile.depth), initial=0.0))
+    bent = way**3 * gradient**2 / (24.0 * slowest**3)
+    return moved + min(bent, way / slowest - way / float(profile.speed.max()))
+
+
+@dataclass(frozen=True)
+class _Span:
+    """When a frame is heard at the array centre (s)."""
+
+    first: float  # first direct arrival of any snap
+    clock: float  # direct arrival of the loudest snap: what the sonar takes for the start
+    last_direct: float  # last direct arrival of any snap
+    first_echo: float  # of any snap, after its own direct arrival; NaN where nothing echoes
+    last_echo: float
+    last: float  # last arrival of any snap
+    others: tuple[tuple[float, float], ...] = ()  # direct arrival and last echo of the snaps that are not the loudest
+
+
+def _spans(look: Look) -> list[_Span]:
+    """When each frame is heard, with what straight lines between things at rest leave out."""
+    scene, profile = look.scene, look.profile
+    bounces, bed = scene.physics.tracing.bounces, scene.world.environment.depth
+    blurred, spans = blur_of(scene), []
+    for frame in look.frames:
+        span = _span(frame, profile, bed, bounces)
+        slack = _slack(scene.physics.doppler, frame, span, profile)
+        spans.append(
+            replace(
+                span,
+                first=span.first - slack,
+                last_direct=span.last_direct + slack,
+                first_echo=span.first_echo - 2.0 * slack,  # the direct arrival may err, and the echo
+                last_echo=span.last_echo + 2.0 * slack + blurred,
+                last=span.last + slack + blurred,
+            )
+        )
+    return spans
+
+
+def _span(frame: Frame, profile: Profile, bed: float, bounces: int) -> _Span:
+    array = frame.sonar_pose.position
+    snaps = frame.moment.snaps
+    if not snaps:
+        return _Span(0.0, 0.0, 0.0, np.nan, np.nan, 0.0)
+    direct = np.array([s.time + float(_straight_time(profile, bed, s.position, array)) for s in snaps])
+    earliest, late_echo = np.full(len(snaps), np.inf), [-np.inf] * len(snaps)
+    parts = [(body, some) for body in frame.moment.bodies for some in in_blocks(len(body.mesh.faces))]
+    for body, some in parts:
+        points = body.pose.to_world(body.mesh.centroid[some])
+        back = _straight_time(profile, bed, points, array)
+        for n, snap in enumerate(snaps):
+            echo = snap.time + _straight_time(profile, bed, snap.position, points) + back
+            earliest[n] = min(earliest[n], echo.min(initial=np.inf))
+            late_echo[n] = max(late_echo[n], echo.max(initial=-np.inf))
+    echoes = bool(np.isfinite(earliest).all())
+    late_direct = direct
+    if bounces:
+        late_direct, late_echo = _reflected(frame, profile, bed, bounces)
+    last = np.array([max(d, e) for d, e in zip(late_direct, late_echo, strict=True)])
+    heard = [
+        level - 20 * np.log10(max(float(np.linalg.norm(s.position - array)), 1e-9))
+        for s, level in zip(snaps, snap_levels(snaps), strict=True)
+    ]
+    loudest = int(np.argmax(heard))
+    latest = float(np.max(np.asarray(late_echo) - direct)) if echoes else np.nan
+    others = tuple((float(direct[n]), float(last[n])) for n in range(len(snaps)) if n != loudest)
+    return _Span(
+        first=float(direct.min()),
+        clock=float(direct[loudest]),
+        last_direct=float(direct.max()),
+        first_echo=float((earliest - direct).min()) if echoes else np.nan,
+        last_echo=latest,
+        last=float(last.max()),
+        others=others,
+    )
+
+
+def _reflected(frame: Frame, profile: Profile, bed: float, bounces: int) -> tuple[Floats, list[float]]:
+    """Last direct arrival and last echo (s) of each snap by so many reflections, from the boxes round the bodies.
+
+    The length of a path by image sources is convex in the point that it meets, so a corner of the box is the farthest.
+    """
+    straight, array = Straight(bounces=bounces), frame.sonar_pose.position
+    low_high = [(b.pose, b.mesh.box) for b in frame.moment.bodies]
+    corners = [p.to_world(low + CORNERS * (high - low)) for p, (low, high) in low_high]
+    points = np.concatenate([np.empty((0, 3)), *corners])
+    points[:, 2] = np.clip(points[:, 2], -bed, 0.0)
+    back = straight.connect(profile, bed, points, np.broadcast_to(array, points.shape))
+    direct, echoes = [], []
+    for snap in frame.moment.snaps:
+        start = snap.position[None, :]
+        direct.append(snap.time + straight.connect(profile, bed, start, array[None, :]).travel_time.max())
+        out = straight.connect(profile, bed, np.broadcast_to(start, points.shape), points)
+        latest = -np.inf
+        for n in range(bounces + 1):
+            first, second = (_latest(paths, k, len(points)) for paths, k in ((out, n), (back, bounces - n)))
+            latest = max(latest, float(np.max(first + second, initial=-np.inf)))
+        echoes.append(snap.time + latest)
+    return np.array(direct), echoes
+
+
+def _latest(paths: Paths, bounces: int, points: int) -> Floats:
+    """Longest travel time (point,) of paths with at most so many reflections."""
+    some = paths.surface + paths.bottom <= bounces
+    out = np.zeros(points)
+    np.maximum.at(out, paths.pair[some], paths.travel_time[some])
+    return out
+
+
+def _disturbed(span: _Span, start: float, stop: float) -> bool:
+    """Whether sound of another snap than the loudest falls into the echo window, start to stop after its arrival."""
+    return any(first < span.clock + stop and last > span.clock + start for first, last in span.others)
+
+
+def _straight_time(profile: Profile, bed: float, a: Floats, b: Floats) -> Floats:
+    """Travel time (...) along straight lines a to b (..., xyz): distance times the mean slowness between them."""
+    distance = np.asarray(np.linalg.norm(a - b, axis=-1))
+    if profile.uniform:
+        return np.asarray(distance / profile.speed[0])
+    ends = np.broadcast_arrays(depth(a), depth(b))
+    slowness = mean_slowness(water(profile.depth, profile.speed, bed), *(np.atleast_1d(z) for z in ends))
+    return np.asarray(distance * slowness.reshape(distance.shape))

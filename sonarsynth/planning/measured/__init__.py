@@ -1,0 +1,1 @@
+"""What a plan measures in a few frames before it chooses."""

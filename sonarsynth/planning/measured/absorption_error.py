@@ -1,0 +1,76 @@
+"""What water absorbs along the paths of a sequence: one shape of spectrum for all of them, and its error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, depth
+from sonarsynth.environment.absorption import absorption_db_per_m
+from sonarsynth.environment.sea import Absorption
+from sonarsynth.recipe.scene import Frame
+
+_X, _W = np.polynomial.legendre.leggauss(5)
+FREQUENCIES = 17
+"""Of a band, at which an error is looked for."""
+
+
+class Passed(NamedTuple):
+    """Straight paths: source to array, and source to each target to array."""
+
+    depth: Floats  # (path, sample) m
+    length: Floats  # (path, sample) m: of the path, near each
+
+
+def passed_by(frames: Sequence[Frame]) -> Passed:
+    """The depths that straight paths of some frames pass; of a frame without a source, that of the array."""
+    rows: list[tuple[Floats, Floats]] = []
+    for frame in frames:
+        array = frame.sonar_pose.position
+        for snap in frame.moment.snaps:
+            rows.append(_leg(snap.position, array, array))
+            rows += [_leg(snap.position, body.pose.position, array) for body in frame.moment.bodies]
+        if not frame.moment.snaps:
+            rows.append(_leg(array, array, array))
+    where, length = (np.array(column) for column in zip(*rows, strict=True))
+    return Passed(where, length if length.any() else length + 1.0)
+
+
+def _leg(start: Floats, middle: Floats, end: Floats) -> tuple[Floats, Floats]:
+    """Depths (sample,) and lengths (sample,) in m of a path in two straight parts."""
+    share = 0.5 + 0.5 * _X
+    where = [a + share[:, None] * (b - a) for a, b in ((start, middle), (middle, end))]
+    length = [0.5 * _W * np.linalg.norm(b - a) for a, b in ((start, middle), (middle, end))]
+    return np.maximum(depth(np.concatenate(where)), 0.0), np.concatenate(length)
+
+
+def mean_absorption(absorption: Absorption, passed: Passed, frequency: np.ndarray | float) -> Floats:
+    """Mean (...) in dB/m at frequencies (...) (Hz) over all that the paths pass, by their lengths."""
+    where, at = np.unique(np.round(passed.depth, 3), return_inverse=True)
+    weight = np.bincount(at.ravel(), passed.length.ravel()) / passed.length.sum()
+    f = np.asarray(frequency, float)
+    return np.asarray(absorption_db_per_m(absorption, f[..., None], where) @ weight)
+
+
+def shape_error(
+    absorption: Absorption, passed: Passed, band: tuple[float, float], bed: float, bounces: int = 0
+) -> float:
+    """Largest error (dB) in a band (Hz) of any path: its loss at the centre is its own, its spectrum that of the mean.
+
+    bed (m): where paths are reflected, at most `bounces` times: as long a path close to the surface or to the bed
+    counts then, and one through all of the water so many times.
+    """
+    frequency = np.append(np.linspace(*band, FREQUENCIES), 0.5 * sum(band))
+    mean = mean_absorption(absorption, passed, frequency)
+    if not mean[-1] > 0.0:
+        return 0.0
+    each = absorption_db_per_m(absorption, frequency[:, None, None], passed.depth)
+    own = np.einsum("fps,ps->pf", each, passed.length)
+    if bounces:
+        longest = float(passed.length.sum(axis=1).max())
+        column = absorption_db_per_m(absorption, frequency, bed * (0.5 + 0.5 * _X)[:, None])
+        ends = absorption_db_per_m(absorption, frequency, np.array([[0.0], [bed]]))
+        own = np.concatenate([own, ends * longest, (0.5 * _W @ column)[None] * np.hypot(longest, bounces * bed)])
+    return float(np.abs(own - own[:, -1:] * (mean / mean[-1])).max())

@@ -1,0 +1,86 @@
+"""How many zones the focus of an image needs, as measured in a few frames against exact delays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sonarsynth.conventions import direction
+from sonarsynth.equations.arrays.apertures import focus_delay
+from sonarsynth.imaging import AutoBeamforming, DenseDelayAndSum, FocusedDelayAndSum
+from sonarsynth.imaging.dense import dense_energies
+from sonarsynth.imaging.focus_error import MOST_ZONES
+from sonarsynth.imaging.image_window import weights, window_spectra
+from sonarsynth.planning.listening_windows import frame_start
+from sonarsynth.planning.measured.sampled_arrivals import arrivals_of
+from sonarsynth.planning.plans import Plan
+from sonarsynth.products import Signals
+from sonarsynth.signals.auto_synthesis import USUAL, deposit_for
+from sonarsynth.signals.filtered_pulse import snap_levels
+
+ZONES = (1, 2, 4, 8, 16, MOST_ZONES)
+WITHIN = 20.0
+"""dB below the brightest beam: down to there beams are compared."""
+COMPARED = 1000
+"""Beams that are, at most."""
+SAFETY = 1.25
+"""What was measured in some frames may be so much more in others."""
+
+
+def beamformer(plan: Plan, indices: Sequence[int]) -> tuple[FocusedDelayAndSum | DenseDelayAndSum, float]:
+    """The beamformer of a plan, and its error: root mean square in dB, over beams within 20 dB of the brightest."""
+    method, accuracy = plan.scene.processing.beamforming, plan.recipe.accuracy
+    dense = DenseDelayAndSum(focus=method.focus, shading=method.shading)
+    if isinstance(method, DenseDelayAndSum) or accuracy.exact or not plan.elements.on_lattice:
+        return dense, 0.0
+    focused = FocusedDelayAndSum(focus=method.focus, shading=method.shading, zones=1)
+    heard = [found for found in (_heard(plan, index) for index in indices) if found is not None]
+    if isinstance(method, FocusedDelayAndSum) and method.zones != "auto":
+        return method, max((image_error(plan, method, *one) for one in heard), default=0.0)
+    error = np.inf
+    for zones in ZONES if method.focus is not None else (1,):
+        focused = replace(focused, zones=zones)
+        error = max((image_error(plan, focused, *one) for one in heard), default=0.0)
+        if error <= accuracy.image_db / SAFETY:
+            return focused, error
+    return (dense, 0.0) if isinstance(method, AutoBeamforming) else (focused, error)
+
+
+def image_error(plan: Plan, method: FocusedDelayAndSum, signals: Signals, start: float, stop: float) -> float:
+    """Root mean square error (dB) of an image of signals from start to stop (s), over its bright beams."""
+    elements, sonar = plan.elements, plan.scene.sonar
+    energy = method.image(signals, elements, sonar, start, stop).energy.astype(float)
+    if not energy.any():
+        return 0.0
+    row, column = np.nonzero(energy >= energy.max() * 10.0 ** (-WITHIN / 10.0))
+    every = -(-len(row) // COMPARED)
+    row, column = row[::every], column[::every]
+    frequencies, spectra, unit = window_spectra(signals, sonar, start, stop)
+    beams = direction(sonar.beams.azimuth[column], sonar.beams.elevation[row])
+    delay = focus_delay(elements.position, beams, method.focus, sonar.assumed_sound_speed)
+    exact = unit * dense_energies(spectra, delay, weights(elements, method.shading), frequencies)
+    wrong = 10.0 * np.log10(energy[row, column] / exact)
+    return float(np.sqrt(np.mean(wrong**2)))
+
+
+def _heard(plan: Plan, index: int) -> tuple[Signals, float, float] | None:
+    """Signals of a frame without noise, and its echo window; None where no snap or no echo is heard."""
+    plan = plan.at(index)
+    frame = plan.recipe.frame(index)[1]
+    arrivals, snaps = arrivals_of(plan, frame), frame.moment.snaps
+    if not arrivals.direct.any() or arrivals.direct.all():
+        return None
+    start, samples = frame_start(plan, frame), plan.windows.samples
+    sonar = plan.scene.sonar
+    # Not by the plan's own method: direct sums would take minutes, and the same signals go into both images.
+    imaged = arrivals.select(~arrivals.direct) if plan.windows.direct_removed else arrivals
+    signals = deposit_for(USUAL).signals(imaged, snaps, plan.elements, sonar, plan.absorption, start, samples)
+    direct, levels = arrivals.select(arrivals.direct), np.array(snap_levels(snaps))
+    loudest = np.argmax(levels[direct.snap] + 20.0 * np.log10(np.abs(direct.amplitude)))
+    clock = float(direct.delay[loudest])
+    end = signals.start + samples / sonar.sampling_frequency
+    begin, stop = clock + plan.windows.echo_start, min(clock + plan.windows.echo_stop, end)
+    heard = signals.pressure[:, int(np.ceil((begin - start) * sonar.sampling_frequency)) :]
+    return (signals, begin, stop) if begin < stop and heard.any() else None

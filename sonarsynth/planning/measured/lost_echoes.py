@@ -1,0 +1,116 @@
+"""What echoes lose to the echo window, and to the removal of the direct pulse: measured in a few frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.planning.listening_windows import frame_start
+from sonarsynth.planning.measured.sampled_arrivals import arrivals_of
+from sonarsynth.planning.notes.source_notes import standing_off
+from sonarsynth.planning.plans import Plan
+from sonarsynth.products import Bearings, Signals
+from sonarsynth.ranging.cancelling.direct_pulse import remove
+from sonarsynth.signals.auto_synthesis import USUAL, deposit_for
+from sonarsynth.signals.filtered_pulse import snap_levels
+
+NOTED = 1e-3
+"""Share of an echo that may be lost without a note."""
+MOST = 150.0
+"""dB that are said at most: single precision holds no more."""
+FAINTEST = 1e-9
+"""Share of the echoes of a frame under which a target's echo is not asked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Losses:
+    """Of one frame, by the light of its loudest snap."""
+
+    frame: int
+    lost: Floats  # (target,) share of the energy of its echo that the image is without; NaN where there is no echo
+    fall: float  # dB by which the energy of the direct pulse falls
+    below: float  # dB: of the echoes over what is left of the direct pulse, in the echo window
+
+
+def lost_echoes(made: Plan) -> list[str]:
+    """Notes on what echoes lose, where the direct pulse is taken out or the echo window cuts more than their feet."""
+    windows, names = made.windows, [target.name for target in made.scene.world.targets]
+    if not (windows.direct_removed or windows.cut) or not made.products & {"image", "cloud"}:
+        return []
+    rows = [row for index in windows.tight if (row := losses(made.at(index), index)) is not None]
+    found = []
+    if windows.direct_removed and rows:
+        fall, below = (min([MOST, *(getattr(row, name) for row in rows)]) for name in ("fall", "below"))
+        chosen = made.scene.processing.direct_pulse == "auto"
+        why = "echoes come before it is over" if chosen else "processing.direct_pulse"
+        frames = ", ".join(str(row.frame) for row in rows)
+        found.append(
+            f"the direct pulse is taken out ({why}): it falls by {fall:.0f} dB, and is {below:.0f} dB below the echoes "
+            f"in their window (measured, frame {frames})"
+        )
+    loss = "the direct pulse that is taken out" if windows.direct_removed else "the echo window"
+    for target, name in enumerate(names):
+        share, frame = max(((row.lost[target], row.frame) for row in rows if row.lost[target] >= 0), default=(0.0, 0))
+        if share > NOTED:
+            level = f"{-10 * np.log10(1 - share):.2g} dB" if share < 1 else "all of it"
+            part = f"{100 * share:.1f}" if share < 0.995 else f"{100 * share:.4g}"
+            found.append(f"{name}: {part} % of its echo ({level}) is lost to {loss} in frame {frame}")
+    return found
+
+
+def losses(plan: Plan, index: int) -> Losses | None:
+    """What is lost in a frame, by the signals of its direct pulse and of each echo alone; None without both.
+
+    `plan` is that of the frame's sequence. What is removed depends on all that is heard, so an echo keeps what signals
+    with it hold more, after the removal, than signals without.
+    """
+    frame, sonar, windows = plan.recipe.frame(index)[1], plan.scene.sonar, plan.windows
+    arrivals, snaps, start = arrivals_of(plan, frame), frame.moment.snaps, frame_start(plan, frame)
+    straight = arrivals.direct & (arrivals.surface + arrivals.bottom == 0)
+    if not straight.any():
+        return None
+    loud = np.array(snap_levels(snaps))[arrivals.snap] + 20 * np.log10(np.abs(arrivals.amplitude) + 1e-300)
+    first = int(np.argmax(np.where(straight, loud, -np.inf)))
+    lit, method = arrivals.snap == arrivals.snap[first], deposit_for(USUAL)
+
+    def hear(some: np.ndarray) -> Signals:
+        own = arrivals.select(some & lit)
+        return method.signals(own, snaps, plan.elements, sonar, plan.absorption, start, windows.samples)
+
+    direct = hear(straight)
+    echoes = [hear(arrivals.target == target) for target in range(len(frame.moment.bodies))]
+    whole = np.array([_energy(echo.pressure) for echo in echoes])
+    if not whole.sum() > 0:
+        return None
+    heard = replace(direct, pressure=direct.pressure + sum(echo.pressure for echo in echoes))
+    locating = plan.scene.processing.locating.resolve(on_bottom=not standing_off(plan.scene))
+    bearings = locating.locate(
+        heard, plan.elements, sonar, frame.sonar_pose, plan.scene.world.environment.depth, 1, plan.profile
+    )
+    clock = float(bearings.time[0]) if np.isfinite(bearings.time[0]) else float(arrivals.delay[first])
+    ends = ((clock + edge - start) * sonar.sampling_frequency for edge in (windows.echo_start, windows.echo_stop))
+    window = slice(*(max(int(np.ceil(end)), 0) for end in ends))
+    alone = _without(plan, direct, bearings)
+    kept = np.zeros(len(echoes))
+    for target, echo in enumerate(echoes):
+        both = _without(plan, replace(direct, pressure=direct.pressure + echo.pressure), bearings)
+        kept[target] = _energy((both - alone)[:, window])
+    lost = np.where(whole > FAINTEST * whole.sum(), 1 - kept / np.maximum(whole, 1e-300), np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        fall = 10 * float(np.log10(_energy(direct.pressure) / _energy(alone)))
+        below = 10 * float(np.log10(kept.sum() / _energy(alone[:, window])))
+    return Losses(index, np.clip(lost, 0.0, 1.0), fall, below)
+
+
+def _without(plan: Plan, signals: Signals, bearings: Bearings) -> np.ndarray:
+    """Pressure (sensor, sample) as it is imaged; that of the signals where nothing can be, or is to be, taken out."""
+    if not plan.windows.direct_removed or not np.isfinite(bearings.time[0]):
+        return signals.pressure
+    left = remove(signals, bearings, plan.elements, plan.scene.sonar, plan.windows.supports.clear)
+    return (signals if left is None else left).pressure
+
+
+def _energy(pressure: np.ndarray) -> float:
+    return float(np.sum(np.square(pressure, dtype=np.float64)))

@@ -1,0 +1,100 @@
+"""Whether rays bend by so little that straight ones will do, in paths and in ranges."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, depth
+from sonarsynth.environment.sea import Profile
+from sonarsynth.products import Paths
+from sonarsynth.propagation import AutoTracing, Refracted, Straight
+from sonarsynth.ranging.clouds import isovelocity_solution
+from sonarsynth.receiver import elements
+from sonarsynth.recipe.scene import Frame, Scene
+
+CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+SHARE = 0.3
+"""Of the error allowed to signals that straight rays may take."""
+
+
+def propagation(scene: Scene, profile: Profile, frames: Iterable[Frame], signal: float) -> Straight | Refracted:
+    """How sound travels in this water: straight where that errs by less than a share of `signal`, or is asked for."""
+    tracing = scene.physics.tracing
+    if not isinstance(tracing, AutoTracing):
+        return tracing
+    if profile.uniform or bending_error(scene, profile, frames) <= SHARE * signal:
+        return Straight(bounces=tracing.bounces)
+    return Refracted(bounces=tracing.bounces)
+
+
+def bending_error(scene: Scene, profile: Profile, frames: Iterable[Frame]) -> float:
+    """Error of signals, relative, that straight rays make in some frames; inf where paths differ in number.
+
+    The phase of the highest frequency by which travel times differ, and by which the direction at the array does at
+    its rim; and the difference of amplitudes; over the ways out to the boxes round the bodies, back, and straight in.
+    """
+    bounces = scene.physics.tracing.bounces
+    straight, refracted = Straight(bounces=bounces), Refracted(bounces=bounces)
+    bed, highest = scene.world.environment.depth, scene.sonar.band.high
+    worst = 0.0
+    for frame in frames:
+        array, points = frame.sonar_pose.position, around(frame, bed)
+        snaps = np.array([snap.position for snap in frame.moment.snaps]).reshape(-1, 3)
+        start = np.concatenate([np.repeat(snaps, len(points), axis=0), points, snaps])
+        end = np.concatenate([np.tile(points, (len(snaps), 1)), np.broadcast_to(array, (len(points) + len(snaps), 3))])
+        if not len(start):
+            continue
+        one, other = (model.connect(profile, bed, start, end) for model in (straight, refracted))
+        if not _alike(one, other):
+            return np.inf
+        late = 2.0 * np.pi * highest * np.abs(one.travel_time - other.travel_time)
+        turned = np.linalg.norm(one.arrival - other.arrival, axis=1)
+        wave = 2.0 * np.pi * highest / float(profile.at(depth(array)))
+        over = wave * elements(scene.sonar.array).aperture * turned
+        louder = np.abs(one.spreading / other.spreading - 1.0)
+        worst = max(worst, 2.0 * float(np.max(late + over + louder, initial=0.0)))
+    return worst
+
+
+def around(frame: Frame, bed: float) -> Floats:
+    """Corners and middles (point, xyz) of the boxes round the bodies of a frame, in the water."""
+    found = [np.empty((0, 3))]
+    for body in frame.moment.bodies:
+        low, high = body.mesh.box
+        found += [body.pose.to_world(low + np.vstack([CORNERS, [0.5, 0.5, 0.5]]) * (high - low))]
+    points = np.concatenate(found)
+    points[:, 2] = np.clip(points[:, 2], -bed, 0.0)
+    return points
+
+
+def _alike(one: Paths, other: Paths) -> bool:
+    """Whether two models find the same paths: the same pairs, reflections and turns, none flagged."""
+    if len(one.pair) != len(other.pair) or one.flag.any() or other.flag.any():
+        return False
+    same = (np.array_equal(getattr(one, name), getattr(other, name)) for name in ("pair", "surface", "bottom"))
+    return all(same) and not other.turning.any()
+
+
+def ranging_error(scene: Scene, profile: Profile, frames: Iterable[Frame]) -> float:
+    """Largest difference (m) of ranges by the closed form from those along rays, over the boxes round the bodies."""
+    from sonarsynth.ranging.location.refraction import refracted_solution
+
+    speed, worst = scene.sonar.assumed_sound_speed, 0.0
+    if profile.uniform and profile.speed[0] == speed:
+        return 0.0
+    for frame in frames:
+        points = frame.sonar_pose.to_body(around(frame, scene.world.environment.depth))
+        if not len(points):
+            continue
+        distance = np.linalg.norm(points, axis=1)
+        beam = points / distance[:, None]
+        for snap in frame.moment.snaps:
+            source = frame.sonar_pose.to_body(snap.position[None])[0]
+            delay = (np.linalg.norm(points - source, axis=1) + distance - np.linalg.norm(source)) / speed
+            one = isovelocity_solution(delay, beam, source, speed).range
+            other = refracted_solution(delay, beam, source, speed, frame.sonar_pose, profile).range
+            differ = np.abs(one - other)
+            worst = max(worst, float(np.nan_to_num(differ, nan=0.0).max(initial=0.0)))
+    return worst

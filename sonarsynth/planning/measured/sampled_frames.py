@@ -1,0 +1,108 @@
+"""Which frames a plan looks at: all of them, or so many of a large dataset that the look stays short."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+
+import numpy as np
+
+from sonarsynth.description import FieldError
+from sonarsynth.environment.sea import Profile
+from sonarsynth.planning.notes.scene_checks import check_frame, check_shrimp, read_inputs
+from sonarsynth.recipe import Recipe
+from sonarsynth.recipe.scene import Frame, Scene
+
+LOOKED_AT = 2000
+"""Frames that a plan looks at; of a larger dataset so many, spread evenly, first and last steps among them."""
+STRETCHED = 8
+"""Sequences of such a dataset whose variations are also looked at one by one at their ends."""
+MOST_STRETCHED = 200
+"""Scenes with a variation at an end, at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """Frames of one scene."""
+
+    scene: Scene
+    profile: Profile
+    frames: tuple[Frame, ...]
+    real: bool = True  # False: no sequence, but a scene with a variation at its end
+
+
+def survey(recipe: Recipe) -> tuple[Look, ...]:
+    """The frames to look at, each checked: everything in the water, every file there, all scenes alike in shape.
+
+    Raises FieldError that names the field, the frame and the values of the sequence.
+    """
+    steps = looked_at(recipe)
+    first = next(iter(steps))
+    looks = []
+    for sequence, some in steps.items():
+        with recipe.spanned.naming(sequence):
+            scene = recipe.scene_of(sequence)
+            check_alike(recipe.scene_of(first), scene)
+            profile = read_inputs(scene)
+            check_shrimp(scene)
+            frames = tuple(recipe.frame(sequence * recipe.steps + step)[1] for step in some)
+            for frame in frames:
+                check_frame(scene, frame)
+        looks.append(Look(scene, profile, frames))
+    if sum(len(look.frames) for look in looks) < recipe.frames:
+        looks += islice(_ends(recipe), MOST_STRETCHED)
+    return tuple(looks)
+
+
+def looked_at(recipe: Recipe) -> dict[int, list[int]]:
+    """Steps to look at of each sequence."""
+    count, steps = recipe.sequences, recipe.steps
+    if count * steps <= LOOKED_AT:
+        return {sequence: list(range(steps)) for sequence in range(count)}
+    each = min(max(LOOKED_AT // count, 2), steps)
+    chosen = _spread(steps, each)
+    return dict.fromkeys(_spread(count, LOOKED_AT // each), chosen)
+
+
+def _spread(count: int, most: int) -> list[int]:
+    """At most so many of 0 to count - 1, evenly spread, both ends among them."""
+    return sorted({int(n) for n in np.linspace(0, count - 1, min(most, count)).round()})
+
+
+def _ends(recipe: Recipe) -> Iterator[Look]:
+    """Scenes with each variation at its ends: they bound the windows, and need not be good."""
+    for sequence in _spread(recipe.sequences, STRETCHED):
+        for scene in recipe.spanned.extremes(sequence):
+            try:
+                profile = read_inputs(scene)
+                frames = tuple(scene.frame(step) for step in _spread(recipe.steps, 3))
+                for frame in frames:
+                    check_frame(scene, frame)
+            except FieldError:
+                continue
+            yield Look(scene, profile, frames, real=False)
+
+
+def check_alike(first: Scene, other: Scene) -> None:
+    """Raises FieldError unless two scenes have targets and snaps of the same number and name: the store's axes."""
+    world, others = ("scene", "world"), other.world
+    for what, one, more in (
+        ("targets", first.world.targets, others.targets),
+        ("shrimp", first.world.shrimp, others.shrimp),
+    ):
+        if len(one) != len(more):
+            raise FieldError((*world, what), f"all sequences must have equally many: {len(one)} and {len(more)}")
+    for i, (a, b) in enumerate(zip(first.world.targets, others.targets, strict=True)):
+        if a.name != b.name:
+            raise FieldError(
+                (*world, "targets", i, "name"), f"must be the same in all sequences: '{a.name}' and '{b.name}'"
+            )
+    for i, (s, t) in enumerate(zip(first.world.shrimp, others.shrimp, strict=True)):
+        if len(s.snap_times) != len(t.snap_times):
+            raise FieldError(
+                (*world, "shrimp", i, "snap_times"),
+                f"all sequences must have equally many: {len(s.snap_times)} and {len(t.snap_times)}",
+            )
+    if first.trajectory.frames != other.trajectory.frames:
+        raise FieldError(("scene", "trajectory", "frames"), "all sequences must have equally many frames")

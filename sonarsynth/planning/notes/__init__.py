@@ -1,0 +1,1 @@
+"""What a user should know of a plan before it is built."""

@@ -1,0 +1,51 @@
+"""Formulas of the environment that a scene uses outside their range: one line each, with the field, said once.
+
+Frames use the same formulas without a word.
+"""
+
+from __future__ import annotations
+
+from sonarsynth.description import FieldError
+from sonarsynth.environment.absorption import absorption_notes
+from sonarsynth.environment.boundary_numbers import boundary_notes
+from sonarsynth.environment.casts import profile_of
+from sonarsynth.environment.sea import Profile, WenzNoise
+from sonarsynth.equations.water import formula_ranges
+from sonarsynth.ranging import RefractedRange
+from sonarsynth.recipe.scene import Scene
+
+
+def validity(scene: Scene, profile: Profile) -> tuple[str, ...]:
+    """Notes on the environment of a scene, over its depths and the band of its sonar; profile is that of its water.
+
+    Raises FieldError where the sound speed that the sonar believes in cannot be read.
+    """
+    environment, band = scene.world.environment, scene.sonar.band
+    found = [("sound_speed", note) for note in profile.notes]
+    found += [
+        ("absorption", note)
+        for note in absorption_notes(environment.absorption, [[band.low], [band.high]], [0.0, environment.depth])
+    ]
+    if isinstance(environment.noise, WenzNoise):
+        with formula_ranges.noted() as notes:
+            formula_ranges.WENZ.check(frequency=[band.low, band.high], wind_speed=environment.noise.wind_speed)
+        found += [("noise", note) for note in notes]
+    if scene.physics.tracing.bounces:
+        for name, boundary in (("surface", environment.surface), ("bed", environment.bed)):
+            found += [(f"{name}.{field}", note) for field, note in boundary_notes(boundary, band.low, band.high)]
+    lines = [f"scene.world.environment.{field}: {note}" for field, note in found]
+    return (*lines, *(f"{'.'.join(BELIEVED)}: {note}" for note in _believed(scene)))
+
+
+BELIEVED = ("scene", "processing", "ranging", "profile")
+
+
+def _believed(scene: Scene) -> tuple[str, ...]:
+    """Notes on the sound speed that the sonar ranges with."""
+    ranging = scene.processing.ranging
+    if not isinstance(ranging, RefractedRange) or ranging.profile is None:
+        return ()
+    try:
+        return profile_of(ranging.profile).notes
+    except (ValueError, OSError, ImportError) as error:
+        raise FieldError(BELIEVED, str(error)) from None

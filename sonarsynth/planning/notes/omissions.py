@@ -1,0 +1,209 @@
+"""What a plan leaves out, and the bound on what that costs: rows that `sonarsynth plan` prints."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sonarsynth.environment.boundary_numbers import rms_height
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.planning.measured.ray_bending import bending_error
+from sonarsynth.planning.plans import PRODUCTS, Omission, Plan
+from sonarsynth.propagation import Straight
+from sonarsynth.propagation.bounces import MOST_BOUNCES
+from sonarsynth.receiver import stop_frequency
+from sonarsynth.recipe.scene import Frame
+from sonarsynth.scattering import MirrorLobe
+from sonarsynth.state import Moment
+from sonarsynth.targets.mesh_resolution import expected_error
+from sonarsynth.targets.meshes import mesh_of
+
+ENOUGH = 10_000
+"""Facets of a target that its reflections are estimated from."""
+
+
+def left_out(plan: Plan) -> tuple[Omission, ...]:
+    """What is not computed, why, and the bound on what that costs."""
+    if not plan.products:
+        return (Omission("sound: paths, levels, signals, image, cloud", "truth alone is asked for", "0"),)
+    scene, frame = plan.recipe.frame(0)
+    environment = scene.world.environment
+    rows = []
+    if isinstance(plan.propagation, Straight):
+        rows.append(Omission("refraction", "straight rays", _refraction_bound(plan, frame)))
+    bounces = plan.propagation.bounces
+    kept = "the direct family" if not bounces else f"paths by at most {bounces} reflections of surface and bed in all"
+    rows.append(Omission("more reflections", f"asked for: {kept}", reflected_bound(plan)))
+    rough = [b for b in (environment.surface, environment.bed) if rms_height(b) > 0.0]
+    if bounces and rough:
+        rows.append(
+            Omission(
+                "scattering by rough boundaries",
+                "reflections are coherent",
+                "the energy that roughness takes from them is scattered, and not simulated",
+            )
+        )
+    if environment.absorption.formula != "none":
+        bound = f"{plan.absorption_error:.1g} dB of any path in the band; at its centre each loses by its own depths"
+        rows.append(Omission("absorption over the band at each depth", "one spectrum for all paths", bound))
+    rows += _facets_leave_out(plan)
+    moving = any(b.velocity.any() for b in frame.moment.bodies) or frame.sonar_velocity.any()
+    if moving and not scene.physics.doppler:
+        rows.append(Omission("Doppler", "not asked for: all is where it is at the instant of the frame", _moved(plan)))
+    elif moving:
+        way = "bodies are posed where sound meets their middle; from there velocity and spin carry each facet"
+        rows.append(Omission("what motion does beyond that", way, _carried(plan, frame)))
+    if environment.noise is None:
+        rows.append(Omission("ambient noise", "the scene describes none", "signals are free of noise"))
+    return tuple(rows + _not_asked_for(plan) + _not_traced(plan) + _not_heard(plan))
+
+
+def _not_asked_for(plan: Plan) -> list[Omission]:
+    """What the products of this build do not need."""
+    rows = [Omission(name, "not asked for", "0") for name in PRODUCTS if name not in plan.products]
+    if "signals" not in plan.products:
+        why = "signals are not stored, so that nothing is compared with it"
+        rows.append(Omission("the loudest path of each kind by itself", why, "0"))
+    elif plan.scene.sonar.converter is None:
+        rows.append(Omission("converter", "the sonar describes none", "0: pressure is stored as float32"))
+    return rows
+
+
+def _refraction_bound(plan: Plan, frame: Frame) -> str:
+    if plan.profile.uniform:
+        return "0: the sound speed is the same everywhere"
+    bound = bending_error(plan.scene, plan.profile, [frame])
+    if bound <= plan.recipe.accuracy.signal:
+        return f"{bound:.1g} of the signals"
+    varies = np.ptp(plan.profile.speed)
+    return f"asked for, but the sound speed varies by {varies:.3g} m/s: angles and delays are biased"
+
+
+def _not_traced(plan: Plan) -> list[Omission]:
+    """Paths that are not traced by themselves, or not kept."""
+    rows: list[Omission] = []
+    choices, count = plan.choices, plan.elements.count
+    if choices.subarrays < count:
+        parts = "the array" if choices.subarrays == 1 else f"each of {choices.subarrays} subarrays"
+        known = np.isfinite(plan.errors.expansion)
+        bound = f"{plan.errors.expansion:.1g} of the signals, measured" if known else "not measured"
+        rows.append(Omission("rays to each hydrophone", f"paths are expanded over {parts}", bound))
+    if choices.negligible > 0.0:
+        bound = f"{np.sqrt(choices.negligible):.1g} of the echo of each target"
+        rows.append(Omission("the faintest echoes", f"{-10 * np.log10(choices.negligible):.3g} dB below all", bound))
+    rows.append(Omission("facets in the dark, out of sight or turned away", "no ray meets them", "0"))
+    return rows
+
+
+def _not_heard(plan: Plan) -> list[Omission]:
+    """Hydrophones and frequencies that are not computed."""
+    rows: list[Omission] = []
+    dead, sonar = int((plan.elements.gain == 0.0).sum()), plan.scene.sonar
+    if dead:
+        rows.append(Omission(f"{dead} dead hydrophones", "they hear nothing", "0"))
+    chosen = sonar.antialias
+    rows.append(
+        Omission(
+            f"the spectrum over {stop_frequency(chosen) / 1e3:.4g} kHz",
+            "the filter stops it",
+            f"-{chosen.attenuation:g} dB of what is there",
+        )
+    )
+    return rows
+
+
+def _facets_leave_out(plan: Plan) -> list[Omission]:
+    """What coherent facets do not have of an echo."""
+    scene, rows = plan.scene, []
+    for target, law, mesh in zip(scene.world.targets, scene.laws, scene.meshes, strict=True):
+        if law.coherent:
+            error = expected_error(mesh, scene.sonar.shortest_wavelength)
+            bound = f"about {100.0 * error:.2g} % of the echo at the top of the band"
+            if error > 0.995:
+                bound = "all of the echo at the top of the band"
+            if error == 0.0:
+                bound = "0: it has no curved surface"
+            rows.append(Omission(f"curvature within facets of {target.name}", f"{len(mesh.faces)} flat facets", bound))
+    if rows:
+        bound = "spheres over 26 wavelengths round: 0.3 dB to 60 degrees off backscatter, 2.6 dB to 120"
+        rows.append(Omission("waves that creep round bodies or pass inside", "facets are plane mirrors", bound))
+    return rows
+
+
+def _carried(plan: Plan, frame: Frame) -> str:
+    """What velocity and spin leave out of the first frame, from when a body's middle is met to when a facet is: the
+    rest of the phase, and how far bodies are that hide others from where they are then."""
+    speed, bed = float(plan.profile.speed.min()), plan.scene.world.environment.depth
+    bounces, phase, off = plan.propagation.bounces, 0.0, 0.0
+    bodies, ends = frame.moment.bodies, [frame.sonar_pose.position, *(s.position for s in frame.moment.snaps)]
+    for body in bodies:
+        size = 2.0 * body.mesh.radius
+        apart = max(float(np.linalg.norm(body.pose.position - end)) for end in ends)
+        late = (size + (np.hypot(apart, (bounces + 1) * bed) - apart if bounces else 0.0)) / speed
+        v, turn = float(np.linalg.norm(body.velocity)), float(np.linalg.norm(body.track.spin)) * late
+        phase = max(phase, 0.5 * turn * (turn * size + v * late))
+        others = max((float(np.linalg.norm(body.pose.position - b.pose.position)) for b in bodies), default=0.0)
+        off = max(off, v * (late + 2.0 * others / speed))
+    radians = 4.0 * np.pi * plan.scene.sonar.band.high / speed * phase
+    return f"{radians:.1g} rad at the top of the band; who hides whom is off by {off:.1g} m at most"
+
+
+def _moved(plan: Plan) -> str:
+    """How far targets and sonar move while sound is under way, and how much longer pulses come out."""
+    frame = plan.recipe.frame(0)[1]
+    fastest = max((float(np.linalg.norm(body.velocity)) for body in frame.moment.bodies), default=0.0)
+    fastest += float(np.linalg.norm(frame.sonar_velocity))
+    stretch = 2 * fastest / float(plan.profile.speed.min())
+    phase = 2 * np.pi * plan.scene.sonar.band.high * stretch * 50e-6
+    metres = fastest * plan.windows.echo_stop
+    return f"echoes {metres:.2g} m off; time stretch {stretch:.2g}, {phase:.2g} rad over 50 us at the top of the band"
+
+
+def reflected_bound(plan: Plan) -> str:
+    """Level of what one reflection more would add in the first frame, over the echoes that are kept.
+
+    Of targets as they were described, by a lobe where they are coherent (powers of facets add), and of `ENOUGH` of
+    their facets at most: a level to go by, at little cost.
+    """
+    from sonarsynth.tracing.arrivals import trace
+
+    scene, frame = plan.recipe.frame(0)
+    sonar, bounces = scene.sonar, plan.propagation.bounces
+    if not frame.moment.snaps or bounces >= MOST_BOUNCES:
+        return "not computed"
+    found = trace(
+        scene.world.environment,
+        plan.profile,
+        _rough_moment(plan, frame),
+        frame.sonar_pose,
+        plan.elements,
+        plan.absorption_at_depths,
+        replace(plan.propagation, bounces=bounces + 1),
+        tuple(MirrorLobe() if law.coherent else law for law in scene.laws),
+        band=(sonar.band.low, sonar.band.high),
+    )
+    blur = np.exp(-0.5 * (2 * np.pi * sonar.band.centre * found.blur) ** 2)
+    power, more = (found.amplitude * blur) ** 2, found.surface + found.bottom > bounces
+    parts = []
+    for what, some in (("echoes", ~found.direct), ("snap itself", found.direct)):
+        kept, left = float(power[some & ~more].sum()), float(power[some & more].sum())
+        if kept > 0.0 and left > 0.0:
+            parts.append(f"{what} {10 * np.log10(left / kept):+.1f} dB")
+    return "one more would add, re what is kept in frame 0: " + (", ".join(parts) or "nothing")
+
+
+def _rough_moment(plan: Plan, frame: Frame) -> Moment:
+    """The moment of a frame with few facets."""
+    bodies = []
+    for target, body in zip(plan.scene.world.targets, frame.moment.bodies, strict=True):
+        mesh = mesh_of(target.shape)
+        every = -(-len(mesh.faces) // ENOUGH)
+        bodies.append(replace(body, mesh=mesh if every == 1 else _every(mesh, every)))
+    return replace(frame.moment, bodies=tuple(bodies))
+
+
+def _every(mesh: Mesh, step: int) -> Mesh:
+    """Every so manieth facet of a mesh."""
+    used, number = np.unique(mesh.faces[::step], return_inverse=True)
+    return Mesh(mesh.vertices[used], number.reshape(-1, 3).astype(np.int32))

@@ -1,0 +1,165 @@
+"""What a user should know about a plan before it is built: the lines that `plan` and `build` print."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sonarsynth.environment.sea import Profile
+from sonarsynth.environment.sound_speed import Cast, Tabulated, TemperatureSalinity
+from sonarsynth.planning.measured.lost_echoes import lost_echoes
+from sonarsynth.planning.measured.sampled_frames import Look
+from sonarsynth.planning.notes.formula_validity import validity
+from sonarsynth.planning.notes.source_notes import standing_off
+from sonarsynth.planning.notes.target_notes import held, law_notes, mirror_notes, overlap_notes
+from sonarsynth.planning.plans import Plan
+from sonarsynth.planning.pulse_durations import SUPPORT, extreme_waveforms
+from sonarsynth.recipe import Recipe
+from sonarsynth.recipe.scene import Scene
+from sonarsynth.signals.filtered_pulse import LONGEST_TAIL, cut_tail
+
+UNKNOWN = 0.1
+"""Part of the water, at an end, that a profile may leave out without a word."""
+NOTED = 8
+"""Sequences that the notes on scenes are from, at most."""
+
+
+def notes(made: Plan, looks: Sequence[Look]) -> tuple[str, ...]:
+    """The notes on a plan, in order of importance."""
+    recipe, scene = made.recipe, made.scene
+    found: list[str] = []
+    if made.looked_at < recipe.frames:
+        found.append(
+            f"{made.looked_at} of {recipe.frames} frames were looked at for the windows, and the ends of the "
+            "variations; each other frame is checked when it is rendered, and set aside where it does not fit"
+        )
+    found += _shared(recipe, looks)
+    if made.windows.disturbed:
+        found.append(
+            f"{made.windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest one"
+        )
+    cancelled = scene.processing.cancelling is not None
+    if made.propagation.bounces and not cancelled and made.products & {"image", "cloud"} and made.sizes["snap"]:
+        found.append("the snap's own reflections enter the image: processing.cancelling takes them out before")
+    found += lost_echoes(made) + _accuracy(made, looks) + off_the_bottom(scene)
+    for look in noted(looks):
+        found += mirror_notes(look) + overlap_notes(look)
+        found += _extent(look.scene, look.profile)
+        found += _cut(look.scene, look.profile.uniform)
+        found += validity(look.scene, look.profile)
+        found += law_notes(look)
+    return tuple(dict.fromkeys(found))
+
+
+def noted(looks: Sequence[Look]) -> list[Look]:
+    """The sequences that notes are from."""
+    real = [look for look in looks if look.real]
+    return real[:: -(-len(real) // NOTED)]
+
+
+def stored_validity(looks: Sequence[Look]) -> tuple[str, ...]:
+    """Where formulas and laws of the scenes hold and do not, one line each: as the store has them."""
+    found: list[str] = []
+    for look in noted(looks):
+        found += [*held(look), *validity(look.scene, look.profile)]
+    return tuple(dict.fromkeys(found))
+
+
+def _extent(scene: Scene, profile: Profile) -> list[str]:
+    """Where measured water ends before the real one."""
+    bed, first, last = scene.world.environment.depth, profile.depth[0], profile.depth[-1]
+    written = isinstance(scene.world.environment.sound_speed, (Tabulated, TemperatureSalinity, Cast))
+    if not written or max(first, bed - last) <= UNKNOWN * bed:
+        return []
+    known = f"at {first:g} m only" if first == last else f"from {first:g} to {last:g} m"
+    return [f"the sound speed is given {known}, of {bed:g} m of water: beyond, it stays as it is there"]
+
+
+def _shared(recipe: Recipe, looks: Sequence[Look]) -> list[str]:
+    """What sequences of different splits have in common, so that one tells of the other."""
+    if recipe.splits is None:
+        return []
+    found = []
+    held: dict[str, dict[object, set[int]]] = {"target poses": {}, "snap positions": {}}
+    for look in looks:
+        if look.real:
+            split, world = recipe.split(look.frames[0].index), look.scene.world
+            trajectory = look.scene.trajectory
+            poses = tuple((t.motion, trajectory.start, trajectory.interval) for t in world.targets)
+            snaps = tuple((s.position, s.height) for s in world.shrimp)
+            held["target poses"].setdefault(poses, set()).add(split)
+            held["snap positions"].setdefault(snaps, set()).add(split)
+    for what, splits in held.items():
+        count = sum(len(some) > 1 for some in splits.values())
+        if count:
+            found.append(f"{count} sets of {what} are the same in several splits: vary them, or see splits.undivided")
+    return found
+
+
+def _cut(scene: Scene, uniform: bool) -> tuple[str, ...]:
+    """Which snaps fall so slowly, once a path turns their phase, that the windows cut them."""
+    if uniform and not scene.physics.tracing.bounces:
+        return ()
+    tails = [cut_tail(w, scene.sonar.antialias, SUPPORT) for w in extreme_waveforms(scene)]
+    if max(tails, default=0.0) <= 10.0 * SUPPORT:
+        return ()
+    return (
+        f"turned in phase by a path, a snap falls off slowly: it is cut {LONGEST_TAIL:g} s from its collapse, at "
+        f"{max(tails):.1g} of its peak (no net impulse, or a filter without the lowest frequencies, helps)",
+    )
+
+
+def _accuracy(made: Plan, looks: Sequence[Look]) -> list[str]:
+    """Where the accuracy of the recipe costs a lot, or what the scene chooses does not keep within it."""
+    found, allowed, errors, parts = [], made.recipe.accuracy, made.errors, made.choices.subarrays
+    if parts > 1 and errors.whole > 0.0:
+        found.append(
+            f"accuracy.signal {allowed.signal:g} takes {parts} subarrays, each traced by itself: one would err by "
+            f"{errors.whole:.2g}"
+        )
+    if made.choices.visibility == "hydrophones" and made.scene.physics.visibility == "auto":
+        found.append(
+            f"accuracy.signal {allowed.signal:g} takes each hydrophone's own view of the targets: that from the middle "
+            f"of the array errs by {errors.whole:.2g}"
+        )
+    if np.hypot(np.nan_to_num(errors.expansion), np.nan_to_num(errors.synthesis)) > allowed.signal:
+        found.append(
+            f"signals err by {errors.expansion:.2g} (paths over the array) and {errors.synthesis:.2g} (synthesis): "
+            f"accuracy.signal allows {allowed.signal:g}, but the scene says how they are made (scene.physics)"
+        )
+    tolerance = 20.0 * np.log10(1.0 + allowed.signal)
+    if made.absorption_error > tolerance:
+        found.append(
+            f"the spectrum of absorption is one for all paths, of their mean depth: {made.absorption_error:.2g} dB off "
+            f"at most at the ends of the band, where accuracy.signal allows {tolerance:.2g} dB"
+        )
+    if errors.ranging > allowed.range_m:
+        found.append(
+            f"ranges err by {errors.ranging:.2g} m{_why_ranges_err(made.scene, looks)}: accuracy.range_m allows "
+            f"{allowed.range_m:g}, but the scene asks for '{made.choices.ranging.kind}' (scene.processing.ranging)"
+        )
+    if errors.image > allowed.image_db:
+        found.append(
+            f"beams err by {errors.image:.2g} dB where the focus is not theirs: accuracy.image_db allows "
+            f"{allowed.image_db:g}; more scene.processing.beamforming.zones, or kind dense"
+        )
+    return found
+
+
+def off_the_bottom(scene: Scene) -> list[str]:
+    """Which shrimp the sonar does not find where it may look for them."""
+    if not (names := standing_off(scene)) or scene.processing.locating.on_bottom is False:
+        return []
+    told = scene.processing.locating.on_bottom is True
+    then = "the sonar takes it for being there" if told else "snaps are located by their wavefronts alone"
+    return [f"{', '.join(names)}: not on the bottom; {then} (scene.processing.locating.on_bottom)"]
+
+
+def _why_ranges_err(scene: Scene, looks: Sequence[Look]) -> str:
+    """What the closed form of ranges leaves out of the water: bent rays, or only that it assumes another speed."""
+    if not all(look.profile.uniform for look in looks):
+        return " where rays bend"
+    assumed = scene.sonar.assumed_sound_speed
+    speed = max((float(look.profile.speed[0]) for look in looks), key=lambda real: abs(real - assumed))
+    return f", for sound travels at {speed:g} m/s and scene.sonar.assumed_sound_speed is {assumed:g} m/s"

@@ -1,0 +1,271 @@
+"""Is everything in the water, and can every file be read? Asked before anything is computed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.casting.ray_casting import inside
+from sonarsynth.conventions import FASTEST, REFERENCE_PRESSURE, SLOWEST, Floats, depth, size
+from sonarsynth.description import FieldError
+from sonarsynth.description.memory import frame_bytes, free_bytes
+from sonarsynth.environment.casts import profile_of
+from sonarsynth.environment.sea import Profile
+from sonarsynth.environment.sound_speed import Cast, Tabulated, TemperatureSalinity
+from sonarsynth.equations.bubble.snap_pressure import onset
+from sonarsynth.equations.rays.ray_solutions import TOLERANCE
+from sonarsynth.geometry.mesh import in_blocks
+from sonarsynth.geometry.motion import pose
+from sonarsynth.geometry.placed_target import Body
+from sonarsynth.imaging import FocusedDelayAndSum
+from sonarsynth.receiver import Sonar, elements
+from sonarsynth.recipe.scene import Frame, Scene
+from sonarsynth.signals.array_paths import MOST_STRETCH
+from sonarsynth.signals.filtered_pulse import bubble, heard_part
+from sonarsynth.sources.shrimp import LogarithmicBubble, SnappingShrimp
+from sonarsynth.sources.snap_pulses import largest_scales, pulse, waveform
+from sonarsynth.state import meeting_times, model_of
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import MeshFile
+from sonarsynth.targets.target import mesh_for
+
+if TYPE_CHECKING:
+    from sonarsynth.planning.plans import Windows
+
+CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+FARTHEST = 1e6
+"""m from the origin: beyond, travel times lose their microseconds."""
+CLOSEST = 1e-3
+"""m: a snap no nearer to the centre of the array."""
+LOUDEST = 300.0
+"""dB re 1 uPa at 1 m: single precision holds the signals of no louder snap everywhere."""
+LONGEST_SNAP = 0.1
+"""s."""
+FAINTEST = 1e-9
+"""Part of a snap that the filter must let pass: what rounding makes of nothing is less."""
+IN_WATER = (1000.0, 2500.0)
+"""m/s: what may be measured in water, warm or cold, in depths or in a tank."""
+STEEPEST = 1e6
+"""m/s a metre: more is a jump, which is written as two speeds at one depth."""
+
+
+def read_inputs(scene: Scene) -> Profile:
+    """Read the cast and the meshes, so that a missing or broken file is known before anything is computed."""
+    world = ("scene", "world")
+    try:
+        profile = profile_of(scene.world.environment.sound_speed)
+    except (ValueError, OSError, ImportError) as error:
+        raise FieldError((*world, "environment", "sound_speed"), str(error)) from None
+    _check_profile(scene, profile)
+    for i, (target, law) in enumerate(zip(scene.world.targets, scene.laws, strict=True)):
+        try:
+            _check_plain(scene, i)
+            mesh_for(target.shape, law, scene.sonar.shortest_wavelength)
+        except FieldError:
+            raise
+        except (ValueError, OSError) as error:
+            raise FieldError((*world, "targets", i, "shape"), str(error)) from None
+    try:
+        elements(scene.sonar.array)
+    except ValueError as error:
+        raise FieldError(("scene", "sonar", "array"), str(error)) from None
+    return profile
+
+
+def _check_profile(scene: Scene, profile: Profile) -> None:
+    """The sound speed must be that of water, somewhere above the bed, and change at a rate that rays can follow."""
+    path = ("scene", "world", "environment", "sound_speed")
+    measured = isinstance(scene.world.environment.sound_speed, (Tabulated, TemperatureSalinity, Cast))
+    slowest, fastest = IN_WATER if measured else (SLOWEST, FASTEST)
+    odd = np.flatnonzero(~((profile.speed >= slowest) & (profile.speed <= fastest)))
+    if len(odd):
+        feet = IN_WATER[0] <= 0.3048 * profile.speed[odd[0]] <= IN_WATER[1]
+        raise FieldError(
+            path,
+            f"is {profile.speed[odd[0]]:g} m/s at {profile.depth[odd[0]]:g} m, outside {slowest:g} to {fastest:g} m/s"
+            + (": is it in feet a second?" if feet else ""),
+        )
+    if profile.depth[0] > scene.world.environment.depth:
+        raise FieldError(
+            path,
+            f"is given from {profile.depth[0]:g} m down, below the bed at {scene.world.environment.depth:g} m",
+        )
+    steep = np.flatnonzero(np.abs(np.diff(profile.speed)) > STEEPEST * np.diff(profile.depth))
+    jumps = steep[np.diff(profile.depth)[steep] > 0]
+    if len(jumps):
+        at, below = profile.depth[jumps[0]], profile.depth[jumps[0] + 1]
+        raise FieldError(
+            path,
+            f"changes by more than {STEEPEST:g} m/s a metre between {at:.12g} and {below:.12g} m",
+        )
+
+
+def _check_plain(scene: Scene, number: int) -> None:
+    """A mesh file must be in the water as it stands, before it is cut into many facets: its unit may be wrong."""
+    target, bed = scene.world.targets[number], scene.world.environment.depth
+    if not isinstance(target.shape, MeshFile):
+        return
+    plain = mesh_of(replace(target.shape, edge=None, smooth=False))
+    body = Body(target.name, plain, pose(target.motion, scene.trajectory.time(0)), np.zeros(3))
+    if not _box_in_water(body, bed):
+        size = float(np.ptp(plain.box, axis=0).max())
+        what = f"target '{body.name}', {size:.3g} m long with numbers in {target.shape.unit},"
+        _check_depth(("scene", "world", "targets", number, "motion"), what, _places(body), bed, "the first frame")
+
+
+def check_shrimp(scene: Scene) -> None:
+    """Every shrimp must be in the water, and its snap one that can be made and heard."""
+    bed = scene.world.environment.depth
+    for i, shrimp in enumerate(scene.world.shrimp):
+        position = shrimp.position
+        if max(map(abs, position)) > FARTHEST:
+            raise FieldError(
+                ("scene", "world", "shrimp", i, "position"), f"is more than {FARTHEST:g} m from the origin"
+            )
+        down = -position[2] if len(position) > 2 else bed - shrimp.height
+        if not 0 <= down <= bed:
+            raise FieldError(
+                ("scene", "world", "shrimp", i, "position"),
+                f"depth {down:.12g} m is outside the water (0 to {bed:g} m)",
+            )
+        try:
+            _check_snap(shrimp, bed, scene.sonar)
+        except ValueError as error:
+            raise FieldError(("scene", "world", "shrimp", i, "snap"), str(error)) from None
+
+
+def check_frame(scene: Scene, frame: Frame) -> None:
+    """The array and every body must be in the water, and no snap inside a body or the array."""
+    bed = scene.world.environment.depth
+    reach = elements(scene.sonar.array).position
+    when = f"frame {frame.index}"
+    _check_depth(("scene", "trajectory", "sonar"), "the array", frame.sonar_pose.to_world(reach), bed, when)
+    for i, body in enumerate(frame.moment.bodies):
+        path = ("scene", "world", "targets", i, "motion")
+        if not _box_in_water(body, bed):
+            _check_depth(path, f"target '{body.name}'", _places(body), bed, when)
+        if scene.physics.doppler:
+            _check_speed(scene, frame, i)
+            _check_met(scene, frame, i)
+        if inside(body, frame.sonar_pose.position):
+            raise FieldError(path, f"target '{body.name}' has the sonar inside at frame {frame.index}")
+    _check_snaps(scene, frame)
+
+
+def _check_met(scene: Scene, frame: Frame, number: int) -> None:
+    """A body must be in the water where the sound of each snap meets it, and no snap inside it when it sounds."""
+    body, slowest = frame.moment.bodies[number], float(profile_of(scene.world.environment.sound_speed).speed.min())
+    snaps, path = frame.moment.snaps, ("scene", "world", "targets", number, "motion")
+    if body.track.still or not snaps:
+        return
+    met = meeting_times([body.track], snaps, lambda start, end: np.linalg.norm(end - start, axis=1) / slowest)
+    bed, what = scene.world.environment.depth, f"target '{body.name}', where sound meets it,"
+    for late in {float(met.min()), float(met.max())}:
+        there = body.later(late)
+        if not _box_in_water(there, bed):
+            _check_depth(path, what, _places(there), bed, f"frame {frame.index}")
+    for snap in snaps:
+        if snap.time and inside(body.later(snap.time), snap.position):
+            raise FieldError(path, f"{what} has a snap inside at frame {frame.index}")
+
+
+def _check_speed(scene: Scene, frame: Frame, number: int) -> None:
+    """Nothing moves so fast that the pulses are stretched beyond what the synthesis can do (`MOST_STRETCH`)."""
+    body, array = frame.moment.bodies[number], float(np.linalg.norm(frame.sonar_velocity))
+    own = float(np.linalg.norm(body.velocity))
+    slowest = float(profile_of(scene.world.environment.sound_speed).speed.min())
+    if array + 2.0 * own > 0.9 * MOST_STRETCH * slowest:
+        sonar = array > 2.0 * own
+        path = ("scene", "trajectory", "sonar") if sonar else ("scene", "world", "targets", number, "motion")
+        what, speed = ("the array", array) if sonar else (f"target '{body.name}'", own)
+        raise FieldError(path, f"{what} moves at {speed:.3g} m/s at frame {frame.index}, too fast for sound in water")
+
+
+def _check_snaps(scene: Scene, frame: Frame) -> None:
+    """No shrimp is at the centre of the array, or inside a target."""
+    owners = [i for i, shrimp in enumerate(scene.world.shrimp) for _ in shrimp.snap_times]
+    for owner, snap in zip(owners, frame.moment.snaps, strict=True):
+        path = ("scene", "world", "shrimp", owner, "position")
+        if np.linalg.norm(snap.position - frame.sonar_pose.position) < CLOSEST:
+            raise FieldError(path, f"is at the centre of the array at frame {frame.index}")
+        for body in frame.moment.bodies:
+            if inside(body, snap.position):
+                raise FieldError(path, f"is inside target '{body.name}' at frame {frame.index}")
+
+
+def check_methods(scene: Scene, products: frozenset[str]) -> None:
+    """The beamformer must be able to use the array."""
+    fast = isinstance(scene.processing.beamforming, FocusedDelayAndSum)
+    if fast and products & {"image", "cloud"} and not elements(scene.sonar.array).on_lattice:
+        raise FieldError(
+            ("scene", "processing", "beamforming", "kind"),
+            "'focused' needs an array on a lattice; use 'dense' for a table of positions",
+        )
+
+
+def check_windows(scene: Scene, windows: Windows) -> None:
+    """The echo window must hold a period of the band, and a frame must fit in the memory that is free here."""
+    path = ("scene", "processing", "echo_window")
+    length, period = windows.echo_stop - windows.echo_start, 1.0 / scene.sonar.band.high
+    if length < period:
+        raise FieldError(path, f"is {length:.3g} s long, less than a period of the highest frequency, {period:.3g} s")
+    sensors, facets = elements(scene.sonar.array).count, sum(len(mesh.faces) for mesh in scene.meshes)
+    needed, free = frame_bytes(facets, sensors * windows.samples), free_bytes()
+    if needed > max(free, frame_bytes(facets, 0)):  # meshes are checked by themselves
+        seconds = windows.samples / scene.sonar.sampling_frequency
+        raise FieldError(
+            path,
+            f"a frame would take {size(needed)} of memory, and {size(free)} are free here ({sensors} hydrophones for "
+            f"{seconds:.3g} s): the arrivals are too far apart in time",
+        )
+
+
+def _box_in_water(body: Body, bed: float) -> bool:
+    """Whether the box round a body is in the water: then all of the body is."""
+    low, high = body.mesh.box
+    corners = body.pose.to_world(low + CORNERS * (high - low))
+    down = depth(corners)
+    return bool(down.min() >= 0.0 and down.max() <= bed and np.abs(corners).max() <= FARTHEST)
+
+
+def _places(body: Body) -> Floats:
+    """Places in the world of the vertices of a body that lie farthest out along each axis of the world, either way."""
+    extreme = []
+    for some in in_blocks(len(body.mesh.vertices)):
+        places = body.pose.to_world(body.mesh.vertices[some])
+        extreme.append(places[np.concatenate([places.argmin(axis=0), places.argmax(axis=0)])])
+    return np.concatenate(extreme)
+
+
+def _check_snap(shrimp: SnappingShrimp, bed: float, sonar: Sonar) -> None:
+    """Whether the snap can be made, is short, neither too loud nor out of the sonar's band; else ValueError."""
+    model = model_of(shrimp, bed)
+    gain, longest = largest_scales(shrimp.variation)
+    if isinstance(model, LogarithmicBubble):
+        duration = -onset(bubble(model))
+        if not 1.0 / -model.q < duration:
+            raise ValueError(f"grows for {duration:.3g} s and has no time to collapse: q is too small")
+        if not longest * duration <= LONGEST_SNAP:
+            raise ValueError(f"grows for {longest * duration:.3g} s; a snap is over in {LONGEST_SNAP:g} s")
+    made = pulse(model, 0.0, 0.0)
+    if not longest * (made.end - made.start) <= LONGEST_SNAP:
+        raise ValueError(f"lasts {longest * (made.end - made.start):.3g} s; a snap is over in {LONGEST_SNAP:g} s")
+    level = float(20.0 * np.log10(gain * made.peak / REFERENCE_PRESSURE))
+    if not abs(level) <= LOUDEST:
+        raise ValueError(f"makes a source level of {level:.3g} dB re 1 uPa at 1 m; {LOUDEST:g} dB is the most")
+    for width in {longest, 1.0 / longest}:
+        part = heard_part(waveform(model, width), sonar.antialias)
+        if not part >= FAINTEST:
+            raise ValueError(f"is not heard: the sonar's filter lets {part:.1g} of it pass")
+
+
+def _check_depth(path: tuple[str | int, ...], what: str, points: Floats, bed: float, when: str) -> None:
+    if not np.abs(points).max() <= FARTHEST:
+        raise FieldError(path, f"{what} is more than {FARTHEST:g} m from the origin at {when}")
+    shallow, deep = float(depth(points).min()), float(depth(points).max())
+    if shallow < -TOLERANCE:
+        raise FieldError(path, f"{what} is {-shallow:.3g} m above the surface at {when}")
+    if deep > bed + TOLERANCE:
+        raise FieldError(path, f"{what} is {deep - bed:.3g} m below the bed at {when}")

@@ -1,0 +1,143 @@
+"""What a user should know about the bodies of a plan: where laws hold for them, which overlap, which are mirrored."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.labels.views import View, box_in_view
+from sonarsynth.planning.measured.sampled_frames import Look
+from sonarsynth.receiver import elements
+from sonarsynth.receiver.mirror_images import mirror_image, mirror_normal
+from sonarsynth.recipe.scene import Frame
+from sonarsynth.scattering import Scatterer
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.overlaps import overlap, sphere_round
+from sonarsynth.targets.shapes import Box
+
+FRAMES = 64
+"""Frames of a sequence that bodies are compared in, at most; first and last among them."""
+UNIT_BOX = mesh_of(Box(size=(1.0, 1.0, 1.0)))
+
+
+def chosen(look: Look) -> tuple[Frame, ...]:
+    """So many of the frames of a look, evenly spread."""
+    count = len(look.frames)
+    return tuple(look.frames[n] for n in sorted({int(n) for n in np.linspace(0, count - 1, min(count, FRAMES))}))
+
+
+def law_notes(look: Look) -> list[str]:
+    """Where the laws of a scene do not hold for its bodies, and what meshes stand for."""
+    found: list[str] = []
+    targets = zip(look.scene.world.targets, look.scene.laws, bodies(look), strict=True)
+    for target, law, body in targets:
+        found += [f"{target.name}: {line}" for line in (*body.mesh.notes, *law.validity(body))]
+    return found
+
+
+def held(look: Look) -> list[str]:
+    """Where the law of each body of a scene holds or does not, one line at least a body."""
+    found: list[str] = []
+    for target, law, body in zip(look.scene.world.targets, look.scene.laws, bodies(look), strict=True):
+        low, high = body.ka
+        notes = law.validity(body) or (f"holds, by size, facets and angles: ka {low:.3g} to {high:.3g} in the band",)
+        found += [f"{target.name}: {law.kind}: {line}" for line in notes]
+    return found
+
+
+def bodies(look: Look) -> list[Scatterer]:
+    """The bodies of a scene as laws are asked about them."""
+    sonar, speed = look.scene.sonar, look.profile.speed
+    aperture, frames = elements(sonar.array).aperture, chosen(look)
+    found = []
+    for number, mesh in enumerate(look.scene.meshes):
+        distances, angles = [np.inf], [0.0]
+        for frame in frames:
+            centre, radius = sphere_round(frame.moment.bodies[number])
+            away = frame.sonar_pose.position - centre
+            distances.append(float(np.linalg.norm(away)) - radius)
+            for snap in frame.moment.snaps:
+                angles.append(_between(away, snap.position - centre))
+        wavelengths = float(speed.min()) / sonar.band.high, float(speed.max()) / sonar.band.low
+        found.append(Scatterer(mesh, *wavelengths, min(distances), aperture, max(angles)))
+    return found
+
+
+def _between(one: Floats, other: Floats) -> float:
+    """Angle (rad) between two vectors (xyz); 0 where one has no length."""
+    lengths = float(np.linalg.norm(one) * np.linalg.norm(other))
+    return float(np.arccos(np.clip(one @ other / lengths, -1.0, 1.0))) if lengths > 0.0 else 0.0
+
+
+def overlap_notes(look: Look) -> list[str]:
+    """Which bodies overlap, how, and in which frames."""
+    when: dict[tuple[str, str, str], list[int]] = {}
+    known: dict[tuple[int, int, bytes], str | None] = {}
+    frames = chosen(look)
+    for frame in frames:
+        for one, other in _near(frame):
+            a, b = frame.moment.bodies[one], frame.moment.bodies[other]
+            place = a.pose.to_body(b.pose.position), a.pose.turn_to_body(b.pose.turn_to_world(np.eye(3)))
+            key = one, other, np.round(np.concatenate([place[0], place[1].ravel()]), 9).tobytes()
+            if key not in known:
+                known[key] = overlap(a, b)
+            if how := known[key]:
+                when.setdefault((a.name, b.name, how), []).append(frame.index)
+    return [
+        f"{a} and {b} {how} {said(indices, len(frames))}: no sound comes from within the other; of surfaces that "
+        "coincide one echo is heard, and labels, as both being seen, are of each by itself"
+        for (a, b, how), indices in when.items()
+    ]
+
+
+def said(indices: Sequence[int], of: int) -> str:
+    """Some frames out of so many, in words."""
+    if len(indices) == of:
+        return "in every frame" if of > 1 else f"in frame {indices[0]}"
+    return f"in {len(indices)} of {of} frames looked at (the first: frame {indices[0]})"
+
+
+def _near(frame: Frame) -> Iterator[tuple[int, int]]:
+    """Pairs of bodies whose bounding spheres meet."""
+    if len(frame.moment.bodies) < 2:
+        return
+    centre, radius = (np.array(column) for column in zip(*map(sphere_round, frame.moment.bodies), strict=True))
+    for one in range(len(centre) - 1):
+        apart = np.linalg.norm(centre[one + 1 :] - centre[one], axis=1)
+        for other in np.flatnonzero(apart < radius[one] + radius[one + 1 :]).tolist():
+            yield one, one + 1 + other
+
+
+def mirror_notes(look: Look) -> list[str]:
+    """Which snaps and targets an array that cannot tell front from back hears as if in front, in which frames."""
+    sonar = look.scene.sonar
+    array = elements(sonar.array)
+    normal = mirror_normal(array, float(look.profile.speed.min()) / sonar.band.high)
+    if normal is None:
+        return []
+    frames = chosen(look)
+    when: dict[str, list[int]] = {}
+    snaps: list[int] = []
+    for frame in frames:
+        if any(float(frame.sonar_pose.to_body(snap.position) @ normal) < 0.0 for snap in frame.moment.snaps):
+            snaps.append(frame.index)
+        for target, body in zip(look.scene.world.targets, frame.moment.bodies, strict=True):
+            low, high = body.mesh.box
+            corners = body.pose.to_world(0.5 * (low + high) + UNIT_BOX.vertices * (high - low))
+            seen = frame.sonar_pose.to_body(corners)
+            if (seen @ normal >= 0.0).all():
+                continue
+            behind = UNIT_BOX.faces[(seen @ normal)[UNIT_BOX.faces].min(axis=1) < 0.0]
+            if box_in_view(mirror_image(seen, normal), behind, sonar.beams).view <= View.PARTLY_IN_VIEW:
+                when.setdefault(target.name, []).append(frame.index)
+    plane = "the hydrophones lie in a plane and hear alike from both of its sides"
+    found = []
+    if snaps:
+        found = [f"snaps come from behind the array {said(snaps, len(frames))}, taken for their mirror images: {plane}"]
+    return found + [
+        f"{name}: behind the array {said(indices, len(frames))}, and its mirror image is within the beams: points "
+        f"in front of the array that are not there; {plane}"
+        for name, indices in when.items()
+    ]

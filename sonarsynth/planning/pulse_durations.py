@@ -1,0 +1,85 @@
+"""How long pulses are, as the sonar hears them: what windows must hold of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sonarsynth.conventions import SLOWEST, Floats
+from sonarsynth.environment.boundary_numbers import rms_height
+from sonarsynth.geometry.mesh import farthest_corner
+from sonarsynth.planning.measured.sampled_frames import Look
+from sonarsynth.planning.plans import Supports
+from sonarsynth.receiver import elements
+from sonarsynth.recipe.scene import Scene
+from sonarsynth.scattering import Kirchhoff, PartlyReflecting
+from sonarsynth.signals import pulse_support
+from sonarsynth.signals.filtered_pulse import FEET, at_longest, silencing_blur
+from sonarsynth.sources.snap_pulses import Waveform, largest_scales, waveform
+from sonarsynth.state import model_of
+
+SUPPORT = 1e-7
+"""The sample window holds every pulse down to this part of its peak; so long after the direct one begin the echoes."""
+TAIL = 1e-3
+"""s after the direct pulse in its plain shape: echoes are heard from then on, though a turned one has a longer tail."""
+ECHO_SUPPORT = 1e-4
+"""The echo window holds every echo down to this part of its peak: its feet, under -80 dB, are cut."""
+FOOT = 1e-2
+"""Where the direct pulse is in the way, feet of echoes under this part of their peak may be cut."""
+
+
+def supports_of(looks: Sequence[Look]) -> Supports:
+    """How long pulses are, over all scenes."""
+    rows = []
+    for look in looks:
+        scene, profile = look.scene, look.profile
+        across = elements(scene.sonar.array).aperture / profile.speed.min()  # of a wave, from the centre to the edge
+        lossy = any(isinstance(law, Kirchhoff) and isinstance(law.surface, PartlyReflecting) for law in scene.laws)
+        turned = lossy or scene.physics.tracing.bounces > 0 or not profile.uniform  # also caustics turn the phase
+        before, after = _support(scene, SUPPORT, turned=turned) + across
+        plain = _support(scene, SUPPORT, turned=False)[1]
+        clear = min(after, plain + across + TAIL)  # a turned pulse may never end: what echoes meanwhile must be heard
+        echo, foot = (_support(scene, part, turned=turned) + across for part in (ECHO_SUPPORT, FOOT))
+        rows.append((before, after, *echo, clear, foot.max()))
+    return Supports(*(float(n) for n in np.max(rows, axis=0)))
+
+
+def _support(scene: Scene, tolerance: float, *, turned: bool) -> Floats:
+    """Longest time (s) before and after its collapse that any filtered snap exceeds `tolerance` of its peak, and the
+    echo of any facet."""
+    chosen, waveforms = scene.sonar.antialias, extreme_waveforms(scene)
+    supports = [(0.0, 0.0), *(pulse_support(w, chosen, tolerance, turned=turned) for w in waveforms)]
+    for law, mesh in zip(scene.laws, scene.meshes, strict=True):
+        if isinstance(law, Kirchhoff):
+            smooth = [pulse_support(w, chosen, tolerance, turned=turned, sloped=True) for w in waveforms]
+            rough = [
+                pulse_support(w, chosen, tolerance, turned=turned, rough=2.0 * law.roughness / SLOWEST)
+                for w in waveforms
+                if law.roughness > 0
+            ]
+            corner = 2.0 * farthest_corner(mesh) / SLOWEST
+            supports += [(before + corner, after + corner) for before, after in smooth + rough]
+    return np.asarray(np.max(supports, axis=0))
+
+
+def blur_of(scene: Scene) -> float:
+    """By how much (s) rough boundaries and bodies lengthen the pulses that they reflect and leave anything of."""
+    environment, bounces = scene.world.environment, scene.physics.tracing.bounces
+    heights = [law.roughness for law in scene.laws if isinstance(law, Kirchhoff)]
+    roughest = max(rms_height(environment.surface), rms_height(environment.bed))
+    most = np.hypot(max(heights, default=0.0), roughest * np.sqrt(bounces))
+    if not most > 0.0:
+        return 0.0
+    blur = 2.0 * most / SLOWEST  # at the steepest grazing angle
+    silent = max((silencing_blur(w, scene.sonar.antialias) for w in extreme_waveforms(scene)), default=0.0)
+    return float(FEET * min(blur, silent))
+
+
+def extreme_waveforms(scene: Scene) -> list[Waveform]:
+    """What each shrimp may sound like at the most: as its model, as long as it may become, and as short."""
+    found = []
+    for shrimp in scene.world.shrimp:
+        model, longest = model_of(shrimp, scene.world.environment.depth), largest_scales(shrimp.variation)[1]
+        found += [at_longest(waveform(model, width)) for width in sorted({1.0, longest, 1.0 / longest})]
+    return found

@@ -1,0 +1,58 @@
+"""What surface and bed do to each path, and caustics on the way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.environment.boundary_numbers import bounces
+from sonarsynth.environment.sea import Environment, Profile
+from sonarsynth.products import Paths
+
+
+@dataclass(frozen=True, eq=False)
+class Reflections:
+    """What paths lose and how their pulses change by reflections and caustics."""
+
+    modulus: Floats  # (path,)
+    phase: Floats  # (path,) rad
+    blur: Floats  # (path,) s
+
+
+def reflections(environment: Environment, profile: Profile, paths: Paths, centre: float) -> Reflections:
+    """Of all reflections and caustics of each path; centre (Hz): of the band, where the loss in bubbles is taken.
+
+    A caustic advances the phase by a quarter period: exp(+i pi/2) at positive frequencies, in time dependence
+    exp(+i 2 pi f t). Source: Jensen, Kuperman, Porter and Schmidt (2011), Computational Ocean Acoustics, section 3.3.
+    """
+    changed = at_boundaries(
+        environment, profile, paths.surface_grazing, paths.surface, paths.bottom_grazing, paths.bottom, centre
+    )
+    return Reflections(changed.modulus, changed.phase + 0.5 * np.pi * paths.caustics, changed.blur)
+
+
+def at_boundaries(
+    environment: Environment,
+    profile: Profile,
+    surface_grazing: Floats,
+    surface: Ints,
+    bottom_grazing: Floats,
+    bottom: Ints,
+    centre: float,
+) -> Reflections:
+    """Of so many reflections (path,) at grazing angles (path,) in rad."""
+    if not (surface.any() or bottom.any()):
+        return Reflections(np.ones(surface.shape), np.zeros(surface.shape), np.zeros(surface.shape))
+    over = bounces(environment.surface, surface_grazing, surface, float(profile.at(0.0)), centre)
+    under = bounces(environment.bed, bottom_grazing, bottom, float(profile.at(environment.depth)), centre)
+    return Reflections(over.modulus * under.modulus, over.phase + under.phase, np.hypot(over.blur, under.blur))
+
+
+def as_sign(phase: Floats) -> tuple[Floats, Floats]:
+    """Sign (path,) and what is left of phases (path,), 0 for whole multiples of pi, else as it is within a turn."""
+    half = np.rint(phase / np.pi)
+    whole = np.abs(phase - np.pi * half) < 1e-9
+    sign = np.where(whole & (np.mod(half, 2) == 1), -1.0, 1.0)
+    return sign, np.where(whole, 0.0, np.mod(phase + np.pi, 2.0 * np.pi) - np.pi)

@@ -1,0 +1,76 @@
+"""Straight rays."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, depth
+from sonarsynth.description import description
+from sonarsynth.environment.sea import Profile
+from sonarsynth.equations.rays.ray_solutions import COINCIDENT, GOOD, mean_slowness, water, within
+from sonarsynth.products import Paths
+from sonarsynth.propagation.bounces import Bounces
+from sonarsynth.propagation.images import images, order
+
+
+@description
+class Straight:
+    """Straight rays at the mean slowness of the depths that they cross: exact where the sound speed is uniform."""
+
+    kind: Literal["straight"] = "straight"
+    bounces: Bounces = 0
+    """Most reflections from surface and bed on the way from the snap to the array."""
+
+    @property
+    def bends(self) -> bool:
+        """Whether rays bend where the sound speed varies."""
+        return False
+
+    def connect(self, profile: Profile, environment_depth: float, start: Floats, end: Floats) -> Paths:
+        """One path a pair and family, 1/r; arguments and errors as in `Propagation`. Coincident ends are flagged."""
+        layers = water(profile.depth, profile.speed, environment_depth)
+        z1, z2 = within(layers, depth(start), "start"), within(layers, depth(end), "end")
+        level = np.asarray(end, float)[:, :2] - np.asarray(start, float)[:, :2]
+        if not np.isfinite(level).all():
+            raise ValueError("paths need finite ends")
+        speed = profile.speed[0]
+        slowness = [np.full(len(z1), 1.0 / speed)] * 3
+        if not profile.uniform:
+            top, bottom = np.minimum(z1, z2), np.maximum(z1, z2)
+            ends = ((0.0 * top, top), (top, bottom), (bottom, 0.0 * bottom + environment_depth))
+            slowness = [mean_slowness(layers, a, b) for a, b in ends]
+        columns = []
+        for image in images(z1, z2, environment_depth, self.bounces):
+            height = np.abs(image.climb)
+            length = np.sqrt(level[:, 0] ** 2 + level[:, 1] ** 2 + height**2)
+            parts = (image.above, image.between, image.below)
+            crossed = sum(part * s for part, s in zip(parts, slowness, strict=True))
+            mean = np.divide(crossed, height, out=slowness[1].copy(), where=height > 0)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                departure = np.column_stack([level, image.climb]) / length[:, None]
+                spreading, grazing = 1.0 / length, np.arcsin(height / length)
+            none = np.zeros(len(length), int)
+            columns.append(
+                {
+                    "pair": np.arange(len(length)),
+                    "travel_time": length * (1.0 / speed if profile.uniform else mean),
+                    "length": length,
+                    "departure": departure,
+                    "arrival": departure * [1.0, 1.0, image.turns],
+                    "spreading": spreading,
+                    "surface": none + image.surface,
+                    "bottom": none + image.bottom,
+                    "turning": none,
+                    "caustics": none,
+                    "surface_grazing": grazing if image.surface else np.full(len(length), np.nan),
+                    "bottom_grazing": grazing if image.bottom else np.full(len(length), np.nan),
+                    "flag": np.where(length > 0, GOOD, COINCIDENT),
+                }
+            )
+        if len(columns) == 1:
+            return Paths(**columns[0])
+        joined = {name: np.concatenate([c[name] for c in columns]) for name in columns[0]}
+        rows = order(joined["pair"], joined["travel_time"])
+        return Paths(**{name: value[rows] for name, value in joined.items()})

@@ -1,0 +1,1 @@
+"""Taking the direct pulse and its reflections out of the signals."""

@@ -1,0 +1,230 @@
+"""The snap's own reflections: predicted from where the snap is, found in the signals, and taken out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, azimuth_elevation
+from sonarsynth.geometry import Pose
+from sonarsynth.products import Bearings, Signals
+from sonarsynth.ranging import ranging_kernels
+from sonarsynth.ranging.location import pulse_times
+from sonarsynth.ranging.location.locating import MAX_LAG
+from sonarsynth.ranging.location.plane_waves import (
+    HALF,
+    Front,
+    Part,
+    brightness,
+    cut,
+    look,
+    part_of,
+    refine,
+    restored,
+    without,
+)
+from sonarsynth.receiver import Elements, Sonar
+
+SENSORS: Final = 32
+"""Fewer live sensors cancel nothing: an echo would lose more than one part in so many (0.14 dB)."""
+PASSES: Final = 3
+"""Times that arrivals which overlap are each taken out anew, with the others gone."""
+SETTLED: Final = 0.01
+"""A pass that gains less than this share of the first is the last."""
+
+REASONS: Final = (
+    "cancelled",
+    "outside the echo window",
+    "too near a direct pulse",
+    "inside the field of view",
+    "not bright enough",
+    "does not fit a wavefront",
+    "weaker than expected",
+)
+"""What became of an expected arrival: `Outcome.reason` is an index."""
+CANCELLED, OUTSIDE, DIRECT, SEEN, FAINT, UNFIT, WEAK = range(len(REASONS))
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What is looked for, and what counts as found; see `WavefrontCancelling`."""
+
+    bounces: int
+    search: float  # rad
+    excess: float  # dB
+    weakest: float  # dB
+
+
+@dataclass(frozen=True, eq=False)
+class Expected:
+    """An arrival as straight paths, and reflections without loss, would bring it."""
+
+    surface: int  # reflections
+    bottom: int
+    front: Front
+    energy: float  # Pa2 s at a sensor in the band, its face's response included
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What became of an expected arrival."""
+
+    expected: Expected
+    reason: int  # index into REASONS
+    found: Front | None = None  # as fitted, where it was
+    excess: float = float("nan")  # dB: of a beam on it over all else in its window; NaN where it was not fitted
+
+
+@dataclass(frozen=True, eq=False)
+class Cancelled:
+    """Signals without the arrivals that were found, and what became of each that was expected."""
+
+    signals: Signals  # the same object where nothing was taken out
+    outcomes: tuple[Outcome, ...]  # loudest expected first
+
+
+def images(position: Floats, pose: Pose, bed_depth: float, bounces: int) -> list[tuple[int, int, Floats]]:
+    """Reflections at surface and at bed, and image source (xyz, sonar frame), of every path of up to `bounces`.
+
+    Two paths of each number of reflections: the first at the surface, or at the bed.
+    """
+    found = []
+    for first in (0, 1):
+        place = pose.to_world(position).copy()
+        for n in range(bounces):
+            at_bed = (first + n) % 2
+            place[2] = -2 * bed_depth * at_bed - place[2]
+            bottom = (n + 1 + first) // 2
+            found.append((n + 1 - bottom, bottom, pose.to_body(place)))
+    return found
+
+
+def cancel(
+    signals: Signals,
+    bearings: Bearings,
+    elements: Elements,
+    sonar: Sonar,
+    pose: Pose,
+    bed_depth: float,
+    window: tuple[float, float],
+    limits: Limits,
+) -> Cancelled:
+    """Signals without the located snaps' reflections in the echo `window` (start, stop), in s.
+
+    See `WavefrontCancelling`. Loudest first, so that each is looked for with the louder ones gone.
+    """
+    if np.sum(elements.gain != 0) < SENSORS:
+        return Cancelled(signals, ())
+    expected = expect(signals, bearings, elements, sonar, pose, bed_depth, limits.bounces)
+    left, outcomes, taken = signals, [], []
+    for each in sorted(expected, key=lambda e: -e.energy):
+        reason = _out_of_question(each.front, bearings, elements, sonar, window)
+        outcome = Outcome(each, reason) if reason != CANCELLED else find(left, elements, sonar, each, limits)
+        outcomes.append(outcome)
+        if outcome.reason == CANCELLED and outcome.found is not None:
+            taken.append(part_of(left, elements, sonar, outcome.found))
+            left, _ = without(left, taken[-1])
+    return Cancelled(_settle(left, elements, sonar, taken), tuple(outcomes))
+
+
+def expect(
+    signals: Signals,
+    bearings: Bearings,
+    elements: Elements,
+    sonar: Sonar,
+    pose: Pose,
+    bed_depth: float,
+    bounces: int,
+) -> list[Expected]:
+    """Every reflected path of every located snap, by image sources and at the assumed sound speed."""
+    c, found = sonar.assumed_sound_speed, []
+    for time, position in zip(bearings.time, bearings.position, strict=True):
+        distance = float(np.linalg.norm(position))
+        if not (np.isfinite(time) and np.isfinite(distance) and distance > 0):
+            continue
+        direct = Front(position / distance, 1 / distance, float(time))
+        aligned = cut(signals, elements, direct.delays(elements, c), pulse_times.PULSE_HALF, sonar.band)
+        wave = pulse_times.waveform(aligned, elements, c, direct.direction, direct.curvature, direct.time)
+        density = 2 * aligned.spacing * np.abs(wave.template) ** 2
+        for surface, bottom, place in images(position, pose, bed_depth, bounces):
+            r = float(np.linalg.norm(place))
+            front = Front(place / r, 1 / r, float(time) + (r - distance) / c)
+            across, up = front.direction[1:, None] * (elements.face / c)
+            face = ranging_kernels.face_responses(across, up, aligned.frequency[0], aligned.spacing, len(density))[0]
+            found.append(Expected(surface, bottom, front, float(density @ face**2) * (distance / r) ** 2))
+    return found
+
+
+def _out_of_question(
+    front: Front, bearings: Bearings, elements: Elements, sonar: Sonar, window: tuple[float, float]
+) -> int:
+    """Why an arrival is not even looked for; `CANCELLED` where it is."""
+    c = sonar.assumed_sound_speed
+    when = front.delays(elements, c)
+    if not (when.min() - HALF < window[1] and when.max() + HALF > window[0]):
+        return OUTSIDE
+    apart = pulse_times.transit(elements, c) + 2 * HALF
+    if np.any((bearings.time > when.min() - apart) & (bearings.time < when.max() + apart)):
+        return DIRECT
+    return SEEN if in_view(front.direction, elements, sonar) else CANCELLED
+
+
+def in_view(direction: Floats, elements: Elements, sonar: Sonar) -> bool:
+    """Whether a direction lies within the beam grid, or a beam (to its first null at the lowest frequency) beside it.
+
+    A planar array cannot tell front from back, so what comes from behind counts as coming from its mirror image.
+    """
+    ahead = np.array([abs(direction[0]), direction[1], direction[2]])
+    beam = 0.61 * sonar.assumed_sound_speed / (sonar.band.low * elements.aperture)
+    angles = zip(azimuth_elevation(ahead), (sonar.beams.azimuth, sonar.beams.elevation), strict=True)
+    return all(grid[0] - beam <= angle <= grid[-1] + beam for angle, grid in angles)
+
+
+def find(signals: Signals, elements: Elements, sonar: Sonar, expected: Expected, limits: Limits) -> Outcome:
+    """The arrival's wavefront as the sensors hear it, and whether it is what was expected."""
+    fitted = refine(signals, elements, sonar, look(signals, elements, sonar, expected.front, limits.search))
+    if fitted is None:
+        return Outcome(expected, FAINT)
+    front, misfit = fitted
+    excess, energy = brightness(signals, elements, sonar, front)
+    turned = float(np.linalg.norm(front.direction - expected.front.direction))
+    reason = CANCELLED
+    if excess < limits.excess:
+        reason = FAINT
+    elif not misfit < MAX_LAG / sonar.band.centre or turned > 2 * limits.search:
+        reason = UNFIT
+    elif in_view(front.direction, elements, sonar):
+        reason = SEEN
+    elif energy < expected.energy * 10 ** (-limits.weakest / 10):
+        reason = WEAK
+    return Outcome(expected, reason, front, excess)
+
+
+def _settle(signals: Signals, elements: Elements, sonar: Sonar, taken: list[Part]) -> Signals:
+    """Arrivals that overlap are each taken out anew, fitted with the others gone, where that leaves less energy."""
+    parts, first = list(taken), 0.0
+    for turn in range(PASSES):
+        gained = 0.0
+        for n, old in enumerate(parts):
+            if not any(_overlap(old, other, signals) for m, other in enumerate(parts) if m != n):
+                continue
+            whole, rise = restored(signals, old)
+            fitted = refine(whole, elements, sonar, old.front)
+            if fitted is None or in_view(fitted[0].direction, elements, sonar):
+                continue
+            new = part_of(whole, elements, sonar, fitted[0])
+            less, fell = without(whole, new)
+            if rise + fell > 0:
+                signals, parts[n] = less, new
+                gained += rise + fell
+        first = gained if turn == 0 else first
+        if gained <= SETTLED * first:
+            break
+    return signals
+
+
+def _overlap(one: Part, other: Part, signals: Signals) -> bool:
+    """Whether at any sensor the windows of two parts share a sample."""
+    return bool(np.min(np.abs(one.place - other.place)) < 2 * HALF * signals.sampling_frequency)

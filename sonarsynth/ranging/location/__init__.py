@@ -1,0 +1,1 @@
+"""Locating the source from the signals."""

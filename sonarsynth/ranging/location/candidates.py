@@ -1,0 +1,133 @@
+"""Pulses that were looked at, and which of them may be taken for snaps: an echo must not pass for one.
+
+An echo comes after the pulse that it is of, which it cannot be louder than a mirror would make it: as if it came from
+the image of the source behind the mirror. Where it seems to come from lies between the point of the body that it met
+and that image. So an echo of a pulse of delay t, place S and amplitude A, L/c later from direction v, has
+
+    1/(R + L) <= curvature <= 1/r,  amplitude <= A R/(R + L),  R = |S|,  r = L (L + 2 R)/(2 (L + R (1 - cos psi))),
+
+r the range at which a body in that direction is met (psi between S and v), for S or any of its images in surface and
+bottom. What is so may be an echo, and is refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.geometry import Pose
+from sonarsynth.ranging.location.source_position import ACCEPTED, ECHO, RANGE, Known, Row, refused
+
+SIGMAS = 4.0
+"""Standard errors within which a curvature, a direction and a time may be those of an echo."""
+LOUDER = 1.25
+"""An echo louder than a mirror's by this factor is none; less may be noise."""
+SMALL = 0.5
+"""Part of a mirror's echo that a body too small, or too round, to mirror gives: its echo comes from where it is."""
+ALLOWED = 0.02
+"""Share of a curvature by which straight rays, and bodies that are no points, may change it."""
+SHARP = 0.05
+"""Standard error of the curvature, in curvatures, with which a wavefront shows that its source is on the bottom."""
+BOUNCES = 2
+"""Reflections at surface and bottom after which sound may still meet a body."""
+FAR = 1e7
+"""m: taken for the distance of a source whose range is not known."""
+
+
+class Candidate(NamedTuple):
+    """A pulse as it was looked at."""
+
+    centre: float  # s: about when
+    power: float  # Pa2: mean over its window, all sensors together
+    row: Row
+
+
+class Source(NamedTuple):
+    """What echoes may be of: a pulse that was heard, or its image."""
+
+    time: float  # s at the array centre
+    place: Floats  # (xyz) m
+    amplitude: float  # at the array centre
+
+
+@dataclass
+class Candidates:
+    """Pulses, loudest first."""
+
+    known: Known
+    found: list[Candidate] = field(default_factory=list)
+
+    @property
+    def rows(self) -> list[Row]:
+        """Those that are accepted, then those that are refused."""
+        judged = [self._judged(candidate) for candidate in self.found]
+        return sorted(judged, key=lambda row: row.reason not in (ACCEPTED, RANGE))
+
+    @property
+    def accepted(self) -> int:
+        """How many are."""
+        return sum(row.reason in (ACCEPTED, RANGE) for row in self.rows)
+
+    def _judged(self, candidate: Candidate) -> Row:
+        row = candidate.row
+        if row.reason not in (ACCEPTED, RANGE):
+            return refused(row.reason)
+        earlier = [other for other in self.found if other.centre < candidate.centre]
+        if not any(self._may_cause(other, candidate) for other in earlier):
+            return row
+        return refused(ECHO)
+
+    def _may_cause(self, other: Candidate, candidate: Candidate) -> bool:
+        row, cause = candidate.row, other.row
+        if not np.isfinite(cause.time):  # nothing is known of it, but that it was there
+            return other.power > candidate.power
+        return any(self._may_be_echo(row, source) for source in _sources(cause, self.known))
+
+    def _may_be_echo(self, row: Row, source: Source) -> bool:
+        """Whether a pulse is what a source's echo, or the image itself, would be."""
+        speed, error = self.known.sonar.assumed_sound_speed, SIGMAS * row.time_error
+        extra, distance = speed * (row.time - source.time), float(np.linalg.norm(source.place))
+        cosine = float(row.chord @ source.place) / distance
+        mirrored = distance + extra
+        loudest = LOUDER * source.amplitude * distance / max(mirrored, distance)
+        if extra < -speed * error or row.amplitude > loudest:
+            return False
+        if extra <= speed * error:  # no longer on its way than from the source itself
+            return cosine > float(np.cos(SIGMAS * float(np.hypot(*row.angle_error)) + ALLOWED))
+        range_ = extra * (extra + 2 * distance) / (2 * (extra + distance * (1 - cosine)))
+        k, slack = row.curvature[0], SIGMAS * row.curvature[1] + ALLOWED / range_
+        if not 1 / mirrored - slack <= k <= 1 / range_ + slack:
+            return False
+        behind = max(1 / max(k - slack, 1 / mirrored) - range_, 0.0)  # how far behind the body it may come from
+        flat = behind * mirrored / ((behind + range_) * (mirrored - range_))
+        if row.amplitude > loudest * min(max(SMALL, 1.5 * flat), 1.0):
+            return False
+        # a snap on the bottom that was made at the same time is where a wall would mirror the other: it is a snap
+        on_bottom = row.bottom_used == 1 and row.curvature[1] < SHARP * k
+        return not (on_bottom and bool(abs(k - 1 / mirrored) <= slack) and k + slack < 1 / range_)
+
+
+def _sources(row: Row, known: Known) -> list[Source]:
+    """The pulse where its wavefront puts it, and its images in surface and bottom."""
+    k = max(row.curvature[0], 1 / FAR)
+    direct = Source(row.time, row.chord / k, row.amplitude)
+    speed, found = known.sonar.assumed_sound_speed, [direct]
+    for place in images(direct.place, known.pose, known.bed_depth, BOUNCES):
+        distance = float(np.linalg.norm(place))
+        longer = distance - 1 / k
+        found.append(Source(row.time + longer / speed, place, row.amplitude / (k * distance)))
+    return [source for source in found if source.time >= row.time]
+
+
+def images(position: Floats, pose: Pose, bottom: float, bounces: int) -> list[Floats]:
+    """Places (xyz) of the images of a source in surface and bottom (m deep), by up to so many reflections."""
+    found = []
+    for first in (0, 1):
+        place = pose.to_world(position).copy()
+        for n in range(bounces):
+            place[2] = -2 * bottom * ((first + n) % 2) - place[2]
+            found.append(pose.to_body(place))
+    return found

@@ -1,0 +1,223 @@
+"""Locate snaps: from the signals to directions, distances, and what errors to expect of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.equations.arrays.spherical_wave import (
+    Wavefront,
+    plane_wave,
+    plane_wavefront,
+    spherical_wave,
+    wavefront_delays,
+)
+from sonarsynth.geometry import Pose
+from sonarsynth.products import Bearings, Signals
+from sonarsynth.ranging.location import pulse_times
+from sonarsynth.ranging.location.candidates import Candidate, Candidates
+from sonarsynth.ranging.location.pulse_times import Pulse
+from sonarsynth.ranging.location.source_position import (
+    ACCEPTED,
+    ARRAY,
+    BAND,
+    RANGE,
+    UNFIT,
+    UNRESOLVED,
+    Known,
+    Row,
+    as_bearings,
+    place,
+    refused,
+)
+from sonarsynth.receiver import Elements, Sonar
+
+ROUNDS = 3
+"""Alignments of the sensors on the wavefront; each improves the last, and the lags left settle the fit."""
+ROBUST_ROUNDS = 3
+"""Reweightings that turn outliers out of the first fit."""
+FIRST_STEPS = 3
+"""Steps from the plane wave to the first sphere; a step each after that."""
+SHARED = 0.05
+"""Share of a pulse's power at the sensors that its wavefront may leave unexplained, unless it is the noise's own:"""
+AUDIBLE = 4.0
+"""no more than this factor over the power of the quiet."""
+MAX_LAG = 0.15
+"""A pulse whose lags exceed this share of a period (root mean square, band centre) is not one wavefront."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bend:
+    """What bent rays do."""
+
+    delays: Callable[[Floats], Floats]  # of a source (xyz), sonar frame: beyond those of straight paths (sensor,), in s
+    sound_speed: float  # m/s of the water at the array
+    gradient: float  # 1/s: what is allowed for before a place is known
+
+
+@lru_cache(maxsize=16)
+def unlocatable(elements: Elements) -> str | None:
+    """Why an array can locate nothing; None where it can."""
+    live = elements.position[elements.gain != 0]
+    if len(live) < 3:
+        return f"{len(live)} live sensor{'s' * (len(live) != 1)}: a direction needs three that are not in line"
+    spread = np.linalg.svd(live - live.mean(axis=0), compute_uv=False)
+    if not spread[1] > 1e-6 * spread[0]:
+        return "the live sensors are in one line or in one place: they cannot tell a direction"
+    return None
+
+
+def locate(
+    signals: Signals,
+    elements: Elements,
+    sonar: Sonar,
+    pose: Pose,
+    bed_depth: float,
+    snaps: int,
+    bend: Bend | None = None,
+    gradient: float = 0.0,
+    kink: float = 0.0,
+    on_bottom: bool = True,
+) -> Bearings:
+    """The `snaps` loudest direct pulses, loudest first; see `ranging.SensorDelays`.
+
+    Paths bend as `bend` says; without it they are taken for straight, and the errors hold what a `gradient` (1/s) of
+    the sound speed may do, and those of directions what its change over the array does, a `kink` (1/s). Pulses that are
+    refused follow those that are not, loudest first.
+    """
+    if unlocatable(elements) is not None:
+        return as_bearings([], snaps, ARRAY)
+    if pulse_times.half_length(sonar.band) > pulse_times.LONGEST_HALF:
+        return as_bearings([], snaps, BAND)
+    if not signals.pressure.shape[1] or not snaps:
+        return as_bearings([], snaps)
+    live = elements.gain != 0
+    half = pulse_times.transit(elements, sonar.assumed_sound_speed) + 2 * pulse_times.half_length(sonar.band)
+    width = int(2 * half * signals.sampling_frequency) | 1
+    loud = pulse_times.loudness(signals, live, width)
+    rounding = pulse_times.rounding(signals, loud.peak, pulse_times.half_length(sonar.band))
+    quiet = pulse_times.quiet_bin(loud.quiet, int(live.sum()), sonar.band, pulse_times.half_length(sonar.band))
+    known = Known(elements, sonar, pose, bed_depth, gradient, rounding, quiet, on_bottom, kink)
+    track, heard = loud.track.copy(), Candidates(known)
+    for _ in range(4 * snaps):
+        top = _loudest(track, heard, signals, snaps)
+        if top is None or not track[top] > pulse_times.QUIET * loud.quiet:
+            break
+        centre = signals.start + top / signals.sampling_frequency
+        heard.found.append(Candidate(centre, float(track[top]), candidate(signals, known, centre, half, bend)))
+        track[max(top - width, 0) : top + width + 1] = 0.0
+    return as_bearings(heard.rows, snaps)
+
+
+def _loudest(track: Floats, heard: Candidates, signals: Signals, snaps: int) -> int | None:
+    """Where the signals are loudest; once enough snaps are found, before the first of them: it may be an echo."""
+    if heard.accepted < snaps:
+        return int(track.argmax())
+    first = min(each.centre for each in heard.found if each.row.reason in (ACCEPTED, RANGE))
+    before = track[: max(round((first - signals.start) * signals.sampling_frequency), 0)]
+    return int(before.argmax()) if before.any() else None
+
+
+def candidate(signals: Signals, known: Known, centre: float, half: float, bend: Bend | None) -> Row:
+    """The loudest pulse about `centre` (s) by itself; refused where its data do not support a place."""
+    elements, sonar = known.elements, known.sonar
+    found = fit_pulse(signals, elements, sonar, centre, half)
+    if isinstance(found, int):
+        return refused(found)
+    wave, pulse = found
+    if pulse.share > SHARED and pulse.noise > AUDIBLE * known.quiet:
+        return refused(UNRESOLVED)
+    if bend is None:
+        return place(wave, pulse, known)
+    heard = _refit(pulse, wave, elements, bend.sound_speed, 0.0, sonar.assumed_sound_speed)
+    row = place(wave, pulse, replace(known, gradient=bend.gradient), heard)
+    for _ in range(3):  # delays beyond straight ones change little with the place: this settles at once
+        extra = bend.delays(row.position)
+        if not np.all(np.isfinite(extra)):
+            break
+        row = place(_refit(pulse, wave, elements, sonar.assumed_sound_speed, extra), pulse, known, heard)
+    return row
+
+
+def fit_pulse(
+    signals: Signals, elements: Elements, sonar: Sonar, centre: float, half: float
+) -> tuple[Wavefront, Pulse] | int:
+    """Wavefront of the pulse about `centre` (s), and the pulse as measured last; or why it is refused, of REASONS.
+
+    Envelope peaks of the sensors give eq. 6 in closed form, then the sphere, robustly; then the sensors are aligned
+    and their lags measured coherently, until these settle.
+    """
+    c, q = sonar.assumed_sound_speed, elements.position
+    cut, start = pulse_times.excerpt(signals, centre, half)
+    delay, height = pulse_times.envelope_peaks(cut, signals.sampling_frequency, sonar.band)
+    wave = _robust_wave(start + delay, height * (elements.gain != 0), q, c)
+    if wave is None:
+        return UNFIT
+    expected = wave.time + wavefront_delays(q, wave.direction, wave.curvature, c)
+    aligned = pulse_times.align(signals, elements, sonar.band, expected)
+    for _ in range(ROUNDS):
+        pulse = pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time)
+        delay = wave.time + wavefront_delays(q, wave.direction, wave.curvature, c) + pulse.lag
+        better = fit_wave(delay, q, c, pulse.weight, wave, 1)
+        if better is None:
+            return UNFIT
+        wave = better
+    rms = np.sqrt(pulse.weight @ wave.residual**2 / pulse.weight.sum())
+    if not rms < MAX_LAG / sonar.band.centre:
+        return UNFIT
+    return wave, pulse
+
+
+def fit_wave(
+    delay: Floats, position: Floats, sound_speed: float, weight: Floats, start: Wavefront, steps: int = 20
+) -> Wavefront | None:
+    """Sphere through delays; a plane where there are too few sensors for a sphere.
+
+    One step (of Gauss and Newton) suffices where `start` is near and the fit is made again on better delays.
+    """
+    u, k = start.direction, start.curvature
+    wave = spherical_wave(delay, position, sound_speed, weight, u, k, iterations=steps)
+    if wave is None:
+        wave = spherical_wave(delay, position, sound_speed, weight, u, curved=False, iterations=steps)
+    return wave
+
+
+def _robust_wave(delay: Floats, height: Floats, position: Floats, sound_speed: float) -> Wavefront | None:
+    """Sphere through envelope peaks: who hears more counts more, outliers count for nothing (Tukey's biweight)."""
+    loud = height**2
+    direction, time = plane_wave(delay, position, sound_speed, loud)
+    if not np.isfinite(time):
+        return None
+    wave = fit_wave(delay, position, sound_speed, loud, plane_wavefront(direction, time), FIRST_STEPS)
+    for _ in range(ROBUST_ROUNDS):
+        if wave is None:
+            return None
+        late = np.abs(wave.residual)
+        order = np.argsort(late)
+        share = np.cumsum(loud[order])
+        middle = late[order[np.searchsorted(share, 0.5 * share[-1])]]
+        scale = max(6 * middle, 1e-7)
+        weight = loud * np.maximum(1 - (late / scale) ** 2, 0.0) ** 2
+        wave = fit_wave(delay, position, sound_speed, weight, wave, 1)
+    return wave
+
+
+def _refit(
+    pulse: Pulse,
+    wave: Wavefront,
+    elements: Elements,
+    speed: float,
+    extra: Floats | float,
+    measured: float | None = None,
+) -> Wavefront:
+    """The straight wave at `speed` (m/s) that is left when delays `extra` (sensor,) in s are taken away.
+
+    measured: the speed (m/s) that `wave` was fitted with, where it is another.
+    """
+    q = elements.position
+    own = wavefront_delays(q, wave.direction, wave.curvature, measured or speed)
+    return fit_wave(wave.time + own + wave.residual - extra, q, speed, pulse.weight, wave) or wave

@@ -1,0 +1,98 @@
+"""What looking for a wavefront and taking it out do to every sensor, compiled. One thread, fixed order."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba as nb
+import numpy as np
+
+from sonarsynth.ranging.ranging_kernels import template_sums
+
+
+@nb.njit(cache=True, error_model="numpy", nogil=True)
+def tilted_energies(heard: Any, response: Any, late: Any, first: float, spacing: float, steps: int) -> Any:
+    """Energy of beams tilted by -steps..steps of two tilts (tilt, tilt): sum over bins of |sum over sensors|^2.
+
+    heard, response (sensor, bin) at f = first + spacing * bin (Hz); late (2, sensor) s: by how much the wave of one
+    step of each tilt is later. Each bin is divided by its sum of response^2.
+    """
+    sensors, bins = heard.shape
+    n = 2 * steps + 1
+    beam = np.zeros((bins, n, n), np.complex128)
+    power = np.zeros(bins)
+    for q in range(sensors):
+        one, other = np.exp(2j * np.pi * first * late[0, q]), np.exp(2j * np.pi * first * late[1, q])
+        one_on, other_on = np.exp(2j * np.pi * spacing * late[0, q]), np.exp(2j * np.pi * spacing * late[1, q])
+        corner, corner_on = np.conj(one * other) ** steps, np.conj(one_on * other_on) ** steps
+        for k in range(bins):
+            h = response[q, k]
+            power[k] += h * h
+            row = h * heard[q, k] * corner
+            for i in range(n):
+                value = row
+                for j in range(n):
+                    beam[k, i, j] += value
+                    value *= other
+                row *= one
+            one, other, corner = one * one_on, other * other_on, corner * corner_on
+    energy = np.zeros((n, n))
+    for k in range(bins):
+        if power[k] > 0:
+            energy += (beam[k].real ** 2 + beam[k].imag ** 2) / power[k]
+    return energy
+
+
+@nb.njit(cache=True, error_model="numpy", nogil=True)
+def shares(heard: Any, response: Any) -> Any:
+    """Of each bin (bin,): energy that the best common wave explains, energy of all, and the power of the response.
+
+    heard, response (sensor, bin). The best wave is sum(h x)/sum(h^2).
+    """
+    sensors, bins = heard.shape
+    total = np.zeros(bins, np.complex128)
+    power, whole = np.zeros(bins), np.zeros(bins)
+    for q in range(sensors):
+        for k in range(bins):
+            h, x = response[q, k], heard[q, k]
+            total[k] += h * x
+            power[k] += h * h
+            whole[k] += x.real**2 + x.imag**2
+    wave = np.abs(total) ** 2
+    return np.where(power > 0, wave / np.where(power > 0, power, 1.0), 0.0), whole, power
+
+
+@nb.njit(cache=True, error_model="numpy", nogil=True)
+def explained(heard: Any, response: Any) -> Any:
+    """What the best common wave makes each sensor hear (sensor, bin): an orthogonal projection, bin by bin."""
+    sensors, bins = heard.shape
+    total, power = template_sums(heard, response)
+    for k in range(bins):
+        total[k] = total[k] / power[k] if power[k] > 0 else 0.0
+    part = np.empty((sensors, bins), np.complex128)
+    for q in range(sensors):
+        for k in range(bins):
+            part[q, k] = response[q, k] * total[k]
+    return part
+
+
+@nb.njit(cache=True, error_model="numpy", nogil=True)
+def add(pressure: Any, place: Any, wave: Any, sign: float) -> Any:
+    """Add sign * wave (sensor, 2 half) to pressure (sensor, sample) about `place`, with the window of `cut_out`.
+
+    In place. Returns by how much the sum of squares fell (Pa2).
+    """
+    sensors, held = pressure.shape
+    half = wave.shape[1] // 2
+    fell = 0.0
+    for q in range(sensors):
+        whole = np.floor(place[q])
+        first, part = int(whole) - half, place[q] - whole
+        for i in range(max(1, -first), min(2 * half, held - first)):
+            x = i - part
+            flat = 1.0 if 0.25 * half <= x <= 1.75 * half else np.sin(2 * np.pi * x / half) ** 2
+            old = pressure[q, first + i]
+            new = np.float32(old + sign * flat * wave[q, i])
+            pressure[q, first + i] = new
+            fell += np.float64(old) ** 2 - np.float64(new) ** 2
+    return fell

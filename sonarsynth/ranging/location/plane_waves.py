@@ -1,0 +1,182 @@
+"""A wavefront over the array: looked for in the signals, fitted to them, and taken out of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from scipy.fft import ifft, irfft, next_fast_len, rfft
+
+from sonarsynth.conventions import Floats, direction
+from sonarsynth.equations.arrays.spherical_wave import plane_wavefront, tangent_plane, wavefront_delays
+from sonarsynth.geometry import unit
+from sonarsynth.products import Bearings, Signals
+from sonarsynth.ranging import ranging_kernels
+from sonarsynth.ranging.location import plane_wave_kernels, pulse_times
+from sonarsynth.ranging.location.locating import fit_wave
+from sonarsynth.ranging.location.pulse_times import Aligned
+from sonarsynth.receiver import Band, Elements, Sonar
+
+EARLY: Final = 160e-6
+"""A wave is looked for so long (s) before and after its expected time."""
+HALF: Final = 500e-6
+"""Half length (s) of what is taken out, flanks included: a pulse with the ringing of its filter."""
+STEPS: Final = 4
+"""Tilts of half a beam width tried on either side, at most."""
+ROUNDS: Final = 4
+"""Fits of the wavefront to the lags that the last one left."""
+
+
+@dataclass(frozen=True, eq=False)
+class Front:
+    """A spherical wavefront over the array."""
+
+    direction: Floats  # (xyz) unit vector towards its source, sonar frame
+    curvature: float  # 1/m
+    time: float  # s at the array centre
+
+    @staticmethod
+    def of(bearings: Bearings, row: int = 0) -> Front:
+        """The direct pulse of a located snap; plane where nothing says how far away that is."""
+        radius = float(bearings.range_from_curvature[row])
+        if not np.isfinite(radius):
+            radius = float(np.linalg.norm(bearings.position[row]))
+        curvature = 1 / radius if np.isfinite(radius) else 0.0
+        towards = direction(bearings.azimuth[row], bearings.elevation[row])
+        return Front(towards, curvature, float(bearings.time[row]))
+
+    def delays(self, elements: Elements, sound_speed: float) -> Floats:
+        """When each sensor hears it (sensor,), in s."""
+        late = wavefront_delays(elements.position, self.direction, self.curvature, sound_speed)
+        return np.asarray(self.time + late)
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """What each sensor hears of a wave that all hear."""
+
+    front: Front
+    place: Floats  # (sensor,) samples, where the front is
+    wave: Floats  # (sensor, 2 half) Pa, about `place`, before the second window
+
+
+def cut(signals: Signals, elements: Elements, time: Floats, half: float, band: Band | None) -> Aligned:
+    """As `pulses.align`, for a window of `half` (s) to either side; without a band: all frequencies."""
+    rate = signals.sampling_frequency
+    samples = max(int(half * rate), 4)
+    place = (time - signals.start) * rate
+    window = ranging_kernels.cut_out(signals.pressure, place, samples, (elements.gain != 0) / rate)
+    f = np.asarray(np.arange(samples + 1) * (0.5 * rate / samples), np.float64)
+    kept = slice(None) if band is None else pulse_times.in_band(f, band)
+    spectrum = np.ascontiguousarray(rfft(window, axis=1)[:, kept])
+    return Aligned(
+        f[kept], ranging_kernels.turned(spectrum, _since(place, samples) / rate, f[kept][0], f[1]), time, float(f[1])
+    )
+
+
+def _since(place: Floats, samples: int) -> Floats:
+    """From the first sample of a window of 2 `samples` to its place (sensor,), in samples."""
+    return np.asarray(place - np.floor(place) + samples)
+
+
+def look(signals: Signals, elements: Elements, sonar: Sonar, expected: Front, search: float) -> Front:
+    """The expected wavefront, tilted by up to `search` (rad) and moved in time to where a beam on it hears most."""
+    c, u = sonar.assumed_sound_speed, expected.direction
+    aligned = cut(signals, elements, expected.delays(elements, c), pulse_times.PULSE_HALF + EARLY, sonar.band)
+    wave = pulse_times.waveform(aligned, elements, c, u, expected.curvature, expected.time)
+    step = 0.25 * c / (sonar.band.centre * elements.aperture)  # half a beam width
+    steps = min(int(np.ceil(search / step)), STEPS)
+    tangents = tangent_plane(u) * step
+    late = -(tangents @ elements.position.T) / c
+    first, spacing = aligned.frequency[0], aligned.spacing
+    energy = plane_wave_kernels.tilted_energies(wave.heard, wave.response, late, first, spacing, steps)
+    tilt = np.array(np.unravel_index(energy.argmax(), energy.shape)) - steps
+    beam, power = ranging_kernels.template_sums(
+        ranging_kernels.turned(wave.heard, tilt @ late, first, spacing), wave.response
+    )
+    count = next_fast_len(16 * len(beam))
+    envelope = np.abs(ifft(beam / np.sqrt(power + pulse_times.DEAF * elements.count), count))
+    index = (int(envelope.argmax()) + count / 2) % count - count / 2
+    moved = float(np.clip(index / (count * spacing), -EARLY, EARLY))
+    return Front(unit(u + tilt @ tangents), expected.curvature, expected.time + moved)
+
+
+def refine(signals: Signals, elements: Elements, sonar: Sonar, near: Front) -> tuple[Front, float] | None:
+    """The sphere that fits the sensors' lags, and the root mean square lag (s) that it leaves; None where none does."""
+    c, q = sonar.assumed_sound_speed, elements.position
+    aligned = cut(signals, elements, near.delays(elements, c), pulse_times.PULSE_HALF, sonar.band)
+    wave = replace(plane_wavefront(near.direction, near.time), curvature=near.curvature)
+    for _ in range(ROUNDS):
+        pulse = pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time)
+        delay = wave.time + wavefront_delays(q, wave.direction, wave.curvature, c) + pulse.lag
+        better = fit_wave(delay, q, c, pulse.weight, wave, 1)
+        if better is None:
+            return None
+        wave = better
+    misfit = float(np.sqrt(pulse.weight @ wave.residual**2 / pulse.weight.sum()))
+    return Front(wave.direction, wave.curvature, wave.time), misfit
+
+
+def brightness(signals: Signals, elements: Elements, sonar: Sonar, front: Front) -> tuple[float, float]:
+    """How far (dB) a beam on a wavefront stands above all else in its window, and its energy at a sensor, Pa2 s.
+
+    Of each bin, the share of the energy that one wave explains, over the rest per sensor: 1 for noise, and in the band
+    as a whole for an echo from elsewhere, but for the bins where a grating lobe holds it. So: the median, over the half
+    of the band that the sensors' faces hear best.
+    """
+    c = sonar.assumed_sound_speed
+    aligned = cut(signals, elements, front.delays(elements, c), pulse_times.PULSE_HALF, sonar.band)
+    wave = pulse_times.waveform(aligned, elements, c, front.direction, front.curvature, front.time)
+    own, whole, power = plane_wave_kernels.shares(wave.heard, wave.response)
+    count = int(np.sum(elements.gain != 0))
+    rest = np.maximum(whole - own, np.finfo(float).eps * whole)
+    ratio = own * (count - 1) / np.where(rest > 0, rest, np.inf)
+    middle = float(np.median(ratio[power >= np.median(power)]))
+    return 10 * float(np.log10(max(middle, 1e-30))), 2 * aligned.spacing * float(own.sum()) / count
+
+
+def part_of(
+    signals: Signals,
+    elements: Elements,
+    sonar: Sonar,
+    front: Front,
+    half: float = HALF,
+    lag: Floats | float = 0.0,
+    gain: Floats | float = 1.0,
+) -> Part:
+    """What each sensor hears of the wave that a wavefront carries, within `half` (s) of it, flanks included.
+
+    lag, gain (sensor,): how much later (s) than the front, and how many times as loud, a sensor hears it.
+
+    The sensors' windows, moved onto the front, are projected bin by bin on the response of the sensors to one wave.
+    With the window once more on what is taken out, that is W Q W with Q an orthogonal projection and 0 <= W <= 1: all
+    its eigenvalues lie in 0..1, so what is left has no more energy, and an echo loses about one part in as many as
+    there are sensors.
+    """
+    c, rate = sonar.assumed_sound_speed, signals.sampling_frequency
+    time = front.delays(elements, c) + lag
+    aligned = cut(signals, elements, time, half, None)
+    toward = front.direction - front.curvature * elements.position
+    distance = np.sqrt(np.sum(toward * toward, axis=1))
+    sine = toward * (elements.face / (c * distance))[:, None]
+    response = ranging_kernels.face_responses(sine[:, 1], sine[:, 2], 0.0, aligned.spacing, len(aligned.frequency))
+    response *= (gain * elements.gain / distance)[:, None]
+    heard = plane_wave_kernels.explained(aligned.spectrum, response) * rate
+    heard[:, -1] = 0.0  # half the sampling frequency cannot be moved by parts of a sample
+    samples = heard.shape[1] - 1
+    place = (time - signals.start) * rate
+    back = ranging_kernels.turned(heard, -_since(place, samples) / rate, 0.0, aligned.spacing)
+    return Part(front, place, irfft(back, 2 * samples, axis=1))
+
+
+def without(signals: Signals, part: Part) -> tuple[Signals, float]:
+    """Signals from which a part is taken, and by how much that lowers their sum of squares (Pa2)."""
+    left = replace(signals, pressure=signals.pressure.copy())
+    return left, float(plane_wave_kernels.add(left.pressure, part.place, part.wave, -1.0))
+
+
+def restored(signals: Signals, part: Part) -> tuple[Signals, float]:
+    """Signals to which a part that was taken is given back, and by how much that lowers their sum of squares (Pa2)."""
+    whole = replace(signals, pressure=signals.pressure.copy())
+    return whole, float(plane_wave_kernels.add(whole.pressure, part.place, part.wave, 1.0))

@@ -1,0 +1,229 @@
+"""Find direct pulses in the signals and measure when each sensor hears them, to a small part of a sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.fft import ifft, irfft, next_fast_len, rfft
+from scipy.ndimage import uniform_filter1d
+
+from sonarsynth.conventions import Floats
+from sonarsynth.equations.arrays.spherical_wave import wavefront_delays
+from sonarsynth.products import Signals
+from sonarsynth.ranging import ranging_kernels
+from sonarsynth.receiver import Band, Elements
+
+Complexes = npt.NDArray[np.complex128]
+
+PULSE_HALF = 160e-6
+"""Half length (s) of what is kept round a pulse after alignment: the snap in band and the ringing of its filter."""
+LONGEST_HALF = 2e-3
+"""The same at most (s): bands whose pulses last longer tell no direct pulse from its echoes."""
+PERIODS = 2.0
+"""The same in units of the inverse of the bandwidth, where that is more."""
+DEAF = 1e-4
+"""Mean square response (of one sensor on its axis) below which a bin counts as not heard at all."""
+QUIET = 2.0
+"""The mean power while a pulse passes over the array must exceed that of the quiet by this factor."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pulse:
+    """A pulse over the array, compared with a wavefront: its waveform, and who deviates."""
+
+    frequency: Floats  # (bin,) Hz, evenly spaced
+    template: Complexes  # (bin,) Pa s: the wave at the array centre, face directivity removed, time 0 at `time`
+    time: float  # s at the array centre to which the template refers
+    lag: Floats  # (sensor,) s: delay of each sensor after the wavefront
+    weight: Floats  # (sensor,) (Pa s/s)^2: sum over bins of |2 pi f M|^2, inverse variance of a lag per noise power
+    noise: float  # (Pa s)^2: mean power in a bin of what the model does not explain
+    power: Floats  # (bin,) sum over sensors of their responses squared: so much less noise is in the template
+    share: float  # of the power of the pulse at the sensors: what the model does not explain
+
+
+@dataclass(frozen=True, eq=False)
+class Loudness:
+    """How loud the signals are, all live sensors together."""
+
+    track: Floats  # (sample,) Pa2: mean power, summed over sensors, in a window about the sample
+    quiet: float  # Pa2: the same where nothing is heard
+    peak: float  # Pa: the largest |pressure|
+
+
+def loudness(signals: Signals, live: npt.NDArray[np.bool_], length: int) -> Loudness:
+    """Power in a sliding window of `length` samples, in quiet, and the peak.
+
+    The quiet power is the tenth part from below of short means: a snap and its echoes fill no more of the signals.
+    """
+    power, peak = ranging_kernels.power_and_peak(signals.pressure, live)
+    track = uniform_filter1d(power, min(length, len(power)), mode="constant")
+    tenth = len(power) // 10
+    quiet = np.partition(uniform_filter1d(power, min(16, len(power))), tenth)[tenth]
+    return Loudness(np.maximum(track, 0.0), float(max(quiet, 0.0)), peak)
+
+
+def quiet_bin(quiet: float, live: int, band: Band, half: float) -> float:
+    """Mean power in a bin, (Pa s)^2, of noise at a sensor, at most: `quiet` (Pa2) of `live` sensors, in the band."""
+    return quiet / max(live, 1) * half / (band.high - band.low)
+
+
+def half_length(band: Band) -> float:
+    """Half length (s) of what is kept round a pulse: a band's narrowest pulse lasts 1/bandwidth."""
+    return max(PULSE_HALF, PERIODS / (band.high - band.low))
+
+
+def rounding(signals: Signals, peak: float, half: float = PULSE_HALF) -> float:
+    """Mean power in a bin, (Pa s)^2, of what the converter (a count) and single precision (of `peak`, Pa) round off.
+
+    Of spectra of 2 `half` (s).
+    """
+    step = signals.quantum**2 + (float(np.finfo(np.float32).eps) * peak) ** 2
+    return step / 12 * 2 * half / signals.sampling_frequency
+
+
+def transit(elements: Elements, sound_speed: float) -> float:
+    """Longest time (s) that a wave takes from the array centre to a sensor."""
+    return elements.aperture / sound_speed
+
+
+def excerpt(signals: Signals, centre: float, half: float) -> tuple[npt.NDArray[np.float32], float]:
+    """Samples (sensor, sample) within `half` s of `centre`, zeros beyond the ends; and the time of the first (s)."""
+    rate = signals.sampling_frequency
+    first = int(np.floor((centre - half - signals.start) * rate))
+    count = int(np.ceil(2 * half * rate)) + 1
+    held = signals.pressure.shape[1]
+    a, b = max(first, 0), min(first + count, held)
+    cut = np.zeros((signals.pressure.shape[0], count), np.float32)
+    if b > a:
+        cut[:, a - first : b - first] = signals.pressure[:, a:b]
+    return cut, signals.start + first / rate
+
+
+def envelope_peaks(cut: npt.NDArray[np.float32], rate: float, band: Band) -> tuple[Floats, Floats]:
+    """Time after the first sample (s) and relative height of the envelope's peak at each sensor, in band.
+
+    The band is moved to zero frequency and sampled twice as fast as it needs; a parabola finds the top.
+    """
+    count = next_fast_len(cut.shape[1], real=True)
+    base = rfft(cut, count, axis=1)[:, in_band(_frequencies(count, rate), band)]
+    short = next_fast_len(2 * base.shape[1])
+    wave = ifft(base, short, axis=1)
+    power = wave.real**2 + wave.imag**2
+    top = np.clip(power.argmax(axis=1), 1, short - 2)
+    rows = np.arange(len(power))
+    place, height = parabola(*(np.sqrt(power[rows, top + i]) for i in (-1, 0, 1)))
+    return (top + place) * (count / (short * rate)), height
+
+
+def parabola(left: npt.ArrayLike, middle: npt.ArrayLike, right: npt.ArrayLike) -> tuple[Floats, Floats]:
+    """Place (in samples from the middle, within +-0.5) and height of the vertex through three equidistant values."""
+    a, b, c = (np.asarray(v, float) for v in (left, middle, right))
+    bend = a - 2 * b + c
+    safe = np.where(bend < 0, bend, -1.0)
+    place = np.where(bend < 0, np.clip(0.5 * (a - c) / safe, -0.5, 0.5), 0.0)
+    return np.asarray(place), np.asarray(b - 0.25 * (a - c) * place)
+
+
+@dataclass(frozen=True, eq=False)
+class Aligned:
+    """Spectra of a pulse at the sensors, each about its own time, everything else cut away."""
+
+    frequency: Floats  # (bin,) Hz, evenly spaced: those of the band, or all up to half the sampling frequency
+    spectrum: Complexes  # (sensor, bin) Pa s; 0 for dead sensors
+    time: Floats  # (sensor,) s to which the phases refer
+    spacing: float  # Hz
+
+
+def align(signals: Signals, elements: Elements, band: Band, time: Floats, *, whole: bool = False) -> Aligned:
+    """Cut a short window out of each sensor about `time` (sensor,), when its pulse is expected.
+
+    Frequencies of the band, or `whole`: all of them, from which the waveform can be had. The window moves with the
+    time, not with the samples, so that every sensor's pulse is cut alike.
+    """
+    rate = signals.sampling_frequency
+    half = max(int((PULSE_HALF if whole else half_length(band)) * rate), 4)
+    place = (time - signals.start) * rate
+    cut = ranging_kernels.cut_out(signals.pressure, place, half, elements.gain / rate)
+    f = _frequencies(2 * half, rate)
+    kept = slice(None) if whole else in_band(f, band)
+    since = (place - np.floor(place) + half) / rate
+    spectrum = ranging_kernels.turned(np.ascontiguousarray(rfft(cut, axis=1)[:, kept]), since, f[kept][0], f[1])
+    return Aligned(f[kept], spectrum, time, float(f[1]))
+
+
+@dataclass(frozen=True, eq=False)
+class Wave:
+    """What a wavefront brings, and what of it each sensor hears."""
+
+    template: Complexes  # (bin,) Pa s: the wave at the array centre, face directivity removed
+    heard: Complexes  # (sensor, bin) Pa s, moved to the centre
+    response: Floats  # (sensor, bin) of a sensor to the wave at the centre
+    power: Floats  # (bin,) sum over sensors of the response squared
+
+
+def waveform(
+    aligned: Aligned, elements: Elements, sound_speed: float, direction: Floats, curvature: float, time: float
+) -> Wave:
+    """The waveform that a wavefront carries.
+
+    The wave at the centre, W(f), is unknown. Sensor q hears M = W(f) D(f) R/R_q, D the face directivity towards the
+    source, which may well be near zero or negative: W = sum conj(h) P / sum |h|^2 with h = D R/R_q is its maximum
+    likelihood, and sensors and bins that hear little count for little.
+    """
+    first, bins = aligned.frequency[0], len(aligned.frequency)
+    toward = direction - curvature * elements.position
+    distance = np.sqrt(np.sum(toward * toward, axis=1))
+    sine = toward * (elements.face / (sound_speed * distance))[:, None]
+    response = ranging_kernels.face_responses(sine[:, 1], sine[:, 2], first, aligned.spacing, bins)
+    response *= (elements.gain / distance)[:, None]
+    shift = time + wavefront_delays(elements.position, direction, curvature, sound_speed) - aligned.time
+    heard = ranging_kernels.turned(aligned.spectrum, shift, first, aligned.spacing)
+    total, power = ranging_kernels.template_sums(heard, response)
+    return Wave(total / (power + DEAF * elements.count), heard, response, power)
+
+
+def measure(
+    aligned: Aligned, elements: Elements, sound_speed: float, direction: Floats, curvature: float, time: float
+) -> Pulse:
+    """Each sensor's lag on a wavefront, and the waveform that the wavefront carries.
+
+    The lag of sensor q is the maximum of Re sum_f conj(M) P exp(i 2 pi f lag), M as in `waveform`, by one Newton step:
+    lags are small after alignment, and the caller iterates.
+    """
+    wave = waveform(aligned, elements, sound_speed, direction, curvature, time)
+    omega = 2 * np.pi * aligned.frequency
+    slope, weight, rest = ranging_kernels.lag_sums(wave.heard, wave.response, wave.template, omega)
+    lag = slope / np.where(weight > 0, weight, np.inf)
+    live = elements.gain != 0
+    freedom = max(2 * (np.sum(live) - 1) * len(omega) - np.sum(live), 1)
+    left = float(np.sum(rest[live]))
+    held = float(wave.power @ np.abs(wave.template) ** 2)
+    share = left / (held + left) if held + left > 0 else 1.0
+    return Pulse(aligned.frequency, wave.template, time, lag, weight, 2 * left / freedom, wave.power, share)
+
+
+def template_spectrum(template: Complexes, length: int) -> Complexes:
+    """A template (bin,) in Pa s of all frequencies up to half the sampling frequency, at those of an FFT of `length`.
+
+    It is short, so its spectrum is smooth: its waveform is transformed anew, exactly. Time 0 stays where it was.
+    """
+    half = len(template) - 1
+    centred = template * (-1.0) ** np.arange(half + 1)  # time 0 at the middle sample
+    wave = np.zeros(length)
+    np.add.at(wave, (np.arange(2 * half) - half) % length, irfft(centred, 2 * half))
+    return np.asarray(rfft(wave), np.complex128)
+
+
+def _frequencies(count: int, rate: float) -> Floats:
+    return np.asarray(np.arange(count // 2 + 1) * (rate / count))
+
+
+def in_band(frequency: Floats, band: Band) -> slice:
+    """The bins of ascending frequencies that lie in the band; the nearest one where the band falls between two."""
+    low, high = np.searchsorted(frequency, band.low), np.searchsorted(frequency, band.high, side="right")
+    if low == high:
+        low = np.argmin(np.abs(frequency - band.centre))
+        high = low + 1
+    return slice(int(low), int(high))

@@ -1,0 +1,117 @@
+"""Locating and ranging through a sound-speed profile, by travel times along rays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.environment.sea import Profile
+from sonarsynth.equations.arrays.bistatic_range import bistatic_range
+from sonarsynth.equations.rays.ray_solutions import eigenrays, water
+from sonarsynth.geometry import Pose, unit
+from sonarsynth.ranging.clouds import Solution
+from sonarsynth.ranging.location.locating import Bend
+from sonarsynth.receiver import Elements
+
+STEPS = 20
+"""Newton steps at most; five or six are usual."""
+TOLERANCE = 1e-10
+"""s: travel times are met to this (0.15 um)."""
+
+
+@dataclass(frozen=True, eq=False)
+class FirstRays:
+    """The fastest direct ray of each pair of points; NaN in a shadow and out of the water. World frame."""
+
+    travel_time: Floats  # (pair,) s
+    departure: Floats  # (pair, xyz) unit vector of travel at the start
+    arrival: Floats  # (pair, xyz) unit vector of travel at the end
+
+
+def first_rays(profile: Profile, start: Floats, end: Floats) -> FirstRays:
+    """Fastest direct rays from `start` (pair, xyz) to `end` (pair, xyz), world frame; the bed is not in their way."""
+    a, b = np.broadcast_arrays(np.asarray(start, float), np.asarray(end, float))
+    across = b[:, :2] - a[:, :2]
+    distance = np.hypot(across[:, 0], across[:, 1])
+    wet = np.isfinite(a).all(axis=1) & np.isfinite(b).all(axis=1) & (a[:, 2] <= 0) & (b[:, 2] <= 0)
+    time = np.full(len(a), np.nan)
+    departure, arrival = np.full(a.shape, np.nan), np.full(a.shape, np.nan)
+    if wet.any():
+        bed = max(-a[wet, 2].min(), -b[wet, 2].min(), profile.depth[-1]) + 1.0
+        sea = water(profile.depth, profile.speed, float(bed))
+        rays = eigenrays(sea, -a[wet, 2], -b[wet, 2], distance[wet])
+        found, first = np.unique(rays.pair, return_index=True)
+        pair = np.flatnonzero(wet)[found]
+        time[pair] = rays.travel_time[first]
+        heading = across[pair] / np.where(distance[pair] > 0, distance[pair], 1.0)[:, None]
+        for vectors, sine in ((departure, rays.start_sine[first]), (arrival, rays.end_sine[first])):
+            cosine = np.sqrt(np.maximum((1 - sine) * (1 + sine), 0.0))
+            vectors[pair] = np.column_stack([heading * cosine[:, None], sine])
+    return FirstRays(time, departure, arrival)
+
+
+def mean_gradient(profile: Profile, depth: float, other: float, least: float) -> float:
+    """Mean of |dc/dz| (1/s) between two depths (m), over no less than `least` (m) about them; jumps count."""
+    middle, half = 0.5 * (depth + other), 0.5 * max(abs(depth - other), least)
+    between = np.abs(profile.depth - middle) < half
+    speed = [profile.at(middle - half), *profile.speed[between], profile.at(middle + half)]
+    return float(np.sum(np.abs(np.diff(speed)))) / (2 * half)
+
+
+def kink(profile: Profile, depth: float, reach: float) -> float:
+    """Change (1/s) of the gradient of the sound speed within `reach` (m) of a depth (m): 0 of one slope."""
+    inside = profile.depth[np.abs(profile.depth - depth) < reach]
+    node = np.unique([depth - reach, *inside, depth + reach])
+    slope = np.diff(profile.at(node)) / np.diff(node)
+    return float(np.ptp(slope))
+
+
+def bending(profile: Profile, elements: Elements, pose: Pose, sound_speed: float, gradient: float) -> Bend:
+    """What rays through the profile add to straight delays at `sound_speed` (m/s) over the array."""
+    sensors = np.vstack([elements.position, np.zeros(3)])
+
+    def delays(source: Floats) -> Floats:
+        rays = first_rays(profile, pose.to_world(source)[None], pose.to_world(sensors))
+        straight = np.linalg.norm(source - sensors, axis=1) / sound_speed
+        extra = rays.travel_time - straight
+        return np.asarray(extra[:-1] - extra[-1])
+
+    return Bend(delays, float(profile.at(-pose.position[2])), gradient)
+
+
+def refracted_solution(
+    delay: Floats, beam: Floats, source: Floats, sound_speed: float, pose: Pose, profile: Profile
+) -> Solution:
+    """Where echoes come from through a profile: Newton on travel times from the closed form.
+
+    Solves T(A -> P) + T(P -> S) - T(S -> A) = delay for P on the ray that arrives along the beam. P = A + r v; the
+    residual falls by slope (e1.v + e2.v)/c, with e1 and e2 the directions of travel at P of the rays from the array and
+    from the source, and v turns by what the ray's arrival direction misses the beam. `sound_speed` is what the beams
+    are steered with: a beam hears what arrives with its slowness over the array, from a direction a little off its
+    own where the water at the array is of another speed. NaN in shadow zones, out of the water, and near the baseline.
+    """
+    local = float(profile.at(-pose.position[2]))
+    sideways = beam[:, 1:] * (local / sound_speed)
+    ahead = np.sqrt(np.maximum(1 - np.sum(sideways**2, axis=1), 0.0)) * np.where(beam[:, 0] < 0, -1.0, 1.0)
+    heard = unit(np.column_stack([ahead, sideways]))
+    closed = bistatic_range(local * delay, heard, source)
+    array, snap = pose.position[None], pose.to_world(source)[None]
+    wanted = pose.turn_to_world(heard)
+    v, r = wanted, closed.range
+    direct = first_rays(profile, snap, array).travel_time[0]
+    for _ in range(STEPS):
+        point = array + r[:, None] * v
+        out, back = first_rays(profile, array, point), first_rays(profile, snap, point)
+        late = out.travel_time + back.travel_time - direct - delay
+        slope = np.sum((out.arrival + back.arrival) * v, axis=1) / profile.at(-point[:, 2])
+        missed = wanted - out.departure
+        settled = np.abs(late) + np.linalg.norm(missed, axis=1) * r / local < TOLERANCE
+        if np.all(settled | np.isnan(late)):
+            break
+        r = r - np.clip(late / slope, -0.5 * r, 0.5 * r)
+        v = unit(v + missed)
+    good = settled & ~closed.ill_conditioned & (slope * local >= 0.1)
+    position = np.where(good[:, None], pose.to_body(point), np.nan)
+    return Solution(position, np.where(good, r, np.nan), closed.by_path, closed.by_angle, closed.by_source)

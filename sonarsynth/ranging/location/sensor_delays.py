@@ -1,0 +1,60 @@
+"""Locating by time differences over the sensors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from sonarsynth.description import description
+from sonarsynth.environment.sea import Profile
+from sonarsynth.geometry import Pose
+from sonarsynth.products import Bearings, Signals
+from sonarsynth.receiver import Elements, Sonar
+
+
+@description
+class SensorDelays:
+    """Direction and position from the time differences of the direct pulse over the sensors (Kuselan et al. 2011).
+
+    Equation 6 of the thesis with its square and an intercept, then the sphere that fits the delays best, then the depth
+    of the bed. Delays are measured coherently in the band against the wave that all sensors hear, to about a
+    thousandth of a sample. Standard errors are those of the lags that remain (and no less than the Cramer-Rao bound
+    for the noise), of the assumed sound speed, of the depth of the bed, and of the bending of rays where these are
+    taken for straight, through the Jacobians.
+    """
+
+    kind: Literal["sensor_delays"] = "sensor_delays"
+    refraction: bool = False
+    """Trace the bearing through the sound-speed profile of the water; otherwise paths are straight, at the sonar's
+    assumed sound speed, and predicted errors hold what a gradient g may do: r g/(2c) in angle, r^2 g/(2c) in place."""
+
+    on_bottom: bool | None = None
+    """Whether sources are known to be on the bottom. True: its depth is used where the wavefront agrees;
+    false (pingers, vehicles, fish): places are those of the wavefront alone. Left out: as the sources of the recipe."""
+
+    def resolve(self, *, on_bottom: bool) -> SensorDelays:
+        """With what the recipe says of its sources, where this is left out."""
+        return self if self.on_bottom is not None else replace(self, on_bottom=on_bottom)
+
+    def locate(
+        self,
+        signals: Signals,
+        elements: Elements,
+        sonar: Sonar,
+        sonar_pose: Pose,
+        bed_depth: float,
+        snaps: int,
+        profile: Profile,
+    ) -> Bearings:
+        """See `LocatingMethod`. An array that cannot locate gives NaN rows (`locating.unlocatable` says why)."""
+        from sonarsynth.ranging.location.locating import locate
+        from sonarsynth.ranging.location.refraction import bending, kink, mean_gradient
+
+        on_bottom = self.on_bottom is not False
+        gradient = mean_gradient(profile, -float(sonar_pose.position[2]), bed_depth, elements.aperture)
+        where = signals, elements, sonar, sonar_pose, bed_depth, snaps
+        kinked = kink(profile, -float(sonar_pose.position[2]), elements.aperture) if elements.aperture else 0.0
+        if not self.refraction:
+            return locate(*where, gradient=gradient, kink=kinked, on_bottom=on_bottom)
+        bend = bending(profile, elements, sonar_pose, sonar.assumed_sound_speed, gradient)
+        return locate(*where, bend=bend, kink=kinked, on_bottom=on_bottom)

@@ -1,0 +1,295 @@
+"""From a wavefront, and the depth of the bottom where it agrees, to a place, with the errors to expect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, azimuth_elevation
+from sonarsynth.equations.arrays.spherical_wave import Wavefront, envelope_peak
+from sonarsynth.geometry import Pose
+from sonarsynth.products import REASONS, Bearings
+from sonarsynth.ranging.location.pulse_times import DEAF, Pulse
+from sonarsynth.receiver import Elements, Sonar
+
+FLOOR = 1e-9
+"""Standard error (s) of a lag without any noise: what cutting the pulse's tail off does. Biases of 0.01 to 0.2 ns of
+curvature at the rim have been seen, which is what independent errors six times as large would leave."""
+TIME_FLOOR = 0.002
+"""Standard error of the time without any noise, in units of 1/bandwidth: absorption, and what is cut, skew a pulse."""
+AGREES = 9.0
+"""The bottom is used where innovation squared over variance is no more: three standard errors, since a source that
+stands off the bottom by less than the wavefront can tell is pulled there."""
+FARTHEST = 0.2
+"""Standard error of the range, in ranges, above which the range is unknown: errors of such a place are no ellipsoid."""
+STEPS = 5
+"""Linear steps to where wavefront and bottom meet, at most."""
+SETTLED = 0.01
+"""A step, in standard errors, after which no other is taken."""
+
+KINKED = 3 / 16
+"""A sphere fitted to a wavefront through a kink at the middle of an array of radius a, where the gradient of the sound
+speed changes by dg, is tilted by 3 dg a/(16 c): least squares of z|z| by z over -a..a."""
+
+ACCEPTED, SILENT, ARRAY, BAND, UNFIT, UNRESOLVED, OUTSIDE, ECHO, RANGE = range(len(REASONS))
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One snap of `Bearings`."""
+
+    time: float
+    time_error: float
+    direction: Floats  # (xyz) of the arriving wave
+    angle_error: Floats  # (2,) rad of azimuth, elevation
+    range_from_depth: tuple[float, float]  # value, error
+    range_from_curvature: tuple[float, float]
+    position: Floats
+    covariance: Floats
+    residual: float
+    bottom_used: int
+    reason: int
+    curvature: tuple[float, float]  # 1/m: value, error; of the straight wave over the array
+    chord: Floats  # (xyz) unit vector towards the source, where the wavefront alone puts it
+    amplitude: float  # Pa: of the pulse at the array centre, peak of the envelope, the face's response removed
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """What the sonar knows besides what it hears."""
+
+    elements: Elements
+    sonar: Sonar
+    pose: Pose
+    bed_depth: float  # m
+    gradient: float  # 1/s: size of the gradient of sound speed that rays taken for straight may have met; 0 for none
+    rounding: float  # (Pa s)^2: power in a bin of what the converter and single precision round off
+    quiet: float  # (Pa s)^2: power in a bin of the noise at a sensor
+    on_bottom: bool = True  # whether sources may be taken to be on the bottom, where the wavefront agrees
+    kink: float = 0.0  # 1/s: change of the gradient of the sound speed over the array
+
+
+@dataclass(frozen=True, eq=False)
+class Fix:
+    """Direction and curvature of a source with their errors, in the tangents of the wavefront."""
+
+    direction: Floats  # (xyz)
+    curvature: float
+    covariance: Floats  # (3, 3) of (along tangents, curvature)
+    used: bool  # whether the bottom was
+
+
+def _variance(wave: Wavefront, pulse: Pulse, rounding: float) -> float:
+    """Variance of a lag of weight one: the larger of what the lags show and of the Cramer-Rao bound for the noise seen.
+
+    The noise is not taken below that of rounding, nor lags below `FLOOR`.
+    """
+    count = int(np.sum(pulse.weight > 0))
+    least = FLOOR**2 * float(np.sum(pulse.weight)) / max(count, 1)
+    shown = float(pulse.weight @ wave.residual**2) / max(count - 4, 1)
+    return float(np.max([shown, least, 0.5 * pulse.noise, 0.5 * rounding]))
+
+
+def bending_covariance(
+    by_angle: Floats, slope: float, distance: float, gradient: float, sound_speed: float, aperture: float
+) -> Floats:
+    """Covariance (4, 4) of a wavefront's parameters where rays are taken for straight in a gradient (1/s).
+
+    A ray of grazing angle a is an arc of curvature g cos a/c: over a distance r it arrives r g cos a/(2c) beside its
+    chord, in the vertical plane. Where the gradient is that of a layer on the way, rays spread there by more or less,
+    and the curvature of the wavefront over the array is off by up to g cos^2 a/(c sin a), half of it on the mean; where
+    it is the same all the way, by g sin a/(2c): together g/(2c sin a), and never more than that of a source in the
+    array (1/aperture). slope is sin a; by_angle (2,) its derivatives along the tangents, of size cos a.
+    """
+    half = 0.5 * gradient / sound_speed
+    covariance = np.zeros((4, 4))
+    covariance[:2, :2] = np.outer(by_angle, by_angle) * (half * distance) ** 2
+    covariance[2, 2] = (half / max(abs(slope), half * aperture)) ** 2
+    return covariance
+
+
+def place(wave: Wavefront, pulse: Pulse, known: Known, heard: Wavefront | None = None) -> Row:
+    """Ranges and position from a wavefront, and the depth of the bottom where it agrees; errors through the Jacobians.
+
+    heard: the wave as the array hears it, where `wave` is the straight one that is left without bending. The direction
+    is always that of the wave as heard.
+    """
+    elements, sonar, pose = known.elements, known.sonar, known.pose
+    heard = heard or wave
+    timing = _variance(wave, pulse, known.rounding) * wave.covariance
+    full = timing + np.outer(wave.by_sound_speed, wave.by_sound_speed) * sonar.sound_speed_error**2
+    if not np.isfinite(full[2, 2]):  # too few sensors to tell the curvature: anything outside the array
+        full[2, 2] = 1 / elements.aperture**2
+    fall = -known.bed_depth - pose.position[2]  # the bottom is this much above the sonar (negative: below it)
+    slope, by_angle = float(pose.rotation[2] @ wave.direction), wave.tangents @ pose.rotation[2]
+    from_depth = fall / slope if slope * fall > 0 else np.nan
+    tilt = by_angle * (KINKED * known.kink * elements.aperture / sonar.assumed_sound_speed)
+    straight, spread = full, full[:2, :2] + np.outer(tilt, tilt)
+    around = spread[0, 0] / max(1 - heard.direction[2] ** 2, 1e-300)
+    fix = _fuse(wave, straight, fall, known)
+    for _ in range(2 * (known.gradient > 0)):  # what bending does depends on the distance, and that a little on bending
+        likely = [1 / fix.curvature if fix.curvature > 0 else np.nan, from_depth, elements.aperture]
+        distance = next(d for d in likely if np.isfinite(d))
+        full = straight + bending_covariance(
+            by_angle, slope, distance, known.gradient, sonar.assumed_sound_speed, elements.aperture
+        )
+        fix = _fuse(wave, full, fall, known)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        depth_error = np.hypot(from_depth * np.sqrt(by_angle @ full[:2, :2] @ by_angle), sonar.bed_depth_error)
+        from_curvature = 1 / wave.curvature if wave.curvature > 0 else np.nan
+        curvature_error = np.sqrt(full[2, 2]) * from_curvature**2
+    reason = RANGE if not np.sqrt(fix.covariance[2, 2]) <= FARTHEST * fix.curvature else ACCEPTED
+    if not _in_water(wave, full, slope, by_angle, fall, known):
+        reason = OUTSIDE
+    time, time_error = _arrival(pulse, full, timing[3, 3] / max(wave.covariance[3, 3], 1e-300), sonar, known.rounding)
+    if not np.isfinite(time):
+        reason = BAND
+    position, covariance = _position(wave, fix)
+    known_place = reason == ACCEPTED
+    return Row(
+        time=pulse.time + time,
+        time_error=time_error,
+        direction=heard.direction,
+        angle_error=np.sqrt([around, spread[1, 1]]),
+        range_from_depth=(from_depth, float(depth_error) / abs(slope) if np.isfinite(from_depth) else np.nan),
+        range_from_curvature=(from_curvature, curvature_error),
+        position=position if known_place else np.full(3, np.nan),
+        covariance=covariance if known_place else np.full((3, 3), np.nan),
+        residual=float(np.sqrt(pulse.weight @ wave.residual**2 / pulse.weight.sum())),
+        bottom_used=int(fix.used) if known_place else -1,
+        reason=reason,
+        curvature=(wave.curvature, float(np.sqrt(full[2, 2]))),
+        chord=wave.direction,
+        amplitude=float(np.sqrt(np.sum(np.abs(pulse.template) ** 2))),
+    )
+
+
+def _fuse(wave: Wavefront, covariance: Floats, fall: float, known: Known) -> Fix:
+    """The wavefront, and where it agrees the depth: slope - k fall = 0 within |k| times the error of the depth.
+
+    slope is the sine of the bearing's elevation in the world, fall (m) the height of the bottom above the sonar. In
+    (tangents, curvature) the far field is no special case, and the condition is nearly linear: it is made linear anew
+    where each step has led (Gauss and Newton), and not used where that does not settle.
+    """
+    u, k, p, up = wave.direction, wave.curvature, covariance[:3, :3], known.pose.rotation[2]
+    alone = Fix(u, k, p, False)
+    slope, by_angle = float(up @ u), wave.tangents @ up
+    if not (known.on_bottom and slope * fall > 0):
+        return alone
+    # near the horizontal the depth says nothing of k
+    noise = (max(abs(k), slope / fall) * known.sonar.bed_depth_error) ** 2
+    row = np.array([*by_angle, -fall])
+    variance = float(row @ p @ row) + noise
+    if not (k * fall - slope) ** 2 <= AGREES * variance:
+        return alone
+    step, scale = np.zeros(3), np.sqrt(np.maximum(np.diag(p), 1e-300))
+    for _ in range(STEPS):
+        u = _turned(wave, step)
+        row = np.array([*(wave.tangents @ up) / np.linalg.norm(wave.direction + step[:2] @ wave.tangents), -fall])
+        missed = (k + step[2]) * fall - float(up @ u)
+        gain = p @ row / (float(row @ p @ row) + noise)
+        last, step = step, gain * (missed + row @ step)
+        if np.max(np.abs(step - last) / scale) < SETTLED:
+            break
+    else:
+        return alone
+    keep = np.eye(3) - np.outer(gain, row)  # Joseph's form: no variance can come out negative
+    return Fix(_turned(wave, step), k + float(step[2]), keep @ p @ keep.T + np.outer(gain, gain) * noise, True)
+
+
+def _turned(wave: Wavefront, step: Floats) -> Floats:
+    u = wave.direction + step[:2] @ wave.tangents
+    return np.asarray(u / np.linalg.norm(u))
+
+
+def _position(wave: Wavefront, fix: Fix) -> tuple[Floats, Floats]:
+    """Position (xyz) and covariance of a fix."""
+    u, k = fix.direction, fix.curvature
+    if not k > 0:
+        return np.full(3, np.nan), np.full((3, 3), np.nan)
+    jacobian = np.stack([wave.tangents[0] / k, wave.tangents[1] / k, -u / k**2], axis=1)
+    return u / k, jacobian @ fix.covariance @ jacobian.T
+
+
+def _in_water(wave: Wavefront, covariance: Floats, slope: float, by_angle: Floats, fall: float, known: Known) -> bool:
+    """Whether the wavefront alone can come from between surface and bottom, within three standard errors.
+
+    The images of a snap in surface and bottom lie beyond them. Asked of the curvature: the source may be anywhere on
+    the bearing this side of the boundary, k room >= slope. An array under the bottom (a shelf overhead) knows none.
+    """
+    k, p = wave.curvature, covariance[:3, :3]
+    room = fall if slope < 0 else -float(known.pose.position[2])
+    if fall > 0 or slope * room <= 0:
+        return True
+    row = np.array([*by_angle, -room])
+    slack = (max(abs(k), slope / room) * known.sonar.bed_depth_error) ** 2 if slope < 0 else 0.0
+    beyond = (slope - k * room) * np.sign(room)
+    return bool(beyond <= 3 * np.sqrt(float(row @ p @ row) + slack))
+
+
+def _arrival(pulse: Pulse, full: Floats, unit: float, sonar: Sonar, rounding: float) -> tuple[float, float]:
+    """Where the pulse's envelope peaks, s after the template's time 0, and the standard error of that time (s).
+
+    The error is that of the envelope of the mean pulse, and what direction and curvature add at the array centre: of
+    the fitted time's variance all but the least, that of the mean of the lags; `unit` is the variance of a lag of
+    weight one.
+    """
+    whole = np.minimum(1 + DEAF * len(pulse.lag) / np.maximum(pulse.power, 1e-300), 2.0)  # `waveform` holds it down
+    noise = max(pulse.noise, rounding) / np.maximum(pulse.power, 1e-300)
+    low, high = sonar.band.low, sonar.band.high
+    time, error = envelope_peak(pulse.frequency, pulse.template * whole, low, high, noise)
+    tilted = max(float(full[3, 3]) - unit / float(np.sum(pulse.weight)), 0.0)
+    floor = TIME_FLOOR / (high - low)
+    return time, float(np.sqrt(error**2 + tilted + floor**2))
+
+
+def refused(reason: int) -> Row:
+    """A row of which nothing is known but why."""
+    none, pair = np.full(3, np.nan), (np.nan, np.nan)
+    return Row(
+        np.nan,
+        np.nan,
+        none,
+        none[:2],
+        pair,
+        pair,
+        none,
+        np.full((3, 3), np.nan),
+        np.nan,
+        -1,
+        reason,
+        pair,
+        none,
+        np.nan,
+    )
+
+
+def as_bearings(rows: list[Row], snaps: int, reason: int = SILENT) -> Bearings:
+    """Rows as `Bearings` of `snaps` rows; NaN beyond those there are, for a reason."""
+    rows = [*rows[:snaps], *[refused(reason)] * (snaps - len(rows))]
+
+    def column(get: Callable[[Row], object], *shape: int) -> Floats:
+        return np.array([get(row) for row in rows], float).reshape(snaps, *shape)
+
+    def ints(get: Callable[[Row], int]) -> np.ndarray:
+        return np.array([get(row) for row in rows], np.int64)
+
+    return Bearings(
+        time=column(lambda r: r.time),
+        time_error=column(lambda r: r.time_error),
+        azimuth=column(lambda r: azimuth_elevation(r.direction)[0]),
+        azimuth_error=column(lambda r: r.angle_error[0]),
+        elevation=column(lambda r: azimuth_elevation(r.direction)[1]),
+        elevation_error=column(lambda r: r.angle_error[1]),
+        range_from_depth=column(lambda r: r.range_from_depth[0]),
+        range_from_depth_error=column(lambda r: r.range_from_depth[1]),
+        range_from_curvature=column(lambda r: r.range_from_curvature[0]),
+        range_from_curvature_error=column(lambda r: r.range_from_curvature[1]),
+        position=column(lambda r: r.position, 3),
+        position_covariance=column(lambda r: r.covariance, 3, 3),
+        residual=column(lambda r: r.residual),
+        bottom_used=ints(lambda r: r.bottom_used),
+        reason=ints(lambda r: r.reason),
+    )

@@ -1,0 +1,201 @@
+"""What listens: the array, its band and filter, the converter, the beam grid, and the sound speed it assumes.
+
+All of it belongs to the instrument, never to the water: a varied sound speed must not change the shape of a frame.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import Ge, Le, Lt
+from pydantic import ValidationInfo, field_validator
+
+from sonarsynth.conventions import (
+    Decibels,
+    Floats,
+    MetresPerSecond,
+    NonNegativeMetres,
+    Pascals,
+    PositiveHertz,
+    PositiveRadians,
+    WaterSoundSpeed,
+)
+from sonarsynth.description import BY_KIND, description
+from sonarsynth.receiver.hydrophones import Array, Elements, PlanarLattice, PositionTable, Romanis, elements
+
+__all__ = [
+    "Array",
+    "Band",
+    "BandPass",
+    "BeamGrid",
+    "Converter",
+    "Elements",
+    "Filter",
+    "LowPass",
+    "PlanarLattice",
+    "PositionTable",
+    "Romanis",
+    "Sonar",
+    "elements",
+    "stop_frequency",
+]
+
+
+@description
+class Band:
+    """The band that the sonar works in: the bins that are beamformed, located and ranged."""
+
+    low: PositiveHertz
+    high: PositiveHertz
+
+    @field_validator("high")
+    @classmethod
+    def _check_high(cls, value: float, info: ValidationInfo) -> float:
+        return _above_low(value, info)
+
+    @property
+    def centre(self) -> float:
+        """Middle of the band (Hz)."""
+        return 0.5 * (self.low + self.high)
+
+
+Transition = Annotated[PositiveHertz, Ge(100.0)]
+"""A filter rings for several periods of its transition: narrower ones would ring for more than 0.1 s."""
+
+
+@description
+class LowPass:
+    """Linear-phase low-pass FIR filter (Kaiser window), zero delay."""
+
+    kind: Literal["low_pass"] = "low_pass"
+    cutoff: PositiveHertz
+    """Where the response is one half (-6 dB)."""
+    transition: Transition = 10e3
+    attenuation: Annotated[Decibels, Ge(21), Le(160)] = 80.0
+
+
+@description
+class BandPass:
+    """Linear-phase band-pass FIR filter (Kaiser window), zero delay."""
+
+    kind: Literal["band_pass"] = "band_pass"
+    low: PositiveHertz
+    high: PositiveHertz
+    transition: Transition = 5e3
+    attenuation: Annotated[Decibels, Ge(21), Le(160)] = 80.0
+
+    @field_validator("high")
+    @classmethod
+    def _check_high(cls, value: float, info: ValidationInfo) -> float:
+        return _above_low(value, info)
+
+
+Filter = Annotated[LowPass | BandPass, BY_KIND]
+
+
+@description
+class Converter:
+    """Analogue to digital: pressure is stored as a whole number of counts."""
+
+    bits: Annotated[int, Ge(2), Le(24)] = 16
+    """Counts run over +-(2^(bits - 1) - 1)."""
+    full_scale: Annotated[Pascals, Ge(1e-9), Le(1e12)]
+    """Largest pressure (Pa): counts run over +-full_scale; louder samples are clipped, and counted."""
+
+    @property
+    def quantum(self) -> float:
+        """Pressure of one count (Pa)."""
+        return float(self.full_scale / 2 ** (self.bits - 1))
+
+
+@description
+class BeamGrid:
+    """Steered directions: a grid symmetric about the acoustic axis, ascending in azimuth and in elevation."""
+
+    azimuth_span: Annotated[PositiveRadians, Lt(np.pi)] = np.deg2rad(50.0)
+    """Angle from the first beam of a row to the last."""
+    azimuths: Annotated[int, Ge(1), Le(2001)] = 101
+    """Beams in a row."""
+    elevation_span: Annotated[PositiveRadians, Lt(np.pi)] = np.deg2rad(50.0)
+    """Angle from the lowest row of beams to the highest."""
+    elevations: Annotated[int, Ge(1), Le(2001)] = 101
+    """Rows of beams."""
+
+    @property
+    def azimuth(self) -> Floats:
+        """(azimuth,) rad, port positive."""
+        return _symmetric(self.azimuth_span, self.azimuths)
+
+    @property
+    def elevation(self) -> Floats:
+        """(elevation,) rad, up positive."""
+        return _symmetric(self.elevation_span, self.elevations)
+
+
+def _above_low(value: float, info: ValidationInfo) -> float:
+    """Validate the upper edge of a band against its lower one."""
+    if value <= info.data.get("low", 0.0):
+        raise ValueError(f"must be above low ({info.data['low']:g} Hz)")
+    return value
+
+
+def _symmetric(span: float, count: int) -> Floats:
+    """Exactly antisymmetric grid: kernels that use x -> -x rely on it."""
+    if count == 1:
+        return np.zeros(1)
+    return np.asarray((2.0 * np.arange(count) - (count - 1)) * (0.5 * span / (count - 1)), float)
+
+
+@description
+class Sonar:
+    """A passive sonar."""
+
+    array: Array = Romanis()
+    band: Band = Band(low=25e3, high=85e3)
+    filter: Filter | None = None
+    """Anti-alias filter before sampling; left out: a `BandPass` of the band."""
+    sampling_frequency: Annotated[PositiveHertz, Le(100e6)] = 196e3
+    converter: Converter | None = None
+    """Left out: pressure is stored as float32."""
+    beams: BeamGrid = BeamGrid()
+    assumed_sound_speed: WaterSoundSpeed = 1540.0
+    """The sound speed that the sonar uses to steer and to range."""
+    sound_speed_error: Annotated[MetresPerSecond, Ge(0)] = 1.0
+    """Standard error that the sonar ascribes to it: enters the predicted errors only."""
+    bed_depth_error: NonNegativeMetres = 0.05
+    """Standard error of the depth of a snap below the surface, as the sonar knows it."""
+
+    @field_validator("sampling_frequency")
+    @classmethod
+    def _check_sampling(cls, value: float, info: ValidationInfo) -> float:
+        band, chosen = info.data.get("band"), info.data.get("filter")
+        if band is None:
+            return value
+        if value < 2 * band.high:
+            raise ValueError(f"{value:g} Hz is under twice the band ({band.high:g} Hz)")
+        chosen = chosen or BandPass(low=band.low, high=band.high)
+        edge = stop_frequency(chosen)
+        if edge <= band.low or (isinstance(chosen, BandPass) and chosen.low - 0.5 * chosen.transition >= band.high):
+            raise ValueError(f"nothing to sample: the filter stops the whole band ({band.low:g} to {band.high:g} Hz)")
+        if value < 2 * edge:
+            raise ValueError(f"{value:g} Hz is under twice the filter's stop edge ({edge:g} Hz)")
+        return value
+
+    @property
+    def antialias(self) -> Filter:
+        """The filter before sampling."""
+        if self.filter is not None:
+            return self.filter
+        return BandPass(low=self.band.low, high=self.band.high)
+
+    @property
+    def shortest_wavelength(self) -> float:
+        """In the band, by the assumed sound speed (m)."""
+        return self.assumed_sound_speed / self.band.high
+
+
+def stop_frequency(filter: Filter) -> float:
+    """Where the stop band begins (Hz)."""
+    edge = filter.cutoff if isinstance(filter, LowPass) else filter.high
+    return edge + 0.5 * filter.transition

@@ -1,0 +1,160 @@
+"""YAML and recipes: the same classes as in Python, with errors that name file, line and field.
+
+A value is checked as strictly as JSON: a number is a number (or a text with a unit), a whole number has no point,
+true is no 1. A bare number is in the SI unit that the schema names; of an angle it is refused, unless it is 0. Paths
+inside a file are relative to it and stay in its folder; paths given by `--set` are relative to the working directory.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+from pydantic.json_schema import GenerateJsonSchema
+from ruamel.yaml import YAML
+
+from sonarsynth.description import FieldError
+from sonarsynth.recipe import FILE_KINDS, Recipe
+from sonarsynth.recipe.reading.messages import explain
+from sonarsynth.recipe.reading.yaml_source import SET, RecipeError, Source, Where, override, read_file, read_text
+
+__all__ = ["RecipeError", "Source", "dump", "load", "loads", "locating", "read", "recipe_of", "schema"]
+
+_ADAPTER: Final[TypeAdapter[Recipe]] = TypeAdapter(Recipe)
+
+
+def load(path: Path | str, sets: Sequence[str] = ()) -> Recipe:
+    """The recipe of a YAML file, with `path=value` settings over it. Raises RecipeError."""
+    return recipe_of(read(path, sets))
+
+
+def loads(text: str, name: str = "recipe", folder: Path | str = ".", *, resolved: bool = False) -> Recipe:
+    """The recipe of a YAML text; its paths are relative to `folder`.
+
+    `resolved` says that `dump` wrote the text, maybe before it gave angles their unit: bare ones are then in rad.
+    Raises RecipeError.
+    """
+    return recipe_of(read_text(text, name, Path(folder).absolute()), check_files=False, resolved=resolved)
+
+
+def read(path: Path | str, sets: Sequence[str] = ()) -> Source:
+    """A recipe file as plain values with their lines, and settings over it. Raises RecipeError."""
+    source = read_file(path)
+    for setting in sets:
+        source = override(source, setting)
+    return source
+
+
+def recipe_of(source: Source, *, check_files: bool = True, resolved: bool = False) -> Recipe:
+    """The recipe that a source describes, files resolved to absolute paths. Raises RecipeError."""
+    data = _resolved(source, source.data, (), check_files)
+    try:
+        return _ADAPTER.validate_json(json.dumps(data), strict=True, context={"resolved": resolved})
+    except ValidationError as error:
+        raise explain(error, Recipe, source) from None
+
+
+@contextmanager
+def locating(source: Source) -> Iterator[None]:
+    """Turn a FieldError (from planning) into a RecipeError that names file, line and field."""
+    try:
+        yield
+    except FieldError as error:
+        raise source.error(error.path, error.message) from None
+    except MemoryError:
+        raise RecipeError(source.name, "", "", "needs more memory than there is") from None
+
+
+def dump(recipe: Recipe) -> str:
+    """YAML of a recipe, every default written out; `loads` gives an equal recipe."""
+    text = io.StringIO()
+    yaml: Any = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = None  # mappings and lists of plain values in one line, the rest as blocks
+    yaml.sort_base_mapping_type_on_output = False
+    yaml.width = 4096
+    yaml.allow_unicode = True
+    yaml.dump(_ADAPTER.dump_python(recipe, mode="json"), text)
+    return text.getvalue()
+
+
+def schema() -> dict[str, Any]:
+    """JSON schema of a recipe, for editors: titles, descriptions, kinds, and the unit of each number (`x-unit`)."""
+    found = _ADAPTER.json_schema(schema_generator=_Schema)
+    _write_defaults(found)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **found}
+
+
+def _write_defaults(part: Any) -> str | None:
+    """Give defaults that are angles their unit, as people write it. Returns the unit of a number, None for others."""
+    if isinstance(part, list):
+        return next((unit for unit in [_write_defaults(one) for one in part] if unit), None)
+    if not isinstance(part, dict):
+        return None
+    inner = {name: _write_defaults(value) for name, value in part.items()}
+    unit = part.get("x-unit") or inner.get("anyOf")
+    value = part.get("default")
+    if unit in ("rad", "rad/s") and isinstance(value, float) and value != 0:
+        part["default"] = f"{round(float(np.rad2deg(value)), 10):.12g} {unit.replace('rad', 'deg')}"
+    return unit
+
+
+class _Schema(GenerateJsonSchema):
+    """Takes NumPy numbers as defaults."""
+
+    def encode_default(self, dft: Any) -> Any:
+        return super().encode_default(dft.item() if isinstance(dft, np.generic) else dft)
+
+
+def _resolved(source: Source, data: Any, where: Where, check: bool) -> Any:
+    """The data with the paths of files absolute; raises RecipeError where a file is not there."""
+    if isinstance(data, list):
+        return [_resolved(source, value, (*where, i), check) for i, value in enumerate(data)]
+    if not isinstance(data, dict):
+        return data
+    path = data.get("path")
+    if isinstance(path, str) and any(data.get("kind") == kind for kind in FILE_KINDS):
+        place = (*where, "path")
+        folder = Path.cwd() if source.place(place) == SET else source.folder
+        file = Path(path) if Path(path).is_absolute() else folder / path
+        if check:
+            _check_place(source, place, path)
+            _check_file(source, place, path, file)
+        return data | {"path": path if Path(path).is_absolute() else str(file)}
+    return {key: _resolved(source, value, (*where, key), check) for key, value in data.items()}
+
+
+def _check_file(source: Source, where: Where, path: str, file: Path) -> None:
+    try:
+        found, there = file.exists(), file.is_file()
+    except (OSError, ValueError):  # too long, or a NUL byte
+        raise source.error(where, "is not the path of a file") from None
+    if not found:
+        raise source.error(where, f"no such file: {path or file}")
+    if not there:
+        raise source.error(where, f"is not a file: {path or file}")
+
+
+def _check_place(source: Source, where: Where, path: str) -> None:
+    """What a recipe names lies in its folder: what comes from elsewhere with a recipe opens no other file of ours."""
+    if source.place(where) == SET:
+        return
+    if re.match(r"[A-Za-z][A-Za-z0-9+.-]+://|file:", path):
+        raise source.error(where, "is a URL: a recipe names files in its own folder")
+    elsewhere = "a recipe names files in its own folder; `--set` may name any"
+    if Path(path).is_absolute():
+        raise source.error(where, f"is an absolute path: {elsewhere}")
+    if ".." in Path(path).parts:
+        raise source.error(where, f"leaves the folder of the recipe: {elsewhere}")
+    try:
+        inside = (source.folder / path).resolve().is_relative_to(source.folder.resolve())
+    except (OSError, ValueError, RuntimeError):  # too long, a NUL byte, links in a circle
+        raise source.error(where, "is not the path of a file") from None
+    if not inside:
+        raise source.error(where, f"is a link out of the folder of the recipe: {elsewhere}")

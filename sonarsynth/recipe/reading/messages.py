@@ -1,0 +1,172 @@
+"""Validation errors as people read them: the field as it stands in the file, and one clear line."""
+
+from __future__ import annotations
+
+import difflib
+import types
+from dataclasses import is_dataclass
+from typing import Annotated, Any, Union, get_args, get_origin
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from sonarsynth.recipe.reading.yaml_source import SET, RecipeError, Source, Where, dotted
+from sonarsynth.targets.target import NAME
+
+
+def explain(error: ValidationError, root: type, source: Source) -> RecipeError:
+    """The first error of a validation, with its place in the file, and how many more there are."""
+    found: dict[Where, str] = {}
+    for details in error.errors(include_url=False):
+        where = _where(details, source.data)
+        where, message = _message(details, where, root, source.data)
+        if details["type"] == "dataclass_type" and (found.get(where) or "").startswith("must be '"):
+            found[where] = found[where].replace("' or '", "', '").replace(", not ", " or a mapping, not ", 1)
+        found.setdefault(where, message)
+    words = {where for where, text in found.items() if text.startswith("must be '") and text.endswith("not a mapping")}
+    for where in words:  # of a word or a mapping, it is the mapping that was meant
+        if any(len(other) > len(where) and other[: len(where)] == where for other in found):
+            del found[where]
+    guessed = [item for item in found.items() if "did you mean" in item[1]]  # a misspelt field explains a missing one
+    where, message = next(iter(found.items()))
+    if guessed and message == "is required":
+        where, message = guessed[0]
+    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+    return source.error(where, message + _of_another_kind(where, source) + more)
+
+
+def _of_another_kind(where: Where, source: Source) -> str:
+    """What to do about a field of the kind that `--set` has replaced; "" where it has not."""
+    kind = (*where[:-1], "kind")
+    if not where or where[-1] == "kind" or source.places.get(kind) != SET or source.places.get(where, SET) == SET:
+        return ""
+    holder = source.data
+    for part in where[:-1]:
+        holder = holder[part]
+    return f"; to replace all fields: --set {dotted(where[:-1])}='{{kind: {holder['kind']}}}'"
+
+
+def _where(details: ErrorDetails, data: Any) -> Where:
+    """The path of an error in the file: pydantic's, without the parts that name members of unions."""
+    path: list[str | int] = []
+    parts = details["loc"]
+    for n, part in enumerate(parts):
+        named = isinstance(data, dict) and part in data and data.get("kind") != part
+        if named or (isinstance(data, list) and isinstance(part, int) and part < len(data)):
+            data = data[part]
+        elif not (details["type"] == "missing" and n == len(parts) - 1):
+            continue
+        path.append(part)
+    return tuple(path)
+
+
+def _message(details: ErrorDetails, where: Where, root: type, data: Any) -> tuple[Where, str]:
+    """Path and text of an error."""
+    context = details.get("ctx", {})
+    if details["type"] == "union_tag_invalid":
+        kinds = _kinds(_type_at(root, where, data))
+        return (*where, "kind"), _unknown(str(context["tag"]), kinds, "kind")
+    if details["type"] == "union_tag_not_found":
+        return where, f"needs a kind: one of {', '.join(_kinds(_type_at(root, where, data)))}"
+    if details["type"] == "unexpected_keyword_argument":
+        return where, _unknown(str(where[-1]), _fields(_class_at(root, where[:-1], data)))
+    return where, _text(details)
+
+
+def _text(details: ErrorDetails) -> str:
+    """What is wrong with a value, whatever it is in."""
+    context, value = details.get("ctx", {}), _shown(details["input"])
+    match details["type"]:
+        case "missing":
+            return "is required"
+        case "value_error":
+            return str(context["error"])
+        case "dataclass_type" | "dict_type" | "model_attributes_type":
+            return f"must be a mapping of fields, not {value}"
+        case "string_pattern_mismatch" if context["pattern"] == NAME:
+            return f"must be letters, digits, hyphens and underscores, a letter first, not {value}"
+        case "tuple_type" | "list_type":
+            return f"must be a list, not {value}"
+        case "too_long":
+            return f"must have at most {context['max_length']} entries, not {context['actual_length']}"
+        case "too_short":
+            return f"must have at least {context['min_length']} entries, not {context['actual_length']}"
+    text = details["msg"].replace("Input should be", "must be").replace("String should", "must")
+    return f"{text[0].lower()}{text[1:]}, not {value}"
+
+
+def _unknown(name: str, known: list[str], what: str = "field") -> str:
+    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    hint = f"did you mean '{close[0]}'?" if close else f"known: {', '.join(known)}"
+    return f"'{name}' is not a {what} here; {hint}"
+
+
+def _shown(value: Any) -> str:
+    match value:
+        case None:
+            return "nothing"
+        case bool():
+            return str(value).lower()
+        case dict():
+            return "a mapping"
+        case list() | tuple():
+            return "a list"
+    text = repr(value)
+    return text if len(text) <= 40 else f"{text[:37]}..."
+
+
+def _fields(cls: type | None) -> list[str]:
+    return [] if cls is None else list(getattr(cls, "__pydantic_fields__", {}))
+
+
+def _class_at(root: Any, where: Where, data: Any) -> type | None:
+    """The description that a path leads to; None where it leads elsewhere."""
+    kind = _type_at(root, where, data)
+    for part in where:
+        data = data[part]
+    chosen = _chosen(kind, data)
+    return chosen if isinstance(chosen, type) and is_dataclass(chosen) else None
+
+
+def _type_at(kind: Any, where: Where, data: Any) -> Any:
+    """The annotation of what a path leads to, choosing members of unions by the `kind` in the data."""
+    for part in where:
+        kind, data = _chosen(kind, data), data[part]
+        if get_origin(kind) is tuple:
+            members = get_args(kind)
+            kind = members[0] if members[-1] is Ellipsis else members[min(int(part), len(members) - 1)]
+        else:
+            field = getattr(kind, "__pydantic_fields__", {}).get(part)
+            kind = None if field is None else field.annotation
+    return kind
+
+
+def _members(kind: Any) -> list[Any]:
+    """Members of a union (without None), or the type itself."""
+    if get_origin(kind) is Annotated:
+        return _members(get_args(kind)[0])
+    if get_origin(kind) in (Union, types.UnionType):
+        return [m for member in get_args(kind) if member is not type(None) for m in _members(member)]
+    return [kind]
+
+
+def _tag(kind: Any) -> str | None:
+    field = getattr(kind, "__pydantic_fields__", {}).get("kind")
+    return None if field is None else str(field.default)
+
+
+def _kinds(kind: Any) -> list[str]:
+    return [tag for tag in map(_tag, _members(kind)) if tag is not None]
+
+
+def _chosen(kind: Any, data: Any) -> Any:
+    members = _members(kind)
+    if len(members) == 1:
+        return members[0]
+    tag = data.get("kind") if isinstance(data, dict) else None
+    tagged = [m for m in members if _tag(m) is not None]
+    if isinstance(data, dict) and tag is None and len(tagged) == 1:  # the kind of the only one may be left out
+        return tagged[0]
+    fitting = [m for m in members if _tag(m) == tag and hasattr(m, "__pydantic_fields__")]
+    given = set(data) if isinstance(data, dict) else set()
+    return max(fitting, key=lambda m: len(given & set(_fields(m))), default=None)

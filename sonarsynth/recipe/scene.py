@@ -1,0 +1,222 @@
+"""A scene: the world, the sonar in it, when frames are taken, and the methods that simulate and process them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from annotated_types import Ge, Gt, Le
+from pydantic import Field, ValidationInfo, field_validator
+
+from sonarsynth.conventions import Decibels, Floats, PositiveSeconds, Seconds
+from sonarsynth.description import description
+from sonarsynth.environment.sea import Environment
+from sonarsynth.geometry import Pose
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.geometry.motion import Motion, Still, Track, pose, velocity
+from sonarsynth.geometry.placed_target import Body
+from sonarsynth.imaging import AutoBeamforming, Beamformer
+from sonarsynth.propagation import AutoTracing, Tracing
+from sonarsynth.randomness import stream
+from sonarsynth.ranging import AutoRange, Cancelling, Locator, Ranging, SensorDelays
+from sonarsynth.receiver import Sonar
+from sonarsynth.scattering import MirrorLobe, Scattering
+from sonarsynth.signals import AutoSynthesis, Synthesis
+from sonarsynth.sources.shrimp import SnappingShrimp
+from sonarsynth.sources.snap_pulses import scales
+from sonarsynth.state import Moment, Snap, snaps_of
+from sonarsynth.targets.target import Target, mesh_for
+
+MOST = 500
+"""Targets of a scene; snaps of a frame."""
+
+
+@description
+class World:
+    """What there is."""
+
+    environment: Environment
+    targets: tuple[Target, ...] = ()
+    """Bodies in the water."""
+    shrimp: tuple[SnappingShrimp, ...] = ()
+    """What makes the sound."""
+
+    @field_validator("targets")
+    @classmethod
+    def _check_names(cls, targets: tuple[Target, ...]) -> tuple[Target, ...]:
+        names = set[str]()
+        for target in targets:
+            if target.name in names:
+                raise ValueError(f"two targets are called '{target.name}'")
+            names.add(target.name)
+        return targets
+
+    @field_validator("targets", "shrimp")
+    @classmethod
+    def _check_count(cls, several: tuple[Any, ...], info: ValidationInfo) -> tuple[Any, ...]:
+        count = sum(len(one.snap_times) if isinstance(one, SnappingShrimp) else 1 for one in several)
+        if count > MOST:
+            what = "snaps" if info.field_name == "shrimp" else "targets"
+            raise ValueError(f"{count} {what} are more than {MOST}")
+        return several
+
+
+@description
+class Trajectory:
+    """When frames are taken, and how the sonar moves."""
+
+    frames: Annotated[int, Ge(1), Le(10_000_000)] = 1
+    """Number of frames."""
+    interval: PositiveSeconds = 0.1
+    """Time from one frame to the next."""
+    start: Seconds = 0.0
+    """Time of the first frame since the start of the motions."""
+    sonar: Motion = Still(position=(0.0, 0.0, -5.0), heading=0.5 * np.pi)
+    """How the sonar moves."""
+
+    def time(self, step: int) -> float:
+        """Time (s) of a frame since the start of the motions."""
+        return self.start + step * self.interval
+
+
+@description
+class Physics:
+    """How the scene is simulated."""
+
+    tracing: Tracing = Field(default_factory=AutoTracing)
+    """How sound travels."""
+    scattering: Scattering = Field(default_factory=MirrorLobe)
+    """How facets scatter it, of targets that do not say so themselves."""
+    subarrays: Literal["auto", "sensors"] | Annotated[int, Ge(1), Le(100_000)] = "auto"
+    """Parts that the array is cut into: paths are traced to the middle of each and expanded from there to its
+    hydrophones. `sensors`: every hydrophone by itself; `auto`: as few as the accuracy of the recipe allows."""
+    visibility: Literal["auto", "centre", "hydrophones"] = "auto"
+    """Whether a facet is heard where the middle of the array (or part) sees it, or by each hydrophone that sees it.
+    `auto`: the latter where the accuracy of the recipe asks for it."""
+    faintest: Literal["auto"] | Annotated[Decibels, Gt(0), Le(300)] = "auto"
+    """The faintest echoes of each target are left out, all of them together this far below the whole echo."""
+    synthesis: Synthesis = Field(default_factory=AutoSynthesis)
+    """How signals are made from arrivals."""
+    doppler: bool = True
+    """Whether targets and sonar move while sound is under way; false: all is where it is at the instant of the frame.
+    """
+
+
+@description
+class EchoWindow:
+    """When the sonar listens for echoes, in seconds after the direct arrival of the snap.
+
+    Left out, the planner takes the shortest window that holds the echoes of every frame.
+    """
+
+    start: Annotated[Seconds, Ge(0)] | None = None
+    """Begin of the window after the direct arrival."""
+    stop: PositiveSeconds | None = None
+    """End of the window after the direct arrival."""
+
+
+@description
+class Processing:
+    """What the sonar does with what it hears."""
+
+    echo_window: EchoWindow = Field(default_factory=EchoWindow)
+    locating: Locator = Field(default_factory=SensorDelays)
+    """How the snap is located."""
+    cancelling: Cancelling | None = None
+    """How the snap's own reflections are taken out of the signals before imaging; left out: they stay in."""
+    direct_pulse: Literal["auto", "keep", "remove"] = "auto"
+    """Whether the direct pulse of the loudest snap is taken out of the signals before imaging, and the echo window
+    opens while it lasts. `auto`: where the echo window would otherwise cut echoes; `keep`: the window opens after it.
+    But for `keep`, direct pulses of other located snaps are taken out wherever they are heard in the echo window."""
+    beamforming: Beamformer = Field(default_factory=AutoBeamforming)
+    """How the energy image is made."""
+    ranging: Ranging = Field(default_factory=AutoRange)
+    """How echoes are ranged and placed."""
+
+
+@description
+class Scene:
+    """World, sonar, trajectory, physics and processing."""
+
+    world: World
+    sonar: Sonar = Field(default_factory=Sonar)
+    trajectory: Trajectory = Field(default_factory=Trajectory)
+    physics: Physics = Field(default_factory=Physics)
+    processing: Processing = Field(default_factory=Processing)
+
+    @property
+    def laws(self) -> tuple[Scattering, ...]:
+        """How each target scatters."""
+        return tuple(t.scattering or self.physics.scattering for t in self.world.targets)
+
+    @property
+    def meshes(self) -> tuple[Mesh, ...]:
+        """What each target is traced with: kept by content, so that asking again costs nothing."""
+        return tuple(self.mesh_of(i) for i in range(len(self.world.targets)))
+
+    def mesh_of(self, target: int) -> Mesh:
+        """What a target is traced with. Raises ValueError, or OSError, where it has no mesh."""
+        return mesh_for(self.world.targets[target].shape, self.laws[target], self.sonar.shortest_wavelength)
+
+    def moment(self, time: float, *, key: int | str = 0, step: int = 0, seed: int = 0) -> Moment:
+        """The world at a time (s), with the snaps that a frame of the sequence of this key, step and seed draws."""
+        placed = zip(self.world.targets, self.meshes, strict=True)
+        bodies = tuple(
+            Body(t.name, mesh, pose(t.motion, time), velocity(t.motion, time), t.motion, time) for t, mesh in placed
+        )
+        bed = self.world.environment.depth
+        snaps: list[Snap] = []
+        for i, shrimp in enumerate(self.world.shrimp):
+            drawn = scales(shrimp.variation, stream(seed, "snap", key, step, i), len(shrimp.snap_times))
+            snaps += snaps_of(shrimp, bed, drawn)
+        return Moment(time, bodies, tuple(snaps))
+
+    def frame(
+        self,
+        step: int,
+        *,
+        index: int | None = None,
+        trajectory: int = 0,
+        seed: int = 0,
+        key: int | str | None = None,
+    ) -> Frame:
+        """Frame `step` of this scene's trajectory; `key` of its random streams (left out: the trajectory)."""
+        key = trajectory if key is None else key
+        time = self.trajectory.time(step)
+        return Frame(
+            index=step if index is None else index,
+            trajectory=trajectory,
+            step=step,
+            seed=seed,
+            key=key,
+            sonar_pose=pose(self.trajectory.sonar, time),
+            sonar_velocity=velocity(self.trajectory.sonar, time),
+            sonar_motion=self.trajectory.sonar,
+            moment=self.moment(time, key=key, step=step, seed=seed),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One frame: the scene at one instant, and the keys of its random streams."""
+
+    index: int  # in the dataset
+    trajectory: int  # sequence
+    step: int  # within the sequence
+    seed: int
+    key: int | str  # of the sequence: random streams are keyed (seed, name, key, step)
+    sonar_pose: Pose
+    sonar_velocity: Floats  # (xyz) m/s, world
+    moment: Moment
+    sonar_motion: Motion | None = None  # None: it goes on at its velocity, and does not turn
+
+    @property
+    def sonar_track(self) -> Track:
+        """Where the sonar is about the instant of the frame."""
+        return Track(self.sonar_pose, self.sonar_velocity, self.sonar_motion, self.time)
+
+    @property
+    def time(self) -> float:
+        """s since the start of the trajectory."""
+        return self.moment.time

@@ -1,0 +1,1 @@
+"""What varies between the sequences of a recipe: grids, random draws, meshes."""

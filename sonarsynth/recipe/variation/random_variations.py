@@ -1,0 +1,216 @@
+"""What is drawn anew for each sequence. A draw depends on the seed, the sequence and the variation, on nothing else."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import MinLen
+from pydantic import model_validator
+
+from sonarsynth.conventions import Ints, Number
+from sonarsynth.description import BY_KIND, description
+from sonarsynth.randomness import share
+from sonarsynth.recipe.variation.values import (
+    Name,
+    Paths,
+    Plain,
+    PlainValue,
+    Quantity,
+    number_and_unit,
+    same_unit,
+    with_unit,
+)
+
+SOBOL_BITS = 30
+SOBOL_BLOCK = 1024
+LEAST_SHARE = 1e-12
+"""A normal distribution must have so much of itself between its bounds."""
+FAR = 4.0
+"""Standard deviations that stand for the end of a normal distribution without a bound."""
+
+
+@description
+class Uniform:
+    """Evenly between two bounds."""
+
+    kind: Literal["uniform"] = "uniform"
+    path: Paths
+    """Field of the scene; a list of fields gets the same value."""
+    name: Name | None = None
+    """Name of the coordinate in the store; left out: made from the path."""
+    low: Quantity
+    high: Quantity
+
+    @model_validator(mode="after")
+    def _check(self) -> Uniform:
+        _check_bounds(self.low, self.high)
+        return self
+
+    def at(self, part: float) -> Plain:
+        """The value that this part (0 to 1) of all draws stays under."""
+        return _between(self.low, self.high, part)
+
+    def draw(self, seed: int, key: int | str, path: str) -> Plain:
+        """The value of a sequence."""
+        return self.at(share(seed, "variation", key, path))
+
+
+@description
+class Normal:
+    """A normal distribution, cut off at bounds where these are given (truncated: no draw lies outside)."""
+
+    kind: Literal["normal"] = "normal"
+    path: Paths
+    """Field of the scene; a list of fields gets the same value."""
+    name: Name | None = None
+    """Name of the coordinate in the store; left out: made from the path."""
+    mean: Quantity
+    """Mean before it is cut."""
+    deviation: Quantity
+    """Standard deviation before it is cut."""
+    low: Quantity | None = None
+    high: Quantity | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Normal:
+        same_unit(mean=self.mean, deviation=self.deviation, low=self.low, high=self.high)
+        if not number_and_unit(self.deviation)[0] > 0.0:
+            raise ValueError(f"deviation must be greater than 0, not {self.deviation}")
+        if self.low is not None and self.high is not None:
+            _check_bounds(self.low, self.high)
+        first, last, _ = self._shares()
+        if not last - first >= LEAST_SHARE:
+            raise ValueError(f"less than {LEAST_SHARE:g} of the distribution lies between low and high")
+        return self
+
+    def _shares(self) -> tuple[float, float, float]:
+        """Shares of the whole distribution under its bounds, mirrored where that is more exact; and the sign."""
+        from scipy.special import ndtr
+
+        mean, deviation = number_and_unit(self.mean)[0], number_and_unit(self.deviation)[0]
+        low = -np.inf if self.low is None else (number_and_unit(self.low)[0] - mean) / deviation
+        high = np.inf if self.high is None else (number_and_unit(self.high)[0] - mean) / deviation
+        sign = -1.0 if low > 0.0 else 1.0
+        if sign < 0:
+            low, high = -high, -low
+        return float(ndtr(low)), float(ndtr(high)), sign
+
+    def at(self, part: float) -> Plain:
+        """The value that this part (0 to 1) of all draws stays under; at most FAR deviations from the mean at 0 and 1
+        where there is no bound.
+        """
+        from scipy.special import ndtri
+
+        mean, unit = number_and_unit(self.mean)
+        deviation = number_and_unit(self.deviation)[0]
+        first, last, sign = self._shares()
+        share = first + (last - first) * (part if sign > 0 else 1.0 - part)
+        score = sign * float(ndtri(share))
+        if not np.isfinite(score):
+            score = float(np.copysign(FAR, score))
+        value = mean + deviation * score
+        low, high = (number_and_unit(b)[0] if b is not None else None for b in (self.low, self.high))
+        value = value if low is None else max(low, value)
+        return with_unit(value if high is None else min(high, value), unit)
+
+    def draw(self, seed: int, key: int | str, path: str) -> Plain:
+        """The value of a sequence."""
+        return self.at(share(seed, "variation", key, path) + 2.0**-54)
+
+
+@description
+class Choice:
+    """One of several values."""
+
+    kind: Literal["choice"] = "choice"
+    path: Paths
+    """Field of the scene; a list of fields gets the same value."""
+    name: Name | None = None
+    """Name of the coordinate in the store; left out: made from the path."""
+    values: Annotated[tuple[PlainValue, ...], MinLen(1)]
+    weights: tuple[Number, ...] | None = None
+    """How often each is taken, relative to the others; left out: equally often."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Choice:
+        if len(set(self.values)) < len(self.values):
+            raise ValueError("a value is given twice: use weights")
+        if self.weights is not None:
+            if len(self.weights) != len(self.values):
+                raise ValueError(f"has {len(self.values)} values and {len(self.weights)} weights")
+            if min(self.weights) < 0.0 or not sum(self.weights) > 0.0:
+                raise ValueError("weights must be 0 or more, and not all 0")
+        return self
+
+    def number(self, seed: int, key: int | str, path: str) -> int:
+        """Number of the value of a sequence."""
+        bounds = np.cumsum(self.weights if self.weights is not None else np.ones(len(self.values)))
+        part = share(seed, "variation", key, path)
+        return int(np.searchsorted(bounds, part * bounds[-1], side="right"))
+
+    def draw(self, seed: int, key: int | str, path: str) -> Plain:
+        """The value of a sequence."""
+        return self.values[self.number(seed, key, path)]
+
+
+@description
+class Sobol:
+    """Evenly between two bounds, and more evenly than by chance: the repeats of a grid point share one Sobol sequence
+    (Sobol 1967, directions of Joe and Kuo 2008), with a dimension for each variation of this kind, shifted at random
+    (digital shift) for each grid point.
+    """
+
+    kind: Literal["sobol"] = "sobol"
+    path: Paths
+    """Field of the scene; a list of fields gets the same value."""
+    name: Name | None = None
+    """Name of the coordinate in the store; left out: made from the path."""
+    low: Quantity
+    high: Quantity
+
+    @model_validator(mode="after")
+    def _check(self) -> Sobol:
+        _check_bounds(self.low, self.high)
+        return self
+
+    def at(self, part: float) -> Plain:
+        """The value at this part (0 to 1) of the way from low to high."""
+        return _between(self.low, self.high, part)
+
+    def draw(self, seed: int, key: int | str, path: str, dimension: int, repeat: int) -> Plain:
+        """The value of a repeat of the grid point `key`, in this dimension of the sequence."""
+        shift = int(share(seed, "sobol", key, path) * (1 << SOBOL_BITS))
+        return self.at((_sobol(dimension, repeat) ^ shift) / (1 << SOBOL_BITS))
+
+
+Variation = Annotated[Uniform | Normal | Choice | Sobol, BY_KIND]
+
+
+def _sobol(dimension: int, number: int) -> int:
+    """Point `number` of the unshifted sequence in one dimension, in units of 2^-SOBOL_BITS."""
+    block, row = divmod(number, SOBOL_BLOCK)
+    return int(_sobol_block(dimension, block)[row])
+
+
+@lru_cache(maxsize=64)
+def _sobol_block(dimension: int, block: int) -> Ints:
+    from scipy.stats.qmc import Sobol as Sequence
+
+    sequence = Sequence(dimension + 1, scramble=False, bits=SOBOL_BITS)
+    if block:
+        sequence.fast_forward(block * SOBOL_BLOCK)
+    return np.asarray(sequence.random(SOBOL_BLOCK)[:, dimension] * (1 << SOBOL_BITS)).astype(np.int64)
+
+
+def _check_bounds(low: float | str, high: float | str) -> None:
+    same_unit(low=low, high=high)
+    if not number_and_unit(low)[0] < number_and_unit(high)[0]:
+        raise ValueError(f"low must be less than high: {low} to {high}")
+
+
+def _between(low: float | str, high: float | str, part: float) -> Plain:
+    """Exactly low at 0 and high at 1."""
+    (a, unit), (b, _) = number_and_unit(low), number_and_unit(high)
+    return with_unit(min(max(a * (1.0 - part) + b * part, a), b), unit)

@@ -1,0 +1,180 @@
+"""A scene with other values at some paths, checked as if it had been written so."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import types
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Union, get_args, get_origin
+
+from pydantic import TypeAdapter, ValidationError
+from pydantic_core import ErrorDetails
+
+from sonarsynth.conventions import Unit
+from sonarsynth.description import FieldError
+from sonarsynth.recipe.scene import Scene, Trajectory, World
+from sonarsynth.recipe.variation.values import Plain, Where, where
+
+_SCENE: TypeAdapter[Scene] = TypeAdapter(Scene)
+_PARTS: dict[str, TypeAdapter[Any]] = {"world": TypeAdapter(World), "trajectory": TypeAdapter(Trajectory)}
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A value for some paths, and where in the recipe it comes from."""
+
+    source: Where
+    name: str
+    paths: tuple[str, ...]
+    value: Plain
+
+    @property
+    def shown(self) -> str:
+        """As errors say it."""
+        return f"{self.name} = {self.value.shown}"
+
+
+def plain_scene(scene: Scene) -> dict[str, Any]:
+    """The scene as plain JSON values."""
+    value: dict[str, Any] = _SCENE.dump_python(scene, mode="json")
+    return value
+
+
+def with_settings(scene: Scene, plain: dict[str, Any], settings: Sequence[Setting]) -> Scene:
+    """The scene (`plain` is the same in JSON) with settings made, wider ones first.
+
+    Raises FieldError that names the setting and the field.
+    """
+    data: Any = {"scene": plain}
+    made = [(where(path), setting) for setting in settings for path in setting.paths]
+    for path, setting in sorted(made, key=lambda one: len(one[0])):
+        try:
+            data = put(data, path, setting.value.value)
+        except LookupError as error:
+            place = setting.source[:-2] if "values" in setting.source else setting.source
+            raise FieldError((*place, "path"), f"{'.'.join(map(str, path))}: {error.args[0]}") from None
+    parts = {}
+    for name in {path[1] for path, _ in made}:
+        try:
+            parts[str(name)] = _PARTS[str(name)].validate_json(json.dumps(data["scene"][name]), strict=True)
+        except ValidationError as error:
+            raise _explained(error, data, ("scene", name), made) from None
+    return replace(scene, **parts)
+
+
+def put(data: Any, path: Where, value: Any, depth: int = 0) -> Any:
+    """`data` with the value at path[depth:] replaced. Raises LookupError where the path leads nowhere."""
+    if depth == len(path):
+        return value
+    part = path[depth]
+    if isinstance(data, list):
+        if not isinstance(part, int) or part >= len(data):
+            raise LookupError(f"'{part}' is not one of the {len(data)} entries from 0")
+        return [put(v, path, value, depth + 1) if i == part else v for i, v in enumerate(data)]
+    if data is None or isinstance(data, dict):
+        key, data = str(part), data or {}
+        if data and key not in data and not (depth == len(path) - 1 or data.get("kind")):
+            raise LookupError(_unknown(key, data))
+        return data | {key: put(data.get(key), path, value, depth + 1)}
+    raise LookupError(f"'{'.'.join(map(str, path[:depth]))}' has no fields")
+
+
+def _unknown(name: str, known: dict[str, Any]) -> str:
+    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    return f"'{name}' is not a field here; " + (
+        f"did you mean '{close[0]}'?" if close else f"known: {', '.join(known)}"
+    )
+
+
+def _explained(error: ValidationError, data: Any, top: Where, made: Sequence[tuple[Where, Setting]]) -> FieldError:
+    """The first error of a validation, with the setting that is to blame: the one that sets most of its path."""
+    found_all = error.errors(include_url=False)  # a misspelt field explains a missing one
+    details = next((d for d in found_all if d["type"] == "unexpected_keyword_argument"), found_all[0])
+    path, known = list(top), data[top[0]][top[1]]
+    for n, part in enumerate(details["loc"]):
+        named = isinstance(known, dict) and part in known and known.get("kind") != part
+        last = n == len(details["loc"]) - 1
+        if named or (isinstance(known, list) and isinstance(part, int) and part < len(known)):
+            known = known[part]
+        elif not (last and details["type"] in ("missing", "unexpected_keyword_argument")):
+            continue
+        path.append(part)
+    found = tuple(path)
+
+    def shared(one: tuple[Where, Setting]) -> int:
+        return next((n for n, (a, b) in enumerate(zip(one[0], found, strict=False)) if a != b), len(one[0]))
+
+    setting = max(made, key=lambda one: (shared(one) == len(one[0]), shared(one)))[1]
+    return FieldError(setting.source, f"{'.'.join(map(str, found))}: {_text(details, data, found)} ({setting.shown})")
+
+
+def _text(details: ErrorDetails, data: Any, path: Where) -> str:
+    match details["type"]:
+        case "value_error":
+            return str(details.get("ctx", {})["error"])
+        case "missing":
+            return "is required"
+        case "unexpected_keyword_argument":
+            for part in path[:-1]:
+                data = data[part]
+            return _unknown(str(path[-1]), {name: None for name in data if name != path[-1]})
+    text = details["msg"].replace("Input should be", "must be").replace("String should", "must")
+    shown = Plain.of(details["input"]).shown if details["type"] != "union_tag_not_found" else "a value without kind"
+    return f"{text[0].lower()}{text[1:]}, not {shown}"
+
+
+def value_at(scene: Scene, path: str) -> Any:
+    """What a path leads to, in SI units."""
+    found: Any = scene
+    for part in where(path)[1:]:
+        found = found[int(part)] if isinstance(found, tuple) else getattr(found, str(part))
+    return found
+
+
+def unit_at(scene: Scene, path: str) -> Unit | None:
+    """The unit of the number that a path leads to; None for one without."""
+    found: Any = scene
+    kind: Any = Scene
+    for part in where(path)[1:]:
+        if isinstance(found, tuple):
+            kind, found = _member(kind, int(part), len(found)), found[int(part)]
+        else:
+            field = type(found).__pydantic_fields__[str(part)]
+            kind, found = _with(field.annotation, field.metadata), getattr(found, str(part))
+    return _unit(kind)
+
+
+def _with(annotation: Any, metadata: list[Any]) -> Any:
+    units = [m for m in metadata if isinstance(m, Unit)]
+    return Annotated[annotation, units[0]] if units else annotation
+
+
+def _member(kind: Any, index: int, size: int) -> Any:
+    """The annotation of a member of a tuple of this size."""
+    for option in _options(kind):
+        members = get_args(option)
+        if get_origin(option) is tuple and members:
+            if members[-1] is Ellipsis:
+                return members[0]
+            if len(members) == size:
+                return members[index]
+    return None
+
+
+def _options(kind: Any) -> list[Any]:
+    if get_origin(kind) is Annotated:
+        return _options(get_args(kind)[0])
+    if get_origin(kind) in (Union, types.UnionType):
+        return [one for member in get_args(kind) for one in _options(member)]
+    return [kind]
+
+
+def _unit(kind: Any) -> Unit | None:
+    if get_origin(kind) is Annotated:
+        inner, *metadata = get_args(kind)
+        return next((m for m in metadata if isinstance(m, Unit)), None) or _unit(inner)
+    if get_origin(kind) in (Union, types.UnionType):
+        return next((unit for unit in map(_unit, get_args(kind)) if unit is not None), None)
+    return None

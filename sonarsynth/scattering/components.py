@@ -1,0 +1,262 @@
+"""The parts of an echo: what a law sends back with its phase, and what without, as paths of their own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from sonarsynth.conventions import Bools, Floats
+from sonarsynth.equations.scattering.facet_pulses import facet_response
+from sonarsynth.equations.scattering.kirchhoff_integral import local_grazing
+from sonarsynth.equations.scattering.lobes import dot, lambert, lit_and_seen, slope_lobe
+from sonarsynth.equations.water.boundary_reflection import rayleigh
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.scattering.facet_geometry import Patches, Pulses
+from sonarsynth.scattering.random_signs import random_polarity
+
+if TYPE_CHECKING:
+    from sonarsynth.scattering import ScatteringLaw
+    from sonarsynth.scattering.isotropic import Isotropic
+    from sonarsynth.scattering.kirchhoff import Kirchhoff
+    from sonarsynth.scattering.mirror_lobe import MirrorLobe
+
+
+class Part(Protocol):
+    """One part of the echo of a facet.
+
+    Directions are unit vectors of propagation (..., xyz) in the frame of the body, in and away.
+    """
+
+    def amplitude(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
+        """Far-field amplitude (...) in m at a wavenumber (...) (rad/m), but for `pulses`; of echoes never negative.
+
+        0 where a facet is not lit, or, for an echo, not seen.
+        """
+        ...
+
+    def pulses(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Pulses:
+        """What it makes of the pulse, for directions (path, xyz) and sound speeds (path,) in m/s."""
+        ...
+
+    def polarity(self, mesh: Mesh) -> Floats:
+        """Sign (facet,) of the echo of each facet: f is the amplitude times it."""
+        ...
+
+
+@dataclass(frozen=True)
+class Plain:
+    """A law that repeats the pulse."""
+
+    law: MirrorLobe | Isotropic
+    beyond: bool = False
+    """Whether the amplitude goes on where a facet is lit but not seen: for arrays of which some hydrophones see it, and
+    are told from those that do not."""
+
+    def amplitude(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
+        """As `Part.amplitude`: the same at all wavenumbers."""
+        return self.law.amplitude(incident, scattered, patch.normal, patch.area, self.beyond)
+
+    def pulses(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Pulses:
+        """As `Part.pulses`: none."""
+        return Pulses.plain(len(incident))
+
+    def polarity(self, mesh: Mesh) -> Floats:
+        """As the law says."""
+        return self.law.polarity(mesh)
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """The coherent part of a Kirchhoff facet: it mirrors as far as it is large, and the phases of facets add up.
+
+    f = V (i k/4 pi) A n.(ks - ki) 2 exp[corners] exp(-g^2/2) (`acoustics.kirchhoff`, `acoustics.roughness`).
+    """
+
+    law: Kirchhoff
+    beyond: bool = False
+    """As of `Plain`; it may be below 0 there."""
+
+    def amplitude(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
+        """As `Part.amplitude`: |V| k A n.(ks - ki)/(4 pi), by the factor `Kirchhoff.lit`."""
+        if self.beyond:
+            return self._beyond(incident, scattered, patch, wavenumber)
+        across = dot(patch.normal, scattered - incident)
+        lit = self.law.lit(incident, scattered, patch.normal, patch.curved)
+        mirrored = np.abs(reflection(self.law, incident, scattered)) * np.sqrt(1.0 - self.law.diffuse)
+        return np.where(lit > 0.0, lit * mirrored * wavenumber * patch.area * across / (4.0 * np.pi), 0.0)
+
+    def _beyond(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
+        """The same, going on in n.ks past where facets are seen: of those that taper to 0 as an odd function, which is
+        bounded; its bend there is least where it falls least steeply, and those that the snap grazes as well are
+        faint."""
+        inward, outward = np.maximum(-dot(patch.normal, incident), 0.0), dot(patch.normal, scattered)
+        both = np.where(inward > 0.0, inward + np.abs(outward), 1.0)
+        across = np.where(self.tapers(patch), 4.0 * inward * outward / both, inward + outward)
+        mirrored = np.abs(reflection(self.law, incident, scattered)) * np.sqrt(1.0 - self.law.diffuse)
+        return np.where(inward > 0.0, mirrored * wavenumber * patch.area * across / (4.0 * np.pi), 0.0)
+
+    def pulses(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Pulses:
+        """As `Part.pulses`: differentiated, and a mean over the facet; blurred by roughness."""
+        count, zero = len(incident), np.zeros(len(incident))
+        corners = dot(patch.corners, (incident - scattered)[:, None, :]) / sound_speed[:, None]
+        phase = self.phase(incident, scattered) + zero
+        blur = self.law.roughness * np.abs(dot(patch.normal, scattered - incident)) / sound_speed
+        return Pulses(np.ones(count, bool), corners, zero, zero, zero, phase, blur)
+
+    def spread(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Floats:
+        """Variance (...) of the delays of an echo in s2, over the facet and the heights of its surface."""
+        rough = self.law.roughness * dot(patch.normal, scattered - incident) / sound_speed
+        return np.asarray(over_facet(incident, scattered, patch, sound_speed) + rough * rough)
+
+    def phase(self, incident: Floats, scattered: Floats) -> Floats:
+        """Phase (...) of the reflection coefficient in rad, which directions change where `turns`."""
+        return np.asarray(np.angle(reflection(self.law, incident, scattered)))
+
+    def tapers(self, patch: Patches) -> Bools:
+        """Where (facet,) the echo falls to 0 towards the limb of the body, rather than ending there (`edges`)."""
+        smooth = {"auto": patch.curved, "smooth": np.ones_like(patch.curved), "sharp": np.zeros_like(patch.curved)}
+        return smooth[self.law.edges]
+
+    @property
+    def turns(self) -> bool:
+        """Whether the phase differs from direction to direction."""
+        return not isinstance(self.law.surface, str)
+
+    def polarity(self, mesh: Mesh) -> Floats:
+        """All alike: the sign is the reflection coefficient's."""
+        return np.ones(len(mesh.faces))
+
+
+@dataclass(frozen=True)
+class Rough:
+    """The incoherent part of a Kirchhoff facet: the lobe of the slopes and Lambert's floor (`acoustics.roughness`).
+
+    It comes from one point of the facet, with one sign, both drawn once for each facet of a mesh.
+    """
+
+    law: Kirchhoff
+    beyond: bool = False
+    """As of `Plain`."""
+
+    def _powers(self, incident: Floats, scattered: Floats, patch: Patches) -> tuple[Floats, Floats]:
+        """Cross-sections per area (...) (1/sr) of the lobe, where heights are large, and of the floor."""
+        on = lit_and_seen(incident, scattered, patch.normal, self.beyond)
+        returned = np.where(on, np.abs(reflection(self.law, incident, scattered)) ** 2, 0.0)
+        lobe = slope_lobe(incident, scattered, patch.normal, self.law.slope) if self.law.roughness > 0 else 0.0
+        floor = lambert(incident, scattered, patch.normal, self.law.diffuse)
+        return np.asarray(returned * (1.0 - self.law.diffuse) * lobe), np.asarray(returned * floor)
+
+    def amplitude(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
+        """As `Part.amplitude`: root of the area times lobe and floor."""
+        lobe, floor = self._powers(incident, scattered, patch)
+        return np.sqrt(patch.area * (lobe + floor))
+
+    def _sent(
+        self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats, frequency: Floats
+    ) -> Floats:
+        """Power (frequency, ...) in m2 that is sent without phase in common."""
+        lobe, floor = self._powers(incident, scattered, patch)
+        late = self.law.roughness * dot(patch.normal, scattered - incident) / sound_speed
+        g = 2.0 * np.pi * np.multiply.outer(frequency, late)
+        return np.asarray(patch.area * (floor - lobe * np.expm1(-g * g)))
+
+    def elsewhere(
+        self,
+        incident: Floats,
+        scattered: Floats,
+        away: Floats,
+        patch: Patches,
+        sound_speed: Floats,
+        band: tuple[float, float],
+    ) -> tuple[Floats, Floats]:
+        """What is sent in directions `away` (path, direction, xyz) over that in `scattered` (path, xyz), nearly
+        gain exp(-spread (2 pi f)^2/2): gain and spread (s2) (path, direction).
+
+        Exact at two frequencies, Chebyshev's over the band (Hz). Where n.(ks - ki) changes by a small part, the factor
+        sqrt(1 - exp(-g^2)) does by x/(e^x - 1) of that, x = g^2: by all of it for low heights, by nothing for great
+        ones, and nearly linearly in f^2 in between. This leaves at most 0.12 of it, for g of 1.5 to 2.5 in mid-band.
+        """
+        middle, half = 0.5 * (band[1] + band[0]), np.sqrt(0.125) * (band[1] - band[0])
+        frequency = middle + half * np.array([-1.0, 1.0])
+        square = frequency**2
+        at = patch, sound_speed, frequency
+        there = self._sent(incident[:, None], away, patch.over(), sound_speed[:, None], at[2])
+        here = self._sent(incident, scattered, *at)[:, :, None]
+        both = (there > 0.0).all(axis=0) & (here > 0.0).all(axis=0)
+        first, last = 0.5 * np.log(np.divide(there, here, out=np.ones_like(there), where=both))
+        slope = (last - first) / (square[1] - square[0])
+        gain = np.where(both, np.exp(first - slope * square[0]), (there[1] > 0.0) * 1.0)
+        return gain, -slope / (2.0 * np.pi**2)
+
+    def pulses(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Pulses:
+        """As `Part.pulses`: without the share of the power that is coherent still."""
+        count, zero = len(incident), np.zeros(len(incident))
+        lobe, floor = self._powers(incident, scattered, patch)
+        share = lobe / np.where(lobe + floor > 0.0, lobe + floor, 1.0)
+        delay = self.law.roughness * np.abs(dot(patch.normal, scattered - incident)) / sound_speed
+        late = dot(patch.spot, incident - scattered) / sound_speed
+        return Pulses(np.zeros(count, bool), np.zeros((count, 3)), share, delay, late, zero, zero)
+
+    def polarity(self, mesh: Mesh) -> Floats:
+        """At random."""
+        return random_polarity(mesh)
+
+
+@dataclass(frozen=True)
+class Shadow:
+    """The wave that makes the shadow behind lit facets, seen or not (`acoustics.kirchhoff.shadow_amplitude`).
+
+    f = (i k/4 pi) A n.(ki + ks) 2 exp[corners], whatever the surface is made of and however rough it is.
+    """
+
+    def amplitude(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
+        """As `Part.amplitude`, but k A n.(ki + ks)/(4 pi) with its sign: below 0 ahead, 0 where an echo is mirrored."""
+        across = dot(patch.normal, incident + scattered)
+        return np.where(dot(incident, patch.normal) < 0.0, wavenumber * patch.area * across / (4.0 * np.pi), 0.0)
+
+    def pulses(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Pulses:
+        """As `Part.pulses`: differentiated, and a mean over the facet."""
+        count, zero = len(incident), np.zeros(len(incident))
+        corners = dot(patch.corners, (incident - scattered)[:, None, :]) / sound_speed[:, None]
+        return Pulses(np.ones(count, bool), corners, zero, zero, zero, zero, zero)
+
+    def polarity(self, mesh: Mesh) -> Floats:
+        """All alike: the amplitude has the sign."""
+        return np.ones(len(mesh.faces))
+
+    def spread(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Floats:
+        """Variance (...) of the delays over the facet in s2."""
+        return over_facet(incident, scattered, patch, sound_speed)
+
+
+def over_facet(incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Floats:
+    """Variance (...) of the delays over facets in s2: a twelfth of the sum of squares of those of the corners."""
+    late = dot(patch.corners, (incident - scattered)[..., None, :]) / sound_speed[..., None]
+    return np.asarray(dot(late, late) / 12.0)
+
+
+def reflection(law: Kirchhoff, incident: Floats, scattered: Floats) -> np.ndarray:
+    """Plane-wave coefficient V (...) of facets that would mirror one way into the other: reciprocal."""
+    surface = law.surface
+    if isinstance(surface, str):
+        return np.asarray(1.0 + 0.0j if surface == "rigid" else -1.0 + 0.0j)
+    grazing = local_grazing(incident, scattered)
+    return rayleigh(grazing, surface.density_ratio, surface.speed_ratio, surface.loss_tangent)
+
+
+def size_at(
+    law: ScatteringLaw, incident: Floats, scattered: Floats, patch: Patches, frequency: float, sound_speed: Floats
+) -> Floats:
+    """|f| (path,) in m of facets at a frequency (Hz): powers of the parts of a law summed.
+
+    Directions (path, xyz) in the frame of the body; sound_speed (path,) in m/s at the facets.
+    """
+    power = np.zeros(len(incident))
+    for part in law.parts:
+        pulse = part.pulses(incident, scattered, patch, sound_speed)
+        amplitude = part.amplitude(incident, scattered, patch, 2.0 * np.pi * frequency / sound_speed)
+        response = facet_response(np.array([frequency]), *pulse[:4], frequency)[:, 0]
+        power += np.abs(amplitude * response * np.exp(-0.5 * (2.0 * np.pi * frequency * pulse.blur) ** 2)) ** 2
+    return np.sqrt(power)

@@ -1,0 +1,80 @@
+"""Facets as laws of scattering see them, and the pulses that they send back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.description.byte_bounded_cache import kept
+from sonarsynth.geometry.curvature import curvature_radius
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.randomness import stream
+
+
+@dataclass(frozen=True, eq=False)
+class Patches:
+    """Facets, one a path, in the frame of their body; the directions that go with them are in that frame too."""
+
+    normal: Floats  # (..., xyz)
+    area: Floats  # (...) m2
+    curved: Bools  # (...) whether the surface is curved there, rather than a plane with its neighbours
+    corners: Floats  # (..., 3, xyz) m from the middle of the facet
+    spot: Floats  # (..., xyz) m from the middle: a point of the facet drawn once
+
+    def select(self, rows: Ints) -> Patches:
+        """The facets picked by indices."""
+        return Patches(**{name: value[rows] for name, value in vars(self).items()})
+
+    def over(self) -> Patches:
+        """With an axis after the first, for the directions in which each facet is seen."""
+        return Patches(**{name: value[:, None] for name, value in vars(self).items()})
+
+
+@kept(32)
+def patches(mesh: Mesh, whole: bool = True) -> Patches:
+    """All facets (facet, ...) of a mesh. What is drawn is the same for every mesh of this content.
+
+    Not whole: for laws that need only normals and areas, the rest is 0.
+    """
+    count = len(mesh.faces)
+    if not whole:
+        none = np.zeros((1, 3, 3))
+        corners, spot = np.broadcast_to(none, (count, 3, 3)), np.broadcast_to(none[0, 0], (count, 3))
+        zero = np.broadcast_to(none[0, 0, 0], count)
+        return Patches(mesh.normal, mesh.area, zero.astype(bool), corners, spot)
+    corners = mesh.corners - mesh.centroid[:, None, :]
+    share = stream(0, "spot", mesh.digest).dirichlet(np.ones(3), count)  # even over the triangle
+    spot = np.einsum("fc,fcx->fx", share, corners)
+    return Patches(mesh.normal, mesh.area, np.isfinite(curvature_radius(mesh)), corners, spot)
+
+
+class Pulses(NamedTuple):
+    """What facets do to a pulse beside its amplitude, a row a path; columns as in `products.Arrivals`."""
+
+    coherent: Bools  # (path,)
+    corners: Floats  # (path, 3) s
+    rough_share: Floats  # (path,)
+    rough_delay: Floats  # (path,) s
+    late: Floats  # (path,) s: from the middle of the facet to the point that echoes
+    phase: Floats  # (path,) rad: of the reflection coefficient
+    blur: Floats  # (path,) s: what roughness takes from a coherent echo
+
+    @staticmethod
+    def plain(count: int) -> Pulses:
+        """Nothing at all: the pulse is repeated."""
+        zero = np.zeros(count)
+        return Pulses(np.zeros(count, bool), np.zeros((count, 3)), zero, zero, zero, zero, zero)
+
+    def select(self, rows: Bools | Ints) -> Pulses:
+        """The rows picked by a mask or by indices."""
+        columns: Any = (value[rows] for value in self)
+        return Pulses(*columns)
+
+    @staticmethod
+    def join(parts: list[Pulses]) -> Pulses:
+        """Rows of all, in order."""
+        columns: Any = zip(*parts, strict=True)
+        return Pulses(*(np.concatenate(column) for column in columns))

@@ -1,0 +1,136 @@
+"""What came of a build: the report that grows while it runs, the files beside the store, and who is told."""
+
+from __future__ import annotations
+
+import os
+import socket
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from sonarsynth import store
+from sonarsynth.planning import Plan
+from sonarsynth.schedule import tasks
+from sonarsynth.schedule.build_log import Log, append_lines
+from sonarsynth.schedule.tasks import Failure, Written
+from sonarsynth.store import Folder
+
+Progress = Callable[[int, int, int], None]
+"""Called with the frames done, the frames to do, and the frames set aside, as shards are written."""
+
+
+@dataclass
+class BuildReport:
+    """What a build did. Grows while it runs."""
+
+    store: str
+    frames: int  # of the dataset
+    wanted: int  # frames that this build was asked for
+    there: int  # of those, complete before it began
+    workers: int = 0  # 0: in this process
+    written: int = 0  # frames written (a shard that had some frames is written again whole)
+    shards: int = 0
+    bytes: int = 0
+    seconds: float = 0.0
+    writing_seconds: float = 0.0  # of workers, in writing
+    stage_seconds: dict[str, float] = field(default_factory=dict)  # of the tasks that ran, by name
+    stage_cpu: dict[str, float] = field(default_factory=dict)
+    workers_lost: int = 0
+    dashboard: str = ""  # address
+    worker_peak_bytes: int = 0  # largest of any worker
+    client_peak_bytes: int = 0
+    failures: list[Failure] = field(default_factory=list)
+    notes: tuple[str, ...] = ()  # what the plan warns of
+    warnings: tuple[str, ...] = ()  # what the finished store warns of (`verification.warnings`), where that is asked
+    prediction: dict[str, Any] = field(default_factory=dict)  # predicted and measured, where a prediction was given
+
+    @property
+    def ok(self) -> bool:
+        """True where no frame was set aside."""
+        return not self.failures
+
+    def add(self, written: Written) -> None:
+        """Count a shard in."""
+        self.written += len(written.frames)
+        self.shards += bool(written.frames)
+        self.bytes += written.bytes
+        self.writing_seconds += written.seconds
+        self.worker_peak_bytes = max(self.worker_peak_bytes, written.peak_bytes)
+        self.failures.extend(written.failures)
+        for row in written.times:
+            for stage, seconds in row["seconds"].items():
+                self.stage_seconds[stage] = self.stage_seconds.get(stage, 0.0) + seconds
+                self.stage_cpu[stage] = self.stage_cpu.get(stage, 0.0) + row["cpu"][stage]
+
+    def as_json(self) -> dict[str, Any]:
+        """The report for a program."""
+        return {**asdict(self), "ok": self.ok}
+
+
+class Course:
+    """What is done as shards are written: counted, run times and failures put beside the store, progress told."""
+
+    def __init__(
+        self,
+        path: Folder,
+        report: BuildReport,
+        total: int,
+        progress: Progress | None,
+        announce: Callable[[str], None] | None,
+    ) -> None:
+        self.path, self.report, self.total = path, report, total
+        self.progress, self.announce = progress, announce
+        self.before = len(report.failures)
+        self.log = Log(store.here(path, "log.jsonl"))
+        self._tell()
+
+    def _tell(self) -> None:
+        counts = (self.report.written, self.total, len(self.report.failures) - self.before)
+        self.log.progress(*counts)
+        if self.progress is not None:
+            self.progress(*counts)
+
+    def started(self, workers: int, dashboard: str) -> None:
+        """Workers are there."""
+        self.report.workers, self.report.dashboard = workers, dashboard
+        self.log.event("workers", workers=workers, dashboard=dashboard)
+        if self.announce is not None and dashboard:
+            self.announce(dashboard)
+
+    def done(self, written: Written) -> None:
+        """A shard is written."""
+        self.report.add(written)
+        append_lines(store.here(self.path, "times.jsonl"), written.times)
+        append_lines(store.beside(self.path, "aside.jsonl"), [asdict(f) for f in written.failures])
+        for failure in written.failures:
+            self.log.event("aside", frame=failure.frame, stage=failure.stage, error=failure.error)
+        self._tell()
+
+    def lost(self, worker: str, why: str) -> None:
+        """A worker ended."""
+        self.report.workers_lost += 1
+        self.log.event("worker lost", worker=worker, doing=why)
+
+    @contextmanager
+    def logged(self, made: Plan) -> Iterator[None]:
+        """Put the beginning and the end of the build into the log."""
+        r = self.report
+        self.log.event(
+            "build", digest=made.digest, frames=r.frames, wanted=r.wanted, there=r.there, to_do=self.total,
+            process=os.getpid(), host=socket.gethostname(),
+        )  # fmt: skip
+        how, began = "done", time.perf_counter()
+        try:
+            yield
+        except BaseException as error:
+            how = "interrupted" if isinstance(error, KeyboardInterrupt) else f"{type(error).__name__}: {error}"
+            raise
+        finally:
+            r.seconds, r.client_peak_bytes = time.perf_counter() - began, tasks.peak_memory()
+            with suppress(OSError):
+                self.log.event(
+                    "end", how=how, written=r.written, aside=len(r.failures), workers_lost=r.workers_lost,
+                    seconds=r.seconds,
+                )  # fmt: skip

@@ -1,0 +1,117 @@
+"""What a worker is doing, so that its end can be explained: a small file a worker, in a folder beside the store.
+
+A worker notes the frame and the stage before it begins. The interpreter's fault handler, which needs no lock of the
+interpreter, adds the traceback when the stage crashes the process, or ends the process when the stage takes too long.
+What it finds there, the client sets aside by name. Only workers of one thread that a nanny starts again keep a diary.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import json
+import os
+import re
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, TextIO
+
+from sonarsynth.store import here
+from sonarsynth.store.files import scratch
+
+LONGEST: Final = 20_000
+"""Characters of a traceback that are kept."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What a worker was doing when it ended."""
+
+    frame: int
+    stage: str
+    error: str  # one line; "" where nothing says why
+    traceback: str
+
+
+def open_folder(store: str) -> None:
+    """Make the folder for the workers of a build, empty. Raises Mismatch where something that is not ours is there."""
+    scratch.make(here(store, "doing"))
+
+
+def close_folder(store: str) -> None:
+    """Remove the folder. Raises Mismatch where something that is not ours is in its place."""
+    with suppress(OSError):  # a worker that is still about may write there
+        scratch.clear(here(store, "doing"))
+
+
+def read(store: str, worker: str) -> Entry | None:
+    """What the worker at an address was doing, None where it was doing nothing that it noted."""
+    try:
+        text = _file(store, worker).read_text("utf-8", errors="replace")
+        head, _, rest = text.partition("\n")
+        noted = json.loads(head)
+        return Entry(int(noted["frame"]), str(noted["stage"]), _reason(rest, noted["limit"]), rest[:LONGEST])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+@contextmanager
+def noted(store: str, frame: int, stage: str, limit: float) -> Iterator[None]:
+    """Note a stage of a frame while it runs; after `limit` seconds (0: no limit) this process ends."""
+    out = _mine(store)
+    if out is None:
+        yield
+        return
+    out.seek(0)
+    out.truncate()
+    out.write(json.dumps({"frame": frame, "stage": stage, "limit": limit}) + "\n")
+    out.flush()
+    if limit > 0:
+        faulthandler.dump_traceback_later(limit, exit=True, file=out)
+    try:
+        yield
+    finally:
+        faulthandler.cancel_dump_traceback_later()
+        out.seek(0)
+        out.truncate()
+
+
+_open: dict[Path, TextIO] = {}
+
+
+def _mine(store: str) -> TextIO | None:
+    """The diary of this process, None where it is not a worker that is started again."""
+    distributed = sys.modules.get("distributed")
+    if distributed is None:
+        return None
+    try:
+        worker = distributed.get_worker()
+    except ValueError:
+        return None
+    if not worker.nanny or worker.state.nthreads > 1:  # a traceback is of a process, and frames would mix in it
+        return None
+    file = _file(store, worker.address)
+    if file not in _open:
+        for old in _open.values():
+            old.close()
+        _open.clear()
+        try:
+            handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o666)
+            _open[file] = os.fdopen(handle, "w+", encoding="utf-8")
+        except OSError:  # the build has ended
+            return None
+        faulthandler.enable(_open[file])
+    return _open[file]
+
+
+def _file(store: str, worker: str) -> Path:
+    return here(store, "doing") / re.sub(r"[^\w.]+", "-", worker)
+
+
+def _reason(text: str, limit: float) -> str:
+    first = text.partition("\n")[0].strip()
+    if first.startswith("Timeout"):
+        return f"it took longer than {limit:g} s"
+    return f"it crashed its worker process: {first}" if first.startswith("Fatal Python error") else ""

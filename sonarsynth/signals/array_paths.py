@@ -1,0 +1,271 @@
+"""Wavefronts over the aperture: when, how loud and from where each path reaches a point. Stable for plane waves (radius
+inf)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.equations.arrays.apertures import aperture_terms
+from sonarsynth.products import Arrivals
+from sonarsynth.receiver import Elements
+from sonarsynth.signals.filtered_pulse import snap_gains
+from sonarsynth.state import Snap
+
+MOST_STRETCH = 0.1
+"""Doppler of 0.1 is a closing speed of 75 m/s: more is an error."""
+
+LONGEST_BLUR = 1.0
+"""A longer blur (s) leaves as little of a snap: nothing."""
+
+NEPER = np.log(10.0) / 20.0
+"""Of a dB."""
+
+LONGEST_CORNER = 0.01
+"""The corners of a facet are closer to its arrival than this (s): 7 m, there and back."""
+
+FINITE = (
+    *("delay", "direction", "amplitude", "absorption", "delay_terms", "amplitude_terms", "phase", "blur", "stretch"),
+    *("phase_terms", "blur_terms", "stretch_terms", "corners", "rough_share", "rough_delay"),
+)
+"""What of the arrivals must be finite."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fronts:
+    """Arrivals as synthesis takes them: curvature for radius, and the level of the snap inside the amplitude."""
+
+    delay: Floats  # (path,) s at the array centre, of the middle of a facet's corners
+    direction: Floats  # (path, xyz)
+    curvature: Floats  # (path,) 1/m: 1/radius, 0 for a plane wave
+    amplitude: Floats  # (path,)
+    loss: Floats  # (path,) dB of absorption at the band centre, inside amplitude
+    delay_terms: Floats  # (path, term) s
+    gain_terms: Floats  # (path, term)
+    turn_terms: Floats  # (path, term) rad: phase over that at the centre
+    spread_terms: Floats  # (path, term) s2: variance over that at the centre
+    bend_terms: Floats  # (path, term) doppler over that at the centre
+    sound_speed: float  # m/s
+    aperture: float  # m: scale of the terms
+    phase: Floats  # (path,) rad, -pi/2 to pi/2: whole half turns are signs of the amplitude
+    variance: Floats  # (path,) s2: of the Gaussian that the pulse is blurred with
+    doppler: Floats  # (path,) the pulse lasts 1 + doppler times as long
+    coherent: Bools  # (path,) the pulse is differentiated, i f/centre
+    corners: Floats  # (path, 3) s: delays over which the pulse is a mean; their sum is 0
+    rough_share: Floats  # (path,) and
+    rough_delay: Floats  # (path,) s: of `facet_pulses.rough_factor`
+    dark: Bools  # (path, sensor) hydrophones that a path does not reach; (path, 0): it reaches all
+    modes: Floats  # (path, mode) weights of the modes of a stretch of time (`shapes`); none as yet
+    bends: Floats  # (path, mode) what they change by for each unit of doppler more; none as yet
+    centre: float  # Hz, where the amplitudes hold
+    attenuation: float = 0.0  # dB/m there: absorption of what the way to a hydrophone is longer than to the centre
+
+    @property
+    def count(self) -> int:
+        """Number of paths."""
+        return self.delay.size
+
+    def select(self, keep: Ints) -> Fronts:
+        """The paths of these indices."""
+        rows: dict[str, Any] = {
+            name: value[keep] if isinstance(value, np.ndarray) else value for name, value in vars(self).items()
+        }
+        return Fronts(**rows)
+
+
+def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements, attenuation: float = 0.0) -> Fronts:
+    """The wavefronts of arrivals, in water that absorbs `attenuation` (dB/m) at the band centre; raises ValueError
+    where one cannot be synthesised."""
+    count = arrivals.delay.size
+    for name in FINITE:
+        value = getattr(arrivals, name)
+        if not np.isfinite(value).all():
+            wrong = ~np.isfinite(value).all(axis=tuple(range(1, value.ndim)))
+            raise ValueError(f"arrival {np.flatnonzero(wrong)[0]} has {name} that is not a finite number")
+    if count and not (arrivals.amplitude != 0.0).all():
+        raise ValueError(f"arrival {np.flatnonzero(arrivals.amplitude == 0.0)[0]} has no amplitude")
+    if count and not (arrivals.radius > 0.0).all():
+        raise ValueError(f"arrival {np.flatnonzero(~(arrivals.radius > 0.0))[0]} has a radius that is not positive")
+    _check_shapes(arrivals)
+    if arrivals.hidden_from.shape[1] not in (0, 1 + elements.count // 8):
+        raise ValueError(f"arrivals are hidden from hydrophones of another array, not of one of {elements.count}")
+    if count and not (arrivals.snap.min() >= 0 and arrivals.snap.max() < len(snaps)):
+        raise ValueError(f"arrivals name a snap outside 0..{len(snaps) - 1}")
+    near = np.flatnonzero(arrivals.radius <= 1.001 * elements.aperture)
+    away = elements.position - (arrivals.radius[near, None] * arrivals.direction[near])[:, None]
+    touching = (np.linalg.norm(away, axis=2) <= 1e-9 * arrivals.radius[near, None]).any(axis=1)
+    if touching.any():
+        raise ValueError(f"arrival {near[touching][0]} comes from a hydrophone")
+    gain = snap_gains(snaps)
+    sign, phase = folded(arrivals.phase)
+    delay, corners = _centred(arrivals)
+    return Fronts(
+        delay=delay,
+        direction=arrivals.direction,
+        curvature=1.0 / arrivals.radius,
+        amplitude=arrivals.amplitude * gain[arrivals.snap] * sign if count else arrivals.amplitude,
+        loss=arrivals.absorption,
+        delay_terms=arrivals.delay_terms,
+        gain_terms=arrivals.amplitude_terms,
+        turn_terms=arrivals.phase_terms,
+        spread_terms=arrivals.blur_terms,
+        bend_terms=arrivals.stretch_terms,
+        sound_speed=arrivals.sound_speed,
+        aperture=elements.aperture or 1.0,
+        phase=phase,
+        variance=np.minimum(arrivals.blur, LONGEST_BLUR) ** 2,
+        doppler=arrivals.stretch,
+        coherent=arrivals.coherent,
+        corners=corners,
+        rough_share=arrivals.rough_share,
+        rough_delay=np.minimum(arrivals.rough_delay, LONGEST_BLUR),
+        dark=arrivals.hidden(elements.count),
+        modes=np.zeros((count, 0)),
+        bends=np.zeros((count, 0)),
+        centre=arrivals.centre,
+        attenuation=attenuation,
+    )
+
+
+def _centred(arrivals: Arrivals) -> tuple[Floats, Floats]:
+    """Delays (path,) of the middle of facets, and those (path, 3) of their corners about it."""
+    if not arrivals.corners.any():
+        return arrivals.delay, arrivals.corners
+    middle = np.einsum("pc->p", arrivals.corners) / 3.0
+    return arrivals.delay + middle, arrivals.corners - middle[:, None]
+
+
+def _check_shapes(arrivals: Arrivals) -> None:
+    """Raise ValueError for a path whose pulse has no shape."""
+    for wrong, what in (
+        (arrivals.blur < 0.0, "a negative blur"),
+        (
+            np.abs(arrivals.stretch) + np.abs(arrivals.stretch_terms).sum(axis=1) >= MOST_STRETCH,
+            f"a stretch that is not within +-{MOST_STRETCH:g}",
+        ),
+        (np.abs(arrivals.corners.T) >= LONGEST_CORNER, f"corners that are not within {LONGEST_CORNER:g} s"),
+        ((arrivals.rough_share < 0.0) | (arrivals.rough_share > 1.0), "a rough_share that is not from 0 to 1"),
+        (arrivals.rough_delay < 0.0, "a negative rough_delay"),
+    ):
+        if wrong.any():
+            raise ValueError(f"arrival {np.flatnonzero(wrong)[0] % wrong.shape[-1]} has {what}")
+    if arrivals.coherent.any() and not 0.0 < arrivals.centre < np.inf:
+        raise ValueError("coherent arrivals need the centre of their band, above 0 Hz")
+
+
+def folded(phase: Floats) -> tuple[Floats, Floats]:
+    """Signs (path,) and phases (path,) from -pi/2 to pi/2 that are together phases of any size; what is a whole number
+    of half turns to rounding leaves no phase."""
+    if not phase.any():
+        return np.ones(phase.size), phase
+    cosine, sine = np.cos(phase), np.sin(phase)
+    sign = np.where(cosine < 0.0, -1.0, 1.0)
+    rest = np.arctan2(sign * sine, sign * cosine)
+    return sign, np.where(np.abs(rest) > 2e-16 * (1.0 + np.abs(phase)), rest, 0.0)
+
+
+def towards(front: Fronts, points: Floats) -> tuple[Floats, Floats]:
+    """Unit vectors u = (R d - q)/|R d - q| (path, point, xyz) and |R d - q|/R (path, point) at points q (point,
+    xyz)."""
+    v = front.direction[:, None, :] - front.curvature[:, None, None] * points
+    n = np.sqrt(np.einsum("epi,epi->ep", v, v))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return v / n[:, :, None], n
+
+
+BENT = 4
+"""The first of the terms that turn the wavefront: a linear one is the motion of the array, which turns no wave."""
+
+
+def tilt(front: Fronts, gradient: Floats) -> Floats:
+    """What delay terms turn the wavefront by, (point, xyz, path), beside the sphere: -c times their gradient (xyz,
+    point, term)."""
+    slope = gradient[:, :, BENT:] @ front.delay_terms[:, BENT:].T
+    return np.asarray(-front.sound_speed * slope.swapaxes(0, 1))
+
+
+def faced(front: Fronts, points: Floats) -> Floats:
+    """Slownesses of the wavefronts at points (point, xyz), times the speed of sound at the centre, (path, point, xyz):
+    what element faces hear, and unit vectors of `towards` where rays are straight."""
+    u, _ = towards(front, points)
+    if not front.delay_terms.shape[1]:
+        return u
+    gradient = terms_gradient(points, front.aperture, front.delay_terms.shape[1])
+    return np.asarray(u + np.moveaxis(tilt(front, gradient), 2, 0))
+
+
+def terms_gradient(points: Floats, aperture: float, terms: int) -> Floats:
+    """Gradient (xyz, point, term) in 1/m of so many aperture terms at points (point, xyz)."""
+    steps = 1e-4 * aperture * np.eye(3)
+    sides = [[aperture_terms(points + way * step, aperture, terms) for way in (1, -1)] for step in steps]
+    return np.array([(ahead - behind) / (2e-4 * aperture) for ahead, behind in sides])
+
+
+def over(terms: Floats, points: Floats, aperture: float) -> Floats:
+    """Polynomials with coefficients terms (path, term) at points (point, xyz): (path, point); 0 without terms."""
+    if not terms.shape[1]:
+        return np.zeros((len(terms), len(points)))
+    return np.asarray(terms @ aperture_terms(points, aperture, terms.shape[1]).T)
+
+
+def delay_and_gain(front: Fronts, points: Floats) -> tuple[Floats, Floats]:
+    """Delay (s) after the array centre, and gain over it at the band centre, (path, point) each."""
+    _, n = towards(front, points)
+    square = np.einsum("pi,pi->p", points, points)
+    # (|R d - q| - R)/c without the difference of nearly equal numbers
+    path = (front.curvature[:, None] * square - 2.0 * front.direction @ points.T) / (n + 1.0)
+    delay, gain = path / front.sound_speed, 1.0 / n
+    if front.delay_terms.shape[1]:
+        delay = delay + over(front.delay_terms, points, front.aperture)
+    if front.gain_terms.shape[1]:
+        gain = gain * (1.0 + over(front.gain_terms, points, front.aperture))
+    if front.attenuation:
+        gain = gain * lost(front.attenuation * front.sound_speed * delay)
+    return delay, gain
+
+
+def lost(level: Floats) -> Floats:
+    """Factor on the amplitude of what loses `level` (dB)."""
+    return np.asarray(np.exp(-NEPER * level))
+
+
+def reach(front: Fronts) -> Floats:
+    """Bound (path,) on how long (s) before or after the array centre a wavefront meets any hydrophone."""
+    return np.asarray(front.aperture / front.sound_speed + np.abs(front.delay_terms).sum(axis=1))
+
+
+def reference_of(front: Fronts, middle: Floats, turn_terms: Floats, spread_terms: Floats) -> Fronts:
+    """The front that a tile of paths is steered to, from the middle (column,) of their directions, curvatures,
+    absorption and delay terms, and the change over the aperture that it takes."""
+    norm = np.linalg.norm(middle[:3])
+    direction = middle[:3] if norm < 0.1 else middle[:3] / norm
+    terms = front.delay_terms.shape[1]
+    return Fronts(
+        delay=np.zeros(1),
+        direction=direction[None] if norm >= 0.1 else np.array([[1.0, 0.0, 0.0]]),
+        curvature=middle[3:4],
+        amplitude=np.ones(1),
+        loss=middle[4:5],
+        delay_terms=middle[None, 5 : 5 + terms],
+        gain_terms=np.zeros((1, 0)),
+        turn_terms=turn_terms[None],
+        spread_terms=spread_terms[None],
+        bend_terms=np.zeros((1, 0)),
+        sound_speed=front.sound_speed,
+        aperture=front.aperture,
+        phase=np.zeros(1),
+        variance=np.zeros(1),
+        doppler=np.zeros(1),
+        coherent=np.zeros(1, bool),
+        corners=np.zeros((1, 3)),
+        rough_share=np.zeros(1),
+        rough_delay=np.zeros(1),
+        dark=np.zeros((1, 0), bool),
+        modes=np.zeros((1, 0)),
+        bends=np.zeros((1, 0)),
+        centre=front.centre,
+        attenuation=front.attenuation,
+    )

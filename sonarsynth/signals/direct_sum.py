@@ -1,0 +1,134 @@
+"""The slow exact synthesis: the reference that the fast one is measured against."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.description import description
+from sonarsynth.equations.arrays.apertures import element_directivity
+from sonarsynth.equations.scattering.facet_pulses import facet_response
+from sonarsynth.products import Arrivals, Signals
+from sonarsynth.receiver import Elements, Sonar
+from sonarsynth.signals.array_paths import Fronts, delay_and_gain, faced, fronts, lost, reach
+from sonarsynth.signals.filtered_pulse import pulse_spectrum
+from sonarsynth.signals.pulse_variation import bend, changed
+from sonarsynth.signals.segments import fast_length, layout
+from sonarsynth.state import Snap
+
+
+def relative_absorption(absorption: Callable[[Floats], Floats] | None, frequency: Floats, centre: float) -> Floats:
+    """Absorption at frequencies (bin,) over that at the band centre, less one; zero where none is given."""
+    if absorption is None:
+        return np.zeros_like(frequency)
+    at = absorption(np.append(frequency, centre))
+    if not at[-1] > 0.0:
+        return np.zeros_like(frequency)
+    return np.asarray(at[:-1] / at[-1] - 1.0)
+
+
+def attenuation(absorption: Callable[[Floats], Floats] | None, centre: float) -> float:
+    """Absorption (dB/m) at the band centre; zero where none is given."""
+    return 0.0 if absorption is None else max(float(absorption(np.array([centre]))[0]), 0.0)
+
+
+def exact_spectra(front: Fronts, elements: Elements, frequency: Floats, relative: Floats, origin: float) -> np.ndarray:
+    """Transfer functions (sensor, bin) from the snap at 1 m to each hydrophone, delays counted from `origin` (s); but
+    for Doppler, which is the snap's."""
+    facets = bool(front.coherent.any() or front.corners.any() or front.rough_share.any())
+    total = np.zeros((elements.count, frequency.size), complex)
+    for e in range(front.count):
+        one = front.select(np.array([e]))
+        delay, gain = delay_and_gain(one, elements.position)
+        u = faced(one, elements.position)
+        late = one.delay[0] - origin + delay[0]
+        face = element_directivity(frequency, u[0][:, None, :], elements.face, one.sound_speed)
+        farther = one.attenuation * one.sound_speed * delay[0]  # dB
+        loss = lost(np.multiply.outer(one.loss[0] + farther, relative))
+        shape = np.exp(1j * one.phase[0] - 0.5 * one.variance[0] * (2.0 * np.pi * frequency) ** 2)
+        if facets:
+            shape = shape * facet_response(
+                frequency, one.coherent, one.corners, one.rough_share, one.rough_delay, one.centre
+            )
+        if one.turn_terms.any() or one.spread_terms.any():
+            shape = shape * changed(one, elements.position, frequency)
+        heard = elements.gain * ~one.dark[0] if one.dark.shape[1] else elements.gain
+        total += (one.amplitude[0] * gain[0] * heard)[:, None] * (
+            face * loss * shape * np.exp(-2j * np.pi * late[:, None] * frequency)
+        )
+    return total
+
+
+def through(before: np.ndarray, at: np.ndarray, after: np.ndarray, x: Floats) -> np.ndarray:
+    """The parabola (sensor, bin) through values (bin,) at -1, 0 and 1, at x (sensor,)."""
+    slope, curve = 0.5 * (after - before), 0.5 * (after - 2.0 * at + before)
+    return np.asarray(at + np.multiply.outer(x, slope) + np.multiply.outer(x * x, curve))
+
+
+@description
+class DirectSum:
+    """Sum of every path at every hydrophone and frequency, in float64, with exact delay, amplitude, directivity,
+    phase, blur, Doppler and mean over its facet."""
+
+    kind: Literal["direct_sum"] = "direct_sum"
+
+    def signals(
+        self,
+        arrivals: Arrivals,
+        snaps: tuple[Snap, ...],
+        elements: Elements,
+        sonar: Sonar,
+        absorption: Callable[[Floats], Floats] | None,
+        start: float,
+        samples: int,
+    ) -> Signals:
+        """Pressure at each hydrophone; the period of the transform is the window and a pulse at either end."""
+        return exact_signals(arrivals, snaps, elements, sonar, absorption, start, samples)[1]
+
+
+def exact_signals(
+    arrivals: Arrivals,
+    snaps: tuple[Snap, ...],
+    elements: Elements,
+    sonar: Sonar,
+    absorption: Callable[[Floats], Floats] | None,
+    start: float,
+    samples: int,
+) -> tuple[Floats, Signals]:
+    """The signals in float64 (sensor, sample), and as the stage gives them."""
+    fs = sonar.sampling_frequency
+    front = fronts(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
+    plan = layout(arrivals, front, snaps, elements, sonar, start, samples)
+    pressure = np.zeros((elements.count, samples))
+    waveforms = [s.waveform for s in snaps]
+    for waveform in dict.fromkeys(waveforms):
+        rows = np.flatnonzero(np.array([w == waveform for w in waveforms])[arrivals.snap] & plan.heard)
+        if not rows.size:
+            continue
+        pad = int(np.ceil(plan.support[:, rows].sum(axis=0).max() * fs)) + 2
+        # where a pulse is partly heard at one hydrophone, it is at most this far out at another
+        spread = int(np.ceil(2.0 * reach(front).max(initial=0.0) * fs)) + pad
+        length = fast_length(samples + 2 * spread)
+        for doppler in np.unique(front.doppler[rows]):
+            frequency, spectrum = pulse_spectrum(waveform, sonar.antialias, fs, length, float(doppler))
+            relative = relative_absorption(absorption, frequency, sonar.band.centre)
+            some = front.select(rows[front.doppler[rows] == doppler])
+            if not some.bend_terms.any():
+                transfer = exact_spectra(some, elements, frequency, relative, start - spread / fs)
+                pressure += np.fft.irfft(transfer * spectrum, length)[:, spread : spread + samples] * fs
+                continue
+            for e in range(some.count):
+                one = some.select(np.array([e]))
+                more = bend(one, elements.position)[0]
+                widest = float(np.abs(more).max(initial=1e-12))
+                ends = [
+                    pulse_spectrum(waveform, sonar.antialias, fs, length, float(doppler) + way * widest)[1]
+                    for way in (-1.0, 1.0)
+                ]
+                each = through(ends[0], spectrum, ends[1], more / widest)
+                transfer = exact_spectra(one, elements, frequency, relative, start - spread / fs)
+                pressure += np.fft.irfft(transfer * each, length)[:, spread : spread + samples] * fs
+    return pressure, Signals(pressure.astype(np.float32), start, fs, 0.0, 0, plan.outside)

@@ -1,0 +1,284 @@
+"""The snap as the sonar hears it at 1 m: through the anti-alias filter, and as paths change its shape."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+from scipy.fft import ifft, irfft, rfft
+
+from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
+from sonarsynth.equations.bubble import pulses
+from sonarsynth.equations.bubble.pulses import Pulse
+from sonarsynth.equations.bubble.snap_pressure import Bubble, ComplexArray
+from sonarsynth.equations.noise import filters
+from sonarsynth.equations.noise.filters import Fir
+from sonarsynth.equations.scattering.facet_pulses import rough_factor
+from sonarsynth.receiver import Filter, LowPass, stop_frequency
+from sonarsynth.signals.gridded.nodes import analysis, chebyshev, rounded_up
+from sonarsynth.sources.recordings import Stamp
+from sonarsynth.sources.shrimp import LogarithmicBubble, SnapModel
+from sonarsynth.sources.snap_models import KellerMiksis
+from sonarsynth.sources.snap_pulses import Waveform, pulse
+from sonarsynth.state import Snap
+
+LONGEST_TAIL = 0.02
+"""s, times the width: the tails of turned pulses are cut there, unless the pulse itself is longer."""
+
+MOST_SAMPLES = 1 << 23
+"""Samples of a pulse whose tails are looked at."""
+
+FEET = float(np.sqrt(-2.0 * np.log(filters.SUPPORT_TOLERANCE)))
+"""A Gaussian blur makes the support of a pulse longer at both ends by so many of its standard deviations."""
+
+
+def bubble(model: LogarithmicBubble) -> Bubble:
+    """The constants of a described snap, as the equations take them."""
+    return Bubble(model.a, model.k, model.m, model.q, model.density)
+
+
+def fir(chosen: Filter) -> Fir:
+    """The numbers of a described filter, as the equations take them."""
+    low = 0.0 if isinstance(chosen, LowPass) else chosen.low
+    high = chosen.cutoff if isinstance(chosen, LowPass) else chosen.high
+    return Fir(low, high, chosen.transition, chosen.attenuation)
+
+
+class Reshaped(NamedTuple):
+    """What paths do to a pulse that changes how long it lasts, beside making it longer."""
+
+    turned: bool = False  # at any constant phase
+    sloped: bool = False  # differentiated
+    rough: float = 0.0  # s: by `facet_pulses.rough_factor` with a share of 1 and this delay; 0: not
+
+
+def pulse_support(
+    waveform: Waveform,
+    chosen: Filter,
+    tolerance: float = filters.SUPPORT_TOLERANCE,
+    *,
+    turned: bool = False,
+    sloped: bool = False,
+    rough: float = 0.0,
+) -> tuple[float, float]:
+    """How long (s) before and after its collapse the filtered snap exceeds `tolerance` of its peak: for laying out
+    windows.
+
+    turned: at any constant phase. Such a pulse never ends. It falls as 1/t^3 where the snap has no net impulse, nor the
+    impulse a net integral, as the logarithmic bubble; as 1/t^2 or 1/t (Keller-Miksis, recordings) it may be cut at
+    LONGEST_TAIL: `cut_tail` says what is left there. sloped: differentiated, as a smooth facet does. rough: from rough
+    facets with a `rough_delay` (s) up to this, of any share. Facets make it longer by their corners, at both ends.
+    """
+    return support_of(waveform, chosen, Reshaped(turned, sloped, rough), tolerance)
+
+
+def support_of(
+    waveform: Waveform, chosen: Filter, shape: Reshaped, tolerance: float = filters.SUPPORT_TOLERANCE
+) -> tuple[float, float]:
+    """As `pulse_support`."""
+    turned, sloped, rough = shape
+    supports = [] if sloped else [_plain_support(waveform, chosen, tolerance)]
+    if turned or sloped:
+        supports.append(_shaped_support(waveform, chosen, tolerance, Reshaped(turned, sloped))[:2])
+    # a rough one lasts longest where what is missing has just not fallen silent: looked for within a factor of two
+    shortest = 1e-11  # shorter ones are quieter only
+    longest = rounded_up(max(min(rough, silencing_blur(waveform, chosen)), shortest), 2.0) if rough > 0.0 else 0.0
+    for delay in [longest / 2.0**n for n in range(4)] if rough > 0.0 else []:
+        supports.append(_shaped_support(waveform, chosen, tolerance, Reshaped(turned, sloped, delay))[:2])
+    before, after = zip(*supports, strict=True)
+    return max(before), max(after)
+
+
+def cut_tail(waveform: Waveform, chosen: Filter, tolerance: float = filters.SUPPORT_TOLERANCE) -> float:
+    """What a turned snap may be outside of its support, relative to its peak: `tolerance`, or more where it is cut."""
+    return max(_shaped_support(waveform, chosen, tolerance, Reshaped(turned=True))[2], tolerance)
+
+
+def at_longest(waveform: Waveform) -> Waveform:
+    """The waveform a little longer, of one of few widths, so that supports are bounds, and kept."""
+    return waveform._replace(width=rounded_up(waveform.width, 1.05))
+
+
+@lru_cache(maxsize=64)
+def _plain_support(waveform: Waveform, chosen: Filter, tolerance: float) -> tuple[float, float]:
+    if isinstance(waveform.model, LogarithmicBubble):
+        a, k, m, q, density = bubble(waveform.model)
+        longer = waveform.width
+        return filters.pulse_support(Bubble(a, k / longer, m * longer, q / longer, density), fir(chosen), tolerance)
+    return pulses.support(_pulse(waveform, pulses.reach(fir(chosen))), fir(chosen), tolerance)
+
+
+def _tapered(waveform: Waveform, chosen: Filter, window: float) -> tuple[Floats, ComplexArray]:
+    """Frequencies (bin,) from 0 to twice the stop edge in steps of 1/window, and the spectrum of the filtered snap,
+    faded out from the stop edge on: cut there it would ring."""
+    stop = stop_frequency(chosen)
+    f = np.asarray(np.arange(2 * int(np.ceil(stop * window)) + 1) / window)
+    fade = np.cos(0.5 * np.pi * np.clip(f / stop - 1.0, 0.0, 1.0)) ** 2
+    return f, _snap_spectrum(waveform, 1.0, f) * filters.response(f, fir(chosen)) * fade
+
+
+@lru_cache(maxsize=256)
+def _shaped_support(
+    waveform: Waveform, chosen: Filter, tolerance: float, shape: Reshaped
+) -> tuple[float, float, float]:
+    """As `pulse_support`, of one shape; and what is left of it outside. At any phase, that is of the envelope: the
+    modulus of the pulse and i times its Hilbert transform."""
+    plain = sum(_plain_support(waveform, chosen, tolerance))
+    window = 2.0 * plain
+    f, value = _tapered(waveform, chosen, window)
+    samples = 2 * (f.size - 1)
+    wave = np.fft.fftshift(irfft(value, samples))
+    longest = max(LONGEST_TAIL * waveform.width, plain)
+    while True:
+        padding, step = wave.size // 2, window / samples
+        wave = np.pad(wave, padding)  # a wider window, in which less of the tails is folded
+        envelope = _shaped(wave, step, shape)
+        envelope /= envelope.max()
+        loud = (np.flatnonzero(envelope > tolerance) - wave.size // 2) * step
+        quarter = 0.25 * wave.size * step
+        if max(-loud[0], loud[-1]) < quarter or longest < quarter or wave.size > MOST_SAMPLES:
+            break
+    time = (np.arange(wave.size) - wave.size // 2) * step
+    left = float(envelope[np.abs(time) >= longest].max(initial=0.0))
+    before, after = (min(max(float(end), 0.0), longest) for end in (step - loud[0], loud[-1] + step))
+    return before, after, left
+
+
+def _shaped(wave: Floats, step: float, shape: Reshaped) -> Floats:
+    """Modulus (sample,) of a wave in that shape; half of its envelope, if it may be turned."""
+    spectrum = rfft(wave)
+    f = np.arange(spectrum.size) / (wave.size * step)
+    if shape.sloped:
+        spectrum = spectrum * (1j * f)
+    if shape.rough > 0.0:
+        spectrum = spectrum * rough_factor(f, np.ones(1), np.array([shape.rough]))[0]
+    if not shape.turned:
+        return np.asarray(np.abs(irfft(spectrum, wave.size)))
+    half = np.zeros(wave.size, complex)
+    half[: wave.size // 2 + 1] = spectrum
+    half[0] *= 0.5  # no frequency is neither positive nor negative
+    return np.asarray(np.abs(ifft(half)))
+
+
+@lru_cache(maxsize=64)
+def silencing_blur(waveform: Waveform, chosen: Filter, tolerance: float = filters.SUPPORT_TOLERANCE) -> float:
+    """The blur (s) that leaves no more than `tolerance` of the modulus of the filtered snap's spectrum."""
+    window = 4.0 * sum(_plain_support(waveform, chosen, tolerance))
+    f, value = _tapered(waveform, chosen, window)
+    mass = np.abs(value) / np.abs(value).sum()
+    low, high = 0.0, 1e3 / f[1]
+    while high > 1.01 * low and high > 1e-12:
+        middle = np.sqrt(max(low, 1e-3 * high) * high)
+        silent = mass @ np.exp(-0.5 * (2.0 * np.pi * middle * f) ** 2) <= tolerance
+        low, high = (low, middle) if silent else (middle, high)
+    return float(high)
+
+
+@lru_cache(maxsize=64)
+def _response(chosen: Filter, sampling_frequency: float, samples: int) -> Floats:
+    value = filters.response(_bins(sampling_frequency, samples), fir(chosen))
+    value.setflags(write=False)
+    return value
+
+
+def _bins(sampling_frequency: float, samples: int) -> Floats:
+    return np.asarray(np.arange(samples // 2 + 1) * (sampling_frequency / samples), float)
+
+
+@lru_cache(maxsize=32)
+def _made(model: SnapModel, stamp: Stamp | None, highest: float) -> Pulse:
+    if isinstance(model, KellerMiksis) and model.depth is None:
+        raise ValueError("a keller_miksis snap needs the depth of its shrimp")
+    return pulse(model, 0.0, highest)
+
+
+def _pulse(waveform: Waveform, highest: float) -> Pulse:
+    """The pulse for waves up to `highest` (Hz), or somewhat more: few pulses serve all frequencies and widths."""
+    made = _made(waveform.model, waveform.stamp, rounded_up(waveform.width * highest, 2.0))
+    return made if waveform.width == 1.0 else pulses.scaled(made, 1.0, waveform.width)
+
+
+def _snap_spectrum(waveform: Waveform, longer: float, frequency: Floats) -> ComplexArray:
+    """Spectrum of the snap, unfiltered, at `longer` times evenly spaced frequencies (bin,)."""
+    return pulses.spectrum(longer * frequency, _pulse(waveform, 1.2 * float(frequency[-1])))
+
+
+@lru_cache(maxsize=64)
+def _spectrum(
+    waveform: Waveform, chosen: Filter, sampling_frequency: float, samples: int, doppler: float
+) -> ComplexArray:
+    f, longer = _bins(sampling_frequency, samples), 1.0 + doppler
+    value = _snap_spectrum(waveform, longer, f) * _response(chosen, sampling_frequency, samples) * longer
+    value[2 * f >= sampling_frequency] = 0.0
+    value.setflags(write=False)
+    return value
+
+
+def pulse_spectrum(
+    waveform: Waveform, chosen: Filter, sampling_frequency: float, samples: int, doppler: float = 0.0
+) -> tuple[Floats, ComplexArray]:
+    """Frequencies (bin,) in Hz and spectrum (bin,) in Pa s of the filtered snap at 1 m, at the `rfft` bins of a sample
+    grid.
+
+    What the filter leaves at and above half the sampling frequency (under its attenuation) is left out, not folded.
+    doppler stretches the snap, p(t/(1 + doppler)), before the filter, which is the receiver's and keeps its band.
+    """
+    value = _spectrum(waveform, chosen, sampling_frequency, samples, doppler)
+    return _bins(sampling_frequency, samples), value
+
+
+@lru_cache(maxsize=16)
+def stretched_spectra(
+    waveform: Waveform, chosen: Filter, sampling_frequency: float, samples: int, widest: float, count: int
+) -> ComplexArray:
+    """Chebyshev coefficients (degree < count, bin) of `pulse_spectrum` in doppler/widest, from -1 to 1."""
+    at = widest * chebyshev(count)
+    value = analysis(count) @ [pulse_spectrum(waveform, chosen, sampling_frequency, samples, float(d))[1] for d in at]
+    value.setflags(write=False)
+    return np.asarray(value)
+
+
+@lru_cache(maxsize=64)
+def stretch_sizes(waveform: Waveform, chosen: Filter, widest: float, sloped: bool = False) -> tuple[float, ...]:
+    """Mean moduli of the coefficients (degree < 16,) of `stretched_spectra` over frequency, over that of the first;
+    of the differentiated snap, if it is sloped."""
+    f = np.linspace(0.0, stop_frequency(chosen), 97)
+    filtered = filters.response(f, fir(chosen)) * (f if sloped else 1.0)
+    at = 1.0 + widest * chebyshev(16)
+    made = _pulse(waveform, 1.2 * float(f[-1]))
+    value = analysis(16) @ (pulses.stretched_spectra(f, made, at) * at[:, None] * filtered)
+    sizes = np.abs(value).sum(axis=1)
+    return tuple((sizes / sizes[0]).tolist()) if sizes[0] > 0.0 else (1.0, inf)
+
+
+@lru_cache(maxsize=64)
+def heard_part(waveform: Waveform, chosen: Filter) -> float:
+    """Largest modulus of the filtered snap's spectrum over that of the snap, up to the stop band; 0 for one that has
+    nothing there."""
+    f = np.linspace(0.0, stop_frequency(chosen), 513)
+    made = _pulse(waveform, 1.2 * float(f[-1]))
+    whole = np.abs(made.strength).sum()  # bounds its spectrum
+    passed = np.abs(pulses.spectrum(f, made) * filters.response(f, fir(chosen))).max()
+    return float(passed / whole) if whole > 0.0 else 0.0
+
+
+def _peak(waveform: Waveform) -> float:
+    """Largest pressure (Pa) at 1 m, as the model's level is taken."""
+    return _made(waveform.model, waveform.stamp, 0.0).peak
+
+
+def snap_levels(heard: tuple[Snap, ...]) -> Floats:
+    """(snap,) peak source level of each snap (dB re 1 uPa at 1 m), as its model's level is taken."""
+    with np.errstate(divide="ignore"):
+        own = [20.0 * np.log10(_peak(s.waveform) / REFERENCE_PRESSURE) for s in heard]
+    level = [o if s.source_level is None else s.source_level for s, o in zip(heard, own, strict=True)]
+    return np.array([v + 20.0 * np.log10(s.gain) for s, v in zip(heard, level, strict=True)])
+
+
+def snap_gains(heard: tuple[Snap, ...]) -> Floats:
+    """(snap,) factor on the pulse of each snap's waveform."""
+    return np.array(
+        [s.gain * pulses.gain_for_level(_made(s.model, s.waveform.stamp, 0.0), s.source_level) for s in heard]
+    )

@@ -1,0 +1,64 @@
+"""How the amplitude of a wavefront varies over the aperture: what its polynomial adds to the nodes that a tile needs.
+
+A lobe that is broad beside the array is nearly constant over it; a narrow one is a cubic of its own on every path.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.equations.arrays.apertures import aperture_terms
+from sonarsynth.receiver import Elements
+from sonarsynth.signals.array_paths import Fronts
+from sonarsynth.signals.gridded.interpolation import box_nodes
+from sonarsynth.signals.gridded.nodes import DEGREES, analysis
+
+
+@lru_cache(maxsize=16)
+def _basis(elements: Elements, aperture: float, terms: int) -> tuple[tuple[int, int, int], Floats, Floats]:
+    """Degrees + 1 (xyz), Chebyshev coefficients over the box (degrees, term) of each aperture term, and what makes of
+    terms a vector as long as their root mean square over the hydrophones (term, term)."""
+    x, y, z = (DEGREES if s > 0 else 1 for s in np.ptp(elements.position, axis=0))
+    value = aperture_terms(box_nodes(elements, (x, y, z)), aperture, terms).reshape(x, y, z, -1)
+    for axis, n in enumerate((x, y, z)):
+        value = np.moveaxis(np.tensordot(analysis(n), value, (1, axis)), 0, axis)
+    heard = np.linalg.qr(aperture_terms(elements.position, aperture, terms), mode="r") / np.sqrt(elements.count)
+    return (x, y, z), value.reshape(x * y * z, -1), heard
+
+
+def variation(front: Fronts, elements: Elements) -> Floats:
+    """Amplitudes of paths over the box round the hydrophones (1 + 3 axes * 4 degrees, path), over the loudest.
+
+    First the root mean square over the hydrophones; then, of each axis, bounds on the Chebyshev coefficients of degree
+    0 to 3. No rows where the amplitude is that of the sphere alone.
+    """
+    if not front.gain_terms.shape[1]:
+        return np.zeros((0, front.count))
+    shape, basis, heard = _basis(elements, front.aperture, front.gain_terms.shape[1])
+    terms = front.gain_terms.T.copy()
+    terms[0] += 1.0
+    rows = np.zeros((1 + 3 * DEGREES, front.count))
+    rows[0] = np.sqrt(((heard @ terms) ** 2).sum(axis=0))
+    size = np.abs(basis @ terms).reshape(*shape, -1)
+    for axis, n in enumerate(shape):
+        others = tuple(a for a in range(3) if a != axis)
+        rows[1 + axis * DEGREES :][:n] = size.sum(axis=others)
+    rows *= np.abs(front.amplitude) / np.abs(front.amplitude).max()
+    return rows
+
+
+def degrees(some: Floats) -> tuple[tuple[float, ...], ...]:
+    """Sizes of the degrees of each axis (xyz, degree) in the sum of paths, over that sum, from rows of `variation`.
+
+    Paths in phase add up by amplitude, others by power: the larger of both is taken. Infinite where nothing is heard.
+    """
+    if not some.shape[0]:
+        return ((1.0,),) * 3
+    total, power = some.sum(axis=1), np.einsum("rp,rp->r", some, some)
+    if not power[0] > 0.0:
+        return ((np.inf,),) * 3
+    found = np.maximum(total[1:] / total[0], np.sqrt(power[1:] / power[0]))
+    return tuple(map(tuple, found.reshape(3, DEGREES).tolist()))

@@ -1,0 +1,223 @@
+"""The frequencies of a stretch of time that count, and the spectra of its pulses there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.equations.bubble.snap_pressure import ComplexArray
+from sonarsynth.equations.scattering.facet_pulses import facet_mean, rough_factor
+from sonarsynth.receiver import Sonar
+from sonarsynth.signals.array_paths import Fronts
+from sonarsynth.signals.direct_sum import relative_absorption
+from sonarsynth.signals.filtered_pulse import at_longest, pulse_spectrum, stretch_sizes, stretched_spectra
+from sonarsynth.signals.gridded.nodes import rounded_up
+from sonarsynth.signals.pulse_shapes import MOST_PHASE, bending, blur_exponent, shape_modes, stretched
+from sonarsynth.signals.pulse_variation import (
+    UNCHANGING,
+    Changes,
+    changes,
+    widest_bend,
+    widest_spread,
+    widest_turn,
+    with_changes,
+)
+from sonarsynth.signals.segments import Stretch
+
+SHAPES = 0.02
+"""Share of the tolerance that the shapes of the pulses get, beside their terms."""
+
+
+MOST_DECAY = 2.0
+"""Range of absorption (Np) that is among the modes of pulses; a wider one keeps terms."""
+
+
+class Bins(NamedTuple):
+    """Frequencies of a stretch that count, next to each other."""
+
+    first: int  # number of the first bin
+    frequency: Floats  # (bin,) Hz
+    spectrum: ComplexArray  # (bin,) of the filtered snap at 1 m, in the shape that all paths share
+    relative: Floats  # (bin,) absorption over that at the band centre, less one
+    step: float  # Hz
+    modes: ComplexArray  # (mode, bin) spectra that the modes of the paths weigh; none where all share their shape
+    changes: Changes  # of pulses over the aperture, in these modes
+
+    def cut(self, count: int) -> Bins:
+        """The first of them."""
+        some = slice(0, count)
+        frequency, spectrum, relative = self.frequency[some], self.spectrum[some], self.relative[some]
+        return self._replace(frequency=frequency, spectrum=spectrum, relative=relative, modes=self.modes[:, some])
+
+
+def audible(spectrum: ComplexArray, tolerance: float) -> slice:
+    """The bins of a spectrum without its ends, which hold no more than 0.03 `tolerance` of its modulus each."""
+    mass = np.cumsum(np.abs(spectrum))
+    ends = np.searchsorted(mass, np.array([0.03 * tolerance, 1.0 - 0.03 * tolerance]) * mass[-1])
+    return slice(int(ends[0]), min(int(ends[1]) + 1, spectrum.size))
+
+
+def bins_of(
+    part: Stretch, front: Fronts, sonar: Sonar, absorption: Callable[[Floats], Floats] | None, tolerance: float
+) -> tuple[Fronts, Bins]:
+    """The paths of a stretch, with the modes of their pulses, and its bins.
+
+    Errors are relative to the least blurred path; paths that are silent beside it are left out. Raises ValueError for
+    facets with corners more than `MOST_PHASE` from their middle.
+    """
+    fs = sonar.sampling_frequency
+    frequency, spectrum = pulse_spectrum(part.waveform, sonar.antialias, fs, part.samples)
+    slope = np.asarray(1j * frequency / front.centre if part.coherent else 1.0)
+    spectrum = spectrum * slope
+    widest = rounded_up(float((np.abs(front.doppler) + widest_bend(front)).max()), 2.0)
+    series = np.zeros((0, spectrum.size), complex)
+    if widest > 0.0:
+        sizes = np.array(stretch_sizes(at_longest(part.waveform), sonar.antialias, widest, part.coherent))
+        left = np.append(np.cumsum(sizes[::-1])[::-1], 0.0)
+        count = int(np.flatnonzero(left <= SHAPES * tolerance)[0])
+        series = slope * stretched_spectra(part.waveform, sonar.antialias, fs, part.samples, widest, count)
+        front = _bent(front, spectrum, series, widest, tolerance)
+    if len(series) or _shaped(front):
+        front, spectrum, series = _shared(front, frequency, spectrum, series, widest, tolerance)
+    some = audible(spectrum, tolerance)
+    frequency, spectrum, series = frequency[some], spectrum[some], series[:, some]
+    modes, found = np.zeros((0, spectrum.size), complex), UNCHANGING
+    if front.variance.any():
+        front = _loud(front, frequency, spectrum, tolerance)
+    relative = relative_absorption(absorption, frequency, sonar.band.centre)
+    if front.corners.any():
+        _check_corners(front, float(frequency[-1]))
+    if front.count > 1:
+        front = _changing(front, frequency[-1:], tolerance)
+    if len(series) or _shaped(front):
+        front, spectrum, modes = _with_modes(front, frequency, spectrum, relative, series, widest, tolerance)
+        found = changes(front, frequency, modes) if front.count > 1 else UNCHANGING
+    return front, Bins(some.start, frequency, spectrum, relative, fs / part.samples, modes, found)
+
+
+def _shaped(front: Fronts) -> bool:
+    """Whether pulses have shapes, beside Doppler."""
+    found = bool(front.variance.any() or front.phase.any() or front.corners.any() or front.rough_share.any())
+    return found or (front.count > 1 and bool(front.turn_terms.any() or front.spread_terms.any()))
+
+
+def _changing(front: Fronts, highest: Floats, tolerance: float) -> Fronts:
+    """Paths without what their pulses change by over the aperture, up to the highest frequency (1,), where that is
+    nothing beside the loudest."""
+    loud = np.abs(front.amplitude)
+    turn = np.linalg.norm(widest_turn(front) * loud)
+    spread = np.linalg.norm(widest_spread(front) * loud) * float(blur_exponent(highest)[0])
+    least = SHAPES * tolerance * loud.max()
+    terms = (v if size > least else v[:, :0] for size, v in ((turn, front.turn_terms), (spread, front.spread_terms)))
+    turn_terms, spread_terms = terms
+    return replace(front, turn_terms=turn_terms, spread_terms=spread_terms)
+
+
+def _bent(front: Fronts, spectrum: ComplexArray, series: ComplexArray, widest: float, tolerance: float) -> Fronts:
+    """Paths without what their Doppler changes by over the aperture, where that is nothing beside the loudest."""
+    if not front.bend_terms.shape[1]:
+        return front
+    loud, longer = np.abs(front.amplitude), widest_bend(front)
+    slope = bending(series, front.doppler[:1] / widest) @ series / widest
+    rate = float(np.abs(slope).sum() / np.abs(spectrum).sum())
+    size = max(np.linalg.norm(loud * longer) / np.linalg.norm(loud), (loud * longer).max() / loud.max())
+    return front if rate * size > SHAPES * tolerance else replace(front, bend_terms=front.bend_terms[:, :0])
+
+
+def _check_corners(front: Fronts, highest: float) -> None:
+    """Raise ValueError where a facet is too large for the series in its corners."""
+    longest = MOST_PHASE / (2.0 * np.pi * highest)
+    far = np.abs(front.corners).max()
+    if far > longest:
+        raise ValueError(
+            f"facets up to {1e6 * far:.3g} us from middle to corner are too large for synthesis in modes up to "
+            f"{highest:.6g} Hz, which takes {1e6 * longest:.3g} us: split them, or use direct_sum"
+        )
+
+
+def _with_modes(
+    front: Fronts,
+    frequency: Floats,
+    spectrum: ComplexArray,
+    relative: Floats,
+    series: ComplexArray,
+    widest: float,
+    tolerance: float,
+) -> tuple[Fronts, ComplexArray, ComplexArray]:
+    """Paths with modes, the spectrum, and those of the modes. Absorption is among them, unless it differs much."""
+    decay = np.log(10.0) / 20.0 * relative
+    few = float(np.ptp(front.loss) * np.abs(decay).max()) <= MOST_DECAY
+    if few:
+        middle = 0.5 * float(front.loss.min() + front.loss.max())
+        lost = np.exp(-middle * decay)
+        front, spectrum, series = replace(front, loss=front.loss - middle), spectrum * lost, series * lost
+    else:
+        decay = np.zeros(frequency.size)
+    bent = front.count if len(series) and front.bend_terms.shape[1] else 0
+    every = with_changes(front) if front.count > 1 or bent else front
+    weight, modes, bends = shape_modes(every, frequency, spectrum, decay, series, widest, SHAPES * tolerance, bent)
+    weight, bends = weight[: front.count], bends[: front.count]
+    if front.corners.any() or front.rough_share.any():
+        spectrum = modes[0]  # what paths mostly send: the colour of the errors
+    return replace(front, modes=weight, bends=bends, loss=np.zeros(front.count) if few else front.loss), spectrum, modes
+
+
+def _shared(
+    front: Fronts, frequency: Floats, spectrum: ComplexArray, series: ComplexArray, widest: float, tolerance: float
+) -> tuple[Fronts, ComplexArray, ComplexArray]:
+    """Paths without the shape that all share, and the spectrum with it; and the series in Doppler, empty where all
+    share that."""
+    if len(series):
+        longer = widest_bend(front)
+        low, high = float((front.doppler - longer).min()), float((front.doppler + longer).max())
+        spectrum = (stretched(series, np.array([0.5 * (low + high) / widest])) @ series)[0]
+        # the ends of a smooth series differ most
+        bend = stretched(series, np.array([low, high]) / widest) @ series
+        if np.abs(bend[1] - bend[0]).sum() <= SHAPES * tolerance * np.abs(spectrum).sum():
+            series, front = series[:0], replace(front, bend_terms=front.bend_terms[:, :0])
+    least = float(front.variance.min())
+    spread = float(front.variance.max()) - least
+    if least > 0.0:
+        soft = np.exp(-least * blur_exponent(frequency))
+        spectrum, series = spectrum * soft, series * soft
+    alike = spread * blur_exponent(frequency)[-1] <= SHAPES * tolerance
+    front = replace(front, variance=np.zeros(front.count) if alike else front.variance - least)
+    phase = float(front.phase[0])
+    if (np.abs(front.phase - phase) <= SHAPES * tolerance).all():
+        turn = np.exp(1j * phase)
+        spectrum, series = spectrum * turn, series * turn
+        front = replace(front, phase=np.zeros(front.count))
+    if front.corners.any() or front.rough_share.any():
+        front, facet = _shared_facet(front, frequency)
+        spectrum, series = spectrum * facet, series * facet
+    return front, spectrum, series
+
+
+def _shared_facet(front: Fronts, frequency: Floats) -> tuple[Fronts, ComplexArray]:
+    """Paths without what all facets do alike to the pulse, and that (bin,)."""
+    one, facet = front.select(np.arange(1)), np.ones(frequency.size, complex)
+    if (front.corners == one.corners).all():
+        facet = facet * facet_mean(frequency, one.corners)[0]
+        front = replace(front, corners=np.zeros((front.count, 3)))
+    if not (np.ptp(front.rough_share) or np.ptp(front.rough_delay)):
+        facet = facet * rough_factor(frequency, one.rough_share, one.rough_delay)[0]
+        front = replace(front, rough_share=np.zeros(front.count))
+    return front, facet
+
+
+def _loud(front: Fronts, frequency: Floats, spectrum: ComplexArray, tolerance: float) -> Fronts:
+    """The paths without those that their blur leaves, all together, less than 0.01 `tolerance` of the loudest."""
+    some = slice(None, None, max(1, frequency.size // 128))
+    mass, exponent = np.abs(spectrum[some]), blur_exponent(frequency[some])
+    blurred = exponent[exponent > 0.0]  # 0 Hz is not
+    if not blurred.size:
+        return front
+    variance = np.append(0.0, np.geomspace(1e-4 / blurred[-1], 1e3 / blurred[0], 257))
+    level = np.exp(-np.multiply.outer(variance, exponent)) @ mass / mass.sum()
+    loudness = np.abs(front.amplitude) * np.interp(front.variance, variance, level)
+    keep = loudness > 0.01 * tolerance / front.count * loudness.max()
+    return front if keep.all() else front.select(np.flatnonzero(keep))

@@ -1,0 +1,298 @@
+"""One stretch of signals by kernel deposit: paths onto a fine grid, spectra, hydrophones, samples."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.fft import irfft, next_fast_len, rfft
+
+from sonarsynth.conventions import Floats
+from sonarsynth.equations.noise.filters import kaiser_bessel, kaiser_bessel_beta, kaiser_bessel_transform
+from sonarsynth.receiver import Elements
+from sonarsynth.signals.array_paths import (
+    NEPER,
+    Fronts,
+    delay_and_gain,
+    faced,
+    lost,
+    over,
+    terms_gradient,
+    tilt,
+    towards,
+)
+from sonarsynth.signals.gridded.bins import Bins
+from sonarsynth.signals.gridded.interpolation import to_sensors
+from sonarsynth.signals.gridded.low_rank import colour, face_pairs, recipe, sinc_polynomials
+from sonarsynth.signals.gridded.nodes import DEGREES, Axis, chebyshev, interpolation, nodes_for, polynomials_for
+from sonarsynth.signals.gridded.tiles import Aim, Tile, tiles
+from sonarsynth.signals.pulse_variation import Changes, bend, changed, shares
+
+RELAXING = np.log(4.0)
+"""Chebyshev coefficients of absorption over the band fall by this (Np) from each degree to the next, or by more."""
+
+LARGEST = 1 << 20
+"""Most numbers in a deposit grid: nodes are taken in groups of so many."""
+
+
+class Kernel(NamedTuple):
+    """A Kaiser-Bessel kernel on the grid that the paths are deposited on."""
+
+    width: int  # samples, even
+    beta: float
+    taps: npt.NDArray[Any]  # (row * 4 * lane,) a cubic in the fraction of a sample for each row and tap
+    lanes: int  # taps, padded to a multiple of 8
+    circle: int  # samples of the grid
+
+
+@lru_cache(maxsize=64)
+def kernel(width: int, oversampling: float, circle: int, dtype: str) -> Kernel:
+    """The kernel for a grid of `circle` samples at `oversampling` times twice the highest frequency."""
+    rows, lanes = (32 if dtype == "float32" else 512), 8 * ((width + 7) // 8)
+    beta = kaiser_bessel_beta(width, oversampling)
+    x = 0.5 * chebyshev(4)
+    fraction = (np.arange(rows)[:, None] + 0.5 + x) / rows  # (row, point)
+    taps = np.zeros((rows, 4, lanes))
+    value = kaiser_bessel(fraction[:, :, None] + np.arange(width) - width / 2, width, beta)
+    taps[:, :, :width] = np.linalg.inv(np.vander(x, increasing=True)) @ value
+    return Kernel(width, beta, taps.astype(dtype).ravel(), lanes, circle)
+
+
+class Stage(NamedTuple):
+    """What the tiles of a stretch have in common."""
+
+    aim: Aim
+    bins: Bins
+    origin: float  # s
+    grid: Kernel
+    scale: float  # from spectra to samples
+    dtype: str
+
+
+def add_stretch(
+    out: npt.NDArray[Any],
+    first: int,
+    samples: int,
+    front: Fronts,
+    elements: Elements,
+    bins: Bins,
+    origin: float,
+    highest: float,
+    method: tuple[int, float, str, float],
+    fresh: bool,
+) -> None:
+    """Add to out (sensor, sample) the pressure of paths in a stretch that holds the whole of their pulses.
+
+    The stretch begins at `origin` (s) and at sample `first` of out, which may be negative, and has `samples`, even.
+    highest (Hz) is the stop edge of the filter; method is width, oversampling, precision and tolerance of
+    `KernelDeposit`; fresh says that out is silent there.
+    """
+    width, oversampling, dtype, tolerance = method
+    circle = 2 * int(next_fast_len(int(np.ceil(highest * oversampling / bins.step)) + width, real=True))
+    used = min(bins.frequency.size, circle // 2 - bins.first)
+    bins = bins.cut(used)
+    grid = kernel(width, circle * bins.step / (2.0 * highest), circle, dtype)
+    aim = Aim(
+        elements=elements,
+        highest=highest,
+        weights=colour(bins.frequency, bins.spectrum, highest),
+        steepest=float(np.abs(bins.relative[bins.frequency <= highest]).max(initial=0.0)),
+        fading=float(np.abs(bins.relative) @ np.abs(bins.spectrum) / np.abs(bins.spectrum).sum()),
+        tolerance=tolerance,
+        changes=bins.changes,
+        bins=used,
+        circle=circle,
+    )
+    stage = Stage(aim, bins, origin, grid, samples * bins.step, dtype)
+    spectra = np.zeros((elements.count, samples // 2 + 1), np.result_type(dtype, np.complex64))
+    heard = spectra.view(dtype)[:, 2 * bins.first : 2 * (bins.first + used)]
+    for tile in tiles(front, aim):
+        _add_tile(heard, tile, front.select(tile.paths), stage)
+    begin, end = max(first, 0), min(first + samples, out.shape[1])
+    piece = irfft(spectra, samples, axis=1, overwrite_x=True)[:, begin - first : end - first]
+    if fresh:
+        out[:, begin:end] = piece
+    else:
+        out[:, begin:end] += piece
+
+
+def _add_tile(heard: npt.NDArray[Any], tile: Tile, part: Fronts, stage: Stage) -> None:
+    """Add the spectra of a tile at the hydrophones to heard (sensor, re and im of bins)."""
+    from sonarsynth.signals.gridded.deposit_kernels import steer_back
+
+    elements, bins, dtype = stage.aim.elements, stage.bins, heard.dtype
+    points = tile.nodes(elements)
+    alone = part.count == 1
+    field = _alone(tile, part, points, stage) if alone else _deposited(tile, part, points, stage)
+    if tile.reference.turn_terms.any() or tile.reference.spread_terms.any():
+        field = _changed(field, tile, points, stage)
+    delay, gain = delay_and_gain(tile.reference, elements.position)
+    late = delay[0] + (part.delay[0] - stage.origin if alone else 0.0)
+    gain = gain[0] * elements.gain * (part.amplitude[0] if alone else 1.0)
+    if alone and part.dark.shape[1]:
+        gain = gain * ~part.dark[0]
+    onto, column, weight = to_sensors(elements, tile.axes, dtype.name)
+    field = field.reshape(len(points) // weight.shape[1], -1)
+    if onto is not None:
+        field = onto @ field
+    field = field.reshape(len(field), weight.shape[1], -1)
+    steer_back(field, column, weight, late * bins.step, gain, bins.first, heard)
+
+
+def _alone(tile: Tile, part: Fronts, points: Floats, stage: Stage) -> npt.NDArray[Any]:
+    """The field (node, 2, bin) of one path that everything is steered to: that of the snap, through its face."""
+    faces = _faces(tile, points, stage)
+    weight = part.modes
+    if part.bends.shape[1]:
+        weight = weight + bend(part, points).T * part.bends
+    response = _responses(weight, stage)
+    return np.asarray(faces * _power(tile, stage, np.ones(1)) * response)
+
+
+def _changed(field: npt.NDArray[Any], tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
+    """The field (node, 2, bin) with what pulses change by at each node, as the reference of the tile does."""
+    value = (field[:, 0] + 1j * field[:, 1]) * changed(tile.reference, points, stage.bins.frequency)
+    return np.stack([value.real, value.imag], axis=1).astype(stage.dtype)
+
+
+def _deposited(tile: Tile, part: Fronts, points: Floats, stage: Stage) -> npt.NDArray[Any]:
+    """The field (node, 2, bin) of a tile at its nodes, steered to its reference: real and imaginary part."""
+    from sonarsynth.signals.gridded.deposit_kernels import combine
+
+    bins, grid = stage.bins, stage.grid
+    last = bins.first + bins.frequency.size
+    blur = kaiser_bessel_transform(np.arange(bins.first, last) / grid.circle, grid.width, grid.beta)
+    power = _power(tile, stage, blur)
+    mode = np.array(tile.terms)[:, 3]
+    response = _responses(tile.modes.T[: mode.max() + 1], stage)
+    _, place = face_pairs(tile.terms)
+    table = _packed(part, tile, bins.changes, (part.delay - stage.origin) * (grid.circle * bins.step))
+    field = np.empty((len(points), 2, bins.frequency.size), stage.dtype)
+    group = max(1, LARGEST // (len(tile.terms) * grid.circle))
+    for first in range(0, len(points), group):
+        some = slice(first, first + group)
+        deposits = _deposits(table, part, tile, points, some, stage)
+        spectra, faces = rfft(deposits[:, :, : grid.circle], axis=2), _faces(tile, points[some], stage)
+        combine(spectra, bins.first, faces, place, power, response, mode, field[some])
+    return field
+
+
+def _deposits(table: Floats, part: Fronts, tile: Tile, nodes: Floats, some: slice, stage: Stage) -> npt.NDArray[Any]:
+    """The grid (node, term, sample) of a tile at some of its nodes (node, xyz)."""
+    from sonarsynth.signals.gridded.deposit_kernels import deposit
+
+    points, grid, reference = nodes[some], stage.grid, tile.reference
+    rate = grid.circle * stage.bins.step
+    steer, _ = delay_and_gain(reference, points)
+    middle, level = faced(reference, points), towards(reference, points)[1]
+    late, louder, lean = np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0, 0))
+    share = shares(part, reference, tile.changes, tile.bent, stage.bins.changes, points, stage.dtype)
+    if part.delay_terms.shape[1]:
+        late = over(part.delay_terms, points, part.aperture).T * rate
+        if stage.aim.elements.face > 0.0:
+            lean = np.ascontiguousarray(
+                tilt(part, terms_gradient(points, part.aperture, part.delay_terms.shape[1])[1:])
+            )
+    if part.gain_terms.shape[1]:
+        louder = np.ascontiguousarray(over(part.gain_terms, points, part.aperture).T)
+    if part.dark.any():
+        louder = np.where(part.dark.T[some], -1.0, louder if louder.size else 0.0)
+    farther = part.attenuation * part.sound_speed / rate  # dB a sample
+    out = np.zeros((len(points), len(tile.terms), grid.circle + grid.lanes), stage.dtype)
+    deposit(
+        table.ravel(),
+        table.shape[1],
+        part.count,
+        points,
+        steer[0] * rate,
+        1.0 / level[0],
+        np.ascontiguousarray(middle[0, :, 1:]),
+        np.array([1.0 / d if d > 0 else 0.0 for d in tile.deviation[:2]]),
+        np.array([NEPER * farther, farther / (tile.deviation[2] or 1.0)]),
+        late,
+        louder,
+        lean,
+        share,
+        recipe(tile.terms),
+        grid.taps,
+        0.5 * grid.width,
+        grid.lanes,
+        rate / part.sound_speed,
+        grid.circle,
+        out.ravel(),
+    )
+    return out
+
+
+def _packed(part: Fronts, tile: Tile, found: Changes, position: Floats) -> Floats:
+    """Paths in blocks of rows (block, row, path), padded with silent ones: what `deposit` reads."""
+    from sonarsynth.signals.gridded.deposit_kernels import BLOCK
+
+    loss = (part.loss - tile.reference.loss) / (tile.deviation[2] or 1.0)
+    onto = tile.modes[:, : max(term[3] for term in tile.terms) + 1]
+    modes = np.concatenate([onto, *(found.onto[change] @ onto for change in tile.changes)], axis=1)
+    bent = (part.bends @ onto).T if tile.bent else ()
+    values = (*part.direction.T, part.curvature, position, part.amplitude, loss, *(part.modes @ modes).T, *bent)
+    blocks = -(-part.count // BLOCK)
+    rows = np.zeros((len(values), blocks * BLOCK))
+    rows[0] = 1.0
+    for row, value in zip(rows, values, strict=True):
+        row[: part.count] = value
+    return np.ascontiguousarray(rows.reshape(len(values), blocks, BLOCK).swapaxes(0, 1))
+
+
+def _responses(weight: Floats, stage: Stage) -> npt.NDArray[Any]:
+    """Spectra (mode, 2, bin) of pulses, real and imaginary part: sums, by weight (mode, mode of all paths), or that of
+    all paths where they have no modes."""
+    bins = stage.bins
+    value = (weight @ bins.modes if len(bins.modes) else bins.spectrum[None]) * stage.scale
+    return np.stack([value.real, value.imag], axis=1).astype(stage.dtype)
+
+
+def _power(tile: Tile, stage: Stage, blur: Floats) -> npt.NDArray[Any]:
+    """Real factor (term, bin) of each term's spectrum: the polynomials of absorption, without the blur (bin,)."""
+    relative = stage.bins.relative
+    loss = lost(tile.reference.loss * relative) / blur
+    decay = -NEPER * tile.deviation[2] * relative
+    degree = np.array(tile.terms)[:, 2]
+    power = np.cumprod(np.concatenate([[loss], decay / np.arange(1, degree.max() + 1)[:, None]]), axis=0)
+    return np.asarray(power.astype(stage.dtype)[degree])
+
+
+def _faces(tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
+    """Real factor (node, pair, bin) of the spectra of terms, by `face_pairs`: the polynomials of the face's
+    directivity, and what the longer way of the reference loses at a frequency beside that at the band centre."""
+    f, dtype, face, reference = stage.bins.frequency, stage.dtype, stage.aim.elements.face, tile.reference
+    degrees, _ = face_pairs(tile.terms)
+    if face == 0.0 and not reference.attenuation:
+        return np.broadcast_to(np.ones(1, dtype), (len(points), len(degrees), f.size))
+    u = faced(reference, points)[0, :, 1:].T
+    middle, half = 0.5 * (f[-1] + f[0]), 0.5 * (f[-1] - f[0])
+    scale = face / reference.sound_speed
+    deviation = np.array(tile.deviation[:2])[:, None]
+    # smooth in frequency: a few Chebyshev frequencies do
+    widest = float((np.abs(u) + deviation).max(axis=1).sum())
+    farther = reference.attenuation * reference.sound_speed * delay_and_gain(reference, points)[0][0]  # dB
+    most = NEPER * float(np.abs(farther).max()) * stage.aim.steepest
+    allowed = 0.1 * stage.aim.tolerance
+    axis = nodes_for(np.pi * scale * half * widest, (1.0,), allowed)
+    if most:
+        axis = polynomials_for(np.pi * scale * half * widest, (1.0,), allowed, (1.0, most, most, most))
+        axis = Axis(axis.nodes + max(int(np.ceil(np.log(most / allowed) / RELAXING)) - DEGREES, 0))
+    frequency = middle + half * chebyshev(axis.nodes)
+    at = frequency * scale
+    degree = int(degrees.max())
+    y, z = sinc_polynomials(u[:, :, None] * at, (deviation * at)[:, None], degree).swapaxes(0, 1)
+    some = (y[degrees[:, 0]] * z[degrees[:, 1]]).swapaxes(0, 1)
+    if most:
+        some = some * lost(np.multiply.outer(farther, np.interp(frequency, f, stage.bins.relative)))[:, None]
+    some = some.reshape(-1, axis.nodes).astype(dtype)
+    return np.asarray(some @ _to_bins(f.size, axis, dtype)).reshape(len(points), len(degrees), f.size)
+
+
+@lru_cache(maxsize=64)
+def _to_bins(bins: int, axis: Axis, dtype: str) -> npt.NDArray[Any]:
+    """Interpolation (node, bin) from nodes over the band to all bins."""
+    return np.ascontiguousarray(interpolation(np.linspace(-1.0, 1.0, bins), axis).T.astype(dtype))

@@ -1,0 +1,278 @@
+"""Compiled loops of the kernel deposit. One thread, fixed order: the same bits on any number of workers.
+
+Arrays are flat with constant offsets and loop bodies are straight lines, because the compiler vectorises only those.
+Functions that others call are inlined always: of a function that is not, each caller has a copy, which fast mathematics
+gives other bits, and which of them runs depends on what was compiled in this process and what was loaded.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from sonarsynth.equations.kernels.vectors import add_scaled, cubics
+
+BLOCK = 128
+"""Paths in a block of the packed table."""
+
+RUN = 64
+"""Bins that are turned by one table: 4 * 2^4."""
+
+ROWS = 7
+"""Rows of the packed table: direction x, y, z; curvature; position (samples); amplitude; absorption (scaled
+deviation). Weights of the modes may follow, then those of what they change by."""
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+def _wavefront(
+    block: Any, node: Any, middle: Any, scale: Any, absorbed: Any, rate: float, steer: float, level: float, late: Any,
+    place: Any, value: Any,
+) -> None:  # fmt: skip
+    """Positions (samples) of a block of paths at a node, and rows of value: deviations in y, z and absorption, -,
+    amplitude."""
+    qx, qy, qz = node[0], node[1], node[2]
+    qq = qx * qx + qy * qy + qz * qz
+    uy, uz, sy, sz = middle[0], middle[1], scale[0], scale[1]
+    nepers, scaled, louder = absorbed[0], absorbed[1], 1.0 / level
+    for i in range(BLOCK):
+        dx, dy, dz, k = block[i], block[BLOCK + i], block[2 * BLOCK + i], block[3 * BLOCK + i]
+        vx, vy, vz = dx - k * qx, dy - k * qy, dz - k * qz
+        n = np.sqrt(vx * vx + vy * vy + vz * vz)
+        near = 1.0 / n
+        away = (k * qq - 2.0 * (qx * dx + qy * dy + qz * dz)) / (n + 1.0) * rate + (late[i] - steer)
+        lost = nepers * away
+        place[i] = block[4 * BLOCK + i] + away
+        value[i] = (vy * near - uy) * sy
+        value[BLOCK + i] = (vz * near - uz) * sz
+        value[2 * BLOCK + i] = block[6 * BLOCK + i] + scaled * away
+        left = louder - louder * lost * (1.0 - lost * (0.5 - lost * (1.0 / 6.0)))
+        value[4 * BLOCK + i] = block[5 * BLOCK + i] * near * left
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+def _multiply(a: Any, b: Any, out: Any) -> None:
+    for i in range(BLOCK):
+        out[i] = a[i] * b[i]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+def _copy(row: Any, out: Any) -> None:
+    for i in range(row.size):
+        out[i] = row[i]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+def _amplify(out: Any, more: Any) -> None:
+    for i in range(more.size):
+        out[i] *= 1.0 + more[i]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+def _lean(out: Any, more: Any, scale: float) -> None:
+    for i in range(more.size):
+        out[i] += scale * more[i]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+def _recur(out: Any, earlier: Any) -> None:
+    for i in range(BLOCK):
+        out[i] = 2.0 * out[i] - earlier[i]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+def _mix(weight: Any, share: Any, node: int, first: int, size: int, modes: int, out: Any) -> None:
+    """Weights of modes (mode * BLOCK,) at a node: of the pulses, and of what they change by, (change * mode * BLOCK,),
+    in shares (change, node, path)."""
+    for s in range(share.shape[0]):
+        part = share[s, node, first : first + size]
+        for k in range(modes):
+            row = weight[(s * modes + k) * BLOCK : (s * modes + k) * BLOCK + size]
+            mixed = out[k * BLOCK : k * BLOCK + size]
+            if s == 0:
+                for i in range(size):
+                    mixed[i] = part[i] * row[i]
+            else:
+                for i in range(size):
+                    mixed[i] += part[i] * row[i]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+def _expand(value: Any, weight: Any, recipe: Any, modes: bool) -> None:
+    """Terms of a block of paths, from row 4 of value on; there is the amplitude, which with modes moves to row 3."""
+    if modes:
+        value[3 * BLOCK : 4 * BLOCK] = value[4 * BLOCK : 5 * BLOCK]
+    for t in range(0 if modes else 1, recipe.shape[0]):
+        a, b, c = (4 + recipe[t, 0]) * BLOCK, recipe[t, 1] * BLOCK, (4 + t) * BLOCK
+        if recipe[t, 1] < 3:
+            _multiply(value[a : a + BLOCK], value[b : b + BLOCK], value[c : c + BLOCK])
+        else:
+            _multiply(value[a : a + BLOCK], weight[b - 3 * BLOCK :], value[c : c + BLOCK])
+        if recipe[t, 2] >= 0:
+            d = (4 + recipe[t, 2]) * BLOCK
+            _recur(value[c : c + BLOCK], value[d : d + BLOCK])
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+def _split(place: Any, half: float, rows: int, length: int, begin: Any, row: Any, fraction: Any) -> None:
+    """First sample of the kernel on the circle, row of its table, and place in the row, from -1/2 to 1/2."""
+    for i in range(BLOCK):
+        left = np.floor(place[i] - half)
+        x = (left + 1.0 - (place[i] - half)) * rows
+        r = min(np.floor(x), rows - 1.0)
+        first = left + 1.0
+        begin[i] = int(first - np.floor(first / length) * length)
+        row[i] = int(r)
+        fraction[i] = x - r - 0.5
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+def deposit(
+    table: Any,
+    rows: int,
+    count: int,
+    nodes: Any,
+    steer: Any,
+    level: Any,
+    middle: Any,
+    scale: Any,
+    absorbed: Any,
+    late: Any,
+    louder: Any,
+    lean: Any,
+    share: Any,
+    recipe: Any,
+    taps: Any,
+    half: float,
+    lanes: int,
+    rate: float,
+    length: int,
+    grid: Any,
+) -> None:
+    """Add the kernel of every path at every node, times every term, to grid (node * term * (length + lanes),).
+
+    table: `count` paths in blocks (block * rows * BLOCK,), float64. nodes (node, xyz) in m. Of the tile's middle at the
+    nodes, taken off: steer (node,) its delay in samples, level (node,) its gain, middle (node, 2) its direction y, z.
+    scale (2,) is one over the deviation of y and z; absorbed (2,) what a sample more of the way takes, in Np and in
+    deviations of absorption. late (samples) and louder (node, path) and lean (node, y or z, path) are the wavefront's
+    terms, or empty; share (change, node, path) is how much the modes are of each change, or empty. recipe (term, 3)
+    makes terms. taps (row * 4 * lane,) is the kernel, a cubic a row, and half its half width in samples. rate is in
+    samples/m; the grid is a circle of `length` samples.
+    """
+    terms, stride = recipe.shape[0], length + lanes
+    cubes = taps.size // (4 * lanes)
+    place, more, fraction = np.empty(BLOCK), np.zeros(BLOCK), np.empty(BLOCK, grid.dtype)
+    begin, row = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
+    value = np.empty((4 + terms) * BLOCK, grid.dtype)
+    modes = (rows - ROWS) // max(share.shape[0], 1)
+    mixed = np.zeros(modes * BLOCK, grid.dtype)
+    for m in range(nodes.shape[0]):
+        for first in range(0, count, BLOCK):
+            size = min(BLOCK, count - first)
+            block = table[first * rows : (first + BLOCK) * rows]
+            if late.size:
+                _copy(late[m, first : first + size], more)
+            _wavefront(block, nodes[m], middle[m], scale, absorbed, rate, steer[m], level[m], more, place, value)
+            if lean.size:
+                _lean(value, lean[m, 0, first : first + size], scale[0])
+                _lean(value[BLOCK:], lean[m, 1, first : first + size], scale[1])
+            if louder.size:
+                _amplify(value[4 * BLOCK :], louder[m, first : first + size])
+            if share.size:
+                _mix(block[ROWS * BLOCK :], share, m, first, size, modes, mixed)
+                _expand(value, mixed, recipe, True)
+            else:
+                _expand(value, block[ROWS * BLOCK :], recipe, rows > ROWS)
+            _split(place, half, cubes, length, begin, row, fraction)
+            for i in range(size):
+                for lane in range(0, lanes, 8):
+                    w: Any = cubics(taps, row[i] * 4 * lanes + lane, lanes, fraction[i])  # type: ignore[call-arg]
+                    for t in range(terms):
+                        add_scaled(grid, (m * terms + t) * stride + begin[i] + lane, value[(4 + t) * BLOCK + i], w)
+    for line in range(nodes.shape[0] * terms):  # close the circle
+        for i in range(lanes):
+            grid[line * stride + i] += grid[line * stride + length + i]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+def combine(spectra: Any, first: int, factors: Any, place: Any, power: Any, response: Any, mode: Any, out: Any) -> None:
+    """Sum over terms of spectra (node, term, bin) times real factors (node, place of term, bin) and power (term, bin).
+
+    Times response (mode, 2, bin) of the mode of each term (term,), real and imaginary part as in out (node, 2, bin).
+    Bins of spectra count from `first`.
+    """
+    bins = out.shape[2]
+    re, im = np.empty(bins, out.dtype), np.empty(bins, out.dtype)
+    for m in range(out.shape[0]):
+        for k in range(response.shape[0]):
+            re[:], im[:] = 0.0, 0.0
+            for t in range(power.shape[0]):
+                if mode[t] == k:
+                    for b in range(bins):
+                        factor = factors[m, place[t], b] * power[t, b]
+                        re[b] += spectra[m, t, first + b].real * factor
+                        im[b] += spectra[m, t, first + b].imag * factor
+            if k == 0:
+                for b in range(bins):
+                    out[m, 0, b] = re[b] * response[k, 0, b] - im[b] * response[k, 1, b]
+                    out[m, 1, b] = re[b] * response[k, 1, b] + im[b] * response[k, 0, b]
+            else:
+                for b in range(bins):
+                    out[m, 0, b] += re[b] * response[k, 0, b] - im[b] * response[k, 1, b]
+                    out[m, 1, b] += re[b] * response[k, 1, b] + im[b] * response[k, 0, b]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+def _turn(real: Any, imaginary: Any, c: Any, s: Any, re: Any, im: Any, out: Any) -> None:
+    for i in range(real.size):
+        cr, ci = re * c[i] - im * s[i], re * s[i] + im * c[i]
+        out[2 * i] += cr * real[i] - ci * imaginary[i]
+        out[2 * i + 1] += cr * imaginary[i] + ci * real[i]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+def _phasors(turn: complex, c: Any, s: Any) -> complex:
+    """Powers 0 to RUN - 1 of turn, real and imaginary part, in four chains that do not wait for each other; power
+    RUN."""
+    quarter = turn
+    for _ in range(4):
+        quarter *= quarter
+    p0, p1, p2, p3 = 1.0 + 0.0j, quarter, quarter * quarter, quarter * quarter * quarter
+    for j in range(RUN // 4):
+        c[j], c[RUN // 4 + j], c[RUN // 2 + j], c[3 * RUN // 4 + j] = p0.real, p1.real, p2.real, p3.real
+        s[j], s[RUN // 4 + j], s[RUN // 2 + j], s[3 * RUN // 4 + j] = p0.imag, p1.imag, p2.imag, p3.imag
+        p0, p1, p2, p3 = p0 * turn, p1 * turn, p2 * turn, p3 * turn
+    return p3
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+def _accumulate(field: Any, weight: float, out: Any) -> None:
+    for i in range(out.size):
+        out[i] += weight * field[i]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+def steer_back(field: Any, column: Any, weight: Any, delay: Any, gain: Any, first: int, out: Any) -> None:
+    """Add the field at each hydrophone, delayed and amplified, to out (sensor, 2 * bin): pairs of real and imaginary
+    part.
+
+    The field at sensor s is sum_n weight[s, n] field[column[s], n]; field (column, node, 2 * bin) has all real parts,
+    then all imaginary ones. Bins count from `first`; delay is in cycles a bin.
+    """
+    c, s = np.empty(RUN, field.dtype), np.empty(RUN, field.dtype)
+    bins = field.shape[2] // 2
+    here = np.empty(2 * bins, field.dtype)
+    for q in range(out.shape[0]):
+        if gain[q] == 0.0:
+            continue
+        here[:] = 0.0
+        for n in range(weight.shape[1]):
+            _accumulate(field[column[q], n], weight[q, n], here)
+        w = _phasors(np.exp(-2j * np.pi * delay[q]), c, s)
+        start = gain[q] * np.exp(-2j * np.pi * (delay[q] * first))
+        for low in range(0, bins, RUN):
+            re, im = field.dtype.type(start.real), field.dtype.type(start.imag)
+            high = min(low + RUN, bins)
+            _turn(here[low:high], here[bins + low : bins + high], c, s, re, im, out[q, 2 * low : 2 * high])
+            start *= w

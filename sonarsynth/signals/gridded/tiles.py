@@ -1,0 +1,296 @@
+"""Tiles: groups of paths from nearly the same direction, chosen by their predicted cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.receiver import Elements
+from sonarsynth.signals.array_paths import NEPER, Fronts, reference_of
+from sonarsynth.signals.gridded.amplitude_nodes import degrees, variation
+from sonarsynth.signals.gridded.interpolation import Axes, box_nodes, columns
+from sonarsynth.signals.gridded.low_rank import PLAIN, Term, terms_for
+from sonarsynth.signals.gridded.nodes import MOST_NODES, Colour, nodes_for
+from sonarsynth.signals.pulse_shapes import main_modes
+from sonarsynth.signals.pulse_variation import Changes, aperture_gradient, pulses, rest, slopes
+
+MOST_TERMS = 24
+"""A tile that needs more terms, of one mode of its pulses, is split."""
+
+
+@dataclass(frozen=True, eq=False)
+class Aim:
+    """What the tiles are for: the array, its highest frequency, the pulse's colour, and the error allowed."""
+
+    elements: Elements
+    highest: float  # Hz
+    weights: Colour
+    steepest: float  # largest change of absorption over the band, over that at the centre
+    fading: float  # mean of it over the pulse
+    tolerance: float
+    changes: Changes  # of pulses over the aperture
+    bins: int
+    circle: int  # samples of the deposit grid
+
+
+@dataclass(frozen=True, eq=False)
+class Tile:
+    """Paths, the front that they are steered to, and the nodes and terms that represent them."""
+
+    paths: Ints  # (path,)
+    reference: Fronts  # one front: the middle of the tile
+    axes: Axes | None  # nodes along x, y, z; None where the hydrophones themselves are the nodes
+    terms: tuple[Term, ...]
+    deviation: tuple[float, float, float]  # half range of direction y and z, and of absorption (dB)
+    changes: Ints  # (some,) which of the changes of pulses over the aperture count, beside the reference
+    bent: bool  # whether that of their Doppler does
+    modes: Floats  # (mode, mode) turn of the modes of all paths to those of the tile; (0, 0) where there are none
+    cost: float  # ns, predicted
+
+    def nodes(self, elements: Elements) -> Floats:
+        """Positions (node, xyz) where the field is synthesised, x slowest."""
+        if self.axes is None:
+            return elements.position
+        x, y, z = self.axes
+        return box_nodes(elements, (x.nodes, y.nodes, z.nodes))
+
+
+class _Probes(NamedTuple):
+    """Where directions are looked at: the corners of the array's box and its centre; near it, all hydrophones."""
+
+    points: Floats  # (point, xyz)
+    corners: tuple[int, int, int]  # how many along x, y, z; they come first
+    size: Floats  # (xyz) m: half of the box
+
+
+@lru_cache(maxsize=16)
+def _probes(elements: Elements, near: bool) -> _Probes:
+    low, high = elements.position.min(axis=0), elements.position.max(axis=0)
+    axes = [np.unique([a, b]) for a, b in zip(low, high, strict=True)]
+    corners = np.stack([g.ravel() for g in np.meshgrid(*axes, indexing="ij")], axis=1)
+    points = elements.position if near else np.concatenate([corners, 0.5 * (low + high)[None]])
+    x, y, z = (int(a.size) for a in axes)
+    return _Probes(points, (x, y, z), 0.5 * (high - low))
+
+
+@dataclass(frozen=True, eq=False)
+class _Views:
+    """What every tile that is tried looks at, computed once: a tile is the smallest and the largest of each column."""
+
+    front: Fronts
+    columns: Floats  # (column, path): direction, curvature, absorption, delay terms; slownesses at probes
+    amplitude: Floats  # (row, path) of `variation`
+    probes: _Probes
+    gradient: Floats  # (xyz, point, term) of the aperture terms; empty where there are none
+    bend: Floats  # (xyz, path) rad/m: how fast pulses change over the aperture (`changing.slopes`)
+    own: bool  # no nodes can stand for the hydrophones: a source is within or about that box, or paths miss some
+
+
+def _views(front: Fronts, aim: Aim, missed: bool) -> _Views:
+    elements = aim.elements
+    near = bool(front.curvature.max() * np.linalg.norm(np.abs(elements.position).max(axis=0)) > 0.8)
+    probes = _probes(elements, near)
+    gradient = aperture_gradient(front, probes.points)
+    columns = _columns(front, probes.points, gradient)
+    bend = slopes(front, gradient, aim.weights[0] * aim.highest, aim.highest)
+    return _Views(front, columns, variation(front, elements), probes, gradient, bend, near or missed)
+
+
+def _columns(front: Fronts, probes: Floats, gradient: Floats) -> Floats:
+    """Columns of `_Views` of fronts; slownesses are -c times the gradient of delay: directions where rays are
+    straight."""
+    v = front.direction.T - front.curvature * probes[:, :, None]  # (point, xyz, path)
+    u = v / np.sqrt(v[:, 0] ** 2 + v[:, 1] ** 2 + v[:, 2] ** 2)[:, None]
+    columns = [front.direction.T, front.curvature[None], front.loss[None], front.delay_terms.T]
+    if front.delay_terms.shape[1]:
+        u = u - front.sound_speed * np.einsum(
+            "et,ipt->pie", front.delay_terms, gradient[:, :, : front.delay_terms.shape[1]]
+        )
+    columns.append(u.reshape(-1, front.count))
+    return np.ascontiguousarray(np.concatenate(columns))
+
+
+class _Extent(NamedTuple):
+    """What decides how a tile is represented, and what that costs."""
+
+    paths: float  # how many
+    phase: tuple[float, ...]  # (xyz) rad: half range at the highest frequency, over half of the box
+    drift: tuple[float, ...]  # (xyz) rad, on top of it: the directivity of the reference varies too
+    degrees: tuple[tuple[float, ...], ...]  # (xyz, degree) of the amplitude
+    turn: tuple[float, float]  # half range of the face's argument in y and z at the highest frequency
+    decay: float  # Np: half range of absorption, at the frequency where it differs most from that at the centre
+    modes: tuple[float, ...]  # sizes of the modes of the pulses' shapes
+
+    def half(self) -> _Extent:
+        """The best that halving can give."""
+        y, z = self.turn
+        phase, modes = tuple(0.5 * p for p in self.phase), (1.0, *(0.5 * m for m in self.modes[1:]))
+        return _Extent(0.5 * self.paths, phase, self.drift, self.degrees, (0.5 * y, 0.5 * z), 0.5 * self.decay, modes)
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """A tile, and why it is as it is."""
+
+    tile: Tile
+    extent: _Extent | None  # None for a path alone
+
+
+def _try(paths: Ints, views: _Views, aim: Aim) -> _Trial:
+    if paths.size == 1:
+        return _Trial(_alone(paths, views.front, aim), None)
+    whole = paths.size == views.front.count
+    columns = views.columns if whole else np.take(views.columns, paths, axis=1)
+    low, high = columns.min(axis=1), columns.max(axis=1)
+    over = rest(views.front, paths, aim.changes, 0.1 * aim.tolerance)
+    reference = reference_of(views.front, 0.5 * (low + high), over.turn_terms, over.spread_terms)
+    probes = views.probes
+    own = _columns(reference, probes.points, views.gradient)[:, 0]
+    far = np.maximum(high - own, own - low)
+    slope = far[-3 * len(probes.points) :].reshape(-1, 3).max(axis=0)
+    _, dy, dz = slope.tolist()
+    wave = aim.highest / reference.sound_speed  # 1/m
+    turn, loss = (aim.elements.face * wave * dy, aim.elements.face * wave * dz), float(far[4])
+    bend = views.bend[:, paths].max(axis=1)
+    phase = np.full(3, np.inf) if views.own else (2.0 * np.pi * wave * slope + bend) * probes.size
+    modes, sizes = np.zeros((0, 0)), PLAIN
+    if views.front.modes.shape[1]:
+        modes, sizes = main_modes(*pulses(views.front, paths, over, aim.changes))
+    farther = views.front.attenuation * float(slope @ np.abs(aim.elements.position).max(axis=0))  # dB
+    extent = _Extent(
+        paths=paths.size,
+        phase=tuple(phase.tolist()),
+        drift=_drift(reference, aim),
+        degrees=degrees(views.amplitude if whole else np.take(views.amplitude, paths, axis=1)),
+        turn=turn,
+        decay=NEPER * (loss * aim.steepest + farther * aim.fading),
+        modes=sizes,
+    )
+    axes, terms, cost = _cheapest(extent, aim)
+    return _Trial(
+        Tile(paths, reference, axes, terms, (dy, dz, loss + farther), over.which, over.bent, modes, cost), extent
+    )
+
+
+def _drift(front: Fronts, aim: Aim) -> tuple[float, ...]:
+    """Half range (xyz, rad) of the phase that is left over a face, along each axis of the box: du_j/dq_i is
+    -(e_i - u_i u)_j k/n; and of what absorption varies by (Np). inf about the source."""
+    _, _, size = _probes(aim.elements, False)
+    k = float(front.curvature[0])
+    nearest = 1.0 - k * float(np.linalg.norm(np.abs(aim.elements.position).max(axis=0)))
+    if not nearest > 0.2:
+        return (np.inf,) * 3
+    scale = np.pi * aim.highest * aim.elements.face / front.sound_speed * k / nearest
+    x, y, z = np.abs(front.direction[0]).tolist()
+    slack = 3.0 * (1.0 - nearest) / nearest  # u itself turns by a third of it
+    change = x * (y + z), 1.0 - y * y + y * z, 1.0 - z * z + y * z
+    faded = NEPER * front.attenuation * aim.steepest
+    faded += np.sqrt(faded * k)  # a wave that bends as much as what a curved front loses
+    return tuple((scale * min(c + slack, 1.21) + faded) * s for c, s in zip(change, size.tolist(), strict=True))
+
+
+def _cheapest(extent: _Extent, aim: Aim) -> tuple[Axes | None, tuple[Term, ...], float]:
+    """Nodes or the hydrophones themselves, terms, and the predicted time (ns) on one core at 3 GHz."""
+    sensors, bins = aim.elements.count, aim.bins
+    terms = terms_for(extent.turn, extent.decay, aim.weights, aim.tolerance, extent.modes)
+    x, y, z = (
+        nodes_for(p + d, aim.weights, aim.tolerance, a)
+        for p, d, a in zip(extent.phase, extent.drift, extent.degrees, strict=True)
+    )
+
+    def work(nodes: int) -> float:
+        each = extent.paths * (8.0 + 0.6 * len(terms)) + len(terms) * (1.4 * aim.circle + 2.5 * bins)
+        return nodes * each + 2.0 * sensors * bins + 4e5
+
+    own, nodes = work(sensors), x.nodes * y.nodes * z.nodes
+    few = max(x.nodes, y.nodes, z.nodes) <= MOST_NODES
+    onto = 0.03 * nodes * columns(aim.elements)[0].size + 0.3 * z.nodes * sensors
+    by_nodes = work(nodes) + onto * bins if few else np.inf
+    crowded = np.inf if sum(not term[3] for term in terms) > MOST_TERMS else 1.0
+    return ((x, y, z), terms, by_nodes * crowded) if by_nodes < own else (None, terms, own * crowded)
+
+
+def _halves(paths: Ints, views: _Views, aim: Aim) -> tuple[Ints, Ints] | None:
+    """Two halves of a tile, cut across its widest extent in phase; None where all paths are alike."""
+    front = views.front
+    size = np.append(views.probes.size + aim.elements.face, 0.5 * front.aperture**2)
+    weight = np.append(2.0 * np.pi * aim.highest / front.sound_speed * size, NEPER * aim.steepest)
+    where = np.take(views.columns[:5], paths, axis=1)
+    low, high = where.min(axis=1), where.max(axis=1)
+    axis = int(np.argmax((high - low) * weight))
+    right = where[axis] > 0.5 * (low[axis] + high[axis])
+    if not right.any():
+        return None
+    return paths[~right], paths[right]
+
+
+def tiles(front: Fronts, aim: Aim) -> list[Tile]:
+    """The tiles of predicted least cost: each is halved while that pays; the first halving may pay only with the
+    second.
+
+    Paths that miss some hydrophones are apart: each of these is a node of their tiles."""
+    missed = front.dark.any(axis=1)
+    if not missed.any() or missed.all():
+        return _tiles(front, aim, bool(missed.any()))
+    rows = [np.flatnonzero(~missed), np.flatnonzero(missed)]
+    found = [(some, _tiles(front.select(some), aim, n == 1)) for n, some in enumerate(rows)]
+    return [replace(tile, paths=some[tile.paths]) for some, made in found for tile in made]
+
+
+def _tiles(front: Fronts, aim: Aim, missed: bool) -> list[Tile]:
+    """The tiles of paths of one kind."""
+    if front.count == 1:
+        return [_alone(np.arange(1), front, aim)]
+    views = _views(front, aim, missed)
+    trial = _try(np.arange(front.count), views, aim)
+    if not missed:
+        return _best(trial, views, aim, patient=True)
+    best = [trial.tile] if _alone_pays(trial.tile, front, aim) else _best(trial, views, aim, patient=True)
+    gradient = aperture_gradient(front, _probes(aim.elements, True).points)
+    found: list[Tile] = []
+    for tile in best:  # halving seldom leads to single paths
+        alone = (
+            [_alone(path[None], front, aim, gradient) for path in tile.paths] if _alone_pays(tile, front, aim) else []
+        )
+        found += alone or [tile]
+    return found
+
+
+def _alone_pays(tile: Tile, front: Fronts, aim: Aim) -> bool:
+    """Whether the paths of a tile cost less one by one, each steered to the hydrophones that it does not miss."""
+    steered = 4.0 * aim.bins * float(np.count_nonzero(~front.dark[tile.paths]))
+    return tile.paths.size > 1 and 2e5 * tile.paths.size + steered < tile.cost
+
+
+def _alone(paths: Ints, front: Fronts, aim: Aim, gradient: Floats | None = None) -> Tile:
+    """One path is its own reference: nothing is deposited, and its directivity is all that varies; gradient: of the
+    aperture terms at all hydrophones."""
+    reference, size = front.select(paths), _probes(aim.elements, False).size
+    if gradient is None:
+        gradient = aperture_gradient(reference, _probes(aim.elements, True).points)
+    bend = slopes(reference, gradient, aim.weights[0] * aim.highest, aim.highest)[:, 0] * size
+    x, y, z = (
+        nodes_for(d + b, aim.weights, aim.tolerance) for d, b in zip(_drift(reference, aim), bend.tolist(), strict=True)
+    )
+    axes = (x, y, z) if 2 * x.nodes * y.nodes * z.nodes < aim.elements.count else None
+    cost, modes = 2e5 + 4.0 * aim.elements.count * aim.bins, np.eye(reference.modes.shape[1])
+    return Tile(paths, reference, axes, ((0, 0, 0, 0),), (0.0, 0.0, 0.0), np.zeros(0, int), False, modes, cost)
+
+
+def _best(trial: _Trial, views: _Views, aim: Aim, patient: bool) -> list[Tile]:
+    tile = trial.tile
+    if trial.extent is None:
+        return [tile]
+    possible = tile.cost == np.inf or 2.0 * _cheapest(trial.extent.half(), aim)[2] < tile.cost
+    halves = _halves(tile.paths, views, aim) if possible else None
+    if halves is None:
+        return [tile]
+    children = [_try(half, views, aim) for half in halves]
+    best = [child.tile for child in children]
+    if sum(t.cost for t in best) < tile.cost or patient or tile.cost == np.inf:
+        best = [t for child in children for t in _best(child, views, aim, patient=tile.cost == np.inf)]
+    return best if sum(t.cost for t in best) < tile.cost else [tile]

@@ -1,0 +1,119 @@
+"""The fast synthesis: paths are deposited with a kernel on a fine grid, and everything else is done in the frequency
+domain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+from annotated_types import Ge, Gt, Le, Lt, MultipleOf
+
+from sonarsynth.conventions import Floats, Number
+from sonarsynth.description import description
+from sonarsynth.products import Arrivals, Signals
+from sonarsynth.receiver import Elements, Sonar, stop_frequency
+from sonarsynth.signals.array_paths import fronts
+from sonarsynth.signals.direct_sum import attenuation
+from sonarsynth.signals.gridded.bins import bins_of
+from sonarsynth.signals.gridded.deposit import add_stretch
+from sonarsynth.signals.segments import Stretch, layout
+from sonarsynth.state import Snap
+
+
+@description
+class KernelDeposit:
+    """Synthesis by a Kaiser-Bessel kernel, Chebyshev nodes over the aperture and polynomial directivity.
+
+    Measured: 508 hydrophones with faces, 2000 echoes of a body of 1.6 m and the direct snap, absorption; largest error
+    over the peak of the echoes, against `DirectSum`, and time of one core (2.6 GHz Zen 4, shared), by distance:
+
+        width  tolerance  precision |  20 m            |  5 m
+        4      2e-3       float32   |  1.5e-3   6.0 ms |  1.4e-3    20 ms
+        6      1e-3       float32   |  2.4e-4   5.6 ms |  2.5e-4    24 ms
+        6      4e-4       float32   |  1.5e-4   6.8 ms |  6.5e-5    29 ms
+        6      1.5e-4     float32   |  2.1e-5   8.5 ms |  3.6e-5    36 ms   (default)
+        6      5e-5       float32   |  1.9e-5   8.9 ms |  2.5e-5    46 ms
+        8      2e-5       float32   |  3.3e-6    11 ms |  4.9e-6    58 ms
+        8      2e-6       float64   |  5.2e-7    27 ms |  6.2e-7   280 ms
+        DirectSum                   |          130 s   |            76 s
+
+    Pulses that differ in shape: 2000 direct echoes and 5000 by surface and bed, all with absorption; largest error, and
+    time over that of the same paths with plain pulses (turn about, on a core that others shared), at 20 m | at 8 m:
+
+        plain                         |  2.1e-5   1          |  4.5e-5   1
+        phases spread by +-1 rad      |  1.6e-5   1.2 - 1.6  |  4.7e-5   1.2
+        and blurs of 0 to 17 us       |  1.7e-5   1.7 - 2.3  |  4.8e-5   1.3
+        and stretches within +-3e-3   |  1.8e-5   1.9 - 2.9  |  4.6e-5   1.5
+
+    Pulses that facets reshape: 18 000 facets of 7 mm of a body of 1.6 m by 0.2 m at 20 m, with absorption; largest
+    error over the peak of the echo, which is a hundredth of the sum of those of the coherent facets:
+
+        plain                                     |  4.5e-5   20 ms
+        smooth: differentiated, mean over corners |  1.7e-5   38 ms
+        and blurs of 1 to 2 us                    |  1.9e-5   49 ms
+        rough: what is missing from that          |  6.6e-5   37 ms
+
+    Point hydrophones take 4.9 ms and 11 ms. The error of echoes of 40 to 250 facets of a REMUS-100, lobes of 3 to 30
+    degrees, at 5, 10 and 20 m: at most 7e-5. Errors include what the support of the pulse leaves out (1e-7 of its
+    peak).
+    """
+
+    kind: Literal["kernel_deposit"] = "kernel_deposit"
+    width: Annotated[int, Ge(4), Le(16), MultipleOf(2)] = 6
+    """Samples that a path is spread over."""
+    oversampling: Annotated[Number, Ge(1.2), Le(8)] = 1.5
+    """Rate of the grid over twice the highest frequency."""
+    precision: Literal["float32", "float64"] = "float32"
+    tolerance: Annotated[Number, Gt(0), Lt(0.1)] = 1.5e-4
+    """Error allowed to each of the other approximations, relative to what a path gives: nodes along each axis of the
+    aperture, terms of directivity and of absorption; the quiet ends of the spectrum get 3 % of it each."""
+
+    def signals(
+        self,
+        arrivals: Arrivals,
+        snaps: tuple[Snap, ...],
+        elements: Elements,
+        sonar: Sonar,
+        absorption: Callable[[Floats], Floats] | None,
+        start: float,
+        samples: int,
+    ) -> Signals:
+        """Pressure at each hydrophone from `start` (s): silence, and stretches of it that hold whole pulses."""
+        pressure, outside = self.pressure(arrivals, snaps, elements, sonar, absorption, start, samples)
+        return Signals(pressure.astype(np.float32, copy=False), start, sonar.sampling_frequency, 0.0, 0, outside)
+
+    def pressure(
+        self,
+        arrivals: Arrivals,
+        snaps: tuple[Snap, ...],
+        elements: Elements,
+        sonar: Sonar,
+        absorption: Callable[[Floats], Floats] | None,
+        start: float,
+        samples: int,
+    ) -> tuple[npt.NDArray[Any], int]:
+        """Pressure (sensor, sample) in the precision of the method, and the number of arrivals that the window cuts."""
+        fs = sonar.sampling_frequency
+        front = fronts(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
+        plan = layout(arrivals, front, snaps, elements, sonar, start, samples)
+        out = np.zeros((elements.count, samples), self.precision)
+        method = (self.width, self.oversampling, self.precision, self.tolerance)
+        done: list[Stretch] = []
+        for part in plan.stretches:
+            paths, bins = bins_of(part, front.select(part.paths), sonar, absorption, self.tolerance)
+            add_stretch(
+                out,
+                part.first,
+                part.samples,
+                paths,
+                elements,
+                bins,
+                start + part.first / fs,
+                stop_frequency(sonar.antialias),
+                method,
+                fresh=not any(p.first < part.first + part.samples and part.first < p.first + p.samples for p in done),
+            )
+            done.append(part)
+        return out, plan.outside

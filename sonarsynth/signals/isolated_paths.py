@@ -1,0 +1,109 @@
+"""Single paths, measured in signals: each alone in silence, at one ideal hydrophone in the middle of the array."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.fft import rfft
+
+from sonarsynth.conventions import Floats
+from sonarsynth.products import Arrivals
+from sonarsynth.receiver import Elements, PositionTable, Sonar, elements
+from sonarsynth.signals.array_paths import fronts, reach
+from sonarsynth.signals.filtered_pulse import (
+    at_longest,
+    pulse_spectrum,
+    pulse_support,
+    snap_gains,
+    stretch_sizes,
+    stretched_spectra,
+)
+from sonarsynth.signals.gridded.nodes import rounded_up
+from sonarsynth.signals.pulse_shapes import stretched
+from sonarsynth.signals.segments import fast_length, layout
+from sonarsynth.sources.snap_pulses import Waveform
+from sonarsynth.state import Snap
+
+if TYPE_CHECKING:
+    from sonarsynth.signals import SignalSynthesis
+
+GUARD = 4
+"""Samples of silence at either end of a slot of time."""
+
+STRETCH_TOLERANCE = 1e-6
+"""Error of the spectra of pulses that Doppler stretches, relative to their size."""
+
+
+def ideal_hydrophone() -> Elements:
+    """One point hydrophone of gain 1 in the middle of the array."""
+    return elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
+
+
+@lru_cache(maxsize=64)
+def energy_in_slices(waveform: Waveform, sonar: Sonar, count: int) -> Floats:
+    """Energy (slice,) in Pa2 s, at positive frequencies, of the filtered snap at 1 m in equal slices of the band."""
+    fs, band = sonar.sampling_frequency, sonar.band
+    samples = fast_length(int(np.ceil(2.0 * sum(pulse_support(at_longest(waveform), sonar.antialias)) * fs)))
+    f, spectrum = pulse_spectrum(waveform, sonar.antialias, fs, samples)
+    power = np.abs(spectrum) ** 2
+    up_to = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1])) * (fs / samples)])
+    energy = np.diff(np.interp(np.linspace(band.low, band.high, count + 1), f, up_to))
+    energy.setflags(write=False)
+    return np.asarray(energy)
+
+
+def measured_levels(
+    method: SignalSynthesis,
+    paths: Arrivals,
+    snaps: tuple[Snap, ...],
+    sonar: Sonar,
+    absorption: Callable[[Floats], Floats] | None,
+) -> Floats:
+    """Level (path,) in dB of each path alone, measured in the signals that a method of synthesis makes of it.
+
+    The energy in the band of the sonar at `ideal_hydrophone`, over that of the snap at 1 m, through the same filter and
+    stretched by the same Doppler. Paths are moved by whole samples into slots of time of their own, so far apart that
+    none is heard in another's, and made about equally loud (exactly: by powers of two), so that single precision rounds
+    none away beside another; NaN for a snap that is silent in the band. Raises ValueError as the method does.
+    """
+    count, fs = len(paths.delay), sonar.sampling_frequency
+    if not count:
+        return np.zeros(0)
+    hydrophone, none = ideal_hydrophone(), np.empty((count, 0))
+    paths = replace(paths, phase_terms=none, blur_terms=none, stretch_terms=none)  # that of the centre is heard
+    front = fronts(paths, snaps, hydrophone)
+    before, after = layout(paths, front, snaps, hydrophone, sonar, 0.0, 1).support + reach(front)
+    lead = int(np.ceil(before.max() * fs)) + GUARD
+    slot = fast_length(lead + int(np.ceil(after.max() * fs)) + GUARD)
+    place = lead + slot * np.arange(count)
+    mantissa, exponent = np.frexp(paths.amplitude)
+    moved = replace(paths, delay=(paths.delay * fs % 1.0 + place) / fs, amplitude=mantissa)
+    signals = method.signals(moved, snaps, hydrophone, sonar, absorption, 0.0, slot * count)
+    spectrum = rfft(np.asarray(signals.pressure[0], float).reshape(count, slot), axis=1) / fs
+    at = np.arange(spectrum.shape[1]) - 0.5
+    low, high = sonar.band.low * slot / fs, sonar.band.high * slot / fs  # in bins
+    inside = np.clip(np.minimum(at + 1.0, high) - np.maximum(at, low), 0.0, 1.0)  # share of each bin
+    gain = snap_gains(snaps)
+    sent = np.array([
+        gain[s] ** 2 * (np.abs(_sent(snaps[s].waveform, sonar, slot, float(d))) ** 2 @ inside)
+        for s, d in zip(paths.snap, paths.stretch, strict=True)
+    ])  # fmt: skip
+    heard = np.abs(spectrum) ** 2 @ inside
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(10.0 * np.log10(heard / sent) + 20.0 * np.log10(2.0) * exponent)
+
+
+def _sent(waveform: Waveform, sonar: Sonar, samples: int, doppler: float) -> np.ndarray:
+    """Spectrum (bin,) of the filtered snap at 1 m that lasts 1 + doppler times as long, from spectra that are kept."""
+    chosen, fs = sonar.antialias, sonar.sampling_frequency
+    if doppler == 0.0:
+        return pulse_spectrum(waveform, chosen, fs, samples)[1]
+    widest = rounded_up(abs(doppler), 2.0)
+    sizes = np.array(stretch_sizes(at_longest(waveform), chosen, widest))
+    enough = np.flatnonzero(np.append(np.cumsum(sizes[::-1])[::-1], 0.0) <= STRETCH_TOLERANCE)[0]
+    series = stretched_spectra(waveform, chosen, fs, samples, widest, int(max(enough, 1)))
+    return np.asarray((stretched(series, np.array([doppler / widest])) @ series)[0])

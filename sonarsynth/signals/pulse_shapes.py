@@ -1,0 +1,234 @@
+"""How the pulses of paths differ in shape: turned in phase, blurred, stretched, and as facets change them.
+
+A pulse of spectrum S, after a phase, a blur of variance v and a Doppler s, has the spectrum
+    exp(i phase) exp(-v g(f)) (1 + s) S((1 + s) f),  g = (2 pi f)^2/2,  f > 0,
+times what its facet does (`acoustics.facet_pulses`), a point on a smooth surface of few dimensions. What all paths
+share is taken to the spectrum. What differs is expanded in modes, sum_k weight[path, k] spectrum[k, bin], and with it
+the absorption, which may then have no terms of its own: first in the cosine and sine of phase, in Chebyshev polynomials
+of Doppler, in mean powers of the delays over a facet, and in values of exp(-v g), of what is absorbed and of what a
+rough facet sends at some frequencies; then, by singular values, in the fewest that these paths need (Eckart and Young,
+1936).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from sonarsynth.conventions import Floats
+from sonarsynth.equations.bubble.snap_pressure import ComplexArray
+from sonarsynth.equations.scattering.facet_pulses import mean_powers, rough_factor
+from sonarsynth.signals.array_paths import Fronts
+from sonarsynth.signals.gridded.nodes import Axis, chebyshev, interpolation, rounded_up
+
+SAMPLES = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 20, 24, 32, 48, 64, 96, 128)
+"""How many frequencies a blur or an absorption may be sampled at."""
+
+MOST_PHASE = 12.0
+"""rad: facets with corners further than this from their middle, at the highest frequency, have no series in them."""
+
+MOST_POWERS = 80
+"""Powers of the phase over a facet that may be needed, and some more."""
+
+
+class Modes(NamedTuple):
+    """Pulses of paths, as a sum: weight @ spectrum. The spectra are orthogonal and of one norm."""
+
+    weight: Floats  # (path, mode)
+    spectrum: ComplexArray  # (mode, bin)
+    bend: Floats  # (path, mode) change of weight for each unit of doppler more; no columns where that is not asked for
+
+
+class Reduction(NamedTuple):
+    """From weights and spectra to fewer: weight @ onto, back @ spectrum."""
+
+    onto: Floats  # (given, mode)
+    back: Floats  # (mode, given)
+
+
+def blur_exponent(frequency: Floats) -> Floats:
+    """Exponent g(f) (1/s2) of a blur: (2 pi f)^2/2."""
+    return np.asarray(0.5 * (2.0 * np.pi * frequency) ** 2)
+
+
+def stretched(series: ComplexArray, doppler: Floats) -> Floats:
+    """Chebyshev polynomials (path, degree) at doppler (path,), -1 to 1, as many as the series (degree, bin) has."""
+    return np.asarray(np.cos(np.outer(np.arccos(np.clip(doppler, -1.0, 1.0)), np.arange(len(series)))))
+
+
+def bending(series: ComplexArray, doppler: Floats) -> Floats:
+    """Slopes (path, degree) of `stretched` in doppler (path,)."""
+    degree, x = np.arange(len(series)), np.clip(doppler, -1.0, 1.0)
+    angle = np.arccos(x)
+    sine = np.sin(angle)[:, None]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        slope = degree * np.sin(np.outer(angle, degree)) / sine
+    return np.asarray(np.where(sine > 1e-6, slope, degree**2 * np.sign(x)[:, None] ** (degree + 1)))
+
+
+def reduction(weight: Floats, spectrum: ComplexArray, loudness: Floats, tolerance: float) -> Reduction:
+    """The fewest modes of weight (path, given) @ spectrum (given, bin) times loudness (path,), to `tolerance` of the
+    loudest path and of their root mean square."""
+    some = spectrum[:, :: max(1, spectrum.shape[1] // 128)]
+    u, s, _ = np.linalg.svd(np.concatenate([some.real, some.imag], axis=1), full_matrices=False)
+    loud = np.multiply(weight.T, loudness, order="C")
+    heard = np.linalg.qr(loud.T, mode="r")
+    left, size, v = np.linalg.svd(heard @ (u * s), full_matrices=False)
+    onto = (u * s) @ v.T
+    keep = _sizes(np.abs(onto.T @ loud)) > tolerance
+    onto, size = onto[:, keep], size[keep]
+    back = left[:, keep].T @ heard / size[:, None]
+    scale = size[0] / np.linalg.norm(loudness)  # makes the weights of the first about 1
+    return Reduction(onto / scale, back * scale)
+
+
+def _sizes(heard: Floats) -> Floats:
+    """Sizes (mode,) over the first, of moduli (mode, path): of root mean squares, and of the largest."""
+    mean, most = np.sqrt(np.einsum("mp,mp->m", heard, heard)), heard.max(axis=1)
+    return np.asarray(np.maximum(mean / mean[0], most / most[0]))
+
+
+def main_modes(weight: Floats, loudness: Floats) -> tuple[Floats, tuple[float, ...]]:
+    """Turn (mode, mode) of orthogonal modes with weights (path, mode) that puts the largest first, and their sizes over
+    that of the first, rounded up by at most a fifth, so that choices are kept from frame to frame."""
+    heard = np.multiply(weight.T, loudness, order="C")
+    turn = np.linalg.eigh(heard @ heard.T)[1][:, ::-1]  # a turn whatever rounds: sizes are those of what it gives
+    sizes = _sizes(np.abs(turn.T @ heard))
+    return turn, (1.0, *(min(rounded_up(s, 1.2), 1.0) for s in sizes[1:].tolist()))
+
+
+def shape_modes(
+    front: Fronts,
+    frequency: Floats,
+    spectrum: ComplexArray,
+    decay: Floats,
+    series: ComplexArray,
+    widest: float,
+    tolerance: float,
+    bent: int = 0,
+) -> Modes:
+    """The modes of pulses: of phase, of blur, of absorption, of facets, and of Doppler where there is a series (degree,
+    bin) in Doppler/widest.
+
+    spectrum (bin,) is of the pulse without them; decay (bin,) is in Np for each dB of the paths' loss; bent: of how
+    many paths, the first ones, the change with Doppler is wanted.
+    """
+    loudness = np.abs(front.amplitude) / np.abs(front.amplitude).max()
+    weight: Floats = np.ones((front.count, 1))
+    factor: Floats | ComplexArray = np.ones((1, frequency.size))
+    if front.variance.any() or (front.loss.any() and decay.any()) or front.rough_share.any():
+        weight, factor = _softened(front, frequency, decay, tolerance)
+        fewer = reduction(weight, factor * spectrum, loudness, tolerance)
+        weight, factor = weight @ fewer.onto, fewer.back @ factor
+    if front.corners.any():
+        powers, waves = _powers(front.corners, frequency, spectrum, tolerance)
+        fewer = reduction(powers, waves * spectrum, loudness, tolerance)
+        powers, waves = powers @ fewer.onto, fewer.back @ waves
+        weight = (weight[:, :, None] * powers[:, None, :]).reshape(front.count, -1)
+        factor = (factor[:, None, :] * waves).reshape(-1, frequency.size)
+    spectra, slope = factor * spectrum, weight[:0]
+    if len(series):
+        bend = stretched(series, front.doppler / widest)
+        if bent:
+            more = bending(series, front.doppler[:bent] / widest) / widest
+            slope = (weight[:bent, :, None] * more[:, None, :]).reshape(bent, -1)
+        weight = (weight[:, :, None] * bend[:, None, :]).reshape(front.count, -1)
+        spectra = (factor[:, None, :] * series).reshape(-1, frequency.size)
+    if front.phase.any():
+        turn = front.phase[:, None]
+        weight = np.concatenate([weight * np.cos(turn), weight * np.sin(turn)], axis=1)
+        slope = np.concatenate([slope * np.cos(turn[: len(slope)]), slope * np.sin(turn[: len(slope)])], axis=1)
+        spectra = np.concatenate([spectra, 1j * spectra])
+    fewer = reduction(weight, spectra, loudness, tolerance)
+    bends = slope @ fewer.onto if len(slope) else np.zeros((front.count, 0))
+    return Modes(weight @ fewer.onto, fewer.back @ spectra, bends)
+
+
+def _powers(
+    corners: Floats, frequency: Floats, spectrum: ComplexArray, tolerance: float
+) -> tuple[Floats, ComplexArray]:
+    """The mean of a wave over facets with corners (path, 3): powers of the delay (path, given), and of the frequency
+    (given, bin)."""
+    scale = float(np.abs(corners).max())
+    phase, mass = -2j * np.pi * scale * frequency, np.abs(spectrum) / np.abs(spectrum).sum()
+    ratio = phase / np.arange(1, MOST_POWERS)[:, None]
+    waves = np.cumprod(np.concatenate([np.ones((1, frequency.size)), ratio]), axis=0)  # (-i w scale)^j/j!
+    left = np.cumsum((np.abs(waves) @ mass)[::-1])[::-1]
+    count = max(3, int(np.argmax(np.append(left, 0.0) <= tolerance)))
+    some = np.append(0, np.arange(2, count))  # the mean of the first power is 0
+    return mean_powers(corners, scale, count).T[:, some], waves[some]
+
+
+def _softened(front: Fronts, frequency: Floats, decay: Floats, tolerance: float) -> tuple[Floats, Floats]:
+    """What blur, absorption and rough facets leave at some frequencies (path, given), and their interpolation in the
+    logarithm of frequency (given, bin). Degrees of a product add up."""
+    low, high = float(frequency[0]), float(frequency[-1])
+    low = low if low > 0.0 else 0.1 * float(frequency[min(1, frequency.size - 1)]) or 1.0  # 0 Hz has no logarithm
+    high = max(high, low)
+    span = max(float(np.log(high / low)), 1e-3)
+    place = 2.0 * np.log(np.maximum(frequency, low) / high) / span + 1.0
+    steepest = float(front.variance.max() * blur_exponent(frequency)[-1])
+    rate = CubicSpline(frequency, decay)
+
+    def at(count: int) -> Floats:
+        return np.asarray(high * np.exp(0.5 * span * (chebyshev(count) - 1.0)))
+
+    def lost(loss: Floats, frequency: Floats) -> Floats:
+        return np.asarray(np.exp(-np.multiply.outer(rate(frequency), loss)))
+
+    some = slice(None, None, max(1, frequency.size // 64))
+    ends = np.array([front.loss.min(), front.loss.max()])
+    exact = lost(ends, frequency[some])
+    onto = ((n, interpolation(place[some], Axis(n))) for n in SAMPLES)
+    count = next((n for n, i in onto if np.abs(i @ lost(ends, at(n)) - exact).max() <= tolerance), SAMPLES[-1])
+    if front.rough_share.any():
+        roughest = 2.0 * np.pi * high * float(front.rough_delay.max())
+        count += _rough_samples(rounded_up(roughest, 1.25), float(np.ceil(10.0 * span)) / 10.0, tolerance) - 1
+    if steepest > 0.0:
+        count += _samples(rounded_up(steepest, 1.25), float(np.ceil(10.0 * span)) / 10.0, tolerance) - 1
+    exponent = np.multiply.outer(front.variance, blur_exponent(at(count))) + np.multiply.outer(
+        front.loss, rate(at(count))
+    )
+    left = np.exp(-exponent)
+    if front.rough_share.any():
+        left *= rough_factor(at(count), front.rough_share, front.rough_delay)
+    return left, np.asarray(interpolation(place, Axis(count)).T)
+
+
+@lru_cache(maxsize=256)
+def _samples(steepest: float, span: float, tolerance: float) -> int:
+    """How many frequencies, Chebyshev in the logarithm, `span` between the ends, give every blur up to the exponent
+    `steepest` at the highest."""
+    x = np.linspace(-1.0, 1.0, 257)
+    exponents = np.append(0.0, np.geomspace(min(1e-3, 0.1 / steepest), 1.0, 64)) * steepest
+
+    def blurs(at: Floats) -> Floats:
+        return np.asarray(np.exp(-np.multiply.outer(np.exp(span * (at - 1.0)), exponents)))
+
+    for count in SAMPLES:
+        if np.abs(interpolation(x, Axis(count)) @ blurs(chebyshev(count)) - blurs(x)).max() <= tolerance:
+            return count
+    return SAMPLES[-1]
+
+
+@lru_cache(maxsize=256)
+def _rough_samples(roughest: float, span: float, tolerance: float) -> int:
+    """How many frequencies, Chebyshev in the logarithm, `span` between the ends, give what rough facets of any share
+    send, with g up to `roughest` at the highest."""
+    x = np.linspace(-1.0, 1.0, 257)
+    shares = 1.0 - np.append(0.0, np.geomspace(1e-6, 0.9, 16))
+    delays = np.geomspace(min(1e-3, 0.1 * roughest), roughest, 48) / (2.0 * np.pi) if roughest > 0.0 else np.zeros(1)
+    share, delay = (g.ravel() for g in np.meshgrid(shares, delays))
+
+    def left(at: Floats) -> Floats:
+        return rough_factor(np.exp(span * (at - 1.0)), share, delay).T
+
+    exact = left(x)
+    size = np.maximum(exact.max(axis=0), 1e-300)
+    for count in SAMPLES:
+        if (np.abs(interpolation(x, Axis(count)) @ left(chebyshev(count)) - exact) / size).max() <= tolerance:
+            return count
+    return SAMPLES[-1]

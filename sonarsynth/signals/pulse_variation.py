@@ -1,0 +1,231 @@
+"""Pulses that change over the aperture: reflections turn and blur them otherwise at each hydrophone.
+
+At a point of the aperture a path has the phase and the variance of its blur
+    phase + turn,  variance + spread,
+both polynomials (`acoustics.arrays.aperture_terms`). The modes of its pulse (`shapes`) change with them: by the cosine
+and the sine of turn, times its modes and those of the pulse a quarter of a period ahead; and by powers of spread, times
+those of the pulse times powers of -(2 pi f)^2/2. What all paths of a tile share of it the field of the tile takes.
+Doppler is seen from another side too: of doppler + bend, the first power of bend counts, with weights of their own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import factorial
+from typing import NamedTuple
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.equations.bubble.snap_pressure import ComplexArray
+from sonarsynth.signals.array_paths import Fronts, over, terms_gradient
+
+MOST_POWERS = 8
+"""Powers of spread that pulses may be expanded in."""
+
+LOUDEST = 256
+"""Paths that modes are made for as they change over the aperture, and that tiles look at."""
+
+Change = tuple[int, int]
+"""Power of spread, and 1 for the pulse a quarter of a period ahead."""
+
+
+class Changes(NamedTuple):
+    """What pulses of a stretch of time change by over the aperture, in its modes."""
+
+    kinds: tuple[Change, ...]
+    onto: Floats  # (change, mode, mode) weights @ onto: those of the change
+    rate: float  # 1/s2: what spread is counted in
+
+
+UNCHANGING = Changes((), np.zeros((0, 0, 0)), 0.0)
+
+
+def widest_turn(front: Fronts) -> Floats:
+    """Bound (path,) on |turn| (rad) over the aperture."""
+    return np.asarray(np.abs(front.turn_terms).sum(axis=1))
+
+
+def widest_spread(front: Fronts) -> Floats:
+    """Bound (path,) on |spread| (s2) over the aperture."""
+    return np.asarray(np.abs(front.spread_terms).sum(axis=1))
+
+
+def widest_bend(front: Fronts) -> Floats:
+    """Bound (path,) on |bend| over the aperture."""
+    return np.asarray(np.abs(front.bend_terms).sum(axis=1))
+
+
+def bend(front: Fronts, points: Floats) -> Floats:
+    """Doppler (path, point) at points (point, xyz), over that at the centre."""
+    return over(front.bend_terms, points, front.aperture)
+
+
+def turn_and_spread(front: Fronts, points: Floats) -> tuple[Floats, Floats]:
+    """Turn (rad) and spread (s2), (path, point) each, at points (point, xyz)."""
+    return over(front.turn_terms, points, front.aperture), over(front.spread_terms, points, front.aperture)
+
+
+def changed(front: Fronts, points: Floats, frequency: Floats) -> ComplexArray:
+    """Factor (point, bin) on the pulse of one path at points (point, xyz), over that at the centre."""
+    turn, spread = turn_and_spread(front, points)
+    soft = 0.5 * np.multiply.outer(spread[0], (2.0 * np.pi * frequency) ** 2)
+    return np.asarray(np.exp(1j * turn[0][:, None] - soft))
+
+
+def aperture_gradient(front: Fronts, points: Floats) -> Floats:
+    """Gradient (xyz, point, term) of the aperture terms at points (point, xyz); empty where no front has such terms."""
+    every = front.delay_terms, front.turn_terms, front.spread_terms, front.bend_terms
+    widest = max(terms.shape[1] for terms in every)
+    if not widest:
+        return np.zeros((3, 0, 0))
+    return terms_gradient(points, front.aperture, widest)
+
+
+def slopes(front: Fronts, gradient: Floats, lowest: float, highest: float) -> Floats:
+    """Bounds (xyz, path) in rad/m on how fast pulses change along each axis, as a phase at the highest frequency.
+
+    gradient (xyz, point, term): of the aperture terms, where it is looked at. A phase is as steep at all frequencies:
+    it is taken for as much as has its slope at `lowest` (Hz), so that it bounds that at any from there on.
+    """
+    total = np.zeros((3, front.count))
+    for terms, scale in (
+        (front.turn_terms, highest / lowest),
+        (front.spread_terms, 0.5 * (2.0 * np.pi * highest) ** 2),
+    ):
+        if terms.shape[1]:
+            total += scale * np.abs(np.einsum("et,ipt->ipe", terms, gradient[:, :, : terms.shape[1]])).max(axis=1)
+    if front.bends.shape[1]:
+        share = np.linalg.norm(front.bends, axis=1) / np.maximum(np.linalg.norm(front.modes, axis=1), 1e-300)
+        steep = np.abs(np.einsum("et,ipt->ipe", front.bend_terms, gradient[:, :, : front.bend_terms.shape[1]])).max(
+            axis=1
+        )
+        total += highest / lowest * share * steep
+    return total
+
+
+def with_changes(front: Fronts) -> Fronts:
+    """Paths, and after them the loudest of those that change, as they are elsewhere on the aperture: more and less
+    blurred, more and less stretched, and as loud as what turns, a quarter of a period ahead."""
+    turn, spread, longer = widest_turn(front), widest_spread(front), widest_bend(front)
+    loud = np.abs(front.amplitude)
+    parts = [np.arange(front.count)]
+    parts += [_loudest(loud * (spread > 0.0))] * 2 + [_loudest(loud * turn)] + [_loudest(loud * (longer > 0.0))] * 2
+    count = [part.size for part in parts]
+    every = front.select(np.concatenate(parts))
+    way = np.repeat([0.0, 1.0, -1.0, 0.0, 0.0, 0.0], count)
+    ahead = np.repeat([0.0, 0.0, 0.0, 1.0, 0.0, 0.0], count)
+    bent = np.repeat([0.0, 0.0, 0.0, 0.0, 1.0, -1.0], count)
+    size = np.where(ahead > 0.0, np.minimum(widest_turn(every), 1.0), 1.0)
+    return replace(
+        every,
+        amplitude=every.amplitude * size,
+        variance=every.variance + way * widest_spread(every),
+        phase=every.phase + 0.5 * np.pi * ahead,
+        doppler=every.doppler + bent * widest_bend(every),
+    )
+
+
+def _loudest(loud: Floats) -> Ints:
+    """The loudest (path,), not those that are silent."""
+    order = np.argsort(-loud, kind="stable")[:LOUDEST]
+    return np.asarray(order[loud[order] > 0.0])
+
+
+def changes(front: Fronts, frequency: Floats, spectrum: ComplexArray) -> Changes:
+    """What the pulses of paths change by, from the spectra (mode, bin) of modes that hold it (`with_changes`)."""
+    turns, spreads = bool(front.turn_terms.any()), bool(front.spread_terms.any())
+    if not (turns or spreads):
+        return UNCHANGING
+    exponent = 0.5 * (2.0 * np.pi * frequency) ** 2
+    rate = float(exponent[-1])
+    kinds = [(power, ahead) for power in range(1 + MOST_POWERS * spreads) for ahead in range(1 + turns)][1:]
+    both = np.concatenate([spectrum.real, spectrum.imag], axis=1)
+    solve = np.linalg.inv(both @ both.T)
+    found = []
+    for power, ahead in kinds:
+        value = spectrum * (1j**ahead * (-exponent / rate) ** power / factorial(power))
+        found.append(np.concatenate([value.real, value.imag], axis=1) @ both.T @ solve)
+    return Changes(tuple(kinds), np.array(found), rate)
+
+
+class Rest(NamedTuple):
+    """What pulses of a tile change by beside the reference, which the whole field of the tile changes with."""
+
+    turn_terms: Floats  # (term,) rad of the reference; none where it does not change
+    spread_terms: Floats  # (term,) s2
+    which: Ints  # (some,) changes that count
+    size: Floats  # (some, path) bounds on how much there is of each in some paths of the tile
+    bent: bool  # whether their Doppler's change counts
+    paths: Ints  # (path,) those
+
+
+def rest(front: Fronts, paths: Ints, found: Changes, tolerance: float) -> Rest:
+    """Of the tile of these paths; changes that add less than `tolerance` are left out, to all together or to the
+    loudest."""
+    none = np.zeros(0)
+    some = paths[:: max(1, paths.size // LOUDEST)]
+    loud, weight = np.abs(front.amplitude[some]), front.modes[some]
+    bent = front.bends.shape[1] > 0 and _counts(_bent(front, some), loud * np.linalg.norm(weight, axis=1), tolerance)
+    if not found.kinds:
+        return Rest(none, none, np.zeros(0, int), np.zeros((0, some.size)), bent, some)
+    turn, turned = _middle(front.turn_terms, some)
+    spread, softer = _middle(front.spread_terms, some)
+    share = np.array([np.minimum(turned, 1.0) ** a * (softer * found.rate) ** p for p, a in found.kinds])
+    size = np.sqrt((np.tensordot(weight, found.onto, (1, 1)) ** 2).sum(axis=2)).T * share * loud
+    mean = np.sqrt((size**2).sum(axis=1) / (loud**2).sum())
+    which = np.flatnonzero(np.maximum(mean, size.max(axis=1) / loud.max()) > tolerance)
+    return Rest(turn, spread, which, share[which], bent, some)
+
+
+def _bent(front: Fronts, some: Ints) -> Floats:
+    """Bounds (path,) on what Doppler's change over the aperture adds to some paths."""
+    size = np.linalg.norm(front.bends[some], axis=1) * np.abs(front.amplitude[some])
+    return np.asarray(size * np.abs(front.bend_terms[some]).sum(axis=1))
+
+
+def _counts(size: Floats, loud: Floats, tolerance: float) -> bool:
+    """Whether what adds up to `size` (path,) is more than `tolerance` of all together, or of the loudest."""
+    mean = np.linalg.norm(size) / max(float(np.linalg.norm(loud)), 1e-300)
+    return bool(max(mean, size.max(initial=0.0) / max(float(loud.max(initial=0.0)), 1e-300)) > tolerance)
+
+
+def pulses(front: Fronts, paths: Ints, over: Rest, found: Changes) -> tuple[Floats, Floats]:
+    """Weights (pulse, mode) of the pulses of paths, with what some of them change by, and how loud (pulse,) each is."""
+    weight, loud = [front.modes[paths]], [np.abs(front.amplitude[paths])]
+    for change, size in zip(over.which, over.size, strict=True):
+        weight.append(front.modes[over.paths] @ found.onto[change])
+        loud.append(np.abs(front.amplitude[over.paths]) * size)
+    if over.bent:
+        weight.append(front.bends[over.paths])
+        loud.append(np.abs(front.amplitude[over.paths]) * widest_bend(front)[over.paths])
+    return np.concatenate(weight), np.concatenate(loud)
+
+
+def _middle(terms: Floats, some: Ints) -> tuple[Floats, Floats]:
+    """Mean (term,) of the terms of some paths, and bounds (path,) on what each has beside it."""
+    if not terms.shape[1]:
+        return np.zeros(0), np.zeros(some.size)
+    value = terms[some]
+    mean = value.mean(axis=0)
+    return mean, np.asarray(np.abs(value - mean).sum(axis=1))
+
+
+def shares(
+    front: Fronts, reference: Fronts, which: Ints, bent: bool, found: Changes, points: Floats, dtype: str
+) -> Floats:
+    """How much there is of pulses and of each change that counts, (1 + some, point, path), beside the reference; the
+    change of Doppler comes last, if it is `bent`."""
+    longer = [bend(front, points).T.astype(dtype)] if bent else []
+    if not which.size:
+        return np.array([np.ones_like(longer[0]), *longer]) if bent else np.zeros((0, 0, 0), dtype)
+    turn, spread = (value.T for value in turn_and_spread(front, points))
+    own, softer = turn_and_spread(reference, points)
+    turn, spread = (turn - own[0][:, None]).astype(dtype), ((spread - softer[0][:, None]) * found.rate).astype(dtype)
+    kinds = [(0, 0), *(found.kinds[k] for k in which)]
+    if any(ahead for _, ahead in kinds):
+        quarter = np.cos(turn), np.sin(turn)
+    else:
+        quarter = np.ones_like(turn), turn
+    found_shares = [quarter[ahead] * spread**power if power else quarter[ahead] for power, ahead in kinds]
+    return np.array(found_shares + longer)

@@ -1,0 +1,145 @@
+"""Which arrivals a window holds, and how they fall into short stretches of time that are synthesised one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.equations.noise.filters import SUPPORT_TOLERANCE
+from sonarsynth.equations.scattering.facet_pulses import rough_factor
+from sonarsynth.products import Arrivals
+from sonarsynth.receiver import Elements, Sonar, stop_frequency
+from sonarsynth.signals.array_paths import Fronts, delay_and_gain, reach
+from sonarsynth.signals.filtered_pulse import FEET, Reshaped, at_longest, silencing_blur, support_of
+from sonarsynth.signals.pulse_variation import widest_spread
+from sonarsynth.sources.snap_pulses import Waveform
+from sonarsynth.state import Snap
+
+FAST = (16, 18, 20, 24, 27, 30)
+"""Lengths of stretches are these times powers of two: fast to transform, and few, so that spectra of pulses are
+kept."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Paths of one waveform whose pulses overlap in time, and the samples that hold them."""
+
+    paths: Ints  # (path,) which
+    waveform: Waveform
+    coherent: bool  # all pulses are differentiated, or none
+    first: int  # sample of the window where it begins; may be negative
+    samples: int  # even
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """What of the arrivals is heard in the window."""
+
+    stretches: tuple[Stretch, ...]
+    heard: Bools  # (path,) some of the pulse is in the window at some hydrophone
+    outside: int  # paths whose pulse is not wholly in the window at every hydrophone
+    support: Floats  # (before or after, path) s: how far a pulse reaches from its arrival
+
+
+def fast_length(samples: int) -> int:
+    """The smallest even length of the list `FAST` times a power of two that holds so many samples."""
+    scale = 2
+    while FAST[-1] * scale < samples:
+        scale *= 2
+    return next(m * scale for m in FAST if m * scale >= samples)
+
+
+def layout(
+    arrivals: Arrivals,
+    front: Fronts,
+    snaps: tuple[Snap, ...],
+    elements: Elements,
+    sonar: Sonar,
+    start: float,
+    samples: int,
+) -> Layout:
+    """Sort arrivals into stretches: direct and echoes apart (they differ by tens of dB), each waveform apart, and
+    coherent echoes, whose pulses are differentiated."""
+    if samples < 1:
+        raise ValueError("a window needs at least one sample")
+    fs = sonar.sampling_frequency
+    plain, support, silent = _supports(arrivals, front, snaps, sonar)
+    before, after = support
+    early, late = _extent(front, elements, before, after, start, start + (samples - 1) / fs)
+    cut = ~silent & ((early < start) | (late > start + (samples - 1) / fs))
+    heard = ~silent & (late > start) & (early < start + (samples - 1) / fs)
+    stretches: list[Stretch] = []
+    waveforms = [s.waveform for s in snaps]
+    for waveform in dict.fromkeys(waveforms):
+        same = np.array([w == waveform for w in waveforms])[arrivals.snap] & heard
+        for coherent, direct in ((False, True), (False, False), (True, True), (True, False)):
+            rows = np.flatnonzero(same & (front.coherent == coherent) & (arrivals.direct == direct))
+            for chosen in _runs(rows, early + before - plain[0], late - after + plain[1]):
+                first = int(np.floor((early[chosen].min() - start) * fs)) - 1
+                last = int(np.ceil((late[chosen].max() - start) * fs)) + 1
+                stretches.append(Stretch(chosen, waveform, coherent, first, fast_length(last - first + 1)))
+    return Layout(tuple(stretches), heard, int(cut.sum()), support)
+
+
+def _supports(arrivals: Arrivals, front: Fronts, snaps: tuple[Snap, ...], sonar: Sonar) -> tuple[Floats, Floats, Bools]:
+    """Support (before or after, path) of each pulse in s: in its plain shape or its slope's, and in its own; and which
+    (path,) are silent, blurred or from a facet that is not rough."""
+    if not front.count:
+        return np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0, bool)
+    chosen, rough = sonar.antialias, front.rough_share > 0.0
+    spread = widest_spread(front)
+    blur, least = np.sqrt(front.variance + spread), np.sqrt(np.maximum(front.variance - spread, 0.0))
+    turned = (front.phase != 0.0) | front.turn_terms.any(axis=1)
+    longest = [at_longest(s.waveform) for s in snaps]
+    roughest = float(front.rough_delay[rough].max(initial=0.0))
+
+    def each(turned: Bools, rough: Bools) -> Floats:
+        out, kinds = np.empty((2, front.count)), front.coherent + 2 * turned + 4 * rough
+        for kind in range(8):
+            rows = kinds == kind
+            if rows.any():
+                shape = Reshaped(turned=kind & 2 > 0, sloped=kind % 2 == 1, rough=roughest * (kind >= 4))
+                out[:, rows] = np.array([support_of(w, chosen, shape) for w in longest])[arrivals.snap[rows]].T
+        return out
+
+    none, silent = np.zeros(front.count, bool), np.zeros(front.count, bool)
+    plain = each(none, none)
+    support = each(turned, rough) if turned.any() or roughest else plain
+    if blur.any():
+        silent = least >= np.array([silencing_blur(w, chosen) for w in longest])[arrivals.snap]
+    if rough.any():
+        highest = np.array([stop_frequency(chosen)])
+        left = rough_factor(highest, front.rough_share, front.rough_delay)[:, 0]
+        silent |= left <= SUPPORT_TOLERANCE
+    a, b, c = front.corners.T
+    wide = np.stack([-np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)])
+    return plain, support * (1.0 + np.abs(front.doppler)) + np.where(silent, 0.0, FEET * blur) + wide, silent
+
+
+def _extent(
+    front: Fronts, elements: Elements, before: Floats, after: Floats, start: float, stop: float
+) -> tuple[Floats, Floats]:
+    """When the pulse of each path begins at the first hydrophone and ends at the last: bounds, exact where they leave
+    the window."""
+    spread = reach(front)
+    early, late = front.delay - spread - before, front.delay + spread + after
+    doubtful = np.flatnonzero((early < start) | (late > stop))
+    for rows in np.array_split(doubtful, doubtful.size // 1024 + 1):  # bounds the memory
+        if rows.size:
+            delay, _ = delay_and_gain(front.select(rows), elements.position)
+            early[rows] = front.delay[rows] + delay.min(axis=1) - before[rows]
+            late[rows] = front.delay[rows] + delay.max(axis=1) + after[rows]
+    return early, late
+
+
+def _runs(rows: Ints, early: Floats, late: Floats) -> Iterator[Ints]:
+    """Rows in runs that overlap in time; each run keeps the order of the arrivals."""
+    if not rows.size:
+        return
+    order = rows[np.argsort(early[rows], kind="stable")]
+    silent = early[order[1:]] > np.maximum.accumulate(late[order])[:-1]
+    for run in np.split(order, np.flatnonzero(silent) + 1):
+        yield np.sort(run)

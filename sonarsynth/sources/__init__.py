@@ -1,0 +1,1 @@
+"""Sources of sound: snapping shrimp and their snaps."""

@@ -1,0 +1,189 @@
+"""Recorded waveforms: read from CSV, text and WAV files, checked, brought to 1 m."""
+
+from __future__ import annotations
+
+import io
+import re
+import warnings
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from sonarsynth.conventions import UNITS, Floats
+from sonarsynth.description import named_files
+from sonarsynth.sources.snap_models import RecordedSnap
+
+MOST_SAMPLES = 1 << 18
+"""A longer file is a recording of the sea, not of a snap."""
+
+MOST_BYTES = 1 << 26
+
+Stamp = tuple[int, int]
+
+QUIET = 1e-2
+"""What a recording may be at its ends, relative to its peak: a step there is heard at all frequencies."""
+
+
+class RecordingError(ValueError):
+    """A recording that cannot be used: one line that names the file, and the line and column where there is one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A snap as recorded, at 1 m."""
+
+    pressure: Floats  # (sample,) Pa
+    sampling_frequency: float  # Hz
+    zero: float  # sample of the collapse, a fraction too
+
+
+def read_recording(snap: RecordedSnap) -> Recording:
+    """The recording of a described snap (its path relative to the working directory), kept until the file changes.
+
+    Raises RecordingError in one line that names the file, and the line and column where there is one.
+    """
+    return _recording(snap, stamp(snap))
+
+
+def stamp(snap: RecordedSnap) -> Stamp:
+    """What changes when the file does: when it was written, and its size. Raises RecordingError without a file."""
+    try:
+        return named_files.stamp(snap.path)
+    except named_files.FileError as error:
+        raise RecordingError(f"{snap.path}: {error}") from None
+
+
+@lru_cache(maxsize=32)
+def _recording(snap: RecordedSnap, changed: Stamp) -> Recording:
+    path = Path(snap.path)
+    start, rate, values = (_wav if path.suffix.lower() in {".wav", ".wave"} else _text)(path, snap)
+    if not 4 <= values.size <= MOST_SAMPLES:
+        raise RecordingError(f"{path}: has {values.size} samples; a snap has 4 to {MOST_SAMPLES}")
+    with np.errstate(over="ignore", invalid="ignore"):
+        p = values * (snap.pascals * snap.distance)
+    peak = float(np.abs(p).max())
+    if not 0 < peak < np.inf:
+        raise RecordingError(f"{path}: " + ("is silent" if peak == 0 else "holds numbers that are not finite"))
+    if snap.fade:
+        p = p * _gate(p.size, snap.fade)
+    loud = max(abs(p[0]), abs(p[-1])) / peak
+    if loud > QUIET:
+        raise RecordingError(
+            f"{path}: is cut off: at an end it is {loud:.2g} of its peak; record more of it, or set fade"
+        )
+    zero = float(np.argmax(np.abs(p))) if snap.time is None else (snap.time - start) * rate
+    if not 0 <= zero <= p.size - 1:
+        end = start + (p.size - 1) / rate
+        raise RecordingError(f"{path}: time {snap.time:.6g} s is not in the recording, {start:.6g} to {end:.6g} s")
+    p.flags.writeable = False
+    return Recording(p, rate, zero)
+
+
+def _gate(size: int, part: float) -> Floats:
+    """A raised cosine at either end, from 0."""
+    u = np.arange(size) / (part * (size - 1))
+    rise = np.sin(0.5 * np.pi * np.clip(u, 0.0, 1.0)) ** 2
+    return np.asarray(rise * rise[::-1], float)
+
+
+def _wav(path: Path, snap: RecordedSnap) -> tuple[float, float, Floats]:
+    from scipy.io import wavfile
+
+    if snap.sampling_frequency is not None:
+        raise RecordingError(f"{path}: a WAV has its own sampling frequency: leave out sampling_frequency")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            warnings.filterwarnings("ignore", "Chunk .* not understood")
+            rate, data = wavfile.read(io.BytesIO(_bytes(path)))
+    except RecordingError:
+        raise
+    except Exception as error:  # whatever a damaged file may bring
+        text = " ".join(str(error).split())[:120]
+        raise RecordingError(f"{path}: cannot be read as WAV ({type(error).__name__}: {text})") from None
+    columns = data.reshape(len(data), -1)
+    if snap.channel >= columns.shape[1]:
+        raise RecordingError(f"{path}: has no channel {snap.channel}, only {columns.shape[1]} (from 0)")
+    values = columns[:, snap.channel].astype(float)
+    if data.dtype == np.uint8:
+        values = (values - 128.0) / 128.0
+    elif data.dtype.kind == "i":
+        values = values / -float(np.iinfo(data.dtype).min)
+    if not rate > 0:
+        raise RecordingError(f"{path}: has a sampling frequency of {rate} Hz")
+    return 0.0, float(rate), values
+
+
+def _text(path: Path, snap: RecordedSnap) -> tuple[float, float, Floats]:
+    rows, lines, names = _rows(path)
+    timed = snap.sampling_frequency is None
+    column = snap.channel + timed
+    if rows.shape[1] <= column:
+        wanted = "time and pressure (a file of pressures alone needs sampling_frequency)" if timed else "pressure"
+        raise RecordingError(f"{path}, line {lines[0]}: has {rows.shape[1]} columns, too few for {wanted}")
+    values = rows[:, column] * _unit(path, names, column, "Pa")
+    if snap.sampling_frequency is not None:
+        return 0.0, snap.sampling_frequency, values
+    time = rows[:, 0] * _unit(path, names, 0, "s")
+    step = (time[-1] - time[0]) / max(time.size - 1, 1)
+    uneven = np.flatnonzero(~(np.abs(time - (time[0] + step * np.arange(time.size))) <= 0.05 * step))
+    if step <= 0 or uneven.size:
+        where = lines[uneven[0] if uneven.size else -1]
+        raise RecordingError(f"{path}, line {where}: time does not rise in even steps (of {step:.6g} s)")
+    return float(time[0]), float(1.0 / step), values
+
+
+def _rows(path: Path) -> tuple[Floats, list[int], list[str]]:
+    """Numbers (row, column), the number of each one's line, and the names of the columns where the file has them."""
+    try:
+        text = _bytes(path).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise RecordingError(f"{path}: is not a text file") from None
+    written = [(i, s) for i, s in enumerate(text.splitlines(), start=1) if s.strip() and s.lstrip()[0] not in "#%"]
+    if len(written) > MOST_SAMPLES + 1:
+        raise RecordingError(f"{path}: has more than {MOST_SAMPLES} rows: cut it to the snap")
+    cells = [(i, _cells(s)) for i, s in written]
+    names = cells.pop(0)[1] if cells and not any(_number(c) is not None for c in cells[0][1]) else []
+    if not cells:
+        raise RecordingError(f"{path}: has no rows of numbers")
+    width = len(cells[0][1])
+    rows = np.empty((len(cells), width))
+    for k, (i, row) in enumerate(cells):
+        if len(row) != width:
+            raise RecordingError(f"{path}, line {i}: has {len(row)} columns where the first row has {width}")
+        for j, cell in enumerate(row):
+            number = _number(cell)
+            if number is None or not np.isfinite(number):
+                raise RecordingError(f"{path}, line {i}, column {j + 1}: {cell[:40]!r} is not a finite number")
+            rows[k, j] = number
+    return rows, [i for i, _ in cells], names
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return named_files.read(path, MOST_BYTES)
+    except named_files.FileError as error:
+        raise RecordingError(f"{path}: {error}") from None
+
+
+def _cells(line: str) -> list[str]:
+    return [c.strip().strip('"') for c in re.split(r"[,;\t]", line)] if re.search(r"[,;\t]", line) else line.split()
+
+
+def _number(cell: str) -> float | None:
+    try:
+        return float(cell)
+    except ValueError:
+        return None
+
+
+def _unit(path: Path, names: list[str], column: int, symbol: str) -> float:
+    """Size of the unit in a column's name, in brackets ("time (us)"); 1 where it names none."""
+    if not (found := re.search(r"[(\[]\s*(.*?)\s*[)\]]", names[column] if column < len(names) else "")):
+        return 1.0
+    if found[1] not in UNITS[symbol]:
+        known = ", ".join(UNITS[symbol])
+        raise RecordingError(f"{path}, column '{names[column]}': unit '{found[1]}' is not one of {known}")
+    return UNITS[symbol][found[1]]

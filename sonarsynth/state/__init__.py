@@ -1,0 +1,91 @@
+"""The world at one instant: placed bodies and the snaps of that instant. What a frame is traced in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.geometry.motion import Track
+from sonarsynth.geometry.placed_target import Body
+from sonarsynth.sources.shrimp import SnapModel, SnappingShrimp
+from sonarsynth.sources.snap_pulses import Scales, Waveform, at_depth, waveform
+
+TravelTime = Callable[[Floats, Floats], Floats]
+"""Travel times (pair,) in s from points (pair, xyz) to points (pair, xyz) of the world; NaN where no sound arrives."""
+
+MEETINGS, MET = 20, 1e-9
+"""Rounds of solving for when sound meets what moves, at most; s: enough. Each round leaves v/c of the error."""
+
+
+@dataclass(frozen=True, eq=False)
+class Snap:
+    """One snap of one shrimp: gain p(t/width) of its model."""
+
+    position: Floats  # (xyz) m, world
+    time: float  # s of the collapse on the clock of the frame
+    model: SnapModel  # a bubble at its depth
+    source_level: float | None  # dB re 1 uPa at 1 m peak of the model (see `level_below`); None: its own
+    gain: float = 1.0
+    width: float = 1.0
+
+    @property
+    def waveform(self) -> Waveform:
+        """What it shares with snaps that sound alike, but for how loud they are."""
+        return waveform(self.model, self.width)
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """Everything that is in the water at the instant of a frame."""
+
+    time: float  # s since the start of the trajectory
+    bodies: tuple[Body, ...]
+    snaps: tuple[Snap, ...]
+
+
+def place(shrimp: SnappingShrimp, bed: float) -> Floats:
+    """Where a shrimp is (xyz) in m, over a bed at this depth (m)."""
+    x, y, *z = shrimp.position
+    return np.array([x, y, z[0] if z else shrimp.height - bed])
+
+
+def model_of(shrimp: SnappingShrimp, bed: float) -> SnapModel:
+    """The model of a shrimp's snaps, where it is."""
+    return at_depth(shrimp.snap, -float(place(shrimp, bed)[2]))
+
+
+def snaps_of(shrimp: SnappingShrimp, bed: float, scales: Scales) -> tuple[Snap, ...]:
+    """The snaps of a shrimp, with the scales (snap,) that were drawn for them."""
+    position, model = place(shrimp, bed), model_of(shrimp, bed)
+    drawn = zip(shrimp.snap_times, scales.gain.tolist(), scales.width.tolist(), strict=True)
+    return tuple(Snap(position, time, model, shrimp.source_level, gain, width) for time, gain, width in drawn)
+
+
+def meeting_times(tracks: Sequence[Track], snaps: tuple[Snap, ...], travel_time: TravelTime) -> Floats:
+    """When the sound of each snap meets what is on each track (snap, track), s on the clock of the frame.
+
+    tracks: from the instant of the frame on; travel_time: of direct paths. Solves t = t_snap + T(x(t)), x the track, by
+    iteration; NaN where no sound arrives.
+    """
+    emitted = np.array([snap.time for snap in snaps])[:, None] + np.zeros((len(snaps), len(tracks)))
+    start = np.array([snap.position for snap in snaps]).reshape(-1, 1, 3) + np.zeros((len(tracks), 3))
+    met, arrives = emitted, np.ones(emitted.shape, bool)
+    for _ in range(MEETINGS if emitted.size else 0):
+        found = emitted + travel_time(start.reshape(-1, 3), positions(tracks, met).reshape(-1, 3)).reshape(met.shape)
+        arrives = np.isfinite(found)
+        late = np.abs(found - met)[arrives].max(initial=0.0)
+        met = np.where(arrives, found, met)
+        if late <= MET or all(track.still for track in tracks):
+            break
+    return np.where(arrives, met, np.nan)
+
+
+def positions(tracks: Sequence[Track], times: Floats) -> Floats:
+    """Where tracks are (snap, track, xyz) m, world, at times (snap, track) s of the frame; NaN where these are."""
+    places = np.empty((*times.shape, 3))
+    for number, track in enumerate(tracks):
+        places[:, number] = track.positions(np.nan_to_num(times[:, number]))
+    return np.where(np.isnan(times)[..., None], np.nan, places)

@@ -1,0 +1,195 @@
+"""What there is to say about a store: read from its metadata, its marks and what was set aside; no number is read."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sonarsynth.store import Folder, Remote, beside, must_be_store, root_attributes
+from sonarsynth.store.files.place import FileRecord, read, read_beside
+from sonarsynth.store.marks import Damage, Mark, load_layout, load_marks, marked
+
+
+@dataclass(frozen=True)
+class Array:
+    """One array as its metadata describes it."""
+
+    path: str  # such as image/energy
+    dims: tuple[str, ...]
+    shape: tuple[int, ...]
+    dtype: str  # as Zarr names it
+    attributes: Mapping[str, Any]
+
+    @property
+    def framed(self) -> bool:
+        """True where there is an entry for each frame."""
+        return self.dims[:1] == ("frame",)
+
+    @property
+    def units(self) -> str:
+        """Units, "" where it has none."""
+        return str(self.attributes.get("units", ""))
+
+    @property
+    def meaning(self) -> str:
+        """What it is, in a few words."""
+        return str(self.attributes.get("long_name", ""))
+
+    @property
+    def group(self) -> str:
+        """The group that it is in, "" for the root."""
+        return self.path.rpartition("/")[0]
+
+    @property
+    def kind(self) -> str:
+        """One of: text, number, whole number, yes or no."""
+        if self.dtype.startswith(("int", "uint")):
+            return "number" if "scale_factor" in self.attributes else "whole number"
+        return {"float": "number", "bool": "yes or no"}.get(self.dtype.rstrip("0123456789"), "text")
+
+
+@dataclass(frozen=True)
+class Facts:
+    """A store, as a card describes it."""
+
+    name: str  # of the folder
+    attributes: Mapping[str, Any]  # of the root
+    arrays: tuple[Array, ...]  # in the order of their paths
+    laid_out: Mapping[str, FileRecord]  # files that no frame changes
+    url: str  # of a store that has one
+    complete: int  # frames that are there
+    files: int
+    bytes: int
+    aside: Mapping[str, int]  # frames set aside, by what went wrong
+    mixed: Mapping[str, int]  # frames made with other libraries than the rest, by these
+
+    @property
+    def frames(self) -> int:
+        """Frames of the whole dataset."""
+        return next((a.shape[0] for a in self.arrays if a.framed), 0)
+
+    @property
+    def plan(self) -> Mapping[str, Any]:
+        """The plan as the store has it; {} in a store of an earlier version."""
+        return _mapping(self.attributes.get("plan"))
+
+    @property
+    def dataset(self) -> Mapping[str, Any]:
+        """Whose it is, and how to cite it."""
+        return _mapping(self.attributes.get("dataset"))
+
+    @property
+    def provenance(self) -> Mapping[str, Any]:
+        """How the store was begun."""
+        return _mapping(self.attributes.get("provenance"))
+
+    @property
+    def created(self) -> str:
+        """When the store was begun, ISO 8601; "" where it is not known."""
+        return str(self.provenance.get("created", ""))
+
+    @property
+    def title(self) -> str:
+        """Title, in one line."""
+        return " ".join(str(self.attributes.get("title", self.name)).split())
+
+    @property
+    def citation(self) -> str:
+        """How to cite the dataset: as its makers want it, or made of what is known."""
+        own = str(self.dataset.get("citation", ""))
+        if own:
+            return own
+        people = ", ".join(str(_mapping(c).get("name", "")) for c in self.dataset.get("creators", ()))
+        year = f" ({self.created[:4]})" if self.created else ""
+        dated = f"{people or 'Anonymous'}{year}. {self.title}, version {self.dataset.get('version', '1.0.0')}."
+        made = f"Made with sonarsynth {self.attributes.get('sonarsynth_version', '')}".rstrip() + "."
+        return " ".join(part for part in (dated, made, str(self.dataset.get("url", ""))) if part)
+
+    @property
+    def summary(self) -> str:
+        """What the dataset is, in the words of its makers or in one sentence of ours."""
+        own = str(self.dataset.get("description", ""))
+        if own:
+            return own
+        sizes = _mapping(self.plan.get("sizes"))
+        parts = [f"{self.frames} frames"]
+        if self.plan.get("sequences"):
+            parts.append(f"in {self.plan['sequences']} sequence{'s' * (self.plan['sequences'] != 1)}")
+        if sizes.get("sensor"):
+            parts.append(f"of an array of {sizes['sensor']} hydrophones")
+        return (
+            f"Synthetic passive sonar that is lit by snapping shrimp: {' '.join(parts)}, simulated, each with the "
+            "truth that made it: where targets and shrimp are, what each beam meets, and a ledger of levels."
+        )
+
+
+def facts_of(store: Folder) -> Facts:
+    """Read what there is to say. Raises Mismatch where there is no store of ours, Damage where it cannot be read."""
+    must_be_store(store)
+    complete = files = size = 0
+    mixed: Counter[str] = Counter()
+    layout = load_layout(store)
+    records = {} if layout is None else dict(layout.files)
+    for _, mark in load_marks(store, marked(store)):
+        if isinstance(mark, Mark):
+            complete += len(mark.frames)
+            there = [bytes_ for bytes_, _ in mark.files.values() if bytes_ >= 0]
+            files += len(there)
+            size += sum(there)
+            others = _mapping(mark.attributes.get("versions"))
+            if others:
+                mixed[", ".join(f"{name} {number}" for name, number in others.items())] += len(mark.frames)
+    return Facts(
+        name=store.name,
+        url=str(store) if isinstance(store, Remote) else "",
+        attributes=root_attributes(store),
+        arrays=_arrays(store),
+        laid_out=records,
+        complete=complete,
+        files=files + len(records),
+        bytes=size + sum(bytes_ for bytes_, _ in records.values()),
+        aside=_aside(store),
+        mixed=mixed,
+    )
+
+
+def _arrays(store: Folder) -> tuple[Array, ...]:
+    try:
+        members = json.loads(read(store, "zarr.json"))["consolidated_metadata"]["metadata"]
+        found = [
+            Array(
+                path, tuple(m.get("dimension_names") or ()), tuple(m["shape"]), _type(m["data_type"]), m["attributes"]
+            )
+            for path, m in members.items()
+            if m["node_type"] == "array"
+        ]
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        raise Damage(f"{store}: zarr.json is missing or damaged: 'sonarsynth repair' restores it") from None
+    return tuple(sorted(found, key=lambda a: (a.group, a.path)))
+
+
+def _type(name: Any) -> str:
+    return str(name["name"] if isinstance(name, dict) else name)
+
+
+def _aside(store: Folder) -> dict[str, int]:
+    """Frames that were set aside, counted by the kind of what went wrong."""
+    last: dict[int, str] = {}
+    try:
+        lines = read_beside(beside(store, "aside.jsonl")).decode("utf-8", errors="replace").splitlines()
+    except OSError:
+        return {}
+    for line in lines:
+        try:
+            row = json.loads(line)
+            last[int(row["frame"])] = f"{row['stage']}: {str(row['error']).partition(':')[0]}"
+        except (ValueError, KeyError, TypeError):
+            continue
+    return dict(Counter(last.values()))
+
+
+def _mapping(value: Any) -> Mapping[str, Any]:
+    return value if isinstance(value, Mapping) else {}

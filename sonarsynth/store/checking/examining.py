@@ -1,0 +1,214 @@
+"""What in a store is not as it was written, file by file: what `verify` reports, and `repair` mends."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any, Final
+
+from sonarsynth.store.creating import root_attributes
+from sonarsynth.store.files.place import FileRecord, Folder, entries, is_folder, read, records, there
+from sonarsynth.store.files.remote import Remote
+from sonarsynth.store.files.within import Mismatch
+from sonarsynth.store.marks import (
+    ABSENT,
+    LAYOUT,
+    MANIFESTS,
+    MARKS,
+    Damage,
+    Mark,
+    all_files,
+    load_layout,
+    load_marks,
+    marked,
+    read_mark,
+)
+
+MOST_FRAMES: Final = 1_000_000
+"""Frames of a shard that are counted, whatever a store says of itself."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Something that is not as it was written; `frames` are those that it spoils, none where it is not about frames."""
+
+    where: str
+    what: str
+    frames: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What there is in a store, and what of it is not as it was written."""
+
+    layout: Mark | None  # None where no copy of it can be read
+    marks: Mapping[int, Mark]  # of shards; those that are whole
+    problems: tuple[Problem, ...]
+    manifests: frozenset[str]  # copies of the mark of the layout that are damaged
+    fixed: frozenset[str]  # files that were laid out and are damaged
+    shards: frozenset[int]  # with files that are not as their mark says, or without a mark that can be read
+    foreign: frozenset[str]  # files that nobody wrote
+
+    @property
+    def files(self) -> dict[str, FileRecord]:
+        """Every file that the marks know."""
+        fixed = {} if self.layout is None else dict(self.layout.files)
+        return fixed | {name: found for mark in self.marks.values() for name, found in mark.files.items()}
+
+    @property
+    def attributes(self) -> Mapping[str, Any]:
+        """Attributes of the root as they were laid out; {} where no copy of the mark of the layout can be read."""
+        return {} if self.layout is None else self.layout.attributes
+
+
+def examine(path: Folder) -> Findings:
+    """Compare every file of a store with its record. Raises Mismatch where there is no store of ours."""
+    must_be_store(path)
+    problems: list[Problem] = []
+    manifests = _manifests(path, problems)
+    layout = load_layout(path)
+    region = _regions(path, layout)
+    marks, shards = _marks(path, region, problems)
+    fixed = set() if layout is None else _compare(path, layout, problems)
+    for number, mark in marks.items():
+        if _compare(path, mark, problems):
+            shards.add(number)
+    known = Findings(layout, marks, (), manifests, frozenset(fixed), frozenset(shards), frozenset())
+    unmarked, foreign = _strangers(path, known, region, problems)
+    shards |= unmarked
+    return Findings(layout, marks, tuple(problems), manifests, known.fixed, frozenset(shards), foreign)
+
+
+def must_be_store(path: Folder) -> None:
+    """Raise Mismatch where there is no store of ours: neither marks nor metadata with the digest of a recipe."""
+    if not path.is_dir():
+        raise Mismatch(f"{path} is not a store: it is no folder" if there(path) else f"{path}: no such store")
+    manifest = any(there(path, place) for place in MANIFESTS)
+    if not (manifest or "recipe_digest" in root_attributes(path) or marked(path)):
+        raise Mismatch(f"{path} is not a store of sonarsynth")
+
+
+def _manifests(path: Folder, problems: list[Problem]) -> frozenset[str]:
+    """Copies of the mark of the layout that are damaged."""
+    bad = set()
+    for place in MANIFESTS:
+        what = "the mark is missing"
+        try:
+            if read_mark(path, place, LAYOUT) is not None:
+                continue
+        except Damage as damage:
+            what = str(damage).partition(": ")[2]
+        bad.add(place)
+        problems.append(Problem(place, what))
+    return frozenset(bad)
+
+
+def frame_count(path: Folder) -> int:
+    """Frames of the dataset, by the metadata of the array `frame` or the copy in the root's; 0 where both are lost."""
+    for file, inside in (("frame/zarr.json", ()), ("zarr.json", ("consolidated_metadata", "metadata", "frame"))):
+        try:
+            found: Any = json.loads(read(path, file))
+            for name in inside:
+                found = found[name]
+            return int(found["shape"][0])
+        except (OSError, ValueError, KeyError, TypeError, IndexError, RecursionError):
+            continue
+    return 0
+
+
+def _regions(path: Folder, layout: Mark | None) -> Callable[[int], tuple[int, ...]]:
+    """The frames of a shard."""
+    step = (root_attributes(path) if layout is None else layout.attributes).get("shard_frames")
+    count = frame_count(path)
+    if not isinstance(step, int) or not 0 < step <= MOST_FRAMES:
+        return lambda shard: ()
+    return lambda shard: tuple(range(shard * step, min((shard + 1) * step, count)))
+
+
+def _marks(
+    path: Folder, region: Callable[[int], tuple[int, ...]], problems: list[Problem]
+) -> tuple[dict[int, Mark], set[int]]:
+    """Marks of shards, and the numbers of those that are damaged."""
+    marks, bad = {}, set()
+    for number, mark in load_marks(path, marked(path)):
+        if isinstance(mark, Damage):
+            where, _, what = str(mark).partition(": ")
+            problems.append(Problem(where, what, region(number)))
+            bad.add(number)
+        elif mark is not None:
+            marks[number] = mark
+    return marks, bad
+
+
+def _compare(path: Folder, mark: Mark, problems: list[Problem]) -> set[str]:
+    """Names of the files of a mark that are not as recorded."""
+    bad = set()
+    for name, found in records(path, mark.files):
+        size, digest = mark.files[name]
+        if isinstance(found, FileNotFoundError | NotADirectoryError):
+            if (size, digest) == ABSENT:
+                continue
+            what = "the file is missing"
+        elif isinstance(found, OSError):
+            what = f"cannot be read: {found.strerror}"
+        else:
+            if found == (size, digest):
+                continue
+            what = f"has {found[0]} bytes, not {max(size, 0)}" if found[0] != size else "its contents have changed"
+        bad.add(name)
+        problems.append(Problem(name, what, mark.frames))
+    return bad
+
+
+def _strangers(
+    path: Folder, known: Findings, region: Callable[[int], tuple[int, ...]], problems: list[Problem]
+) -> tuple[set[int], frozenset[str]]:
+    """Files that no mark knows: numbers of the shards that they are data of (a mark is lost, or a build was
+    interrupted), and the names of those that are not ours."""
+    if isinstance(path, Remote) and not path.listed:
+        return set(), frozenset()  # nobody can ask what else there is
+    files = known.files
+    folders = {MARKS}
+    for name in files:
+        while name := name.rpartition("/")[0]:
+            folders.add(name)
+    folders = {name for name in folders if isinstance(path, Path) and is_folder(path, name)}
+    lost: dict[int, list[str]] = {}
+    foreign: list[str] = []
+    for name in sorted(set(all_files(path)) - set(files) - folders):
+        shard = shard_of(path, name)
+        if shard is None or shard in known.marks:
+            if known.layout is not None or shard is not None:
+                foreign.append(name)
+        else:
+            lost.setdefault(shard, []).append(name)
+    for shard in sorted(lost):
+        what = "data without a completion mark: build again, or repair, to finish it"
+        problems.append(Problem(f"shard {shard}", what, region(shard)))
+    ours = {f"{number}.json" for number in marked(path)} | {PurePosixPath(m).name for m in MANIFESTS}
+    foreign += sorted(f"{MARKS}/{name}" for name in entries(path, MARKS) if name not in ours)
+    problems.extend(Problem(shown(name), "the file does not belong here") for name in foreign)
+    return set(lost), frozenset(foreign)
+
+
+def shard_of(path: Folder, name: str) -> int | None:
+    """The shard that a file of an array would be of by its name, None for other files."""
+    array, _, key = name.rpartition("/")
+    head, *numbers = key.split(".")
+    if head != "c" or not array or not numbers or not all(n.isascii() and n.isdecimal() for n in numbers):
+        return None
+    return int(numbers[0]) if is_folder(path, array) else None
+
+
+def shown(name: str) -> str:
+    """A file name as a line can hold it."""
+    return name if name.isprintable() else ascii(name)[1:-1]
+
+
+def ranges(frames: Sequence[int]) -> str:
+    """Frame numbers, in order, as `--frames` takes them: 0:8,12:13."""
+    starts = [f for f, before in zip(frames, [None, *frames], strict=False) if before is None or f != before + 1]
+    stops = [f + 1 for f, after in zip(frames, [*frames[1:], None], strict=False) if after is None or after != f + 1]
+    return ",".join(f"{start}:{stop}" for start, stop in zip(starts, stops, strict=True))

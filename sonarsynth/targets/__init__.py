@@ -1,0 +1,1 @@
+"""What targets are: shapes, meshes, and how finely they must be cut."""

@@ -1,0 +1,1 @@
+"""Meshes of shapes: boxes, bodies of revolution, REMUS-100."""

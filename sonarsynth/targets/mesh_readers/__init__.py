@@ -1,0 +1,1 @@
+"""Mesh files: reading, checking and repairing them."""

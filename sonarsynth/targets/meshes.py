@@ -1,0 +1,104 @@
+"""Meshes: read, generated, checked, cleaned. Body frame, metres, outward normals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from sonarsynth.conventions import UNITS
+from sonarsynth.description import named_files
+from sonarsynth.description.byte_bounded_cache import kept
+from sonarsynth.geometry.mesh import Mesh, read_only
+from sonarsynth.geometry.surfaces import MeshError, Surface, halve_longest_edges, split_long_edges
+from sonarsynth.targets.generated.generation import generate
+from sonarsynth.targets.shapes import Cylinder, MeshFile, Myring, Remus100, Shape
+
+__all__ = ["MeshError", "file_stamp", "mesh_of", "refined_mesh"]
+
+
+SHARP: Final = MeshFile(path="").crease
+"""The crease of shapes that leave it out."""
+
+
+def mesh_of(shape: Shape) -> Mesh:
+    """The mesh of a shape: read or generated, checked, repaired. Its arrays are read-only, its digest always the same.
+
+    A file (its path relative to the working directory) is kept until it changes. Raises `MeshError`, a ValueError in
+    one line that names the file and the reason; what was repaired is said in `Mesh.notes`.
+    """
+    return _mesh_of(shape, file_stamp(shape))
+
+
+@kept(32)
+def _mesh_of(shape: Shape, stamp: tuple[int, int] | None) -> Mesh:
+    return refined_mesh(shape)
+
+
+def file_stamp(shape: Shape) -> tuple[int, int] | None:
+    """When the file of a shape was changed (ns) and its size, for caches; None for other shapes. Raises MeshError."""
+    if not isinstance(shape, MeshFile):
+        return None
+    try:
+        return named_files.stamp(shape.path)
+    except named_files.FileError as error:
+        raise MeshError(f"{shape.path}: {error}") from None
+
+
+def refined_mesh(shape: Shape, edge: float = np.inf, sagitta: float = np.inf) -> Mesh:
+    """The mesh of a shape, made anew, with no edge longer than `edge` (m), nor than the shape's own.
+
+    Analytic shapes, and files that stand for a curved surface (`MeshFile.smooth`), are refined on that surface, until
+    facets are no farther from it, on average, than about `sagitta` (m). The flat facets of other files, of boxes and
+    L-shapes are cut in their planes, which changes nothing but the length of their edges; a coarse REMUS too.
+    Raises MeshError as `mesh_of`.
+    """
+    if isinstance(shape, MeshFile):
+        (vertices, numbers), notes = _read(shape, edge, sagitta)
+    else:
+        (vertices, numbers), notes = generate(shape, edge, sagitta)
+        if isinstance(shape, Remus100) and shape.coarse and edge < np.inf:
+            vertices, numbers = halve_longest_edges((vertices, numbers), edge)
+    faces = np.ascontiguousarray(numbers, np.int32)
+    flat = None
+    if isinstance(shape, (Cylinder, Myring, Remus100)):  # their ends
+        flat = np.ptp(vertices[faces, 0], axis=1) == 0
+        flat.flags.writeable = False
+    faces.flags.writeable = False
+    return Mesh(read_only(np.ascontiguousarray(vertices, np.float64)), faces, notes, flat)
+
+
+def _read(shape: MeshFile, edge: float, sagitta: float) -> tuple[Surface, tuple[str, ...]]:
+    from sonarsynth.targets.generated.smoothing import curved
+
+    surface, notes = _repaired(replace(shape, edge=None, smooth=False, crease=SHARP), file_stamp(shape))
+    longest = min(edge, np.inf if shape.edge is None else shape.edge)
+    if np.isinf(longest) and not (shape.smooth and np.isfinite(sagitta)):
+        return surface, notes
+    try:
+        if shape.smooth:
+            return curved(surface, longest, sagitta, shape.crease), notes
+        return (halve_longest_edges if edge < np.inf else split_long_edges)(surface, longest), notes
+    except MeshError as error:
+        raise MeshError(f"{shape.path}: {error}") from None
+
+
+@kept(4)
+def _repaired(shape: MeshFile, stamp: tuple[int, int] | None) -> tuple[Surface, tuple[str, ...]]:
+    """What a file holds, before any refinement, read once for all of them."""
+    from scipy.spatial.transform import Rotation
+
+    from sonarsynth.targets.mesh_readers.mesh_files import read_surface
+    from sonarsynth.targets.mesh_readers.mesh_repair import check, repair
+
+    path = Path(shape.path)
+    vertices, faces = read_surface(path)
+    turn = Rotation.from_euler("xyz", [shape.roll, shape.pitch, shape.heading]).as_matrix()
+    with np.errstate(invalid="ignore", over="ignore"):
+        placed = (vertices * UNITS["m"][shape.unit]) @ turn.T + np.array(shape.offset)
+    check((placed, faces), shape.path)
+    (vertices, faces), notes = repair((placed, faces), shape.path, shares_vertices=path.suffix.lower() != ".stl")
+    vertices.flags.writeable = faces.flags.writeable = False
+    return (vertices, faces), notes

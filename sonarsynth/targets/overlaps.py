@@ -1,0 +1,92 @@
+"""Whether two bodies take the same place."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from sonarsynth.casting.ray_casting import first_hit, occluded
+from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.geometry import Pose
+from sonarsynth.geometry.mesh import Mesh, in_blocks
+from sonarsynth.geometry.placed_target import Body
+
+INSET: Final = 1e-5
+"""Of the smaller body: how far under its surface it is looked at, so that bodies that touch do not overlap."""
+SHRUNK: Final = 1e-4
+"""Of a facet: how much smaller it is looked at, so that its corners are under the surface too."""
+MOST: Final = 4096
+"""Facets of each by which it is found how they overlap."""
+
+
+def overlap(one: Body, other: Body) -> str | None:
+    """How two closed bodies overlap, as a verb with its object left out, or None: they are apart, or only touch.
+
+    "coincide", "overlap", or "overlap (the second is inside the first)" and the like. Facets are taken a little under
+    the surface: bodies overlap where one such is inside the other body, or where one crosses its surface.
+    """
+    if not (len(one.mesh.faces) and len(other.mesh.faces)):
+        return None
+    (a, r), (b, s) = sphere_round(one), sphere_round(other)
+    if np.linalg.norm(a - b) >= r + s:
+        return None
+    inset = INSET * min(r, s)
+    near = _near(one, other, inset), _near(other, one, inset)
+    within = _within(one, near[0], other, inset), _within(other, near[1], one, inset)
+    every = [len(n) == len(body.mesh.faces) and w.all() for n, w, body in zip(near, within, (one, other), strict=True)]
+    if all(every):
+        return "coincide"
+    if any(every):
+        return f"overlap (the {'first' if every[0] else 'second'} is inside the {'second' if every[0] else 'first'})"
+    if any(w.any() for w in within) or _crosses(one, near[0], other, inset) or _crosses(other, near[1], one, inset):
+        return "overlap"
+    return None
+
+
+def sphere_round(body: Body) -> tuple[Floats, float]:
+    """Centre (xyz) in the world and radius (m) of the sphere round a body's box."""
+    low, high = body.mesh.box
+    return body.pose.to_world(0.5 * (low + high)), 0.5 * float(np.linalg.norm(high - low))
+
+
+def _near(body: Body, other: Body, inset: float) -> Ints:
+    """Facets of a body whose boxes, in the frame of the other body, meet the box round it."""
+    vertices = other.pose.to_body(body.pose.to_world(body.mesh.vertices))
+    low, high = other.mesh.box
+    found = []
+    for some in in_blocks(len(body.mesh.faces)):
+        corners = vertices[body.mesh.faces[some]]
+        apart = (corners.min(axis=1) > high + inset) | (corners.max(axis=1) < low - inset)
+        found.append(np.flatnonzero(~apart.any(axis=1)) + some.start)
+    return np.concatenate(found)
+
+
+def _corners(body: Body, facets: Ints, inset: float) -> Floats:
+    """Corners (facet, 3, xyz) of facets in the world, a little under the surface."""
+    mesh = body.mesh
+    middle = mesh.centroid[facets][:, None, :]
+    corners = middle + (1.0 - SHRUNK) * (mesh.corners_of(facets) - middle) - inset * mesh.normal[facets][:, None, :]
+    return body.pose.to_world(corners.reshape(-1, 3)).reshape(-1, 3, 3)
+
+
+def _within(body: Body, facets: Ints, other: Body, inset: float) -> Bools:
+    """Which of facets, `MOST` of them at most, have their middles inside another body."""
+    some = facets[:: max(-(-len(facets) // MOST), 1)]
+    return insides(other.mesh, other.pose, _corners(body, some, inset).mean(axis=1))
+
+
+def insides(mesh: Mesh, pose: Pose, points: Floats) -> Bools:
+    """Which points (point, xyz) of the world are inside a closed mesh: the facet above shows its inner side."""
+    up = np.array([1e-3, 2e-3, 1.0])  # off the edges of boxes
+    facet, _ = first_hit(mesh, pose.to_body(points), np.broadcast_to(up, points.shape))
+    return np.asarray((facet >= 0) & (mesh.normal[facet] @ up > 0.0))
+
+
+def _crosses(body: Body, facets: Ints, other: Body, inset: float) -> bool:
+    """Whether any edge of facets goes through the surface of another body."""
+    for some in in_blocks(len(facets)):
+        corners = _corners(body, facets[some], inset)
+        if occluded((other,), corners.reshape(-1, 3), np.roll(corners, 1, axis=1).reshape(-1, 3)).any():
+            return True
+    return False

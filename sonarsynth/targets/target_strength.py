@@ -1,0 +1,166 @@
+"""Target strength: how much of a plane wave a body sends into a direction, far away."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.conventions import FASTEST, SLOWEST, Bools, Floats
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.scattering import Scattering
+from sonarsynth.scattering.kirchhoff import Kirchhoff
+from sonarsynth.scattering.law_notes import SmallBody
+from sonarsynth.scattering.law_validity import Scatterer
+from sonarsynth.targets.mesh_resolution import checked, convex, fine_mesh
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Box, Cylinder, LShape, MeshFile, Myring, Remus100, Shape, Sphere
+from sonarsynth.targets.target import Target
+
+SHAPES: Final = (MeshFile, Sphere, Cylinder, Box, LShape, Remus100, Myring)
+
+
+def target_strength(
+    target: Mesh | Shape | Target,
+    frequency: npt.ArrayLike,
+    incident: npt.ArrayLike,
+    scattered: npt.ArrayLike,
+    sound_speed: npt.ArrayLike = 1500.0,
+    scattering: Scattering | None = None,
+) -> Floats:
+    """Target strength (...) in dB re 1 m2: 20 log10 of the far-field amplitude in m (pressure f/r for unit pressure).
+
+    frequency (...) Hz, incident and scattered (..., xyz) unit vectors of propagation, in and away, in the target's own
+    frame (x forward, y port, z up), sound_speed (...) m/s: broadcast together. Backscatter is scattered = -incident.
+    scattering: `Kirchhoff()` where left out; of a lobe, and of the incoherent part of rough facets, powers are summed.
+    -inf where no facet is both lit and seen: nothing comes back by this law. Bodies shade themselves, facet by facet.
+    Of a closed convex body, curved everywhere and without creases, as a sphere is, Kirchhoff has all that it adds to
+    the wave, with what creeps round it and what makes its shadow; of others, the echo alone.
+
+    With Kirchhoff, a shape is refined on its true surface (never made coarser) until the facets' error is about 2 % of
+    the echo at the highest frequency; where more than 5 % is expected, of a `Mesh` or a mesh file, a `CoarseMesh`
+    warning says how much, and `SmallBody` of a body too small for the lowest frequency. Rigid and soft spheres of 0.25
+    m or more from 25 to 110 kHz are within 0.25 dB of the exact series up to 120 degrees off backscatter, within 0.9 dB
+    beyond.
+
+    Raises ValueError (MeshError for a mesh) in one line for what is no target, frequency, direction or sound speed.
+    """
+    law = Kirchhoff() if scattering is None else scattering
+    k, going, away = _checked(frequency, incident, scattered, sound_speed)
+    shape = np.broadcast_shapes(k.shape, going.shape[:-1], away.shape[:-1])
+    if 0 in shape:
+        return np.empty(shape)
+    body = _Body(target, law, 2.0 * np.pi / float(k.max()), 2.0 * np.pi / float(k.min()))
+    wave = np.broadcast_to(k, shape).ravel()
+    both = np.concatenate([np.broadcast_to(v, (*shape, 3)).reshape(-1, 3) for v in (going, away)], axis=1) + 0.0
+    pairs, pair = np.unique(both, axis=0, return_inverse=True)
+    order = np.argsort(pair.ravel(), kind="stable")
+    parts = np.split(order, np.cumsum(np.bincount(pair.ravel()))[:-1])
+    power = np.empty(wave.size)
+    for row, at in zip(pairs, parts, strict=True):
+        values, index = np.unique(wave[at], return_inverse=True)
+        power[at] = body.cross_section(row[:3], row[3:], values)[index.ravel()]
+    with np.errstate(divide="ignore"):
+        return np.asarray(10.0 * np.log10(power).reshape(shape))
+
+
+class _Body:
+    """A mesh, its law, and what each direction sees of it."""
+
+    def __init__(self, target: Mesh | Shape | Target, law: Scattering, wavelength: float, longest: float) -> None:
+        from sonarsynth.geometry.curvature import curvature_radius
+
+        shape = target.shape if isinstance(target, Target) else target
+        coherent = isinstance(law, Kirchhoff)
+        if isinstance(shape, Mesh):
+            self.mesh = checked(shape, wavelength) if coherent else shape
+        elif isinstance(shape, SHAPES):
+            self.mesh = fine_mesh(shape, wavelength) if coherent else mesh_of(shape)
+        else:
+            raise ValueError(
+                f"target must be a Mesh, a shape such as Sphere(radius=0.25), or a Target, not {shape!r:.60}"
+            )
+        if small := law.too_small(Scatterer(self.mesh, wavelength, longest)):
+            warnings.warn(small, SmallBody, stacklevel=3)
+        self.law = law
+        self.convex = convex(None if isinstance(shape, Mesh) else shape, self.mesh)
+        self.curved = np.isfinite(curvature_radius(self.mesh)) if coherent else np.zeros(len(self.mesh.faces), bool)
+        self.shape = self._round() if isinstance(law, Kirchhoff) and law.edges == "auto" else None
+        self.unhidden: dict[bytes, Bools] = {}
+
+    def _round(self) -> Floats | None:
+        """Shape operators (facet, xyz, xyz) of a closed convex body, curved everywhere, without creases; else None."""
+        from sonarsynth.equations.scattering.convex_bodies import shape_operators
+        from sonarsynth.geometry.curvature import CREASE, neighbours
+        from sonarsynth.geometry.surfaces import weld
+
+        if not (self.convex and self.curved.all()):
+            return None
+        pairs = neighbours(self.mesh)
+        if 2 * len(pairs.turn) < 3 * len(self.mesh.faces) or pairs.turn.max() >= CREASE:
+            return None
+        return shape_operators(*weld((self.mesh.vertices, self.mesh.faces.astype(np.int64))))
+
+    def cross_section(self, incident: Floats, scattered: Floats, wavenumber: Floats) -> Floats:
+        """|f|^2 (frequency,) in m2 for one pair of directions."""
+        mesh = self.mesh
+        if isinstance(self.law, Kirchhoff) and self.shape is not None:
+            parts = mesh.corners, mesh.normal, mesh.area, self.curved
+            return self.law.cross_section(*parts, incident, scattered, wavenumber, self.shape)
+        on = np.flatnonzero(self.seen_from(-incident) & self.seen_from(scattered))
+        if isinstance(self.law, Kirchhoff):
+            parts = mesh.corners_of(on), mesh.normal[on], mesh.area[on], self.curved[on]
+            return self.law.cross_section(*parts, incident, scattered, wavenumber)
+        amplitude = self.law.amplitude(incident, scattered, mesh.normal[on], mesh.area[on])
+        return np.full(wavenumber.shape, np.sum(amplitude**2))
+
+    def seen_from(self, towards: Floats) -> Bools:
+        """Facets (facet,) that face a direction (xyz) with no other facet before their middles; kept for the last."""
+        from sonarsynth.casting.ray_casting import OFFSET, first_hit
+
+        towards = towards + 0.0
+        key = towards.tobytes()
+        if key not in self.unhidden:
+            mesh = self.mesh
+            out = mesh.normal @ towards > 0.0
+            if not self.convex:
+                on = np.flatnonzero(out)
+                size = 0.5 * float(np.linalg.norm(mesh.box[1] - mesh.box[0]))
+                start = mesh.centroid[on] + OFFSET * size * mesh.normal[on]
+                out[on] = first_hit(mesh, start, np.broadcast_to(towards, start.shape))[0] < 0
+            if len(self.unhidden) >= 64:
+                self.unhidden.pop(next(iter(self.unhidden)))
+            self.unhidden[key] = out
+        return self.unhidden[key]
+
+
+def _checked(
+    frequency: npt.ArrayLike, incident: npt.ArrayLike, scattered: npt.ArrayLike, sound_speed: npt.ArrayLike
+) -> tuple[Floats, Floats, Floats]:
+    """Wavenumber (...) in rad/m, and the directions (..., xyz), made exactly as long as 1."""
+    try:
+        f, c = np.asarray(frequency, float), np.asarray(sound_speed, float)
+        directions = [np.asarray(v, float) for v in (incident, scattered)]
+    except (TypeError, ValueError):
+        raise ValueError("frequency, incident, scattered and sound_speed must be numbers or arrays of them") from None
+    if not np.all((f > 0) & np.isfinite(f)):
+        raise ValueError("frequency (Hz) must be a number above 0")
+    if not np.all((c >= SLOWEST) & (c <= FASTEST)):
+        raise ValueError(f"sound_speed (m/s) must be from {SLOWEST:g} to {FASTEST:g}")
+    units = []
+    for name, vector in zip(("incident", "scattered"), directions, strict=True):
+        if vector.ndim < 1 or vector.shape[-1] != 3:
+            raise ValueError(f"{name} must be unit vectors (..., xyz), not of shape {vector.shape}")
+        length = np.linalg.norm(vector, axis=-1, keepdims=True)
+        if not np.all(np.abs(length - 1.0) < 1e-6):
+            worst = length.flat[np.argmax(np.nan_to_num(np.abs(length - 1.0), nan=np.inf))]
+            raise ValueError(f"{name} must be unit vectors of propagation; one is {worst:g} long")
+        units.append(vector / length)
+    try:
+        np.broadcast_shapes(f.shape, c.shape, units[0].shape[:-1], units[1].shape[:-1])
+    except ValueError:
+        shapes = f"{f.shape}, {units[0].shape}, {units[1].shape} and {c.shape}"
+        raise ValueError(f"frequency, incident, scattered and sound_speed do not broadcast: {shapes}") from None
+    return 2.0 * np.pi * f / c, units[0], units[1]

@@ -1,0 +1,258 @@
+"""Paths between things that move: directions, spreading, delays and Doppler of when and where sound meets them.
+
+A snap's echoes are traced as if all were at rest: each body where the snap's sound meets its middle, the array where it
+hears that (`sonarsynth.tracing.meetings`). What is left is by how much sooner or later (tau_1) a path meets its facet,
+which is then v tau_1 farther, and the array (tau_2), which is u tau_2 farther. With T, a, d and b the travel times and
+directions of travel of the rays that were traced, to the facet, from it and to the array, t_s the time of the snap and
+m and h those of the poses that rays were traced between,
+
+    m + tau_1 = t_s + T_out + (v.a/c) tau_1,    h + tau_2 = m + tau_1 + T_in - (v.d/c) tau_1 + (u.b/c) tau_2
+
+and each leg is longer by its curvature, as a straight one of its length is (`aside`), so that times are exact in
+uniform water. Directions at facet and array, and spreading, are those of the lengthened leg, exact there as well. v is
+the velocity of the facet: its body may turn, by omega tau_1 till then, and with it all that its law asks for. The pulse
+is longer by dt_2/dt_s. Left out in bent water: how much more or less than straight rays the rays turn and spread for
+the remainder v tau_1; of a moving array, u/c of the curvature of the wavefront.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sonarsynth.conventions import Bools, Floats, Ints, depth
+from sonarsynth.environment.sea import Profile
+from sonarsynth.equations.scattering.lobes import dot
+from sonarsynth.geometry.motion import Track
+from sonarsynth.geometry.placed_target import Body
+from sonarsynth.products import Arrivals
+from sonarsynth.receiver import Elements
+from sonarsynth.tracing.expansion.probe_paths import TERMS
+from sonarsynth.tracing.expansion.wavefront_polynomials import FEW, SECOND_DEGREE, probes, sphere
+from sonarsynth.tracing.receive_paths import Legs
+from sonarsynth.tracing.transmit_paths import Outward
+
+ROUNDS = 3
+"""Of solving for times that depend on themselves: each leaves v/c of the error, or v t/r of that."""
+
+
+CHANGED = 2.0
+"""What a snap changes by, of itself, for each unit of Doppler: one of few periods, in whose band it is heard."""
+
+
+@dataclass(frozen=True, eq=False)
+class Meeting:
+    """When what was traced is where it was traced."""
+
+    met: Floats  # (body,) s of the frame: each body is where it is then
+    heard: float  # s: the array is
+    sonar: Track  # of the array, at `heard`
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """How paths (path,) differ from those that were traced, by the remainder of the motion."""
+
+    met: Floats  # s: of the poses of bodies
+    late: Floats  # s: after `met`, the facet is met
+    velocity: Floats  # (path, xyz) m/s of the facet, world
+    spin: Floats  # (path, xyz) rad/s of its body
+    apart: Floats  # (path, xyz) m: by what the array, or its image, is farther from the facet
+
+    def select(self, rows: Bools | Ints) -> Carried:
+        """The paths picked by a mask or by indices."""
+        return Carried(**{name: value[rows] for name, value in vars(self).items()})
+
+    @staticmethod
+    def at_rest(count: int, time: float) -> Carried:
+        """Paths from what does not move, at a time (s)."""
+        zero, none = np.zeros(count), np.zeros((count, 3))
+        return Carried(zero + time, zero, none, none, none)
+
+    def departure(self, length: Floats, away: Floats) -> Floats:
+        """Directions (path, ..., xyz) to the array or probes of it, of rays of some length (path,) m that left in
+        directions `away`; world."""
+        some = (slice(None), *(None for _ in away.shape[2:]))
+        seen = length[(*some, None)] * away + self.apart[some]
+        return np.asarray(seen / np.sqrt(dot(seen, seen))[..., None])
+
+    def turned_back(self, way: Floats) -> Floats:
+        """Directions (path, ..., xyz) as the body that has turned sees them, in the axes that it was traced in."""
+        if not self.spin.any():
+            return way
+        some = (slice(None), *(None for _ in way.shape[2:]))
+        turn = (self.late[:, None] * self.spin)[some]
+        back = way - np.cross(turn, way)
+        return np.asarray(back / np.sqrt(dot(back, back))[..., None])
+
+
+def velocities(bodies: tuple[Body, ...], target: Ints, point: Floats) -> tuple[Floats, Floats]:
+    """Velocity (point, xyz) m/s of points of bodies (target of each), world, and the spin of their body rad/s."""
+    found, spins = np.zeros((2, len(point), 3))
+    for number, body in enumerate(bodies):
+        mine = target == number
+        spin = body.track.spin
+        found[mine] = body.velocity + np.cross(spin, point[mine] - body.pose.position) if spin.any() else body.velocity
+        spins[mine] = spin
+    return found, spins
+
+
+def aside(length: Floats, along: Floats, moved: Floats) -> Floats:
+    """How much longer (path,) in m straight legs get when their ends come apart, more than by what is along them.
+
+    |r a + d| - r - a.d of legs r (path,) m along unit vectors a (path, xyz), by d (path, xyz) m; never negative, and
+    without cancellation.
+    """
+    forward = length + dot(along, moved)
+    across = moved - dot(along, moved)[:, None] * along
+    square = dot(across, across)
+    return np.asarray(square / np.maximum(np.sqrt(forward**2 + square) + forward, 1e-300))
+
+
+def meets(out: Outward, met: Floats, velocity: Floats, time: float, speed: Floats) -> tuple[Outward, Floats]:
+    """Ways to facets that move, when and where the sound of a snap at `time` (s) meets them, and by how much after
+    `met` (way,) s, where ways lead to where they are then; velocity (way, xyz) of the facets, speed (way,) of sound
+    there, m/s."""
+    rate, gone = dot(velocity, out.arrival) / speed, time + out.travel_time - met
+    late = gone
+    for _ in range(ROUNDS):
+        late = (gone + aside(out.length, out.arrival, velocity * late[:, None]) / speed) / (1.0 - rate)
+    way = out.length[:, None] * out.arrival + velocity * late[:, None]
+    length = np.sqrt(dot(way, way))
+    there = replace(
+        out, arrival=way / length[:, None], length=length, travel_time=(met - time) + late,
+        spreading=out.spreading * (out.length / length),
+    )  # fmt: skip
+    return there, late
+
+
+def mirrored(velocity: Floats, bounces: Ints) -> Floats:
+    """Velocities (path, xyz) of images after so many reflections (path,) from level surfaces."""
+    seen = velocity.copy()
+    seen[bounces % 2 == 1, 2] *= -1.0
+    return seen
+
+
+def carry(
+    legs: Legs, leg: Ints, met: Floats, late: Floats, velocity: Floats, spin: Floats, meeting: Meeting
+) -> Carried:
+    """The remainder of paths (path,) that go on by a leg each; `late` s after `met` their facets are met."""
+    apart = -velocity * late[:, None]
+    if not meeting.sonar.still:
+        heard = met + late + legs.travel_time[leg] - meeting.heard
+        apart += mirrored(meeting.sonar.velocity * heard[:, None], legs.bounces[leg])
+    return Carried(met, late, velocity, spin, apart)
+
+
+def received(legs: Legs, of: Carried, meeting: Meeting, profile: Profile) -> Legs:
+    """Legs from facets that move to an array that does: from where they are met to where they are heard."""
+    pose, u = meeting.sonar.pose, meeting.sonar.velocity
+    c_facet, c_array = profile.at(depth(legs.point)), float(profile.at(depth(pose.position)))
+    moved, of_array = of.velocity * of.late[:, None], dot(legs.arrival, u) / c_array
+    begun = of.met + of.late
+    gone = begun - meeting.heard + legs.travel_time - dot(moved, legs.departure) / c_facet
+    image = mirrored(moved, legs.bounces)
+    heard = gone
+    for _ in range(ROUNDS):
+        heard = (gone + aside(legs.length, legs.arrival, u * heard[:, None] - image) / c_array) / (1.0 - of_array)
+    seen = legs.radius[:, None] * legs.direction + pose.turn_to_body(image - u * heard[:, None])
+    radius = np.sqrt(dot(seen, seen))
+    arrival = -pose.turn_to_world(seen) / radius[:, None]
+    seen = seen - np.cross(pose.turn_to_body(meeting.sonar.spin), seen) * heard[:, None]
+    return replace(
+        legs, point=legs.point + moved, departure=of.departure(legs.length, legs.departure), arrival=arrival,
+        direction=seen / np.sqrt(dot(seen, seen))[:, None], radius=radius, length=legs.length + (radius - legs.radius),
+        spreading=legs.spreading * (legs.radius / radius), travel_time=meeting.heard - begun + heard,
+    )  # fmt: skip
+
+
+class _Doppler(NamedTuple):
+    """Of paths, at the array centre."""
+
+    velocity: Floats  # (path, xyz) m/s of the facet, world
+    mirrored: Floats  # (path, xyz) m/s of where it seems to be
+    rate_out: Floats  # (path,) of the way to it,
+    rate_in: Floats  # (path,) and from there
+    of_array: Floats  # (path,) by the motion of the array
+    stretch: Floats  # (path,)
+
+    def select(self, rows: Ints) -> _Doppler:
+        """The paths picked by indices."""
+        columns: Any = (value[rows] for value in self)
+        return _Doppler(*columns)
+
+
+def turned(legs: Legs, points: Floats, slow: Floats) -> Floats:
+    """What (path, point, xyz) the unit vectors towards where legs come from turn by, from the array centre to points
+    (point, xyz) of an array that moves at `slow` (xyz) of the sound speed, when sound comes there; sonar frame."""
+    farther = sphere(legs.direction, legs.radius, points)
+    v = legs.direction[:, None] - (points + farther[..., None] * slow) / legs.radius[:, None, None]
+    return np.asarray(v / np.sqrt(dot(v, v))[..., None] - legs.direction[:, None])
+
+
+def _over_aperture(
+    of: _Doppler, legs: Legs, array: Track, profile: Profile, elements: Elements,
+    departure: Callable[[], Floats] | None, enough: float,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Polynomials (path, term) of the second degree over the aperture: of Doppler; and of what bent rays change faster
+    than straight ones to a place that moves (s a second). None of paths where that errs less, whatever the others."""
+    sonar, pose = array.velocity, array.pose
+    c_array = float(profile.at(depth(pose.position)))
+    turning = np.sqrt(dot(of.velocity, of.velocity)) / legs.length + np.sqrt(sonar @ sonar) / legs.radius  # rad/s
+    some = np.flatnonzero(CHANGED * turning * elements.aperture / c_array > enough)
+    if not len(some):
+        return np.empty((len(of.stretch), 0)), np.empty((len(of.stretch), 0))
+    probe, doppler, leg = probes(elements), of.select(some), legs.select(some)
+    turn = turned(leg, probe.position[:FEW], pose.turn_to_body(sonar) / c_array)
+    of_array = -dot(turn, pose.turn_to_body(sonar)) / c_array + doppler.of_array[:, None]
+    rate_in = doppler.rate_in[:, None]
+    if departure is not None:
+        away = departure()[some]
+        rate_in = -np.einsum("px,pqx->pq", doppler.velocity, away) / profile.at(depth(leg.point))[:, None]
+    there = (1.0 + rate_in) / ((1.0 - doppler.rate_out[:, None]) * (1.0 - of_array)) - 1.0
+    straight = np.einsum("px,pqx->pq", pose.turn_to_body(doppler.mirrored), turn) / c_array
+    both = there - doppler.stretch[:, None], rate_in - doppler.rate_in[:, None] - straight
+    found = np.zeros((2, len(of.stretch), SECOND_DEGREE))
+    for terms, values in zip(found, both, strict=True):
+        terms[some] = probe.fit_few(values)[0][:, :SECOND_DEGREE]
+    return found[0], found[1]
+
+
+def _later(terms: Floats, late: Floats, along: Floats | None) -> Floats:
+    """Delay terms (path, term) of bent rays, if there are any, with what is late, and without what is along the motion
+    of the array (path, xyz)."""
+    if terms.shape[1] and late.shape[1]:
+        terms = np.concatenate([terms[:, : late.shape[1]] + late, terms[:, late.shape[1] :]], axis=1)
+    if along is not None:
+        terms = terms.copy() if terms.shape[1] else np.zeros((len(terms), TERMS))
+        terms[:, 1:4] -= along
+    return terms
+
+
+def stretched(
+    made: Arrivals, legs: Legs, out: Outward, of: Carried, meeting: Meeting, profile: Profile, elements: Elements,
+    departure: Callable[[], Floats] | None = None, enough: float = 0.0,
+) -> Arrivals:  # fmt: skip
+    """Arrivals with their Doppler; legs and ways: those of `received` and `meets`.
+
+    An array that moves meets a wavefront later, or sooner, the farther it has still to go: delays over the aperture (m)
+    are longer by u.b/c, which goes into their linear terms. departure: makes the directions (path, FEW, xyz) in which
+    the first probes are seen from the facets, world; None for direct paths; enough: error of signals that is left, of
+    Doppler over the aperture.
+    """
+    if not len(made.delay):
+        return made
+    array = meeting.sonar
+    c, c_array = profile.at(depth(legs.point)), float(profile.at(depth(array.pose.position)))
+    rate_out, rate_in = dot(of.velocity, out.arrival) / c, -dot(of.velocity, legs.departure) / c
+    of_array = dot(legs.arrival, array.velocity) / c_array
+    stretch = (1.0 + rate_in) / ((1.0 - rate_out) * (1.0 - of_array)) - 1.0
+    doppler = _Doppler(of.velocity, mirrored(of.velocity, legs.bounces), rate_out, rate_in, of_array, stretch)
+    over, faster = _over_aperture(doppler, legs, array, profile, elements, departure, enough)
+    along = (of_array / (1.0 - of_array) * elements.aperture / c_array)[:, None] * legs.direction
+    moves = array.velocity.any() and elements.aperture > 0.0
+    terms = _later(made.delay_terms, of.late[:, None] * faster, along if moves else None)
+    return replace(made, stretch=stretch, stretch_terms=over, delay_terms=terms)

@@ -1,0 +1,202 @@
+"""Legs over the aperture: the wavefront of each leg and where each sensor is seen from, at probe sensors.
+
+In uniform water both follow from the image of the array, in refracting water from rays to the probes. Those of a family
+from one body vary smoothly with the facet, so that some facets, spread over the body, serve for all of them by
+polynomials over the body; held-out facets measure the error, and where it is too large every facet is traced.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.environment.sea import Environment, Profile
+from sonarsynth.equations.arrays.apertures import aperture_terms
+from sonarsynth.equations.kernels.row_products import row_products
+from sonarsynth.geometry import Pose
+from sonarsynth.receiver import Elements
+from sonarsynth.tracing.expansion.probe_paths import Made, Place, image, traced
+from sonarsynth.tracing.expansion.wavefront_polynomials import Terms, probes
+from sonarsynth.tracing.receive_paths import Legs
+
+if TYPE_CHECKING:
+    from sonarsynth.propagation import Propagation
+
+SAMPLES = 96
+"""Facets of a body and family that rays to the probes are traced from where that is enough; a quarter is held out."""
+SMOOTH_TIME = 1e-9
+"""s: largest error of a delay from facet to facet: 5e-4 rad at 85 kHz."""
+SMOOTH_PHASE = 5e-4
+"""rad: largest error of a phase of reflection from facet to facet."""
+SMOOTH_BLUR = 4e-15
+"""s2: largest error of a squared blur from facet to facet: 5e-4 of the amplitude at 85 kHz."""
+SMOOTH_GAIN = 1e-3
+"""Largest relative error of an amplitude from facet to facet."""
+SMOOTH_DIRECTION = 1e-4
+"""Largest error of a direction from facet to facet."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fronts:
+    """Legs over the aperture."""
+
+    terms: Terms  # (leg,)
+    legs: Legs
+    place: Place
+    probe_departure: Floats | None  # (leg, probe, xyz) world; None: towards the images of the probes
+    probe_gain: Floats | None  # (leg, probe); None: 1
+
+    def departure(self, rows: Ints, few: int | None = None) -> Floats:
+        """Where each probe, or the first few, is seen from the points of some legs: (row, probe, xyz), world."""
+        if self.probe_departure is not None:
+            return self.probe_departure[:, :few][rows]
+        return image(self.legs.select(rows), self.place.probe, self.place.sonar_pose, few)
+
+    def gain(self, rows: Ints, few: int | None = None) -> Floats:
+        """Amplitude at each probe, or the first few, over that of the sphere (row, probe); 1 in uniform water."""
+        if self.probe_gain is not None:
+            return self.probe_gain[:, :few][rows]
+        return np.broadcast_to(1.0, (len(rows), len(self.place.probe.sensor[:few])))
+
+
+@dataclass(frozen=True, eq=False)
+class Wavefronts:
+    """What the wavefronts of legs are made from: for all of them, or for some at a time, with the same result."""
+
+    legs: Legs
+    place: Place
+    families: tuple[tuple[Ints, Made | _Smooth | None], ...]  # legs of each; None: made from images
+    plain: bool  # uniform water, no reflections: all are spheres
+
+    def of(self, some: slice) -> Fronts:
+        """The wavefronts of some legs."""
+        legs = self.legs.select(some)
+        count = len(legs.row)
+        if self.plain:
+            return Fronts(Terms.none(count), legs, self.place, None, None)
+        made = Made.room(count, *self.place.probe.basis.shape)
+        for members, kept in self.families:
+            first, last = np.searchsorted(members, (some.start, some.stop))
+            rows = members[first:last] - some.start
+            if kept is None:
+                made.put(rows, traced(legs.select(rows), self.place))
+            elif isinstance(kept, _Smooth):
+                made.put(rows, kept.at(legs.point[rows]))
+            else:
+                made.put(rows, Made(**{name: value[first:last] for name, value in vars(kept).items()}))
+        none = np.empty((count, 0))
+        terms = none if self.place.profile.uniform and not made.terms.any() else made.terms
+        phase, blur = (value if value.any() else none for value in (made.phase, made.blur))
+        return Fronts(Terms(terms, phase, blur, made.error), legs, self.place, made.departure, made.gain)
+
+
+def fronts(
+    legs: Legs,
+    group: Ints,
+    environment: Environment,
+    profile: Profile,
+    sonar_pose: Pose,
+    elements: Elements,
+    propagation: Propagation,
+    band: tuple[float, float],
+    degree: int = 3,
+) -> Fronts:
+    """Wavefronts of all legs, as `wavefronts`."""
+    made = wavefronts(legs, group, environment, profile, sonar_pose, elements, propagation, band, degree)
+    return made.of(slice(0, len(legs.row)))
+
+
+def wavefronts(
+    legs: Legs,
+    group: Ints,
+    environment: Environment,
+    profile: Profile,
+    sonar_pose: Pose,
+    elements: Elements,
+    propagation: Propagation,
+    band: tuple[float, float],
+    degree: int = 3,
+) -> Wavefronts:
+    """Wavefronts of legs. group (leg,): legs of one body; band (Hz); degree: of their polynomials.
+
+    Reflections turn and blur the pulse by the grazing angle, which varies over the aperture. What the polynomials in
+    that miss is in `error`, as delays that are as much at the upper edge of the band.
+    """
+    place = Place(environment, profile, sonar_pose, probes(elements, degree), propagation, band)
+    if profile.uniform and not legs.bounces.any():
+        return Wavefronts(legs, place, (), True)
+    families: list[tuple[Ints, Made | _Smooth | None]] = []
+    for members in _families(legs, group):
+        if profile.uniform and not legs.bounces[members[0]]:
+            families.append((members, None))
+            continue
+        chosen = members[_spread(legs.point[members])]
+        exact = traced(legs.select(chosen), place)
+        kept: Made | _Smooth | None = exact
+        if len(chosen) < len(members):
+            kept = _over_body(legs.point[members], legs.point[chosen], exact, 2.0 * np.pi * band[1])
+        families.append((members, kept or traced(legs.select(members), place)))
+    return Wavefronts(legs, place, tuple(families), False)
+
+
+def _families(legs: Legs, group: Ints) -> list[Ints]:
+    """Indices of the legs of each body and family."""
+    up = legs.departure[:, 2] > 0
+    key = group.astype(np.int64)
+    for part in (legs.surface, legs.bottom, legs.turning, up * (legs.bounces + legs.turning > 0)):
+        key = key * (int(part.max(initial=0)) + 1) + part
+    order = np.argsort(key, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(key[order])) + 1) if len(order) else []
+
+
+def _spread(point: Floats) -> Ints:
+    """Some of many points: the extreme ones along each axis and others spread evenly through their order; else all."""
+    if len(point) <= 2 * SAMPLES:
+        return np.arange(len(point))
+    extreme = np.concatenate([point.argmin(axis=0), point.argmax(axis=0)])
+    golden = np.floor(np.mod(np.arange(SAMPLES) * 0.6180339887498949, 1.0) * len(point)).astype(int)
+    return np.unique(np.concatenate([extreme, golden]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Smooth:
+    """Legs of a family from anywhere on a body, by cubics."""
+
+    middle: Floats  # (xyz) m
+    half: Floats  # (xyz) m
+    coefficients: Floats  # (cubic, value): of the terms, gains and departures
+    parts: Ints  # (4,) where phases, blurs, gains and departures begin among them
+    error: float  # s
+
+    def at(self, point: Floats) -> Made:
+        """Legs from points (point, xyz), some of the family."""
+        found = row_products(aperture_terms((point - self.middle) / self.half, 1.0), self.coefficients)
+        terms, phase, blur, gain, away = np.split(found, self.parts, axis=1)
+        towards = away.reshape(*gain.shape, 3)
+        return Made(terms, phase, blur, gain, towards, np.full(len(point), self.error))
+
+
+def _over_body(point: Floats, sample: Floats, exact: Made, rate: float) -> _Smooth | None:
+    """Legs from points (point, xyz) of a body from those of a sample of them, by cubics; None if they err too much;
+    rate (rad/s): of the upper edge of the band."""
+    middle, half = 0.5 * (point.min(axis=0) + point.max(axis=0)), np.maximum(0.5 * np.ptp(point, axis=0), 1e-9)
+    at = aperture_terms((sample - middle) / half, 1.0)
+    degrees, sensors = exact.terms.shape[1], exact.gain.shape[1]
+    towards = exact.departure.reshape(len(sample), -1)
+    values = np.concatenate([exact.terms, exact.phase, exact.blur, exact.gain, towards], axis=1)
+    parts = np.cumsum([degrees, degrees, degrees, sensors])
+    if not np.isfinite(values).all():
+        return None
+    held = np.arange(len(sample)) % 4 == 3
+    coefficients = np.linalg.lstsq(at[~held], values[~held], rcond=1e-10)[0]
+    misfit = np.abs(at[held] @ coefficients - values[held]).max(axis=0)
+    wrong = np.split(misfit, parts)
+    late, turned, softer = (float(w.sum()) for w in wrong[:3])  # monomials over the aperture are at most 1
+    smooth = late <= SMOOTH_TIME and turned <= SMOOTH_PHASE and softer <= SMOOTH_BLUR
+    if not (smooth and wrong[3].max() <= SMOOTH_GAIN and wrong[4].max() <= SMOOTH_DIRECTION):
+        return None
+    error = late + turned / rate + 0.5 * rate * softer + float(exact.error.max())
+    return _Smooth(middle, half, coefficients, parts, error)

@@ -1,0 +1,162 @@
+"""Legs at the probe sensors of an array, each of them traced."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, Ints, depth
+from sonarsynth.environment.sea import Environment, Profile
+from sonarsynth.equations.rays.ray_solutions import water
+from sonarsynth.equations.scattering.lobes import dot
+from sonarsynth.geometry import Pose
+from sonarsynth.propagation.reflections import at_boundaries
+from sonarsynth.tracing.expansion.wavefront_polynomials import BRANCH, Probes, pick_branch, sphere
+from sonarsynth.tracing.receive_paths import Legs
+
+if TYPE_CHECKING:
+    from sonarsynth.propagation import Propagation
+
+
+TERMS = 20
+"""Terms over the aperture (`acoustics.arrays.aperture_terms`)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where legs go, and through what."""
+
+    environment: Environment
+    profile: Profile
+    sonar_pose: Pose
+    probe: Probes
+    propagation: Propagation
+    band: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """Legs at the probes."""
+
+    terms: Floats  # (leg, term) s: delay over the sphere's
+    phase: Floats  # (leg, term) rad: of reflections, over that at the centre
+    blur: Floats  # (leg, term) s2: its square, over that at the centre
+    gain: Floats  # (leg, probe)
+    departure: Floats  # (leg, probe, xyz)
+    error: Floats  # (leg,) s
+
+    @staticmethod
+    def room(count: int, sensors: int, degrees: int) -> Made:
+        """Room for so many, at so many probes, with so many terms."""
+        terms, phase, blur = np.zeros((3, count, degrees))
+        return Made(terms, phase, blur, np.ones((count, sensors)), np.zeros((count, sensors, 3)), np.zeros(count))
+
+    def put(self, rows: Ints, made: Made) -> None:
+        """Write some of them."""
+        for name, value in vars(made).items():
+            getattr(self, name)[rows] = value
+
+
+def traced(legs: Legs, place: Place) -> Made:
+    """Legs at the probes, each of them traced."""
+    environment, profile, band = place.environment, place.profile, place.band
+    made = Made.room(len(legs.row), *place.probe.basis.shape)
+    if profile.uniform:
+        departure, left, gain = image(legs, place.probe, place.sonar_pose), np.zeros(made.gain.shape), made.gain
+        if not legs.bounces.any():
+            return replace(made, departure=departure)
+    else:
+        left, gain, departure = rays_to_probes(
+            legs, environment, profile, place.sonar_pose, place.probe, place.propagation
+        )
+    probe, rate = place.probe, 2.0 * np.pi * band[1]
+    turned, loss, softer = _boundaries(legs, departure, environment, profile, 0.5 * (band[0] + band[1]))
+    turned, softer = (np.where(np.isnan(left), np.nan, value) for value in (turned, softer))
+    terms, phase, blur = probe.fit(left), probe.fit(turned), probe.fit(softer)
+    error = probe.misfit(left, terms) + probe.misfit(turned, phase) / rate + probe.misfit(softer, blur) * 0.5 * rate
+    return Made(terms, phase, blur, gain * loss, departure, error)
+
+
+def image(legs: Legs, probe: Probes, sonar_pose: Pose, few: int | None = None) -> Floats:
+    """Unit vectors (leg, probe, xyz) from each point to the image of each probe, as far as the ray is long."""
+    offset = sonar_pose.turn_to_world(probe.position)[:few]
+    mirror = np.where(legs.bounces % 2 == 1, -1.0, 1.0)
+    span = (legs.length[:, None] * legs.departure)[:, None, :] + offset
+    span[:, :, 2] += (mirror - 1.0)[:, None] * offset[:, 2]
+    return np.asarray(span / np.sqrt(dot(span, span))[..., None])
+
+
+def _boundaries(
+    legs: Legs, departure: Floats, environment: Environment, profile: Profile, centre: float
+) -> tuple[Floats, Floats, Floats]:
+    """Phase (leg, probe) that the reflections to each probe add to those to the centre, ratio of their moduli, and
+    what their squared blurs (s2) add; centre: of the band (Hz)."""
+    shape = departure.shape[:2]
+    shift, ratio, softer = np.zeros(shape), np.ones(shape), np.zeros(shape)
+    some = np.flatnonzero(legs.bounces > 0)
+    if not len(some):
+        return shift, ratio, softer
+    p = np.hypot(departure[some, :, 0], departure[some, :, 1]) / profile.at(depth(legs.point[some]))[:, None]
+    surface, bottom = (np.repeat(n[some, None], p.shape[1], axis=1) for n in (legs.surface, legs.bottom))
+    angles = [np.arccos(np.minimum(p * float(profile.at(z)), 1.0)) for z in (0.0, environment.depth)]
+    seen = at_boundaries(environment, profile, angles[0], surface, angles[1], bottom, centre)
+    turned = seen.phase - (legs.phase - 0.5 * np.pi * legs.caustics)[some, None]
+    shift[some] = turned - 2.0 * np.pi * np.rint(turned / (2.0 * np.pi))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio[some] = np.where(legs.boundary[some, None] > 0, seen.modulus / legs.boundary[some, None], 1.0)
+    softer[some] = seen.blur**2 - legs.blur[some, None] ** 2
+    return shift, ratio, softer
+
+
+def rays_to_probes(
+    legs: Legs, environment: Environment, profile: Profile, sonar_pose: Pose, probe: Probes, propagation: Propagation
+) -> tuple[Floats, Floats, Floats]:
+    """Delay over the sphere's (s), gain over it (leg, probe), departure (leg, probe, xyz): rays to every probe."""
+    from sonarsynth.equations.rays import ray_continuation
+
+    position = sonar_pose.to_world(probe.position)
+    layers = water(profile.depth, profile.speed, environment.depth)
+    count, sensors = len(legs.row), len(position)
+    z, ends = np.clip(depth(legs.point), 0.0, environment.depth), np.clip(depth(position), 0.0, environment.depth)
+    c_start = np.interp(z, layers.depth, layers.speed)
+    level = position[None, :, :2] - legs.point[:, None, :2]
+    distance = np.hypot(level[..., 0], level[..., 1])
+    time, sine, spreading = (np.empty((count, sensors)) for _ in range(3))
+    ray_continuation.rays_nearby(
+        layers.depth, layers.speed, z, np.hypot(legs.departure[:, 0], legs.departure[:, 1]) / c_start,
+        (legs.departure[:, 2] > 0).astype(np.int64), legs.bounces + legs.turning, np.arange(sensors), ends, distance,
+        time, sine, spreading,
+    )  # fmt: skip
+    ahead = np.divide(level, distance[..., None], out=np.zeros_like(level), where=distance[..., None] > 0)
+    cosine = np.sqrt(np.maximum((1.0 - sine) * (1.0 + sine), 0.0))
+    departure = np.concatenate([ahead * cosine[..., None], sine[..., None]], axis=2)
+    c = float(profile.at(depth(sonar_pose.position)))
+    farther = sphere(legs.direction, legs.radius, probe.position)
+    predicted = legs.travel_time[:, None] + farther / c
+    lost = np.flatnonzero(np.isnan(time).any(axis=1))
+    if len(lost):
+        some = legs.select(lost)
+        found = _searched(
+            some, position, predicted[lost], BRANCH * probe.aperture / c, environment, profile, propagation
+        )
+        time[lost], spreading[lost] = found[0], found[1]
+        departure[lost] = np.where(np.isnan(found[0])[..., None], some.departure[:, None, :], found[2])
+    expected = legs.spreading[:, None] * legs.radius[:, None] / (legs.radius[:, None] + farther)
+    return time - predicted, spreading / expected, departure
+
+
+def _searched(
+    legs: Legs, position: Floats, predicted: Floats, tolerance: float, environment: Environment, profile: Profile,
+    propagation: Propagation,
+) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    """Time, spreading (leg, probe) and departure of the rays nearest in time among all; NaN where there is none."""
+    count, sensors = predicted.shape
+    start, end = np.repeat(legs.point, sensors, axis=0), np.tile(position, (count, 1))
+    paths = propagation.connect(profile, environment.depth, start, end)
+    same = (paths.surface == legs.surface[paths.pair // sensors]) & (paths.bottom == legs.bottom[paths.pair // sensors])
+    found = pick_branch(paths, predicted, tolerance, same)
+    missing = found < 0
+    time = np.where(missing, np.nan, paths.travel_time[found])
+    return time, np.where(missing, np.nan, paths.spreading[found]), paths.departure[found]

@@ -1,0 +1,48 @@
+"""Echoes that come from a point beside the middle of their facet, as those of rough ones do, over the aperture.
+
+What the point is nearer or farther than the middle differs from hydrophone to hydrophone: by its distance from there
+over that from the array, times the aperture. The wavefront is that of the point, not of the middle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, Ints, depth
+from sonarsynth.equations.scattering.lobes import dot
+from sonarsynth.geometry import Pose
+from sonarsynth.products import Arrivals
+from sonarsynth.tracing.expansion.wavefront_polynomials import Terms, probes
+from sonarsynth.tracing.receive_paths import Legs
+
+if TYPE_CHECKING:
+    from sonarsynth.tracing.arrivals import ArrayLegs
+
+
+def from_spots(made: Arrivals, legs: Legs, spot: Floats, sonar_pose: Pose) -> Arrivals:
+    """Arrivals through uniform water that seem to come from points `spot` (path, xyz) m, world, off the start of their
+    legs, or from the images of these: exact."""
+    some = np.flatnonzero(spot.any(axis=1))
+    mirrored = spot[some]
+    mirrored[legs.bounces[some] % 2 == 1, 2] *= -1.0
+    seen = made.radius[some, None] * made.direction[some] + sonar_pose.turn_to_body(mirrored)
+    direction, radius = made.direction.copy(), made.radius.copy()
+    radius[some] = np.sqrt(dot(seen, seen))
+    direction[some] = seen / radius[some, None]
+    return replace(made, direction=direction, radius=radius)
+
+
+def delayed_by_spots(over: Terms, array: ArrayLegs, leg: Ints, spot: Floats) -> Terms:
+    """Wavefronts of paths by legs (path,) through water that bends them, with what points `spot` (path, xyz) m, world,
+    are farther from each hydrophone, beside the array centre: by the directions in which rays leave, for points much
+    nearer to the middle than to the array."""
+    some = np.flatnonzero(spot.any(axis=1))
+    away = array.fronts.departure(leg[some]) - array.legs.departure[leg[some], None]
+    speed = array.profile.at(depth(array.legs.point[leg[some]]))
+    late = -dot(spot[some, None], away) / speed[:, None]
+    delay = over.delay.copy()
+    delay[some] += probes(array.elements, array.degree).fit(late)
+    return over._replace(delay=delay)

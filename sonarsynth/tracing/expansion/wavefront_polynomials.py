@@ -1,0 +1,136 @@
+"""The wavefront of a path over the aperture: a reference sphere and a polynomial for what it leaves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.equations.arrays.apertures import aperture_terms
+from sonarsynth.equations.kernels.row_products import row_products
+from sonarsynth.products import Paths
+from sonarsynth.receiver import Elements
+
+HELD_OUT = 3
+"""Probes that only measure the error of a fit; those that it is fitted to are as many and as three in ten more."""
+FEW = 9
+"""Probes, the first ones, that a polynomial of the second degree is fitted to and measured at."""
+SECOND_DEGREE = 10
+"""Terms up to the second degree."""
+BRANCH = 0.05
+"""Largest misfit of a probe to the sphere, in travel times over the aperture: a path farther off is another branch."""
+
+
+@dataclass(frozen=True, eq=False)
+class Probes:
+    """Sensors spread over the aperture, edge first, at which rays are traced exactly."""
+
+    sensor: Ints  # (probe,) the fitted ones first
+    position: Floats  # (probe, xyz) m, sonar frame
+    fitted: int
+    solve: Floats  # (term, fitted): values at the fitted probes to coefficients; the row of the constant term is 0
+    basis: Floats  # (probe, term)
+    aperture: float  # m
+    solve_few: Floats  # (term, probe): as solve, from the first of FEW probes to terms up to the second degree
+
+    def fit(self, values: Floats) -> Floats:
+        """Coefficients (path, term) of the least-squares polynomial, 0 at the centre, through values (path, probe).
+
+        Values that are NaN (no ray there) are left out.
+        """
+        fitted = values[:, : self.fitted]
+        terms = row_products(np.nan_to_num(fitted), self.solve.T)
+        for i in np.flatnonzero(np.isnan(fitted).any(axis=1)):
+            there = np.isfinite(fitted[i])
+            terms[i, 1:] = np.linalg.lstsq(self.basis[: self.fitted][there, 1:], fitted[i, there], rcond=1e-10)[0]
+        return terms
+
+    def fit_few(self, values: Floats) -> tuple[Floats, Floats]:
+        """Coefficients (path, term) of the second degree through values (path, FEW), and misfit (path,) there."""
+        few = row_products(values[:, : self.solve_few.shape[1]], self.solve_few.T)
+        terms = np.concatenate([few, np.zeros((len(few), self.basis.shape[1] - few.shape[1]))], axis=1)
+        return terms, self.misfit(values, terms)
+
+    def misfit(self, values: Floats, terms: Floats) -> Floats:
+        """Largest |error| (path,) at the probes, those held out as well; inf where a ray is missing.
+
+        A measurement at some places, not a bound: kinks of a profile within the aperture were seen to err twice as much
+        between the probes.
+        """
+        basis = self.basis[: values.shape[1], : terms.shape[1]]
+        error = np.abs(values - row_products(terms, basis.T)).max(axis=1, initial=0.0)
+        return np.where(np.isnan(values).any(axis=1), np.inf, error)
+
+
+class Terms(NamedTuple):
+    """How paths vary over the aperture: polynomials, without columns where there is nothing to say."""
+
+    delay: Floats  # (path, term) s: over the sphere's
+    phase: Floats  # (path, term) rad: of reflections, over that of the centre
+    blur: Floats  # (path, term) s2: squares of blurs, over that of the centre
+    error: Floats  # (path,) s: misfit of the wavefront at the probes, the held-out ones among them
+
+    @staticmethod
+    def none(count: int) -> Terms:
+        """Of spheres, all alike."""
+        nothing = np.empty((count, 0))
+        return Terms(nothing, nothing, nothing, np.zeros(count))
+
+    def select(self, rows: Bools | Ints) -> Terms:
+        """The paths picked by a mask or by indices."""
+        return Terms(*(value[rows] for value in self))
+
+
+def terms_of(degree: int) -> int:
+    """How many aperture terms there are up to a degree."""
+    return (degree + 1) * (degree + 2) * (degree + 3) // 6
+
+
+@lru_cache(maxsize=1024)
+def probes(elements: Elements, degree: int = 3) -> Probes:
+    """Probe sensors of an array for polynomials of a degree: each the one farthest from those before it, from the
+    element farthest out."""
+    position = elements.position
+    scale = elements.aperture or 1.0  # one element at the centre has no aperture, and no terms but 0
+    terms = terms_of(degree)
+    rank = int(np.linalg.matrix_rank(aperture_terms(position, scale, terms)[:, 1:]))
+    wanted = int(np.ceil(1.3 * rank)) + HELD_OUT
+    chosen = [int(np.argmax(np.linalg.norm(position, axis=1)))]
+    nearest = np.full(len(position), np.inf)
+    for _ in range(min(wanted, elements.count) - 1):
+        nearest = np.minimum(nearest, np.linalg.norm(position - position[chosen[-1]], axis=1))
+        chosen.append(int(np.argmax(nearest)))
+    sensor = np.array(chosen)
+    fitted = max(len(sensor) - HELD_OUT, min(rank, len(sensor)), 1)
+    basis = aperture_terms(position[sensor], scale, terms)
+    solve = np.vstack([np.zeros(fitted), np.linalg.pinv(basis[:fitted, 1:], rcond=1e-10)])
+    few = max(min(FEW, len(sensor)) - HELD_OUT, 1)
+    second = np.linalg.pinv(basis[:few, 1:SECOND_DEGREE], rcond=1e-10)
+    return Probes(sensor, position[sensor], fitted, solve, basis, scale, np.vstack([np.zeros(few), second]))
+
+
+def sphere(direction: Floats, radius: Floats, position: Floats) -> Floats:
+    """Distance (path, probe) from the centre of the reference sphere R d to a position q, less R, without cancellation.
+
+    |R d - q| - R = (q.q - 2 R d.q)/(|R d - q| + R).
+    """
+    source = radius[:, None] * direction
+    square = (position * position).sum(axis=1) - row_products(2.0 * source, position.T)
+    return np.asarray(square / (np.sqrt(radius[:, None] ** 2 + square) + radius[:, None]))
+
+
+def pick_branch(paths: Paths, predicted: Floats, tolerance: float, allowed: Bools) -> Ints:
+    """Index (row, probe) of the path nearest in time to predicted (row, probe); -1 where none is within tolerance (s).
+
+    Pair n of paths is row n // probes, probe n % probes; allowed: (path,) which count.
+    """
+    best = np.full(predicted.size, -1)
+    wanted = np.abs(paths.travel_time - predicted.ravel()[paths.pair])
+    order = np.flatnonzero((wanted <= tolerance) & allowed)
+    if (np.diff(paths.pair) == 0).any():
+        order = order[np.argsort(-wanted[order], kind="stable")]  # the nearest is written last, and stays
+    best[paths.pair[order]] = order
+    return best.reshape(predicted.shape)

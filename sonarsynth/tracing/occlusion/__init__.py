@@ -1,0 +1,1 @@
+"""Who is hidden from whom: by each ray and for each sensor."""

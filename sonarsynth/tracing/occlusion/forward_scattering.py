@@ -1,0 +1,61 @@
+"""Sound that passes a body which scatters it forward: legs of the wave that makes the shadow.
+
+Behind such a body the direct wave is left as it is, and the shadow wave of the facets that the snap lights cancels it
+(Babinet); beyond, both are the forward lobe. Ways to the facets and legs from them are those of all families, so that
+what reaches the array by surface or bed, before or after the body, is cancelled as well. The shadow wave goes through
+the body that sends it, and through all others that scatter forward: one that stands in the shadow of another is lit by
+none of the sound that the first takes away. Bodies that block hide its facets from the array as they hide the snap.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.casting.ray_casting import inside
+from sonarsynth.conventions import Floats
+from sonarsynth.geometry.placed_target import Body
+from sonarsynth.scattering import Kirchhoff, Part, ScatteringLaw
+from sonarsynth.scattering.components import Shadow
+from sonarsynth.tracing.expansion.array_expansion import wavefronts
+from sonarsynth.tracing.receive_paths import facets_of, rays_to_centre
+
+if TYPE_CHECKING:
+    from sonarsynth.tracing.arrivals import ArrayLegs
+
+
+def shadow_parts(law: ScatteringLaw) -> tuple[Part, ...]:
+    """What facets send beside echoes; nothing unless the law scatters forward."""
+    return (Shadow(),) if isinstance(law, Kirchhoff) and law.forward == "scattered" else ()
+
+
+def opaque(bodies: tuple[Body, ...], laws: tuple[ScatteringLaw, ...], source: Floats | None = None) -> tuple[Body, ...]:
+    """The bodies that sound does not pass on its way to the array, with any that its source (xyz) is inside of."""
+    return tuple(
+        body
+        for body, law in zip(bodies, laws, strict=True)
+        if not shadow_parts(law) or (source is not None and inside(body, source))
+    )
+
+
+def forward_legs(array: ArrayLegs, laws: tuple[ScatteringLaw, ...]) -> ArrayLegs | None:
+    """Facet to array, for every facet of the bodies that scatter forward, seen or not; None where there is none."""
+    solid = opaque(array.bodies, laws)
+    if len(solid) == len(array.bodies):
+        return None
+    environment, profile, pose, propagation = array.environment, array.profile, array.sonar_pose, array.propagation
+    every = facets_of(array.bodies, slice(0, sum(len(body.mesh.faces) for body in array.bodies)))
+    mine = range(len(laws)) if array.targets is None else array.targets
+    scatters = np.array([bool(shadow_parts(law)) and number in mine for number, law in enumerate(laws)])
+    every = every.select(scatters[every.target])
+    legs = rays_to_centre(environment, profile, every.point, pose, propagation, array.centre)
+    view = array.view(solid)
+    legs = view.visible(legs, every.clear[legs.row], None)
+    legs = view.settled(legs, every.clear[legs.row], None)
+    kept, row = np.unique(legs.row, return_inverse=True)
+    legs, facets = legs.numbered(row), every.select(kept)
+    group = facets.target[legs.row]
+    over = wavefronts(legs, group, environment, array.bending, pose, array.elements, propagation, array.band)
+    return replace(array, legs=legs, wavefronts=over, facets=facets)

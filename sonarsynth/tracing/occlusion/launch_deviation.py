@@ -1,0 +1,96 @@
+"""Where bent rays leave for hydrophones: beside the directions towards the images of these, beside that of the centre.
+
+Those directions are what straight rays have. In water that bends rays they are off by the size of the array over the
+distance, times what the rays' spreading differs from that of straight ones.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.conventions import Bools, Floats, depth
+from sonarsynth.environment.sea import Environment, Profile
+from sonarsynth.equations.arrays.apertures import aperture_terms
+from sonarsynth.equations.scattering.lobes import dot
+from sonarsynth.geometry import Pose
+from sonarsynth.receiver import Elements
+from sonarsynth.tracing.expansion.probe_paths import rays_to_probes
+from sonarsynth.tracing.expansion.wavefront_polynomials import probes, terms_of
+from sonarsynth.tracing.receive_paths import Legs
+
+if TYPE_CHECKING:
+    from sonarsynth.propagation import Propagation
+
+SAME = 1e-9
+"""Largest distance of two directions of one ray, found in two ways."""
+
+
+def swerves(
+    legs: Legs, points: Floats, environment: Environment, profile: Profile, sonar_pose: Pose, elements: Elements,
+    propagation: Propagation, degree: int,
+) -> Floats:  # fmt: skip
+    """(leg, point, xyz) what is between the directions in which rays leave for points (point, xyz) m of the sonar
+    frame, on the aperture, and those towards their images; profile: what bends them.
+
+    Polynomials of a degree through rays to the probes of the aperture: arcs where these do not leave a layer of
+    constant gradient, others traced. Where a probe has no ray, it is taken to be where straight ones are.
+    """
+    probe = probes(elements, degree)
+    offset = sonar_pose.turn_to_world(probe.position)
+    away, arc = _arcs(legs, sonar_pose.position, offset, environment, profile)
+    image = towards(legs, offset)
+    rest = np.flatnonzero(~arc)
+    if len(rest):
+        left, _, bent = rays_to_probes(legs.select(rest), environment, profile, sonar_pose, probe, propagation)
+        away[rest] = np.where(np.isnan(left)[..., None], image[rest], bent)
+    away -= image
+    basis = aperture_terms(points, probe.aperture, terms_of(degree))
+    coefficients = np.einsum("tp,lpx->ltx", probe.solve, away[:, : probe.fitted], optimize=True)
+    return np.asarray(np.matmul(basis, coefficients))
+
+
+def towards(legs: Legs, offset: Floats) -> Floats:
+    """Unit vectors (leg, point, xyz) from the starts of legs to the images of places beside the centre (point, xyz),
+    world."""
+    ahead = (legs.length[:, None] * legs.departure)[:, None] + offset
+    odd = np.asarray(legs.bounces % 2 == 1)
+    ahead[odd, :, 2] -= 2.0 * offset[:, 2]  # of the mirrored array
+    return np.asarray(ahead / np.maximum(np.sqrt(dot(ahead, ahead)), 1e-300)[..., None])
+
+
+def _arcs(
+    legs: Legs, centre: Floats, offset: Floats, environment: Environment, profile: Profile
+) -> tuple[Floats, Bools]:
+    """Directions (leg, point, xyz) of rays to places beside the centre (point, xyz) m, world, of legs that keep to one
+    layer, with some room; and which (leg,) legs these are.
+
+    In a layer of constant gradient g the centre of the circle is at the depth where c would be 0 and equally far from
+    both ends, so the tangent of the grazing angle at the start, down positive, is (dz (c + c') / X + g X) / 2 c.
+    """
+    made = np.zeros((len(legs.row), len(offset), 3))
+    nodes, speed = profile.depth, profile.speed
+    ends = np.append(depth(centre + offset), depth(centre))
+    layer = np.searchsorted(nodes, ends.min(), "right") - 1
+    if layer < 0 or layer + 1 >= len(nodes):
+        return made, np.zeros(len(legs.row), bool)
+    top, low = float(nodes[layer]), min(float(nodes[layer + 1]), environment.depth)
+    gradient = float((speed[layer + 1] - speed[layer]) / (nodes[layer + 1] - top))
+    z = depth(legs.point)
+    bow = abs(gradient) / float(speed[layer : layer + 2].min()) * (legs.length + np.abs(offset).sum(axis=1).max()) ** 2
+    within = (np.minimum(z, ends.min()) - bow >= top) & (np.maximum(z, ends.max()) + bow <= low)
+    some = np.flatnonzero(within & (legs.bounces == 0))
+    to = np.concatenate([np.zeros((1, 3)), offset])[None] + (centre - legs.point[some])[:, None]
+    level = np.hypot(to[..., 0], to[..., 1])
+    c = (float(speed[layer]) + gradient * (z[some] - top))[:, None]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        down = 0.5 * (-to[..., 2] * (2.0 - gradient * to[..., 2] / c) / level + gradient * level / c)
+        cosine = 1.0 / np.hypot(1.0, down)
+        ahead = np.concatenate([to[..., :2] * (cosine / level)[..., None], (-down * cosine)[..., None]], axis=2)
+        known = np.abs(ahead[:, 0] - legs.departure[some]).max(axis=1) <= SAME
+    known &= np.isfinite(ahead).all(axis=(1, 2))
+    made[some[known]] = ahead[known, 1:]
+    found = np.zeros(len(legs.row), bool)
+    found[some[known]] = True
+    return made, found

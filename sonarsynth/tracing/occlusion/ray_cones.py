@@ -1,0 +1,251 @@
+"""Which rays a body stands in the way of: bent and reflected ones by the chords that keep to them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonarsynth.casting.ray_casting import enclosing, occluded
+from sonarsynth.conventions import Bools, Floats, Ints, depth
+from sonarsynth.environment.sea import Environment, Profile
+from sonarsynth.equations.rays.ray_solutions import water
+from sonarsynth.geometry.placed_target import Body
+
+BOW = 1e-3
+"""Largest distance (m) of a bent ray from the chords that stand for it when it is tested against bodies."""
+
+
+def hidden(
+    bodies: tuple[Body, ...],
+    environment: Environment,
+    profile: Profile,
+    start: Floats,
+    end: Floats,
+    departure: Floats,
+    length: Floats,
+    bounces: Ints | None = None,
+    turning: Ints | None = None,
+) -> Bools:
+    """Whether a body stands in rays (ray, xyz) that leave start in direction departure and end after length (m) at end.
+
+    bounces, turning (ray,): their reflections from surface and bed, and turning points. Straight rays and reflections
+    in uniform water are exact; bent rays are followed by chords within `BOW`, but only where they may pass a body: no
+    ray is farther from the straight line between its ends, unfolded at its reflections, than its largest curvature
+    allows.
+    """
+    blocked = np.zeros(len(start), bool)
+    if not bodies or not len(start):
+        return blocked
+    times = np.zeros(len(start), np.int64) if bounces is None else bounces
+    bow = _curvature(profile) * length**2 / 8.0
+    broken = (bow > BOW) | (times > 0)
+    blocked[~broken] = occluded(bodies, start[~broken], end[~broken])
+    rest = np.flatnonzero(broken)
+    whole, first = _near(bodies, environment, start[rest], end[rest], departure[rest], times[rest], bow[rest])
+    if turning is not None:
+        whole |= (times[rest] > 0) & (turning[rest] > 0)  # which boundary comes first, a turn may have changed
+    for some, part in ((rest[whole], length[rest[whole]]), (rest[~whole], np.minimum(first, length[rest])[~whole])):
+        leaves = np.flatnonzero(part > 0.0)
+        rows = some[leaves]
+        blocked[rows] = _along_chords(
+            bodies, environment, profile, start[rows], end[rows], departure[rows], part[leaves], length[rows]
+        )
+    return blocked
+
+
+def bundles(
+    bodies: tuple[Body, ...],
+    environment: Environment,
+    profile: Profile,
+    start: Floats,
+    end: Floats,
+    departure: Floats,
+    length: Floats,
+    spread: Floats,
+    bounces: Ints,
+    turning: Ints,
+    swerve: Floats | float = 0.0,
+) -> tuple[Floats, Floats, Floats]:
+    """Cones that hold what `hidden` looks at of all rays to within `spread` (ray,) m of some: slope, and how far (m)
+    along the departure bodies may be met, and surely would be if they close the cone, (ray,) each.
+
+    Arguments as of `hidden`, for the rays to the middle; those beside them, unfolded, end within `spread` of them and
+    leave as straight rays to there would, but for `swerve` (ray,) rad. The slope is NaN where no cone is certain: of
+    reflected rays that may meet a body again.
+    """
+    longest, shortest = length + spread, length - spread
+    bow = _curvature(profile) * longest**2 / 8.0
+    straight = (bounces == 0) & (_curvature(profile) * shortest**2 <= 8.0 * BOW)  # some of them
+    again, first = _near(bodies, environment, start, end, departure, bounces, bow + spread)
+    whole = straight | again | ((bounces > 0) & (turning > 0))
+    reach = np.where(whole, longest, np.minimum(first, longest))
+    with np.errstate(invalid="ignore", over="ignore"):  # where the speed jumps, rays bend by any angle
+        far = 0.98 * np.where(whole, shortest, np.minimum(first - 2.0 * (bow + spread), shortest))
+        angle = _subtended(spread, length) + 0.5 * _curvature_about(profile, depth(start), reach) * reach + swerve
+    ahead = end - start
+    distance = np.linalg.norm(ahead, axis=1)
+    off = np.linalg.norm(np.cross(departure, ahead), axis=1) / np.maximum(distance, 1e-300)
+    angle = np.where(whole, np.maximum(angle, np.arcsin(np.minimum(off, 1.0)) + _subtended(spread, distance)), angle)
+    slope = 1.02 * np.tan(np.minimum(angle, 0.5)) + 2e-5  # more than what casting may err by
+    room = np.where(departure[:, 2] > 0.0, -start[:, 2], environment.depth + start[:, 2])
+    bounced = (bounces > 0) & (whole | (reach * (np.abs(departure[:, 2]) + slope) >= room))
+    return (
+        np.where(bounced | (angle > 0.4) | (bounces > 0) & (np.abs(departure[:, 2]) <= slope), np.nan, slope),
+        reach,
+        far,
+    )
+
+
+def most_swerve(
+    bed: float,
+    profile: Profile,
+    start: Floats,
+    end: float,
+    departure: Floats,
+    length: Floats,
+    spreading: Floats,
+    surface: Ints,
+    bottom: Ints,
+    turning: Ints,
+    spread: Floats | float,
+) -> Floats:
+    """By how much (ray,) rad rays to within `spread` (m) of the end of some leave beside where the ends of straight
+    rays are, at most; 0 in uniform water.
+
+    bed, end (m): depths, of the ends; spreading (ray,) 1/m; surface, bottom, turning (ray,): of the rays, and of those
+    beside them. A ray leaves within half of its length times its largest curvature of the straight line to its end,
+    unfolded at reflections. Where rays are nowhere nearly level, how far ends are apart for an angle at the start
+    varies slowly: twice what it is for the ray to the middle, by its spreading, and what it may vary by.
+    """
+    if profile.uniform:
+        return np.zeros(len(start))
+    z, speed = depth(start), profile.at(np.append(profile.depth[profile.depth < bed], bed))
+    slowest, fastest = float(speed.min()), float(speed.max())
+    top = np.where((surface > 0) | (turning > 0), 0.0, np.minimum(z, end - spread))
+    low = np.where((bottom > 0) | (turning > 0), bed, np.maximum(z, end + spread))
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        bend = _curvature_about(profile, 0.5 * (top + low), 0.5 * (low - top))
+        bound = bend * (length + spread) * length / np.maximum(length - spread, 0.0)
+        sine2 = 1.0 - (np.hypot(departure[:, 0], departure[:, 1]) / profile.at(z) * fastest) ** 2
+        apart, uneven = spread / length, fastest / slowest - 1.0
+        unlike = 2.0 * np.abs((spreading * length) ** 2 - 1.0) + uneven * (1.0 + 4.0 * apart / sine2**1.5)
+    nowhere_level = (turning == 0) & (sine2 > (8.0 * spread / np.maximum(length, 1e-300)) ** 2)
+    bound = np.fmin(np.nan_to_num(bound, nan=2.0), np.where(nowhere_level, apart * unlike, 2.0))
+    return np.asarray(np.minimum(bound, 2.0))
+
+
+def _subtended(radius: Floats, distance: Floats) -> Floats:
+    """Half of the angle (rad) that a ball is seen under; a right angle from within."""
+    return np.asarray(np.arcsin(np.minimum(radius / np.maximum(distance, 1e-300), 1.0)))
+
+
+def _curvature_about(profile: Profile, middle: Floats, reach: Floats) -> Floats:
+    """Largest curvature (1/m) of rays within `reach` (m) of some depths (ray,)."""
+    if profile.uniform or len(profile.depth) < 2:
+        return np.full(len(middle), _curvature(profile))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bend = np.nan_to_num(np.abs(np.diff(profile.speed)) / np.diff(profile.depth), posinf=np.inf)
+    bend /= float(profile.speed.min())
+    first = np.clip(np.searchsorted(profile.depth, middle - reach, "right") - 1, 0, len(bend) - 1)
+    last = np.clip(np.searchsorted(profile.depth, middle + reach, "left"), first + 1, len(bend))
+    most, step, level = [bend], 1, np.frexp(last - first)[1] - 1  # largest of 1, 2, 4, ... layers from each on
+    while 2 * step <= len(bend):
+        most.append(np.maximum(most[-1], np.append(most[-1][step:], np.zeros(min(step, len(bend))))))
+        step *= 2
+    level = np.minimum(level, len(most) - 1)
+    table = np.stack(most)
+    return np.asarray(np.maximum(table[level, first], table[level, last - (1 << level)]))
+
+
+def overlapping(bodies: tuple[Body, ...]) -> list[tuple[int, tuple[Body, ...]]]:
+    """Bodies that may lie in or on others that come before them: number, and those others.
+
+    Of facets that coincide neither hides the other from a ray that starts off both; one that starts under them does.
+    """
+    if len(bodies) < 2:
+        return []
+    centres, radii = (np.array(column) for column in zip(*map(enclosing, bodies), strict=True))
+    apart = np.linalg.norm(centres[:, None] - centres, axis=-1)
+    near = np.tril(apart < radii[:, None] + radii, -1)
+    return [
+        (number, tuple(bodies[n] for n in np.flatnonzero(near[number])))
+        for number in np.flatnonzero(near.any(axis=1)).tolist()
+    ]
+
+
+def _curvature(profile: Profile) -> float:
+    """Largest curvature (1/m) of any ray."""
+    if profile.uniform:
+        return 0.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gradient = np.abs(np.diff(profile.speed)) / np.diff(profile.depth)
+    return float(np.nanmax(gradient, initial=0.0)) / float(profile.speed.min())
+
+
+def _near(
+    bodies: tuple[Body, ...], environment: Environment, start: Floats, end: Floats, departure: Floats, bounces: Ints,
+    bow: Floats,
+) -> tuple[Bools, Floats]:  # fmt: skip
+    """Which rays (ray,) may pass a body far from their start, and how far from it (m) others may still be in one."""
+    from sonarsynth.casting import intersections
+
+    far, first = np.zeros(len(start), bool), np.zeros(len(start))
+    for body in bodies:
+        centre, radius = enclosing(body)
+        inside = np.linalg.norm(start - centre, axis=1) <= radius
+        leave = np.where(inside, 2.0 * (radius + bow), 0.0)
+        near = np.empty(len(start), bool)
+        intersections.folded_pass_near(
+            start, end, departure[:, 2] > 0, bounces, environment.depth, leave, bow, centre, radius, near
+        )
+        far |= near
+        first = np.maximum(first, leave)
+    return far, first
+
+
+def _along_chords(
+    bodies: tuple[Body, ...],
+    environment: Environment,
+    profile: Profile,
+    start: Floats,
+    end: Floats,
+    departure: Floats,
+    part: Floats,
+    length: Floats,
+) -> Bools:
+    """Whether a body stands in a chord of the first `part` (ray,) m of each ray."""
+    blocked = np.zeros(len(start), bool)
+    if not len(start):
+        return blocked
+    ray, points = chords(environment, profile, start, departure, part)
+    last = np.flatnonzero(np.diff(ray, append=-1))
+    points[last] = np.where((part < length)[:, None], points[last], end)
+    points[np.flatnonzero(np.diff(ray, prepend=-1))] = start
+    pieces = np.flatnonzero(ray[1:] == ray[:-1])
+    found = occluded(bodies, points[pieces], points[pieces + 1])
+    blocked[ray[pieces[found]]] = True
+    return blocked
+
+
+def chords(
+    environment: Environment, profile: Profile, start: Floats, departure: Floats, length: Floats, sagitta: float = BOW
+) -> tuple[np.ndarray, Floats]:
+    """Polylines that keep within `sagitta` (m) of rays from start (ray, xyz): ray of each node, node (node, xyz)."""
+    from sonarsynth.equations.rays import ray_arcs
+
+    layers = water(profile.depth, profile.speed, environment.depth)
+    z = np.clip(depth(start), 0.0, environment.depth)
+    flat = np.hypot(departure[:, 0], departure[:, 1])
+    p = flat / np.interp(z, layers.depth, layers.speed)
+    angle = -np.arctan2(departure[:, 2], flat)
+    room = 8 * len(start) + 64
+    count = -1
+    while count < 0:
+        nodes = np.empty((room, 3))
+        count = ray_arcs.chords(layers.depth, layers.speed, z, angle, p, length, sagitta, nodes)
+        room *= 2
+    ray = nodes[:count, 0].astype(np.int64)
+    ahead = np.divide(departure[:, :2], flat[:, None], out=np.zeros((len(start), 2)), where=flat[:, None] > 0)
+    points = np.empty((count, 3))
+    points[:, :2] = start[ray, :2] + nodes[:count, 1:2] * ahead[ray]
+    points[:, 2] = -nodes[:count, 2]
+    return ray, points

@@ -1,0 +1,240 @@
+"""What bodies hide from some hydrophones and not from others: seen from each, not from the array centre alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import product
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from sonarsynth.casting.cones import CLOSED, UNKNOWN, look
+from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.environment.sea import Environment, Profile
+from sonarsynth.equations.scattering.lobes import dot
+from sonarsynth.geometry import Pose
+from sonarsynth.geometry.placed_target import Body
+from sonarsynth.receiver import Elements
+from sonarsynth.tracing.occlusion.launch_deviation import swerves
+from sonarsynth.tracing.occlusion.ray_cones import bundles, hidden
+from sonarsynth.tracing.receive_paths import Legs
+
+if TYPE_CHECKING:
+    from sonarsynth.propagation import Propagation
+
+RAYS = 30_000
+"""Rays that are looked at together."""
+NO_CONE = 3
+"""Rays that are in no narrow cone for certain, by `shadows.bundles`: of these the centre and the rim of the array are
+looked at, and where they do not see alike every hydrophone; what only those within the rim see is not found."""
+PARTS = 32
+"""Parts of the array that are looked at as one where the whole does not see alike."""
+
+
+@lru_cache(maxsize=16)
+def rim(elements: Elements) -> Ints:
+    """The hydrophones that are farthest out in 26 directions, ascending: where visibility is looked at first."""
+    towards = np.array([v for v in product((-1.0, 0.0, 1.0), repeat=3) if any(v)])
+    return np.unique((elements.position @ towards.T).argmax(axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What stands between points in the water and those who look at them."""
+
+    bodies: tuple[Body, ...]
+    environment: Environment
+    bending: Profile
+    sonar_pose: Pose
+    elements: Elements | None  # None: the array centre looks for all
+    propagation: Propagation
+    degree: int = 3  # of polynomials over the aperture
+
+    def visible(self, legs: Legs, start: Floats, normal: Floats | None) -> Legs:
+        """The legs that no body hides from the array centre; or, with elements, from every hydrophone, some of them
+        open for `settled`.
+
+        start (leg, xyz): of the legs, moved off their facets; normal (leg, xyz): of these, which legs leave on their
+        outer side; None where they have none.
+        """
+        if self.elements is None or self.elements.count == 1 or not self.bodies:
+            end = np.broadcast_to(self.sonar_pose.position, start.shape)
+            return legs.select(~self._hides(start, end, legs.departure, legs.length, legs.bounces, legs.turning))
+        certain = self._certain(legs, start, normal)
+        kept, mixed = certain != CLOSED, certain == UNKNOWN
+        first = np.append(0, 1 + rim(self.elements))
+        for kind in (UNKNOWN, NO_CONE):
+            for some in _parts(np.flatnonzero(certain == kind), len(first)):
+                leg, point = np.repeat(some, len(first)), np.tile(first, len(some))
+                swerve = self._swerve(legs.select(some), first) if kind == NO_CONE else None  # others stay open
+                unseen = self._unseen(legs, start, normal, leg, point, swerve).reshape(len(some), len(first))
+                kept[some] = ~unseen.all(axis=1)
+                mixed[some] |= unseen.any(axis=1)
+        for some in _parts(np.flatnonzero(mixed & ~kept & (certain == UNKNOWN)), len(self._points)):
+            kept[some] = ~self._dark(legs, start, normal, some).all(axis=1)
+        none = np.zeros((np.count_nonzero(kept), 1 + self.elements.count // 8), np.uint8)
+        return legs.select(np.flatnonzero(kept)).seen(none, mixed[kept])
+
+    def settled(self, legs: Legs, start: Floats, normal: Floats | None) -> Legs:
+        """The same legs, none of them open: those that are, looked at from each hydrophone; arguments as above.
+
+        That is left until it is known which of them count: of facets that are neither lit nor loud, none.
+        """
+        rows = np.flatnonzero(legs.open)
+        if not len(rows):
+            return legs
+        hidden_from = legs.hidden_from.copy()
+        for some in _parts(rows, len(self._points)):
+            hidden_from[some] = np.packbits(self._dark(legs, start, normal, some), axis=1)
+        return legs.seen(hidden_from, np.zeros(len(legs.row), bool))
+
+    @property
+    def _points(self) -> Floats:
+        """(1 + sensor, xyz) the array centre, and the hydrophones."""
+        return np.concatenate([np.zeros((1, 3)), self.elements.position if self.elements else np.empty((0, 3))])
+
+    def _certain(self, legs: Legs, start: Floats, normal: Floats | None) -> Ints:
+        """(leg,) EMPTY where all hydrophones see it, CLOSED where none does; elsewhere UNKNOWN or NO_CONE."""
+        points = self._points
+        spread = np.full(len(start), 1.001 * float(np.linalg.norm(points, axis=1).max()))
+        middle = np.zeros((len(start), 3))
+        swerve = legs.swerve(self.environment, self.bending, self.sonar_pose, spread)
+        if normal is None:
+            return self._cones(legs, start, middle, spread, None, swerve)
+        least, most = _within(legs, normal, spread, swerve)
+        rows = np.flatnonzero((least <= 0.0) & (most >= 0.0))
+        flip = np.where(legs.bounces[rows] % 2 == 1, -1.0, 1.0)  # of the mirrored array
+        across = self.sonar_pose.turn_to_body(normal[rows] * np.column_stack([np.ones((len(rows), 2)), flip]))
+        beside, ahead = across @ points.T, 0.5 * (least + most)[rows]
+        margin = 1e-9 * legs.length[rows] + (swerve * (legs.length + spread))[rows]
+        least[rows] = ahead + beside.min(axis=1, initial=np.inf) - margin
+        most[rows] = ahead + beside.max(axis=1, initial=-np.inf) + margin
+        return self._cones(legs, start, middle, spread, (least, most), swerve)
+
+    def _cones(
+        self, legs: Legs, start: Floats, offset: Floats, spread: Floats, ahead: tuple[Floats, Floats] | None,
+        swerve: Floats,
+    ) -> Ints:  # fmt: skip
+        """(leg,) as `_certain`, of the hydrophones within `spread` (leg,) of places beside the centre (leg, xyz); ahead
+        (leg,): how far (m) they are on the outer side of the facet, at least and at most; swerve (leg,) rad: by how
+        much rays to them leave beside their images, at most."""
+        away, length = _towards(legs, offset)
+        found, rows = np.full(len(start), UNKNOWN), np.arange(len(start))
+        if ahead is not None:
+            found[ahead[1] < 0.0] = CLOSED
+            rows = np.flatnonzero(ahead[0] > 0.0)
+        end, counts = (self.sonar_pose.position + offset)[rows], (legs.bounces[rows], legs.turning[rows])
+        ray = start[rows], end, away[rows], length[rows], spread[rows], *counts, swerve[rows]
+        slope, reach, far = bundles(self.bodies, self.environment, self.bending, *ray)
+        sure = np.flatnonzero(np.isfinite(slope))
+        found[rows], rows = NO_CONE, rows[sure]
+        found[rows] = look(self.bodies, start[rows], away[rows], slope[sure], reach[sure], far[sure])
+        return found
+
+    def _dark(self, legs: Legs, start: Floats, normal: Floats | None, rows: Ints) -> Bools:
+        """(row, 1 + sensor) from where some legs are hidden: the array centre, each hydrophone. Parts of the array that
+        see alike are looked at together."""
+        parts = cells(self.elements)
+        row, cell = np.repeat(rows, len(parts.radius)), np.tile(np.arange(len(parts.radius)), len(rows))
+        some, offset, spread = legs.select(row), self.sonar_pose.turn_to_world(parts.centre)[cell], parts.radius[cell]
+        swerve = self._swerve(legs.select(rows), np.arange(len(self._points)))
+        beside = np.zeros(len(row))
+        if swerve is not None:
+            order = np.argsort(parts.cell, kind="stable")
+            first = np.searchsorted(parts.cell[order], np.arange(len(parts.radius)))
+            beside = np.maximum.reduceat(np.sqrt(dot(swerve, swerve))[:, order], first, axis=1).ravel()
+        ahead = None if normal is None else _within(some, normal[row], spread, beside, offset)
+        found = self._cones(some, start[row], offset, spread, ahead, beside)
+        found = found.reshape(len(rows), len(parts.radius))[:, parts.cell]
+        dark = np.asarray(found == CLOSED)
+        one, point = np.nonzero(found >= UNKNOWN)
+        some_of = None if swerve is None else swerve[one, point]
+        dark[one, point] = self._unseen(legs, start, normal, rows[one], point, some_of)
+        return dark
+
+    def _swerve(self, legs: Legs, point: Ints) -> Floats | None:
+        """(leg, point, xyz) as `swerves`, of the centre, or the hydrophones from 1; None where rays are straight."""
+        if self.bending.uniform or self.elements is None:
+            return None
+        where = self.environment, self.bending, self.sonar_pose, self.elements
+        return swerves(legs, self._points[point], *where, self.propagation, self.degree)
+
+    def _unseen(
+        self, legs: Legs, start: Floats, normal: Floats | None, leg: Ints, point: Ints, swerve: Floats | None
+    ) -> Bools:
+        """(ray,) which legs (ray,) leave the back of their facets, or meet a body, on the way to points (ray,): the
+        centre, or the hydrophones from 1.
+
+        To each point a ray leaves for where it is beside the image of the array centre, which is exact for straight
+        rays; bent ones off that by `swerve`, some for each ray.
+        """
+        legs, offset = legs.select(leg), self.sonar_pose.turn_to_world(self._points)[point]
+        ahead, length = _towards(legs, offset)
+        if swerve is not None:
+            ahead += swerve.reshape(ahead.shape)
+            ahead /= np.linalg.norm(ahead, axis=1)[:, None]
+        unseen = np.zeros(len(leg), bool)
+        if normal is not None:
+            unseen = np.einsum("rx,rx->r", ahead, normal[leg]) <= 0.0
+        ray = np.flatnonzero(~unseen)
+        end, times, turns = self.sonar_pose.position + offset[ray], legs.bounces[ray], legs.turning[ray]
+        unseen[ray] = self._hides(start[leg[ray]], end, ahead[ray], length[ray], times, turns)
+        return unseen
+
+    def _hides(self, *ray: Any) -> Bools:
+        return hidden(self.bodies, self.environment, self.bending, *ray)
+
+
+def _towards(legs: Legs, offset: Floats) -> tuple[Floats, Floats]:
+    """Unit vectors (leg, xyz) and distances (leg,) from the starts of legs to the images of places beside the centre
+    (leg, xyz)."""
+    ahead = legs.length[:, None] * legs.departure + offset
+    odd = np.asarray(legs.bounces % 2 == 1)
+    ahead[odd, 2] -= 2.0 * offset[odd, 2]  # of the mirrored array
+    length = np.linalg.norm(ahead, axis=1)
+    return ahead / np.maximum(length, 1e-300)[:, None], length
+
+
+def _within(
+    legs: Legs, normal: Floats, spread: Floats, swerve: Floats, offset: Floats | None = None
+) -> tuple[Floats, Floats]:
+    """(leg,) how far (m) on the outer side of a facet what is within `spread` (leg,) of a place beside the centre is,
+    at least and at most, where rays to there leave beside its image by `swerve` (leg,) rad at most."""
+    away, length = (legs.departure, legs.length) if offset is None else _towards(legs, offset)
+    ahead = np.einsum("ij,ij->i", normal, away) * length
+    room = spread + swerve * (length + spread)
+    return ahead - room, ahead + room
+
+
+class Cells(NamedTuple):
+    """Parts of an array, its centre among them."""
+
+    cell: Ints  # (1 + sensor,) which part it is in
+    centre: Floats  # (cell, xyz) m
+    radius: Floats  # (cell,) m, of all of it about the centre
+
+
+@lru_cache(maxsize=16)
+def cells(elements: Elements) -> Cells:
+    """An array cut into parts by halves along their longer sides."""
+    points = np.concatenate([np.zeros((1, 3)), elements.position])
+    parts = [np.arange(len(points))]
+    while len(parts) < min(PARTS, len(points) // 2):
+        halves = []
+        for part in parts:
+            along = points[part, np.ptp(points[part], axis=0).argmax()]
+            halves += np.array_split(part[np.argsort(along, kind="stable")], 2)
+        parts = halves
+    centre = np.array([0.5 * (points[part].min(axis=0) + points[part].max(axis=0)) for part in parts])
+    away = zip(parts, centre, strict=True)
+    radius = np.array([1e-6 + 1.001 * np.linalg.norm(points[part] - c, axis=1).max() for part, c in away])
+    cell = np.empty(len(points), int)
+    for number, part in enumerate(parts):
+        cell[part] = number
+    return Cells(cell, centre, radius)
+
+
+def _parts(rows: Ints, points: int) -> list[Ints]:
+    """Rows in parts, so that few rays to so many points are held at a time."""
+    return np.array_split(rows, max(1, len(rows) * points // RAYS))

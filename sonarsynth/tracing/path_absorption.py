@@ -1,0 +1,35 @@
+"""What water absorbs along whole paths: the mean over the depths that each of them passes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, depth
+from sonarsynth.environment.absorption import DepthAbsorption
+from sonarsynth.state import Snap
+from sonarsynth.tracing.receive_paths import Legs
+
+if TYPE_CHECKING:
+    from sonarsynth.tracing.arrivals import ArrayLegs
+    from sonarsynth.tracing.transmit_paths import Outward
+
+
+def path_loss(
+    array: ArrayLegs, absorption: float | DepthAbsorption, snap: Snap, legs: Legs, out: Outward | None = None
+) -> Floats:
+    """Absorption (path,) in dB along legs to the array and, of echoes, along the ways out to where they start.
+
+    absorption: at every depth, or the same (dB/m) at all of them.
+    """
+    if not isinstance(absorption, DepthAbsorption):
+        return np.asarray(absorption * (legs.length if out is None else out.length + legs.length))
+    start, profile = depth(legs.point), array.bending
+    end = np.full(len(start), float(depth(array.sonar_pose.position)))
+    lost = legs.length * absorption.along(profile, start, end, legs.departure[:, 2], legs.bounces + legs.turning)
+    if out is None:
+        return np.asarray(lost)
+    source = np.full(len(start), float(depth(snap.position)))
+    back = absorption.along(profile, start, source, -out.arrival[:, 2], out.bounces + out.turning)  # the way, reversed
+    return np.asarray(lost + out.length * back)

@@ -1,0 +1,206 @@
+"""Legs from points in the water to the array: the half of every path that does not depend on the snap."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+
+from sonarsynth.casting.ray_casting import OFFSET
+from sonarsynth.conventions import Bools, Bytes, Floats, Ints, depth
+from sonarsynth.environment.sea import Environment, Profile
+from sonarsynth.equations.rays.ray_solutions import COINCIDENT, TOLERANCE
+from sonarsynth.geometry import Pose
+from sonarsynth.geometry.mesh import in_blocks
+from sonarsynth.geometry.placed_target import Body
+from sonarsynth.products import Paths
+from sonarsynth.propagation.reflections import Reflections, reflections
+from sonarsynth.tracing.occlusion.ray_cones import most_swerve
+
+if TYPE_CHECKING:
+    from sonarsynth.propagation import Propagation
+
+
+@dataclass(frozen=True, eq=False)
+class Legs:
+    """Rays from points in the water to the array centre."""
+
+    point: Floats  # (leg, xyz) m, world: where it starts
+    row: Ints  # (leg,) which of the points asked for
+    departure: Floats  # (leg, xyz) world
+    arrival: Floats  # (leg, xyz) world
+    direction: Floats  # (leg, xyz) sonar frame, from the array centre to where it seems to come from
+    radius: Floats  # (leg,) m: of the reference sphere: the length of the ray
+    travel_time: Floats  # (leg,) s
+    length: Floats  # (leg,) m
+    spreading: Floats  # (leg,) 1/m
+    surface: Ints  # (leg,)
+    bottom: Ints  # (leg,)
+    turning: Ints  # (leg,)
+    caustics: Ints  # (leg,)
+    boundary: Floats  # (leg,) product of the moduli of reflection
+    phase: Floats  # (leg,) rad of reflections and caustics
+    blur: Floats  # (leg,) s
+    hidden_from: Bytes  # (leg, byte) as of `Arrivals`
+    open: Bools  # (leg,) bodies hide it from some hydrophones: which ones, is not known yet (`shading.settled`)
+
+    def select(self, keep: Bools | Ints | slice) -> Legs:
+        """The legs picked by a mask, by indices, or by a slice, which copies nothing."""
+        return Legs(**{name: value[keep] for name, value in vars(self).items()})
+
+    def numbered(self, row: Ints) -> Legs:
+        """The legs with other numbers (leg,) for the points that they start from."""
+        return replace(self, row=row)
+
+    def seen(self, hidden_from: Bytes, open: Bools) -> Legs:
+        """The legs, hidden from some hydrophones, which are not known yet for some."""
+        return replace(self, hidden_from=hidden_from, open=open)
+
+    @property
+    def bounces(self) -> Ints:
+        """(leg,) reflections from surface and bed."""
+        return np.asarray(self.surface + self.bottom)
+
+    def swerve(self, environment: Environment, profile: Profile, sonar_pose: Pose, spread: Floats | float) -> Floats:
+        """(leg,) rad as `shadows.most_swerve`, of those to within `spread` (m) of the array centre."""
+        ray = self.departure, self.length, self.spreading, self.surface, self.bottom, self.turning
+        return most_swerve(environment.depth, profile, self.point, float(depth(sonar_pose.position)), *ray, spread)
+
+
+@dataclass(frozen=True, eq=False)
+class Facets:
+    """Facets of the bodies, placed in the world."""
+
+    target: Ints  # (facet,) index of the body
+    facet: Ints  # (facet,) index in its mesh
+    point: Floats  # (facet, xyz) m: centroid
+    clear: Floats  # (facet, xyz) m: the centroid moved off its facet
+    normal: Floats  # (facet, xyz)
+    area: Floats  # (facet,) m2
+
+    def select(self, keep: Bools | Ints | slice) -> Facets:
+        """The facets picked by a mask, by indices, or by a slice, which copies nothing."""
+        return Facets(**{name: value[keep] for name, value in vars(self).items()})
+
+
+T = TypeVar("T", Legs, Facets)
+
+
+def one_of(parts: list[T]) -> T:
+    """All rows of some parts, in order; the list is emptied, so that no more than a column is there twice."""
+    if len(parts) == 1:
+        return parts.pop()
+    kind, columns = type(parts[0]), [dict(vars(part)) for part in parts]
+    parts.clear()
+    return kind(**{name: np.concatenate([part.pop(name) for part in columns]) for name in list(columns[0])})
+
+
+def usable(paths: Paths) -> Bools:
+    """Paths with a direction and a finite amplitude: not between coincident ends, nor exactly on a caustic."""
+    return np.asarray((paths.flag != COINCIDENT) & np.isfinite(paths.spreading))
+
+
+def rays_to_centre(
+    environment: Environment, profile: Profile, point: Floats, sonar_pose: Pose, propagation: Propagation, centre: float
+) -> Legs:
+    """All rays from points (point, xyz) in the world to the array centre, sorted by point; centre (Hz): of the band."""
+    end = np.broadcast_to(sonar_pose.position, point.shape)
+    paths = propagation.connect(profile, environment.depth, point, end)
+    keep = np.flatnonzero(usable(paths))
+    start = point[paths.pair[keep]]
+    bounced: Reflections = reflections(environment, profile, paths, centre)
+    return Legs(
+        point=start,
+        row=paths.pair[keep],
+        departure=paths.departure[keep],
+        arrival=paths.arrival[keep],
+        direction=-sonar_pose.turn_to_body(paths.arrival[keep]),
+        radius=paths.length[keep],
+        travel_time=paths.travel_time[keep],
+        length=paths.length[keep],
+        spreading=paths.spreading[keep],
+        surface=paths.surface[keep],
+        bottom=paths.bottom[keep],
+        turning=paths.turning[keep],
+        caustics=paths.caustics[keep],
+        boundary=bounced.modulus[keep],
+        phase=bounced.phase[keep],
+        blur=bounced.blur[keep],
+        hidden_from=np.zeros((len(keep), 0), np.uint8),
+        open=np.zeros(len(keep), bool),
+    )
+
+
+def require_in_water(bodies: tuple[Body, ...], environment: Environment) -> None:
+    """Raises ValueError for a body that reaches out of the water."""
+    for body in bodies:
+        highest, deepest = environment.depth, 0.0
+        for some in in_blocks(len(body.mesh.vertices)):
+            down = depth(body.pose.to_world(body.mesh.vertices[some]))
+            highest, deepest = float(down.min(initial=highest)), float(down.max(initial=deepest))
+        if highest < -TOLERANCE or deepest > environment.depth + TOLERANCE:
+            where = "above the surface" if highest < -TOLERANCE else "below the bed"
+            raise ValueError(
+                f"target '{body.name}' reaches {where} ({highest:g} to {deepest:g} m in {environment.depth:g} m)"
+            )
+
+
+def facets_of(bodies: tuple[Body, ...], some: slice) -> Facets:
+    """Some of the facets of all bodies, one body after the other."""
+    last = np.cumsum([0, *(len(body.mesh.faces) for body in bodies)])
+    of = [slice(*np.clip([some.start - n, some.stop - n], 0, m - n)) for n, m in pairwise(last.tolist())]
+    target = np.repeat(np.arange(len(bodies)), [part.stop - part.start for part in of])
+    none, mine = np.empty((0, 3)), list(zip(bodies, of, strict=True))
+    point = np.concatenate([none, *(b.pose.to_world(b.mesh.centroid[part]) for b, part in mine)])
+    normal = np.concatenate([none, *(b.pose.turn_to_world(b.mesh.normal[part]) for b, part in mine)])
+    rounding = 8.0 * np.finfo(float).eps * np.abs(point).max(axis=1, initial=0.0)  # of places in the world
+    offset = np.maximum(OFFSET * np.array([b.mesh.radius for b in bodies])[target], rounding)
+    return Facets(
+        target=target,
+        facet=np.concatenate([np.empty(0, np.int64), *(np.arange(part.start, part.stop) for part in of)]),
+        point=point,
+        clear=point + offset[:, None] * normal,
+        normal=normal,
+        area=np.concatenate([np.empty(0), *(b.mesh.area[part] for b, part in mine)]),
+    )
+
+
+def legs_from(
+    facets: Facets,
+    environment: Environment,
+    profile: Profile,
+    sonar_pose: Pose,
+    propagation: Propagation,
+    centre: float,
+    slack: float = 0.0,
+) -> Legs:
+    """Facet to array: rays that leave a facet on its outer side, whether or not a body stands in them; rows are facets.
+
+    Or that may on their way to a point within `slack` (m) of the array centre.
+    """
+    legs = rays_to_centre(environment, profile, facets.point, sonar_pose, propagation, centre)
+    ahead = np.einsum("ij,ij->i", facets.normal[legs.row], legs.departure) * legs.length
+    if slack and propagation.bends:
+        ahead += legs.swerve(environment, profile, sonar_pose, slack) * (legs.length + slack)
+    return legs.select(np.flatnonzero(ahead > -slack))
+
+
+def may_face(facets: Facets, position: Floats, bounces: int, profile: Profile, bed: float, slack: float = 0.0) -> Bools:
+    """(facet,) which may have a ray on their outer side to a point (xyz), or within `slack` (m) of it; exactly so in
+    uniform water, unreflected.
+
+    A ray rises and falls by (bounces + 2) bed depths at most over its distance, so somewhere it has that slope or less,
+    and by Snell's law its cosine is nowhere less than there times the ratio of the extreme sound speeds.
+    """
+    if not bounces and profile.uniform:
+        return np.asarray(np.einsum("ij,ij->i", facets.normal, position - facets.point) > -slack)
+    level = position[:2] - facets.point[:, :2]
+    distance = np.hypot(level[:, 0], level[:, 1])
+    flattest = distance / np.hypot(distance, (bounces + 2) * bed)
+    cosine = flattest * profile.speed.min() / profile.speed.max()
+    ahead = np.einsum("ij,ij->i", facets.normal[:, :2], level) / np.maximum(distance, 1e-300)
+    steepest = np.abs(facets.normal[:, 2]) * np.sqrt((1.0 - cosine) * (1.0 + cosine))
+    margin = 1e-9 + slack / np.maximum(distance, 1e-300)
+    return np.asarray((ahead >= -margin) | (ahead * cosine + steepest > -margin))

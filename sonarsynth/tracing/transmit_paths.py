@@ -1,0 +1,181 @@
+"""Arrivals put together from both halves of their paths: out to the facet, and back to the array."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.products import Arrivals, Paths
+from sonarsynth.propagation.reflections import Reflections, as_sign
+from sonarsynth.scattering.facet_geometry import Pulses
+from sonarsynth.tracing.expansion.wavefront_polynomials import Terms
+from sonarsynth.tracing.receive_paths import Legs
+
+TOGETHER = 1e-12
+"""s: ways to a facet whose travel times differ by less are one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outward:
+    """Ways from a snap to facets."""
+
+    facet: Ints  # (way,) which facet
+    arrival: Floats  # (way, xyz) world
+    travel_time: Floats  # (way,) s
+    length: Floats  # (way,) m
+    spreading: Floats  # (way,) 1/m
+    surface: Ints  # (way,)
+    bottom: Ints  # (way,)
+    turning: Ints  # (way,)
+    caustics: Ints  # (way,)
+    boundary: Floats  # (way,)
+    phase: Floats  # (way,) rad
+    blur: Floats  # (way,) s
+
+    @staticmethod
+    def of(paths: Paths, bounced: Reflections, facet: Ints) -> Outward:
+        """Of paths to facets (path,)."""
+        return Outward(
+            facet, paths.arrival, paths.travel_time, paths.length, paths.spreading, paths.surface, paths.bottom,
+            paths.turning, paths.caustics, bounced.modulus, bounced.phase, bounced.blur,
+        )  # fmt: skip
+
+    @staticmethod
+    def none(count: int) -> Outward:
+        """No way at all, of paths that come straight from the snap; its spreading is that of the leg."""
+        zero, none = np.zeros(count), np.zeros(count, int)
+        return Outward(
+            none, np.zeros((count, 3)), zero, zero, zero + 1.0, none, none, none, none, zero + 1.0, zero, zero
+        )
+
+    def select(self, keep: Bools | Ints) -> Outward:
+        """The ways picked by a mask or by indices."""
+        return Outward(**{name: value[keep] for name, value in vars(self).items()})
+
+    def merged(self) -> Outward:
+        """The ways with those that coincide added up: from a snap on the bed, say, and its image there."""
+        first = np.ones(len(self.facet), bool)
+        same = (np.diff(self.facet) == 0) & (np.abs(np.diff(self.travel_time)) < TOGETHER)
+        first[1:] = ~(same & (np.diff(self.blur) == 0) & (np.abs(np.diff(self.arrival, axis=0)) < 1e-9).all(axis=1))
+        if first.all():
+            return self
+        number = np.cumsum(first) - 1
+        value = np.zeros(number[-1] + 1, complex)
+        np.add.at(value, number, self.spreading * self.boundary * np.exp(1j * self.phase))
+        order = np.lexsort((self.bounces, number))
+        kept = self.select(order[np.flatnonzero(np.diff(number[order], prepend=-1))])  # by the fewest bounces
+        return replace(kept, boundary=np.abs(value) / kept.spreading, phase=np.angle(value + 0.0))
+
+    @property
+    def bounces(self) -> Ints:
+        """(way,) reflections from surface and bed."""
+        return np.asarray(self.surface + self.bottom)
+
+
+def assemble(
+    legs: Legs, over: Terms, out: Outward, index: int, time: float, loss: Floats,
+    target: Ints, facet: Ints, scattering: Floats, variation: tuple[Floats, float], pulses: Pulses,
+) -> Arrivals:  # fmt: skip
+    """Arrivals of snap `index` at `time` (s) from both halves of their paths; over: the wavefronts; loss: absorption of
+    each (dB); variation: terms of the amplitude and their error; pulses: what facets make of the snap."""
+    length = out.length + legs.length
+    sign, phase = as_sign(out.phase + legs.phase + pulses.phase)
+    boundary = sign * out.boundary * legs.boundary
+    direct = target < 0
+    first, second = np.where(direct, legs.spreading, out.spreading), np.where(direct, 1.0, legs.spreading)
+    return Arrivals(
+        delay=time + (out.travel_time + legs.travel_time),
+        direction=legs.direction,
+        radius=legs.radius,
+        delay_terms=over.delay,
+        phase_terms=over.phase,
+        blur_terms=over.blur,
+        amplitude_terms=variation[0],
+        amplitude=first * scattering * second * boundary * 10.0 ** (-loss / 20.0),
+        spreading_out=first,
+        spreading_in=second,
+        scattering=scattering,
+        boundary=boundary,
+        absorption=loss,
+        length=length,
+        snap=np.full(len(length), index),
+        target=target,
+        facet=facet,
+        point=legs.point,
+        surface=out.surface + legs.surface,
+        bottom=out.bottom + legs.bottom,
+        turning=out.turning + legs.turning,
+        caustics=out.caustics + legs.caustics,
+        arrives_by=np.asarray((legs.surface > 0) + 2 * (legs.bottom > 0)),
+        phase=phase,
+        blur=np.hypot(np.hypot(out.blur, legs.blur), pulses.blur),
+        echo_blur=pulses.blur,
+        stretch=np.zeros(len(length)),
+        stretch_terms=np.empty((len(length), 0)),
+        coherent=pulses.coherent,
+        corners=pulses.corners,
+        rough_share=pulses.rough_share,
+        rough_delay=pulses.rough_delay,
+        hidden_from=legs.hidden_from,
+        centre=np.nan,
+        sound_speed=np.nan,
+        wavefront_error=float(over.error.max(initial=0.0)),
+        amplitude_error=variation[1],
+    )
+
+
+def silence(legs: Legs) -> Arrivals:
+    """No arrivals at all: what a frame without a snap has."""
+    none, zero = np.empty(0), np.empty(0, int)
+    empty = legs.select(zero), Terms.none(0), Outward.none(0)
+    return assemble(*empty, 0, 0.0, none, zero, zero, none, (np.empty((0, 0)), 0.0), Pulses.plain(0))
+
+
+def join(parts: list[Arrivals], sound_speed: float, centre: float) -> Arrivals:
+    """Arrivals of all snaps, in order, at the centre of a band (Hz); terms that some of them lack are 0.
+
+    What absorption leaves nothing of is out. The list is emptied.
+    """
+    heard = np.concatenate([part.amplitude for part in parts]) != 0.0
+    return replace(_stacked(parts, None if heard.all() else heard), sound_speed=sound_speed, centre=centre)
+
+
+def by_target(parts: list[tuple[tuple[int, int], Arrivals]], sound_speed: float, centre: float) -> Arrivals:
+    """As `join`, of parts of numbered snaps and kinds (snap, kind), sorted by these, then by target."""
+    parts.sort(key=lambda part: part[0])
+    number = np.repeat(np.arange(len(parts)), [len(part.delay) for _, part in parts])
+    key = np.array([snap * 3 + kind for (snap, kind), _ in parts])[number]
+    target = np.concatenate([part.target for _, part in parts])
+    heard = [part for _, part in parts]
+    parts.clear()
+    order = np.lexsort((target, key))
+    if (np.diff(order) == 1).all():
+        return join(heard, sound_speed, centre)
+    return join([_stacked(heard, order)], sound_speed, centre)
+
+
+def ordered(parts: list[Arrivals], group: list[Ints]) -> Arrivals:
+    """Arrivals of all parts, sorted by group (path,) of each; the list is emptied."""
+    if len(parts) == 1:
+        return parts.pop()
+    return _stacked(parts, np.argsort(np.concatenate(group), kind="stable"))
+
+
+def _stacked(parts: list[Arrivals], rows: Bools | Ints | None) -> Arrivals:
+    """These rows of all parts, one after the other; the list is emptied, so that only one column is there twice."""
+    left = [dict(vars(part)) for part in parts]
+    errors = {name: max(part[name] for part in left) for name in ("wavefront_error", "amplitude_error")}
+    plain = {name: left[0][name] for name in ("centre", "sound_speed")}
+    parts.clear()
+    columns: dict[str, Any] = {}
+    for name in [name for name, value in left[0].items() if isinstance(value, np.ndarray)]:
+        arrays = [part.pop(name) for part in left]
+        if arrays[0].ndim == 2:  # columns that some lack are 0
+            width = max(a.shape[1] for a in arrays)
+            arrays = [a if a.shape[1] == width else np.zeros((len(a), width), a.dtype) for a in arrays]
+        whole = np.concatenate(arrays)
+        columns[name] = whole if rows is None else whole[rows]
+    return Arrivals(**columns, **plain, **errors)

@@ -1,0 +1,1 @@
+"""Echoes of bodies against exact series and closed forms."""

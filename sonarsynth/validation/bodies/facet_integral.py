@@ -1,0 +1,75 @@
+"""The integral over a facet against arithmetic of 50 digits: any triangle, any wave, the mirror angle among them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib.util import find_spec
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.equations.scattering.kirchhoff_integral import triangle_integral
+from sonarsynth.randomness import stream
+from sonarsynth.validation.bodies.body_cases import SEED, timed
+from sonarsynth.validation.rays.ray_matching import worst
+from sonarsynth.validation.references.triangle_integral import exact_triangle
+from sonarsynth.validation.validation_rows import Row
+
+HEIGHTS = (1.0, 1e-3, 1e-6, 1e-9)
+"""Of triangles with a base of 1: from fat ones to needles."""
+SIZES = 10.0 ** np.arange(-12.0, 4.1)
+"""Of the wave times the base, rad."""
+MIRROR, NEAR, ANY, EDGES = "at the mirror angle", "1e-8 off the mirror angle", "any wave", "square to an edge"
+ROUNDING = 2.0**-52
+
+
+def triangle_rows(quick: bool) -> Iterator[Row]:
+    """Errors over the area of facets in their own plane, and of facets turned any way.
+
+    Corners of a turned facet are rounded, and so is the phase w.x: by eps of the longest edge and of |w| L, whatever is
+    done with them then. Its error is allowed that much more, over the longest edge squared. Raises ModuleNotFoundError
+    without mpmath.
+    """
+    if find_spec("mpmath") is None:
+        raise ModuleNotFoundError("the reference for triangles needs mpmath: pip install 'sonarsynth[accuracy]'")
+    rng = stream(SEED, "accuracy", "triangles")
+    sizes = SIZES[::4] if quick else np.repeat(SIZES, 4)
+    cost = _cost(rng.normal(size=(10_000, 3, 3)), rng.normal(size=(10_000, 3)))
+    for turned in (False, True):
+        case = "triangles turned any way" if turned else "triangles in their own plane"
+        note = "allowed more by the rounding of corners and of the phase" if turned else ""
+        for way in (MIRROR, NEAR, ANY, EDGES):
+            errors = np.array([_error(rng, height, size, way, turned) for height in HEIGHTS for size in sizes])
+            got, bound = worst(errors[:, 0], errors[:, 1])
+            unit, counts = ("edge squared" if turned else "area"), {"facets": len(errors), "values": len(errors)}
+            yield Row(case, "50 digits", way, unit, bound, got, cost, "us a facet", counts, note=note)
+
+
+def _cost(corners: Floats, wave: Floats) -> float:
+    """CPU time (us) of one of many triangles (triangle, 3, xyz) with a wave each."""
+    return 1e3 * timed(lambda: triangle_integral(corners, wave))[1] / len(corners)
+
+
+def _error(rng: np.random.Generator, height: float, size: float, way: str, turned: bool) -> tuple[float, float]:
+    """Error of the integral over one random triangle, over its area or its longest edge squared, and the bound."""
+    flat = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [rng.uniform(-0.2, 1.2), height, 0.0]])
+    flat -= np.array([rng.uniform(), height / 3.0, 0.0])
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0] if turned else np.eye(3)
+    corners, edges = flat @ turn.T, (flat - np.roll(flat, 1, axis=0)) @ turn.T
+    normal = turn[:, 2]
+    match way:
+        case "at the mirror angle":
+            wave = normal
+        case "1e-8 off the mirror angle":
+            wave = normal + 1e-8 * rng.normal(size=3)
+        case "square to an edge":
+            wave = np.cross(normal, edges[rng.integers(3)])
+        case _:
+            wave = rng.normal(size=3)
+    wave = wave * (size / np.linalg.norm(wave))
+    exact, area = exact_triangle(corners, wave)
+    longest = float(np.sum(edges**2, axis=1).max())
+    error = abs(complex(triangle_integral(corners, wave)) - exact)
+    if turned:
+        return error / longest, 1e-14 + ROUNDING * size
+    return error / area, 1e-14

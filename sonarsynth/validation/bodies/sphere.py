@@ -1,0 +1,193 @@
+"""Echoes of spheres of facets against the exact series and the exact Kirchhoff integral: error against run time.
+
+Also the integral over one facet against many digits, and the law of partly reflecting surfaces against the exact series
+of a fluid sphere.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from typing import Final, Literal
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.equations.scattering.kirchhoff_integral import lit_sphere
+from sonarsynth.equations.scattering.modal_series import Fluid, sphere_amplitude
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.scattering import Kirchhoff, PartlyReflecting
+from sonarsynth.targets.mesh_resolution import CoarseMesh, expected_error, fine_mesh
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Sphere
+from sonarsynth.targets.target_strength import target_strength
+from sonarsynth.validation.bodies.body_cases import (
+    BAND,
+    LEVEL,
+    PER_ASPECT,
+    SOUND_SPEED,
+    Point,
+    decibels,
+    measured,
+    round_x,
+    timed,
+    trade_rows,
+    wavenumber,
+    ways,
+)
+from sonarsynth.validation.bodies.facet_integral import triangle_rows
+from sonarsynth.validation.references.front_echo import front_echo
+from sonarsynth.validation.validation_rows import Row
+
+SERIES, INTEGRAL = "modal series", "Kirchhoff integral"
+FRONT = "modal series, front echo"
+RADII: Final = (0.25, 0.5)
+WAYS = 12
+FAIR = 0.3  # dB, at backscatter
+AIM = 0.8  # dB, up to 120 degrees off it
+BEHIND = 0.9  # dB, beyond: what `target_strength` claims
+SECTORS: Final = (0.0, 60.0, 105.0, 120.0, 180.0)  # deg off backscatter
+CLAIMED: Final = 2.6
+"""dB: what `Kirchhoff` claims of the taper, for a rigid sphere of 0.25 m from 105 to 120 degrees."""
+STEPS: Final = {("rigid", 0.25): 5.0, ("rigid", 0.5): 15.0, ("soft", 0.25): 7.5, ("soft", 0.5): 30.0}
+"""deg: angles that are checked, of surface and radius (m)."""
+
+Surface = Literal["rigid", "soft"]
+
+FILLING: Final = Fluid(1.8, 1.1)
+"""Much as sand, over the water."""
+INSIDE: Final = 12.0
+"""dB: echoes from inside a lossless sphere of that filling, which focuses them, over that of its outside."""
+
+
+def sphere_accuracy(quick: bool = False) -> list[Row]:
+    """Errors and run times; quick: fewer meshes, ways and angles. Raises ModuleNotFoundError without mpmath."""
+    radii = RADII[:1] if quick else RADII
+    surfaces: tuple[Surface, ...] = ("rigid",) if quick else ("rigid", "soft")
+    rows = [*triangle_rows(quick)]
+    for radius in radii:
+        rows += trade_rows(f"rigid sphere, {radius:g} m", INTEGRAL, sphere_points(radius, quick))
+        rows += _levels(radius, quick)
+    for radius in radii:
+        for surface in surfaces:
+            rows += [*_backscatter(radius, surface, quick), *_bistatic(radius, surface, quick)]
+        rows += _tapered(radius, quick)
+    rows += _partly_reflecting(RADII[0], quick)
+    return rows
+
+
+def sphere_points(radius: float, quick: bool) -> list[Point]:
+    """Ever finer meshes of a rigid sphere: edges from 0.7 of sqrt(wavelength x radius) down, each 1/sqrt(2) of it."""
+    exact = lit_sphere(radius, wavenumber(BAND))
+    towards = ways(4 if quick else WAYS)
+    return [measured(mesh, towards, exact) for mesh in _meshes(radius, quick)]
+
+
+def _meshes(radius: float, quick: bool) -> list[Mesh]:
+    first = 0.7 * np.sqrt(SOUND_SPEED / BAND[-1] * radius)
+    edges = first * 2.0 ** (-0.5 * np.arange(1, 5) if quick else -0.5 * np.arange(0, 7))
+    return [mesh_of(Sphere(radius=radius, edge=float(edge))) for edge in edges]
+
+
+def _levels(radius: float, quick: bool) -> Iterator[Row]:
+    """Backscatter of the same meshes as users get it, checks of the mesh and all, in dB."""
+    case = f"rigid sphere, {radius:g} m, as a mesh"
+    exact = sphere_level(BAND, np.zeros(1), radius, "rigid")
+    towards = ways(2 if quick or radius > 0.3 else 4)
+    meshes = _meshes(radius, quick)
+    _mesh_level(meshes[0], towards)  # compiles
+    for mesh in meshes:
+        got, cost = timed(lambda: _mesh_level(mesh, towards), repeats=0)  # noqa: B023 -- called here
+        expected = expected_error(mesh, SOUND_SPEED / BAND[-1])
+        bound = FAIR + 20.0 * float(np.log10(1.0 + 2.0 * expected))
+        error = float(np.abs(got - exact).max())
+        counts = {"facets": len(mesh.faces), "values": got.size}
+        yield Row(case, SERIES, LEVEL, "dB", bound, error, cost / len(towards), PER_ASPECT, counts, case)
+
+
+def _mesh_level(mesh: Mesh, towards: Floats) -> Floats:
+    """Level (frequency, way) in dB re 1 m2 of backscatter, however coarse the mesh."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", CoarseMesh)
+        return target_strength(mesh, BAND[:, None], -towards, towards, SOUND_SPEED)
+
+
+def sphere_level(frequency: Floats, off: Floats, radius: float, surface: Surface | Fluid) -> Floats:
+    """Exact target strength (frequency, angle) in dB re 1 m2 at angles off backscatter (deg)."""
+    angle = np.pi - np.radians(off)
+    series = sphere_amplitude(frequency[:, None], angle, radius=radius, sound_speed=SOUND_SPEED, boundary=surface)
+    return decibels(series)
+
+
+def facet_level(frequency: Floats, off: Floats, radius: float, law: Kirchhoff) -> Floats:
+    """Target strength (frequency, angle) in dB re 1 m2 of facets, as users get it, at angles off backscatter (deg)."""
+    out = -round_x(-off)
+    return target_strength(Sphere(radius=radius), frequency[:, None], (1.0, 0.0, 0.0), out, SOUND_SPEED, law)
+
+
+@cache
+def _facets(radius: float) -> int:
+    return len(fine_mesh(Sphere(radius=radius), SOUND_SPEED / BAND[-1]).faces)
+
+
+def _backscatter(radius: float, surface: Surface, quick: bool) -> Iterator[Row]:
+    """Levels of backscatter as users get them, all over the band, along the mesh's axis and others."""
+    frequency = np.arange(25e3, 110.1e3, 5e3 if quick else 1e3 if radius < 0.3 else 2.5e3)
+    towards = np.concatenate([[[-1.0, 0.0, 0.0]], ways(1 if quick or radius > 0.3 else 3)])
+    body, law = Sphere(radius=radius), Kirchhoff(surface=surface)
+    got, cost = timed(lambda: target_strength(body, frequency[:, None], -towards, towards, SOUND_SPEED, law), repeats=0)
+    error = float(np.abs(got - sphere_level(frequency, np.zeros(1), radius, surface)).max())
+    rest = cost / len(towards), PER_ASPECT, {"facets": _facets(radius), "values": got.size}
+    yield Row(f"{surface} sphere, {radius:g} m", SERIES, "backscatter", "dB", FAIR, error, *rest)
+
+
+def _bistatic(radius: float, surface: Surface, quick: bool) -> Iterator[Row]:
+    """Levels all round as users get them, sector by sector."""
+    step, last = (30.0 if quick else STEPS[surface, radius]), SECTORS[-1]
+    for row in _sectors(f"{surface} sphere, {radius:g} m", radius, surface, Kirchhoff(surface=surface), step, last):
+        behind = row.quantity.endswith(f"{last:g} deg")
+        note = f"{AIM:g} dB is aimed at up to {SECTORS[-2]:g} deg" if behind else ""
+        yield replace(row, expected=BEHIND if behind else AIM, note=note)
+
+
+def _tapered(radius: float, quick: bool) -> Iterator[Row]:
+    """The same with the echo tapered towards the shadow, as in frames, and on bodies that have creases."""
+    step, last = (30.0 if quick else 3.0), SECTORS[-2]
+    case, law = f"rigid sphere, {radius:g} m, tapered", Kirchhoff(edges="smooth")
+    for row in _sectors(case, radius, "rigid", law, step, last):
+        claimed = radius < 0.3 and row.quantity.endswith(f"{last:g} deg")
+        note = f"what Kirchhoff claims; {AIM:g} dB is aimed at" if claimed else ""
+        yield replace(row, expected=CLAIMED if claimed else AIM, note=note)
+
+
+def _sectors(case: str, radius: float, surface: Surface, law: Kirchhoff, step: float, last: float) -> Iterator[Row]:
+    """The largest error over each sector, at angles (deg) every `step` and at the ends of sectors."""
+    frequency = BAND[::8] if step >= 30.0 else BAND
+    off = np.unique([*np.arange(0.0, last, step), *(end for end in SECTORS if end <= last)])
+    got, cost = timed(lambda: facet_level(frequency, off, radius, law), repeats=0)
+    error = np.abs(got - sphere_level(frequency, off, radius, surface)).max(axis=0)
+    for first, end in pairwise(SECTORS[: SECTORS.index(last) + 1]):
+        inside = (off >= first) & (off <= end)
+        rest = cost / len(off), PER_ASPECT, {"facets": _facets(radius), "values": int(inside.sum()) * len(frequency)}
+        worst = float(error[inside].max())
+        yield Row(case, SERIES, f"bistatic, {first:g} to {end:g} deg", "dB", AIM, worst, *rest)
+
+
+def _partly_reflecting(radius: float, quick: bool) -> Iterator[Row]:
+    """A surface that lets sound through: the front echo of a fluid sphere, and all its echoes in mean power."""
+    case = f"fluid sphere, {radius:g} m"
+    law = Kirchhoff(surface=PartlyReflecting(density_ratio=FILLING.density_ratio, speed_ratio=FILLING.speed_ratio))
+    off = np.array([0.0, 60.0] if quick else [0.0, 30.0, 60.0])
+    got, cost = timed(lambda: facet_level(BAND, off, radius, law), repeats=0)
+    counts = {"facets": _facets(radius), "values": got.size}
+    front = np.array([front_echo(BAND, float(a), radius, FILLING, SOUND_SPEED) for a in np.radians(off)]).T
+    error = float(np.abs(got - decibels(front)).max())
+    yield Row(case, FRONT, "front, 0 to 60 deg", "dB", FAIR, error, cost / len(off), PER_ASPECT, counts)
+    whole = sphere_level(BAND, off, radius, FILLING)
+    power = [10.0 * np.log10(np.mean(10.0 ** (level / 10.0), axis=0)) for level in (got, whole)]
+    left_out = float(np.abs(power[0] - power[1]).max())
+    note = "echoes from inside, which the law leaves out: it is for bodies that swallow them"
+    yield Row(case, SERIES, "left out", "dB", INSIDE, left_out, cost / len(off), PER_ASPECT, counts, note=note)

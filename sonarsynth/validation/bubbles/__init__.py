@@ -1,0 +1,1 @@
+"""Collapsing bubbles against series, closed forms and what is conserved."""

@@ -1,0 +1,177 @@
+"""Bubbles that collapse, against power series of many digits, closed forms and what is conserved.
+
+Keller-Miksis and Rayleigh-Plesset against their power series and frozen values; an empty cavity against Rayleigh's
+closed form; energy; published levels; the logarithmic bubble; error against run time of solvers with and without the
+stretched clock; extremes, each solved or refused.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from functools import cache
+from importlib.util import find_spec
+from typing import Final
+
+import numpy as np
+
+from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
+from sonarsynth.equations.bubble import bubble_collapse, bubble_pulse, pulses
+from sonarsynth.equations.bubble.bubble_collapse import Cavity, Collapse
+from sonarsynth.validation.references.bubble_series import Exact, exact_bubble
+from sonarsynth.validation.validation_rows import Row
+
+RADIUS, DEPTH = 3.5e-3, 5.0  # m
+SERIES, FROZEN, TABLE = "power series, 20 digits", "frozen values", "table of levels"
+TOLERANCE: Final = 1e-9
+"""Relative: what the solver's default of 1e-10 is to give."""
+HERTZ = np.arange(600) * 1e3
+"""Frequencies of a period of 1 ms, longer than a snap and its rebound."""
+SAMPLES = 1 << 14
+
+NUMBERS: Final = {
+    ("Rayleigh-Plesset", 1000.0): (264.931205028e-6, 115.131170396e-6, 194639.11, 529.7965203e-6, 3.499278989e-3),
+    ("Keller-Miksis", 1000.0): (266.595948477e-6, 172.320125199e-6, 53529.824, 462.5012497e-6, 2.549506611e-3),
+    ("Rayleigh-Plesset", 100.0): (263.105018922e-6, 17.1129325736e-6, 8678555.5, 526.1318877e-6, 3.499125169e-3),
+    ("Keller-Miksis", 100.0): (264.646120412e-6, 58.5736406583e-6, 169198.31, 380.7513615e-6, 1.516192155e-3),
+}
+"""Equation and gas (Pa) at 5 m: time (s) and radius (m) of the collapse, pressure there (Pa at 1 m), time and radius of
+the rebound. Two formulations and two solvers agreed on them to 1e-14."""
+
+LEVELS: Final = {
+    100.0: (228.1, 206.9, 202.6),
+    300.0: (223.2, 207.2, 203.0),
+    1000.0: (215.5, 207.2, 203.4),
+    2000.0: (209.8, 206.1, 203.0),
+    3000.0: (206.1, 204.5, 202.1),
+}
+"""Gas (Pa) at 5 m: peak, and peak to peak below 200 and 100 kHz (dB re 1 uPa at 1 m)."""
+DEEPER: Final = {(0.0, 1000.0): 209.7, (0.0, 3000.0): 199.1, (20.0, 1000.0): 223.9, (20.0, 3000.0): 216.6}
+"""Depth (m) and gas (Pa): peak (dB re 1 uPa at 1 m)."""
+PRINTED: Final = 0.06
+"""dB: half a digit of the table, and a little."""
+
+
+def bubble_accuracy(quick: bool = False) -> list[Row]:
+    """Errors and run times; quick: fewer gases, depths and tolerances. Raises ModuleNotFoundError without mpmath."""
+    if find_spec("mpmath") is None:
+        raise ModuleNotFoundError("the references for bubbles need mpmath: pip install 'sonarsynth[accuracy]'")
+    from sonarsynth.validation.bubbles.bubbles_conserved import conserved_rows, rayleigh_rows
+    from sonarsynth.validation.bubbles.bubbles_extreme import extreme_rows
+    from sonarsynth.validation.bubbles.bubbles_logarithmic import logarithmic_rows
+    from sonarsynth.validation.bubbles.bubbles_solvers import solver_rows
+
+    return [
+        *frozen_rows(quick),
+        *rayleigh_rows(),
+        *conserved_rows(quick),
+        *level_rows(quick),
+        *logarithmic_rows(quick),
+        *solver_rows(quick),
+        *extreme_rows(quick),
+    ]
+
+
+def described(gas: float, depth: float = DEPTH, *, compressible: bool = True, core: bool = False) -> Cavity:
+    """The bubble of all cases: 3.5 mm, in water of 20 degC."""
+    ambient = bubble_collapse.ambient_pressure(depth)
+    h = bubble_collapse.hard_core(RADIUS, gas, ambient) if core else 0.0
+    return Cavity(RADIUS, gas, ambient, core=h, compressible=compressible)
+
+
+@cache
+def exact(cavity: Cavity) -> Exact:
+    """A bubble and its rebound to many digits, kept: a second each."""
+    return exact_bubble(cavity)
+
+
+def timed(
+    cavity: Cavity, tolerance: float = 1e-10, method: bubble_collapse.Method = "DOP853", rebounds: int = 0
+) -> tuple[Collapse, float]:
+    """A bubble and its rebound as they are solved, and the CPU time that takes (ms): the median of several runs."""
+    times: list[float] = []
+    while len(times) < 5 and sum(times) < 0.2:
+        began = time.process_time()
+        found = bubble_collapse.collapse.__wrapped__(cavity, rebounds, tolerance, method)
+        times.append(time.process_time() - began)
+    return found, 1e3 * float(np.median(times))
+
+
+def row(
+    case: str, reference: str, quantity: str, unit: str, expected: float, got: float, cost: float, found: Collapse
+) -> Row:
+    """A row of a solved bubble."""
+    counts = {"evaluations": found.evaluations}
+    return Row(case, reference, quantity, unit, expected, abs(float(got)), cost, "ms a bubble", counts)
+
+
+def numbers_of(found: Collapse) -> tuple[float, ...]:
+    """What the references state: time and radius of the collapse, pressure there, time and radius of the rebound."""
+    after = found.largest[0]
+    there = float(bubble_collapse.pressure(0.0, found))
+    return found.collapse_time, found.minimum_radius, there, after.time + found.collapse_time, after.radius
+
+
+def worst(got: tuple[float, ...], expected: tuple[float, ...]) -> float:
+    """The largest relative error."""
+    return float(np.abs(np.array(got) / expected - 1.0).max())
+
+
+def frozen_rows(quick: bool) -> Iterator[Row]:
+    """Collapse and rebound, to all that is known of them."""
+    for (equation, gas), expected in NUMBERS.items():
+        found, cost = timed(described(gas, compressible=equation == "Keller-Miksis"))
+        case = f"{equation}, {gas:g} Pa"
+        yield row(case, FROZEN, "collapse, rebound", "1", 1e-7, worst(numbers_of(found), expected), cost, found)
+        if not quick or gas == 1000.0:
+            yield from series_rows(case, found, cost)
+    for gas in (1000.0,) if quick else (100.0, 1000.0):
+        found, cost = timed(described(gas, core=True))
+        yield from series_rows(f"Keller-Miksis with a hard core, {gas:g} Pa", found, cost)
+
+
+def series_rows(case: str, found: Collapse, cost: float) -> Iterator[Row]:
+    """Every number of a bubble and its rebound, and the waveform, against the power series."""
+    best = exact(found.cavity)
+    (low, high), (first, last) = best.radii, best.times
+    again = found.largest[0]
+    yield row(case, SERIES, "smallest radius", "1", TOLERANCE, found.minimum_radius / low - 1.0, cost, found)
+    yield row(case, SERIES, "collapse time", "1", 0.1 * TOLERANCE, found.collapse_time / first - 1.0, cost, found)
+    got = (again.time + found.collapse_time, again.radius)
+    yield row(case, SERIES, "rebound", "1", TOLERANCE, worst(got, (last, high)), cost, found)
+    heard, own = waveform(exact_spectrum(best)), waveform(spectrum(found))
+    miss = np.abs(heard - own).max() / np.abs(heard).max()
+    yield row(case, SERIES, "waveform below 200 kHz", "of peak", 1e-8, miss, cost, found)
+
+
+def exact_spectrum(best: Exact) -> np.ndarray:
+    """Spectrum (Pa s) of a bubble and its rebound at HERTZ, from the collapse on: a sum over the series' nodes."""
+    time = best.node - best.times[0]
+    return np.asarray(np.exp(-2j * np.pi * np.outer(HERTZ, time)) @ (best.weight * best.pressure))
+
+
+def spectrum(found: Collapse) -> np.ndarray:
+    """The same of a solved bubble, as snaps have it; its ends are not faded."""
+    return pulses.spectrum(HERTZ, bubble_pulse.pulse(found, float(HERTZ[-1]), fade=0.0))
+
+
+def waveform(S: np.ndarray, corner: float = 200e3) -> Floats:
+    """Pressure (Pa at 1 m) of a spectrum behind a Butterworth filter of fourth order, forwards and backwards."""
+    passed = S / (1.0 + (HERTZ / corner) ** 8)
+    return np.asarray(np.fft.irfft(passed, SAMPLES) * SAMPLES * HERTZ[1])
+
+
+def level_rows(quick: bool) -> Iterator[Row]:
+    """Peak source levels, before filters and behind them, as tabled."""
+    for gas, (raw, *limited) in LEVELS.items():
+        found, cost = timed(described(gas))
+        case = f"Keller-Miksis, {gas:g} Pa"
+        yield row(case, TABLE, "peak", "dB", PRINTED, bubble_pulse.source_level(found) - raw, cost, found)
+        S = spectrum(found)
+        for corner, level in zip((200.0, 100.0), limited, strict=True):
+            got = 20.0 * np.log10(np.ptp(waveform(S, 1e3 * corner)) / REFERENCE_PRESSURE)
+            yield row(case, TABLE, f"p-p below {corner:g} kHz", "dB", PRINTED, got - level, cost, found)
+    for (depth, gas), level in {} if quick else DEEPER.items():
+        found, cost = timed(described(gas, depth))
+        case = f"Keller-Miksis, {gas:g} Pa at {depth:g} m"
+        yield row(case, TABLE, "peak", "dB", PRINTED, bubble_pulse.source_level(found) - level, cost, found)

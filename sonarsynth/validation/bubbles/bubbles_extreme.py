@@ -1,0 +1,84 @@
+"""Bubbles where they are extreme: each is solved, and right, or refused with the reason; the rows say which."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from sonarsynth.sources.snap_models import KellerMiksis
+from sonarsynth.sources.snap_pulses import cavity, pulse
+from sonarsynth.validation.bubbles.bubble_checks import (
+    SERIES,
+    TOLERANCE,
+    exact,
+    exact_spectrum,
+    row,
+    spectrum,
+    timed,
+    waveform,
+)
+from sonarsynth.validation.validation_rows import Row
+
+GASES: Final = (1.0, 10.0, 100.0, 1000.0, 10e3)  # Pa
+DEPTHS: Final = (0.0, 10.0, 100.0, 1000.0)  # m
+HIGHEST = 110e3  # Hz, of the pulse that a described snap is asked for
+PRESSURES, OF = "pressures at rest", "ms a bubble"
+HOPELESS: Final = {
+    "no gas": (KellerMiksis(gas_pressure=0.0), "nothing stops"),
+    "a little gas and a bound on Mach of 1e9": (KellerMiksis(gas_pressure=1e-3, largest_mach=1e9), ""),
+    "as much gas inside as pressure outside": (KellerMiksis(gas_pressure=150e3), "does not collapse"),
+    "no pressure outside": (KellerMiksis(surface_pressure=0.0, depth=0.0), "not above the vapour"),
+    "water as thick as syrup": (KellerMiksis(viscosity=100.0), "settles"),
+}
+"""Bubbles at 5 m that are refused, and a word of the reason; one is not, because its user wants it."""
+
+
+def extreme_rows(quick: bool) -> Iterator[Row]:
+    """Gas from next to nothing to a tenth of an atmosphere, from the surface down to 1 km; and what must be refused."""
+    for gas in GASES[::3] if quick else GASES:
+        for depth in DEPTHS[::3] if quick else DEPTHS:
+            yield from _solved_or_refused(gas, depth)
+    for name, (model, reason) in HOPELESS.items():
+        began = time.process_time()
+        got = verdict(model, 5.0)
+        cost = 1e3 * (time.process_time() - began)
+        wrong = float(not (reason in got if reason else got == ""))
+        note = f"refused: {got}" if got else "solved"
+        yield Row(f"Keller-Miksis, {name}", PRESSURES, "verdict", "wrong", 0.0, wrong, cost, OF, {}, None, note)
+
+
+def verdict(model: KellerMiksis, depth: float) -> str:
+    """Why a described snap is refused at a depth (m), in one line; nothing for one that is solved."""
+    try:
+        made = pulse(model, depth, HIGHEST)
+    except ValueError as error:
+        return str(error)
+    return "" if np.isfinite(made.strength).all() and np.isfinite(made.peak) else "its pulse is not finite, unsaid"
+
+
+def _solved_or_refused(gas: float, depth: float) -> Iterator[Row]:
+    """The snap's verdict against the wall speed of the series; and what was solved, whether refused or not."""
+    model = KellerMiksis(gas_pressure=gas)
+    of = cavity(model, depth)
+    found, cost = timed(of)
+    best = exact(of)
+    case = f"Keller-Miksis, {gas:g} Pa at {depth:g} m"
+    mach = best.fastest / of.sound_speed
+    got = verdict(model, depth)
+    note = f"refused: {got}" if got else f"solved, Mach {mach:.2g}"
+    right = (mach > model.largest_mach) == ("largest_mach" in got) and (got == "" or "largest_mach" in got)
+    counts = {"evaluations": found.evaluations}
+    yield Row(case, SERIES, "verdict", "wrong", 0.0, float(not right), cost, OF, counts, None, note)
+    yield row(case, SERIES, "largest wall speed", "1", 1e-3, found.mach / mach - 1.0, cost, found)
+    yield row(case, SERIES, "smallest radius", "1", TOLERANCE, found.minimum_radius / best.radii[0] - 1.0, cost, found)
+    miss = found.collapse_time / best.times[0] - 1.0
+    yield row(case, SERIES, "collapse time", "1", 0.1 * TOLERANCE, miss, cost, found)
+    heard, own = waveform(exact_spectrum(best)), waveform(spectrum(found))
+    for quantity, bound, error in (
+        ("waveform below 200 kHz", 1e-8, np.abs(heard - own).max()),
+        ("peak below 200 kHz", 1e-8, heard.max() - own.max()),
+    ):
+        yield row(case, SERIES, quantity, "of peak", bound, error / np.abs(heard).max(), cost, found)

@@ -1,0 +1,175 @@
+"""The logarithmic bubble against its own formula in many digits, a closed form, and frozen values."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from typing import Any, Final
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
+from sonarsynth.equations.bubble import snap_pressure
+from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.validation.validation_rows import Row
+
+CASE = "logarithmic bubble"
+DIGITS, TABLE, CLOSED = "40 digits", "frozen values", "closed form"
+MODEL = LogarithmicBubble()
+BUBBLE = snap_pressure.Bubble(MODEL.a, MODEL.k, MODEL.m, MODEL.q, MODEL.density)
+TAU = 1.0 / abs(BUBBLE.q)
+
+WALL: Final = np.array(
+    [
+        [-1e-3, 3.52237389815e-4, 2.45465275512, 12757.8888076, 5.82757238674],
+        [-6.172539e-4, 2.15816862664e-3, 5.75148805193, -5826.65160123, 115.644026228],
+        [-5e-4, 2.76465467209e-3, 4.37185412275, -17079.3116843, -24.86027771],
+        [-3e-4, 3.22159373731e-3, -0.0726494674525, -25652.3809623, -266.203492664],
+        [-1e-4, 2.56902250565e-3, -8.10965448584, -89814.9063812, -254.856085993],
+        [-3e-5, 1.59819751731e-3, -25.3905600289, -706006.202619, 257.347704633],
+        [-1e-5, 8.60483598328e-4, -56.3076805892, -3391937.59041, 2944.92175469],
+        [-3.1e-6, 3.58614020993e-4, -96.1760084114, -9845072.00622, 5368.1177839],
+        [-1e-6, 1.31231474904e-4, -122.490681213, -15949602.2535, 3663.30616824],
+        [-1e-7, 1.39779179399e-5, -138.746338251, -20453915.5656, 534.168784329],
+        [0.0, 0.0, -140.822279346, -21069470.5597, 0.0],
+    ]
+)
+"""(time, 5): time (s), R (m), R' (m/s), R'' (m/s2), pressure (Pa at 1 m), of a density of 1000 kg/m3."""
+SPECTRUM: Final = {2: -3.91, 5: -5.00, 10: -6.36, 20: -9.16, 25: -10.43, 50: -15.71, 85: -21.22, 100: -23.15} | {
+    150: -28.50,
+    200: -32.67,
+    300: -38.96,
+}
+"""Frequency (kHz): level re the largest (dB), at 1.311 kHz."""
+ENERGY, LARGEST = 249.63, 0.12743  # Pa2 s, Pa s
+
+
+def logarithmic_rows(quick: bool) -> list[Row]:
+    """Radius, its derivatives, pressure, spectrum, impulse and energy. Needs mpmath."""
+    return [*_wall_rows(quick), *_collapse_rows(), *_spectrum_rows(quick)]
+
+
+def _timed(run: Callable[[], Any], count: int) -> float:
+    """CPU time (us) of one of `count`, the median of several runs."""
+    times = []
+    for _ in range(5):
+        began = time.process_time()
+        for _ in range(20):
+            run()
+        times.append((time.process_time() - began) / 20.0)
+    return 1e6 * float(np.median(times)) / count
+
+
+def _row(reference: str, quantity: str, unit: str, expected: float, got: Any, cost: float, points: int) -> Row:
+    of = "us a frequency" if "spectrum" in quantity else "us a time"
+    return Row(CASE, reference, quantity, unit, expected, abs(float(got)), cost, of, {"evaluations": points})
+
+
+def _computed(t: Floats) -> Floats:
+    return np.array([*snap_pressure.wall(t, BUBBLE), snap_pressure.pressure(t, BUBBLE)])
+
+
+def _wall_rows(quick: bool) -> Iterator[Row]:
+    cost = _timed(lambda: _computed(WALL[:, 0]), len(WALL))
+    known = WALL[:, 1:].T
+    miss = np.abs(_computed(WALL[:, 0]) - known) / np.where(known == 0.0, 1.0, np.abs(known))
+    for name, error in zip(("radius", "speed", "acceleration", "pressure"), miss, strict=True):
+        yield _row(TABLE, name, "1", 1e-10, error.max(), cost, len(WALL))
+    times = -np.geomspace(1e-9, 2e-3, 6 if quick else 40)
+    exact = np.array([_many_digits(float(t)) for t in times]).T
+    miss = np.abs(_computed(times) - exact) / np.abs(_scale(exact))
+    for name, error in zip(("radius", "speed", "acceleration", "pressure"), miss, strict=True):
+        yield _row(DIGITS, name, "of terms", 2e-14, error.max(), cost, len(times))
+
+
+def _scale(exact: Floats) -> Floats:
+    """What an error is relative to: the value, or the terms of a pressure that cancel where it changes its sign."""
+    R, R1, R2, _ = exact
+    pressure = BUBBLE.density * np.abs(R) * (np.abs(R * R2) + 2.0 * R1 * R1)
+    return np.array([R, np.abs(R1) + np.abs(R * BUBBLE.k), np.abs(R2) + np.abs(R1 * BUBBLE.k), pressure])
+
+
+def _many_digits(t: float) -> tuple[float, ...]:
+    """R, R', R'' and the pressure from the formula of R alone, its derivatives by the series of its parts."""
+    import mpmath as mp
+
+    with mp.workdps(40):
+        a, k, m, q, rho = (mp.mpf(v) for v in BUBBLE)
+        R = mp.taylor(lambda s: a * (1 + mp.erf(k * (s - m) / mp.sqrt(2))) * mp.log(1 + q * s), mp.mpf(t), 2)
+        R0, R1, R2 = R[0], R[1], 2 * R[2]
+        return float(R0), float(R1), float(R2), float(rho * R0 * (R0 * R2 + 2 * R1 * R1))
+
+
+def _collapse_rows() -> Iterator[Row]:
+    """With its growth frozen, R = A ln(1 + x/tau), and the peak is at ln(1 + x/tau) = (3 - sqrt 5)/2."""
+    frozen = BUBBLE._replace(k=1e-3, m=-1e6)
+    L = (3.0 - np.sqrt(5.0)) / 2.0
+    factor = L * (2.0 - L) * np.exp(-2.0 * L)  # 0.28790
+    size = frozen.density * (2.0 * frozen.a) ** 3 / TAU**2
+    found = minimize_scalar(
+        lambda x: -float(snap_pressure.pressure(-x, frozen)),
+        bounds=(0.1 * TAU, TAU),
+        method="bounded",
+        options={"xatol": 1e-12},
+    )
+    cost = _timed(lambda: snap_pressure.pressure(-TAU, frozen), 1)
+    yield _row(CLOSED, "peak, growth frozen", "1", 1e-9, -found.fun / size / factor - 1.0, cost, 1)
+    yield _row(CLOSED, "net impulse", "Pa s", 0.0, float(snap_pressure.impulse(0.0, BUBBLE)), cost, 1)
+    x, w = snap_pressure.quadrature(BUBBLE, 2e5)
+    p = snap_pressure.pressure(-x, BUBBLE)
+    cost = _timed(lambda: snap_pressure.pressure(-x, BUBBLE), x.size)
+    yield _row(CLOSED, "net impulse, summed", "1", 1e-13, (w @ p) / (w @ np.abs(p)), cost, x.size)
+    yield _row(TABLE, "energy", "1", 1e-4, (w @ p**2) / ENERGY - 1.0, cost, x.size)
+    level = 10.0 * np.log10((w @ p**2) / REFERENCE_PRESSURE**2)
+    yield _row(TABLE, "exposure level", "dB", 0.01, level - 143.97, cost, x.size)
+
+
+def _spectrum_rows(quick: bool) -> Iterator[Row]:
+    f = np.linspace(500.0, 4000.0, 3501)
+    cost = _timed(lambda: snap_pressure.spectrum(f[:500], BUBBLE), 500)
+    S = np.abs(snap_pressure.spectrum(f, BUBBLE))
+    yield _row(TABLE, "spectrum, peak", "1", 1e-4, S.max() / LARGEST - 1.0, cost, f.size)
+    yield _row(TABLE, "spectrum, peak at", "Hz", 5.0, f[S.argmax()] - 1311.0, cost, f.size)
+    between = (f > 1500.0) & (f < 3500.0)
+    dip = f[between][S[between].argmin()]
+    yield _row(TABLE, "spectrum, dip at", "Hz", 5.0, dip - 2380.0, cost, f.size)
+    kilohertz = np.array(list(SPECTRUM))
+    level = 20.0 * np.log10(np.abs(snap_pressure.spectrum(1e3 * kilohertz, BUBBLE)) / S.max())
+    miss = np.abs(level - np.array(list(SPECTRUM.values())))
+    yield _row(TABLE, "spectrum, levels", "dB", 0.05, miss.max(), cost, kilohertz.size)
+    yield from _integrals(quick, cost, float(S.max()))
+
+
+def _integrals(quick: bool, cost: float, largest: float) -> Iterator[Row]:
+    """The spectrum by adaptive quadrature of the formula in many digits."""
+    import mpmath as mp
+
+    f = np.array([25e3]) if quick else np.array([0.0, 2e3, 25e3, 110e3])
+    with mp.workdps(20):
+        a, k, m, q, rho = (mp.mpf(v) for v in BUBBLE)
+
+        def flow(t: Any) -> Any:
+            """rho R^2 R', whose derivative is the pressure: the spectrum is i 2 pi f times its own."""
+            z = k * (t - m) / mp.sqrt(2)
+            G, L = mp.erfc(-z), mp.log1p(q * t)
+            return rho * (a * G * L) ** 2 * a * (mp.sqrt(2 / mp.pi) * k * mp.exp(-z * z) * L + G * q / (1 + q * t))
+
+        exact = []
+        for frequency in f.tolist():
+            w = 2 * mp.pi * mp.mpf(frequency)
+            edges = [mp.mpf(v) for v in _edges(frequency)]
+            exact.append(complex(1j * w * mp.quad(lambda t, w=w: flow(t) * mp.expj(-w * t), edges, maxdegree=6)))
+    miss = np.abs(snap_pressure.spectrum(f, BUBBLE) - np.array(exact)).max() / largest
+    yield _row("quadrature, 20 digits", "spectrum", "of peak", 1e-11, miss, cost, f.size)
+
+
+def _edges(frequency: float) -> Floats:
+    """Panels of two periods at most, short ones about the collapse."""
+    start = snap_pressure.onset(BUBBLE)
+    longest = 2.0 / frequency if frequency > 0.0 else 3e-4
+    graded = -TAU * np.append(0.0, 2.0 ** np.arange(-2, 20))
+    even = np.arange(0.0, start, -min(longest, 3e-4))
+    kept = graded[graded > -longest * 0.7]
+    joined = np.unique(np.concatenate([kept, even[even < kept.min()], [start]]))
+    return np.asarray(joined)

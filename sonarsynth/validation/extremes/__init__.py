@@ -1,0 +1,39 @@
+"""Stiff and extreme cases of every stage: what must come out, computed on its own, and what did."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from sonarsynth.validation.extremes.outcomes import Case, Extreme, outcome, outcomes
+
+__all__ = ["Case", "Extreme", "extremes", "groups", "outcome"]
+
+
+def groups() -> dict[str, tuple[Case, ...]]:
+    """All cases, by what they are about."""
+    from sonarsynth.validation.extremes import (
+        extreme_bodies,
+        extreme_bubbles,
+        extreme_chains,
+        extreme_facets,
+        extreme_rays,
+        extreme_signals,
+        extreme_sources,
+        extreme_targets,
+    )
+
+    return {
+        "rays": extreme_rays.CASES,
+        "signals": extreme_signals.CASES,
+        "sources": extreme_sources.CASES,
+        "targets": extreme_targets.CASES,
+        "bodies": extreme_bodies.CASES,
+        "facets": extreme_facets.CASES,
+        "bubbles": extreme_bubbles.CASES,
+        "chain": extreme_chains.CASES,
+    }
+
+
+def extremes(*, quick: bool = False) -> Iterator[Extreme]:
+    """The rows of the table, as they are done; quick: without what takes minutes or gigabytes."""
+    return outcomes(groups(), quick=quick)

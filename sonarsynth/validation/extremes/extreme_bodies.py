@@ -1,0 +1,124 @@
+"""Spheres of a millimetre to 10 m by every law, against the exact series; bodies at every bearing."""
+
+from __future__ import annotations
+
+import re
+from functools import partial
+from typing import Literal
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, direction
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.receiver import BeamGrid, PositionTable, elements
+from sonarsynth.scattering import Isotropic, Kirchhoff, MirrorLobe, Scatterer, ScatteringLaw
+from sonarsynth.scattering.law_validity import OFF
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Box, Sphere
+from sonarsynth.targets.target import mesh_for
+from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, together
+from sonarsynth.validation.extremes.plain_scenes import BED, POSE, PROFILE, C, body, snap, traced, transfer
+
+ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
+BESIDE = np.array([0.0, 1e-6, 0.0])
+"""A source so near the array that what it hears is backscatter."""
+SPHERES = ((1e-3, 25e3), (1e-2, 25e3), (0.1, 25e3), (1.0, 4e3), (10.0, 400.0))
+"""Radii (m), each with the bottom (Hz) of a band of 3.4 times it: that of the default sonar, or one that a mesh of some
+thousand facets serves."""
+LAWS: tuple[MirrorLobe | Kirchhoff, ...] = (
+    MirrorLobe(),
+    MirrorLobe(width=0.1),
+    Kirchhoff(),
+    Kirchhoff(surface="soft"),
+)
+MESHED = 0.6
+"""dB: of the mesh (5 %), and of 200 radii of distance."""
+
+
+def echo(law: ScatteringLaw, mesh: Mesh, radius: float, frequency: Floats) -> Floats:
+    """Target strength (frequency,) in dB re 1 m2 of what a frame has of a sphere 200 radii off."""
+    far = 200.0 * radius
+    band = float(frequency[0]), float(frequency[-1])
+    found = traced([snap(BESIDE)], ONE, [body(mesh, (far, 0.0, 0.0))], [law], band)
+    found = found.select(~found.direct)
+    if law.coherent:
+        return np.asarray(20.0 * np.log10(np.abs(transfer(found, frequency)) * far**2))
+    return np.full(len(frequency), 10.0 * np.log10(float((found.amplitude**2).sum()) * far**4))
+
+
+def _law(law: MirrorLobe | Kirchhoff) -> Got:
+    """Each sphere is as exact as the law says without a word, or as far off as its note says."""
+    from sonarsynth.equations.scattering.modal_series import sphere_amplitude
+
+    soft = isinstance(law, Kirchhoff) and law.surface == "soft"
+    boundary: Literal["rigid", "soft"] = "soft" if soft else "rigid"
+    parts = []
+    for radius, low in SPHERES:
+        frequency = np.geomspace(low, 3.4 * low, 9)
+        shape = Sphere(radius=radius, edge=radius / 8.0)
+        mesh = mesh_for(shape, law, C / frequency[-1])
+        exact = sphere_amplitude(frequency, np.pi, radius=radius, sound_speed=C, boundary=boundary)
+        error = echo(law, mesh, radius, frequency) - 20.0 * np.log10(np.abs(exact))
+        note = law.too_small(Scatterer(mesh, C / frequency[-1], C / frequency[0]))
+        if note is None:
+            parts.append(off(error, OFF + MESHED, "dB", f"{radius:g} m, unsaid:"))
+            continue
+        least, most = map(float, re.findall(r"[-+]\d+\.\d", note))
+        within = bool((error >= least - MESHED).all() and (error <= most + MESHED).all())
+        parts.append(holds(within, f"{radius:g} m: {error.min():+.1f} to {error.max():+.1f} dB off, and said to be"))
+    return together(*parts)
+
+
+def _isotropic() -> Got:
+    """Whatever the size: a strength for each facet that is lit and seen, and a note that it is no body's."""
+    law, parts = Isotropic(strength=0.01), []
+    for radius, low in SPHERES:
+        mesh = mesh_of(Sphere(radius=radius, edge=radius / 4.0))
+        lit = int((mesh.normal[:, 0] < 0.0).sum())
+        level = echo(law, mesh, radius, np.array([low, 3.4 * low]))[0]
+        parts.append(off(level - 20.0 * np.log10(0.01) - 10.0 * np.log10(lit), 0.1, "dB", f"{radius:g} m:"))
+        said = " ".join(law.validity(Scatterer(mesh, C / (3.4 * low), C / low)))
+        parts.append(holds("not the level of a body" in said, "noted"))
+    return together(parts)
+
+
+def _bearings() -> Got:
+    """Bounds within the view, mirrored with the bearing, none exactly where a flag says so."""
+    from sonarsynth.labels import label
+    from sonarsynth.labels.views import View
+    from sonarsynth.propagation import Straight
+    from sonarsynth.state import Moment
+
+    beams, mesh = BeamGrid(azimuths=3, elevations=3), mesh_of(Box(size=(0.5, 3.0, 1.0)))
+    connect = partial(Straight().connect, PROFILE, BED)
+    edge, parts, flags = 0.5 * beams.azimuth_span, [], set()
+    for bearing in np.deg2rad(np.arange(0.0, 181.0, 5.0)):
+        boxes = []
+        for side in (bearing, -bearing):
+            moment = Moment(0.0, (body(mesh, 5.0 * direction(np.array(side), np.array(0.0)), 0.5 * np.pi - side),), ())
+            found = label(moment, POSE, beams, connect, np.zeros(0), True)
+            boxes.append(found.image_box[0])
+            flags.add(int(found.view[0]))
+            none = bool(np.isnan(boxes[-1]).all())
+            parts.append(holds(none == (found.view[0] > View.PARTLY_IN_VIEW), "a box, or a flag"))
+            parts.append(holds(none or bool((np.abs(boxes[-1]) <= edge + 1e-12).all()), "within the view"))
+        left, right = boxes
+        parts.append(off(np.nan_to_num(left + right[[1, 0, 2, 3]] * [1, 1, -1, -1]), 1e-9, "rad", "mirrored:"))
+    expected = {View.IN_VIEW, View.PARTLY_IN_VIEW, View.OUTSIDE_VIEW, View.BEHIND}
+    return together(parts, holds(flags == expected, f"flags {sorted(flags)}"))
+
+
+CASES = (
+    *(
+        Case(
+            f"spheres of 1 mm to 10 m, {law.kind} {what}".strip(),
+            f"the exact series within {OFF:g} dB and the mesh, or as far off it as the note says",
+            lambda law=law: _law(law),  # type: ignore[misc]
+        )
+        for law, what in zip(LAWS, ("", "of 0.1 rad", "rigid", "soft"), strict=True)
+    ),
+    Case("spheres of 1 mm to 10 m, isotropic", "as strong as asked for, and a note that no body is", _isotropic),
+    Case(
+        "a body at every bearing", "its box within the view, mirrored with it, or a flag that says why not", _bearings
+    ),
+)

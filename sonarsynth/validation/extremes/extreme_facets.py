@@ -1,0 +1,164 @@
+"""Kirchhoff's facets, roughness, Fock's field and smoothed meshes at their limits."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.receiver import PositionTable, elements
+from sonarsynth.scattering.kirchhoff import Kirchhoff
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Box, Sphere
+from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, refused, together
+from sonarsynth.validation.extremes.plain_scenes import C, body, heard, snap, traced, transfer
+
+ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
+TRIANGLE = np.array([[0.2, -0.1, 0.0], [-0.15, 0.25, 0.0], [-0.05, -0.15, 0.0]])
+
+
+def _waves() -> Got:
+    """In the mirror direction f is k A/2 pi at any k; elsewhere it falls; none at backscatter along the facet."""
+    from sonarsynth.equations.scattering.kirchhoff_integral import facet_amplitude, triangle_integral
+
+    down, up, along = np.array([0.0, 0, -1.0]), np.array([0.0, 0, 1.0]), np.array([1.0, 0.0, 0.0])
+    k = 10.0 ** np.arange(-12.0, 10.0)
+    area = 0.5 * np.linalg.norm(np.cross(TRIANGLE[1] - TRIANGLE[0], TRIANGLE[2] - TRIANGLE[0]))
+    mirror = np.abs(facet_amplitude(TRIANGLE, down, up, k)) / (k * area / (2.0 * np.pi))
+    tilted = np.array([np.sin(0.3), 0.0, np.cos(0.3)])
+    side = np.abs(triangle_integral(TRIANGLE, k[:, None] * tilted)) / area
+    return together(
+        off(mirror - 1.0, 1e-14, what="mirror, k from 1e-12 to 1e9:"),
+        off(np.abs(facet_amplitude(TRIANGLE, along, -along, k)) / k, 1e-16, "m2", "grazing"),
+        holds(
+            bool((side <= 1.0 + 1e-14).all() and side[-1] < 1e-12), f"off it from {side[0]:.3g} down to {side[-1]:.2g}"
+        ),
+    )
+
+
+def _mirror() -> Got:
+    """Through the mirror direction, from 1e-18 to 0.1 rad off it: the sinc of a square, no step anywhere."""
+    from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
+
+    square = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]])[[[0, 1, 2], [0, 2, 3]]]
+    parts, k = [], np.array([300.0])
+    for tilt in (0.0, *10.0 ** np.arange(-18.0, 0.0)):
+        away = np.array([np.sin(tilt), 0.0, np.cos(tilt)])
+        change = k * np.sin(tilt)
+        exact = k / (4.0 * np.pi) * (1.0 + np.cos(tilt)) * np.sinc(0.5 * change / np.pi)
+        got = mesh_amplitude(square, np.array([0.0, 0.0, -1.0]), away, k)
+        parts.append(off(np.abs(np.abs(got) - np.abs(exact)) / k, 1e-14, "of k A"))
+    return together(parts)
+
+
+def _rough() -> Got:
+    """No height: the smooth echo. Any height: the coherent and the incoherent share of the power are all of it."""
+    from sonarsynth.equations.scattering.roughness import coherent_factor, incoherent_power, roughness_parameter
+
+    mesh, band = mesh_of(Box(size=(0.1, 0.3, 0.3), edge=0.02)), (40e3, 80e3)
+    f = np.array(band)
+    smooth, rough = (
+        transfer(traced([snap((0.0, 0.1, 0.0))], ONE, [body(mesh, (5.0, 0.0, 0.0))], [Kirchhoff(roughness=h)], band), f)
+        for h in (0.0, 1e-15)
+    )
+    down, up = np.array([0.0, 0, -1.0]), np.array([0.0, 0, 1.0])
+    g = roughness_parameter(300.0, np.array([0.0, 1e-200, 1e-9, 1e-3, 0.1, 1e200]), down, up, up)
+    lobe = 1.0 / (8.0 * np.pi * 0.2**2)  # of the slopes, in the mirror direction
+    shares = coherent_factor(g) ** 2 + incoherent_power(g, down, up, up, 0.2) / lobe
+    return together(
+        off(np.abs(rough / smooth - 1.0), 1e-9, what="a height of 1e-15 m:"),
+        off(shares - 1.0, 1e-14, what="shares of the power, from none to 1e200 m:"),
+    )
+
+
+def _rough_frame() -> Got:
+    """So rough that nothing is coherent: the powers of the facets are the lobe of the slopes, times their area."""
+    mesh, at = mesh_of(Box(size=(0.1, 0.2, 0.2), edge=0.02)), 30.0
+    law = Kirchhoff(roughness=0.3, slope=0.2)
+    found = traced([snap((0.0, 1e-6, 0.0))], ONE, [body(mesh, (at, 0.0, 0.0))], [law])
+    found = found.select(~found.direct)
+    power = float((found.amplitude[~found.coherent] ** 2 * found.rough_share[~found.coherent]).sum())
+    exact = 0.2 * 0.2 / (8.0 * np.pi * 0.2**2) / (at - 0.05) ** 4
+    return off(10.0 * np.log10(power / exact), 0.01, "dB")
+
+
+def _fock() -> Got:
+    """Limits, and spheres of k a 20 to 300 at all angles against the exact series."""
+    from sonarsynth.equations.scattering.convex_bodies import surface_field
+    from sonarsynth.equations.scattering.modal_series import sphere_amplitude
+    from sonarsynth.targets.target_strength import target_strength
+
+    lit, dark = surface_field(np.array([-1e9, -1e3, -30.0]), "rigid"), surface_field(np.array([11.9]), "rigid")
+    parts = [
+        off(np.abs(lit - 1.0), 1e-5, what="far in the light:"),
+        off(np.abs(surface_field(np.array([0.0]), "rigid") - 0.5 * 1.39937), 1e-5, what="at the edge, g(0)/2:"),
+        holds(bool(np.abs(dark) < 3e-5), f"{abs(dark[0]):.1g} in the dark"),
+    ]
+    way = np.array([1.0, 0.0, 0.0])
+    for ka in (20.0, 300.0):
+        f = ka * C / (2.0 * np.pi * 0.25)
+        angle = np.radians([0.0, 90.0, 150.0, 180.0])
+        out = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+        exact = sphere_amplitude(f, angle, radius=0.25, sound_speed=C)
+        got = target_strength(Sphere(radius=0.25), f, way, out, C)
+        parts.append(off(got - 20.0 * np.log10(np.abs(exact)), 0.9, "dB", f"k a = {ka:g}:"))
+    return together(*parts)
+
+
+def _large() -> Got:
+    """Facets too long for their echo to be a pulse in a window are refused; and a body of one huge facet a side."""
+    from sonarsynth.signals import KernelDeposit
+
+    plate = mesh_of(Box(size=(1.0, 2e3, 2e3)))
+    snaps = [snap((1.0, 900.0, 0.0))]
+    found = traced(snaps, ONE, [body(plate, (3e3, 0.0, 0.0))], [Kirchhoff()])
+    return refused(lambda: heard(KernelDeposit(), found, snaps, ONE, 3.9, 100), "corners that are not within")
+
+
+def _icosahedron() -> tuple[Floats, np.ndarray]:
+    from scipy.spatial import ConvexHull
+
+    phi = 0.5 * (1.0 + np.sqrt(5.0))
+    points = np.array([[0, a, b * phi] for a in (1, -1) for b in (1, -1)], float)
+    vertices = np.concatenate([np.roll(points, n, axis=1) for n in range(3)]) / np.hypot(1.0, phi)
+    hull = ConvexHull(vertices)
+    faces = hull.simplices.astype(np.int64)
+    a, b, c = np.moveaxis(vertices[faces], 1, 0)
+    inward = np.einsum("fi,fi->f", np.cross(b - a, c - a), a) < 0
+    faces[inward] = faces[inward, ::-1]
+    return vertices, faces
+
+
+def _smoothing() -> Got:
+    """Twenty facets become a sphere; a cube stays a cube; needles and far places change nothing."""
+    from sonarsynth.geometry.surfaces import volume
+    from sonarsynth.targets.generated.smoothing import curved
+
+    parts = []
+    for scale, away in ((1.0, 0.0), (1e-3, 0.0), (1e3, 0.0), (1.0, 100.0)):
+        vertices, faces = _icosahedron()
+        made, _ = curved((scale * vertices + away, faces), 0.1 * scale, np.inf, 1.0)
+        parts.append(
+            off(np.linalg.norm(made - away, axis=1) / scale - 1.0, 1e-9, what=f"{scale:g} m, {away:g} m away:")
+        )
+    cube = mesh_of(Box(size=(1.0, 1.0, 1.0)))
+    kept = curved((cube.vertices, cube.faces.astype(np.int64)), 0.2, 1e-4, 0.7)
+    parts.append(off(volume(kept) - 1.0, 1e-12, "m3", "a cube:"))
+    thin = mesh_of(Box(size=(1.0, 1e-6, 1.0)))
+    needle = curved((thin.vertices, thin.faces.astype(np.int64)), 0.2, 1e-4, 0.7)
+    parts.append(off(volume(needle) / 1e-6 - 1.0, 1e-6, what="a sheet of 1 um:"))
+    return together(*parts)
+
+
+CASES = (
+    Case("facets at wavenumbers of 1e-12 to 1e9", "k A/(2 pi) in the mirror, none along the facet", _waves),
+    Case("through the mirror direction", "the sinc of a square, to 1e-14", _mirror),
+    Case("roughness from none to 1e200 m", "the smooth echo; shares of power that sum to one", _rough),
+    Case("a very rough plate in a frame", "the lobe of its slopes, to 0.01 dB", _rough_frame),
+    Case("Fock's field from light to dark", "its limits; spheres by the exact series, within 0.9 dB", _fock),
+    Case("facets of a kilometre", "refused, with the reason", _large),
+    Case(
+        "smoothing of 20 facets, a cube and a sheet",
+        "a sphere to 1e-9; the cube and the sheet as they were",
+        _smoothing,
+    ),
+)

@@ -1,0 +1,222 @@
+"""Signals at the ends of what there is: delays, windows, bands, loudness, numbers of hydrophones."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.receiver import Band, BeamGrid, LowPass, PlanarLattice, PositionTable, Sonar, elements
+from sonarsynth.scattering.isotropic import Isotropic
+from sonarsynth.sources.snap_models import Gabor, Ricker
+from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.targets.shapes import Sphere
+from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, refused, together
+from sonarsynth.validation.extremes.plain_scenes import (
+    POSE,
+    PROFILE,
+    PULSE,
+    RATE,
+    SONAR,
+    C,
+    body,
+    direct,
+    heard,
+    ricker,
+    snap,
+    times,
+    traced,
+)
+
+if TYPE_CHECKING:
+    from sonarsynth.products import Signals
+    from sonarsynth.signals import SignalSynthesis
+
+ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
+TWO = elements(PositionTable(positions=((0.0, 0.2, 0.1),) * 2))
+FEW = elements(PlanarLattice(columns=4, rows=4, pitch=0.1, face=0.0))
+FINE = 1e-4
+"""Error allowed to signals, of their peak: what `KernelDeposit` promises."""
+
+
+def methods() -> tuple[SignalSynthesis, ...]:
+    """The fast synthesis and the exact one."""
+    from sonarsynth.signals import DirectSum, KernelDeposit
+
+    return KernelDeposit(), DirectSum()
+
+
+def _against(got: Signals, exact: Floats, allowed: float = FINE) -> Got:
+    """Signals against what they must be, of its peak; none may be outside."""
+    error = off(np.abs(got.pressure - exact).max() / np.abs(exact).max(), allowed, "of peak")
+    return Got(error.text, error.ok and got.outside == 0)
+
+
+def _delays() -> Got:
+    parts = []
+    for delay in (1e-6, 1e-3, 1.0, 100.0):
+        place = (delay * C, 0.0, 0.0)
+        snaps = (snap(place),)
+        start, samples = delay - 4e-4, 200
+        found = traced(snaps, ONE)
+        exact = direct(ONE, place, times(start, samples))
+        parts += [_against(heard(m, found, snaps, ONE, start, samples), exact) for m in methods()]
+    return together(parts)
+
+
+def _long() -> Got:
+    """One window that holds both."""
+    places = (1e-6 * C, 0.0, 0.0), (0.0, 100.0 * C, 0.0)
+    snaps = tuple(snap(p, gain=float(np.linalg.norm(p))) for p in places)
+    start, samples = -4e-4, round((100.0 + 8e-4) * RATE)
+    got = heard(methods()[0], traced(snaps, ONE), snaps, ONE, start, samples)
+    parts = []
+    for delay in (1e-6, 100.0):
+        first = max(round((delay - 4e-4 - start) * RATE), 0)
+        part = slice(first, first + 190)
+        exact = ricker(start + np.arange(samples)[part] / RATE - delay)
+        parts.append(off(np.abs(got.pressure[0, part] - exact).max(), FINE, "of peak"))
+        got.pressure[0, part] = 0.0
+    return together(parts, off(np.abs(got.pressure).max(), FINE, "of peak", "elsewhere"))
+
+
+def _one_sample() -> Got:
+    from sonarsynth.imaging import FocusedDelayAndSum
+
+    place = (9.0, 2.0, -3.0)
+    snaps = (snap(place),)
+    found, parts, peak = traced(snaps, FEW), [], 1.0 / float(np.linalg.norm(place))
+    for late in (-2e-5, 0.0, 1.3e-5, 1e-4):
+        start = float(np.linalg.norm(place)) / C + late
+        exact = direct(FEW, place, times(start, 1))
+        for method in methods():
+            got = method.signals(found, snaps, FEW, SONAR, None, start, 1)
+            parts.append(off(np.abs(got.pressure - exact).max() / peak, FINE, "of peak"))
+    short = heard(methods()[0], found, snaps, FEW, start, 1)
+    image = refused(lambda: FocusedDelayAndSum().image(short, FEW, SONAR, start, start), "window")
+    return together(parts, image)
+
+
+def _bands() -> Got:
+    parts = []
+    for frequency, rate, stop in ((50.0, 2e5, 9e4), (5e3, 2e5, 9e4), (2e5, 1e7, 2e6), (1e7, 1e8, 40e6)):
+        sonar = Sonar(sampling_frequency=rate, filter=LowPass(cutoff=stop, transition=0.1 * stop))
+        place = (9.0, 2.0, -3.0)
+        snaps = (snap(place, model=Ricker(frequency=frequency)),)
+        half = 2.0 / frequency + 2.0 * FEW.aperture / C
+        samples = round(2.0 * half * rate)
+        start = float(np.linalg.norm(place)) / C - half
+        exact = direct(FEW, place, times(start, samples, rate), frequency)
+        got = heard(methods()[0], traced(snaps, FEW), snaps, FEW, start, samples, sonar)
+        parts.append(_against(got, exact))
+    return together(parts)
+
+
+def _narrow() -> Got:
+    """A thousand cycles: the tone in its Gaussian, whose width at half its height is theirs."""
+    f, cycles, place = 50e3, 1000.0, (9.0, 2.0, -3.0)
+    snaps = (snap(place, model=Gabor(frequency=f, cycles=cycles)),)
+    r, samples = float(np.linalg.norm(place)), 60_000
+    start = r / C - 0.5 * samples / RATE
+    got = heard(methods()[0], traced(snaps, ONE), snaps, ONE, start, samples)
+    t = times(start, samples) - r / C
+    exact = np.exp(-4.0 * np.log(2.0) * (t * f / cycles) ** 2) * np.cos(2.0 * np.pi * f * t) / r
+    return _against(got, exact)
+
+
+def _loud_and_faint() -> Got:
+    """100 dB: a strength of 1 and of 1e-5, at places heard apart; each against what is heard of it alone."""
+    source = np.array([6.0, -4.0, -3.0])
+    snaps, parts = (snap(source),), []
+    mesh = mesh_of(Sphere(radius=1e-3))
+    bodies = body(mesh, (8.0, 0.0, 0.0)), body(mesh, (15.0, 1.0, 0.0))
+    laws = Isotropic(strength=1.0), Isotropic(strength=1e-5)
+    both, alone = traced(snaps, FEW, bodies, laws), traced(snaps, FEW, bodies[1:], laws[1:])
+    both, alone = (x.select(~x.direct) for x in (both, alone))
+    late = float(alone.delay.mean())
+    for method in methods():
+        got, exact = (heard(method, x, snaps, FEW, late - 4e-4, 200) for x in (both, alone))
+        error = np.abs(got.pressure - exact.pressure).max() / np.abs(exact.pressure).max()
+        parts.append(off(error, 1e-3, "of peak"))
+    counts = [int((both.target == n).sum()) for n in (0, 1)]
+    return together(holds(min(counts) > 0, f"{counts} paths"), parts)
+
+
+def _silence() -> Got:
+    from sonarsynth.imaging import FocusedDelayAndSum
+    from sonarsynth.ranging import IsovelocityRange, SensorDelays
+
+    quiet = heard(methods()[0], traced((), FEW), (), FEW, 0.0, 2000)
+    sonar = Sonar(array=PlanarLattice(columns=4, rows=4, pitch=0.1, face=0.0), beams=BeamGrid(azimuths=5, elevations=5))
+    found = SensorDelays().locate(quiet, FEW, sonar, POSE, 100.0, 1, PROFILE)
+    image = FocusedDelayAndSum().image(quiet, FEW, sonar, 1e-3, 6e-3)
+    cloud = IsovelocityRange().cloud(quiet, image, found, FEW, sonar, POSE, PROFILE)
+    return together(
+        holds(not quiet.pressure.any() and quiet.outside == 0, "no pressure"),
+        holds(not image.energy.any(), "no energy in any beam"),
+        holds(all(np.isnan(v).all() for v in vars(found).values() if v.dtype.kind == "f"), "no snap found: NaN"),
+        holds(all(np.isnan(v).all() for v in vars(cloud).values()), "no point: NaN"),
+    )
+
+
+def _few_sensors() -> Got:
+    from sonarsynth.ranging import SensorDelays
+    from sonarsynth.ranging.location.locating import unlocatable
+
+    place, parts = (9.0, 2.0, -3.0), []
+    snaps, start = (snap(place),), 0.004
+    for array, reason in ((ONE, "1 live sensor"), (TWO, "2 live sensors")):
+        got = heard(methods()[0], traced(snaps, array), snaps, array, start, 1000)
+        parts.append(_against(got, direct(array, place, times(start, 1000))))
+        found = SensorDelays().locate(got, array, SONAR, POSE, 100.0, 1, PROFILE)
+        said = unlocatable(array) or ""
+        parts.append(holds(bool(np.isnan(found.azimuth).all()) and reason in said, f"no bearing: {said}"))
+        if array is TWO:
+            parts.append(holds(bool((got.pressure[0] == got.pressure[1]).all()), "both the same"))
+    return together(*parts)
+
+
+def _ten_thousand() -> Got:
+    """Every hydrophone; and the beam that is focused at the snap, whose energy in the band is the pulse's over r^2."""
+    from scipy.integrate import quad
+
+    from sonarsynth.imaging import FocusedDelayAndSum
+
+    array = PlanarLattice(columns=100, rows=100, pitch=0.01, face=0.0)
+    band = Band(low=10e3, high=40e3)
+    sonar = Sonar(
+        array=array, sampling_frequency=RATE, filter=LowPass(cutoff=110e3), band=band, assumed_sound_speed=C,
+        beams=BeamGrid(azimuths=21, elevations=21, azimuth_span=0.5, elevation_span=0.5),
+    )  # fmt: skip
+    many, place = elements(array), (15.0, 0.0, 0.0)
+    snaps, start, samples = (snap(place),), 15.0 / C - 1e-3, 500
+    got = heard(methods()[0], traced(snaps, many), snaps, many, start, samples, sonar)
+    exact = _against(got, direct(many, place, times(start, samples)))
+    image = FocusedDelayAndSum(focus=15.0).image(got, many, sonar, start, start + (samples - 1) / RATE)
+    f0 = PULSE.frequency
+
+    def power(f: float) -> float:
+        return float((2.0 / np.sqrt(np.pi) * f**2 / f0**3 * np.exp(-((f / f0) ** 2))) ** 2)
+
+    energy = 2.0 * quad(power, band.low, band.high)[0] / 15.0**2
+    where = int(np.argmax(image.energy))
+    return together(
+        exact,
+        holds(where == 10 * 21 + 10, "the loudest beam is the one ahead"),
+        off(image.energy[10, 10] / energy - 1.0, 0.02, what="its energy"),
+    )
+
+
+EXACT = "the pulse over r at its time, to 1e-4"
+CASES = (
+    Case("delays of 1 us to 100 s", EXACT, _delays),
+    Case("1 us and 100 s in one window", f"{EXACT}; silence between", _long, slow=True),
+    Case("one-sample windows", f"{EXACT}; no image, with the reason", _one_sample),
+    Case("bands of 50 Hz to 10 MHz", EXACT, _bands),
+    Case("a narrow band: 1000 cycles", "the tone in its Gaussian, to 1e-4", _narrow),
+    Case("one loud and one faint target, 100 dB apart", "the faint one as it is alone, to 1e-3", _loud_and_faint),
+    Case("silence", "no pressure, no energy; NaN for what is not there", _silence),
+    Case("one sensor, two at one place", f"{EXACT}; no bearing, with the reason", _few_sensors),
+    Case("10 000 sensors", f"{EXACT}; the energy of the focused beam by Parseval", _ten_thousand, slow=True),
+)

@@ -1,0 +1,112 @@
+"""Sources that are hard to locate: each estimate is right within its errors, or is none and says why."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, azimuth_elevation, direction
+from sonarsynth.products import REASONS, Bearings, Signals
+from sonarsynth.ranging import SensorDelays
+from sonarsynth.receiver import Band, Elements, PlanarLattice, Sonar, elements
+from sonarsynth.validation.extremes.outcomes import Case, Got, holds, together
+from sonarsynth.validation.extremes.plain_scenes import BED, POSE, PROFILE, RATE, C, direct
+
+LATTICE = PlanarLattice(columns=16, rows=16, pitch=0.08, face=0.0)
+BAND = Band(low=25e3, high=85e3)
+TONE = 40e3
+"""Hz: the centre of the narrow bands."""
+
+
+def _heard(array: Elements, places: Sequence[Floats], gains: Sequence[float], noise: float, seed: int) -> Signals:
+    """Snaps at one instant at places (xyz) in the sonar frame, with noise (Pa) at each hydrophone."""
+    away = np.linalg.norm(places, axis=1)
+    start = float(away.min()) / C - 2e-3
+    time = start + np.arange(int((float(np.ptp(away)) / C + 4e-3) * RATE)) / RATE
+    total = sum(g * direct(array, place.tolist(), time, TONE) for g, place in zip(gains, places, strict=True))
+    total = total + noise * np.random.default_rng(seed).standard_normal(np.shape(total))
+    return Signals(total.astype(np.float32), start, RATE, 0.0, 0, 0)
+
+
+def _located(signals: Signals, array: Elements, rows: int, band: Band = BAND, *, refraction: bool = False) -> Bearings:
+    sonar = Sonar(array=LATTICE, band=band, sampling_frequency=RATE, assumed_sound_speed=C, sound_speed_error=0.1)
+    return SensorDelays(refraction=refraction).locate(signals, array, sonar, POSE, BED, rows, PROFILE)
+
+
+def _honest(found: Bearings, places: Sequence[Floats]) -> Got:
+    """Each row that says something is right within four errors about one of the places; others have a reason."""
+    good, heard = True, np.flatnonzero(np.isfinite(found.time))
+    for row in heard:
+        azimuth, elevation = azimuth_elevation(np.array(places))
+        off = np.hypot(
+            (found.azimuth[row] - azimuth) / found.azimuth_error[row],
+            (found.elevation[row] - elevation) / found.elevation_error[row],
+        )
+        good &= bool(off.min() < 4 * np.sqrt(2))
+        if np.isfinite(found.position[row]).all():
+            error = found.position[row] - places[int(off.argmin())]
+            good &= bool(error @ np.linalg.solve(found.position_covariance[row], error) < 22.1)
+    good &= bool((found.reason[np.isnan(found.time)] > 0).all())
+    count = int(np.isfinite(found.position).all(axis=1).sum())
+    reasons = sorted({REASONS[n] for n in found.reason if n})
+    return holds(
+        good, f"{len(heard)} of {len(places)} heard, {count} placed" + (f" ({', '.join(reasons)})" * any(reasons))
+    )
+
+
+def _middle() -> Got:
+    """Half way between surface and bottom, 10 m to 5 km away, by straight and by bent rays; quiet, and with noise."""
+    array, parts = elements(LATTICE), []
+    for distance in (10.0, 30.0, 100.0, 300.0, 1e3, 5e3):
+        place = distance * direction(0.3, -0.2)
+        for noise in (0.0, 1e-2 / distance):
+            signals = _heard(array, [place], [1.0], noise, 1)
+            for refraction in (False, True):
+                found = _located(signals, array, 1, refraction=refraction)
+                near = holds(bool(np.isfinite(found.time[0])), f"heard at {distance:g} m")
+                parts.append(near if not near.ok else _honest(found, [place]))
+    return together(parts)
+
+
+def _bands() -> Got:
+    """100 Hz to 60 kHz about 40 kHz, or above 25 kHz: a place within its errors, or none with a reason."""
+    array, place, parts = elements(LATTICE), 20.0 * direction(0.3, -0.2), []
+    signals = _heard(array, [place], [1.0], 1e-5, 2)
+    for width in (100.0, 300.0, 1e3, 3e3, 10e3, 30e3, 60e3):
+        low = TONE - 0.5 * width if width <= 30e3 else 25e3
+        found = _located(signals, array, 1, Band(low=low, high=low + width))
+        parts.append(_honest(found, [place]))
+        parts.append(holds(not found.time_error[0] > 1 / width, "time within the pulse"))
+    return together(parts)
+
+
+def _crowd() -> Got:
+    """1, 2, 5, 10 and 20 snaps at one instant: none that is accepted is anything but one of them."""
+    array, parts = elements(LATTICE), []
+    for count in (1, 2, 5, 10, 20):
+        random = np.random.default_rng(count)
+        angles = random.uniform([-0.6, -0.5], [0.6, 0.3], (count, 2))
+        places = [r * direction(*each) for r, each in zip(np.linspace(8.0, 40.0, count), angles, strict=True)]
+        found = _located(_heard(array, places, [1.0] * count, 1e-5, count), array, count)
+        parts.append(_honest(found, places))
+    return together(parts)
+
+
+def _stranger() -> Got:
+    """20 dB louder than the other, before it and after it: the clock is the louder one's."""
+    array, parts = elements(LATTICE), []
+    for far in (14.0, 30.0):
+        places = [20.0 * direction(-0.3, -0.2), far * direction(0.4, -0.1)]
+        found = _located(_heard(array, places, [1.0, 10.0], 1e-5, 3), array, 2)
+        off = float(np.abs(found.azimuth[0] - azimuth_elevation(places[1])[0]))
+        parts += [holds(off < 4 * found.azimuth_error[0], "the louder one first"), _honest(found, places)]
+    return together(parts)
+
+
+CASES = (
+    Case("a snap in mid-water, 10 m to 5 km away", "the bearing; the place within its errors, or none", _middle),
+    Case("bands of 100 Hz to 60 kHz", "the place within its errors, or none with a reason", _bands),
+    Case("1 to 20 snaps at one instant", "each estimate one of them, or none with a reason", _crowd),
+    Case("a stranger 20 dB louder", "the louder one first, each within its errors", _stranger),
+)

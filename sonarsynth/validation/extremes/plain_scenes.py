@@ -1,0 +1,106 @@
+"""Scenes of one sound speed without absorption, whose signals are closed forms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
+from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.geometry.placed_target import Body
+from sonarsynth.receiver import Elements, LowPass, Sonar
+from sonarsynth.sources.shrimp import SnapModel
+from sonarsynth.sources.snap_models import Ricker
+from sonarsynth.state import Moment, Snap
+
+if TYPE_CHECKING:
+    from sonarsynth.products import Arrivals, Signals
+    from sonarsynth.scattering import ScatteringLaw
+    from sonarsynth.signals import SignalSynthesis
+
+C, BED, RATE = 1500.0, 12e3, 250e3
+PULSE = Ricker(frequency=20e3)
+SONAR = Sonar(sampling_frequency=RATE, filter=LowPass(cutoff=110e3))
+ARRAY = np.array([0.0, 0.0, -0.5 * BED])
+POSE = Pose(ARRAY, quaternion(0.5 * np.pi))
+"""The sonar frame is the world's, but for its place: x forward."""
+WATER = Environment(depth=BED, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"))
+PROFILE = Profile(np.array([0.0]), np.array([C]))
+
+
+def snap(place: Sequence[float] | Floats, time: float = 0.0, model: SnapModel = PULSE, gain: float = 1.0) -> Snap:
+    """A test pulse at a place (xyz) in the sonar frame."""
+    return Snap(ARRAY + np.asarray(place, float), time, model, None, gain)
+
+
+def body(mesh: Mesh, place: Sequence[float] | Floats, turned: float = 0.5 * np.pi) -> Body:
+    """A body at rest at a place (xyz) in the sonar frame, its heading as the sonar's unless turned."""
+    return Body("body", mesh, Pose(ARRAY + np.asarray(place, float), quaternion(turned)), np.zeros(3))
+
+
+def traced(
+    snaps: Sequence[Snap],
+    elements: Elements,
+    bodies: Sequence[Body] = (),
+    laws: Sequence[ScatteringLaw] = (),
+    band: tuple[float, float] = (25e3, 85e3),
+) -> Arrivals:
+    """Every path, none of which has a number that is none."""
+    from sonarsynth.propagation import AutoTracing
+    from sonarsynth.tracing.arrivals import trace
+
+    moment = Moment(0.0, tuple(bodies), tuple(snaps))
+    found = trace(WATER, PROFILE, moment, POSE, elements, 0.0, AutoTracing(), tuple(laws), band=band)
+    for name, value in vars(found).items():
+        if isinstance(value, np.ndarray) and not np.isfinite(value).all():
+            raise ArithmeticError(f"{name} of a path is not finite")
+    return found
+
+
+def heard(
+    method: SignalSynthesis,
+    found: Arrivals,
+    snaps: Sequence[Snap],
+    elements: Elements,
+    start: float,
+    samples: int,
+    sonar: Sonar = SONAR,
+) -> Signals:
+    """Signals of paths."""
+    return method.signals(found, tuple(snaps), elements, sonar, None, start, samples)
+
+
+def ricker(time: Floats, frequency: float = PULSE.frequency) -> Floats:
+    """The test pulse (...) at times (s): (1 - 2 x^2) exp(-x^2), x = pi f t."""
+    x = (np.pi * frequency * time) ** 2
+    return np.asarray((1.0 - 2.0 * x) * np.exp(-x))
+
+
+def times(start: float, samples: int, rate: float = RATE) -> Floats:
+    """Times (sample,) of a window (s)."""
+    return start + np.arange(samples) / rate
+
+
+def direct(elements: Elements, place: Sequence[float], time: Floats, frequency: float = PULSE.frequency) -> Floats:
+    """What each hydrophone hears of a snap at a place (xyz) in the sonar frame: (sensor, sample)."""
+    r = np.linalg.norm(elements.position - np.asarray(place, float), axis=1)[:, None]
+    return np.asarray(ricker(time - r / C, frequency) / r)
+
+
+def transfer(found: Arrivals, frequency: Floats) -> Floats:
+    """Pressure (frequency,) at the array centre for a snap of unit spectrum at 1 m: complex, of all paths."""
+    from sonarsynth.equations.scattering.facet_pulses import facet_response
+
+    total = np.zeros(len(frequency), complex)
+    for some in np.array_split(np.arange(len(found.delay)), len(found.delay) // 100_000 + 1):
+        part = found.select(some)
+        shape = facet_response(
+            frequency, part.coherent, part.corners, part.rough_share, part.rough_delay, part.centre
+        )  # fmt: skip
+        phase = part.phase[:, None] - 2.0 * np.pi * part.delay[:, None] * frequency
+        total += (part.amplitude[:, None] * shape * np.exp(1j * phase)).sum(axis=0)
+    return np.asarray(total)

@@ -1,0 +1,1 @@
+"""The eigenray search against the references."""

@@ -1,0 +1,170 @@
+"""The eigenray search against computations that share no code with it: error against run time.
+
+Isovelocity water against image sources; one gradient against its circles; layers against arithmetic of 50 digits and
+against the ray equations integrated by DOP853, with a dense fan that counts the rays of every family; the canonical
+profile of Munk, whose layers have an error of their own, against shooting through the smooth profile.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.conventions import Bools
+from sonarsynth.validation.rays import ray_cases
+from sonarsynth.validation.rays.ray_cases import Case
+from sonarsynth.validation.rays.ray_matching import Rays, errors, matched, miscounted, nearest, rays_of, worst
+from sonarsynth.validation.references.rays.image_rays import image_rays
+from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays
+from sonarsynth.validation.references.rays.ode import followed_rays
+from sonarsynth.validation.references.rays.one_gradient import gradient_rays
+from sonarsynth.validation.references.rays.shooting import munk, shooting_rays
+from sonarsynth.validation.references.rays.slowness_fan import count_rays
+from sonarsynth.validation.validation_rows import Row
+
+if TYPE_CHECKING:
+    from sonarsynth.equations.rays.ray_solutions import Eigenrays
+
+IMAGES, CIRCLES = "image sources", "circles, 40 digits"
+MANY_DIGITS, INTEGRATED, FAN = "50 digits", "DOP853 through the layers", "a dense fan"
+SMOOTH = "DOP853, smooth profile"
+REPEATS = 5
+BATCH = 2e-3  # s: a search is timed on at least so much
+COST = "us a ray"  # CPU time of one core for one ray, in the complete search of the whole case
+
+
+def ray_accuracy(quick: bool = False) -> list[Row]:
+    """Errors and run times in every case; quick: fewer pairs. Raises ModuleNotFoundError without mpmath."""
+    if find_spec("mpmath") is None:
+        raise ModuleNotFoundError("the references for rays need mpmath: pip install 'sonarsynth[accuracy]'")
+    return [
+        *_isovelocity(quick),
+        *_gradients(quick),
+        *_layered(quick),
+        *_integrated(quick),
+        *_smooth(quick),
+    ]
+
+
+def search(case: Case) -> tuple[Eigenrays, float]:
+    """All eigenrays of a case, and the CPU time of one of them (us): the median of several runs, on a batch."""
+    from sonarsynth.equations.rays import ray_solutions
+
+    water = ray_solutions.water(case.depth, case.speed, case.bed)
+
+    def run(copies: int) -> tuple[Eigenrays, float]:
+        start, end, distance = (np.tile(v, copies) for v in (case.start, case.end, case.distance))
+        began = time.process_time()
+        found = ray_solutions.eigenrays(water, start, end, distance, case.vertices, case.reflections)
+        return found, time.process_time() - began
+
+    found, _ = run(1)  # compiles
+    _, once = run(1)
+    copies = max(1, min(10_000, round(BATCH / max(once, 1e-6))))
+    seconds = float(np.median([run(copies)[1] for _ in range(REPEATS)]))
+    return found, 1e6 * seconds / (copies * max(1, len(found.pair)))
+
+
+def _rows(case: Case, reference: str, cost: float, found: Rays, exact: Rays, trusted: Bools) -> Iterator[Row]:
+    """One row a quantity of matched rays."""
+    counts = _counts(case, len(found.pair))
+    for quantity, (unit, got, bound) in errors(found, exact, trusted, case.bounds).items():
+        yield Row(case.name, reference, quantity, unit, bound, got, cost, COST, counts)
+
+
+def _counts(case: Case, rays: int) -> dict[str, int]:
+    """Pairs of ends that were searched, and rays that were compared."""
+    return {"pairs": len(case.start), "rays": rays}
+
+
+def _trusted(found: Eigenrays) -> Bools:
+    from sonarsynth.equations.rays.ray_solutions import CAUSTIC
+
+    return np.asarray(found.flag != CAUSTIC)
+
+
+def _complete(case: Case, reference: str, cost: float, found: Rays, exact: Rays, trusted: Bools) -> Iterator[Row]:
+    """Rows of a reference that gives every ray."""
+    wrong = miscounted(found, Counter(exact.families))
+    yield Row(case.name, reference, "count", "rays", 0.0, float(wrong), cost, COST, _counts(case, len(found.pair)))
+    i, j = matched(found, exact)
+    yield from _rows(case, reference, cost, found.select(i), exact.select(j), trusted[i])
+
+
+def _isovelocity(quick: bool) -> Iterator[Row]:
+    for case in ray_cases.isovelocity(quick):
+        found, cost = search(case)
+        exact = image_rays(float(case.speed[0]), case.bed, case.start, case.end, case.distance, case.vertices)
+        yield from _complete(case, IMAGES, cost, rays_of(found), exact, _trusted(found))
+
+
+def _gradients(quick: bool) -> Iterator[Row]:
+    for case, water in ray_cases.gradients(quick):
+        found, cost = search(case)
+        rays = rays_of(found)
+        keep = (rays.bottom if water.slope > 0 else rays.surface) == 0
+        exact = gradient_rays(water, case.start, case.end, case.distance, case.vertices)
+        yield from _complete(case, CIRCLES, cost, rays.select(keep), exact, _trusted(found)[keep])
+
+
+def _thinned(case: Case, rays: Rays) -> np.ndarray:
+    count = len(rays.pair)
+    return np.unique(np.linspace(0, count - 1, min(count, case.check)).astype(int))
+
+
+def _counted(case: Case, reference: str, refine: Callable[[Case, Eigenrays, Rays, np.ndarray], Rays]) -> Iterator[Row]:
+    """Rows of a reference that makes the rays found exact, and of the fan that counts them."""
+    found, cost = search(case)
+    rays = rays_of(found)
+    ends = (case.start, case.end, case.distance)
+    counts = count_rays(case.depth, case.speed, *ends, case.vertices, case.reflections)
+    wrong = miscounted(rays, counts)
+    yield Row(case.name, FAN, "count", "rays", 0.0, float(wrong), cost, COST, _counts(case, len(rays.pair)))
+    keep = _thinned(case, rays)
+    some, trusted = rays.select(keep), _trusted(found)[keep]
+    exact = refine(case, found, some, keep)
+    other = sum(a != b for a, b in zip(some.families, exact.families, strict=True))
+    yield Row(case.name, reference, "family", "wrong", 0.0, float(other), cost, COST, _counts(case, len(keep)))
+    yield from _rows(case, reference, cost, some, exact, trusted)
+
+
+def _layered(quick: bool) -> Iterator[Row]:
+    def refine(case: Case, found: Eigenrays, some: Rays, keep: np.ndarray) -> Rays:
+        ends = (case.start, case.end, case.distance)
+        return exact_rays(Layers(case.depth, case.speed), some, found.slowness[keep], *ends)
+
+    for case in ray_cases.layered(quick):
+        yield from _counted(case, MANY_DIGITS, refine)
+
+
+def _integrated(quick: bool) -> Iterator[Row]:
+    def refine(case: Case, found: Eigenrays, some: Rays, keep: np.ndarray) -> Rays:
+        return followed_rays(case.depth, case.speed, some, case.start, case.end, case.distance)
+
+    for case in ray_cases.shot(quick):
+        yield from _counted(case, INTEGRATED, refine)
+
+
+def _smooth(quick: bool) -> Iterator[Row]:
+    """What the layers that stand for a smooth profile cost in travel time, whatever the search does.
+
+    Every ray of the smooth profile is compared with the nearest in time of its family. Amplitudes are not: layers have
+    kinks, and where a ray turns near one there are caustics, and rays, that the smooth profile has not.
+    """
+    approach = ray_cases.munk_approach(quick)
+    exact = shooting_rays(munk(), approach.start, approach.ends, approach.distance, approach.vertices)
+    for tolerance in approach.tolerances:
+        case = approach.case(tolerance)
+        found, cost = search(case)
+        i, j = nearest(rays_of(found), exact)
+        counts = _counts(case, len(exact.pair))
+        missed = float(len(exact.pair) - len(j))
+        yield Row(case.name, SMOOTH, "missed", "rays", 0.0, missed, cost, COST, counts, approach.name)
+        error = np.abs(found.travel_time[i] - exact.travel_time[j])
+        got, bound = worst(error, tolerance * np.maximum(1, exact.turning[j]))
+        yield Row(case.name, SMOOTH, "time", "s", bound, got, cost, COST, counts, approach.name)

@@ -1,0 +1,163 @@
+"""The waters and the pairs of ends in which the search for eigenrays is checked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.environment.sea import Munk, Thermocline
+from sonarsynth.randomness import stream
+from sonarsynth.validation.rays.ray_matching import Bounds
+from sonarsynth.validation.references.rays.one_gradient import Gradient
+
+SEED = 3
+TIGHT, LOOSE = Bounds(), Bounds(time=1e-12)
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """Water, and pairs of ends to be joined by rays with up to so many vertices and reflections."""
+
+    name: str
+    depth: Floats  # (node,) m, from the surface to the bed
+    speed: Floats  # (node,) m/s
+    start: Floats  # (pair,) m
+    end: Floats  # (pair,) m
+    distance: Floats  # (pair,) m
+    vertices: int
+    reflections: int
+    bounds: Bounds = TIGHT
+    check: int = 60
+    """Rays that are compared, evenly taken."""
+
+    @property
+    def bed(self) -> float:
+        """Depth of the bed (m)."""
+        return float(self.depth[-1])
+
+
+def drawn(
+    name: str,
+    nodes: tuple[Floats, Floats],
+    nearest: float,
+    farthest: float,
+    pairs: int,
+    vertices: int,
+    reflections: int,
+    bounds: Bounds = TIGHT,
+    check: int = 60,
+) -> Case:
+    """A case with ends all over the water, at distances (m) spread evenly in their logarithm."""
+    rng = stream(SEED, "accuracy", "rays", name)
+    start, end = rng.uniform(0.0, float(nodes[0][-1]), (2, pairs))
+    distance = np.geomspace(nearest, farthest, pairs)
+    return Case(name, *nodes, start, end, distance, vertices, reflections, bounds, check)
+
+
+def cut(nodes: tuple[Floats, Floats], bed: float) -> tuple[Floats, Floats]:
+    """The nodes of a profile down to the bed (m)."""
+    above = nodes[0] < bed
+    speed = np.append(nodes[1][above], np.interp(bed, *nodes))
+    return np.append(nodes[0][above], bed), speed
+
+
+def isovelocity(quick: bool) -> Iterator[Case]:
+    """One speed: in 100 m, and in 5 km out to 100 km."""
+    pairs = 12 if quick else 60
+    yield drawn("isovelocity", (np.array([0.0, 100.0]), np.full(2, 1500.0)), 1.0, 1e4, pairs, 4, 4, check=10**6)
+    deep = np.array([0.0, 5000.0]), np.full(2, 1500.0)
+    yield drawn("isovelocity, 100 km", deep, 1e3, 1e5, pairs, 4, 4, check=10**6)
+
+
+def gradients(quick: bool) -> Iterator[tuple[Case, Gradient]]:
+    """One gradient: that of pressure and its opposite, that of a sharp thermocline, and hardly any."""
+    for slope, bed, farthest in ((0.0163, 4e3, 6e4), (-0.0163, 4e3, 6e4), (-4.3, 20.0, 300.0), (1e-6, 100.0, 1e4)):
+        water = Gradient(1500.0, slope, bed)
+        nodes = np.array([0.0, bed]), np.array([1500.0, 1500.0 + slope * bed])
+        name = f"gradient {slope:g} /s"
+        yield drawn(name, nodes, 0.01 * farthest, farthest, 6 if quick else 30, 6, 6, check=10**6), water
+
+
+def random_layers(count: int, bed: float, spread: float) -> tuple[Floats, Floats]:
+    """Layers between nodes at random depths (m), their speeds spread (m/s) about 1500 m/s."""
+    rng = stream(SEED, "accuracy", "layers", count)
+    depth = np.concatenate([[0.0], np.sort(rng.uniform(0.0, bed, count - 1)), [bed]])
+    return depth, 1500.0 + spread * rng.normal(size=count + 1)
+
+
+def noisy_cast(bed: float, step: float) -> tuple[Floats, Floats]:
+    """A cast every `step` (m) down to the bed: a thermocline, with noise of 0.05 m/s from node to node."""
+    rng = stream(SEED, "accuracy", "cast")
+    depth = np.linspace(0.0, bed, round(bed / step) + 1)
+    smooth = 1538.0 - 8.0 / (1.0 + np.exp(-(depth - 0.4 * bed) / (0.05 * bed))) + 0.0163 * depth
+    return depth, smooth + 0.05 * rng.normal(size=len(depth))
+
+
+DUCT = np.array([0.0, 40.0, 60.0, 100.0]), np.array([1520.0, 1500.0, 1502.0, 1530.0])
+JUMP = np.array([0.0, 30.0, 30.0, 70.0, 70.0, 100.0]), np.array([1510.0, 1505.0, 1515.0, 1490.0, 1486.0, 1495.0])
+
+
+def thermocline() -> tuple[Floats, Floats]:
+    """The sharp thermocline of a shallow tropical site over a bed at 20 m."""
+    return cut(Thermocline().nodes, 20.0)
+
+
+def munk_layers(tolerance: float, bed: float = 5000.0) -> tuple[Floats, Floats]:
+    """The layers that stand for the canonical profile to a tolerance (s) at each turning point."""
+    return cut(Munk(tolerance=tolerance).nodes, bed)
+
+
+def layered(quick: bool) -> Iterator[Case]:
+    """Layers: few, many, a thermocline, a duct, jumps, a noisy cast."""
+    many, few = (6, 8) if quick else (40, 120)
+    yield drawn("3 layers", random_layers(3, 100.0, 5.0), 10.0, 3e3, many, 4, 4, check=few)
+    yield drawn("5 layers", random_layers(5, 100.0, 5.0), 10.0, 3e3, many, 4, 4, check=few)
+    yield drawn("50 layers", random_layers(50, 200.0, 5.0), 10.0, 3e3, many, 3, 3, LOOSE, check=few // 2)
+    yield drawn("thermocline", thermocline(), 1.0, 500.0, many, 4, 4, check=few)
+    yield drawn("duct", DUCT, 50.0, 5e3, many, 8, 1, check=few)
+    yield drawn("jumps", JUMP, 10.0, 5e3, many, 4, 4, check=few)
+    cast = noisy_cast(100.0, 2.0 if quick else 0.5)
+    yield drawn("noisy cast", cast, 10.0, 1e3, many // 2, 3, 2, LOOSE, check=few // 4)
+
+
+def shot(quick: bool) -> Iterator[Case]:
+    """Layers whose rays are integrated: a thermocline, a duct, jumps, and the canonical profile out to 50 km."""
+    many, few = (4, 3) if quick else (20, 40)
+    yield drawn("thermocline", thermocline(), 5.0, 300.0, many, 3, 3, check=few)
+    yield drawn("duct", DUCT, 50.0, 3e3, many, 6, 1, check=few)
+    yield drawn("jumps", JUMP, 10.0, 3e3, many, 4, 2, check=few)
+    if not quick:
+        layers = munk_layers(1e-4)
+        ends = np.array([310.0, 800.0, 1310.0, 2000.0])
+        yield Case("Munk in layers", *layers, np.full(4, 1000.0), ends, np.full(4, 5e4), 6, 0, check=8)
+
+
+@dataclass(frozen=True, eq=False)
+class Approach:
+    """A smooth sound speed and the layers that stand for it, to falling tolerances (s) at each turning point."""
+
+    name: str
+    start: float  # m
+    ends: Floats  # (pair,) m
+    distance: float  # m
+    vertices: int
+    layers: Callable[[float], tuple[Floats, Floats]]
+    tolerances: tuple[float, ...]
+
+    def case(self, tolerance: float) -> Case:
+        """The case of one tolerance."""
+        count = len(self.ends)
+        same = np.full(count, self.start), self.ends, np.full(count, self.distance)
+        return Case(f"Munk, layers to {tolerance:g} s", *self.layers(tolerance), *same, self.vertices, 0)
+
+
+def munk_approach(quick: bool) -> Approach:
+    """The canonical profile, joined over 50 or 100 km."""
+    ends = np.array([310.0, 800.0, 1310.0, 2000.0])
+    tolerances = (1e-4, 1e-5) if quick else (1e-4, 1e-5, 1e-6)
+    return Approach(
+        "Munk, over the layers' tolerance", 1000.0, ends, 5e4 if quick else 1e5, 12, munk_layers, tolerances
+    )

@@ -1,0 +1,1 @@
+"""Independent computations of rays: none shares a formula's code with `sonarsynth.equations`; slow, and short."""

@@ -1,0 +1,1 @@
+"""The pressure of a whole frame, from the equations alone."""

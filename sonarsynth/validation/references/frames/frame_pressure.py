@@ -1,0 +1,264 @@
+"""What hydrophones hear of a frame, from its description alone: path by path, frequency by frequency, in float64.
+
+It shares nothing with tracing, synthesis and their equations. What it takes from the rest is what is described: meshes,
+motions, snaps, the profile of sound speed, the array and its filter, and signs that are drawn. Everything of a path is
+taken where the sound meets things (`sound_paths`), for every hydrophone by itself: delays, Doppler, directions,
+spreading, who stands in the way. An echo of a facet is
+
+    law(directions) A_out A_in V exp(-losses) at time t_2, through the face of the hydrophone and the filter,
+
+with the amplitudes A of the rays (`layered_rays`), the coefficient V of all reflections, and the facet's own centroid,
+normal and area. Choices of the model that are the same: a facet is lit and seen where its centroid, off the body by a
+millionth of the body's size, is clear of bodies, and scatters as if at rest; the reflection of a snap that lies on the
+bottom at its own place does not count as one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.fft import next_fast_len
+
+from sonarsynth.conventions import Floats
+from sonarsynth.environment.sea import Profile
+from sonarsynth.receiver.hydrophones import elements
+from sonarsynth.recipe.scene import Frame, Scene
+from sonarsynth.state import Snap
+from sonarsynth.validation.references.frames.facet_laws import amplitudes, known, signs
+from sonarsynth.validation.references.frames.line_of_sight import Surface
+from sonarsynth.validation.references.frames.moving_points import Mover
+from sonarsynth.validation.references.frames.path_sum import Contributions, stretches, transfer
+from sonarsynth.validation.references.frames.snap_spectrum import absorption, duration, filter_response, spectrum
+from sonarsynth.validation.references.frames.sound_paths import Solid, depths, heard, hidden, met
+from sonarsynth.validation.references.rays.boundaries_met import reflected
+from sonarsynth.validation.references.rays.layered_rays import Family, Rays, Water, families
+
+OFF = 1e-6
+"""Of a body's size: how far off a facet a line of sight begins."""
+SLANT = 0.3
+"""Bent rays leave a facet by less than this (rad) beside straight ones: others are not looked for."""
+
+
+STOPPED = 2e-5
+"""What the filter lets through may be so little, and be left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A target: its facets in its own frame, and how it moves."""
+
+    solid: Solid
+    centre: Floats  # (facet, xyz) m
+    clear: Floats  # (facet, xyz) m
+    normal: Floats  # (facet, xyz)
+    area: Floats  # (facet,) m2
+    sign: Floats  # (facet,)
+    number: int
+
+
+@dataclass(frozen=True, eq=False)
+class FramePressure:
+    """A frame to be heard."""
+
+    scene: Scene
+    frame: Frame
+    profile: Profile
+
+    @property
+    def unknown(self) -> str:
+        """Why this frame cannot be computed here; empty where it can."""
+        wrong = [type(law).__name__ for law in self.scene.laws if not known(law)]
+        return f"{wrong[0]} is not among the laws of the independent computation" if wrong else ""
+
+    def pressure(self, sensors: Sequence[int], start: float, samples: int) -> tuple[Floats, Floats]:
+        """Echoes, and what comes without a target, (sensor, sample) in Pa; start: s of the first sample, on the clock
+        of the frame."""
+        out = np.zeros((2, len(sensors), samples))
+        for snap in self.frame.moment.snaps:
+            lit = [part for body in self.bodies for part in self._lit(snap, body)]
+            for n, sensor in enumerate(sensors):
+                if elements(self.scene.sonar.array).gain[sensor]:
+                    place = elements(self.scene.sonar.array).position[sensor]
+                    out[0, n] += self._signal(snap, self._echoes(lit, place), start, samples)
+                    out[1, n] += self._signal(snap, self._direct(snap, place), start, samples)
+        return out[0], out[1]
+
+    @cached_property
+    def water(self) -> Water:
+        """What rays go through."""
+        return Water(self.profile.depth, self.profile.speed, self.scene.world.environment.depth)
+
+    @cached_property
+    def sonar(self) -> Mover:
+        """The array."""
+        return Mover(self.scene.trajectory.sonar, self.frame.time, self.scene.physics.doppler)
+
+    @cached_property
+    def bodies(self) -> tuple[Body, ...]:
+        """The targets."""
+        found = []
+        for number, target in enumerate(self.scene.world.targets):
+            mesh = self.scene.mesh_of(number)
+            corners = mesh.vertices[mesh.faces]
+            cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            twice = np.linalg.norm(cross, axis=1)
+            centre, normal = corners.mean(axis=1), cross / twice[:, None]
+            size = float(np.linalg.norm(mesh.vertices, axis=1).max())
+            solid = Solid(Mover(target.motion, self.frame.time, self.scene.physics.doppler), Surface.of(corners))
+            sign = signs(self.scene.laws[number], mesh)
+            found.append(Body(solid, centre, centre + OFF * size * normal, normal, 0.5 * twice, sign, number))
+        return tuple(found)
+
+    @property
+    def solids(self) -> list[Solid]:
+        """All that may stand in the way."""
+        return [body.solid for body in self.bodies]
+
+    @property
+    def bounces(self) -> int:
+        """Most reflections of a path."""
+        return self.scene.physics.tracing.bounces
+
+    def _lit(self, snap: Snap, body: Body) -> list[_Lit]:
+        """The facets of a body that a snap lights, by each family."""
+        found = []
+        for family in families(self.bounces):
+            rows = self._towards(
+                body, np.arange(len(body.centre)), np.full(len(body.centre), snap.time), snap.position, family
+            )
+            time, back = met(self.water, snap.position, snap.time, body.solid.mover, body.centre[rows], family)
+            normal = body.solid.mover.turned(body.normal[rows], time)
+            lit = np.flatnonzero(np.einsum("nx,nx->n", normal, back.departure) > 0.0)
+            if not len(lit):
+                continue
+            rows, time, back, normal = rows[lit], time[lit], back.select(lit), normal[lit]
+            clear = body.solid.mover.points(body.clear[rows], time)
+            end = np.broadcast_to(snap.position, clear.shape)
+            free = np.flatnonzero(~hidden(self.solids, self.water, clear, end, back, time))
+            counted = family.bounces - family.ends_at(-snap.position[2], self.water.bottom)
+            found.append(_Lit(body, rows[free], time[free], back.select(free), normal[free], family, counted))
+        return found
+
+    def _towards(self, body: Body, rows: np.ndarray, time: Floats, place: Floats, family: Family) -> np.ndarray:
+        """Facets whose outer side may face the image of a place (xyz)."""
+        point = body.solid.mover.points(body.centre[rows], time)
+        normal = body.solid.mover.turned(body.normal[rows], time)
+        image = family.image(np.array([-place[2]]), self.water.bottom)[0]
+        away = np.array([place[0], place[1], -image]) - point
+        margin = SLANT if np.ptp(self.water.speed) > 0.0 else 0.05
+        return np.asarray(rows[np.einsum("nx,nx->n", normal, away) > -margin * np.linalg.norm(away, axis=1)])
+
+    def _echoes(self, lit: list[_Lit], place: Floats) -> list[Contributions]:
+        """What one hydrophone hears of the facets."""
+        found = []
+        for part in lit:
+            for family in families(self.bounces - part.counted):
+                found += self._echo(part, place, family)
+        return found
+
+    def _echo(self, part: _Lit, place: Floats, family: Family) -> list[Contributions]:
+        body, mover = part.body, part.body.solid.mover
+        centre = self.sonar.points(place[None], np.zeros(1))[0]
+        some = np.isin(part.row, self._towards(body, part.row, part.time, centre, family))
+        one = part.select(np.flatnonzero(some))
+        point = mover.points(body.centre[one.row], one.time)
+        late, way = heard(self.water, point, one.time, self.sonar, place, family)
+        seen = np.flatnonzero(np.einsum("nx,nx->n", one.normal, way.departure) > 0.0)
+        if not len(seen):
+            return []
+        one, way, late = one.select(seen), way.select(seen), late[seen]
+        end = self.sonar.points(np.broadcast_to(place, (len(seen), 3)), late)
+        clear = mover.points(body.clear[one.row], one.time)
+        free = np.flatnonzero(~hidden(self.solids, self.water, clear, end, way, one.time))
+        one, way, late = one.select(free), way.select(free), late[free]
+        law = self.scene.laws[body.number]
+        size = amplitudes(law, -one.back.departure, way.departure, one.normal, body.area[one.row])
+        velocity = mover.velocity(body.centre[one.row], one.time)
+        c = self.water.at(-mover.points(body.centre[one.row], one.time)[:, 2])
+        out, away = (np.einsum("nx,nx->n", velocity, x) / c for x in (-one.back.departure, way.departure))
+        size = size * body.sign[one.row] * one.back.spreading * way.spreading
+        return [self._arriving(place, late, size, (1.0 - away) / (1.0 - out), (one.back, one.family), (way, family))]
+
+    def _direct(self, snap: Snap, place: Floats) -> list[Contributions]:
+        """What one hydrophone hears without a target."""
+        found, sent = [], np.array([snap.time])
+        for family in families(self.bounces):
+            late, way = heard(self.water, snap.position[None], sent, self.sonar, place, family)
+            end = self.sonar.points(place[None], late)
+            if not hidden(self.solids, self.water, snap.position[None], end, way, sent)[0]:
+                found.append(self._arriving(place, late, way.spreading, np.ones(1), (way, family)))
+        return found
+
+    def _arriving(
+        self, place: Floats, late: Floats, size: Floats, longer: Floats, *ways: tuple[Rays, Family]
+    ) -> Contributions:
+        """Rows of paths; longer (path,): of a pulse that leaves the last facet."""
+        environment, centre = self.scene.world.environment, self.scene.sonar.band.centre
+        bounced = [reflected(environment, self.water, family, way.cosine, centre) for way, family in ways]
+        last, own = ways[-1][0], np.broadcast_to(place, (len(late), 3))
+        end = self.sonar.points(own, late)
+        slow = last.arrival / self.water.at(-end[:, 2])[:, None]
+        along = np.einsum("nx,nx->n", self.sonar.velocity(own, late), slow)
+        face = np.einsum("nji,nj->ni", self.sonar.places(late)[1], slow)[:, 1:]
+        return Contributions(
+            time=late,
+            size=np.prod([v for v, _ in bounced], axis=0) * size,
+            longer=longer / (1.0 - along) - 1.0,
+            length=sum(depths(self.water, way) for way, _ in ways),  # type: ignore[arg-type]
+            blur=np.asarray(sum(b for _, b in bounced)),
+            face=elements(self.scene.sonar.array).face * face,
+        )
+
+    def _signal(self, snap: Snap, found: list[Contributions], start: float, samples: int) -> Floats:
+        """Pressure (sample,) of what arrives."""
+        rate, chosen = self.scene.sonar.sampling_frequency, self.scene.sonar.antialias
+        pad = int(np.ceil(1.2 * duration(snap, chosen) * rate))
+        signal = np.zeros(samples)
+        if not found:
+            return signal
+        every = Contributions.join(found)
+        sample = (every.time - start) * rate
+        every = every.select(np.flatnonzero((sample > -pad) & (sample < samples + pad)))
+        if not len(every.time):
+            return signal
+        first, last = (int(np.floor((f(every.time) - start) * rate)) for f in (np.min, np.max))
+        first, length = first - pad, next_fast_len(last - first + 2 * pad + 1, real=True)
+        step = rate / length
+        frequency = np.arange(length // 2 + 1) * step
+        passed = filter_response(chosen, frequency)
+        low, high = np.flatnonzero(np.abs(passed) > STOPPED)[[0, -1]]
+        node, weight = stretches(every.longer)
+        total = transfer(every, weight, start + first / rate, step, int(low), self._loss(frequency[low : high + 1]))
+        out = np.zeros(len(frequency), complex)
+        for one, of_node in zip(node, total, strict=True):
+            out[low : high + 1] += of_node * spectrum(snap, step, len(frequency), float(one))[low : high + 1]
+        within = slice(max(first, 0), min(first + length, samples))
+        signal[within] = np.fft.irfft(out * passed, length)[within.start - first : within.stop - first] * rate
+        return signal
+
+    def _loss(self, frequency: Floats) -> Floats:
+        """Absorption (bin, 3) in dB/m, and its first two powers of depth: a parabola through three depths."""
+        depth = np.array([0.0, 0.5, 1.0]) * self.water.bottom
+        loss = absorption(self.scene.world.environment.absorption, frequency, depth)
+        return np.asarray(np.linalg.solve(np.vander(depth, increasing=True), loss), float).T
+
+
+@dataclass(frozen=True, eq=False)
+class _Lit:
+    """Facets of a body that a snap lights by one family of rays."""
+
+    body: Body
+    row: np.ndarray  # (facet,) which
+    time: Floats  # (facet,) s: when the sound meets them
+    back: Rays  # (facet,) to the snap
+    normal: Floats  # (facet, xyz) world, then
+    family: Family  # of the rays back
+    counted: int  # reflections, but for one at the very place of a snap that lies on the bottom
+
+    def select(self, rows: np.ndarray) -> _Lit:
+        """Some of them."""
+        of = self.row[rows], self.time[rows], self.back.select(rows), self.normal[rows]
+        return _Lit(self.body, *of, self.family, self.counted)

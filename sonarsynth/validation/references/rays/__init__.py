@@ -1,0 +1,1 @@
+"""Rays by independent methods: shooting, images, arithmetic of many digits."""

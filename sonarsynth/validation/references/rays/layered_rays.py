@@ -1,0 +1,158 @@
+"""Rays between two points in water of layers, by images: closed forms and one root, with the spreading of the tube.
+
+A ray by surface and bottom is a ray without reflections in the water and its mirror images, one above the other; depth
+u in that stack is `unfolded`. Where the speed is linear in depth a ray is a circle. Between two levels of speeds a and
+b, `dz` apart, with p = cos(grazing)/c and s = sin(grazing) at each,
+
+    X = p (a + b) dz/(s_a + s_b),    T = (2/g) arsinh(g S/(2 sqrt(a b))),  S^2 = X^2 + dz^2
+
+and on from a level to where it turns, and back, X = 2 s/(p g), T = (2/g) arsinh(s/(p c)). The unknown is the sine at
+the fastest level of the ray, counted negative where the ray goes on beyond that level and turns. Amplitude by
+conservation of power in the tube of rays (Jensen, Kuperman, Porter and Schmidt 2011, Computational Ocean Acoustics,
+section 3.3), with dX for the change of the horizontal distance X by the sine sigma at the fastest level of speed c_f,
+
+    A^2 = c_start c_end/(c_f^2 r |dX/dsigma|) |sigma|/(s_start s_end).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from sonarsynth.conventions import Bools, Floats, Ints
+
+if TYPE_CHECKING:
+    from sonarsynth.validation.references.rays.layers_crossed import Crossed
+
+ROUNDS = 60
+CLOSE = 1e-13
+"""Of the distance: rays come as close as that to where they should."""
+
+
+class Family(NamedTuple):
+    """How a ray is reflected: how often, and which boundary comes first."""
+
+    bounces: int = 0
+    down: bool = True
+
+    def image(self, depth: Floats, bottom: float) -> Floats:
+        """Unfolded depth (m) of the image of the end."""
+        n, even = self.bounces, self.bounces % 2 == 0
+        if self.down:
+            return n * bottom + depth if even else (n + 1) * bottom - depth
+        return depth - n * bottom if even else -(n - 1) * bottom - depth
+
+    @property
+    def bottom(self) -> int:
+        """Reflections at the bottom."""
+        return (self.bounces + 1) // 2 if self.down else self.bounces // 2
+
+    def ends_at(self, depth: float, bottom: float) -> bool:
+        """Whether the last reflection is at the boundary on which an end at this depth (m) lies."""
+        at_bottom = self.down == (self.bounces % 2 == 1)
+        return self.bounces > 0 and depth == (bottom if at_bottom else 0.0)
+
+
+def families(bounces: int) -> list[Family]:
+    """All with at most so many reflections."""
+    return [Family(n, down) for n in range(bounces + 1) for down in ((True, False) if n else (True,))]
+
+
+@dataclass(frozen=True, eq=False)
+class Water:
+    """Speed (m/s) at node depths (m), linear between, constant beyond, from the surface to the bottom (m)."""
+
+    depth: Floats
+    speed: Floats
+    bottom: float
+
+    def at(self, depth: Floats) -> Floats:
+        """Sound speed at depths."""
+        return np.interp(depth, self.depth, self.speed)
+
+    def unfolded(self, copies: range) -> tuple[Floats, Floats]:
+        """Levels and speeds of the water and of so many of its images; copy 0 is the water, -1 is above it."""
+        inside = (self.depth > 0.0) & (self.depth < self.bottom)
+        z = np.concatenate([[0.0], self.depth[inside], [self.bottom]])
+        c = np.interp(z, self.depth, self.speed)
+        level = [k * self.bottom + (z if k % 2 == 0 else (self.bottom - z)[::-1]) for k in copies]
+        return np.concatenate(level), np.concatenate([c if k % 2 == 0 else c[::-1] for k in copies])
+
+
+@dataclass(frozen=True, eq=False)
+class Rays:
+    """A ray for each pair of points; NaN where there is none."""
+
+    time: Floats  # (ray,) s
+    length: Floats  # (ray,) m
+    spreading: Floats  # (ray,) 1/m
+    departure: Floats  # (ray, xyz) unit vectors of travel, world
+    arrival: Floats  # (ray, xyz)
+    cosine: Floats  # (ray,) p = cos(grazing)/c, s/m
+    level: Floats  # (ray, 2) unfolded depths of the ends
+    sine: Floats  # (ray,) at the start, down positive in the unfolded water
+
+    def select(self, rows: Bools | Ints) -> Rays:
+        """Some of them."""
+        return Rays(*(getattr(self, f.name)[rows] for f in fields(self)))
+
+
+def rays(water: Water, start: Floats, end: Floats, family: Family) -> Rays:
+    """The ray of a family between points (ray, xyz) of the world, z up, without more turning points than one."""
+    away = end[:, :2] - start[:, :2]
+    r = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-12)
+    first = -start[:, 2]
+    last = family.image(-end[:, 2], water.bottom)
+    if np.ptp(water.speed) == 0.0:
+        p, slope, found = _straight(water, r, first, last)
+    else:
+        p, slope, found = _bent(water, r, first, last)
+    time, length, spreading = found
+    c1, c2 = water.at(first), water.at(-end[:, 2])
+    level = away / r[:, None]
+    fold = -1.0 if family.bounces % 2 else 1.0
+    departure = np.column_stack([level * (p * c1)[:, None], -slope[0]])
+    arrival = np.column_stack([level * (p * c2)[:, None], -fold * slope[1]])
+    return Rays(time, length, spreading, departure, arrival, p, np.column_stack([first, last]), slope[0])
+
+
+Found = tuple[Floats, tuple[Floats, Floats], tuple[Floats, Floats, Floats]]
+"""p, signed sines at both ends, and time, length and spreading of rays."""
+
+
+def _straight(water: Water, r: Floats, first: Floats, last: Floats) -> Found:
+    length = np.hypot(r, last - first)
+    c, sine = water.speed[0], (last - first) / length
+    return r / length / c, (sine, sine), (length / c, length, 1.0 / length)
+
+
+def _bent(water: Water, r: Floats, first: Floats, last: Floats) -> Found:
+    from sonarsynth.validation.references.rays.layers_crossed import crossed
+
+    pieces = crossed(water, first, last)
+    sigma = _root(pieces, r)
+    x, slope = pieces.distance(sigma)
+    p = pieces.cosine(sigma)
+    time = pieces.time(sigma) + p * (r - x)  # stationary: an error of the root counts twice over
+    s1, s2 = pieces.sines(sigma)
+    size = pieces.ends[0] * pieces.ends[1] / pieces.fastest**2
+    tube = r * np.abs(slope) * np.where(pieces.narrow, np.maximum(s1, s2), s1 * s2 / np.maximum(np.abs(sigma), 1e-300))
+    return p, pieces.signed(sigma, s1, s2), (time, pieces.length(sigma), np.sqrt(size / tube))
+
+
+def _root(pieces: Crossed, r: Floats) -> Floats:
+    """Sines at the fastest level whose rays cover distances r (ray,): Newton's, on 1/X, within a bracket."""
+    low, high = pieces.lowest(), np.ones(len(r))
+    sigma = np.clip(pieces.rise / np.hypot(pieces.rise, r), low, 1.0 - 1e-9)
+    for _ in range(ROUNDS):
+        x, slope = pieces.distance(sigma)
+        far = x > r
+        low, high = np.where(far, sigma, low), np.where(far, high, sigma)
+        if (np.abs(x - r) <= CLOSE * r).all():
+            break
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = sigma - (1.0 / x - 1.0 / r) / (-slope / x**2)
+        sigma = np.where((step > low) & (step < high), step, 0.5 * (low + high))
+    return np.where(np.abs(x - r) <= 1e-9 * r, sigma, np.nan)
