@@ -10,13 +10,13 @@ import numpy as np
 from sonarsynth.planning.choices import Choices, choices_from
 from sonarsynth.planning.choosing import choose
 from sonarsynth.planning.costs import machine_factor, stages
-from sonarsynth.planning.listening_windows import frame_start, lay_windows
+from sonarsynth.planning.listening_windows import check_windows, frame_start, lay_windows
 from sonarsynth.planning.measured.ray_bending import propagation
 from sonarsynth.planning.measured.sampled_arrivals import arrivals_of
 from sonarsynth.planning.measured.sampled_frames import Look, check_alike, survey
 from sonarsynth.planning.notes.omissions import left_out
 from sonarsynth.planning.notes.plan_notes import notes, stored_validity
-from sonarsynth.planning.notes.scene_checks import check_frame, check_methods, check_windows, read_inputs
+from sonarsynth.planning.notes.scene_checks import check_frame, check_methods, read_inputs
 from sonarsynth.planning.plans import PRODUCTS, Errors, Omission, Plan, Stage, Windows
 from sonarsynth.receiver import elements
 from sonarsynth.recipe import Recipe

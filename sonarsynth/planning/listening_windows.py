@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints, depth
+from sonarsynth.conventions import Floats, Ints, depth, size
 from sonarsynth.description import FieldError
+from sonarsynth.description.memory import frame_bytes, free_bytes
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.rays.ray_solutions import mean_slowness, water
 from sonarsynth.geometry.mesh import in_blocks
@@ -18,9 +20,13 @@ from sonarsynth.planning.plans import Plan, Supports, Windows
 from sonarsynth.planning.pulse_durations import blur_of, supports_of
 from sonarsynth.products import Paths
 from sonarsynth.propagation import Straight
+from sonarsynth.receiver import elements
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals.filtered_pulse import snap_levels
+
+if TYPE_CHECKING:
+    from sonarsynth.planning.plans import Windows
 
 MARGIN = 0.1e-3
 """Seconds added at both ends of every window. Covers what straight rays leave out of an arrival time: under 2 us at
@@ -257,3 +263,20 @@ def _straight_time(profile: Profile, bed: float, a: Floats, b: Floats) -> Floats
     ends = np.broadcast_arrays(depth(a), depth(b))
     slowness = mean_slowness(water(profile.depth, profile.speed, bed), *(np.atleast_1d(z) for z in ends))
     return np.asarray(distance * slowness.reshape(distance.shape))
+
+
+def check_windows(scene: Scene, windows: Windows) -> None:
+    """The echo window must hold a period of the band, and a frame must fit in the memory that is free here."""
+    path = ("scene", "processing", "echo_window")
+    length, period = windows.echo_stop - windows.echo_start, 1.0 / scene.sonar.band.high
+    if length < period:
+        raise FieldError(path, f"is {length:.3g} s long, less than a period of the highest frequency, {period:.3g} s")
+    sensors, facets = elements(scene.sonar.array).count, sum(len(mesh.faces) for mesh in scene.meshes)
+    needed, free = frame_bytes(facets, sensors * windows.samples), free_bytes()
+    if needed > max(free, frame_bytes(facets, 0)):  # meshes are checked by themselves
+        seconds = windows.samples / scene.sonar.sampling_frequency
+        raise FieldError(
+            path,
+            f"a frame would take {size(needed)} of memory, and {size(free)} are free here ({sensors} hydrophones for "
+            f"{seconds:.3g} s): the arrivals are too far apart in time",
+        )

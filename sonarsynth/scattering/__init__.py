@@ -7,7 +7,8 @@ from typing import Annotated, Protocol
 from sonarsynth.description import BY_KIND
 from sonarsynth.scattering.components import Part
 from sonarsynth.scattering.isotropic import Isotropic
-from sonarsynth.scattering.kirchhoff import Kirchhoff, PartlyReflecting
+from sonarsynth.scattering.kirchhoff import Kirchhoff
+from sonarsynth.scattering.kirchhoff_surface import PartlyReflecting
 from sonarsynth.scattering.law_validity import Scatterer
 from sonarsynth.scattering.mirror_lobe import MirrorLobe
 

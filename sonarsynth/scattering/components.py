@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats
 from sonarsynth.equations.scattering.facet_pulses import facet_response
-from sonarsynth.equations.scattering.kirchhoff_integral import local_grazing
 from sonarsynth.equations.scattering.lobes import dot, lambert, lit_and_seen, slope_lobe
-from sonarsynth.equations.water.boundary_reflection import rayleigh
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.scattering.facet_geometry import Patches, Pulses
+from sonarsynth.scattering.kirchhoff_surface import KirchhoffSurface, reflection
 from sonarsynth.scattering.random_signs import random_polarity
-
-if TYPE_CHECKING:
-    from sonarsynth.scattering import ScatteringLaw
-    from sonarsynth.scattering.isotropic import Isotropic
-    from sonarsynth.scattering.kirchhoff import Kirchhoff
-    from sonarsynth.scattering.mirror_lobe import MirrorLobe
 
 
 class Part(Protocol):
@@ -45,11 +38,25 @@ class Part(Protocol):
         ...
 
 
+class PulseRepeating(Protocol):
+    """A law that repeats the pulse: an amplitude, and a sign of each facet."""
+
+    def amplitude(
+        self, incident: Floats, scattered: Floats, normal: Floats, area: Floats, beyond: bool = False
+    ) -> Floats:
+        """Far-field amplitude (...) in m; `beyond` as `Plain.beyond`."""
+        ...
+
+    def polarity(self, mesh: Mesh) -> Floats:
+        """As `Part.polarity`."""
+        ...
+
+
 @dataclass(frozen=True)
 class Plain:
     """A law that repeats the pulse."""
 
-    law: MirrorLobe | Isotropic
+    law: PulseRepeating
     beyond: bool = False
     """Whether the amplitude goes on where a facet is lit but not seen: for arrays of which some hydrophones see it, and
     are told from those that do not."""
@@ -74,7 +81,7 @@ class Smooth:
     f = V (i k/4 pi) A n.(ks - ki) 2 exp[corners] exp(-g^2/2) (`acoustics.kirchhoff`, `acoustics.roughness`).
     """
 
-    law: Kirchhoff
+    law: KirchhoffSurface
     beyond: bool = False
     """As of `Plain`; it may be below 0 there."""
 
@@ -136,7 +143,7 @@ class Rough:
     It comes from one point of the facet, with one sign, both drawn once for each facet of a mesh.
     """
 
-    law: Kirchhoff
+    law: KirchhoffSurface
     beyond: bool = False
     """As of `Plain`."""
 
@@ -237,24 +244,15 @@ def over_facet(incident: Floats, scattered: Floats, patch: Patches, sound_speed:
     return np.asarray(dot(late, late) / 12.0)
 
 
-def reflection(law: Kirchhoff, incident: Floats, scattered: Floats) -> np.ndarray:
-    """Plane-wave coefficient V (...) of facets that would mirror one way into the other: reciprocal."""
-    surface = law.surface
-    if isinstance(surface, str):
-        return np.asarray(1.0 + 0.0j if surface == "rigid" else -1.0 + 0.0j)
-    grazing = local_grazing(incident, scattered)
-    return rayleigh(grazing, surface.density_ratio, surface.speed_ratio, surface.loss_tangent)
-
-
 def size_at(
-    law: ScatteringLaw, incident: Floats, scattered: Floats, patch: Patches, frequency: float, sound_speed: Floats
+    parts: tuple[Part, ...], incident: Floats, scattered: Floats, patch: Patches, frequency: float, sound_speed: Floats
 ) -> Floats:
-    """|f| (path,) in m of facets at a frequency (Hz): powers of the parts of a law summed.
+    """|f| (path,) in m of facets at a frequency (Hz): powers of the parts summed.
 
     Directions (path, xyz) in the frame of the body; sound_speed (path,) in m/s at the facets.
     """
     power = np.zeros(len(incident))
-    for part in law.parts:
+    for part in parts:
         pulse = part.pulses(incident, scattered, patch, sound_speed)
         amplitude = part.amplitude(incident, scattered, patch, 2.0 * np.pi * frequency / sound_speed)
         response = facet_response(np.array([frequency]), *pulse[:4], frequency)[:, 0]

@@ -12,22 +12,10 @@ from sonarsynth.description import description
 from sonarsynth.equations.scattering.kirchhoff_integral import shadow_taper
 from sonarsynth.equations.scattering.lobes import lit_and_seen
 from sonarsynth.equations.scattering.roughness import incoherent_power, roughness_parameter
-from sonarsynth.scattering.components import Part, Rough, Smooth, reflection
+from sonarsynth.scattering.components import Part, Rough, Smooth
+from sonarsynth.scattering.kirchhoff_surface import PartlyReflecting, reflection
 from sonarsynth.scattering.law_notes import concave_note
 from sonarsynth.scattering.law_validity import NEAR, Scatterer, aside_note, lit_half, size_note, slopes_note
-
-
-@description
-class PartlyReflecting:
-    """The surface of a fluid body so thick that nothing returns from inside: Rayleigh's coefficient at each angle."""
-
-    kind: Literal["partly_reflecting"] = "partly_reflecting"
-    density_ratio: Annotated[Number, Gt(0)]
-    """Density over that of the water."""
-    speed_ratio: Annotated[Number, Gt(0)]
-    """Sound speed over that of the water."""
-    loss_tangent: Annotated[Number, Ge(0)] = 0.0
-    """Imaginary over real part of the wavenumber in the body."""
 
 
 @description

@@ -22,7 +22,7 @@ from sonarsynth.planning.costs import machine_factor
 from sonarsynth.schedule.benchmark_frames import Sizes, Trial, disk_use, try_frames
 
 if TYPE_CHECKING:
-    from sonarsynth.schedule import BuildReport
+    from sonarsynth.schedule.build_report import BuildReport
 
 PREPARED: Final = 3.0
 """Seconds of one core until a process has a plan, where that was not measured: imports, reading, compiled kernels."""

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import NO_TARGET, Ints, depth
+from sonarsynth.conventions import NO_TARGET, depth
 from sonarsynth.environment.absorption import DepthAbsorption
 from sonarsynth.environment.sea import Environment, Profile
 from sonarsynth.geometry import Pose
-from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import Body
 from sonarsynth.products import Arrivals
@@ -22,106 +20,17 @@ from sonarsynth.scattering.facet_geometry import Pulses
 from sonarsynth.state import Moment, Snap
 from sonarsynth.tracing.doppler import Carried, Meeting, received, stretched
 from sonarsynth.tracing.echoes import echoes
-from sonarsynth.tracing.expansion.amplitude_polynomials import ALIKE, ENOUGH, fitted
-from sonarsynth.tracing.expansion.array_expansion import Fronts, Wavefronts, fronts, wavefronts
+from sonarsynth.tracing.expansion.amplitude_polynomials import fitted
+from sonarsynth.tracing.expansion.array_expansion import fronts
+from sonarsynth.tracing.facet_paths import ALIKE, ENOUGH, NEGLIGIBLE, ArrayLegs, array_legs
 from sonarsynth.tracing.meetings import SHARED, hearing_times, occasions
 from sonarsynth.tracing.occlusion.forward_scattering import forward_legs, opaque, shadow_parts
-from sonarsynth.tracing.occlusion.sensor_occlusion import View
 from sonarsynth.tracing.path_absorption import path_loss
-from sonarsynth.tracing.receive_paths import (
-    Facets,
-    Legs,
-    facets_of,
-    legs_from,
-    may_face,
-    one_of,
-    rays_to_centre,
-    require_in_water,
-)
+from sonarsynth.tracing.receive_paths import rays_to_centre
 from sonarsynth.tracing.transmit_paths import Outward, assemble, by_target, join, silence
 
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation, Visibility
-
-
-NEGLIGIBLE = 1e-7
-"""The faintest echoes of a snap from each target are left out, so many that their powers together stay below this part
-of the power of all from there (70 dB); each counts with the largest amplitude that it has anywhere on the array. Of
-coherent ones, which add by amplitude, so many that their amplitudes together stay below the root of this part of that
-of the largest."""
-
-
-@dataclass(frozen=True, eq=False)
-class ArrayLegs:
-    """Every facet that the array sees, with its legs to the array: serves any snap without tracing this side again."""
-
-    legs: Legs  # (leg,) sorted by row
-    wavefronts: Wavefronts  # of all legs, those of other parts among them
-    facets: Facets  # (facet,) that have a leg; legs.row counts them
-    bodies: tuple[Body, ...]
-    environment: Environment
-    profile: Profile
-    propagation: Propagation
-    sonar_pose: Pose
-    elements: Elements
-    band: tuple[float, float]  # Hz
-    negligible: float = NEGLIGIBLE  # power of the faintest echoes, that are left out
-    enough: float = ENOUGH  # error of amplitudes over the aperture, where the second degree will do
-    alike: float = ALIKE  # change of an echo by the mean over its facet, over the aperture, that is left out
-    visibility: Visibility = "centre"  # from where facets must be seen
-    first: int = 0  # of the legs, in the wavefronts
-    degree: int = 3  # of polynomials over the aperture
-    targets: tuple[int, ...] | None = None  # of the facets; None: all
-    meeting: Meeting | None = None  # when bodies and array are where they are here; None: nothing moves
-
-    @property
-    def fronts(self) -> Fronts:
-        """(leg,) over the aperture: kept for all legs, made anew for some."""
-        return self._whole if self.legs is self.wavefronts.legs else self._made()
-
-    @cached_property
-    def _whole(self) -> Fronts:
-        return self._made()
-
-    def _made(self) -> Fronts:
-        return self.wavefronts.of(slice(self.first, self.first + len(self.legs.row)))
-
-    def part(self, some: slice) -> ArrayLegs:
-        """Some of the facets, and the legs from them."""
-        if some == slice(0, len(self.facets.facet)):
-            return self
-        first, last = (int(n) for n in np.searchsorted(self.legs.row, (some.start, some.stop)))
-        legs = self.legs.select(slice(first, last))
-        legs, facets = legs.numbered(legs.row - some.start), self.facets.select(some)
-        return replace(self, legs=legs, facets=facets, first=self.first + first)
-
-    def view(self, bodies: tuple[Body, ...]) -> View:
-        """Who looks, and which bodies stand in between."""
-        lookout = self.elements if self.visibility == "hydrophones" else None
-        return View(bodies, self.environment, self.bending, self.sonar_pose, lookout, self.propagation, self.degree)
-
-    @property
-    def bending(self) -> Profile:
-        """What bends the rays: the profile, or for straight rays the speed at the array everywhere."""
-        return bending(self.profile, self.propagation, self.sonar_pose)
-
-    def settled(self, leg: Ints) -> Legs:
-        """Some legs (row,), with the hydrophones that bodies hide them from."""
-        number, row = np.unique(leg[self.legs.open[leg]], return_inverse=True)
-        legs = self.legs.select(leg)
-        if not len(number):
-            return legs
-        some = self.legs.select(number)
-        side = self.facets.clear[some.row], self.facets.normal[some.row]
-        some = self.view(self.bodies).settled(some, *side)
-        hidden_from = legs.hidden_from.copy()
-        hidden_from[legs.open] = some.hidden_from[row]
-        return legs.seen(hidden_from, np.zeros(len(leg), bool))
-
-    @property
-    def centre(self) -> float:
-        """Hz: centre of the band."""
-        return 0.5 * (self.band[0] + self.band[1])
 
 
 def trace(
@@ -188,62 +97,6 @@ def _hearing(array: ArrayLegs, snap: Snap, sonar: Track) -> ArrayLegs:
     heard = float(hearing_times(snap.position, np.asarray(snap.time), sonar, speed))
     there = sonar.later(heard)
     return replace(array, sonar_pose=there.pose, meeting=Meeting(np.zeros(0), heard, there))
-
-
-def array_legs(
-    environment: Environment,
-    profile: Profile,
-    bodies: tuple[Body, ...],
-    sonar_pose: Pose,
-    elements: Elements,
-    propagation: Propagation,
-    band: tuple[float, float],
-    negligible: float = NEGLIGIBLE,
-    enough: float = ENOUGH,
-    alike: float = ALIKE,
-    visibility: Visibility = "centre",
-    degree: int = 3,
-    targets: tuple[int, ...] | None = None,
-) -> ArrayLegs:
-    """Facet to array, for every facet of every body, or of some targets, that leaves a ray for the array that no body
-    hides.
-
-    Raises ValueError for a body or an array that reaches out of the water.
-    """
-    require_in_water(bodies, environment)
-    bent, centre = bending(profile, propagation, sonar_pose), 0.5 * (band[0] + band[1])
-    lookout = elements if visibility == "hydrophones" else None
-    slack = elements.aperture if lookout is not None else 0.0
-    view = View(bodies, environment, bent, sonar_pose, lookout, propagation, degree)
-    found: tuple[list[Legs], list[Facets]] = [], []
-    seen = 0
-    for some in in_blocks(sum(len(body.mesh.faces) for body in bodies)):
-        every = facets_of(bodies, some)
-        if targets is not None and len(targets) < len(bodies):
-            every = every.select(np.isin(every.target, targets))
-        reached = may_face(every, sonar_pose.position, propagation.bounces, profile, environment.depth, slack)
-        every = every.select(reached)
-        part = legs_from(every, environment, profile, sonar_pose, propagation, centre, slack)
-        side = every.clear[part.row], every.normal[part.row]
-        part = view.visible(part, *side)
-        kept, row = np.unique(part.row, return_inverse=True)
-        found[0].append(part.numbered(seen + row))
-        found[1].append(every.select(kept))
-        seen += len(kept)
-    legs, facets = one_of(found[0]), one_of(found[1])
-    group = facets.target[legs.row]
-    over = wavefronts(legs, group, environment, bent, sonar_pose, elements, propagation, band, degree)
-    return ArrayLegs(
-        legs, over, facets, bodies, environment, profile, propagation, sonar_pose, elements, band, negligible, enough,
-        alike, visibility, degree=degree, targets=targets,
-    )  # fmt: skip
-
-
-def bending(profile: Profile, propagation: Propagation, sonar_pose: Pose) -> Profile:
-    """What bends the rays of a model: the profile, or for straight rays the speed at the array everywhere."""
-    if propagation.bends:
-        return profile
-    return Profile(profile.depth, np.full(len(profile.depth), float(profile.at(depth(sonar_pose.position)))))
 
 
 def arrivals(

@@ -17,7 +17,7 @@ from sonarsynth.tracing.doppler import Carried
 from sonarsynth.tracing.transmit_paths import Outward
 
 if TYPE_CHECKING:
-    from sonarsynth.tracing.arrivals import ArrayLegs
+    from sonarsynth.tracing.facet_paths import ArrayLegs
 
 
 TOGETHER = 10.0

@@ -29,7 +29,7 @@ from sonarsynth.tracing.receive_paths import Legs, may_face, usable
 from sonarsynth.tracing.transmit_paths import Outward, assemble, ordered, silence
 
 if TYPE_CHECKING:
-    from sonarsynth.tracing.arrivals import ArrayLegs
+    from sonarsynth.tracing.facet_paths import ArrayLegs
 
 
 FAINTER = 1e-3

@@ -12,7 +12,7 @@ from sonarsynth.state import Snap
 from sonarsynth.tracing.receive_paths import Legs
 
 if TYPE_CHECKING:
-    from sonarsynth.tracing.arrivals import ArrayLegs
+    from sonarsynth.tracing.facet_paths import ArrayLegs
     from sonarsynth.tracing.transmit_paths import Outward
 
 

@@ -157,7 +157,7 @@ def _send_on(
         incident, mirrored, away = (
             body.pose.turn_to_body(v) for v in (landed.incident[on], rays.direction[on], going[mine])
         )
-        lobe, mirror = (size_at(law, incident, v, patch, centre, c) for v in (away, mirrored))
+        lobe, mirror = (size_at(law.parts, incident, v, patch, centre, c) for v in (away, mirrored))
         strength[mine] = np.divide(lobe, mirror, out=np.zeros_like(lobe), where=mirror > 0)
     strength[hidden(bodies, environment, profile, rays.clear[row], end[row], going, paths.length[first])] = 0.0
     coefficient[rays.ray] = 0.0

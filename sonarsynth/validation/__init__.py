@@ -31,7 +31,7 @@ def _plate(quick: bool) -> list[Row]:
 
 
 def _bubble(quick: bool) -> list[Row]:
-    from sonarsynth.validation.bubbles.bubble_checks import bubble_accuracy
+    from sonarsynth.validation.bubbles.all_bubbles import bubble_accuracy
 
     return bubble_accuracy(quick)
 

@@ -28,7 +28,7 @@ from sonarsynth.state import Moment, Snap
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.tracing.expansion.amplitude_polynomials import ENOUGH
+from sonarsynth.tracing.facet_paths import ENOUGH
 
 C = 1500.0
 PROFILE = Profile(np.array([0.0]), np.array([C]))

@@ -17,7 +17,7 @@ from sonarsynth.receiver import Elements, Romanis, elements
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Cylinder, LShape, Remus100, Shape, Sphere
-from sonarsynth.tracing.arrivals import bending
+from sonarsynth.tracing.facet_paths import bending
 from sonarsynth.tracing.occlusion.launch_deviation import swerves
 from sonarsynth.tracing.occlusion.ray_cones import hidden
 from sonarsynth.tracing.occlusion.sensor_occlusion import View, cells, rim

@@ -20,8 +20,9 @@ from sonarsynth.receiver import Elements, PositionTable, Romanis, elements
 from sonarsynth.scattering import Isotropic, MirrorLobe
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Moment, Snap
-from sonarsynth.tracing.arrivals import array_legs, arrivals, trace
+from sonarsynth.tracing.arrivals import arrivals, trace
 from sonarsynth.tracing.expansion.wavefront_polynomials import probes
+from sonarsynth.tracing.facet_paths import array_legs
 
 ENVIRONMENT = Environment(depth=30.0, sound_speed=Isovelocity(speed=1540.0))
 UNIFORM = Profile(np.array([0.0, 30.0]), np.array([1540.0, 1540.0]))

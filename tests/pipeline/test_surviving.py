@@ -32,7 +32,7 @@ from tests.waiting import wait_until
 FAULTS = """\
 import faulthandler, time
 import numpy as np
-from sonarsynth import render
+from sonarsynth import pipeline as render
 works = getattr(render.beamform_frame, "works", render.beamform_frame)  # preloaded more than once
 def fails(made, index, *parts):
     if index == 2:
@@ -119,7 +119,7 @@ def test_frames_that_end_their_worker_are_named_with_why_and_the_rest_goes_on(
 
 STUCK = """\
 import time
-from sonarsynth import render
+from sonarsynth import pipeline as render
 works = getattr(render.beamform_frame, "works", render.beamform_frame)  # preloaded more than once
 def stuck(made, index, *parts):
     while index >= 8:
@@ -132,11 +132,14 @@ render.beamform_frame = stuck
 
 @pytest.fixture
 def elsewhere(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
-    """A Dask scheduler, with a worker that comes no further than the first shard, as processes of their own."""
+    """A Dask scheduler, with a worker that comes no further than the first shard, as processes of their own.
+
+    It has a thread for each shard: in one alone, a later shard may be stuck before the first is written.
+    """
     file, preload = tmp_path / "scheduler.json", tmp_path / "stuck.py"
     preload.write_text(STUCK)
     common = ["--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", str(file)]
-    parts = {"scheduler": ["--port", "0"], "worker": ["--nthreads", "1", "--no-nanny", "--preload", str(preload)]}
+    parts = {"scheduler": ["--port", "0"], "worker": ["--nthreads", "4", "--no-nanny", "--preload", str(preload)]}
     with ExitStack() as stack:
         processes = []
         for name, options in parts.items():

@@ -20,7 +20,8 @@ from sonarsynth.targets.target import Target
 from sonarsynth.validation.rays.ray_matching import Rays
 from sonarsynth.validation.references.frames.frame_pressure import FramePressure
 from sonarsynth.validation.references.frames.line_of_sight import Surface
-from sonarsynth.validation.references.rays.layered_rays import Water, families, rays
+from sonarsynth.validation.references.rays.layered_rays import families, rays
+from sonarsynth.validation.references.rays.layers_crossed import Water
 from sonarsynth.validation.references.rays.one_gradient import Gradient, gradient_rays
 
 ALLOWED = 1e-3  # of the largest pressure

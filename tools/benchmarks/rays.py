@@ -20,9 +20,9 @@ from sonarsynth.planning import Plan
 from sonarsynth.propagation.refracted import Refracted
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import reading
-from sonarsynth.tracing.arrivals import ArrayLegs, array_legs
 from sonarsynth.tracing.expansion.array_expansion import fronts
 from sonarsynth.tracing.expansion.wavefront_polynomials import sphere
+from sonarsynth.tracing.facet_paths import ArrayLegs, array_legs
 from sonarsynth.validation.rays.ray_cases import random_layers
 from sonarsynth.validation.rays.ray_matching import rays_of
 from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.casting.ray_casting import inside
-from sonarsynth.conventions import FASTEST, REFERENCE_PRESSURE, SLOWEST, Floats, depth, size
+from sonarsynth.conventions import FASTEST, REFERENCE_PRESSURE, SLOWEST, Floats, depth
 from sonarsynth.description import FieldError
-from sonarsynth.description.memory import frame_bytes, free_bytes
 from sonarsynth.environment.casts import profile_of
 from sonarsynth.environment.sea import Profile
 from sonarsynth.environment.sound_speed import Cast, Tabulated, TemperatureSalinity
@@ -32,7 +31,7 @@ from sonarsynth.targets.shapes import MeshFile
 from sonarsynth.targets.target import mesh_for
 
 if TYPE_CHECKING:
-    from sonarsynth.planning.plans import Windows
+    pass
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 FARTHEST = 1e6
@@ -202,23 +201,6 @@ def check_methods(scene: Scene, products: frozenset[str]) -> None:
         raise FieldError(
             ("scene", "processing", "beamforming", "kind"),
             "'focused' needs an array on a lattice; use 'dense' for a table of positions",
-        )
-
-
-def check_windows(scene: Scene, windows: Windows) -> None:
-    """The echo window must hold a period of the band, and a frame must fit in the memory that is free here."""
-    path = ("scene", "processing", "echo_window")
-    length, period = windows.echo_stop - windows.echo_start, 1.0 / scene.sonar.band.high
-    if length < period:
-        raise FieldError(path, f"is {length:.3g} s long, less than a period of the highest frequency, {period:.3g} s")
-    sensors, facets = elements(scene.sonar.array).count, sum(len(mesh.faces) for mesh in scene.meshes)
-    needed, free = frame_bytes(facets, sensors * windows.samples), free_bytes()
-    if needed > max(free, frame_bytes(facets, 0)):  # meshes are checked by themselves
-        seconds = windows.samples / scene.sonar.sampling_frequency
-        raise FieldError(
-            path,
-            f"a frame would take {size(needed)} of memory, and {size(free)} are free here ({sensors} hydrophones for "
-            f"{seconds:.3g} s): the arrivals are too far apart in time",
         )
 
 

@@ -11,12 +11,7 @@ from sonarsynth.conventions import Bools, Floats
 from sonarsynth.tracing.expansion.wavefront_polynomials import FEW, probes
 
 if TYPE_CHECKING:
-    from sonarsynth.tracing.arrivals import ArrayLegs
-
-ALIKE = 1e-3
-"""Change of an echo over the aperture by the mean over its facet, over the strongest echo, that is left out."""
-ENOUGH = 1e-4
-"""Error of amplitudes over the aperture, of the strongest echo's, at which polynomials of the second degree will do."""
+    from sonarsynth.tracing.facet_paths import ArrayLegs
 
 
 class Varying(Protocol):

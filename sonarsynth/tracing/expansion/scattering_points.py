@@ -19,7 +19,7 @@ from sonarsynth.tracing.expansion.wavefront_polynomials import Terms, probes
 from sonarsynth.tracing.receive_paths import Legs
 
 if TYPE_CHECKING:
-    from sonarsynth.tracing.arrivals import ArrayLegs
+    from sonarsynth.tracing.facet_paths import ArrayLegs
 
 
 def from_spots(made: Arrivals, legs: Legs, spot: Floats, sonar_pose: Pose) -> Arrivals:

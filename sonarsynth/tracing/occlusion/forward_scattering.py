@@ -23,7 +23,7 @@ from sonarsynth.tracing.expansion.array_expansion import wavefronts
 from sonarsynth.tracing.receive_paths import facets_of, rays_to_centre
 
 if TYPE_CHECKING:
-    from sonarsynth.tracing.arrivals import ArrayLegs
+    from sonarsynth.tracing.facet_paths import ArrayLegs
 
 
 def shadow_parts(law: ScatteringLaw) -> tuple[Part, ...]:

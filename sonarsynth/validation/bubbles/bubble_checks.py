@@ -10,7 +10,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from functools import cache
-from importlib.util import find_spec
 from typing import Final
 
 import numpy as np
@@ -50,26 +49,6 @@ DEEPER: Final = {(0.0, 1000.0): 209.7, (0.0, 3000.0): 199.1, (20.0, 1000.0): 223
 """Depth (m) and gas (Pa): peak (dB re 1 uPa at 1 m)."""
 PRINTED: Final = 0.06
 """dB: half a digit of the table, and a little."""
-
-
-def bubble_accuracy(quick: bool = False) -> list[Row]:
-    """Errors and run times; quick: fewer gases, depths and tolerances. Raises ModuleNotFoundError without mpmath."""
-    if find_spec("mpmath") is None:
-        raise ModuleNotFoundError("the references for bubbles need mpmath: pip install 'sonarsynth[accuracy]'")
-    from sonarsynth.validation.bubbles.bubbles_conserved import conserved_rows, rayleigh_rows
-    from sonarsynth.validation.bubbles.bubbles_extreme import extreme_rows
-    from sonarsynth.validation.bubbles.bubbles_logarithmic import logarithmic_rows
-    from sonarsynth.validation.bubbles.bubbles_solvers import solver_rows
-
-    return [
-        *frozen_rows(quick),
-        *rayleigh_rows(),
-        *conserved_rows(quick),
-        *level_rows(quick),
-        *logarithmic_rows(quick),
-        *solver_rows(quick),
-        *extreme_rows(quick),
-    ]
 
 
 def described(gas: float, depth: float = DEPTH, *, compressible: bool = True, core: bool = False) -> Cavity:

@@ -34,7 +34,8 @@ from sonarsynth.validation.references.frames.path_sum import Contributions, stre
 from sonarsynth.validation.references.frames.snap_spectrum import absorption, duration, filter_response, spectrum
 from sonarsynth.validation.references.frames.sound_paths import Solid, depths, heard, hidden, met
 from sonarsynth.validation.references.rays.boundaries_met import reflected
-from sonarsynth.validation.references.rays.layered_rays import Family, Rays, Water, families
+from sonarsynth.validation.references.rays.layered_rays import Family, Rays, families
+from sonarsynth.validation.references.rays.layers_crossed import Water
 
 OFF = 1e-6
 """Of a body's size: how far off a facet a line of sight begins."""

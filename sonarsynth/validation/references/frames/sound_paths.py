@@ -22,7 +22,8 @@ import numpy as np
 from sonarsynth.conventions import Bools, Floats
 from sonarsynth.validation.references.frames.line_of_sight import Surface
 from sonarsynth.validation.references.frames.moving_points import Mover
-from sonarsynth.validation.references.rays.layered_rays import Family, Rays, Water, rays
+from sonarsynth.validation.references.rays.layered_rays import Family, Rays, rays
+from sonarsynth.validation.references.rays.layers_crossed import Water
 
 ROUNDS = 40
 SETTLED = 1e-14

@@ -15,7 +15,8 @@ from sonarsynth.environment.boundaries import (
 )
 from sonarsynth.environment.sea import Environment
 from sonarsynth.equations.water.boundary_reflection import SEDIMENTS
-from sonarsynth.validation.references.rays.layered_rays import Family, Water
+from sonarsynth.validation.references.rays.layered_rays import Family
+from sonarsynth.validation.references.rays.layers_crossed import Water
 
 GRAVITY, PHILLIPS, DECAY = 9.81, 8.1e-3, 0.74
 

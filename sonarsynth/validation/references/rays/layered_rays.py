@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.validation.references.rays.layers_crossed import Water
 
 if TYPE_CHECKING:
     from sonarsynth.validation.references.rays.layers_crossed import Crossed
@@ -58,27 +59,6 @@ class Family(NamedTuple):
 def families(bounces: int) -> list[Family]:
     """All with at most so many reflections."""
     return [Family(n, down) for n in range(bounces + 1) for down in ((True, False) if n else (True,))]
-
-
-@dataclass(frozen=True, eq=False)
-class Water:
-    """Speed (m/s) at node depths (m), linear between, constant beyond, from the surface to the bottom (m)."""
-
-    depth: Floats
-    speed: Floats
-    bottom: float
-
-    def at(self, depth: Floats) -> Floats:
-        """Sound speed at depths."""
-        return np.interp(depth, self.depth, self.speed)
-
-    def unfolded(self, copies: range) -> tuple[Floats, Floats]:
-        """Levels and speeds of the water and of so many of its images; copy 0 is the water, -1 is above it."""
-        inside = (self.depth > 0.0) & (self.depth < self.bottom)
-        z = np.concatenate([[0.0], self.depth[inside], [self.bottom]])
-        c = np.interp(z, self.depth, self.speed)
-        level = [k * self.bottom + (z if k % 2 == 0 else (self.bottom - z)[::-1]) for k in copies]
-        return np.concatenate(level), np.concatenate([c if k % 2 == 0 else c[::-1] for k in copies])
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,14 +4,10 @@ ray, in the closed forms of `layered_rays`."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats
-
-if TYPE_CHECKING:
-    from sonarsynth.validation.references.rays.layered_rays import Water
 
 EQUAL = 1e-13
 """Relative: speeds closer than this are one level's."""
@@ -137,3 +133,24 @@ def crossed(water: Water, first: Floats, last: Floats) -> Crossed:
         down=down,
         rise=high - low,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Water:
+    """Speed (m/s) at node depths (m), linear between, constant beyond, from the surface to the bottom (m)."""
+
+    depth: Floats
+    speed: Floats
+    bottom: float
+
+    def at(self, depth: Floats) -> Floats:
+        """Sound speed at depths."""
+        return np.interp(depth, self.depth, self.speed)
+
+    def unfolded(self, copies: range) -> tuple[Floats, Floats]:
+        """Levels and speeds of the water and of so many of its images; copy 0 is the water, -1 is above it."""
+        inside = (self.depth > 0.0) & (self.depth < self.bottom)
+        z = np.concatenate([[0.0], self.depth[inside], [self.bottom]])
+        c = np.interp(z, self.depth, self.speed)
+        level = [k * self.bottom + (z if k % 2 == 0 else (self.bottom - z)[::-1]) for k in copies]
+        return np.concatenate(level), np.concatenate([c if k % 2 == 0 else c[::-1] for k in copies])
