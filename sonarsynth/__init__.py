@@ -1,15 +1,17 @@
-"""sonarsynth: labelled synthetic datasets of snapping-shrimp passive sonar: traced, beamformed, ranged, and true.
+"""sonarsynth: labelled synthetic sonar datasets: pressure, images, point clouds, and the exact truth of each.
 
     import sonarsynth as ss
 
-    recipe = ss.load("configs/remus.yaml")          # or ss.Recipe(scene=ss.Scene(world=ss.World(...)))
-    print(ss.plan(recipe).stages)
-    tree = sonarsynth.pipeline.render(recipe, 0)      # one frame, without a store
-    if __name__ == "__main__":                      # worker processes import the script again
+    recipe = ss.load("configs/remus.yaml")
+    print(ss.plan(recipe))                           # stages, errors, time and size, before anything is built
+    frame = ss.render(recipe, 0)                     # one frame as an xarray.DataTree, without a store
+    if __name__ == "__main__":                       # worker processes import the script again
         ss.build(recipe, "remus.zarr", frames=range(8))
+        tree = ss.open("remus.zarr")
         print(ss.verify("remus.zarr").ok)
 
-Names are looked up when they are first used, so importing the package is light.
+Recipes are written in YAML or with the classes below. Names are looked up when they are first used, so importing the
+package is light.
 """
 
 from __future__ import annotations
@@ -42,8 +44,13 @@ if TYPE_CHECKING:
         Thermocline,
         WenzNoise,
     )
+    from sonarsynth.frontiers import measure as accuracy
     from sonarsynth.geometry.motion import Circle, Course, Line, Still, Waypoint, Waypoints
     from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
+    from sonarsynth.pictures import show
+    from sonarsynth.pictures.ray_pictures import rays
+    from sonarsynth.pictures.snap_pictures import snap
+    from sonarsynth.pipeline import render
     from sonarsynth.planning import Plan, plan
     from sonarsynth.propagation import AutoTracing, Refracted, Straight
     from sonarsynth.propagation.eigenrays import RayArrivals, eigenrays, eigenrays_between
@@ -69,7 +76,9 @@ if TYPE_CHECKING:
     from sonarsynth.signals import AutoSynthesis, DirectSum, KernelDeposit
     from sonarsynth.sources.shrimp import LogarithmicBubble, SnappingShrimp
     from sonarsynth.sources.snap_models import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
+    from sonarsynth.store import open_store as open
     from sonarsynth.store import verify
+    from sonarsynth.store.cards import write as card
     from sonarsynth.targets.shapes import Box, Cylinder, LShape, MeshFile, Myring, Remus100, Sphere
     from sonarsynth.targets.target import Target
     from sonarsynth.targets.target_strength import target_strength
@@ -164,55 +173,68 @@ __all__ = [
     "Waypoints",
     "WenzNoise",
     "World",
+    "accuracy",
     "build",
+    "card",
     "dump",
     "eigenrays",
     "eigenrays_between",
     "load",
     "loads",
+    "open",
     "plan",
+    "rays",
+    "render",
     "repair",
     "schema",
+    "show",
+    "snap",
     "target_strength",
     "verify",
 ]
 
 _HOMES = {
-    "beamforming": "DenseDelayAndSum FocusedDelayAndSum",
-    "config": "RecipeError dump load loads schema",
     "description": "FieldError",
+    "environment.boundaries": "FluidHalfSpace PressureRelease ReflectionTable Rigid SeaBed SeaSurface Sediment",
+    "environment.sea": (
+        "Absorption Cast Catenary Environment FlatNoise Isovelocity Linear "
+        "Munk Tabulated TemperatureSalinity Thermocline WenzNoise"
+    ),
+    "geometry.motion": "Circle Course Line Still Waypoint Waypoints",
+    "imaging": "DenseDelayAndSum FocusedDelayAndSum",
+    "pictures": "show",
+    "pictures.ray_pictures": "rays",
+    "pictures.snap_pictures": "snap",
+    "pipeline": "render",
     "planning": "Plan plan",
+    "propagation": "AutoTracing Refracted Straight",
+    "propagation.eigenrays": "RayArrivals eigenrays eigenrays_between",
+    "propagation.ray_request": "EigenrayRequest RayRequest",
     "ranging": "AutoRange IsovelocityRange RefractedRange SensorDelays WavefrontCancelling",
+    "receiver": "Band BandPass BeamGrid Converter LowPass PlanarLattice PositionTable Romanis Sonar",
     "recipe": "Accuracy Axis Choice Normal Recipe Sobol Splits Together Uniform",
+    "recipe.reading": "RecipeError dump load loads schema",
+    "recipe.scene": "EchoWindow Physics Processing Scene Trajectory World",
     "scattering": "Isotropic Kirchhoff MirrorLobe PartlyReflecting",
-    "scattering.strength": "target_strength",
-    "scattering.targets": "Target",
-    "scene": "EchoWindow Physics Processing Scene Trajectory World",
     "schedule": "BuildReport build",
     "schedule.repairing": "RepairReport repair",
-    "sonar": "Band BandPass BeamGrid Converter LowPass PlanarLattice PositionTable Romanis Sonar",
+    "signals": "AutoSynthesis DirectSum KernelDeposit",
+    "sources.shrimp": "LogarithmicBubble SnappingShrimp",
+    "sources.snap_models": "Gabor KellerMiksis RecordedSnap Ricker SnapVariation",
     "store": "verify",
-    "synthesis": "AutoSynthesis DirectSum KernelDeposit",
-    "tracing": "AutoTracing Refracted Straight",
-    "tracing.eigenrays": "RayArrivals eigenrays eigenrays_between",
-    "tracing.ray_request": "EigenrayRequest RayRequest",
-    "world.boundaries": "FluidHalfSpace PressureRelease ReflectionTable Rigid SeaBed SeaSurface Sediment",
-    "world.environment": (
-        "Absorption Cast Catenary Environment FlatNoise Isovelocity Linear Munk Tabulated "
-        "TemperatureSalinity Thermocline WenzNoise"
-    ),
-    "world.motion": "Circle Course Line Still Waypoint Waypoints",
-    "world.shapes": "Box Cylinder LShape MeshFile Myring Remus100 Sphere",
-    "world.snaps": "Gabor KellerMiksis RecordedSnap Ricker SnapVariation",
-    "world.sources": "LogarithmicBubble SnappingShrimp",
+    "targets.shapes": "Box Cylinder LShape MeshFile Myring Remus100 Sphere",
+    "targets.target": "Target",
+    "targets.target_strength": "target_strength",
 }
-_HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
+_HOME = {name: (home, name) for home, names in _HOMES.items() for name in names.split()}
+_HOME |= {"accuracy": ("frontiers", "measure"), "card": ("store.cards", "write"), "open": ("store", "open_store")}
 
 
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'sonarsynth' has no attribute '{name}'")
-    value = getattr(importlib.import_module(f"sonarsynth.{_HOME[name]}"), name)
+    home, attribute = _HOME[name]
+    value = getattr(importlib.import_module(f"sonarsynth.{home}"), attribute)
     globals()[name] = value
     return value
 

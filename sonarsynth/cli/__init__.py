@@ -263,13 +263,13 @@ def snap(
     settings: Settings = [],  # noqa: B006
 ) -> None:
     """Draw the snap of a recipe: waveform and spectrum, as made and as heard, and the sonar's filter."""
-    from sonarsynth.pictures.snap_pictures import show_snap
+    from sonarsynth.pictures import snap_pictures
     from sonarsynth.recipe import reading
 
     source = reading.read(recipe, settings)
     with reading.locating(source):
-        show_snap(reading.recipe_of(source), out)
-    typer.echo(str(out))
+        file = snap_pictures.snap(reading.recipe_of(source), out)
+    typer.echo(str(file))
 
 
 @app.command()

@@ -15,7 +15,7 @@ from sonarsynth.cli.running import BadOption
 from sonarsynth.cli.selecting import frame_numbers
 
 if TYPE_CHECKING:
-    from sonarsynth.accuracy import Measured, Point, Verdict
+    from sonarsynth.frontiers import Measured, Point, Verdict
 
 
 SECOND = (
@@ -43,8 +43,8 @@ def recipe_table(
 ) -> None:
     """Walk the knobs of a recipe, write <out>/<recipe>.json and .png, print the table; raises typer.Exit(1) where a
     verdict is not good."""
-    from sonarsynth.accuracy import measure
-    from sonarsynth.accuracy.frontier_report import write
+    from sonarsynth.frontiers import measure
+    from sonarsynth.frontiers.frontier_report import write
     from sonarsynth.recipe import reading
 
     count = _hydrophones(hydrophones)

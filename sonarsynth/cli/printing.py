@@ -9,9 +9,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
-from rich.table import Table
 
 from sonarsynth.conventions import size
 
@@ -131,18 +129,11 @@ def _compared(found: dict[str, Any]) -> Iterator[str]:
 
 def plan_report(plan: Plan, prediction: Prediction) -> None:
     """Stages, what is left out, sizes and predicted cost."""
+    from sonarsynth.planning.plan_tables import as_tables
+
     out = console()
-    stages = Table(
-        "stage", "method", "why", "error", "s a frame", "a frame", title=escape(plan.recipe.title), title_justify="left"
-    )
-    for s in plan.stages:
-        stages.add_row(s.stage, s.method, s.why, s.error, f"{s.seconds:.2g}", size(s.bytes))
-    out.print(stages)
-    if plan.left_out:
-        omissions = Table("left out", "why", "costs at most")
-        for o in plan.left_out:
-            omissions.add_row(o.what, o.why, o.bound)
-        out.print(omissions)
+    for table in as_tables(plan.recipe.title, plan.stages, plan.left_out):
+        out.print(table)
     for warning in plan.warnings:
         out.print(f"note: {warning}", markup=False)
     for line in _spanned(plan.as_json()):

@@ -268,3 +268,19 @@ class Profile:
     def at(self, depth: np.ndarray | float) -> Floats:
         """Sound speed (m/s) at depths (m, positive down)."""
         return np.asarray(np.interp(depth, self.depth, self.speed))
+
+
+def mean_gradient(profile: Profile, depth: float, other: float, least: float) -> float:
+    """Mean of |dc/dz| (1/s) between two depths (m), over no less than `least` (m) about them; jumps count."""
+    middle, half = 0.5 * (depth + other), 0.5 * max(abs(depth - other), least)
+    between = np.abs(profile.depth - middle) < half
+    speed = [profile.at(middle - half), *profile.speed[between], profile.at(middle + half)]
+    return float(np.sum(np.abs(np.diff(speed)))) / (2 * half)
+
+
+def kink(profile: Profile, depth: float, reach: float) -> float:
+    """Change (1/s) of the gradient of the sound speed within `reach` (m) of a depth (m): 0 of one slope."""
+    inside = profile.depth[np.abs(profile.depth - depth) < reach]
+    node = np.unique([depth - reach, *inside, depth + reach])
+    slope = np.diff(profile.at(node)) / np.diff(node)
+    return float(np.ptp(slope))

@@ -21,7 +21,9 @@ from sonarsynth.pictures.figures.ray_page import page
 from sonarsynth.pictures.ray_lines import HIDDEN, RayLine, eigenray_lines, fan_lines
 from sonarsynth.pipeline import follow_rays
 from sonarsynth.planning import Plan
+from sonarsynth.planning import plan as plan_of
 from sonarsynth.propagation.ray_request import EigenrayRequest
+from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.tracing.ray_fan import EVENTS
 
@@ -42,6 +44,11 @@ HEADINGS = (
     "flag",
 )
 UNITS = "SI; angles in rad, up positive; positions (east, north, up) with z = 0 the mean surface; levels in dB re 1 uPa"
+
+
+def rays(recipe: Recipe, frame: int = 0, out: Path | str = "rays") -> list[Path]:
+    """Draw the rays of a frame of a recipe into a folder, as `show_rays`. Returns the files written."""
+    return show_rays(plan_of(recipe), frame, Path(out))[0]
 
 
 def show_rays(plan: Plan, index: int, out: Path) -> tuple[list[Path], str]:

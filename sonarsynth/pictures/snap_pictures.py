@@ -12,8 +12,8 @@ from sonarsynth.sources.snap_pulses import pulse
 from sonarsynth.state import model_of
 
 
-def show_snap(recipe: Recipe, out: Path) -> None:
-    """Write the picture of the first shrimp's snap, unvaried, through the sonar's filter.
+def snap(recipe: Recipe, out: Path | str = "snap.png") -> Path:
+    """Draw the first shrimp's snap, unvaried, before and after the sonar's filter. Returns the file written.
 
     Raises FieldError without a shrimp, or where its snap cannot be made.
     """
@@ -26,5 +26,7 @@ def show_snap(recipe: Recipe, out: Path) -> None:
         figure = snap_figure(lambda highest: pulse(model, 0.0, highest), chosen, shrimp[0].source_level)
     except ValueError as error:
         raise FieldError(("scene", "world", "shrimp", 0, "snap"), str(error)) from None
-    out.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(out)
+    file = Path(out)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(file)
+    return file

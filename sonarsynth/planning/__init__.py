@@ -17,7 +17,8 @@ from sonarsynth.planning.measured.sampled_frames import Look, check_alike, surve
 from sonarsynth.planning.notes.omissions import left_out
 from sonarsynth.planning.notes.plan_notes import notes, stored_validity
 from sonarsynth.planning.notes.scene_checks import check_frame, check_methods, read_inputs
-from sonarsynth.planning.plans import PRODUCTS, Errors, Omission, Plan, Stage, Windows
+from sonarsynth.planning.plan_tables import Omission, Stage
+from sonarsynth.planning.plans import PRODUCTS, Errors, Plan, Windows
 from sonarsynth.receiver import elements
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame

@@ -13,7 +13,8 @@ from functools import lru_cache
 import numpy as np
 
 from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
-from sonarsynth.planning.plans import Plan, Stage
+from sonarsynth.planning.plan_tables import Stage
+from sonarsynth.planning.plans import Plan
 from sonarsynth.propagation import Straight
 from sonarsynth.scattering import Kirchhoff
 from sonarsynth.signals import DirectSum

@@ -16,6 +16,7 @@ from sonarsynth.planning.choices import Choices
 from sonarsynth.planning.measured.absorption_error import Passed, mean_absorption, passed_by, shape_error
 from sonarsynth.planning.measured.ray_bending import propagation
 from sonarsynth.planning.notes.scene_checks import check_shrimp, read_inputs
+from sonarsynth.planning.plan_tables import Omission, Stage, as_html, as_text
 from sonarsynth.products import Paths
 from sonarsynth.propagation import Refracted, Straight
 from sonarsynth.receiver import Elements, elements
@@ -24,27 +25,6 @@ from sonarsynth.recipe.scene import Scene
 
 PRODUCTS = ("signals", "image", "cloud")
 """What a build can be asked for. Truth is always written; with any of these, levels of what is traced too."""
-
-
-@dataclass(frozen=True)
-class Stage:
-    """One line of the plan."""
-
-    stage: str
-    method: str
-    why: str
-    error: str
-    seconds: float  # predicted, one core, one frame
-    bytes: int  # in the store, one frame
-
-
-@dataclass(frozen=True)
-class Omission:
-    """Something that this scene does not need, and the bound on what leaving it out costs."""
-
-    what: str
-    why: str
-    bound: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +65,7 @@ class Errors:
     image: float = float("nan")  # dB: of the energy of beams, root mean square within 20 dB of the brightest
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Plan:
     """A recipe with every choice made. Everything that a frame needs, and nothing that it computes."""
 
@@ -178,6 +158,22 @@ class Plan:
     def predicted_bytes(self) -> int:
         """Bytes of the whole dataset before compression."""
         return self.recipe.frames * sum(s.bytes for s in self.stages)
+
+    def __repr__(self) -> str:
+        products = ", ".join(sorted(self.products)) or "truth"
+        return f"<Plan {self.recipe.title!r}: {self.recipe.frames} frames of {products}; print it for its stages>"
+
+    def __str__(self) -> str:
+        return as_text(*self._printed)
+
+    def _repr_html_(self) -> str:
+        return as_html(*self._printed)
+
+    @property
+    def _printed(self) -> tuple[str, tuple[Stage, ...], tuple[Omission, ...], list[str]]:
+        lines = [f"note: {warning}" for warning in self.warnings]
+        lines.append(", ".join(f"{count} {name}" for name, count in self.sizes.items()))
+        return self.recipe.title, self.stages, self.left_out, lines
 
     def as_json(self) -> dict[str, Any]:
         """The plan for a program: stages, left_out, predicted_seconds, predicted_bytes, sizes, windows.

@@ -14,6 +14,7 @@ from sonarsynth.store.files.remote import Remote, Unreachable
 from sonarsynth.store.files.within import Mismatch
 from sonarsynth.store.layout import Layout, layout_of
 from sonarsynth.store.marks import Damage, Mark
+from sonarsynth.store.opening import open_store
 from sonarsynth.store.writing import frames_there, missing, write_shard
 
 __all__ = [
@@ -41,6 +42,7 @@ __all__ = [
     "lock",
     "missing",
     "must_be_store",
+    "open_store",
     "ranges",
     "root_attributes",
     "shared_lock",

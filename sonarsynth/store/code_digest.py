@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 APART: Final = (
-    "accuracy",
+    "frontiers",
     "cli",
     "evaluation",
     "pictures",

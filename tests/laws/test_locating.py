@@ -9,12 +9,13 @@ import pytest
 
 from sonarsynth.conventions import azimuth_elevation, direction
 from sonarsynth.environment.sea import Profile
+from sonarsynth.environment.sound_speed import mean_gradient
 from sonarsynth.equations.arrays.spherical_wave import tangent_plane
 from sonarsynth.equations.rays.ray_solutions import eigenrays, water
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.products import Bearings, Signals
 from sonarsynth.ranging import SensorDelays
-from sonarsynth.ranging.location.refraction import first_rays, mean_gradient
+from sonarsynth.ranging.location.refraction import first_rays
 from sonarsynth.ranging.location.source_position import bending_covariance
 from sonarsynth.receiver import PlanarLattice, Romanis, Sonar, elements
 from tests.heard import RATE, envelope_late, hear, hear_direct, silence

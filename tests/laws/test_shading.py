@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from sonarsynth import planning
-from sonarsynth.accuracy import measure
 from sonarsynth.environment.sea import Profile
+from sonarsynth.frontiers import measure
 from sonarsynth.geometry.motion import Still
 from sonarsynth.pipeline import trace_frame
 from sonarsynth.planning import arrivals_of

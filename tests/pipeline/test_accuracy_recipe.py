@@ -11,16 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonarsynth.accuracy import Measured, Point, exact_frame, measure, usual_frames
-from sonarsynth.accuracy.exact_frame import differences, each_hydrophone, exact_plan, spread
-from sonarsynth.accuracy.frontier_report import write
-from sonarsynth.accuracy.image_knobs import off_by
-from sonarsynth.accuracy.rows import merged
-from sonarsynth.accuracy.verdicts import cheapest, verdicts
 from sonarsynth.cli import app
 from sonarsynth.cli.frontier_table import show
 from sonarsynth.cli.running import run
 from sonarsynth.environment.boundaries import SeaBed, Sediment
+from sonarsynth.frontiers import Measured, Point, exact_frame, measure, usual_frames
+from sonarsynth.frontiers.exact_frame import differences, each_hydrophone, exact_plan, spread
+from sonarsynth.frontiers.frontier_report import write
+from sonarsynth.frontiers.image_knobs import off_by
+from sonarsynth.frontiers.rows import merged
+from sonarsynth.frontiers.verdicts import cheapest, verdicts
 from sonarsynth.imaging import AutoBeamforming, FocusedDelayAndSum
 from sonarsynth.planning import Choices, plan
 from sonarsynth.propagation import AutoTracing
@@ -44,7 +44,7 @@ def small(signal: float = 1e-2, frames: int = 2) -> Recipe:
 def alone() -> pytest.MonkeyPatch:
     """Without libraries of others: they compile for long."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sonarsynth.accuracy.peer_rows.installed", lambda library: False)
+        patch.setattr("sonarsynth.frontiers.peer_rows.installed", lambda library: False)
         yield patch
 
 
@@ -224,8 +224,8 @@ def test_another_seed_keeps_the_choices(alone: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("bounces", [0, 1])
 def test_finufft_and_ours_agree(bounces: int, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("finufft")
-    monkeypatch.setattr("sonarsynth.accuracy.peer_rows.installed", lambda library: True)
-    from sonarsynth.accuracy.peer_rows import synthesis_peers
+    monkeypatch.setattr("sonarsynth.frontiers.peer_rows.installed", lambda library: True)
+    from sonarsynth.frontiers.peer_rows import synthesis_peers
     from sonarsynth.planning import arrivals_of
 
     recipe, bed = small(1e-4), SeaBed(reflection=Sediment(name="medium sand"))
@@ -253,7 +253,7 @@ def test_the_command(
         return replace(measured, verdicts=tuple(replace(v, ok=True) for v in measured.verdicts))
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sonarsynth.accuracy.measure", measures)
+        patch.setattr("sonarsynth.frontiers.measure", measures)
         options = ["--set", "accuracy.signal=0.003", "--frames", "1", "--hydrophones", "7", "--seed", "5", "--no-peers"]
         assert run(app, ["accuracy", str(file), *options, "--out", str(tmp_path)]) == 0
     assert asked == [0.003, (1,), 7, 5, False]
@@ -261,11 +261,11 @@ def test_the_command(
     assert "verdicts" in said and "faintest" in said and "not installed" in said
     assert str(tmp_path / "scene.json") in said and (tmp_path / "scene.png").exists()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sonarsynth.accuracy.measure", lambda *a, **k: replace(measured, verdicts=()))
+        patch.setattr("sonarsynth.frontiers.measure", lambda *a, **k: replace(measured, verdicts=()))
         assert run(app, ["accuracy", str(file), "--json", "--out", str(tmp_path)]) == 0
         assert len(json.loads(capsys.readouterr().out)) == len(measured.points)
         wrong = (replace(measured.verdicts[0], ok=False),)
-        patch.setattr("sonarsynth.accuracy.measure", lambda *a, **k: replace(measured, verdicts=wrong))
+        patch.setattr("sonarsynth.frontiers.measure", lambda *a, **k: replace(measured, verdicts=wrong))
         assert run(app, ["accuracy", str(file), "--out", str(tmp_path)]) == 1
         assert "FAILED" in capsys.readouterr().out
 

@@ -232,7 +232,7 @@ def test_signals_end_a_build_and_its_workers_in_10_s_and_it_goes_on(
 def test_sigterm_ends_a_build_that_can_go_on(small_file: Path, tmp_path: Path) -> None:
     path = tmp_path / "s.zarr"
     code = (
-        "from sonarsynth import render\nfrom sonarsynth.cli import main\nimport time\n"
+        "from sonarsynth import pipeline as render\nfrom sonarsynth.cli import main\nimport time\n"
         "whole = render.trace_frame\n"
         "def slow(made, i):\n    time.sleep(1e4 if i > 9 else 0)\n    return whole(made, i)\n"
         f"render.trace_frame = slow\nmain(['build', {str(small_file)!r}, {str(path)!r}, '--workers', '0'])"

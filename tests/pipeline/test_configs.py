@@ -231,7 +231,7 @@ def test_real_water_and_a_real_hull(tmp_path: Path) -> None:
 
 
 def test_the_snap_is_drawn(tmp_path: Path) -> None:
-    from sonarsynth.pictures.snap_pictures import show_snap
+    from sonarsynth.pictures.snap_pictures import snap as draw_snap
 
-    show_snap(reading.load(CONFIGS / "remus.yaml"), tmp_path / "pictures" / "snap.png")
+    draw_snap(reading.load(CONFIGS / "remus.yaml"), tmp_path / "pictures" / "snap.png")
     assert (tmp_path / "pictures" / "snap.png").read_bytes().startswith(b"\x89PNG")

@@ -23,7 +23,7 @@ def faults(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_killed_builds_come_out_identical() -> None:
-    done = faults("--kills", os.environ.get("SONARSYNTH_KILLS", "3"), "--seed", "3")
+    done = faults("--kills", os.environ.get("SONARSYNTH_KILLS", "2"), "--seed", "3")
     assert done.returncode == 0, done.stdout + done.stderr
     summary = json.loads(done.stdout)
     assert summary["ok"]

@@ -11,7 +11,7 @@ from ruamel.yaml import YAML
 
 from sonarsynth import schedule
 from sonarsynth.description import FieldError
-from sonarsynth.pictures.snap_pictures import show_snap
+from sonarsynth.pictures.snap_pictures import snap as draw_snap
 from sonarsynth.pipeline import render
 from sonarsynth.planning import plan
 from sonarsynth.recipe import Recipe, reading
@@ -79,7 +79,7 @@ def test_a_frame_is_the_same_whatever_was_rendered_before(tmp_path: Path) -> Non
 
 def test_the_snap_of_each_model_is_drawn(tmp_path: Path) -> None:
     for kind, snap in SNAPS.items():
-        show_snap(recipe_with(tmp_path, snap), tmp_path / f"{kind}.png")
+        draw_snap(recipe_with(tmp_path, snap), tmp_path / f"{kind}.png")
         assert (tmp_path / f"{kind}.png").read_bytes().startswith(b"\x89PNG")
 
 

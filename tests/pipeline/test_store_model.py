@@ -122,4 +122,4 @@ class Store(RuleBasedStateMachine):
 
 
 TestStore = Store.TestCase
-TestStore.settings = settings(max_examples=8, stateful_step_count=10, deadline=None)
+TestStore.settings = settings(max_examples=4, stateful_step_count=10, deadline=None)

@@ -135,8 +135,9 @@ def test_parts_hold_every_element_once_about_their_middle(count: int) -> None:
 
 
 BENT = (
-    "acoustics.rays_chain", "acoustics.rays_layers", "acoustics.rays_march", "ranging.refraction",
-    "tracing.eigenrays", "tracing.fan", "tracing.marching", "tracing.polylines",
+    "equations.rays.ray_chain", "equations.rays.ray_in_layer", "equations.rays.ray_arcs",
+    "ranging.location.refraction", "propagation.eigenrays", "propagation.ray_steps", "propagation.polylines",
+    "tracing.ray_fan",
 )  # fmt: skip
 """Modules that solve, follow or invert rays that bend."""
 

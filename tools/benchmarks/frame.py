@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from sonarsynth import pipeline, planning
-from sonarsynth.accuracy.peers import acoular_image, likeness, thesis_image, thesis_pulse
+from sonarsynth.frontiers.peers import acoular_image, likeness, thesis_image, thesis_pulse
 from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.products import Arrivals, EnergyImage, Signals
 from sonarsynth.recipe import reading

@@ -33,7 +33,7 @@ LOOKED_AT = sorted({FRAMES // 10, FRAMES // 2, FRAMES})
 
 PAD = """\
 import time
-from sonarsynth import render
+from sonarsynth import pipeline as render
 began = {}
 def traced(made, index):
     began[index] = time.perf_counter()

@@ -8,8 +8,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +30,8 @@ def main() -> int:
     renamed = dict(pair.split("=", 1) for pair in options.renamed)
     wanted = [name for name in options.recipes.split(",") if name]
     same = True
-    with tempfile.TemporaryDirectory(prefix="same-") as base, _checked_out(options.commit, Path(base) / "old") as old:
+    with tempfile.TemporaryDirectory(prefix="same-") as base:
+        old = _checked_out(options.commit, Path(base) / "old")
         names = sorted(path.stem for path in (old / "configs").glob("*.yaml"))
         for name in (name for name in names if name in wanted or not wanted):
             stores = {}
@@ -43,16 +43,14 @@ def main() -> int:
     return 0 if same else 1
 
 
-@contextmanager
-def _checked_out(commit: str, place: Path) -> Iterator[Path]:
-    """A commit in a folder of its own."""
-    git = ["git", "-C", str(ROOT), "worktree"]
-    if subprocess.run([*git, "add", "--quiet", "--detach", str(place), commit], check=False).returncode:
-        raise SystemExit(2)
-    try:
-        yield place
-    finally:
-        subprocess.run([*git, "remove", "--force", str(place)], check=True)
+def _checked_out(commit: str, place: Path) -> Path:
+    """The files of a commit in a folder of its own. Raises SystemExit where there is no such commit."""
+    place.mkdir()
+    archive = subprocess.run(["git", "-C", str(ROOT), "archive", commit], capture_output=True, check=False)
+    if archive.returncode:
+        raise SystemExit(archive.stderr.decode().strip())
+    subprocess.run(["tar", "-x", "-C", str(place)], input=archive.stdout, check=True)
+    return place
 
 
 def _build(tree: Path, name: str, place: Path, frames: int) -> Path:

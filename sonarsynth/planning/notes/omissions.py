@@ -9,7 +9,8 @@ import numpy as np
 from sonarsynth.environment.boundary_numbers import rms_height
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.planning.measured.ray_bending import bending_error
-from sonarsynth.planning.plans import PRODUCTS, Omission, Plan
+from sonarsynth.planning.plan_tables import Omission
+from sonarsynth.planning.plans import PRODUCTS, Plan
 from sonarsynth.propagation import Straight
 from sonarsynth.propagation.bounces import MOST_BOUNCES
 from sonarsynth.receiver import stop_frequency

@@ -52,22 +52,6 @@ def first_rays(profile: Profile, start: Floats, end: Floats) -> FirstRays:
     return FirstRays(time, departure, arrival)
 
 
-def mean_gradient(profile: Profile, depth: float, other: float, least: float) -> float:
-    """Mean of |dc/dz| (1/s) between two depths (m), over no less than `least` (m) about them; jumps count."""
-    middle, half = 0.5 * (depth + other), 0.5 * max(abs(depth - other), least)
-    between = np.abs(profile.depth - middle) < half
-    speed = [profile.at(middle - half), *profile.speed[between], profile.at(middle + half)]
-    return float(np.sum(np.abs(np.diff(speed)))) / (2 * half)
-
-
-def kink(profile: Profile, depth: float, reach: float) -> float:
-    """Change (1/s) of the gradient of the sound speed within `reach` (m) of a depth (m): 0 of one slope."""
-    inside = profile.depth[np.abs(profile.depth - depth) < reach]
-    node = np.unique([depth - reach, *inside, depth + reach])
-    slope = np.diff(profile.at(node)) / np.diff(node)
-    return float(np.ptp(slope))
-
-
 def bending(profile: Profile, elements: Elements, pose: Pose, sound_speed: float, gradient: float) -> Bend:
     """What rays through the profile add to straight delays at `sound_speed` (m/s) over the array."""
     sensors = np.vstack([elements.position, np.zeros(3)])

@@ -47,8 +47,9 @@ class SensorDelays:
         profile: Profile,
     ) -> Bearings:
         """See `LocatingMethod`. An array that cannot locate gives NaN rows (`locating.unlocatable` says why)."""
+        from sonarsynth.environment.sound_speed import kink, mean_gradient
         from sonarsynth.ranging.location.locating import locate
-        from sonarsynth.ranging.location.refraction import bending, kink, mean_gradient
+        from sonarsynth.ranging.location.refraction import bending
 
         on_bottom = self.on_bottom is not False
         gradient = mean_gradient(profile, -float(sonar_pose.position[2]), bed_depth, elements.aperture)

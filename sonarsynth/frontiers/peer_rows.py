@@ -8,9 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from sonarsynth.accuracy.exact_frame import golden
-from sonarsynth.accuracy.image_knobs import image_of, imaged
-from sonarsynth.accuracy.peers import (
+from sonarsynth.frontiers.exact_frame import golden
+from sonarsynth.frontiers.image_knobs import image_of, imaged
+from sonarsynth.frontiers.peers import (
     acoular_image,
     finufft_signals,
     installed,
@@ -19,8 +19,8 @@ from sonarsynth.accuracy.peers import (
     thesis_image,
     thesis_pulse,
 )
-from sonarsynth.accuracy.rows import Point, timed
-from sonarsynth.accuracy.signal_knobs import FINER
+from sonarsynth.frontiers.rows import Point, timed
+from sonarsynth.frontiers.signal_knobs import FINER
 from sonarsynth.imaging import DenseDelayAndSum
 from sonarsynth.pipeline import Heard
 from sonarsynth.planning import Plan, frame_start

@@ -7,14 +7,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from sonarsynth.accuracy.exact_frame import Exact, exact_frame, synthesis_check
-from sonarsynth.accuracy.full_frame import Whole, whole_points
-from sonarsynth.accuracy.image_knobs import image_points, range_points
-from sonarsynth.accuracy.peer_rows import image_peers, synthesis_peers
-from sonarsynth.accuracy.rows import Point, Verdict, finite, merged
-from sonarsynth.accuracy.signal_knobs import synthesis_points
-from sonarsynth.accuracy.tracing_knobs import Traced, trace_points
-from sonarsynth.accuracy.verdicts import set_by_recipe, verdicts
+from sonarsynth.frontiers.exact_frame import Exact, exact_frame, synthesis_check
+from sonarsynth.frontiers.full_frame import Whole, whole_points
+from sonarsynth.frontiers.image_knobs import image_points, range_points
+from sonarsynth.frontiers.peer_rows import image_peers, synthesis_peers
+from sonarsynth.frontiers.rows import Point, Verdict, finite, merged
+from sonarsynth.frontiers.signal_knobs import synthesis_points
+from sonarsynth.frontiers.tracing_knobs import Traced, trace_points
+from sonarsynth.frontiers.verdicts import set_by_recipe, verdicts
 from sonarsynth.pipeline.synthesis import hear
 from sonarsynth.planning import Plan, arrivals_of
 from sonarsynth.planning import plan as plan_of

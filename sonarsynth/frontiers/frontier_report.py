@@ -8,8 +8,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Final
 
-from sonarsynth.accuracy import Measured
-from sonarsynth.accuracy.rows import Point
+from sonarsynth.frontiers import Measured
+from sonarsynth.frontiers.rows import Point
 from sonarsynth.pictures.accuracy_figures.frontier_figure import Line, Panel, frontier_figure
 
 TITLES: Final = {

@@ -15,7 +15,8 @@ from itertools import takewhile
 
 import numpy as np
 
-from sonarsynth.accuracy.exact_frame import (
+from sonarsynth.conventions import Ints
+from sonarsynth.frontiers.exact_frame import (
     Each,
     Exact,
     Heard,
@@ -25,8 +26,7 @@ from sonarsynth.accuracy.exact_frame import (
     golden,
     pressures,
 )
-from sonarsynth.accuracy.rows import Point, timed
-from sonarsynth.conventions import Ints
+from sonarsynth.frontiers.rows import Point, timed
 from sonarsynth.planning import Plan, arrivals_of, frame_start
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import Refracted, Straight

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import hypot, inf, isnan
 
-from sonarsynth.accuracy.rows import STAGES, Point, Verdict
+from sonarsynth.frontiers.rows import STAGES, Point, Verdict
 from sonarsynth.ranging import AutoRange
 from sonarsynth.recipe.scene import Scene
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sonarsynth.accuracy.rows import Point
 from sonarsynth.conventions import Floats, Ints
+from sonarsynth.frontiers.rows import Point
 from sonarsynth.imaging import DenseDelayAndSum
 from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start
 from sonarsynth.products import Arrivals

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.accuracy.exact_frame import exact_plan
-from sonarsynth.accuracy.rows import Point, timed
 from sonarsynth.conventions import Floats
+from sonarsynth.frontiers.exact_frame import exact_plan
+from sonarsynth.frontiers.rows import Point, timed
 from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.pipeline import Heard
 from sonarsynth.planning import Plan

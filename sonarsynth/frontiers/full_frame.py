@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonarsynth.accuracy.exact_frame import Exact, differences, exact_plan, pressures
-from sonarsynth.accuracy.image_knobs import apart, cloud_of, imaged, off_by
-from sonarsynth.accuracy.rows import Point, timed
-from sonarsynth.accuracy.tracing_knobs import Traced
+from sonarsynth.frontiers.exact_frame import Exact, differences, exact_plan, pressures
+from sonarsynth.frontiers.image_knobs import apart, cloud_of, imaged, off_by
+from sonarsynth.frontiers.rows import Point, timed
+from sonarsynth.frontiers.tracing_knobs import Traced
 from sonarsynth.pipeline import Heard, process, record
 from sonarsynth.planning import frame_start
 from sonarsynth.products import Signals

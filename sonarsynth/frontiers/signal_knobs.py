@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonarsynth.accuracy.exact_frame import Heard, differences, golden, pressures
-from sonarsynth.accuracy.rows import Point
-from sonarsynth.accuracy.tracing_knobs import Traced
+from sonarsynth.frontiers.exact_frame import Heard, differences, golden, pressures
+from sonarsynth.frontiers.rows import Point
+from sonarsynth.frontiers.tracing_knobs import Traced
 from sonarsynth.planning import frame_start
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.signals import DirectSum, KernelDeposit
