@@ -45,7 +45,7 @@ if TYPE_CHECKING:
         WenzNoise,
     )
     from sonarsynth.frontiers import measure as accuracy
-    from sonarsynth.geometry.motion import Circle, Course, Line, Still, Waypoint, Waypoints
+    from sonarsynth.geometry.motion import Circle, ConstantVelocity, Line, Still, Waypoint, Waypoints
     from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
     from sonarsynth.pictures import show
     from sonarsynth.pictures.ray_pictures import rays
@@ -67,13 +67,13 @@ if TYPE_CHECKING:
         Romanis,
         Sonar,
     )
-    from sonarsynth.recipe import Accuracy, Axis, Choice, Normal, Recipe, Sobol, Splits, Together, Uniform
+    from sonarsynth.recipe import Accuracy, Axis, Choice, Normal, Recipe, Sobol, Splits, Uniform, Zip
     from sonarsynth.recipe.reading import RecipeError, dump, load, loads, schema
     from sonarsynth.recipe.scene import EchoWindow, Physics, Processing, Scene, Trajectory, World
     from sonarsynth.scattering import Isotropic, Kirchhoff, MirrorLobe, PartlyReflecting
     from sonarsynth.schedule import BuildReport, build
     from sonarsynth.schedule.repairing import RepairReport, repair
-    from sonarsynth.signals import AutoSynthesis, DirectSum, KernelDeposit
+    from sonarsynth.signals import AutoSynthesis, DirectSum, GriddedSynthesis
     from sonarsynth.sources.shrimp import LogarithmicBubble, SnappingShrimp
     from sonarsynth.sources.snap_models import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
     from sonarsynth.store import open_store as open
@@ -99,8 +99,8 @@ __all__ = [
     "Catenary",
     "Choice",
     "Circle",
+    "ConstantVelocity",
     "Converter",
-    "Course",
     "Cylinder",
     "DenseDelayAndSum",
     "DirectSum",
@@ -112,11 +112,11 @@ __all__ = [
     "FluidHalfSpace",
     "FocusedDelayAndSum",
     "Gabor",
+    "GriddedSynthesis",
     "Isotropic",
     "Isovelocity",
     "IsovelocityRange",
     "KellerMiksis",
-    "KernelDeposit",
     "Kirchhoff",
     "LShape",
     "Line",
@@ -165,7 +165,6 @@ __all__ = [
     "Target",
     "TemperatureSalinity",
     "Thermocline",
-    "Together",
     "Trajectory",
     "Uniform",
     "WavefrontCancelling",
@@ -173,6 +172,7 @@ __all__ = [
     "Waypoints",
     "WenzNoise",
     "World",
+    "Zip",
     "accuracy",
     "build",
     "card",

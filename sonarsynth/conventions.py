@@ -97,14 +97,14 @@ class Unit:
         number, _, symbol = value.strip().partition(" ")
         symbol = symbol.strip()
         try:
-            size = float(number)
+            format_bytes = float(number)
         except ValueError:
             raise ValueError(f"must be a number in {self.symbol}, or a text such as '1 {self.symbol}'") from None
         if symbol not in accepted:
             raise ValueError(
                 (f"has unit '{symbol}'" if symbol else "has no unit") + f"; use one of {', '.join(accepted)}"
             )
-        return size * accepted[symbol]
+        return format_bytes * accepted[symbol]
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
@@ -205,7 +205,7 @@ def pressure(level_db: npt.ArrayLike) -> Floats:
     return np.asarray(REFERENCE_PRESSURE * 10.0 ** (np.asarray(level_db, float) / 20.0))
 
 
-def size(count: float) -> str:
+def format_bytes(count: float) -> str:
     """A number of bytes as people say it."""
     for unit in ("bytes", "kB", "MB", "GB"):
         if count < 1000:

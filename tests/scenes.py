@@ -12,7 +12,7 @@ from sonarsynth.receiver import Band, BandPass, BeamGrid, Romanis, Sonar
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Physics, Processing, Scene, Trajectory, World
 from sonarsynth.scattering import Isotropic
-from sonarsynth.signals import KernelDeposit
+from sonarsynth.signals import GriddedSynthesis
 from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.targets.shapes import Remus100, Sphere
 from sonarsynth.targets.target import Target
@@ -73,6 +73,6 @@ def point_scene(
             sonar=Sonar(assumed_sound_speed=1500.0, **sonar),
             trajectory=Trajectory(frames=1, sonar=Still(position=place, heading=heading)),
             # one point: not each facet as each hydrophone by itself would see it
-            physics=Physics(scattering=Isotropic(strength=strength), subarrays=1, synthesis=KernelDeposit()),
+            physics=Physics(scattering=Isotropic(strength=strength), subarrays=1, synthesis=GriddedSynthesis()),
         )
     )

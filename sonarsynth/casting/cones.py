@@ -6,13 +6,15 @@ import numpy as np
 
 from sonarsynth.casting.ray_casting import casting_mesh
 from sonarsynth.conventions import Floats, Ints
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 
 EMPTY, CLOSED, UNKNOWN = range(3)
 """As `cone_kernels`."""
 
 
-def look(bodies: tuple[Body, ...], apex: Floats, axis: Floats, slope: Floats, reach: Floats, far: Floats) -> Ints:
+def classify_cones(
+    bodies: tuple[PlacedTarget, ...], apex: Floats, axis: Floats, slope: Floats, reach: Floats, far: Floats
+) -> Ints:
     """What is certain of cones (cone,) among bodies: EMPTY of them up to `reach` (m) along the axis, CLOSED by one of
     them nearer than `far` (m), or UNKNOWN.
 

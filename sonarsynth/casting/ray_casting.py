@@ -17,9 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints
-from sonarsynth.description.byte_bounded_cache import kept
+from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 
 Int32s = npt.NDArray[np.int32]
 Backend = Literal["embree", "open3d"]
@@ -169,7 +169,7 @@ class _ByContent:
         return isinstance(other, _ByContent) and self.digest == other.digest
 
 
-@kept(16)
+@byte_bounded_cache(16)
 def _casting_mesh(key: _ByContent, backend: Backend) -> CastingMesh:
     mesh = key.mesh
     if not np.isfinite(mesh.vertices).all():
@@ -194,13 +194,13 @@ def casting_mesh(mesh: Mesh, backend: Backend = "embree") -> CastingMesh:
     return _casting_mesh(_ByContent(mesh.digest, mesh), backend)
 
 
-def enclosing(body: Body) -> tuple[Floats, float]:
+def enclosing(body: PlacedTarget) -> tuple[Floats, float]:
     """Centre (xyz) in the world and radius (m) of a sphere a little larger than the body."""
     ready = casting_mesh(body.mesh)
     return np.asarray(body.pose.to_world(ready.centre)), (1.0 + 1e-5) * ready.size
 
 
-def inside(body: Body, point: Floats) -> bool:
+def inside(body: PlacedTarget, point: Floats) -> bool:
     """Whether a point (xyz) of the world is inside a closed body: the facet above it shows its inner side."""
     centre, radius = enclosing(body)
     if not len(body.mesh.faces) or np.linalg.norm(point - centre) > radius:
@@ -231,7 +231,7 @@ def first_hit(
     return facet, distance * ready.size
 
 
-def occluded(bodies: tuple[Body, ...], start: Floats, end: Floats, backend: Backend = "embree") -> Bools:
+def occluded(bodies: tuple[PlacedTarget, ...], start: Floats, end: Floats, backend: Backend = "embree") -> Bools:
     """Whether any body stands in each straight segment from start (segment, xyz) to end (segment, xyz) in the world.
 
     A segment that starts on a facet must be moved off it (`OFFSET`). Raises ValueError for ends that are not finite.

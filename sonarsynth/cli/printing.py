@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
 
-from sonarsynth.conventions import size
+from sonarsynth.conventions import format_bytes
 
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan
@@ -95,15 +95,15 @@ def build_report(report: BuildReport) -> None:
         rate = report.written / report.seconds
         out.print(
             f"{report.store}: {report.written} frames written in {duration(report.seconds)} ({rate:.3g} frames/s, "
-            f"{size(report.bytes)}), {report.there} of {report.wanted} were there"
+            f"{format_bytes(report.bytes)}), {report.there} of {report.wanted} were there"
         )
         times = ", ".join(f"{stage} {_milliseconds(s / report.written)}" for stage, s in report.stage_cpu.items())
         where = (
-            f"{report.workers} workers, at most {size(report.worker_peak_bytes)} each"
+            f"{report.workers} workers, at most {format_bytes(report.worker_peak_bytes)} each"
             if report.workers
             else "no workers"
         )
-        out.print(f"a frame: {times} of one core; {where}, {size(report.client_peak_bytes)} here")
+        out.print(f"a frame: {times} of one core; {where}, {format_bytes(report.client_peak_bytes)} here")
     elif not report.failures:
         out.print(f"{report.store}: all {report.wanted} frames are there")
     if report.prediction and report.written:
@@ -121,7 +121,7 @@ def build_report(report: BuildReport) -> None:
 
 def _compared(found: dict[str, Any]) -> Iterator[str]:
     """Prediction and measurement of a build, a line each."""
-    for name, what, said in (("seconds", "took", duration), ("bytes", "the store takes", size)):
+    for name, what, said in (("seconds", "took", duration), ("bytes", "the store takes", format_bytes)):
         if found[f"{name}_ratio"] is not None:
             measured, predicted = (said(found[f"{which}_{name}"]) for which in ("measured", "predicted"))
             yield f"{what} {measured} (predicted {predicted})"
@@ -142,11 +142,11 @@ def plan_report(plan: Plan, prediction: Prediction) -> None:
     p = prediction
     out.print(
         f"predicted: {duration(p.seconds)} for {p.frames} frames with {p.workers} workers, {duration(p.core_seconds)} "
-        f"of CPU time; {size(p.bytes)} on the disk, {size(p.raw_bytes)} before compression"
+        f"of CPU time; {format_bytes(p.bytes)} on the disk, {format_bytes(p.raw_bytes)} before compression"
     )
     out.print(
         f"at most {p.files} files and folders for all frames, {plan.shard_frames} frames in a file; "
-        f"a worker takes up to {size(plan.memory_bytes)} of memory"
+        f"a worker takes up to {format_bytes(plan.memory_bytes)} of memory"
     )
     out.print(f"known from {p.how}", markup=False)
 
@@ -168,7 +168,8 @@ def verify_report(report: StoreReport) -> None:
     """Damage and checks, one line each."""
     out = console()
     out.print(
-        f"{report.store}: {len(report.complete)} of {report.frames} frames, {report.files} files, {size(report.bytes)}",
+        f"{report.store}: {len(report.complete)} of {report.frames} frames, {report.files} files, "
+        f"{format_bytes(report.bytes)}",
         markup=False,
     )
     for problem in report.problems[:50]:

@@ -44,7 +44,7 @@ def size_of(*values: object) -> int:
     return total
 
 
-class Kept:
+class ByteBoundedCache:
     """A function that keeps its results: at most `most`, and the last `LEAST` or no more than `MOST_BYTES` together.
 
     Sizes are taken anew whenever a result is added, for meshes grow with what is asked of them. Safe in threads; two
@@ -88,10 +88,10 @@ class Kept:
             self._results.clear()
 
 
-def kept(most: int) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Decorator: keep results by arguments, at most so many, bounded in bytes (`Kept`)."""
+def byte_bounded_cache(most: int) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Decorator: keep results by arguments, at most so many, bounded in bytes (`ByteBoundedCache`)."""
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
-        return Kept(function, most)
+        return ByteBoundedCache(function, most)
 
     return decorate

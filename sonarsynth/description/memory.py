@@ -23,7 +23,7 @@ def frame_bytes(facets: int, samples: int) -> float:
     return PROCESS_BYTES + BYTES * facets + SAMPLE_BYTES * samples
 
 
-def most_facets() -> int:
+def max_facets() -> int:
     """Facets that a mesh may have here."""
     return int(min(MAX_FACETS, free_bytes() / BYTES))
 

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from sonarsynth.evaluation.checks import Check, every, numbered, of_frame
-from sonarsynth.products import LEDGER
+from sonarsynth.products import LINK_BUDGET
 
 LEDGER_TOLERANCE = 0.1  # dB
 
@@ -16,7 +16,7 @@ INAUDIBLE = 120.0
 
 def ledger_adds_up(tree: xr.DataTree, frames: np.ndarray) -> Check:
     """received = source - loss_out + scattering - loss_in - absorption - boundary for every path family."""
-    book = {name: every(tree, f"ledger/{name}")[frames] for name in LEDGER}
+    book = {name: every(tree, f"ledger/{name}")[frames] for name in LINK_BUDGET}
     total = book["source_level"] + book["scattering"]
     for loss in ("transmission_loss_out", "transmission_loss_in", "absorption_loss", "boundary_loss"):
         total = total - book[loss]

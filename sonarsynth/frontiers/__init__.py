@@ -13,9 +13,9 @@ from sonarsynth.frontiers.image_knobs import image_points, range_points
 from sonarsynth.frontiers.peer_rows import image_peers, synthesis_peers
 from sonarsynth.frontiers.rows import Point, Verdict, finite, merged
 from sonarsynth.frontiers.signal_knobs import synthesis_points
-from sonarsynth.frontiers.tracing_knobs import Traced, trace_points
+from sonarsynth.frontiers.tracing_knobs import TracedBySensor, trace_points
 from sonarsynth.frontiers.verdicts import set_by_recipe, verdicts
-from sonarsynth.pipeline.synthesis import hear
+from sonarsynth.pipeline.synthesis import frame_signals
 from sonarsynth.planning import Plan, arrivals_of
 from sonarsynth.planning import plan as plan_of
 from sonarsynth.recipe import Recipe
@@ -99,12 +99,12 @@ def _frame(made: Plan, index: int, hydrophones: int | None, say: Say, *, peers: 
     plan, frame = exact.plan, exact.frame
     points = [synthesis_check(exact)]
     say(f"frame {index}: tracing, {len(exact.sensor)} hydrophones")
-    traced = Traced.of(plan, frame, exact.sensor)
+    traced = TracedBySensor.of(plan, frame, exact.sensor)
     points += trace_points(exact, traced)
     say(f"frame {index}: synthesis")
     points += synthesis_points(traced)
     arrivals = arrivals_of(plan, frame)
-    signals = hear(plan, frame, arrivals)
+    signals = frame_signals(plan, frame, arrivals)
     whole = Whole.of(exact, signals)
     say(f"frame {index}: image and range")
     points += image_points(plan, whole.heard)

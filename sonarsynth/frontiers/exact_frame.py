@@ -20,7 +20,7 @@ from sonarsynth.ranging import RefractedRange
 from sonarsynth.receiver import Elements
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.recipe.scene import Frame
-from sonarsynth.signals import DirectSum, KernelDeposit
+from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.auto_synthesis import deposit_for
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.validation.references.frames.frame_pressure import FramePressure
@@ -106,7 +106,7 @@ def exact_plan(plan: Plan) -> Plan:
     return replace(plan, propagation=paths, choices=choices)
 
 
-def golden(plan: Plan, finer: float = 1.0) -> KernelDeposit:
+def golden(plan: Plan, finer: float = 1.0) -> GriddedSynthesis:
     """The synthesis of the exact way: in float64, and checked against `DirectSum`; finer by a factor where wanted."""
     return replace(deposit_for(finer * SMALL * plan.recipe.accuracy.signal), precision="float64")
 
@@ -182,12 +182,12 @@ def spread(live: Ints, count: int) -> Ints:
 
 
 def pressures(
-    plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements, method: KernelDeposit | DirectSum
+    plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements, method: GriddedSynthesis | DirectSum
 ) -> Heard:
     """Echoes and direct arrivals (element, sample) in Pa, each by itself."""
     start, samples = frame_start(plan, frame), plan.windows.samples
     sonar, snaps = plan.scene.sonar, frame.moment.snaps
-    make = method.pressure if isinstance(method, KernelDeposit) else exact_signals
+    make = method.pressure if isinstance(method, GriddedSynthesis) else exact_signals
     echoes, direct = (
         make(arrivals.select(some), snaps, elements, sonar, plan.absorption, start, samples)[0]
         for some in (~arrivals.direct, arrivals.direct)

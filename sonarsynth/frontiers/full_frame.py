@@ -11,8 +11,8 @@ import numpy as np
 from sonarsynth.frontiers.exact_frame import Exact, differences, exact_plan, pressures
 from sonarsynth.frontiers.image_knobs import apart, cloud_of, imaged, off_by
 from sonarsynth.frontiers.rows import Point, timed
-from sonarsynth.frontiers.tracing_knobs import Traced
-from sonarsynth.pipeline import Heard, process, record
+from sonarsynth.frontiers.tracing_knobs import TracedBySensor
+from sonarsynth.pipeline import BeamformedFrame, digitise, locate_and_image
 from sonarsynth.planning import frame_start
 from sonarsynth.products import Signals
 
@@ -22,15 +22,15 @@ class Whole:
     """What the sonar makes of a frame, of the plan's signals and of exact ones."""
 
     exact: Exact
-    heard: Heard  # the plan's way
+    heard: BeamformedFrame  # the plan's way
     seconds: float  # CPU of locating and all else that nothing is chosen for
 
     @staticmethod
     def of(exact: Exact, signals: Signals) -> Whole:
         """Process the plan's signals (without noise)."""
         plan, frame = exact.plan, exact.frame
-        recorded = record(plan, frame, signals)
-        heard = process(plan, frame, recorded)
+        recorded = digitise(plan, frame, signals)
+        heard = locate_and_image(plan, frame, recorded)
         locating = plan.scene.processing.locating
         environment, sonar = plan.scene.world.environment, plan.scene.sonar
         _, seconds = timed(
@@ -47,7 +47,7 @@ class Whole:
         return Whole(exact, heard, seconds)
 
 
-def whole_points(whole: Whole, traced: Traced, seconds: float) -> Iterator[Point]:
+def whole_points(whole: Whole, traced: TracedBySensor, seconds: float) -> Iterator[Point]:
     """Signals, image and cloud of the plan against exact ones; seconds: of the plan's whole frame.
 
     Image and cloud are compared with those of every hydrophone traced by itself, where all were. Noise is the same in
@@ -74,7 +74,7 @@ def whole_points(whole: Whole, traced: Traced, seconds: float) -> Iterator[Point
     rate, start = plan.scene.sonar.sampling_frequency, frame_start(plan, frame)
     signals = Signals(exact.pressure.astype(np.float32), start, rate, 0.0, 0, 0)
     began = time.process_time()
-    best = process(slow, frame, record(plan, frame, signals))
+    best = locate_and_image(slow, frame, digitise(plan, frame, signals))
     if not imaged(best):
         return
     cloud = cloud_of(slow, frame, best, slow.choices.ranging)
@@ -113,7 +113,7 @@ def whole_points(whole: Whole, traced: Traced, seconds: float) -> Iterator[Point
     )
 
 
-def _signals(exact: Exact, traced: Traced) -> tuple[np.ndarray, np.ndarray]:
+def _signals(exact: Exact, traced: TracedBySensor) -> tuple[np.ndarray, np.ndarray]:
     """Echoes and direct arrivals (heard, sample) by the plan's own synthesis."""
     out = tuple(np.zeros((len(exact.sensor), exact.plan.windows.samples)) for _ in range(2))
     for part, arrivals in traced.pieces:

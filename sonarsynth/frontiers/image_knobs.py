@@ -14,9 +14,9 @@ from sonarsynth.conventions import Floats
 from sonarsynth.frontiers.exact_frame import exact_plan
 from sonarsynth.frontiers.rows import Point, timed
 from sonarsynth.imaging import FocusedDelayAndSum
-from sonarsynth.pipeline import Heard
+from sonarsynth.pipeline import BeamformedFrame
 from sonarsynth.planning import Plan
-from sonarsynth.products import Bearings, EnergyImage, PointCloud
+from sonarsynth.products import EnergyImage, PointCloud, SourceEstimates
 from sonarsynth.ranging import IsovelocityRange, RefractedRange
 from sonarsynth.recipe.scene import Frame
 
@@ -25,7 +25,7 @@ BRIGHT = 20.0
 ZONES = (1, 2, 4, 8, 16)
 
 
-def image_points(plan: Plan, heard: Heard) -> Iterator[Point]:
+def image_points(plan: Plan, heard: BeamformedFrame) -> Iterator[Point]:
     """Walk the beamformers on the signals of a frame; nothing where it has no image."""
     chosen: Any = plan.choices.beamforming
     slow = exact_plan(plan).choices.beamforming
@@ -59,12 +59,12 @@ def named(method: Any) -> str:
     return f"{method.kind}, {zones} zones" if zones is not None else str(method.kind)
 
 
-def imaged(heard: Heard) -> bool:
+def imaged(heard: BeamformedFrame) -> bool:
     """Whether a frame has an image."""
     return heard.image is not None and bool(np.isfinite(heard.image.start))
 
 
-def image_of(plan: Plan, heard: Heard, method: Any) -> EnergyImage:
+def image_of(plan: Plan, heard: BeamformedFrame, method: Any) -> EnergyImage:
     """The image of what a frame heard, by a method."""
     assert heard.image is not None and heard.imaged is not None
     made: EnergyImage = method.image(heard.imaged, plan.elements, plan.scene.sonar, heard.image.start, heard.image.stop)
@@ -103,7 +103,7 @@ def image_point(
     )
 
 
-def range_points(plan: Plan, frame: Frame, heard: Heard) -> Iterator[Point]:
+def range_points(plan: Plan, frame: Frame, heard: BeamformedFrame) -> Iterator[Point]:
     """Walk the methods of ranging on the image of a frame; nothing where it has none."""
     chosen, slow = plan.choices.ranging, exact_plan(plan).choices.ranging
     if not imaged(heard):
@@ -118,10 +118,10 @@ def range_points(plan: Plan, frame: Frame, heard: Heard) -> Iterator[Point]:
         yield range_point(plan, made, exact, method, seconds, chosen=method == chosen)
 
 
-def cloud_of(plan: Plan, frame: Frame, heard: Heard, method: IsovelocityRange | RefractedRange) -> PointCloud:
+def cloud_of(plan: Plan, frame: Frame, heard: BeamformedFrame, method: IsovelocityRange | RefractedRange) -> PointCloud:
     """The point cloud of what a frame heard, by a method."""
     assert heard.image is not None and heard.imaged is not None and heard.bearings is not None
-    bearings: Bearings = heard.bearings
+    bearings: SourceEstimates = heard.bearings
     return method.cloud(
         heard.imaged,
         heard.image,

@@ -22,11 +22,11 @@ from sonarsynth.frontiers.peers import (
 from sonarsynth.frontiers.rows import Point, timed
 from sonarsynth.frontiers.signal_knobs import FINER
 from sonarsynth.imaging import DenseDelayAndSum
-from sonarsynth.pipeline import Heard
+from sonarsynth.pipeline import BeamformedFrame
 from sonarsynth.planning import Plan, frame_start
 from sonarsynth.products import Arrivals
 from sonarsynth.recipe.scene import Frame
-from sonarsynth.signals import KernelDeposit
+from sonarsynth.signals import GriddedSynthesis
 
 THESIS_BEAMS = 24
 """Bright beams that the thesis's loop is timed on."""
@@ -67,12 +67,12 @@ def synthesis_peers(plan: Plan, frame: Frame, arrivals: Arrivals) -> Iterator[Po
         made, seconds = timed(partial(finufft_signals, plan, frame, some, asked))
         yield row("FINUFFT", f"{asked:g}", made, seconds)
     method = plan.choices.synthesis
-    if isinstance(method, KernelDeposit):
+    if isinstance(method, GriddedSynthesis):
         made, seconds = timed(lambda: method.pressure(*arguments)[0])
         yield row("ours, on the same", "chosen", made, seconds)
 
 
-def image_peers(plan: Plan, frame: Frame, arrivals: Arrivals, heard: Heard) -> Iterator[Point]:
+def image_peers(plan: Plan, frame: Frame, arrivals: Arrivals, heard: BeamformedFrame) -> Iterator[Point]:
     """The thesis's loop, and Acoular: errors whatever the scale of the image."""
     if not imaged(heard):
         return

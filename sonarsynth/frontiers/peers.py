@@ -14,7 +14,7 @@ from sonarsynth.conventions import Floats, direction
 from sonarsynth.planning import Plan, frame_start
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.recipe.scene import Frame
-from sonarsynth.signals.array_paths import delay_and_gain, fronts, reach
+from sonarsynth.signals.array_paths import array_paths, delay_and_gain, reach
 from sonarsynth.signals.filtered_pulse import pulse_spectrum, pulse_support
 from sonarsynth.signals.segments import fast_length
 from sonarsynth.state import Snap
@@ -140,7 +140,7 @@ def finufft_signals(plan: Plan, frame: Frame, arrivals: Arrivals, error: float) 
 
     sonar, elements, snap = plan.scene.sonar, plan.elements, frame.moment.snaps[0]
     fs, start, samples = sonar.sampling_frequency, frame_start(plan, frame), plan.windows.samples
-    front = fronts(arrivals, frame.moment.snaps, elements)
+    front = array_paths(arrivals, frame.moment.snaps, elements)
     late, gain = delay_and_gain(front, elements.position)
     support = sum(pulse_support(snap.waveform, sonar.antialias))
     margin = int(np.ceil((2.0 * reach(front).max() + support) * fs)) + 2

@@ -10,10 +10,10 @@ import numpy as np
 
 from sonarsynth.frontiers.exact_frame import Heard, differences, golden, pressures
 from sonarsynth.frontiers.rows import Point
-from sonarsynth.frontiers.tracing_knobs import Traced
+from sonarsynth.frontiers.tracing_knobs import TracedBySensor
 from sonarsynth.planning import frame_start
 from sonarsynth.receiver.subarrays import subarray
-from sonarsynth.signals import DirectSum, KernelDeposit
+from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.auto_synthesis import PRECISIONS, deposit_for, kernel_error
 from sonarsynth.signals.direct_sum import exact_signals
 
@@ -30,23 +30,23 @@ FINER = 0.01
 SUMMED_HYDROPHONES, SUMMED_PATHS = (1, 8), 50
 """What the direct sum is timed on."""
 
-Method = KernelDeposit | DirectSum
+Method = GriddedSynthesis | DirectSum
 
 
-def synthesis_points(traced: Traced) -> Iterator[Point]:
+def synthesis_points(traced: TracedBySensor) -> Iterator[Point]:
     """Walk the knobs of the synthesis on the arrivals that the plan's choices give."""
     plan, chosen = traced.plan, traced.plan.choices.synthesis
     finest = golden(plan, FINER)
     exact = [_heard(traced, finest, n) for n in range(len(traced.few))]
     yield _point(traced, exact, chosen, "chosen", chosen=True)
-    if isinstance(chosen, KernelDeposit):
+    if isinstance(chosen, GriddedSynthesis):
         for knob, method in _settings(chosen, plan.recipe.accuracy.signal):
             yield _point(traced, exact, method, knob)
     if len(traced.few[0][1].delay):
         yield direct_sum_point(traced)
 
 
-def _settings(chosen: KernelDeposit, allowed: float) -> Iterator[tuple[str, KernelDeposit]]:
+def _settings(chosen: GriddedSynthesis, allowed: float) -> Iterator[tuple[str, GriddedSynthesis]]:
     """Every setting that is walked, with the name of its knob."""
     seen = {chosen}
     for knob, method in (
@@ -66,18 +66,18 @@ def _settings(chosen: KernelDeposit, allowed: float) -> Iterator[tuple[str, Kern
             yield knob, method
 
 
-def _rounded(method: KernelDeposit, times: float) -> KernelDeposit:
+def _rounded(method: GriddedSynthesis, times: float) -> GriddedSynthesis:
     """A method with a tolerance of so many times the error of its kernel."""
     wanted = times * kernel_error(method.width, method.oversampling)
     return replace(method, tolerance=float(f"{min(max(wanted, 1e-10), 0.05):.0e}"))
 
 
-def _heard(traced: Traced, method: Method, n: int) -> Heard:
+def _heard(traced: TracedBySensor, method: Method, n: int) -> Heard:
     part, arrivals = traced.few[n]
     return pressures(traced.plan, traced.frame, arrivals, part.elements, method)
 
 
-def _point(traced: Traced, exact: list[Heard], method: Method, knob: str, *, chosen: bool = False) -> Point:
+def _point(traced: TracedBySensor, exact: list[Heard], method: Method, knob: str, *, chosen: bool = False) -> Point:
     plan, few = traced.plan, traced.few
     made = [_heard(traced, method, n) for n in range(len(few))]
     error, largest = differences(
@@ -100,12 +100,12 @@ def _point(traced: Traced, exact: list[Heard], method: Method, knob: str, *, cho
 
 def named(method: Method) -> str:
     """A method in a few words."""
-    if not isinstance(method, KernelDeposit):
+    if not isinstance(method, GriddedSynthesis):
         return "direct sum"
     return f"width {method.width}, {method.tolerance:g}, {method.precision}, x {method.oversampling:g}"
 
 
-def direct_sum_point(traced: Traced) -> Point:
+def direct_sum_point(traced: TracedBySensor) -> Point:
     """The direct sum: no error; its cost from a few hydrophones and paths."""
     plan, (part, arrivals) = traced.plan, traced.few[0]
     arrivals = arrivals.at_centre  # they have as many terms at hydrophones that miss some

@@ -46,7 +46,7 @@ LONGEST, SLOWER = 3.0, 4.0
 
 
 @dataclass(frozen=True, eq=False)
-class Traced:
+class TracedBySensor:
     """A frame traced to those parts of an array that hold some hydrophones."""
 
     plan: Plan
@@ -56,19 +56,19 @@ class Traced:
     seconds: float  # of all parts; and of the whole array, which truth and ledger need
 
     @staticmethod
-    def of(plan: Plan, frame: Frame, sensor: Ints) -> Traced:
+    def of(plan: Plan, frame: Frame, sensor: Ints) -> TracedBySensor:
         """Trace with the subarrays, the faintest paths and the propagation of a plan (that of the sequence)."""
         count, elements = plan.choices.subarrays, plan.elements
         whole, seconds = timed(lambda: arrivals_of(plan, frame))
         if count == 1:
             every = Subarray(np.arange(elements.count), np.zeros(3), elements)
-            return Traced(plan, frame, ((every, whole),), 1, seconds)
+            return TracedBySensor(plan, frame, ((every, whole),), 1, seconds)
         parts = subarrays(elements, count)
         needed = [part for part in parts if np.isin(part.sensor, sensor).any()]
         began = time.process_time()
         pieces = tuple((part, arrivals_of(plan, frame, part)) for part in needed)
         of_parts = (time.process_time() - began) / len(needed) * len(parts)
-        return Traced(plan, frame, pieces, len(parts), seconds + of_parts)
+        return TracedBySensor(plan, frame, pieces, len(parts), seconds + of_parts)
 
     def heard(self, sensor: Ints) -> Heard:
         """Echoes and direct arrivals at some hydrophones, by the exact way's synthesis."""
@@ -99,19 +99,19 @@ class Traced:
         return total * self.parts / len(self.few)
 
 
-def trace_points(exact: Exact, traced: Traced) -> Iterator[Point]:
+def trace_points(exact: Exact, traced: TracedBySensor) -> Iterator[Point]:
     """Walk the knobs of tracing; `traced`: by the plan's own choices."""
     plan = exact.plan
     yield _point(exact, traced, "subarrays", f"{_cut(plan)}, as chosen", chosen=True)
     for setting, cheaper in _cheaper(plan):
-        yield _point(exact, Traced.of(cheaper, exact.frame, exact.sensor), "cheaper", setting)
+        yield _point(exact, TracedBySensor.of(cheaper, exact.frame, exact.sensor), "cheaper", setting)
     yield from _cuts(exact, traced)
     best = exact_plan(plan)
     usual = replace(best, choices=replace(best.choices, subarrays=plan.choices.subarrays))
     if plan.choices.subarrays < plan.elements.count:
         degree, view = replace(usual.choices, degree=3), replace(usual.choices, visibility="centre")
         for knob, choices, setting in (("degree", degree, "of degree 3"), ("visibility", view, "from the centre")):
-            of = Traced.of(replace(usual, choices=choices), exact.frame, exact.sensor)
+            of = TracedBySensor.of(replace(usual, choices=choices), exact.frame, exact.sensor)
             yield _point(exact, of, knob, f"{setting}, {_cut(plan)}")
     for level in FAINTEST:
         share = 10.0 ** (-level / 10.0)
@@ -141,14 +141,14 @@ def _cheaper(plan: Plan) -> Iterator[tuple[str, Plan]]:
         yield "straight rays", replace(plan, propagation=Straight(bounces=plan.propagation.bounces))
 
 
-def _cuts(exact: Exact, traced: Traced) -> Iterator[Point]:
+def _cuts(exact: Exact, traced: TracedBySensor) -> Iterator[Point]:
     """The array cut into more and more parts, all else exact, and at last into hydrophones."""
     best, spent = exact_plan(exact.plan), 0.0
     for count in _counts(exact.plan)[:-1]:
         if 2.0 * spent > max(LONGEST, SLOWER * traced.seconds):
             break
         some = replace(best, choices=replace(best.choices, subarrays=count))
-        yield (point := _point(exact, Traced.of(some, exact.frame, exact.sensor), "subarrays", _cut(some)))
+        yield (point := _point(exact, TracedBySensor.of(some, exact.frame, exact.sensor), "subarrays", _cut(some)))
         spent = point.seconds
         if point.error < FINER * point.allowed:
             break
@@ -199,7 +199,7 @@ def exact_point(exact: Exact) -> Point:
     )
 
 
-def _point(exact: Exact, traced: Traced, knob: str, setting: str, *, chosen: bool = False) -> Point:
+def _point(exact: Exact, traced: TracedBySensor, knob: str, setting: str, *, chosen: bool = False) -> Point:
     error, largest = differences(traced.heard(exact.sensor), exact.heard)
     made = traced.synthesis_seconds()
     paths = max(len(arrivals.delay) for _, arrivals in traced.pieces)

@@ -9,7 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from sonarsynth.conventions import Floats, Ints
-from sonarsynth.description.byte_bounded_cache import kept
+from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.surfaces import sides, weld
 
@@ -67,7 +67,7 @@ class Bend(NamedTuple):
     across: Floats  # (facet,) m: edge of an equilateral facet as long as that piece across the curve; 0 where flat
 
 
-@kept(4)
+@byte_bounded_cache(4)
 def bend(mesh: Mesh) -> Bend:
     """Mean sagitta and extent across the curve, of the flat pieces of a mesh: facets in one plane are one piece.
 

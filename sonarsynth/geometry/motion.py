@@ -88,7 +88,7 @@ class Circle:
 
 
 @description
-class Course:
+class ConstantVelocity:
     """From start at constant speed, straight ahead: what a grid over ranges, headings, speeds and depths varies."""
 
     kind: Literal["course"] = "course"
@@ -104,7 +104,7 @@ class Course:
     roll: Radians = 0.0
 
 
-Motion = Annotated[Still | Line | Waypoints | Circle | Course, BY_KIND]
+Motion = Annotated[Still | Line | Waypoints | Circle | ConstantVelocity, BY_KIND]
 
 
 def pose(motion: Motion, time: float) -> Pose:
@@ -116,7 +116,7 @@ def pose(motion: Motion, time: float) -> Pose:
             position = np.array(motion.start) + velocity(motion, time) * time
             heading = _course(velocity(motion, time)) if motion.heading is None else motion.heading
             return Pose(position, quaternion(heading, motion.pitch, motion.roll))
-        case Course():
+        case ConstantVelocity():
             position = np.array(motion.start) + velocity(motion, time) * time
             return Pose(position, quaternion(motion.heading, motion.pitch, motion.roll))
         case Waypoints():
@@ -134,7 +134,7 @@ def velocity(motion: Motion, time: float) -> Floats:
             return np.zeros(3)
         case Line():
             return np.asarray((np.array(motion.stop) - np.array(motion.start)) / motion.duration)
-        case Course():
+        case ConstantVelocity():
             ahead = motion.speed * np.array([np.sin(motion.heading), np.cos(motion.heading), 0.0])
             return np.asarray(ahead + [0.0, 0.0, motion.climb])
         case Waypoints():
@@ -158,7 +158,7 @@ def spin(motion: Motion, time: float) -> Floats:
             if not motion.points[0].time <= time < motion.points[-1].time:
                 return np.zeros(3)
             return np.array([0.0, 0.0, -_turn(motion, a, b) / (b.time - a.time)])
-        case Still() | Line() | Course():
+        case Still() | Line() | ConstantVelocity():
             return np.zeros(3)
 
 
@@ -200,7 +200,7 @@ class Track:
 
     def positions(self, seconds: Floats) -> Floats:
         """Where it is (..., xyz) m, world, so many seconds (...) s after."""
-        if self.motion is None or isinstance(self.motion, Still | Line | Course):
+        if self.motion is None or isinstance(self.motion, Still | Line | ConstantVelocity):
             return np.asarray(self.pose.position + seconds[..., None] * self.velocity)
         places = [self.later(late).pose.position for late in seconds.ravel().tolist()]
         return np.array(places).reshape(*seconds.shape, 3)

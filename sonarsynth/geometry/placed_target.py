@@ -13,7 +13,7 @@ from sonarsynth.geometry.motion import Motion, Track
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class PlacedTarget:
     """A target where it is."""
 
     name: str
@@ -28,12 +28,12 @@ class Body:
         """Of its origin."""
         return Track(self.pose, self.velocity, self.motion, self.time)
 
-    def later(self, seconds: float) -> Body:
+    def later(self, seconds: float) -> PlacedTarget:
         """The body where it will be, or was, so many seconds (s) after."""
         there = self.track.later(seconds)
         return replace(self, pose=there.pose, velocity=there.velocity, time=there.time)
 
     @property
-    def frozen(self) -> Body:
+    def frozen(self) -> PlacedTarget:
         """The body at rest where it is."""
         return replace(self, velocity=np.zeros(3), motion=None)

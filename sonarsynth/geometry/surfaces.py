@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import Floats, Ints
-from sonarsynth.description.memory import most_facets
+from sonarsynth.description.memory import max_facets
 
 Surface = tuple[Floats, Ints]
 """Vertices (vertex, xyz) in m and faces (facet, 3), counter-clockwise seen from outside."""
@@ -82,23 +82,23 @@ def area_of(surface: Facets) -> float:
 
 def require_possible(area: float, edge: float) -> None:
     """Raise MeshError where even equilateral facets with that edge (m) would be too many on that area (m2)."""
-    if area > most_facets() * 0.25 * np.sqrt(3.0) * edge**2:
+    if area > max_facets() * 0.25 * np.sqrt(3.0) * edge**2:
         raise _too_fine(edge)
 
 
 def _too_fine(edge: float) -> MeshError:
-    return MeshError(f"edges of {edge:g} m would take more than {most_facets()} facets; use a longer edge")
+    return MeshError(f"edges of {edge:g} m would take more than {max_facets()} facets; use a longer edge")
 
 
 def split_long_edges(surface: Surface, edge: float) -> Surface:
     """Cut facets in two, three or four at the middles of edges longer than `edge` (m), again until none is left.
 
     Edges are cut for both facets that share them, so a closed surface stays closed; the surface itself stays as it is.
-    Raises MeshError where that would take more than `room.most_facets`.
+    Raises MeshError where that would take more than `room.max_facets`.
     """
     vertices, faces = surface
     require_possible(area_of(surface), edge)
-    if _split_count(surface, edge) > 1.25 * most_facets():  # known before it is done: the last cuts take seconds
+    if _split_count(surface, edge) > 1.25 * max_facets():  # known before it is done: the last cuts take seconds
         raise _too_fine(edge)
     while True:
         ends, of_facet = sides(faces)
@@ -106,7 +106,7 @@ def split_long_edges(surface: Surface, edge: float) -> Surface:
         long = length > edge
         if not long.any():
             return vertices, faces
-        if len(faces) + np.count_nonzero(long[of_facet]) > most_facets():
+        if len(faces) + np.count_nonzero(long[of_facet]) > max_facets():
             raise _too_fine(edge)
         middle = np.full(len(ends), -1)
         middle[long] = len(vertices) + np.arange(np.count_nonzero(long))
@@ -148,7 +148,7 @@ def halve_longest_edges(surface: Surface, edge: float) -> Surface:
         number = 0
         while number != (number := int(np.count_nonzero(marked))):
             marked[longest[marked[of_facet].any(axis=1)]] = True
-        if len(faces) + np.count_nonzero(marked[of_facet]) > most_facets():
+        if len(faces) + np.count_nonzero(marked[of_facet]) > max_facets():
             raise _too_fine(edge)
         middle = np.full(len(ends), -1)
         middle[marked] = len(vertices) + np.arange(number)

@@ -1,10 +1,10 @@
 """Ground truth of a frame: where everything is, and the levels of its paths."""
 
 from sonarsynth.labels.attribution_of_points import Listening
-from sonarsynth.labels.echo_levels import echoes
+from sonarsynth.labels.echo_levels import echo_levels
 from sonarsynth.labels.frame_truth import label
 from sonarsynth.labels.level_band import SLICES, Band
-from sonarsynth.labels.link_budget import ledger
+from sonarsynth.labels.link_budget import link_budget
 from sonarsynth.labels.path_powers import Powers, family, path_powers
 from sonarsynth.labels.point_labels import label_points
 
@@ -13,10 +13,10 @@ __all__ = [
     "Band",
     "Listening",
     "Powers",
-    "echoes",
+    "echo_levels",
     "family",
     "label",
     "label_points",
-    "ledger",
+    "link_budget",
     "path_powers",
 ]

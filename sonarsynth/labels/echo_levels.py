@@ -12,7 +12,7 @@ ONE_SIDE = 0.95
 """Length of the mean direction of echoes, weighted by power, from which on they count as coming from one side."""
 
 
-def echoes(arrivals: Arrivals, powers: Powers, targets: int, snap_level: Floats) -> Echoes:
+def echo_levels(arrivals: Arrivals, powers: Powers, targets: int, snap_level: Floats) -> Echoes:
     """Where the echoes of each target come from; snap_level: (snap,) dB re 1 uPa at 1 m, peak."""
     shape = (targets, len(FAMILIES))
     size = targets * len(FAMILIES)

@@ -9,7 +9,7 @@ import numpy as np
 
 from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints, azimuth_elevation
 from sonarsynth.conventions import direction as towards
-from sonarsynth.products import Arrivals, Bearings
+from sonarsynth.products import Arrivals, SourceEstimates
 
 SIGMAS = 4.0
 """Standard errors within which an estimate may miss its snap."""
@@ -52,7 +52,7 @@ def heard_first(direct: Direct, snaps: int) -> tuple[Floats, Floats, Floats]:
     return time, azimuth, elevation
 
 
-def emissions(bearings: Bearings, direct: Direct, bandwidth: float, beam: float) -> Ints:
+def emissions(bearings: SourceEstimates, direct: Direct, bandwidth: float, beam: float) -> Ints:
     """Index of the snap that each estimate (row,) came from, by time and direction; -1 for none.
 
     An estimate comes from the nearest direct path within its predicted errors and what the array resolves in time

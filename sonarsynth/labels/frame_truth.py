@@ -11,11 +11,11 @@ from sonarsynth.casting.ray_casting import OFFSET, first_hit, occluded
 from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints, direction
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import Mesh, in_blocks
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels.views import box_in_view
 from sonarsynth.products import Paths, Truth
 from sonarsynth.receiver import BeamGrid
-from sonarsynth.state import Moment, meeting_times, positions
+from sonarsynth.state import WorldState, meeting_times, positions
 
 Connect = Callable[[Floats, Floats], Paths]
 """Rays from (pair, xyz) to (pair, xyz) in the world: a propagation model bound to its water."""
@@ -24,7 +24,7 @@ _CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 
 
 def label(
-    moment: Moment, sonar_pose: Pose, beams: BeamGrid, connect: Connect, snap_level: Floats, straight: bool,
+    moment: WorldState, sonar_pose: Pose, beams: BeamGrid, connect: Connect, snap_level: Floats, straight: bool,
     doppler: bool = True,
 ) -> Truth:  # fmt: skip
     """Truth of a frame.
@@ -83,13 +83,13 @@ def _rows(rows: list[Floats], width: int) -> Floats:
     return np.array(rows, float).reshape(-1, width)
 
 
-def _box(body: Body, sonar_pose: Pose) -> Floats:
+def _box(body: PlacedTarget, sonar_pose: Pose) -> Floats:
     """(8, xyz) corners of the oriented bounding box in the sonar frame."""
     low, high = body.mesh.box
     return sonar_pose.to_body(body.pose.to_world(low + _CORNERS * (high - low)))
 
 
-def _as_seen(body: Body, sonar_pose: Pose, connect: Connect, straight: bool) -> Floats:
+def _as_seen(body: PlacedTarget, sonar_pose: Pose, connect: Connect, straight: bool) -> Floats:
     """(vertex, xyz) in the sonar frame: vertices where the array sees them; NaN where no ray arrives (a shadow)."""
     world = body.pose.to_world(body.mesh.vertices)
     true = sonar_pose.to_body(world)
@@ -105,7 +105,7 @@ def _as_seen(body: Body, sonar_pose: Pose, connect: Connect, straight: bool) -> 
 
 
 def _label_beams(
-    bodies: tuple[Body, ...], seen: list[Floats], beams: BeamGrid, sonar_pose: Pose, straight: bool
+    bodies: tuple[PlacedTarget, ...], seen: list[Floats], beams: BeamGrid, sonar_pose: Pose, straight: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Target, facet and range (elevation, azimuth) of each beam."""
     rays = direction(beams.azimuth[None, :], beams.elevation[:, None])
@@ -148,7 +148,9 @@ def _beams_near(points: Floats, rays: Floats) -> tuple[np.ndarray, np.ndarray]:
     return rows, columns
 
 
-def _visible(body: Body, seen: Floats, bodies: tuple[Body, ...], sonar_pose: Pose) -> tuple[Ints, float]:
+def _visible(
+    body: PlacedTarget, seen: Floats, bodies: tuple[PlacedTarget, ...], sonar_pose: Pose
+) -> tuple[Ints, float]:
     """The visible facets, in the view of the beams or not, and their share of the area that faces the array."""
     mesh = body.mesh
     facing, farthest = np.zeros(len(mesh.faces), bool), 0.0

@@ -8,13 +8,15 @@ from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.labels.level_band import SLICES, Band
 from sonarsynth.labels.path_powers import Powers, family
-from sonarsynth.products import FAMILIES, LEDGER, Arrivals, Ledger
+from sonarsynth.products import FAMILIES, LINK_BUDGET, Arrivals, LinkBudget
 
 QUIET = 1e-12
 """A path that rough surfaces leave less of its power than this is not looked for in the signals."""
 
 
-def ledger(arrivals: Arrivals, powers: Powers, band: Band, targets: int, snap_level: Floats, error: float) -> Ledger:
+def link_budget(
+    arrivals: Arrivals, powers: Powers, band: Band, targets: int, snap_level: Floats, error: float
+) -> LinkBudget:
     """Levels (snap, target + 1, family, LEDGER) in the band that add up exactly, and the loudest path of each family.
 
     Each loss is the ratio of two sums of the powers of the paths, with one factor more in the second. Received is what
@@ -44,8 +46,8 @@ def ledger(arrivals: Arrivals, powers: Powers, band: Band, targets: int, snap_le
     isolated = arrivals.select(best[best >= 0])
     alone_level = np.full(size, np.nan)
     alone_level[best >= 0] = source[best >= 0] + 10.0 * np.log10(exact_powers(isolated, band))
-    return Ledger(
-        level=levels.reshape(*shape, len(LEDGER)),
+    return LinkBudget(
+        level=levels.reshape(*shape, len(LINK_BUDGET)),
         paths=paths.reshape(shape),
         error_bound=np.where(paths > 0, error, np.nan).reshape(shape),
         isolated_level=alone_level.reshape(shape),

@@ -8,14 +8,14 @@ import numpy as np
 
 from sonarsynth.casting.ray_casting import casting_mesh
 from sonarsynth.conventions import NO_TARGET, Floats, Ints, direction
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels import point_kernels as kernels
 from sonarsynth.labels.attribution_of_points import MOST_BINS, Attribution, Listening, attribution
 from sonarsynth.labels.level_band import Band
 from sonarsynth.products import ORIGINS, Arrivals, PointCloud, PointLabels
 from sonarsynth.receiver import Elements
 from sonarsynth.receiver.mirror_images import mirror_normal
-from sonarsynth.state import Moment
+from sonarsynth.state import WorldState
 
 FIRST_NULL = 1.9
 """rad of phase, root mean square over the aperture, at the first null of a beam: 1.915 of a disc, 1.81 of a line."""
@@ -30,7 +30,7 @@ def label_points(
     elevation: Floats,
     arrivals: Arrivals,
     band: Band,
-    moment: Moment,
+    moment: WorldState,
     listening: Listening,
 ) -> PointLabels:
     """Labels of the points of a cloud on a grid of azimuth and elevation (rad).
@@ -104,7 +104,7 @@ def _spread(elements: Elements) -> Floats:
 
 
 def _from_targets(
-    found: Attribution, points: Ints, places: Floats, moment: Moment, listening: Listening
+    found: Attribution, points: Ints, places: Floats, moment: WorldState, listening: Listening
 ) -> tuple[Floats, Floats]:
     """Range (point,) of where the echoes of points were made, and distance (point,) of the places (point, xyz) that the
     sonar gives them from the target, where sound met it and the array (m)."""
@@ -126,7 +126,7 @@ def _from_targets(
     return np.linalg.norm(made - array, axis=1), distance
 
 
-def surface_distances(body: Body, points: Floats) -> Floats:
+def surface_distances(body: PlacedTarget, points: Floats) -> Floats:
     """Distances (point,) m of points (point, xyz) of the world from the surface of a body, inside or outside: exact."""
     ready = casting_mesh(body.mesh)
     at, found = (body.pose.to_body(points) - ready.centre) / ready.size, np.empty(len(points))

@@ -14,7 +14,7 @@ from sonarsynth.pictures.figures.compared_images import BesidePicture, Column, M
 from sonarsynth.pictures.figures.style import decibels
 from sonarsynth.pictures.film import thinned, write_film
 from sonarsynth.pictures.recipe_diff import names_of
-from sonarsynth.pictures.scores import LEVEL, Heard, as_table, heard, standing
+from sonarsynth.pictures.scores import LEVEL, EchoEnergies, as_table, heard, scores_of
 from sonarsynth.pictures.store_reading import NothingToDraw, beam_grid, built, hulls, needed, opened, pictures_of, read
 from sonarsynth.store import Folder, folder_of
 
@@ -63,7 +63,7 @@ def show_beside(
     sounds = [heard(tree, frames) for tree in trees]
     references = [sound.reference for sound in sounds]
     names = names_of([str(tree.attrs.get("recipe", "")) for tree in trees], _file_names(paths))
-    numbers = [standing(t, path, frames, sound) for t, path, sound in zip(trees, paths, sounds, strict=True)]
+    numbers = [scores_of(t, path, frames, sound) for t, path, sound in zip(trees, paths, sounds, strict=True)]
     say(as_table(names, numbers))
     say(NOTE)
     columns = [Column(name, rows) for name, rows in zip(names, numbers, strict=True)]
@@ -162,7 +162,7 @@ def _grid(tree: xr.DataTree) -> str:
     return f"{len(azimuth)} x {len(elevation)} over {np.ptp(azimuth):g} x {np.ptp(elevation):g} deg"
 
 
-def _three(sounds: Sequence[Heard], frames: list[int], wanted: int | None) -> list[tuple[int, str]]:
+def _three(sounds: Sequence[EchoEnergies], frames: list[int], wanted: int | None) -> list[tuple[int, str]]:
     """An early, the best and a late frame, and what they are called; fewer where there are fewer frames."""
     if len(frames) <= 3 and wanted is None:
         return [(frame, "") for frame in frames]

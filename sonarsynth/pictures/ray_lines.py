@@ -22,7 +22,7 @@ from sonarsynth.equations.rays.ray_solutions import (
     eigenrays,
     water,
 )
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.pictures.figures.ray_figure import FAMILIES, FAN
 from sonarsynth.planning import Plan
 from sonarsynth.propagation.polylines import Polylines, polylines
@@ -124,7 +124,7 @@ class _End:
     """A point that eigenrays join."""
 
     position: Floats  # (xyz) m, world
-    inside: Body | None = None  # the body that it is the middle of: it hides nothing of a ray that ends there
+    inside: PlacedTarget | None = None  # the body that it is the middle of: it hides nothing of a ray that ends there
 
 
 def eigenray_lines(plan: Plan, frame: Frame, request: EigenrayRequest) -> list[RayLine]:
@@ -168,7 +168,9 @@ def _aims(frame: Frame, request: EigenrayRequest) -> list[tuple[str, _End]]:
     return aims
 
 
-def _legs(plan: Plan, bodies: tuple[Body, ...], vertices: int, pairs: list[tuple[_End, _End]]) -> list[list[RayLine]]:
+def _legs(
+    plan: Plan, bodies: tuple[PlacedTarget, ...], vertices: int, pairs: list[tuple[_End, _End]]
+) -> list[list[RayLine]]:
     """The eigenrays of each pair, as lines that have no name yet."""
     environment = plan.scene.world.environment
     layers = water(plan.profile.depth, plan.profile.speed, environment.depth)
@@ -205,7 +207,9 @@ def _transmission_loss(plan: Plan, layers: Water, rays: Eigenrays, start: Floats
         return np.asarray(-20.0 * np.log10(factor) + lost)
 
 
-def _leg(lines: Polylines, mine: slice, rays: Eigenrays, i: int, loss: float, others: tuple[Body, ...]) -> RayLine:
+def _leg(
+    lines: Polylines, mine: slice, rays: Eigenrays, i: int, loss: float, others: tuple[PlacedTarget, ...]
+) -> RayLine:
     """Eigenray i as a line; others: the bodies that may hide it."""
     position = lines.position[mine]
     hidden = bool(occluded(others, position[:-1], position[1:]).any())

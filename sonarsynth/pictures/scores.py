@@ -32,7 +32,7 @@ UNKNOWN = "-"
 
 
 @dataclass(frozen=True, eq=False)
-class Heard:
+class EchoEnergies:
     """What a store hears in each of some frames."""
 
     peak: float  # Pa2 s: the brightest beam of all; 0 where nothing is heard
@@ -46,7 +46,7 @@ class Heard:
         return self.peak or 1.0
 
 
-def heard(tree: xr.DataTree, frames: Sequence[int]) -> Heard:
+def heard(tree: xr.DataTree, frames: Sequence[int]) -> EchoEnergies:
     """What a store with an image hears in frames, read one by one."""
     peaks, means, points, beams = [], [], [], []
     for frame in frames:
@@ -57,10 +57,10 @@ def heard(tree: xr.DataTree, frames: Sequence[int]) -> Heard:
         means.append(energy[on].mean() if on.any() else np.nan)
         points.append(np.count_nonzero(judged))
         beams.append(np.count_nonzero(on))
-    return Heard(float(max(peaks)), np.array(means), np.array(points), np.array(beams))
+    return EchoEnergies(float(max(peaks)), np.array(means), np.array(points), np.array(beams))
 
 
-def standing(tree: xr.DataTree, store: Folder, frames: Sequence[int], sound: Heard) -> dict[str, str]:
+def scores_of(tree: xr.DataTree, store: Folder, frames: Sequence[int], sound: EchoEnergies) -> dict[str, str]:
     """Rows of a table about frames of a store that has an image, by name.
 
     Costs are medians over the frames, of the processor time of one core: the first frame of a process also waits for
@@ -87,7 +87,7 @@ def _ranges(tree: xr.DataTree, frames: np.ndarray) -> dict[str, str]:
     }
 
 
-def _echoes(tree: xr.DataTree, frames: np.ndarray, sound: Heard) -> dict[str, str]:
+def _echoes(tree: xr.DataTree, frames: np.ndarray, sound: EchoEnergies) -> dict[str, str]:
     """Whether the brightest beam hits, and levels of the beams that point at a target."""
     hits = brightest_beam_on_target(tree, frames).numbers
     each = sound.on_target[np.isfinite(sound.on_target)]

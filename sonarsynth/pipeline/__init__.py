@@ -15,29 +15,29 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.labels import echoes, label, ledger, path_powers
+from sonarsynth.labels import echo_levels, label, link_budget, path_powers
 from sonarsynth.pipeline.echo_image import image_of, no_image
 from sonarsynth.pipeline.labelled_estimates import emission_values, estimate_truth, heard_directly
 from sonarsynth.pipeline.labelling import band_of, expansion_error, point_labels
 from sonarsynth.pipeline.requested_rays import follow_rays
-from sonarsynth.pipeline.stage_times import LAPS, counted, lap
+from sonarsynth.pipeline.stage_times import STAGES, mark_stage, stage_timer
 from sonarsynth.pipeline.stored_values import (
     Values,
-    bearing_values,
     cloud_values,
     echo_values,
     image_values,
-    ledger_values,
+    link_budget_values,
     of_isolated,
     signal_values,
+    source_estimate_values,
     table,
     truth_values,
 )
-from sonarsynth.pipeline.synthesis import hear
+from sonarsynth.pipeline.synthesis import frame_signals
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, variables
-from sonarsynth.planning import Plan, arrivals_of, check_unseen, plan
+from sonarsynth.planning import Plan, arrivals_of, check_unsampled_frame, plan
 from sonarsynth.planning.notes.source_notes import standing_off
-from sonarsynth.products import Arrivals, Bearings, Echoes, EnergyImage, Ledger, Signals, Truth
+from sonarsynth.products import Arrivals, Echoes, EnergyImage, LinkBudget, Signals, SourceEstimates, Truth
 from sonarsynth.propagation import Straight
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import Recipe
@@ -48,21 +48,21 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "LAPS",
+    "STAGES",
     "VARIABLES",
-    "Heard",
-    "Traced",
+    "BeamformedFrame",
+    "TracedFrame",
     "Values",
     "Variable",
     "attributes",
     "beamform_frame",
     "coordinates",
-    "counted",
+    "digitise",
     "follow_rays",
-    "process",
+    "locate_and_image",
     "range_frame",
-    "record",
     "render",
+    "stage_timer",
     "trace_at",
     "trace_frame",
     "truth_at",
@@ -72,22 +72,22 @@ __all__ = [
 
 
 @dataclass(frozen=True, eq=False)
-class Traced:
+class TracedFrame:
     """What the trace task gives."""
 
     frame: Frame
     arrivals: Arrivals
     truth: Truth
-    ledger: Ledger
+    ledger: LinkBudget
     echoes: Echoes
 
 
 @dataclass(frozen=True, eq=False)
-class Heard:
+class BeamformedFrame:
     """What the beamform task gives; None where no product needs it."""
 
     signals: Signals
-    bearings: Bearings | None
+    bearings: SourceEstimates | None
     image: EnergyImage | None
     imaged: Signals | None = None  # what the image was made of: without the snap's own reflections, where these go
     isolated: Floats | None = None  # (snap, target + 1, family) dB: isolated paths of the ledger as signals have them;
@@ -102,11 +102,11 @@ def truth_frame(plan: Plan, index: int) -> Values:
 def truth_at(plan: Plan, frame: Frame) -> Values:
     """The same of a frame that is at hand; `plan` is that of its sequence."""
     truth = _label(plan, frame, snap_levels(frame.moment.snaps))
-    lap("label")
+    mark_stage("label")
     return _of_frame(plan, frame) | truth_values(truth)
 
 
-def trace_frame(plan: Plan, index: int) -> Traced:
+def trace_frame(plan: Plan, index: int) -> TracedFrame:
     """Every path of a frame, and its truth."""
     return trace_at(*_checked(plan, index))
 
@@ -115,23 +115,23 @@ def _checked(plan: Plan, index: int) -> tuple[Plan, Frame]:
     """The plan of a frame's sequence, and the frame, which was looked at now or before."""
     plan = plan.at(index)
     frame = plan.recipe.frame(index)[1]
-    check_unseen(plan, frame)
+    check_unsampled_frame(plan, frame)
     return plan, frame
 
 
-def trace_at(plan: Plan, frame: Frame) -> Traced:
+def trace_at(plan: Plan, frame: Frame) -> TracedFrame:
     """Every path of a frame that is at hand, and its truth; `plan` is that of its sequence."""
     arrivals = arrivals_of(plan, frame)
-    lap("trace")
+    mark_stage("trace")
     seen = arrivals.at_centre
     levels = snap_levels(frame.moment.snaps)
     truth = _label(plan, frame, levels)
     band, targets = band_of(plan, frame.moment.snaps), len(frame.moment.bodies)
     powers = path_powers(seen, band)
-    book = ledger(seen, powers, band, targets, levels, expansion_error(plan, seen))
-    heard = echoes(seen, powers, targets, levels)
-    lap("label")
-    return Traced(frame, arrivals, truth, book, heard)
+    book = link_budget(seen, powers, band, targets, levels, expansion_error(plan, seen))
+    heard = echo_levels(seen, powers, targets, levels)
+    mark_stage("label")
+    return TracedFrame(frame, arrivals, truth, book, heard)
 
 
 def _label(plan: Plan, frame: Frame, levels: Floats) -> Truth:
@@ -147,25 +147,25 @@ def _of_frame(plan: Plan, frame: Frame) -> Values:
     return table("/", trajectory=frame.trajectory, step=frame.step, time=frame.time, split=split)
 
 
-def beamform_frame(plan: Plan, index: int, traced: Traced) -> Heard:
+def beamform_frame(plan: Plan, index: int, traced: TracedFrame) -> BeamformedFrame:
     """What the array hears: signals, where the snap is, and the energy image of the echo window."""
     signals, isolated = synthesise(plan, traced), None
-    lap("synthesise")
+    mark_stage("synthesise")
     if "signals" in plan.products:
         isolated = measure_isolated(plan, traced)
-        lap("measure")
+        mark_stage("measure")
     if not plan.products & {"image", "cloud"}:
-        return Heard(signals, None, None, isolated=isolated)
-    return replace(process(plan, traced.frame, signals), isolated=isolated)
+        return BeamformedFrame(signals, None, None, isolated=isolated)
+    return replace(locate_and_image(plan, traced.frame, signals), isolated=isolated)
 
 
-def process(plan: Plan, frame: Frame, signals: Signals) -> Heard:
+def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFrame:
     """What the sonar makes of signals: where the snap is, and the energy image of the echo window."""
     processing, sonar, environment = plan.scene.processing, plan.scene.sonar, plan.scene.world.environment
     snaps = plan.sizes["snap"]
     locating = processing.locating.resolve(on_bottom=not standing_off(plan.scene))
     bearings = locating.locate(signals, plan.elements, sonar, frame.sonar_pose, environment.depth, snaps, plan.profile)
-    lap("locate")
+    mark_stage("locate")
     heard = float(bearings.time[0]) if snaps else np.nan
     start, stop = heard + plan.windows.echo_start, heard + plan.windows.echo_stop
     end = signals.start + plan.windows.samples / signals.sampling_frequency
@@ -177,17 +177,17 @@ def process(plan: Plan, frame: Frame, signals: Signals) -> Heard:
         imaged, image = image_of(plan, imaged, bearings, (start, stop))
     else:  # no direct pulse was found, or an echo was taken for it: no clock, so no image, rather than an arbitrary one
         image = no_image(sonar, np.nan, np.nan)
-    lap("beamform")
-    return Heard(signals, bearings, image, imaged)
+    mark_stage("beamform")
+    return BeamformedFrame(signals, bearings, image, imaged)
 
 
-def synthesise(plan: Plan, traced: Traced) -> Signals:
+def synthesise(plan: Plan, traced: TracedFrame) -> Signals:
     """Pressure at each hydrophone: echoes and direct snap, ambient noise, converter."""
     plan = plan.at(traced.frame.index)
-    return record(plan, traced.frame, hear(plan, traced.frame, traced.arrivals))
+    return digitise(plan, traced.frame, frame_signals(plan, traced.frame, traced.arrivals))
 
 
-def record(plan: Plan, frame: Frame, signals: Signals) -> Signals:
+def digitise(plan: Plan, frame: Frame, signals: Signals) -> Signals:
     """Signals as the sonar has them: with ambient noise, through the converter; `plan` is that of the sequence."""
     from sonarsynth.signals import add_noise, convert
 
@@ -198,7 +198,7 @@ def record(plan: Plan, frame: Frame, signals: Signals) -> Signals:
     return signals if sonar.converter is None else convert(signals, sonar.converter)
 
 
-def measure_isolated(plan: Plan, traced: Traced) -> Floats:
+def measure_isolated(plan: Plan, traced: TracedFrame) -> Floats:
     """Levels (snap, target + 1, family) in dB of the isolated paths of the ledger, measured in signals of each."""
     from sonarsynth.signals.isolated_paths import measured_levels
 
@@ -209,24 +209,24 @@ def measure_isolated(plan: Plan, traced: Traced) -> Floats:
     return of_isolated(book, traced.truth.snap_level[book.isolated.snap] + measured)
 
 
-def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
+def range_frame(plan: Plan, index: int, traced: TracedFrame, heard: BeamformedFrame) -> Values:
     """The point cloud, and every stored value of the frame."""
     plan = plan.at(index)
     frame = traced.frame
     values = _of_frame(plan, frame) | truth_values(traced.truth) | echo_values(traced.echoes, traced.arrivals)
-    values |= ledger_values(traced.ledger, heard.isolated)
+    values |= link_budget_values(traced.ledger, heard.isolated)
     direct = heard_directly(plan, traced.arrivals, frame.moment.snaps)
     values |= estimate_truth(direct, len(frame.moment.snaps))
     if "signals" in plan.products:
         counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
         values |= signal_values(heard.signals, counts)
     if heard.image is None or heard.bearings is None or heard.imaged is None:
-        lap("collect")
+        mark_stage("collect")
         return values
-    values |= bearing_values(heard.bearings) | emission_values(plan, direct, heard.bearings)
+    values |= source_estimate_values(heard.bearings) | emission_values(plan, direct, heard.bearings)
     if "image" in plan.products:
         values |= image_values(heard.image, plan.windows.direct_removed)
-    lap("collect")
+    mark_stage("collect")
     if "cloud" in plan.products:
         scene = plan.scene
         cloud = plan.choices.ranging.cloud(
@@ -239,9 +239,9 @@ def range_frame(plan: Plan, index: int, traced: Traced, heard: Heard) -> Values:
             plan.profile,
             heard.signals,
         )
-        lap("range")
+        mark_stage("range")
         values |= cloud_values(cloud, point_labels(plan, frame, traced.arrivals, heard.bearings, cloud))
-        lap("label")
+        mark_stage("label")
     return values
 
 

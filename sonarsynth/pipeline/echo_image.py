@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from sonarsynth.planning import Plan
-from sonarsynth.products import Bearings, EnergyImage, Signals
+from sonarsynth.products import EnergyImage, Signals, SourceEstimates
 from sonarsynth.ranging.cancelling.direct_pulse import remove, remove_others, trusted
 from sonarsynth.receiver import Sonar
 
 
 def image_of(
-    plan: Plan, signals: Signals, bearings: Bearings, window: tuple[float, float]
+    plan: Plan, signals: Signals, bearings: SourceEstimates, window: tuple[float, float]
 ) -> tuple[Signals, EnergyImage]:
     """The image of an echo window (start, stop) in s, and the signals that it was made of.
 

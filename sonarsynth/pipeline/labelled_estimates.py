@@ -8,7 +8,7 @@ from sonarsynth.equations.arrays.spherical_wave import envelope_peak
 from sonarsynth.labels.estimate_labels import Direct, direct_paths, emissions, heard_first
 from sonarsynth.pipeline.stored_values import Values, table
 from sonarsynth.planning import Plan
-from sonarsynth.products import Arrivals, Bearings
+from sonarsynth.products import Arrivals, SourceEstimates
 from sonarsynth.signals.direct_sum import relative_absorption
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.state import Snap
@@ -39,7 +39,7 @@ def estimate_truth(direct: Direct, snaps: int) -> Values:
     return table("/truth", snap_arrival=time, snap_azimuth=np.rad2deg(azimuth), snap_elevation=np.rad2deg(elevation))
 
 
-def emission_values(plan: Plan, direct: Direct, bearings: Bearings) -> Values:
+def emission_values(plan: Plan, direct: Direct, bearings: SourceEstimates) -> Values:
     """Which snap each estimate came from."""
     band = plan.scene.sonar.band
     return table("/bearings", emission=emissions(bearings, direct, band.high - band.low, beam_width(plan)))

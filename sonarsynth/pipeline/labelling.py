@@ -8,7 +8,7 @@ import numpy as np
 
 from sonarsynth.labels import SLICES, Band, Listening, label_points
 from sonarsynth.planning import Plan
-from sonarsynth.products import Arrivals, Bearings, PointCloud, PointLabels
+from sonarsynth.products import Arrivals, PointCloud, PointLabels, SourceEstimates
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.state import Snap
 
@@ -35,7 +35,9 @@ def band_of(plan: Plan, snaps: tuple[Snap, ...]) -> Band:
     return replace(band, relative=relative_absorption(plan.absorption, band.frequency, sonar.band.centre))
 
 
-def point_labels(plan: Plan, frame: Frame, arrivals: Arrivals, bearings: Bearings, cloud: PointCloud) -> PointLabels:
+def point_labels(
+    plan: Plan, frame: Frame, arrivals: Arrivals, bearings: SourceEstimates, cloud: PointCloud
+) -> PointLabels:
     """Whose echo each point of a cloud is."""
     sonar = plan.scene.sonar
     moves = plan.scene.physics.doppler

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Final
 
-LAPS: Final = ("trace", "label", "synthesise", "measure", "locate", "beamform", "range", "collect")
+STAGES: Final = ("trace", "label", "synthesise", "measure", "locate", "beamform", "range", "collect")
 """Stages that are counted, in order: names of rows of a plan, and `collect`, values made ready to be stored."""
 
 
@@ -27,7 +27,7 @@ _watch: ContextVar[_Watch | None] = ContextVar("watch", default=None)
 
 
 @contextmanager
-def counted() -> Iterator[dict[str, float]]:
+def stage_timer() -> Iterator[dict[str, float]]:
     """Give seconds of processor time by stage, of those stages alone that ran; it fills while the block runs."""
     watch = _Watch()
     token = _watch.set(watch)
@@ -37,7 +37,7 @@ def counted() -> Iterator[dict[str, float]]:
         _watch.reset(token)
 
 
-def lap(stage: str) -> None:
+def mark_stage(stage: str) -> None:
     """Count the time since the last lap to a stage that ends here."""
     watch = _watch.get()
     if watch is not None:

@@ -6,15 +6,15 @@ import numpy as np
 
 from sonarsynth.conventions import NO_TARGET, Floats
 from sonarsynth.products import (
-    LEDGER,
+    LINK_BUDGET,
     Arrivals,
-    Bearings,
     Echoes,
     EnergyImage,
-    Ledger,
+    LinkBudget,
     PointCloud,
     PointLabels,
     Signals,
+    SourceEstimates,
     Truth,
 )
 
@@ -44,7 +44,7 @@ def echo_values(echoes: Echoes, arrivals: Arrivals) -> Values:
     return table("/truth", **stored)
 
 
-def ledger_values(book: Ledger, measured: Floats | None) -> Values:
+def link_budget_values(book: LinkBudget, measured: Floats | None) -> Values:
     """Levels; measured (snap, target + 1, family) in dB, or None where signals are not stored.
 
     A path so faint that single precision holds nothing of it (hundreds of dB down a lobe) has no measured level: NaN.
@@ -52,7 +52,7 @@ def ledger_values(book: Ledger, measured: Floats | None) -> Values:
     measures = {} if measured is None else {"measured_level": np.where(np.isneginf(measured), np.nan, measured)}
     return table(
         "/ledger",
-        **{name: book.level[..., n] for n, name in enumerate(LEDGER)},
+        **{name: book.level[..., n] for n, name in enumerate(LINK_BUDGET)},
         paths=book.paths,
         error_bound=book.error_bound,
         isolated_facet=of_isolated(book, book.isolated.facet, NO_TARGET),
@@ -61,7 +61,7 @@ def ledger_values(book: Ledger, measured: Floats | None) -> Values:
     )
 
 
-def of_isolated(book: Ledger, values: np.ndarray, fill: float = np.nan) -> np.ndarray:
+def of_isolated(book: LinkBudget, values: np.ndarray, fill: float = np.nan) -> np.ndarray:
     """Values of the isolated paths of a ledger (path,) as a table (snap, target + 1, family)."""
     rows = np.full(book.isolated_level.shape, fill, values.dtype)
     rows[np.isfinite(book.isolated_level)] = values
@@ -74,7 +74,7 @@ def signal_values(signals: Signals, counts: bool) -> Values:
     return table("/signals", pressure=pressure, start=signals.start, clipped=signals.clipped, outside=signals.outside)
 
 
-def bearing_values(bearings: Bearings) -> Values:
+def source_estimate_values(bearings: SourceEstimates) -> Values:
     """Bearings, in degrees."""
     columns = dict(vars(bearings))
     for name in ("azimuth", "azimuth_error", "elevation", "elevation_error"):

@@ -10,7 +10,7 @@ from sonarsynth.receiver.subarrays import Subarray, subarrays
 from sonarsynth.recipe.scene import Frame
 
 
-def hear(plan: Plan, frame: Frame, arrivals: Arrivals) -> Signals:
+def frame_signals(plan: Plan, frame: Frame, arrivals: Arrivals) -> Signals:
     """Pressure at each hydrophone, without noise and converter; arrivals: those of the frame at the whole array.
 
     Where the array is cut into parts, paths are traced again to each of them. `outside` is that of the part that loses
@@ -22,12 +22,12 @@ def hear(plan: Plan, frame: Frame, arrivals: Arrivals) -> Signals:
         return method.signals(arrivals, snaps, plan.elements, sonar, plan.absorption, start, samples)
     pressure, outside = np.zeros((plan.elements.count, samples), np.float32), 0
     for part in subarrays(plan.elements, plan.choices.subarrays):
-        heard = hear_part(plan, frame, part)
+        heard = subarray_signals(plan, frame, part)
         pressure[part.sensor], outside = heard.pressure, max(outside, heard.outside)
     return Signals(pressure, start, sonar.sampling_frequency, 0.0, 0, outside)
 
 
-def hear_part(plan: Plan, frame: Frame, part: Subarray) -> Signals:
+def subarray_signals(plan: Plan, frame: Frame, part: Subarray) -> Signals:
     """What a part of the array hears, of paths that are traced to it."""
     method, sonar, snaps = plan.choices.synthesis, plan.scene.sonar, frame.moment.snaps
     own, start = arrivals_of(plan, frame, part), frame_start(plan, frame)

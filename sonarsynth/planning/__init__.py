@@ -10,10 +10,10 @@ import numpy as np
 from sonarsynth.planning.choices import Choices, choices_from
 from sonarsynth.planning.choosing import choose
 from sonarsynth.planning.costs import machine_factor, stages
-from sonarsynth.planning.listening_windows import check_windows, frame_start, lay_windows
+from sonarsynth.planning.listening_windows import check_windows, frame_start, listening_windows
 from sonarsynth.planning.measured.ray_bending import propagation
 from sonarsynth.planning.measured.sampled_arrivals import arrivals_of
-from sonarsynth.planning.measured.sampled_frames import Look, check_alike, survey
+from sonarsynth.planning.measured.sampled_frames import SampledScene, check_alike, sample_frames
 from sonarsynth.planning.notes.omissions import left_out
 from sonarsynth.planning.notes.plan_notes import notes, stored_validity
 from sonarsynth.planning.notes.scene_checks import check_frame, check_methods, read_inputs
@@ -32,11 +32,11 @@ __all__ = [
     "Stage",
     "Windows",
     "arrivals_of",
-    "check_unseen",
+    "check_unsampled_frame",
     "choices_from",
     "chosen_products",
     "frame_start",
-    "lay_windows",
+    "listening_windows",
     "plan",
 ]
 
@@ -72,10 +72,10 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS, choices: Choices | 
         scene = recipe.scene_of(0)
         profile = read_inputs(scene)
         check_methods(scene, products)
-    looks = survey(recipe)
+    looks = sample_frames(recipe)
     ends = (looks[0].frames[0], looks[0].frames[-1])
     paths = propagation(scene, profile, ends, recipe.accuracy.signal)
-    windows = lay_windows(recipe, looks)
+    windows = listening_windows(recipe, looks)
     check_windows(scene, windows)
     sizes = _sizes(recipe, windows)
     made = Plan(recipe, products, profile, paths, windows, sizes=sizes)
@@ -94,7 +94,7 @@ def _shard_frames(made: Plan) -> int:
     return int(np.clip(SHARD_BYTES // max(frame_bytes, 1), 1, frames))
 
 
-def _mean_stages(made: Plan, looks: Sequence[Look]) -> tuple[Stage, ...]:
+def _mean_stages(made: Plan, looks: Sequence[SampledScene]) -> tuple[Stage, ...]:
     """The stages, with the mean cost over a few sequences."""
     real = [look.frames[0].index for look in looks if look.real]
     chosen = real[:: -(-len(real) // COSTED)]
@@ -127,7 +127,7 @@ def _sizes(recipe: Recipe, windows: Windows) -> dict[str, int]:
     }
 
 
-def check_unseen(plan: Plan, frame: Frame) -> None:
+def check_unsampled_frame(plan: Plan, frame: Frame) -> None:
     """Check a frame that was not looked at when its dataset was planned; `plan` is that of its sequence.
 
     Raises FieldError where something is out of the water, or the frame does not fit in the windows.

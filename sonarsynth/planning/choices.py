@@ -12,7 +12,7 @@ from sonarsynth.description import BY_KIND, description
 from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.propagation import Visibility
 from sonarsynth.ranging import IsovelocityRange, RefractedRange
-from sonarsynth.signals import DirectSum, KernelDeposit
+from sonarsynth.signals import DirectSum, GriddedSynthesis
 
 Degree = Literal[3, 5]
 
@@ -30,7 +30,7 @@ class Choices:
     """From where facets must be seen to be heard: from the middle of the array or part, or from each hydrophone."""
     negligible: Annotated[Number, Ge(0), Lt(1)] = 1e-7
     """Share of the power of a target's echo that its faintest paths may have, and be left out."""
-    synthesis: Annotated[KernelDeposit | DirectSum, BY_KIND] = KernelDeposit()
+    synthesis: Annotated[GriddedSynthesis | DirectSum, BY_KIND] = GriddedSynthesis()
     beamforming: Annotated[FocusedDelayAndSum | DenseDelayAndSum, BY_KIND] = FocusedDelayAndSum()
     ranging: Annotated[IsovelocityRange | RefractedRange, BY_KIND] = IsovelocityRange()
 

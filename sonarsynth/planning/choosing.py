@@ -20,7 +20,7 @@ from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.focus_zones import beamformer
 from sonarsynth.planning.measured.ray_bending import ranging_error
 from sonarsynth.planning.measured.sampled_arrivals import arrivals_of
-from sonarsynth.planning.measured.sampled_frames import Look
+from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.plans import Errors, Plan
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import Visibility
@@ -29,7 +29,7 @@ from sonarsynth.receiver import Elements
 from sonarsynth.receiver.subarrays import subarray, subarrays, with_rim
 from sonarsynth.recipe import Accuracy
 from sonarsynth.recipe.scene import Frame, Scene
-from sonarsynth.signals import AutoSynthesis, DirectSum, KernelDeposit
+from sonarsynth.signals import AutoSynthesis, DirectSum, GriddedSynthesis
 from sonarsynth.signals.auto_synthesis import deposit_error, deposit_for
 
 FAINT, SYNTHESIS, EXPANSION = 0.1, 0.4, 0.5
@@ -40,22 +40,22 @@ MEASURED = 3
 """Frames of a dataset that expansions are measured in."""
 SAFETY = 1.25
 """What was measured at some hydrophones of some frames may be so much more at others."""
-EVERY = 1e-3
+PER_SENSOR_TOLERANCE = 1e-3
 """Share of the paths left out that are left out where errors are measured: 3 % of what that errs by."""
-MANY = 1_000_000
+LARGE_MESH_FACETS = 1_000_000
 """Facets over which errors are measured in one frame only, at half as many hydrophones."""
-BETTER = 0.7
+WORTHWHILE_GAIN = 0.7
 """Of an error, that must be left for each hydrophone's own view, or the fifth degree, to be taken for it."""
-GOLDEN = 0.03
+DEGREE_TOLERANCE = 0.03
 """Error of the synthesis that measures, over what is allowed."""
 
 
-def choose(plan: Plan, looks: Sequence[Look]) -> Plan:
+def choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
     """A plan whose windows are laid, with its choices made. Nothing in them depends on how fast this machine is."""
     scene, accuracy = plan.scene, plan.recipe.accuracy
     if not plan.products:  # nothing is traced
         return plan
-    some = _some(looks, 1 if _facets(scene) > MANY else MEASURED)
+    some = _some(looks, 1 if _facets(scene) > LARGE_MESH_FACETS else MEASURED)
     bent = max((ranging_error(look.scene, look.profile, look.frames) for look in some), default=0.0)
     synthesis, imaged = _synthesis(scene, accuracy), bool(plan.products & {"image", "cloud"})
     choices = Choices(
@@ -70,7 +70,7 @@ def choose(plan: Plan, looks: Sequence[Look]) -> Plan:
     cut = _subarrays(made, indices)
     steering, blurred = beamformer(made, indices) if imaged else (choices.beamforming, 0.0)
     straight = isinstance(choices.ranging, IsovelocityRange)
-    by_synthesis = deposit_error(synthesis) if isinstance(synthesis, KernelDeposit) else 0.0
+    by_synthesis = deposit_error(synthesis) if isinstance(synthesis, GriddedSynthesis) else 0.0
     return replace(
         made,
         choices=replace(
@@ -84,7 +84,7 @@ def _facets(scene: Scene) -> int:
     return sum(len(mesh.faces) for mesh in scene.meshes)
 
 
-def _some(looks: Sequence[Look], count: int) -> list[Look]:
+def _some(looks: Sequence[SampledScene], count: int) -> list[SampledScene]:
     """Frames of the dataset to measure in, one a look: of different sequences, and along them."""
     real = [look for look in looks if look.real]
     chosen = [real[n] for n in np.unique(np.linspace(0, len(real) - 1, count).round().astype(int))]
@@ -101,7 +101,7 @@ def _negligible(scene: Scene, accuracy: Accuracy) -> float:
     return 0.0 if accuracy.exact else FAINT * accuracy.cheap**2
 
 
-def _synthesis(scene: Scene, accuracy: Accuracy) -> KernelDeposit | DirectSum:
+def _synthesis(scene: Scene, accuracy: Accuracy) -> GriddedSynthesis | DirectSum:
     method = scene.physics.synthesis
     if not isinstance(method, AutoSynthesis):
         return method
@@ -115,7 +115,7 @@ def _ranging(scene: Scene, accuracy: Accuracy, bent: float) -> IsovelocityRange 
     return method.resolve(straight=bent == 0.0 if accuracy.exact else bent <= accuracy.range_m)
 
 
-class _Cut(NamedTuple):
+class _ArrayModel(NamedTuple):
     """How paths reach the hydrophones."""
 
     parts: int  # that the array is cut into
@@ -125,14 +125,14 @@ class _Cut(NamedTuple):
     whole: float = np.nan  # the same, where the array is not cut and its middle sees for all
 
 
-def _subarrays(plan: Plan, indices: Sequence[int]) -> _Cut:
+def _subarrays(plan: Plan, indices: Sequence[int]) -> _ArrayModel:
     """The fewest parts of the array that will do; where one will not, each hydrophone's own view of the targets is
     tried first, and then polynomials of the fifth degree."""
     physics, count = plan.scene.physics, plan.elements.count
     seeing: Visibility = "centre" if physics.visibility == "auto" else physics.visibility
     if physics.subarrays == "sensors" or (physics.subarrays == "auto" and plan.recipe.accuracy.exact):
-        return _Cut(count, "centre", 3, 0.0)
-    measures = [Expansion.of(plan, index) for index in indices]
+        return _ArrayModel(count, "centre", 3, 0.0)
+    measures = [PerSensorReference.of(plan, index) for index in indices]
     allowed = np.sqrt(EXPANSION) * plan.recipe.accuracy.signal / SAFETY
     given = physics.subarrays != "auto"
     first = min(physics.subarrays, count) if physics.subarrays != "auto" else 1
@@ -141,26 +141,28 @@ def _subarrays(plan: Plan, indices: Sequence[int]) -> _Cut:
     whole = error = _worst(measures, first, seeing, degree, enough)
     if error > allowed and physics.visibility == "auto":
         better = _worst(measures, first, "hydrophones", degree, enough)
-        if better < BETTER * error:
+        if better < WORTHWHILE_GAIN * error:
             seeing, error = "hydrophones", better
     if error > allowed and first < count:
         better = _worst(measures, first, seeing, 5, enough)
-        if better < BETTER * error:
+        if better < WORTHWHILE_GAIN * error:
             degree, error = 5, better
     if given:
-        return _Cut(first, seeing, degree, error)
+        return _ArrayModel(first, seeing, degree, error)
     if error <= allowed:
-        return _Cut(1, seeing, degree, error, whole)
+        return _ArrayModel(1, seeing, degree, error, whole)
     # Cubics err by the fourth power of the width of parts, the square of their number: no fewer will do.
     fewest = max(int(np.log2(error / allowed) / (0.5 * (degree + 1))), 1)
     for parts in [2**n for n in range(int(np.ceil(np.log2(count))))][fewest:]:
         error = _worst(measures, parts, seeing, degree, allowed)
         if error <= allowed:
-            return _Cut(parts, seeing, degree, error, whole)
-    return _Cut(count, "centre", 3, 0.0, whole)
+            return _ArrayModel(parts, seeing, degree, error, whole)
+    return _ArrayModel(count, "centre", 3, 0.0, whole)
 
 
-def _worst(measures: Sequence[Expansion], parts: int, visibility: Visibility, degree: Degree, allowed: float) -> float:
+def _worst(
+    measures: Sequence[PerSensorReference], parts: int, visibility: Visibility, degree: Degree, allowed: float
+) -> float:
     """Largest error of signals in some frames, or the first that is more than is allowed."""
     worst = 0.0
     for measure in measures:
@@ -171,7 +173,7 @@ def _worst(measures: Sequence[Expansion], parts: int, visibility: Visibility, de
 
 
 @dataclass(frozen=True, eq=False)
-class Expansion:
+class PerSensorReference:
     """A frame at a few hydrophones, each traced by itself: what expansions are measured against."""
 
     plan: Plan
@@ -180,17 +182,19 @@ class Expansion:
     exact: tuple[Floats, Floats]  # echoes, and direct arrivals (heard, sample) Pa
 
     @staticmethod
-    def of(plan: Plan, index: int) -> Expansion:
+    def of(plan: Plan, index: int) -> PerSensorReference:
         """Trace a frame to some hydrophones one by one, and synthesise what each hears."""
         plan = plan.at(index)
         frame = plan.recipe.frame(index)[1]
-        sensor = heard_at(plan.elements)[:: 2 if _facets(plan.scene) > MANY else 1]
-        every = replace(plan, choices=replace(plan.choices, negligible=EVERY * plan.choices.negligible))
+        sensor = heard_at(plan.elements)[:: 2 if _facets(plan.scene) > LARGE_MESH_FACETS else 1]
+        every = replace(plan, choices=replace(plan.choices, negligible=PER_SENSOR_TOLERANCE * plan.choices.negligible))
         rows = []
         for one in sensor:
             part = subarray(plan.elements, np.array([one]))
             rows.append(_heard(plan, frame, arrivals_of(every, frame, part), part.elements))
-        return Expansion(plan, frame, sensor, (np.vstack([r[0] for r in rows]), np.vstack([r[1] for r in rows])))
+        return PerSensorReference(
+            plan, frame, sensor, (np.vstack([r[0] for r in rows]), np.vstack([r[1] for r in rows]))
+        )
 
     def error(self, parts: int, visibility: Visibility = "centre", degree: Degree = 3) -> float:
         """Error of signals, relative, where the array is cut into so many parts: of echoes or direct arrivals."""
@@ -218,7 +222,7 @@ def heard_at(elements: Elements) -> Ints:
 
 def _heard(plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements) -> tuple[Floats, Floats]:
     """Echoes and direct arrivals (sensor, sample) in Pa, each by itself, of given arrivals."""
-    method = deposit_for(GOLDEN * plan.recipe.accuracy.cheap)
+    method = deposit_for(DEGREE_TOLERANCE * plan.recipe.accuracy.cheap)
     start, samples = frame_start(plan, frame), plan.windows.samples
     sonar, snaps = plan.scene.sonar, frame.moment.snaps
     echoes, direct = (

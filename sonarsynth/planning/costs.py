@@ -42,9 +42,9 @@ SECONDS = {
     "write byte": 12e-9,
 }
 """Seconds per unit of work."""
-LIT, COHERENT = 0.22, 0.35
+ILLUMINATED_FRACTION, COHERENT = 0.22, 0.35
 """Share of the facets of a closed body that are paths: lit, seen and not too faint; and of coherent ones."""
-RESHAPED = 1.9
+FILTERED_PULSE_COST = 1.9
 """Cost of synthesising a path whose pulse its facet reshapes, over that of one that repeats the snap."""
 RANGED_BEAMS = 60
 """Beams over threshold round one glint."""
@@ -62,7 +62,7 @@ def machine_factor() -> float:
     return float(best / REFERENCE_TRANSFORM)
 
 
-FIFTH = 1.6
+QUINTIC_COST = 1.6
 """Times what cubics over the array take, polynomials of the fifth degree take to trace."""
 
 
@@ -73,7 +73,7 @@ def _facets(plan: Plan) -> int:
 def _paths(plan: Plan) -> float:
     """Paths of one snap and family, each with the weight of its cost in the synthesis."""
     pairs = zip(plan.scene.laws, plan.scene.meshes, strict=True)
-    shares = {True: COHERENT * RESHAPED, False: LIT}
+    shares = {True: COHERENT * FILTERED_PULSE_COST, False: ILLUMINATED_FRACTION}
     return sum(len(mesh.faces) * len(law.parts) * shares[isinstance(law, Kirchhoff)] for law, mesh in pairs)
 
 
@@ -83,7 +83,7 @@ def _tracing(plan: Plan, kind: str) -> float:
     extra = SECONDS["trace coherent facet"] - SECONDS["trace facet"]
     each = SECONDS[f"trace {kind}facet"]
     whole = sum(len(mesh.faces) * (each + extra * isinstance(law, Kirchhoff)) for law, mesh in pairs)
-    return whole * (FIFTH if plan.choices.degree > 3 else 1.0)
+    return whole * (QUINTIC_COST if plan.choices.degree > 3 else 1.0)
 
 
 def _ways(plan: Plan) -> int:

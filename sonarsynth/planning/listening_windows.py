@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints, depth, size
+from sonarsynth.conventions import Floats, Ints, depth, format_bytes
 from sonarsynth.description import FieldError
 from sonarsynth.description.memory import frame_bytes, free_bytes
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.rays.ray_solutions import mean_slowness, water
 from sonarsynth.geometry.mesh import in_blocks
-from sonarsynth.planning.measured.sampled_frames import Look
+from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.notes.scene_checks import CORNERS
-from sonarsynth.planning.plans import Plan, Supports, Windows
+from sonarsynth.planning.plans import Plan, PulseDurations, Windows
 from sonarsynth.planning.pulse_durations import blur_of, supports_of
 from sonarsynth.products import Paths
 from sonarsynth.propagation import Straight
@@ -32,11 +32,11 @@ MARGIN = 0.1e-3
 """Seconds added at both ends of every window. Covers what straight rays leave out of an arrival time: under 2 us at
 20 m in a gradient of 4 per second. Arrivals that still fall outside are counted in `/signals/outside`."""
 
-UNSEEN = 0.1
+UNSAMPLED_MARGIN = 0.1
 """Windows of datasets of which not every frame is looked at are wider by this part of themselves."""
 
 
-def lay_windows(recipe: Recipe, looks: Sequence[Look]) -> Windows:
+def listening_windows(recipe: Recipe, looks: Sequence[SampledScene]) -> Windows:
     """The sample window, which holds every arrival of every frame, and the echo window.
 
     The sonar takes the pulse that it hears best for the start of its clock: the echo window holds the echoes of any
@@ -53,7 +53,7 @@ def lay_windows(recipe: Recipe, looks: Sequence[Look]) -> Windows:
     echoes = bool(np.isfinite(first_echo).any())
     shortest = float(np.nanmin(first_echo)) if echoes else np.nan
     longest = float(np.nanmax(last_echo)) if echoes else np.nan
-    unseen = UNSEEN * (longest - shortest) if (real >= 0).sum() < recipe.frames else 0.0
+    unseen = UNSAMPLED_MARGIN * (longest - shortest) if (real >= 0).sum() < recipe.frames else 0.0
     removed, start = _opening(looks[0].scene, shortest, supports, MARGIN + unseen)
     latest = longest + supports.echo_after + MARGIN + unseen
     if not echoes:  # listen for a moment after the snap
@@ -64,7 +64,7 @@ def lay_windows(recipe: Recipe, looks: Sequence[Look]) -> Windows:
     rate = sonar.sampling_frequency
     first = _first_sample(first_heard, supports, rate)
     last = np.maximum(last_heard + supports.after, last_direct + stop) + MARGIN
-    samples = int(np.ceil(np.max(last - first) * rate * (1.0 + (UNSEEN if unseen else 0.0)))) + 1
+    samples = int(np.ceil(np.max(last - first) * rate * (1.0 + (UNSAMPLED_MARGIN if unseen else 0.0)))) + 1
     disturbed = sum(_disturbed(span, start - supports.before, stop + supports.before) for span in spans)
     starts = np.full(recipe.frames, np.nan)
     starts[real[real >= 0]] = first[real >= 0]
@@ -79,7 +79,7 @@ def _first(times: Floats, real: Ints, count: int = 2) -> Ints:
     return np.asarray(order[(real[order] >= 0) & np.isfinite(times[order])][:count])
 
 
-def _opening(scene: Scene, first_echo: float, supports: Supports, margin: float) -> tuple[bool, float]:
+def _opening(scene: Scene, first_echo: float, supports: PulseDurations, margin: float) -> tuple[bool, float]:
     """Whether the direct pulse is taken out, and when the echo window opens (s), both after it.
 
     first_echo (s): NaN where nothing echoes. The window opens when the direct pulse is over. Where that cuts more than
@@ -96,7 +96,7 @@ def _opening(scene: Scene, first_echo: float, supports: Supports, margin: float)
     return removed, max(whole, 0.0) if removed and overlap else max(earliest, supports.clear)
 
 
-def _first_sample(first_heard: Floats, supports: Supports, rate: float) -> Floats:
+def _first_sample(first_heard: Floats, supports: PulseDurations, rate: float) -> Floats:
     return np.asarray(np.floor((first_heard - supports.before - MARGIN) * rate) / rate)
 
 
@@ -109,7 +109,7 @@ def frame_start(plan: Plan, frame: Frame) -> float:
     known = float(windows.start[frame.index])
     if np.isfinite(known):
         return known
-    (span,) = _spans(Look(scene, plan.profile, (frame,)))
+    (span,) = _spans(SampledScene(scene, plan.profile, (frame,)))
     supports, rate, gate = windows.supports, scene.sonar.sampling_frequency, scene.processing.echo_window
     first = float(_first_sample(np.asarray(span.first), supports, rate))
     last = max(span.last + supports.after, span.last_direct + windows.echo_stop) + MARGIN
@@ -124,7 +124,7 @@ def frame_start(plan: Plan, frame: Frame) -> float:
     return first
 
 
-def _slack(doppler: bool, frame: Frame, span: _Span, profile: Profile) -> float:
+def _slack(doppler: bool, frame: Frame, span: _ArrivalInterval, profile: Profile) -> float:
     """By how much (s) arrivals may come before or after what straight lines between things at rest say.
 
     What moves at v changes the travel time of each leg at v/c. A ray between two points r apart, in a sound speed that
@@ -147,7 +147,7 @@ def _slack(doppler: bool, frame: Frame, span: _Span, profile: Profile) -> float:
 
 
 @dataclass(frozen=True)
-class _Span:
+class _ArrivalInterval:
     """When a frame is heard at the array centre (s)."""
 
     first: float  # first direct arrival of any snap
@@ -159,7 +159,7 @@ class _Span:
     others: tuple[tuple[float, float], ...] = ()  # direct arrival and last echo of the snaps that are not the loudest
 
 
-def _spans(look: Look) -> list[_Span]:
+def _spans(look: SampledScene) -> list[_ArrivalInterval]:
     """When each frame is heard, with what straight lines between things at rest leave out."""
     scene, profile = look.scene, look.profile
     bounces, bed = scene.physics.tracing.bounces, scene.world.environment.depth
@@ -180,11 +180,11 @@ def _spans(look: Look) -> list[_Span]:
     return spans
 
 
-def _span(frame: Frame, profile: Profile, bed: float, bounces: int) -> _Span:
+def _span(frame: Frame, profile: Profile, bed: float, bounces: int) -> _ArrivalInterval:
     array = frame.sonar_pose.position
     snaps = frame.moment.snaps
     if not snaps:
-        return _Span(0.0, 0.0, 0.0, np.nan, np.nan, 0.0)
+        return _ArrivalInterval(0.0, 0.0, 0.0, np.nan, np.nan, 0.0)
     direct = np.array([s.time + float(_straight_time(profile, bed, s.position, array)) for s in snaps])
     earliest, late_echo = np.full(len(snaps), np.inf), [-np.inf] * len(snaps)
     parts = [(body, some) for body in frame.moment.bodies for some in in_blocks(len(body.mesh.faces))]
@@ -207,7 +207,7 @@ def _span(frame: Frame, profile: Profile, bed: float, bounces: int) -> _Span:
     loudest = int(np.argmax(heard))
     latest = float(np.max(np.asarray(late_echo) - direct)) if echoes else np.nan
     others = tuple((float(direct[n]), float(last[n])) for n in range(len(snaps)) if n != loudest)
-    return _Span(
+    return _ArrivalInterval(
         first=float(direct.min()),
         clock=float(direct[loudest]),
         last_direct=float(direct.max()),
@@ -250,7 +250,7 @@ def _latest(paths: Paths, bounces: int, points: int) -> Floats:
     return out
 
 
-def _disturbed(span: _Span, start: float, stop: float) -> bool:
+def _disturbed(span: _ArrivalInterval, start: float, stop: float) -> bool:
     """Whether sound of another snap than the loudest falls into the echo window, start to stop after its arrival."""
     return any(first < span.clock + stop and last > span.clock + start for first, last in span.others)
 
@@ -277,6 +277,7 @@ def check_windows(scene: Scene, windows: Windows) -> None:
         seconds = windows.samples / scene.sonar.sampling_frequency
         raise FieldError(
             path,
-            f"a frame would take {size(needed)} of memory, and {size(free)} are free here ({sensors} hydrophones for "
+            f"a frame would take {format_bytes(needed)} of memory, and {format_bytes(free)} are free here "
+            f"({sensors} hydrophones for "
             f"{seconds:.3g} s): the arrivals are too far apart in time",
         )

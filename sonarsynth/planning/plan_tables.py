@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from html import escape as escape_html
 from typing import TYPE_CHECKING, Final
 
-from sonarsynth.conventions import size
+from sonarsynth.conventions import format_bytes
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -46,7 +46,7 @@ OMISSION_COLUMNS = ("left out", "why", "costs at most")
 
 def rows_of(stages: Sequence[Stage], left_out: Sequence[Omission]) -> tuple[list[Row], list[Row]]:
     """The cells of both tables, in the order of `STAGE_COLUMNS` and `OMISSION_COLUMNS`."""
-    first: list[Row] = [(s.stage, s.method, s.why, s.error, f"{s.seconds:.2g}", size(s.bytes)) for s in stages]
+    first: list[Row] = [(s.stage, s.method, s.why, s.error, f"{s.seconds:.2g}", format_bytes(s.bytes)) for s in stages]
     return first, [(o.what, o.why, o.bound) for o in left_out]
 
 

@@ -28,7 +28,7 @@ PRODUCTS = ("signals", "image", "cloud")
 
 
 @dataclass(frozen=True, eq=False)
-class Supports:
+class PulseDurations:
     """How long pulses are (s), before and after their collapse, over the whole aperture."""
 
     before: float
@@ -47,7 +47,7 @@ class Windows:
     samples: int
     echo_start: float  # s after the direct arrival
     echo_stop: float  # s after the direct arrival
-    supports: Supports
+    supports: PulseDurations
     disturbed: int  # of the frames looked at: in whose echo window other snaps, or their echoes, are heard as well
     direct_removed: bool = False  # the direct pulse is taken out of what the image is made of
     cut: bool = False  # more of some echo than its feet is outside of the echo window

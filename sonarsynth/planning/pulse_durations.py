@@ -9,13 +9,13 @@ import numpy as np
 from sonarsynth.conventions import SLOWEST, Floats
 from sonarsynth.environment.boundary_numbers import rms_height
 from sonarsynth.geometry.mesh import farthest_corner
-from sonarsynth.planning.measured.sampled_frames import Look
-from sonarsynth.planning.plans import Supports
+from sonarsynth.planning.measured.sampled_frames import SampledScene
+from sonarsynth.planning.plans import PulseDurations
 from sonarsynth.receiver import elements
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.scattering import Kirchhoff, PartlyReflecting
 from sonarsynth.signals import pulse_support
-from sonarsynth.signals.filtered_pulse import FEET, at_longest, silencing_blur
+from sonarsynth.signals.filtered_pulse import PULSE_FEET, at_longest, silencing_blur
 from sonarsynth.sources.snap_pulses import Waveform, largest_scales, waveform
 from sonarsynth.state import model_of
 
@@ -29,7 +29,7 @@ FOOT = 1e-2
 """Where the direct pulse is in the way, feet of echoes under this part of their peak may be cut."""
 
 
-def supports_of(looks: Sequence[Look]) -> Supports:
+def supports_of(looks: Sequence[SampledScene]) -> PulseDurations:
     """How long pulses are, over all scenes."""
     rows = []
     for look in looks:
@@ -42,7 +42,7 @@ def supports_of(looks: Sequence[Look]) -> Supports:
         clear = min(after, plain + across + TAIL)  # a turned pulse may never end: what echoes meanwhile must be heard
         echo, foot = (_support(scene, part, turned=turned) + across for part in (ECHO_SUPPORT, FOOT))
         rows.append((before, after, *echo, clear, foot.max()))
-    return Supports(*(float(n) for n in np.max(rows, axis=0)))
+    return PulseDurations(*(float(n) for n in np.max(rows, axis=0)))
 
 
 def _support(scene: Scene, tolerance: float, *, turned: bool) -> Floats:
@@ -73,7 +73,7 @@ def blur_of(scene: Scene) -> float:
         return 0.0
     blur = 2.0 * most / SLOWEST  # at the steepest grazing angle
     silent = max((silencing_blur(w, scene.sonar.antialias) for w in extreme_waveforms(scene)), default=0.0)
-    return float(FEET * min(blur, silent))
+    return float(PULSE_FEET * min(blur, silent))
 
 
 def extreme_waveforms(scene: Scene) -> list[Waveform]:

@@ -5,23 +5,23 @@ Unless said otherwise arrays are float64, positions in m in the sonar frame, tim
 the instant of the frame; a snap at `Snap.time` is heard a travel time later).
 """
 
-from sonarsynth.products.labels import LEDGER, ORIGINS, Echoes, Ledger, PointLabels, Truth
+from sonarsynth.products.labels import LINK_BUDGET, ORIGINS, Echoes, LinkBudget, PointLabels, Truth
 from sonarsynth.products.paths import FAMILIES, Arrivals, Paths
-from sonarsynth.products.results import REASONS, Bearings, EnergyImage, PointCloud, Signals
+from sonarsynth.products.results import REASONS, EnergyImage, PointCloud, Signals, SourceEstimates
 
 __all__ = [
     "FAMILIES",
-    "LEDGER",
+    "LINK_BUDGET",
     "ORIGINS",
     "REASONS",
     "Arrivals",
-    "Bearings",
     "Echoes",
     "EnergyImage",
-    "Ledger",
+    "LinkBudget",
     "Paths",
     "PointCloud",
     "PointLabels",
     "Signals",
+    "SourceEstimates",
     "Truth",
 ]

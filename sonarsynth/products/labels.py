@@ -67,7 +67,7 @@ class Echoes:
     """Where the echoes of each target come from, by the boundaries that they touched on their way to the array.
 
     What comes by surface or bed is a ghost: the array sees the target mirrored there. Levels are of the energy in the
-    band: phases count among the coherent paths of a snap and family (`LEDGER`), powers of all else are summed.
+    band: phases count among the coherent paths of a snap and family (`LINK_BUDGET`), powers of all else are summed.
     Directions are weighted by the share of each path in that. NaN where no path comes that way, directions also where
     echoes come from several sides, as by surface and bed both from above and from below.
     """
@@ -77,7 +77,7 @@ class Echoes:
     level: Floats  # (target, family) dB re 1 uPa: peak of a snap, times what the echoes bring of its energy in the band
 
 
-LEDGER = (
+LINK_BUDGET = (
     "source_level",
     "transmission_loss_out",
     "scattering",
@@ -98,7 +98,7 @@ is what is left: the target strength, with what phases add or cancel; 0 dB of pa
 
 
 @dataclass(frozen=True, eq=False)
-class Ledger:
+class LinkBudget:
     """Levels of each (snap, target, family) in dB that add up, and those of one path of it alone.
 
     The isolated path is the loudest of its family. Its level is predicted from the columns of `Arrivals`, over the band

@@ -35,12 +35,12 @@ REASONS = (
     "may_be_an_echo",
     "range_unknown",
 )
-"""Why a row of `Bearings` is not accepted: `Bearings.reason` is an index. Of "range_unknown" the position alone is NaN:
-when and from where the pulse came is known; of all others nothing."""
+"""Why a row of `SourceEstimates` is not accepted: `SourceEstimates.reason` is an index. Of "range_unknown" the position
+alone is NaN: when and from where the pulse came is known; of all others nothing."""
 
 
 @dataclass(frozen=True, eq=False)
-class Bearings:
+class SourceEstimates:
     """Where the array hears each snap: one row a snap, the loudest direct pulse first; NaN where none was found.
 
     Rows of what was found come first, then those of pulses that were refused, `reason` says why. Standard errors are

@@ -10,7 +10,7 @@ from sonarsynth.casting.ray_casting import OFFSET, first_hit
 from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints, depth
 from sonarsynth.equations.rays.ray_solutions import Water
 from sonarsynth.geometry import unit
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 
 EVENTS = ("on the way", "turning point", "surface", "bed", "end", "facet", "launch", "arrival")
 ON, TURN, SURFACE, BED, END, FACET, LAUNCH, ARRIVAL = range(len(EVENTS))
@@ -100,7 +100,7 @@ def move(layers: Water, state: Rays, limit: Floats, sagitta: float) -> tuple[Ray
 
 
 def step(
-    layers: Water, bodies: tuple[Body, ...], state: Rays, spacing: float, sagitta: float
+    layers: Water, bodies: tuple[PlacedTarget, ...], state: Rays, spacing: float, sagitta: float
 ) -> tuple[Rays, Ints, Ints, Ints]:
     """One arc of each ray, cut short at a facet: the rays after it, why it ended, and body and facet met (-1: none)."""
     limit = np.minimum(spacing, 2.0 * layers.speed.max() * (state.until - state.time) + 1e-9)
@@ -123,7 +123,7 @@ def step(
     return after, why, target, facet
 
 
-def meet(bodies: tuple[Body, ...], start: Floats, end: Floats) -> tuple[Ints, Ints, Floats]:
+def meet(bodies: tuple[PlacedTarget, ...], start: Floats, end: Floats) -> tuple[Ints, Ints, Floats]:
     """Body and facet that each chord meets first, and the distance (m); -1 where none."""
     target, facet = np.full(len(start), NO_TARGET), np.full(len(start), NO_TARGET)
     span = end - start
@@ -138,7 +138,7 @@ def meet(bodies: tuple[Body, ...], start: Floats, end: Floats) -> tuple[Ints, In
     return target, facet, nearest
 
 
-def planes(bodies: tuple[Body, ...], target: Ints, facet: Ints) -> tuple[Floats, Floats]:
+def planes(bodies: tuple[PlacedTarget, ...], target: Ints, facet: Ints) -> tuple[Floats, Floats]:
     """A point and the normal of facets, in the world."""
     point, normal = np.empty((len(target), 3)), np.empty((len(target), 3))
     for index, body in enumerate(bodies):
@@ -148,7 +148,7 @@ def planes(bodies: tuple[Body, ...], target: Ints, facet: Ints) -> tuple[Floats,
     return point, normal
 
 
-def reflect(layers: Water, bodies: tuple[Body, ...], rays: Rays, why: Ints, target: Ints, facet: Ints) -> Rays:
+def reflect(layers: Water, bodies: tuple[PlacedTarget, ...], rays: Rays, why: Ints, target: Ints, facet: Ints) -> Rays:
     """Rays turned at surface, bed and facets by the mirror law, and counted."""
     flat = (why == SURFACE) | (why == BED)
     phi, p, direction = np.where(flat, -rays.phi, rays.phi), rays.p.copy(), rays.direction.copy()

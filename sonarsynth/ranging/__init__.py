@@ -7,7 +7,7 @@ from typing import Annotated, Protocol
 from sonarsynth.description import BY_KIND
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose
-from sonarsynth.products import Bearings, EnergyImage, PointCloud, Signals
+from sonarsynth.products import EnergyImage, PointCloud, Signals, SourceEstimates
 from sonarsynth.ranging.auto_ranging import AutoRange
 from sonarsynth.ranging.cancelling.reflection_cancelling import WavefrontCancelling
 from sonarsynth.ranging.isovelocity import IsovelocityRange
@@ -42,7 +42,7 @@ class LocatingMethod(Protocol):
         bed_depth: float,
         snaps: int,
         profile: Profile,
-    ) -> Bearings:
+    ) -> SourceEstimates:
         """The `snaps` loudest direct pulses, loudest first, one row each; NaN rows for those that were not found.
 
         bed_depth (m, positive down) is where the snaps are known to be; profile the sound speed of the water, as the
@@ -56,7 +56,7 @@ class CancellingMethod(Protocol):
     def cancel(
         self,
         signals: Signals,
-        bearings: Bearings,
+        bearings: SourceEstimates,
         elements: Elements,
         sonar: Sonar,
         sonar_pose: Pose,
@@ -77,7 +77,7 @@ class RangingMethod(Protocol):
         self,
         signals: Signals,
         image: EnergyImage,
-        bearings: Bearings,
+        bearings: SourceEstimates,
         elements: Elements,
         sonar: Sonar,
         sonar_pose: Pose,

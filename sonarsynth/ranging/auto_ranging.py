@@ -10,7 +10,7 @@ from sonarsynth.conventions import Decibels, PositiveMetres
 from sonarsynth.description import description
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose
-from sonarsynth.products import Bearings, EnergyImage, PointCloud, Signals
+from sonarsynth.products import EnergyImage, PointCloud, Signals, SourceEstimates
 from sonarsynth.ranging.isovelocity import IsovelocityRange
 from sonarsynth.ranging.refracted_ranging import RefractedRange
 from sonarsynth.receiver import Elements, Sonar
@@ -37,7 +37,7 @@ class AutoRange:
         self,
         signals: Signals,
         image: EnergyImage,
-        bearings: Bearings,
+        bearings: SourceEstimates,
         elements: Elements,
         sonar: Sonar,
         sonar_pose: Pose,

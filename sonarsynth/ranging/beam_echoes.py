@@ -16,10 +16,10 @@ from scipy.ndimage import maximum_filter1d
 from sonarsynth.conventions import Floats, Ints, direction
 from sonarsynth.equations.arrays.beams import beam_spectra, lattice_beam_spectra
 from sonarsynth.equations.arrays.gates import fast_length, frequency_spacing, gate_samples, gated_spectra
-from sonarsynth.products import Bearings, EnergyImage, Signals
+from sonarsynth.products import EnergyImage, Signals, SourceEstimates
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location import pulse_times
-from sonarsynth.ranging.location.plane_waves import Front
+from sonarsynth.ranging.location.plane_waves import PlaneWaveFit
 from sonarsynth.ranging.location.pulse_times import Complexes
 from sonarsynth.receiver import Elements, Sonar
 
@@ -85,12 +85,14 @@ def over_threshold(image: EnergyImage, threshold: float, loudest: float = 0.0) -
     return row, column
 
 
-def direct_spectrum(signals: Signals, bearings: Bearings, elements: Elements, sonar: Sonar, length: int) -> Complexes:
+def direct_spectrum(
+    signals: Signals, bearings: SourceEstimates, elements: Elements, sonar: Sonar, length: int
+) -> Complexes:
     """Spectrum (bin,) in Pa s of the direct pulse at the array centre, without the face, about `bearings.time`.
 
     At the frequencies of an FFT of `length` samples.
     """
-    c, front = sonar.assumed_sound_speed, Front.of(bearings)
+    c, front = sonar.assumed_sound_speed, PlaneWaveFit.of(bearings)
     aligned = pulse_times.align(signals, elements, sonar.band, front.delays(elements, c), whole=True)
     wave = pulse_times.waveform(aligned, elements, c, front.direction, front.curvature, front.time)
     return pulse_times.template_spectrum(wave.template, length)
@@ -99,7 +101,7 @@ def direct_spectrum(signals: Signals, bearings: Bearings, elements: Elements, so
 def range_profiles(
     signals: Signals,
     image: EnergyImage,
-    bearings: Bearings,
+    bearings: SourceEstimates,
     elements: Elements,
     sonar: Sonar,
     beams: tuple[Ints, Ints],

@@ -9,7 +9,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.bistatic_range import bistatic_range
-from sonarsynth.products import Bearings, EnergyImage, PointCloud, Signals
+from sonarsynth.products import EnergyImage, PointCloud, Signals, SourceEstimates
 from sonarsynth.ranging.beam_echoes import over_threshold, pick, range_profiles
 from sonarsynth.receiver import Elements, Sonar
 
@@ -42,7 +42,7 @@ def isovelocity_solution(delay: Floats, beam: Floats, source: Floats, sound_spee
 def point_cloud(
     signals: Signals,
     image: EnergyImage,
-    bearings: Bearings,
+    bearings: SourceEstimates,
     elements: Elements,
     sonar: Sonar,
     threshold: float,
@@ -76,7 +76,7 @@ def point_cloud(
 
 
 def range_error(
-    solution: Solution, delay: Floats, delay_error: Floats, angle_error: Floats, bearings: Bearings, sonar: Sonar
+    solution: Solution, delay: Floats, delay_error: Floats, angle_error: Floats, bearings: SourceEstimates, sonar: Sonar
 ) -> Floats:
     """Predicted standard error (beam,) in m: beam width, clock, snap position, sound speed.
 

@@ -10,7 +10,7 @@ from sonarsynth.conventions import Decibels, PositiveMetres
 from sonarsynth.description import description
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose
-from sonarsynth.products import Bearings, EnergyImage, PointCloud, Signals
+from sonarsynth.products import EnergyImage, PointCloud, Signals, SourceEstimates
 from sonarsynth.receiver import Elements, Sonar
 
 
@@ -46,7 +46,7 @@ class IsovelocityRange:
         self,
         signals: Signals,
         image: EnergyImage,
-        bearings: Bearings,
+        bearings: SourceEstimates,
         elements: Elements,
         sonar: Sonar,
         sonar_pose: Pose,

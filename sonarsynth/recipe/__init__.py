@@ -19,7 +19,7 @@ from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.recipe.sequences import MOST_SEQUENCES, Sequences
 from sonarsynth.recipe.splits import SPLITS, Splits
 from sonarsynth.recipe.tolerance import Accuracy
-from sonarsynth.recipe.variation.grid import Axis, Together, entry_tag
+from sonarsynth.recipe.variation.grid import Axis, Zip, entry_tag
 from sonarsynth.recipe.variation.mesh_variants import Variants, target_meshes, variant_numbers
 from sonarsynth.recipe.variation.random_variations import Choice, Normal, Sobol, Uniform, Variation
 from sonarsynth.recipe.variation.values import Plain
@@ -39,14 +39,14 @@ __all__ = [
     "Recipe",
     "Sobol",
     "Splits",
-    "Together",
     "Uniform",
+    "Zip",
 ]
 
 FILE_KINDS = frozenset({MeshFile.kind, Cast.kind, RecordedSnap.kind})
 """Descriptions whose `path` names a file."""
 
-Entry = Annotated[Annotated[Axis, Tag("axis")] | Annotated[Together, Tag("zip")], Discriminator(entry_tag)]
+Entry = Annotated[Annotated[Axis, Tag("axis")] | Annotated[Zip, Tag("zip")], Discriminator(entry_tag)]
 
 
 @description

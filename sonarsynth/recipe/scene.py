@@ -15,7 +15,7 @@ from sonarsynth.environment.sea import Environment
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.motion import Motion, Still, Track, pose, velocity
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.imaging import AutoBeamforming, Beamformer
 from sonarsynth.propagation import AutoTracing, Tracing
 from sonarsynth.randomness import stream
@@ -25,7 +25,7 @@ from sonarsynth.scattering import MirrorLobe, Scattering
 from sonarsynth.signals import AutoSynthesis, Synthesis
 from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.sources.snap_pulses import scales
-from sonarsynth.state import Moment, Snap, snaps_of
+from sonarsynth.state import Snap, WorldState, snaps_of
 from sonarsynth.targets.target import Target, mesh_for
 
 MOST = 500
@@ -159,18 +159,19 @@ class Scene:
         """What a target is traced with. Raises ValueError, or OSError, where it has no mesh."""
         return mesh_for(self.world.targets[target].shape, self.laws[target], self.sonar.shortest_wavelength)
 
-    def moment(self, time: float, *, key: int | str = 0, step: int = 0, seed: int = 0) -> Moment:
+    def moment(self, time: float, *, key: int | str = 0, step: int = 0, seed: int = 0) -> WorldState:
         """The world at a time (s), with the snaps that a frame of the sequence of this key, step and seed draws."""
         placed = zip(self.world.targets, self.meshes, strict=True)
         bodies = tuple(
-            Body(t.name, mesh, pose(t.motion, time), velocity(t.motion, time), t.motion, time) for t, mesh in placed
+            PlacedTarget(t.name, mesh, pose(t.motion, time), velocity(t.motion, time), t.motion, time)
+            for t, mesh in placed
         )
         bed = self.world.environment.depth
         snaps: list[Snap] = []
         for i, shrimp in enumerate(self.world.shrimp):
             drawn = scales(shrimp.variation, stream(seed, "snap", key, step, i), len(shrimp.snap_times))
             snaps += snaps_of(shrimp, bed, drawn)
-        return Moment(time, bodies, tuple(snaps))
+        return WorldState(time, bodies, tuple(snaps))
 
     def frame(
         self,
@@ -208,7 +209,7 @@ class Frame:
     key: int | str  # of the sequence: random streams are keyed (seed, name, key, step)
     sonar_pose: Pose
     sonar_velocity: Floats  # (xyz) m/s, world
-    moment: Moment
+    moment: WorldState
     sonar_motion: Motion | None = None  # None: it goes on at its velocity, and does not turn
 
     @property

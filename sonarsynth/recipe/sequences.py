@@ -22,7 +22,7 @@ from sonarsynth.description import FieldError
 from sonarsynth.randomness import number
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.recipe.splits import SPLITS, Splits, assign
-from sonarsynth.recipe.variation.grid import Axis, Together, axes
+from sonarsynth.recipe.variation.grid import Axis, Zip, axes
 from sonarsynth.recipe.variation.random_variations import Choice, Sobol, Variation
 from sonarsynth.recipe.variation.setting import Setting, plain_scene, with_settings
 from sonarsynth.recipe.variation.values import Plain, Where, default_name, where
@@ -39,7 +39,7 @@ class Sequences:
 
     base: Scene
     seed: int
-    grid: tuple[Axis | Together, ...]
+    grid: tuple[Axis | Zip, ...]
     variations: tuple[Variation, ...]
     repeats: int
     splits: Splits | None
@@ -63,10 +63,7 @@ class Sequences:
     def _axes(self) -> list[list[tuple[Where, Axis, tuple[Plain, ...]]]]:
         """Axes of each entry of the grid with their values, and where they stand in the recipe."""
         return [
-            [
-                (("grid", i, "zip", j) if isinstance(e, Together) else ("grid", i), a, a.taken)
-                for j, a in enumerate(axes(e))
-            ]
+            [(("grid", i, "zip", j) if isinstance(e, Zip) else ("grid", i), a, a.taken) for j, a in enumerate(axes(e))]
             for i, e in enumerate(self.grid)
         ]
 

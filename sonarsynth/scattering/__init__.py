@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Protocol
 
 from sonarsynth.description import BY_KIND
-from sonarsynth.scattering.components import Part
+from sonarsynth.scattering.components import Component
 from sonarsynth.scattering.isotropic import Isotropic
 from sonarsynth.scattering.kirchhoff import Kirchhoff
 from sonarsynth.scattering.kirchhoff_surface import PartlyReflecting
@@ -22,7 +22,7 @@ class ScatteringLaw(Protocol):
         ...
 
     @property
-    def parts(self) -> tuple[Part, ...]:
+    def parts(self) -> tuple[Component, ...]:
         """What an echo is made of, each a path of its own (`scattering.parts`)."""
         ...
 
@@ -47,10 +47,10 @@ Scattering = Annotated[MirrorLobe | Isotropic | Kirchhoff, BY_KIND]
 """Laws of scattering."""
 
 __all__ = [
+    "Component",
     "Isotropic",
     "Kirchhoff",
     "MirrorLobe",
-    "Part",
     "PartlyReflecting",
     "Scatterer",
     "Scattering",

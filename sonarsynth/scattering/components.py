@@ -11,25 +11,25 @@ from sonarsynth.conventions import Bools, Floats
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.equations.scattering.lobes import dot, lambert, lit_and_seen, slope_lobe
 from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.scattering.facet_geometry import Patches, Pulses
+from sonarsynth.scattering.facet_geometry import FacetGeometry, PulseResponse
 from sonarsynth.scattering.kirchhoff_surface import KirchhoffSurface, reflection
 from sonarsynth.scattering.random_signs import random_polarity
 
 
-class Part(Protocol):
+class Component(Protocol):
     """One part of the echo of a facet.
 
     Directions are unit vectors of propagation (..., xyz) in the frame of the body, in and away.
     """
 
-    def amplitude(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
+    def amplitude(self, incident: Floats, scattered: Floats, patch: FacetGeometry, wavenumber: Floats) -> Floats:
         """Far-field amplitude (...) in m at a wavenumber (...) (rad/m), but for `pulses`; of echoes never negative.
 
         0 where a facet is not lit, or, for an echo, not seen.
         """
         ...
 
-    def pulses(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Pulses:
+    def pulses(self, incident: Floats, scattered: Floats, patch: FacetGeometry, sound_speed: Floats) -> PulseResponse:
         """What it makes of the pulse, for directions (path, xyz) and sound speeds (path,) in m/s."""
         ...
 
@@ -44,16 +44,16 @@ class PulseRepeating(Protocol):
     def amplitude(
         self, incident: Floats, scattered: Floats, normal: Floats, area: Floats, beyond: bool = False
     ) -> Floats:
-        """Far-field amplitude (...) in m; `beyond` as `Plain.beyond`."""
+        """Far-field amplitude (...) in m; `beyond` as `Lobe.beyond`."""
         ...
 
     def polarity(self, mesh: Mesh) -> Floats:
-        """As `Part.polarity`."""
+        """As `Component.polarity`."""
         ...
 
 
 @dataclass(frozen=True)
-class Plain:
+class Lobe:
     """A law that repeats the pulse."""
 
     law: PulseRepeating
@@ -61,13 +61,13 @@ class Plain:
     """Whether the amplitude goes on where a facet is lit but not seen: for arrays of which some hydrophones see it, and
     are told from those that do not."""
 
-    def amplitude(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
-        """As `Part.amplitude`: the same at all wavenumbers."""
+    def amplitude(self, incident: Floats, scattered: Floats, patch: FacetGeometry, wavenumber: Floats) -> Floats:
+        """As `Component.amplitude`: the same at all wavenumbers."""
         return self.law.amplitude(incident, scattered, patch.normal, patch.area, self.beyond)
 
-    def pulses(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Pulses:
-        """As `Part.pulses`: none."""
-        return Pulses.plain(len(incident))
+    def pulses(self, incident: Floats, scattered: Floats, patch: FacetGeometry, sound_speed: Floats) -> PulseResponse:
+        """As `Component.pulses`: none."""
+        return PulseResponse.plain(len(incident))
 
     def polarity(self, mesh: Mesh) -> Floats:
         """As the law says."""
@@ -75,7 +75,7 @@ class Plain:
 
 
 @dataclass(frozen=True)
-class Smooth:
+class CoherentKirchhoff:
     """The coherent part of a Kirchhoff facet: it mirrors as far as it is large, and the phases of facets add up.
 
     f = V (i k/4 pi) A n.(ks - ki) 2 exp[corners] exp(-g^2/2) (`acoustics.kirchhoff`, `acoustics.roughness`).
@@ -83,10 +83,10 @@ class Smooth:
 
     law: KirchhoffSurface
     beyond: bool = False
-    """As of `Plain`; it may be below 0 there."""
+    """As of `Lobe`; it may be below 0 there."""
 
-    def amplitude(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
-        """As `Part.amplitude`: |V| k A n.(ks - ki)/(4 pi), by the factor `Kirchhoff.lit`."""
+    def amplitude(self, incident: Floats, scattered: Floats, patch: FacetGeometry, wavenumber: Floats) -> Floats:
+        """As `Component.amplitude`: |V| k A n.(ks - ki)/(4 pi), by the factor `Kirchhoff.lit`."""
         if self.beyond:
             return self._beyond(incident, scattered, patch, wavenumber)
         across = dot(patch.normal, scattered - incident)
@@ -94,7 +94,7 @@ class Smooth:
         mirrored = np.abs(reflection(self.law, incident, scattered)) * np.sqrt(1.0 - self.law.diffuse)
         return np.where(lit > 0.0, lit * mirrored * wavenumber * patch.area * across / (4.0 * np.pi), 0.0)
 
-    def _beyond(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
+    def _beyond(self, incident: Floats, scattered: Floats, patch: FacetGeometry, wavenumber: Floats) -> Floats:
         """The same, going on in n.ks past where facets are seen: of those that taper to 0 as an odd function, which is
         bounded; its bend there is least where it falls least steeply, and those that the snap grazes as well are
         faint."""
@@ -104,15 +104,15 @@ class Smooth:
         mirrored = np.abs(reflection(self.law, incident, scattered)) * np.sqrt(1.0 - self.law.diffuse)
         return np.where(inward > 0.0, mirrored * wavenumber * patch.area * across / (4.0 * np.pi), 0.0)
 
-    def pulses(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Pulses:
-        """As `Part.pulses`: differentiated, and a mean over the facet; blurred by roughness."""
+    def pulses(self, incident: Floats, scattered: Floats, patch: FacetGeometry, sound_speed: Floats) -> PulseResponse:
+        """As `Component.pulses`: differentiated, and a mean over the facet; blurred by roughness."""
         count, zero = len(incident), np.zeros(len(incident))
         corners = dot(patch.corners, (incident - scattered)[:, None, :]) / sound_speed[:, None]
         phase = self.phase(incident, scattered) + zero
         blur = self.law.roughness * np.abs(dot(patch.normal, scattered - incident)) / sound_speed
-        return Pulses(np.ones(count, bool), corners, zero, zero, zero, phase, blur)
+        return PulseResponse(np.ones(count, bool), corners, zero, zero, zero, phase, blur)
 
-    def spread(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Floats:
+    def spread(self, incident: Floats, scattered: Floats, patch: FacetGeometry, sound_speed: Floats) -> Floats:
         """Variance (...) of the delays of an echo in s2, over the facet and the heights of its surface."""
         rough = self.law.roughness * dot(patch.normal, scattered - incident) / sound_speed
         return np.asarray(over_facet(incident, scattered, patch, sound_speed) + rough * rough)
@@ -121,7 +121,7 @@ class Smooth:
         """Phase (...) of the reflection coefficient in rad, which directions change where `turns`."""
         return np.asarray(np.angle(reflection(self.law, incident, scattered)))
 
-    def tapers(self, patch: Patches) -> Bools:
+    def tapers(self, patch: FacetGeometry) -> Bools:
         """Where (facet,) the echo falls to 0 towards the limb of the body, rather than ending there (`edges`)."""
         smooth = {"auto": patch.curved, "smooth": np.ones_like(patch.curved), "sharp": np.zeros_like(patch.curved)}
         return smooth[self.law.edges]
@@ -137,7 +137,7 @@ class Smooth:
 
 
 @dataclass(frozen=True)
-class Rough:
+class DiffuseKirchhoff:
     """The incoherent part of a Kirchhoff facet: the lobe of the slopes and Lambert's floor (`acoustics.roughness`).
 
     It comes from one point of the facet, with one sign, both drawn once for each facet of a mesh.
@@ -145,9 +145,9 @@ class Rough:
 
     law: KirchhoffSurface
     beyond: bool = False
-    """As of `Plain`."""
+    """As of `Lobe`."""
 
-    def _powers(self, incident: Floats, scattered: Floats, patch: Patches) -> tuple[Floats, Floats]:
+    def _powers(self, incident: Floats, scattered: Floats, patch: FacetGeometry) -> tuple[Floats, Floats]:
         """Cross-sections per area (...) (1/sr) of the lobe, where heights are large, and of the floor."""
         on = lit_and_seen(incident, scattered, patch.normal, self.beyond)
         returned = np.where(on, np.abs(reflection(self.law, incident, scattered)) ** 2, 0.0)
@@ -155,13 +155,13 @@ class Rough:
         floor = lambert(incident, scattered, patch.normal, self.law.diffuse)
         return np.asarray(returned * (1.0 - self.law.diffuse) * lobe), np.asarray(returned * floor)
 
-    def amplitude(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
-        """As `Part.amplitude`: root of the area times lobe and floor."""
+    def amplitude(self, incident: Floats, scattered: Floats, patch: FacetGeometry, wavenumber: Floats) -> Floats:
+        """As `Component.amplitude`: root of the area times lobe and floor."""
         lobe, floor = self._powers(incident, scattered, patch)
         return np.sqrt(patch.area * (lobe + floor))
 
     def _sent(
-        self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats, frequency: Floats
+        self, incident: Floats, scattered: Floats, patch: FacetGeometry, sound_speed: Floats, frequency: Floats
     ) -> Floats:
         """Power (frequency, ...) in m2 that is sent without phase in common."""
         lobe, floor = self._powers(incident, scattered, patch)
@@ -174,7 +174,7 @@ class Rough:
         incident: Floats,
         scattered: Floats,
         away: Floats,
-        patch: Patches,
+        patch: FacetGeometry,
         sound_speed: Floats,
         band: tuple[float, float],
     ) -> tuple[Floats, Floats]:
@@ -197,14 +197,14 @@ class Rough:
         gain = np.where(both, np.exp(first - slope * square[0]), (there[1] > 0.0) * 1.0)
         return gain, -slope / (2.0 * np.pi**2)
 
-    def pulses(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Pulses:
-        """As `Part.pulses`: without the share of the power that is coherent still."""
+    def pulses(self, incident: Floats, scattered: Floats, patch: FacetGeometry, sound_speed: Floats) -> PulseResponse:
+        """As `Component.pulses`: without the share of the power that is coherent still."""
         count, zero = len(incident), np.zeros(len(incident))
         lobe, floor = self._powers(incident, scattered, patch)
         share = lobe / np.where(lobe + floor > 0.0, lobe + floor, 1.0)
         delay = self.law.roughness * np.abs(dot(patch.normal, scattered - incident)) / sound_speed
         late = dot(patch.spot, incident - scattered) / sound_speed
-        return Pulses(np.zeros(count, bool), np.zeros((count, 3)), share, delay, late, zero, zero)
+        return PulseResponse(np.zeros(count, bool), np.zeros((count, 3)), share, delay, late, zero, zero)
 
     def polarity(self, mesh: Mesh) -> Floats:
         """At random."""
@@ -218,34 +218,40 @@ class Shadow:
     f = (i k/4 pi) A n.(ki + ks) 2 exp[corners], whatever the surface is made of and however rough it is.
     """
 
-    def amplitude(self, incident: Floats, scattered: Floats, patch: Patches, wavenumber: Floats) -> Floats:
-        """As `Part.amplitude`, but k A n.(ki + ks)/(4 pi) with its sign: below 0 ahead, 0 where an echo is mirrored."""
+    def amplitude(self, incident: Floats, scattered: Floats, patch: FacetGeometry, wavenumber: Floats) -> Floats:
+        """As `Component.amplitude`, but k A n.(ki + ks)/(4 pi) with its sign: below 0 ahead, 0 where an echo is
+        mirrored."""
         across = dot(patch.normal, incident + scattered)
         return np.where(dot(incident, patch.normal) < 0.0, wavenumber * patch.area * across / (4.0 * np.pi), 0.0)
 
-    def pulses(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Pulses:
-        """As `Part.pulses`: differentiated, and a mean over the facet."""
+    def pulses(self, incident: Floats, scattered: Floats, patch: FacetGeometry, sound_speed: Floats) -> PulseResponse:
+        """As `Component.pulses`: differentiated, and a mean over the facet."""
         count, zero = len(incident), np.zeros(len(incident))
         corners = dot(patch.corners, (incident - scattered)[:, None, :]) / sound_speed[:, None]
-        return Pulses(np.ones(count, bool), corners, zero, zero, zero, zero, zero)
+        return PulseResponse(np.ones(count, bool), corners, zero, zero, zero, zero, zero)
 
     def polarity(self, mesh: Mesh) -> Floats:
         """All alike: the amplitude has the sign."""
         return np.ones(len(mesh.faces))
 
-    def spread(self, incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Floats:
+    def spread(self, incident: Floats, scattered: Floats, patch: FacetGeometry, sound_speed: Floats) -> Floats:
         """Variance (...) of the delays over the facet in s2."""
         return over_facet(incident, scattered, patch, sound_speed)
 
 
-def over_facet(incident: Floats, scattered: Floats, patch: Patches, sound_speed: Floats) -> Floats:
+def over_facet(incident: Floats, scattered: Floats, patch: FacetGeometry, sound_speed: Floats) -> Floats:
     """Variance (...) of the delays over facets in s2: a twelfth of the sum of squares of those of the corners."""
     late = dot(patch.corners, (incident - scattered)[..., None, :]) / sound_speed[..., None]
     return np.asarray(dot(late, late) / 12.0)
 
 
 def size_at(
-    parts: tuple[Part, ...], incident: Floats, scattered: Floats, patch: Patches, frequency: float, sound_speed: Floats
+    parts: tuple[Component, ...],
+    incident: Floats,
+    scattered: Floats,
+    patch: FacetGeometry,
+    frequency: float,
+    sound_speed: Floats,
 ) -> Floats:
     """|f| (path,) in m of facets at a frequency (Hz): powers of the parts summed.
 

@@ -8,14 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints
-from sonarsynth.description.byte_bounded_cache import kept
+from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.geometry.curvature import curvature_radius
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.randomness import stream
 
 
 @dataclass(frozen=True, eq=False)
-class Patches:
+class FacetGeometry:
     """Facets, one a path, in the frame of their body; the directions that go with them are in that frame too."""
 
     normal: Floats  # (..., xyz)
@@ -24,17 +24,17 @@ class Patches:
     corners: Floats  # (..., 3, xyz) m from the middle of the facet
     spot: Floats  # (..., xyz) m from the middle: a point of the facet drawn once
 
-    def select(self, rows: Ints) -> Patches:
+    def select(self, rows: Ints) -> FacetGeometry:
         """The facets picked by indices."""
-        return Patches(**{name: value[rows] for name, value in vars(self).items()})
+        return FacetGeometry(**{name: value[rows] for name, value in vars(self).items()})
 
-    def over(self) -> Patches:
+    def over(self) -> FacetGeometry:
         """With an axis after the first, for the directions in which each facet is seen."""
-        return Patches(**{name: value[:, None] for name, value in vars(self).items()})
+        return FacetGeometry(**{name: value[:, None] for name, value in vars(self).items()})
 
 
-@kept(32)
-def patches(mesh: Mesh, whole: bool = True) -> Patches:
+@byte_bounded_cache(32)
+def patches(mesh: Mesh, whole: bool = True) -> FacetGeometry:
     """All facets (facet, ...) of a mesh. What is drawn is the same for every mesh of this content.
 
     Not whole: for laws that need only normals and areas, the rest is 0.
@@ -44,14 +44,14 @@ def patches(mesh: Mesh, whole: bool = True) -> Patches:
         none = np.zeros((1, 3, 3))
         corners, spot = np.broadcast_to(none, (count, 3, 3)), np.broadcast_to(none[0, 0], (count, 3))
         zero = np.broadcast_to(none[0, 0, 0], count)
-        return Patches(mesh.normal, mesh.area, zero.astype(bool), corners, spot)
+        return FacetGeometry(mesh.normal, mesh.area, zero.astype(bool), corners, spot)
     corners = mesh.corners - mesh.centroid[:, None, :]
     share = stream(0, "spot", mesh.digest).dirichlet(np.ones(3), count)  # even over the triangle
     spot = np.einsum("fc,fcx->fx", share, corners)
-    return Patches(mesh.normal, mesh.area, np.isfinite(curvature_radius(mesh)), corners, spot)
+    return FacetGeometry(mesh.normal, mesh.area, np.isfinite(curvature_radius(mesh)), corners, spot)
 
 
-class Pulses(NamedTuple):
+class PulseResponse(NamedTuple):
     """What facets do to a pulse beside its amplitude, a row a path; columns as in `products.Arrivals`."""
 
     coherent: Bools  # (path,)
@@ -63,18 +63,18 @@ class Pulses(NamedTuple):
     blur: Floats  # (path,) s: what roughness takes from a coherent echo
 
     @staticmethod
-    def plain(count: int) -> Pulses:
+    def plain(count: int) -> PulseResponse:
         """Nothing at all: the pulse is repeated."""
         zero = np.zeros(count)
-        return Pulses(np.zeros(count, bool), np.zeros((count, 3)), zero, zero, zero, zero, zero)
+        return PulseResponse(np.zeros(count, bool), np.zeros((count, 3)), zero, zero, zero, zero, zero)
 
-    def select(self, rows: Bools | Ints) -> Pulses:
+    def select(self, rows: Bools | Ints) -> PulseResponse:
         """The rows picked by a mask or by indices."""
         columns: Any = (value[rows] for value in self)
-        return Pulses(*columns)
+        return PulseResponse(*columns)
 
     @staticmethod
-    def join(parts: list[Pulses]) -> Pulses:
+    def join(parts: list[PulseResponse]) -> PulseResponse:
         """Rows of all, in order."""
         columns: Any = zip(*parts, strict=True)
-        return Pulses(*(np.concatenate(column) for column in columns))
+        return PulseResponse(*(np.concatenate(column) for column in columns))

@@ -11,7 +11,7 @@ from sonarsynth.conventions import Floats, Metres
 from sonarsynth.description import description
 from sonarsynth.equations.scattering.lobes import lit_and_seen
 from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.scattering.components import Part, Plain
+from sonarsynth.scattering.components import Component, Lobe
 from sonarsynth.scattering.law_validity import COARSE, Scatterer, facets_note
 
 
@@ -24,9 +24,9 @@ class Isotropic:
     """Scattering amplitude of a facet (m): a target strength of 20 log10 of it."""
 
     @property
-    def parts(self) -> tuple[Part, ...]:
+    def parts(self) -> tuple[Component, ...]:
         """Of an echo: one, in the shape of the snap."""
-        return (Plain(self),)
+        return (Lobe(self),)
 
     @property
     def coherent(self) -> bool:
@@ -50,7 +50,7 @@ class Isotropic:
     def amplitude(
         self, incident: Floats, scattered: Floats, normal: Floats, area: Floats, beyond: bool = False
     ) -> Floats:
-        """Far-field scattering amplitude (...) in m, directions in and away; `beyond`: as in `parts.Plain`."""
+        """Far-field scattering amplitude (...) in m, directions in and away; `beyond`: as in `parts.Lobe`."""
         return np.where(lit_and_seen(incident, scattered, normal, beyond), self.strength, 0.0)
 
     def polarity(self, mesh: Mesh) -> Floats:

@@ -12,7 +12,7 @@ from sonarsynth.description import description
 from sonarsynth.equations.scattering.kirchhoff_integral import shadow_taper
 from sonarsynth.equations.scattering.lobes import lit_and_seen
 from sonarsynth.equations.scattering.roughness import incoherent_power, roughness_parameter
-from sonarsynth.scattering.components import Part, Rough, Smooth
+from sonarsynth.scattering.components import CoherentKirchhoff, Component, DiffuseKirchhoff
 from sonarsynth.scattering.kirchhoff_surface import PartlyReflecting, reflection
 from sonarsynth.scattering.law_notes import concave_note
 from sonarsynth.scattering.law_validity import NEAR, Scatterer, aside_note, lit_half, size_note, slopes_note
@@ -57,10 +57,13 @@ class Kirchhoff:
     """In frames, shapes are meshed as finely as makes the expected error of the echo this (0.05: 0.4 dB)."""
 
     @property
-    def parts(self) -> tuple[Part, ...]:
+    def parts(self) -> tuple[Component, ...]:
         """Of an echo: the coherent one, and what a rough or diffuse surface scatters."""
         rough = self.roughness > 0 or self.diffuse > 0
-        return (*((Smooth(self),) if self.diffuse < 1 else ()), *((Rough(self),) if rough else ()))
+        return (
+            *((CoherentKirchhoff(self),) if self.diffuse < 1 else ()),
+            *((DiffuseKirchhoff(self),) if rough else ()),
+        )
 
     @property
     def coherent(self) -> bool:

@@ -12,7 +12,7 @@ from sonarsynth.conventions import Floats, Number, Radians
 from sonarsynth.description import description
 from sonarsynth.equations.scattering.lobes import lobe_amplitude, slope_of_width
 from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.scattering.components import Part, Plain
+from sonarsynth.scattering.components import Component, Lobe
 from sonarsynth.scattering.law_validity import (
     COARSE,
     Scatterer,
@@ -57,9 +57,9 @@ class MirrorLobe:
         return value
 
     @property
-    def parts(self) -> tuple[Part, ...]:
+    def parts(self) -> tuple[Component, ...]:
         """Of an echo: one, in the shape of the snap."""
-        return (Plain(self),)
+        return (Lobe(self),)
 
     @property
     def coherent(self) -> bool:
@@ -84,7 +84,7 @@ class MirrorLobe:
     def amplitude(
         self, incident: Floats, scattered: Floats, normal: Floats, area: Floats, beyond: bool = False
     ) -> Floats:
-        """Far-field scattering amplitude (...) in m, directions in and away; `beyond`: as in `parts.Plain`."""
+        """Far-field scattering amplitude (...) in m, directions in and away; `beyond`: as in `parts.Lobe`."""
         slope = float(slope_of_width(self.width))
         return lobe_amplitude(incident, scattered, normal, area, slope, self.reflectivity**2, self.diffuse, beyond)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.description.byte_bounded_cache import kept
+from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.randomness import stream
 
@@ -19,7 +19,7 @@ def random_polarity(mesh: Mesh) -> Floats:
     return _signs(mesh.digest, len(mesh.faces))
 
 
-@kept(16)
+@byte_bounded_cache(16)
 def _signs(digest: str, facets: int) -> Floats:
     signs = stream(0, "polarity", digest).choice([-1.0, 1.0], facets)
     signs.setflags(write=False)

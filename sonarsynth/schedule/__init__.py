@@ -8,15 +8,15 @@ from dataclasses import asdict, fields, replace
 from typing import Final
 
 from sonarsynth import store
-from sonarsynth.conventions import size
+from sonarsynth.conventions import format_bytes
 from sonarsynth.description.memory import free_bytes
 from sonarsynth.planning import PRODUCTS, Plan, choices_from, chosen_products, plan
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.reading import Source
 from sonarsynth.schedule.build_log import append_lines, read_lines, write_lines
-from sonarsynth.schedule.build_report import BuildReport, Course, Progress
+from sonarsynth.schedule.build_report import BuildProgress, BuildReport, Progress
 from sonarsynth.schedule.disk_space import Room, TooLarge, check_space, told_when_full
-from sonarsynth.schedule.making import job_of, make_shards, seen_by, usable_cores
+from sonarsynth.schedule.making import job_of, make_shards, reachable_by_workers, usable_cores
 from sonarsynth.schedule.predicting import Prediction, predict
 from sonarsynth.schedule.tasks import Failure
 from sonarsynth.store import Damage, Folder, Mismatch, cards, provenance
@@ -79,7 +79,7 @@ def build(
     made = what if isinstance(what, Plan) else plan(what, chosen_products(products))
     _check(workers, scheduler, frame_timeout, worker_memory, insecure)
     _check_memory(made, scheduler, workers, worker_memory, agreed)
-    path = seen_by(store.absolute(path), workers)
+    path = reachable_by_workers(store.absolute(path), workers)
     chosen = range(made.recipe.frames) if frames is None else sorted(set(frames))
     if not path.exists() and not agreed:
         check_space(path, _room(made, len(chosen)))
@@ -100,7 +100,7 @@ def build(
         report.there = sum(frame not in lacking and frame not in left for frame in chosen)
         report.failures = [earlier[frame] for frame in sorted(left)]
         _tidy(path, lacking, earlier, restart)
-        course = Course(path, report, len(lacking), progress, announce)
+        course = BuildProgress(path, report, len(lacking), progress, announce)
         with course.logged(made), _dashboard(dashboard):
             job = job_of(path, made, name, frame_timeout)
             make_shards(
@@ -186,7 +186,8 @@ def _check_memory(
     each = free_bytes() / workers if worker_memory is None else worker_memory
     if scheduler is None and not agreed and made.memory_bytes > each:
         raise TooLarge(
-            f"a frame takes up to {size(made.memory_bytes)} of memory, and each of {workers} workers has {size(each)}: "
+            f"a frame takes up to {format_bytes(made.memory_bytes)} of memory, and each of {workers} workers has "
+            f"{format_bytes(each)}: "
             "fewer --workers, or more --worker-memory (--yes builds all the same)"
         )
 

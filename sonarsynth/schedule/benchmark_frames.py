@@ -19,9 +19,9 @@ import numpy as np
 
 from sonarsynth import store
 from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.pipeline import Values, beamform_frame, counted, range_frame, trace_at, truth_at
-from sonarsynth.pipeline.synthesis import hear_part
-from sonarsynth.planning import Plan, check_unseen
+from sonarsynth.pipeline import Values, beamform_frame, range_frame, stage_timer, trace_at, truth_at
+from sonarsynth.pipeline.synthesis import subarray_signals
+from sonarsynth.planning import Plan, check_unsampled_frame
 from sonarsynth.receiver.subarrays import subarrays
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.store.layout import layout_of
@@ -183,10 +183,10 @@ def _make(plan: Plan, index: int, every: int = 1) -> _Made:
     Where the array is cut into more than PARTS parts, it is heard as one and by so many of these.
     """
     began, before = time.perf_counter(), time.thread_time()
-    with counted() as cpu:
+    with stage_timer() as cpu:
         plan = plan.at(index)
         frame = plan.recipe.frame(index)[1]
-        check_unseen(plan, frame)
+        check_unsampled_frame(plan, frame)
         if every > 1:
             frame = _thinned(frame, every)
         parts = plan.choices.subarrays
@@ -197,7 +197,7 @@ def _make(plan: Plan, index: int, every: int = 1) -> _Made:
         some = every_part[:: -(-len(every_part) // PARTS)]
         start = time.thread_time()
         for part in some:
-            hear_part(plan, frame, part)
+            subarray_signals(plan, frame, part)
         cpu["synthesise"] += (time.thread_time() - start) * len(every_part) / len(some)
     return _Made(index, values, dict(cpu), time.perf_counter() - began, time.thread_time() - before, _others())
 

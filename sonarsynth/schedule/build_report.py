@@ -69,7 +69,7 @@ class BuildReport:
         return {**asdict(self), "ok": self.ok}
 
 
-class Course:
+class BuildProgress:
     """What is done as shards are written: counted, run times and failures put beside the store, progress told."""
 
     def __init__(

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final, NamedTuple
 
-from sonarsynth.conventions import size
+from sonarsynth.conventions import format_bytes
 from sonarsynth.store import Folder, Remote
 
 LARGE: Final = 1e12
@@ -51,12 +51,12 @@ def check_space(path: Folder, needed: Room) -> None:
     """Raise TooLarge where a build that needs so much should not start unasked."""
     free = free_room(path)
     if needed.bytes > free.bytes:
-        line = f"needs up to {size(needed.bytes)} and {size(free.bytes)} are free there"
+        line = f"needs up to {format_bytes(needed.bytes)} and {format_bytes(free.bytes)} are free there"
     elif needed.files > free.files:
         line = f"needs up to {needed.files:.0f} files and folders and {free.files:.0f} more fit there"
     elif needed.bytes > LARGE:
-        known = f" ({size(free.bytes)} are free there)" if math.isfinite(free.bytes) else ""
-        line = f"needs up to {size(needed.bytes)}{known}"
+        known = f" ({format_bytes(free.bytes)} are free there)" if math.isfinite(free.bytes) else ""
+        line = f"needs up to {format_bytes(needed.bytes)}{known}"
     else:
         return
     raise TooLarge(f"{path}: {line}: --yes builds all the same")
@@ -71,7 +71,7 @@ def told_when_full(path: Folder, needed: Callable[[], Room]) -> Iterator[None]:
         if error.errno not in FULL or isinstance(path, Remote):
             raise
         more, free = needed(), free_room(path)
-        lacking = f"up to {size(more.bytes)} more are needed, {size(free.bytes)} are free"
+        lacking = f"up to {format_bytes(more.bytes)} more are needed, {format_bytes(free.bytes)} are free"
         if more.files > free.files:
             lacking = f"up to {more.files:.0f} more files and folders are needed, {free.files:.0f} more fit"
         line = f"{FULL[error.errno]}: {lacking}; with room made, the same command goes on"

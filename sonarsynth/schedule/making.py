@@ -21,7 +21,7 @@ BLOCK_BYTES: Final = 64e6
 """Signals that the frames of a task hold at most."""
 
 
-def seen_by(path: Folder, workers: int | None) -> Folder:
+def reachable_by_workers(path: Folder, workers: int | None) -> Folder:
     """The place itself; raises Unreachable where worker processes would not see it."""
     if isinstance(path, Remote) and not path.shared and workers != 0:
         raise Unreachable(f"{path}: is of this process alone: give workers=0 (--workers 0)")

@@ -12,7 +12,7 @@ from sonarsynth.description import FieldError
 from sonarsynth.planning import Plan, choices_from, plan
 from sonarsynth.schedule.build_log import append_lines
 from sonarsynth.schedule.build_report import Progress
-from sonarsynth.schedule.making import job_of, make_shards, seen_by
+from sonarsynth.schedule.making import job_of, make_shards, reachable_by_workers
 from sonarsynth.schedule.tasks import Failure, Written
 from sonarsynth.store import Findings, Folder, Mismatch, Problem, Remote, cards, provenance
 from sonarsynth.store.checking.examining import shard_of
@@ -79,7 +79,7 @@ def repair(
         from sonarsynth.schedule.connecting import check_address
 
         check_address(scheduler, insecure)
-    path = seen_by(store.absolute(path), workers)
+    path = reachable_by_workers(store.absolute(path), workers)
     store.must_be_store(path)
     with store.lock(path) as name:
         if not isinstance(path, Remote):

@@ -116,7 +116,7 @@ def range_(job: Job, heard: Sequence[Step]) -> list[Step]:
     return [_stage(job, "range", before, lambda step: _values(job, step.frame, *step.made)) for before in heard]
 
 
-def _values(job: Job, frame: int, traced: pipeline.Traced, heard: pipeline.Heard) -> pipeline.Values:
+def _values(job: Job, frame: int, traced: pipeline.TracedFrame, heard: pipeline.BeamformedFrame) -> pipeline.Values:
     made = plan_of(job)
     return layout_of(made).check(pipeline.range_frame(made, frame, traced, heard))
 
@@ -199,7 +199,7 @@ def _stage(job: Job, name: str, before: Step, work: Callable[[Step], Any]) -> St
     if before.failure is not None:
         return before
     wall, cpu = time.perf_counter(), time.thread_time()
-    with pipeline.counted() as parts:
+    with pipeline.stage_timer() as parts:
         try:
             with worker_status.noted(job.path, before.frame, name, _limit(job, name)):
                 made, failure = work(before), None

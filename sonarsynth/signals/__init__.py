@@ -13,13 +13,13 @@ from sonarsynth.signals.auto_synthesis import AutoSynthesis
 from sonarsynth.signals.direct_sum import DirectSum
 from sonarsynth.signals.electronics import add_noise, convert
 from sonarsynth.signals.filtered_pulse import pulse_support
-from sonarsynth.signals.gridded_synthesis import KernelDeposit
+from sonarsynth.signals.gridded_synthesis import GriddedSynthesis
 from sonarsynth.state import Snap
 
 __all__ = [
     "AutoSynthesis",
     "DirectSum",
-    "KernelDeposit",
+    "GriddedSynthesis",
     "SignalSynthesis",
     "Synthesis",
     "add_noise",
@@ -50,5 +50,5 @@ class SignalSynthesis(Protocol):
         ...
 
 
-Synthesis = Annotated[AutoSynthesis | KernelDeposit | DirectSum, BY_KIND]
+Synthesis = Annotated[AutoSynthesis | GriddedSynthesis | DirectSum, BY_KIND]
 """The methods of synthesis, by `kind`."""

@@ -15,7 +15,7 @@ from sonarsynth.receiver import Elements
 from sonarsynth.signals.filtered_pulse import snap_gains
 from sonarsynth.state import Snap
 
-MOST_STRETCH = 0.1
+MAX_DOPPLER = 0.1
 """Doppler of 0.1 is a closing speed of 75 m/s: more is an error."""
 
 LONGEST_BLUR = 1.0
@@ -35,7 +35,7 @@ FINITE = (
 
 
 @dataclass(frozen=True, eq=False)
-class Fronts:
+class ArrayPaths:
     """Arrivals as synthesis takes them: curvature for radius, and the level of the snap inside the amplitude."""
 
     delay: Floats  # (path,) s at the array centre, of the middle of a facet's corners
@@ -68,15 +68,17 @@ class Fronts:
         """Number of paths."""
         return self.delay.size
 
-    def select(self, keep: Ints) -> Fronts:
+    def select(self, keep: Ints) -> ArrayPaths:
         """The paths of these indices."""
         rows: dict[str, Any] = {
             name: value[keep] if isinstance(value, np.ndarray) else value for name, value in vars(self).items()
         }
-        return Fronts(**rows)
+        return ArrayPaths(**rows)
 
 
-def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements, attenuation: float = 0.0) -> Fronts:
+def array_paths(
+    arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements, attenuation: float = 0.0
+) -> ArrayPaths:
     """The wavefronts of arrivals, in water that absorbs `attenuation` (dB/m) at the band centre; raises ValueError
     where one cannot be synthesised."""
     count = arrivals.delay.size
@@ -102,7 +104,7 @@ def fronts(arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements, atte
     gain = snap_gains(snaps)
     sign, phase = folded(arrivals.phase)
     delay, corners = _centred(arrivals)
-    return Fronts(
+    return ArrayPaths(
         delay=delay,
         direction=arrivals.direction,
         curvature=1.0 / arrivals.radius,
@@ -143,8 +145,8 @@ def _check_shapes(arrivals: Arrivals) -> None:
     for wrong, what in (
         (arrivals.blur < 0.0, "a negative blur"),
         (
-            np.abs(arrivals.stretch) + np.abs(arrivals.stretch_terms).sum(axis=1) >= MOST_STRETCH,
-            f"a stretch that is not within +-{MOST_STRETCH:g}",
+            np.abs(arrivals.stretch) + np.abs(arrivals.stretch_terms).sum(axis=1) >= MAX_DOPPLER,
+            f"a stretch that is not within +-{MAX_DOPPLER:g}",
         ),
         (np.abs(arrivals.corners.T) >= LONGEST_CORNER, f"corners that are not within {LONGEST_CORNER:g} s"),
         ((arrivals.rough_share < 0.0) | (arrivals.rough_share > 1.0), "a rough_share that is not from 0 to 1"),
@@ -167,7 +169,7 @@ def folded(phase: Floats) -> tuple[Floats, Floats]:
     return sign, np.where(np.abs(rest) > 2e-16 * (1.0 + np.abs(phase)), rest, 0.0)
 
 
-def towards(front: Fronts, points: Floats) -> tuple[Floats, Floats]:
+def towards(front: ArrayPaths, points: Floats) -> tuple[Floats, Floats]:
     """Unit vectors u = (R d - q)/|R d - q| (path, point, xyz) and |R d - q|/R (path, point) at points q (point,
     xyz)."""
     v = front.direction[:, None, :] - front.curvature[:, None, None] * points
@@ -180,14 +182,14 @@ BENT = 4
 """The first of the terms that turn the wavefront: a linear one is the motion of the array, which turns no wave."""
 
 
-def tilt(front: Fronts, gradient: Floats) -> Floats:
+def tilt(front: ArrayPaths, gradient: Floats) -> Floats:
     """What delay terms turn the wavefront by, (point, xyz, path), beside the sphere: -c times their gradient (xyz,
     point, term)."""
     slope = gradient[:, :, BENT:] @ front.delay_terms[:, BENT:].T
     return np.asarray(-front.sound_speed * slope.swapaxes(0, 1))
 
 
-def faced(front: Fronts, points: Floats) -> Floats:
+def faced(front: ArrayPaths, points: Floats) -> Floats:
     """Slownesses of the wavefronts at points (point, xyz), times the speed of sound at the centre, (path, point, xyz):
     what element faces hear, and unit vectors of `towards` where rays are straight."""
     u, _ = towards(front, points)
@@ -211,7 +213,7 @@ def over(terms: Floats, points: Floats, aperture: float) -> Floats:
     return np.asarray(terms @ aperture_terms(points, aperture, terms.shape[1]).T)
 
 
-def delay_and_gain(front: Fronts, points: Floats) -> tuple[Floats, Floats]:
+def delay_and_gain(front: ArrayPaths, points: Floats) -> tuple[Floats, Floats]:
     """Delay (s) after the array centre, and gain over it at the band centre, (path, point) each."""
     _, n = towards(front, points)
     square = np.einsum("pi,pi->p", points, points)
@@ -232,18 +234,18 @@ def lost(level: Floats) -> Floats:
     return np.asarray(np.exp(-NEPER * level))
 
 
-def reach(front: Fronts) -> Floats:
+def reach(front: ArrayPaths) -> Floats:
     """Bound (path,) on how long (s) before or after the array centre a wavefront meets any hydrophone."""
     return np.asarray(front.aperture / front.sound_speed + np.abs(front.delay_terms).sum(axis=1))
 
 
-def reference_of(front: Fronts, middle: Floats, turn_terms: Floats, spread_terms: Floats) -> Fronts:
+def reference_of(front: ArrayPaths, middle: Floats, turn_terms: Floats, spread_terms: Floats) -> ArrayPaths:
     """The front that a tile of paths is steered to, from the middle (column,) of their directions, curvatures,
     absorption and delay terms, and the change over the aperture that it takes."""
     norm = np.linalg.norm(middle[:3])
     direction = middle[:3] if norm < 0.1 else middle[:3] / norm
     terms = front.delay_terms.shape[1]
-    return Fronts(
+    return ArrayPaths(
         delay=np.zeros(1),
         direction=direction[None] if norm >= 0.1 else np.array([[1.0, 0.0, 0.0]]),
         curvature=middle[3:4],

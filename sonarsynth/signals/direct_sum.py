@@ -13,7 +13,7 @@ from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.receiver import Elements, Sonar
-from sonarsynth.signals.array_paths import Fronts, delay_and_gain, faced, fronts, lost, reach
+from sonarsynth.signals.array_paths import ArrayPaths, array_paths, delay_and_gain, faced, lost, reach
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.signals.pulse_variation import bend, changed
 from sonarsynth.signals.segments import fast_length, layout
@@ -35,7 +35,9 @@ def attenuation(absorption: Callable[[Floats], Floats] | None, centre: float) ->
     return 0.0 if absorption is None else max(float(absorption(np.array([centre]))[0]), 0.0)
 
 
-def exact_spectra(front: Fronts, elements: Elements, frequency: Floats, relative: Floats, origin: float) -> np.ndarray:
+def exact_spectra(
+    front: ArrayPaths, elements: Elements, frequency: Floats, relative: Floats, origin: float
+) -> np.ndarray:
     """Transfer functions (sensor, bin) from the snap at 1 m to each hydrophone, delays counted from `origin` (s); but
     for Doppler, which is the snap's."""
     facets = bool(front.coherent.any() or front.corners.any() or front.rough_share.any())
@@ -100,7 +102,7 @@ def exact_signals(
 ) -> tuple[Floats, Signals]:
     """The signals in float64 (sensor, sample), and as the stage gives them."""
     fs = sonar.sampling_frequency
-    front = fronts(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
+    front = array_paths(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
     plan = layout(arrivals, front, snaps, elements, sonar, start, samples)
     pressure = np.zeros((elements.count, samples))
     waveforms = [s.waveform for s in snaps]

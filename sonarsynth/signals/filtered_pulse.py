@@ -30,7 +30,7 @@ LONGEST_TAIL = 0.02
 MOST_SAMPLES = 1 << 23
 """Samples of a pulse whose tails are looked at."""
 
-FEET = float(np.sqrt(-2.0 * np.log(filters.SUPPORT_TOLERANCE)))
+PULSE_FEET = float(np.sqrt(-2.0 * np.log(filters.SUPPORT_TOLERANCE)))
 """A Gaussian blur makes the support of a pulse longer at both ends by so many of its standard deviations."""
 
 

@@ -14,16 +14,16 @@ from sonarsynth.conventions import Floats, Number
 from sonarsynth.description import description
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.receiver import Elements, Sonar, stop_frequency
-from sonarsynth.signals.array_paths import fronts
+from sonarsynth.signals.array_paths import array_paths
 from sonarsynth.signals.direct_sum import attenuation
 from sonarsynth.signals.gridded.bins import bins_of
-from sonarsynth.signals.gridded.deposit import add_stretch
-from sonarsynth.signals.segments import Stretch, layout
+from sonarsynth.signals.gridded.deposit import add_segment
+from sonarsynth.signals.segments import Segment, layout
 from sonarsynth.state import Snap
 
 
 @description
-class KernelDeposit:
+class GriddedSynthesis:
     """Synthesis by a Kaiser-Bessel kernel, Chebyshev nodes over the aperture and polynomial directivity.
 
     Measured: 508 hydrophones with faces, 2000 echoes of a body of 1.6 m and the direct snap, absorption; largest error
@@ -96,14 +96,14 @@ class KernelDeposit:
     ) -> tuple[npt.NDArray[Any], int]:
         """Pressure (sensor, sample) in the precision of the method, and the number of arrivals that the window cuts."""
         fs = sonar.sampling_frequency
-        front = fronts(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
+        front = array_paths(arrivals, snaps, elements, attenuation(absorption, sonar.band.centre))
         plan = layout(arrivals, front, snaps, elements, sonar, start, samples)
         out = np.zeros((elements.count, samples), self.precision)
         method = (self.width, self.oversampling, self.precision, self.tolerance)
-        done: list[Stretch] = []
+        done: list[Segment] = []
         for part in plan.stretches:
             paths, bins = bins_of(part, front.select(part.paths), sonar, absorption, self.tolerance)
-            add_stretch(
+            add_segment(
                 out,
                 part.first,
                 part.samples,

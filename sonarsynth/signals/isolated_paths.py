@@ -13,7 +13,7 @@ from scipy.fft import rfft
 from sonarsynth.conventions import Floats
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import Elements, PositionTable, Sonar, elements
-from sonarsynth.signals.array_paths import fronts, reach
+from sonarsynth.signals.array_paths import array_paths, reach
 from sonarsynth.signals.filtered_pulse import (
     at_longest,
     pulse_spectrum,
@@ -75,7 +75,7 @@ def measured_levels(
         return np.zeros(0)
     hydrophone, none = ideal_hydrophone(), np.empty((count, 0))
     paths = replace(paths, phase_terms=none, blur_terms=none, stretch_terms=none)  # that of the centre is heard
-    front = fronts(paths, snaps, hydrophone)
+    front = array_paths(paths, snaps, hydrophone)
     before, after = layout(paths, front, snaps, hydrophone, sonar, 0.0, 1).support + reach(front)
     lead = int(np.ceil(before.max() * fs)) + GUARD
     slot = fast_length(lead + int(np.ceil(after.max() * fs)) + GUARD)

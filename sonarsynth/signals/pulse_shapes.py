@@ -21,7 +21,7 @@ from scipy.interpolate import CubicSpline
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.bubble.snap_pressure import ComplexArray
 from sonarsynth.equations.scattering.facet_pulses import mean_powers, rough_factor
-from sonarsynth.signals.array_paths import Fronts
+from sonarsynth.signals.array_paths import ArrayPaths
 from sonarsynth.signals.gridded.nodes import Axis, chebyshev, interpolation, rounded_up
 
 SAMPLES = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 20, 24, 32, 48, 64, 96, 128)
@@ -101,7 +101,7 @@ def main_modes(weight: Floats, loudness: Floats) -> tuple[Floats, tuple[float, .
 
 
 def shape_modes(
-    front: Fronts,
+    front: ArrayPaths,
     frequency: Floats,
     spectrum: ComplexArray,
     decay: Floats,
@@ -162,7 +162,7 @@ def _powers(
     return mean_powers(corners, scale, count).T[:, some], waves[some]
 
 
-def _softened(front: Fronts, frequency: Floats, decay: Floats, tolerance: float) -> tuple[Floats, Floats]:
+def _softened(front: ArrayPaths, frequency: Floats, decay: Floats, tolerance: float) -> tuple[Floats, Floats]:
     """What blur, absorption and rough facets leave at some frequencies (path, given), and their interpolation in the
     logarithm of frequency (given, bin). Degrees of a product add up."""
     low, high = float(frequency[0]), float(frequency[-1])

@@ -18,7 +18,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.bubble.snap_pressure import ComplexArray
-from sonarsynth.signals.array_paths import Fronts, over, terms_gradient
+from sonarsynth.signals.array_paths import ArrayPaths, over, terms_gradient
 
 MOST_POWERS = 8
 """Powers of spread that pulses may be expanded in."""
@@ -30,7 +30,7 @@ Change = tuple[int, int]
 """Power of spread, and 1 for the pulse a quarter of a period ahead."""
 
 
-class Changes(NamedTuple):
+class PulseVariation(NamedTuple):
     """What pulses of a stretch of time change by over the aperture, in its modes."""
 
     kinds: tuple[Change, ...]
@@ -38,42 +38,42 @@ class Changes(NamedTuple):
     rate: float  # 1/s2: what spread is counted in
 
 
-UNCHANGING = Changes((), np.zeros((0, 0, 0)), 0.0)
+UNCHANGING = PulseVariation((), np.zeros((0, 0, 0)), 0.0)
 
 
-def widest_turn(front: Fronts) -> Floats:
+def widest_turn(front: ArrayPaths) -> Floats:
     """Bound (path,) on |turn| (rad) over the aperture."""
     return np.asarray(np.abs(front.turn_terms).sum(axis=1))
 
 
-def widest_spread(front: Fronts) -> Floats:
+def widest_spread(front: ArrayPaths) -> Floats:
     """Bound (path,) on |spread| (s2) over the aperture."""
     return np.asarray(np.abs(front.spread_terms).sum(axis=1))
 
 
-def widest_bend(front: Fronts) -> Floats:
+def widest_bend(front: ArrayPaths) -> Floats:
     """Bound (path,) on |bend| over the aperture."""
     return np.asarray(np.abs(front.bend_terms).sum(axis=1))
 
 
-def bend(front: Fronts, points: Floats) -> Floats:
+def bend(front: ArrayPaths, points: Floats) -> Floats:
     """Doppler (path, point) at points (point, xyz), over that at the centre."""
     return over(front.bend_terms, points, front.aperture)
 
 
-def turn_and_spread(front: Fronts, points: Floats) -> tuple[Floats, Floats]:
+def turn_and_spread(front: ArrayPaths, points: Floats) -> tuple[Floats, Floats]:
     """Turn (rad) and spread (s2), (path, point) each, at points (point, xyz)."""
     return over(front.turn_terms, points, front.aperture), over(front.spread_terms, points, front.aperture)
 
 
-def changed(front: Fronts, points: Floats, frequency: Floats) -> ComplexArray:
+def changed(front: ArrayPaths, points: Floats, frequency: Floats) -> ComplexArray:
     """Factor (point, bin) on the pulse of one path at points (point, xyz), over that at the centre."""
     turn, spread = turn_and_spread(front, points)
     soft = 0.5 * np.multiply.outer(spread[0], (2.0 * np.pi * frequency) ** 2)
     return np.asarray(np.exp(1j * turn[0][:, None] - soft))
 
 
-def aperture_gradient(front: Fronts, points: Floats) -> Floats:
+def aperture_gradient(front: ArrayPaths, points: Floats) -> Floats:
     """Gradient (xyz, point, term) of the aperture terms at points (point, xyz); empty where no front has such terms."""
     every = front.delay_terms, front.turn_terms, front.spread_terms, front.bend_terms
     widest = max(terms.shape[1] for terms in every)
@@ -82,7 +82,7 @@ def aperture_gradient(front: Fronts, points: Floats) -> Floats:
     return terms_gradient(points, front.aperture, widest)
 
 
-def slopes(front: Fronts, gradient: Floats, lowest: float, highest: float) -> Floats:
+def slopes(front: ArrayPaths, gradient: Floats, lowest: float, highest: float) -> Floats:
     """Bounds (xyz, path) in rad/m on how fast pulses change along each axis, as a phase at the highest frequency.
 
     gradient (xyz, point, term): of the aperture terms, where it is looked at. A phase is as steep at all frequencies:
@@ -104,7 +104,7 @@ def slopes(front: Fronts, gradient: Floats, lowest: float, highest: float) -> Fl
     return total
 
 
-def with_changes(front: Fronts) -> Fronts:
+def with_changes(front: ArrayPaths) -> ArrayPaths:
     """Paths, and after them the loudest of those that change, as they are elsewhere on the aperture: more and less
     blurred, more and less stretched, and as loud as what turns, a quarter of a period ahead."""
     turn, spread, longer = widest_turn(front), widest_spread(front), widest_bend(front)
@@ -132,7 +132,7 @@ def _loudest(loud: Floats) -> Ints:
     return np.asarray(order[loud[order] > 0.0])
 
 
-def changes(front: Fronts, frequency: Floats, spectrum: ComplexArray) -> Changes:
+def changes(front: ArrayPaths, frequency: Floats, spectrum: ComplexArray) -> PulseVariation:
     """What the pulses of paths change by, from the spectra (mode, bin) of modes that hold it (`with_changes`)."""
     turns, spreads = bool(front.turn_terms.any()), bool(front.spread_terms.any())
     if not (turns or spreads):
@@ -146,7 +146,7 @@ def changes(front: Fronts, frequency: Floats, spectrum: ComplexArray) -> Changes
     for power, ahead in kinds:
         value = spectrum * (1j**ahead * (-exponent / rate) ** power / factorial(power))
         found.append(np.concatenate([value.real, value.imag], axis=1) @ both.T @ solve)
-    return Changes(tuple(kinds), np.array(found), rate)
+    return PulseVariation(tuple(kinds), np.array(found), rate)
 
 
 class Rest(NamedTuple):
@@ -160,7 +160,7 @@ class Rest(NamedTuple):
     paths: Ints  # (path,) those
 
 
-def rest(front: Fronts, paths: Ints, found: Changes, tolerance: float) -> Rest:
+def rest(front: ArrayPaths, paths: Ints, found: PulseVariation, tolerance: float) -> Rest:
     """Of the tile of these paths; changes that add less than `tolerance` are left out, to all together or to the
     loudest."""
     none = np.zeros(0)
@@ -178,7 +178,7 @@ def rest(front: Fronts, paths: Ints, found: Changes, tolerance: float) -> Rest:
     return Rest(turn, spread, which, share[which], bent, some)
 
 
-def _bent(front: Fronts, some: Ints) -> Floats:
+def _bent(front: ArrayPaths, some: Ints) -> Floats:
     """Bounds (path,) on what Doppler's change over the aperture adds to some paths."""
     size = np.linalg.norm(front.bends[some], axis=1) * np.abs(front.amplitude[some])
     return np.asarray(size * np.abs(front.bend_terms[some]).sum(axis=1))
@@ -190,7 +190,7 @@ def _counts(size: Floats, loud: Floats, tolerance: float) -> bool:
     return bool(max(mean, size.max(initial=0.0) / max(float(loud.max(initial=0.0)), 1e-300)) > tolerance)
 
 
-def pulses(front: Fronts, paths: Ints, over: Rest, found: Changes) -> tuple[Floats, Floats]:
+def pulses(front: ArrayPaths, paths: Ints, over: Rest, found: PulseVariation) -> tuple[Floats, Floats]:
     """Weights (pulse, mode) of the pulses of paths, with what some of them change by, and how loud (pulse,) each is."""
     weight, loud = [front.modes[paths]], [np.abs(front.amplitude[paths])]
     for change, size in zip(over.which, over.size, strict=True):
@@ -212,7 +212,7 @@ def _middle(terms: Floats, some: Ints) -> tuple[Floats, Floats]:
 
 
 def shares(
-    front: Fronts, reference: Fronts, which: Ints, bent: bool, found: Changes, points: Floats, dtype: str
+    front: ArrayPaths, reference: ArrayPaths, which: Ints, bent: bool, found: PulseVariation, points: Floats, dtype: str
 ) -> Floats:
     """How much there is of pulses and of each change that counts, (1 + some, point, path), beside the reference; the
     change of Doppler comes last, if it is `bent`."""

@@ -12,8 +12,8 @@ from sonarsynth.equations.noise.filters import SUPPORT_TOLERANCE
 from sonarsynth.equations.scattering.facet_pulses import rough_factor
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import Elements, Sonar, stop_frequency
-from sonarsynth.signals.array_paths import Fronts, delay_and_gain, reach
-from sonarsynth.signals.filtered_pulse import FEET, Reshaped, at_longest, silencing_blur, support_of
+from sonarsynth.signals.array_paths import ArrayPaths, delay_and_gain, reach
+from sonarsynth.signals.filtered_pulse import PULSE_FEET, Reshaped, at_longest, silencing_blur, support_of
 from sonarsynth.signals.pulse_variation import widest_spread
 from sonarsynth.sources.snap_pulses import Waveform
 from sonarsynth.state import Snap
@@ -24,7 +24,7 @@ kept."""
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class Segment:
     """Paths of one waveform whose pulses overlap in time, and the samples that hold them."""
 
     paths: Ints  # (path,) which
@@ -38,7 +38,7 @@ class Stretch:
 class Layout:
     """What of the arrivals is heard in the window."""
 
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[Segment, ...]
     heard: Bools  # (path,) some of the pulse is in the window at some hydrophone
     outside: int  # paths whose pulse is not wholly in the window at every hydrophone
     support: Floats  # (before or after, path) s: how far a pulse reaches from its arrival
@@ -54,7 +54,7 @@ def fast_length(samples: int) -> int:
 
 def layout(
     arrivals: Arrivals,
-    front: Fronts,
+    front: ArrayPaths,
     snaps: tuple[Snap, ...],
     elements: Elements,
     sonar: Sonar,
@@ -71,7 +71,7 @@ def layout(
     early, late = _extent(front, elements, before, after, start, start + (samples - 1) / fs)
     cut = ~silent & ((early < start) | (late > start + (samples - 1) / fs))
     heard = ~silent & (late > start) & (early < start + (samples - 1) / fs)
-    stretches: list[Stretch] = []
+    stretches: list[Segment] = []
     waveforms = [s.waveform for s in snaps]
     for waveform in dict.fromkeys(waveforms):
         same = np.array([w == waveform for w in waveforms])[arrivals.snap] & heard
@@ -80,11 +80,13 @@ def layout(
             for chosen in _runs(rows, early + before - plain[0], late - after + plain[1]):
                 first = int(np.floor((early[chosen].min() - start) * fs)) - 1
                 last = int(np.ceil((late[chosen].max() - start) * fs)) + 1
-                stretches.append(Stretch(chosen, waveform, coherent, first, fast_length(last - first + 1)))
+                stretches.append(Segment(chosen, waveform, coherent, first, fast_length(last - first + 1)))
     return Layout(tuple(stretches), heard, int(cut.sum()), support)
 
 
-def _supports(arrivals: Arrivals, front: Fronts, snaps: tuple[Snap, ...], sonar: Sonar) -> tuple[Floats, Floats, Bools]:
+def _supports(
+    arrivals: Arrivals, front: ArrayPaths, snaps: tuple[Snap, ...], sonar: Sonar
+) -> tuple[Floats, Floats, Bools]:
     """Support (before or after, path) of each pulse in s: in its plain shape or its slope's, and in its own; and which
     (path,) are silent, blurred or from a facet that is not rough."""
     if not front.count:
@@ -116,11 +118,11 @@ def _supports(arrivals: Arrivals, front: Fronts, snaps: tuple[Snap, ...], sonar:
         silent |= left <= SUPPORT_TOLERANCE
     a, b, c = front.corners.T
     wide = np.stack([-np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)])
-    return plain, support * (1.0 + np.abs(front.doppler)) + np.where(silent, 0.0, FEET * blur) + wide, silent
+    return plain, support * (1.0 + np.abs(front.doppler)) + np.where(silent, 0.0, PULSE_FEET * blur) + wide, silent
 
 
 def _extent(
-    front: Fronts, elements: Elements, before: Floats, after: Floats, start: float, stop: float
+    front: ArrayPaths, elements: Elements, before: Floats, after: Floats, start: float, stop: float
 ) -> tuple[Floats, Floats]:
     """When the pulse of each path begins at the first hydrophone and ends at the last: bounds, exact where they leave
     the window."""

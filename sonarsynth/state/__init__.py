@@ -9,7 +9,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry.motion import Track
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.sources.shrimp import SnapModel, SnappingShrimp
 from sonarsynth.sources.snap_pulses import Scales, Waveform, at_depth, waveform
 
@@ -38,15 +38,15 @@ class Snap:
 
 
 @dataclass(frozen=True, eq=False)
-class Moment:
+class WorldState:
     """Everything that is in the water at the instant of a frame."""
 
     time: float  # s since the start of the trajectory
-    bodies: tuple[Body, ...]
+    bodies: tuple[PlacedTarget, ...]
     snaps: tuple[Snap, ...]
 
 
-def place(shrimp: SnappingShrimp, bed: float) -> Floats:
+def source_position(shrimp: SnappingShrimp, bed: float) -> Floats:
     """Where a shrimp is (xyz) in m, over a bed at this depth (m)."""
     x, y, *z = shrimp.position
     return np.array([x, y, z[0] if z else shrimp.height - bed])
@@ -54,12 +54,12 @@ def place(shrimp: SnappingShrimp, bed: float) -> Floats:
 
 def model_of(shrimp: SnappingShrimp, bed: float) -> SnapModel:
     """The model of a shrimp's snaps, where it is."""
-    return at_depth(shrimp.snap, -float(place(shrimp, bed)[2]))
+    return at_depth(shrimp.snap, -float(source_position(shrimp, bed)[2]))
 
 
 def snaps_of(shrimp: SnappingShrimp, bed: float, scales: Scales) -> tuple[Snap, ...]:
     """The snaps of a shrimp, with the scales (snap,) that were drawn for them."""
-    position, model = place(shrimp, bed), model_of(shrimp, bed)
+    position, model = source_position(shrimp, bed), model_of(shrimp, bed)
     drawn = zip(shrimp.snap_times, scales.gain.tolist(), scales.width.tolist(), strict=True)
     return tuple(Snap(position, time, model, shrimp.source_level, gain, width) for time, gain, width in drawn)
 

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.description.byte_bounded_cache import kept
+from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.equations.scattering.facet_size import FIVE_PERCENT
 from sonarsynth.geometry.curvature import bend
 from sonarsynth.geometry.mesh import Mesh
@@ -103,7 +103,7 @@ def frame_mesh(shape: Shape, wavelength: float, error: float = FIVE_PERCENT) -> 
     return _fine(shape, file_stamp(shape), wavelength, error, True)[0]
 
 
-@kept(16)
+@byte_bounded_cache(16)
 def _fine(
     shape: Shape, stamp: tuple[int, int] | None, wavelength: float, error: float, in_frame: bool
 ) -> tuple[Mesh, str | None]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from sonarsynth.conventions import UNITS
 from sonarsynth.description import named_files
-from sonarsynth.description.byte_bounded_cache import kept
+from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.geometry.mesh import Mesh, read_only
 from sonarsynth.geometry.surfaces import MeshError, Surface, halve_longest_edges, split_long_edges
 from sonarsynth.targets.generated.generation import generate
@@ -32,7 +32,7 @@ def mesh_of(shape: Shape) -> Mesh:
     return _mesh_of(shape, file_stamp(shape))
 
 
-@kept(32)
+@byte_bounded_cache(32)
 def _mesh_of(shape: Shape, stamp: tuple[int, int] | None) -> Mesh:
     return refined_mesh(shape)
 
@@ -85,7 +85,7 @@ def _read(shape: MeshFile, edge: float, sagitta: float) -> tuple[Surface, tuple[
         raise MeshError(f"{shape.path}: {error}") from None
 
 
-@kept(4)
+@byte_bounded_cache(4)
 def _repaired(shape: MeshFile, stamp: tuple[int, int] | None) -> tuple[Surface, tuple[str, ...]]:
     """What a file holds, before any refinement, read once for all of them."""
     from scipy.spatial.transform import Rotation

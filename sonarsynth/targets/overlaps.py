@@ -10,7 +10,7 @@ from sonarsynth.casting.ray_casting import first_hit, occluded
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import Mesh, in_blocks
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 
 INSET: Final = 1e-5
 """Of the smaller body: how far under its surface it is looked at, so that bodies that touch do not overlap."""
@@ -20,7 +20,7 @@ MOST: Final = 4096
 """Facets of each by which it is found how they overlap."""
 
 
-def overlap(one: Body, other: Body) -> str | None:
+def overlap(one: PlacedTarget, other: PlacedTarget) -> str | None:
     """How two closed bodies overlap, as a verb with its object left out, or None: they are apart, or only touch.
 
     "coincide", "overlap", or "overlap (the second is inside the first)" and the like. Facets are taken a little under
@@ -44,13 +44,13 @@ def overlap(one: Body, other: Body) -> str | None:
     return None
 
 
-def sphere_round(body: Body) -> tuple[Floats, float]:
+def sphere_round(body: PlacedTarget) -> tuple[Floats, float]:
     """Centre (xyz) in the world and radius (m) of the sphere round a body's box."""
     low, high = body.mesh.box
     return body.pose.to_world(0.5 * (low + high)), 0.5 * float(np.linalg.norm(high - low))
 
 
-def _near(body: Body, other: Body, inset: float) -> Ints:
+def _near(body: PlacedTarget, other: PlacedTarget, inset: float) -> Ints:
     """Facets of a body whose boxes, in the frame of the other body, meet the box round it."""
     vertices = other.pose.to_body(body.pose.to_world(body.mesh.vertices))
     low, high = other.mesh.box
@@ -62,7 +62,7 @@ def _near(body: Body, other: Body, inset: float) -> Ints:
     return np.concatenate(found)
 
 
-def _corners(body: Body, facets: Ints, inset: float) -> Floats:
+def _corners(body: PlacedTarget, facets: Ints, inset: float) -> Floats:
     """Corners (facet, 3, xyz) of facets in the world, a little under the surface."""
     mesh = body.mesh
     middle = mesh.centroid[facets][:, None, :]
@@ -70,7 +70,7 @@ def _corners(body: Body, facets: Ints, inset: float) -> Floats:
     return body.pose.to_world(corners.reshape(-1, 3)).reshape(-1, 3, 3)
 
 
-def _within(body: Body, facets: Ints, other: Body, inset: float) -> Bools:
+def _within(body: PlacedTarget, facets: Ints, other: PlacedTarget, inset: float) -> Bools:
     """Which of facets, `MOST` of them at most, have their middles inside another body."""
     some = facets[:: max(-(-len(facets) // MOST), 1)]
     return insides(other.mesh, other.pose, _corners(body, some, inset).mean(axis=1))
@@ -83,7 +83,7 @@ def insides(mesh: Mesh, pose: Pose, points: Floats) -> Bools:
     return np.asarray((facet >= 0) & (mesh.normal[facet] @ up > 0.0))
 
 
-def _crosses(body: Body, facets: Ints, other: Body, inset: float) -> bool:
+def _crosses(body: PlacedTarget, facets: Ints, other: PlacedTarget, inset: float) -> bool:
     """Whether any edge of facets goes through the surface of another body."""
     for some in in_blocks(len(facets)):
         corners = _corners(body, facets[some], inset)

@@ -12,22 +12,28 @@ from sonarsynth.environment.absorption import DepthAbsorption
 from sonarsynth.environment.sea import Environment, Profile
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.motion import Track
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import Elements
 from sonarsynth.scattering import ScatteringLaw
-from sonarsynth.scattering.facet_geometry import Pulses
-from sonarsynth.state import Moment, Snap
-from sonarsynth.tracing.doppler import Carried, Meeting, received, stretched
+from sonarsynth.scattering.facet_geometry import PulseResponse
+from sonarsynth.state import Snap, WorldState
+from sonarsynth.tracing.doppler import Meeting, MetPaths, apply_doppler, received
 from sonarsynth.tracing.echoes import echoes
 from sonarsynth.tracing.expansion.amplitude_polynomials import fitted
-from sonarsynth.tracing.expansion.array_expansion import fronts
-from sonarsynth.tracing.facet_paths import ALIKE, ENOUGH, NEGLIGIBLE, ArrayLegs, array_legs
+from sonarsynth.tracing.expansion.array_expansion import array_expansion
+from sonarsynth.tracing.facet_paths import (
+    FACET_MEAN_TOLERANCE,
+    NEGLIGIBLE,
+    QUADRATIC_TOLERANCE,
+    FacetPaths,
+    facet_paths,
+)
 from sonarsynth.tracing.meetings import SHARED, hearing_times, occasions
-from sonarsynth.tracing.occlusion.forward_scattering import forward_legs, opaque, shadow_parts
+from sonarsynth.tracing.occlusion.forward_scattering import blocking_bodies, forward_paths, shadow_parts
 from sonarsynth.tracing.path_absorption import path_loss
 from sonarsynth.tracing.receive_paths import rays_to_centre
-from sonarsynth.tracing.transmit_paths import Outward, assemble, by_target, join, silence
+from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, by_target, join, no_arrivals
 
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation, Visibility
@@ -36,7 +42,7 @@ if TYPE_CHECKING:
 def trace(
     environment: Environment,
     profile: Profile,
-    moment: Moment,
+    moment: WorldState,
     sonar_pose: Pose,
     elements: Elements,
     absorption: float | DepthAbsorption,
@@ -47,8 +53,8 @@ def trace(
     moving: Track | None = None,
     shared: float = SHARED,
     negligible: float = NEGLIGIBLE,
-    enough: float = ENOUGH,
-    alike: float = ALIKE,
+    enough: float = QUADRATIC_TOLERANCE,
+    alike: float = FACET_MEAN_TOLERANCE,
     visibility: Visibility = "centre",
     degree: int = 3,
 ) -> Arrivals:
@@ -59,15 +65,15 @@ def trace(
     centre of the band, at every depth or the same (dB/m) at all; propagation: how sound travels, and how many bounces
     are followed; laws: how the facets of each body scatter; band: Hz; moving: the track of the array, where it and
     bodies move while sound is under way (left out: all is where it is at the instant of the frame); shared:
-    `meetings.SHARED`; negligible: see `NEGLIGIBLE`; enough: `variation.ENOUGH`; alike: `variation.ALIKE`; degree: of
-    polynomials over the aperture. A facet counts where it is lit by the snap and seen, with no body in between, by the
-    array centre; or, with `visibility`, by some hydrophone that it faces, and is heard by those. The snap itself is
-    heard if no body stands in between, but for those that scatter forward (`tracing.forward`). Raises ValueError for
-    anything outside the water.
+    `meetings.SHARED`; negligible: see `NEGLIGIBLE`; enough: `variation.QUADRATIC_TOLERANCE`; alike:
+    `variation.FACET_MEAN_TOLERANCE`; degree: of polynomials over the aperture. A facet counts where it is lit by the
+    snap and seen, with no body in between, by the array centre; or, with `visibility`, by some hydrophone that it
+    faces, and is heard by those. The snap itself is heard if no body stands in between, but for those that scatter
+    forward (`tracing.forward`). Raises ValueError for anything outside the water.
     """
 
-    def legs_to(pose: Pose, bodies: tuple[Body, ...], targets: tuple[int, ...] | None = None) -> ArrayLegs:
-        return array_legs(
+    def legs_to(pose: Pose, bodies: tuple[PlacedTarget, ...], targets: tuple[int, ...] | None = None) -> FacetPaths:
+        return facet_paths(
             environment, profile, bodies, pose, elements, propagation, band, negligible, enough, alike, visibility,
             degree, targets,
         )  # fmt: skip
@@ -91,7 +97,7 @@ def trace(
     return by_target(parts, float(profile.at(depth(sonar_pose.position))), 0.5 * (band[0] + band[1]))
 
 
-def _hearing(array: ArrayLegs, snap: Snap, sonar: Track) -> ArrayLegs:
+def _hearing(array: FacetPaths, snap: Snap, sonar: Track) -> FacetPaths:
     """The array where it hears a snap itself."""
     speed = float(array.profile.at(depth(sonar.pose.position)))
     heard = float(hearing_times(snap.position, np.asarray(snap.time), sonar, speed))
@@ -100,23 +106,23 @@ def _hearing(array: ArrayLegs, snap: Snap, sonar: Track) -> ArrayLegs:
 
 
 def arrivals(
-    array: ArrayLegs, snaps: tuple[Snap, ...], absorption: float | DepthAbsorption, laws: tuple[ScatteringLaw, ...]
+    array: FacetPaths, snaps: tuple[Snap, ...], absorption: float | DepthAbsorption, laws: tuple[ScatteringLaw, ...]
 ) -> Arrivals:
     """As `trace`, of what is at rest, from legs that are traced already; shadows of targets have legs of their own."""
     numbered = dict(enumerate(snaps))
     parts = [((index, 0), _direct(array, index, snap, absorption, laws)) for index, snap in numbered.items()]
     parts += _echoes(array, numbered, absorption, laws)
     parts.sort(key=lambda part: part[0])
-    heard = [silence(array.legs), *(part for _, part in parts)]
+    heard = [no_arrivals(array.legs), *(part for _, part in parts)]
     parts.clear()
     return join(heard, float(array.profile.at(depth(array.sonar_pose.position))), array.centre)
 
 
 def _echoes(
-    array: ArrayLegs, snaps: dict[int, Snap], absorption: float | DepthAbsorption, laws: tuple[ScatteringLaw, ...]
+    array: FacetPaths, snaps: dict[int, Snap], absorption: float | DepthAbsorption, laws: tuple[ScatteringLaw, ...]
 ) -> list[tuple[tuple[int, int], Arrivals]]:
     """Echoes (1) and shadow waves (2) of numbered snaps, each with the number of its snap."""
-    parts, through = [], forward_legs(array, laws)
+    parts, through = [], forward_paths(array, laws)
     for index, snap in snaps.items():
         law_parts = tuple(law.parts for law in laws)
         parts.append(((index, 1), echoes(array, index, snap, absorption, law_parts)))
@@ -127,26 +133,26 @@ def _echoes(
 
 
 def _direct(
-    array: ArrayLegs, index: int, snap: Snap, absorption: float | DepthAbsorption, laws: tuple[ScatteringLaw, ...]
+    array: FacetPaths, index: int, snap: Snap, absorption: float | DepthAbsorption, laws: tuple[ScatteringLaw, ...]
 ) -> Arrivals:
     """Snap to array, where no body stands in between that sound does not pass."""
     environment, profile, sonar_pose = array.environment, array.profile, array.sonar_pose
     legs = rays_to_centre(environment, profile, snap.position[None, :], sonar_pose, array.propagation, array.centre)
-    view = array.view(opaque(array.bodies, laws, snap.position))
+    view = array.view(blocking_bodies(array.bodies, laws, snap.position))
     legs = view.visible(legs, legs.point, None)
     legs = view.settled(legs, legs.point, None)
-    over = fronts(
+    over = array_expansion(
         legs, np.zeros(len(legs.row), int), environment, array.bending, sonar_pose, array.elements, array.propagation,
         array.band, array.degree,
     )  # fmt: skip
-    plain = Pulses.plain(len(legs.row))
+    plain = PulseResponse.plain(len(legs.row))
     one, none = np.ones(len(legs.row)), np.full(len(legs.row), NO_TARGET)
     variation = fitted(array, over.gain(np.arange(len(legs.row))), legs.spreading)
-    none_out, meeting, count = Outward.none(len(one)), array.meeting, len(one)
-    rest = Carried.at_rest(count, snap.time)
+    none_out, meeting, count = TransmitPaths.none(len(one)), array.meeting, len(one)
+    rest = MetPaths.at_rest(count, snap.time)
     legs = legs if meeting is None else received(legs, rest, meeting, profile)
     loss = path_loss(array, absorption, snap, legs)
     made = assemble(legs, over.terms, none_out, index, snap.time, loss, none, none, one, variation, plain)
     if meeting is None:
         return made
-    return stretched(made, legs, none_out, rest, meeting, profile, array.elements, None, array.enough)
+    return apply_doppler(made, legs, none_out, rest, meeting, profile, array.elements, None, array.enough)

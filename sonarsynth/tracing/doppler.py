@@ -8,11 +8,11 @@ m and h those of the poses that rays were traced between,
 
     m + tau_1 = t_s + T_out + (v.a/c) tau_1,    h + tau_2 = m + tau_1 + T_in - (v.d/c) tau_1 + (u.b/c) tau_2
 
-and each leg is longer by its curvature, as a straight one of its length is (`aside`), so that times are exact in
-uniform water. Directions at facet and array, and spreading, are those of the lengthened leg, exact there as well. v is
-the velocity of the facet: its body may turn, by omega tau_1 till then, and with it all that its law asks for. The pulse
-is longer by dt_2/dt_s. Left out in bent water: how much more or less than straight rays the rays turn and spread for
-the remainder v tau_1; of a moving array, u/c of the curvature of the wavefront.
+and each leg is longer by its curvature, as a straight one of its length is (`path_elongation`), so that times are exact
+in uniform water. Directions at facet and array, and spreading, are those of the lengthened leg, exact there as well. v
+is the velocity of the facet: its body may turn, by omega tau_1 till then, and with it all that its law asks for. The
+pulse is longer by dt_2/dt_s. Left out in bent water: how much more or less than straight rays the rays turn and spread
+for the remainder v tau_1; of a moving array, u/c of the curvature of the wavefront.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.motion import Track
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import Elements
 from sonarsynth.tracing.expansion.probe_paths import TERMS
-from sonarsynth.tracing.expansion.wavefront_polynomials import FEW, SECOND_DEGREE, probes, sphere
-from sonarsynth.tracing.receive_paths import Legs
-from sonarsynth.tracing.transmit_paths import Outward
+from sonarsynth.tracing.expansion.wavefront_polynomials import QUADRATIC_PROBES, SECOND_DEGREE, probes, sphere
+from sonarsynth.tracing.receive_paths import ReceivePaths
+from sonarsynth.tracing.transmit_paths import TransmitPaths
 
 ROUNDS = 3
 """Of solving for times that depend on themselves: each leaves v/c of the error, or v t/r of that."""
 
 
-CHANGED = 2.0
+MAX_CHANGE = 2.0
 """What a snap changes by, of itself, for each unit of Doppler: one of few periods, in whose band it is heard."""
 
 
@@ -53,7 +53,7 @@ class Meeting:
 
 
 @dataclass(frozen=True, eq=False)
-class Carried:
+class MetPaths:
     """How paths (path,) differ from those that were traced, by the remainder of the motion."""
 
     met: Floats  # s: of the poses of bodies
@@ -62,15 +62,15 @@ class Carried:
     spin: Floats  # (path, xyz) rad/s of its body
     apart: Floats  # (path, xyz) m: by what the array, or its image, is farther from the facet
 
-    def select(self, rows: Bools | Ints) -> Carried:
+    def select(self, rows: Bools | Ints) -> MetPaths:
         """The paths picked by a mask or by indices."""
-        return Carried(**{name: value[rows] for name, value in vars(self).items()})
+        return MetPaths(**{name: value[rows] for name, value in vars(self).items()})
 
     @staticmethod
-    def at_rest(count: int, time: float) -> Carried:
+    def at_rest(count: int, time: float) -> MetPaths:
         """Paths from what does not move, at a time (s)."""
         zero, none = np.zeros(count), np.zeros((count, 3))
-        return Carried(zero + time, zero, none, none, none)
+        return MetPaths(zero + time, zero, none, none, none)
 
     def departure(self, length: Floats, away: Floats) -> Floats:
         """Directions (path, ..., xyz) to the array or probes of it, of rays of some length (path,) m that left in
@@ -89,7 +89,7 @@ class Carried:
         return np.asarray(back / np.sqrt(dot(back, back))[..., None])
 
 
-def velocities(bodies: tuple[Body, ...], target: Ints, point: Floats) -> tuple[Floats, Floats]:
+def velocities(bodies: tuple[PlacedTarget, ...], target: Ints, point: Floats) -> tuple[Floats, Floats]:
     """Velocity (point, xyz) m/s of points of bodies (target of each), world, and the spin of their body rad/s."""
     found, spins = np.zeros((2, len(point), 3))
     for number, body in enumerate(bodies):
@@ -100,7 +100,7 @@ def velocities(bodies: tuple[Body, ...], target: Ints, point: Floats) -> tuple[F
     return found, spins
 
 
-def aside(length: Floats, along: Floats, moved: Floats) -> Floats:
+def path_elongation(length: Floats, along: Floats, moved: Floats) -> Floats:
     """How much longer (path,) in m straight legs get when their ends come apart, more than by what is along them.
 
     |r a + d| - r - a.d of legs r (path,) m along unit vectors a (path, xyz), by d (path, xyz) m; never negative, and
@@ -112,14 +112,16 @@ def aside(length: Floats, along: Floats, moved: Floats) -> Floats:
     return np.asarray(square / np.maximum(np.sqrt(forward**2 + square) + forward, 1e-300))
 
 
-def meets(out: Outward, met: Floats, velocity: Floats, time: float, speed: Floats) -> tuple[Outward, Floats]:
+def meets(
+    out: TransmitPaths, met: Floats, velocity: Floats, time: float, speed: Floats
+) -> tuple[TransmitPaths, Floats]:
     """Ways to facets that move, when and where the sound of a snap at `time` (s) meets them, and by how much after
     `met` (way,) s, where ways lead to where they are then; velocity (way, xyz) of the facets, speed (way,) of sound
     there, m/s."""
     rate, gone = dot(velocity, out.arrival) / speed, time + out.travel_time - met
     late = gone
     for _ in range(ROUNDS):
-        late = (gone + aside(out.length, out.arrival, velocity * late[:, None]) / speed) / (1.0 - rate)
+        late = (gone + path_elongation(out.length, out.arrival, velocity * late[:, None]) / speed) / (1.0 - rate)
     way = out.length[:, None] * out.arrival + velocity * late[:, None]
     length = np.sqrt(dot(way, way))
     there = replace(
@@ -136,18 +138,18 @@ def mirrored(velocity: Floats, bounces: Ints) -> Floats:
     return seen
 
 
-def carry(
-    legs: Legs, leg: Ints, met: Floats, late: Floats, velocity: Floats, spin: Floats, meeting: Meeting
-) -> Carried:
+def met_paths(
+    legs: ReceivePaths, leg: Ints, met: Floats, late: Floats, velocity: Floats, spin: Floats, meeting: Meeting
+) -> MetPaths:
     """The remainder of paths (path,) that go on by a leg each; `late` s after `met` their facets are met."""
     apart = -velocity * late[:, None]
     if not meeting.sonar.still:
         heard = met + late + legs.travel_time[leg] - meeting.heard
         apart += mirrored(meeting.sonar.velocity * heard[:, None], legs.bounces[leg])
-    return Carried(met, late, velocity, spin, apart)
+    return MetPaths(met, late, velocity, spin, apart)
 
 
-def received(legs: Legs, of: Carried, meeting: Meeting, profile: Profile) -> Legs:
+def received(legs: ReceivePaths, of: MetPaths, meeting: Meeting, profile: Profile) -> ReceivePaths:
     """Legs from facets that move to an array that does: from where they are met to where they are heard."""
     pose, u = meeting.sonar.pose, meeting.sonar.velocity
     c_facet, c_array = profile.at(depth(legs.point)), float(profile.at(depth(pose.position)))
@@ -157,7 +159,9 @@ def received(legs: Legs, of: Carried, meeting: Meeting, profile: Profile) -> Leg
     image = mirrored(moved, legs.bounces)
     heard = gone
     for _ in range(ROUNDS):
-        heard = (gone + aside(legs.length, legs.arrival, u * heard[:, None] - image) / c_array) / (1.0 - of_array)
+        heard = (gone + path_elongation(legs.length, legs.arrival, u * heard[:, None] - image) / c_array) / (
+            1.0 - of_array
+        )
     seen = legs.radius[:, None] * legs.direction + pose.turn_to_body(image - u * heard[:, None])
     radius = np.sqrt(dot(seen, seen))
     arrival = -pose.turn_to_world(seen) / radius[:, None]
@@ -185,7 +189,7 @@ class _Doppler(NamedTuple):
         return _Doppler(*columns)
 
 
-def turned(legs: Legs, points: Floats, slow: Floats) -> Floats:
+def turned(legs: ReceivePaths, points: Floats, slow: Floats) -> Floats:
     """What (path, point, xyz) the unit vectors towards where legs come from turn by, from the array centre to points
     (point, xyz) of an array that moves at `slow` (xyz) of the sound speed, when sound comes there; sonar frame."""
     farther = sphere(legs.direction, legs.radius, points)
@@ -194,7 +198,7 @@ def turned(legs: Legs, points: Floats, slow: Floats) -> Floats:
 
 
 def _over_aperture(
-    of: _Doppler, legs: Legs, array: Track, profile: Profile, elements: Elements,
+    of: _Doppler, legs: ReceivePaths, array: Track, profile: Profile, elements: Elements,
     departure: Callable[[], Floats] | None, enough: float,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Polynomials (path, term) of the second degree over the aperture: of Doppler; and of what bent rays change faster
@@ -202,11 +206,11 @@ def _over_aperture(
     sonar, pose = array.velocity, array.pose
     c_array = float(profile.at(depth(pose.position)))
     turning = np.sqrt(dot(of.velocity, of.velocity)) / legs.length + np.sqrt(sonar @ sonar) / legs.radius  # rad/s
-    some = np.flatnonzero(CHANGED * turning * elements.aperture / c_array > enough)
+    some = np.flatnonzero(MAX_CHANGE * turning * elements.aperture / c_array > enough)
     if not len(some):
         return np.empty((len(of.stretch), 0)), np.empty((len(of.stretch), 0))
     probe, doppler, leg = probes(elements), of.select(some), legs.select(some)
-    turn = turned(leg, probe.position[:FEW], pose.turn_to_body(sonar) / c_array)
+    turn = turned(leg, probe.position[:QUADRATIC_PROBES], pose.turn_to_body(sonar) / c_array)
     of_array = -dot(turn, pose.turn_to_body(sonar)) / c_array + doppler.of_array[:, None]
     rate_in = doppler.rate_in[:, None]
     if departure is not None:
@@ -232,10 +236,17 @@ def _later(terms: Floats, late: Floats, along: Floats | None) -> Floats:
     return terms
 
 
-def stretched(
-    made: Arrivals, legs: Legs, out: Outward, of: Carried, meeting: Meeting, profile: Profile, elements: Elements,
-    departure: Callable[[], Floats] | None = None, enough: float = 0.0,
-) -> Arrivals:  # fmt: skip
+def apply_doppler(
+    made: Arrivals,
+    legs: ReceivePaths,
+    out: TransmitPaths,
+    of: MetPaths,
+    meeting: Meeting,
+    profile: Profile,
+    elements: Elements,
+    departure: Callable[[], Floats] | None = None,
+    enough: float = 0.0,
+) -> Arrivals:
     """Arrivals with their Doppler; legs and ways: those of `received` and `meets`.
 
     An array that moves meets a wavefront later, or sooner, the farther it has still to go: delays over the aperture (m)

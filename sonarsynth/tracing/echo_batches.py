@@ -9,30 +9,30 @@ import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.equations.scattering.lobes import dot
-from sonarsynth.geometry.placed_target import Body
-from sonarsynth.scattering import Part
-from sonarsynth.scattering.components import Plain, Rough, Shadow, Smooth
-from sonarsynth.scattering.facet_geometry import Patches, Pulses, patches
-from sonarsynth.tracing.doppler import Carried
-from sonarsynth.tracing.transmit_paths import Outward
+from sonarsynth.geometry.placed_target import PlacedTarget
+from sonarsynth.scattering import Component
+from sonarsynth.scattering.components import CoherentKirchhoff, DiffuseKirchhoff, Lobe, Shadow
+from sonarsynth.scattering.facet_geometry import FacetGeometry, PulseResponse, patches
+from sonarsynth.tracing.doppler import MetPaths
+from sonarsynth.tracing.transmit_paths import TransmitPaths
 
 if TYPE_CHECKING:
-    from sonarsynth.tracing.facet_paths import ArrayLegs
+    from sonarsynth.tracing.facet_paths import FacetPaths
 
 
-TOGETHER = 10.0
+SAME_FACET_CHANGE = 10.0
 """How much more what heights take from echoes counts, where it changes over the aperture, than means over facets do: it
-is alike on all facets, where these make up for each other (`ArrayLegs.alike`)."""
+is alike on all facets, where these make up for each other (`FacetPaths.alike`)."""
 
 
 @dataclass(frozen=True, eq=False)
-class Group:
+class EchoBatch:
     """Echoes by one part of the law of one body, in the frame of the body."""
 
-    body: Body
-    part: Part
+    body: PlacedTarget
+    part: Component
     row: Ints  # (echo,) which pair of a way and a leg
-    patch: Patches  # (echo,)
+    patch: FacetGeometry  # (echo,)
     incident: Floats  # (echo, xyz)
     scattered: Floats  # (echo, xyz)
     wavenumber: Floats  # (echo,) rad/m at the centre of the band
@@ -40,7 +40,7 @@ class Group:
     amplitude: Floats  # (echo,) m
     sign: Floats  # (echo,)
 
-    def select(self, keep: Ints) -> Group:
+    def select(self, keep: Ints) -> EchoBatch:
         """The echoes picked by indices."""
         rows: dict[str, Any] = {k: v[keep] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
         return replace(self, patch=self.patch.select(keep), **rows)
@@ -53,28 +53,30 @@ class Group:
         return self.part.amplitude(self.incident[:, None, :], away, self.patch.over(), self.wavenumber[:, None])
 
     @property
-    def _heights(self) -> Rough | None:
+    def _heights(self) -> DiffuseKirchhoff | None:
         """The part, where it is what heights scatter without phase in common."""
-        return self.part if isinstance(self.part, Rough) and self.part.law.roughness > 0.0 else None
+        return self.part if isinstance(self.part, DiffuseKirchhoff) and self.part.law.roughness > 0.0 else None
 
-    def _elsewhere(self, heights: Rough, departure: Floats) -> tuple[Floats, Floats]:
-        """As `Rough.elsewhere`, in directions (echo, probe, xyz) of the world."""
+    def _elsewhere(self, heights: DiffuseKirchhoff, departure: Floats) -> tuple[Floats, Floats]:
+        """As `DiffuseKirchhoff.elsewhere`, in directions (echo, probe, xyz) of the world."""
         away, speed = self.body.pose.turn_to_body(departure), np.pi * sum(self.band) / self.wavenumber
         return heights.elsewhere(self.incident, self.scattered, away, self.patch, speed, self.band)
 
     @property
     def tapered(self) -> Bools:
         """(echo,) whether it falls to 0 at the limb of the body, rather than ending there."""
-        return self.part.tapers(self.patch) if isinstance(self.part, Smooth) else np.zeros(len(self.row), bool)
+        return (
+            self.part.tapers(self.patch) if isinstance(self.part, CoherentKirchhoff) else np.zeros(len(self.row), bool)
+        )
 
     @property
     def turns(self) -> bool:
         """Whether the phase of its reflections differs from direction to direction."""
-        return isinstance(self.part, Smooth) and self.part.turns
+        return isinstance(self.part, CoherentKirchhoff) and self.part.turns
 
     def turned(self, departure: Floats) -> Floats:
         """Phase (echo, probe) in directions (echo, probe, xyz) of the world more than in that of the array centre."""
-        if not (isinstance(self.part, Smooth) and self.part.turns):
+        if not (isinstance(self.part, CoherentKirchhoff) and self.part.turns):
             return np.zeros(departure.shape[:2])
         away = self.body.pose.turn_to_body(departure)
         at_centre = self.part.phase(self.incident, self.scattered)[:, None]
@@ -84,11 +86,11 @@ class Group:
     @property
     def spreads(self) -> bool:
         """Whether directions change what echoes are blurred by: means over facets, or what heights scatter."""
-        return isinstance(self.part, Smooth | Shadow) or self._heights is not None
+        return isinstance(self.part, CoherentKirchhoff | Shadow) or self._heights is not None
 
     def most_spread(self, late: Floats, turn: Floats, centre: float) -> Floats:
-        """Bound (echo,) on |spread|, of directions that differ by no more than `turn` (echo,); `TOGETHER` times that
-        of heights.
+        """Bound (echo,) on |spread|, of directions that differ by no more than `turn` (echo,); `SAME_FACET_CHANGE`
+        times that of heights.
 
         late (echo, 3) s: of the corners in that of the array centre; centre (Hz).
         """
@@ -98,14 +100,14 @@ class Group:
             square = (heights.law.roughness * across * self.wavenumber / (2.0 * np.pi * centre)) ** 2
             left = np.minimum(square * np.exp(-0.3 * low**2 * square), 2.0 / high**2)
             relative = turn * (1.0 / across + (heights.law.diffuse > 0.0) / heights.law.slope**2)
-            return np.asarray(TOGETHER * left * np.minimum(relative, 1.0))
-        if not isinstance(self.part, Smooth | Shadow):
+            return np.asarray(SAME_FACET_CHANGE * left * np.minimum(relative, 1.0))
+        if not isinstance(self.part, CoherentKirchhoff | Shadow):
             return np.zeros(len(self.row))
         speed = 2.0 * np.pi * centre / self.wavenumber
         more = np.sqrt(dot(self.patch.corners, self.patch.corners)) * (turn / speed)[:, None]
-        rough = self.part.law.roughness / speed if isinstance(self.part, Smooth) else 0.0
+        rough = self.part.law.roughness / speed if isinstance(self.part, CoherentKirchhoff) else 0.0
         return np.asarray(
-            ((2.0 * np.abs(late) + more) * more).sum(axis=1) / 12.0 + TOGETHER * rough**2 * turn * (4.0 + turn)
+            ((2.0 * np.abs(late) + more) * more).sum(axis=1) / 12.0 + SAME_FACET_CHANGE * rough**2 * turn * (4.0 + turn)
         )
 
     def spread(self, departure: Floats, centre: float) -> Floats:
@@ -113,7 +115,7 @@ class Group:
         than in that of the array centre; centre (Hz)."""
         if (heights := self._heights) is not None:
             return self._elsewhere(heights, departure)[1]
-        if not isinstance(self.part, Smooth | Shadow):
+        if not isinstance(self.part, CoherentKirchhoff | Shadow):
             return np.zeros(departure.shape[:2])
         away, speed = self.body.pose.turn_to_body(departure), 2.0 * np.pi * centre / self.wavenumber
         at_centre = self.part.spread(self.incident, self.scattered, self.patch, speed)
@@ -123,19 +125,19 @@ class Group:
     @property
     def spot(self) -> Floats:
         """Where on its facet each echo comes from (echo, xyz) m, world, from the middle; 0 of means over facets."""
-        if not isinstance(self.part, Rough):
+        if not isinstance(self.part, DiffuseKirchhoff):
             return np.zeros((len(self.row), 3))
         return self.body.pose.turn_to_world(self.patch.spot)
 
-    def pulses(self, centre: float) -> Pulses:
+    def pulses(self, centre: float) -> PulseResponse:
         """What they make of the pulse; centre (Hz)."""
         sound_speed = 2.0 * np.pi * centre / self.wavenumber
         return self.part.pulses(self.incident, self.scattered, self.patch, sound_speed)
 
 
-def groups_of(
-    array: ArrayLegs, out: Outward, leg: Ints, parts: tuple[tuple[Part, ...], ...], carried: Carried | None
-) -> list[Group]:
+def echo_batches(
+    array: FacetPaths, out: TransmitPaths, leg: Ints, parts: tuple[tuple[Component, ...], ...], carried: MetPaths | None
+) -> list[EchoBatch]:
     """Echoes of pairs of a way and a leg (pair,), by body and part; those that are nothing are left out; carried: by
     how much pairs differ from those that were traced, where anything moves."""
     facets, found = array.facets, []
@@ -153,17 +155,18 @@ def groups_of(
         speed = array.profile.at(depth(array.legs.point[leg[row]]))
         wavenumber = 2.0 * np.pi * array.centre / speed
         for part in (
-            replace(p, beyond=True) if looked_for and isinstance(p, Plain | Smooth | Rough) else p for p in of_law
+            replace(p, beyond=True) if looked_for and isinstance(p, Lobe | CoherentKirchhoff | DiffuseKirchhoff) else p
+            for p in of_law
         ):
-            patch = patches(body.mesh, not isinstance(part, Plain)).select(facet)
+            patch = patches(body.mesh, not isinstance(part, Lobe)).select(facet)
             amplitude = part.amplitude(incident, scattered, patch, wavenumber)
             sign = part.polarity(body.mesh)[facet]
-            group = Group(body, part, row, patch, incident, scattered, wavenumber, array.band, amplitude, sign)
+            group = EchoBatch(body, part, row, patch, incident, scattered, wavenumber, array.band, amplitude, sign)
             found.append(group.select(np.flatnonzero(amplitude)))
     return found
 
 
-def heard(pulses: Pulses, band: tuple[float, float]) -> Floats:
+def in_band(pulses: PulseResponse, band: tuple[float, float]) -> Floats:
     """What roughness leaves of each pulse (path,) at most, at any frequency of the band (Hz)."""
     low, high = (2.0 * np.pi * f for f in band)
     rough = np.sqrt(1.0 - pulses.rough_share * np.exp(-((high * pulses.rough_delay) ** 2)))

@@ -11,50 +11,50 @@ import numpy as np
 from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.environment.absorption import DepthAbsorption
 from sonarsynth.geometry.mesh import in_blocks
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation.reflections import reflections
-from sonarsynth.scattering import Part
-from sonarsynth.scattering.facet_geometry import Pulses
+from sonarsynth.scattering import Component
+from sonarsynth.scattering.facet_geometry import PulseResponse
 from sonarsynth.state import Snap
-from sonarsynth.tracing.doppler import Carried, carry, meets, received, stretched, velocities
-from sonarsynth.tracing.echo_batches import Group, groups_of, heard
+from sonarsynth.tracing.doppler import MetPaths, apply_doppler, meets, met_paths, received, velocities
+from sonarsynth.tracing.echo_batches import EchoBatch, echo_batches, in_band
 from sonarsynth.tracing.expansion.amplitude_polynomials import variations
-from sonarsynth.tracing.expansion.scattering_points import delayed_by_spots, from_spots
-from sonarsynth.tracing.expansion.wavefront_polynomials import FEW, Terms, probes
+from sonarsynth.tracing.expansion.scattering_points import delay_to_scattering_points, shift_to_scattering_points
+from sonarsynth.tracing.expansion.wavefront_polynomials import QUADRATIC_PROBES, ExpansionTerms, probes
 from sonarsynth.tracing.occlusion.ray_cones import hidden, overlapping
 from sonarsynth.tracing.path_absorption import path_loss
-from sonarsynth.tracing.pruning import Seen, loud_of_all, loud_ones
-from sonarsynth.tracing.receive_paths import Legs, may_face, usable
-from sonarsynth.tracing.transmit_paths import Outward, assemble, ordered, silence
+from sonarsynth.tracing.pruning import EchoLevels, loud_of_all, loud_ones
+from sonarsynth.tracing.receive_paths import ReceivePaths, may_face_receiver, usable
+from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, no_arrivals, ordered
 
 if TYPE_CHECKING:
-    from sonarsynth.tracing.facet_paths import ArrayLegs
+    from sonarsynth.tracing.facet_paths import FacetPaths
 
 
-FAINTER = 1e-3
+PRUNE_MARGIN = 1e-3
 """Of what is negligible: fainter echoes are not held while other facets are looked at."""
 
-LEAP = 1.0
+MAX_PHASE_CHANGE = 1.0
 """rad: a phase of reflection that varies by more over the aperture is not followed."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Found:
+class _EchoBlock:
     """Echoes of a snap from some facets, group by group."""
 
-    array: ArrayLegs  # of these facets
-    groups: list[Group]
-    out: Outward  # (pair,)
+    array: FacetPaths  # of these facets
+    groups: list[EchoBatch]
+    out: TransmitPaths  # (pair,)
     leg: Ints  # (pair,)
     factor: Floats  # (pair,) what the ways do to amplitudes
     few: Floats  # (echo, FEW) amplitudes of the law at the first probes
     gain: Floats  # (echo, FEW) of the legs there
-    terms: Terms  # (echo,) of the wavefronts
-    pulses: Pulses  # (echo,)
-    carried: Carried | None  # (pair,); None: nothing moves
+    terms: ExpansionTerms  # (echo,) of the wavefronts
+    pulses: PulseResponse  # (echo,)
+    carried: MetPaths | None  # (pair,); None: nothing moves
 
-    def select(self, loud: Bools) -> _Found:
+    def select(self, loud: Bools) -> _EchoBlock:
         """The echoes picked by a mask, each with a pair of its own."""
         ends = np.cumsum([len(g.row) for g in self.groups])[:-1]
         groups = [g.select(np.flatnonzero(keep)) for g, keep in zip(self.groups, np.split(loud, ends), strict=True)]
@@ -64,7 +64,7 @@ class _Found:
         out, leg, factor = self.out.select(row), self.leg[row], self.factor[row]
         terms, pulses = self.terms.select(loud), self.pulses.select(loud)
         carried = None if self.carried is None else self.carried.select(row)
-        return _Found(self.array, groups, out, leg, factor, self.few[loud], self.gain[loud], terms, pulses, carried)
+        return _EchoBlock(self.array, groups, out, leg, factor, self.few[loud], self.gain[loud], terms, pulses, carried)
 
     @property
     def amplitude(self) -> Floats:
@@ -93,24 +93,28 @@ class _Found:
         """Where each probe, or the first few, is seen from the facets of pairs (row, probe, xyz), as `_departure`."""
         return _departure(self.array, self.leg[rows], None if self.carried is None else self.carried.select(rows), few)
 
-    def seen(self) -> Seen:
+    def seen(self) -> EchoLevels:
         """What decides which of them are kept."""
         row, amplitude = _columns(self.groups, "row", "amplitude")
         most = np.maximum(np.abs(self.few).max(axis=1, initial=0.0), np.abs(amplitude)) * self.factor[row]
         target = self.array.facets.target[self.out.facet[row]]
         number = np.repeat(np.arange(len(self.groups)), [len(g.row) for g in self.groups])
-        return Seen(most * heard(self.pulses, self.array.band), self.pulses.coherent, target, number)
+        return EchoLevels(most * in_band(self.pulses, self.array.band), self.pulses.coherent, target, number)
 
 
 def echoes(
-    array: ArrayLegs, index: int, snap: Snap, absorption: float | DepthAbsorption, parts: tuple[tuple[Part, ...], ...]
+    array: FacetPaths,
+    index: int,
+    snap: Snap,
+    absorption: float | DepthAbsorption,
+    parts: tuple[tuple[Component, ...], ...],
 ) -> Arrivals:
     """Snap `index` to facet to array, over every facet of the legs that is lit; parts: of the law of each body.
 
     Facets are taken in blocks, so that little is held at a time; the echoes are those of one block, in its order.
     """
     if not any(parts):
-        return silence(array.legs)
+        return no_arrivals(array.legs)
     found = _loudest(array, snap, parts)
     terms, error = variations(found)
     most = max(float(np.abs(some.strength).max(initial=0.0)) for some in found)
@@ -123,7 +127,7 @@ def echoes(
         over = _spread(some, over, most) if spread else over
         spot = np.concatenate([g.spot for g in some.groups])
         if spot.any() and not some.array.bending.uniform:
-            over = delayed_by_spots(over, some.array, some.leg, spot)
+            over = delay_to_scattering_points(over, some.array, some.leg, spot)
         array, out, legs, meeting = some.array, some.out, some.array.settled(some.leg), some.array.meeting
         view = partial(_away, array, legs, some.leg, some.carried)
         if meeting is not None and some.carried is not None:
@@ -134,14 +138,14 @@ def echoes(
         one = assemble(legs, over, out, index, snap.time, loss, target, facet, scattered, vary, some.pulses)
         if meeting is not None and some.carried is not None:
             place = meeting, array.profile, array.elements
-            one = stretched(one, legs, out, some.carried, *place, view, array.enough)
+            one = apply_doppler(one, legs, out, some.carried, *place, view, array.enough)
         if spot.any() and array.bending.uniform:
-            one = from_spots(one, legs, spot, array.sonar_pose)
+            one = shift_to_scattering_points(one, legs, spot, array.sonar_pose)
         made.append(replace(one, delay=one.delay + some.pulses.late))
     return ordered(made, group)
 
 
-def _loudest(array: ArrayLegs, snap: Snap, parts: tuple[tuple[Part, ...], ...]) -> list[_Found]:
+def _loudest(array: FacetPaths, snap: Snap, parts: tuple[tuple[Component, ...], ...]) -> list[_EchoBlock]:
     """Echoes from each block of facets that are not too faint.
 
     What is much fainter than will do, by the blocks so far, is not held; should it be wanted after all, its block is
@@ -151,13 +155,13 @@ def _loudest(array: ArrayLegs, snap: Snap, parts: tuple[tuple[Part, ...], ...]) 
     if len(blocks) == 1:
         found = _found(array, snap, parts)
         return [found.select(loud_ones(found.seen(), array.negligible))]
-    held: list[_Found] = []
-    seen: list[Seen] = []
+    held: list[_EchoBlock] = []
+    seen: list[EchoLevels] = []
     kept: list[Bools] = []
     for some in blocks:
         found = _found(array.part(some), snap, parts)
         seen.append(found.seen())
-        kept.append(loud_of_all(seen, FAINTER * array.negligible)[-1])
+        kept.append(loud_of_all(seen, PRUNE_MARGIN * array.negligible)[-1])
         held.append(found.select(kept[-1]))
     for n, wanted in enumerate(loud_of_all(seen, array.negligible)):
         if (wanted & ~kept[n]).any():
@@ -167,7 +171,7 @@ def _loudest(array: ArrayLegs, snap: Snap, parts: tuple[tuple[Part, ...], ...]) 
     return held
 
 
-def _found(array: ArrayLegs, snap: Snap, parts: tuple[tuple[Part, ...], ...]) -> _Found:
+def _found(array: FacetPaths, snap: Snap, parts: tuple[tuple[Component, ...], ...]) -> _EchoBlock:
     """All echoes of a snap from the facets of the legs."""
     out, fronts = _ways(array, snap), array.fronts
     way, leg = _pairs(out.facet, array.legs.row, len(array.facets.facet))
@@ -175,17 +179,17 @@ def _found(array: ArrayLegs, snap: Snap, parts: tuple[tuple[Part, ...], ...]) ->
     out, leg, carried = out.select(way[kept]), leg[kept], None
     if array.meeting is not None:
         out, carried = _carried(array, snap, out, leg)
-    groups = groups_of(array, out, leg, parts, carried)
+    groups = echo_batches(array, out, leg, parts, carried)
     factor = array.legs.spreading[leg] * array.legs.boundary[leg] * out.spreading * out.boundary
-    away = [_departure(array, leg[g.row], carried and carried.select(g.row), FEW) for g in groups]
+    away = [_departure(array, leg[g.row], carried and carried.select(g.row), QUADRATIC_PROBES) for g in groups]
     few = np.concatenate([g.over(of) for g, of in zip(groups, away, strict=True)])
-    pulses = Pulses.join([g.pulses(array.centre) for g in groups])
+    pulses = PulseResponse.join([g.pulses(array.centre) for g in groups])
     rows = leg[_columns(groups, "row")[0]]
-    gain, over = fronts.gain(rows, FEW), fronts.terms.select(rows)
-    return _Found(array, groups, out, leg, factor, few, gain, over, pulses, carried)
+    gain, over = fronts.gain(rows, QUADRATIC_PROBES), fronts.terms.select(rows)
+    return _EchoBlock(array, groups, out, leg, factor, few, gain, over, pulses, carried)
 
 
-def _carried(array: ArrayLegs, snap: Snap, out: Outward, leg: Ints) -> tuple[Outward, Carried]:
+def _carried(array: FacetPaths, snap: Snap, out: TransmitPaths, leg: Ints) -> tuple[TransmitPaths, MetPaths]:
     """Ways (pair,) when and where the sound meets what moves, and the remainder of the motion."""
     meeting, facets = array.meeting, array.facets
     assert meeting is not None
@@ -193,10 +197,10 @@ def _carried(array: ArrayLegs, snap: Snap, out: Outward, leg: Ints) -> tuple[Out
     velocity, spin = velocities(array.bodies, target, point)
     met = meeting.met[target]
     there, late = meets(out, met, velocity, snap.time, array.profile.at(depth(point)))
-    return there, carry(array.legs, leg, met, late, velocity, spin, meeting)
+    return there, met_paths(array.legs, leg, met, late, velocity, spin, meeting)
 
 
-def _departure(array: ArrayLegs, leg: Ints, carried: Carried | None, few: int | None) -> Floats:
+def _departure(array: FacetPaths, leg: Ints, carried: MetPaths | None, few: int | None) -> Floats:
     """Where each probe, or the first few, is seen from facets (row, probe, xyz): world, in axes that turn with what
     turns."""
     away = array.fronts.departure(leg, few)
@@ -205,26 +209,30 @@ def _departure(array: ArrayLegs, leg: Ints, carried: Carried | None, few: int | 
     return carried.turned_back(carried.departure(array.legs.length[leg], away))
 
 
-def _away(array: ArrayLegs, legs: Legs, leg: Ints, carried: Carried | None) -> Floats:
+def _away(array: FacetPaths, legs: ReceivePaths, leg: Ints, carried: MetPaths | None) -> Floats:
     """Where the first few probes are seen from facets (row, probe, xyz): world."""
-    away = array.fronts.departure(leg, FEW)
+    away = array.fronts.departure(leg, QUADRATIC_PROBES)
     return away if carried is None else carried.departure(legs.length, away)
 
 
-def _columns(groups: list[Group], *names: str) -> list[np.ndarray]:
+def _columns(groups: list[EchoBatch], *names: str) -> list[np.ndarray]:
     """Columns (echo,) of all groups, in order."""
     return [np.concatenate([getattr(g, name) for g in groups]) for name in names]
 
 
-def _ways(array: ArrayLegs, snap: Snap) -> Outward:
+def _ways(array: FacetPaths, snap: Snap) -> TransmitPaths:
     """Ways from a snap to the lit side of facets that no body hides; of facets in one place, the first body's."""
     environment, profile, facets = array.environment, array.profile, array.facets
-    row = np.flatnonzero(may_face(facets, snap.position, array.propagation.bounces, profile, environment.depth))
+    row = np.flatnonzero(
+        may_face_receiver(facets, snap.position, array.propagation.bounces, profile, environment.depth)
+    )
     start = np.broadcast_to(snap.position, (len(row), 3))
     paths = array.propagation.connect(profile, environment.depth, start, facets.point[row])
     facet = row[paths.pair]
     lit = usable(paths) & (np.einsum("ij,ij->i", facets.normal[facet], paths.arrival) < 0)
-    out = Outward.of(paths, reflections(environment, profile, paths, array.centre), facet).select(np.flatnonzero(lit))
+    out = TransmitPaths.of(paths, reflections(environment, profile, paths, array.centre), facet).select(
+        np.flatnonzero(lit)
+    )
     out = out.select(~_hides(array, array.bodies, snap, out, facets.clear[out.facet]))
     for number, before in overlapping(array.bodies):
         mine = np.flatnonzero(facets.target[out.facet] == number)
@@ -234,7 +242,7 @@ def _ways(array: ArrayLegs, snap: Snap) -> Outward:
     return out.merged()
 
 
-def _hides(array: ArrayLegs, bodies: tuple[Body, ...], snap: Snap, out: Outward, start: Floats) -> Bools:
+def _hides(array: FacetPaths, bodies: tuple[PlacedTarget, ...], snap: Snap, out: TransmitPaths, start: Floats) -> Bools:
     """Whether any of some bodies stands in ways (way,) from a snap to points near facets, start (way, xyz)."""
     end = np.broadcast_to(snap.position, start.shape)
     return hidden(  # backwards, so that bodies are where a ray begins
@@ -251,7 +259,7 @@ def _pairs(facet: Ints, row: Ints, facets: int) -> tuple[Ints, Ints]:
     return way, begin[facet[way]] + within
 
 
-def _turned(found: _Found, most: float) -> Terms:
+def _turned(found: _EchoBlock, most: float) -> ExpansionTerms:
     """Wavefronts (path,) of echoes, with the phases of reflections from facets to each probe; most: the strongest of
     all.
 
@@ -263,7 +271,7 @@ def _turned(found: _Found, most: float) -> Terms:
     if not any(g.turns for g in found.groups):
         return over
     shift = np.concatenate([g.turned(found.departure(g.row)) for g in found.groups])
-    leaps = np.abs(shift).max(axis=1, initial=0.0) > LEAP
+    leaps = np.abs(shift).max(axis=1, initial=0.0) > MAX_PHASE_CHANGE
     if not shift.any():
         return over
     probe = probes(array.elements, array.degree)
@@ -273,9 +281,9 @@ def _turned(found: _Found, most: float) -> Terms:
     return over._replace(phase=over.phase + terms if over.phase.shape[1] else terms, error=error)
 
 
-def _spreads(found: _Found, most: float) -> bool:
-    """Whether what facets spread echoes by in time changes any of them over the array by more than `ArrayLegs.alike` of
-    the strongest of all."""
+def _spreads(found: _EchoBlock, most: float) -> bool:
+    """Whether what facets spread echoes by in time changes any of them over the array by more than `FacetPaths.alike`
+    of the strongest of all."""
     array, rate = found.array, 2.0 * np.pi * found.array.band[1]
     if not any(g.spreads for g in found.groups):
         return False
@@ -286,14 +294,14 @@ def _spreads(found: _Found, most: float) -> bool:
     return bool(0.5 * rate**2 * (share * bound).max(initial=0.0) > array.alike)
 
 
-def _spread(found: _Found, over: Terms, most: float) -> Terms:
+def _spread(found: _EchoBlock, over: ExpansionTerms, most: float) -> ExpansionTerms:
     """Wavefronts (path,) of echoes, with what facets spread them by in time more at a hydrophone than at the centre.
 
     Their delays over a facet have another variance there; the mean over a facet is that of the centre, blurred by what
     it is more.
     """
     array, share = found.array, np.abs(found.strength) / max(most, 1e-300)
-    more = np.concatenate([g.spread(found.departure(g.row, FEW), array.centre) for g in found.groups])
+    more = np.concatenate([g.spread(found.departure(g.row, QUADRATIC_PROBES), array.centre) for g in found.groups])
     terms, misfit = probes(array.elements, array.degree).fit_few(more)
     blur = over.blur + terms if over.blur.shape[1] else terms
     return over._replace(blur=blur, error=over.error + share * np.pi * array.band[1] * misfit)

@@ -12,12 +12,20 @@ from sonarsynth.conventions import Ints, depth
 from sonarsynth.environment.sea import Environment, Profile
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import in_blocks
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.receiver import Elements
 from sonarsynth.tracing.doppler import Meeting
-from sonarsynth.tracing.expansion.array_expansion import Fronts, Wavefronts, wavefronts
-from sonarsynth.tracing.occlusion.sensor_occlusion import View
-from sonarsynth.tracing.receive_paths import Facets, Legs, facets_of, legs_from, may_face, one_of, require_in_water
+from sonarsynth.tracing.expansion.array_expansion import ArrayExpansion, ExpansionSource, expansion_source
+from sonarsynth.tracing.occlusion.sensor_occlusion import Occlusion
+from sonarsynth.tracing.receive_paths import (
+    Facets,
+    ReceivePaths,
+    concatenate,
+    facets_of,
+    may_face_receiver,
+    receive_paths,
+    require_in_water,
+)
 
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation, Visibility
@@ -26,11 +34,11 @@ if TYPE_CHECKING:
     pass
 
 
-ALIKE = 1e-3
+FACET_MEAN_TOLERANCE = 1e-3
 """Change of an echo over the aperture by the mean over its facet, over the strongest echo, that is left out."""
 
 
-ENOUGH = 1e-4
+QUADRATIC_TOLERANCE = 1e-4
 """Error of amplitudes over the aperture, of the strongest echo's, at which polynomials of the second degree will do."""
 
 
@@ -42,13 +50,13 @@ of the largest."""
 
 
 @dataclass(frozen=True, eq=False)
-class ArrayLegs:
+class FacetPaths:
     """Every facet that the array sees, with its legs to the array: serves any snap without tracing this side again."""
 
-    legs: Legs  # (leg,) sorted by row
-    wavefronts: Wavefronts  # of all legs, those of other parts among them
+    legs: ReceivePaths  # (leg,) sorted by row
+    wavefronts: ExpansionSource  # of all legs, those of other parts among them
     facets: Facets  # (facet,) that have a leg; legs.row counts them
-    bodies: tuple[Body, ...]
+    bodies: tuple[PlacedTarget, ...]
     environment: Environment
     profile: Profile
     propagation: Propagation
@@ -56,8 +64,10 @@ class ArrayLegs:
     elements: Elements
     band: tuple[float, float]  # Hz
     negligible: float = NEGLIGIBLE  # power of the faintest echoes, that are left out
-    enough: float = ENOUGH  # error of amplitudes over the aperture, where the second degree will do
-    alike: float = ALIKE  # change of an echo by the mean over its facet, over the aperture, that is left out
+    enough: float = QUADRATIC_TOLERANCE  # error of amplitudes over the aperture, where the second degree will do
+    alike: float = (
+        FACET_MEAN_TOLERANCE  # change of an echo by the mean over its facet, over the aperture, that is left out
+    )
     visibility: Visibility = "centre"  # from where facets must be seen
     first: int = 0  # of the legs, in the wavefronts
     degree: int = 3  # of polynomials over the aperture
@@ -65,18 +75,18 @@ class ArrayLegs:
     meeting: Meeting | None = None  # when bodies and array are where they are here; None: nothing moves
 
     @property
-    def fronts(self) -> Fronts:
+    def fronts(self) -> ArrayExpansion:
         """(leg,) over the aperture: kept for all legs, made anew for some."""
         return self._whole if self.legs is self.wavefronts.legs else self._made()
 
     @cached_property
-    def _whole(self) -> Fronts:
+    def _whole(self) -> ArrayExpansion:
         return self._made()
 
-    def _made(self) -> Fronts:
+    def _made(self) -> ArrayExpansion:
         return self.wavefronts.of(slice(self.first, self.first + len(self.legs.row)))
 
-    def part(self, some: slice) -> ArrayLegs:
+    def part(self, some: slice) -> FacetPaths:
         """Some of the facets, and the legs from them."""
         if some == slice(0, len(self.facets.facet)):
             return self
@@ -85,17 +95,19 @@ class ArrayLegs:
         legs, facets = legs.numbered(legs.row - some.start), self.facets.select(some)
         return replace(self, legs=legs, facets=facets, first=self.first + first)
 
-    def view(self, bodies: tuple[Body, ...]) -> View:
+    def view(self, bodies: tuple[PlacedTarget, ...]) -> Occlusion:
         """Who looks, and which bodies stand in between."""
         lookout = self.elements if self.visibility == "hydrophones" else None
-        return View(bodies, self.environment, self.bending, self.sonar_pose, lookout, self.propagation, self.degree)
+        return Occlusion(
+            bodies, self.environment, self.bending, self.sonar_pose, lookout, self.propagation, self.degree
+        )
 
     @property
     def bending(self) -> Profile:
         """What bends the rays: the profile, or for straight rays the speed at the array everywhere."""
         return bending(self.profile, self.propagation, self.sonar_pose)
 
-    def settled(self, leg: Ints) -> Legs:
+    def settled(self, leg: Ints) -> ReceivePaths:
         """Some legs (row,), with the hydrophones that bodies hide them from."""
         number, row = np.unique(leg[self.legs.open[leg]], return_inverse=True)
         legs = self.legs.select(leg)
@@ -114,21 +126,21 @@ class ArrayLegs:
         return 0.5 * (self.band[0] + self.band[1])
 
 
-def array_legs(
+def facet_paths(
     environment: Environment,
     profile: Profile,
-    bodies: tuple[Body, ...],
+    bodies: tuple[PlacedTarget, ...],
     sonar_pose: Pose,
     elements: Elements,
     propagation: Propagation,
     band: tuple[float, float],
     negligible: float = NEGLIGIBLE,
-    enough: float = ENOUGH,
-    alike: float = ALIKE,
+    enough: float = QUADRATIC_TOLERANCE,
+    alike: float = FACET_MEAN_TOLERANCE,
     visibility: Visibility = "centre",
     degree: int = 3,
     targets: tuple[int, ...] | None = None,
-) -> ArrayLegs:
+) -> FacetPaths:
     """Facet to array, for every facet of every body, or of some targets, that leaves a ray for the array that no body
     hides.
 
@@ -138,26 +150,26 @@ def array_legs(
     bent, centre = bending(profile, propagation, sonar_pose), 0.5 * (band[0] + band[1])
     lookout = elements if visibility == "hydrophones" else None
     slack = elements.aperture if lookout is not None else 0.0
-    view = View(bodies, environment, bent, sonar_pose, lookout, propagation, degree)
-    found: tuple[list[Legs], list[Facets]] = [], []
+    view = Occlusion(bodies, environment, bent, sonar_pose, lookout, propagation, degree)
+    found: tuple[list[ReceivePaths], list[Facets]] = [], []
     seen = 0
     for some in in_blocks(sum(len(body.mesh.faces) for body in bodies)):
         every = facets_of(bodies, some)
         if targets is not None and len(targets) < len(bodies):
             every = every.select(np.isin(every.target, targets))
-        reached = may_face(every, sonar_pose.position, propagation.bounces, profile, environment.depth, slack)
+        reached = may_face_receiver(every, sonar_pose.position, propagation.bounces, profile, environment.depth, slack)
         every = every.select(reached)
-        part = legs_from(every, environment, profile, sonar_pose, propagation, centre, slack)
+        part = receive_paths(every, environment, profile, sonar_pose, propagation, centre, slack)
         side = every.clear[part.row], every.normal[part.row]
         part = view.visible(part, *side)
         kept, row = np.unique(part.row, return_inverse=True)
         found[0].append(part.numbered(seen + row))
         found[1].append(every.select(kept))
         seen += len(kept)
-    legs, facets = one_of(found[0]), one_of(found[1])
+    legs, facets = concatenate(found[0]), concatenate(found[1])
     group = facets.target[legs.row]
-    over = wavefronts(legs, group, environment, bent, sonar_pose, elements, propagation, band, degree)
-    return ArrayLegs(
+    over = expansion_source(legs, group, environment, bent, sonar_pose, elements, propagation, band, degree)
+    return FacetPaths(
         legs, over, facets, bodies, environment, profile, propagation, sonar_pose, elements, band, negligible, enough,
         alike, visibility, degree=degree, targets=targets,
     )  # fmt: skip

@@ -13,7 +13,7 @@ import numpy as np
 from sonarsynth.conventions import Floats, depth
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry.motion import Track
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.state import Snap, meeting_times, positions
 from sonarsynth.tracing.doppler import Meeting
 
@@ -28,7 +28,7 @@ class Occasion:
 
     snaps: tuple[int, ...]
     targets: tuple[int, ...]
-    bodies: tuple[Body, ...]  # all of them, where the sound meets them
+    bodies: tuple[PlacedTarget, ...]  # all of them, where the sound meets them
     meeting: Meeting
 
 
@@ -36,7 +36,7 @@ class Occasion:
 class _Times:
     """When the sound of each snap meets the middle of bodies, and when the array hears that."""
 
-    bodies: tuple[Body, ...]
+    bodies: tuple[PlacedTarget, ...]
     sonar: Track
     met: Floats  # (snap, body) s
     heard: Floats  # (snap, body) s
@@ -81,7 +81,7 @@ class _Times:
 
 
 def occasions(
-    bodies: tuple[Body, ...],
+    bodies: tuple[PlacedTarget, ...],
     snaps: tuple[Snap, ...],
     sonar: Track,
     profile: Profile,

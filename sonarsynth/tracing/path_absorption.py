@@ -9,15 +9,19 @@ import numpy as np
 from sonarsynth.conventions import Floats, depth
 from sonarsynth.environment.absorption import DepthAbsorption
 from sonarsynth.state import Snap
-from sonarsynth.tracing.receive_paths import Legs
+from sonarsynth.tracing.receive_paths import ReceivePaths
 
 if TYPE_CHECKING:
-    from sonarsynth.tracing.facet_paths import ArrayLegs
-    from sonarsynth.tracing.transmit_paths import Outward
+    from sonarsynth.tracing.facet_paths import FacetPaths
+    from sonarsynth.tracing.transmit_paths import TransmitPaths
 
 
 def path_loss(
-    array: ArrayLegs, absorption: float | DepthAbsorption, snap: Snap, legs: Legs, out: Outward | None = None
+    array: FacetPaths,
+    absorption: float | DepthAbsorption,
+    snap: Snap,
+    legs: ReceivePaths,
+    out: TransmitPaths | None = None,
 ) -> Floats:
     """Absorption (path,) in dB along legs to the array and, of echoes, along the ways out to where they start.
 

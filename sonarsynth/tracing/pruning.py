@@ -10,7 +10,7 @@ import numpy as np
 from sonarsynth.conventions import Bools, Floats, Ints
 
 
-class Seen(NamedTuple):
+class EchoLevels(NamedTuple):
     """Echoes, and how loud they are."""
 
     strength: Floats  # (echo,) the largest amplitude that it has anywhere on the array
@@ -19,17 +19,17 @@ class Seen(NamedTuple):
     group: Ints  # (echo,)
 
 
-def loud_of_all(seen: list[Seen], negligible: float) -> list[Bools]:
+def loud_of_all(seen: list[EchoLevels], negligible: float) -> list[Bools]:
     """Which echoes of each block are kept, by all of them in the order of one block."""
     columns = [np.concatenate(column) for column in zip(*seen, strict=True)]
     order = np.argsort(columns[-1], kind="stable")
     keep = np.empty(len(order), bool)
     in_order: Any = [column[order] for column in columns]
-    keep[order] = loud_ones(Seen(*in_order), negligible)
+    keep[order] = loud_ones(EchoLevels(*in_order), negligible)
     return np.split(keep, np.cumsum([len(some.strength) for some in seen])[:-1])
 
 
-def loud_ones(seen: Seen, negligible: float) -> Bools:
+def loud_ones(seen: EchoLevels, negligible: float) -> Bools:
     """Which (path,) are kept: all but the faintest of each target, by `arrivals.NEGLIGIBLE`."""
     strength, coherent, target, _ = seen
     keep = np.ones(len(strength), bool)

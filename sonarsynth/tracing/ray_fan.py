@@ -11,7 +11,7 @@ from sonarsynth.conventions import NO_TARGET, Floats, Ints, depth
 from sonarsynth.environment.sea import Environment, Profile
 from sonarsynth.equations.rays.ray_solutions import Water, water, within
 from sonarsynth.geometry import unit
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.propagation.ray_steps import ARRIVAL, END, EVENTS, FACET, LAUNCH, Rays, launch, reflect, step
 from sonarsynth.scattering import ScatteringLaw
 from sonarsynth.scattering.components import size_at
@@ -42,7 +42,7 @@ class RayFan:
 def fan(
     environment: Environment,
     profile: Profile,
-    bodies: tuple[Body, ...],
+    bodies: tuple[PlacedTarget, ...],
     origin: Floats,
     directions: Floats,
     duration: float,
@@ -107,7 +107,7 @@ def _points(
 
 def _follow(
     layers: Water,
-    bodies: tuple[Body, ...],
+    bodies: tuple[PlacedTarget, ...],
     rays: Rays,
     bounces: int,
     spacing: float,
@@ -134,7 +134,7 @@ def _send_on(
     environment: Environment,
     profile: Profile,
     layers: Water,
-    bodies: tuple[Body, ...],
+    bodies: tuple[PlacedTarget, ...],
     landed: _Landed,
     towards: Floats,
     laws: tuple[ScatteringLaw, ...],

@@ -14,17 +14,17 @@ from sonarsynth.environment.sea import Environment, Profile
 from sonarsynth.equations.rays.ray_solutions import COINCIDENT, TOLERANCE
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import in_blocks
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Paths
 from sonarsynth.propagation.reflections import Reflections, reflections
-from sonarsynth.tracing.occlusion.ray_cones import most_swerve
+from sonarsynth.tracing.occlusion.ray_cones import max_launch_deviation
 
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
 
 
 @dataclass(frozen=True, eq=False)
-class Legs:
+class ReceivePaths:
     """Rays from points in the water to the array centre."""
 
     point: Floats  # (leg, xyz) m, world: where it starts
@@ -46,15 +46,15 @@ class Legs:
     hidden_from: Bytes  # (leg, byte) as of `Arrivals`
     open: Bools  # (leg,) bodies hide it from some hydrophones: which ones, is not known yet (`shading.settled`)
 
-    def select(self, keep: Bools | Ints | slice) -> Legs:
+    def select(self, keep: Bools | Ints | slice) -> ReceivePaths:
         """The legs picked by a mask, by indices, or by a slice, which copies nothing."""
-        return Legs(**{name: value[keep] for name, value in vars(self).items()})
+        return ReceivePaths(**{name: value[keep] for name, value in vars(self).items()})
 
-    def numbered(self, row: Ints) -> Legs:
+    def numbered(self, row: Ints) -> ReceivePaths:
         """The legs with other numbers (leg,) for the points that they start from."""
         return replace(self, row=row)
 
-    def seen(self, hidden_from: Bytes, open: Bools) -> Legs:
+    def seen(self, hidden_from: Bytes, open: Bools) -> ReceivePaths:
         """The legs, hidden from some hydrophones, which are not known yet for some."""
         return replace(self, hidden_from=hidden_from, open=open)
 
@@ -64,9 +64,11 @@ class Legs:
         return np.asarray(self.surface + self.bottom)
 
     def swerve(self, environment: Environment, profile: Profile, sonar_pose: Pose, spread: Floats | float) -> Floats:
-        """(leg,) rad as `shadows.most_swerve`, of those to within `spread` (m) of the array centre."""
+        """(leg,) rad as `shadows.max_launch_deviation`, of those to within `spread` (m) of the array centre."""
         ray = self.departure, self.length, self.spreading, self.surface, self.bottom, self.turning
-        return most_swerve(environment.depth, profile, self.point, float(depth(sonar_pose.position)), *ray, spread)
+        return max_launch_deviation(
+            environment.depth, profile, self.point, float(depth(sonar_pose.position)), *ray, spread
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,10 +87,10 @@ class Facets:
         return Facets(**{name: value[keep] for name, value in vars(self).items()})
 
 
-T = TypeVar("T", Legs, Facets)
+T = TypeVar("T", ReceivePaths, Facets)
 
 
-def one_of(parts: list[T]) -> T:
+def concatenate(parts: list[T]) -> T:
     """All rows of some parts, in order; the list is emptied, so that no more than a column is there twice."""
     if len(parts) == 1:
         return parts.pop()
@@ -104,14 +106,14 @@ def usable(paths: Paths) -> Bools:
 
 def rays_to_centre(
     environment: Environment, profile: Profile, point: Floats, sonar_pose: Pose, propagation: Propagation, centre: float
-) -> Legs:
+) -> ReceivePaths:
     """All rays from points (point, xyz) in the world to the array centre, sorted by point; centre (Hz): of the band."""
     end = np.broadcast_to(sonar_pose.position, point.shape)
     paths = propagation.connect(profile, environment.depth, point, end)
     keep = np.flatnonzero(usable(paths))
     start = point[paths.pair[keep]]
     bounced: Reflections = reflections(environment, profile, paths, centre)
-    return Legs(
+    return ReceivePaths(
         point=start,
         row=paths.pair[keep],
         departure=paths.departure[keep],
@@ -133,7 +135,7 @@ def rays_to_centre(
     )
 
 
-def require_in_water(bodies: tuple[Body, ...], environment: Environment) -> None:
+def require_in_water(bodies: tuple[PlacedTarget, ...], environment: Environment) -> None:
     """Raises ValueError for a body that reaches out of the water."""
     for body in bodies:
         highest, deepest = environment.depth, 0.0
@@ -147,7 +149,7 @@ def require_in_water(bodies: tuple[Body, ...], environment: Environment) -> None
             )
 
 
-def facets_of(bodies: tuple[Body, ...], some: slice) -> Facets:
+def facets_of(bodies: tuple[PlacedTarget, ...], some: slice) -> Facets:
     """Some of the facets of all bodies, one body after the other."""
     last = np.cumsum([0, *(len(body.mesh.faces) for body in bodies)])
     of = [slice(*np.clip([some.start - n, some.stop - n], 0, m - n)) for n, m in pairwise(last.tolist())]
@@ -167,7 +169,7 @@ def facets_of(bodies: tuple[Body, ...], some: slice) -> Facets:
     )
 
 
-def legs_from(
+def receive_paths(
     facets: Facets,
     environment: Environment,
     profile: Profile,
@@ -175,7 +177,7 @@ def legs_from(
     propagation: Propagation,
     centre: float,
     slack: float = 0.0,
-) -> Legs:
+) -> ReceivePaths:
     """Facet to array: rays that leave a facet on its outer side, whether or not a body stands in them; rows are facets.
 
     Or that may on their way to a point within `slack` (m) of the array centre.
@@ -187,7 +189,9 @@ def legs_from(
     return legs.select(np.flatnonzero(ahead > -slack))
 
 
-def may_face(facets: Facets, position: Floats, bounces: int, profile: Profile, bed: float, slack: float = 0.0) -> Bools:
+def may_face_receiver(
+    facets: Facets, position: Floats, bounces: int, profile: Profile, bed: float, slack: float = 0.0
+) -> Bools:
     """(facet,) which may have a ray on their outer side to a point (xyz), or within `slack` (m) of it; exactly so in
     uniform water, unreflected.
 

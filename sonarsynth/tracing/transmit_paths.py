@@ -10,16 +10,16 @@ import numpy as np
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.products import Arrivals, Paths
 from sonarsynth.propagation.reflections import Reflections, as_sign
-from sonarsynth.scattering.facet_geometry import Pulses
-from sonarsynth.tracing.expansion.wavefront_polynomials import Terms
-from sonarsynth.tracing.receive_paths import Legs
+from sonarsynth.scattering.facet_geometry import PulseResponse
+from sonarsynth.tracing.expansion.wavefront_polynomials import ExpansionTerms
+from sonarsynth.tracing.receive_paths import ReceivePaths
 
-TOGETHER = 1e-12
+COINCIDENCE_TIME = 1e-12
 """s: ways to a facet whose travel times differ by less are one."""
 
 
 @dataclass(frozen=True, eq=False)
-class Outward:
+class TransmitPaths:
     """Ways from a snap to facets."""
 
     facet: Ints  # (way,) which facet
@@ -36,29 +36,29 @@ class Outward:
     blur: Floats  # (way,) s
 
     @staticmethod
-    def of(paths: Paths, bounced: Reflections, facet: Ints) -> Outward:
+    def of(paths: Paths, bounced: Reflections, facet: Ints) -> TransmitPaths:
         """Of paths to facets (path,)."""
-        return Outward(
+        return TransmitPaths(
             facet, paths.arrival, paths.travel_time, paths.length, paths.spreading, paths.surface, paths.bottom,
             paths.turning, paths.caustics, bounced.modulus, bounced.phase, bounced.blur,
         )  # fmt: skip
 
     @staticmethod
-    def none(count: int) -> Outward:
+    def none(count: int) -> TransmitPaths:
         """No way at all, of paths that come straight from the snap; its spreading is that of the leg."""
         zero, none = np.zeros(count), np.zeros(count, int)
-        return Outward(
+        return TransmitPaths(
             none, np.zeros((count, 3)), zero, zero, zero + 1.0, none, none, none, none, zero + 1.0, zero, zero
         )
 
-    def select(self, keep: Bools | Ints) -> Outward:
+    def select(self, keep: Bools | Ints) -> TransmitPaths:
         """The ways picked by a mask or by indices."""
-        return Outward(**{name: value[keep] for name, value in vars(self).items()})
+        return TransmitPaths(**{name: value[keep] for name, value in vars(self).items()})
 
-    def merged(self) -> Outward:
+    def merged(self) -> TransmitPaths:
         """The ways with those that coincide added up: from a snap on the bed, say, and its image there."""
         first = np.ones(len(self.facet), bool)
-        same = (np.diff(self.facet) == 0) & (np.abs(np.diff(self.travel_time)) < TOGETHER)
+        same = (np.diff(self.facet) == 0) & (np.abs(np.diff(self.travel_time)) < COINCIDENCE_TIME)
         first[1:] = ~(same & (np.diff(self.blur) == 0) & (np.abs(np.diff(self.arrival, axis=0)) < 1e-9).all(axis=1))
         if first.all():
             return self
@@ -76,8 +76,8 @@ class Outward:
 
 
 def assemble(
-    legs: Legs, over: Terms, out: Outward, index: int, time: float, loss: Floats,
-    target: Ints, facet: Ints, scattering: Floats, variation: tuple[Floats, float], pulses: Pulses,
+    legs: ReceivePaths, over: ExpansionTerms, out: TransmitPaths, index: int, time: float, loss: Floats,
+    target: Ints, facet: Ints, scattering: Floats, variation: tuple[Floats, float], pulses: PulseResponse,
 ) -> Arrivals:  # fmt: skip
     """Arrivals of snap `index` at `time` (s) from both halves of their paths; over: the wavefronts; loss: absorption of
     each (dB); variation: terms of the amplitude and their error; pulses: what facets make of the snap."""
@@ -127,11 +127,11 @@ def assemble(
     )
 
 
-def silence(legs: Legs) -> Arrivals:
+def no_arrivals(legs: ReceivePaths) -> Arrivals:
     """No arrivals at all: what a frame without a snap has."""
     none, zero = np.empty(0), np.empty(0, int)
-    empty = legs.select(zero), Terms.none(0), Outward.none(0)
-    return assemble(*empty, 0, 0.0, none, zero, zero, none, (np.empty((0, 0)), 0.0), Pulses.plain(0))
+    empty = legs.select(zero), ExpansionTerms.none(0), TransmitPaths.none(0)
+    return assemble(*empty, 0, 0.0, none, zero, zero, none, (np.empty((0, 0)), 0.0), PulseResponse.plain(0))
 
 
 def join(parts: list[Arrivals], sound_speed: float, centre: float) -> Arrivals:

@@ -12,7 +12,7 @@ from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.motion import Still
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.planning import plan
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing
@@ -22,7 +22,7 @@ from sonarsynth.recipe.scene import Scene, World
 from sonarsynth.scattering import Isotropic, Kirchhoff, MirrorLobe
 from sonarsynth.scattering.law_notes import concave_note, facing_share
 from sonarsynth.sources.shrimp import LogarithmicBubble, SnappingShrimp
-from sonarsynth.state import Moment, Snap
+from sonarsynth.state import Snap, WorldState
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Cylinder, LShape, Remus100, Sphere
 from sonarsynth.targets.target import Target
@@ -40,17 +40,22 @@ SHARP = Kirchhoff(edges="sharp")
 SCATTERED = Kirchhoff(forward="scattered")
 
 
-def placed(mesh: Mesh, *place: float, turned: float = 1.1, name: str = "body") -> Body:
-    return Body(name, mesh, Pose(np.array(place), quaternion(turned)), np.zeros(3))
+def placed(mesh: Mesh, *place: float, turned: float = 1.1, name: str = "body") -> PlacedTarget:
+    return PlacedTarget(name, mesh, Pose(np.array(place), quaternion(turned)), np.zeros(3))
 
 
 def heard(
-    bodies: tuple[Body, ...], laws: tuple[object, ...], *, source: Floats = SOURCE, bounces: int = 0, bent: bool = False
+    bodies: tuple[PlacedTarget, ...],
+    laws: tuple[object, ...],
+    *,
+    source: Floats = SOURCE,
+    bounces: int = 0,
+    bent: bool = False,
 ) -> Arrivals:
     """Every path; all of them finite."""
     speed = np.array([C + 8.0, C - 7.0]) if bent else np.array([C])
     found = trace(
-        WATER, Profile(np.array([0.0, BED])[: len(speed)], speed), Moment(0.0, bodies,
+        WATER, Profile(np.array([0.0, BED])[: len(speed)], speed), WorldState(0.0, bodies,
         (Snap(np.asarray(source), 0.0, LogarithmicBubble(), None),)), Pose(ARRAY, EAST), ROMANIS, 0.0,
         AutoTracing(bounces=bounces), laws, band=(25e3, 85e3),
     )  # fmt: skip
@@ -72,7 +77,7 @@ def transfer(found: Arrivals) -> Floats:
     return (found.amplitude[:, None] * shape * np.exp(1j * phase)).sum(axis=0)
 
 
-def unhidden(bodies: tuple[Body, ...], own: int, towards: Floats) -> tuple[Bools, Bools]:
+def unhidden(bodies: tuple[PlacedTarget, ...], own: int, towards: Floats) -> tuple[Bools, Bools]:
     """Which facets (facet,) of a body face a point with no triangle before it, and of which this is in no doubt.
 
     Every triangle of every body is met by every ray, Moller and Trumbore (1997).
@@ -246,9 +251,16 @@ def test_a_body_that_touches_a_boundary_within_rounding_is_in_the_water(depth: f
             surface = Environment(depth=depth, sound_speed=Isovelocity(speed=C))
             snap = Snap(np.array([14.0, -4.0, -5.0]), 0.0, LogarithmicBubble(), None)
             found = trace(
-                surface, made.profile, Moment(0.0, (body,), (snap,)), Pose(np.array([0.0, 0.0, -5.0]), EAST), ROMANIS,
-                0.0, AutoTracing(bounces=1), (Kirchhoff(),), band=(25e3, 85e3),
-            )  # fmt: skip
+                surface,
+                made.profile,
+                WorldState(0.0, (body,), (snap,)),
+                Pose(np.array([0.0, 0.0, -5.0]), EAST),
+                ROMANIS,
+                0.0,
+                AutoTracing(bounces=1),
+                (Kirchhoff(),),
+                band=(25e3, 85e3),
+            )
             assert np.isfinite(found.amplitude).all() and (found.target == 0).any()
 
 

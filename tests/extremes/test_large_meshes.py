@@ -12,8 +12,8 @@ import trimesh
 
 from sonarsynth import FieldError
 from sonarsynth.casting.ray_casting import casting_mesh
-from sonarsynth.description import byte_bounded_cache
-from sonarsynth.description.byte_bounded_cache import Kept, kept, size_of
+from sonarsynth.description import byte_bounded_cache as caching
+from sonarsynth.description.byte_bounded_cache import ByteBoundedCache, byte_bounded_cache, size_of
 from sonarsynth.geometry.curvature import bend
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.planning.notes import scene_checks
@@ -63,8 +63,10 @@ def test_bodies_in_the_water_that_their_boxes_leave() -> None:
 
 
 def test_caches_of_meshes_are_bounded_whatever_was_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(byte_bounded_cache, "MOST_BYTES", 4_000_000)
-    caches = [one for one in gc.get_objects() if isinstance(one, Kept) and one.__module__.startswith("sonarsynth")]
+    monkeypatch.setattr(caching, "MOST_BYTES", 4_000_000)
+    caches = [
+        one for one in gc.get_objects() if isinstance(one, ByteBoundedCache) and one.__module__.startswith("sonarsynth")
+    ]
     for cache in caches:
         cache.cache_clear()  # what was kept under the real bound
     for n in range(50):
@@ -76,7 +78,7 @@ def test_caches_of_meshes_are_bounded_whatever_was_seen(monkeypatch: pytest.Monk
     assert len(caches) >= 7
     grown = size_of(mesh, casting_mesh(mesh))  # the last mesh has grown since it was kept
     for cache in caches:
-        assert cache.nbytes <= 4_000_000 + grown or len(cache) <= byte_bounded_cache.LEAST, cache.__qualname__
+        assert cache.nbytes <= 4_000_000 + grown or len(cache) <= caching.LEAST, cache.__qualname__
     assert max(len(cache) for cache in caches) < 50 < 2 * sum(len(cache) for cache in caches)
 
 
@@ -92,21 +94,21 @@ def test_no_cache_of_the_package_grows_without_bound() -> None:
 def test_kept_results_are_the_last_ones(monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[int] = []
 
-    @kept(8)
+    @byte_bounded_cache(8)
     def zeros(count: int) -> np.ndarray:
         made.append(count)
         return np.zeros(count)
 
-    monkeypatch.setattr(byte_bounded_cache, "MOST_BYTES", 8 * 1000)
+    monkeypatch.setattr(caching, "MOST_BYTES", 8 * 1000)
     for count in (100, 101, 102, 103, 104, 100):
         assert len(zeros(count)) == count
     assert made == [100, 101, 102, 103, 104]  # all fit
     zeros(900)
-    assert len(zeros) == byte_bounded_cache.LEAST  # type: ignore[arg-type]
+    assert len(zeros) == caching.LEAST  # type: ignore[arg-type]
     assert zeros(100) is zeros(100) and made[-1] == 900  # the last stay
     zeros(101)
     assert made[-1] == 101  # the first went
-    monkeypatch.setattr(byte_bounded_cache, "MOST_BYTES", 10**9)
+    monkeypatch.setattr(caching, "MOST_BYTES", 10**9)
     for count in range(20):
         zeros(count)
     assert len(zeros) == 8  # type: ignore[arg-type]

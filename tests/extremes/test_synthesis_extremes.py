@@ -11,7 +11,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.equations.bubble import snap_pressure
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import Elements, LowPass, PositionTable, Sonar, elements
-from sonarsynth.signals import DirectSum, KernelDeposit, pulse_support
+from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.sources.snap_pulses import waveform
@@ -23,7 +23,7 @@ SONAR = Sonar()
 C = 1540.0
 GRID = np.linspace(-0.6, 0.6, 4)
 ARRAY = elements(PositionTable(positions=tuple((0.0, float(y), float(z)) for y in GRID for z in GRID), face=49.53e-3))
-METHODS = (DirectSum(), KernelDeposit())
+METHODS = (DirectSum(), GriddedSynthesis())
 
 
 def arrivals(delay: Floats, direction: Floats, radius: Floats, amplitude: Floats) -> Arrivals:
@@ -76,7 +76,7 @@ def window(of: Arrivals, array: Elements) -> tuple[float, int]:
     return start, int((of.delay.max() + after + array.aperture / C - start) * SONAR.sampling_frequency) + 3
 
 
-def error_of(method: KernelDeposit, of: Arrivals, array: Elements) -> float:
+def error_of(method: GriddedSynthesis, of: Arrivals, array: Elements) -> float:
     start, samples = window(of, array)
     exact, _ = exact_signals(of, SNAPS, array, SONAR, None, start, samples)
     got = method.signals(of, SNAPS, array, SONAR, None, start, samples).pressure
@@ -88,14 +88,16 @@ def test_any_curvature(radius: float) -> None:
     rng = np.random.default_rng(1)
     direction = np.array([1.0, 0.2, 0.1]) + 0.05 * rng.standard_normal((20, 3))
     of = arrivals(rng.uniform(0.01, 0.011, 20), direction, np.full(20, radius), rng.standard_normal(20))
-    assert error_of(KernelDeposit(), of, ARRAY) < 1e-4
+    assert error_of(GriddedSynthesis(), of, ARRAY) < 1e-4
 
 
 def test_a_huge_radius_is_a_plane_wave() -> None:
     of = arrivals([0.01], [[1.0, 0.3, 0.2]], [1e15], [1.0])
     start, samples = window(of, ARRAY)
     far, flat = (
-        KernelDeposit().signals(replace(of, radius=np.array([r])), SNAPS, ARRAY, SONAR, None, start, samples).pressure
+        GriddedSynthesis()
+        .signals(replace(of, radius=np.array([r])), SNAPS, ARRAY, SONAR, None, start, samples)
+        .pressure
         for r in (1e15, np.inf)
     )
     np.testing.assert_allclose(far, flat, atol=1e-6 * np.abs(flat).max())
@@ -104,44 +106,46 @@ def test_a_huge_radius_is_a_plane_wave() -> None:
 @pytest.mark.parametrize("delay", [-50.0, 0.0, 1.0, 1e4])
 def test_any_clock(delay: float) -> None:
     of = arrivals(delay + np.array([0.0, 3.3e-4]), [[1.0, 0.1, 0.0], [1.0, 0.15, 0.1]], [20.0, 21.0], [1.0, -0.5])
-    assert error_of(KernelDeposit(), of, ARRAY) < (1e-4 if delay < 1e3 else 3e-4)  # 1e4 s is held to 1e-12 s
+    assert error_of(GriddedSynthesis(), of, ARRAY) < (1e-4 if delay < 1e3 else 3e-4)  # 1e4 s is held to 1e-12 s
 
 
 @pytest.mark.parametrize("direction", [(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)])
 def test_along_the_edges_and_from_behind(direction: tuple[float, float, float]) -> None:
     of = arrivals([0.01], [direction], [5.0], [1.0])
-    assert error_of(KernelDeposit(), of, ARRAY) < 1e-4
+    assert error_of(GriddedSynthesis(), of, ARRAY) < 1e-4
 
 
 def test_from_all_sides_at_once() -> None:
     rng = np.random.default_rng(2)
     of = arrivals(rng.uniform(0, 2e-3, 40), rng.standard_normal((40, 3)), rng.uniform(2, 50, 40), rng.uniform(1, 2, 40))
-    assert error_of(KernelDeposit(), of, ARRAY) < 1e-4
+    assert error_of(GriddedSynthesis(), of, ARRAY) < 1e-4
 
 
 def test_opposite_paths_of_one_tile() -> None:
     of = arrivals([0.01, 0.01], [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], [np.inf, np.inf], [1.0, 1.0])
-    assert error_of(KernelDeposit(), of, ARRAY) < 1e-4
+    assert error_of(GriddedSynthesis(), of, ARRAY) < 1e-4
 
 
 def test_paths_that_are_all_alike() -> None:
     of = arrivals(np.full(300, 0.01), np.tile([1.0, 0.2, 0.1], (300, 1)), np.full(300, 20.0), np.full(300, 1 / 300))
     one = arrivals([0.01], [[1.0, 0.2, 0.1]], [20.0], [1.0])
     start, samples = window(of, ARRAY)
-    many, single = (KernelDeposit().signals(x, SNAPS, ARRAY, SONAR, None, start, samples).pressure for x in (of, one))
+    many, single = (
+        GriddedSynthesis().signals(x, SNAPS, ARRAY, SONAR, None, start, samples).pressure for x in (of, one)
+    )
     np.testing.assert_allclose(many, single, atol=1e-4 * np.abs(single).max())  # one path alone needs no deposit
 
 
 def test_one_hydrophone_at_the_centre() -> None:
     one = elements(PositionTable(positions=((0.0, 0.0, 0.0),), face=49.53e-3))
     of = arrivals([0.01, 0.0101], [[1.0, 0.3, 0.0], [1.0, 0.0, 0.3]], [1e-3, 10.0], [1.0, 1.0])
-    assert error_of(KernelDeposit(), of, one) < 1e-4
+    assert error_of(GriddedSynthesis(), of, one) < 1e-4
 
 
 def test_levels_from_whisper_to_explosion() -> None:
     for size in (1e-30, 1e12):
         of = arrivals([0.01], [[1.0, 0.1, 0.1]], [20.0], [size])
-        assert error_of(KernelDeposit(), of, ARRAY) < 1e-4
+        assert error_of(GriddedSynthesis(), of, ARRAY) < 1e-4
 
 
 def test_an_echo_120_db_below_the_direct_snap_keeps_its_accuracy() -> None:
@@ -149,7 +153,7 @@ def test_an_echo_120_db_below_the_direct_snap_keeps_its_accuracy() -> None:
     of = replace(of, target=np.array([-1, 0]))
     start, samples = window(of, ARRAY)
     exact, _ = exact_signals(of, SNAPS, ARRAY, SONAR, None, start, samples)
-    got = KernelDeposit().signals(of, SNAPS, ARRAY, SONAR, None, start, samples).pressure
+    got = GriddedSynthesis().signals(of, SNAPS, ARRAY, SONAR, None, start, samples).pressure
     alone, _ = exact_signals(of.select(of.target == 0), SNAPS, ARRAY, SONAR, None, start, samples)
     late = int((0.018 - start) * SONAR.sampling_frequency)
     assert np.abs(got - alone)[:, late:].max() < 1e-4 * np.abs(alone).max()
@@ -157,7 +161,7 @@ def test_an_echo_120_db_below_the_direct_snap_keeps_its_accuracy() -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_no_paths_are_silence(method: DirectSum | KernelDeposit) -> None:
+def test_no_paths_are_silence(method: DirectSum | GriddedSynthesis) -> None:
     of = arrivals([], np.zeros((0, 3)), [], [])
     for snaps in (SNAPS, ()):
         got = method.signals(of, snaps, ARRAY, SONAR, None, 0.0, 64)
@@ -188,7 +192,7 @@ def test_no_paths_are_silence(method: DirectSum | KernelDeposit) -> None:
     ],
 )
 def test_what_cannot_be_synthesised_is_refused(
-    method: DirectSum | KernelDeposit, change: dict[str, np.ndarray], message: str
+    method: DirectSum | GriddedSynthesis, change: dict[str, np.ndarray], message: str
 ) -> None:
     array = elements(PositionTable(positions=((0.0, 0.0, 0.2), (0.0, 0.0, -0.2))))
     of = replace(arrivals([0.0, 1e-4], [[1.0, 0.0, 0.0]] * 2, [2.0, 2.0], [1.0, 1.0]), **change)
@@ -223,8 +227,8 @@ FEW = arrivals(
 )
 def test_any_shape_of_pulse(phase: object, blur: object, stretch: object) -> None:
     of = shaped(FEW, phase, blur, stretch)
-    assert error_of(KernelDeposit(), of, ARRAY) < 1e-4
-    assert error_of(KernelDeposit(), of.select(np.array([0])), ARRAY) < 1e-4
+    assert error_of(GriddedSynthesis(), of, ARRAY) < 1e-4
+    assert error_of(GriddedSynthesis(), of.select(np.array([0])), ARRAY) < 1e-4
 
 
 @pytest.mark.parametrize("loss", [(1e-9, 0.0, 0.0), (10.0, 11.0, 14.0), (0.0, 20.0, 40.0)])
@@ -234,12 +238,12 @@ def test_pulses_of_any_shape_and_any_absorption(loss: tuple[float, float, float]
     of = replace(of, amplitude=of.amplitude * 10.0 ** (-of.absorption / 40.0))
     start, samples = window(of, ARRAY)
     exact, _ = exact_signals(of, SNAPS, ARRAY, SONAR, lambda f: 1e-6 * f, start, samples)
-    got = KernelDeposit().signals(of, SNAPS, ARRAY, SONAR, lambda f: 1e-6 * f, start, samples).pressure
+    got = GriddedSynthesis().signals(of, SNAPS, ARRAY, SONAR, lambda f: 1e-6 * f, start, samples).pressure
     assert np.abs(got - exact).max() < 1e-4 * np.abs(exact).max()
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_huge_blur_is_silence_and_nothing_is_outside(method: DirectSum | KernelDeposit) -> None:
+def test_a_huge_blur_is_silence_and_nothing_is_outside(method: DirectSum | GriddedSynthesis) -> None:
     got = method.signals(shaped(FEW, 1.0, [1e300, 1.0, 0.1], 0.05), SNAPS, ARRAY, SONAR, None, 0.0, 4000)
     assert not got.pressure.any()
     assert got.outside == 0
@@ -250,13 +254,13 @@ def test_a_low_pass_hears_what_a_wide_range_of_blurs_leaves() -> None:
     of = arrivals(0.05 + 1e-4 * np.arange(12), [[1.0, 0.1, 0.1]] * 12, [20.0] * 12, [1.0] * 12)
     of = shaped(of, np.arange(12.0), np.append(0.0, np.geomspace(1e-7, 1e-2, 11)), 0.0)
     exact, _ = exact_signals(of, SNAPS, ARRAY, sonar, None, 0.0, 18000)
-    got = KernelDeposit().signals(of, SNAPS, ARRAY, sonar, None, 0.0, 18000).pressure
+    got = GriddedSynthesis().signals(of, SNAPS, ARRAY, sonar, None, 0.0, 18000).pressure
     assert np.abs(got - exact).max() < 1e-4 * np.abs(exact).max()
 
 
 def test_an_empty_window_is_refused() -> None:
     with pytest.raises(ValueError, match="at least one sample"):
-        KernelDeposit().signals(arrivals([0.0], [[1.0, 0, 0]], [1.0], [1.0]), SNAPS, ARRAY, SONAR, None, 0.0, 0)
+        GriddedSynthesis().signals(arrivals([0.0], [[1.0, 0, 0]], [1.0], [1.0]), SNAPS, ARRAY, SONAR, None, 0.0, 0)
 
 
 def test_a_snap_of_other_scales() -> None:

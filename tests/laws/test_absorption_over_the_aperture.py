@@ -9,7 +9,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.equations.water.seawater import ainslie_mccolm
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, elements
-from sonarsynth.signals import DirectSum, KernelDeposit
+from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Snap
@@ -78,7 +78,7 @@ def test_the_fast_synthesis_absorbs_as_the_exact_sum(count: int, face: float) ->
     of = from_points(points, np.zeros(3), rate)
     part = elements(PositionTable(positions=tuple(map(tuple, ROMANIS.position[::16].tolist())), face=face))
     exact, _ = exact_signals(of, SNAPS, part, SONAR, sea, start, samples)
-    fast = KernelDeposit(width=10, precision="float64", tolerance=1e-7)
+    fast = GriddedSynthesis(width=10, precision="float64", tolerance=1e-7)
     got, _ = fast.pressure(of, SNAPS, part, SONAR, sea, start, samples)
     assert np.abs(got - exact).max() < 5e-7 * np.abs(exact).max()
 
@@ -93,7 +93,7 @@ def test_absorption_that_is_strong_is_absorbed_at_every_hydrophone() -> None:
     of = from_points(points, np.zeros(3), rate)
     part = elements(PositionTable(positions=tuple(map(tuple, ROMANIS.position[::16].tolist())), face=ROMANIS.face))
     exact, _ = exact_signals(of, SNAPS, part, SONAR, strong, start, samples)
-    got, _ = KernelDeposit().pressure(of, SNAPS, part, SONAR, strong, start, samples)
+    got, _ = GriddedSynthesis().pressure(of, SNAPS, part, SONAR, strong, start, samples)
     assert np.abs(got - exact).max() < 1.5e-4 * np.abs(exact).max()
 
 
@@ -103,7 +103,7 @@ def test_a_hydrophone_farther_away_hears_less_of_the_high_frequencies() -> None:
     line = elements(PositionTable(positions=((0.25, 0.0, 0.0), (-0.25, 0.0, 0.0))))
     of = from_points(np.array([[distance, 0.0, 0.0]]), np.zeros(3), float(sea(SONAR.band.centre)))
     start, samples = window(distance)
-    for method in (DirectSum(), KernelDeposit(width=10, precision="float64", tolerance=1e-7)):
+    for method in (DirectSum(), GriddedSynthesis(width=10, precision="float64", tolerance=1e-7)):
         signals = method.signals(of, SNAPS, line, SONAR, sea, start, samples)
         near, far = np.abs(np.fft.rfft(signals.pressure.astype(float), axis=1))
         f = np.fft.rfftfreq(samples, 1.0 / SONAR.sampling_frequency)

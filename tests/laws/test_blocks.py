@@ -11,14 +11,14 @@ from sonarsynth.environment.sea import Environment, Isovelocity, Profile
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.mesh import Mesh, in_blocks
 from sonarsynth.geometry.motion import Track
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels import label
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing, Refracted, Straight
 from sonarsynth.receiver import BeamGrid, Romanis, elements
 from sonarsynth.scattering import Kirchhoff, MirrorLobe, PartlyReflecting, Scattering
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Moment, Snap
+from sonarsynth.state import Snap, WorldState
 from sonarsynth.targets import meshes
 from sonarsynth.tracing import echoes
 from sonarsynth.tracing.arrivals import trace
@@ -36,10 +36,10 @@ def hull(subdivisions: int) -> Mesh:
 
 
 BODIES = tuple(
-    Body(name, hull(n), Pose(np.array(place), quaternion(0.4, 0.1, 0.2)), np.array([1.0, -2.0, 0.1]))
+    PlacedTarget(name, hull(n), Pose(np.array(place), quaternion(0.4, 0.1, 0.2)), np.array([1.0, -2.0, 0.1]))
     for name, n, place in (("large", 5, (20.0, 1.0, -11.0)), ("small", 3, (15.0, 0.5, -11.5)))
 )
-MOMENT = Moment(
+MOMENT = WorldState(
     0.0,
     BODIES,
     tuple(Snap(np.array(at), 1e-3 * at[0], LogarithmicBubble(), None) for at in ((3.0, 6.0, -30.0), (9.0, -6.0, -30))),

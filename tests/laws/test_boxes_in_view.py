@@ -8,12 +8,12 @@ import pytest
 from sonarsynth.conventions import azimuth_elevation, direction
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels import label
 from sonarsynth.labels.views import MEANINGS, View, box_in_view
 from sonarsynth.products import Truth
 from sonarsynth.receiver import BeamGrid
-from sonarsynth.state import Moment
+from sonarsynth.state import WorldState
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
 
@@ -25,10 +25,10 @@ STRAIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 def truth(*bodies: tuple[Mesh, np.ndarray]) -> Truth:
     placed = tuple(
-        Body(f"body{n}", mesh, Pose(SONAR.position + place, STRAIGHT), np.zeros(3))
+        PlacedTarget(f"body{n}", mesh, Pose(SONAR.position + place, STRAIGHT), np.zeros(3))
         for n, (mesh, place) in enumerate(bodies)
     )
-    return label(Moment(0.0, placed, ()), SONAR, BEAMS, None, np.zeros(0), True)  # type: ignore[arg-type]
+    return label(WorldState(0.0, placed, ()), SONAR, BEAMS, None, np.zeros(0), True)  # type: ignore[arg-type]
 
 
 def sampled(corners: np.ndarray, rng: np.random.Generator, count: int) -> np.ndarray:

@@ -13,13 +13,13 @@ from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import Romanis, elements
 from sonarsynth.scattering import Isotropic, Kirchhoff, MirrorLobe, PartlyReflecting
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Moment, Snap
+from sonarsynth.state import Snap, WorldState
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.tracing.arrivals import trace
@@ -35,16 +35,16 @@ ROMANIS = elements(Romanis())
 F = np.linspace(25e3, 85e3, 7)
 
 
-def body(mesh: Mesh, place: Floats, name: str = "body", turned: float = 0.5 * np.pi) -> Body:
-    return Body(name, mesh, Pose(np.array(place, float), quaternion(turned)), np.zeros(3))
+def body(mesh: Mesh, place: Floats, name: str = "body", turned: float = 0.5 * np.pi) -> PlacedTarget:
+    return PlacedTarget(name, mesh, Pose(np.array(place, float), quaternion(turned)), np.zeros(3))
 
 
 def echo(
-    bodies: tuple[Body, ...], source: Floats, laws: tuple[object, ...], bounces: int = 0, array: Floats = ARRAY
+    bodies: tuple[PlacedTarget, ...], source: Floats, laws: tuple[object, ...], bounces: int = 0, array: Floats = ARRAY
 ) -> Arrivals:
     snaps = (Snap(np.array(source, float), 0.0, LogarithmicBubble(), None),)
     found = trace(
-        WATER, PROFILE, Moment(0.0, bodies, snaps), Pose(array, EAST), ROMANIS, 0.0, AutoTracing(bounces=bounces),
+        WATER, PROFILE, WorldState(0.0, bodies, snaps), Pose(array, EAST), ROMANIS, 0.0, AutoTracing(bounces=bounces),
         laws, band=(25e3, 85e3),
     )  # fmt: skip
     return found.select(~found.direct)
@@ -180,7 +180,7 @@ def test_source_and_array_exchanged_hear_the_same() -> None:
     there = echo((body(mesh, place),), source, (law,))
     snaps = (Snap(ARRAY, 0.0, LogarithmicBubble(), None),)
     back = trace(
-        WATER, PROFILE, Moment(0.0, (body(mesh, place),), snaps), Pose(source, EAST), ROMANIS, 0.0, AutoTracing(),
+        WATER, PROFILE, WorldState(0.0, (body(mesh, place),), snaps), Pose(source, EAST), ROMANIS, 0.0, AutoTracing(),
         (law,), band=(25e3, 85e3),
     )  # fmt: skip
     back = back.select(~back.direct)

@@ -13,17 +13,17 @@ from sonarsynth.conventions import Floats
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
 from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.geometry import Pose, quaternion
-from sonarsynth.planning.choosing import Expansion
+from sonarsynth.planning.choosing import PerSensorReference
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import Refracted
 from sonarsynth.receiver import Elements, Romanis, Sonar, elements
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.recipe import reading
-from sonarsynth.signals import DirectSum, KernelDeposit
-from sonarsynth.signals.array_paths import delay_and_gain, fronts
+from sonarsynth.signals import DirectSum, GriddedSynthesis
+from sonarsynth.signals.array_paths import array_paths, delay_and_gain
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Moment, Snap
+from sonarsynth.state import Snap, WorldState
 from sonarsynth.tracing.arrivals import trace
 from sonarsynth.tracing.expansion.wavefront_polynomials import terms_of
 
@@ -39,7 +39,7 @@ TANK = Path(__file__).parents[2] / "configs" / "tank.yaml"
 
 def traced(array: Elements, pose: Pose, degree: int = 3) -> Arrivals:
     return trace(
-        WATER, PROFILE, Moment(0.0, (), (SNAP,)), pose, array, 0.0, Refracted(bounces=0), (),
+        WATER, PROFILE, WorldState(0.0, (), (SNAP,)), pose, array, 0.0, Refracted(bounces=0), (),
         band=(SONAR.band.low, SONAR.band.high), degree=degree,
     )  # fmt: skip
 
@@ -47,7 +47,7 @@ def traced(array: Elements, pose: Pose, degree: int = 3) -> Arrivals:
 def error(degree: int, share: float) -> float:
     """Largest error (s) of the delays at three hydrophones of a smaller array, each traced by itself."""
     array = replace(ROMANIS, position=share * ROMANIS.position)
-    front, errors = fronts(traced(array, POSE, degree), (SNAP,), array), []
+    front, errors = array_paths(traced(array, POSE, degree), (SNAP,), array), []
     delay, _ = delay_and_gain(front, array.position)
     for sensor in FAR:
         part = subarray(array, np.array([sensor]))
@@ -80,12 +80,14 @@ def test_kernel_deposit_is_the_direct_sum_to_the_fifth_degree() -> None:
     part = replace(subarray(ROMANIS, FAR).elements, position=ROMANIS.position[FAR])
     together = found.select(np.zeros(2, int))  # alone it is its own tile
     for some in (found, replace(together, delay=together.delay + [0.0, 1e-4])):
-        fast, slow = (heard(m, some, part) for m in (KernelDeposit(tolerance=1e-6, precision="float64"), DirectSum()))
+        fast, slow = (
+            heard(m, some, part) for m in (GriddedSynthesis(tolerance=1e-6, precision="float64"), DirectSum())
+        )
         assert np.linalg.norm(fast - slow) < 2e-5 * np.linalg.norm(slow)
 
 
-def heard(method: KernelDeposit | DirectSum, found: Arrivals, part: Elements) -> Floats:
-    make = method.pressure if isinstance(method, KernelDeposit) else exact_signals
+def heard(method: GriddedSynthesis | DirectSum, found: Arrivals, part: Elements) -> Floats:
+    make = method.pressure if isinstance(method, GriddedSynthesis) else exact_signals
     return np.asarray(make(found, (SNAP,), part, SONAR, None, 0.002, 800)[0])
 
 
@@ -93,7 +95,7 @@ def heard(method: KernelDeposit | DirectSum, found: Arrivals, part: Elements) ->
 def test_a_planner_takes_the_fifth_degree_before_it_cuts_the_array(signal: float, degree: int) -> None:
     made = planning.plan(reading.recipe_of(reading.read(TANK, [f"accuracy.signal={signal}"])))
     assert made.choices.subarrays == 1 and made.choices.degree == degree
-    measured = Expansion.of(made, 0)
+    measured = PerSensorReference.of(made, 0)
     assert measured.error(1, degree=made.choices.degree) < signal
     if degree == 5:
         assert measured.error(1, degree=3) > signal

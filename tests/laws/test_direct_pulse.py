@@ -13,7 +13,7 @@ from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.planning import plan
 from sonarsynth.planning.measured.lost_echoes import losses
-from sonarsynth.products import Bearings
+from sonarsynth.products import SourceEstimates
 from sonarsynth.ranging import IsovelocityRange, SensorDelays
 from sonarsynth.ranging.cancelling.direct_pulse import remove, remove_others, trusted
 from sonarsynth.receiver import BeamGrid, PlanarLattice, Sonar, elements
@@ -118,7 +118,7 @@ def test_a_later_snap_in_the_echo_window_is_taken_out_and_what_is_not_located_st
     later = hear(silence(ARRAY, START, 1000), ARRAY, 7.0 * direction(0.3, 0.1), CLOCK + excess - 7.0 / C, 0.5, C)
     both = replace(first, pressure=first.pressure + later.pressure)
     rows = vars(located(first)), vars(located(later))
-    bearings = Bearings(**{name: np.concatenate([row[name] for row in rows]) for name in rows[0]})
+    bearings = SourceEstimates(**{name: np.concatenate([row[name] for row in rows]) for name in rows[0]})
     window = CLOCK + 0.8e-3, CLOCK + 1.6e-3
     left = remove_others(both, bearings, ARRAY, SONAR, 0.5e-3, window)
     assert energy(left.pressure - first.pressure) < 1e-5 * energy(later.pressure)

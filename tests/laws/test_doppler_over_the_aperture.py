@@ -14,21 +14,21 @@ from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Pro
 from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.motion import Track
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import Refracted, Straight
 from sonarsynth.receiver import Elements, Romanis, Sonar, elements
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.scattering import Isotropic
-from sonarsynth.signals import DirectSum, KernelDeposit
-from sonarsynth.signals.array_paths import delay_and_gain, fronts
+from sonarsynth.signals import DirectSum, GriddedSynthesis
+from sonarsynth.signals.array_paths import array_paths, delay_and_gain
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Moment, Snap
+from sonarsynth.state import Snap, WorldState
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.tracing.facet_paths import ENOUGH
+from sonarsynth.tracing.facet_paths import QUADRATIC_TOLERANCE
 
 C = 1500.0
 PROFILE = Profile(np.array([0.0]), np.array([C]))
@@ -63,10 +63,10 @@ def traced(
         absorption=Absorption(formula="none"),
         bed=SeaBed(reflection=Rigid()),
     )
-    panel = Body("panel", PANEL, Pose(np.array([12.0, 1.5, -4.8]), quaternion(0.6)), moving.target)
+    panel = PlacedTarget("panel", PANEL, Pose(np.array([12.0, 1.5, -4.8]), quaternion(0.6)), moving.target)
     rays = Straight if profile.uniform else Refracted
     found = trace(
-        water, profile, Moment(0.0, (panel,), (SNAP,)), pose, array, 0.0, rays(bounces=bounces), (Isotropic(),),
+        water, profile, WorldState(0.0, (panel,), (SNAP,)), pose, array, 0.0, rays(bounces=bounces), (Isotropic(),),
         band=BAND, moving=Track(pose, moving.sonar), enough=enough, negligible=0.0,
     )  # fmt: skip
     return found.select(found.direct | np.isin(found.facet, FRONT))  # those that no hydrophone sees from their edge
@@ -150,14 +150,14 @@ def test_kernel_deposit_adds_what_the_direct_sum_adds(amplify: float) -> None:
     part = over_far()
     fast, slow = (
         heard(method, found, part) - heard(method, flat(found), part)
-        for method in (KernelDeposit(tolerance=1e-7, precision="float64"), DirectSum())
+        for method in (GriddedSynthesis(tolerance=1e-7, precision="float64"), DirectSum())
     )
     assert np.linalg.norm(slow) > 1e-4 * amplify * np.linalg.norm(heard(DirectSum(), found, part))
     assert np.linalg.norm(fast - slow) < 2e-3 * amplify * np.linalg.norm(slow)
 
 
-def heard(method: KernelDeposit | DirectSum, found: Arrivals, part: Elements) -> Floats:
-    if isinstance(method, KernelDeposit):
+def heard(method: GriddedSynthesis | DirectSum, found: Arrivals, part: Elements) -> Floats:
+    if isinstance(method, GriddedSynthesis):
         return np.asarray(method.pressure(found, (SNAP,), part, SONAR, None, START, SAMPLES)[0])
     return exact_signals(found, (SNAP,), part, SONAR, None, START, SAMPLES)[0]
 
@@ -168,16 +168,16 @@ def test_one_path_alone_is_the_direct_sum() -> None:
     assert len(found.delay) == 1 and found.stretch_terms.any()
     fast, slow = (
         np.asarray(m.signals(found, (SNAP,), ROMANIS, SONAR, None, 0.009, 800).pressure, float)
-        for m in (KernelDeposit(tolerance=1e-6, precision="float64"), DirectSum())
+        for m in (GriddedSynthesis(tolerance=1e-6, precision="float64"), DirectSum())
     )
     assert np.linalg.norm(fast - slow) / np.linalg.norm(slow) < 1e-6
 
 
 def test_nothing_is_carried_where_it_would_not_be_heard() -> None:
     slow = Moving(0.1 * FAST, STILL)
-    assert traced(slow, ROMANIS, POSE, enough=ENOUGH).stretch_terms.shape[1] == 0
+    assert traced(slow, ROMANIS, POSE, enough=QUADRATIC_TOLERANCE).stretch_terms.shape[1] == 0
     assert traced(Moving(STILL, STILL), ROMANIS, POSE).stretch_terms.shape[1] == 0
-    assert traced(MOVING["target"], ROMANIS, POSE, enough=ENOUGH).stretch_terms.shape[1] > 0
+    assert traced(MOVING["target"], ROMANIS, POSE, enough=QUADRATIC_TOLERANCE).stretch_terms.shape[1] > 0
 
 
 def test_delays_of_bent_rays_from_what_moves_are_those_of_each_hydrophone() -> None:
@@ -195,6 +195,6 @@ def test_delays_of_bent_rays_from_what_moves_are_those_of_each_hydrophone() -> N
 
 def delays(found: Arrivals, array: Elements, sensors: list[int]) -> list[Floats]:
     """Delay (path,) of echoes at each of some hydrophones."""
-    front = fronts(found.select(~found.direct), (SNAP,), array)
+    front = array_paths(found.select(~found.direct), (SNAP,), array)
     delay, _ = delay_and_gain(front, array.position)
     return [front.delay + delay[:, sensor] for sensor in sensors]

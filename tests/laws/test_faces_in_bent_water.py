@@ -15,11 +15,11 @@ from sonarsynth.products import Arrivals
 from sonarsynth.propagation import Refracted
 from sonarsynth.receiver import Elements, Romanis, Sonar, elements
 from sonarsynth.receiver.subarrays import subarray
-from sonarsynth.signals import DirectSum, KernelDeposit
-from sonarsynth.signals.array_paths import faced, fronts, towards
+from sonarsynth.signals import DirectSum, GriddedSynthesis
+from sonarsynth.signals.array_paths import array_paths, faced, towards
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Moment, Snap
+from sonarsynth.state import Snap, WorldState
 from sonarsynth.tracing.arrivals import trace
 
 C = 1500.0
@@ -39,7 +39,7 @@ def profile(gradient: float) -> Profile:
 
 def traced(gradient: float, array: Elements, pose: Pose, moving: Track | None = None) -> Arrivals:
     return trace(
-        WATER, profile(gradient), Moment(0.0, (), SNAPS), pose, array, 0.0, Refracted(bounces=0), (),
+        WATER, profile(gradient), WorldState(0.0, (), SNAPS), pose, array, 0.0, Refracted(bounces=0), (),
         band=(SONAR.band.low, SONAR.band.high), moving=moving,
     )  # fmt: skip
 
@@ -57,7 +57,7 @@ def smaller(share: float) -> Elements:
 def slownesses(gradient: float, array: Elements) -> tuple[float, float]:
     """Largest error of slownesses across faces at three hydrophones, times the sound speed: of wavefronts, and of
     straight rays."""
-    front, errors = fronts(traced(gradient, array, POSE), SNAPS, array), []
+    front, errors = array_paths(traced(gradient, array, POSE), SNAPS, array), []
     bent, straight = faced(front, array.position), towards(front, array.position)[0]
     for sensor in FAR:
         own, _ = alone(gradient, array, int(sensor))
@@ -79,14 +79,14 @@ def test_slownesses_are_those_of_rays_to_each_hydrophone_to_the_third_order_of_t
 def test_the_straight_limit_is_that_of_straight_rays() -> None:
     gap = slownesses(1e-3, ROMANIS)[1]
     assert gap < 1e-3 * slownesses(1.0, ROMANIS)[1] * 1.1
-    front = fronts(traced(0.0, ROMANIS, POSE), SNAPS, ROMANIS)
+    front = array_paths(traced(0.0, ROMANIS, POSE), SNAPS, ROMANIS)
     assert (faced(front, ROMANIS.position) == towards(front, ROMANIS.position)[0]).all()
 
 
 def test_the_motion_of_the_array_turns_no_wave() -> None:
     """It makes delays longer, not what a face hears of them."""
     moving = Track(POSE, np.array([1.0, 2.0, 0.0]))
-    front = fronts(traced(0.0, ROMANIS, POSE, moving), SNAPS, ROMANIS)
+    front = array_paths(traced(0.0, ROMANIS, POSE, moving), SNAPS, ROMANIS)
     assert front.delay_terms.any()
     assert np.abs(faced(front, ROMANIS.position) - towards(front, ROMANIS.position)[0]).max() < 1e-12
 
@@ -106,7 +106,9 @@ def test_kernel_deposit_is_the_direct_sum(gradient: float) -> None:
     found, part = traced(gradient, ROMANIS, POSE), over_far()
     together = replace(found, delay=found.delay - found.delay + found.delay.mean())  # in one stretch, and one tile
     for some in (found, together):
-        fast, slow = (heard(m, some, part) for m in (KernelDeposit(tolerance=1e-6, precision="float64"), DirectSum()))
+        fast, slow = (
+            heard(m, some, part) for m in (GriddedSynthesis(tolerance=1e-6, precision="float64"), DirectSum())
+        )
         assert np.linalg.norm(fast - slow) < 2e-5 * np.linalg.norm(slow)  # tails that are cut
 
 
@@ -115,6 +117,6 @@ def over_far() -> Elements:
     return replace(subarray(ROMANIS, FAR).elements, position=ROMANIS.position[FAR])
 
 
-def heard(method: KernelDeposit | DirectSum, found: Arrivals, part: Elements) -> Floats:
-    make = method.pressure if isinstance(method, KernelDeposit) else exact_signals
+def heard(method: GriddedSynthesis | DirectSum, found: Arrivals, part: Elements) -> Floats:
+    make = method.pressure if isinstance(method, GriddedSynthesis) else exact_signals
     return np.asarray(make(found, SNAPS, part, SONAR, None, START, SAMPLES)[0])

@@ -14,7 +14,7 @@ from sonarsynth.equations.scattering.kirchhoff_integral import facet_amplitude
 from sonarsynth.equations.scattering.kirchhoff_pulse import Waveform, facet_echo
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import BandPass, LowPass, PositionTable, Romanis, Sonar, elements
-from sonarsynth.signals import DirectSum, KernelDeposit, pulse_support
+from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.sources.shrimp import LogarithmicBubble
@@ -28,7 +28,7 @@ SHARP = Sonar(filter=BandPass(low=35e3, high=75e3, transition=15e3, attenuation=
 CENTRE = SHARP.band.centre
 ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
 FACES = elements(Romanis())
-PRECISE = KernelDeposit(precision="float64", width=14, tolerance=1e-10)
+PRECISE = GriddedSynthesis(precision="float64", width=14, tolerance=1e-10)
 METHODS = (DirectSum(), PRECISE)
 
 
@@ -45,10 +45,10 @@ def paths(delay: list[float] | Floats, amplitude: list[float] | Floats, **column
     return replace(made, centre=CENTRE, **columns)
 
 
-def heard(of: Arrivals, method: DirectSum | KernelDeposit | None = None, margin: float = 1.5e-3) -> Floats:
+def heard(of: Arrivals, method: DirectSum | GriddedSynthesis | None = None, margin: float = 1.5e-3) -> Floats:
     """Pressure (sample,) in the window of the arrivals at one hydrophone, in float64."""
     sonar, (start, samples) = SHARP, window(of, margin=margin)
-    if isinstance(method, KernelDeposit):
+    if isinstance(method, GriddedSynthesis):
         return method.pressure(of, SNAPS, ONE, sonar, None, start, samples)[0][0]
     return exact_signals(of, SNAPS, ONE, sonar, None, start, samples)[0][0]
 
@@ -102,7 +102,7 @@ def test_amplitude_and_response_are_the_kirchhoff_integral(size: float) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("size", [1e-4, 3e-3, 2e-2])
-def test_signals_are_the_echo_in_the_time_domain(method: DirectSum | KernelDeposit, size: float) -> None:
+def test_signals_are_the_echo_in_the_time_domain(method: DirectSum | GriddedSynthesis, size: float) -> None:
     """Divided differences in time of the antiderivative of the filtered snap, against the factor on its spectrum."""
     corners, incident, scattered = facet(2, size)
     delay, period = 0.03, 1 << 10
@@ -143,7 +143,7 @@ def test_powers_of_delays_are_the_mean_over_the_facet() -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_facet_in_four_parts_sends_the_same(method: DirectSum | KernelDeposit) -> None:
+def test_a_facet_in_four_parts_sends_the_same(method: DirectSum | GriddedSynthesis) -> None:
     corners, incident, scattered = facet(4, 4e-3)
     whole = echo_of(corners[None], incident, scattered, 0.03)
     parts = echo_of(split(corners[None]), incident, scattered, 0.03)
@@ -168,7 +168,7 @@ def test_many_tiny_facets_are_one_that_is_large() -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_mirror_differentiates_and_an_edge_repeats(method: DirectSum | KernelDeposit) -> None:
+def test_a_mirror_differentiates_and_an_edge_repeats(method: DirectSum | GriddedSynthesis) -> None:
     mirror = paths([0.03], [1.0], coherent=np.ones(1, bool))
     plain, slope = heard(paths([0.03], [1.0]), method=method), heard(mirror, method=method)
     f = np.fft.rfftfreq(plain.size, 1.0 / SHARP.sampling_frequency)
@@ -186,7 +186,7 @@ def test_a_mirror_differentiates_and_an_edge_repeats(method: DirectSum | KernelD
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_what_is_missing_from_the_coherent_echo_is_sent_without_phase(method: DirectSum | KernelDeposit) -> None:
+def test_what_is_missing_from_the_coherent_echo_is_sent_without_phase(method: DirectSum | GriddedSynthesis) -> None:
     """Powers of both parts add up to that of the smooth facet at every frequency: exp(-g^2) and 1 - exp(-g^2)."""
     height = 2e-6  # s
     plain = paths([0.03, 0.0301], [1.0, 0.3])
@@ -209,7 +209,7 @@ def test_limits_of_roughness() -> None:
     ):
         got = heard(replace(plain, rough_share=np.array([share]), rough_delay=np.array([delay])))
         assert error(got, expected * whole) < 1e-9
-    for method in (*METHODS, KernelDeposit()):
+    for method in (*METHODS, GriddedSynthesis()):
         nothing = replace(plain, rough_share=np.ones(1))
         assert not heard(nothing, method=method).any()
     f = np.geomspace(1.0, 1e6, 50)
@@ -217,8 +217,8 @@ def test_limits_of_roughness() -> None:
     np.testing.assert_allclose(small, 2e-15 * np.pi * f, rtol=1e-13)
 
 
-@pytest.mark.parametrize("method", [DirectSum(), KernelDeposit()])
-def test_columns_that_say_nothing_change_no_bit(method: DirectSum | KernelDeposit) -> None:
+@pytest.mark.parametrize("method", [DirectSum(), GriddedSynthesis()])
+def test_columns_that_say_nothing_change_no_bit(method: DirectSum | GriddedSynthesis) -> None:
     of = target_at(15.0, 30, 6)
     array = some_of(FACES, 60)
     start, samples = window(of, margin=2e-3)
@@ -229,7 +229,7 @@ def test_columns_that_say_nothing_change_no_bit(method: DirectSum | KernelDeposi
 
 
 @pytest.mark.parametrize("method", [DirectSum(), PRECISE])
-def test_corners_have_no_order_and_their_middle_is_a_delay(method: DirectSum | KernelDeposit) -> None:
+def test_corners_have_no_order_and_their_middle_is_a_delay(method: DirectSum | GriddedSynthesis) -> None:
     corners = np.array([[-6e-6, 1e-6, 3e-6], [2e-6, -4e-6, 1e-6]])
     of = paths([0.03, 0.03002], [1.0, -0.7], coherent=np.ones(2, bool), corners=corners)
     off = np.array([7e-6, -3e-6])

@@ -12,15 +12,15 @@ from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Pro
 from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.geometry import Pose, quaternion
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, elements
 from sonarsynth.scattering import Kirchhoff
-from sonarsynth.signals import KernelDeposit
+from sonarsynth.signals import GriddedSynthesis
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Moment, Snap
+from sonarsynth.state import Snap, WorldState
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box
 from sonarsynth.tracing.arrivals import trace
@@ -39,9 +39,9 @@ SINGLE = elements(PositionTable(positions=((0.0, 0.0, 0.0),), face=ROMANIS.face)
 
 
 def traced(law: Kirchhoff, place: Floats, array: Elements, alike: float) -> Arrivals:
-    panel = Body("panel", PANEL, Pose(PLACE + [3.0, 0.2, 0.2], quaternion(0.3)), np.zeros(3))
+    panel = PlacedTarget("panel", PANEL, Pose(PLACE + [3.0, 0.2, 0.2], quaternion(0.3)), np.zeros(3))
     found = trace(
-        WATER, PROFILE, Moment(0.0, (panel,), (SNAP,)), Pose(place, EAST), array, 0.0, AutoTracing(), (law,),
+        WATER, PROFILE, WorldState(0.0, (panel,), (SNAP,)), Pose(place, EAST), array, 0.0, AutoTracing(), (law,),
         band=(SONAR.band.low, SONAR.band.high), negligible=0.0, alike=alike,
     )  # fmt: skip
     return found.select(~found.direct)
@@ -107,7 +107,7 @@ def test_the_fast_synthesis_follows_facets_over_the_array() -> None:
     start, samples = found.delay.min() - 1e-3, 512
     exact, _ = exact_signals(found, (SNAP,), part, SONAR, None, start, samples)
     for tolerance, most in ((1.5e-4, 2e-4), (1e-6, 3e-6)):
-        method = KernelDeposit(width=10, precision="float64", tolerance=tolerance)
+        method = GriddedSynthesis(width=10, precision="float64", tolerance=tolerance)
         got, _ = method.pressure(found, (SNAP,), part, SONAR, None, start, samples)
         assert np.abs(got - exact).max() < most * np.abs(exact).max()
     flat, _ = exact_signals(

@@ -10,7 +10,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.environment.sea import Environment, Isovelocity, Profile
 from sonarsynth.geometry import Pose, quaternion, unit
 from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.propagation import AutoTracing, Refracted
 from sonarsynth.scattering import MirrorLobe
 from sonarsynth.tracing.ray_fan import EVENTS, RayFan, fan
@@ -23,10 +23,10 @@ def mesh_from(shape: trimesh.Trimesh) -> Mesh:
     return Mesh(np.asarray(shape.vertices, float), np.asarray(shape.faces, np.int32))
 
 
-def cylinder() -> Body:
+def cylinder() -> PlacedTarget:
     mesh = mesh_from(trimesh.creation.cylinder(radius=0.05, height=0.3, sections=48))
     lying = Pose(np.array([0.7, 0.02, -0.16]), quaternion(0.3, 0.5 * np.pi, 0.0))
-    return Body("cylinder", mesh, lying, np.zeros(3))
+    return PlacedTarget("cylinder", mesh, lying, np.zeros(3))
 
 
 def downward(*degrees: float, azimuth: float = 0.0) -> Floats:
@@ -121,11 +121,11 @@ def test_a_fan_and_an_eigenray_agree() -> None:
     np.testing.assert_allclose(followed.direction[-1], path.arrival[0], atol=1e-9)
 
 
-def l_shape() -> Body:
+def l_shape() -> PlacedTarget:
     upright = trimesh.creation.box((0.2, 4.0, 4.0), transform=trimesh.transformations.translation_matrix([0, 0, 2.0]))
     lying = trimesh.creation.box((3.0, 4.0, 0.2), transform=trimesh.transformations.translation_matrix([1.6, 0, 0.1]))
     mesh = mesh_from(trimesh.util.concatenate([upright, lying]))
-    return Body("l", mesh, Pose(np.array([8.0, 6.0, -12.0]), quaternion(-0.5 * np.pi)), np.zeros(3))
+    return PlacedTarget("l", mesh, Pose(np.array([8.0, 6.0, -12.0]), quaternion(-0.5 * np.pi)), np.zeros(3))
 
 
 def test_rays_that_meet_the_l_shape_are_sent_on_to_the_shrimp_with_the_lobes_coefficient() -> None:

@@ -15,13 +15,13 @@ from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.motion import Track
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import Romanis, elements
 from sonarsynth.scattering import Kirchhoff, MirrorLobe, PartlyReflecting
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Moment, Snap
+from sonarsynth.state import Snap, WorldState
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.tracing.arrivals import trace
@@ -38,12 +38,12 @@ F = np.linspace(25e3, 85e3, 7)
 SCATTERED = Kirchhoff(forward="scattered")
 
 
-def body(mesh: Mesh, place: Floats, name: str = "body", turned: float = 0.5 * np.pi) -> Body:
-    return Body(name, mesh, Pose(np.array(place, float), quaternion(turned)), np.zeros(3))
+def body(mesh: Mesh, place: Floats, name: str = "body", turned: float = 0.5 * np.pi) -> PlacedTarget:
+    return PlacedTarget(name, mesh, Pose(np.array(place, float), quaternion(turned)), np.zeros(3))
 
 
 def heard(
-    bodies: tuple[Body, ...],
+    bodies: tuple[PlacedTarget, ...],
     source: Floats,
     laws: tuple[object, ...] = (SCATTERED,),
     *,
@@ -54,7 +54,7 @@ def heard(
 ) -> Arrivals:
     snaps = (Snap(np.array(source, float), 0.0, LogarithmicBubble(), None),)
     return trace(
-        WATER, profile, Moment(0.0, bodies, snaps), Pose(np.array(array, float), EAST), ROMANIS, 0.0,
+        WATER, profile, WorldState(0.0, bodies, snaps), Pose(np.array(array, float), EAST), ROMANIS, 0.0,
         AutoTracing(bounces=bounces), laws, band=(25e3, 85e3), moving=moving,
     )  # fmt: skip
 
@@ -204,7 +204,7 @@ def test_what_comes_by_a_boundary_is_shadowed_like_what_comes_straight(boundary:
     free = Environment(depth=3 * BED, sound_speed=WATER.sound_speed, absorption=WATER.absorption)
     lower = np.array([0.0, 0.0, -BED])
     alone = trace(
-        free, PROFILE, Moment(0.0, (replace(bodies[0], pose=Pose(bodies[0].pose.position + lower, EAST)),),
+        free, PROFILE, WorldState(0.0, (replace(bodies[0], pose=Pose(bodies[0].pose.position + lower, EAST)),),
         (Snap(start + lower, 0.0, LogarithmicBubble(), None),)), Pose(end + lower, EAST), ROMANIS, 0.0, AutoTracing(),
         (SCATTERED,), band=(25e3, 85e3),
     )  # fmt: skip

@@ -10,18 +10,18 @@ import xarray as xr
 
 from sonarsynth.evaluation import ledger_adds_up, ledger_measured
 from sonarsynth.labels import family
-from sonarsynth.pipeline import Traced, beamform_frame, measure_isolated, range_frame, trace_frame
+from sonarsynth.pipeline import TracedFrame, beamform_frame, measure_isolated, range_frame, trace_frame
 from sonarsynth.planning import Choices, plan
 from sonarsynth.scattering import Kirchhoff
-from sonarsynth.signals import DirectSum, KernelDeposit
+from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.isolated_paths import measured_levels
 from tests.laws.test_ledger import LEVEL, SNAPS, SONAR, assert_it_adds_up, booked, some_paths, the_band, transfer
 from tests.laws.test_synthesis import absorption
 from tests.scenes import point_scene, remus
 
 
-@pytest.mark.parametrize("method", [KernelDeposit(), DirectSum()], ids=["kernel", "direct"])
-def test_each_isolated_path_is_found_in_its_signals(method: KernelDeposit | DirectSum) -> None:
+@pytest.mark.parametrize("method", [GriddedSynthesis(), DirectSum()], ids=["kernel", "direct"])
+def test_each_isolated_path_is_found_in_its_signals(method: GriddedSynthesis | DirectSum) -> None:
     """Turned, blurred, rough, coherent over a facet, absorbed, stretched by Doppler, of another gain: all as said."""
     of = some_paths(160, 6)
     of = replace(of, stretch=np.random.default_rng(6).uniform(-5e-3, 5e-3, 160))
@@ -52,7 +52,7 @@ def test_extreme_paths_are_found_too(extreme: dict[str, float]) -> None:
     one = replace(one, **{name: np.array([value]) for name, value in extreme.items()})
     product = one.scattering * one.spreading_out * one.spreading_in * one.boundary
     book = booked(replace(one, amplitude=product * 10.0 ** (-one.absorption / 20.0)))
-    level = LEVEL[one.snap] + measured_levels(KernelDeposit(), book.isolated, SNAPS, SONAR, absorption)
+    level = LEVEL[one.snap] + measured_levels(GriddedSynthesis(), book.isolated, SNAPS, SONAR, absorption)
     assert level == pytest.approx(book.isolated_level[np.isfinite(book.isolated_level)], abs=0.06)
     assert_it_adds_up(book)
 
@@ -89,7 +89,7 @@ def test_a_frame_has_the_levels_that_its_ledger_says_until_one_is_changed(law: K
     made = plan(recipe, frozenset({"signals"}))
     traced = trace_frame(made, 0)
 
-    def rows(of: Traced) -> xr.DataTree:
+    def rows(of: TracedFrame) -> xr.DataTree:
         return ledger_tree(range_frame(made, 0, of, beamform_frame(made, 0, of)))
 
     good = rows(traced)

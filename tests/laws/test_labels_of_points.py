@@ -11,8 +11,8 @@ import trimesh
 
 from sonarsynth.conventions import azimuth_elevation, direction
 from sonarsynth.geometry import Pose
-from sonarsynth.geometry.motion import Course, Still
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.motion import ConstantVelocity, Still
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels import Band, Listening, label_points
 from sonarsynth.labels.attribution_of_points import attribution
 from sonarsynth.labels.point_labels import surface_distances
@@ -26,7 +26,7 @@ from sonarsynth.receiver import elements as elements_of
 from sonarsynth.receiver.hydrophones import PositionTable
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
-from sonarsynth.signals import KernelDeposit
+from sonarsynth.signals import GriddedSynthesis
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.targets.meshes import mesh_of
@@ -120,7 +120,7 @@ def heard_alone(case: Made, beam: np.ndarray, delay: np.ndarray) -> tuple[list[t
     for rows in found.values():
         alone = case.arrivals.select(rows)
         absorption = case.plan.absorption
-        p = KernelDeposit().signals(alone, snaps, case.plan.elements, sonar, absorption, start, samples).pressure
+        p = GriddedSynthesis().signals(alone, snaps, case.plan.elements, sonar, absorption, start, samples).pressure
         spectra = np.fft.rfft(p.astype(float), axis=1)[:, inside]
         beams = np.einsum("bqf,qf->bf", steering, spectra)
         power.append(np.abs((beams * matched * np.exp(2j * np.pi * f * (delay[:, None] - start))).sum(axis=1)) ** 2)
@@ -257,7 +257,7 @@ def test_true_ranges_are_of_where_the_sound_met_what_moves() -> None:
     recipe = point_scene((20.0, 2.0, -50.0), (12.0, 5.0, -60.0), array=ARRAY)
     velocity = 25.0
     target = replace(
-        recipe.scene.world.targets[0], motion=Course(start=(20.0, 2.0, -50.0), heading=0.0, speed=velocity)
+        recipe.scene.world.targets[0], motion=ConstantVelocity(start=(20.0, 2.0, -50.0), heading=0.0, speed=velocity)
     )
     shrimp = replace(recipe.scene.world.shrimp[0], snap_times=(-0.05,))
     world = replace(recipe.scene.world, targets=(target,), shrimp=(shrimp,))
@@ -277,7 +277,7 @@ def test_true_ranges_are_of_where_the_sound_met_what_moves() -> None:
 def test_distances_from_a_surface_are_those_of_the_nearest_triangle() -> None:
     """Against trimesh's closest points on every triangle, inside the body, on it and far from it."""
     mesh = mesh_of(Box(size=(1.0, 0.6, 0.4), edge=0.15))
-    body = Body("box", mesh, Pose(np.array([3.0, -2.0, -5.0]), np.array([0.8, 0.0, 0.6, 0.0])), np.zeros(3))
+    body = PlacedTarget("box", mesh, Pose(np.array([3.0, -2.0, -5.0]), np.array([0.8, 0.0, 0.6, 0.0])), np.zeros(3))
     random = np.random.default_rng(2)
     points = body.pose.to_world(np.concatenate([random.normal(size=(60, 3)) * s for s in (0.1, 1.0, 30.0)]))
     points = np.concatenate([points, body.pose.to_world(mesh.vertices[:5])])

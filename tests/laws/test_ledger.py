@@ -9,11 +9,11 @@ import pytest
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.scattering.facet_pulses import facet_response
-from sonarsynth.labels import SLICES, Band, echoes, family, ledger, path_powers
-from sonarsynth.products import LEDGER, Arrivals, Ledger
+from sonarsynth.labels import SLICES, Band, echo_levels, family, link_budget, path_powers
+from sonarsynth.products import LINK_BUDGET, Arrivals, LinkBudget
 from sonarsynth.receiver import Band as SonarBand
 from sonarsynth.receiver import BandPass, Sonar
-from sonarsynth.signals import KernelDeposit
+from sonarsynth.signals import GriddedSynthesis
 from sonarsynth.signals.direct_sum import exact_signals, relative_absorption
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.signals.isolated_paths import energy_in_slices, ideal_hydrophone, measured_levels
@@ -86,16 +86,16 @@ def power_of(of: Arrivals, band: Band) -> float:
     return float(band.weight[of.snap[0]] @ both)
 
 
-def levels_of(book: Ledger) -> dict[str, Floats]:
-    return dict(zip(LEDGER, np.moveaxis(book.level, -1, 0), strict=True))
+def levels_of(book: LinkBudget) -> dict[str, Floats]:
+    return dict(zip(LINK_BUDGET, np.moveaxis(book.level, -1, 0), strict=True))
 
 
-def booked(of: Arrivals, targets: int = 2) -> Ledger:
+def booked(of: Arrivals, targets: int = 2) -> LinkBudget:
     band = the_band()
-    return ledger(of, path_powers(of, band), band, targets, LEVEL, 0.5)
+    return link_budget(of, path_powers(of, band), band, targets, LEVEL, 0.5)
 
 
-def assert_it_adds_up(book: Ledger) -> None:
+def assert_it_adds_up(book: LinkBudget) -> None:
     terms = levels_of(book)
     total = terms["source_level"] + terms["scattering"] - sum(terms[name] for name in LOSSES)
     np.testing.assert_allclose(total, terms["received_level"], atol=1e-9)
@@ -237,10 +237,10 @@ def test_directions_of_echoes_are_means_by_share() -> None:
     band = the_band()
     for coherent, share in ((False, power**2), (True, power)):
         some = replace(of, coherent=np.full(2, coherent))
-        found = echoes(some, path_powers(some, band), 1, LEVEL)
+        found = echo_levels(some, path_powers(some, band), 1, LEVEL)
         mean = share @ of.direction
         assert found.azimuth[0, 0] == pytest.approx(np.arctan2(mean[1], mean[0]), rel=1e-6)
-        received = levels_of(ledger(some, path_powers(some, band), band, 1, LEVEL, 0.0))["received_level"][0, 0, 0]
+        received = levels_of(link_budget(some, path_powers(some, band), band, 1, LEVEL, 0.0))["received_level"][0, 0, 0]
         assert found.level[0, 0] == pytest.approx(received, abs=1e-9)
 
 
@@ -248,7 +248,7 @@ def test_no_paths_and_no_snaps_are_an_empty_book() -> None:
     of = some_paths(5, 8).select(np.zeros(0, int))
     assert not booked(of).paths.any()
     assert np.isnan(booked(of).level).all()
-    assert measured_levels(KernelDeposit(), of, SNAPS, SONAR, absorption).shape == (0,)
+    assert measured_levels(GriddedSynthesis(), of, SNAPS, SONAR, absorption).shape == (0,)
     band = the_band(0)
-    assert ledger(of, path_powers(of, band), band, 2, np.zeros(0), 0.0).level.shape == (0, 3, 4, len(LEDGER))
-    assert np.isnan(echoes(of, path_powers(of, band), 2, np.zeros(0)).level).all()
+    assert link_budget(of, path_powers(of, band), band, 2, np.zeros(0), 0.0).level.shape == (0, 3, 4, len(LINK_BUDGET))
+    assert np.isnan(echo_levels(of, path_powers(of, band), 2, np.zeros(0)).level).all()

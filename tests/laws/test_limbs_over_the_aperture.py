@@ -11,16 +11,16 @@ from sonarsynth.conventions import Floats
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
 from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.geometry import Pose, quaternion
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing, Visibility
 from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, elements
 from sonarsynth.scattering import Kirchhoff, PartlyReflecting
-from sonarsynth.scattering.components import Smooth
+from sonarsynth.scattering.components import CoherentKirchhoff
 from sonarsynth.scattering.facet_geometry import patches
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Moment, Snap
+from sonarsynth.state import Snap, WorldState
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Sphere
 from sonarsynth.tracing.arrivals import trace
@@ -42,9 +42,9 @@ ROWS = ("position", "gain", "column", "row")
 
 def traced(law: Kirchhoff, place: Floats, array: Elements, visibility: Visibility = "hydrophones") -> Arrivals:
     """Coherent echoes of a ball 8 m ahead, lit from the side."""
-    ball = Body("ball", BALL, Pose(PLACE + [8.0, 0.3, 0.2], EAST), np.zeros(3))
+    ball = PlacedTarget("ball", BALL, Pose(PLACE + [8.0, 0.3, 0.2], EAST), np.zeros(3))
     found = trace(
-        WATER, PROFILE, Moment(0.0, (ball,), (SNAP,)), Pose(place, EAST), array, 0.0, AutoTracing(), (law,),
+        WATER, PROFILE, WorldState(0.0, (ball,), (SNAP,)), Pose(place, EAST), array, 0.0, AutoTracing(), (law,),
         band=(SONAR.band.low, SONAR.band.high), negligible=0.0, enough=0.0, alike=0.0, visibility=visibility,
     )  # fmt: skip
     return found.select(found.coherent)
@@ -103,9 +103,11 @@ def test_amplitudes_go_on_from_those_that_are_seen(law: Kirchhoff) -> None:
     scattered = np.cos(angle) * side + np.sin(angle) * normal
     incident = np.broadcast_to(0.8 * side - 0.6 * normal, (count, 3))
     wavenumber = np.full(count, 200.0)
-    plain, goes_on = (Smooth(law, b).amplitude(incident, scattered, patch, wavenumber) for b in (False, True))
+    plain, goes_on = (
+        CoherentKirchhoff(law, b).amplitude(incident, scattered, patch, wavenumber) for b in (False, True)
+    )
     seen = scattered @ normal > 0.0
     assert goes_on[seen] == pytest.approx(plain[seen], rel=1e-12)
     assert not plain[~seen].any()
     assert np.abs(np.diff(goes_on, 2)).max() < 1e-3 * np.abs(goes_on).max()
-    assert not Smooth(law, True).amplitude(-incident, scattered, patch, wavenumber).any()
+    assert not CoherentKirchhoff(law, True).amplitude(-incident, scattered, patch, wavenumber).any()

@@ -13,7 +13,7 @@ from sonarsynth.environment.sound_speed import mean_gradient
 from sonarsynth.equations.arrays.spherical_wave import tangent_plane
 from sonarsynth.equations.rays.ray_solutions import eigenrays, water
 from sonarsynth.geometry import Pose, quaternion
-from sonarsynth.products import Bearings, Signals
+from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.ranging.location.refraction import first_rays
 from sonarsynth.ranging.location.source_position import bending_covariance
@@ -30,7 +30,7 @@ WATER = Profile(np.array([0.0]), np.array([C]))
 
 def locate(
     signals, array, source, pose=AHEAD, sonar=None, depth_error=0.0, snaps=1, method=None, profile=WATER
-) -> Bearings:
+) -> SourceEstimates:
     """With the bed where the source is, but for depth_error."""
     depth = -pose.to_world(np.asarray(source, float))[2] + depth_error
     method = method or SensorDelays()

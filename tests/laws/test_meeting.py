@@ -9,13 +9,13 @@ import pytest
 from scipy.optimize import brentq
 
 from sonarsynth.description import FieldError
-from sonarsynth.geometry.motion import Circle, Course, Still, Waypoint, Waypoints, pose, spin, velocity
+from sonarsynth.geometry.motion import Circle, ConstantVelocity, Still, Waypoint, Waypoints, pose, spin, velocity
 from sonarsynth.labels import label
 from sonarsynth.planning import Choices, plan
 from sonarsynth.planning.notes.scene_checks import check_frame
 from sonarsynth.propagation import Refracted, Straight
 from sonarsynth.receiver import BeamGrid
-from sonarsynth.state import Moment
+from sonarsynth.state import WorldState
 from tests.laws.test_traced_families import BED, SONAR, THERMOCLINE, UNIFORM, C, ball
 from tests.laws.test_traced_families import snap as snap_at
 from tests.scenes import remus
@@ -24,7 +24,7 @@ TIMES = (-0.1, 0.0, 0.1)
 NOW = 2.0
 MOTIONS = {
     "still": Still(position=(15.0, 1.0, -6.0)),
-    "course": Course(start=(15.0, -50.0, -6.0), heading=0.3, speed=30.0, climb=0.5),
+    "course": ConstantVelocity(start=(15.0, -50.0, -6.0), heading=0.3, speed=30.0, climb=0.5),
     "circle": Circle(centre=(18.0, 0.0, -5.0), radius=6.0, speed=-9.0, bearing=4.0),
     "waypoints": Waypoints(
         points=(
@@ -39,7 +39,7 @@ MOTIONS = {
 
 def truth(motion, straight: bool = True, doppler: bool = True):
     body = replace(ball(), pose=pose(motion, NOW), velocity=velocity(motion, NOW), motion=motion, time=NOW)
-    moment = Moment(NOW, (body,), tuple(snap_at(time) for time in TIMES))
+    moment = WorldState(NOW, (body,), tuple(snap_at(time) for time in TIMES))
     rays, water = (Straight(), UNIFORM) if straight else (Refracted(), THERMOCLINE)
     beams = BeamGrid(azimuth_span=0.2, azimuths=3, elevation_span=0.2, elevations=3)
     levels = np.zeros(len(TIMES))
@@ -102,7 +102,7 @@ def moved(motion, times: tuple[float, ...] = (0.0,)):
 
 
 def test_a_target_that_sound_would_meet_out_of_the_water_is_refused() -> None:
-    rising = Course(start=(20.0, 0.0, -0.5), climb=10.0)
+    rising = ConstantVelocity(start=(20.0, 0.0, -0.5), climb=10.0)
     for time in (0.0, 0.1):
         scene, frame = moved(rising, (time,)).frame(0)
         if time:

@@ -11,11 +11,11 @@ from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.motion import Circle, Motion, Track, Waypoint, Waypoints, pose, velocity
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing
 from sonarsynth.scattering import Isotropic, MirrorLobe
-from sonarsynth.state import Moment
+from sonarsynth.state import WorldState
 from sonarsynth.tracing.arrivals import trace
 from tests.laws.test_traced_families import (
     ARRAY,
@@ -41,10 +41,17 @@ def run(v=STILL, u=STILL, *times: float, bodies=None, bounces=0, array=ONE, law=
     bodies = (ball(),) if bodies is None else bodies
     bodies = tuple(b if b.motion else replace(b, velocity=np.array(v)) for b in bodies)
     return trace(
-        RIGID, more.pop("profile", UNIFORM), Moment(0.0, bodies, tuple(snap(t) for t in times or (0.0,))), sonar, array,
-        0.0, AutoTracing(bounces=bounces), (law or Isotropic(strength=1.0),) * len(bodies), band=BAND,
+        RIGID,
+        more.pop("profile", UNIFORM),
+        WorldState(0.0, bodies, tuple(snap(t) for t in times or (0.0,))),
+        sonar,
+        array,
+        0.0,
+        AutoTracing(bounces=bounces),
+        (law or Isotropic(strength=1.0),) * len(bodies),
+        band=BAND,
         **{"moving": Track(sonar, np.array(u, float))} | more,
-    )  # fmt: skip
+    )
 
 
 def heard(emitted: float, centre, v, u, source, array) -> tuple[float, float]:
@@ -124,7 +131,7 @@ CORNER = Waypoints(
 )
 
 
-def on(motion: Motion) -> Body:
+def on(motion: Motion) -> PlacedTarget:
     return replace(ball(), pose=pose(motion, 0.0), velocity=velocity(motion, 0.0), motion=motion)
 
 
@@ -164,7 +171,7 @@ def test_a_body_hides_another_where_it_is_when_the_sound_passes() -> None:
     def lit(time: float) -> int:
         moved = tuple(replace(b, velocity=w) for b, w in zip(bodies, (STILL, v), strict=True))
         found = trace(
-            RIGID, UNIFORM, Moment(0.0, moved, (snap(time),)), SONAR, ONE, 0.0, AutoTracing(bounces=0),
+            RIGID, UNIFORM, WorldState(0.0, moved, (snap(time),)), SONAR, ONE, 0.0, AutoTracing(bounces=0),
             (Isotropic(strength=1.0),) * 2, band=BAND, moving=Track(SONAR, STILL),
         )  # fmt: skip
         return int((found.target == 0).sum())

@@ -10,8 +10,8 @@ import pytest
 import sonarsynth as ss
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.geometry.placed_target import Body
-from sonarsynth.planning.measured.sampled_frames import survey
+from sonarsynth.geometry.placed_target import PlacedTarget
+from sonarsynth.planning.measured.sampled_frames import sample_frames
 from sonarsynth.planning.notes.target_notes import mirror_notes, overlap_notes
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.overlaps import overlap
@@ -24,8 +24,8 @@ PLATE = Box(size=(2.0, 2.0, 0.01))
 FINE = Sphere(radius=0.5, edge=0.02)
 
 
-def body(shape: Shape, at: tuple[float, float, float], turn: np.ndarray = UNTURNED) -> Body:
-    return Body("b", mesh_of(shape), Pose(np.array(at), turn), np.zeros(3))
+def body(shape: Shape, at: tuple[float, float, float], turn: np.ndarray = UNTURNED) -> PlacedTarget:
+    return PlacedTarget("b", mesh_of(shape), Pose(np.array(at), turn), np.zeros(3))
 
 
 CASES = {
@@ -70,7 +70,9 @@ def test_a_pair_of_spheres_overlaps_as_far_as_their_radii_reach() -> None:
 
 
 def test_an_empty_mesh_overlaps_nothing() -> None:
-    none = Body("none", Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32)), Pose(np.zeros(3), UNTURNED), np.zeros(3))
+    none = PlacedTarget(
+        "none", Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32)), Pose(np.zeros(3), UNTURNED), np.zeros(3)
+    )
     assert overlap(none, body(BALL, (0, 0, -5))) is None
 
 
@@ -103,7 +105,7 @@ def test_the_frames_in_which_bodies_meet_are_named() -> None:
         shape=ss.Sphere(radius=0.3, edge=0.08),
         motion=ss.Line(start=(10.0, -4.0, -5.0), stop=(10.0, 4.0, -5.0), duration=8.0),
     )
-    (look,) = survey(recipe(ball("still", (10.0, 0.0, -5.0)), passing, frames=9))
+    (look,) = sample_frames(recipe(ball("still", (10.0, 0.0, -5.0)), passing, frames=9))
     (note,) = overlap_notes(look)
     assert note.startswith("still and passing coincide in 1 of 9 frames looked at (the first: frame 4)")
 
@@ -115,7 +117,7 @@ def test_the_frames_in_which_bodies_meet_are_named() -> None:
 def test_a_target_behind_a_planar_array_is_noted_where_its_mirror_image_is_in_view(
     place: tuple[float, float, float], noted: bool
 ) -> None:
-    (look,) = survey(recipe(ball("ball", place)))
+    (look,) = sample_frames(recipe(ball("ball", place)))
     found = [line for line in mirror_notes(look) if line.startswith("ball: behind the array in frame 0")]
     assert len(found) == noted
     if noted:
@@ -128,4 +130,4 @@ def test_an_array_with_depth_tells_front_from_back() -> None:
     deep = replace(
         flat, scene=replace(flat.scene, sonar=replace(flat.scene.sonar, array=ss.PositionTable(positions=places)))
     )
-    assert mirror_notes(survey(deep)[0]) == []
+    assert mirror_notes(sample_frames(deep)[0]) == []

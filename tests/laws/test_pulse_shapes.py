@@ -13,8 +13,8 @@ from sonarsynth.equations.bubble.snap_pressure import Bubble, ComplexArray
 from sonarsynth.equations.noise import filters
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import BandPass, LowPass, PositionTable, Romanis, Sonar, elements
-from sonarsynth.signals import DirectSum, KernelDeposit, pulse_support
-from sonarsynth.signals.array_paths import folded, fronts
+from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
+from sonarsynth.signals.array_paths import array_paths, folded
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.signals.filtered_pulse import (
     bubble,
@@ -37,7 +37,7 @@ SHARP = Sonar(filter=BandPass(low=35e3, high=75e3, transition=15e3, attenuation=
 LOW = Sonar(filter=LowPass(cutoff=60e3, attenuation=140), sampling_frequency=250e3)
 FACES = elements(Romanis())
 ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
-METHODS = (DirectSum(), KernelDeposit(precision="float64", width=14, tolerance=1e-9))
+METHODS = (DirectSum(), GriddedSynthesis(precision="float64", width=14, tolerance=1e-9))
 
 
 def shaped(of: Arrivals, seed: int, *, phase: float = 10.0, blur: float = 20e-6, stretch: float = 3e-3) -> Arrivals:
@@ -122,9 +122,9 @@ def test_a_turned_pulse_is_over_after_its_support(sonar: Sonar) -> None:
 
 @pytest.mark.parametrize(
     ("method", "bound"),
-    [(KernelDeposit(), 1e-4), (KernelDeposit(width=14, precision="float64", tolerance=1e-11), 1e-8)],
+    [(GriddedSynthesis(), 1e-4), (GriddedSynthesis(width=14, precision="float64", tolerance=1e-11), 1e-8)],
 )
-def test_kernel_deposit_is_the_exact_sum(method: KernelDeposit, bound: float) -> None:
+def test_kernel_deposit_is_the_exact_sum(method: GriddedSynthesis, bound: float) -> None:
     """All at once: phase, blur and stretch of any size, refracted fronts, several snaps of different kinds."""
     snaps = (*SNAPS, Snap(np.zeros(3), 0.0, LogarithmicBubble(q=-2.5e5), 190.0))
     array = some_of(FACES, 60)
@@ -145,7 +145,7 @@ def test_many_shapes_over_the_whole_array(phase: float, blur: float) -> None:
     part = elements(PositionTable(positions=tuple(map(tuple, FACES.position[some].tolist())), face=FACES.face))
     start, samples = window(of, SONAR, FACES.aperture)
     exact, _ = exact_signals(of, SNAPS, part, SONAR, absorption, start, samples)
-    got = KernelDeposit().signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure
+    got = GriddedSynthesis().signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure
     assert error(got[some], exact) < 1e-4
 
 
@@ -155,7 +155,7 @@ def test_one_odd_path_among_many_is_not_lost() -> None:
     of = replace(of, phase=np.where(np.arange(1000) == 500, 0.02, 0.0), amplitude=np.full(1000, 1e-4))
     start, samples = window(of, SONAR, FACES.aperture)
     plain = replace(of, phase=np.zeros(1000))
-    got, without = (KernelDeposit().pressure(x, SNAPS, FACES, SONAR, None, start, samples)[0] for x in (of, plain))
+    got, without = (GriddedSynthesis().pressure(x, SNAPS, FACES, SONAR, None, start, samples)[0] for x in (of, plain))
     odd = of.select(np.array([500]))
     parts = (
         DirectSum().signals(x, SNAPS, FACES, SONAR, None, start, samples).pressure
@@ -170,7 +170,7 @@ def test_one_odd_path_among_many_is_not_lost() -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_half_turns_are_signs_and_nothing_is_nothing(method: DirectSum | KernelDeposit) -> None:
+def test_half_turns_are_signs_and_nothing_is_nothing(method: DirectSum | GriddedSynthesis) -> None:
     array = some_of(FACES, 100)
     of = target_at(15.0, 12, 8, direct=False)
     start, samples = window(of, SHARP, array.aperture)
@@ -182,7 +182,7 @@ def test_half_turns_are_signs_and_nothing_is_nothing(method: DirectSum | KernelD
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_turn_keeps_the_energy_and_turns_add_up(method: DirectSum | KernelDeposit) -> None:
+def test_a_turn_keeps_the_energy_and_turns_add_up(method: DirectSum | GriddedSynthesis) -> None:
     of = arrivals([0.05, 0.0501], [[1.0, 0.0, 0.0], [1.0, 0.1, 0.0]], [10.0, 11.0], [1.0, 0.4])
     start, samples = window(of, SHARP, 0.0, 2e-3)
 
@@ -201,7 +201,7 @@ def test_a_turn_keeps_the_energy_and_turns_add_up(method: DirectSum | KernelDepo
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_blurs_add_by_squares_and_end_in_silence(method: DirectSum | KernelDeposit) -> None:
+def test_blurs_add_by_squares_and_end_in_silence(method: DirectSum | GriddedSynthesis) -> None:
     of = arrivals([0.05, 0.0502], [[1.0, 0.0, 0.0], [1.0, 0.1, 0.0]], [10.0, 11.0], [1.0, 0.4])
     start, samples = window(of, SHARP, 0.0, 2e-3)
 
@@ -228,7 +228,7 @@ def test_shared_shapes_cost_no_modes() -> None:
     start, samples = window(of, SHARP, 0.0, 1e-3)
     once = replace(of, phase=np.full(6, 0.8), blur=np.full(6, 4e-6), stretch=np.full(6, 2e-3))
     exact, _ = exact_signals(once, SNAPS, ONE, SHARP, None, start, samples)
-    got, _ = KernelDeposit(width=14, precision="float64", tolerance=1e-10).pressure(
+    got, _ = GriddedSynthesis(width=14, precision="float64", tolerance=1e-10).pressure(
         once, SNAPS, ONE, SHARP, None, start, samples
     )
     assert error(got, exact) < 1e-8
@@ -258,7 +258,7 @@ def test_modes_are_the_definition(tolerance: float, most: int) -> None:
         stretch=rng.uniform(-1e-3, 1e-3, n),
     )
     series = stretched_spectra(waveform(MODEL), SHARP.antialias, SHARP.sampling_frequency, samples, 2.0**-9, 4)
-    front = fronts(of, SNAPS, ONE)
+    front = array_paths(of, SNAPS, ONE)
     front = replace(front, loss=front.loss - front.loss.mean())
     decay = absorption(f)
     modes = shape_modes(front, f[some], spectrum[some], decay[some], series[:, some], 2.0**-9, tolerance)
@@ -271,7 +271,7 @@ def test_modes_are_the_definition(tolerance: float, most: int) -> None:
 def test_phases_alone_are_two_modes() -> None:
     f, spectrum = pulse_spectrum(waveform(MODEL), SHARP.antialias, SHARP.sampling_frequency, 384)
     of = shaped(target_at(15.0, 50, 13, direct=False), 14, blur=0.0, stretch=0.0)
-    none, front = np.zeros((0, 130), complex), fronts(of, SNAPS, ONE)
+    none, front = np.zeros((0, 130), complex), array_paths(of, SNAPS, ONE)
     modes = shape_modes(front, f[40:170], spectrum[40:170], np.zeros(130), none, 0.0, 1e-9)
     assert modes.weight.shape == (50, 2)
 

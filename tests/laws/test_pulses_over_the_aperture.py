@@ -13,14 +13,14 @@ from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Pro
 from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.geometry import Pose, quaternion
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, elements
 from sonarsynth.scattering import Kirchhoff, MirrorLobe, PartlyReflecting, ScatteringLaw
-from sonarsynth.signals import DirectSum, KernelDeposit
+from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Moment, Snap
+from sonarsynth.state import Snap, WorldState
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box
 from sonarsynth.tracing.arrivals import trace
@@ -50,11 +50,18 @@ def traced(surface: SeaSurface, bed: SeaBed, law: ScatteringLaw, place: Floats, 
     water = Environment(
         depth=10.0, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"), surface=surface, bed=bed
     )
-    panel = Body("panel", PANEL, Pose(PLACE + [12.0, 1.5, 0.2], quaternion(0.7)), np.zeros(3))
+    panel = PlacedTarget("panel", PANEL, Pose(PLACE + [12.0, 1.5, 0.2], quaternion(0.7)), np.zeros(3))
     return trace(
-        water, PROFILE, Moment(0.0, (panel,), (SNAP,)), Pose(place, EAST), array, 0.0, AutoTracing(bounces=2), (law,),
+        water,
+        PROFILE,
+        WorldState(0.0, (panel,), (SNAP,)),
+        Pose(place, EAST),
+        array,
+        0.0,
+        AutoTracing(bounces=2),
+        (law,),
         band=(BAND.low, BAND.high),
-    )  # fmt: skip
+    )
 
 
 def alone(*scene: object, sensor: int) -> Arrivals:
@@ -141,7 +148,7 @@ def test_each_family_at_the_edges_of_the_band_is_that_of_a_hydrophone_alone(scen
 def test_signals_of_one_expansion_are_those_of_each_hydrophone_alone(scene: tuple, most: float) -> None:
     """In time, direct arrivals and echoes of the paths that both have, by the fast synthesis."""
     found = traced(*scene, PLACE)
-    method = KernelDeposit(precision="float64", tolerance=1e-6, width=12, oversampling=2.0)
+    method = GriddedSynthesis(precision="float64", tolerance=1e-6, width=12, oversampling=2.0)
     for sensor in FAR[:1]:
         exact = alone(*scene, sensor=sensor)
         mine, theirs = both(found, exact)
@@ -168,7 +175,7 @@ def test_every_edge_of_a_blur_is_within_the_window_or_counted() -> None:
     one = replace(one, blur_terms=terms, phase_terms=np.zeros((1, 0)))
     array = few()
     exact = DirectSum().signals(one, (SNAP,), array, SONAR, None, START, 4000).pressure
-    got = KernelDeposit(precision="float64", tolerance=1e-6).signals(one, (SNAP,), array, SONAR, None, START, 4000)
+    got = GriddedSynthesis(precision="float64", tolerance=1e-6).signals(one, (SNAP,), array, SONAR, None, START, 4000)
     assert np.abs(got.pressure - exact).max() < 1e-4 * np.abs(exact).max()
     size = np.linalg.norm(exact, axis=1)
     assert size.max() > 2.0 * size.min()
@@ -191,8 +198,8 @@ def test_the_fast_synthesis_changes_pulses_as_the_exact_one_does(amplify: float)
         part = found.select(found.direct == direct)
         want = DirectSum().signals(part, (SNAP,), array, SONAR, None, START, 4000).pressure
         for method, most in (
-            (KernelDeposit(), 2e-4),
-            (KernelDeposit(precision="float64", tolerance=1e-6, width=12), 2e-6),
+            (GriddedSynthesis(), 2e-4),
+            (GriddedSynthesis(precision="float64", tolerance=1e-6, width=12), 2e-6),
         ):
             got = method.signals(part, (SNAP,), array, SONAR, None, START, 4000).pressure
             assert np.abs(got - want).max() < most * np.abs(want).max()

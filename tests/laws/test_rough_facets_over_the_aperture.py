@@ -12,15 +12,15 @@ from sonarsynth.conventions import Floats, Ints
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
 from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.geometry import Pose, quaternion
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, elements
 from sonarsynth.scattering import Kirchhoff
-from sonarsynth.signals import KernelDeposit
+from sonarsynth.signals import GriddedSynthesis
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Moment, Snap
+from sonarsynth.state import Snap, WorldState
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box
 from sonarsynth.tracing.arrivals import trace
@@ -66,10 +66,10 @@ def traced(
     law: Kirchhoff, view: View, place: Floats, array: Elements, profile: Profile = EVEN, bounces: int = 0
 ) -> Arrivals:
     """What the front of the panel echoes without phase in common."""
-    panel = Body("panel", PANEL, Pose(PLACE + view.place, quaternion(view.heading)), np.zeros(3))
+    panel = PlacedTarget("panel", PANEL, Pose(PLACE + view.place, quaternion(view.heading)), np.zeros(3))
     snap = Snap(PLACE + view.snap, 0.0, LogarithmicBubble(), None)
     found = trace(
-        WATER, profile, Moment(0.0, (panel,), (snap,)), Pose(place, EAST), array, 0.0, AutoTracing(bounces=bounces),
+        WATER, profile, WorldState(0.0, (panel,), (snap,)), Pose(place, EAST), array, 0.0, AutoTracing(bounces=bounces),
         (law,), band=(SONAR.band.low, SONAR.band.high), negligible=0.0, enough=0.0, alike=0.0,
     )  # fmt: skip
     front = np.isin(found.facet, np.flatnonzero(PANEL.normal[:, 0] > 0.9))
@@ -178,7 +178,7 @@ def test_the_fast_synthesis_follows_rough_facets_over_the_array() -> None:
     start, snap = found.delay.min() - 2e-4, Snap(PLACE, 0.0, LogarithmicBubble(), None)
     exact = heard(found, array, start)
     for tolerance, most in ((1.5e-4, 2e-4), (1e-6, 3e-6)):
-        method = KernelDeposit(width=10, precision="float64", tolerance=tolerance)
+        method = GriddedSynthesis(width=10, precision="float64", tolerance=tolerance)
         got, _ = method.pressure(found, (snap,), array, SONAR, None, start, 512)
         assert np.abs(got - exact).max() < most * np.abs(exact).max()
 

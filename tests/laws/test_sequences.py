@@ -13,8 +13,8 @@ from scipy.stats import kstest, norm
 from scipy.stats.qmc import discrepancy
 
 from sonarsynth.environment.sea import Environment, Isovelocity
-from sonarsynth.geometry.motion import Course, Line, pose, velocity
-from sonarsynth.recipe import Axis, Choice, Normal, Recipe, Sobol, Together, Uniform, reading
+from sonarsynth.geometry.motion import ConstantVelocity, Line, pose, velocity
+from sonarsynth.recipe import Axis, Choice, Normal, Recipe, Sobol, Uniform, Zip, reading
 from sonarsynth.recipe.scene import Scene, Trajectory, World
 from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.targets.shapes import Box, Sphere
@@ -27,7 +27,9 @@ SHRIMP = "scene.world.shrimp.0.position"
 def recipe(**more: Any) -> Recipe:
     world = World(
         environment=Environment(depth=20.0, sound_speed=Isovelocity(speed=1500.0)),
-        targets=(Target(name="body", shape=Sphere(radius=0.5), motion=Course(start=(10.0, 0.0, -7.0), speed=1.0)),),
+        targets=(
+            Target(name="body", shape=Sphere(radius=0.5), motion=ConstantVelocity(start=(10.0, 0.0, -7.0), speed=1.0)),
+        ),
         shrimp=(SnappingShrimp(position=(20.0, 0.0)),),
     )
     return Recipe(**({"seed": 5, "scene": Scene(world=world, trajectory=Trajectory(frames=3))} | more))
@@ -83,7 +85,7 @@ def test_zipped_entries_advance_together() -> None:
     shapes = Axis(
         path="scene.world.targets.0.shape", values=(Sphere(radius=0.3), Box(size=(1, 1, 1)), {"kind": "remus100"})
     )
-    made = recipe(grid=(Together(zip=(RANGES, shapes)),))
+    made = recipe(grid=(Zip(zip=(RANGES, shapes)),))
     targets = [made.scene_of(n).world.targets[0] for n in range(3)]
     assert [(t.motion.start[0], t.shape.kind) for t in targets] == [(10, "sphere"), (12, "box"), (15, "remus100")]
 
@@ -179,7 +181,7 @@ def test_what_varies_survives_yaml() -> None:
     made = recipe(
         grid=(
             RANGES,
-            Together(zip=(HEADINGS, Axis(path=f"{MOTION}.pitch", values=(0, "1 deg", "0.002 rad", "3 mrad")))),
+            Zip(zip=(HEADINGS, Axis(path=f"{MOTION}.pitch", values=(0, "1 deg", "0.002 rad", "3 mrad")))),
         ),
         variations=DRAWN,
         repeats=2,
@@ -212,7 +214,7 @@ def test_the_digest_knows_the_files_of_the_grid_wherever_they_lie(tmp_path: Path
 
 
 def test_a_course_is_a_line_by_heading_and_speed() -> None:
-    course = Course(start=(1.0, 2.0, -9.0), heading=np.deg2rad(30.0), speed=2.0, climb=0.1)
+    course = ConstantVelocity(start=(1.0, 2.0, -9.0), heading=np.deg2rad(30.0), speed=2.0, climb=0.1)
     ahead = (1.0 + 2.0 * 5 * np.sin(np.deg2rad(30)), 2.0 + 2.0 * 5 * np.cos(np.deg2rad(30)), -8.5)
     line = Line(start=course.start, stop=ahead, duration=5.0, heading=course.heading)
     for time in (-3.0, 0.0, 7.5):

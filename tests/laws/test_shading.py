@@ -11,13 +11,13 @@ from sonarsynth.frontiers import measure
 from sonarsynth.geometry.motion import Still
 from sonarsynth.pipeline import trace_frame
 from sonarsynth.planning import arrivals_of
-from sonarsynth.planning.choosing import Expansion
+from sonarsynth.planning.choosing import PerSensorReference
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import Refracted, Straight
 from sonarsynth.receiver import BeamGrid
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.recipe import Recipe
-from sonarsynth.signals import KernelDeposit
+from sonarsynth.signals import GriddedSynthesis
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.targets.target import Target
@@ -42,7 +42,7 @@ def test_each_hydrophone_hears_what_it_sees() -> None:
     """Behind the edge of a screen: as each hydrophone traced by itself, which the middle's view is far from."""
     made = planning.plan(screened(0.02), {"signals"})
     assert made.choices.visibility == "hydrophones"
-    measure = Expansion.of(made, 0)
+    measure = PerSensorReference.of(made, 0)
     assert measure.error(1, "centre") > 0.1
     assert measure.error(1, "hydrophones") < 2e-3
 
@@ -122,8 +122,8 @@ def test_kernel_deposit_keeps_silent_where_the_exact_sum_does(hidden: int, step:
     of = partly_hidden(target_at(8.0, 40, 2, refracted=True, direct=True), hidden, array.count)
     start, samples = window(of, SONAR, array)
     exact, _ = exact_signals(of, SNAPS, array, SONAR, absorption, start, samples)
-    got = KernelDeposit().signals(of, SNAPS, array, SONAR, absorption, start, samples).pressure
-    plain = KernelDeposit().signals(of.at_centre, SNAPS, array, SONAR, absorption, start, samples).pressure
+    got = GriddedSynthesis().signals(of, SNAPS, array, SONAR, absorption, start, samples).pressure
+    plain = GriddedSynthesis().signals(of.at_centre, SNAPS, array, SONAR, absorption, start, samples).pressure
     late = slice(int((of.delay[of.target == 0].min() - 1e-3 - start) * SONAR.sampling_frequency), None)
     assert error(got[:, late], exact[:, late]) < 1e-4
     assert error(got, exact) < 1e-4
@@ -148,7 +148,7 @@ def test_shade_of_another_array_is_refused() -> None:
     start, samples = window(of, SONAR, FACES)
     array = replace(FACES, position=FACES.position[:9], gain=FACES.gain[:9])
     with pytest.raises(ValueError, match="hidden from hydrophones of another array"):
-        KernelDeposit().signals(of, SNAPS, array, SONAR, absorption, start, samples)
+        GriddedSynthesis().signals(of, SNAPS, array, SONAR, absorption, start, samples)
 
 
 def test_errors_are_measured_where_each_hydrophone_sees_for_itself() -> None:

@@ -5,23 +5,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonarsynth.casting.cones import CLOSED, EMPTY, UNKNOWN, look
+from sonarsynth.casting.cones import CLOSED, EMPTY, UNKNOWN, classify_cones
 from sonarsynth.casting.ray_casting import occluded
 from sonarsynth.conventions import Bools, Floats
 from sonarsynth.environment.sea import Environment, Profile
 from sonarsynth.environment.sound_speed import Isovelocity
 from sonarsynth.geometry import Pose, quaternion
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.propagation import Propagation, Refracted, Straight
 from sonarsynth.receiver import Elements, Romanis, elements
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Cylinder, LShape, Remus100, Shape, Sphere
 from sonarsynth.tracing.facet_paths import bending
-from sonarsynth.tracing.occlusion.launch_deviation import swerves
+from sonarsynth.tracing.occlusion.launch_deviation import launch_deviation
 from sonarsynth.tracing.occlusion.ray_cones import hidden
-from sonarsynth.tracing.occlusion.sensor_occlusion import View, cells, rim
-from sonarsynth.tracing.receive_paths import Legs, facets_of, legs_from
+from sonarsynth.tracing.occlusion.sensor_occlusion import Occlusion, cells, rim
+from sonarsynth.tracing.receive_paths import ReceivePaths, facets_of, receive_paths
 
 BED = 30.0
 WATER = Environment(depth=BED, sound_speed=Isovelocity(speed=1500.0))
@@ -36,11 +36,11 @@ def array_of(count: int) -> Elements:
     return subarray(whole, np.random.default_rng(count).permutation(whole.count)[:count]).elements
 
 
-def body(shape: Shape, place: tuple[float, float, float], *turned: float) -> Body:
-    return Body("body", mesh_of(shape), Pose(np.array(place), quaternion(*turned)), np.zeros(3))
+def body(shape: Shape, place: tuple[float, float, float], *turned: float) -> PlacedTarget:
+    return PlacedTarget("body", mesh_of(shape), Pose(np.array(place), quaternion(*turned)), np.zeros(3))
 
 
-def seen_alone(view: View, legs: Legs, start: Floats, normal: Floats, sensor: int) -> Bools:
+def seen_alone(view: Occlusion, legs: ReceivePaths, start: Floats, normal: Floats, sensor: int) -> Bools:
     """(leg,) whether a hydrophone does not see a leg, by the one ray to it."""
     assert view.elements is not None
     offset = view.sonar_pose.turn_to_world(view.elements.position[sensor])
@@ -50,7 +50,7 @@ def seen_alone(view: View, legs: Legs, start: Floats, normal: Floats, sensor: in
     ahead /= length[:, None]
     if not view.bending.uniform:
         where = view.environment, view.bending, view.sonar_pose, view.elements, view.propagation, view.degree
-        ahead += swerves(legs, view.elements.position[[sensor]], *where)[:, 0]
+        ahead += launch_deviation(legs, view.elements.position[[sensor]], *where)[:, 0]
         ahead /= np.linalg.norm(ahead, axis=1)[:, None]
     end = np.broadcast_to(view.sonar_pose.position + offset, start.shape)
     ray = start, end, ahead, length, legs.bounces, legs.turning
@@ -58,11 +58,11 @@ def seen_alone(view: View, legs: Legs, start: Floats, normal: Floats, sensor: in
     return np.asarray(blocked | (np.einsum("ij,ij->i", ahead, normal) <= 0.0))
 
 
-def shaded(bodies: tuple[Body, ...], array: Elements, rays: Propagation, profile: Profile) -> Bools:
+def shaded(bodies: tuple[PlacedTarget, ...], array: Elements, rays: Propagation, profile: Profile) -> Bools:
     """Hold every leg against each hydrophone by itself: (leg, sensor) which do not see it."""
     facets = facets_of(bodies, slice(0, sum(len(b.mesh.faces) for b in bodies)))
-    legs = legs_from(facets, WATER, profile, SONAR, rays, 50e3, array.aperture)
-    view = View(bodies, WATER, bending(profile, rays, SONAR), SONAR, array, rays)
+    legs = receive_paths(facets, WATER, profile, SONAR, rays, 50e3, array.aperture)
+    view = Occlusion(bodies, WATER, bending(profile, rays, SONAR), SONAR, array, rays)
     side = facets.clear[legs.row], facets.normal[legs.row]
     alone = np.stack([seen_alone(view, legs, *side, sensor) for sensor in range(array.count)], axis=1)
     numbered = replace(legs, caustics=np.arange(len(legs.row)))
@@ -81,7 +81,7 @@ def mixed(dark: Bools) -> Bools:
     return np.asarray(dark.any(axis=1) & ~dark.all(axis=1))
 
 
-def some_bodies(seed: int) -> tuple[Body, ...]:
+def some_bodies(seed: int) -> tuple[PlacedTarget, ...]:
     """Bodies of every kind, some before others."""
     rng = np.random.default_rng(seed)
     plates = LShape(height=0.8, length=0.6, width=0.5, thickness=0.05, edge=0.3)
@@ -138,7 +138,7 @@ def test_cones_that_are_certain_are_so_for_any_ray_in_them(seed: int) -> None:
     axis = rng.normal(size=(count, 3))
     axis /= np.linalg.norm(axis, axis=1)[:, None]
     slope, reach = 10.0 ** rng.uniform(-3.0, -1.0, count), rng.uniform(1.0, 15.0, count)
-    found = look(bodies, apex, axis, slope, reach, reach)
+    found = classify_cones(bodies, apex, axis, slope, reach, reach)
     blocked = np.zeros((40, count), bool)
     for ray in blocked:
         across = np.cross(axis, rng.normal(size=(count, 3)))

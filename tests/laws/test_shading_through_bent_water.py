@@ -6,13 +6,13 @@ import pytest
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.propagation import Propagation, Refracted
 from sonarsynth.receiver import Elements
 from sonarsynth.targets.shapes import Sphere
-from sonarsynth.tracing.occlusion.launch_deviation import swerves, towards
-from sonarsynth.tracing.occlusion.sensor_occlusion import View
-from sonarsynth.tracing.receive_paths import Facets, Legs, facets_of, legs_from
+from sonarsynth.tracing.occlusion.launch_deviation import launch_deviation, towards
+from sonarsynth.tracing.occlusion.sensor_occlusion import Occlusion
+from sonarsynth.tracing.receive_paths import Facets, ReceivePaths, facets_of, receive_paths
 from tests.laws.test_shading_by_cones import SONAR, WATER, array_of, body, some_bodies
 
 DEPTHS = np.array([0.0, 8.0, 12.0, 17.0, 22.0, 30.0])
@@ -25,33 +25,35 @@ BENT = pytest.mark.parametrize("profile", PROFILES.values(), ids=PROFILES.keys()
 ARRAY = array_of(61)
 
 
-def names(legs: Legs) -> Ints:
+def names(legs: ReceivePaths) -> Ints:
     """(leg,) facet and family; which side direct ones leave on may differ over the array."""
     up = (legs.departure[:, 2] > 0.0) & (legs.bounces > 0)
     return np.asarray(9 * (2 * legs.row + up) + 3 * legs.surface + legs.bottom)
 
 
-def seen_by(bodies: tuple[Body, ...], facets: Facets, rays: Propagation, profile: Profile, place: Floats) -> Ints:
+def seen_by(
+    bodies: tuple[PlacedTarget, ...], facets: Facets, rays: Propagation, profile: Profile, place: Floats
+) -> Ints:
     """Names of the legs to one place that no body hides."""
     pose = Pose(place, SONAR.orientation)
-    legs = legs_from(facets, WATER, profile, pose, rays, 50e3)
-    view = View(bodies, WATER, profile, pose, None, rays)
+    legs = receive_paths(facets, WATER, profile, pose, rays, 50e3)
+    view = Occlusion(bodies, WATER, profile, pose, None, rays)
     return names(view.visible(legs, facets.clear[legs.row], facets.normal[legs.row]))
 
 
 def seen_by_all(
-    bodies: tuple[Body, ...], facets: Facets, rays: Propagation, profile: Profile, array: Elements, degree: int
+    bodies: tuple[PlacedTarget, ...], facets: Facets, rays: Propagation, profile: Profile, array: Elements, degree: int
 ) -> tuple[Ints, Bools]:
     """Names of the legs that any hydrophone sees, and from which they are hidden (leg, sensor)."""
-    legs = legs_from(facets, WATER, profile, SONAR, rays, 50e3, array.aperture)
-    view = View(bodies, WATER, profile, SONAR, array, rays, degree)
+    legs = receive_paths(facets, WATER, profile, SONAR, rays, 50e3, array.aperture)
+    view = Occlusion(bodies, WATER, profile, SONAR, array, rays, degree)
     legs = view.visible(legs, facets.clear[legs.row], facets.normal[legs.row])
     legs = view.settled(legs, facets.clear[legs.row], facets.normal[legs.row])
     hidden = np.unpackbits(legs.hidden_from, axis=1, count=1 + array.count)[:, 1:]
     return names(legs), hidden.astype(bool)
 
 
-def some_facets(seed: int) -> tuple[tuple[Body, ...], Facets]:
+def some_facets(seed: int) -> tuple[tuple[PlacedTarget, ...], Facets]:
     """Bodies, some before others, and some of their facets; of a ball many near its limb."""
     ball = body(Sphere(radius=0.5, edge=0.05), (12.0, 0.9, -14.5), 0.0)
     bodies = (*some_bodies(seed), ball)
@@ -78,9 +80,9 @@ def test_rays_leave_for_hydrophones_as_those_traced_from_them(profile: Profile) 
     """The directions themselves, and that they are within what is allowed for; towards the images they are not."""
     _, facets = some_facets(1)
     rays = Refracted(bounces=2)
-    legs = legs_from(facets, WATER, profile, SONAR, rays, 50e3, ARRAY.aperture)
+    legs = receive_paths(facets, WATER, profile, SONAR, rays, 50e3, ARRAY.aperture)
     where = WATER, profile, SONAR, ARRAY, rays, 5
-    swerve = swerves(legs, ARRAY.position, *where)
+    swerve = launch_deviation(legs, ARRAY.position, *where)
     size = np.linalg.norm(swerve, axis=2).max(axis=1)
     bound = legs.swerve(WATER, profile, SONAR, ARRAY.aperture)
     assert (size <= bound).all()
@@ -88,7 +90,7 @@ def test_rays_leave_for_hydrophones_as_those_traced_from_them(profile: Profile) 
     away = towards(legs, SONAR.turn_to_world(ARRAY.position)) + swerve
     for sensor in (0, 17, 44):
         pose = Pose(SONAR.to_world(ARRAY.position[[sensor]])[0], SONAR.orientation)
-        own = legs_from(facets, WATER, profile, pose, rays, 50e3, 2.0 * ARRAY.aperture)
+        own = receive_paths(facets, WATER, profile, pose, rays, 50e3, 2.0 * ARRAY.aperture)
         _, first, second = np.intersect1d(names(legs), names(own), return_indices=True)
         assert len(first) > 0.95 * len(legs.row)
         np.testing.assert_allclose(away[first, sensor], own.departure[second], atol=1e-6)
@@ -98,7 +100,7 @@ def test_straight_rays_leave_for_images() -> None:
     _, facets = some_facets(1)
     uniform = Profile(DEPTHS[[0, -1]], np.array([1500.0, 1500.0]))
     rays = Refracted(bounces=2)
-    legs = legs_from(facets, WATER, uniform, SONAR, rays, 50e3, ARRAY.aperture)
+    legs = receive_paths(facets, WATER, uniform, SONAR, rays, 50e3, ARRAY.aperture)
     assert not legs.swerve(WATER, uniform, SONAR, ARRAY.aperture).any()
-    found = swerves(legs, ARRAY.position, WATER, uniform, SONAR, ARRAY, rays, 3)
+    found = launch_deviation(legs, ARRAY.position, WATER, uniform, SONAR, ARRAY, rays, 3)
     np.testing.assert_allclose(found, 0.0, atol=1e-9)

@@ -13,7 +13,7 @@ from sonarsynth.equations.bubble import pulses
 from sonarsynth.equations.noise import filters
 from sonarsynth.receiver import LowPass, PositionTable, Romanis, Sonar, elements
 from sonarsynth.recipe import Recipe
-from sonarsynth.signals import KernelDeposit, pulse_support
+from sonarsynth.signals import GriddedSynthesis, pulse_support
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.signals.filtered_pulse import (
     LONGEST_TAIL,
@@ -113,7 +113,7 @@ def test_the_fast_synthesis_of_different_snaps_is_the_exact_one(tmp_path: Path) 
     for sonar in (SONAR, Sonar(filter=LOW, sampling_frequency=250e3)):
         start, samples = float(of.delay.min()) - 4e-3, int(9e-3 * sonar.sampling_frequency)
         exact, _ = exact_signals(of, snaps, array, sonar, absorption, start, samples)
-        got, _ = KernelDeposit().pressure(of, snaps, array, sonar, absorption, start, samples)
+        got, _ = GriddedSynthesis().pressure(of, snaps, array, sonar, absorption, start, samples)
         assert 1e-9 < error(got, exact) < 3e-4
 
 

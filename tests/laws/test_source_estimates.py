@@ -16,7 +16,7 @@ from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.labels.estimate_labels import Direct, emissions
 from sonarsynth.planning.notes.plan_notes import off_the_bottom
 from sonarsynth.planning.notes.source_notes import standing_off
-from sonarsynth.products import REASONS, Bearings, Signals
+from sonarsynth.products import REASONS, Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.receiver import Band, PlanarLattice, Sonar, elements
 from tests.heard import RATE, add_noise, envelope_late, hear, hear_direct, silence
@@ -29,7 +29,9 @@ WATER = Profile(np.array([0.0]), np.array([C]))
 POSE = Pose(np.array([0.0, 0.0, -40.0]), quaternion(np.pi / 2))
 
 
-def locate(signals: Signals, bottom: float, snaps: int = 1, method: SensorDelays | None = None, **sonar) -> Bearings:
+def locate(
+    signals: Signals, bottom: float, snaps: int = 1, method: SensorDelays | None = None, **sonar
+) -> SourceEstimates:
     described = Sonar(array=WIDE, assumed_sound_speed=C, **sonar)
     return (method or SensorDelays()).locate(signals, elements(WIDE), described, POSE, bottom, snaps, WATER)
 
@@ -154,7 +156,7 @@ def test_pulls_of_estimates_have_unit_variance() -> None:
     assert np.mean(single < 16.0) >= 0.99
 
 
-def estimate(time: float, azimuth: float, elevation: float = -0.2) -> Bearings:
+def estimate(time: float, azimuth: float, elevation: float = -0.2) -> SourceEstimates:
     found = locate(silence(elements(WIDE), 0.0, 600), 45.0)
     return replace(
         found,

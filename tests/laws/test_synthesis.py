@@ -13,7 +13,7 @@ from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.equations.noise import filters
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import BandPass, Elements, LowPass, PositionTable, Romanis, Sonar, elements
-from sonarsynth.signals import DirectSum, KernelDeposit, pulse_support
+from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.signals.filtered_pulse import bubble, fir
 from sonarsynth.signals.gridded.nodes import chebyshev, interpolation, nodes_for
@@ -202,7 +202,7 @@ def test_kernel_deposit_is_the_exact_sum(distance: float, refracted: bool) -> No
     of = target_at(distance, 40, 2, refracted=refracted, direct=False)
     start, samples = window(of, SONAR, array)
     exact, _ = exact_signals(of, SNAPS, array, SONAR, absorption, start, samples)
-    got = KernelDeposit().signals(of, SNAPS, array, SONAR, absorption, start, samples)
+    got = GriddedSynthesis().signals(of, SNAPS, array, SONAR, absorption, start, samples)
     assert error(got.pressure, exact) < 1e-4
     assert got.outside == 0
     assert got.pressure.dtype == np.float32
@@ -212,7 +212,7 @@ def test_nodes_over_the_aperture_serve_the_whole_array() -> None:
     """Enough paths that nodes pay: 508 hydrophones interpolated from some tens of points, the direct snap apart."""
     of = target_at(20.0, 500, 3)
     start, samples = window(of, SONAR, FACES)
-    got = KernelDeposit().signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure[::127]
+    got = GriddedSynthesis().signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure[::127]
     exact, _ = exact_signals(of, SNAPS, some_of(FACES, 127), SONAR, absorption, start, samples)
     late = int((of.delay[of.target == 0].min() - 2.3e-3 - start) * SONAR.sampling_frequency)
     assert error(got[:, late:], exact[:, late:]) < 1e-4  # relative to the echo
@@ -226,7 +226,7 @@ def test_lobes_that_vary_over_the_aperture(size: float) -> None:
     terms = np.random.default_rng(18).uniform(-1, 1, (400, 20)) * size
     of = replace(of, amplitude_terms=terms)
     start, samples = window(of, SONAR, FACES)
-    got = KernelDeposit().signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure
+    got = GriddedSynthesis().signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure
     some = np.append(np.argsort(-np.linalg.norm(FACES.position, axis=1), kind="stable")[:4], 250)  # rim and middle
     part = elements(PositionTable(positions=tuple(map(tuple, FACES.position[some].tolist())), face=FACES.face))
     exact, _ = exact_signals(of, SNAPS, part, SONAR, absorption, start, samples)
@@ -239,7 +239,7 @@ def test_one_path_needs_no_deposit() -> None:
     of = target_at(15.0, 1, 19, refracted=True)
     start, samples = window(of, SONAR, array)
     exact, _ = exact_signals(of, SNAPS, array, SONAR, absorption, start, samples)
-    got, _ = KernelDeposit(tolerance=1e-6, precision="float64").pressure(
+    got, _ = GriddedSynthesis(tolerance=1e-6, precision="float64").pressure(
         of, SNAPS, array, SONAR, absorption, start, samples
     )
     assert 1e-14 < error(got, exact) < 1e-6
@@ -267,14 +267,14 @@ def test_waves_are_interpolated_to_the_tolerance(tolerance: float, phase: float,
 @pytest.mark.parametrize(
     ("method", "bound"),
     [
-        (KernelDeposit(width=4, tolerance=1e-3), 3e-3),
-        (KernelDeposit(), 1e-4),
-        (KernelDeposit(width=8, tolerance=1e-5), 5e-6),
-        (KernelDeposit(width=6, oversampling=3.0, tolerance=1e-5), 5e-6),
-        (KernelDeposit(width=14, precision="float64", tolerance=1e-12), 1e-9),
+        (GriddedSynthesis(width=4, tolerance=1e-3), 3e-3),
+        (GriddedSynthesis(), 1e-4),
+        (GriddedSynthesis(width=8, tolerance=1e-5), 5e-6),
+        (GriddedSynthesis(width=6, oversampling=3.0, tolerance=1e-5), 5e-6),
+        (GriddedSynthesis(width=14, precision="float64", tolerance=1e-12), 1e-9),
     ],
 )
-def test_each_knob_buys_its_error(method: KernelDeposit, bound: float) -> None:
+def test_each_knob_buys_its_error(method: GriddedSynthesis, bound: float) -> None:
     array = some_of(FACES, 30)
     of = target_at(8.0, 20, 4, refracted=True, direct=False)
     start, samples = window(of, SHARP, array)
@@ -290,7 +290,7 @@ def test_hydrophones_anywhere_and_plane_waves() -> None:
     of = arrivals(rng.uniform(0.01, 0.012, n), rng.standard_normal((n, 3)), np.full(n, np.inf), rng.standard_normal(n))
     start, samples = window(of, SONAR, array)
     exact, _ = exact_signals(of, SNAPS, array, SONAR, None, start, samples)
-    got = KernelDeposit().signals(of, SNAPS, array, SONAR, None, start, samples)
+    got = GriddedSynthesis().signals(of, SNAPS, array, SONAR, None, start, samples)
     assert error(got.pressure, exact) < 1e-4
 
 
@@ -303,7 +303,7 @@ def test_several_snaps_of_different_kinds_and_levels() -> None:
     array = some_of(FACES, 60)
     start, samples = window(of, SONAR, array)
     exact, _ = exact_signals(of, snaps, array, SONAR, None, start, samples)
-    got = KernelDeposit().signals(of, snaps, array, SONAR, None, start, samples)
+    got = GriddedSynthesis().signals(of, snaps, array, SONAR, None, start, samples)
     assert error(got.pressure, exact) < 1e-4
     parts = sum(exact_signals(of.select(of.snap == i), snaps, array, SONAR, None, start, samples)[0] for i in range(3))
     np.testing.assert_allclose(parts, exact, atol=1e-12)
@@ -315,17 +315,17 @@ def test_low_pass_of_the_thesis() -> None:
     of = target_at(15.0, 20, 8, direct=False)
     start, samples = window(of, sonar, array)
     exact, _ = exact_signals(of, SNAPS, array, sonar, None, start, samples)
-    got = KernelDeposit().signals(of, SNAPS, array, sonar, None, start, samples)
+    got = GriddedSynthesis().signals(of, SNAPS, array, sonar, None, start, samples)
     assert error(got.pressure, exact) < 1e-4
 
 
 # ---- laws ------------------------------------------------------------------------------------------------------------
 
-METHODS = (DirectSum(), KernelDeposit())
+METHODS = (DirectSum(), GriddedSynthesis())
 Run = Callable[[Arrivals, float, int], np.ndarray]
 
 
-def run(method: DirectSum | KernelDeposit, array: Elements) -> Run:
+def run(method: DirectSum | GriddedSynthesis, array: Elements) -> Run:
     def go(of: Arrivals, start: float, samples: int) -> np.ndarray:
         return method.signals(of, SNAPS, array, SONAR, absorption, start, samples).pressure.astype(float)
 
@@ -333,7 +333,7 @@ def run(method: DirectSum | KernelDeposit, array: Elements) -> Run:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_doubled_amplitude_doubles_the_pressure_and_sums_add(method: DirectSum | KernelDeposit) -> None:
+def test_doubled_amplitude_doubles_the_pressure_and_sums_add(method: DirectSum | GriddedSynthesis) -> None:
     array = some_of(FACES, 60)
     of = target_at(15.0, 24, 9, direct=False)
     start, samples = window(of, SONAR, array)
@@ -346,7 +346,7 @@ def test_doubled_amplitude_doubles_the_pressure_and_sums_add(method: DirectSum |
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_delay_of_part_of_a_sample_is_a_ramp_of_phase(method: DirectSum | KernelDeposit) -> None:
+def test_a_delay_of_part_of_a_sample_is_a_ramp_of_phase(method: DirectSum | GriddedSynthesis) -> None:
     array = some_of(FACES, 60)
     of = target_at(15.0, 24, 10, direct=False)
     start, samples = window(of, SONAR, array)
@@ -362,7 +362,7 @@ def test_a_delay_of_part_of_a_sample_is_a_ramp_of_phase(method: DirectSum | Kern
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_windows_that_adjoin_hold_what_one_window_holds(method: DirectSum | KernelDeposit) -> None:
+def test_windows_that_adjoin_hold_what_one_window_holds(method: DirectSum | GriddedSynthesis) -> None:
     array = some_of(FACES, 60)
     of = target_at(15.0, 24, 11)
     start, samples = window(of, SONAR, array)
@@ -378,7 +378,7 @@ def test_windows_that_adjoin_hold_what_one_window_holds(method: DirectSum | Kern
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_what_falls_outside_is_counted_and_never_wrapped(method: DirectSum | KernelDeposit) -> None:
+def test_what_falls_outside_is_counted_and_never_wrapped(method: DirectSum | GriddedSynthesis) -> None:
     array = some_of(FACES, 100)
     of = target_at(15.0, 8, 12, direct=False)
     start, samples = window(of, SONAR, array)
@@ -392,7 +392,7 @@ def test_quiet_time_is_exactly_silent() -> None:
     array = some_of(FACES, 100)
     of = target_at(15.0, 8, 13)
     start, samples = window(of, SONAR, array)
-    got = KernelDeposit().signals(of, SNAPS, array, SONAR, absorption, start, samples).pressure
+    got = GriddedSynthesis().signals(of, SNAPS, array, SONAR, absorption, start, samples).pressure
     silent = (got == 0.0).all(axis=0)
     before, after = pulse_support(waveform(MODEL), SONAR.antialias)
     t = start + np.arange(samples) / SONAR.sampling_frequency
@@ -402,7 +402,7 @@ def test_quiet_time_is_exactly_silent() -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_mirrored_paths_give_mirrored_signals(method: DirectSum | KernelDeposit) -> None:
+def test_mirrored_paths_give_mirrored_signals(method: DirectSum | GriddedSynthesis) -> None:
     """Port and starboard: y -> -y swaps the columns of the array."""
     positions = ((0.0, 0.3, 0.1), (0.0, -0.3, 0.1), (0.0, 0.5, -0.2), (0.0, -0.5, -0.2))
     array = elements(PositionTable(positions=positions, face=0.05))
@@ -417,8 +417,8 @@ def test_dead_elements_give_nothing_and_change_no_other() -> None:
     of = target_at(20.0, 50, 15)
     start, samples = window(of, SONAR, FACES)
     some = elements(Romanis(dead=(0, 200, 507)))
-    alive = KernelDeposit().signals(of, SNAPS, FACES, SONAR, None, start, samples).pressure
-    got = KernelDeposit().signals(of, SNAPS, some, SONAR, None, start, samples).pressure
+    alive = GriddedSynthesis().signals(of, SNAPS, FACES, SONAR, None, start, samples).pressure
+    got = GriddedSynthesis().signals(of, SNAPS, some, SONAR, None, start, samples).pressure
     assert not got[[0, 200, 507]].any()
     rest = some.gain > 0
     np.testing.assert_array_equal(got[rest], alive[rest])
@@ -427,5 +427,5 @@ def test_dead_elements_give_nothing_and_change_no_other() -> None:
 def test_the_same_bits_every_time() -> None:
     of = target_at(20.0, 300, 16)
     start, samples = window(of, SONAR, FACES)
-    a, b = (KernelDeposit().signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure for _ in range(2))
+    a, b = (GriddedSynthesis().signals(of, SNAPS, FACES, SONAR, absorption, start, samples).pressure for _ in range(2))
     np.testing.assert_array_equal(a, b)

@@ -12,13 +12,13 @@ from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.equations.water.boundary_reflection import rayleigh
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing, Refracted, Straight
 from sonarsynth.receiver import PositionTable, Romanis, elements
 from sonarsynth.scattering import Isotropic, MirrorLobe
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Moment, Snap
+from sonarsynth.state import Snap, WorldState
 from sonarsynth.tracing.arrivals import trace
 
 BED, C = 12.0, 1530.0
@@ -32,10 +32,10 @@ RIGID = Environment(depth=BED, sound_speed=Isovelocity(speed=C), bed=SeaBed(refl
 BAND = (25e3, 85e3)
 
 
-def ball(place=(15.0, 1.0, -6.0), radius: float = 0.3, subdivisions: int = 2) -> Body:
+def ball(place=(15.0, 1.0, -6.0), radius: float = 0.3, subdivisions: int = 2) -> PlacedTarget:
     shape = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
     mesh = Mesh(np.asarray(shape.vertices), np.asarray(shape.faces, np.int32))
-    return Body("ball", mesh, Pose(np.array(place), quaternion(0.0)), np.zeros(3))
+    return PlacedTarget("ball", mesh, Pose(np.array(place), quaternion(0.0)), np.zeros(3))
 
 
 def snap(time: float = 0.0) -> Snap:
@@ -47,7 +47,7 @@ def run(bodies=None, profile=UNIFORM, environment=RIGID, bounces=2, law=None, ar
     bodies = (ball(),) if bodies is None else bodies
     tracing = more.pop("tracing", AutoTracing(bounces=bounces))
     return trace(
-        environment, profile, Moment(0.0, bodies, snaps), SONAR, array, 0.0, tracing,
+        environment, profile, WorldState(0.0, bodies, snaps), SONAR, array, 0.0, tracing,
         (law or Isotropic(strength=1.0),) * len(bodies),
         band=BAND, **more,
     )  # fmt: skip
@@ -154,13 +154,13 @@ def test_the_bed_gives_its_coefficient_and_phase_and_the_surface_changes_the_sig
     np.testing.assert_allclose(found.blur, [0.0, *(2 * np.array([0.003, 0.001]) * np.sin(grazing[1:]) / C)], rtol=1e-12)
 
 
-def plate(centre, half, normal_axis: int) -> Body:
+def plate(centre, half, normal_axis: int) -> PlacedTarget:
     """A thin board across one axis."""
     size = np.full(3, 2.0 * half)
     size[normal_axis] = 0.02
     box = trimesh.creation.box(size)
     mesh = Mesh(np.asarray(box.vertices), np.asarray(box.faces, np.int32))
-    return Body("board", mesh, Pose(np.array(centre), quaternion(0.0)), np.zeros(3))
+    return PlacedTarget("board", mesh, Pose(np.array(centre), quaternion(0.0)), np.zeros(3))
 
 
 @pytest.mark.parametrize("profile", [UNIFORM, THERMOCLINE])
@@ -206,7 +206,7 @@ def test_a_snap_on_the_bed_and_its_image_there_are_one() -> None:
     for height in (0.0, 1e-7):
         snaps = (Snap(np.array([6.0, 5.0, -BED + height]), 0.0, LogarithmicBubble(), None),)
         found = trace(
-            environment, UNIFORM, Moment(0.0, (ball(),), snaps), SONAR, ONE, 0.0, AutoTracing(bounces=2),
+            environment, UNIFORM, WorldState(0.0, (ball(),), snaps), SONAR, ONE, 0.0, AutoTracing(bounces=2),
             (Isotropic(strength=1.0),), band=BAND,
         )  # fmt: skip
         echo = found.select(~found.direct)
@@ -232,7 +232,7 @@ def test_a_body_at_the_foot_of_a_ray_that_turns_and_then_meets_the_bed_hides_it_
         snaps, pose = (Snap(source, 0.0, LogarithmicBubble(), None),), Pose(array, quaternion(0.5 * np.pi))
         kept = [
             trace(
-                environment, falling, Moment(0.0, bodies, snaps), pose, ONE, 0.0, Refracted(bounces=1),
+                environment, falling, WorldState(0.0, bodies, snaps), pose, ONE, 0.0, Refracted(bounces=1),
                 (Isotropic(strength=1.0),) * len(bodies), band=BAND,
             )
             for bodies in ((), (foot,))

@@ -13,16 +13,16 @@ from sonarsynth.environment.sea import Environment, Isovelocity, Profile
 from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.geometry import Pose, quaternion, unit
 from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing, Refracted, Straight
 from sonarsynth.receiver import Elements, PositionTable, Romanis, elements
 from sonarsynth.scattering import Isotropic, MirrorLobe
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Moment, Snap
+from sonarsynth.state import Snap, WorldState
 from sonarsynth.tracing.arrivals import arrivals, trace
 from sonarsynth.tracing.expansion.wavefront_polynomials import probes
-from sonarsynth.tracing.facet_paths import array_legs
+from sonarsynth.tracing.facet_paths import facet_paths
 
 ENVIRONMENT = Environment(depth=30.0, sound_speed=Isovelocity(speed=1540.0))
 UNIFORM = Profile(np.array([0.0, 30.0]), np.array([1540.0, 1540.0]))
@@ -39,8 +39,10 @@ def hull(subdivisions: int = 3) -> Mesh:
 HULL = hull()
 
 
-def body(position: tuple[float, float, float], heading: float = 0.4, mesh: Mesh = HULL, name: str = "hull") -> Body:
-    return Body(name, mesh, Pose(np.array(position), quaternion(heading, 0.1, 0.2)), np.zeros(3))
+def body(
+    position: tuple[float, float, float], heading: float = 0.4, mesh: Mesh = HULL, name: str = "hull"
+) -> PlacedTarget:
+    return PlacedTarget(name, mesh, Pose(np.array(position), quaternion(heading, 0.1, 0.2)), np.zeros(3))
 
 
 def snap(position: tuple[float, float, float], time: float = 0.0) -> Snap:
@@ -48,7 +50,7 @@ def snap(position: tuple[float, float, float], time: float = 0.0) -> Snap:
 
 
 def run(
-    bodies: tuple[Body, ...] = (body((20.0, 1.0, -11.0)),),
+    bodies: tuple[PlacedTarget, ...] = (body((20.0, 1.0, -11.0)),),
     snaps: tuple[Snap, ...] = (snap((3.0, 6.0, -30.0)),),
     profile: Profile = UNIFORM,
     law: MirrorLobe | Isotropic | None = None,
@@ -60,7 +62,7 @@ def run(
     return trace(
         ENVIRONMENT,
         profile,
-        Moment(0.0, bodies, snaps),
+        WorldState(0.0, bodies, snaps),
         sonar,
         array,
         absorption,
@@ -128,7 +130,7 @@ def test_arrivals_are_sorted_by_snap_target_and_facet() -> None:
 @pytest.mark.parametrize("profile", [UNIFORM, LAYERED])
 def test_legs_of_the_array_side_serve_a_moved_shrimp(profile: Profile) -> None:
     bodies = (body((20.0, 1.0, -11.0)), body((15.0, 0.5, -11.5), name="other"))
-    legs = array_legs(ENVIRONMENT, profile, bodies, SONAR, ROMANIS, AutoTracing(), (25e3, 85e3))
+    legs = facet_paths(ENVIRONMENT, profile, bodies, SONAR, ROMANIS, AutoTracing(), (25e3, 85e3))
     for place in ((3.0, 6.0, -30.0), (10.0, -9.0, -29.0), (25.0, 3.0, -30.0)):
         again = arrivals(legs, (snap(place),), 0.02, (MirrorLobe(),) * 2)
         anew = run(bodies, (snap(place),), profile)
@@ -214,7 +216,7 @@ def test_a_body_in_between_hides_facets_and_the_direct_snap() -> None:
             for a in (trimesh.creation.box((0.1, 3.0, 3.0)).vertices, trimesh.creation.box((0.1, 3.0, 3.0)).faces)
         )
     )
-    wall = Body("wall", screen, Pose(np.array([10.0, 0.5, -10.5]), quaternion(0.5 * np.pi)), np.zeros(3))
+    wall = PlacedTarget("wall", screen, Pose(np.array([10.0, 0.5, -10.5]), quaternion(0.5 * np.pi)), np.zeros(3))
     for profile in (UNIFORM, LAYERED):
         alone, shielded = run(profile=profile), run((body((20.0, 1.0, -11.0)), wall), profile=profile)
         assert (alone.target == 0).any()

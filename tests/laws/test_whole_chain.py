@@ -12,7 +12,7 @@ from sonarsynth.equations.bubble.snap_pressure import spectrum
 from sonarsynth.equations.noise.filters import response
 from sonarsynth.pipeline import beamform_frame, render, synthesise, trace_frame
 from sonarsynth.planning import PRODUCTS, plan
-from sonarsynth.products import FAMILIES, LEDGER
+from sonarsynth.products import FAMILIES, LINK_BUDGET
 from sonarsynth.receiver import PositionTable
 from sonarsynth.recipe import Recipe
 from sonarsynth.scattering import MirrorLobe
@@ -143,7 +143,7 @@ def test_truth_agrees_with_the_arrivals_that_made_the_signals() -> None:
 
 def test_the_ledger_adds_up_and_matches_the_arrivals() -> None:
     traced = trace_frame(_planned(remus()), 0)
-    terms = dict(zip(LEDGER, np.moveaxis(traced.ledger.level, -1, 0), strict=True))
+    terms = dict(zip(LINK_BUDGET, np.moveaxis(traced.ledger.level, -1, 0), strict=True))
     total = terms["source_level"] + terms["scattering"]
     for loss in ("transmission_loss_out", "transmission_loss_in", "absorption_loss", "boundary_loss"):
         total = total - terms[loss]

@@ -26,7 +26,7 @@ from sonarsynth.planning import Choices, plan
 from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import BeamGrid, PlanarLattice
 from sonarsynth.recipe import Accuracy, Recipe, reading
-from sonarsynth.signals import KernelDeposit
+from sonarsynth.signals import GriddedSynthesis
 from tests.scenes import remus
 
 STAGES = {"trace", "synthesis", "image", "range", "frame"}
@@ -232,7 +232,7 @@ def test_finufft_and_ours_agree(bounces: int, monkeypatch: pytest.MonkeyPatch) -
     world = replace(recipe.scene.world, environment=replace(recipe.scene.world.environment, bed=bed))
     physics = replace(recipe.scene.physics, tracing=AutoTracing(bounces=bounces))
     recipe = replace(recipe, scene=replace(recipe.scene, world=world, physics=physics))
-    made = plan(recipe, choices=Choices(synthesis=KernelDeposit(width=8, tolerance=1e-5)))
+    made = plan(recipe, choices=Choices(synthesis=GriddedSynthesis(width=8, tolerance=1e-5)))
     frame = made.recipe.frame(1)[1]
     found = list(synthesis_peers(made, frame, arrivals_of(made, frame)))
     errors = [p.error for p in found if p.knob == "FINUFFT"]

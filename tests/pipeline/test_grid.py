@@ -274,13 +274,17 @@ def test_a_path_too_faint_for_single_precision_has_no_measured_level() -> None:
     """-inf would be an infinite number in the store, which verify takes for damage."""
     from types import SimpleNamespace
 
-    from sonarsynth.pipeline.stored_values import ledger_values
-    from sonarsynth.products import LEDGER
+    from sonarsynth.pipeline.stored_values import link_budget_values
+    from sonarsynth.products import LINK_BUDGET
 
     level = np.full((1, 1, 1), -1274.0)
     isolated = SimpleNamespace(facet=np.array([3]), level=np.array([-1274.0]))
     book = SimpleNamespace(
-        level=np.zeros((1, 1, 1, len(LEDGER))), paths=level, error_bound=level, isolated=isolated, isolated_level=level
+        level=np.zeros((1, 1, 1, len(LINK_BUDGET))),
+        paths=level,
+        error_bound=level,
+        isolated=isolated,
+        isolated_level=level,
     )
-    stored = ledger_values(book, np.full((1, 1, 1), -np.inf))["/ledger", "measured_level"]  # type: ignore[arg-type]
+    stored = link_budget_values(book, np.full((1, 1, 1), -np.inf))["/ledger", "measured_level"]  # type: ignore[arg-type]
     assert np.isnan(stored).all()

@@ -51,7 +51,7 @@ def test_only_what_was_asked_for_runs(small: Recipe, tmp_path: Path, products: s
     (row,) = map(json.loads, (tmp_path / "s.times.jsonl").read_text().splitlines())
     assert list(row["seconds"]) == list(row["cpu"]) == list(report.stage_cpu) == TASKS[products]
     assert row["parts"].keys() == PARTS[products]
-    assert row["parts"].keys() <= set(pipeline.LAPS)
+    assert row["parts"].keys() <= set(pipeline.STAGES)
     planned = {stage.stage for stage in plan(small, split(products)).stages}
     assert planned - {"write"} == PARTS[products] - {"collect"}
     assert math.fsum(row["parts"].values()) == pytest.approx(math.fsum(row["cpu"].values()), abs=0.01)
@@ -64,8 +64,8 @@ def test_only_what_was_asked_for_is_submitted(small: Recipe, tmp_path: Path) -> 
 
 
 def test_laps_count_to_the_innermost_and_nowhere_else(small_plan: Plan) -> None:
-    with pipeline.counted() as outer:
-        with pipeline.counted() as inner:
+    with pipeline.stage_timer() as outer:
+        with pipeline.stage_timer() as inner:
             pipeline.trace_frame(small_plan, 0)
         assert outer == {}
     assert inner.keys() == {"trace", "label"}
@@ -167,7 +167,7 @@ def test_some_parts_of_the_array_stand_for_all(small: Recipe, monkeypatch: pytes
     def cut(parts: object) -> Plan:
         return plan(replace(small, scene=replace(small.scene, physics=replace(small.scene.physics, subarrays=parts))))
 
-    real, heard = benchmark_frames.hear_part, []
+    real, heard = benchmark_frames.subarray_signals, []
 
     def hears(made: Plan, frame: Frame, part: Subarray) -> Signals:
         heard.append(int(part.sensor[0]))

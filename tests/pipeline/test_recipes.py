@@ -223,7 +223,7 @@ motions = st.one_of(
     st.builds(motion.Still, position=points, heading=angles, pitch=angles, roll=angles),
     st.builds(motion.Line, start=points, stop=points, duration=positive, heading=st.none() | angles),
     st.builds(motion.Circle, centre=points, radius=positive, speed=numbers, bearing=angles),
-    st.builds(motion.Course, start=points, heading=angles, speed=numbers, climb=numbers),
+    st.builds(motion.ConstantVelocity, start=points, heading=angles, speed=numbers, climb=numbers),
     st.builds(
         motion.Waypoints,
         points=st.tuples(*(st.builds(motion.Waypoint, time=st.just(t), position=points) for t in (0.0, 1.5))),

@@ -15,7 +15,7 @@ from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start
 from sonarsynth.planning.choosing import HEARD_AT, heard_at
 from sonarsynth.receiver.subarrays import subarray, subarrays
 from sonarsynth.recipe import Accuracy, reading
-from sonarsynth.signals import KernelDeposit
+from sonarsynth.signals import GriddedSynthesis
 from tests.scenes import remus
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
@@ -28,7 +28,7 @@ RECIPES = {
     "crowd.yaml": (),
 }
 """The thesis's scene, its tank, deep water, the array in a thermocline, and a crowd."""
-EXACT = KernelDeposit(width=16, precision="float64", tolerance=1e-9)
+EXACT = GriddedSynthesis(width=16, precision="float64", tolerance=1e-9)
 """Within 1e-8 of `DirectSum` (tests/extremes)."""
 
 
@@ -83,7 +83,7 @@ def test_more_accuracy_takes_more_work() -> None:
     for rough, fine in pairwise(plans):
         assert fine.negligible < rough.negligible
         assert fine.subarrays >= rough.subarrays
-        assert isinstance(rough.synthesis, KernelDeposit) and isinstance(fine.synthesis, KernelDeposit)
+        assert isinstance(rough.synthesis, GriddedSynthesis) and isinstance(fine.synthesis, GriddedSynthesis)
         assert fine.synthesis.tolerance < rough.synthesis.tolerance
 
 
@@ -105,7 +105,7 @@ def test_exact_is_every_slow_way() -> None:
 
 def test_choices_of_the_scene_are_kept_and_their_error_is_said() -> None:
     scene = remus(1).scene
-    physics = replace(scene.physics, subarrays=1, faintest=20.0, synthesis=KernelDeposit(width=4, tolerance=0.01))
+    physics = replace(scene.physics, subarrays=1, faintest=20.0, synthesis=GriddedSynthesis(width=4, tolerance=0.01))
     made = planning.plan(replace(remus(1), scene=replace(scene, physics=physics)))
     assert made.choices.subarrays == 1 and made.choices.synthesis == physics.synthesis
     assert made.choices.negligible == pytest.approx(0.01)

@@ -11,7 +11,7 @@ from sonarsynth.casting.ray_casting import OFFSET, Backend, first_hit, occluded
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose, quaternion, unit
 from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 
 
 def mesh_from(shape: trimesh.Trimesh, scale: float = 1.0) -> Mesh:
@@ -80,8 +80,8 @@ def test_rays_end_at_far_and_do_not_look_back() -> None:
     assert out[0] == pytest.approx(0.5, abs=5e-3)
 
 
-def place(mesh: Mesh, position: tuple[float, float, float], heading: float = 0.7) -> Body:
-    return Body("body", mesh, Pose(np.array(position), quaternion(heading, 0.2, -0.4)), np.zeros(3))
+def place(mesh: Mesh, position: tuple[float, float, float], heading: float = 0.7) -> PlacedTarget:
+    return PlacedTarget("body", mesh, Pose(np.array(position), quaternion(heading, 0.2, -0.4)), np.zeros(3))
 
 
 def test_a_convex_body_hides_none_of_the_facets_that_face_away_from_it() -> None:

@@ -13,7 +13,7 @@ from sonarsynth.planning import plan
 from sonarsynth.receiver import BeamGrid, Converter, Sonar
 from sonarsynth.recipe.scene import Scene, Trajectory, World
 from sonarsynth.scattering import MirrorLobe
-from sonarsynth.signals import KernelDeposit
+from sonarsynth.signals import GriddedSynthesis
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.targets.shapes import Sphere
@@ -123,7 +123,7 @@ def test_narrow_lobes_are_synthesised_as_stated() -> None:
         float(made.windows.start[0]),
         made.windows.samples,
     )
-    exact, fast = exact_signals(*arguments)[0], KernelDeposit().signals(*arguments).pressure
+    exact, fast = exact_signals(*arguments)[0], GriddedSynthesis().signals(*arguments).pressure
     assert np.abs(fast - exact).max() < 2e-4 * np.abs(exact).max()
 
 

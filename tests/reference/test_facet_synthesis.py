@@ -14,8 +14,8 @@ from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.equations.scattering.kirchhoff_integral import shadow_taper
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import BandPass, LowPass, PositionTable, Romanis, Sonar, elements
-from sonarsynth.signals import DirectSum, KernelDeposit, pulse_support
-from sonarsynth.signals.array_paths import fronts
+from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
+from sonarsynth.signals.array_paths import array_paths
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.signals.pulse_shapes import MOST_PHASE, shape_modes
@@ -30,7 +30,7 @@ SONAR = Sonar()
 SHARP = Sonar(filter=BandPass(low=35e3, high=75e3, transition=15e3, attenuation=160))  # nothing beyond 98 kHz
 LOW = Sonar(filter=LowPass(cutoff=60e3, attenuation=140), sampling_frequency=250e3)
 FACES = elements(Romanis())
-PRECISE = KernelDeposit(precision="float64", width=14, tolerance=1e-10)
+PRECISE = GriddedSynthesis(precision="float64", width=14, tolerance=1e-10)
 
 
 def window(of: Arrivals, sonar: Sonar, margin: float = 5e-4) -> tuple[float, int]:
@@ -81,7 +81,7 @@ def test_kernel_deposit_is_the_exact_sum(kind: dict[str, float], also: bool, son
     array = some_of(FACES, 130)
     start, samples = window(of, sonar)
     exact, _ = exact_signals(of, SNAPS, array, sonar, absorption, start, samples)
-    got, outside = KernelDeposit().pressure(of, SNAPS, array, sonar, absorption, start, samples)
+    got, outside = GriddedSynthesis().pressure(of, SNAPS, array, sonar, absorption, start, samples)
     assert outside == 0
     assert 1e-14 < error(got, exact) < 1e-4
     if sonar is SHARP:
@@ -143,7 +143,7 @@ def test_a_coherent_body_whose_facets_cancel() -> None:
     part = elements(PositionTable(positions=tuple(map(tuple, FACES.position[some].tolist())), face=FACES.face))
     start, samples = window(of, SONAR)
     exact, _ = exact_signals(of, SNAPS, part, SONAR, absorption, start, samples)
-    got, _ = KernelDeposit().pressure(of, SNAPS, FACES, SONAR, absorption, start, samples)
+    got, _ = GriddedSynthesis().pressure(of, SNAPS, FACES, SONAR, absorption, start, samples)
     one = of.select(np.array([int(np.argmax(of.amplitude))]))
     alone, _ = exact_signals(one, SNAPS, part, SONAR, absorption, start, samples)
     assert np.abs(of.amplitude).sum() / one.amplitude[0] * np.abs(alone).max() > 10.0 * np.abs(exact).max()
@@ -161,7 +161,7 @@ def test_facets_of_half_a_wavelength_are_few_modes() -> None:
     of = facets(target_at(15.0, n, 6, direct=False), 7, corners=6e-6)
     of = replace(of, amplitude=rng.uniform(0.5, 1.0, n), absorption=np.zeros(n))
     front, none = (
-        fronts(of, SNAPS, elements(PositionTable(positions=((0.0, 0.0, 0.0),)))),
+        array_paths(of, SNAPS, elements(PositionTable(positions=((0.0, 0.0, 0.0),)))),
         np.zeros((0, f.size), complex),
     )
     modes = shape_modes(front, f, spectrum, np.zeros(f.size), none, 0.0, 3e-6)
@@ -184,7 +184,7 @@ def test_what_is_no_facet_is_refused() -> None:
         ({"rough_delay": np.where(third, np.inf, 0.0)}, "arrival 2 has rough_delay that is not a finite"),
         ({"coherent": third, "centre": np.nan}, "centre of their band"),
     ):
-        for method in (DirectSum(), KernelDeposit()):
+        for method in (DirectSum(), GriddedSynthesis()):
             with pytest.raises(ValueError, match=message):
                 method.signals(replace(of, **columns), SNAPS, FACES, SONAR, None, start, samples)
 
@@ -199,11 +199,11 @@ def test_facets_too_large_for_modes_are_refused_and_the_exact_sum_takes_them() -
         return replace(of, corners=size * np.array([[-1.0, 0.0, 1.0]] * 3 + [[-0.5, 0.0, 0.5]]))
 
     exact, _ = exact_signals(of_size(0.99 * limit), SNAPS, array, SONAR, None, start, samples)
-    got, _ = KernelDeposit().pressure(of_size(0.99 * limit), SNAPS, array, SONAR, None, start, samples)
+    got, _ = GriddedSynthesis().pressure(of_size(0.99 * limit), SNAPS, array, SONAR, None, start, samples)
     assert error(got, exact) < 1e-4
     with pytest.raises(ValueError, match="split them, or use direct_sum"):
-        KernelDeposit().pressure(of_size(1.1 * limit), SNAPS, array, SONAR, None, start, samples)
+        GriddedSynthesis().pressure(of_size(1.1 * limit), SNAPS, array, SONAR, None, start, samples)
     assert np.isfinite(exact_signals(of_size(1.1 * limit), SNAPS, array, SONAR, None, start, samples)[0]).all()
     alike = replace(of, corners=np.tile([-3e-5, 0.0, 3e-5], (4, 1)))  # one shape for all is exact, whatever its size
     exact, _ = exact_signals(alike, SNAPS, array, SONAR, None, start, samples)
-    assert error(KernelDeposit().pressure(alike, SNAPS, array, SONAR, None, start, samples)[0], exact) < 1e-4
+    assert error(GriddedSynthesis().pressure(alike, SNAPS, array, SONAR, None, start, samples)[0], exact) < 1e-4

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from sonarsynth.environment.sea import Environment, Isovelocity
-from sonarsynth.geometry.motion import Circle, Course, Motion, Still
-from sonarsynth.pipeline.synthesis import hear
+from sonarsynth.geometry.motion import Circle, ConstantVelocity, Motion, Still
+from sonarsynth.pipeline.synthesis import frame_signals
 from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start, plan
 from sonarsynth.receiver import PlanarLattice, Sonar
 from sonarsynth.recipe import Accuracy, Recipe, reading
@@ -35,7 +35,7 @@ def away(made: Plan, sensors: list[int]) -> tuple[float, float]:
     exact = FramePressure(made.scene, frame, made.profile).pressure(sensors, start, samples)
     found = []
     for some, right in zip((~arrivals.direct, arrivals.direct), exact, strict=True):
-        heard = hear(made, frame, arrivals.select(some)).pressure[sensors]
+        heard = frame_signals(made, frame, arrivals.select(some)).pressure[sensors]
         assert np.abs(right).max() > 0.0
         found.append(float(np.abs(heard - right).max() / np.abs(right).max()))
     return found[0], found[1]
@@ -59,7 +59,7 @@ def test_a_frame_of_a_shipped_recipe_is_what_its_description_says(
     scene = replace(recipe.scene, trajectory=replace(way, frames=1, start=way.time(way.frames // 3)))
     recipe = replace(recipe, scene=scene, accuracy=replace(recipe.accuracy, signal=min(recipe.accuracy.signal, 1e-3)))
     made = plan(recipe, ("signals",), choices)
-    assert made.choices.subarrays == 1  # else `hear` traces again
+    assert made.choices.subarrays == 1  # else `frame_signals` traces again
     assert max(away(made, sensors)) < ALLOWED
 
 
@@ -84,8 +84,8 @@ def test_what_moves_is_heard_where_the_sound_met_it(speed: float, sonar: float) 
     """At any speed, before the instant of the frame and after it, by a sonar that moves too."""
     heading, drift = np.deg2rad(200.0), np.deg2rad(60.0)
     start = np.array([22.0, 1.0, -29.0]) - speed * np.array([np.sin(heading), np.cos(heading), 0.05])
-    body = Course(start=tuple(start), heading=heading, speed=speed, climb=0.05 * speed)
-    ours = Course(start=(0.0, 0.0, -30.0), heading=drift, speed=sonar)
+    body = ConstantVelocity(start=tuple(start), heading=heading, speed=speed, climb=0.05 * speed)
+    ours = ConstantVelocity(start=(0.0, 0.0, -30.0), heading=drift, speed=sonar)
     made = crossing(body, ours)
     assert max(away(made, [0, 47])) < ALLOWED
 

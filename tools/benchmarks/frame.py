@@ -132,7 +132,7 @@ def synthesis_of_new_frames(plan: planning.Plan, warm: int = 8) -> float:
     return float(np.median(seconds[warm:]))
 
 
-def synthesis_error(plan: planning.Plan, traced: pipeline.Traced) -> dict[str, Any]:
+def synthesis_error(plan: planning.Plan, traced: pipeline.TracedFrame) -> dict[str, Any]:
     """Largest error of the signals over their peak, against the direct sum, on every eighth echo (it takes seconds)."""
     share = 8
     some = thin(traced.arrivals, PATHS // share)
@@ -153,7 +153,7 @@ def synthesis_error(plan: planning.Plan, traced: pipeline.Traced) -> dict[str, A
 
 def peers(
     plan: planning.Plan,
-    traced: pipeline.Traced,
+    traced: pipeline.TracedFrame,
     signals: Signals,
     ours: float,
     image: np.ndarray,

@@ -10,7 +10,7 @@ import numpy as np
 import sonarsynth as ss
 from benchmarks.frame import RECIPE, cpu, relative
 from sonarsynth import pipeline, planning
-from sonarsynth.pipeline import Traced
+from sonarsynth.pipeline import TracedFrame
 from sonarsynth.planning import Plan
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.recipe import reading
@@ -38,7 +38,7 @@ def plain(arrivals: Arrivals) -> Arrivals:
     )  # fmt: skip
 
 
-def synthesise(plan: Plan, traced: Traced) -> Signals:
+def synthesise(plan: Plan, traced: TracedFrame) -> Signals:
     """What reaches the hydrophones: no noise, no converter."""
     return plan.scene.physics.synthesis.signals(
         traced.arrivals, traced.frame.moment.snaps, plan.elements, plan.scene.sonar, plan.absorption,

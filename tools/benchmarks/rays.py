@@ -20,9 +20,9 @@ from sonarsynth.planning import Plan
 from sonarsynth.propagation.refracted import Refracted
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import reading
-from sonarsynth.tracing.expansion.array_expansion import fronts
+from sonarsynth.tracing.expansion.array_expansion import array_expansion
 from sonarsynth.tracing.expansion.wavefront_polynomials import sphere
-from sonarsynth.tracing.facet_paths import ArrayLegs, array_legs
+from sonarsynth.tracing.facet_paths import FacetPaths, facet_paths
 from sonarsynth.validation.rays.ray_cases import random_layers
 from sonarsynth.validation.rays.ray_matching import rays_of
 from sonarsynth.validation.references.rays.mpmath_layers import Layers, exact_rays
@@ -104,7 +104,7 @@ def batch(plan: Plan, index: int, bounces: int) -> dict[str, Any]:
     environment, sonar = scene.world.environment, scene.sonar
     band, propagation = (sonar.band.low, sonar.band.high), Refracted(bounces=bounces)
     bodies, pose = frame.moment.bodies, frame.sonar_pose
-    made = array_legs(environment, plan.profile, bodies, pose, plan.elements, propagation, band)
+    made = facet_paths(environment, plan.profile, bodies, pose, plan.elements, propagation, band)
     legs = made.legs
     some = np.unique(np.linspace(0, len(legs.row) - 1, FACETS).astype(int))
     position = pose.to_world(plan.elements.position)
@@ -121,7 +121,7 @@ def batch(plan: Plan, index: int, bounces: int) -> dict[str, Any]:
     (delay, of_fronts), seconds_evaluate = median(lambda: expanded(plan, made))
     group = made.facets.target[legs.row]
     _, seconds_fronts = median(
-        lambda: fronts(legs, group, environment, plan.profile, pose, plan.elements, propagation, band)
+        lambda: array_expansion(legs, group, environment, plan.profile, pose, plan.elements, propagation, band)
     )
     time_exact, gain_exact = of_legs(found, made, some, sensors, time_on)
     paths = len(legs.row) * sensors
@@ -152,7 +152,7 @@ def batch(plan: Plan, index: int, bounces: int) -> dict[str, Any]:
 
 
 def continued(
-    water: ray_solutions.Water, made: ArrayLegs, position: np.ndarray, distance: np.ndarray
+    water: ray_solutions.Water, made: FacetPaths, position: np.ndarray, distance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Times (s) and amplitudes (leg, sensor) of the rays to every sensor, each from the one before, by depth."""
     legs = made.legs
@@ -170,7 +170,7 @@ def continued(
     return times[:, back], gains[:, back]
 
 
-def expanded(plan: Plan, made: ArrayLegs) -> tuple[np.ndarray, np.ndarray]:
+def expanded(plan: Plan, made: FacetPaths) -> tuple[np.ndarray, np.ndarray]:
     """Times (leg, sensor) by the wavefronts of the product (`products.Arrivals`), and the errors that they state."""
     legs, over, elements = made.legs, made.fronts, plan.elements
     c = float(plan.profile.at(depth(made.sonar_pose.position)))
@@ -180,7 +180,7 @@ def expanded(plan: Plan, made: ArrayLegs) -> tuple[np.ndarray, np.ndarray]:
 
 
 def of_legs(
-    found: ray_solutions.Eigenrays, made: ArrayLegs, some: np.ndarray, sensors: int, near: np.ndarray
+    found: ray_solutions.Eigenrays, made: FacetPaths, some: np.ndarray, sensors: int, near: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Times and amplitudes (leg, sensor) of the rays found that belong to some legs, or NaN: of their family, and
     nearest to a time (leg, sensor) where there are several."""

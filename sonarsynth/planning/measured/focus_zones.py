@@ -17,7 +17,7 @@ from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.sampled_arrivals import arrivals_of
 from sonarsynth.planning.plans import Plan
 from sonarsynth.products import Signals
-from sonarsynth.signals.auto_synthesis import USUAL, deposit_for
+from sonarsynth.signals.auto_synthesis import DEFAULT_ERROR, deposit_for
 from sonarsynth.signals.filtered_pulse import snap_levels
 
 ZONES = (1, 2, 4, 8, 16, MOST_ZONES)
@@ -76,7 +76,7 @@ def _heard(plan: Plan, index: int) -> tuple[Signals, float, float] | None:
     sonar = plan.scene.sonar
     # Not by the plan's own method: direct sums would take minutes, and the same signals go into both images.
     imaged = arrivals.select(~arrivals.direct) if plan.windows.direct_removed else arrivals
-    signals = deposit_for(USUAL).signals(imaged, snaps, plan.elements, sonar, plan.absorption, start, samples)
+    signals = deposit_for(DEFAULT_ERROR).signals(imaged, snaps, plan.elements, sonar, plan.absorption, start, samples)
     direct, levels = arrivals.select(arrivals.direct), np.array(snap_levels(snaps))
     loudest = np.argmax(levels[direct.snap] + 20.0 * np.log10(np.abs(direct.amplitude)))
     clock = float(direct.delay[loudest])

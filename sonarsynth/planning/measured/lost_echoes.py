@@ -11,9 +11,9 @@ from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.sampled_arrivals import arrivals_of
 from sonarsynth.planning.notes.source_notes import standing_off
 from sonarsynth.planning.plans import Plan
-from sonarsynth.products import Bearings, Signals
+from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.cancelling.direct_pulse import remove
-from sonarsynth.signals.auto_synthesis import USUAL, deposit_for
+from sonarsynth.signals.auto_synthesis import DEFAULT_ERROR, deposit_for
 from sonarsynth.signals.filtered_pulse import snap_levels
 
 NOTED = 1e-3
@@ -73,7 +73,7 @@ def losses(plan: Plan, index: int) -> Losses | None:
         return None
     loud = np.array(snap_levels(snaps))[arrivals.snap] + 20 * np.log10(np.abs(arrivals.amplitude) + 1e-300)
     first = int(np.argmax(np.where(straight, loud, -np.inf)))
-    lit, method = arrivals.snap == arrivals.snap[first], deposit_for(USUAL)
+    lit, method = arrivals.snap == arrivals.snap[first], deposit_for(DEFAULT_ERROR)
 
     def hear(some: np.ndarray) -> Signals:
         own = arrivals.select(some & lit)
@@ -104,7 +104,7 @@ def losses(plan: Plan, index: int) -> Losses | None:
     return Losses(index, np.clip(lost, 0.0, 1.0), fall, below)
 
 
-def _without(plan: Plan, signals: Signals, bearings: Bearings) -> np.ndarray:
+def _without(plan: Plan, signals: Signals, bearings: SourceEstimates) -> np.ndarray:
     """Pressure (sensor, sample) as it is imaged; that of the signals where nothing can be, or is to be, taken out."""
     if not plan.windows.direct_removed or not np.isfinite(bearings.time[0]):
         return signals.pressure

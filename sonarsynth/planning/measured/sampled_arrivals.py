@@ -29,7 +29,7 @@ def arrivals_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Arriv
         scene.world.environment,
         plan.profile,
         frame.moment,
-        frame.sonar_pose if part is None else moved_to(frame.sonar_pose, part),
+        frame.sonar_pose if part is None else subarray_pose(frame.sonar_pose, part),
         plan.elements if part is None else part.elements,
         plan.absorption_at_depths,
         plan.propagation,
@@ -45,6 +45,6 @@ def arrivals_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Arriv
     )
 
 
-def moved_to(pose: Pose, part: Subarray) -> Pose:
+def subarray_pose(pose: Pose, part: Subarray) -> Pose:
     """The pose of a part of an array that has a pose."""
     return Pose(pose.to_world(part.centre[None, :])[0], pose.orientation)

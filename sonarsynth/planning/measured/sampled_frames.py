@@ -14,16 +14,16 @@ from sonarsynth.planning.notes.scene_checks import check_frame, check_shrimp, re
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame, Scene
 
-LOOKED_AT = 2000
+MAX_SAMPLED_FRAMES = 2000
 """Frames that a plan looks at; of a larger dataset so many, spread evenly, first and last steps among them."""
-STRETCHED = 8
+SEQUENCE_SAMPLES = 8
 """Sequences of such a dataset whose variations are also looked at one by one at their ends."""
-MOST_STRETCHED = 200
+MAX_SEQUENCE_SAMPLES = 200
 """Scenes with a variation at an end, at most."""
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class SampledScene:
     """Frames of one scene."""
 
     scene: Scene
@@ -32,12 +32,12 @@ class Look:
     real: bool = True  # False: no sequence, but a scene with a variation at its end
 
 
-def survey(recipe: Recipe) -> tuple[Look, ...]:
+def sample_frames(recipe: Recipe) -> tuple[SampledScene, ...]:
     """The frames to look at, each checked: everything in the water, every file there, all scenes alike in shape.
 
     Raises FieldError that names the field, the frame and the values of the sequence.
     """
-    steps = looked_at(recipe)
+    steps = sampled_frames(recipe)
     first = next(iter(steps))
     looks = []
     for sequence, some in steps.items():
@@ -49,20 +49,20 @@ def survey(recipe: Recipe) -> tuple[Look, ...]:
             frames = tuple(recipe.frame(sequence * recipe.steps + step)[1] for step in some)
             for frame in frames:
                 check_frame(scene, frame)
-        looks.append(Look(scene, profile, frames))
+        looks.append(SampledScene(scene, profile, frames))
     if sum(len(look.frames) for look in looks) < recipe.frames:
-        looks += islice(_ends(recipe), MOST_STRETCHED)
+        looks += islice(_ends(recipe), MAX_SEQUENCE_SAMPLES)
     return tuple(looks)
 
 
-def looked_at(recipe: Recipe) -> dict[int, list[int]]:
+def sampled_frames(recipe: Recipe) -> dict[int, list[int]]:
     """Steps to look at of each sequence."""
     count, steps = recipe.sequences, recipe.steps
-    if count * steps <= LOOKED_AT:
+    if count * steps <= MAX_SAMPLED_FRAMES:
         return {sequence: list(range(steps)) for sequence in range(count)}
-    each = min(max(LOOKED_AT // count, 2), steps)
+    each = min(max(MAX_SAMPLED_FRAMES // count, 2), steps)
     chosen = _spread(steps, each)
-    return dict.fromkeys(_spread(count, LOOKED_AT // each), chosen)
+    return dict.fromkeys(_spread(count, MAX_SAMPLED_FRAMES // each), chosen)
 
 
 def _spread(count: int, most: int) -> list[int]:
@@ -70,9 +70,9 @@ def _spread(count: int, most: int) -> list[int]:
     return sorted({int(n) for n in np.linspace(0, count - 1, min(most, count)).round()})
 
 
-def _ends(recipe: Recipe) -> Iterator[Look]:
+def _ends(recipe: Recipe) -> Iterator[SampledScene]:
     """Scenes with each variation at its ends: they bound the windows, and need not be good."""
-    for sequence in _spread(recipe.sequences, STRETCHED):
+    for sequence in _spread(recipe.sequences, SEQUENCE_SAMPLES):
         for scene in recipe.spanned.extremes(sequence):
             try:
                 profile = read_inputs(scene)
@@ -81,7 +81,7 @@ def _ends(recipe: Recipe) -> Iterator[Look]:
                     check_frame(scene, frame)
             except FieldError:
                 continue
-            yield Look(scene, profile, frames, real=False)
+            yield SampledScene(scene, profile, frames, real=False)
 
 
 def check_alike(first: Scene, other: Scene) -> None:

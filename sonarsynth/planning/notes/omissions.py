@@ -16,7 +16,7 @@ from sonarsynth.propagation.bounces import MOST_BOUNCES
 from sonarsynth.receiver import stop_frequency
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.scattering import MirrorLobe
-from sonarsynth.state import Moment
+from sonarsynth.state import WorldState
 from sonarsynth.targets.mesh_resolution import expected_error
 from sonarsynth.targets.meshes import mesh_of
 
@@ -194,7 +194,7 @@ def reflected_bound(plan: Plan) -> str:
     return "one more would add, re what is kept in frame 0: " + (", ".join(parts) or "nothing")
 
 
-def _rough_moment(plan: Plan, frame: Frame) -> Moment:
+def _rough_moment(plan: Plan, frame: Frame) -> WorldState:
     """The moment of a frame with few facets."""
     bodies = []
     for target, body in zip(plan.scene.world.targets, frame.moment.bodies, strict=True):

@@ -9,7 +9,7 @@ import numpy as np
 from sonarsynth.environment.sea import Profile
 from sonarsynth.environment.sound_speed import Cast, Tabulated, TemperatureSalinity
 from sonarsynth.planning.measured.lost_echoes import lost_echoes
-from sonarsynth.planning.measured.sampled_frames import Look
+from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.notes.formula_validity import validity
 from sonarsynth.planning.notes.source_notes import standing_off
 from sonarsynth.planning.notes.target_notes import held, law_notes, mirror_notes, overlap_notes
@@ -25,7 +25,7 @@ NOTED = 8
 """Sequences that the notes on scenes are from, at most."""
 
 
-def notes(made: Plan, looks: Sequence[Look]) -> tuple[str, ...]:
+def notes(made: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
     """The notes on a plan, in order of importance."""
     recipe, scene = made.recipe, made.scene
     found: list[str] = []
@@ -52,13 +52,13 @@ def notes(made: Plan, looks: Sequence[Look]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def noted(looks: Sequence[Look]) -> list[Look]:
+def noted(looks: Sequence[SampledScene]) -> list[SampledScene]:
     """The sequences that notes are from."""
     real = [look for look in looks if look.real]
     return real[:: -(-len(real) // NOTED)]
 
 
-def stored_validity(looks: Sequence[Look]) -> tuple[str, ...]:
+def stored_validity(looks: Sequence[SampledScene]) -> tuple[str, ...]:
     """Where formulas and laws of the scenes hold and do not, one line each: as the store has them."""
     found: list[str] = []
     for look in noted(looks):
@@ -76,7 +76,7 @@ def _extent(scene: Scene, profile: Profile) -> list[str]:
     return [f"the sound speed is given {known}, of {bed:g} m of water: beyond, it stays as it is there"]
 
 
-def _shared(recipe: Recipe, looks: Sequence[Look]) -> list[str]:
+def _shared(recipe: Recipe, looks: Sequence[SampledScene]) -> list[str]:
     """What sequences of different splits have in common, so that one tells of the other."""
     if recipe.splits is None:
         return []
@@ -110,7 +110,7 @@ def _cut(scene: Scene, uniform: bool) -> tuple[str, ...]:
     )
 
 
-def _accuracy(made: Plan, looks: Sequence[Look]) -> list[str]:
+def _accuracy(made: Plan, looks: Sequence[SampledScene]) -> list[str]:
     """Where the accuracy of the recipe costs a lot, or what the scene chooses does not keep within it."""
     found, allowed, errors, parts = [], made.recipe.accuracy, made.errors, made.choices.subarrays
     if parts > 1 and errors.whole > 0.0:
@@ -156,7 +156,7 @@ def off_the_bottom(scene: Scene) -> list[str]:
     return [f"{', '.join(names)}: not on the bottom; {then} (scene.processing.locating.on_bottom)"]
 
 
-def _why_ranges_err(scene: Scene, looks: Sequence[Look]) -> str:
+def _why_ranges_err(scene: Scene, looks: Sequence[SampledScene]) -> str:
     """What the closed form of ranges leaves out of the water: bent rays, or only that it assumes another speed."""
     if not all(look.profile.uniform for look in looks):
         return " where rays bend"

@@ -17,11 +17,11 @@ from sonarsynth.equations.bubble.snap_pressure import onset
 from sonarsynth.equations.rays.ray_solutions import TOLERANCE
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.motion import pose
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.receiver import Sonar, elements
 from sonarsynth.recipe.scene import Frame, Scene
-from sonarsynth.signals.array_paths import MOST_STRETCH
+from sonarsynth.signals.array_paths import MAX_DOPPLER
 from sonarsynth.signals.filtered_pulse import bubble, heard_part
 from sonarsynth.sources.shrimp import LogarithmicBubble, SnappingShrimp
 from sonarsynth.sources.snap_pulses import largest_scales, pulse, waveform
@@ -107,7 +107,7 @@ def _check_plain(scene: Scene, number: int) -> None:
     if not isinstance(target.shape, MeshFile):
         return
     plain = mesh_of(replace(target.shape, edge=None, smooth=False))
-    body = Body(target.name, plain, pose(target.motion, scene.trajectory.time(0)), np.zeros(3))
+    body = PlacedTarget(target.name, plain, pose(target.motion, scene.trajectory.time(0)), np.zeros(3))
     if not _box_in_water(body, bed):
         size = float(np.ptp(plain.box, axis=0).max())
         what = f"target '{body.name}', {size:.3g} m long with numbers in {target.shape.unit},"
@@ -171,11 +171,11 @@ def _check_met(scene: Scene, frame: Frame, number: int) -> None:
 
 
 def _check_speed(scene: Scene, frame: Frame, number: int) -> None:
-    """Nothing moves so fast that the pulses are stretched beyond what the synthesis can do (`MOST_STRETCH`)."""
+    """Nothing moves so fast that the pulses are stretched beyond what the synthesis can do (`MAX_DOPPLER`)."""
     body, array = frame.moment.bodies[number], float(np.linalg.norm(frame.sonar_velocity))
     own = float(np.linalg.norm(body.velocity))
     slowest = float(profile_of(scene.world.environment.sound_speed).speed.min())
-    if array + 2.0 * own > 0.9 * MOST_STRETCH * slowest:
+    if array + 2.0 * own > 0.9 * MAX_DOPPLER * slowest:
         sonar = array > 2.0 * own
         path = ("scene", "trajectory", "sonar") if sonar else ("scene", "world", "targets", number, "motion")
         what, speed = ("the array", array) if sonar else (f"target '{body.name}'", own)
@@ -204,7 +204,7 @@ def check_methods(scene: Scene, products: frozenset[str]) -> None:
         )
 
 
-def _box_in_water(body: Body, bed: float) -> bool:
+def _box_in_water(body: PlacedTarget, bed: float) -> bool:
     """Whether the box round a body is in the water: then all of the body is."""
     low, high = body.mesh.box
     corners = body.pose.to_world(low + CORNERS * (high - low))
@@ -212,7 +212,7 @@ def _box_in_water(body: Body, bed: float) -> bool:
     return bool(down.min() >= 0.0 and down.max() <= bed and np.abs(corners).max() <= FARTHEST)
 
 
-def _places(body: Body) -> Floats:
+def _places(body: PlacedTarget) -> Floats:
     """Places in the world of the vertices of a body that lie farthest out along each axis of the world, either way."""
     extreme = []
     for some in in_blocks(len(body.mesh.vertices)):

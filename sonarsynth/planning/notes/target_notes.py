@@ -8,7 +8,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.labels.views import View, box_in_view
-from sonarsynth.planning.measured.sampled_frames import Look
+from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.receiver import elements
 from sonarsynth.receiver.mirror_images import mirror_image, mirror_normal
 from sonarsynth.recipe.scene import Frame
@@ -22,13 +22,13 @@ FRAMES = 64
 UNIT_BOX = mesh_of(Box(size=(1.0, 1.0, 1.0)))
 
 
-def chosen(look: Look) -> tuple[Frame, ...]:
+def chosen(look: SampledScene) -> tuple[Frame, ...]:
     """So many of the frames of a look, evenly spread."""
     count = len(look.frames)
     return tuple(look.frames[n] for n in sorted({int(n) for n in np.linspace(0, count - 1, min(count, FRAMES))}))
 
 
-def law_notes(look: Look) -> list[str]:
+def law_notes(look: SampledScene) -> list[str]:
     """Where the laws of a scene do not hold for its bodies, and what meshes stand for."""
     found: list[str] = []
     targets = zip(look.scene.world.targets, look.scene.laws, bodies(look), strict=True)
@@ -37,7 +37,7 @@ def law_notes(look: Look) -> list[str]:
     return found
 
 
-def held(look: Look) -> list[str]:
+def held(look: SampledScene) -> list[str]:
     """Where the law of each body of a scene holds or does not, one line at least a body."""
     found: list[str] = []
     for target, law, body in zip(look.scene.world.targets, look.scene.laws, bodies(look), strict=True):
@@ -47,7 +47,7 @@ def held(look: Look) -> list[str]:
     return found
 
 
-def bodies(look: Look) -> list[Scatterer]:
+def bodies(look: SampledScene) -> list[Scatterer]:
     """The bodies of a scene as laws are asked about them."""
     sonar, speed = look.scene.sonar, look.profile.speed
     aperture, frames = elements(sonar.array).aperture, chosen(look)
@@ -71,7 +71,7 @@ def _between(one: Floats, other: Floats) -> float:
     return float(np.arccos(np.clip(one @ other / lengths, -1.0, 1.0))) if lengths > 0.0 else 0.0
 
 
-def overlap_notes(look: Look) -> list[str]:
+def overlap_notes(look: SampledScene) -> list[str]:
     """Which bodies overlap, how, and in which frames."""
     when: dict[tuple[str, str, str], list[int]] = {}
     known: dict[tuple[int, int, bytes], str | None] = {}
@@ -110,7 +110,7 @@ def _near(frame: Frame) -> Iterator[tuple[int, int]]:
             yield one, one + 1 + other
 
 
-def mirror_notes(look: Look) -> list[str]:
+def mirror_notes(look: SampledScene) -> list[str]:
     """Which snaps and targets an array that cannot tell front from back hears as if in front, in which frames."""
     sonar = look.scene.sonar
     array = elements(sonar.array)

@@ -10,11 +10,11 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.gates import frequency_spacing, gate_samples, gated_spectra
-from sonarsynth.products import Bearings, EnergyImage, Signals
+from sonarsynth.products import EnergyImage, Signals, SourceEstimates
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location import pulse_times
 from sonarsynth.ranging.location.locating import MAX_LAG
-from sonarsynth.ranging.location.plane_waves import Front, cut, part_of, refine, without
+from sonarsynth.ranging.location.plane_waves import PlaneWaveFit, cut, part_of, refine, subtract
 from sonarsynth.receiver import Elements, Sonar
 
 FLAT: Final = 0.75
@@ -33,7 +33,7 @@ Imaging = Callable[[Signals, float, float], EnergyImage]
 
 def remove_others(
     signals: Signals,
-    bearings: Bearings,
+    bearings: SourceEstimates,
     elements: Elements,
     sonar: Sonar,
     length: float,
@@ -53,7 +53,7 @@ def remove_others(
 
 
 def remove(
-    signals: Signals, bearings: Bearings, elements: Elements, sonar: Sonar, length: float, row: int = 0
+    signals: Signals, bearings: SourceEstimates, elements: Elements, sonar: Sonar, length: float, row: int = 0
 ) -> Signals | None:
     """Signals without the direct pulse of a located snap; None where none is located, or it is not
     one wavefront.
@@ -71,15 +71,15 @@ def remove(
     """
     if not np.isfinite(bearings.time[row]):
         return None
-    fitted = refine(signals, elements, sonar, Front.of(bearings, row))
+    fitted = refine(signals, elements, sonar, PlaneWaveFit.of(bearings, row))
     if fitted is None or not fitted[1] < MAX_LAG / sonar.band.centre:
         return None
     front, _ = fitted
     lag, gain = deviations(signals, elements, sonar, front)
-    return without(signals, part_of(signals, elements, sonar, front, length / FLAT, lag, gain))[0]
+    return subtract(signals, part_of(signals, elements, sonar, front, length / FLAT, lag, gain))[0]
 
 
-def deviations(signals: Signals, elements: Elements, sonar: Sonar, front: Front) -> tuple[Floats, Floats]:
+def deviations(signals: Signals, elements: Elements, sonar: Sonar, front: PlaneWaveFit) -> tuple[Floats, Floats]:
     """How much later (sensor,) in s than a wavefront, and how many times as loud (sensor,), each sensor hears it.
 
     Newton steps on the squares of what the wave leaves, over the power of that, and of the deviations, over `UNLIKE`:

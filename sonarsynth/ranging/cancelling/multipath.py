@@ -9,21 +9,21 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, azimuth_elevation
 from sonarsynth.geometry import Pose
-from sonarsynth.products import Bearings, Signals
+from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location import pulse_times
 from sonarsynth.ranging.location.locating import MAX_LAG
 from sonarsynth.ranging.location.plane_waves import (
     HALF,
-    Front,
-    Part,
-    brightness,
+    PlaneWaveFit,
+    WindowSegment,
+    beam_contrast,
     cut,
     look,
     part_of,
     refine,
     restored,
-    without,
+    subtract,
 )
 from sonarsynth.receiver import Elements, Sonar
 
@@ -63,7 +63,7 @@ class Expected:
 
     surface: int  # reflections
     bottom: int
-    front: Front
+    front: PlaneWaveFit
     energy: float  # Pa2 s at a sensor in the band, its face's response included
 
 
@@ -73,7 +73,7 @@ class Outcome:
 
     expected: Expected
     reason: int  # index into REASONS
-    found: Front | None = None  # as fitted, where it was
+    found: PlaneWaveFit | None = None  # as fitted, where it was
     excess: float = float("nan")  # dB: of a beam on it over all else in its window; NaN where it was not fitted
 
 
@@ -103,7 +103,7 @@ def images(position: Floats, pose: Pose, bed_depth: float, bounces: int) -> list
 
 def cancel(
     signals: Signals,
-    bearings: Bearings,
+    bearings: SourceEstimates,
     elements: Elements,
     sonar: Sonar,
     pose: Pose,
@@ -125,13 +125,13 @@ def cancel(
         outcomes.append(outcome)
         if outcome.reason == CANCELLED and outcome.found is not None:
             taken.append(part_of(left, elements, sonar, outcome.found))
-            left, _ = without(left, taken[-1])
+            left, _ = subtract(left, taken[-1])
     return Cancelled(_settle(left, elements, sonar, taken), tuple(outcomes))
 
 
 def expect(
     signals: Signals,
-    bearings: Bearings,
+    bearings: SourceEstimates,
     elements: Elements,
     sonar: Sonar,
     pose: Pose,
@@ -144,13 +144,13 @@ def expect(
         distance = float(np.linalg.norm(position))
         if not (np.isfinite(time) and np.isfinite(distance) and distance > 0):
             continue
-        direct = Front(position / distance, 1 / distance, float(time))
+        direct = PlaneWaveFit(position / distance, 1 / distance, float(time))
         aligned = cut(signals, elements, direct.delays(elements, c), pulse_times.PULSE_HALF, sonar.band)
         wave = pulse_times.waveform(aligned, elements, c, direct.direction, direct.curvature, direct.time)
         density = 2 * aligned.spacing * np.abs(wave.template) ** 2
         for surface, bottom, place in images(position, pose, bed_depth, bounces):
             r = float(np.linalg.norm(place))
-            front = Front(place / r, 1 / r, float(time) + (r - distance) / c)
+            front = PlaneWaveFit(place / r, 1 / r, float(time) + (r - distance) / c)
             across, up = front.direction[1:, None] * (elements.face / c)
             face = ranging_kernels.face_responses(across, up, aligned.frequency[0], aligned.spacing, len(density))[0]
             found.append(Expected(surface, bottom, front, float(density @ face**2) * (distance / r) ** 2))
@@ -158,7 +158,7 @@ def expect(
 
 
 def _out_of_question(
-    front: Front, bearings: Bearings, elements: Elements, sonar: Sonar, window: tuple[float, float]
+    front: PlaneWaveFit, bearings: SourceEstimates, elements: Elements, sonar: Sonar, window: tuple[float, float]
 ) -> int:
     """Why an arrival is not even looked for; `CANCELLED` where it is."""
     c = sonar.assumed_sound_speed
@@ -188,7 +188,7 @@ def find(signals: Signals, elements: Elements, sonar: Sonar, expected: Expected,
     if fitted is None:
         return Outcome(expected, FAINT)
     front, misfit = fitted
-    excess, energy = brightness(signals, elements, sonar, front)
+    excess, energy = beam_contrast(signals, elements, sonar, front)
     turned = float(np.linalg.norm(front.direction - expected.front.direction))
     reason = CANCELLED
     if excess < limits.excess:
@@ -202,7 +202,7 @@ def find(signals: Signals, elements: Elements, sonar: Sonar, expected: Expected,
     return Outcome(expected, reason, front, excess)
 
 
-def _settle(signals: Signals, elements: Elements, sonar: Sonar, taken: list[Part]) -> Signals:
+def _settle(signals: Signals, elements: Elements, sonar: Sonar, taken: list[WindowSegment]) -> Signals:
     """Arrivals that overlap are each taken out anew, fitted with the others gone, where that leaves less energy."""
     parts, first = list(taken), 0.0
     for turn in range(PASSES):
@@ -215,7 +215,7 @@ def _settle(signals: Signals, elements: Elements, sonar: Sonar, taken: list[Part
             if fitted is None or in_view(fitted[0].direction, elements, sonar):
                 continue
             new = part_of(whole, elements, sonar, fitted[0])
-            less, fell = without(whole, new)
+            less, fell = subtract(whole, new)
             if rise + fell > 0:
                 signals, parts[n] = less, new
                 gained += rise + fell
@@ -225,6 +225,6 @@ def _settle(signals: Signals, elements: Elements, sonar: Sonar, taken: list[Part
     return signals
 
 
-def _overlap(one: Part, other: Part, signals: Signals) -> bool:
+def _overlap(one: WindowSegment, other: WindowSegment, signals: Signals) -> bool:
     """Whether at any sensor the windows of two parts share a sample."""
     return bool(np.min(np.abs(one.place - other.place)) < 2 * HALF * signals.sampling_frequency)

@@ -10,7 +10,7 @@ from annotated_types import Ge, Le
 from sonarsynth.conventions import Decibels, PositiveRadians
 from sonarsynth.description import description
 from sonarsynth.geometry import Pose
-from sonarsynth.products import Bearings, Signals
+from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.receiver import Elements, Sonar
 
 
@@ -55,7 +55,7 @@ class WavefrontCancelling:
     def cancel(
         self,
         signals: Signals,
-        bearings: Bearings,
+        bearings: SourceEstimates,
         elements: Elements,
         sonar: Sonar,
         sonar_pose: Pose,

@@ -19,7 +19,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry import Pose
-from sonarsynth.ranging.location.source_position import ACCEPTED, ECHO, RANGE, Known, Row, refused
+from sonarsynth.ranging.location.source_position import ACCEPTED, ECHO, RANGE, SonarKnowledge, SourceFix, refused
 
 SIGMAS = 4.0
 """Standard errors within which a curvature, a direction and a time may be those of an echo."""
@@ -42,7 +42,7 @@ class Candidate(NamedTuple):
 
     centre: float  # s: about when
     power: float  # Pa2: mean over its window, all sensors together
-    row: Row
+    row: SourceFix
 
 
 class Source(NamedTuple):
@@ -57,11 +57,11 @@ class Source(NamedTuple):
 class Candidates:
     """Pulses, loudest first."""
 
-    known: Known
+    known: SonarKnowledge
     found: list[Candidate] = field(default_factory=list)
 
     @property
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[SourceFix]:
         """Those that are accepted, then those that are refused."""
         judged = [self._judged(candidate) for candidate in self.found]
         return sorted(judged, key=lambda row: row.reason not in (ACCEPTED, RANGE))
@@ -71,7 +71,7 @@ class Candidates:
         """How many are."""
         return sum(row.reason in (ACCEPTED, RANGE) for row in self.rows)
 
-    def _judged(self, candidate: Candidate) -> Row:
+    def _judged(self, candidate: Candidate) -> SourceFix:
         row = candidate.row
         if row.reason not in (ACCEPTED, RANGE):
             return refused(row.reason)
@@ -86,7 +86,7 @@ class Candidates:
             return other.power > candidate.power
         return any(self._may_be_echo(row, source) for source in _sources(cause, self.known))
 
-    def _may_be_echo(self, row: Row, source: Source) -> bool:
+    def _may_be_echo(self, row: SourceFix, source: Source) -> bool:
         """Whether a pulse is what a source's echo, or the image itself, would be."""
         speed, error = self.known.sonar.assumed_sound_speed, SIGMAS * row.time_error
         extra, distance = speed * (row.time - source.time), float(np.linalg.norm(source.place))
@@ -110,7 +110,7 @@ class Candidates:
         return not (on_bottom and bool(abs(k - 1 / mirrored) <= slack) and k + slack < 1 / range_)
 
 
-def _sources(row: Row, known: Known) -> list[Source]:
+def _sources(row: SourceFix, known: SonarKnowledge) -> list[Source]:
     """The pulse where its wavefront puts it, and its images in surface and bottom."""
     k = max(row.curvature[0], 1 / FAR)
     direct = Source(row.time, row.chord / k, row.amplitude)

@@ -17,7 +17,7 @@ from sonarsynth.equations.arrays.spherical_wave import (
     wavefront_delays,
 )
 from sonarsynth.geometry import Pose
-from sonarsynth.products import Bearings, Signals
+from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.location import pulse_times
 from sonarsynth.ranging.location.candidates import Candidate, Candidates
 from sonarsynth.ranging.location.pulse_times import Pulse
@@ -28,8 +28,8 @@ from sonarsynth.ranging.location.source_position import (
     RANGE,
     UNFIT,
     UNRESOLVED,
-    Known,
-    Row,
+    SonarKnowledge,
+    SourceFix,
     as_bearings,
     place,
     refused,
@@ -82,7 +82,7 @@ def locate(
     gradient: float = 0.0,
     kink: float = 0.0,
     on_bottom: bool = True,
-) -> Bearings:
+) -> SourceEstimates:
     """The `snaps` loudest direct pulses, loudest first; see `ranging.SensorDelays`.
 
     Paths bend as `bend` says; without it they are taken for straight, and the errors hold what a `gradient` (1/s) of
@@ -101,7 +101,7 @@ def locate(
     loud = pulse_times.loudness(signals, live, width)
     rounding = pulse_times.rounding(signals, loud.peak, pulse_times.half_length(sonar.band))
     quiet = pulse_times.quiet_bin(loud.quiet, int(live.sum()), sonar.band, pulse_times.half_length(sonar.band))
-    known = Known(elements, sonar, pose, bed_depth, gradient, rounding, quiet, on_bottom, kink)
+    known = SonarKnowledge(elements, sonar, pose, bed_depth, gradient, rounding, quiet, on_bottom, kink)
     track, heard = loud.track.copy(), Candidates(known)
     for _ in range(4 * snaps):
         top = _loudest(track, heard, signals, snaps)
@@ -122,7 +122,7 @@ def _loudest(track: Floats, heard: Candidates, signals: Signals, snaps: int) -> 
     return int(before.argmax()) if before.any() else None
 
 
-def candidate(signals: Signals, known: Known, centre: float, half: float, bend: Bend | None) -> Row:
+def candidate(signals: Signals, known: SonarKnowledge, centre: float, half: float, bend: Bend | None) -> SourceFix:
     """The loudest pulse about `centre` (s) by itself; refused where its data do not support a place."""
     elements, sonar = known.elements, known.sonar
     found = fit_pulse(signals, elements, sonar, centre, half)

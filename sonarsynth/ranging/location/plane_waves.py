@@ -11,7 +11,7 @@ from scipy.fft import ifft, irfft, next_fast_len, rfft
 from sonarsynth.conventions import Floats, direction
 from sonarsynth.equations.arrays.spherical_wave import plane_wavefront, tangent_plane, wavefront_delays
 from sonarsynth.geometry import unit
-from sonarsynth.products import Bearings, Signals
+from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location import plane_wave_kernels, pulse_times
 from sonarsynth.ranging.location.locating import fit_wave
@@ -29,7 +29,7 @@ ROUNDS: Final = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Front:
+class PlaneWaveFit:
     """A spherical wavefront over the array."""
 
     direction: Floats  # (xyz) unit vector towards its source, sonar frame
@@ -37,14 +37,14 @@ class Front:
     time: float  # s at the array centre
 
     @staticmethod
-    def of(bearings: Bearings, row: int = 0) -> Front:
+    def of(bearings: SourceEstimates, row: int = 0) -> PlaneWaveFit:
         """The direct pulse of a located snap; plane where nothing says how far away that is."""
         radius = float(bearings.range_from_curvature[row])
         if not np.isfinite(radius):
             radius = float(np.linalg.norm(bearings.position[row]))
         curvature = 1 / radius if np.isfinite(radius) else 0.0
         towards = direction(bearings.azimuth[row], bearings.elevation[row])
-        return Front(towards, curvature, float(bearings.time[row]))
+        return PlaneWaveFit(towards, curvature, float(bearings.time[row]))
 
     def delays(self, elements: Elements, sound_speed: float) -> Floats:
         """When each sensor hears it (sensor,), in s."""
@@ -53,10 +53,10 @@ class Front:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class WindowSegment:
     """What each sensor hears of a wave that all hear."""
 
-    front: Front
+    front: PlaneWaveFit
     place: Floats  # (sensor,) samples, where the front is
     wave: Floats  # (sensor, 2 half) Pa, about `place`, before the second window
 
@@ -80,7 +80,7 @@ def _since(place: Floats, samples: int) -> Floats:
     return np.asarray(place - np.floor(place) + samples)
 
 
-def look(signals: Signals, elements: Elements, sonar: Sonar, expected: Front, search: float) -> Front:
+def look(signals: Signals, elements: Elements, sonar: Sonar, expected: PlaneWaveFit, search: float) -> PlaneWaveFit:
     """The expected wavefront, tilted by up to `search` (rad) and moved in time to where a beam on it hears most."""
     c, u = sonar.assumed_sound_speed, expected.direction
     aligned = cut(signals, elements, expected.delays(elements, c), pulse_times.PULSE_HALF + EARLY, sonar.band)
@@ -99,10 +99,10 @@ def look(signals: Signals, elements: Elements, sonar: Sonar, expected: Front, se
     envelope = np.abs(ifft(beam / np.sqrt(power + pulse_times.DEAF * elements.count), count))
     index = (int(envelope.argmax()) + count / 2) % count - count / 2
     moved = float(np.clip(index / (count * spacing), -EARLY, EARLY))
-    return Front(unit(u + tilt @ tangents), expected.curvature, expected.time + moved)
+    return PlaneWaveFit(unit(u + tilt @ tangents), expected.curvature, expected.time + moved)
 
 
-def refine(signals: Signals, elements: Elements, sonar: Sonar, near: Front) -> tuple[Front, float] | None:
+def refine(signals: Signals, elements: Elements, sonar: Sonar, near: PlaneWaveFit) -> tuple[PlaneWaveFit, float] | None:
     """The sphere that fits the sensors' lags, and the root mean square lag (s) that it leaves; None where none does."""
     c, q = sonar.assumed_sound_speed, elements.position
     aligned = cut(signals, elements, near.delays(elements, c), pulse_times.PULSE_HALF, sonar.band)
@@ -115,10 +115,10 @@ def refine(signals: Signals, elements: Elements, sonar: Sonar, near: Front) -> t
             return None
         wave = better
     misfit = float(np.sqrt(pulse.weight @ wave.residual**2 / pulse.weight.sum()))
-    return Front(wave.direction, wave.curvature, wave.time), misfit
+    return PlaneWaveFit(wave.direction, wave.curvature, wave.time), misfit
 
 
-def brightness(signals: Signals, elements: Elements, sonar: Sonar, front: Front) -> tuple[float, float]:
+def beam_contrast(signals: Signals, elements: Elements, sonar: Sonar, front: PlaneWaveFit) -> tuple[float, float]:
     """How far (dB) a beam on a wavefront stands above all else in its window, and its energy at a sensor, Pa2 s.
 
     Of each bin, the share of the energy that one wave explains, over the rest per sensor: 1 for noise, and in the band
@@ -140,11 +140,11 @@ def part_of(
     signals: Signals,
     elements: Elements,
     sonar: Sonar,
-    front: Front,
+    front: PlaneWaveFit,
     half: float = HALF,
     lag: Floats | float = 0.0,
     gain: Floats | float = 1.0,
-) -> Part:
+) -> WindowSegment:
     """What each sensor hears of the wave that a wavefront carries, within `half` (s) of it, flanks included.
 
     lag, gain (sensor,): how much later (s) than the front, and how many times as loud, a sensor hears it.
@@ -167,16 +167,16 @@ def part_of(
     samples = heard.shape[1] - 1
     place = (time - signals.start) * rate
     back = ranging_kernels.turned(heard, -_since(place, samples) / rate, 0.0, aligned.spacing)
-    return Part(front, place, irfft(back, 2 * samples, axis=1))
+    return WindowSegment(front, place, irfft(back, 2 * samples, axis=1))
 
 
-def without(signals: Signals, part: Part) -> tuple[Signals, float]:
+def subtract(signals: Signals, part: WindowSegment) -> tuple[Signals, float]:
     """Signals from which a part is taken, and by how much that lowers their sum of squares (Pa2)."""
     left = replace(signals, pressure=signals.pressure.copy())
     return left, float(plane_wave_kernels.add(left.pressure, part.place, part.wave, -1.0))
 
 
-def restored(signals: Signals, part: Part) -> tuple[Signals, float]:
+def restored(signals: Signals, part: WindowSegment) -> tuple[Signals, float]:
     """Signals to which a part that was taken is given back, and by how much that lowers their sum of squares (Pa2)."""
     whole = replace(signals, pressure=signals.pressure.copy())
     return whole, float(plane_wave_kernels.add(whole.pressure, part.place, part.wave, 1.0))

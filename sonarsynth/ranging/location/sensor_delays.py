@@ -8,7 +8,7 @@ from typing import Literal
 from sonarsynth.description import description
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose
-from sonarsynth.products import Bearings, Signals
+from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.receiver import Elements, Sonar
 
 
@@ -45,7 +45,7 @@ class SensorDelays:
         bed_depth: float,
         snaps: int,
         profile: Profile,
-    ) -> Bearings:
+    ) -> SourceEstimates:
         """See `LocatingMethod`. An array that cannot locate gives NaN rows (`locating.unlocatable` says why)."""
         from sonarsynth.environment.sound_speed import kink, mean_gradient
         from sonarsynth.ranging.location.locating import locate

@@ -10,7 +10,7 @@ import numpy as np
 from sonarsynth.conventions import Floats, azimuth_elevation
 from sonarsynth.equations.arrays.spherical_wave import Wavefront, envelope_peak
 from sonarsynth.geometry import Pose
-from sonarsynth.products import REASONS, Bearings
+from sonarsynth.products import REASONS, SourceEstimates
 from sonarsynth.ranging.location.pulse_times import DEAF, Pulse
 from sonarsynth.receiver import Elements, Sonar
 
@@ -37,8 +37,8 @@ ACCEPTED, SILENT, ARRAY, BAND, UNFIT, UNRESOLVED, OUTSIDE, ECHO, RANGE = range(l
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
-    """One snap of `Bearings`."""
+class SourceFix:
+    """One snap of `SourceEstimates`."""
 
     time: float
     time_error: float
@@ -57,7 +57,7 @@ class Row:
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class SonarKnowledge:
     """What the sonar knows besides what it hears."""
 
     elements: Elements
@@ -110,7 +110,7 @@ def bending_covariance(
     return covariance
 
 
-def place(wave: Wavefront, pulse: Pulse, known: Known, heard: Wavefront | None = None) -> Row:
+def place(wave: Wavefront, pulse: Pulse, known: SonarKnowledge, heard: Wavefront | None = None) -> SourceFix:
     """Ranges and position from a wavefront, and the depth of the bottom where it agrees; errors through the Jacobians.
 
     heard: the wave as the array hears it, where `wave` is the straight one that is left without bending. The direction
@@ -148,7 +148,7 @@ def place(wave: Wavefront, pulse: Pulse, known: Known, heard: Wavefront | None =
         reason = BAND
     position, covariance = _position(wave, fix)
     known_place = reason == ACCEPTED
-    return Row(
+    return SourceFix(
         time=pulse.time + time,
         time_error=time_error,
         direction=heard.direction,
@@ -166,7 +166,7 @@ def place(wave: Wavefront, pulse: Pulse, known: Known, heard: Wavefront | None =
     )
 
 
-def _fuse(wave: Wavefront, covariance: Floats, fall: float, known: Known) -> Fix:
+def _fuse(wave: Wavefront, covariance: Floats, fall: float, known: SonarKnowledge) -> Fix:
     """The wavefront, and where it agrees the depth: slope - k fall = 0 within |k| times the error of the depth.
 
     slope is the sine of the bearing's elevation in the world, fall (m) the height of the bottom above the sonar. In
@@ -213,7 +213,9 @@ def _position(wave: Wavefront, fix: Fix) -> tuple[Floats, Floats]:
     return u / k, jacobian @ fix.covariance @ jacobian.T
 
 
-def _in_water(wave: Wavefront, covariance: Floats, slope: float, by_angle: Floats, fall: float, known: Known) -> bool:
+def _in_water(
+    wave: Wavefront, covariance: Floats, slope: float, by_angle: Floats, fall: float, known: SonarKnowledge
+) -> bool:
     """Whether the wavefront alone can come from between surface and bottom, within three standard errors.
 
     The images of a snap in surface and bottom lie beyond them. Asked of the curvature: the source may be anywhere on
@@ -245,10 +247,10 @@ def _arrival(pulse: Pulse, full: Floats, unit: float, sonar: Sonar, rounding: fl
     return time, float(np.sqrt(error**2 + tilted + floor**2))
 
 
-def refused(reason: int) -> Row:
+def refused(reason: int) -> SourceFix:
     """A row of which nothing is known but why."""
     none, pair = np.full(3, np.nan), (np.nan, np.nan)
-    return Row(
+    return SourceFix(
         np.nan,
         np.nan,
         none,
@@ -266,17 +268,17 @@ def refused(reason: int) -> Row:
     )
 
 
-def as_bearings(rows: list[Row], snaps: int, reason: int = SILENT) -> Bearings:
-    """Rows as `Bearings` of `snaps` rows; NaN beyond those there are, for a reason."""
+def as_bearings(rows: list[SourceFix], snaps: int, reason: int = SILENT) -> SourceEstimates:
+    """Rows as `SourceEstimates` of `snaps` rows; NaN beyond those there are, for a reason."""
     rows = [*rows[:snaps], *[refused(reason)] * (snaps - len(rows))]
 
-    def column(get: Callable[[Row], object], *shape: int) -> Floats:
+    def column(get: Callable[[SourceFix], object], *shape: int) -> Floats:
         return np.array([get(row) for row in rows], float).reshape(snaps, *shape)
 
-    def ints(get: Callable[[Row], int]) -> np.ndarray:
+    def ints(get: Callable[[SourceFix], int]) -> np.ndarray:
         return np.array([get(row) for row in rows], np.int64)
 
-    return Bearings(
+    return SourceEstimates(
         time=column(lambda r: r.time),
         time_error=column(lambda r: r.time_error),
         azimuth=column(lambda r: azimuth_elevation(r.direction)[0]),

@@ -91,14 +91,14 @@ def _numbers(axis: Axis) -> list[float]:
 
 
 @description
-class Together:
+class Zip:
     """Entries that advance together: the first values of all, the second values of all, ..."""
 
     zip: Annotated[tuple[Axis, ...], MinLen(2)]
     """Entries of equally many values."""
 
     @model_validator(mode="after")
-    def _check(self) -> Together:
+    def _check(self) -> Zip:
         counts = [axis.size for axis in self.zip]
         if len(set(counts)) > 1:
             raise ValueError(f"the entries have {', '.join(map(str, counts))} values; they must have equally many")
@@ -107,9 +107,9 @@ class Together:
 
 def entry_tag(value: Any) -> str:
     """Which of the two a written entry is."""
-    return "zip" if (isinstance(value, dict) and "zip" in value) or isinstance(value, Together) else "axis"
+    return "zip" if (isinstance(value, dict) and "zip" in value) or isinstance(value, Zip) else "axis"
 
 
-def axes(entry: Axis | Together) -> tuple[Axis, ...]:
+def axes(entry: Axis | Zip) -> tuple[Axis, ...]:
     """The axes of an entry."""
-    return entry.zip if isinstance(entry, Together) else (entry,)
+    return entry.zip if isinstance(entry, Zip) else (entry,)

@@ -12,7 +12,7 @@ import numpy as np
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.receiver import Elements
-from sonarsynth.signals.array_paths import Fronts
+from sonarsynth.signals.array_paths import ArrayPaths
 from sonarsynth.signals.gridded.interpolation import box_nodes
 from sonarsynth.signals.gridded.nodes import DEGREES, analysis
 
@@ -29,7 +29,7 @@ def _basis(elements: Elements, aperture: float, terms: int) -> tuple[tuple[int, 
     return (x, y, z), value.reshape(x * y * z, -1), heard
 
 
-def variation(front: Fronts, elements: Elements) -> Floats:
+def variation(front: ArrayPaths, elements: Elements) -> Floats:
     """Amplitudes of paths over the box round the hydrophones (1 + 3 axes * 4 degrees, path), over the loudest.
 
     First the root mean square over the hydrophones; then, of each axis, bounds on the Chebyshev coefficients of degree

@@ -12,21 +12,21 @@ from sonarsynth.conventions import Floats
 from sonarsynth.equations.bubble.snap_pressure import ComplexArray
 from sonarsynth.equations.scattering.facet_pulses import facet_mean, rough_factor
 from sonarsynth.receiver import Sonar
-from sonarsynth.signals.array_paths import Fronts
+from sonarsynth.signals.array_paths import ArrayPaths
 from sonarsynth.signals.direct_sum import relative_absorption
 from sonarsynth.signals.filtered_pulse import at_longest, pulse_spectrum, stretch_sizes, stretched_spectra
 from sonarsynth.signals.gridded.nodes import rounded_up
 from sonarsynth.signals.pulse_shapes import MOST_PHASE, bending, blur_exponent, shape_modes, stretched
 from sonarsynth.signals.pulse_variation import (
     UNCHANGING,
-    Changes,
+    PulseVariation,
     changes,
     widest_bend,
     widest_spread,
     widest_turn,
     with_changes,
 )
-from sonarsynth.signals.segments import Stretch
+from sonarsynth.signals.segments import Segment
 
 SHAPES = 0.02
 """Share of the tolerance that the shapes of the pulses get, beside their terms."""
@@ -45,7 +45,7 @@ class Bins(NamedTuple):
     relative: Floats  # (bin,) absorption over that at the band centre, less one
     step: float  # Hz
     modes: ComplexArray  # (mode, bin) spectra that the modes of the paths weigh; none where all share their shape
-    changes: Changes  # of pulses over the aperture, in these modes
+    changes: PulseVariation  # of pulses over the aperture, in these modes
 
     def cut(self, count: int) -> Bins:
         """The first of them."""
@@ -62,8 +62,8 @@ def audible(spectrum: ComplexArray, tolerance: float) -> slice:
 
 
 def bins_of(
-    part: Stretch, front: Fronts, sonar: Sonar, absorption: Callable[[Floats], Floats] | None, tolerance: float
-) -> tuple[Fronts, Bins]:
+    part: Segment, front: ArrayPaths, sonar: Sonar, absorption: Callable[[Floats], Floats] | None, tolerance: float
+) -> tuple[ArrayPaths, Bins]:
     """The paths of a stretch, with the modes of their pulses, and its bins.
 
     Errors are relative to the least blurred path; paths that are silent beside it are left out. Raises ValueError for
@@ -99,13 +99,13 @@ def bins_of(
     return front, Bins(some.start, frequency, spectrum, relative, fs / part.samples, modes, found)
 
 
-def _shaped(front: Fronts) -> bool:
+def _shaped(front: ArrayPaths) -> bool:
     """Whether pulses have shapes, beside Doppler."""
     found = bool(front.variance.any() or front.phase.any() or front.corners.any() or front.rough_share.any())
     return found or (front.count > 1 and bool(front.turn_terms.any() or front.spread_terms.any()))
 
 
-def _changing(front: Fronts, highest: Floats, tolerance: float) -> Fronts:
+def _changing(front: ArrayPaths, highest: Floats, tolerance: float) -> ArrayPaths:
     """Paths without what their pulses change by over the aperture, up to the highest frequency (1,), where that is
     nothing beside the loudest."""
     loud = np.abs(front.amplitude)
@@ -117,7 +117,9 @@ def _changing(front: Fronts, highest: Floats, tolerance: float) -> Fronts:
     return replace(front, turn_terms=turn_terms, spread_terms=spread_terms)
 
 
-def _bent(front: Fronts, spectrum: ComplexArray, series: ComplexArray, widest: float, tolerance: float) -> Fronts:
+def _bent(
+    front: ArrayPaths, spectrum: ComplexArray, series: ComplexArray, widest: float, tolerance: float
+) -> ArrayPaths:
     """Paths without what their Doppler changes by over the aperture, where that is nothing beside the loudest."""
     if not front.bend_terms.shape[1]:
         return front
@@ -128,7 +130,7 @@ def _bent(front: Fronts, spectrum: ComplexArray, series: ComplexArray, widest: f
     return front if rate * size > SHAPES * tolerance else replace(front, bend_terms=front.bend_terms[:, :0])
 
 
-def _check_corners(front: Fronts, highest: float) -> None:
+def _check_corners(front: ArrayPaths, highest: float) -> None:
     """Raise ValueError where a facet is too large for the series in its corners."""
     longest = MOST_PHASE / (2.0 * np.pi * highest)
     far = np.abs(front.corners).max()
@@ -140,14 +142,14 @@ def _check_corners(front: Fronts, highest: float) -> None:
 
 
 def _with_modes(
-    front: Fronts,
+    front: ArrayPaths,
     frequency: Floats,
     spectrum: ComplexArray,
     relative: Floats,
     series: ComplexArray,
     widest: float,
     tolerance: float,
-) -> tuple[Fronts, ComplexArray, ComplexArray]:
+) -> tuple[ArrayPaths, ComplexArray, ComplexArray]:
     """Paths with modes, the spectrum, and those of the modes. Absorption is among them, unless it differs much."""
     decay = np.log(10.0) / 20.0 * relative
     few = float(np.ptp(front.loss) * np.abs(decay).max()) <= MOST_DECAY
@@ -167,8 +169,8 @@ def _with_modes(
 
 
 def _shared(
-    front: Fronts, frequency: Floats, spectrum: ComplexArray, series: ComplexArray, widest: float, tolerance: float
-) -> tuple[Fronts, ComplexArray, ComplexArray]:
+    front: ArrayPaths, frequency: Floats, spectrum: ComplexArray, series: ComplexArray, widest: float, tolerance: float
+) -> tuple[ArrayPaths, ComplexArray, ComplexArray]:
     """Paths without the shape that all share, and the spectrum with it; and the series in Doppler, empty where all
     share that."""
     if len(series):
@@ -197,7 +199,7 @@ def _shared(
     return front, spectrum, series
 
 
-def _shared_facet(front: Fronts, frequency: Floats) -> tuple[Fronts, ComplexArray]:
+def _shared_facet(front: ArrayPaths, frequency: Floats) -> tuple[ArrayPaths, ComplexArray]:
     """Paths without what all facets do alike to the pulse, and that (bin,)."""
     one, facet = front.select(np.arange(1)), np.ones(frequency.size, complex)
     if (front.corners == one.corners).all():
@@ -209,7 +211,7 @@ def _shared_facet(front: Fronts, frequency: Floats) -> tuple[Fronts, ComplexArra
     return front, facet
 
 
-def _loud(front: Fronts, frequency: Floats, spectrum: ComplexArray, tolerance: float) -> Fronts:
+def _loud(front: ArrayPaths, frequency: Floats, spectrum: ComplexArray, tolerance: float) -> ArrayPaths:
     """The paths without those that their blur leaves, all together, less than 0.01 `tolerance` of the loudest."""
     some = slice(None, None, max(1, frequency.size // 128))
     mass, exponent = np.abs(spectrum[some]), blur_exponent(frequency[some])

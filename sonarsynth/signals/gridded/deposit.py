@@ -14,7 +14,7 @@ from sonarsynth.equations.noise.filters import kaiser_bessel, kaiser_bessel_beta
 from sonarsynth.receiver import Elements
 from sonarsynth.signals.array_paths import (
     NEPER,
-    Fronts,
+    ArrayPaths,
     delay_and_gain,
     faced,
     lost,
@@ -27,8 +27,8 @@ from sonarsynth.signals.gridded.bins import Bins
 from sonarsynth.signals.gridded.interpolation import to_sensors
 from sonarsynth.signals.gridded.low_rank import colour, face_pairs, recipe, sinc_polynomials
 from sonarsynth.signals.gridded.nodes import DEGREES, Axis, chebyshev, interpolation, nodes_for, polynomials_for
-from sonarsynth.signals.gridded.tiles import Aim, Tile, tiles
-from sonarsynth.signals.pulse_variation import Changes, bend, changed, shares
+from sonarsynth.signals.gridded.tiles import Tile, TileSettings, tiles
+from sonarsynth.signals.pulse_variation import PulseVariation, bend, changed, shares
 
 RELAXING = np.log(4.0)
 """Chebyshev coefficients of absorption over the band fall by this (Np) from each degree to the next, or by more."""
@@ -63,7 +63,7 @@ def kernel(width: int, oversampling: float, circle: int, dtype: str) -> Kernel:
 class Stage(NamedTuple):
     """What the tiles of a stretch have in common."""
 
-    aim: Aim
+    aim: TileSettings
     bins: Bins
     origin: float  # s
     grid: Kernel
@@ -71,11 +71,11 @@ class Stage(NamedTuple):
     dtype: str
 
 
-def add_stretch(
+def add_segment(
     out: npt.NDArray[Any],
     first: int,
     samples: int,
-    front: Fronts,
+    front: ArrayPaths,
     elements: Elements,
     bins: Bins,
     origin: float,
@@ -94,7 +94,7 @@ def add_stretch(
     used = min(bins.frequency.size, circle // 2 - bins.first)
     bins = bins.cut(used)
     grid = kernel(width, circle * bins.step / (2.0 * highest), circle, dtype)
-    aim = Aim(
+    aim = TileSettings(
         elements=elements,
         highest=highest,
         weights=colour(bins.frequency, bins.spectrum, highest),
@@ -118,7 +118,7 @@ def add_stretch(
         out[:, begin:end] += piece
 
 
-def _add_tile(heard: npt.NDArray[Any], tile: Tile, part: Fronts, stage: Stage) -> None:
+def _add_tile(heard: npt.NDArray[Any], tile: Tile, part: ArrayPaths, stage: Stage) -> None:
     """Add the spectra of a tile at the hydrophones to heard (sensor, re and im of bins)."""
     from sonarsynth.signals.gridded.deposit_kernels import steer_back
 
@@ -141,7 +141,7 @@ def _add_tile(heard: npt.NDArray[Any], tile: Tile, part: Fronts, stage: Stage) -
     steer_back(field, column, weight, late * bins.step, gain, bins.first, heard)
 
 
-def _alone(tile: Tile, part: Fronts, points: Floats, stage: Stage) -> npt.NDArray[Any]:
+def _alone(tile: Tile, part: ArrayPaths, points: Floats, stage: Stage) -> npt.NDArray[Any]:
     """The field (node, 2, bin) of one path that everything is steered to: that of the snap, through its face."""
     faces = _faces(tile, points, stage)
     weight = part.modes
@@ -157,7 +157,7 @@ def _changed(field: npt.NDArray[Any], tile: Tile, points: Floats, stage: Stage) 
     return np.stack([value.real, value.imag], axis=1).astype(stage.dtype)
 
 
-def _deposited(tile: Tile, part: Fronts, points: Floats, stage: Stage) -> npt.NDArray[Any]:
+def _deposited(tile: Tile, part: ArrayPaths, points: Floats, stage: Stage) -> npt.NDArray[Any]:
     """The field (node, 2, bin) of a tile at its nodes, steered to its reference: real and imaginary part."""
     from sonarsynth.signals.gridded.deposit_kernels import combine
 
@@ -179,7 +179,9 @@ def _deposited(tile: Tile, part: Fronts, points: Floats, stage: Stage) -> npt.ND
     return field
 
 
-def _deposits(table: Floats, part: Fronts, tile: Tile, nodes: Floats, some: slice, stage: Stage) -> npt.NDArray[Any]:
+def _deposits(
+    table: Floats, part: ArrayPaths, tile: Tile, nodes: Floats, some: slice, stage: Stage
+) -> npt.NDArray[Any]:
     """The grid (node, term, sample) of a tile at some of its nodes (node, xyz)."""
     from sonarsynth.signals.gridded.deposit_kernels import deposit
 
@@ -226,7 +228,7 @@ def _deposits(table: Floats, part: Fronts, tile: Tile, nodes: Floats, some: slic
     return out
 
 
-def _packed(part: Fronts, tile: Tile, found: Changes, position: Floats) -> Floats:
+def _packed(part: ArrayPaths, tile: Tile, found: PulseVariation, position: Floats) -> Floats:
     """Paths in blocks of rows (block, row, path), padded with silent ones: what `deposit` reads."""
     from sonarsynth.signals.gridded.deposit_kernels import BLOCK
 

@@ -10,20 +10,20 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.receiver import Elements
-from sonarsynth.signals.array_paths import NEPER, Fronts, reference_of
+from sonarsynth.signals.array_paths import NEPER, ArrayPaths, reference_of
 from sonarsynth.signals.gridded.amplitude_nodes import degrees, variation
 from sonarsynth.signals.gridded.interpolation import Axes, box_nodes, columns
 from sonarsynth.signals.gridded.low_rank import PLAIN, Term, terms_for
 from sonarsynth.signals.gridded.nodes import MOST_NODES, Colour, nodes_for
 from sonarsynth.signals.pulse_shapes import main_modes
-from sonarsynth.signals.pulse_variation import Changes, aperture_gradient, pulses, rest, slopes
+from sonarsynth.signals.pulse_variation import PulseVariation, aperture_gradient, pulses, rest, slopes
 
 MOST_TERMS = 24
 """A tile that needs more terms, of one mode of its pulses, is split."""
 
 
 @dataclass(frozen=True, eq=False)
-class Aim:
+class TileSettings:
     """What the tiles are for: the array, its highest frequency, the pulse's colour, and the error allowed."""
 
     elements: Elements
@@ -32,7 +32,7 @@ class Aim:
     steepest: float  # largest change of absorption over the band, over that at the centre
     fading: float  # mean of it over the pulse
     tolerance: float
-    changes: Changes  # of pulses over the aperture
+    changes: PulseVariation  # of pulses over the aperture
     bins: int
     circle: int  # samples of the deposit grid
 
@@ -42,7 +42,7 @@ class Tile:
     """Paths, the front that they are steered to, and the nodes and terms that represent them."""
 
     paths: Ints  # (path,)
-    reference: Fronts  # one front: the middle of the tile
+    reference: ArrayPaths  # one front: the middle of the tile
     axes: Axes | None  # nodes along x, y, z; None where the hydrophones themselves are the nodes
     terms: tuple[Term, ...]
     deviation: tuple[float, float, float]  # half range of direction y and z, and of absorption (dB)
@@ -81,7 +81,7 @@ def _probes(elements: Elements, near: bool) -> _Probes:
 class _Views:
     """What every tile that is tried looks at, computed once: a tile is the smallest and the largest of each column."""
 
-    front: Fronts
+    front: ArrayPaths
     columns: Floats  # (column, path): direction, curvature, absorption, delay terms; slownesses at probes
     amplitude: Floats  # (row, path) of `variation`
     probes: _Probes
@@ -90,7 +90,7 @@ class _Views:
     own: bool  # no nodes can stand for the hydrophones: a source is within or about that box, or paths miss some
 
 
-def _views(front: Fronts, aim: Aim, missed: bool) -> _Views:
+def _views(front: ArrayPaths, aim: TileSettings, missed: bool) -> _Views:
     elements = aim.elements
     near = bool(front.curvature.max() * np.linalg.norm(np.abs(elements.position).max(axis=0)) > 0.8)
     probes = _probes(elements, near)
@@ -100,7 +100,7 @@ def _views(front: Fronts, aim: Aim, missed: bool) -> _Views:
     return _Views(front, columns, variation(front, elements), probes, gradient, bend, near or missed)
 
 
-def _columns(front: Fronts, probes: Floats, gradient: Floats) -> Floats:
+def _columns(front: ArrayPaths, probes: Floats, gradient: Floats) -> Floats:
     """Columns of `_Views` of fronts; slownesses are -c times the gradient of delay: directions where rays are
     straight."""
     v = front.direction.T - front.curvature * probes[:, :, None]  # (point, xyz, path)
@@ -140,7 +140,7 @@ class _Trial:
     extent: _Extent | None  # None for a path alone
 
 
-def _try(paths: Ints, views: _Views, aim: Aim) -> _Trial:
+def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
     if paths.size == 1:
         return _Trial(_alone(paths, views.front, aim), None)
     whole = paths.size == views.front.count
@@ -176,7 +176,7 @@ def _try(paths: Ints, views: _Views, aim: Aim) -> _Trial:
     )
 
 
-def _drift(front: Fronts, aim: Aim) -> tuple[float, ...]:
+def _drift(front: ArrayPaths, aim: TileSettings) -> tuple[float, ...]:
     """Half range (xyz, rad) of the phase that is left over a face, along each axis of the box: du_j/dq_i is
     -(e_i - u_i u)_j k/n; and of what absorption varies by (Np). inf about the source."""
     _, _, size = _probes(aim.elements, False)
@@ -193,7 +193,7 @@ def _drift(front: Fronts, aim: Aim) -> tuple[float, ...]:
     return tuple((scale * min(c + slack, 1.21) + faded) * s for c, s in zip(change, size.tolist(), strict=True))
 
 
-def _cheapest(extent: _Extent, aim: Aim) -> tuple[Axes | None, tuple[Term, ...], float]:
+def _cheapest(extent: _Extent, aim: TileSettings) -> tuple[Axes | None, tuple[Term, ...], float]:
     """Nodes or the hydrophones themselves, terms, and the predicted time (ns) on one core at 3 GHz."""
     sensors, bins = aim.elements.count, aim.bins
     terms = terms_for(extent.turn, extent.decay, aim.weights, aim.tolerance, extent.modes)
@@ -214,7 +214,7 @@ def _cheapest(extent: _Extent, aim: Aim) -> tuple[Axes | None, tuple[Term, ...],
     return ((x, y, z), terms, by_nodes * crowded) if by_nodes < own else (None, terms, own * crowded)
 
 
-def _halves(paths: Ints, views: _Views, aim: Aim) -> tuple[Ints, Ints] | None:
+def _halves(paths: Ints, views: _Views, aim: TileSettings) -> tuple[Ints, Ints] | None:
     """Two halves of a tile, cut across its widest extent in phase; None where all paths are alike."""
     front = views.front
     size = np.append(views.probes.size + aim.elements.face, 0.5 * front.aperture**2)
@@ -228,7 +228,7 @@ def _halves(paths: Ints, views: _Views, aim: Aim) -> tuple[Ints, Ints] | None:
     return paths[~right], paths[right]
 
 
-def tiles(front: Fronts, aim: Aim) -> list[Tile]:
+def tiles(front: ArrayPaths, aim: TileSettings) -> list[Tile]:
     """The tiles of predicted least cost: each is halved while that pays; the first halving may pay only with the
     second.
 
@@ -241,7 +241,7 @@ def tiles(front: Fronts, aim: Aim) -> list[Tile]:
     return [replace(tile, paths=some[tile.paths]) for some, made in found for tile in made]
 
 
-def _tiles(front: Fronts, aim: Aim, missed: bool) -> list[Tile]:
+def _tiles(front: ArrayPaths, aim: TileSettings, missed: bool) -> list[Tile]:
     """The tiles of paths of one kind."""
     if front.count == 1:
         return [_alone(np.arange(1), front, aim)]
@@ -260,13 +260,13 @@ def _tiles(front: Fronts, aim: Aim, missed: bool) -> list[Tile]:
     return found
 
 
-def _alone_pays(tile: Tile, front: Fronts, aim: Aim) -> bool:
+def _alone_pays(tile: Tile, front: ArrayPaths, aim: TileSettings) -> bool:
     """Whether the paths of a tile cost less one by one, each steered to the hydrophones that it does not miss."""
     steered = 4.0 * aim.bins * float(np.count_nonzero(~front.dark[tile.paths]))
     return tile.paths.size > 1 and 2e5 * tile.paths.size + steered < tile.cost
 
 
-def _alone(paths: Ints, front: Fronts, aim: Aim, gradient: Floats | None = None) -> Tile:
+def _alone(paths: Ints, front: ArrayPaths, aim: TileSettings, gradient: Floats | None = None) -> Tile:
     """One path is its own reference: nothing is deposited, and its directivity is all that varies; gradient: of the
     aperture terms at all hydrophones."""
     reference, size = front.select(paths), _probes(aim.elements, False).size
@@ -281,7 +281,7 @@ def _alone(paths: Ints, front: Fronts, aim: Aim, gradient: Floats | None = None)
     return Tile(paths, reference, axes, ((0, 0, 0, 0),), (0.0, 0.0, 0.0), np.zeros(0, int), False, modes, cost)
 
 
-def _best(trial: _Trial, views: _Views, aim: Aim, patient: bool) -> list[Tile]:
+def _best(trial: _Trial, views: _Views, aim: TileSettings, patient: bool) -> list[Tile]:
     tile = trial.tile
     if trial.extent is None:
         return [tile]

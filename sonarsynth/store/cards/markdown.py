@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import Any, Final
 
-from sonarsynth.conventions import size
+from sonarsynth.conventions import format_bytes
 from sonarsynth.store.cards.facts import Facts
 
 LIMITS: Final = (
@@ -62,7 +62,7 @@ def _head(facts: Facts) -> str:
         ("frames", f"{facts.complete} of {facts.frames} are there"),
         ("sequences", str(facts.plan.get("sequences", ""))),
         ("holds", ", ".join(_holds(facts))),
-        ("size", f"{size(facts.bytes)} in {facts.files} files"),
+        ("size", f"{format_bytes(facts.bytes)} in {facts.files} files"),
         ("format", "Zarr 3, one folder; one chunk a frame, CRC-32C on each"),
         ("version", str(facts.dataset.get("version", ""))),
         ("begun", facts.created),

@@ -15,7 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from sonarsynth.conventions import Floats, Ints
-from sonarsynth.description.memory import most_facets
+from sonarsynth.description.memory import max_facets
 from sonarsynth.geometry.surfaces import MeshError, Surface, cut, require_possible, sides
 
 FLAT: Final = 1e-6
@@ -37,7 +37,7 @@ def curved(surface: Surface, edge: float, sagitta: float, crease: float) -> Surf
     """The surface cut until no edge is longer than `edge` (m), nor farther than `sagitta` (m) from its curve.
 
     Edges that turn by more than `crease` (rad) stay sharp, and straight where both sides are flat; corners stay where
-    they are. Raises MeshError where that would take more than `room.most_facets`.
+    they are. Raises MeshError where that would take more than `room.max_facets`.
     """
     vertices, faces = surface
     if np.isfinite(edge):
@@ -51,8 +51,8 @@ def curved(surface: Surface, edge: float, sagitta: float, crease: float) -> Surf
         long = (length > edge) | (curves.height > sagitta)
         if not long.any():
             break
-        if len(faces) + np.count_nonzero(long[of_facet]) > most_facets():
-            raise MeshError(f"so smooth a surface would take more than {most_facets()} facets; use a longer edge")
+        if len(faces) + np.count_nonzero(long[of_facet]) > max_facets():
+            raise MeshError(f"so smooth a surface would take more than {max_facets()} facets; use a longer edge")
         number = np.full(len(ends), -1)
         number[long] = len(vertices) + np.arange(np.count_nonzero(long))
         vertices = np.concatenate([vertices, curves.middle[long]])

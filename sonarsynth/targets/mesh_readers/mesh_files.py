@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.description import named_files
-from sonarsynth.description.memory import most_facets
+from sonarsynth.description.memory import max_facets
 from sonarsynth.geometry.surfaces import MeshError, Surface
 from sonarsynth.targets.mesh_readers.mesh_ply import read_ply
 from sonarsynth.targets.mesh_readers.mesh_text import read_obj, read_off, read_text_stl
@@ -61,8 +61,8 @@ def _content(path: Path, kind: str) -> bytes:
     with named_files.opened(path) as file:
         head = file.read(84) if kind == "stl" else b""
         count, size = int.from_bytes(head[80:84], "little"), os.fstat(file.fileno()).st_size
-    if len(head) == 84 and size == 84 + 50 * count and count > most_facets():
-        raise named_files.FileError(f"has {count} facets, more than {most_facets()}")
+    if len(head) == 84 and size == 84 + 50 * count and count > max_facets():
+        raise named_files.FileError(f"has {count} facets, more than {max_facets()}")
     return named_files.read(path, MAX_BYTES[kind])
 
 
@@ -151,7 +151,7 @@ def _absurd(tree: dict[str, Any]) -> str | None:
         for mesh in tree.get("meshes", [])
     ]
     total = sum(facets[node["mesh"]] for node in nodes if "mesh" in node)
-    return f"places {total} corners, more than of {most_facets()} facets" if total > 3 * most_facets() else None
+    return f"places {total} corners, more than of {max_facets()} facets" if total > 3 * max_facets() else None
 
 
 READERS: dict[str, Callable[[bytes], Surface]] = {

@@ -9,7 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from sonarsynth.conventions import Bools, Floats, Ints
-from sonarsynth.description.memory import most_facets
+from sonarsynth.description.memory import max_facets
 from sonarsynth.geometry.surfaces import MeshError, Surface, sides, weld
 
 SMALLEST, LARGEST = 1e-3, 10e3  # m, of the whole mesh
@@ -21,8 +21,8 @@ NEARLY_CLOSED = 0.25  # area of the opening over the area of the part (0 closed,
 def check(surface: Surface, name: str) -> None:
     """Refuse what cannot be a mesh: too many facets, NaN or infinity, indices out of range, an absurd size."""
     vertices, faces = surface
-    if len(faces) > most_facets():
-        raise MeshError(f"{name}: has {len(faces)} facets, more than {most_facets()}")
+    if len(faces) > max_facets():
+        raise MeshError(f"{name}: has {len(faces)} facets, more than {max_facets()}")
     if faces.size == 0:
         raise MeshError(f"{name}: holds no facets")
     outside = (faces < 0) | (faces >= len(vertices))

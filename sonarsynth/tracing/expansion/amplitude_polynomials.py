@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats
-from sonarsynth.tracing.expansion.wavefront_polynomials import FEW, probes
+from sonarsynth.tracing.expansion.wavefront_polynomials import QUADRATIC_PROBES, probes
 
 if TYPE_CHECKING:
-    from sonarsynth.tracing.facet_paths import ArrayLegs
+    from sonarsynth.tracing.facet_paths import FacetPaths
 
 
 class Varying(Protocol):
     """Echoes of a block of facets."""
 
     @property
-    def array(self) -> ArrayLegs:
+    def array(self) -> FacetPaths:
         """The legs of these facets."""
         ...
 
@@ -47,7 +47,7 @@ def variations(blocks: Sequence[Varying]) -> tuple[list[Floats], float]:
 
     The second degree serves where it errs by no more than `enough` of the legs.
     """
-    terms, error = _fitted(blocks, FEW)
+    terms, error = _fitted(blocks, QUADRATIC_PROBES)
     return (terms, error) if not blocks or error <= blocks[0].array.enough else _fitted(blocks, None)
 
 
@@ -71,7 +71,7 @@ def _gain(over_aperture: Floats, amplitude: Floats, tapered: Bools, probe_gain: 
     return np.asarray(gain)
 
 
-def fitted(array: ArrayLegs, gain: Floats, strength: Floats) -> tuple[Floats, float]:
+def fitted(array: FacetPaths, gain: Floats, strength: Floats) -> tuple[Floats, float]:
     """Polynomials (path, term) of gain (path, probe) - 1 over the aperture; no columns where it is 1 everywhere.
 
     And their largest error at the probes, for paths of that strength (path,), relative to the strongest.
@@ -80,14 +80,14 @@ def fitted(array: ArrayLegs, gain: Floats, strength: Floats) -> tuple[Floats, fl
     return terms, worst / max(loudest, 1e-300)
 
 
-def _fit(array: ArrayLegs, gain: Floats, strength: Floats, few: int | None) -> tuple[Floats, float, float]:
+def _fit(array: FacetPaths, gain: Floats, strength: Floats, few: int | None) -> tuple[Floats, float, float]:
     """Polynomials, the largest error at the probes, and the largest amplitude there."""
     loudest = float(np.nanmax(np.abs(strength)[:, None] * np.abs(gain), initial=0.0))
     if (gain == 1.0).all():
         return np.empty((len(gain), 0)), 0.0, loudest
     probe = probes(array.elements, array.degree)
     left = gain - 1.0
-    if few is None or len(probe.sensor) < FEW:
+    if few is None or len(probe.sensor) < QUADRATIC_PROBES:
         terms = probe.fit(left)
         error = probe.misfit(left, terms)
     else:

@@ -18,9 +18,9 @@ from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.equations.kernels.row_products import row_products
 from sonarsynth.geometry import Pose
 from sonarsynth.receiver import Elements
-from sonarsynth.tracing.expansion.probe_paths import Made, Place, image, traced
-from sonarsynth.tracing.expansion.wavefront_polynomials import Terms, probes
-from sonarsynth.tracing.receive_paths import Legs
+from sonarsynth.tracing.expansion.probe_paths import ApertureSamples, ReceiverGeometry, image, traced
+from sonarsynth.tracing.expansion.wavefront_polynomials import ExpansionTerms, probes
+from sonarsynth.tracing.receive_paths import ReceivePaths
 
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
@@ -40,12 +40,12 @@ SMOOTH_DIRECTION = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Fronts:
+class ArrayExpansion:
     """Legs over the aperture."""
 
-    terms: Terms  # (leg,)
-    legs: Legs
-    place: Place
+    terms: ExpansionTerms  # (leg,)
+    legs: ReceivePaths
+    place: ReceiverGeometry
     probe_departure: Floats | None  # (leg, probe, xyz) world; None: towards the images of the probes
     probe_gain: Floats | None  # (leg, probe); None: 1
 
@@ -63,38 +63,42 @@ class Fronts:
 
 
 @dataclass(frozen=True, eq=False)
-class Wavefronts:
+class ExpansionSource:
     """What the wavefronts of legs are made from: for all of them, or for some at a time, with the same result."""
 
-    legs: Legs
-    place: Place
-    families: tuple[tuple[Ints, Made | _Smooth | None], ...]  # legs of each; None: made from images
+    legs: ReceivePaths
+    place: ReceiverGeometry
+    families: tuple[
+        tuple[Ints, ApertureSamples | _FacetInterpolant | None], ...
+    ]  # legs of each; None: made from images
     plain: bool  # uniform water, no reflections: all are spheres
 
-    def of(self, some: slice) -> Fronts:
+    def of(self, some: slice) -> ArrayExpansion:
         """The wavefronts of some legs."""
         legs = self.legs.select(some)
         count = len(legs.row)
         if self.plain:
-            return Fronts(Terms.none(count), legs, self.place, None, None)
-        made = Made.room(count, *self.place.probe.basis.shape)
+            return ArrayExpansion(ExpansionTerms.none(count), legs, self.place, None, None)
+        made = ApertureSamples.room(count, *self.place.probe.basis.shape)
         for members, kept in self.families:
             first, last = np.searchsorted(members, (some.start, some.stop))
             rows = members[first:last] - some.start
             if kept is None:
                 made.put(rows, traced(legs.select(rows), self.place))
-            elif isinstance(kept, _Smooth):
+            elif isinstance(kept, _FacetInterpolant):
                 made.put(rows, kept.at(legs.point[rows]))
             else:
-                made.put(rows, Made(**{name: value[first:last] for name, value in vars(kept).items()}))
+                made.put(rows, ApertureSamples(**{name: value[first:last] for name, value in vars(kept).items()}))
         none = np.empty((count, 0))
         terms = none if self.place.profile.uniform and not made.terms.any() else made.terms
         phase, blur = (value if value.any() else none for value in (made.phase, made.blur))
-        return Fronts(Terms(terms, phase, blur, made.error), legs, self.place, made.departure, made.gain)
+        return ArrayExpansion(
+            ExpansionTerms(terms, phase, blur, made.error), legs, self.place, made.departure, made.gain
+        )
 
 
-def fronts(
-    legs: Legs,
+def array_expansion(
+    legs: ReceivePaths,
     group: Ints,
     environment: Environment,
     profile: Profile,
@@ -103,14 +107,14 @@ def fronts(
     propagation: Propagation,
     band: tuple[float, float],
     degree: int = 3,
-) -> Fronts:
-    """Wavefronts of all legs, as `wavefronts`."""
-    made = wavefronts(legs, group, environment, profile, sonar_pose, elements, propagation, band, degree)
+) -> ArrayExpansion:
+    """Wavefronts of all legs, as `expansion_source`."""
+    made = expansion_source(legs, group, environment, profile, sonar_pose, elements, propagation, band, degree)
     return made.of(slice(0, len(legs.row)))
 
 
-def wavefronts(
-    legs: Legs,
+def expansion_source(
+    legs: ReceivePaths,
     group: Ints,
     environment: Environment,
     profile: Profile,
@@ -119,30 +123,30 @@ def wavefronts(
     propagation: Propagation,
     band: tuple[float, float],
     degree: int = 3,
-) -> Wavefronts:
+) -> ExpansionSource:
     """Wavefronts of legs. group (leg,): legs of one body; band (Hz); degree: of their polynomials.
 
     Reflections turn and blur the pulse by the grazing angle, which varies over the aperture. What the polynomials in
     that miss is in `error`, as delays that are as much at the upper edge of the band.
     """
-    place = Place(environment, profile, sonar_pose, probes(elements, degree), propagation, band)
+    place = ReceiverGeometry(environment, profile, sonar_pose, probes(elements, degree), propagation, band)
     if profile.uniform and not legs.bounces.any():
-        return Wavefronts(legs, place, (), True)
-    families: list[tuple[Ints, Made | _Smooth | None]] = []
+        return ExpansionSource(legs, place, (), True)
+    families: list[tuple[Ints, ApertureSamples | _FacetInterpolant | None]] = []
     for members in _families(legs, group):
         if profile.uniform and not legs.bounces[members[0]]:
             families.append((members, None))
             continue
         chosen = members[_spread(legs.point[members])]
         exact = traced(legs.select(chosen), place)
-        kept: Made | _Smooth | None = exact
+        kept: ApertureSamples | _FacetInterpolant | None = exact
         if len(chosen) < len(members):
             kept = _over_body(legs.point[members], legs.point[chosen], exact, 2.0 * np.pi * band[1])
         families.append((members, kept or traced(legs.select(members), place)))
-    return Wavefronts(legs, place, tuple(families), False)
+    return ExpansionSource(legs, place, tuple(families), False)
 
 
-def _families(legs: Legs, group: Ints) -> list[Ints]:
+def _families(legs: ReceivePaths, group: Ints) -> list[Ints]:
     """Indices of the legs of each body and family."""
     up = legs.departure[:, 2] > 0
     key = group.astype(np.int64)
@@ -162,7 +166,7 @@ def _spread(point: Floats) -> Ints:
 
 
 @dataclass(frozen=True, eq=False)
-class _Smooth:
+class _FacetInterpolant:
     """Legs of a family from anywhere on a body, by cubics."""
 
     middle: Floats  # (xyz) m
@@ -171,15 +175,15 @@ class _Smooth:
     parts: Ints  # (4,) where phases, blurs, gains and departures begin among them
     error: float  # s
 
-    def at(self, point: Floats) -> Made:
+    def at(self, point: Floats) -> ApertureSamples:
         """Legs from points (point, xyz), some of the family."""
         found = row_products(aperture_terms((point - self.middle) / self.half, 1.0), self.coefficients)
         terms, phase, blur, gain, away = np.split(found, self.parts, axis=1)
         towards = away.reshape(*gain.shape, 3)
-        return Made(terms, phase, blur, gain, towards, np.full(len(point), self.error))
+        return ApertureSamples(terms, phase, blur, gain, towards, np.full(len(point), self.error))
 
 
-def _over_body(point: Floats, sample: Floats, exact: Made, rate: float) -> _Smooth | None:
+def _over_body(point: Floats, sample: Floats, exact: ApertureSamples, rate: float) -> _FacetInterpolant | None:
     """Legs from points (point, xyz) of a body from those of a sample of them, by cubics; None if they err too much;
     rate (rad/s): of the upper edge of the band."""
     middle, half = 0.5 * (point.min(axis=0) + point.max(axis=0)), np.maximum(0.5 * np.ptp(point, axis=0), 1e-9)
@@ -199,4 +203,4 @@ def _over_body(point: Floats, sample: Floats, exact: Made, rate: float) -> _Smoo
     if not (smooth and wrong[3].max() <= SMOOTH_GAIN and wrong[4].max() <= SMOOTH_DIRECTION):
         return None
     error = late + turned / rate + 0.5 * rate * softer + float(exact.error.max())
-    return _Smooth(middle, half, coefficients, parts, error)
+    return _FacetInterpolant(middle, half, coefficients, parts, error)

@@ -14,7 +14,7 @@ from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry import Pose
 from sonarsynth.propagation.reflections import at_boundaries
 from sonarsynth.tracing.expansion.wavefront_polynomials import BRANCH, Probes, pick_branch, sphere
-from sonarsynth.tracing.receive_paths import Legs
+from sonarsynth.tracing.receive_paths import ReceivePaths
 
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
@@ -25,7 +25,7 @@ TERMS = 20
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class ReceiverGeometry:
     """Where legs go, and through what."""
 
     environment: Environment
@@ -37,7 +37,7 @@ class Place:
 
 
 @dataclass(frozen=True, eq=False)
-class Made:
+class ApertureSamples:
     """Legs at the probes."""
 
     terms: Floats  # (leg, term) s: delay over the sphere's
@@ -48,21 +48,23 @@ class Made:
     error: Floats  # (leg,) s
 
     @staticmethod
-    def room(count: int, sensors: int, degrees: int) -> Made:
+    def room(count: int, sensors: int, degrees: int) -> ApertureSamples:
         """Room for so many, at so many probes, with so many terms."""
         terms, phase, blur = np.zeros((3, count, degrees))
-        return Made(terms, phase, blur, np.ones((count, sensors)), np.zeros((count, sensors, 3)), np.zeros(count))
+        return ApertureSamples(
+            terms, phase, blur, np.ones((count, sensors)), np.zeros((count, sensors, 3)), np.zeros(count)
+        )
 
-    def put(self, rows: Ints, made: Made) -> None:
+    def put(self, rows: Ints, made: ApertureSamples) -> None:
         """Write some of them."""
         for name, value in vars(made).items():
             getattr(self, name)[rows] = value
 
 
-def traced(legs: Legs, place: Place) -> Made:
+def traced(legs: ReceivePaths, place: ReceiverGeometry) -> ApertureSamples:
     """Legs at the probes, each of them traced."""
     environment, profile, band = place.environment, place.profile, place.band
-    made = Made.room(len(legs.row), *place.probe.basis.shape)
+    made = ApertureSamples.room(len(legs.row), *place.probe.basis.shape)
     if profile.uniform:
         departure, left, gain = image(legs, place.probe, place.sonar_pose), np.zeros(made.gain.shape), made.gain
         if not legs.bounces.any():
@@ -76,10 +78,10 @@ def traced(legs: Legs, place: Place) -> Made:
     turned, softer = (np.where(np.isnan(left), np.nan, value) for value in (turned, softer))
     terms, phase, blur = probe.fit(left), probe.fit(turned), probe.fit(softer)
     error = probe.misfit(left, terms) + probe.misfit(turned, phase) / rate + probe.misfit(softer, blur) * 0.5 * rate
-    return Made(terms, phase, blur, gain * loss, departure, error)
+    return ApertureSamples(terms, phase, blur, gain * loss, departure, error)
 
 
-def image(legs: Legs, probe: Probes, sonar_pose: Pose, few: int | None = None) -> Floats:
+def image(legs: ReceivePaths, probe: Probes, sonar_pose: Pose, few: int | None = None) -> Floats:
     """Unit vectors (leg, probe, xyz) from each point to the image of each probe, as far as the ray is long."""
     offset = sonar_pose.turn_to_world(probe.position)[:few]
     mirror = np.where(legs.bounces % 2 == 1, -1.0, 1.0)
@@ -89,7 +91,7 @@ def image(legs: Legs, probe: Probes, sonar_pose: Pose, few: int | None = None) -
 
 
 def _boundaries(
-    legs: Legs, departure: Floats, environment: Environment, profile: Profile, centre: float
+    legs: ReceivePaths, departure: Floats, environment: Environment, profile: Profile, centre: float
 ) -> tuple[Floats, Floats, Floats]:
     """Phase (leg, probe) that the reflections to each probe add to those to the centre, ratio of their moduli, and
     what their squared blurs (s2) add; centre: of the band (Hz)."""
@@ -111,7 +113,12 @@ def _boundaries(
 
 
 def rays_to_probes(
-    legs: Legs, environment: Environment, profile: Profile, sonar_pose: Pose, probe: Probes, propagation: Propagation
+    legs: ReceivePaths,
+    environment: Environment,
+    profile: Profile,
+    sonar_pose: Pose,
+    probe: Probes,
+    propagation: Propagation,
 ) -> tuple[Floats, Floats, Floats]:
     """Delay over the sphere's (s), gain over it (leg, probe), departure (leg, probe, xyz): rays to every probe."""
     from sonarsynth.equations.rays import ray_continuation
@@ -148,9 +155,14 @@ def rays_to_probes(
 
 
 def _searched(
-    legs: Legs, position: Floats, predicted: Floats, tolerance: float, environment: Environment, profile: Profile,
+    legs: ReceivePaths,
+    position: Floats,
+    predicted: Floats,
+    tolerance: float,
+    environment: Environment,
+    profile: Profile,
     propagation: Propagation,
-) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+) -> tuple[Floats, Floats, Floats]:
     """Time, spreading (leg, probe) and departure of the rays nearest in time among all; NaN where there is none."""
     count, sensors = predicted.shape
     start, end = np.repeat(legs.point, sensors, axis=0), np.tile(position, (count, 1))

@@ -15,14 +15,14 @@ from sonarsynth.conventions import Floats, Ints, depth
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Arrivals
-from sonarsynth.tracing.expansion.wavefront_polynomials import Terms, probes
-from sonarsynth.tracing.receive_paths import Legs
+from sonarsynth.tracing.expansion.wavefront_polynomials import ExpansionTerms, probes
+from sonarsynth.tracing.receive_paths import ReceivePaths
 
 if TYPE_CHECKING:
-    from sonarsynth.tracing.facet_paths import ArrayLegs
+    from sonarsynth.tracing.facet_paths import FacetPaths
 
 
-def from_spots(made: Arrivals, legs: Legs, spot: Floats, sonar_pose: Pose) -> Arrivals:
+def shift_to_scattering_points(made: Arrivals, legs: ReceivePaths, spot: Floats, sonar_pose: Pose) -> Arrivals:
     """Arrivals through uniform water that seem to come from points `spot` (path, xyz) m, world, off the start of their
     legs, or from the images of these: exact."""
     some = np.flatnonzero(spot.any(axis=1))
@@ -35,7 +35,7 @@ def from_spots(made: Arrivals, legs: Legs, spot: Floats, sonar_pose: Pose) -> Ar
     return replace(made, direction=direction, radius=radius)
 
 
-def delayed_by_spots(over: Terms, array: ArrayLegs, leg: Ints, spot: Floats) -> Terms:
+def delay_to_scattering_points(over: ExpansionTerms, array: FacetPaths, leg: Ints, spot: Floats) -> ExpansionTerms:
     """Wavefronts of paths by legs (path,) through water that bends them, with what points `spot` (path, xyz) m, world,
     are farther from each hydrophone, beside the array centre: by the directions in which rays leave, for points much
     nearer to the middle than to the array."""

@@ -16,7 +16,7 @@ from sonarsynth.receiver import Elements
 
 HELD_OUT = 3
 """Probes that only measure the error of a fit; those that it is fitted to are as many and as three in ten more."""
-FEW = 9
+QUADRATIC_PROBES = 9
 """Probes, the first ones, that a polynomial of the second degree is fitted to and measured at."""
 SECOND_DEGREE = 10
 """Terms up to the second degree."""
@@ -65,7 +65,7 @@ class Probes:
         return np.where(np.isnan(values).any(axis=1), np.inf, error)
 
 
-class Terms(NamedTuple):
+class ExpansionTerms(NamedTuple):
     """How paths vary over the aperture: polynomials, without columns where there is nothing to say."""
 
     delay: Floats  # (path, term) s: over the sphere's
@@ -74,14 +74,14 @@ class Terms(NamedTuple):
     error: Floats  # (path,) s: misfit of the wavefront at the probes, the held-out ones among them
 
     @staticmethod
-    def none(count: int) -> Terms:
+    def none(count: int) -> ExpansionTerms:
         """Of spheres, all alike."""
         nothing = np.empty((count, 0))
-        return Terms(nothing, nothing, nothing, np.zeros(count))
+        return ExpansionTerms(nothing, nothing, nothing, np.zeros(count))
 
-    def select(self, rows: Bools | Ints) -> Terms:
+    def select(self, rows: Bools | Ints) -> ExpansionTerms:
         """The paths picked by a mask or by indices."""
-        return Terms(*(value[rows] for value in self))
+        return ExpansionTerms(*(value[rows] for value in self))
 
 
 def terms_of(degree: int) -> int:
@@ -107,7 +107,7 @@ def probes(elements: Elements, degree: int = 3) -> Probes:
     fitted = max(len(sensor) - HELD_OUT, min(rank, len(sensor)), 1)
     basis = aperture_terms(position[sensor], scale, terms)
     solve = np.vstack([np.zeros(fitted), np.linalg.pinv(basis[:fitted, 1:], rcond=1e-10)])
-    few = max(min(FEW, len(sensor)) - HELD_OUT, 1)
+    few = max(min(QUADRATIC_PROBES, len(sensor)) - HELD_OUT, 1)
     second = np.linalg.pinv(basis[:few, 1:SECOND_DEGREE], rcond=1e-10)
     return Probes(sensor, position[sensor], fitted, solve, basis, scale, np.vstack([np.zeros(few), second]))
 

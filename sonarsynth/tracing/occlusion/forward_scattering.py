@@ -16,22 +16,24 @@ import numpy as np
 
 from sonarsynth.casting.ray_casting import inside
 from sonarsynth.conventions import Floats
-from sonarsynth.geometry.placed_target import Body
-from sonarsynth.scattering import Kirchhoff, Part, ScatteringLaw
+from sonarsynth.geometry.placed_target import PlacedTarget
+from sonarsynth.scattering import Component, Kirchhoff, ScatteringLaw
 from sonarsynth.scattering.components import Shadow
-from sonarsynth.tracing.expansion.array_expansion import wavefronts
+from sonarsynth.tracing.expansion.array_expansion import expansion_source
 from sonarsynth.tracing.receive_paths import facets_of, rays_to_centre
 
 if TYPE_CHECKING:
-    from sonarsynth.tracing.facet_paths import ArrayLegs
+    from sonarsynth.tracing.facet_paths import FacetPaths
 
 
-def shadow_parts(law: ScatteringLaw) -> tuple[Part, ...]:
+def shadow_parts(law: ScatteringLaw) -> tuple[Component, ...]:
     """What facets send beside echoes; nothing unless the law scatters forward."""
     return (Shadow(),) if isinstance(law, Kirchhoff) and law.forward == "scattered" else ()
 
 
-def opaque(bodies: tuple[Body, ...], laws: tuple[ScatteringLaw, ...], source: Floats | None = None) -> tuple[Body, ...]:
+def blocking_bodies(
+    bodies: tuple[PlacedTarget, ...], laws: tuple[ScatteringLaw, ...], source: Floats | None = None
+) -> tuple[PlacedTarget, ...]:
     """The bodies that sound does not pass on its way to the array, with any that its source (xyz) is inside of."""
     return tuple(
         body
@@ -40,9 +42,9 @@ def opaque(bodies: tuple[Body, ...], laws: tuple[ScatteringLaw, ...], source: Fl
     )
 
 
-def forward_legs(array: ArrayLegs, laws: tuple[ScatteringLaw, ...]) -> ArrayLegs | None:
+def forward_paths(array: FacetPaths, laws: tuple[ScatteringLaw, ...]) -> FacetPaths | None:
     """Facet to array, for every facet of the bodies that scatter forward, seen or not; None where there is none."""
-    solid = opaque(array.bodies, laws)
+    solid = blocking_bodies(array.bodies, laws)
     if len(solid) == len(array.bodies):
         return None
     environment, profile, pose, propagation = array.environment, array.profile, array.sonar_pose, array.propagation
@@ -57,5 +59,5 @@ def forward_legs(array: ArrayLegs, laws: tuple[ScatteringLaw, ...]) -> ArrayLegs
     kept, row = np.unique(legs.row, return_inverse=True)
     legs, facets = legs.numbered(row), every.select(kept)
     group = facets.target[legs.row]
-    over = wavefronts(legs, group, environment, array.bending, pose, array.elements, propagation, array.band)
+    over = expansion_source(legs, group, environment, array.bending, pose, array.elements, propagation, array.band)
     return replace(array, legs=legs, wavefronts=over, facets=facets)

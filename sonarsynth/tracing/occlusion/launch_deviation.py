@@ -18,7 +18,7 @@ from sonarsynth.geometry import Pose
 from sonarsynth.receiver import Elements
 from sonarsynth.tracing.expansion.probe_paths import rays_to_probes
 from sonarsynth.tracing.expansion.wavefront_polynomials import probes, terms_of
-from sonarsynth.tracing.receive_paths import Legs
+from sonarsynth.tracing.receive_paths import ReceivePaths
 
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
@@ -27,10 +27,16 @@ SAME = 1e-9
 """Largest distance of two directions of one ray, found in two ways."""
 
 
-def swerves(
-    legs: Legs, points: Floats, environment: Environment, profile: Profile, sonar_pose: Pose, elements: Elements,
-    propagation: Propagation, degree: int,
-) -> Floats:  # fmt: skip
+def launch_deviation(
+    legs: ReceivePaths,
+    points: Floats,
+    environment: Environment,
+    profile: Profile,
+    sonar_pose: Pose,
+    elements: Elements,
+    propagation: Propagation,
+    degree: int,
+) -> Floats:
     """(leg, point, xyz) what is between the directions in which rays leave for points (point, xyz) m of the sonar
     frame, on the aperture, and those towards their images; profile: what bends them.
 
@@ -51,7 +57,7 @@ def swerves(
     return np.asarray(np.matmul(basis, coefficients))
 
 
-def towards(legs: Legs, offset: Floats) -> Floats:
+def towards(legs: ReceivePaths, offset: Floats) -> Floats:
     """Unit vectors (leg, point, xyz) from the starts of legs to the images of places beside the centre (point, xyz),
     world."""
     ahead = (legs.length[:, None] * legs.departure)[:, None] + offset
@@ -61,7 +67,7 @@ def towards(legs: Legs, offset: Floats) -> Floats:
 
 
 def _arcs(
-    legs: Legs, centre: Floats, offset: Floats, environment: Environment, profile: Profile
+    legs: ReceivePaths, centre: Floats, offset: Floats, environment: Environment, profile: Profile
 ) -> tuple[Floats, Bools]:
     """Directions (leg, point, xyz) of rays to places beside the centre (point, xyz) m, world, of legs that keep to one
     layer, with some room; and which (leg,) legs these are.

@@ -8,14 +8,14 @@ from sonarsynth.casting.ray_casting import enclosing, occluded
 from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.environment.sea import Environment, Profile
 from sonarsynth.equations.rays.ray_solutions import water
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 
-BOW = 1e-3
+SAGITTA_TOLERANCE = 1e-3
 """Largest distance (m) of a bent ray from the chords that stand for it when it is tested against bodies."""
 
 
 def hidden(
-    bodies: tuple[Body, ...],
+    bodies: tuple[PlacedTarget, ...],
     environment: Environment,
     profile: Profile,
     start: Floats,
@@ -28,16 +28,16 @@ def hidden(
     """Whether a body stands in rays (ray, xyz) that leave start in direction departure and end after length (m) at end.
 
     bounces, turning (ray,): their reflections from surface and bed, and turning points. Straight rays and reflections
-    in uniform water are exact; bent rays are followed by chords within `BOW`, but only where they may pass a body: no
-    ray is farther from the straight line between its ends, unfolded at its reflections, than its largest curvature
-    allows.
+    in uniform water are exact; bent rays are followed by chords within `SAGITTA_TOLERANCE`, but only where they may
+    pass a body: no ray is farther from the straight line between its ends, unfolded at its reflections, than its
+    largest curvature allows.
     """
     blocked = np.zeros(len(start), bool)
     if not bodies or not len(start):
         return blocked
     times = np.zeros(len(start), np.int64) if bounces is None else bounces
     bow = _curvature(profile) * length**2 / 8.0
-    broken = (bow > BOW) | (times > 0)
+    broken = (bow > SAGITTA_TOLERANCE) | (times > 0)
     blocked[~broken] = occluded(bodies, start[~broken], end[~broken])
     rest = np.flatnonzero(broken)
     whole, first = _near(bodies, environment, start[rest], end[rest], departure[rest], times[rest], bow[rest])
@@ -52,8 +52,8 @@ def hidden(
     return blocked
 
 
-def bundles(
-    bodies: tuple[Body, ...],
+def ray_cones(
+    bodies: tuple[PlacedTarget, ...],
     environment: Environment,
     profile: Profile,
     start: Floats,
@@ -74,7 +74,7 @@ def bundles(
     """
     longest, shortest = length + spread, length - spread
     bow = _curvature(profile) * longest**2 / 8.0
-    straight = (bounces == 0) & (_curvature(profile) * shortest**2 <= 8.0 * BOW)  # some of them
+    straight = (bounces == 0) & (_curvature(profile) * shortest**2 <= 8.0 * SAGITTA_TOLERANCE)  # some of them
     again, first = _near(bodies, environment, start, end, departure, bounces, bow + spread)
     whole = straight | again | ((bounces > 0) & (turning > 0))
     reach = np.where(whole, longest, np.minimum(first, longest))
@@ -95,7 +95,7 @@ def bundles(
     )
 
 
-def most_swerve(
+def max_launch_deviation(
     bed: float,
     profile: Profile,
     start: Floats,
@@ -156,7 +156,7 @@ def _curvature_about(profile: Profile, middle: Floats, reach: Floats) -> Floats:
     return np.asarray(np.maximum(table[level, first], table[level, last - (1 << level)]))
 
 
-def overlapping(bodies: tuple[Body, ...]) -> list[tuple[int, tuple[Body, ...]]]:
+def overlapping(bodies: tuple[PlacedTarget, ...]) -> list[tuple[int, tuple[PlacedTarget, ...]]]:
     """Bodies that may lie in or on others that come before them: number, and those others.
 
     Of facets that coincide neither hides the other from a ray that starts off both; one that starts under them does.
@@ -182,9 +182,14 @@ def _curvature(profile: Profile) -> float:
 
 
 def _near(
-    bodies: tuple[Body, ...], environment: Environment, start: Floats, end: Floats, departure: Floats, bounces: Ints,
+    bodies: tuple[PlacedTarget, ...],
+    environment: Environment,
+    start: Floats,
+    end: Floats,
+    departure: Floats,
+    bounces: Ints,
     bow: Floats,
-) -> tuple[Bools, Floats]:  # fmt: skip
+) -> tuple[Bools, Floats]:
     """Which rays (ray,) may pass a body far from their start, and how far from it (m) others may still be in one."""
     from sonarsynth.casting import intersections
 
@@ -203,7 +208,7 @@ def _near(
 
 
 def _along_chords(
-    bodies: tuple[Body, ...],
+    bodies: tuple[PlacedTarget, ...],
     environment: Environment,
     profile: Profile,
     start: Floats,
@@ -227,7 +232,12 @@ def _along_chords(
 
 
 def chords(
-    environment: Environment, profile: Profile, start: Floats, departure: Floats, length: Floats, sagitta: float = BOW
+    environment: Environment,
+    profile: Profile,
+    start: Floats,
+    departure: Floats,
+    length: Floats,
+    sagitta: float = SAGITTA_TOLERANCE,
 ) -> tuple[np.ndarray, Floats]:
     """Polylines that keep within `sagitta` (m) of rays from start (ray, xyz): ray of each node, node (node, xyz)."""
     from sonarsynth.equations.rays import ray_arcs

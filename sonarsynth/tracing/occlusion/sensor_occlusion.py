@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from sonarsynth.casting.cones import CLOSED, UNKNOWN, look
+from sonarsynth.casting.cones import CLOSED, UNKNOWN, classify_cones
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.environment.sea import Environment, Profile
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry import Pose
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.receiver import Elements
-from sonarsynth.tracing.occlusion.launch_deviation import swerves
-from sonarsynth.tracing.occlusion.ray_cones import bundles, hidden
-from sonarsynth.tracing.receive_paths import Legs
+from sonarsynth.tracing.occlusion.launch_deviation import launch_deviation
+from sonarsynth.tracing.occlusion.ray_cones import hidden, ray_cones
+from sonarsynth.tracing.receive_paths import ReceivePaths
 
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 RAYS = 30_000
 """Rays that are looked at together."""
 NO_CONE = 3
-"""Rays that are in no narrow cone for certain, by `shadows.bundles`: of these the centre and the rim of the array are
+"""Rays that are in no narrow cone for certain, by `shadows.ray_cones`: of these the centre and the rim of the array are
 looked at, and where they do not see alike every hydrophone; what only those within the rim see is not found."""
 PARTS = 32
 """Parts of the array that are looked at as one where the whole does not see alike."""
@@ -40,10 +40,10 @@ def rim(elements: Elements) -> Ints:
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class Occlusion:
     """What stands between points in the water and those who look at them."""
 
-    bodies: tuple[Body, ...]
+    bodies: tuple[PlacedTarget, ...]
     environment: Environment
     bending: Profile
     sonar_pose: Pose
@@ -51,7 +51,7 @@ class View:
     propagation: Propagation
     degree: int = 3  # of polynomials over the aperture
 
-    def visible(self, legs: Legs, start: Floats, normal: Floats | None) -> Legs:
+    def visible(self, legs: ReceivePaths, start: Floats, normal: Floats | None) -> ReceivePaths:
         """The legs that no body hides from the array centre; or, with elements, from every hydrophone, some of them
         open for `settled`.
 
@@ -76,7 +76,7 @@ class View:
         none = np.zeros((np.count_nonzero(kept), 1 + self.elements.count // 8), np.uint8)
         return legs.select(np.flatnonzero(kept)).seen(none, mixed[kept])
 
-    def settled(self, legs: Legs, start: Floats, normal: Floats | None) -> Legs:
+    def settled(self, legs: ReceivePaths, start: Floats, normal: Floats | None) -> ReceivePaths:
         """The same legs, none of them open: those that are, looked at from each hydrophone; arguments as above.
 
         That is left until it is known which of them count: of facets that are neither lit nor loud, none.
@@ -94,7 +94,7 @@ class View:
         """(1 + sensor, xyz) the array centre, and the hydrophones."""
         return np.concatenate([np.zeros((1, 3)), self.elements.position if self.elements else np.empty((0, 3))])
 
-    def _certain(self, legs: Legs, start: Floats, normal: Floats | None) -> Ints:
+    def _certain(self, legs: ReceivePaths, start: Floats, normal: Floats | None) -> Ints:
         """(leg,) EMPTY where all hydrophones see it, CLOSED where none does; elsewhere UNKNOWN or NO_CONE."""
         points = self._points
         spread = np.full(len(start), 1.001 * float(np.linalg.norm(points, axis=1).max()))
@@ -113,7 +113,7 @@ class View:
         return self._cones(legs, start, middle, spread, (least, most), swerve)
 
     def _cones(
-        self, legs: Legs, start: Floats, offset: Floats, spread: Floats, ahead: tuple[Floats, Floats] | None,
+        self, legs: ReceivePaths, start: Floats, offset: Floats, spread: Floats, ahead: tuple[Floats, Floats] | None,
         swerve: Floats,
     ) -> Ints:  # fmt: skip
         """(leg,) as `_certain`, of the hydrophones within `spread` (leg,) of places beside the centre (leg, xyz); ahead
@@ -126,13 +126,13 @@ class View:
             rows = np.flatnonzero(ahead[0] > 0.0)
         end, counts = (self.sonar_pose.position + offset)[rows], (legs.bounces[rows], legs.turning[rows])
         ray = start[rows], end, away[rows], length[rows], spread[rows], *counts, swerve[rows]
-        slope, reach, far = bundles(self.bodies, self.environment, self.bending, *ray)
+        slope, reach, far = ray_cones(self.bodies, self.environment, self.bending, *ray)
         sure = np.flatnonzero(np.isfinite(slope))
         found[rows], rows = NO_CONE, rows[sure]
-        found[rows] = look(self.bodies, start[rows], away[rows], slope[sure], reach[sure], far[sure])
+        found[rows] = classify_cones(self.bodies, start[rows], away[rows], slope[sure], reach[sure], far[sure])
         return found
 
-    def _dark(self, legs: Legs, start: Floats, normal: Floats | None, rows: Ints) -> Bools:
+    def _dark(self, legs: ReceivePaths, start: Floats, normal: Floats | None, rows: Ints) -> Bools:
         """(row, 1 + sensor) from where some legs are hidden: the array centre, each hydrophone. Parts of the array that
         see alike are looked at together."""
         parts = cells(self.elements)
@@ -153,15 +153,16 @@ class View:
         dark[one, point] = self._unseen(legs, start, normal, rows[one], point, some_of)
         return dark
 
-    def _swerve(self, legs: Legs, point: Ints) -> Floats | None:
-        """(leg, point, xyz) as `swerves`, of the centre, or the hydrophones from 1; None where rays are straight."""
+    def _swerve(self, legs: ReceivePaths, point: Ints) -> Floats | None:
+        """(leg, point, xyz) as `launch_deviation`, of the centre, or the hydrophones from 1; None where rays are
+        straight."""
         if self.bending.uniform or self.elements is None:
             return None
         where = self.environment, self.bending, self.sonar_pose, self.elements
-        return swerves(legs, self._points[point], *where, self.propagation, self.degree)
+        return launch_deviation(legs, self._points[point], *where, self.propagation, self.degree)
 
     def _unseen(
-        self, legs: Legs, start: Floats, normal: Floats | None, leg: Ints, point: Ints, swerve: Floats | None
+        self, legs: ReceivePaths, start: Floats, normal: Floats | None, leg: Ints, point: Ints, swerve: Floats | None
     ) -> Bools:
         """(ray,) which legs (ray,) leave the back of their facets, or meet a body, on the way to points (ray,): the
         centre, or the hydrophones from 1.
@@ -186,7 +187,7 @@ class View:
         return hidden(self.bodies, self.environment, self.bending, *ray)
 
 
-def _towards(legs: Legs, offset: Floats) -> tuple[Floats, Floats]:
+def _towards(legs: ReceivePaths, offset: Floats) -> tuple[Floats, Floats]:
     """Unit vectors (leg, xyz) and distances (leg,) from the starts of legs to the images of places beside the centre
     (leg, xyz)."""
     ahead = legs.length[:, None] * legs.departure + offset
@@ -197,7 +198,7 @@ def _towards(legs: Legs, offset: Floats) -> tuple[Floats, Floats]:
 
 
 def _within(
-    legs: Legs, normal: Floats, spread: Floats, swerve: Floats, offset: Floats | None = None
+    legs: ReceivePaths, normal: Floats, spread: Floats, swerve: Floats, offset: Floats | None = None
 ) -> tuple[Floats, Floats]:
     """(leg,) how far (m) on the outer side of a facet what is within `spread` (leg,) of a place beside the centre is,
     at least and at most, where rays to there leave beside its image by `swerve` (leg,) rad at most."""

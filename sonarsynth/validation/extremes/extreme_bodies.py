@@ -87,7 +87,7 @@ def _bearings() -> Got:
     from sonarsynth.labels import label
     from sonarsynth.labels.views import View
     from sonarsynth.propagation import Straight
-    from sonarsynth.state import Moment
+    from sonarsynth.state import WorldState
 
     beams, mesh = BeamGrid(azimuths=3, elevations=3), mesh_of(Box(size=(0.5, 3.0, 1.0)))
     connect = partial(Straight().connect, PROFILE, BED)
@@ -95,7 +95,9 @@ def _bearings() -> Got:
     for bearing in np.deg2rad(np.arange(0.0, 181.0, 5.0)):
         boxes = []
         for side in (bearing, -bearing):
-            moment = Moment(0.0, (body(mesh, 5.0 * direction(np.array(side), np.array(0.0)), 0.5 * np.pi - side),), ())
+            moment = WorldState(
+                0.0, (body(mesh, 5.0 * direction(np.array(side), np.array(0.0)), 0.5 * np.pi - side),), ()
+            )
             found = label(moment, POSE, beams, connect, np.zeros(0), True)
             boxes.append(found.image_box[0])
             flags.add(int(found.view[0]))

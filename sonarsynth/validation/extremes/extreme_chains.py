@@ -11,7 +11,7 @@ from sonarsynth.environment.sea import Environment, Isovelocity, Tabulated
 from sonarsynth.geometry.motion import Still
 from sonarsynth.imaging import DenseDelayAndSum
 from sonarsynth.labels.views import View
-from sonarsynth.products import LEDGER
+from sonarsynth.products import LINK_BUDGET
 from sonarsynth.receiver import BeamGrid, PlanarLattice, PositionTable, Sonar
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Processing, Scene, World
@@ -63,7 +63,7 @@ REASONS: dict[str, tuple[str, Callable[[Any], Any]]] = {
     "/ledger/error_bound": ("paths", lambda paths: paths == 0),
     "/ledger/measured_level": ("paths", lambda paths: paths == 0),
     "/ledger/isolated_level": ("paths", lambda paths: paths == 0),
-    **{f"/ledger/{term}": ("paths", lambda paths: paths == 0) for term in LEDGER},
+    **{f"/ledger/{term}": ("paths", lambda paths: paths == 0) for term in LINK_BUDGET},
 }
 """Where numbers may be none, what stands beside them, and what that says then."""
 ELSEWHERE = (
@@ -196,7 +196,7 @@ def _ledger() -> Got:
     hidden = ((Sphere(radius=0.05), (12.0, 1.3, 0.0)),)
     tree = frame(recipe(far + hidden, (14.0, -4.0), depth=60.0), ("signals",))
     book: dict[str, Any] = {str(name): np.asarray(v) for name, v in tree["ledger"].data_vars.items()}
-    source, out, scattering, back, absorption, boundary, received = (book[term] for term in LEDGER)
+    source, out, scattering, back, absorption, boundary, received = (book[term] for term in LINK_BUDGET)
     paths = book["paths"]
     left = source - out + scattering - back - absorption - boundary - received
     there = paths > 0

@@ -106,12 +106,12 @@ def _fock() -> Got:
 
 def _large() -> Got:
     """Facets too long for their echo to be a pulse in a window are refused; and a body of one huge facet a side."""
-    from sonarsynth.signals import KernelDeposit
+    from sonarsynth.signals import GriddedSynthesis
 
     plate = mesh_of(Box(size=(1.0, 2e3, 2e3)))
     snaps = [snap((1.0, 900.0, 0.0))]
     found = traced(snaps, ONE, [body(plate, (3e3, 0.0, 0.0))], [Kirchhoff()])
-    return refused(lambda: heard(KernelDeposit(), found, snaps, ONE, 3.9, 100), "corners that are not within")
+    return refused(lambda: heard(GriddedSynthesis(), found, snaps, ONE, 3.9, 100), "corners that are not within")
 
 
 def _icosahedron() -> tuple[Floats, np.ndarray]:

@@ -37,14 +37,14 @@ ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
 TWO = elements(PositionTable(positions=((0.0, 0.2, 0.1),) * 2))
 FEW = elements(PlanarLattice(columns=4, rows=4, pitch=0.1, face=0.0))
 FINE = 1e-4
-"""Error allowed to signals, of their peak: what `KernelDeposit` promises."""
+"""Error allowed to signals, of their peak: what `GriddedSynthesis` promises."""
 
 
 def methods() -> tuple[SignalSynthesis, ...]:
     """The fast synthesis and the exact one."""
-    from sonarsynth.signals import DirectSum, KernelDeposit
+    from sonarsynth.signals import DirectSum, GriddedSynthesis
 
-    return KernelDeposit(), DirectSum()
+    return GriddedSynthesis(), DirectSum()
 
 
 def _against(got: Signals, exact: Floats, allowed: float = FINE) -> Got:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sonarsynth.conventions import Floats, azimuth_elevation, direction
-from sonarsynth.products import REASONS, Bearings, Signals
+from sonarsynth.products import REASONS, Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.receiver import Band, Elements, PlanarLattice, Sonar, elements
 from sonarsynth.validation.extremes.outcomes import Case, Got, holds, together
@@ -29,12 +29,14 @@ def _heard(array: Elements, places: Sequence[Floats], gains: Sequence[float], no
     return Signals(total.astype(np.float32), start, RATE, 0.0, 0, 0)
 
 
-def _located(signals: Signals, array: Elements, rows: int, band: Band = BAND, *, refraction: bool = False) -> Bearings:
+def _located(
+    signals: Signals, array: Elements, rows: int, band: Band = BAND, *, refraction: bool = False
+) -> SourceEstimates:
     sonar = Sonar(array=LATTICE, band=band, sampling_frequency=RATE, assumed_sound_speed=C, sound_speed_error=0.1)
     return SensorDelays(refraction=refraction).locate(signals, array, sonar, POSE, BED, rows, PROFILE)
 
 
-def _honest(found: Bearings, places: Sequence[Floats]) -> Got:
+def _honest(found: SourceEstimates, places: Sequence[Floats]) -> Got:
     """Each row that says something is right within four errors about one of the places; others have a reason."""
     good, heard = True, np.flatnonzero(np.isfinite(found.time))
     for row in heard:

@@ -11,11 +11,11 @@ from sonarsynth.conventions import Floats
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.geometry.placed_target import Body
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.receiver import Elements, LowPass, Sonar
 from sonarsynth.sources.shrimp import SnapModel
 from sonarsynth.sources.snap_models import Ricker
-from sonarsynth.state import Moment, Snap
+from sonarsynth.state import Snap, WorldState
 
 if TYPE_CHECKING:
     from sonarsynth.products import Arrivals, Signals
@@ -37,15 +37,15 @@ def snap(place: Sequence[float] | Floats, time: float = 0.0, model: SnapModel = 
     return Snap(ARRAY + np.asarray(place, float), time, model, None, gain)
 
 
-def body(mesh: Mesh, place: Sequence[float] | Floats, turned: float = 0.5 * np.pi) -> Body:
+def body(mesh: Mesh, place: Sequence[float] | Floats, turned: float = 0.5 * np.pi) -> PlacedTarget:
     """A body at rest at a place (xyz) in the sonar frame, its heading as the sonar's unless turned."""
-    return Body("body", mesh, Pose(ARRAY + np.asarray(place, float), quaternion(turned)), np.zeros(3))
+    return PlacedTarget("body", mesh, Pose(ARRAY + np.asarray(place, float), quaternion(turned)), np.zeros(3))
 
 
 def traced(
     snaps: Sequence[Snap],
     elements: Elements,
-    bodies: Sequence[Body] = (),
+    bodies: Sequence[PlacedTarget] = (),
     laws: Sequence[ScatteringLaw] = (),
     band: tuple[float, float] = (25e3, 85e3),
 ) -> Arrivals:
@@ -53,7 +53,7 @@ def traced(
     from sonarsynth.propagation import AutoTracing
     from sonarsynth.tracing.arrivals import trace
 
-    moment = Moment(0.0, tuple(bodies), tuple(snaps))
+    moment = WorldState(0.0, tuple(bodies), tuple(snaps))
     found = trace(WATER, PROFILE, moment, POSE, elements, 0.0, AutoTracing(), tuple(laws), band=band)
     for name, value in vars(found).items():
         if isinstance(value, np.ndarray) and not np.isfinite(value).all():

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.geometry.motion import Course, Line, Motion, Still, pose, velocity
+from sonarsynth.geometry.motion import ConstantVelocity, Line, Motion, Still, pose, velocity
 
 STEP = 1e-4
 """s: velocities of what turns are differences over so long, either side."""
@@ -55,7 +55,7 @@ class Mover:
 
     @property
     def _straight(self) -> bool:
-        return not self.moves or isinstance(self.motion, Still | Line | Course)
+        return not self.moves or isinstance(self.motion, Still | Line | ConstantVelocity)
 
     @cached_property
     def _line(self) -> tuple[Floats, Floats, Floats]:
