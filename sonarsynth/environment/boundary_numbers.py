@@ -1,8 +1,8 @@
 """What a boundary does to sound: its description turned into numbers.
 
 Coefficients are for f > 0 in time dependence exp(+i 2 pi f t) and the same at every frequency (absorption in the bed
-goes with frequency, so its loss tangent is a number). Roughness is what depends on frequency: exp(-(2 pi f blur)^2/2).
-Formulas out of their range do not warn here, frame after frame: `boundary_notes` say it once.
+goes with frequency, so its loss tangent is a number). Roughness is what depends on frequency: exp(-(2 pi f
+delay_std)^2/2). Formulas out of their range do not warn here, frame after frame: `boundary_notes` say it once.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Bounces:
 
     modulus: Floats  # (path,) factor on the amplitude
     phase: Floats  # (path,) rad: the sum of the phases, of which a change of sign is pi; 0 without a reflection
-    blur: Floats  # (path,) s: the reflections take exp(-(2 pi f blur)^2/2) off the spectrum
+    delay_std: Floats  # (path,) s: the reflections take exp(-(2 pi f delay_std)^2/2) off the spectrum
 
 
 def bounces(
@@ -52,7 +52,7 @@ def bounces(
     q = np.where(times > 0, np.asarray(grazing, float), 0.0)
     once = coefficient(boundary, q, frequency) + 0.0  # no negative zeros: the phase of -1 is pi
     modulus, phase = np.abs(once) ** times, np.angle(once) * times
-    spread = np.where(times > 0, np.sqrt(times) * blur(boundary, q, sound_speed), 0.0)
+    spread = np.where(times > 0, np.sqrt(times) * delay_std(boundary, q, sound_speed), 0.0)
     return Bounces(*(np.where(np.isnan(q), np.nan, x) for x in (modulus, phase, spread)))
 
 
@@ -82,8 +82,9 @@ def rms_height(boundary: SeaSurface | SeaBed) -> float:
     return boundary.rms_height
 
 
-def blur(boundary: SeaSurface | SeaBed, grazing: npt.ArrayLike, sound_speed: npt.ArrayLike) -> Floats:
-    """Time (path,) in s such that roughness takes exp(-(2 pi f blur)^2/2) off one reflection; 0 where grazing is NaN.
+def delay_std(boundary: SeaSurface | SeaBed, grazing: npt.ArrayLike, sound_speed: npt.ArrayLike) -> Floats:
+    """Time (path,) in s such that roughness takes exp(-(2 pi f delay_std)^2/2) off one reflection; 0 where grazing is
+    NaN.
 
     sound_speed (m/s) is the water's at the boundary. What this takes is scattered, not lost, and is not simulated.
     """

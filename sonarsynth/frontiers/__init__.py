@@ -111,8 +111,8 @@ def _frame(made: Plan, index: int, hydrophones: int | None, say: Say, *, peers: 
     points += range_points(plan, frame, whole.heard)
     if peers:
         say(f"frame {index}: peers")
-        points += synthesis_peers(plan, frame, arrivals.at_centre)  # peers know no shade
-        points += image_peers(plan, frame, arrivals.at_centre, whole.heard)
+        points += synthesis_peers(plan, frame, arrivals.seen_from_centre)  # peers know no shade
+        points += image_peers(plan, frame, arrivals.seen_from_centre, whole.heard)
     say(f"frame {index}: everything exact")
     spent = whole.seconds + sum(p.seconds for p in points if p.chosen and p.stage != "synthesis")
     points += whole_points(whole, traced, spent)

@@ -120,16 +120,16 @@ def plain(arrivals: Arrivals, plan: Plan, frame: Frame) -> Arrivals:
     nought = np.zeros_like(some.delay)
     return replace(
         some,
-        blur=nought,
-        echo_blur=nought,
-        stretch=nought,
-        stretch_terms=np.zeros((len(nought), 0)),
+        delay_std=nought,
+        echo_delay_std=nought,
+        doppler=nought,
+        doppler_terms=np.zeros((len(nought), 0)),
         coherent=np.zeros(len(nought), bool),
         corners=np.zeros((len(nought), 3)),
-        rough_share=nought,
-        rough_delay=nought,
+        coherent_fraction=nought,
+        height_delay_std=nought,
         phase_terms=np.zeros((len(nought), 0)),
-        blur_terms=np.zeros((len(nought), 0)),
+        delay_variance_terms=np.zeros((len(nought), 0)),
     )
 
 

@@ -108,7 +108,7 @@ def named(method: Method) -> str:
 def direct_sum_point(traced: TracedBySensor) -> Point:
     """The direct sum: no error; its cost from a few hydrophones and paths."""
     plan, (part, arrivals) = traced.plan, traced.few[0]
-    arrivals = arrivals.at_centre  # they have as many terms at hydrophones that miss some
+    arrivals = arrivals.seen_from_centre  # they have as many terms at hydrophones that miss some
     some = np.linspace(0, len(arrivals.delay) - 1, min(SUMMED_PATHS, len(arrivals.delay))).astype(int)
     start, samples = frame_start(plan, traced.frame), plan.windows.samples
     seconds = []

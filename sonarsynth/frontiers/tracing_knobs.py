@@ -77,7 +77,7 @@ class TracedBySensor:
             rows = np.flatnonzero(np.isin(sensor, part.sensor))
             own = np.searchsorted(part.sensor, sensor[rows])
             some, place = with_rim(part, own)
-            arrivals = traced.heard_by(place, part.elements.count)
+            arrivals = traced.for_sensors(place, part.elements.count)
             made = pressures(self.plan, self.frame, arrivals, some, golden(self.plan))
             for total, one in zip(out, made, strict=True):
                 total[rows] = one[: len(rows)]

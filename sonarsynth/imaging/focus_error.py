@@ -20,7 +20,7 @@ import numpy as np
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.imaging.image_window import Shading, weights
-from sonarsynth.imaging.zones import Lens, Zone, corners, heard_by, lens, quadrant, zones_of
+from sonarsynth.imaging.zones import Lens, Zone, corners, for_sensors, lens, quadrant, zones_of
 from sonarsynth.receiver import Band, BeamGrid, Elements, Sonar
 
 MOST_ZONES = 32
@@ -58,7 +58,7 @@ def focus_error(
     """
     if focus is None:
         return 0.0
-    glass, heard = lens(elements, focus, sound_speed), heard_by(elements, weight, band)
+    glass, heard = lens(elements, focus, sound_speed), for_sensors(elements, weight, band)
     cut = zones_of(glass, heard, beams, zones)
     u = quadrant(beams)
 

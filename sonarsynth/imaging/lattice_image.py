@@ -12,7 +12,7 @@ from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.arrays.beams import first_and_spacing
 from sonarsynth.equations.arrays.lattices import axial_focus_delay, half_coordinates, mirrored_sensors
 from sonarsynth.imaging.image_window import Shading, weights
-from sonarsynth.imaging.zones import Lens, Zone, heard_by, lens, quadrant, zones_of
+from sonarsynth.imaging.zones import Lens, Zone, for_sensors, lens, quadrant, zones_of
 from sonarsynth.receiver import Band, BeamGrid, Elements
 
 
@@ -115,7 +115,7 @@ def steered_zones(
 ) -> tuple[SteeredZone, ...]:
     """The zones of a beam grid cut into zones x zones parts, ready for `zoned_energies`; kept from frame to frame."""
     glass = lens(elements, focus, sound_speed)
-    cut = zones_of(glass, heard_by(elements, weights(elements, shading), band), beams, zones)
+    cut = zones_of(glass, for_sensors(elements, weights(elements, shading), band), beams, zones)
     return tuple(steered(zone, elements, beams, glass) for zone in cut)
 
 

@@ -152,7 +152,7 @@ def lens(elements: Elements, focus: float, sound_speed: float) -> Lens:
     return Lens(focus, sound_speed, reach * elements.columns, reach * elements.rows)
 
 
-def heard_by(elements: Elements, weight: Floats, band: Band) -> Heard:
+def for_sensors(elements: Elements, weight: Floats, band: Band) -> Heard:
     """The array with its weights (sensor,), neighbours on the lattice gathered into cells, and the band."""
     places = [elements.row // -(-elements.rows // CELLS), elements.column // -(-elements.columns // CELLS)]
     cell = np.unique(np.stack(places)[:, weight > 0], axis=1, return_inverse=True)[1].ravel()

@@ -189,16 +189,20 @@ def _clock(arrivals: Arrivals, clock: float, gate: float) -> float:
 def _spectra(paths: Arrivals, elements: Elements, band: Band) -> kernels.Complexes:
     """Spectra (path, bin) that elements hear, over that of the snap at 1 m, without delay."""
     amplitude = paths.amplitude
-    if paths.hidden_from.shape[1]:  # of the array, as much as sees it
-        hidden = np.bitwise_count(paths.hidden_from).sum(axis=1) - (paths.hidden_from[:, 0] >= 128)
+    if paths.occluded.shape[1]:  # of the array, as much as sees it
+        hidden = np.bitwise_count(paths.occluded).sum(axis=1) - (paths.occluded[:, 0] >= 128)
         amplitude = amplitude * (1.0 - hidden / elements.count)
     sine = paths.direction[:, 1:] * (elements.face / paths.sound_speed)
     frequency = band.frequency
-    heard = kernels.path_spectra(amplitude, paths.phase, paths.blur, paths.absorption, sine, frequency, band.relative)
-    shaped = paths.coherent | paths.corners.any(axis=1) | (paths.rough_share > 0.0)
+    heard = kernels.path_spectra(
+        amplitude, paths.phase, paths.delay_std, paths.absorption, sine, frequency, band.relative
+    )
+    shaped = paths.coherent | paths.corners.any(axis=1) | (paths.coherent_fraction > 0.0)
     if shaped.any():
         some = paths.select(shaped)
-        shape = facet_response(frequency, some.coherent, some.corners, some.rough_share, some.rough_delay, some.centre)
+        shape = facet_response(
+            frequency, some.coherent, some.corners, some.coherent_fraction, some.height_delay_std, some.centre
+        )
         heard[shaped] *= shape
     return heard
 

@@ -34,7 +34,7 @@ def direct_paths(arrivals: Arrivals, envelope: Callable[[int, float], float]) ->
     envelope: of the index of a snap, and the absorption on its way (dB at the centre of the band): when the envelope of
     its pulse peaks in the band, s after its collapse.
     """
-    chosen = arrivals.at_centre
+    chosen = arrivals.seen_from_centre
     kept = chosen.direct & (chosen.surface == 0) & (chosen.bottom == 0)
     some = chosen.select(kept)
     order = np.lexsort((some.delay, some.snap))

@@ -81,7 +81,9 @@ def exact_powers(paths: Arrivals, band: Band) -> Floats:
     fine = band.sliced(min(max(64.0, 4.0 * (band.high - band.low) * longest), SLICES))
     f = fine.frequency
     amplitude = paths.spreading_out * paths.scattering * paths.spreading_in * paths.boundary
-    facet = facet_response(f, paths.coherent, paths.corners, paths.rough_share, paths.rough_delay, paths.centre)
+    facet = facet_response(
+        f, paths.coherent, paths.corners, paths.coherent_fraction, paths.height_delay_std, paths.centre
+    )
     lost = 10.0 ** (-np.outer(paths.absorption, 1.0 + fine.relative) / 10.0)
-    blur = np.exp(-((2.0 * np.pi * np.outer(paths.blur, f)) ** 2))
-    return np.asarray(amplitude**2 * (np.abs(facet) ** 2 * lost * blur * fine.weight[paths.snap]).sum(axis=1))
+    delay_std = np.exp(-((2.0 * np.pi * np.outer(paths.delay_std, f)) ** 2))
+    return np.asarray(amplitude**2 * (np.abs(facet) ** 2 * lost * delay_std * fine.weight[paths.snap]).sum(axis=1))

@@ -56,8 +56,8 @@ def path_powers(arrivals: Arrivals, band: Band) -> Powers:
     from sonarsynth.equations.noise.path_sums import mean_powers
 
     few = band.sliced(FEWEST)
-    columns = arrivals.coherent, arrivals.rough_share, arrivals.rough_delay, arrivals.absorption
-    blurs = arrivals.blur, arrivals.echo_blur
+    columns = arrivals.coherent, arrivals.coherent_fraction, arrivals.height_delay_std, arrivals.absorption
+    blurs = arrivals.delay_std, arrivals.echo_delay_std
     bins = few.frequency, few.relative, few.weight
     # echo: with the facet's own roughness, which is no loss at a boundary
     facet, echo, absorbed, blurred = mean_powers(arrivals.snap, *columns, *blurs, *bins, arrivals.centre)
@@ -119,7 +119,7 @@ def _coherent(arrivals: Arrivals, rows: Ints, band: Band) -> tuple[Floats, _Toge
     weight = fine.weight * slope**2
     _, representative = np.unique(group, return_index=True)
     some = arrivals.select(rows)
-    least = _least(some.blur, group)
+    least = _least(some.delay_std, group)
     loss = np.bincount(group, some.absorption) / np.bincount(group)
     real, imaginary, mean = coherent_sums(
         part,
@@ -129,7 +129,7 @@ def _coherent(arrivals: Arrivals, rows: Ints, band: Band) -> tuple[Floats, _Toge
         some.delay - middle[group],
         some.corners,
         some.absorption - loss[group],
-        np.maximum(some.blur**2 - least[group] ** 2, 0.0),
+        np.maximum(some.delay_std**2 - least[group] ** 2, 0.0),
         some.direction,
         f,
         fine.relative,

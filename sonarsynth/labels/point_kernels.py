@@ -32,7 +32,7 @@ class Pattern(NamedTuple):
 def path_spectra(
     amplitude: Floats,
     phase: Floats,
-    blur: Floats,
+    delay_std: Floats,
     loss: Floats,
     sine: Floats,
     frequency: Floats,
@@ -48,7 +48,9 @@ def path_spectra(
         turn = complex(math.cos(phase[e]), math.sin(phase[e])) * amplitude[e]
         for k in range(len(frequency)):
             f = frequency[k]
-            gain = math.exp(-0.5 * (2.0 * math.pi * f * blur[e]) ** 2 - math.log(10.0) / 20.0 * loss[e] * relative[k])
+            gain = math.exp(
+                -0.5 * (2.0 * math.pi * f * delay_std[e]) ** 2 - math.log(10.0) / 20.0 * loss[e] * relative[k]
+            )
             for axis in range(2):
                 x = math.pi * f * sine[e, axis]
                 if abs(x) > 1e-6:

@@ -197,7 +197,7 @@ def _transmission_loss(plan: Plan, layers: Water, rays: Eigenrays, start: Floats
     factor = rays.amplitude.copy()
     for boundary, count, c in met:
         effect = bounces(boundary, np.arccos(np.minimum(rays.slowness * c, 1.0)), count, c, frequency)
-        factor *= effect.modulus * np.exp(-0.5 * (2.0 * np.pi * frequency * effect.blur) ** 2)
+        factor *= effect.modulus * np.exp(-0.5 * (2.0 * np.pi * frequency * effect.delay_std) ** 2)
     vertices = rays.surface + rays.bottom + rays.turning
     climb = np.nan_to_num(rays.start_sine)
     lost = rays.length * plan.absorption_at_depths.along(

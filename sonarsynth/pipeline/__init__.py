@@ -123,7 +123,7 @@ def trace_at(plan: Plan, frame: Frame) -> TracedFrame:
     """Every path of a frame that is at hand, and its truth; `plan` is that of its sequence."""
     arrivals = arrivals_of(plan, frame)
     mark_stage("trace")
-    seen = arrivals.at_centre
+    seen = arrivals.seen_from_centre
     levels = snap_levels(frame.moment.snaps)
     truth = _label(plan, frame, levels)
     band, targets = band_of(plan, frame.moment.snaps), len(frame.moment.bodies)

@@ -205,7 +205,7 @@ class PerSensorReference:
             rows = np.flatnonzero(np.isin(self.sensor, part.sensor))
             if len(rows):
                 own, place = with_rim(part, np.searchsorted(part.sensor, self.sensor[rows]))
-                arrivals = arrivals_of(plan, self.frame, part).heard_by(place, part.elements.count)
+                arrivals = arrivals_of(plan, self.frame, part).for_sensors(place, part.elements.count)
                 for out, made in zip(found, _heard(plan, self.frame, arrivals, own), strict=True):
                     out[rows] = made[: len(rows)]
         sizes = [float(np.linalg.norm(x)) for x in self.exact]

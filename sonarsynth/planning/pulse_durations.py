@@ -71,9 +71,9 @@ def blur_of(scene: Scene) -> float:
     most = np.hypot(max(heights, default=0.0), roughest * np.sqrt(bounces))
     if not most > 0.0:
         return 0.0
-    blur = 2.0 * most / SLOWEST  # at the steepest grazing angle
+    delay_std = 2.0 * most / SLOWEST  # at the steepest grazing angle
     silent = max((silencing_blur(w, scene.sonar.antialias) for w in extreme_waveforms(scene)), default=0.0)
-    return float(PULSE_FEET * min(blur, silent))
+    return float(PULSE_FEET * min(delay_std, silent))
 
 
 def extreme_waveforms(scene: Scene) -> list[Waveform]:

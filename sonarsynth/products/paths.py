@@ -47,14 +47,14 @@ class Arrivals:
     (`acoustics.arrays.aperture_terms`.) Water absorbs on what the way is longer by, its delay times sound_speed, as it
     does on the way to the array centre: synthesis takes that off at each frequency. In isovelocity water the sphere is
     exact and delay_terms has no columns. Reflections on the way differ over the aperture: there the phase is phase[e] +
-    phase_terms[e] @ aperture_terms(q), at every frequency, and the square of the blur is blur[e]^2 + blur_terms[e] @
-    aperture_terms(q), which may be below 0: the delays over a facet, whose mean `corners` is that at the centre, have
-    another variance there, and heights of a rough facet, of which the centre's `rough_delay` tells, another echo: what
-    blur and amplitude together nearly say over the band. What moves is seen from another side there: the stretch is
-    stretch[e] + stretch_terms[e] @ aperture_terms(q).
-    amplitude is the factor on the pressure waveform of the snap at 1 m: the product of the columns below it. Facets
-    change the waveform: its spectrum is multiplied by `acoustics.facet_pulses.facet_response` of
-    coherent, corners, rough_share and rough_delay, whose modulus is 1 at `centre` for a coherent facet that is small.
+    phase_terms[e] @ aperture_terms(q), at every frequency, and the variance of the delay is delay_std[e]^2 +
+    delay_variance_terms[e] @ aperture_terms(q), which may be below 0: the delays over a facet, whose mean `corners` is
+    that at the centre, have another variance there, and heights of a rough facet, of which the centre's
+    `height_delay_std` tells, another echo: what delay_std and amplitude together nearly say over the band. What moves
+    is seen from another side there: the Doppler factor is doppler[e] + doppler_terms[e] @ aperture_terms(q). amplitude
+    is the factor on the pressure waveform of the snap at 1 m: the product of the columns below it. Facets change the
+    waveform: its spectrum is multiplied by `acoustics.facet_pulses.facet_response` of coherent, corners, rough_share
+    and rough_delay, whose modulus is 1 at `centre` for a coherent facet that is small.
     """
 
     delay: Floats  # (path,) s at the array centre, snap time included
@@ -63,7 +63,7 @@ class Arrivals:
     delay_terms: Floats  # (path, term) s; (path, 0) where the sphere is exact
     amplitude_terms: Floats  # (path, term); (path, 0) where R/|R d - q| is exact
     phase_terms: Floats  # (path, term) rad; (path, 0) where all hydrophones have the phase of the centre
-    blur_terms: Floats  # (path, term) s2; (path, 0) where all have the blur of the centre
+    delay_variance_terms: Floats  # (path, term) s2; (path, 0) where all have that of the centre
     amplitude: Floats  # (path,) signed: spreading_out * scattering * spreading_in * boundary * 10^(-absorption/20)
     spreading_out: Floats  # (path,) 1/m: snap to facet (snap to array for the direct path)
     spreading_in: Floats  # (path,) 1/m: facet to array (1 for the direct path)
@@ -81,17 +81,15 @@ class Arrivals:
     caustics: Ints  # (path,) caustics passed
     arrives_by: Ints  # (path,) index into FAMILIES: which boundaries it touched last, on its way to the array
     phase: Floats  # (path,) rad: constant phase of the pulse over frequency, from caustics and lossy reflections
-    blur: Floats  # (path,) s: roughness takes exp(-(2 pi f blur)^2/2) off the spectrum, a Gaussian in time
-    echo_blur: Floats  # (path,) s: the part of blur that is the facet's, blur^2 the sum of its square and boundaries'
-    stretch: Floats  # (path,) Doppler: the pulse is p((t - delay)/(1 + stretch))
-    stretch_terms: Floats  # (path, term); (path, 0) where all hydrophones have the Doppler of the centre
+    delay_std: Floats  # (path,) s: roughness takes exp(-(2 pi f delay_std)^2/2) off the spectrum, a Gaussian in time
+    echo_delay_std: Floats  # (path,) s: the facet's part of delay_std; the squares of both parts add up
+    doppler: Floats  # (path,) Doppler: the pulse is p((t - delay)/(1 + doppler))
+    doppler_terms: Floats  # (path, term); (path, 0) where all hydrophones have the Doppler of the centre
     coherent: Bools  # (path,) of a smooth facet, or its shadow: differentiated, i f/centre; phases count in sums
     corners: Floats  # (path, 3) s: of the facet about `delay`, a mean over it; 0: a point
-    rough_share: Floats  # (path,) w: of the power that is coherent where it is smooth
-    rough_delay: Floats  # (path,) s: a rough facet sends sqrt(1 - w exp(-(2 pi f rough_delay)^2)); w = 0: all
-    hidden_from: (
-        Bytes  # (path, byte) bits: a body hides it from the array centre, from each hydrophone; (path, 0): none
-    )
+    coherent_fraction: Floats  # (path,) w: of the power that is coherent where it is smooth
+    height_delay_std: Floats  # (path,) s: a rough facet sends sqrt(1 - w exp(-(2 pi f rough_delay)^2)); w = 0: all
+    occluded: Bytes  # (path, byte) bits: a body hides it from the array centre, from each hydrophone; (path, 0): none
     centre: float  # Hz: centre of the band, where amplitudes hold
     sound_speed: float  # m/s of the water at the array centre
     wavefront_error: float  # s: largest error of the wavefronts that was measured, at probes spread over the aperture
@@ -106,23 +104,23 @@ class Arrivals:
 
     def hidden(self, sensors: int) -> Bools:
         """(path, sensor) hydrophones that a body hides each path from; (path, 0) where none is hidden anywhere."""
-        bits = np.unpackbits(self.hidden_from, axis=1, count=1 + sensors if self.hidden_from.shape[1] else None)
+        bits = np.unpackbits(self.occluded, axis=1, count=1 + sensors if self.occluded.shape[1] else None)
         return bits[:, 1:].astype(bool)
 
-    def heard_by(self, rows: Ints, sensors: int) -> Arrivals:
+    def for_sensors(self, rows: Ints, sensors: int) -> Arrivals:
         """The same for some (row,) of so many hydrophones, in another order perhaps."""
-        if not self.hidden_from.shape[1]:
+        if not self.occluded.shape[1]:
             return self
-        bits = np.unpackbits(self.hidden_from, axis=1, count=1 + sensors)
-        return replace(self, hidden_from=np.packbits(bits[:, np.append(0, 1 + rows)], axis=1))
+        bits = np.unpackbits(self.occluded, axis=1, count=1 + sensors)
+        return replace(self, occluded=np.packbits(bits[:, np.append(0, 1 + rows)], axis=1))
 
     @property
-    def at_centre(self) -> Arrivals:
+    def seen_from_centre(self) -> Arrivals:
         """The paths that reach the centre of the array, as if all hydrophones saw what it sees."""
-        if not self.hidden_from.shape[1]:
+        if not self.occluded.shape[1]:
             return self
-        seen = self.select(self.hidden_from[:, 0] < 128)
-        return replace(seen, hidden_from=seen.hidden_from[:, :0])
+        seen = self.select(self.occluded[:, 0] < 128)
+        return replace(seen, occluded=seen.occluded[:, :0])
 
     @property
     def direct(self) -> Bools:

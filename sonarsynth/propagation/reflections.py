@@ -18,7 +18,7 @@ class Reflections:
 
     modulus: Floats  # (path,)
     phase: Floats  # (path,) rad
-    blur: Floats  # (path,) s
+    delay_std: Floats  # (path,) s
 
 
 def reflections(environment: Environment, profile: Profile, paths: Paths, centre: float) -> Reflections:
@@ -30,7 +30,7 @@ def reflections(environment: Environment, profile: Profile, paths: Paths, centre
     changed = at_boundaries(
         environment, profile, paths.surface_grazing, paths.surface, paths.bottom_grazing, paths.bottom, centre
     )
-    return Reflections(changed.modulus, changed.phase + 0.5 * np.pi * paths.caustics, changed.blur)
+    return Reflections(changed.modulus, changed.phase + 0.5 * np.pi * paths.caustics, changed.delay_std)
 
 
 def at_boundaries(
@@ -47,7 +47,9 @@ def at_boundaries(
         return Reflections(np.ones(surface.shape), np.zeros(surface.shape), np.zeros(surface.shape))
     over = bounces(environment.surface, surface_grazing, surface, float(profile.at(0.0)), centre)
     under = bounces(environment.bed, bottom_grazing, bottom, float(profile.at(environment.depth)), centre)
-    return Reflections(over.modulus * under.modulus, over.phase + under.phase, np.hypot(over.blur, under.blur))
+    return Reflections(
+        over.modulus * under.modulus, over.phase + under.phase, np.hypot(over.delay_std, under.delay_std)
+    )
 
 
 def as_sign(phase: Floats) -> tuple[Floats, Floats]:

@@ -109,8 +109,8 @@ class CoherentKirchhoff:
         count, zero = len(incident), np.zeros(len(incident))
         corners = dot(patch.corners, (incident - scattered)[:, None, :]) / sound_speed[:, None]
         phase = self.phase(incident, scattered) + zero
-        blur = self.law.roughness * np.abs(dot(patch.normal, scattered - incident)) / sound_speed
-        return PulseResponse(np.ones(count, bool), corners, zero, zero, zero, phase, blur)
+        delay_std = self.law.roughness * np.abs(dot(patch.normal, scattered - incident)) / sound_speed
+        return PulseResponse(np.ones(count, bool), corners, zero, zero, zero, phase, delay_std)
 
     def spread(self, incident: Floats, scattered: Floats, patch: FacetGeometry, sound_speed: Floats) -> Floats:
         """Variance (...) of the delays of an echo in s2, over the facet and the heights of its surface."""
@@ -262,5 +262,5 @@ def size_at(
         pulse = part.pulses(incident, scattered, patch, sound_speed)
         amplitude = part.amplitude(incident, scattered, patch, 2.0 * np.pi * frequency / sound_speed)
         response = facet_response(np.array([frequency]), *pulse[:4], frequency)[:, 0]
-        power += np.abs(amplitude * response * np.exp(-0.5 * (2.0 * np.pi * frequency * pulse.blur) ** 2)) ** 2
+        power += np.abs(amplitude * response * np.exp(-0.5 * (2.0 * np.pi * frequency * pulse.delay_std) ** 2)) ** 2
     return np.sqrt(power)

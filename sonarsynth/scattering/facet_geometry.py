@@ -56,11 +56,11 @@ class PulseResponse(NamedTuple):
 
     coherent: Bools  # (path,)
     corners: Floats  # (path, 3) s
-    rough_share: Floats  # (path,)
-    rough_delay: Floats  # (path,) s
+    coherent_fraction: Floats  # (path,)
+    height_delay_std: Floats  # (path,) s
     late: Floats  # (path,) s: from the middle of the facet to the point that echoes
     phase: Floats  # (path,) rad: of the reflection coefficient
-    blur: Floats  # (path,) s: what roughness takes from a coherent echo
+    delay_std: Floats  # (path,) s: what roughness takes from a coherent echo
 
     @staticmethod
     def plain(count: int) -> PulseResponse:

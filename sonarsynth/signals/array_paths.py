@@ -19,7 +19,7 @@ MAX_DOPPLER = 0.1
 """Doppler of 0.1 is a closing speed of 75 m/s: more is an error."""
 
 LONGEST_BLUR = 1.0
-"""A longer blur (s) leaves as little of a snap: nothing."""
+"""A longer delay_std (s) leaves as little of a snap: nothing."""
 
 NEPER = np.log(10.0) / 20.0
 """Of a dB."""
@@ -28,8 +28,18 @@ LONGEST_CORNER = 0.01
 """The corners of a facet are closer to its arrival than this (s): 7 m, there and back."""
 
 FINITE = (
-    *("delay", "direction", "amplitude", "absorption", "delay_terms", "amplitude_terms", "phase", "blur", "stretch"),
-    *("phase_terms", "blur_terms", "stretch_terms", "corners", "rough_share", "rough_delay"),
+    *(
+        "delay",
+        "direction",
+        "amplitude",
+        "absorption",
+        "delay_terms",
+        "amplitude_terms",
+        "phase",
+        "delay_std",
+        "doppler",
+    ),
+    *("phase_terms", "delay_variance_terms", "doppler_terms", "corners", "coherent_fraction", "height_delay_std"),
 )
 """What of the arrivals must be finite."""
 
@@ -55,8 +65,8 @@ class ArrayPaths:
     doppler: Floats  # (path,) the pulse lasts 1 + doppler times as long
     coherent: Bools  # (path,) the pulse is differentiated, i f/centre
     corners: Floats  # (path, 3) s: delays over which the pulse is a mean; their sum is 0
-    rough_share: Floats  # (path,) and
-    rough_delay: Floats  # (path,) s: of `facet_pulses.rough_factor`
+    coherent_fraction: Floats  # (path,) and
+    height_delay_std: Floats  # (path,) s: of `facet_pulses.rough_factor`
     dark: Bools  # (path, sensor) hydrophones that a path does not reach; (path, 0): it reaches all
     modes: Floats  # (path, mode) weights of the modes of a stretch of time (`shapes`); none as yet
     bends: Floats  # (path, mode) what they change by for each unit of doppler more; none as yet
@@ -92,7 +102,7 @@ def array_paths(
     if count and not (arrivals.radius > 0.0).all():
         raise ValueError(f"arrival {np.flatnonzero(~(arrivals.radius > 0.0))[0]} has a radius that is not positive")
     _check_shapes(arrivals)
-    if arrivals.hidden_from.shape[1] not in (0, 1 + elements.count // 8):
+    if arrivals.occluded.shape[1] not in (0, 1 + elements.count // 8):
         raise ValueError(f"arrivals are hidden from hydrophones of another array, not of one of {elements.count}")
     if count and not (arrivals.snap.min() >= 0 and arrivals.snap.max() < len(snaps)):
         raise ValueError(f"arrivals name a snap outside 0..{len(snaps) - 1}")
@@ -113,17 +123,17 @@ def array_paths(
         delay_terms=arrivals.delay_terms,
         gain_terms=arrivals.amplitude_terms,
         turn_terms=arrivals.phase_terms,
-        spread_terms=arrivals.blur_terms,
-        bend_terms=arrivals.stretch_terms,
+        spread_terms=arrivals.delay_variance_terms,
+        bend_terms=arrivals.doppler_terms,
         sound_speed=arrivals.sound_speed,
         aperture=elements.aperture or 1.0,
         phase=phase,
-        variance=np.minimum(arrivals.blur, LONGEST_BLUR) ** 2,
-        doppler=arrivals.stretch,
+        variance=np.minimum(arrivals.delay_std, LONGEST_BLUR) ** 2,
+        doppler=arrivals.doppler,
         coherent=arrivals.coherent,
         corners=corners,
-        rough_share=arrivals.rough_share,
-        rough_delay=np.minimum(arrivals.rough_delay, LONGEST_BLUR),
+        coherent_fraction=arrivals.coherent_fraction,
+        height_delay_std=np.minimum(arrivals.height_delay_std, LONGEST_BLUR),
         dark=arrivals.hidden(elements.count),
         modes=np.zeros((count, 0)),
         bends=np.zeros((count, 0)),
@@ -143,14 +153,17 @@ def _centred(arrivals: Arrivals) -> tuple[Floats, Floats]:
 def _check_shapes(arrivals: Arrivals) -> None:
     """Raise ValueError for a path whose pulse has no shape."""
     for wrong, what in (
-        (arrivals.blur < 0.0, "a negative blur"),
+        (arrivals.delay_std < 0.0, "a negative delay_std"),
         (
-            np.abs(arrivals.stretch) + np.abs(arrivals.stretch_terms).sum(axis=1) >= MAX_DOPPLER,
-            f"a stretch that is not within +-{MAX_DOPPLER:g}",
+            np.abs(arrivals.doppler) + np.abs(arrivals.doppler_terms).sum(axis=1) >= MAX_DOPPLER,
+            f"a Doppler factor that is not within +-{MAX_DOPPLER:g}",
         ),
         (np.abs(arrivals.corners.T) >= LONGEST_CORNER, f"corners that are not within {LONGEST_CORNER:g} s"),
-        ((arrivals.rough_share < 0.0) | (arrivals.rough_share > 1.0), "a rough_share that is not from 0 to 1"),
-        (arrivals.rough_delay < 0.0, "a negative rough_delay"),
+        (
+            (arrivals.coherent_fraction < 0.0) | (arrivals.coherent_fraction > 1.0),
+            "a rough_share that is not from 0 to 1",
+        ),
+        (arrivals.height_delay_std < 0.0, "a negative rough_delay"),
     ):
         if wrong.any():
             raise ValueError(f"arrival {np.flatnonzero(wrong)[0] % wrong.shape[-1]} has {what}")
@@ -263,8 +276,8 @@ def reference_of(front: ArrayPaths, middle: Floats, turn_terms: Floats, spread_t
         doppler=np.zeros(1),
         coherent=np.zeros(1, bool),
         corners=np.zeros((1, 3)),
-        rough_share=np.zeros(1),
-        rough_delay=np.zeros(1),
+        coherent_fraction=np.zeros(1),
+        height_delay_std=np.zeros(1),
         dark=np.zeros((1, 0), bool),
         modes=np.zeros((1, 0)),
         bends=np.zeros((1, 0)),

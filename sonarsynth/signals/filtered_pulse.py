@@ -69,7 +69,7 @@ def pulse_support(
     turned: at any constant phase. Such a pulse never ends. It falls as 1/t^3 where the snap has no net impulse, nor the
     impulse a net integral, as the logarithmic bubble; as 1/t^2 or 1/t (Keller-Miksis, recordings) it may be cut at
     LONGEST_TAIL: `cut_tail` says what is left there. sloped: differentiated, as a smooth facet does. rough: from rough
-    facets with a `rough_delay` (s) up to this, of any share. Facets make it longer by their corners, at both ends.
+    facets with a `height_delay_std` (s) up to this, of any share. Facets make it longer by their corners, at both ends.
     """
     return support_of(waveform, chosen, Reshaped(turned, sloped, rough), tolerance)
 

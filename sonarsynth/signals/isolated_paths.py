@@ -74,7 +74,9 @@ def measured_levels(
     if not count:
         return np.zeros(0)
     hydrophone, none = ideal_hydrophone(), np.empty((count, 0))
-    paths = replace(paths, phase_terms=none, blur_terms=none, stretch_terms=none)  # that of the centre is heard
+    paths = replace(
+        paths, phase_terms=none, delay_variance_terms=none, doppler_terms=none
+    )  # that of the centre is heard
     front = array_paths(paths, snaps, hydrophone)
     before, after = layout(paths, front, snaps, hydrophone, sonar, 0.0, 1).support + reach(front)
     lead = int(np.ceil(before.max() * fs)) + GUARD
@@ -90,7 +92,7 @@ def measured_levels(
     gain = snap_gains(snaps)
     sent = np.array([
         gain[s] ** 2 * (np.abs(_sent(snaps[s].waveform, sonar, slot, float(d))) ** 2 @ inside)
-        for s, d in zip(paths.snap, paths.stretch, strict=True)
+        for s, d in zip(paths.snap, paths.doppler, strict=True)
     ])  # fmt: skip
     heard = np.abs(spectrum) ** 2 @ inside
     with np.errstate(divide="ignore", invalid="ignore"):

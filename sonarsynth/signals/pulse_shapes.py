@@ -119,7 +119,7 @@ def shape_modes(
     loudness = np.abs(front.amplitude) / np.abs(front.amplitude).max()
     weight: Floats = np.ones((front.count, 1))
     factor: Floats | ComplexArray = np.ones((1, frequency.size))
-    if front.variance.any() or (front.loss.any() and decay.any()) or front.rough_share.any():
+    if front.variance.any() or (front.loss.any() and decay.any()) or front.coherent_fraction.any():
         weight, factor = _softened(front, frequency, decay, tolerance)
         fewer = reduction(weight, factor * spectrum, loudness, tolerance)
         weight, factor = weight @ fewer.onto, fewer.back @ factor
@@ -184,8 +184,8 @@ def _softened(front: ArrayPaths, frequency: Floats, decay: Floats, tolerance: fl
     exact = lost(ends, frequency[some])
     onto = ((n, interpolation(place[some], Axis(n))) for n in SAMPLES)
     count = next((n for n, i in onto if np.abs(i @ lost(ends, at(n)) - exact).max() <= tolerance), SAMPLES[-1])
-    if front.rough_share.any():
-        roughest = 2.0 * np.pi * high * float(front.rough_delay.max())
+    if front.coherent_fraction.any():
+        roughest = 2.0 * np.pi * high * float(front.height_delay_std.max())
         count += _rough_samples(rounded_up(roughest, 1.25), float(np.ceil(10.0 * span)) / 10.0, tolerance) - 1
     if steepest > 0.0:
         count += _samples(rounded_up(steepest, 1.25), float(np.ceil(10.0 * span)) / 10.0, tolerance) - 1
@@ -193,8 +193,8 @@ def _softened(front: ArrayPaths, frequency: Floats, decay: Floats, tolerance: fl
         front.loss, rate(at(count))
     )
     left = np.exp(-exponent)
-    if front.rough_share.any():
-        left *= rough_factor(at(count), front.rough_share, front.rough_delay)
+    if front.coherent_fraction.any():
+        left *= rough_factor(at(count), front.coherent_fraction, front.height_delay_std)
     return left, np.asarray(interpolation(place, Axis(count)).T)
 
 

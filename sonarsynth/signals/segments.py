@@ -91,12 +91,12 @@ def _supports(
     (path,) are silent, blurred or from a facet that is not rough."""
     if not front.count:
         return np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0, bool)
-    chosen, rough = sonar.antialias, front.rough_share > 0.0
+    chosen, rough = sonar.antialias, front.coherent_fraction > 0.0
     spread = widest_spread(front)
-    blur, least = np.sqrt(front.variance + spread), np.sqrt(np.maximum(front.variance - spread, 0.0))
+    delay_std, least = np.sqrt(front.variance + spread), np.sqrt(np.maximum(front.variance - spread, 0.0))
     turned = (front.phase != 0.0) | front.turn_terms.any(axis=1)
     longest = [at_longest(s.waveform) for s in snaps]
-    roughest = float(front.rough_delay[rough].max(initial=0.0))
+    roughest = float(front.height_delay_std[rough].max(initial=0.0))
 
     def each(turned: Bools, rough: Bools) -> Floats:
         out, kinds = np.empty((2, front.count)), front.coherent + 2 * turned + 4 * rough
@@ -110,15 +110,15 @@ def _supports(
     none, silent = np.zeros(front.count, bool), np.zeros(front.count, bool)
     plain = each(none, none)
     support = each(turned, rough) if turned.any() or roughest else plain
-    if blur.any():
+    if delay_std.any():
         silent = least >= np.array([silencing_blur(w, chosen) for w in longest])[arrivals.snap]
     if rough.any():
         highest = np.array([stop_frequency(chosen)])
-        left = rough_factor(highest, front.rough_share, front.rough_delay)[:, 0]
+        left = rough_factor(highest, front.coherent_fraction, front.height_delay_std)[:, 0]
         silent |= left <= SUPPORT_TOLERANCE
     a, b, c = front.corners.T
     wide = np.stack([-np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)])
-    return plain, support * (1.0 + np.abs(front.doppler)) + np.where(silent, 0.0, PULSE_FEET * blur) + wide, silent
+    return plain, support * (1.0 + np.abs(front.doppler)) + np.where(silent, 0.0, PULSE_FEET * delay_std) + wide, silent
 
 
 def _extent(

@@ -181,7 +181,7 @@ class _Doppler(NamedTuple):
     rate_out: Floats  # (path,) of the way to it,
     rate_in: Floats  # (path,) and from there
     of_array: Floats  # (path,) by the motion of the array
-    stretch: Floats  # (path,)
+    doppler: Floats  # (path,)
 
     def select(self, rows: Ints) -> _Doppler:
         """The paths picked by indices."""
@@ -208,18 +208,18 @@ def _over_aperture(
     turning = np.sqrt(dot(of.velocity, of.velocity)) / legs.length + np.sqrt(sonar @ sonar) / legs.radius  # rad/s
     some = np.flatnonzero(MAX_CHANGE * turning * elements.aperture / c_array > enough)
     if not len(some):
-        return np.empty((len(of.stretch), 0)), np.empty((len(of.stretch), 0))
-    probe, doppler, leg = probes(elements), of.select(some), legs.select(some)
+        return np.empty((len(of.doppler), 0)), np.empty((len(of.doppler), 0))
+    probe, rates, leg = probes(elements), of.select(some), legs.select(some)
     turn = turned(leg, probe.position[:QUADRATIC_PROBES], pose.turn_to_body(sonar) / c_array)
-    of_array = -dot(turn, pose.turn_to_body(sonar)) / c_array + doppler.of_array[:, None]
-    rate_in = doppler.rate_in[:, None]
+    of_array = -dot(turn, pose.turn_to_body(sonar)) / c_array + rates.of_array[:, None]
+    rate_in = rates.rate_in[:, None]
     if departure is not None:
         away = departure()[some]
-        rate_in = -np.einsum("px,pqx->pq", doppler.velocity, away) / profile.at(depth(leg.point))[:, None]
-    there = (1.0 + rate_in) / ((1.0 - doppler.rate_out[:, None]) * (1.0 - of_array)) - 1.0
-    straight = np.einsum("px,pqx->pq", pose.turn_to_body(doppler.mirrored), turn) / c_array
-    both = there - doppler.stretch[:, None], rate_in - doppler.rate_in[:, None] - straight
-    found = np.zeros((2, len(of.stretch), SECOND_DEGREE))
+        rate_in = -np.einsum("px,pqx->pq", rates.velocity, away) / profile.at(depth(leg.point))[:, None]
+    there = (1.0 + rate_in) / ((1.0 - rates.rate_out[:, None]) * (1.0 - of_array)) - 1.0
+    straight = np.einsum("px,pqx->pq", pose.turn_to_body(rates.mirrored), turn) / c_array
+    both = there - rates.doppler[:, None], rate_in - rates.rate_in[:, None] - straight
+    found = np.zeros((2, len(of.doppler), SECOND_DEGREE))
     for terms, values in zip(found, both, strict=True):
         terms[some] = probe.fit_few(values)[0][:, :SECOND_DEGREE]
     return found[0], found[1]
@@ -260,10 +260,10 @@ def apply_doppler(
     c, c_array = profile.at(depth(legs.point)), float(profile.at(depth(array.pose.position)))
     rate_out, rate_in = dot(of.velocity, out.arrival) / c, -dot(of.velocity, legs.departure) / c
     of_array = dot(legs.arrival, array.velocity) / c_array
-    stretch = (1.0 + rate_in) / ((1.0 - rate_out) * (1.0 - of_array)) - 1.0
-    doppler = _Doppler(of.velocity, mirrored(of.velocity, legs.bounces), rate_out, rate_in, of_array, stretch)
-    over, faster = _over_aperture(doppler, legs, array, profile, elements, departure, enough)
+    doppler = (1.0 + rate_in) / ((1.0 - rate_out) * (1.0 - of_array)) - 1.0
+    rates = _Doppler(of.velocity, mirrored(of.velocity, legs.bounces), rate_out, rate_in, of_array, doppler)
+    over, faster = _over_aperture(rates, legs, array, profile, elements, departure, enough)
     along = (of_array / (1.0 - of_array) * elements.aperture / c_array)[:, None] * legs.direction
     moves = array.velocity.any() and elements.aperture > 0.0
     terms = _later(made.delay_terms, of.late[:, None] * faster, along if moves else None)
-    return replace(made, stretch=stretch, stretch_terms=over, delay_terms=terms)
+    return replace(made, doppler=doppler, doppler_terms=over, delay_terms=terms)

@@ -79,8 +79,8 @@ class EchoBatch:
         if not (isinstance(self.part, CoherentKirchhoff) and self.part.turns):
             return np.zeros(departure.shape[:2])
         away = self.body.pose.turn_to_body(departure)
-        at_centre = self.part.phase(self.incident, self.scattered)[:, None]
-        more = self.part.phase(self.incident[:, None, :], away) - at_centre
+        seen_from_centre = self.part.phase(self.incident, self.scattered)[:, None]
+        more = self.part.phase(self.incident[:, None, :], away) - seen_from_centre
         return np.asarray(more - 2.0 * np.pi * np.rint(more / (2.0 * np.pi)))
 
     @property
@@ -118,9 +118,9 @@ class EchoBatch:
         if not isinstance(self.part, CoherentKirchhoff | Shadow):
             return np.zeros(departure.shape[:2])
         away, speed = self.body.pose.turn_to_body(departure), 2.0 * np.pi * centre / self.wavenumber
-        at_centre = self.part.spread(self.incident, self.scattered, self.patch, speed)
+        seen_from_centre = self.part.spread(self.incident, self.scattered, self.patch, speed)
         over = self.part.spread(self.incident[:, None, :], away, self.patch.over(), speed[:, None])
-        return np.asarray(over - at_centre[:, None])
+        return np.asarray(over - seen_from_centre[:, None])
 
     @property
     def spot(self) -> Floats:
@@ -169,5 +169,5 @@ def echo_batches(
 def in_band(pulses: PulseResponse, band: tuple[float, float]) -> Floats:
     """What roughness leaves of each pulse (path,) at most, at any frequency of the band (Hz)."""
     low, high = (2.0 * np.pi * f for f in band)
-    rough = np.sqrt(1.0 - pulses.rough_share * np.exp(-((high * pulses.rough_delay) ** 2)))
-    return np.asarray(np.exp(-0.5 * (low * pulses.blur) ** 2) * rough)
+    rough = np.sqrt(1.0 - pulses.coherent_fraction * np.exp(-((high * pulses.height_delay_std) ** 2)))
+    return np.asarray(np.exp(-0.5 * (low * pulses.delay_std) ** 2) * rough)

@@ -303,5 +303,5 @@ def _spread(found: _EchoBlock, over: ExpansionTerms, most: float) -> ExpansionTe
     array, share = found.array, np.abs(found.strength) / max(most, 1e-300)
     more = np.concatenate([g.spread(found.departure(g.row, QUADRATIC_PROBES), array.centre) for g in found.groups])
     terms, misfit = probes(array.elements, array.degree).fit_few(more)
-    blur = over.blur + terms if over.blur.shape[1] else terms
-    return over._replace(blur=blur, error=over.error + share * np.pi * array.band[1] * misfit)
+    delay_std = over.delay_std + terms if over.delay_std.shape[1] else terms
+    return over._replace(delay_std=delay_std, error=over.error + share * np.pi * array.band[1] * misfit)

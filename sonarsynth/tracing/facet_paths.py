@@ -116,9 +116,9 @@ class FacetPaths:
         some = self.legs.select(number)
         side = self.facets.clear[some.row], self.facets.normal[some.row]
         some = self.view(self.bodies).settled(some, *side)
-        hidden_from = legs.hidden_from.copy()
-        hidden_from[legs.open] = some.hidden_from[row]
-        return legs.seen(hidden_from, np.zeros(len(leg), bool))
+        occluded = legs.occluded.copy()
+        occluded[legs.open] = some.occluded[row]
+        return legs.seen(occluded, np.zeros(len(leg), bool))
 
     @property
     def centre(self) -> float:

@@ -42,8 +42,8 @@ class ReceivePaths:
     caustics: Ints  # (leg,)
     boundary: Floats  # (leg,) product of the moduli of reflection
     phase: Floats  # (leg,) rad of reflections and caustics
-    blur: Floats  # (leg,) s
-    hidden_from: Bytes  # (leg, byte) as of `Arrivals`
+    delay_std: Floats  # (leg,) s
+    occluded: Bytes  # (leg, byte) as of `Arrivals`
     open: Bools  # (leg,) bodies hide it from some hydrophones: which ones, is not known yet (`shading.settled`)
 
     def select(self, keep: Bools | Ints | slice) -> ReceivePaths:
@@ -54,9 +54,9 @@ class ReceivePaths:
         """The legs with other numbers (leg,) for the points that they start from."""
         return replace(self, row=row)
 
-    def seen(self, hidden_from: Bytes, open: Bools) -> ReceivePaths:
+    def seen(self, occluded: Bytes, open: Bools) -> ReceivePaths:
         """The legs, hidden from some hydrophones, which are not known yet for some."""
-        return replace(self, hidden_from=hidden_from, open=open)
+        return replace(self, occluded=occluded, open=open)
 
     @property
     def bounces(self) -> Ints:
@@ -129,8 +129,8 @@ def rays_to_centre(
         caustics=paths.caustics[keep],
         boundary=bounced.modulus[keep],
         phase=bounced.phase[keep],
-        blur=bounced.blur[keep],
-        hidden_from=np.zeros((len(keep), 0), np.uint8),
+        delay_std=bounced.delay_std[keep],
+        occluded=np.zeros((len(keep), 0), np.uint8),
         open=np.zeros(len(keep), bool),
     )
 

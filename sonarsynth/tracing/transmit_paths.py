@@ -33,14 +33,14 @@ class TransmitPaths:
     caustics: Ints  # (way,)
     boundary: Floats  # (way,)
     phase: Floats  # (way,) rad
-    blur: Floats  # (way,) s
+    delay_std: Floats  # (way,) s
 
     @staticmethod
     def of(paths: Paths, bounced: Reflections, facet: Ints) -> TransmitPaths:
         """Of paths to facets (path,)."""
         return TransmitPaths(
             facet, paths.arrival, paths.travel_time, paths.length, paths.spreading, paths.surface, paths.bottom,
-            paths.turning, paths.caustics, bounced.modulus, bounced.phase, bounced.blur,
+            paths.turning, paths.caustics, bounced.modulus, bounced.phase, bounced.delay_std,
         )  # fmt: skip
 
     @staticmethod
@@ -59,7 +59,9 @@ class TransmitPaths:
         """The ways with those that coincide added up: from a snap on the bed, say, and its image there."""
         first = np.ones(len(self.facet), bool)
         same = (np.diff(self.facet) == 0) & (np.abs(np.diff(self.travel_time)) < COINCIDENCE_TIME)
-        first[1:] = ~(same & (np.diff(self.blur) == 0) & (np.abs(np.diff(self.arrival, axis=0)) < 1e-9).all(axis=1))
+        first[1:] = ~(
+            same & (np.diff(self.delay_std) == 0) & (np.abs(np.diff(self.arrival, axis=0)) < 1e-9).all(axis=1)
+        )
         if first.all():
             return self
         number = np.cumsum(first) - 1
@@ -92,7 +94,7 @@ def assemble(
         radius=legs.radius,
         delay_terms=over.delay,
         phase_terms=over.phase,
-        blur_terms=over.blur,
+        delay_variance_terms=over.delay_std,
         amplitude_terms=variation[0],
         amplitude=first * scattering * second * boundary * 10.0 ** (-loss / 20.0),
         spreading_out=first,
@@ -111,15 +113,15 @@ def assemble(
         caustics=out.caustics + legs.caustics,
         arrives_by=np.asarray((legs.surface > 0) + 2 * (legs.bottom > 0)),
         phase=phase,
-        blur=np.hypot(np.hypot(out.blur, legs.blur), pulses.blur),
-        echo_blur=pulses.blur,
-        stretch=np.zeros(len(length)),
-        stretch_terms=np.empty((len(length), 0)),
+        delay_std=np.hypot(np.hypot(out.delay_std, legs.delay_std), pulses.delay_std),
+        echo_delay_std=pulses.delay_std,
+        doppler=np.zeros(len(length)),
+        doppler_terms=np.empty((len(length), 0)),
         coherent=pulses.coherent,
         corners=pulses.corners,
-        rough_share=pulses.rough_share,
-        rough_delay=pulses.rough_delay,
-        hidden_from=legs.hidden_from,
+        coherent_fraction=pulses.coherent_fraction,
+        height_delay_std=pulses.height_delay_std,
+        occluded=legs.occluded,
         centre=np.nan,
         sound_speed=np.nan,
         wavefront_error=float(over.error.max(initial=0.0)),

@@ -88,7 +88,7 @@ def test_coincident_ends_on_a_boundary_or_a_jump_take_no_time_to_search(
 ) -> None:
     """In a process of its own: a search without an end could not be interrupted."""
     code = (
-        "import numpy as np; from sonarsynth.equations import rays\n"
+        "import numpy as np; from sonarsynth.equations.rays import ray_solutions as rays\n"
         f"water = rays.water(np.array({depths}), np.array({speeds}), 50.0)\n"
         f"found = rays.eigenrays(water, np.array([{at}]), np.array([{at}]), np.array([0.0]), 4, 4)\n"
         "print(len(found.pair), np.isfinite(found.travel_time).all(), (found.flag == rays.COINCIDENT).sum())"

@@ -37,8 +37,8 @@ def arrivals(delay: Floats, direction: Floats, radius: Floats, amplitude: Floats
         delay_terms=none,
         amplitude_terms=none,
         phase_terms=none,
-        blur_terms=none,
-        stretch_terms=none,
+        delay_variance_terms=none,
+        doppler_terms=none,
         amplitude=np.asarray(amplitude, float),
         spreading_out=one,
         spreading_in=one,
@@ -56,14 +56,14 @@ def arrivals(delay: Floats, direction: Floats, radius: Floats, amplitude: Floats
         caustics=zero,
         arrives_by=zero,
         phase=np.zeros(n),
-        blur=np.zeros(n),
-        echo_blur=np.zeros(n),
-        stretch=np.zeros(n),
+        delay_std=np.zeros(n),
+        echo_delay_std=np.zeros(n),
+        doppler=np.zeros(n),
         coherent=np.zeros(n, bool),
         corners=np.zeros((n, 3)),
-        rough_share=np.zeros(n),
-        rough_delay=np.zeros(n),
-        hidden_from=np.zeros((n, 0), np.uint8),
+        coherent_fraction=np.zeros(n),
+        height_delay_std=np.zeros(n),
+        occluded=np.zeros((n, 0), np.uint8),
         centre=55e3,
         sound_speed=C,
         wavefront_error=0.0,
@@ -181,10 +181,10 @@ def test_no_paths_are_silence(method: DirectSum | GriddedSynthesis) -> None:
         ({"radius": np.array([np.nan, 2.0])}, "arrival 0 has a radius that is not positive"),
         ({"snap": np.array([0, 1])}, r"snap outside 0\.\.0"),
         ({"phase": np.array([0.0, np.nan])}, "arrival 1 has phase that is not a finite number"),
-        ({"blur": np.array([np.inf, 0.0])}, "arrival 0 has blur that is not a finite number"),
-        ({"blur": np.array([0.0, -1e-9])}, "arrival 1 has a negative blur"),
-        ({"stretch": np.array([np.nan, 0.0])}, "arrival 0 has stretch that is not a finite number"),
-        ({"stretch": np.array([0.0, -0.1])}, r"arrival 1 has a stretch that is not within \+-0\.1"),
+        ({"delay_std": np.array([np.inf, 0.0])}, "arrival 0 has delay_std that is not a finite number"),
+        ({"delay_std": np.array([0.0, -1e-9])}, "arrival 1 has a negative delay_std"),
+        ({"doppler": np.array([np.nan, 0.0])}, "arrival 0 has stretch that is not a finite number"),
+        ({"doppler": np.array([0.0, -0.1])}, r"arrival 1 has a Doppler factor that is not within \+-0\.1"),
         (
             {"radius": np.array([0.2, 2.0]), "direction": np.array([[0.0, 0.0, 1.0]] * 2)},
             "arrival 0 comes from a hydrophone",
@@ -200,9 +200,9 @@ def test_what_cannot_be_synthesised_is_refused(
         method.signals(of, SNAPS, array, SONAR, None, -0.01, 4000)
 
 
-def shaped(of: Arrivals, phase: object, blur: object, stretch: object) -> Arrivals:
-    some = (np.broadcast_to(np.asarray(x, float), of.delay.shape).copy() for x in (phase, blur, stretch))
-    return replace(of, **dict(zip(("phase", "blur", "stretch"), some, strict=True)))
+def shaped(of: Arrivals, phase: object, delay_std: object, doppler: object) -> Arrivals:
+    some = (np.broadcast_to(np.asarray(x, float), of.delay.shape).copy() for x in (phase, delay_std, doppler))
+    return replace(of, **dict(zip(("phase", "delay_std", "doppler"), some, strict=True)))
 
 
 FEW = arrivals(
@@ -211,7 +211,7 @@ FEW = arrivals(
 
 
 @pytest.mark.parametrize(
-    ("phase", "blur", "stretch"),
+    ("phase", "delay_std", "doppler"),
     [
         (1e6, 0.0, 0.0),
         ([0.0, 1e300, -1e6], 0.0, 0.0),
@@ -225,8 +225,8 @@ FEW = arrivals(
         ([2.0, 1.0, 0.0], [0.0, 4e-6, 15e-6], [1e-3, 1e-3, -0.05]),
     ],
 )
-def test_any_shape_of_pulse(phase: object, blur: object, stretch: object) -> None:
-    of = shaped(FEW, phase, blur, stretch)
+def test_any_shape_of_pulse(phase: object, delay_std: object, doppler: object) -> None:
+    of = shaped(FEW, phase, delay_std, doppler)
     assert error_of(GriddedSynthesis(), of, ARRAY) < 1e-4
     assert error_of(GriddedSynthesis(), of.select(np.array([0])), ARRAY) < 1e-4
 

@@ -72,7 +72,7 @@ def test_nothing_falls_outside_and_the_echo_window_holds_the_echoes(which: str) 
     traced = trace_frame(made, 0)
     assert synthesise(made, traced).outside == 0
     found = traced.arrivals
-    audible = found.blur < 1e-4
+    audible = found.delay_std < 1e-4
     direct = found.delay[found.direct & (found.surface + found.bottom == 0)][0]
     echoes = found.delay[~found.direct & audible] - direct
     assert made.windows.echo_start <= echoes.min() and echoes.max() <= made.windows.echo_stop

@@ -9,6 +9,7 @@ import trimesh
 from sonarsynth.conventions import NO_TARGET
 from sonarsynth.environment.sea import Environment, Isovelocity, Profile
 from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.geometry import mesh as meshes
 from sonarsynth.geometry.mesh import Mesh, in_blocks
 from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
@@ -19,7 +20,6 @@ from sonarsynth.receiver import BeamGrid, Romanis, elements
 from sonarsynth.scattering import Kirchhoff, MirrorLobe, PartlyReflecting, Scattering
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Snap, WorldState
-from sonarsynth.targets import meshes
 from sonarsynth.tracing import echoes
 from sonarsynth.tracing.arrivals import trace
 
@@ -79,7 +79,7 @@ def test_arrivals_are_the_same_whatever_the_block(monkeypatch: pytest.MonkeyPatc
 def test_what_was_given_up_too_soon_is_looked_at_again(monkeypatch: pytest.MonkeyPatch, case: str) -> None:
     whole = found(*CASES[case])
     monkeypatch.setattr(meshes, "BLOCK", 2500)
-    monkeypatch.setattr(echoes, "FAINTER", 1e5)
+    monkeypatch.setattr(echoes, "PRUNE_MARGIN", 1e5)
     for name, value in vars(found(*CASES[case])).items():
         np.testing.assert_array_equal(value, getattr(whole, name), err_msg=name)
 

@@ -81,10 +81,10 @@ def alone(
     return traced(moving, part.elements, pose, bounces=bounces, profile=profile), part.elements
 
 
-def stretch(found: Arrivals, array: Elements, sensor: int) -> Floats:
+def doppler(found: Arrivals, array: Elements, sensor: int) -> Floats:
     """Doppler (path,) at a hydrophone."""
     terms = aperture_terms(array.position[sensor], array.aperture)
-    return np.asarray(found.stretch + found.stretch_terms @ terms[: found.stretch_terms.shape[1]])
+    return np.asarray(found.doppler + found.doppler_terms @ terms[: found.doppler_terms.shape[1]])
 
 
 def smaller(share: float) -> Elements:
@@ -97,8 +97,8 @@ def worst(moving: Moving, array: Elements, bounces: int) -> tuple[float, float]:
     errors = []
     for sensor in FAR:
         own, _ = alone(moving, int(sensor), array, bounces=bounces)
-        mine = np.abs(stretch(one, array, int(sensor)) - own.stretch).max()
-        errors.append((mine, np.abs(one.stretch - own.stretch).max()))
+        mine = np.abs(doppler(one, array, int(sensor)) - own.doppler).max()
+        errors.append((mine, np.abs(one.doppler - own.doppler).max()))
     first, second = zip(*errors, strict=True)
     return max(first), max(second)
 
@@ -139,14 +139,14 @@ def echoes(moving: Moving) -> Arrivals:
 
 def flat(found: Arrivals) -> Arrivals:
     """With the Doppler of the array centre everywhere."""
-    return replace(found, stretch_terms=np.zeros((len(found.delay), 0)))
+    return replace(found, doppler_terms=np.zeros((len(found.delay), 0)))
 
 
 @pytest.mark.parametrize("amplify", [1.0, 20.0])
 def test_kernel_deposit_adds_what_the_direct_sum_adds(amplify: float) -> None:
     """To the first power: the second is left out."""
     found = echoes(MOVING["both"])
-    found = replace(found, stretch_terms=amplify * found.stretch_terms)
+    found = replace(found, doppler_terms=amplify * found.doppler_terms)
     part = over_far()
     fast, slow = (
         heard(method, found, part) - heard(method, flat(found), part)
@@ -165,7 +165,7 @@ def heard(method: GriddedSynthesis | DirectSum, found: Arrivals, part: Elements)
 def test_one_path_alone_is_the_direct_sum() -> None:
     found = traced(MOVING["array"], ROMANIS, POSE)
     found = found.select(found.direct)
-    assert len(found.delay) == 1 and found.stretch_terms.any()
+    assert len(found.delay) == 1 and found.doppler_terms.any()
     fast, slow = (
         np.asarray(m.signals(found, (SNAP,), ROMANIS, SONAR, None, 0.009, 800).pressure, float)
         for m in (GriddedSynthesis(tolerance=1e-6, precision="float64"), DirectSum())
@@ -175,9 +175,9 @@ def test_one_path_alone_is_the_direct_sum() -> None:
 
 def test_nothing_is_carried_where_it_would_not_be_heard() -> None:
     slow = Moving(0.1 * FAST, STILL)
-    assert traced(slow, ROMANIS, POSE, enough=QUADRATIC_TOLERANCE).stretch_terms.shape[1] == 0
-    assert traced(Moving(STILL, STILL), ROMANIS, POSE).stretch_terms.shape[1] == 0
-    assert traced(MOVING["target"], ROMANIS, POSE, enough=QUADRATIC_TOLERANCE).stretch_terms.shape[1] > 0
+    assert traced(slow, ROMANIS, POSE, enough=QUADRATIC_TOLERANCE).doppler_terms.shape[1] == 0
+    assert traced(Moving(STILL, STILL), ROMANIS, POSE).doppler_terms.shape[1] == 0
+    assert traced(MOVING["target"], ROMANIS, POSE, enough=QUADRATIC_TOLERANCE).doppler_terms.shape[1] > 0
 
 
 def test_delays_of_bent_rays_from_what_moves_are_those_of_each_hydrophone() -> None:

@@ -95,7 +95,7 @@ def test_amplitude_and_response_are_the_kirchhoff_integral(size: float) -> None:
     corners, incident, scattered = facet(1, size)
     of = echo_of(corners[None], incident, scattered, 0.0)
     f = np.linspace(0.0, 1e5, 257)
-    response = facet_response(f, of.coherent, of.corners, of.rough_share, of.rough_delay, of.centre)
+    response = facet_response(f, of.coherent, of.corners, of.coherent_fraction, of.height_delay_std, of.centre)
     exact = facet_amplitude(corners, incident, scattered, 2.0 * np.pi * f / C)
     np.testing.assert_allclose(of.amplitude[0] * response[0], exact, atol=1e-14 * of.amplitude[0])
 
@@ -190,8 +190,8 @@ def test_what_is_missing_from_the_coherent_echo_is_sent_without_phase(method: Di
     """Powers of both parts add up to that of the smooth facet at every frequency: exp(-g^2) and 1 - exp(-g^2)."""
     height = 2e-6  # s
     plain = paths([0.03, 0.0301], [1.0, 0.3])
-    blurred = replace(plain, blur=np.full(2, height))
-    rough = replace(plain, rough_share=np.ones(2), rough_delay=np.full(2, height))
+    blurred = replace(plain, delay_std=np.full(2, height))
+    rough = replace(plain, coherent_fraction=np.ones(2), height_delay_std=np.full(2, height))
     a, b, c = (np.abs(np.fft.rfft(heard(x, method=method))) ** 2 for x in (plain, blurred, rough))
     np.testing.assert_allclose(b + c, a, atol=1e-9 * a.max())
     assert 0.1 < b.sum() / a.sum() < 0.9
@@ -207,10 +207,10 @@ def test_limits_of_roughness() -> None:
         (1.0, 1e-4, 1.0),
         (1.0, 1e300, 1.0),
     ):
-        got = heard(replace(plain, rough_share=np.array([share]), rough_delay=np.array([delay])))
+        got = heard(replace(plain, coherent_fraction=np.array([share]), height_delay_std=np.array([delay])))
         assert error(got, expected * whole) < 1e-9
     for method in (*METHODS, GriddedSynthesis()):
-        nothing = replace(plain, rough_share=np.ones(1))
+        nothing = replace(plain, coherent_fraction=np.ones(1))
         assert not heard(nothing, method=method).any()
     f = np.geomspace(1.0, 1e6, 50)
     small = rough_factor(f, np.ones(1), np.array([1e-15]))[0]  # g to its last digit, not a difference of ones
@@ -223,7 +223,7 @@ def test_columns_that_say_nothing_change_no_bit(method: DirectSum | GriddedSynth
     array = some_of(FACES, 60)
     start, samples = window(of, margin=2e-3)
     rng = np.random.default_rng(7)
-    same = replace(of, rough_delay=rng.uniform(0.0, 1e-3, of.delay.size), centre=np.nan)
+    same = replace(of, height_delay_std=rng.uniform(0.0, 1e-3, of.delay.size), centre=np.nan)
     one, two = (method.signals(x, SNAPS, array, SHARP, absorption, start, samples).pressure for x in (of, same))
     np.testing.assert_array_equal(one, two)
 
@@ -250,8 +250,8 @@ def test_a_reshaped_pulse_is_over_after_its_support(chosen: BandPass | LowPass |
     sonar = Sonar(filter=chosen)
     left = 1e-5 if chosen is None else 5e-7  # 80 dB down and beyond half the sampling frequency
     for sloped, rough in ((True, 0.0), (False, 3e-8), (False, 5e-6)):
-        shape = {"coherent": np.array([sloped]), "rough_share": np.array([1.0 * (rough > 0.0)])}
-        of = paths([0.05], [1.0], **shape, rough_delay=np.array([rough]))
+        shape = {"coherent": np.array([sloped]), "coherent_fraction": np.array([1.0 * (rough > 0.0)])}
+        of = paths([0.05], [1.0], **shape, height_delay_std=np.array([rough]))
         before, after = pulse_support(waveform(MODEL), sonar.antialias, sloped=sloped, rough=rough)
         start, samples = window(of, sonar, 12e-3)
         got = np.abs(exact_signals(of, SNAPS, ONE, sonar, None, start, samples)[0][0])

@@ -61,10 +61,12 @@ def both(*found: Arrivals) -> list[Arrivals]:
 
 def means(found: Arrivals, q: Floats) -> Floats:
     """What facets and blurs make of the pulse (path, frequency) at a place in the sonar frame."""
-    more = found.blur_terms @ aperture_terms(q, ROMANIS.aperture) if found.blur_terms.shape[1] else 0.0
-    soft = np.exp(-0.5 * np.multiply.outer(found.blur**2 + more, (2.0 * np.pi * EDGES) ** 2))
+    more = (
+        found.delay_variance_terms @ aperture_terms(q, ROMANIS.aperture) if found.delay_variance_terms.shape[1] else 0.0
+    )
+    soft = np.exp(-0.5 * np.multiply.outer(found.delay_std**2 + more, (2.0 * np.pi * EDGES) ** 2))
     return soft * facet_response(
-        EDGES, found.coherent, found.corners, found.rough_share, found.rough_delay, found.centre
+        EDGES, found.coherent, found.corners, found.coherent_fraction, found.height_delay_std, found.centre
     )
 
 
@@ -80,8 +82,8 @@ def test_what_a_facet_makes_of_the_pulse_is_that_of_a_hydrophone_alone(
     In a shadow wave the phases over a facet are largest, and so are the higher moments.
     """
     found, shared = traced(law, PLACE, ROMANIS, 0.0), traced(law, PLACE, ROMANIS, 1.0)
-    assert found.blur_terms.shape[1] > 0
-    assert shared.blur_terms.shape[1] == 0
+    assert found.delay_variance_terms.shape[1] > 0
+    assert shared.delay_variance_terms.shape[1] == 0
     for sensor in FAR:
         q = ROMANIS.position[sensor]
         exact, mine, flat = both(alone(law, int(sensor)), found, shared)
@@ -95,10 +97,10 @@ def test_what_a_facet_makes_of_the_pulse_is_that_of_a_hydrophone_alone(
 def test_a_facet_is_blurred_and_sharpened_by_turns() -> None:
     """A variance below 0 where the array sees the facet more squarely; 0 at its centre."""
     found = traced(Kirchhoff(), PLACE, ROMANIS, 0.0)
-    over = found.blur_terms @ aperture_terms(ROMANIS.position, ROMANIS.aperture).T
+    over = found.delay_variance_terms @ aperture_terms(ROMANIS.position, ROMANIS.aperture).T
     assert over.min() < 0.0 < over.max()
-    assert np.abs(found.blur_terms[:, 0]).max() == 0.0
-    assert not found.blur.any()
+    assert np.abs(found.delay_variance_terms[:, 0]).max() == 0.0
+    assert not found.delay_std.any()
 
 
 def test_the_fast_synthesis_follows_facets_over_the_array() -> None:
@@ -111,6 +113,6 @@ def test_the_fast_synthesis_follows_facets_over_the_array() -> None:
         got, _ = method.pressure(found, (SNAP,), part, SONAR, None, start, samples)
         assert np.abs(got - exact).max() < most * np.abs(exact).max()
     flat, _ = exact_signals(
-        replace(found, blur_terms=np.zeros((len(found.delay), 0))), (SNAP,), part, SONAR, None, start, samples
+        replace(found, delay_variance_terms=np.zeros((len(found.delay), 0))), (SNAP,), part, SONAR, None, start, samples
     )
     assert np.abs(flat - exact).max() > 4e-4 * np.abs(exact).max()

@@ -61,7 +61,9 @@ def heard(
 
 def transfer(found: Arrivals, sensor: Floats | None = None) -> Floats:
     """Pressure (frequency,) at the array centre, or at a sensor (xyz), for a snap of unit spectrum at 1 m."""
-    shape = facet_response(F, found.coherent, found.corners, found.rough_share, found.rough_delay, found.centre)
+    shape = facet_response(
+        F, found.coherent, found.corners, found.coherent_fraction, found.height_delay_std, found.centre
+    )
     delay, amplitude = found.delay, found.amplitude
     if sensor is not None:
         away = np.linalg.norm(found.radius[:, None] * found.direction - sensor, axis=1)
@@ -74,7 +76,7 @@ def transfer(found: Arrivals, sensor: Floats | None = None) -> Floats:
             delay = delay + found.delay_terms @ terms[: found.delay_terms.shape[1]]
         amplitude = amplitude * found.radius / away * gain
     phase = found.phase[:, None] - 2.0 * np.pi * delay[:, None] * F
-    left = np.exp(-0.5 * np.multiply.outer(found.blur, 2.0 * np.pi * F) ** 2)
+    left = np.exp(-0.5 * np.multiply.outer(found.delay_std, 2.0 * np.pi * F) ** 2)
     return (amplitude[:, None] * shape * left * np.exp(1j * phase)).sum(axis=0)
 
 
@@ -262,7 +264,7 @@ def test_a_body_that_moves_keeps_its_shadow() -> None:
     met = place + velocity * 10.0 / C
     still = heard((body(mesh, met),), source)
     np.testing.assert_allclose(transfer(moved), transfer(still), atol=2e-3 * np.abs(straight(source)).max())
-    assert np.abs(moved.stretch).max() < 1e-5  # ahead there is no Doppler
+    assert np.abs(moved.doppler).max() < 1e-5  # ahead there is no Doppler
 
 
 def test_bent_rays_are_cancelled_like_straight_ones() -> None:

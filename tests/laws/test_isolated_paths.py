@@ -24,7 +24,7 @@ from tests.scenes import point_scene, remus
 def test_each_isolated_path_is_found_in_its_signals(method: GriddedSynthesis | DirectSum) -> None:
     """Turned, blurred, rough, coherent over a facet, absorbed, stretched by Doppler, of another gain: all as said."""
     of = some_paths(160, 6)
-    of = replace(of, stretch=np.random.default_rng(6).uniform(-5e-3, 5e-3, 160))
+    of = replace(of, doppler=np.random.default_rng(6).uniform(-5e-3, 5e-3, 160))
     book = booked(of)
     found = np.isfinite(book.isolated_level)
     assert (found == (book.paths > 0)).all()
@@ -37,18 +37,18 @@ def test_each_isolated_path_is_found_in_its_signals(method: GriddedSynthesis | D
 @pytest.mark.parametrize(
     "extreme",
     [
-        {"blur": 3e-5},  # 110 dB less
+        {"delay_std": 3e-5},  # 110 dB less
         {"absorption": 200.0},
         {"corners": (-0.7e-3, -0.3e-3, 1e-3)},  # 400 rad over the facet
         {"corners": (0.0, 0.0, 0.0)},
-        {"stretch": -0.09},
-        {"rough_share": 1.0, "rough_delay": 1e-10},
+        {"doppler": -0.09},
+        {"coherent_fraction": 1.0, "height_delay_std": 1e-10},
         {"scattering": 1e-12},
     ],
     ids=str,
 )
 def test_extreme_paths_are_found_too(extreme: dict[str, float]) -> None:
-    one = replace(some_paths(1, 9, coherent="corners" in extreme), blur=np.zeros(1))
+    one = replace(some_paths(1, 9, coherent="corners" in extreme), delay_std=np.zeros(1))
     one = replace(one, **{name: np.array([value]) for name, value in extreme.items()})
     product = one.scattering * one.spreading_out * one.spreading_in * one.boundary
     book = booked(replace(one, amplitude=product * 10.0 ** (-one.absorption / 20.0)))
@@ -59,7 +59,7 @@ def test_extreme_paths_are_found_too(extreme: dict[str, float]) -> None:
 
 def test_the_isolated_path_is_the_loudest_and_silent_ones_are_none() -> None:
     of = some_paths(300, 7)
-    loud = replace(of, blur=np.where(np.arange(300) % 2, 1e-3, of.blur))  # 1 ms of blur leaves nothing
+    loud = replace(of, delay_std=np.where(np.arange(300) % 2, 1e-3, of.delay_std))  # 1 ms of blur leaves nothing
     book, band = booked(loud), the_band()
     each = (np.abs(transfer(loud, band.frequency, band.relative)) ** 2 * band.weight[loud.snap]).sum(axis=1)
     rows = np.argwhere(np.isfinite(book.isolated_level))
@@ -68,8 +68,8 @@ def test_the_isolated_path_is_the_loudest_and_silent_ones_are_none() -> None:
         assert 10 * np.log10(each[mine].max()) + LEVEL[snap] == pytest.approx(
             book.isolated_level[snap, target, kind], abs=0.02
         )
-        assert book.isolated.blur[n] < 1e-3
-    silent = booked(replace(of, blur=np.full(300, 1e-3)))
+        assert book.isolated.delay_std[n] < 1e-3
+    silent = booked(replace(of, delay_std=np.full(300, 1e-3)))
     assert not np.isfinite(silent.isolated_level).any()
     assert (silent.paths == book.paths).all()
 

@@ -63,19 +63,21 @@ def some_paths(count: int, seed: int, *, coherent: bool | None = None, spread: f
         bottom=rng.integers(0, 2, count),
         arrives_by=rng.integers(0, 2, count),
         phase=rng.uniform(-3.0, 3.0, count),
-        blur=rng.choice([0.0, 2e-6], count) * rng.uniform(0.5, 1.0, count),
+        delay_std=rng.choice([0.0, 2e-6], count) * rng.uniform(0.5, 1.0, count),
         coherent=phases,
         corners=(corners - corners.mean(axis=1, keepdims=True)) * phases[:, None],
-        rough_share=np.where(phases, 0.0, rng.uniform(0.0, 1.0, count)),
-        rough_delay=np.where(phases, 0.0, rng.uniform(0.0, 1e-5, count)),
+        coherent_fraction=np.where(phases, 0.0, rng.uniform(0.0, 1.0, count)),
+        height_delay_std=np.where(phases, 0.0, rng.uniform(0.0, 1e-5, count)),
     )
 
 
 def transfer(of: Arrivals, f: Floats, relative: Floats) -> np.ndarray:
     """(path, bin) of each path, written out."""
-    facet = facet_response(f, of.coherent, of.corners, of.rough_share, of.rough_delay, of.centre)
+    facet = facet_response(f, of.coherent, of.corners, of.coherent_fraction, of.height_delay_std, of.centre)
     turn = np.exp(1j * of.phase[:, None] - 2j * np.pi * np.outer(of.delay, f))
-    lost = 10.0 ** (-np.outer(of.absorption, relative) / 20.0) * np.exp(-0.5 * (2 * np.pi * np.outer(of.blur, f)) ** 2)
+    lost = 10.0 ** (-np.outer(of.absorption, relative) / 20.0) * np.exp(
+        -0.5 * (2 * np.pi * np.outer(of.delay_std, f)) ** 2
+    )
     return of.amplitude[:, None] * facet * turn * lost
 
 
@@ -119,7 +121,7 @@ def test_losses_are_means_of_the_losses_of_paths_and_phases_are_in_the_scatterin
     """All paths alike but for place: a common loss is that of each, whatever the phases do."""
     of = some_paths(60, 2, coherent=True)
     zero = np.zeros(60, np.int64)
-    same = {"snap": zero, "target": zero, "surface": zero, "bottom": zero, "blur": np.zeros(60)}
+    same = {"snap": zero, "target": zero, "surface": zero, "bottom": zero, "delay_std": np.zeros(60)}
     of = replace(of, spreading_out=np.full(60, 0.1), spreading_in=np.full(60, 0.05), boundary=np.full(60, 0.5), **same)
     of = replace(of, absorption=np.zeros(60), amplitude=of.scattering * 0.1 * 0.05 * 0.5)
     terms = {name: value[0, 0, 0] for name, value in levels_of(booked(of)).items()}
@@ -138,8 +140,10 @@ def test_what_a_rough_facet_does_not_mirror_is_in_its_scattering_and_what_the_be
     of = replace(of, boundary=np.ones(1), absorption=np.zeros(1), amplitude=of.spreading_out * of.spreading_in)
     of = replace(of, scattering=np.ones(1), corners=np.zeros((1, 3)))
 
-    def terms(blur: float, echo_blur: float) -> tuple[float, float]:
-        book = levels_of(booked(replace(of, blur=np.array([blur]), echo_blur=np.array([echo_blur]))))
+    def terms(delay_std: float, echo_delay_std: float) -> tuple[float, float]:
+        book = levels_of(
+            booked(replace(of, delay_std=np.array([delay_std]), echo_delay_std=np.array([echo_delay_std])))
+        )
         return float(np.nanmax(book["scattering"])), float(np.nanmax(book["boundary_loss"]))
 
     band = the_band()

@@ -64,7 +64,7 @@ def test_one_expansion_hears_what_each_hydrophone_sees(law: Kirchhoff, better: f
     start, part = found.delay.min() - 2e-4, replace(ARRAY, **{n: getattr(ARRAY, n)[FAR] for n in ROWS})
     assert found.hidden(ARRAY.count)[:, FAR].any()
     exact = np.vstack([heard(alone(law, int(n)), SINGLE, start) for n in FAR])
-    mine, plain = (np.linalg.norm(heard(x.heard_by(FAR, ARRAY.count), part, start) - exact) for x in (found, centre))
+    mine, plain = (np.linalg.norm(heard(x.for_sensors(FAR, ARRAY.count), part, start) - exact) for x in (found, centre))
     assert mine < 3e-4 * np.linalg.norm(exact)
     assert better * mine < plain
 
@@ -74,10 +74,10 @@ def test_facets_that_the_centre_does_not_see_are_heard_where_they_are_seen() -> 
 
     Least alike are those that the snap grazes as well: their amplitudes turn within the array."""
     found, scale = traced(Kirchhoff(), PLACE, ARRAY), aperture_terms(ARRAY.position[FAR], ARRAY.aperture)
-    beyond = found.hidden_from[:, 0] >= 128
+    beyond = found.occluded[:, 0] >= 128
     assert (found.amplitude[beyond] < 0.0).all()
     assert (found.amplitude[~beyond] > 0.0).all()
-    assert not found.at_centre.hidden_from.any()
+    assert not found.seen_from_centre.occluded.any()
     for n, sensor in enumerate(FAR):
         exact = alone(Kirchhoff(), int(sensor))
         away = found.radius[:, None] * found.direction - ARRAY.position[sensor]

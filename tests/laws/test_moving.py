@@ -87,21 +87,21 @@ def test_delays_and_stretches_of_echoes_by_every_family(v, u, time: float) -> No
                         heard(time + t, centre[found.facet[i]], v, flip * u, source, array)[1] for t in (0.0, 1e-3)
                     )
                     options.append((at, (later - at) / 1e-3 - 1.0))
-        at, stretch = min(options, key=lambda o: abs(o[0] - found.delay[i]))
+        at, doppler = min(options, key=lambda o: abs(o[0] - found.delay[i]))
         fast = np.linalg.norm(v) + np.linalg.norm(u)
         assert found.delay[i] == pytest.approx(at, abs=5e-12)
-        assert found.stretch[i] == pytest.approx(stretch, abs=2e-9 + 2e-6 * fast**2 / 30.0 + 1e-7 * fast)
+        assert found.doppler[i] == pytest.approx(doppler, abs=2e-9 + 2e-6 * fast**2 / 30.0 + 1e-7 * fast)
         seen.add((found.surface[i], found.bottom[i]))
     assert len(seen) == 3
 
 
 def test_still_things_change_nothing_and_a_receding_target_stretches_the_pulse() -> None:
     a, b = run(bounces=1), run(bounces=1, moving=None)
-    assert all(np.array_equal(getattr(a, n), getattr(b, n)) for n in ("delay", "direction", "radius", "stretch"))
+    assert all(np.array_equal(getattr(a, n), getattr(b, n)) for n in ("delay", "direction", "radius", "doppler"))
     away = run((2.0, 0.0, 0.0), bodies=(ball((15.0, 0.0, -5.0)),))
-    echoes = away.stretch[~away.direct]
+    echoes = away.doppler[~away.direct]
     assert (echoes > 0).all() and echoes.max() < 2 * 2.0 / C * 1.01
-    assert away.stretch[away.direct] == pytest.approx(0.0, abs=0)
+    assert away.doppler[away.direct] == pytest.approx(0.0, abs=0)
 
 
 @pytest.mark.parametrize("time", [0.0, -0.1, 0.1])

@@ -40,15 +40,17 @@ ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
 METHODS = (DirectSum(), GriddedSynthesis(precision="float64", width=14, tolerance=1e-9))
 
 
-def shaped(of: Arrivals, seed: int, *, phase: float = 10.0, blur: float = 20e-6, stretch: float = 3e-3) -> Arrivals:
+def shaped(
+    of: Arrivals, seed: int, *, phase: float = 10.0, delay_std: float = 20e-6, doppler: float = 3e-3
+) -> Arrivals:
     """Random shapes, of a few different stretches (each costs the exact sum a spectrum); some paths stay plain."""
     rng, n = np.random.default_rng(seed), of.delay.size
     some = rng.random((3, n)) < 0.8
     return replace(
         of,
         phase=np.where(some[0], rng.uniform(-phase, phase, n), 0.0),
-        blur=np.where(some[1], rng.uniform(0.0, blur, n), 0.0),
-        stretch=np.where(some[2], rng.choice(stretch * np.array([-1.0, -0.3, 0.8, 1.0]), n), 0.0),
+        delay_std=np.where(some[1], rng.uniform(0.0, delay_std, n), 0.0),
+        doppler=np.where(some[2], rng.choice(doppler * np.array([-1.0, -0.3, 0.8, 1.0]), n), 0.0),
     )
 
 
@@ -59,10 +61,10 @@ def window(of: Arrivals, sonar: Sonar, aperture: float, margin: float = 4e-4) ->
     return start, int((stop - start) * sonar.sampling_frequency) + 1
 
 
-def alone(sonar: Sonar, phase: float = 0.0, blur: float = 0.0, stretch: float = 0.0) -> tuple[Floats, Floats]:
+def alone(sonar: Sonar, phase: float = 0.0, delay_std: float = 0.0, doppler: float = 0.0) -> tuple[Floats, Floats]:
     """Times after the collapse (sample,) and the exact pressure (sample,) of one path at one hydrophone."""
     of = arrivals([0.05], [[1.0, 0.0, 0.0]], [10.0], [1.0])
-    of = replace(of, phase=np.array([phase]), blur=np.array([blur]), stretch=np.array([stretch]))
+    of = replace(of, phase=np.array([phase]), delay_std=np.array([delay_std]), doppler=np.array([doppler]))
     start, samples = window(of, sonar, 0.0, 6e-3)
     got, signals = exact_signals(of, SNAPS, ONE, sonar, None, start, samples)
     assert signals.outside == 0
@@ -83,21 +85,21 @@ def test_a_quarter_turn_is_less_the_hilbert_transform() -> None:
 
 def test_a_blur_is_a_gaussian_in_time() -> None:
     """Convolved in time with the Gaussian of that standard deviation, by Gauss-Hermite quadrature."""
-    blur = 7e-6
-    t, got = alone(SHARP, blur=blur)
+    delay_std = 7e-6
+    t, got = alone(SHARP, delay_std=delay_std)
     near = np.abs(t) < 3e-4
     x, w = np.polynomial.hermite_e.hermegauss(24)
-    delayed = [filters.filtered_pulse(t[near] - blur * late, bubble(MODEL), fir(SHARP.antialias)) for late in x]
+    delayed = [filters.filtered_pulse(t[near] - delay_std * late, bubble(MODEL), fir(SHARP.antialias)) for late in x]
     expected = w @ delayed / w.sum()
     assert error(got[near], expected) < 1e-8
 
 
-@pytest.mark.parametrize("stretch", [3e-3, -3e-2])
-def test_a_stretched_snap_is_that_of_a_slower_bubble(stretch: float) -> None:
+@pytest.mark.parametrize("doppler", [3e-3, -3e-2])
+def test_a_stretched_snap_is_that_of_a_slower_bubble(doppler: float) -> None:
     """p(t/(1 + s)) is (1 + s)^2 times the pressure of the bubble that lives 1 + s times as long; then the filter."""
-    t, got = alone(SHARP, stretch=stretch)
+    t, got = alone(SHARP, doppler=doppler)
     one = bubble(MODEL)
-    longer = 1.0 + stretch
+    longer = 1.0 + doppler
     slower = Bubble(one.a, one.k / longer, one.m * longer, one.q / longer, one.density)
     near = np.abs(t) < 3e-4
     expected = longer**2 * filters.filtered_pulse(t[near], slower, fir(SHARP.antialias))
@@ -137,10 +139,10 @@ def test_kernel_deposit_is_the_exact_sum(method: GriddedSynthesis, bound: float)
     assert 1e-14 < error(got, exact) < bound
 
 
-@pytest.mark.parametrize(("phase", "blur"), [(1.0, 0.0), (0.0, 20e-6), (10.0, 20e-6)])
-def test_many_shapes_over_the_whole_array(phase: float, blur: float) -> None:
+@pytest.mark.parametrize(("phase", "delay_std"), [(1.0, 0.0), (0.0, 20e-6), (10.0, 20e-6)])
+def test_many_shapes_over_the_whole_array(phase: float, delay_std: float) -> None:
     """Enough paths that nodes pay, in tiles of many modes; looked at where the rim and the middle are."""
-    of = shaped(target_at(20.0, 300, 5, direct=False), 6, phase=phase, blur=blur, stretch=0.0)
+    of = shaped(target_at(20.0, 300, 5, direct=False), 6, phase=phase, delay_std=delay_std, doppler=0.0)
     some = np.append(np.argsort(-np.linalg.norm(FACES.position, axis=1), kind="stable")[:2], 250)
     part = elements(PositionTable(positions=tuple(map(tuple, FACES.position[some].tolist())), face=FACES.face))
     start, samples = window(of, SONAR, FACES.aperture)
@@ -205,8 +207,8 @@ def test_blurs_add_by_squares_and_end_in_silence(method: DirectSum | GriddedSynt
     of = arrivals([0.05, 0.0502], [[1.0, 0.0, 0.0], [1.0, 0.1, 0.0]], [10.0, 11.0], [1.0, 0.4])
     start, samples = window(of, SHARP, 0.0, 2e-3)
 
-    def heard(*blur: float) -> Floats:
-        soft = replace(of, blur=np.array(blur))
+    def heard(*delay_std: float) -> Floats:
+        soft = replace(of, delay_std=np.array(delay_std))
         got = method.signals(soft, SNAPS, ONE, SHARP, None, start, samples)
         assert got.outside == 0
         return got.pressure[0].astype(float)
@@ -226,7 +228,7 @@ def test_shared_shapes_cost_no_modes() -> None:
     """Where all paths have one shape, what is deposited is what plain pulses deposit: only their spectrum differs."""
     of = target_at(15.0, 6, 10, direct=False)
     start, samples = window(of, SHARP, 0.0, 1e-3)
-    once = replace(of, phase=np.full(6, 0.8), blur=np.full(6, 4e-6), stretch=np.full(6, 2e-3))
+    once = replace(of, phase=np.full(6, 0.8), delay_std=np.full(6, 4e-6), doppler=np.full(6, 2e-3))
     exact, _ = exact_signals(once, SNAPS, ONE, SHARP, None, start, samples)
     got, _ = GriddedSynthesis(width=14, precision="float64", tolerance=1e-10).pressure(
         once, SNAPS, ONE, SHARP, None, start, samples
@@ -237,11 +239,11 @@ def test_shared_shapes_cost_no_modes() -> None:
 # ---- the modes -------------------------------------------------------------------------------------------------------
 
 
-def pulses(phase: Floats, blur: Floats, stretch: Floats, f: Floats, samples: int) -> ComplexArray:
+def pulses(phase: Floats, delay_std: Floats, doppler: Floats, f: Floats, samples: int) -> ComplexArray:
     """The spectra (path, bin) that the definition gives."""
     rate, chosen = SHARP.sampling_frequency, SHARP.antialias
-    S = [pulse_spectrum(waveform(MODEL), chosen, rate, samples, float(s))[1][: f.size] for s in stretch]
-    return np.exp(1j * phase[:, None] - 0.5 * (2 * np.pi * np.multiply.outer(blur, f)) ** 2) * S
+    S = [pulse_spectrum(waveform(MODEL), chosen, rate, samples, float(s))[1][: f.size] for s in doppler]
+    return np.exp(1j * phase[:, None] - 0.5 * (2 * np.pi * np.multiply.outer(delay_std, f)) ** 2) * S
 
 
 @pytest.mark.parametrize(("tolerance", "most"), [(1e-3, 10), (1e-6, 22)])
@@ -254,15 +256,17 @@ def test_modes_are_the_definition(tolerance: float, most: int) -> None:
         of,
         amplitude=np.ones(n),
         phase=rng.uniform(-1.5, 1.5, n),
-        blur=rng.uniform(0.0, 10e-6, n),
-        stretch=rng.uniform(-1e-3, 1e-3, n),
+        delay_std=rng.uniform(0.0, 10e-6, n),
+        doppler=rng.uniform(-1e-3, 1e-3, n),
     )
     series = stretched_spectra(waveform(MODEL), SHARP.antialias, SHARP.sampling_frequency, samples, 2.0**-9, 4)
     front = array_paths(of, SNAPS, ONE)
     front = replace(front, loss=front.loss - front.loss.mean())
     decay = absorption(f)
     modes = shape_modes(front, f[some], spectrum[some], decay[some], series[:, some], 2.0**-9, tolerance)
-    exact = (pulses(of.phase, of.blur, of.stretch, f, samples) * np.exp(-np.multiply.outer(front.loss, decay)))[:, some]
+    exact = (pulses(of.phase, of.delay_std, of.doppler, f, samples) * np.exp(-np.multiply.outer(front.loss, decay)))[
+        :, some
+    ]
     apart = np.abs(modes.weight @ modes.spectrum - exact)
     assert apart.mean(axis=1).max() < 3.0 * tolerance * np.abs(exact).mean(axis=1).max()
     assert modes.weight.shape[1] <= most
@@ -270,7 +274,7 @@ def test_modes_are_the_definition(tolerance: float, most: int) -> None:
 
 def test_phases_alone_are_two_modes() -> None:
     f, spectrum = pulse_spectrum(waveform(MODEL), SHARP.antialias, SHARP.sampling_frequency, 384)
-    of = shaped(target_at(15.0, 50, 13, direct=False), 14, blur=0.0, stretch=0.0)
+    of = shaped(target_at(15.0, 50, 13, direct=False), 14, delay_std=0.0, doppler=0.0)
     none, front = np.zeros((0, 130), complex), array_paths(of, SNAPS, ONE)
     modes = shape_modes(front, f[40:170], spectrum[40:170], np.zeros(130), none, 0.0, 1e-9)
     assert modes.weight.shape == (50, 2)

@@ -85,8 +85,12 @@ def heard(found: Arrivals, q: Floats) -> Floats:
     late = found.delay + (away - found.radius) / C + over(found.delay_terms)
     amplitude = found.amplitude * found.radius / away * (1.0 + over(found.amplitude_terms))
     phase = found.phase + over(found.phase_terms)
-    soft = np.exp(-0.5 * np.multiply.outer(found.blur**2 + over(found.blur_terms), (2.0 * np.pi * EDGES) ** 2))
-    shape = facet_response(EDGES, found.coherent, found.corners, found.rough_share, found.rough_delay, found.centre)
+    soft = np.exp(
+        -0.5 * np.multiply.outer(found.delay_std**2 + over(found.delay_variance_terms), (2.0 * np.pi * EDGES) ** 2)
+    )
+    shape = facet_response(
+        EDGES, found.coherent, found.corners, found.coherent_fraction, found.height_delay_std, found.centre
+    )
     turn = np.exp(1j * (phase[:, None] - 2.0 * np.pi * late[:, None] * EDGES))
     return amplitude[:, None] * soft * shape * turn
 
@@ -131,7 +135,7 @@ def test_each_family_at_the_edges_of_the_band_is_that_of_a_hydrophone_alone(scen
         exact = alone(*scene, sensor=sensor)
         mine, theirs = both(found, exact)
         q = ROMANIS.position[sensor]
-        flat = replace(mine, phase_terms=none[: len(mine.delay)], blur_terms=none[: len(mine.delay)])
+        flat = replace(mine, phase_terms=none[: len(mine.delay)], delay_variance_terms=none[: len(mine.delay)])
         truth = heard(theirs, np.zeros(3))
         all_echoes = np.linalg.norm(truth[~theirs.direct], axis=0)
         family = 64 * (mine.target + 1) + 16 * mine.surface + 4 * mine.bottom + mine.arrives_by
@@ -163,7 +167,7 @@ def test_signals_of_one_expansion_are_those_of_each_hydrophone_alone(scene: tupl
 def test_boundaries_that_are_alike_at_all_angles_need_no_terms() -> None:
     found = traced(SeaSurface(), HARD, MirrorLobe(width=0.5), PLACE)
     assert (found.surface > 0).any() and (found.bottom > 0).any()
-    assert found.phase_terms.shape == found.blur_terms.shape == (len(found.delay), 0)
+    assert found.phase_terms.shape == found.delay_variance_terms.shape == (len(found.delay), 0)
 
 
 def test_every_edge_of_a_blur_is_within_the_window_or_counted() -> None:
@@ -172,7 +176,7 @@ def test_every_edge_of_a_blur_is_within_the_window_or_counted() -> None:
     one = found.select(np.flatnonzero(found.direct & (found.surface == 1) & (found.bottom == 0)))
     terms = np.zeros((1, 20))
     terms[0, [1, 4, 7, 9]] = 0.0, 0.0, 4e-10, 4e-10
-    one = replace(one, blur_terms=terms, phase_terms=np.zeros((1, 0)))
+    one = replace(one, delay_variance_terms=terms, phase_terms=np.zeros((1, 0)))
     array = few()
     exact = DirectSum().signals(one, (SNAP,), array, SONAR, None, START, 4000).pressure
     got = GriddedSynthesis(precision="float64", tolerance=1e-6).signals(one, (SNAP,), array, SONAR, None, START, 4000)
@@ -191,7 +195,9 @@ def few(count: int = 20) -> Elements:
 def test_the_fast_synthesis_changes_pulses_as_the_exact_one_does(amplify: float) -> None:
     """Both kinds of change at once, families mixed, and as they are or four times as large."""
     found = traced(*SCENES[3].values[0], PLACE)
-    found = replace(found, phase_terms=amplify * found.phase_terms, blur_terms=amplify * found.blur_terms)
+    found = replace(
+        found, phase_terms=amplify * found.phase_terms, delay_variance_terms=amplify * found.delay_variance_terms
+    )
     found = found.select(np.concatenate([np.flatnonzero(found.direct), np.flatnonzero(~found.direct)[::80]]))
     array = few()
     for direct in (True, False):

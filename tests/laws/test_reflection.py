@@ -16,7 +16,7 @@ from sonarsynth.environment.boundaries import (
     SeaSurface,
     Sediment,
 )
-from sonarsynth.environment.boundary_numbers import blur, bounces, coefficient, rms_height
+from sonarsynth.environment.boundary_numbers import bounces, coefficient, delay_std, rms_height
 from sonarsynth.equations.water.boundary_reflection import (
     bubble_loss,
     eckart,
@@ -121,7 +121,7 @@ def test_every_medium_that_may_be_described_has_finite_passive_coefficients(
 def test_the_blur_is_eckarts_loss_at_every_frequency() -> None:
     f = np.geomspace(1.0, 1e6, 40)[:, None]
     q, height, c = GRAZING, 0.02, 1531.0
-    by_blur = np.exp(-0.5 * (2 * np.pi * f * blur(SeaBed(rms_height=height), q, c)) ** 2)
+    by_blur = np.exp(-0.5 * (2 * np.pi * f * delay_std(SeaBed(rms_height=height), q, c)) ** 2)
     np.testing.assert_allclose(by_blur, eckart(2 * np.pi * f / c, height, q), rtol=1e-9, atol=1e-300)
 
 
@@ -132,7 +132,7 @@ def test_eckarts_loss_is_the_mean_over_a_rough_boundary() -> None:
     f, q, c = 40e3, 0.4, 1500.0
     delay = 2 * rough.rms_height * nodes * np.sin(q) / c
     mean = np.sum(weights * np.exp(-2j * np.pi * f * delay)) / np.sqrt(2 * np.pi)
-    assert np.exp(-0.5 * (2 * np.pi * f * blur(rough, q, c)) ** 2) == pytest.approx(mean, abs=1e-13)
+    assert np.exp(-0.5 * (2 * np.pi * f * delay_std(rough, q, c)) ** 2) == pytest.approx(mean, abs=1e-13)
 
 
 def test_bounces_are_the_product_of_single_reflections() -> None:
@@ -142,7 +142,7 @@ def test_bounces_are_the_product_of_single_reflections() -> None:
     np.testing.assert_allclose(got.modulus * np.exp(1j * got.phase), coefficient(bed, q) ** count, rtol=1e-13)
     f = 30e3
     np.testing.assert_allclose(
-        np.exp(-0.5 * (2 * np.pi * f * got.blur) ** 2), eckart(2 * np.pi * f / c, 0.02, q) ** count, rtol=1e-11
+        np.exp(-0.5 * (2 * np.pi * f * got.delay_std) ** 2), eckart(2 * np.pi * f / c, 0.02, q) ** count, rtol=1e-11
     )
 
 
@@ -150,19 +150,19 @@ def test_a_path_without_reflections_is_left_as_it_is() -> None:
     for boundary in (SeaSurface(wind_speed=9.0, bubbles=True), SeaBed(rms_height=0.1)):
         got = bounces(boundary, np.array([np.nan, 0.2]), np.array([0, 0]), np.nan, 50e3)
         assert got.modulus.tolist() == [1.0, 1.0]
-        assert got.phase.tolist() == got.blur.tolist() == [0.0, 0.0]
+        assert got.phase.tolist() == got.delay_std.tolist() == [0.0, 0.0]
 
 
 def test_a_reflection_at_no_angle_is_not_a_number() -> None:
     got = bounces(SeaBed(), np.array([np.nan, 0.2]), np.array([1, 1]), 1500.0)
-    for value in (got.modulus, got.phase, got.blur):
+    for value in (got.modulus, got.phase, got.delay_std):
         assert np.isnan(value).tolist() == [True, False]
 
 
 def test_no_angle_is_no_reflection_to_the_single_coefficient() -> None:
     for boundary in (SeaSurface(wind_speed=9.0, bubbles=True), SeaBed(), SeaBed(reflection=TABLE)):
         assert coefficient(boundary, [np.nan], 50e3).tolist() == [1.0]
-        assert blur(boundary, [np.nan], 1500.0).tolist() == [0.0]
+        assert delay_std(boundary, [np.nan], 1500.0).tolist() == [0.0]
 
 
 @pytest.mark.parametrize("reflection", [PressureRelease(), FluidHalfSpace(density_ratio=1e-9, speed_ratio=0.5)])
@@ -216,7 +216,7 @@ def test_wind_raises_the_waves_of_the_fully_developed_spectrum() -> None:
     assert rms_height(SeaSurface(wind_speed=0.0)) == 0.0
     assert wind_wave_height(1.5 * u) == pytest.approx(2.25 * wind_wave_height(u), rel=1e-14)
     expected = roughness_blur(np.sqrt(variance), 0.3, 1500.0)
-    assert blur(SeaSurface(wind_speed=u), 0.3, 1500.0) == pytest.approx(expected, rel=1e-5)
+    assert delay_std(SeaSurface(wind_speed=u), 0.3, 1500.0) == pytest.approx(expected, rel=1e-5)
 
 
 def test_bubbles_take_their_loss_and_nothing_else() -> None:
@@ -226,7 +226,7 @@ def test_bubbles_take_their_loss_and_nothing_else() -> None:
     np.testing.assert_allclose(-20 * np.log10(ratio.real), bubble_loss(8.0, 50e3, q), rtol=1e-11)
     np.testing.assert_array_equal(ratio.imag, 0.0)
     assert coefficient(windy, 0.0, 50e3) == 0.0
-    np.testing.assert_array_equal(blur(calm, q, 1500.0), blur(windy, q, 1500.0))
+    np.testing.assert_array_equal(delay_std(calm, q, 1500.0), delay_std(windy, q, 1500.0))
 
 
 def test_the_loss_in_bubbles_is_continuous_where_waves_begin_to_break() -> None:

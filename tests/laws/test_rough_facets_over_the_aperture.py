@@ -98,7 +98,7 @@ def errors(
     place = Pose(PLACE, EAST).to_world(array.position[FAR])
     alone = [bounced(traced(law, view, at, SINGLE, profile, bounces), bounces) for at in place]
     exact = np.vstack([heard(x, SINGLE, start) for x in alone])
-    shared = replace(found, amplitude_terms=plain.amplitude_terms, blur_terms=np.zeros((len(found.delay), 0)))
+    shared = replace(found, amplitude_terms=plain.amplitude_terms, delay_variance_terms=np.zeros((len(found.delay), 0)))
     one, two = (float(np.linalg.norm(heard(x, part, start) - exact)) for x in (found, shared))
     size = float(np.linalg.norm(exact))
     return one / size, two / size
@@ -174,7 +174,7 @@ def test_echoes_come_from_their_points(profile: Profile, bounces: int) -> None:
 
 def test_the_fast_synthesis_follows_rough_facets_over_the_array() -> None:
     found, array = traced(ROUGH, GRAZING, PLACE, array_of(1.0)), array_of(1.0)
-    assert found.blur_terms.any()
+    assert found.delay_variance_terms.any()
     start, snap = found.delay.min() - 2e-4, Snap(PLACE, 0.0, LogarithmicBubble(), None)
     exact = heard(found, array, start)
     for tolerance, most in ((1.5e-4, 2e-4), (1e-6, 3e-6)):
@@ -189,4 +189,4 @@ def test_surfaces_that_are_not_rough_have_no_such_terms() -> None:
     for law in (Kirchhoff(diffuse=1.0), Kirchhoff(roughness=0.3, slope=0.2)):
         found = traced(law, NORMAL, PLACE, array_of(1.0))
         assert len(found.delay) > 50
-        assert not found.blur_terms.any()
+        assert not found.delay_variance_terms.any()

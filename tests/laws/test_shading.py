@@ -69,7 +69,7 @@ def test_convex_and_alone_nothing_is_hidden_from_some() -> None:
     one, other = arrivals_of(made, frame), arrivals_of(seen, frame)
     hidden = other.hidden(made.elements.count).any(axis=1)
     assert hidden.mean() < 0.1  # facets of the flanks, in the shade of others for some
-    np.testing.assert_array_equal(np.sort(one.delay), np.sort(other.at_centre.delay))
+    np.testing.assert_array_equal(np.sort(one.delay), np.sort(other.seen_from_centre.delay))
 
 
 def test_truth_and_ledger_are_of_the_centre() -> None:
@@ -123,7 +123,7 @@ def test_kernel_deposit_keeps_silent_where_the_exact_sum_does(hidden: int, step:
     start, samples = window(of, SONAR, array)
     exact, _ = exact_signals(of, SNAPS, array, SONAR, absorption, start, samples)
     got = GriddedSynthesis().signals(of, SNAPS, array, SONAR, absorption, start, samples).pressure
-    plain = GriddedSynthesis().signals(of.at_centre, SNAPS, array, SONAR, absorption, start, samples).pressure
+    plain = GriddedSynthesis().signals(of.seen_from_centre, SNAPS, array, SONAR, absorption, start, samples).pressure
     late = slice(int((of.delay[of.target == 0].min() - 1e-3 - start) * SONAR.sampling_frequency), None)
     assert error(got[:, late], exact[:, late]) < 1e-4
     assert error(got, exact) < 1e-4
@@ -134,13 +134,13 @@ def partly_hidden(of: Arrivals, count: int, sensors: int = FACES.count) -> Arriv
     """Some of the paths hidden from random hydrophones, the direct one too."""
     dark = np.zeros((len(of.delay), 1 + sensors), np.uint8)
     dark[-count:, 1:] = np.random.default_rng(count).integers(0, 2, (count, sensors))
-    return replace(of, hidden_from=np.packbits(dark, axis=1))
+    return replace(of, occluded=np.packbits(dark, axis=1))
 
 
 def test_hydrophones_keep_their_own_shade() -> None:
     of = partly_hidden(target_at(8.0, 40, 2), 20)
     rows = np.array([400, 3, 77])
-    np.testing.assert_array_equal(of.heard_by(rows, FACES.count).hidden(3), of.hidden(FACES.count)[:, rows])
+    np.testing.assert_array_equal(of.for_sensors(rows, FACES.count).hidden(3), of.hidden(FACES.count)[:, rows])
 
 
 def test_shade_of_another_array_is_refused() -> None:

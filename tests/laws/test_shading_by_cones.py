@@ -71,7 +71,7 @@ def shaded(bodies: tuple[PlacedTarget, ...], array: Elements, rays: Propagation,
     seen = view.settled(seen, *side)
     assert not seen.open.any()
     found = np.ones_like(alone)
-    found[seen.caustics] = np.unpackbits(seen.hidden_from, axis=1, count=1 + array.count)[:, 1:]
+    found[seen.caustics] = np.unpackbits(seen.occluded, axis=1, count=1 + array.count)[:, 1:]
     np.testing.assert_array_equal(found, alone)
     return alone
 

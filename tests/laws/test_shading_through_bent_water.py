@@ -49,7 +49,7 @@ def seen_by_all(
     view = Occlusion(bodies, WATER, profile, SONAR, array, rays, degree)
     legs = view.visible(legs, facets.clear[legs.row], facets.normal[legs.row])
     legs = view.settled(legs, facets.clear[legs.row], facets.normal[legs.row])
-    hidden = np.unpackbits(legs.hidden_from, axis=1, count=1 + array.count)[:, 1:]
+    hidden = np.unpackbits(legs.occluded, axis=1, count=1 + array.count)[:, 1:]
     return names(legs), hidden.astype(bool)
 
 

@@ -107,8 +107,8 @@ def test_the_fast_synthesis_of_different_snaps_is_the_exact_one(tmp_path: Path) 
         of,
         snap=np.arange(20) % len(models),
         phase=random.choice([0.0, 0.3], 20),
-        blur=random.uniform(0.0, 5e-6, 20),
-        stretch=random.choice([-1e-3, 2e-3], 20),
+        delay_std=random.uniform(0.0, 5e-6, 20),
+        doppler=random.choice([-1e-3, 2e-3], 20),
     )
     for sonar in (SONAR, Sonar(filter=LOW, sampling_frequency=250e3)):
         start, samples = float(of.delay.min()) - 4e-3, int(9e-3 * sonar.sampling_frequency)

@@ -88,7 +88,7 @@ def test_in_uniform_water_every_path_is_that_of_an_image_of_source_and_array(mos
     assert rows.shape == expected.shape
     ways = [np.lexsort((np.round(r[:, 1], 12), r[:, 0])) for r in (rows, expected)]
     np.testing.assert_allclose(rows[ways[0]], expected[ways[1]], rtol=1e-11, atol=1e-16)
-    assert (found.phase == 0).all() and (found.blur == 0).all()
+    assert (found.phase == 0).all() and (found.delay_std == 0).all()
 
 
 def test_rays_in_nearly_uniform_water_are_the_straight_ones() -> None:
@@ -151,7 +151,9 @@ def test_the_bed_gives_its_coefficient_and_phase_and_the_surface_changes_the_sig
     assert found.boundary[1] == pytest.approx(abs(expected), rel=1e-12)
     assert found.phase[1] == pytest.approx(np.angle(expected), abs=1e-12)
     assert found.boundary[2] == -1.0 and found.phase[2] == 0.0
-    np.testing.assert_allclose(found.blur, [0.0, *(2 * np.array([0.003, 0.001]) * np.sin(grazing[1:]) / C)], rtol=1e-12)
+    np.testing.assert_allclose(
+        found.delay_std, [0.0, *(2 * np.array([0.003, 0.001]) * np.sin(grazing[1:]) / C)], rtol=1e-12
+    )
 
 
 def plate(centre, half, normal_axis: int) -> PlacedTarget:

@@ -116,7 +116,7 @@ def test_zarr_2_in_a_store_is_not_read(path: Path) -> None:
     (path / "image/zarr.json").unlink()
     (path / "image/.zgroup").write_text('{"zarr_format": 2}')
     with pytest.raises(FileNotFoundError):
-        zarr.open_group(store.place.opens(path / "image"), mode="r")
+        zarr.open_group(store.files.place.opens(path / "image"), mode="r")
 
 
 BESIDE = ("lock", "writers", "log.jsonl", "times.jsonl", "aside.jsonl")
@@ -171,7 +171,7 @@ def test_what_a_killed_build_left_is_removed(path: Path, made: Plan, left: str) 
         folder = path.with_name(name)
         folder.mkdir()
         if left != "nothing":
-            (folder / store.scratch.MARKER).touch()
+            (folder / store.files.scratch.MARKER).touch()
         if left == "half a store":
             shutil.copytree(path / "image", folder / "new")
     assert build(made, path, workers=0).ok
@@ -302,7 +302,7 @@ def forge(path: Path, change: Callable[[dict[str, object]], object]) -> None:
     root = json.loads((path / "zarr.json").read_text())
     change(root["attributes"])
     (path / "zarr.json").write_text(json.dumps(root))
-    files = {**layout.files, "zarr.json": store.place.record(path, "zarr.json")}
+    files = {**layout.files, "zarr.json": store.files.place.record(path, "zarr.json")}
     save_mark(path, Mark("layout", (), "", files, root["attributes"]))
 
 

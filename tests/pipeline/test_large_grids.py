@@ -36,7 +36,7 @@ def large(small_text: str) -> Recipe:
 def test_of_a_large_dataset_a_part_is_looked_at_and_the_rest_checked_when_rendered(
     small_text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sampled_frames, "LOOKED_AT", 60)
+    monkeypatch.setattr(sampled_frames, "MAX_SAMPLED_FRAMES", 60)
     recipe = large(small_text)
     made = planning.plan(recipe)
     assert made.looked_at == 60
@@ -59,7 +59,7 @@ def test_of_a_large_dataset_a_part_is_looked_at_and_the_rest_checked_when_render
 def test_unseen_frames_are_laid_as_they_would_be_if_seen(small_text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first sample of a frame is the same whether or not the plan looked at it."""
     recipe = large(small_text)
-    monkeypatch.setattr(sampled_frames, "LOOKED_AT", 60)
+    monkeypatch.setattr(sampled_frames, "MAX_SAMPLED_FRAMES", 60)
     few = planning.plan(recipe)
     frame = recipe.frame(0)[1]
     known = few.windows.start[0]
@@ -68,7 +68,7 @@ def test_unseen_frames_are_laid_as_they_would_be_if_seen(small_text: str, monkey
 
 
 def test_a_frame_that_does_not_fit_is_refused(small_text: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sampled_frames, "LOOKED_AT", 60)
+    monkeypatch.setattr(sampled_frames, "MAX_SAMPLED_FRAMES", 60)
     recipe = large(small_text)
     made = planning.plan(recipe)
     unseen = next(f for f in range(0, 30000, 3) if not np.isfinite(made.windows.start[f]))
@@ -84,7 +84,7 @@ def test_a_frame_that_does_not_fit_is_refused(small_text: str, monkeypatch: pyte
 def test_a_single_long_trajectory_is_looked_at_from_end_to_end(
     small_text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sampled_frames, "LOOKED_AT", 7)
+    monkeypatch.setattr(sampled_frames, "MAX_SAMPLED_FRAMES", 7)
     made = planning.plan(reading.loads(small_text))
     assert np.flatnonzero(np.isfinite(made.windows.start)).tolist() == [0, 3, 6, 10, 13, 16, 19]
 

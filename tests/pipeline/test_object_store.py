@@ -127,7 +127,7 @@ def test_killed_builds_are_resumed_to_the_same(bucket: str, small_file: Path, wh
         assert child.returncode in (-signal.SIGKILL, 0), said
         for number, mark in store.marks.load_marks(place, store.marks.marked(place)):
             assert isinstance(mark, store.Mark), number
-            found = dict(store.place.records(place, mark.files))
+            found = dict(store.files.place.records(place, mark.files))
             assert all(found[name] == kept or kept == store.marks.ABSENT for name, kept in mark.files.items())
     done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -173,7 +173,7 @@ def test_some_parts_of_the_array_stand_for_all(small: Recipe, monkeypatch: pytes
         heard.append(int(part.sensor[0]))
         return real(made, frame, part)
 
-    monkeypatch.setattr(benchmark_frames, "hear_part", hears)
+    monkeypatch.setattr(benchmark_frames, "subarray_signals", hears)
     alone, whole = benchmark_frames.try_frames(cut("sensors")), benchmark_frames.try_frames(cut(1))
     assert 2 <= len(set(heard)) <= benchmark_frames.PARTS
     assert alone.shard.files == pytest.approx(whole.shard.files, rel=0.05)

@@ -12,6 +12,7 @@ from sonarsynth.equations.bubble import bubble_collapse
 from sonarsynth.equations.bubble.bubble_collapse import Method
 from sonarsynth.sources.snap_models import KellerMiksis
 from sonarsynth.validation.bubbles import bubble_checks, bubbles_conserved, bubbles_extreme, bubbles_solvers
+from sonarsynth.validation.bubbles.all_bubbles import bubble_accuracy
 from sonarsynth.validation.bubbles.bubble_checks import described, exact
 from sonarsynth.validation.references.bubble_forms import acceleration, solve
 
@@ -78,7 +79,7 @@ def test_the_last_of_an_empty_cavity_is_rayleighs() -> None:
 
 
 def test_the_table_holds_and_says_what_is_solved_and_what_refused() -> None:
-    rows = bubble_checks.bubble_accuracy(quick=True)
+    rows = bubble_accuracy(quick=True)
     assert [row for row in rows if not row.ok] == []
     notes = {row.note.split(":")[0].split(",")[0] for row in rows if row.quantity == "verdict"}
     assert notes == {"solved", "refused"}

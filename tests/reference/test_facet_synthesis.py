@@ -34,7 +34,7 @@ PRECISE = GriddedSynthesis(precision="float64", width=14, tolerance=1e-10)
 
 
 def window(of: Arrivals, sonar: Sonar, margin: float = 5e-4) -> tuple[float, int]:
-    before, after = pulse_support(waveform(MODEL), sonar.antialias, turned=True, rough=float(of.rough_delay.max()))
+    before, after = pulse_support(waveform(MODEL), sonar.antialias, turned=True, rough=float(of.height_delay_std.max()))
     reach = FACES.aperture / C + margin
     start, stop = float(of.delay.min() - before - reach), float(of.delay.max() + after + reach)
     return start, int((stop - start) * sonar.sampling_frequency) + 1
@@ -49,15 +49,15 @@ def facets(
         of,
         coherent=rng.random(n) < coherent,
         corners=rng.uniform(-corners, corners, (n, 3)) * rng.random((n, 1)),
-        rough_share=np.where(rng.random(n) < 0.5, share, rng.uniform(0.0, share, n)),
-        rough_delay=rng.uniform(0.0, rough, n),
+        coherent_fraction=np.where(rng.random(n) < 0.5, share, rng.uniform(0.0, share, n)),
+        height_delay_std=rng.uniform(0.0, rough, n),
     )
 
 
 def shaped(of: Arrivals, seed: int) -> Arrivals:
     rng, n = np.random.default_rng(seed), of.delay.size
-    stretch = rng.choice([-1e-3, 0.0, 1e-3], n)
-    return replace(of, phase=rng.uniform(-9.0, 9.0, n), blur=rng.uniform(0.0, 5e-6, n), stretch=stretch)
+    doppler = rng.choice([-1e-3, 0.0, 1e-3], n)
+    return replace(of, phase=rng.uniform(-9.0, 9.0, n), delay_std=rng.uniform(0.0, 5e-6, n), doppler=doppler)
 
 
 KINDS = {
@@ -165,7 +165,9 @@ def test_facets_of_half_a_wavelength_are_few_modes() -> None:
         np.zeros((0, f.size), complex),
     )
     modes = shape_modes(front, f, spectrum, np.zeros(f.size), none, 0.0, 3e-6)
-    exact = facet_response(f, np.zeros(n, bool), front.corners, of.rough_share, of.rough_delay, 1.0) * spectrum
+    exact = (
+        facet_response(f, np.zeros(n, bool), front.corners, of.coherent_fraction, of.height_delay_std, 1.0) * spectrum
+    )
     apart = np.abs(modes.weight @ modes.spectrum - exact).mean(axis=1).max()
     assert apart < 1e-5 * np.abs(spectrum).mean()
     assert modes.weight.shape[1] <= 8
@@ -178,10 +180,10 @@ def test_what_is_no_facet_is_refused() -> None:
     for columns, message in (
         ({"corners": np.where(third[:, None], np.nan, np.zeros((n, 3)))}, "arrival 2 has corners that is not a finite"),
         ({"corners": np.where(third[:, None], [0.0, 0.02, 0.0], 0.0)}, "arrival 2 has corners that are not within"),
-        ({"rough_share": np.where(third, 1.1, 0.0)}, "arrival 2 has a rough_share that is not from 0 to 1"),
-        ({"rough_share": np.where(third, -0.1, 0.0)}, "arrival 2 has a rough_share"),
-        ({"rough_delay": np.where(third, -1e-9, 0.0)}, "arrival 2 has a negative rough_delay"),
-        ({"rough_delay": np.where(third, np.inf, 0.0)}, "arrival 2 has rough_delay that is not a finite"),
+        ({"coherent_fraction": np.where(third, 1.1, 0.0)}, "arrival 2 has a rough_share that is not from 0 to 1"),
+        ({"coherent_fraction": np.where(third, -0.1, 0.0)}, "arrival 2 has a rough_share"),
+        ({"height_delay_std": np.where(third, -1e-9, 0.0)}, "arrival 2 has a negative rough_delay"),
+        ({"height_delay_std": np.where(third, np.inf, 0.0)}, "arrival 2 has rough_delay that is not a finite"),
         ({"coherent": third, "centre": np.nan}, "centre of their band"),
     ):
         for method in (DirectSum(), GriddedSynthesis()):

@@ -11,7 +11,7 @@ from sonarsynth.imaging import AutoBeamforming, DenseDelayAndSum, FocusedDelayAn
 from sonarsynth.imaging.dense import dense_energies
 from sonarsynth.imaging.focus_error import focus_error, zones_for
 from sonarsynth.imaging.lattice_image import focused_energies, steered_zones, zoned_energies
-from sonarsynth.imaging.zones import corners, heard_by, lens, quadrant, zones_of
+from sonarsynth.imaging.zones import corners, for_sensors, lens, quadrant, zones_of
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
 
@@ -47,7 +47,7 @@ def applied(parts, beams, focus, zones):
     """Delays (elevation, azimuth, sensor) that each beam takes by the zones' own account, one beam at a time."""
     glass = lens(parts, focus, SPEED)
     delay = np.full((beams.elevations, beams.azimuths, parts.count), np.nan)
-    for zone in zones_of(glass, heard_by(parts, uniform(parts), BAND), beams, zones):
+    for zone in zones_of(glass, for_sensors(parts, uniform(parts), BAND), beams, zones):
         for row in range(zone.low, zone.high):
             for column in range(zone.near, zone.far):
                 u = quadrant(beams)[row, column]
@@ -95,7 +95,7 @@ def test_error_model_is_not_below_the_error_of_these_images_within_20_db_of_thei
     """
     parts, beams = elements(array), grid(span, 31)
     weight, glass = uniform(parts), lens(parts, focus, SPEED)
-    heard = heard_by(parts, weight, BAND)
+    heard = for_sensors(parts, weight, BAND)
     u = quadrant(beams)
     tried = [
         (z.estimate(glass, heard, u[at][None]), at) for z in zones_of(glass, heard, beams, zones) for at in corners(z)

@@ -182,6 +182,6 @@ def test_a_splitting_that_would_take_too_many_is_refused_before_it_is_done(monke
     plate = generate(Box(size=(1.0, 30.0, 0.3)))[0]
     assert len(split_long_edges(plate, 0.3)[1]) == 24352  # 3.4 times what its area would need
     monkeypatch.setattr(surfaces, "cut", None)  # nothing is cut
-    monkeypatch.setattr(surfaces, "most_facets", lambda: 19_000)
+    monkeypatch.setattr(surfaces, "max_facets", lambda: 19_000)
     with pytest.raises(MeshError, match=r"edges of 0\.3 m would take more than 19000 facets"):
         split_long_edges(plate, 0.3)

@@ -33,9 +33,17 @@ def plain(arrivals: Arrivals) -> Arrivals:
     none = np.zeros(len(arrivals.delay))
     terms = np.empty((len(none), 0))
     return replace(
-        arrivals, coherent=none.astype(bool), corners=0.0 * arrivals.corners, rough_share=none, rough_delay=none,
-        blur=none, phase=none, phase_terms=terms, blur_terms=terms, stretch_terms=terms,
-    )  # fmt: skip
+        arrivals,
+        coherent=none.astype(bool),
+        corners=0.0 * arrivals.corners,
+        coherent_fraction=none,
+        height_delay_std=none,
+        delay_std=none,
+        phase=none,
+        phase_terms=terms,
+        delay_variance_terms=terms,
+        doppler_terms=terms,
+    )
 
 
 def synthesise(plan: Plan, traced: TracedFrame) -> Signals:
@@ -60,7 +68,7 @@ def synthesis_ms(plan: Plan, index: int) -> tuple[float, float, float]:
         row=elements.row[some],
     )  # fmt: skip
     sonar, start = plan.scene.sonar, float(plan.windows.start[index])
-    heard = echoes.arrivals.heard_by(some, elements.count)
+    heard = echoes.arrivals.for_sensors(some, elements.count)
     exact, _ = exact_signals(heard, traced.frame.moment.snaps, few, sonar, plan.absorption, start, plan.windows.samples)
     times = []
     for make in (lambda a: a, plain):

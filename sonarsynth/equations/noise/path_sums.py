@@ -141,11 +141,11 @@ def _phasors(c: Floats, s: Floats, first: float, step: float, count: int) -> Non
 def mean_powers(
     snap: Ints,
     coherent: Bools,
-    rough_share: Floats,
-    rough_delay: Floats,
+    coherent_fraction: Floats,
+    height_delay_std: Floats,
     loss: Floats,
-    blur: Floats,
-    echo_blur: Floats,
+    delay_std: Floats,
+    echo_delay_std: Floats,
     frequency: Floats,
     relative: Floats,
     weight: Floats,
@@ -154,23 +154,23 @@ def mean_powers(
     """Means over the band (4, path) of the power of each path over that at its centre.
 
     First of what a facet does to the pulse, (f/centre)^2 of a coherent one (its mean left out) or 1 - w exp(-g^2) of a
-    rough one (`facet_pulses`); then with echo_blur (path,) s, the facet's part of the blur; then with absorption of
-    loss (path,) dB at the centre, relative (bin,) more at the other frequencies; then with the rest of the blur (path,)
-    s as well. weight (snap, bin) sums to 1.
+    rough one (`facet_pulses`); then with echo_delay_std (path,) s, the facet's part of it; then with absorption of
+    loss (path,) dB at the centre, relative (bin,) more at the other frequencies; then with the rest of delay_std
+    (path,) s as well. weight (snap, bin) sums to 1.
     """
     out = np.zeros((4, loss.size))
     omega = 2.0 * math.pi * frequency
     for e in range(loss.size):
         decay = math.log(10.0) / 10.0 * loss[e]
-        own = echo_blur[e] ** 2
-        others = max(blur[e] ** 2 - own, 0.0)
+        own = echo_delay_std[e] ** 2
+        others = max(delay_std[e] ** 2 - own, 0.0)
         for k in range(frequency.size):
             power = weight[snap[e], k]
             if coherent[e]:
                 power *= (frequency[k] / centre) ** 2
-            if rough_share[e] > 0.0:
-                g = omega[k] * rough_delay[e]
-                power *= 1.0 - rough_share[e] - rough_share[e] * math.expm1(-g * g)
+            if coherent_fraction[e] > 0.0:
+                g = omega[k] * height_delay_std[e]
+                power *= 1.0 - coherent_fraction[e] - coherent_fraction[e] * math.expm1(-g * g)
             out[0, e] += power
             if own > 0.0:
                 power *= math.exp(-(omega[k] ** 2) * own)

@@ -15,14 +15,21 @@ from sonarsynth.equations.scattering.kirchhoff_integral import Complexes, divide
 
 
 def facet_response(
-    frequency: Floats, coherent: Bools, corners: Floats, rough_share: Floats, rough_delay: Floats, centre: float
+    frequency: Floats,
+    coherent: Bools,
+    corners: Floats,
+    coherent_fraction: Floats,
+    height_delay_std: Floats,
+    centre: float,
 ) -> Complexes:
     """Factor (path, bin) on the spectra of pulses at frequencies (bin,) (Hz), exact.
 
     coherent, rough_share, rough_delay (path,) and corners (path, 3) in s as in `products.Arrivals`; centre f_c (Hz).
     """
     slope = np.where(coherent[:, None], 1j * frequency / centre, 1.0)
-    return np.asarray(facet_mean(frequency, corners) * slope * rough_factor(frequency, rough_share, rough_delay))
+    return np.asarray(
+        facet_mean(frequency, corners) * slope * rough_factor(frequency, coherent_fraction, height_delay_std)
+    )
 
 
 def facet_mean(frequency: Floats, corners: Floats) -> Complexes:

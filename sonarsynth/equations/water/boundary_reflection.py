@@ -99,10 +99,10 @@ def eckart(wavenumber: npt.ArrayLike, rms_height: npt.ArrayLike, grazing: npt.Ar
 
 
 def roughness_blur(rms_height: npt.ArrayLike, grazing: npt.ArrayLike, sound_speed: npt.ArrayLike) -> Floats:
-    """Time (s) that stands for a rough reflection at every frequency: `eckart` is exp(-(2 pi f blur)^2/2).
+    """Time (s) that stands for a rough reflection at every frequency: `eckart` is exp(-(2 pi f delay_std)^2/2).
 
-    blur = 2 h sin q/c: the rms of the delay from boundary that is a height h nearer or farther, with the sound speed c
-    (m/s) at the boundary. Roughness that differs from bounce to bounce adds its squares.
+    delay_std = 2 h sin q/c: the rms of the delay from boundary that is a height h nearer or farther, with the sound
+    speed c (m/s) at the boundary. Roughness that differs from bounce to bounce adds its squares.
     """
     h, q, c = (np.asarray(x, float) for x in (rms_height, grazing, sound_speed))
     return np.asarray(2.0 * h * np.abs(np.sin(q)) / c)

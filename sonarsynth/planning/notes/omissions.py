@@ -184,8 +184,8 @@ def reflected_bound(plan: Plan) -> str:
         tuple(MirrorLobe() if law.coherent else law for law in scene.laws),
         band=(sonar.band.low, sonar.band.high),
     )
-    blur = np.exp(-0.5 * (2 * np.pi * sonar.band.centre * found.blur) ** 2)
-    power, more = (found.amplitude * blur) ** 2, found.surface + found.bottom > bounces
+    delay_std = np.exp(-0.5 * (2 * np.pi * sonar.band.centre * found.delay_std) ** 2)
+    power, more = (found.amplitude * delay_std) ** 2, found.surface + found.bottom > bounces
     parts = []
     for what, some in (("echoes", ~found.direct), ("snap itself", found.direct)):
         kept, left = float(power[some & ~more].sum()), float(power[some & more].sum())

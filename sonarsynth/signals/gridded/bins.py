@@ -101,7 +101,7 @@ def bins_of(
 
 def _shaped(front: ArrayPaths) -> bool:
     """Whether pulses have shapes, beside Doppler."""
-    found = bool(front.variance.any() or front.phase.any() or front.corners.any() or front.rough_share.any())
+    found = bool(front.variance.any() or front.phase.any() or front.corners.any() or front.coherent_fraction.any())
     return found or (front.count > 1 and bool(front.turn_terms.any() or front.spread_terms.any()))
 
 
@@ -163,7 +163,7 @@ def _with_modes(
     every = with_changes(front) if front.count > 1 or bent else front
     weight, modes, bends = shape_modes(every, frequency, spectrum, decay, series, widest, SHAPES * tolerance, bent)
     weight, bends = weight[: front.count], bends[: front.count]
-    if front.corners.any() or front.rough_share.any():
+    if front.corners.any() or front.coherent_fraction.any():
         spectrum = modes[0]  # what paths mostly send: the colour of the errors
     return replace(front, modes=weight, bends=bends, loss=np.zeros(front.count) if few else front.loss), spectrum, modes
 
@@ -193,7 +193,7 @@ def _shared(
         turn = np.exp(1j * phase)
         spectrum, series = spectrum * turn, series * turn
         front = replace(front, phase=np.zeros(front.count))
-    if front.corners.any() or front.rough_share.any():
+    if front.corners.any() or front.coherent_fraction.any():
         front, facet = _shared_facet(front, frequency)
         spectrum, series = spectrum * facet, series * facet
     return front, spectrum, series
@@ -205,9 +205,9 @@ def _shared_facet(front: ArrayPaths, frequency: Floats) -> tuple[ArrayPaths, Com
     if (front.corners == one.corners).all():
         facet = facet * facet_mean(frequency, one.corners)[0]
         front = replace(front, corners=np.zeros((front.count, 3)))
-    if not (np.ptp(front.rough_share) or np.ptp(front.rough_delay)):
-        facet = facet * rough_factor(frequency, one.rough_share, one.rough_delay)[0]
-        front = replace(front, rough_share=np.zeros(front.count))
+    if not (np.ptp(front.coherent_fraction) or np.ptp(front.height_delay_std)):
+        facet = facet * rough_factor(frequency, one.coherent_fraction, one.height_delay_std)[0]
+        front = replace(front, coherent_fraction=np.zeros(front.count))
     return front, facet
 
 

@@ -163,8 +163,8 @@ def _deposited(tile: Tile, part: ArrayPaths, points: Floats, stage: Stage) -> np
 
     bins, grid = stage.bins, stage.grid
     last = bins.first + bins.frequency.size
-    blur = kaiser_bessel_transform(np.arange(bins.first, last) / grid.circle, grid.width, grid.beta)
-    power = _power(tile, stage, blur)
+    delay_std = kaiser_bessel_transform(np.arange(bins.first, last) / grid.circle, grid.width, grid.beta)
+    power = _power(tile, stage, delay_std)
     mode = np.array(tile.terms)[:, 3]
     response = _responses(tile.modes.T[: mode.max() + 1], stage)
     _, place = face_pairs(tile.terms)
@@ -253,10 +253,10 @@ def _responses(weight: Floats, stage: Stage) -> npt.NDArray[Any]:
     return np.stack([value.real, value.imag], axis=1).astype(stage.dtype)
 
 
-def _power(tile: Tile, stage: Stage, blur: Floats) -> npt.NDArray[Any]:
+def _power(tile: Tile, stage: Stage, delay_std: Floats) -> npt.NDArray[Any]:
     """Real factor (term, bin) of each term's spectrum: the polynomials of absorption, without the blur (bin,)."""
     relative = stage.bins.relative
-    loss = lost(tile.reference.loss * relative) / blur
+    loss = lost(tile.reference.loss * relative) / delay_std
     decay = -NEPER * tile.deviation[2] * relative
     degree = np.array(tile.terms)[:, 2]
     power = np.cumprod(np.concatenate([[loss], decay / np.arange(1, degree.max() + 1)[:, None]]), axis=0)

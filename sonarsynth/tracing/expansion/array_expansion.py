@@ -91,9 +91,9 @@ class ExpansionSource:
                 made.put(rows, ApertureSamples(**{name: value[first:last] for name, value in vars(kept).items()}))
         none = np.empty((count, 0))
         terms = none if self.place.profile.uniform and not made.terms.any() else made.terms
-        phase, blur = (value if value.any() else none for value in (made.phase, made.blur))
+        phase, delay_std = (value if value.any() else none for value in (made.phase, made.delay_std))
         return ArrayExpansion(
-            ExpansionTerms(terms, phase, blur, made.error), legs, self.place, made.departure, made.gain
+            ExpansionTerms(terms, phase, delay_std, made.error), legs, self.place, made.departure, made.gain
         )
 
 
@@ -178,9 +178,9 @@ class _FacetInterpolant:
     def at(self, point: Floats) -> ApertureSamples:
         """Legs from points (point, xyz), some of the family."""
         found = row_products(aperture_terms((point - self.middle) / self.half, 1.0), self.coefficients)
-        terms, phase, blur, gain, away = np.split(found, self.parts, axis=1)
+        terms, phase, delay_std, gain, away = np.split(found, self.parts, axis=1)
         towards = away.reshape(*gain.shape, 3)
-        return ApertureSamples(terms, phase, blur, gain, towards, np.full(len(point), self.error))
+        return ApertureSamples(terms, phase, delay_std, gain, towards, np.full(len(point), self.error))
 
 
 def _over_body(point: Floats, sample: Floats, exact: ApertureSamples, rate: float) -> _FacetInterpolant | None:
@@ -190,7 +190,7 @@ def _over_body(point: Floats, sample: Floats, exact: ApertureSamples, rate: floa
     at = aperture_terms((sample - middle) / half, 1.0)
     degrees, sensors = exact.terms.shape[1], exact.gain.shape[1]
     towards = exact.departure.reshape(len(sample), -1)
-    values = np.concatenate([exact.terms, exact.phase, exact.blur, exact.gain, towards], axis=1)
+    values = np.concatenate([exact.terms, exact.phase, exact.delay_std, exact.gain, towards], axis=1)
     parts = np.cumsum([degrees, degrees, degrees, sensors])
     if not np.isfinite(values).all():
         return None

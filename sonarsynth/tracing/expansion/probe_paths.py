@@ -42,7 +42,7 @@ class ApertureSamples:
 
     terms: Floats  # (leg, term) s: delay over the sphere's
     phase: Floats  # (leg, term) rad: of reflections, over that at the centre
-    blur: Floats  # (leg, term) s2: its square, over that at the centre
+    delay_std: Floats  # (leg, term) s2: its square, over that at the centre
     gain: Floats  # (leg, probe)
     departure: Floats  # (leg, probe, xyz)
     error: Floats  # (leg,) s
@@ -50,9 +50,9 @@ class ApertureSamples:
     @staticmethod
     def room(count: int, sensors: int, degrees: int) -> ApertureSamples:
         """Room for so many, at so many probes, with so many terms."""
-        terms, phase, blur = np.zeros((3, count, degrees))
+        terms, phase, delay_std = np.zeros((3, count, degrees))
         return ApertureSamples(
-            terms, phase, blur, np.ones((count, sensors)), np.zeros((count, sensors, 3)), np.zeros(count)
+            terms, phase, delay_std, np.ones((count, sensors)), np.zeros((count, sensors, 3)), np.zeros(count)
         )
 
     def put(self, rows: Ints, made: ApertureSamples) -> None:
@@ -76,9 +76,11 @@ def traced(legs: ReceivePaths, place: ReceiverGeometry) -> ApertureSamples:
     probe, rate = place.probe, 2.0 * np.pi * band[1]
     turned, loss, softer = _boundaries(legs, departure, environment, profile, 0.5 * (band[0] + band[1]))
     turned, softer = (np.where(np.isnan(left), np.nan, value) for value in (turned, softer))
-    terms, phase, blur = probe.fit(left), probe.fit(turned), probe.fit(softer)
-    error = probe.misfit(left, terms) + probe.misfit(turned, phase) / rate + probe.misfit(softer, blur) * 0.5 * rate
-    return ApertureSamples(terms, phase, blur, gain * loss, departure, error)
+    terms, phase, delay_std = probe.fit(left), probe.fit(turned), probe.fit(softer)
+    error = (
+        probe.misfit(left, terms) + probe.misfit(turned, phase) / rate + probe.misfit(softer, delay_std) * 0.5 * rate
+    )
+    return ApertureSamples(terms, phase, delay_std, gain * loss, departure, error)
 
 
 def image(legs: ReceivePaths, probe: Probes, sonar_pose: Pose, few: int | None = None) -> Floats:
@@ -108,7 +110,7 @@ def _boundaries(
     shift[some] = turned - 2.0 * np.pi * np.rint(turned / (2.0 * np.pi))
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio[some] = np.where(legs.boundary[some, None] > 0, seen.modulus / legs.boundary[some, None], 1.0)
-    softer[some] = seen.blur**2 - legs.blur[some, None] ** 2
+    softer[some] = seen.delay_std**2 - legs.delay_std[some, None] ** 2
     return shift, ratio, softer
 
 

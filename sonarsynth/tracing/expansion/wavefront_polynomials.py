@@ -70,7 +70,7 @@ class ExpansionTerms(NamedTuple):
 
     delay: Floats  # (path, term) s: over the sphere's
     phase: Floats  # (path, term) rad: of reflections, over that of the centre
-    blur: Floats  # (path, term) s2: squares of blurs, over that of the centre
+    delay_std: Floats  # (path, term) s2: squares of blurs, over that of the centre
     error: Floats  # (path,) s: misfit of the wavefront at the probes, the held-out ones among them
 
     @staticmethod

@@ -84,10 +84,10 @@ class Occlusion:
         rows = np.flatnonzero(legs.open)
         if not len(rows):
             return legs
-        hidden_from = legs.hidden_from.copy()
+        occluded = legs.occluded.copy()
         for some in _parts(rows, len(self._points)):
-            hidden_from[some] = np.packbits(self._dark(legs, start, normal, some), axis=1)
-        return legs.seen(hidden_from, np.zeros(len(legs.row), bool))
+            occluded[some] = np.packbits(self._dark(legs, start, normal, some), axis=1)
+        return legs.seen(occluded, np.zeros(len(legs.row), bool))
 
     @property
     def _points(self) -> Floats:

@@ -76,7 +76,7 @@ def _rough_frame() -> Got:
     law = Kirchhoff(roughness=0.3, slope=0.2)
     found = traced([snap((0.0, 1e-6, 0.0))], ONE, [body(mesh, (at, 0.0, 0.0))], [law])
     found = found.select(~found.direct)
-    power = float((found.amplitude[~found.coherent] ** 2 * found.rough_share[~found.coherent]).sum())
+    power = float((found.amplitude[~found.coherent] ** 2 * found.coherent_fraction[~found.coherent]).sum())
     exact = 0.2 * 0.2 / (8.0 * np.pi * 0.2**2) / (at - 0.05) ** 4
     return off(10.0 * np.log10(power / exact), 0.01, "dB")
 

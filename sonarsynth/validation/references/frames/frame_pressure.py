@@ -209,7 +209,7 @@ class FramePressure:
             size=np.prod([v for v, _ in bounced], axis=0) * size,
             longer=longer / (1.0 - along) - 1.0,
             length=sum(depths(self.water, way) for way, _ in ways),  # type: ignore[arg-type]
-            blur=np.asarray(sum(b for _, b in bounced)),
+            delay_std=np.asarray(sum(b for _, b in bounced)),
             face=elements(self.scene.sonar.array).face * face,
         )
 

@@ -28,7 +28,7 @@ class Contributions:
     size: np.ndarray  # (path,) complex: amplitude at 1 m over that of the snap, without absorption
     longer: Floats  # (path,) the pulse lasts 1 + longer times as long
     length: Floats  # (path, 3) m, m2, m3: integrals of 1, depth and depth squared along the path
-    blur: Floats  # (path,) s2: variance of delays, by roughness
+    delay_std: Floats  # (path,) s2: variance of delays, by roughness
     face: Floats  # (path, 2) s: side of the face times the slowness along either side
 
     @staticmethod
@@ -62,7 +62,7 @@ def transfer(some: Contributions, weight: Floats, origin: float, step: float, fi
     delay, bins = np.ascontiguousarray(some.time - origin), np.ascontiguousarray(loss * NEPER)
     with np.errstate(divide="ignore"):
         inverse = 1.0 / (np.pi * step * (first + np.arange(len(loss))))
-    _sum(delay, some.size, weight, some.length, some.blur, some.face, step, first, bins, inverse, out)
+    _sum(delay, some.size, weight, some.length, some.delay_std, some.face, step, first, bins, inverse, out)
     return out[..., 0] + 1j * out[..., 1]
 
 
@@ -84,14 +84,14 @@ def _points(time, strength, step, out):  # type: ignore[no-untyped-def] # pragma
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _sum(delay, size, weight, length, blur, face, step, first, loss, inverse, out):  # type: ignore[no-untyped-def] # pragma: no cover
+def _sum(delay, size, weight, length, delay_std, face, step, first, loss, inverse, out):  # type: ignore[no-untyped-def] # pragma: no cover
     nodes, bins = out.shape[:2]
     for n in range(len(delay)):
         one, other = np.pi * step * face[n, 0], np.pi * step * face[n, 1]
         turn, turn_y, turn_z = np.exp(-2j * np.pi * step * delay[n]), np.exp(1j * one), np.exp(1j * other)
         phasor = size[n] * np.exp(-2j * np.pi * step * first * delay[n])
         y, z = np.exp(1j * one * first), np.exp(1j * other * first)
-        spread = 0.5 * (2.0 * np.pi * step) ** 2 * blur[n]
+        spread = 0.5 * (2.0 * np.pi * step) ** 2 * delay_std[n]
         flat_y, flat_z = abs(face[n, 0]) < FLAT, abs(face[n, 1]) < FLAT
         for block in range(0, bins, BLOCK):
             end = min(block + BLOCK, bins)
