@@ -183,7 +183,7 @@ def test_no_paths_are_silence(method: DirectSum | GriddedSynthesis) -> None:
         ({"phase": np.array([0.0, np.nan])}, "arrival 1 has phase that is not a finite number"),
         ({"delay_std": np.array([np.inf, 0.0])}, "arrival 0 has delay_std that is not a finite number"),
         ({"delay_std": np.array([0.0, -1e-9])}, "arrival 1 has a negative delay_std"),
-        ({"doppler": np.array([np.nan, 0.0])}, "arrival 0 has stretch that is not a finite number"),
+        ({"doppler": np.array([np.nan, 0.0])}, "arrival 0 has doppler that is not a finite number"),
         ({"doppler": np.array([0.0, -0.1])}, r"arrival 1 has a Doppler factor that is not within \+-0\.1"),
         (
             {"radius": np.array([0.2, 2.0]), "direction": np.array([[0.0, 0.0, 1.0]] * 2)},
