@@ -257,7 +257,7 @@ def test_truth_alone_is_made_without_sound(
     def never(*_: object, **__: object) -> None:
         raise AssertionError("nothing of sound is needed")
 
-    for name in ("tracing.arrivals.trace", "synthesis.KernelDeposit.signals", "planning.choosing.arrivals_of"):
+    for name in ("tracing.arrivals.trace", "signals.GriddedSynthesis.signals", "planning.choosing.arrivals_of"):
         monkeypatch.setattr(f"sonarsynth.{name}", never)
     path = tmp_path / "s.zarr"
     assert build(small, path, products="truth", workers=0).ok
