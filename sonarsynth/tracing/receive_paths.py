@@ -18,7 +18,6 @@ from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Paths
 from sonarsynth.propagation.reflections import Reflections, reflections
 from sonarsynth.tracing.occlusion.ray_cones import max_launch_deviation
-from sonarsynth.tracing.receive_paths import ReceivePaths, may_face_receiver, usable
 
 if TYPE_CHECKING:
     pass
