@@ -47,31 +47,54 @@ def refused(tree: xr.DataTree, frame: int) -> bool:
     )
 
 
+def on_ghost(tree: xr.DataTree, frame: int, azimuth: float, elevation: float) -> bool:
+    """Whether a direction (rad) is where the truth has a ghost of a target, by surface or bottom.
+
+    Ghosts are as wide as their target; the truth has the middle of their energy, so they reach that far either way.
+    """
+    if "echo_azimuth" not in tree["truth"].dataset:
+        return False
+    at = (np.deg2rad(of_frame(tree, f"truth/echo_{axis}", frame)[:, 1:]) for axis in ("azimuth", "elevation"))
+    box = np.deg2rad(of_frame(tree, "truth/image_box", frame))[:, None]
+    reach = np.nan_to_num(np.stack([box[..., 1] - box[..., 0], box[..., 3] - box[..., 2]])) + beam_width(tree)
+    off = np.abs(np.stack([middle - angle for middle, angle in zip(at, (azimuth, elevation), strict=True)]))
+    return bool((off <= reach).all(axis=0).any())  # NaN where no echo comes that way
+
+
 def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
-    """The brightest beam of each frame lies on a target, or within one beam width of its outline.
+    """The brightest beam of each frame lies on a target, or within one beam width of its outline; or on a ghost of one
+    that the truth has, which the check counts and warns of.
 
     Frames without a target in view, or whose echoes are inaudible, do not count.
     """
-    hits, seen, missed = 0, 0, []
+    name, expected = "brightest beam on target", "every frame, or on a ghost by surface or bottom"
+    azimuth, elevation = (np.deg2rad(every(tree, f"truth/{axis}")) for axis in ("azimuth", "elevation"))
+    hits, ghosts, seen, missed = 0, 0, 0, []
     for i in frames:
         energy, truth = of_frame(tree, "image/energy", i), of_frame(tree, "truth/target", i)
         if not ((truth >= 0).any() and echoes_heard(tree, i)):
             continue
         if not np.isfinite(energy).any():  # no clock, no image: a miss, unless no snap could be heard or made out
-            hit, counts = False, bool(snaps_heard(tree, i).any()) and not refused(tree, i)
+            hit = ghost = False
+            counts = bool(snaps_heard(tree, i).any()) and not refused(tree, i)
         else:
-            hit, counts = bool(near_target(tree, truth)[np.unravel_index(np.nanargmax(energy), energy.shape)]), True
+            row, column = np.unravel_index(np.nanargmax(energy), energy.shape)
+            hit, counts = bool(near_target(tree, truth)[row, column]), True
+            ghost = not hit and on_ghost(tree, i, azimuth[column], elevation[row])
         seen += counts
         hits += hit
-        if counts and not hit:
+        ghosts += ghost
+        if counts and not (hit or ghost):
             missed.append(i)
     if not seen:
-        return Check("brightest beam on target", "every frame", "no target in view and heard", None, {})
+        return Check(name, expected, "no target in view and heard", None, {})
+    also = f", on a ghost in {ghosts}" if ghosts else ""
     return Check(
-        "brightest beam on target",
-        "every frame",
-        f"{hits} of {seen} frames",
-        hits == seen,
-        {"hits": hits, "frames": seen},
+        name,
+        expected,
+        f"{hits} of {seen} frames{also}",
+        hits + ghosts == seen,
+        {"hits": hits, "frames": seen, "ghosts": ghosts},
         numbered(missed),
+        warning=f"in {ghosts} of {seen} frames the brightest beam is on a ghost by surface or bottom" if ghosts else "",
     )

@@ -287,3 +287,23 @@ def test_a_target_too_small_for_its_law_is_announced() -> None:
 def test_a_snap_from_behind_is_announced() -> None:
     notes = plan(scene(snaps=(shrimp(-10.0, 0.0, -7.0),))).warnings
     assert any("come from behind the array" in note for note in notes)
+
+
+@pytest.mark.parametrize("bounces", [0, 2])
+def test_no_echo_passes_for_the_direct_pulse_in_half_a_metre_of_water(bounces: int) -> None:
+    """Sound by the boundaries comes within a few pulses: the snap is found where it is, or refused with the reason."""
+    made = plan(
+        scene(
+            (ball((4.0, 0.3, -0.25), 0.1),), (shrimp(2.5, -1.5),), {"depth": 0.5},
+            {"array": PlanarLattice(columns=16, rows=8, pitch=0.01)}, {"sonar": Still(position=(0.0, 0.0, -0.25), heading=np.pi / 2)},
+            physics=Physics(tracing=Straight(bounces=bounces)),
+        )
+    )  # fmt: skip
+    frame = render(made, 0)
+    found, truth = frame["bearings"].dataset, frame["truth"].dataset
+    accepted = found["reason"].values == 0
+    assert accepted.any() or bounces
+    assert np.isnan(found["time"].values[~accepted]).all()
+    for name in ("azimuth", "elevation"):
+        off = np.abs(found[name].values - truth[f"snap_{name}"].values)[accepted]
+        assert (off <= 4.0 * found[f"{name}_error"].values[accepted]).all()

@@ -28,7 +28,7 @@ needs_real_input = pytest.mark.skipif(not REAL.is_dir(), reason="the real cast a
 
 FRAMES = {
     "remus.yaml": range(0, 64, 9),
-    "thermocline.yaml": (9, 36, 63),
+    "thermocline.yaml": (0, 9, 36, 63),  # the first is brightest at a ghost
     "grid.yaml": (0, 5, 72, 77, 138, 143),  # ends of the first sequence, of one between, and of the last
     "harbour.yaml": (0, 8),
     "deep.yaml": (0, 15),
@@ -109,7 +109,7 @@ def test_the_thesis_scene_is_imaged_ranged_and_located(built: Callable[[str], Pa
     assert made.sizes["azimuth"] == made.sizes["elevation"] == 101
     checks = _checks(built("remus.yaml"))
     assert all(check.ok for name, check in checks.items() if name not in REPORTED), checks
-    assert checks["brightest beam on target"].numbers == {"hits": 8, "frames": 8}
+    assert checks["brightest beam on target"].numbers == {"hits": 8, "frames": 8, "ghosts": 0}
     ranges = checks["range of points on target"].numbers
     assert ranges["points"] >= 8 and ranges["median_m"] < 0.05 and ranges["share_within_3"] >= 0.99
     assert not any(check.warning for check in checks.values()) and not evaluation.warnings(built("remus.yaml"))
@@ -122,12 +122,12 @@ def test_the_thesis_scene_is_imaged_ranged_and_located(built: Callable[[str], Pa
 
 
 def test_ghosts_by_surface_and_bed_are_imaged_where_the_truth_says(built: Callable[[str], Path]) -> None:
-    """Three frames of the crossing over a thermocline, with every path of up to two bounces."""
+    """Some frames of the crossing over a thermocline, with every path of up to two bounces."""
     made = _plan("thermocline.yaml")
     assert made.sizes["frame"] == 64 and made.sizes["elevation"] == 129
     checks = _checks(built("thermocline.yaml"))
     assert all(check.ok for name, check in checks.items() if name not in REPORTED), checks
-    assert checks["brightest beam on target"].numbers == {"hits": 3, "frames": 3}
+    assert checks["brightest beam on target"].numbers == {"hits": 3, "frames": 4, "ghosts": 1}
     with xr.open_datatree(built("thermocline.yaml"), engine="zarr") as tree:
         for frame in (9, 36, 63):
             energy, truth = tree["image/energy"][frame], tree["truth"].dataset.isel(frame=frame, target=0)
