@@ -121,11 +121,11 @@ def test_the_command_makes_them_again_the_same(built: Path, tmp_path: Path, caps
     assert (tmp_path / "out/small.zarr.card.md").read_text() == text
 
 
-def test_frames_set_aside_are_counted(built: Path, tmp_path: Path) -> None:
+def test_failed_frames_are_counted(built: Path, tmp_path: Path) -> None:
     path = Path(shutil.copytree(built, tmp_path / "s.zarr"))
     row = {"frame": 9, "stage": "trace", "error": "ValueError: no such ray", "traceback": ""}
-    store.beside(path, "aside.jsonl").write_text(json.dumps(row) + "\n" + json.dumps(row) + "\nnot json\n")
-    assert "- 1 frames were set aside (trace: ValueError)." in cards.markdown(cards.facts_of(path))
+    store.beside(path, "failed.jsonl").write_text(json.dumps(row) + "\n" + json.dumps(row) + "\nnot json\n")
+    assert "- 1 frames failed (trace: ValueError)." in cards.markdown(cards.facts_of(path))
 
 
 @pytest.mark.parametrize("how", ["nothing", "folder", "metadata"])

@@ -20,7 +20,7 @@ from tools.same_numbers import harbour
 
 ROOT = Path(__file__).resolve().parents[2]
 CONFIGS = ROOT / "configs"
-REPORTED = {"range of points on target", "whose echoes points are", "ranges useful", "snaps useful"}
+REPORTED = {"range of points on target", "origin of points", "ranges useful", "snaps useful"}
 """Figures of `verify` that depend on the scene: what they must be for one is asked by its test."""
 REAL = ROOT.parent / "shared" / "data"
 needs_real_input = pytest.mark.skipif(not REAL.is_dir(), reason="the real cast and hull lie beside the repository")

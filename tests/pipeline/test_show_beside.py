@@ -141,7 +141,7 @@ def test_the_cost_is_the_median_of_the_frames_as_last_built(stores: dict[str, Pa
     tree = opened(stores["lobe"])
     rows = [
         {"frame": 0, "cpu": {"trace": 9.0, "beamform": 9.0, "range": 9.0}},  # built again below
-        {"frame": 1, "cpu": {"trace": 0.002}},  # set aside
+        {"frame": 1, "cpu": {"trace": 0.002}},  # failed
         {"frame": 2, "cpu": {"trace": 0.002, "beamform": 0.030, "range": 0.004}},
         {"frame": 3, "cpu": {"trace": 0.010, "beamform": 0.005, "range": 0.001}},
         {"frame": 0, "cpu": {"trace": 0.003, "beamform": 0.020, "range": 0.002}},

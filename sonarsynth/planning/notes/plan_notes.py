@@ -32,7 +32,7 @@ def notes(made: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
     if made.looked_at < recipe.frames:
         found.append(
             f"{made.looked_at} of {recipe.frames} frames were looked at for the windows, and the ends of the "
-            "variations; each other frame is checked when it is rendered, and set aside where it does not fit"
+            "variations; each other frame is checked when it is rendered, and fails where it does not fit"
         )
     found += _shared(recipe, looks)
     if made.windows.disturbed:

@@ -133,7 +133,7 @@ def _limits(facts: Facts) -> str:
     lines = [*LIMITS, *map(str, facts.plan.get("warnings", ()))]
     if facts.complete < facts.frames:
         lines.append(f"{facts.frames - facts.complete} of {facts.frames} frames are not there.")
-    lines += [f"{count} frames were set aside ({why})." for why, count in facts.aside.items()]
+    lines += [f"{count} frames failed ({why})." for why, count in facts.failed.items()]
     lines += [
         f"{count} frames were made with other libraries than the rest ({which}): last digits may differ."
         for which, count in facts.mixed.items()
