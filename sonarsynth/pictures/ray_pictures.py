@@ -86,15 +86,15 @@ def ray_lines(plan: Plan, frame: Frame, index: int) -> list[RayLine]:
 
 def as_json(plan: Plan, frame: Frame, lines: Sequence[RayLine]) -> dict[str, Any]:
     """The rays of a frame, and the water that they are in, for a program."""
-    bed = plan.scene.world.environment.depth
-    layers = water(plan.profile.depth, plan.profile.speed, bed)
+    bottom = plan.scene.world.environment.depth
+    layers = water(plan.profile.depth, plan.profile.speed, bottom)
     places = {"array": frame.sonar_pose.position} | {f"snap {n}": s.position for n, s in enumerate(frame.moment.snaps)}
     return {
         "title": plan.recipe.title,
         "frame": frame.index,
         "time": frame.time,
         "units": UNITS,
-        "bed": bed,
+        "bed": bottom,
         "profile": {"depth": layers.depth.tolist(), "speed": layers.speed.tolist()},
         "places": {name: place.tolist() for name, place in places.items()},
         "bearing": _bearing(frame, lines),

@@ -158,7 +158,9 @@ def test_a_target_below_the_bed_at_some_frame_is_named_with_its_line(
     small_file.write_text(small_file.read_text().replace("stop: [10, 1, -5]", "stop: [10, 1, -9]"))
     answer = command(of, small_file, *([tmp_path / "s.zarr"] if of == "build" else []))
     assert answer.status == 2
-    assert re.search(r"small\.yaml:9: scene\.world\.targets\.0\.motion: .*below the bed at frame \d+", one_line(answer))
+    assert re.search(
+        r"small\.yaml:9: scene\.world\.targets\.0\.motion: .*below the bottom at frame \d+", one_line(answer)
+    )
 
 
 def test_the_plan_for_people_and_for_programs(command: Command, small_file: Path) -> None:

@@ -194,7 +194,7 @@ def test_the_target_crosses_20_m_ahead_9_m_to_the_right() -> None:
 
 
 def test_three_rays_in_the_tank() -> None:
-    """Figure 14: reflections from surface, bed and cylinder; between them the Snell invariant holds."""
+    """Figure 14: reflections from surface, bottom and cylinder; between them the Snell invariant holds."""
     rays = follow_rays(_plan("tank.yaml"), 0)
     events = [EVENTS[e] for e in rays.event]
     assert set(rays.ray) == {0, 1, 2}

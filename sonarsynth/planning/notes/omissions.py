@@ -34,7 +34,9 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
     if isinstance(plan.propagation, Straight):
         rows.append(Omission("refraction", "straight rays", _refraction_bound(plan, frame)))
     bounces = plan.propagation.bounces
-    kept = "the direct family" if not bounces else f"paths by at most {bounces} reflections of surface and bed in all"
+    kept = (
+        "the direct family" if not bounces else f"paths by at most {bounces} reflections at surface and bottom in all"
+    )
     rows.append(Omission("more reflections", f"asked for: {kept}", reflected_bound(plan)))
     rough = [b for b in (environment.surface, environment.bed) if rms_height(b) > 0.0]
     if bounces and rough:

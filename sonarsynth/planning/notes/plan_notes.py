@@ -68,12 +68,12 @@ def stored_validity(looks: Sequence[SampledScene]) -> tuple[str, ...]:
 
 def _extent(scene: Scene, profile: Profile) -> list[str]:
     """Where measured water ends before the real one."""
-    bed, first, last = scene.world.environment.depth, profile.depth[0], profile.depth[-1]
+    bottom, first, last = scene.world.environment.depth, profile.depth[0], profile.depth[-1]
     written = isinstance(scene.world.environment.sound_speed, (Tabulated, TemperatureSalinity, Cast))
-    if not written or max(first, bed - last) <= UNKNOWN * bed:
+    if not written or max(first, bottom - last) <= UNKNOWN * bottom:
         return []
     known = f"at {first:g} m only" if first == last else f"from {first:g} to {last:g} m"
-    return [f"the sound speed is given {known}, of {bed:g} m of water: beyond, it stays as it is there"]
+    return [f"the sound speed is given {known}, of {bottom:g} m of water: beyond, it stays as it is there"]
 
 
 def _shared(recipe: Recipe, looks: Sequence[SampledScene]) -> list[str]:

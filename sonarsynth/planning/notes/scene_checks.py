@@ -74,7 +74,7 @@ def read_inputs(scene: Scene) -> Profile:
 
 
 def _check_profile(scene: Scene, profile: Profile) -> None:
-    """The sound speed must be that of water, somewhere above the bed, and change at a rate that rays can follow."""
+    """The sound speed must be that of water, somewhere above the bottom, and change at a rate that rays can follow."""
     path = ("scene", "world", "environment", "sound_speed")
     measured = isinstance(scene.world.environment.sound_speed, (Tabulated, TemperatureSalinity, Cast))
     slowest, fastest = IN_WATER if measured else (SLOWEST, FASTEST)
@@ -89,7 +89,7 @@ def _check_profile(scene: Scene, profile: Profile) -> None:
     if profile.depth[0] > scene.world.environment.depth:
         raise FieldError(
             path,
-            f"is given from {profile.depth[0]:g} m down, below the bed at {scene.world.environment.depth:g} m",
+            f"is given from {profile.depth[0]:g} m down, below the bottom at {scene.world.environment.depth:g} m",
         )
     steep = np.flatnonzero(np.abs(np.diff(profile.speed)) > STEEPEST * np.diff(profile.depth))
     jumps = steep[np.diff(profile.depth)[steep] > 0]
@@ -250,4 +250,4 @@ def _check_depth(path: tuple[str | int, ...], what: str, points: Floats, bed: fl
     if shallow < -TOLERANCE:
         raise FieldError(path, f"{what} is {-shallow:.3g} m above the surface at {when}")
     if deep > bed + TOLERANCE:
-        raise FieldError(path, f"{what} is {deep - bed:.3g} m below the bed at {when}")
+        raise FieldError(path, f"{what} is {deep - bed:.3g} m below the bottom at {when}")
