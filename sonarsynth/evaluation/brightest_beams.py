@@ -66,7 +66,7 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
         if counts and not hit:
             missed.append(i)
     if not seen:
-        return Check("brightest beam on target", "every frame", "no target in view and heard", None, {})
+        return Check("brightest beam on target", "every frame", "no target is in view and audible", None, {})
     return Check(
         "brightest beam on target",
         "every frame",

@@ -105,12 +105,12 @@ def range_errors(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
         "pull_std": float(finite.std()) if len(finite) else float("nan"),
     }
     spread = f"median error {100 * numbers['median_m']:.2g} cm, at most {100 * numbers['largest_m']:.2g} cm"
-    within = f"{100 * numbers['share_within_3']:.4g} %, errors over predicted ones have standard deviation "
+    within = f"{100 * numbers['share_within_3']:.4g} %; ratio of error to predicted error has standard deviation "
     return [
         Check(name, reported, f"{spread}, over {len(error)} points", None, numbers),
         Check(
             "predicted range errors",
-            "99 % within three, but one",
+            "99 % (all but one at least) within 3 predicted errors",
             within + f"{numbers['pull_std']:.2g}",
             bool(missed.sum() <= max(1, OUTLIERS * len(missed))),
             numbers,

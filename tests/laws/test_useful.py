@@ -139,4 +139,4 @@ def test_a_bearing_of_no_snap_is_a_miss_however_near_it_is() -> None:
     assert row(bounds(store, ALL), "snap located").ok
     store["bearings/emission"].values[:] = -1
     found = row(bounds(store, ALL), "snap located")
-    assert found.ok is False and "4 come from no snap" in found.got
+    assert found.ok is False and "4 match no snap" in found.got
