@@ -121,11 +121,11 @@ def _values(text: str, option: str) -> Floats:
     except ValueError:
         parts = []
     if len(parts) not in (1, 3) or not np.isfinite(parts).all():
-        raise BadOption(f"{option}: '{text}' is no number and no range such as 0:90:5")
+        raise BadOption(f"{option}: '{text}' is neither a number nor a range such as 0:90:5")
     if len(parts) == 1:
         return np.array(parts)
     first, last, step = parts
     count = (last - first) / step if step != 0.0 else np.nan
     if not 0 <= count < MOST:
-        raise BadOption(f"{option}: '{text}' holds no value or more than {MOST}")
+        raise BadOption(f"{option}: '{text}' contains no value, or more than {MOST}")
     return np.asarray(first + step * np.arange(int(count + 1e-9) + 1))

@@ -123,7 +123,7 @@ def _synthesised(plan: Plan) -> str:
     method = plan.choices.synthesis
     if isinstance(method, DirectSum):
         return method.kind
-    return f"{method.kind}, {method.width} wide, tolerance {method.tolerance:.1g}, {method.precision}"
+    return f"{method.kind}, width {method.width}, tolerance {method.tolerance:.1g}, {method.precision}"
 
 
 def _traced(plan: Plan) -> str:
@@ -132,18 +132,18 @@ def _traced(plan: Plan) -> str:
     parts = plan.choices.subarrays
     to = "the array" if parts == 1 else f"each of {parts} subarrays"
     if parts == plan.elements.count > 1:
-        to = "each hydrophone by itself"
+        to = "each hydrophone separately"
     if plan.choices.degree > 3 and parts < plan.elements.count:
-        to += f", to the degree {plan.choices.degree}"
+        to += f", degree {plan.choices.degree}"
     if plan.choices.visibility == "hydrophones":
-        to += ", seen from each hydrophone"
+        to += ", visibility from each hydrophone"
     words = [f"{plan.propagation.kind} rays to {to}", f"{plan.propagation.bounces} bounces", laws]
     return ", ".join(word for word in words if word)
 
 
 def _beams(plan: Plan) -> str:
     """The beamformer in words."""
-    method, without = plan.choices.beamforming, ", direct pulse taken out" if plan.windows.direct_removed else ""
+    method, without = plan.choices.beamforming, ", direct pulse removed" if plan.windows.direct_removed else ""
     if isinstance(method, FocusedDelayAndSum) and method.zones != "auto" and method.zones > 1:
         return f"{method.kind}, {method.zones} zones{without}"
     return method.kind + without
@@ -181,7 +181,7 @@ def _trace_rows(plan: Plan) -> list[Row]:
     kind, rows = "" if straight else "refracted ", list[Row]()
     if plan.products:
         traced = 1 if plan.choices.subarrays == 1 else 1 + plan.choices.subarrays
-        why = "rays bend by less than the accuracy allows" if straight else "the sound speed varies with depth"
+        why = "refraction is below the required accuracy" if straight else "the sound speed varies with depth"
         seconds = _tracing(plan, kind) * max(sizes["snap"], 1) * _ways(plan) * traced
         rows.append(("trace", _traced(plan), why, _expanded(plan), seconds, 0))
     beams = sizes["azimuth"] * sizes["elevation"]

@@ -126,7 +126,7 @@ def _notes(path: Folder, scheduler: str | None) -> list[str]:
         [f"frames written now use other libraries than the first ones of this store ({spelled(odd)})"] if odd else []
     )
     if scheduler is not None and not scheduler.startswith(("tls://", "wss://", "inproc://")):
-        notes.append(f"{scheduler} is not encrypted: whoever reaches it can run code on it and here")
+        notes.append(f"{scheduler} is not encrypted: anyone who can reach it can run code there and on this machine")
     return notes
 
 

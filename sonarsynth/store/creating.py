@@ -203,7 +203,7 @@ def _compare(path: Folder, stored: Mapping[str, Any], wanted: Mapping[str, Any])
 
 def spelled(odd: Mapping[str, tuple[str, str]]) -> str:
     """Versions that differ, in words."""
-    return ", ".join(f"{name} {before} then and {now} now" for name, (before, now) in odd.items())
+    return "; ".join(f"{name} {before}, now {now}" for name, (before, now) in odd.items())
 
 
 def _short(value: Any) -> str:

@@ -137,7 +137,7 @@ def other_versions(stored: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
 def differing(there: Mapping[str, str], here: Mapping[str, str]) -> str:
     """What differs between two sets of versions, in words; "" where nothing does."""
     odd = [name for name in here if there.get(name, here[name]) != here[name]]
-    return ", ".join(f"{name} {there[name]}, now {here[name]}" for name in odd)
+    return ", ".join(f"{name} {there[name]} there and {here[name]} here" for name in odd)
 
 
 def machine() -> dict[str, Any]:

@@ -89,7 +89,7 @@ def test_the_card_says_what_was_planned_and_what_is_missing(built: Path) -> None
     for row in attrs["plan"]["left_out"]:
         assert f"| {row['what']} | {row['why']} | {row['bound']} |" in text
     assert "8 of 20 are there" in text
-    assert "- 12 of 20 frames are not there." in text
+    assert "- 12 of 20 frames are not built." in text
     assert f"| digest of the recipe | {attrs['recipe_digest']} |" in text
     assert attrs["provenance"]["recipe_as_written"].strip() in text
     assert "| train | 1 | 20 |" in text

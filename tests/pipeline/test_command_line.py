@@ -132,7 +132,7 @@ def test_a_folder_that_cannot_be_written_is_one_line(command: Command, small_fil
     ("arguments", "message"),
     [
         (["--frames", "0:21"], "--frames: '0:21' ends past the last frame, 19"),
-        (["--frames", "x"], "--frames: 'x' is no frame and no range such as 0:8"),
+        (["--frames", "x"], "--frames: 'x' is neither a frame number nor a range such as 0:8"),
         (["--products", "film"], "--products: 'film' is not a product; known: signals, image, cloud"),
         (["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "--workers starts processes on this machine"),
         (["--workers", "-1"], "Invalid value for '--workers'"),

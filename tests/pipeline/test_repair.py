@@ -280,7 +280,7 @@ def test_the_command_says_what_it_did(copy: Path, tmp_path: Path, capfd: pytest.
         ((copy, "--workers", "1", "--scheduler", "tcp://127.0.0.1:1"), "--workers starts processes on this machine"),
         ((tmp_path / "none",), "none: no such store"),
         ((tmp_path,), "is not a store of sonarsynth"),
-        ((copy / "zarr.json",), "is not a store: it is no folder"),
+        ((copy / "zarr.json",), "is not a store: it is not a folder"),
     ):
         status, out, err = command("repair", *arguments)
         assert (status, out, err.count("\n")) == (2, "", 1)

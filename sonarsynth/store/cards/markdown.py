@@ -126,16 +126,16 @@ def _methods(facts: Facts) -> str:
 
 def _left_out(facts: Facts) -> str:
     rows = _rows(facts.plan.get("left_out"), ("what", "why", "bound"))
-    return _table(("what", "why", "what that costs, at most"), rows) if rows else ""
+    return _table(("what", "why", "error bound"), rows) if rows else ""
 
 
 def _limits(facts: Facts) -> str:
     lines = [*LIMITS, *map(str, facts.plan.get("warnings", ()))]
     if facts.complete < facts.frames:
-        lines.append(f"{facts.frames - facts.complete} of {facts.frames} frames are not there.")
+        lines.append(f"{facts.frames - facts.complete} of {facts.frames} frames are not built.")
     lines += [f"{count} frames failed ({why})." for why, count in facts.failed.items()]
     lines += [
-        f"{count} frames were made with other libraries than the rest ({which}): last digits may differ."
+        f"{count} frames were made with different libraries from the rest ({which}): last digits may differ."
         for which, count in facts.mixed.items()
     ]
     return "\n".join(f"- {_text(line)}" for line in lines)
@@ -174,7 +174,7 @@ def _recipe(facts: Facts) -> str:
     cut = [f"# ... {len(lines) - _MOST_LINES} more lines, in the store"] if len(lines) > _MOST_LINES else []
     shown = "\n".join(lines[:_MOST_LINES] + cut)
     fence = "`" * max(3, *(len(run) + 1 for run in re.findall("`+", shown)), 3)
-    settings = [f"Set over it: {_code(str(s))}" for s in facts.provenance.get("recipe_settings", ())]
+    settings = [f"Overridden: {_code(str(s))}" for s in facts.provenance.get("recipe_settings", ())]
     text = "As written; as resolved, with every default, it is the attribute `recipe` of the store."
     return "\n\n".join([text, f"{fence}yaml\n{shown}\n{fence}", *settings])
 
