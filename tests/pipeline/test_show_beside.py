@@ -150,9 +150,9 @@ def test_the_cost_is_the_median_of_the_frames_as_last_built(stores: dict[str, Pa
     lines = [json.dumps(row | {"seconds": {}}) for row in rows]
     (tmp_path / "s.zarr.times.jsonl").write_text("\n".join([*lines, '{"frame": 2, "cpu": {"tra']))
     found = scores_of(tree, tmp_path / "s.zarr", [0, 1, 2, 3], heard(tree, [0, 1, 2, 3]))
-    costs = {name: value for name, value in found.items() if name.startswith(("CPU", "frames a second"))}
+    costs = {name: value for name, value in found.items() if name.startswith(("CPU", "frames per second"))}
     assert list(costs.values()) == ["3 ms", "20 ms", "2 ms", "25 ms", "40"]
-    assert list(costs)[-2:] == ["CPU a frame: all", "frames a second, one core"]
+    assert list(costs)[-2:] == ["CPU per frame: all", "frames per second, one core"]
     without = scores_of(tree, tmp_path / "none.zarr", [0], heard(tree, [0]))
     assert {without[name] for name in costs} == {"-"}
 

@@ -13,14 +13,14 @@ from sonarsynth.store.cards.facts import Facts
 
 LIMITS: Final = (
     "Everything is simulated; nothing was measured at sea.",
-    "Frames that are not there read as NaN, or -1 in whole numbers.",
-    "Frames of a sequence resemble each other: divide by `split`, never by frame.",
+    "Frames that are not built read as NaN, or as -1 in integer variables.",
+    "Frames of a sequence resemble each other: split by `split`, never by frame.",
 )
 """What holds of every dataset."""
 
 DIGESTS: Final = (
-    "That finds damage, not forgery: who changes a store can write its digests anew. For that, compare `SHA-256` of "
-    "what you have with a list from its makers."
+    "That finds damage, not forgery: anyone who changes a store can also rewrite its digests. Against forgery, compare "
+    "the `SHA-256` of your copy with a list from its makers."
 )
 """What digests prove, and what they do not."""
 
@@ -40,12 +40,12 @@ def markdown(facts: Facts) -> str:
     sections = (
         _head(facts),
         _section("How to load it", _loading(facts)),
-        _section("What is in it", _variables(facts)),
+        _section("Contents", _variables(facts)),
         _section("Splits", _splits(facts)),
         _section("How it was made", _methods(facts)),
         _section("What is left out", _left_out(facts)),
         _section("Known limits", _limits(facts)),
-        _section("Where it comes from", _origin(facts)),
+        _section("Provenance", _origin(facts)),
         _section("The recipe", _recipe(facts)),
         _section("Licence and citation", _rights(facts)),
     )
