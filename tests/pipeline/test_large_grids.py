@@ -73,7 +73,7 @@ def test_a_frame_that_does_not_fit_is_refused(small_text: str, monkeypatch: pyte
     made = planning.plan(recipe)
     unseen = next(f for f in range(0, 30000, 3) if not np.isfinite(made.windows.start[f]))
     for change, message in (
-        ({"samples": made.windows.samples // 2}, "more than those looked at"),
+        ({"samples": made.windows.samples // 2}, "longer than the sampled frames"),
         ({"echo_stop": 0.5 * made.windows.echo_stop}, "echoes outside the window"),
     ):
         tight = replace(made, windows=replace(made.windows, **change)).at(unseen)
