@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
 
-from sonarsynth.conventions import format_bytes
+from sonarsynth.conventions import counted, format_bytes
 
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan
@@ -73,11 +73,6 @@ def _pace(done: int, total: int, failed: int, began: float) -> str:
     rate = finished / max(time.monotonic() - began, 1e-9)
     text = f"{rate:.3g} frames/s, {duration((total - finished) / rate)} left"
     return text + (f", {failed} failed" if failed else "")
-
-
-def counted(number: int, what: str) -> str:
-    """A number of things: "1 frame", "2 frames"."""
-    return f"{number} {what}" + ("" if number == 1 else "s")
 
 
 def duration(seconds: float) -> str:
@@ -145,7 +140,7 @@ def plan_report(plan: Plan, prediction: Prediction) -> None:
         out.print(f"note: {warning}", markup=False)
     for line in _spanned(plan.as_json()):
         out.print(line, markup=False)
-    out.print(", ".join(f"{count} {name}" for name, count in plan.sizes.items()))
+    out.print(", ".join(counted(count, name) for name, count in plan.sizes.items()))
     p = prediction
     out.print(
         f"predicted: {duration(p.seconds)} for {counted(p.frames, 'frame')} with {counted(p.workers, 'worker')}, "

@@ -65,7 +65,8 @@ def repair(
 
 
 def _print(report: RepairReport) -> None:
-    from sonarsynth.cli.printing import console, counted
+    from sonarsynth.cli.printing import console
+    from sonarsynth.conventions import counted
     from sonarsynth.store import ranges
     from sonarsynth.store.checking.examining import shown
 

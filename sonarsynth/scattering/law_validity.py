@@ -105,8 +105,8 @@ def facets_note(body: Scatterer, longest: float) -> str | None:
     if not edge > longest:
         return None
     return (
-        f"facets up to {edge:.2g} m long ({edge / body.shortest:.1g} wavelengths at the top of the band), each scattering from "
-        "its centre: set shape.edge to refine"
+        f"facets up to {edge:.2g} m long ({edge / body.shortest:.1g} wavelengths at the top of the band), each "
+        "scattering from its centre: set shape.edge to refine"
     )
 
 

@@ -239,10 +239,10 @@ def _from(made: Prediction, trial: Trial) -> Prediction:
     """A prediction with what a trial has shown."""
     stages = {name: seconds for name, seconds in trial.cpu.items() if name != "collect"}
     stages["write"] = trial.writing[0] / made.shard_frames + trial.cpu.get("collect", 0.0)
-    few = "" if trial.every == 1 else f" using one facet in {trial.every}"
+    few = "" if trial.every == 1 else f"; with one facet in {trial.every}"
     return replace(
         made,
-        how=f"frames {', '.join(map(str, sorted(trial.frames)))} timed on this machine{few}",
+        how=f"timing frames on this machine (number {', '.join(map(str, sorted(trial.frames)))}{few})",
         stages=stages,
         loading=min(trial.loading, 0.2 * made.prepared),  # not what a compiler did, which is kept
         fresh=trial.fresh,
