@@ -217,7 +217,7 @@ def images(bed: float, start: float, end: float, reflections: int) -> list[tuple
 
 
 def random_water(rng: np.random.Generator, layers: int, spread: float) -> ray_solutions.Water:
-    """A random profile over a bed at 100 m; some layers of one speed, some jumps."""
+    """A random profile over a bottom at 100 m; some layers of one speed, some jumps."""
     depth = np.sort(rng.uniform(0.0, 100.0, layers))
     speed = 1500.0 + spread * rng.normal(size=layers)
     if layers > 3 and rng.random() < 0.5:

@@ -127,13 +127,13 @@ def pass_near(start: Floats, end: Floats, centre: Floats, radius: float, near: B
 
 @njit(cache=True, nogil=True)
 def folded_pass_near(
-    start: Floats, end: Floats, up: Bools, bounces: Ints, bed: float, skip: Floats, reach: Floats, centre: Floats,
+    start: Floats, end: Floats, up: Bools, bounces: Ints, bottom: float, skip: Floats, reach: Floats, centre: Floats,
     radius: float, near: Bools,
 ) -> None:  # fmt: skip
     """Write whether straight rays from start to end (ray, xyz) with bounces come within radius + reach of a point.
 
-    bounces (ray,): reflections from the surface z = 0 and the bed z = -bed (m); up: launched upwards; skip (ray,): m
-    along the ray from its start that do not count; reach (ray,) m.
+    bounces (ray,): reflections from the surface z = 0 and the bottom z = -bottom (m); up: launched upwards; skip
+    (ray,): m along the ray from its start that do not count; reach (ray,) m.
     """
     for i in range(len(start)):
         x0, y0, z0 = start[i, 0], start[i, 1], start[i, 2]
@@ -141,14 +141,16 @@ def folded_pass_near(
         climb = end[i, 2] - z0
         if n > 0:
             last_above = (n % 2 == 1) == up[i]
-            climb = (-z0 if up[i] else bed + z0) + (n - 1) * bed + (-end[i, 2] if last_above else bed + end[i, 2])
+            climb = (
+                (-z0 if up[i] else bottom + z0) + (n - 1) * bottom + (-end[i, 2] if last_above else bottom + end[i, 2])
+            )
         dx, dy = end[i, 0] - x0, end[i, 1] - y0
         length = math.sqrt(dx * dx + dy * dy + climb * climb)
         within = (radius + reach[i]) ** 2
         near[i] = False
         done, z, sense = 0.0, z0, rising if n > 0 else 1.0
         for k in range(n + 1):  # piece by piece between boundaries, part: of the whole way
-            edge = 0.0 if sense > 0.0 else -bed
+            edge = 0.0 if sense > 0.0 else -bottom
             part = 1.0 if k == n or climb == 0.0 else min(done + abs(edge - z) / climb, 1.0)
             z_after = end[i, 2] if k == n else edge
             first = max(done, min(part, skip[i] / length if length > 0.0 else 1.0))

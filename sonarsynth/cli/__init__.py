@@ -1,6 +1,6 @@
 """The command line. Thin: every command is a call that Python users have too.
 
-Exit status: 0 done, 1 our fault, 2 bad input, 3 finished with frames set aside, 4 store damaged or locked,
+Exit status: 0 done, 1 our fault, 2 bad input, 3 finished, but some frames failed, 4 store damaged or locked,
 130 interrupted and resumable. Errors are one line on stderr.
 """
 
@@ -26,7 +26,7 @@ __all__ = ["app", "main"]
 
 app = typer.Typer(
     name="sonarsynth",
-    help="Labelled synthetic datasets of snapping-shrimp passive sonar.",
+    help="Labelled synthetic datasets of passive sonar with snapping shrimp as the sound source.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -39,14 +39,14 @@ Settings = Annotated[
     typer.Option(
         "--set",
         metavar="PATH=VALUE",
-        help="Set a field over the recipe, such as scene.trajectory.frames=8. Repeatable.",
+        help="Override a field of the recipe, such as scene.trajectory.frames=8. Repeatable.",
     ),
 ]
 Products = Annotated[
     str,
-    typer.Option(metavar="LIST", help="What to store beside the truth: signals, image, cloud; or truth for it alone."),
+    typer.Option(metavar="LIST", help="Stored besides the ground truth: signals, image, cloud; 'truth': nothing else."),
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 ALL_PRODUCTS = "signals,image,cloud"
 
 
@@ -70,62 +70,68 @@ def _options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    """Labelled synthetic datasets of snapping-shrimp passive sonar: traced, beamformed, ranged, and true."""
+    """Labelled synthetic datasets of passive sonar with snapping shrimp as the sound source."""
 
 
 @app.command()
 def build(
     recipe: RecipeFile,
-    store: Annotated[str, typer.Argument(help="Where the dataset goes: a folder, or a URL.", show_default=False)],
+    store: Annotated[str, typer.Argument(help="Where to write the dataset: a folder or a URL.", show_default=False)],
     settings: Settings = [],  # noqa: B006 - typer copies it
-    frames: Annotated[str | None, typer.Option(metavar="A:B", help="Only these frames, such as 0:8 or 0:8,12.")] = None,
+    frames: Annotated[
+        str | None, typer.Option(metavar="A:B", help="Only these frames, such as 0:8 or 0:8,12 (end excluded).")
+    ] = None,
     sequences: Annotated[
-        str | None, typer.Option(metavar="A:B", help="Only these sequences, such as 0:10; with --frames: both.")
+        str | None,
+        typer.Option(metavar="A:B", help="Only these sequences, such as 0:10; with --frames, their overlap."),
     ] = None,
     products: Products = ALL_PRODUCTS,
     workers: Annotated[
-        int | None, typer.Option(min=0, help="Worker processes; 0: none, in this process. Left out: one a core.")
+        int | None, typer.Option(min=0, help="Worker processes (default: one per core; 0 runs in this process).")
     ] = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A running Dask scheduler, such as tcp://127.0.0.1:8786.")
     ] = None,
     restart: Annotated[
-        bool, typer.Option("--restart", help="Begin anew where the store holds something else.")
+        bool, typer.Option("--restart", help="Overwrite a store built from a different recipe.")
     ] = False,
     retry_failed: Annotated[
-        bool, typer.Option("--retry-failed", help="Try frames again that an earlier build set aside.")
+        bool, typer.Option("--retry-failed", help="Retry frames that failed in an earlier build.")
     ] = False,
     frame_timeout: Annotated[
         float | None,
-        typer.Option(min=0, metavar="SECONDS", help="Set a frame aside whose stage takes longer; 0: never."),
+        typer.Option(min=0, metavar="SECONDS", help="Skip a frame if one stage takes longer (0: no limit)."),
     ] = None,
     worker_memory: Annotated[
-        float | None, typer.Option(metavar="GB", help="Memory of a worker. Left out: its share of the machine's.")
+        float | None, typer.Option(metavar="GB", help="Memory per worker. Default: an equal share of the machine's.")
     ] = None,
-    agreed: Annotated[bool, typer.Option("--yes", help="Build what needs more than is free, or over 1 TB.")] = False,
+    agreed: Annotated[
+        bool, typer.Option("--yes", help="Build even if it needs more than is free (disk, memory), or over 1 TB.")
+    ] = False,
     insecure: Annotated[
-        bool, typer.Option("--insecure", help="Use a scheduler on another machine without TLS.")
+        bool, typer.Option("--insecure", help="Allow an unencrypted connection to a remote scheduler.")
     ] = False,
     mixed_versions: Annotated[
         bool,
-        typer.Option("--mixed-versions", help="Resume with other numeric libraries, and mark those frames."),
+        typer.Option("--mixed-versions", help="Resume with other versions of numeric libraries; mark those frames."),
     ] = False,
     dashboard: Annotated[
-        bool, typer.Option("--dashboard", help="Start Dask's dashboard; every user of this machine can read it.")
+        bool, typer.Option("--dashboard", help="Start Dask's dashboard; all users of this machine can read it.")
     ] = False,
     predicting: Annotated[
-        bool, typer.Option("--predict/--no-predict", help="Predict time and size first, and compare afterwards.")
+        bool,
+        typer.Option("--predict/--no-predict", help="Predict time and size first, and compare them with the result."),
     ] = True,
     as_json: Json = False,
 ) -> None:
-    """Build a dataset, or the part of it that is missing. Interrupted, the same command goes on."""
+    """Build a dataset, or the part of it that is missing. Run the same command again to resume."""
     from sonarsynth import evaluation, planning, schedule
     from sonarsynth import store as stores
     from sonarsynth.cli import printing
     from sonarsynth.recipe import reading
 
     if scheduler is not None and workers is not None:
-        raise BadOption("--workers is for worker processes of our own, --scheduler for those of another: give one")
+        raise BadOption("--workers starts processes on this machine, --scheduler uses a running cluster: give only one")
     bounds = worker_bounds(workers, scheduler, frame_timeout, worker_memory, insecure)
     chosen = product_names(products)
     source = reading.read(recipe, settings)
@@ -155,9 +161,9 @@ def build(
 
 @app.command()
 def plan(recipe: RecipeFile, settings: Settings = [], products: Products = ALL_PRODUCTS, as_json: Json = False) -> None:  # noqa: B006
-    """Say what each stage will do and why, what is left out and what that costs, predicted time and size.
+    """Show what each stage will do and why, what is left out, the error bounds, and the predicted time and size.
 
-    Time and size are of a build with as many workers as this machine has cores, known from frames made here.
+    For one worker per core. Estimated by timing a few frames on this machine.
     """
     from sonarsynth import planning, schedule
     from sonarsynth.cli import printing
@@ -179,10 +185,10 @@ def plan(recipe: RecipeFile, settings: Settings = [], products: Products = ALL_P
 @app.command()
 def verify(
     store: Store,
-    quick: Annotated[bool, typer.Option("--quick", help="Compare files with their digests, and no more.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Only compare files with their digests.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Check a store: every file against its digest, every number read back, ground truth against the data."""
+    """Check a store: compare all files with their digests, re-read all data, check it against the ground truth."""
     from sonarsynth import evaluation
     from sonarsynth import store as stores
     from sonarsynth.cli import printing
@@ -199,20 +205,22 @@ def verify(
 @app.command()
 def show(
     stores: Annotated[
-        list[str], typer.Argument(metavar="STORE...", help="A store, or up to four to compare.", show_default=False)
+        list[str], typer.Argument(metavar="STORE...", help="One store, or up to four to compare.", show_default=False)
     ],
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FOLDER", help="Where the pictures go. Left out: <store>.pictures, <a>-<b>.pictures."),
+        typer.Option(
+            metavar="FOLDER", help="Where to write the pictures. Default: <store>.pictures, <a>-<b>.pictures."
+        ),
     ] = None,
     frame: Annotated[
-        int | None, typer.Option(min=0, help="The frame of the sheet. Left out: the one with most points.")
+        int | None, typer.Option(min=0, help="The frame of the sheet. Default: the frame with most points.")
     ] = None,
-    film: Annotated[bool, typer.Option(help="Write the film as well.")] = True,
+    film: Annotated[bool, typer.Option(help="Also write the film.")] = True,
 ) -> None:
     """Draw a store: a film of the energy image, a sheet with image, point cloud and signals; print a summary.
 
-    Several stores: their films side by side, each with its range error, levels and cost.
+    With several stores: films side by side, each with its range error, levels and cost.
     """
     from sonarsynth.pictures import show as draw
     from sonarsynth.pictures.compare import show_beside
@@ -235,12 +243,15 @@ app.command("target-strength")(target_strength)
 def rays(
     recipe: RecipeFile,
     out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Where the pictures go. Left out: <recipe>.rays.")
+        Path | None, typer.Option(metavar="FOLDER", help="Where to write the pictures. Default: <recipe>.rays.")
     ] = None,
-    frame: Annotated[int, typer.Option(min=0, help="The frame whose targets the rays meet.")] = 0,
+    frame: Annotated[int, typer.Option(min=0, help="The frame to trace.")] = 0,
     settings: Settings = [],  # noqa: B006
 ) -> None:
-    """Draw rays through a frame in a section, in space and as a page: eigenrays, or what the recipe asks for."""
+    """Draw rays as a vertical section, in 3-D, and as an interactive HTML page.
+
+    Eigenrays by default; the recipe's `rays:` block if it has one.
+    """
     from sonarsynth import planning
     from sonarsynth.pictures.ray_pictures import show_rays
     from sonarsynth.recipe import reading
@@ -259,10 +270,10 @@ def rays(
 @app.command()
 def snap(
     recipe: RecipeFile,
-    out: Annotated[Path, typer.Option(metavar="FILE", help="Where the picture goes.")] = Path("snap.png"),
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Where to write the picture.")] = Path("snap.png"),
     settings: Settings = [],  # noqa: B006
 ) -> None:
-    """Draw the snap of a recipe: waveform and spectrum, as made and as heard, and the sonar's filter."""
+    """Draw the snap of a recipe: waveform and spectrum before and after the sonar's filter, and the filter."""
     from sonarsynth.pictures import snap_pictures
     from sonarsynth.recipe import reading
 
@@ -274,7 +285,7 @@ def snap(
 
 @app.command()
 def schema() -> None:
-    """Print the JSON schema of a recipe, for editors."""
+    """Print the JSON schema of recipes, for text editors."""
     from sonarsynth.recipe import reading
 
     _print_json(reading.schema())

@@ -15,43 +15,49 @@ if TYPE_CHECKING:
     from sonarsynth.validation import Row
 
 HELP = (
-    "What is checked: rays, the search for eigenrays; sphere, cylinder or plate, their echoes by flat facets; "
-    "bubble, the collapse that a snap comes from."
+    "What to check: rays (the search for eigenrays); sphere, cylinder or plate (echoes computed with flat facets, "
+    "against exact series and integrals); bubble (the collapse that makes a snap)."
 )
 
 
 def accuracy(
     recipe: Annotated[
         Path | None,
-        typer.Argument(help="A recipe: each setting is varied with all others exact.", show_default=False),
+        typer.Argument(
+            help="A recipe: each setting is varied around the planner's choice, all others exact.", show_default=False
+        ),
     ] = None,
     reference: Annotated[str | None, typer.Option(metavar="NAME", help=HELP, show_default="rays")] = None,
     extremes: Annotated[
-        bool, typer.Option("--extremes", help="Stiff and extreme cases of every stage instead.")
+        bool, typer.Option("--extremes", help="Run stiff and extreme cases of every stage instead.")
     ] = False,
     settings: Annotated[
-        list[str], typer.Option("--set", metavar="PATH=VALUE", help="Set a field over the recipe. Repeatable.")
+        list[str], typer.Option("--set", metavar="PATH=VALUE", help="Override a field of the recipe. Repeatable.")
     ] = [],  # noqa: B006 - typer copies it
     frames: Annotated[
         str | None,
-        typer.Option(metavar="LIST", help="Frames of the recipe, such as 21,42. Left out: at 1/3 and 2/3 of the way."),
+        typer.Option(
+            metavar="LIST", help="Frames of the recipe, such as 21,42 (default: at 1/3 and 2/3 of the recipe)."
+        ),
     ] = None,
     hydrophones: Annotated[
         str | None,
-        typer.Option(metavar="all|N", help="Hydrophones computed exactly. Left out: 4 to 24, by how long one takes."),
+        typer.Option(metavar="all|N", help="Hydrophones computed exactly (default: 4 to 24, fewer if slow)."),
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="Draw the frames anew from this seed, by the choices of the recipe's.")
+        int | None, typer.Option(min=0, help="Redraw the random frames with this seed; keep the planner's choices.")
     ] = None,
     peers: Annotated[
-        bool, typer.Option(help="Measure a recipe's peers too: the thesis's loop, FINUFFT, Acoular.")
+        bool, typer.Option(help="Also run other programs for comparison: the thesis's loop, FINUFFT, Acoular.")
     ] = True,
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where rows and picture go.")] = Path("accuracy"),
-    as_json: Annotated[bool, typer.Option("--json", help="Print the rows as JSON.")] = False,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to write the table and the picture.")] = Path(
+        "accuracy"
+    ),
+    as_json: Annotated[bool, typer.Option("--json", help="Print the table as JSON.")] = False,
 ) -> None:
-    """Measure errors against slow and exact computations, and run times; exit status 1 if one is off.
+    """Measure errors against slow, exact computations, and run times; exits 1 if any error exceeds its bound.
 
-    Of a recipe, of a reference, or of stiff and extreme cases.
+    For a recipe, for a reference, or for stiff and extreme cases.
     """
     from sonarsynth.validation import REFERENCES
     from sonarsynth.validation.report import as_json as for_programs
@@ -68,7 +74,7 @@ def accuracy(
         return extremes_table(out, as_json=as_json)
     reference = reference or "rays"
     if reference not in REFERENCES:
-        raise BadOption(f"--reference {reference} is none of {', '.join(REFERENCES)}")
+        raise BadOption(f"--reference {reference} is not one of {', '.join(REFERENCES)}")
     try:
         rows = REFERENCES[reference](False)
     except ModuleNotFoundError as error:
@@ -87,11 +93,11 @@ def accuracy(
 def _check(recipe: Path | None, reference: str | None, extremes: bool, of_recipe: list[Any]) -> None:
     """Raise BadOption for more than one thing to measure."""
     if extremes and reference is not None:
-        raise BadOption("--extremes goes without --reference: it checks every stage")
+        raise BadOption("--extremes checks every stage: do not give --reference as well")
     if recipe is not None and (extremes or reference is not None):
-        raise BadOption(f"a recipe goes without {'--extremes' if extremes else '--reference'}: give one of the three")
+        raise BadOption("give only one of: a recipe, --reference, --extremes")
     if recipe is None and of_recipe:
-        raise BadOption("--set, --frames, --hydrophones and --seed go with a recipe")
+        raise BadOption("--set, --frames, --hydrophones and --seed need a recipe")
 
 
 def _table(rows: list[Row]) -> None:

@@ -43,7 +43,7 @@ def _show(rows: list[Extreme]) -> None:
     """A section a group, and how many are right."""
     from sonarsynth.cli.printing import console
 
-    table = Table("case", "must come out", "came out", title="stiff and extreme cases", title_justify="left")
+    table = Table("case", "expected", "result", title="stiff and extreme cases", title_justify="left")
     table.add_column("s", justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)
     group = ""
@@ -55,5 +55,5 @@ def _show(rows: list[Extreme]) -> None:
     console().print(table, markup=False)
     failed = sum(not row.ok for row in rows)
     seconds = sum(row.seconds for row in rows)
-    verdict = f"{failed} failed" if failed else "all right, none skipped"
+    verdict = f"{failed} failed" if failed else "all passed, none skipped"
     console().print(f"{len(rows)} cases in {seconds:.3g} s of one core, {verdict}")

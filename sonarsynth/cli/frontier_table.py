@@ -89,9 +89,9 @@ def show(measured: Measured) -> None:
 
     table = Table(title=measured.title, title_justify="left")
     table.add_column("stage", no_wrap=True)
-    table.add_column("knob")
+    table.add_column("parameter")
     table.add_column("setting")
-    for name in ("error", "allowed", "ms a frame"):
+    for name in ("error", "allowed", "ms per frame"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("", min_width=6)
     table.add_column("also")
@@ -105,7 +105,9 @@ def show(measured: Measured) -> None:
     for one in (table, _verdict_table(measured.verdicts)):
         console().print(one, markup=False, soft_wrap=False, width=min(console().width, WIDEST))
     frames = ", ".join(str(n) for n in measured.frames)
-    console().print(f"frames {frames}, {measured.hydrophones} hydrophones; {'all good' if measured.ok else 'FAILED'}")
+    console().print(
+        f"frames {frames}, {measured.hydrophones} hydrophones; {'all within their bounds' if measured.ok else 'FAILED'}"
+    )
 
 
 def _numbers(point: Point) -> tuple[str, str, str]:
@@ -119,7 +121,7 @@ def _mark(point: Point) -> str:
         return ""
     if point.role == "check":
         return "ok" if point.meets else "FAILED"
-    return ("chosen, " if point.chosen else "") + ("within" if point.meets else "beyond")
+    return ("chosen, " if point.chosen else "") + ("within" if point.meets else "exceeds")
 
 
 def _also(point: Point) -> str:
@@ -132,7 +134,7 @@ def _verdict_table(verdicts: Sequence[Verdict]) -> Table:
     table = Table("stage", "chosen", title="verdicts", title_justify="left")
     for name in ("error", "allowed", "ms"):
         table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("cheapest that keeps within")
+    table.add_column("cheapest within the bound")
     for name in ("ms", "times"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)

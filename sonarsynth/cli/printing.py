@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
 
-from sonarsynth.conventions import format_bytes
+from sonarsynth.conventions import counted, format_bytes
 
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan
@@ -40,8 +40,8 @@ def progress() -> Iterator[Report]:
         task = bar.add_task("frames", total=None, pace="starting workers")
         began = time.monotonic()
 
-        def update(done: int, total: int, aside: int) -> None:
-            bar.update(task, completed=done + aside, total=total, pace=_pace(done, total, aside, began))
+        def update(done: int, total: int, failed: int) -> None:
+            bar.update(task, completed=done + failed, total=total, pace=_pace(done, total, failed, began))
 
         yield update
 
@@ -57,26 +57,26 @@ class _Lines:
     def __init__(self) -> None:
         self.began = self.said = time.monotonic()
 
-    def __call__(self, done: int, total: int, aside: int) -> None:
+    def __call__(self, done: int, total: int, failed: int) -> None:
         now = time.monotonic()
         if now - self.said >= SECONDS_BETWEEN_LINES:
             self.said = now
-            sys.stderr.write(f"{done + aside} of {total} frames, {_pace(done, total, aside, self.began)}\n")
+            sys.stderr.write(f"{done + failed} of {total} frames, {_pace(done, total, failed, self.began)}\n")
             sys.stderr.flush()
 
 
-def _pace(done: int, total: int, aside: int, began: float) -> str:
-    """Frames per second, time left, frames set aside."""
-    finished = done + aside
+def _pace(done: int, total: int, failed: int, began: float) -> str:
+    """Frames per second, time left, frames that failed."""
+    finished = done + failed
     if not finished:
         return "starting workers"
     rate = finished / max(time.monotonic() - began, 1e-9)
     text = f"{rate:.3g} frames/s, {duration((total - finished) / rate)} left"
-    return text + (f", {aside} set aside" if aside else "")
+    return text + (f", {failed} failed" if failed else "")
 
 
 def duration(seconds: float) -> str:
-    """A time as people say it."""
+    """A time in a unit that suits it."""
     if seconds < 100:
         return f"{seconds:.3g} s"
     minutes, hours = seconds / 60, seconds / 3600
@@ -94,18 +94,18 @@ def build_report(report: BuildReport) -> None:
     if report.written:
         rate = report.written / report.seconds
         out.print(
-            f"{report.store}: {report.written} frames written in {duration(report.seconds)} ({rate:.3g} frames/s, "
-            f"{format_bytes(report.bytes)}), {report.there} of {report.wanted} were there"
+            f"{report.store}: {counted(report.written, 'frame')} written in {duration(report.seconds)} "
+            f"({rate:.3g} frames/s, {format_bytes(report.bytes)}), {report.there} of {report.wanted} were already built"
         )
         times = ", ".join(f"{stage} {_milliseconds(s / report.written)}" for stage, s in report.stage_cpu.items())
         where = (
-            f"{report.workers} workers, at most {format_bytes(report.worker_peak_bytes)} each"
+            f"{counted(report.workers, 'worker')} with at most {format_bytes(report.worker_peak_bytes)} of memory each"
             if report.workers
-            else "no workers"
+            else "no worker processes"
         )
-        out.print(f"a frame: {times} of one core; {where}, {format_bytes(report.client_peak_bytes)} here")
+        out.print(f"CPU time per frame: {times}; {where}, {format_bytes(report.client_peak_bytes)} in this process")
     elif not report.failures:
-        out.print(f"{report.store}: all {report.wanted} frames are there")
+        out.print(f"{report.store}: all {report.wanted} frames were already built")
     if report.prediction and report.written:
         for line in _compared(report.prediction):
             out.print(line)
@@ -114,9 +114,11 @@ def build_report(report: BuildReport) -> None:
     for warning in report.warnings:
         out.print(f"warning: {warning}", markup=False)
     for failure in report.failures[:10]:
-        out.print(f"frame {failure.frame} set aside in {failure.stage}: {failure.error}", markup=False)
+        out.print(f"frame {failure.frame} failed in {failure.stage}: {failure.error}", markup=False)
     if report.failures:
-        out.print(f"{len(report.failures)} frames set aside; tracebacks in {report.store}.aside.jsonl", markup=False)
+        out.print(
+            f"{counted(len(report.failures), 'frame')} failed; tracebacks in {report.store}.failed.jsonl", markup=False
+        )
 
 
 def _compared(found: dict[str, Any]) -> Iterator[str]:
@@ -138,17 +140,18 @@ def plan_report(plan: Plan, prediction: Prediction) -> None:
         out.print(f"note: {warning}", markup=False)
     for line in _spanned(plan.as_json()):
         out.print(line, markup=False)
-    out.print(", ".join(f"{count} {name}" for name, count in plan.sizes.items()))
+    out.print(", ".join(counted(count, name) for name, count in plan.sizes.items()))
     p = prediction
     out.print(
-        f"predicted: {duration(p.seconds)} for {p.frames} frames with {p.workers} workers, {duration(p.core_seconds)} "
-        f"of CPU time; {format_bytes(p.bytes)} on the disk, {format_bytes(p.raw_bytes)} before compression"
+        f"predicted: {duration(p.seconds)} for {counted(p.frames, 'frame')} with {counted(p.workers, 'worker')}, "
+        f"{duration(p.core_seconds)} of CPU time; {format_bytes(p.bytes)} on disk, {format_bytes(p.raw_bytes)} before "
+        "compression"
     )
     out.print(
         f"at most {p.files} files and folders for all frames, {plan.shard_frames} frames in a file; "
         f"a worker takes up to {format_bytes(plan.memory_bytes)} of memory"
     )
-    out.print(f"known from {p.how}", markup=False)
+    out.print(f"estimated from {p.how}", markup=False)
 
 
 def _spanned(plan: dict[str, Any]) -> Iterator[str]:
@@ -180,10 +183,11 @@ def verify_report(report: StoreReport) -> None:
     if report.problems and spoiled:
         from sonarsynth.store import ranges
 
-        out.print(f"damaged frames: {ranges(spoiled)}; 'sonarsynth repair' makes them again", markup=False)
+        out.print(f"damaged frames: {ranges(spoiled)}; run 'sonarsynth repair' to rebuild them", markup=False)
     for check in report.checks:
-        word = {True: "ok", False: "FAILED", None: "reported"}[check.ok]
-        out.print(f"{word}: {check.name}: {check.got} (expected: {check.expected})", markup=False)
+        word = {True: "ok", False: "FAILED", None: "info"}[check.ok]
+        expected = "" if check.ok is None else f" (expected: {check.expected})"
+        out.print(f"{word}: {check.name}: {check.got}{expected}", markup=False)
         if check.ok is False and check.frames:
             from sonarsynth.store import ranges
 
@@ -192,6 +196,6 @@ def verify_report(report: StoreReport) -> None:
         if check.warning:
             out.print(f"warning: {check.warning}", markup=False)
     if report.building:
-        out.print(f"it is being built by {report.building}: what is complete was looked at, the rest not", markup=False)
+        out.print(f"being built by {report.building}: only the complete part was checked", markup=False)
     if report.ok:
-        out.print("whole and as written" if not report.quick else "all files are as written")
+        out.print("store is intact" if not report.quick else "all files match their digests")

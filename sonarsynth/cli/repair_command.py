@@ -18,39 +18,37 @@ if TYPE_CHECKING:
 def repair(
     store: Annotated[str, typer.Argument(help="The store, a Zarr folder or its URL.", show_default=False)],
     workers: Annotated[
-        int | None, typer.Option(min=0, help="Worker processes; 0: none, in this process. Left out: one a core.")
+        int | None, typer.Option(min=0, help="Worker processes (default: one per core; 0 runs in this process).")
     ] = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A running Dask scheduler, such as tcp://127.0.0.1:8786.")
     ] = None,
-    anyway: Annotated[
-        bool, typer.Option("--anyway", help="Though another version of sonarsynth built it: says if numbers differ.")
+    force: Annotated[
+        bool, typer.Option("--force", help="Repair even if another version built it; reports differences.")
     ] = False,
     files: Annotated[
         Path | None,
-        typer.Option(metavar="FOLDER", help="Where files that the recipe names are; none is opened outside of it."),
+        typer.Option(metavar="FOLDER", help="Folder of the files that the recipe names; no file outside it is opened."),
     ] = None,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Compare files with their digests; do not read every number back.")
-    ] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Only compare files with their digests.")] = False,
     insecure: Annotated[
-        bool, typer.Option("--insecure", help="Use a scheduler on another machine without TLS.")
+        bool, typer.Option("--insecure", help="Allow an unencrypted connection to a remote scheduler.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Make what is damaged in a store again, from the recipe in it. What does not belong there moves out."""
+    """Rebuild damaged parts of a store from the recipe in it. Files that do not belong there are moved out."""
     from sonarsynth.cli import printing
     from sonarsynth.schedule.repairing import repair as run
 
     if scheduler is not None and workers is not None:
-        raise BadOption("--workers is for worker processes of our own, --scheduler for those of another: give one")
+        raise BadOption("--workers starts processes on this machine, --scheduler uses a running cluster: give only one")
     worker_bounds(workers, scheduler, None, None, insecure)
     with printing.progress() as progress:
         report = run(
             store,
             workers=workers,
             scheduler=scheduler,
-            anyway=anyway,
+            force=force,
             quick=quick,
             insecure=insecure,
             files=files,
@@ -68,6 +66,7 @@ def repair(
 
 def _print(report: RepairReport) -> None:
     from sonarsynth.cli.printing import console
+    from sonarsynth.conventions import counted
     from sonarsynth.store import ranges
     from sonarsynth.store.checking.examining import shown
 
@@ -75,15 +74,15 @@ def _print(report: RepairReport) -> None:
     for name in report.restored:
         out.print(f"restored {name}", markup=False)
     if report.shards:
-        out.print(f"made again: {len(report.shards)} shards, frames {ranges(report.frames)}", markup=False)
+        out.print(f"rebuilt: {counted(len(report.shards), 'shard')}, frames {ranges(report.frames)}", markup=False)
     for name in report.moved:
         out.print(f"moved out: {shown(name)}", markup=False)
     for failure in report.failures[:10]:
-        out.print(f"frame {failure.frame} set aside in {failure.stage}: {failure.error}", markup=False)
+        out.print(f"frame {failure.frame} failed in {failure.stage}: {failure.error}", markup=False)
     for shard in report.differing:
-        out.print(f"DIFFERS shard {shard}: its numbers are not those that were written", markup=False)
+        out.print(f"DIFFERS shard {shard}: the rebuilt data are not those that were first written", markup=False)
     for problem in report.problems[:50]:
         out.print(f"DAMAGE {problem.where}: {problem.what}", markup=False)
     if report.ok:
         made = report.restored or report.shards or report.moved
-        out.print(f"{report.store}: whole and as written" + ("" if made else "; nothing to repair"), markup=False)
+        out.print(f"{report.store}: store is intact" + ("" if made else "; nothing to repair"), markup=False)

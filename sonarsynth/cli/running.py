@@ -44,7 +44,7 @@ def run(app: typer.Typer, arguments: list[str] | None = None) -> int:
 
 
 def _interrupted() -> int:
-    return _say("interrupted; the same command goes on from here", INTERRUPTED)
+    return _say("interrupted; run the same command again to resume", INTERRUPTED)
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:

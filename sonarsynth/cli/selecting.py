@@ -34,13 +34,13 @@ def _numbers(option: str, what: str, text: str | None, count: int) -> tuple[int,
     for part in text.split(","):
         found = re.fullmatch(r"\s*(\d*)(:?)(\d*)\s*", part)
         if found is None or not part.strip() or not (found[2] or found[1]):
-            raise BadOption(f"{option}: '{part}' is no {what} and no range such as 0:8")
+            raise BadOption(f"{option}: '{part}' is neither a {what} number nor a range such as 0:8")
         first = int(found[1] or 0)
         stop = (int(found[3]) if found[3] else count) if found[2] else first + 1
         if stop > count:
             raise BadOption(f"{option}: '{part}' ends past the last {what}, {count - 1}")
         if stop <= first:
-            raise BadOption(f"{option}: '{part}' holds no {what}; there are 0 to {count - 1}")
+            raise BadOption(f"{option}: '{part}' contains no {what}; they are numbered 0 to {count - 1}")
         chosen.update(range(first, stop))
     return tuple(sorted(chosen))
 

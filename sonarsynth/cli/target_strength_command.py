@@ -26,19 +26,28 @@ def target_strength(
             metavar="MESH", help="A mesh file, or a shape such as '{kind: sphere, radius: 0.25 m}'.", show_default=False
         ),
     ],
-    frequency: Annotated[str, typer.Option(metavar="A:B:STEP", help="Hz, both ends included.")] = "25e3:110e3:5e3",
+    frequency: Annotated[
+        str, typer.Option(metavar="A:B:STEP", help="Frequencies in Hz, both ends included.")
+    ] = "25e3:110e3:5e3",
     aspect: Annotated[
-        str, typer.Option(metavar="A:B:STEP", help="Where the sonar is (deg): 0 ahead, 90 to port.")
+        str, typer.Option(metavar="A:B:STEP", help="Direction of the sonar from the target (deg; 0 bow, 90 port).")
     ] = "0:360:1",
     scattering: Annotated[
-        str, typer.Option(metavar="LAW", help="Such as '{kind: kirchhoff, surface: soft}' or '{kind: mirror_lobe}'.")
+        str,
+        typer.Option(
+            metavar="LAW", help="Scattering law, such as '{kind: kirchhoff, surface: soft}' or '{kind: mirror_lobe}'."
+        ),
     ] = "{kind: kirchhoff}",
-    sound_speed: Annotated[float, typer.Option(help="m/s.", metavar="C")] = 1500.0,
-    unit: Annotated[str, typer.Option(metavar="UNIT", help="Of a mesh file: m, cm, mm, in or ft.")] = "m",
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where table and picture go.")] = Path("target_strength"),
+    sound_speed: Annotated[float, typer.Option(help="Sound speed in m/s.", metavar="C")] = 1500.0,
+    unit: Annotated[
+        str, typer.Option(metavar="UNIT", help="Unit of the mesh file's coordinates: m, cm, mm, in or ft.")
+    ] = "m",
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to write the table and the picture.")] = Path(
+        "target_strength"
+    ),
     as_json: Annotated[bool, typer.Option("--json", help="Print the table as JSON.")] = False,
 ) -> None:
-    """Backscattered target strength over aspect and frequency, in dB re 1 m2: a table (CSV) and a polar picture."""
+    """Monostatic target strength over aspect and frequency, in dB re 1 m2: a table (CSV) and a polar plot."""
     import numpy as np
 
     from sonarsynth.conventions import FASTEST, SLOWEST
@@ -112,11 +121,11 @@ def _values(text: str, option: str) -> Floats:
     except ValueError:
         parts = []
     if len(parts) not in (1, 3) or not np.isfinite(parts).all():
-        raise BadOption(f"{option}: '{text}' is no number and no range such as 0:90:5")
+        raise BadOption(f"{option}: '{text}' is neither a number nor a range such as 0:90:5")
     if len(parts) == 1:
         return np.array(parts)
     first, last, step = parts
     count = (last - first) / step if step != 0.0 else np.nan
     if not 0 <= count < MOST:
-        raise BadOption(f"{option}: '{text}' holds no value or more than {MOST}")
+        raise BadOption(f"{option}: '{text}' contains no value, or more than {MOST}")
     return np.asarray(first + step * np.arange(int(count + 1e-9) + 1))

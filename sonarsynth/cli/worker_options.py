@@ -16,12 +16,14 @@ def worker_bounds(
     """Arguments of schedule.build. Raises BadOption for what cannot be."""
     if timeout is not None:
         if not math.isfinite(timeout):
-            raise BadOption(f"--frame-timeout {timeout} is no number of seconds")
+            raise BadOption(f"--frame-timeout {timeout} is not a number of seconds")
         if workers == 0:
-            raise BadOption("--frame-timeout ends worker processes, and --workers 0 has none")
+            raise BadOption("--frame-timeout works only with worker processes: use --workers 1 or more")
     if memory_gb is not None:
         if workers == 0 or scheduler is not None:
-            raise BadOption("--worker-memory is for worker processes of our own: it goes with --workers of 1 or more")
+            raise BadOption(
+                "--worker-memory applies only to processes on this machine: use it with --workers 1 or more"
+            )
         if not LEAST_GB <= memory_gb <= MOST_GB:
             raise BadOption(f"--worker-memory: must be from {LEAST_GB} to {MOST_GB:g} GB, not {memory_gb}")
     if scheduler is not None:

@@ -31,13 +31,13 @@ NODES = 513
 class DepthAbsorption:
     """Absorption at one frequency at every depth: each path loses its mean over the depths that it passes."""
 
-    depth: Floats  # (node,) m, from the surface to the bed
+    depth: Floats  # (node,) m, from the surface to the bottom
     value: Floats  # (node,) dB/m
 
     @staticmethod
-    def of(absorption: Absorption, frequency: float, bed: float) -> DepthAbsorption:
+    def of(absorption: Absorption, frequency: float, bottom: float) -> DepthAbsorption:
         """That of a description at a frequency (Hz), in water so deep (m)."""
-        depth = np.linspace(0.0, bed, NODES)
+        depth = np.linspace(0.0, bottom, NODES)
         return DepthAbsorption(depth, absorption_db_per_m(absorption, frequency, depth))
 
     def along(self, profile: Profile, start: Floats, end: Floats, climb: Floats, vertices: Ints) -> Floats:

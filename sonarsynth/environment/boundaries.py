@@ -1,5 +1,5 @@
-"""The boundaries of the water: surface and bed, flat on average. What each is made of, and how rough it is. One that is
-not flat, a slope or a reef, is a target with a mesh.
+"""The boundaries of the water: surface and bottom, flat on average. What each is made of, and how rough it is. One that
+is not flat, a slope or a reef, is a target with a mesh.
 
 Roughness takes from the mirror echo what it scatters elsewhere (Eckart 1953), frequency by frequency. That energy is
 not lost in the sea: it comes as many small echoes from around the mirror point. These are not simulated, so a rough
@@ -102,7 +102,7 @@ class ReflectionTable:
 
     Each is interpolated linearly in the angle, as it is written. Phases are those of exp(+i 2 pi f t), as in Bellhop's
     tables: 180 degrees for a pressure-release surface, and from 180 down to 0 as the angle grows from grazing to
-    critical over a fast bed. They are not wrapped: write neighbours close to each other.
+    critical over a fast bottom. They are not wrapped: write neighbours close to each other.
     """
 
     kind: Literal["table"] = "table"
@@ -174,7 +174,7 @@ class SeaSurface:
 
 @description
 class SeaBed:
-    """The bed: medium sand and smooth unless said otherwise."""
+    """The bottom: medium sand and smooth unless said otherwise."""
 
     reflection: Reflection = Sediment(name="medium sand")
     rms_height: RmsHeight = 0.0

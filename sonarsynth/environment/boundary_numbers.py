@@ -1,6 +1,6 @@
 """What a boundary does to sound: its description turned into numbers.
 
-Coefficients are for f > 0 in time dependence exp(+i 2 pi f t) and the same at every frequency (absorption in the bed
+Coefficients are for f > 0 in time dependence exp(+i 2 pi f t) and the same at every frequency (absorption in the bottom
 goes with frequency, so its loss tangent is a number). Roughness is what depends on frequency: exp(-(2 pi f
 delay_std)^2/2). Formulas out of their range do not warn here, frame after frame: `boundary_notes` say it once.
 """
@@ -121,8 +121,8 @@ def _smooth(reflection: Reflection, grazing: Floats) -> Complexes:
         case Rigid():
             return np.ones(grazing.shape, complex)
         case FluidHalfSpace():
-            bed = (reflection.density_ratio, reflection.speed_ratio, reflection.loss_tangent)
-            return boundary_reflection.rayleigh(grazing, *bed)
+            bottom = (reflection.density_ratio, reflection.speed_ratio, reflection.loss_tangent)
+            return boundary_reflection.rayleigh(grazing, *bottom)
         case Sediment():
             return boundary_reflection.rayleigh(grazing, *boundary_reflection.SEDIMENTS[reflection.name])
         case ReflectionTable():

@@ -1,4 +1,4 @@
-"""The water: depth, sound speed, surface, bed, absorption and ambient noise."""
+"""The water: depth, sound speed, surface, bottom, absorption and ambient noise."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class Environment:
     """The water and its boundaries."""
 
     depth: Annotated[PositiveMetres, Le(12e3)]
-    """Depth of the bed below the mean surface."""
+    """Depth of the bottom below the mean surface."""
     sound_speed: SoundSpeed
     surface: SeaSurface = SeaSurface()
     bed: SeaBed = SeaBed()

@@ -171,8 +171,8 @@ class Munk:
 
     Rays go through layers of linear sound speed that stand for the formula (`world.profiles`). Travel times measured
     against rays integrated through the formula (ends at 100 to 4500 m, up to 3 vertices; left out are rays that graze
-    the bed at under 1 degree or for which the integration did not converge, 5 % at 50 km), largest and root mean square
-    error in s; `chords` are even nodes on the formula itself:
+    the bottom at under 1 degree or for which the integration did not converge, 5 % at 50 km), largest and root mean
+    square error in s; `chords` are even nodes on the formula itself:
 
         tolerance   nodes     10 km               50 km               100 km
         1e-5           53     3.6e-6   5.6e-7     1.2e-5   3.4e-6     1.9e-5   9.4e-6
@@ -241,13 +241,13 @@ SoundSpeed = Annotated[
 
 
 def reaches(sound_speed: SoundSpeed, depth: float) -> None:
-    """Raises ValueError in one line where a formula of sound speed ends above a bed at `depth` (m)."""
+    """Raises ValueError in one line where a formula of sound speed ends above a bottom at `depth` (m)."""
     if isinstance(sound_speed, (Linear, Thermocline, Munk, Catenary)):
         node, speed = sound_speed.nodes
         if node[-1] < depth:
             raise ValueError(
                 f"the sound speed, {sound_speed.kind}, goes down to {node[-1]:g} m, where it is {speed[-1]:g} m/s: "
-                f"not to the bed at {depth:g} m"
+                f"not to the bottom at {depth:g} m"
             )
 
 

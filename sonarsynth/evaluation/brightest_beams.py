@@ -87,7 +87,7 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
         if counts and not (hit or ghost):
             missed.append(i)
     if not seen:
-        return Check(name, expected, "no target in view and heard", None, {})
+        return Check(name, expected, "no target is in view and audible", None, {})
     also = f", on a ghost in {ghosts}" if ghosts else ""
     return Check(
         name,

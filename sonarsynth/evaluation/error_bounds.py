@@ -38,10 +38,12 @@ def useful_ranges(tree: xr.DataTree, frames: np.ndarray) -> Check:
     middle = [float(np.median(x)) for x in (error, predicted, limit)]
     over = error > limit, predicted > limit
     numbers = {"median_m": middle[0], "predicted_m": middle[1], "limit_m": middle[2]}
-    got = f"error {middle[0]:.2g} m, predicted {middle[1]:.2g} m, medians; target or beam {middle[2]:.2g} m"
+    got = (
+        f"median error {middle[0]:.2g} m, median predicted {middle[1]:.2g} m; size of target or beam {middle[2]:.2g} m"
+    )
     if not any(np.mean(x) > 0.5 for x in over):
         return Check(name, expected, got, None, numbers)
-    warning = f"ranges tell nothing: {got}"
+    warning = f"ranges carry no information: {got}"
     return Check(name, expected, got, None, numbers, numbered(np.unique(frame[over[0] | over[1]])), warning)
 
 

@@ -92,7 +92,7 @@ def range_errors(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
     found = points(tree, frames)
     numbers: dict[str, float] = {word: int(mask.sum()) for word, mask in kinds(found).items()}
     numbers |= {"points": int(found.judged.sum()), "off_target": int((~found.judged).sum())}
-    whose = Check("whose echoes points are", reported, _said(numbers), None, numbers, warning=_few(numbers))
+    whose = Check("origin of points", reported, _said(numbers), None, numbers, warning=_few(numbers))
     if not found.judged.any():
         return [Check(name, reported, "no points on a target", None, numbers), whose]
     error, ratio = found.error[found.judged], _ratio(found)[found.judged]
@@ -105,12 +105,12 @@ def range_errors(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
         "pull_std": float(finite.std()) if len(finite) else float("nan"),
     }
     spread = f"median error {100 * numbers['median_m']:.2g} cm, at most {100 * numbers['largest_m']:.2g} cm"
-    within = f"{100 * numbers['share_within_3']:.4g} %, errors over predicted ones have standard deviation "
+    within = f"{100 * numbers['share_within_3']:.4g} %; ratio of error to predicted error has standard deviation "
     return [
         Check(name, reported, f"{spread}, over {len(error)} points", None, numbers),
         Check(
             "predicted range errors",
-            "99 % within three, but one",
+            "99 % (all but one at least) within 3 predicted errors",
             within + f"{numbers['pull_std']:.2g}",
             bool(missed.sum() <= max(1, OUTLIERS * len(missed))),
             numbers,
@@ -145,10 +145,15 @@ def kinds(found: Points) -> dict[str, np.ndarray]:
 
 def _said(numbers: dict[str, float]) -> str:
     rest = [f"{count:.0f} {word}" for word, count in numbers.items() if count and word not in ("points", "off_target")]
-    return ", ".join([f"{numbers['points']:.0f} direct echoes of targets", *rest])
+    off = f", {numbers['off_target']:.0f} off" + (f" ({', '.join(rest)})" if rest else "")
+    return f"{numbers['points']:.0f} points on target{off if numbers['off_target'] else ''}"
 
 
 def _few(numbers: dict[str, float]) -> str:
     """A warning where most points are no direct echoes."""
     count = numbers["points"] + numbers["off_target"]
-    return f"of {count:.0f} points only {_said(numbers)}" if numbers["points"] < 0.5 * count else ""
+    return (
+        f"only {100 * numbers['points'] / count:.0f} % of the points are direct echoes of targets: {_said(numbers)}"
+        if numbers["points"] < 0.5 * count
+        else ""
+    )

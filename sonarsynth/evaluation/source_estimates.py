@@ -70,7 +70,7 @@ def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
     if not good and worst != "position":
         got += f"; {worst} in {100 * shares.get(worst, 0.0):.3g} %"
     if tally.strays:
-        got += f"; {tally.strays} come from no snap"
+        got += f"; {tally.strays} match no snap"
     numbers |= {"good": sum(places), "found": tally.rows, "median_m": median, "strays": tally.strays}
     return Check(NAME, EXPECTED, got, good, numbers, numbered(sorted(tally.frames)), _warning(tally))
 
@@ -127,5 +127,5 @@ def _warning(tally: _Tally) -> str:
         why = ", ".join(f"{name} {count}" for name, count in tally.reasons.most_common(3))
         said.append(f"{tally.unheard} snaps that reach the array were not located" + (f" ({why})" if why else ""))
     if tally.useless:
-        said.append(f"{tally.useless} of {tally.rows} estimates err by as much as they say, by their own errors")
+        said.append(f"{tally.useless} of {tally.rows} estimates are useless: their predicted errors are too large")
     return "; ".join(said)

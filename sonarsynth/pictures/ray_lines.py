@@ -61,7 +61,7 @@ class RayLine:
 
     @property
     def vertices(self) -> str:
-        """Its vertices in order, such as S-B; S surface, B bed, T turning point, X target; a dash without any."""
+        """Its vertices in order, such as S-B; S surface, B bottom, T turning point, X target; a dash without any."""
         return "-".join(LETTERS[e] for e in self.event if e in LETTERS) or "-"
 
     @property

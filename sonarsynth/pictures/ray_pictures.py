@@ -25,12 +25,14 @@ from sonarsynth.planning import plan as plan_of
 from sonarsynth.propagation.ray_request import EigenrayRequest
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
-from sonarsynth.tracing.ray_fan import EVENTS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LONGEST_TABLE = 100
+REFLECTED = {"surface": "surface", "bed": "bottom", "facet": "target"}
+"""Events of rays that are reflections, and from what."""
+
 HEADINGS = (
     "joins",
     "family",
@@ -84,15 +86,15 @@ def ray_lines(plan: Plan, frame: Frame, index: int) -> list[RayLine]:
 
 def as_json(plan: Plan, frame: Frame, lines: Sequence[RayLine]) -> dict[str, Any]:
     """The rays of a frame, and the water that they are in, for a program."""
-    bed = plan.scene.world.environment.depth
-    layers = water(plan.profile.depth, plan.profile.speed, bed)
+    bottom = plan.scene.world.environment.depth
+    layers = water(plan.profile.depth, plan.profile.speed, bottom)
     places = {"array": frame.sonar_pose.position} | {f"snap {n}": s.position for n, s in enumerate(frame.moment.snaps)}
     return {
         "title": plan.recipe.title,
         "frame": frame.index,
         "time": frame.time,
         "units": UNITS,
-        "bed": bed,
+        "bed": bottom,
         "profile": {"depth": layers.depth.tolist(), "speed": layers.speed.tolist()},
         "places": {name: place.tolist() for name, place in places.items()},
         "bearing": _bearing(frame, lines),
@@ -116,13 +118,14 @@ def table(lines: Sequence[RayLine]) -> str:
     if len(found) > LONGEST_TABLE:
         texts.append(f"... and {len(found) - LONGEST_TABLE} more, in rays.json")
     if found:
-        texts.append("vertices: S surface, B bed, T turning point, X target; angles of travel, up positive")
-        texts.append("how many vertices at most is for the recipe to say: rays.eigenrays.vertices")
-        texts.append("TL at the centre of the band; of an echo: both ways, off a target of 0 dB")
+        texts.append("vertices: S surface, B bottom, T turning point, X target; angles of the ray, up positive")
+        texts.append("set rays.eigenrays.vertices to change the maximum number of vertices")
+        texts.append("TL at the centre of the band; for an echo: two-way, with a target strength of 0 dB")
     if fan:
         met = Counter(event for line in fan for event in line.event)
-        words = ", ".join(f"{met[name]} x {name}" for name in EVENTS if met[name])
-        texts.append(f"{len(fan)} rays of a fan: {words}")
+        words = [f"{met[name]} {word}" for name, word in REFLECTED.items() if met[name]]
+        turned = f"; {met['turning point']} turning points" if met["turning point"] else ""
+        texts.append(f"{len(fan)} rays: {', '.join(words) or 'no'} reflections{turned}")
     return "\n".join(texts)
 
 

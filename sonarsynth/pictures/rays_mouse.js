@@ -104,7 +104,7 @@ function start() {
     view.stretch = Number(slider.value);
     draw(drawSpace);
   };
-  label.append("depth drawn larger ", slider);
+  label.append("vertical exaggeration ", slider);
   byId("controls").append(label);
   const canvas = byId("space");
   let held = null;

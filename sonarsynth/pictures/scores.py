@@ -26,7 +26,7 @@ LEVEL = "dB re 1 uPa2 s"
 STAGES = {"trace": "tracing", "beamform": "signals and beams", "range": "ranging"}
 """Stages of the file of run times, as they are called in a table."""
 
-SPEED = "frames a second, one core"
+SPEED = "frames per second, one core"
 
 UNKNOWN = "-"
 
@@ -106,9 +106,9 @@ def _level(energy: float) -> str:
 def _costs(file: Path, frames: frozenset[int]) -> dict[str, str]:
     """Median processor time of each stage and of all, from the file of run times; the last time a frame was built."""
     found = [row for row in _rows(file) if row.get("frame") in frames]
-    tasks = max((set(row["cpu"]) for row in found), key=len, default=set())  # a frame that was set aside lacks some
+    tasks = max((set(row["cpu"]) for row in found), key=len, default=set())  # a frame that failed lacks some
     rows = {row["frame"]: row["cpu"] for row in found if set(row["cpu"]) == tasks}
-    called = [f"CPU a frame: {name}" for name in (*STAGES.values(), "all")]
+    called = [f"CPU per frame: {name}" for name in (*STAGES.values(), "all")]
     if not rows:
         return dict.fromkeys([*called, SPEED], UNKNOWN)
     spent = np.array([[cpu.get(stage, 0.0) for stage in STAGES] for cpu in rows.values()])

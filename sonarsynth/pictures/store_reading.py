@@ -185,8 +185,8 @@ def ghosts(tree: xr.DataTree, frame: int) -> tuple[Ghost, ...]:
 def _blended(azimuth: Floats, elevation: Floats, families: list[str], family: int) -> bool:
     """True where a direction (deg) is none, or the mean of several that lie apart, where there is nothing to see.
 
-    Echoes by surface and bed come from above (the bed first) and from below (the surface first). Each of the two lies
-    farther from the direct echo than the ghosts by one boundary do; their mean lies between them.
+    Echoes by surface and bottom come from above (the bottom first) and from below (the surface first). Each of the two
+    lies farther from the direct echo than the ghosts by one boundary do; their mean lies between them.
     """
     towards = direction(np.deg2rad(azimuth), np.deg2rad(elevation))
     if not np.isfinite(towards[family]).all():

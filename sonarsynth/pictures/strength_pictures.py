@@ -42,8 +42,8 @@ class StrengthTable:
         mean = 10.0 * np.log10(np.mean(10.0 ** (self.strength / 10.0)))
         at = f"{np.rad2deg(self.aspect[high[0]]):g} deg and {self.frequency[high[1]] / 1e3:g} kHz"
         return (
-            f"{self.strength.size} levels: highest {self.strength[high]:.1f} dB re 1 m2 at {at}, "
-            f"median {np.median(self.strength):.1f}, mean power {mean:.1f}"
+            f"{self.strength.size} levels: maximum {self.strength[high]:.1f} dB re 1 m2 at {at}, "
+            f"median {np.median(self.strength):.1f} dB, mean power {mean:.1f} dB"
         )
 
 

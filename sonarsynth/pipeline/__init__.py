@@ -172,8 +172,8 @@ def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFr
     imaged = signals
     if signals.start <= start and stop <= end:
         if processing.cancelling is not None:
-            bed, pose = environment.depth, frame.sonar_pose
-            imaged = processing.cancelling.cancel(signals, bearings, plan.elements, sonar, pose, bed, (start, stop))
+            bottom, pose = environment.depth, frame.sonar_pose
+            imaged = processing.cancelling.cancel(signals, bearings, plan.elements, sonar, pose, bottom, (start, stop))
         imaged, image = image_of(plan, imaged, bearings, (start, stop))
     else:  # no direct pulse was found, or an echo was taken for it: no clock, so no image, rather than an arbitrary one
         image = no_image(sonar, np.nan, np.nan)

@@ -60,7 +60,7 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS, choices: Choices | 
     rendered. `choices`: those that another plan of the same recipe made; left out: the cheapest that keep within the
     accuracy of the recipe.
 
-    Raises FieldError, naming the field, for a body above the surface or in the bed, a sonar or shrimp out of the
+    Raises FieldError, naming the field, for a body above the surface or in the bottom, a sonar or shrimp out of the
     water, a snap that cannot be made, a missing or broken file, or methods that cannot serve the scene; ValueError for
     an unknown product. No frame is rendered.
     """

@@ -114,7 +114,7 @@ def _synthesis(plan: Plan) -> Row:
         work += sensor_samples * SECONDS["noise sensor sample"]
     stored = sensor_samples * (2 if scene.sonar.converter else 4) if "signals" in plan.products else 0
     error = f"{plan.errors.synthesis:.1g} of the peak" if plan.errors.synthesis > 0.0 else "rounding"
-    why = "asked for" if "signals" in plan.products else f"needed by the {' and the '.join(sorted(plan.products))}"
+    why = "requested" if "signals" in plan.products else f"needed by the {' and the '.join(sorted(plan.products))}"
     return ("synthesise", _synthesised(plan), why, error, work, stored)
 
 
@@ -123,7 +123,7 @@ def _synthesised(plan: Plan) -> str:
     method = plan.choices.synthesis
     if isinstance(method, DirectSum):
         return method.kind
-    return f"{method.kind}, {method.width} wide, tolerance {method.tolerance:.1g}, {method.precision}"
+    return f"{method.kind}, width {method.width}, tolerance {method.tolerance:.1g}, {method.precision}"
 
 
 def _traced(plan: Plan) -> str:
@@ -132,18 +132,18 @@ def _traced(plan: Plan) -> str:
     parts = plan.choices.subarrays
     to = "the array" if parts == 1 else f"each of {parts} subarrays"
     if parts == plan.elements.count > 1:
-        to = "each hydrophone by itself"
+        to = "each hydrophone separately"
     if plan.choices.degree > 3 and parts < plan.elements.count:
-        to += f", to the degree {plan.choices.degree}"
+        to += f", degree {plan.choices.degree}"
     if plan.choices.visibility == "hydrophones":
-        to += ", seen from each hydrophone"
+        to += ", visibility from each hydrophone"
     words = [f"{plan.propagation.kind} rays to {to}", f"{plan.propagation.bounces} bounces", laws]
     return ", ".join(word for word in words if word)
 
 
 def _beams(plan: Plan) -> str:
     """The beamformer in words."""
-    method, without = plan.choices.beamforming, ", direct pulse taken out" if plan.windows.direct_removed else ""
+    method, without = plan.choices.beamforming, ", direct pulse removed" if plan.windows.direct_removed else ""
     if isinstance(method, FocusedDelayAndSum) and method.zones != "auto" and method.zones > 1:
         return f"{method.kind}, {method.zones} zones{without}"
     return method.kind + without
@@ -181,12 +181,12 @@ def _trace_rows(plan: Plan) -> list[Row]:
     kind, rows = "" if straight else "refracted ", list[Row]()
     if plan.products:
         traced = 1 if plan.choices.subarrays == 1 else 1 + plan.choices.subarrays
-        why = "rays bend by less than the accuracy allows" if straight else "the sound speed varies with depth"
+        why = "refraction is below the required accuracy" if straight else "the sound speed varies with depth"
         seconds = _tracing(plan, kind) * max(sizes["snap"], 1) * _ways(plan) * traced
         rows.append(("trace", _traced(plan), why, _expanded(plan), seconds, 0))
     beams = sizes["azimuth"] * sizes["elevation"]
     seconds = beams * SECONDS["label beam"] + _facets(plan) * SECONDS[f"label {kind}facet"]
-    return [*rows, ("label", "one ray a beam", "always", "none", seconds, beams * 10 + 4096)]
+    return [*rows, ("label", "one ray per beam", "always", "none", seconds, beams * 10 + 4096)]
 
 
 def _signal_rows(plan: Plan) -> list[Row]:
@@ -194,7 +194,7 @@ def _signal_rows(plan: Plan) -> list[Row]:
     rows = [_synthesis(plan)] if plan.products else []
     if "signals" in plan.products:
         seconds = max(plan.sizes["snap"], 1) * (plan.sizes["target"] + 1) * SECONDS["measure path"]
-        rows.append(("measure", "the loudest path of each kind alone", "verify compares levels", "none", seconds, 0))
+        rows.append(("measure", "loudest path of each kind alone", "verify compares levels", "none", seconds, 0))
     return rows
 
 
@@ -211,11 +211,11 @@ def _sonar_rows(plan: Plan) -> list[Row]:
     if plan.windows.direct_removed:  # and what is left of it imaged
         image = 2 * image + sizes["sensor"] * SECONDS["remove sensor"]
     asked = "image" in plan.products
-    why = "asked for" if asked else "needed by the cloud"
+    why = "requested" if asked else "needed by the cloud"
     rows.append(("beamform", _beams(plan), why, _steered(plan), image, 4 * beams * asked))
     if "cloud" in plan.products:
         error, seconds = "predicted, /cloud/range_error" + _bent(plan), RANGED_BEAMS * SECONDS["range beam"]
-        rows.append(("range", plan.choices.ranging.kind, "asked for", error, seconds, 46 * beams))
+        rows.append(("range", plan.choices.ranging.kind, "requested", error, seconds, 46 * beams))
     return rows
 
 

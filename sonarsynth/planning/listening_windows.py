@@ -115,12 +115,14 @@ def frame_start(plan: Plan, frame: Frame) -> float:
     last = max(span.last + supports.after, span.last_direct + windows.echo_stop) + MARGIN
     path, advice = ("scene", "processing", "echo_window"), "give its start and stop, or fewer frames"
     if np.ceil((last - first) * rate) + 1 > windows.samples:
-        raise FieldError(path, f"frame {frame.index} lasts {last - first:.3g} s, more than those looked at: {advice}")
+        raise FieldError(
+            path, f"frame {frame.index} lasts {last - first:.3g} s, longer than the sampled frames: {advice}"
+        )
     removed, opens = _opening(scene, span.first_echo, supports, 0.0)
     early = opens < windows.echo_start or (removed and not windows.direct_removed)
     late = gate.stop is None and span.last_echo + supports.echo_after > windows.echo_stop
     if early or late:
-        raise FieldError(path, f"frame {frame.index} echoes outside the window of those looked at: {advice}")
+        raise FieldError(path, f"frame {frame.index} has echoes outside the window of the sampled frames: {advice}")
     return first
 
 

@@ -40,8 +40,8 @@ class Omission:
     bound: str
 
 
-STAGE_COLUMNS = ("stage", "method", "why", "error", "s a frame", "a frame")
-OMISSION_COLUMNS = ("left out", "why", "costs at most")
+STAGE_COLUMNS = ("stage", "method", "why", "error", "CPU s per frame", "size per frame")
+OMISSION_COLUMNS = ("left out", "why", "error bound")
 
 
 def rows_of(stages: Sequence[Stage], left_out: Sequence[Omission]) -> tuple[list[Row], list[Row]]:

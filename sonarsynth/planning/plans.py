@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Floats, counted
 from sonarsynth.description.memory import frame_bytes
 from sonarsynth.environment.absorption import DepthAbsorption
 from sonarsynth.environment.sea import Profile
@@ -172,7 +172,7 @@ class Plan:
     @property
     def _printed(self) -> tuple[str, tuple[Stage, ...], tuple[Omission, ...], list[str]]:
         lines = [f"note: {warning}" for warning in self.warnings]
-        lines.append(", ".join(f"{count} {name}" for name, count in self.sizes.items()))
+        lines.append(", ".join(counted(count, name) for name, count in self.sizes.items()))
         return self.recipe.title, self.stages, self.left_out, lines
 
     def as_json(self) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from sonarsynth.products.paths import Arrivals
 
 ORIGINS = ("main lobe", "side lobe", "grating lobe", "mirror image", "snap itself", "unexplained")
 """How the array came to hear what made a point: in the beam, beside it, through a lobe that a lattice has in other
-directions, from behind a planar array, from no target but the snap (its direct pulse, or one that surface or bed
+directions, from behind a planar array, from no target but the snap (its direct pulse, or one that surface or bottom
 reflects), or from no path of the frame: noise, or what cancelling leaves."""
 
 
@@ -66,10 +66,10 @@ class Truth:
 class Echoes:
     """Where the echoes of each target come from, by the boundaries that they touched on their way to the array.
 
-    What comes by surface or bed is a ghost: the array sees the target mirrored there. Levels are of the energy in the
-    band: phases count among the coherent paths of a snap and family (`LINK_BUDGET`), powers of all else are summed.
+    What comes by surface or bottom is a ghost: the array sees the target mirrored there. Levels are of the energy in
+    the band: phases count among the coherent paths of a snap and family (`LINK_BUDGET`), powers of all else are summed.
     Directions are weighted by the share of each path in that. NaN where no path comes that way, directions also where
-    echoes come from several sides, as by surface and bed both from above and from below.
+    echoes come from several sides, as by surface and bottom both from above and from below.
     """
 
     azimuth: Floats  # (target, family) rad, sonar frame

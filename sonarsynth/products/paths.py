@@ -24,11 +24,11 @@ class Paths:
     arrival: Floats  # (path, xyz) unit vector of travel where it ends
     spreading: Floats  # (path,) 1/m: geometric amplitude re 1 m from the source (1/r in isovelocity water)
     surface: Ints  # (path,) number of surface reflections
-    bottom: Ints  # (path,) number of bed reflections
+    bottom: Ints  # (path,) number of bottom reflections
     turning: Ints  # (path,) number of turning points
     caustics: Ints  # (path,) caustics passed
     surface_grazing: Floats  # (path,) rad: grazing angle at the surface; NaN without a reflection there
-    bottom_grazing: Floats  # (path,) rad: grazing angle at the bed; NaN without a reflection there
+    bottom_grazing: Floats  # (path,) rad: grazing angle at the bottom; NaN without a reflection there
     flag: Ints  # (path,) 0 good; else why ray theory ends here (`acoustics.rays.REASONS`)
 
 
@@ -76,7 +76,7 @@ class Arrivals:
     facet: Ints  # (path,) index of the facet in its target's mesh, -1 for the direct path
     point: Floats  # (path, xyz) m, world: scattering point where the sound met it (direct path: the snap)
     surface: Ints  # (path,) surface reflections
-    bottom: Ints  # (path,) bed reflections
+    bottom: Ints  # (path,) bottom reflections
     turning: Ints  # (path,) turning points
     caustics: Ints  # (path,) caustics passed
     arrives_by: Ints  # (path,) index into FAMILIES: which boundaries it touched last, on its way to the array

@@ -54,7 +54,7 @@ class SourceEstimates:
     azimuth_error: Floats  # (snap,) rad
     elevation: Floats  # (snap,) rad
     elevation_error: Floats  # (snap,) rad
-    range_from_depth: Floats  # (snap,) m: where the bearing meets the known depth of the bed
+    range_from_depth: Floats  # (snap,) m: where the bearing meets the known depth of the bottom
     range_from_depth_error: Floats  # (snap,) m
     range_from_curvature: Floats  # (snap,) m: from the curvature of the wavefront
     range_from_curvature_error: Floats  # (snap,) m

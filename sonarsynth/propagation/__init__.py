@@ -25,7 +25,7 @@ class Propagation(Protocol):
 
     @property
     def bounces(self) -> int:
-        """Most reflections from surface and bed on the way from the snap to the array."""
+        """Most reflections from surface and bottom on the way from the snap to the array."""
         ...
 
     @property
@@ -36,7 +36,7 @@ class Propagation(Protocol):
     def connect(self, profile: Profile, environment_depth: float, start: Floats, end: Floats) -> Paths:
         """All paths with at most `bounces` reflections from start (pair, xyz) to end (pair, xyz) in the world.
 
-        environment_depth: depth of the bed in m.
+        environment_depth: depth of the bottom in m.
 
         Raises ValueError for points outside the water or not finite.
         """

@@ -37,7 +37,7 @@ class RayArrivals:
     launch_angle: Floats  # (ray,) rad at the source; NaN where source and receiver coincide
     arrival_angle: Floats  # (ray,) rad at the receiver
     surface: Ints  # (ray,) reflections from the surface
-    bottom: Ints  # (ray,) reflections from the bed
+    bottom: Ints  # (ray,) reflections from the bottom
     turning: Ints  # (ray,) turning points
     caustics: Ints  # (ray,) caustics passed: each takes a quarter period off the phase
     ray_parameter: Floats  # (ray,) s/m: p = cos(angle)/c, the same all along the ray, and the slope dT/dR
@@ -91,16 +91,16 @@ def eigenrays(
     *,
     vertices: int = 2,
 ) -> RayArrivals:
-    """Every ray with at most so many vertices (surface and bed reflections and turning points) between points.
+    """Every ray with at most so many vertices (surface and bottom reflections and turning points) between points.
 
     sound_speed is a description: `Isovelocity`, `Linear`, `Tabulated`, `TemperatureSalinity`, `Cast`, `Thermocline`,
     `Munk`, `Catenary`. Depths are positive down; depths and ranges are in m, numbers or arrays of any shapes that
-    broadcast. Surface and bed are flat and perfect: losses are for the caller. None is missed, none comes twice: the
+    broadcast. Surface and bottom are flat and perfect: losses are for the caller. None is missed, none comes twice: the
     search is exact for piecewise linear profiles. Smooth ones have travel times to their tolerance; what layers do to
     amplitudes and near foci is said in `Munk`. Directions lie in the x-z plane, from source to receiver along x.
 
     Raises ValueError in one line that names the argument and the pair: for a point outside the water, a negative range,
-    a number that is not finite, a formula that ends above the bed; `CastError` for a cast that cannot be read.
+    a number that is not finite, a formula that ends above the bottom; `CastError` for a cast that cannot be read.
 
     >>> import sonarsynth as ss
     >>> ss.eigenrays(ss.Isovelocity(speed=1500.0), 20.0, 5.0, 10.0, 100.0, vertices=1)
@@ -163,7 +163,7 @@ def _find(
     names: tuple[str, ...],
     vertices: int,
 ) -> RayArrivals:
-    """Rays of pairs in water down to beds (pair,), a search for each depth of bed; ahead: (pair or 1, xy)."""
+    """Rays of pairs in water down to bottoms (pair,), a search for each depth of bottom; ahead: (pair or 1, xy)."""
     if not isinstance(sound_speed, get_args(get_args(SoundSpeed)[0])):
         kinds = ", ".join(kind.__name__ for kind in get_args(get_args(SoundSpeed)[0]))
         raise ValueError(f"sound_speed must be one of {kinds}, not {type(sound_speed).__name__}")

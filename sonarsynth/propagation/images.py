@@ -1,4 +1,4 @@
-"""Straight rays with reflections: each is straight in water mirrored at surface and bed."""
+"""Straight rays with reflections: each is straight in water mirrored at surface and bottom."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sonarsynth.conventions import Floats, Ints
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """A way from one depth to another by surface and bed, unfolded."""
+    """A way from one depth to another by surface and bottom, unfolded."""
 
     surface: int
     bottom: int

@@ -16,7 +16,7 @@ class EigenrayRequest:
     """All rays from each snap to the array centre, and from each snap by each target to the array centre."""
 
     vertices: Annotated[int, Ge(0), Le(12)] = 2
-    """Most reflections from surface and bed and turning points of a whole path together."""
+    """Most reflections from surface and bottom and turning points of a whole path together."""
     targets: Literal["centre", "nearest", "none"] = "centre"
     """By way of the middle of each target, of its facet nearest to the array, or of no target."""
 

@@ -149,7 +149,7 @@ def planes(bodies: tuple[PlacedTarget, ...], target: Ints, facet: Ints) -> tuple
 
 
 def reflect(layers: Water, bodies: tuple[PlacedTarget, ...], rays: Rays, why: Ints, target: Ints, facet: Ints) -> Rays:
-    """Rays turned at surface, bed and facets by the mirror law, and counted."""
+    """Rays turned at surface, bottom and facets by the mirror law, and counted."""
     flat = (why == SURFACE) | (why == BED)
     phi, p, direction = np.where(flat, -rays.phi, rays.phi), rays.p.copy(), rays.direction.copy()
     direction[flat, 2] *= -1.0

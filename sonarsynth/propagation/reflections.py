@@ -1,4 +1,4 @@
-"""What surface and bed do to each path, and caustics on the way."""
+"""What surface and bottom do to each path, and caustics on the way."""
 
 from __future__ import annotations
 

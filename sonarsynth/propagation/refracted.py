@@ -20,7 +20,7 @@ class Refracted:
 
     kind: Literal["refracted"] = "refracted"
     bounces: Bounces = 0
-    """Most reflections from surface and bed on the way from the snap to the array."""
+    """Most reflections from surface and bottom on the way from the snap to the array."""
 
     @property
     def bends(self) -> bool:

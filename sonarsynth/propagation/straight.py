@@ -21,7 +21,7 @@ class Straight:
 
     kind: Literal["straight"] = "straight"
     bounces: Bounces = 0
-    """Most reflections from surface and bed on the way from the snap to the array."""
+    """Most reflections from surface and bottom on the way from the snap to the array."""
 
     @property
     def bends(self) -> bool:

@@ -39,19 +39,19 @@ class LocatingMethod(Protocol):
         elements: Elements,
         sonar: Sonar,
         sonar_pose: Pose,
-        bed_depth: float,
+        bottom_depth: float,
         snaps: int,
         profile: Profile,
     ) -> SourceEstimates:
         """The `snaps` loudest direct pulses, loudest first, one row each; NaN rows for those that were not found.
 
-        bed_depth (m, positive down) is where the snaps are known to be; profile the sound speed of the water, as the
+        bottom_depth (m, positive down) is where the snaps are known to be; profile the sound speed of the water, as the
         sonar knows it from a cast: for tracing rays, or for what straight ones may cost.
         """
 
 
 class CancellingMethod(Protocol):
-    """Takes what reaches the array by surface and bed without an echo out of what it hears."""
+    """Takes what reaches the array by surface and bottom without an echo out of what it hears."""
 
     def cancel(
         self,
@@ -60,13 +60,13 @@ class CancellingMethod(Protocol):
         elements: Elements,
         sonar: Sonar,
         sonar_pose: Pose,
-        bed_depth: float,
+        bottom_depth: float,
         window: tuple[float, float],
     ) -> Signals:
         """The signals without the reflections of the located snaps in the echo window (start, stop), in s.
 
         The same object where nothing is taken out; `quantum` stays that of the converter, though pressures are no
-        whole multiples of it where something is. bed_depth in m, positive down.
+        whole multiples of it where something is. bottom_depth in m, positive down.
         """
 
 

@@ -166,11 +166,11 @@ class Scene:
             PlacedTarget(t.name, mesh, pose(t.motion, time), velocity(t.motion, time), t.motion, time)
             for t, mesh in placed
         )
-        bed = self.world.environment.depth
+        bottom = self.world.environment.depth
         snaps: list[Snap] = []
         for i, shrimp in enumerate(self.world.shrimp):
             drawn = scales(shrimp.variation, stream(seed, "snap", key, step, i), len(shrimp.snap_times))
-            snaps += snaps_of(shrimp, bed, drawn)
+            snaps += snaps_of(shrimp, bottom, drawn)
         return WorldState(time, bodies, tuple(snaps))
 
     def frame(

@@ -94,8 +94,8 @@ def aside_note(body: Scatterer) -> str | None:
     if body.angle <= ASIDE:
         return None
     return (
-        f"seen up to {np.rad2deg(body.angle):.0f} degrees off backscatter: beyond 120 the wave that makes the shadow "
-        "adds to the echo, which this law does not have (2.5 dB of a sphere at 120)"
+        f"seen up to {np.rad2deg(body.angle):.0f} degrees off backscatter: beyond 120 the shadow-forming wave "
+        "adds to the echo, which this law leaves out (2.5 dB for a sphere at 120)"
     )
 
 
@@ -105,8 +105,8 @@ def facets_note(body: Scatterer, longest: float) -> str | None:
     if not edge > longest:
         return None
     return (
-        f"facets up to {edge:.2g} m long ({edge / body.shortest:.1g} wavelengths at the top of the band), each echoing "
-        "from its middle: set shape.edge to refine"
+        f"facets up to {edge:.2g} m long ({edge / body.shortest:.1g} wavelengths at the top of the band), each "
+        "scattering from its centre: set shape.edge to refine"
     )
 
 

@@ -54,12 +54,12 @@ def build(
     On `workers` processes of this machine (left out: one a usable core; 0: in this process), or on the workers of a
     running Dask scheduler. `products` counts where a recipe is given; a Plan has its own. The arrays are the same
     whatever the number of workers, the order, the interruptions. Beside the store: a log in `<store>.log.jsonl`, run
-    times in `<store>.times.jsonl`, frames set aside in `<store>.aside.jsonl`, a card in `<store>.card.md`, Croissant
+    times in `<store>.times.jsonl`, frames that failed in `<store>.failed.jsonl`, a card in `<store>.card.md`, Croissant
     metadata in `<store>.croissant.json`. From a script, call it under
     `if __name__ == "__main__":`, as all multiprocessing needs.
 
-    A frame that raises is set aside, and on worker processes one that crashes, that takes `frame_timeout` seconds for a
-    stage (left out: by the plan; 0: no limit), or whose worker takes more than `worker_memory` bytes (left out: its
+    A frame fails and is skipped if it raises; on worker processes also if it crashes, takes `frame_timeout` seconds for
+    a stage (left out: by the plan; 0: no limit), or if its worker takes more than `worker_memory` bytes (left out: its
     share of the machine's); `retry_failed` tries those of earlier builds again. `agreed` builds what needs more than is
     free, or over 1 TB; `insecure` uses a scheduler on another machine without TLS; `mixed_versions` goes on with other
     versions of libraries that touch numbers than the store was begun with, and marks those frames. `dashboard` starts
@@ -74,7 +74,7 @@ def build(
     of something else, store.Locked while another build runs, store.Damage where the store cannot go on, TooLarge where
     `agreed` is needed, OSError where it cannot be written or the scheduler is gone, store.Unreachable for a URL that
     cannot be used, RuntimeError where workers do not start, ValueError for options that cannot be. After any of these,
-    and after an interruption, the same call goes on where it ended.
+    and after an interruption, the same call resumes where it ended.
     """
     made = what if isinstance(what, Plan) else plan(what, chosen_products(products))
     _check(workers, scheduler, frame_timeout, worker_memory, insecure)
@@ -91,7 +91,7 @@ def build(
         report.notes = (*made.warnings, *_notes(path, scheduler))
         if workers != 0:
             _check_files(path, made)
-        earlier = {} if restart else _set_aside(path)
+        earlier = {} if restart else _failed(path)
         left = set() if retry_failed else earlier.keys() & set(chosen)
         todo = store.missing(path, made, [frame for frame in chosen if frame not in left])
         lacking = {frame for some in todo.values() for frame in some}
@@ -122,9 +122,11 @@ def _describe(path: Folder, report: BuildReport, prediction: Prediction | None) 
 def _notes(path: Folder, scheduler: str | None) -> list[str]:
     """What a user should know of a build that goes on all the same."""
     odd = provenance.other_versions(store.root_attributes(path))
-    notes = [f"frames written now are by other libraries than the store was begun with ({spelled(odd)})"] if odd else []
+    notes = (
+        [f"frames written now use other libraries than the first ones of this store ({spelled(odd)})"] if odd else []
+    )
     if scheduler is not None and not scheduler.startswith(("tls://", "wss://", "inproc://")):
-        notes.append(f"{scheduler} is not encrypted: whoever reaches it can run code on it and here")
+        notes.append(f"{scheduler} is not encrypted: anyone who can reach it can run code there and on this machine")
     return notes
 
 
@@ -134,8 +136,8 @@ def _check_files(path: Folder, made: Plan) -> None:
     odd = sorted(stored - set(provenance.paths(made.recipe.as_json())))
     if odd:
         raise Mismatch(
-            f"{path}: its recipe names {odd[0]}, which this one does not: --workers 0 goes on without opening it, "
-            "--restart begins anew"
+            f"{path}: its recipe names {odd[0]}, which this one does not: use --workers 0 to go on without opening it, "
+            "or --restart to overwrite the store"
         )
 
 
@@ -155,7 +157,7 @@ def _as_begun(path: Folder, made: Plan) -> Plan:
     try:
         return replace(made, choices=choices_from(there["choices"]))
     except ValueError:
-        raise Damage(f"{path}: its choices cannot be read: --restart begins anew") from None
+        raise Damage(f"{path}: its choices cannot be read: use --restart to overwrite it") from None
 
 
 def _check(
@@ -188,7 +190,7 @@ def _check_memory(
         raise TooLarge(
             f"a frame takes up to {format_bytes(made.memory_bytes)} of memory, and each of {workers} workers has "
             f"{format_bytes(each)}: "
-            "fewer --workers, or more --worker-memory (--yes builds all the same)"
+            "fewer --workers, or more --worker-memory (use --yes to build anyway)"
         )
 
 
@@ -198,10 +200,10 @@ def _room(made: Plan, frames: int) -> Room:
     return Room(bytes_, store.layout_of(made).files(-(-frames // made.shard_frames)))
 
 
-def _set_aside(path: Folder) -> dict[int, Failure]:
-    """Frames that earlier builds set aside and that are still missing."""
+def _failed(path: Folder) -> dict[int, Failure]:
+    """Frames that failed in earlier builds and are still missing."""
     names = {field.name for field in fields(Failure)}
-    rows = [row for row in read_lines(store.beside(path, "aside.jsonl")) if names <= row.keys()]
+    rows = [row for row in read_lines(store.beside(path, "failed.jsonl")) if names <= row.keys()]
     there = set(store.frames_there(path)) if rows else set()
     found = [Failure(**{name: row[name] for name in names}) for row in rows]
     return {failure.frame: failure for failure in found if failure.frame not in there}
@@ -214,7 +216,7 @@ def _tidy(path: Folder, again: set[int], earlier: Mapping[int, Failure], restart
             store.here(path, old).unlink(missing_ok=True)
         for old in ("card.md", "croissant.json"):  # of what was there before
             store.beside(path, old).unlink(missing_ok=True)
-    aside = store.beside(path, "aside.jsonl")
+    file = store.beside(path, "failed.jsonl")
     kept = [asdict(failure) for frame, failure in earlier.items() if frame not in again]
-    if aside.exists():
-        write_lines(aside, kept)
+    if file.exists():
+        write_lines(file, kept)

@@ -66,11 +66,11 @@ class Log:
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
         append_lines(self.file, [{"time": now, "event": event, **facts}])
 
-    def progress(self, done: int, total: int, aside: int) -> None:
+    def progress(self, done: int, total: int, failed: int) -> None:
         """Say how far it is, now and then."""
         now = time.monotonic()
         if now - self.said >= PROGRESS_EVERY:
             self.said = now
-            rate = (done + aside) / (now - self.began)
-            left = (total - done - aside) / rate if rate else None
-            self.event("progress", done=done, of=total, aside=aside, frames_per_second=rate, seconds_left=left)
+            rate = (done + failed) / (now - self.began)
+            left = (total - done - failed) / rate if rate else None
+            self.event("progress", done=done, of=total, failed=failed, frames_per_second=rate, seconds_left=left)

@@ -18,7 +18,7 @@ from sonarsynth.schedule.tasks import Failure, Written
 from sonarsynth.store import Folder
 
 Progress = Callable[[int, int, int], None]
-"""Called with the frames done, the frames to do, and the frames set aside, as shards are written."""
+"""Called with the frames done, the frames to do, and the frames that failed, as shards are written."""
 
 
 @dataclass
@@ -48,7 +48,7 @@ class BuildReport:
 
     @property
     def ok(self) -> bool:
-        """True where no frame was set aside."""
+        """True where no frame failed."""
         return not self.failures
 
     def add(self, written: Written) -> None:
@@ -103,9 +103,9 @@ class BuildProgress:
         """A shard is written."""
         self.report.add(written)
         append_lines(store.here(self.path, "times.jsonl"), written.times)
-        append_lines(store.beside(self.path, "aside.jsonl"), [asdict(f) for f in written.failures])
+        append_lines(store.beside(self.path, "failed.jsonl"), [asdict(f) for f in written.failures])
         for failure in written.failures:
-            self.log.event("aside", frame=failure.frame, stage=failure.stage, error=failure.error)
+            self.log.event("failed", frame=failure.frame, stage=failure.stage, error=failure.error)
         self._tell()
 
     def lost(self, worker: str, why: str) -> None:
@@ -131,6 +131,6 @@ class BuildProgress:
             r.seconds, r.client_peak_bytes = time.perf_counter() - began, tasks.peak_memory()
             with suppress(OSError):
                 self.log.event(
-                    "end", how=how, written=r.written, aside=len(r.failures), workers_lost=r.workers_lost,
+                    "end", how=how, written=r.written, failed=len(r.failures), workers_lost=r.workers_lost,
                     seconds=r.seconds,
                 )  # fmt: skip

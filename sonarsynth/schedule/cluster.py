@@ -37,7 +37,7 @@ class _Flight:
     frames: tuple[int, ...]
     worker: str = ""
     losses: int = 0  # workers that died with it
-    aside: tuple[Failure, ...] = ()  # frames that are left out because they end their worker
+    failed: tuple[Failure, ...] = ()  # frames that are left out because they end their worker
     last: bool = False  # it does not come again
 
 
@@ -49,7 +49,7 @@ def _without(flight: _Flight, entry: worker_status.Entry | None) -> _Flight:
         return replace(flight, losses=flight.losses + 1)
     failure = Failure(entry.frame, entry.stage, entry.error, entry.traceback)
     left = tuple(frame for frame in flight.frames if frame != entry.frame)
-    return replace(flight, frames=left, aside=(*flight.aside, failure))
+    return replace(flight, frames=left, failed=(*flight.failed, failure))
 
 
 class _Builder:
@@ -74,12 +74,12 @@ class _Builder:
     def run(self, todo: Mapping[int, tuple[int, ...]]) -> None:
         """Build all shards. Those that lost workers come again at the end, without the frames that end a worker."""
         for suspect in self._pass([_Flight(shard, frames) for shard, frames in todo.items()]):
-            aside = tuple(failure for frame in suspect.frames if (failure := self._alone(frame)) is not None)
-            good = tuple(sorted(set(suspect.frames) - {failure.frame for failure in aside}))
-            last = _Flight(suspect.shard, good, aside=(*suspect.aside, *aside), last=True)
+            failed = tuple(failure for frame in suspect.frames if (failure := self._alone(frame)) is not None)
+            good = tuple(sorted(set(suspect.frames) - {failure.frame for failure in failed}))
+            last = _Flight(suspect.shard, good, failed=(*suspect.failed, *failed), last=True)
             for again in self._pass([last]):
                 died = [Failure(f, "shard", "its worker died while the shard was written", "") for f in again.frames]
-                self.done(Written(again.shard, (), (*again.aside, *died), (), 0.0, 0, 0))
+                self.done(Written(again.shard, (), (*again.failed, *died), (), 0.0, 0, 0))
 
     def _pass(self, flights: Sequence[_Flight]) -> list[_Flight]:
         """Run shards through the window. Returns those that lost their workers, raises what went wrong in writing."""
@@ -109,7 +109,7 @@ class _Builder:
                 if not flight.last and any(failure.transient for failure in written.failures):
                     suspects.append(flight)
                 else:
-                    self.done(replace(written, failures=(*flight.aside, *written.failures)))
+                    self.done(replace(written, failures=(*flight.failed, *written.failures)))
             del self.flights[landed]
         return suspects
 
@@ -151,13 +151,15 @@ class _Builder:
         try:
             workers = sorted(self.client.nthreads())
         except (OSError, TimeoutError, CancelledError) as error:
-            line = "the scheduler is gone; with one running, the same command goes on"
+            line = "the scheduler is gone; start one and run the same command again to resume"
             raise ConnectionError(errno.ECONNRESET, line, getattr(self.client.scheduler, "address", None)) from error
         now = time.monotonic()
         if workers:
             self.seen = now
         elif now - self.seen > self.patience:
-            raise RuntimeError(f"no worker process came back in {self.patience:g} s; the same command goes on")
+            raise RuntimeError(
+                f"no worker process came back in {self.patience:g} s; run the same command again to resume"
+            )
         return workers
 
     def _launch(self, flight: _Flight, workers: Sequence[str]) -> None:

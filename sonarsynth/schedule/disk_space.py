@@ -51,15 +51,15 @@ def check_space(path: Folder, needed: Room) -> None:
     """Raise TooLarge where a build that needs so much should not start unasked."""
     free = free_room(path)
     if needed.bytes > free.bytes:
-        line = f"needs up to {format_bytes(needed.bytes)} and {format_bytes(free.bytes)} are free there"
+        line = f"needs up to {format_bytes(needed.bytes)} and {format_bytes(free.bytes)} are free"
     elif needed.files > free.files:
         line = f"needs up to {needed.files:.0f} files and folders and {free.files:.0f} more fit there"
     elif needed.bytes > LARGE:
-        known = f" ({format_bytes(free.bytes)} are free there)" if math.isfinite(free.bytes) else ""
+        known = f" ({format_bytes(free.bytes)} are free)" if math.isfinite(free.bytes) else ""
         line = f"needs up to {format_bytes(needed.bytes)}{known}"
     else:
         return
-    raise TooLarge(f"{path}: {line}: --yes builds all the same")
+    raise TooLarge(f"{path}: {line}: use --yes to build anyway")
 
 
 @contextmanager
@@ -74,5 +74,5 @@ def told_when_full(path: Folder, needed: Callable[[], Room]) -> Iterator[None]:
         lacking = f"up to {format_bytes(more.bytes)} more are needed, {format_bytes(free.bytes)} are free"
         if more.files > free.files:
             lacking = f"up to {more.files:.0f} more files and folders are needed, {free.files:.0f} more fit"
-        line = f"{FULL[error.errno]}: {lacking}; with room made, the same command goes on"
+        line = f"{FULL[error.errno]}: {lacking}; free some space and run the same command again to resume"
         raise OSError(error.errno, line, os.fspath(path)) from error

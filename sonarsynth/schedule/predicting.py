@@ -210,7 +210,7 @@ def predict(
         workers=cores,
         cores=cores,
         shard_frames=min(plan.shard_frames, plan.recipe.frames),
-        how="counts of work",
+        how="counts of operations",
         stages=counted,
         raw_bytes_a_frame=raw,
         loading=0.0,
@@ -229,7 +229,7 @@ def predict(
         trial = try_frames(plan, None if folder is None else Path(folder))
     except Exception as error:
         line = " ".join(f"{error}".split()) or type(error).__name__
-        made = replace(made, how=f"counts of work: no frame could be tried ({line})", failures=(line,))
+        made = replace(made, how=f"counts of operations: no frame could be timed ({line})", failures=(line,))
     else:
         made = _from(made, trial)
     return made.of(frames=frames, workers=workers)
@@ -239,10 +239,10 @@ def _from(made: Prediction, trial: Trial) -> Prediction:
     """A prediction with what a trial has shown."""
     stages = {name: seconds for name, seconds in trial.cpu.items() if name != "collect"}
     stages["write"] = trial.writing[0] / made.shard_frames + trial.cpu.get("collect", 0.0)
-    few = "" if trial.every == 1 else f" with one facet of {trial.every}"
+    few = "" if trial.every == 1 else f"; with one facet in {trial.every}"
     return replace(
         made,
-        how=f"frames {', '.join(map(str, sorted(trial.frames)))} made here{few}",
+        how=f"timing frames on this machine (number {', '.join(map(str, sorted(trial.frames)))}{few})",
         stages=stages,
         loading=min(trial.loading, 0.2 * made.prepared),  # not what a compiler did, which is kept
         fresh=trial.fresh,

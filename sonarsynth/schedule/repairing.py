@@ -55,7 +55,7 @@ def repair(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
-    anyway: bool = False,
+    force: bool = False,
     quick: bool = False,
     insecure: bool = False,
     files: Path | str | None = None,
@@ -64,13 +64,13 @@ def repair(
     """Make what is damaged in a store again, from the recipe in it, so that it is what it was, bit for bit.
 
     Metadata and fixed arrays are laid out again; damaged shards are computed again, those frames that they had, on
-    `workers` processes as in `build`; files that do not belong there move to `<store>.foreign`. What was set aside
+    `workers` processes as in `build`; files that do not belong there move to `<store>.foreign`. What failed
     when the store was built is not tried. Ended in whatever way, the same call goes on. Where the recipe names files,
     they are looked for in the folder `files`, and opened nowhere else.
 
     `quick` trusts files that have the digest of their mark; else every number is read back, as `verify` does.
     Raises Mismatch where there is no store of ours, or where it cannot be made again as it was: the version of
-    sonarsynth, its code or its libraries are others (unless `anyway`), or files that the recipe names have changed, are
+    sonarsynth, its code or its libraries are others (unless `force`), or files that the recipe names have changed, are
     gone, or need `files`; Damage
     where the recipe cannot be read any more; store.Locked while a build runs; OSError where the store cannot be
     written; ValueError for a scheduler on another machine without TLS, unless `insecure`.
@@ -87,7 +87,7 @@ def repair(
         found = store.examine(path)
         laid = found.layout is not None and not found.fixed
         unlike = _unlike(path, found) if laid and not quick else []
-        made = _plan_of(path, found, anyway, files) if not laid or found.shards or unlike else None
+        made = _plan_of(path, found, force, files) if not laid or found.shards or unlike else None
         report = RepairReport(str(path))
         report.moved = move_out(path, found.foreign)
         report.restored, in_the_way = restore(path, found, made)
@@ -123,14 +123,14 @@ def _elsewhere(path: Folder, made: Plan) -> bool:
     return set(stored) != set(provenance.paths(made.recipe.as_json()))
 
 
-def _plan_of(path: Folder, found: Findings, anyway: bool, files: Path | str | None) -> Plan:
+def _plan_of(path: Folder, found: Findings, force: bool, files: Path | str | None) -> Plan:
     """The plan that the store was built by. Raises Mismatch where it cannot be had again, Damage without a recipe."""
     attrs = found.attributes or store.root_attributes(path)
     try:
         text, digest, products = str(attrs["recipe"]), attrs["recipe_digest"], frozenset(attrs["products"])
     except (KeyError, TypeError):
         raise Damage(
-            f"{path}: its recipe cannot be read any more, neither in {MARKS} nor in zarr.json: build it anew"
+            f"{path}: its recipe cannot be read any more, neither in {MARKS} nor in zarr.json: rebuild it"
         ) from None
     try:
         choices = choices_from(attrs["choices"]) if "choices" in attrs else None
@@ -149,13 +149,13 @@ def _plan_of(path: Folder, found: Findings, anyway: bool, files: Path | str | No
             f"{path} has {attrs.get('shard_frames')} frames in a shard, and would now have {now['shard_frames']}"
         )
     old, new = attrs.get("sonarsynth_version"), now["sonarsynth_version"]
-    if old != new and not anyway:
-        raise Mismatch(f"{path} was built by sonarsynth {old}, and this is {new}: use that one, or --anyway")
-    if attrs.get("code_digest") != now["code_digest"] and not anyway:
-        raise Mismatch(f"{path} was built by another state of the code of sonarsynth {new}: use that one, or --anyway")
+    if old != new and not force:
+        raise Mismatch(f"{path} was built by sonarsynth {old}, and this is {new}: use that one, or --force")
+    if attrs.get("code_digest") != now["code_digest"] and not force:
+        raise Mismatch(f"{path} was built by another state of the code of sonarsynth {new}: use that one, or --force")
     odd = provenance.other_versions(attrs)
-    if odd and not anyway:
-        raise Mismatch(f"{path} was built with other libraries ({spelled(odd)}): use those, or --anyway")
+    if odd and not force:
+        raise Mismatch(f"{path} was built with other libraries ({spelled(odd)}): use those, or --force")
     return made
 
 
@@ -198,7 +198,7 @@ def _counter(
         nonlocal done_frames
         done_frames += len(again.frames)
         report.failures.extend(again.failures)
-        append_lines(store.beside(path, "aside.jsonl"), [asdict(f) for f in again.failures])
+        append_lines(store.beside(path, "failed.jsonl"), [asdict(f) for f in again.failures])
         mark, old = load_mark(path, again.shard), written.get(again.shard)
         if mark is not None and old is not None and not again.failures and _written(mark) != _written(old):
             report.differing.append(again.shard)

@@ -49,7 +49,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a frame was set aside."""
+    """Why a frame failed."""
 
     frame: int
     stage: str

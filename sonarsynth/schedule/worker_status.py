@@ -2,7 +2,7 @@
 
 A worker notes the frame and the stage before it begins. The interpreter's fault handler, which needs no lock of the
 interpreter, adds the traceback when the stage crashes the process, or ends the process when the stage takes too long.
-What it finds there, the client sets aside by name. Only workers of one thread that a nanny starts again keep a diary.
+What it finds there, the client reports as failed. Only workers of one thread that a nanny starts again keep a diary.
 """
 
 from __future__ import annotations

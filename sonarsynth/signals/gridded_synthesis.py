@@ -39,8 +39,8 @@ class GriddedSynthesis:
         8      2e-6       float64   |  5.2e-7    27 ms |  6.2e-7   280 ms
         DirectSum                   |          130 s   |            76 s
 
-    Pulses that differ in shape: 2000 direct echoes and 5000 by surface and bed, all with absorption; largest error, and
-    time over that of the same paths with plain pulses (turn about, on a core that others shared), at 20 m | at 8 m:
+    Pulses that differ in shape: 2000 direct echoes and 5000 by surface and bottom, all with absorption; largest error,
+    and time over that of the same paths with plain pulses (turn about, on a core that others shared), at 20 m | at 8 m:
 
         plain                         |  2.1e-5   1          |  4.5e-5   1
         phases spread by +-1 rad      |  1.6e-5   1.2 - 1.6  |  4.7e-5   1.2

@@ -36,14 +36,14 @@ SnapModel = Annotated[LogarithmicBubble | KellerMiksis | RecordedSnap | Ricker |
 
 @description
 class SnappingShrimp:
-    """A shrimp on the bed that snaps at given times."""
+    """A shrimp on the bottom that snaps at given times."""
 
     name: str = "shrimp"
     """For people; nothing depends on it."""
     position: tuple[Metres, Metres] | Position
-    """(x, y) on the bed, or (x, y, z)."""
+    """(x, y) on the bottom, or (x, y, z)."""
     height: NonNegativeMetres = 0.0
-    """Height above the bed, where z is left out."""
+    """Height above the bottom, where z is left out."""
     snap: SnapModel = LogarithmicBubble()
     """What a snap sounds like at 1 m."""
     source_level: Annotated[Decibels, Ge(-200), Le(300)] | None = None

@@ -46,20 +46,20 @@ class WorldState:
     snaps: tuple[Snap, ...]
 
 
-def source_position(shrimp: SnappingShrimp, bed: float) -> Floats:
-    """Where a shrimp is (xyz) in m, over a bed at this depth (m)."""
+def source_position(shrimp: SnappingShrimp, bottom: float) -> Floats:
+    """Where a shrimp is (xyz) in m, over a bottom at this depth (m)."""
     x, y, *z = shrimp.position
-    return np.array([x, y, z[0] if z else shrimp.height - bed])
+    return np.array([x, y, z[0] if z else shrimp.height - bottom])
 
 
-def model_of(shrimp: SnappingShrimp, bed: float) -> SnapModel:
+def model_of(shrimp: SnappingShrimp, bottom: float) -> SnapModel:
     """The model of a shrimp's snaps, where it is."""
-    return at_depth(shrimp.snap, -float(source_position(shrimp, bed)[2]))
+    return at_depth(shrimp.snap, -float(source_position(shrimp, bottom)[2]))
 
 
-def snaps_of(shrimp: SnappingShrimp, bed: float, scales: Scales) -> tuple[Snap, ...]:
+def snaps_of(shrimp: SnappingShrimp, bottom: float, scales: Scales) -> tuple[Snap, ...]:
     """The snaps of a shrimp, with the scales (snap,) that were drawn for them."""
-    position, model = source_position(shrimp, bed), model_of(shrimp, bed)
+    position, model = source_position(shrimp, bottom), model_of(shrimp, bottom)
     drawn = zip(shrimp.snap_times, scales.gain.tolist(), scales.width.tolist(), strict=True)
     return tuple(Snap(position, time, model, shrimp.source_level, gain, width) for time, gain, width in drawn)
 

@@ -82,8 +82,8 @@ def _go_on(path: Folder, stored: Mapping[str, Any], plan: Plan, mixed_versions: 
     odd = other_versions(stored)
     if odd and not mixed_versions:
         raise Mismatch(
-            f"{path} was begun with other libraries ({spelled(odd)}), and the frames still to come would differ from "
-            "those that are there: use the former, or --mixed-versions to go on and have these frames marked"
+            f"{path} was begun with other libraries ({spelled(odd)}), so the remaining frames would differ from "
+            "the existing ones: use those libraries, or --mixed-versions to resume and mark the new frames"
         )
 
 
@@ -169,7 +169,7 @@ def _version() -> str:
 def _identity_of(path: Folder) -> dict[str, Any]:
     stored = root_attributes(path)
     if not path.is_dir() or "recipe_digest" not in stored:
-        raise Mismatch(f"{path} exists and is not a store of sonarsynth: choose another place")
+        raise Mismatch(f"{path} exists and is not a store of sonarsynth: choose another path")
     return stored
 
 
@@ -181,7 +181,7 @@ def _compare(path: Folder, stored: Mapping[str, Any], wanted: Mapping[str, Any])
     differing = [key for key in [*new, *old] if old.get(key) != new.get(key)]
     if differing:
         key = differing[0]
-        difference = f"{key} is {old.get(key, 'absent')} there and {new.get(key, 'absent')} now"
+        how, difference = "from a different recipe", f"{key}: {old.get(key, 'absent')}, now {new.get(key, 'absent')}"
     else:
         names = {
             "products": "products",
@@ -190,17 +190,20 @@ def _compare(path: Folder, stored: Mapping[str, Any], wanted: Mapping[str, Any])
             "code_digest": "digest of the code",
         }
         changed = next((key for key in names if stored.get(key) != wanted[key]), None)
-        difference = (
-            "the content of a file that the recipe names has changed"
-            if changed is None
-            else f"{names[changed]}: {_short(stored.get(changed))} there and {_short(wanted[changed])} now"
+        how, difference = (
+            "differently",
+            (
+                "the content of a file that the recipe names has changed"
+                if changed is None
+                else f"{names[changed]}: {_short(stored.get(changed))}, now {_short(wanted[changed])}"
+            ),
         )
-    raise Mismatch(f"{path} was begun differently ({difference}): use --restart to begin anew, or another place")
+    raise Mismatch(f"{path} was built {how} ({difference}): use --restart to overwrite it, or another path")
 
 
 def spelled(odd: Mapping[str, tuple[str, str]]) -> str:
     """Versions that differ, in words."""
-    return ", ".join(f"{name} {before} then and {now} now" for name, (before, now) in odd.items())
+    return "; ".join(f"{name} {before}, now {now}" for name, (before, now) in odd.items())
 
 
 def _short(value: Any) -> str:

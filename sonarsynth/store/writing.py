@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from sonarsynth.planning import Plan
 
 GONE: Final = (
-    "the store was moved, removed or exchanged while it was built: with it back in its place, or under its new name, "
-    "the same command goes on"
+    "the store was moved, removed or exchanged while it was built: put it back, or use its "
+    "new name, and run the same command again to resume"
 )
 
 AT_ONCE: Final = 8

@@ -1,4 +1,4 @@
-"""Rays followed wherever they go: arcs between reflections from surface, bed and facets (thesis, figures 14 and 15)."""
+"""Rays followed wherever they go: arcs between reflections at surface, bottom and facets (thesis, figures 14, 15)."""
 
 from __future__ import annotations
 

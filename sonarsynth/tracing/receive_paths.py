@@ -63,7 +63,7 @@ class ReceivePaths:
 
     @property
     def bounces(self) -> Ints:
-        """(leg,) reflections from surface and bed."""
+        """(leg,) reflections from surface and bottom."""
         return np.asarray(self.surface + self.bottom)
 
     def swerve(self, environment: Environment, profile: Profile, sonar_pose: Pose, spread: Floats | float) -> Floats:
@@ -146,7 +146,7 @@ def require_in_water(bodies: tuple[PlacedTarget, ...], environment: Environment)
             down = depth(body.pose.to_world(body.mesh.vertices[some]))
             highest, deepest = float(down.min(initial=highest)), float(down.max(initial=deepest))
         if highest < -TOLERANCE or deepest > environment.depth + TOLERANCE:
-            where = "above the surface" if highest < -TOLERANCE else "below the bed"
+            where = "above the surface" if highest < -TOLERANCE else "below the bottom"
             raise ValueError(
                 f"target '{body.name}' reaches {where} ({highest:g} to {deepest:g} m in {environment.depth:g} m)"
             )
@@ -198,8 +198,8 @@ def may_face_receiver(
     """(facet,) which may have a ray on their outer side to a point (xyz), or within `slack` (m) of it; exactly so in
     uniform water, unreflected.
 
-    A ray rises and falls by (bounces + 2) bed depths at most over its distance, so somewhere it has that slope or less,
-    and by Snell's law its cosine is nowhere less than there times the ratio of the extreme sound speeds.
+    A ray rises and falls by (bounces + 2) bottom depths at most over its distance, so somewhere it has that slope or
+    less, and by Snell's law its cosine is nowhere less than there times the ratio of the extreme sound speeds.
     """
     if not bounces and profile.uniform:
         return np.asarray(np.einsum("ij,ij->i", facets.normal, position - facets.point) > -slack)

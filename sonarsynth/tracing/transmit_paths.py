@@ -56,7 +56,7 @@ class TransmitPaths:
         return TransmitPaths(**{name: value[keep] for name, value in vars(self).items()})
 
     def merged(self) -> TransmitPaths:
-        """The ways with those that coincide added up: from a snap on the bed, say, and its image there."""
+        """The ways with those that coincide added up: from a snap on the bottom, say, and its image there."""
         first = np.ones(len(self.facet), bool)
         same = (np.diff(self.facet) == 0) & (np.abs(np.diff(self.travel_time)) < COINCIDENCE_TIME)
         first[1:] = ~(
@@ -73,7 +73,7 @@ class TransmitPaths:
 
     @property
     def bounces(self) -> Ints:
-        """(way,) reflections from surface and bed."""
+        """(way,) reflections from surface and bottom."""
         return np.asarray(self.surface + self.bottom)
 
 

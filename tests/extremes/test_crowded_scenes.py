@@ -227,7 +227,7 @@ def scene(target: Target, depth: float) -> Recipe:
 @pytest.mark.parametrize("z", [-0.2, 0.3, -11.8, -13.0])
 def test_a_body_that_goes_through_a_boundary_is_refused_in_one_line(z: float) -> None:
     shape = Sphere(radius=0.5, edge=0.2)
-    where = "above the surface" if z > -6 else "below the bed"
+    where = "above the surface" if z > -6 else "below the bottom"
     with pytest.raises(FieldError, match=f"targets.0.motion: target 'ball' is .* m {where}") as refused:
         plan(scene(Target(name="ball", shape=shape, motion=Still(position=(10.0, 0.0, z))), 12.0), {"cloud"})
     assert "\n" not in str(refused.value)
@@ -238,7 +238,7 @@ def test_a_body_that_goes_through_a_boundary_is_refused_in_one_line(z: float) ->
 
 def test_a_body_that_pokes_out_by_less_than_a_facet_is_refused() -> None:
     mesh = ball(0.5, 0.2)
-    for z, where in ((-0.495, "above the surface"), (-BED + 0.495, "below the bed")):
+    for z, where in ((-0.495, "above the surface"), (-BED + 0.495, "below the bottom")):
         with pytest.raises(ValueError, match=f"target 'body' reaches {where}"):
             heard((placed(mesh, 10, 0, z),), (Kirchhoff(),))
 

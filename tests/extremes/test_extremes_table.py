@@ -66,7 +66,7 @@ def test_the_command_prints_rows_and_tells_by_its_status(
     assert all({"case", "expected", "got", "ok", "seconds", "group"} == set(row) for row in rows)
     assert json.loads((tmp_path / "extremes.json").read_text()) == rows
     assert run(app, ["accuracy", "--extremes", "--out", str(tmp_path)]) == (0 if ok else 1)
-    assert ("all right, none skipped" in capsys.readouterr().out) == ok
+    assert ("all passed, none skipped" in capsys.readouterr().out) == ok
 
 
 def test_it_goes_without_a_reference(capsys: pytest.CaptureFixture[str]) -> None:

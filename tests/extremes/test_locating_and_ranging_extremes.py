@@ -152,7 +152,7 @@ def test_snap_below(vertical):
 def test_snap_straight_above():
     source = np.array([0.5, 0.0, 4.0])
     array = elements(Romanis(face=0.0))
-    found = locate(hear_direct(array, source), array, 5.0 - source[2])  # a "bed" above the sonar: a shelf
+    found = locate(hear_direct(array, source), array, 5.0 - source[2])  # a "bottom" above the sonar: a shelf
     assert np.linalg.norm(found.position[0] - source) < 0.02
 
 
@@ -257,7 +257,7 @@ def test_a_snap_so_near_that_plane_waves_mean_nothing():
 
 @pytest.mark.parametrize("gradient", [1e-12, 1.0, 50.0])
 def test_gradients_of_any_size_leave_a_bearing(gradient):
-    """And a bearing along the bed, where a ray bends most and the depth says nothing."""
+    """And a bearing along the bottom, where a ray bends most and the depth says nothing."""
     array, source = elements(Romanis()), np.array([20.0, 3.0, -0.05])
     profile = Profile(np.array([0.0, 10.0]), C + gradient * np.array([-5.0, 5.0]))
     found = SensorDelays().locate(

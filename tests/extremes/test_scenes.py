@@ -257,7 +257,7 @@ REFUSED = [
     (scene(snaps=(shrimp(0.0, 0.0, -5.0),)), "scene.world.shrimp.0.position: is at the centre of the array"),
     (
         scene((Target(name="dome", shape=Sphere(radius=1.0), motion=Still(position=(0.5, 0, -5))),)),
-        "scene.world.targets.0.motion: target 'dome' has the sonar inside at frame 0",
+        "scene.world.targets.0.motion: target 'dome' contains the sonar at frame 0",
     ),
     (
         scene((Target(name="wall", shape=Box(size=(2, 1000, 2), edge=0.01), motion=Still(position=(10, 0, -5))),)),

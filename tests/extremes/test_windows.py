@@ -27,7 +27,7 @@ BENDING = Tabulated(depth=(0.0, 60.0), speed=(1540.0, 1500.0))
 def recipe(
     distance, speed, water=UNIFORM, depth=20.0, below=5.0, sonar=0.0, bounces=0, snap=0.0, surface=None
 ) -> Recipe:
-    """A sphere straight ahead that comes nearer or goes away; a snap on the bed; few sensors."""
+    """A sphere straight ahead that comes nearer or goes away; a snap on the bottom; few sensors."""
     stop = (distance + 10.0 * speed, 0.0, -below)
     away = Still(position=(distance, 0.0, -below)) if speed == 0 else None
     environment = Environment(depth=depth, sound_speed=water, surface=surface or SeaSurface())

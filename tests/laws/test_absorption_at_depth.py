@@ -113,7 +113,7 @@ def test_sources_far_apart_in_depth_are_noted_where_one_spectrum_does_not_serve_
 
 
 def test_reflected_straight_paths_pass_the_depths_of_their_images() -> None:
-    """Down to the bed, up to the surface and back down: each leg by itself."""
+    """Down to the bottom, up to the surface and back down: each leg by itself."""
     bed, table = 3000.0, DepthAbsorption.of(COLD, 55e3, 3000.0)
     z1, z2, level = 500.0, 900.0, 700.0
     drop = (bed - z1) + bed + z2

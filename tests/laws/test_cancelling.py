@@ -40,7 +40,7 @@ WATER = Profile(np.array([0.0]), np.array([C]))
 BED = 10.0
 POSE = Pose(np.array([0.0, 0.0, -5.0]), quaternion(np.pi / 2))
 SNAP = np.array([14.0, -5.0, -5.0])
-BELOW = np.array([14.0, -5.0, -25.0])  # by the surface, then the bed
+BELOW = np.array([14.0, -5.0, -25.0])  # by the surface, then the bottom
 DELAY = np.linalg.norm(BELOW) / C
 TARGET = np.array([18.0, 2.0, 1.0])
 LIMITS = Limits(bounces=2, search=0.03, excess=15.0, weakest=40.0)

@@ -100,7 +100,7 @@ def test_a_planner_takes_the_fifth_degree_before_it_cuts_the_array(signal: float
     if degree == 5:
         assert measured.error(1, degree=3) > signal
         (stage,) = (s for s in made.stages if s.stage == "trace")
-        assert "to the degree 5" in stage.method
+        assert "degree 5" in stage.method
 
 
 def test_choices_of_before_are_cubic() -> None:

@@ -186,7 +186,7 @@ def test_the_plan_takes_the_direct_pulse_out_where_it_hides_echoes_and_says_what
     ahead, hidden, clear = (3.5, 0.2, -50.0), (4.25, 1.594, -50.03), (9.0, -4.0, -50.0)
     made = plan(overlapped(ahead))
     assert made.windows.direct_removed and made.windows.echo_start < 1e-3
-    (line,) = (note for note in made.warnings if "taken out" in note and note.startswith("the direct pulse"))
+    (line,) = (note for note in made.warnings if "removed" in note and note.startswith("the direct pulse"))
     assert "dB below the echoes" in line and "frame 0" in line
     aside, behind = losses(made, 0), losses(plan(overlapped(hidden)), 0)
     assert aside.fall > 70 and aside.below > 60 and aside.lost[0] < 0.1

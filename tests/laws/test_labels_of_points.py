@@ -169,7 +169,7 @@ def test_a_table_of_the_pattern_says_what_the_sensors_say(crowd: Made) -> None:
 
 
 def test_a_point_on_a_path_is_of_its_target_snap_and_way(crowd: Made) -> None:
-    """By the loudest path of each group: ghosts come by surface and bed, from where the images are."""
+    """By the loudest path of each group: ghosts come by surface and bottom, from where the images are."""
     a, seen = crowd.arrivals, set()
     for (target, snap, way), paths in groups(a).items():
         rows = paths[(a.target[paths] >= 0) & (a.direction[paths, 0] > 0.2)]

@@ -31,7 +31,7 @@ WATER = Profile(np.array([0.0]), np.array([C]))
 def locate(
     signals, array, source, pose=AHEAD, sonar=None, depth_error=0.0, snaps=1, method=None, profile=WATER
 ) -> SourceEstimates:
-    """With the bed where the source is, but for depth_error."""
+    """With the bottom where the source is, but for depth_error."""
     depth = -pose.to_world(np.asarray(source, float))[2] + depth_error
     method = method or SensorDelays()
     return method.locate(signals, array, sonar or Sonar(assumed_sound_speed=C), pose, float(depth), snaps, profile)
@@ -40,7 +40,7 @@ def locate(
 @pytest.mark.parametrize("azimuth", [-0.4, 0.5])
 @pytest.mark.parametrize("elevation", [-0.6, -0.15])
 def test_four_quadrants(azimuth, elevation):
-    """Port is +y and up is +z; upwards the same, where the bed is overhead (a sonar that hangs upside down)."""
+    """Port is +y and up is +z; upwards the same, where the bottom is overhead (a sonar that hangs upside down)."""
     for turn in (1.0, -1.0):
         source = 12.0 * direction(azimuth, turn * elevation)
         pose = Pose(AHEAD.position, quaternion(np.pi / 2, 0.0, 0.0 if turn > 0 else np.pi))

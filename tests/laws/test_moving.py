@@ -69,7 +69,7 @@ def heard(emitted: float, centre, v, u, source, array) -> tuple[float, float]:
 @pytest.mark.parametrize("u", [(0.0, 0.0, 0.0), (2.0, -1.0, 0.3)])
 @pytest.mark.parametrize("v", [(0.0, 0.0, 0.0), (1.4, 0.0, 0.0), (-30.0, 2.0, 0.5)])
 def test_delays_and_stretches_of_echoes_by_every_family(v, u, time: float) -> None:
-    """Long before and after the instant of the frame too, and by surface and bed, when the target is elsewhere."""
+    """Long before and after the instant of the frame too, and by surface and bottom, when the target is elsewhere."""
     v, u = np.array(v), np.array(u)
     body = ball(tuple(np.array([15.0, 1.0, -6.0]) - v * time))
     found = run(v, u, time, bodies=(body,), bounces=1)

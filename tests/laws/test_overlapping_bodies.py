@@ -107,7 +107,7 @@ def test_the_frames_in_which_bodies_meet_are_named() -> None:
     )
     (look,) = sample_frames(recipe(ball("still", (10.0, 0.0, -5.0)), passing, frames=9))
     (note,) = overlap_notes(look)
-    assert note.startswith("still and passing coincide in 1 of 9 frames looked at (the first: frame 4)")
+    assert note.startswith("still and passing coincide in 1 of 9 frames examined (first: frame 4)")
 
 
 @pytest.mark.parametrize(

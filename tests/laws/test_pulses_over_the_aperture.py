@@ -104,7 +104,7 @@ def key(found: Arrivals) -> np.ndarray:
 
 def both(one: Arrivals, other: Arrivals) -> tuple[Arrivals, Arrivals]:
     """The paths that both have, in one order: bodies hide other facets from other hydrophones. Without those that have
-    their number with others, as by surface and bed and by bed and surface."""
+    their number with others, as by surface and bottom and by bottom and surface."""
     keys, rows = [], []
     for found in (one, other):
         _, first, count = np.unique(key(found), return_index=True, return_counts=True)

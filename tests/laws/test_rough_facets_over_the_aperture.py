@@ -82,7 +82,7 @@ def heard(found: Arrivals, array: Elements, start: float) -> Floats:
 
 
 def bounced(found: Arrivals, bounces: int) -> Arrivals:
-    """Of paths with so many reflections from the surface, all on the way to the array, and none from the bed."""
+    """Of paths with so many reflections from the surface, all on the way to the array, and none from the bottom."""
     return found.select((found.surface == bounces) & (found.bottom == 0) & (found.arrives_by == bounces))
 
 

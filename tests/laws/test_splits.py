@@ -100,7 +100,7 @@ def test_no_scene_mesh_pose_or_snap_is_shared_by_splits() -> None:
 def test_what_splits_share_is_noted() -> None:
     made = recipe(variations=VARIED[2:], repeats=6, splits=Splits(train=0.5, test=0.5))
     (note,) = [note for note in plan(made).warnings if "several splits" in note]
-    assert note.startswith("1 sets of target poses are the same in several splits")
+    assert note.startswith("1 sets of target poses occur in more than one split")
 
 
 def test_sequences_of_one_scene_stay_together() -> None:

@@ -1,4 +1,4 @@
-"""Paths by surface and bed in a frame: against images, the straight limit, rays to every sensor; what hides them."""
+"""Paths by surface and bottom in a frame: against images, the straight limit, rays to every sensor; what hides them."""
 
 from __future__ import annotations
 
@@ -183,7 +183,9 @@ def test_a_board_hides_the_paths_that_it_stands_in_and_no_others(profile, height
 
 
 def test_a_facet_is_lit_from_below_by_the_bed_alone() -> None:
-    board = plate((9.0, 3.0, -9.0 - 0.01), 0.3, 2)  # its upper face level with the source, its lower face sees the bed
+    board = plate(
+        (9.0, 3.0, -9.0 - 0.01), 0.3, 2
+    )  # its upper face level with the source, its lower face sees the bottom
     direct, reflected = (run(bodies=(board,), bounces=n) for n in (0, 2))
     normals = board.pose.turn_to_world(board.mesh.normal)
     down = {i for i in range(len(normals)) if normals[i, 2] < -0.9}
@@ -201,7 +203,7 @@ def test_the_echo_of_a_ghost_comes_from_the_mirrored_place() -> None:
 
 
 def test_a_snap_on_the_bed_and_its_image_there_are_one() -> None:
-    """Of one strength to a snap a hair above the bed, whose two ways add up when they come together."""
+    """Of one strength to a snap a hair above the bottom, whose two ways add up when they come together."""
     fluid = SeaBed(reflection=FluidHalfSpace(density_ratio=1.8, speed_ratio=1.15, loss_tangent=0.02))
     environment = Environment(depth=BED, sound_speed=Isovelocity(speed=C), bed=fluid)
     totals = []
@@ -225,7 +227,7 @@ def test_a_snap_on_the_bed_and_its_image_there_are_one() -> None:
 
 
 def test_a_body_at_the_foot_of_a_ray_that_turns_and_then_meets_the_bed_hides_it_both_ways() -> None:
-    """Launched upwards, it turns: the bed is the first boundary that it meets."""
+    """Launched upwards, it turns: the bottom is the first boundary that it meets."""
     falling = Profile(np.array([0.0, 20.0]), np.array([1520.0, 1500.0]))
     environment = Environment(depth=20.0, sound_speed=Isovelocity(speed=1510.0), bed=SeaBed(reflection=Rigid()))
     ends = np.array([[0.0, 0.0, -10.0], [360.0, 0.0, -10.0]])

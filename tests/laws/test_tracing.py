@@ -287,5 +287,5 @@ def test_probes_spread_over_the_aperture_and_small_arrays_use_what_they_have() -
 def test_a_target_out_of_the_water_is_refused_by_name() -> None:
     with pytest.raises(ValueError, match="target 'hull' reaches above the surface"):
         run((body((20.0, 1.0, -0.05)),))
-    with pytest.raises(ValueError, match="target 'hull' reaches below the bed"):
+    with pytest.raises(ValueError, match="target 'hull' reaches below the bottom"):
         run((body((20.0, 1.0, -29.95)),))

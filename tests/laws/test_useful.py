@@ -120,9 +120,9 @@ def test_what_no_range_is_judged_of_is_named_counted_and_warned_of(labels: dict[
     store["cloud/range"].values.reshape(4, -1)[:, :60] += 3.0
     checks = range_errors(store, ALL)
     assert all(check.ok is not False for check in checks)
-    whose = row(checks, "whose echoes points are")
-    assert said in whose.got and "160 direct echoes of targets" in whose.got
-    assert said in whose.warning and whose.warning.startswith("of 400 points only 160")
+    whose = row(checks, "origin of points")
+    assert said in whose.got and "160 points on target, 240 off" in whose.got
+    assert said in whose.warning and whose.warning.startswith("only 40 % of the points")
     assert row(checks, "range of points on target").numbers["points"] == 160
 
 
@@ -139,4 +139,4 @@ def test_a_bearing_of_no_snap_is_a_miss_however_near_it_is() -> None:
     assert row(bounds(store, ALL), "snap located").ok
     store["bearings/emission"].values[:] = -1
     found = row(bounds(store, ALL), "snap located")
-    assert found.ok is False and "4 come from no snap" in found.got
+    assert found.ok is False and "4 match no snap" in found.got

@@ -71,7 +71,7 @@ ABSURD = [
     (
         SPEED,
         "kind: tabulated, depth: [0, 1e-300, 12], speed: [1500, 1600, 1500]",
-        f"5: {WATER}: changes by more than 1e+06 m/s a metre between 0 and 1e-300 m",
+        f"5: {WATER}: changes by more than 1e+06 m/s per metre between 0 and 1e-300 m",
     ),
     (
         SPEED,
@@ -88,9 +88,9 @@ ABSURD = [
     (
         SPEED,
         "kind: tabulated, depth: [0, 12], speed: [4920, 4921]",
-        f"5: {WATER}: is 4920 m/s at 0 m, outside 1000 to 2500 m/s: is it in feet a second?",
+        f"5: {WATER}: is 4920 m/s at 0 m, outside 1000 to 2500 m/s: is it in feet per second?",
     ),
-    (SPEED, "kind: tabulated, depth: [50], speed: [1500]", f"5: {WATER}: is given from 50 m down, below the bed at"),
+    (SPEED, "kind: tabulated, depth: [50], speed: [1500]", f"5: {WATER}: is given from 50 m down, below the bottom at"),
     ("kind: flat", "kind: [flat]", "5: scene.world.environment.noise"),
     ("title: small", "%YAML 1.1\n---\ntitle: small", "2: is not of YAML 1.2: leave out '%YAML'"),
     ("title: small", "title: &a small\nlicence: &a CC0-1.0", "2: the anchor 'a' is given twice"),

@@ -154,7 +154,7 @@ def test_the_command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pyt
     assert run(app, ["--json", "--out", str(tmp_path)]) == 1
     assert [row["ok"] for row in json.loads(capfd.readouterr().out)] == [True, False]
     assert run(app, ["--reference", "nothing", "--out", str(tmp_path)]) == 2
-    assert capfd.readouterr().err == f"sonarsynth: --reference nothing is none of {', '.join(REFERENCES)}\n"
+    assert capfd.readouterr().err == f"sonarsynth: --reference nothing is not one of {', '.join(REFERENCES)}\n"
 
 
 def test_without_mpmath_one_line_says_how_to_get_it(

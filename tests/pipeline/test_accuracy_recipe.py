@@ -273,10 +273,10 @@ def test_the_command(
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (["FILE", "--reference", "rays"], "give one of the three"),
-        (["FILE", "--extremes"], "give one of the three"),
-        (["--frames", "1"], "go with a recipe"),
-        (["--extremes", "--seed", "1"], "go with a recipe"),
+        (["FILE", "--reference", "rays"], "give only one of"),
+        (["FILE", "--extremes"], "give only one of"),
+        (["--frames", "1"], "need a recipe"),
+        (["--extremes", "--seed", "1"], "need a recipe"),
         (["FILE", "--hydrophones", "few"], "--hydrophones few"),
         (["FILE", "--hydrophones", "0"], "--hydrophones 0"),
         (["FILE", "--frames", "7"], "ends past the last frame"),

@@ -65,7 +65,7 @@ def test_a_dataset_is_whole_and_says_what_it_cost(reference: Path) -> None:
     rows = [json.loads(line) for line in store.beside(reference, "times.jsonl").read_text().splitlines()]
     assert sorted(row["frame"] for row in rows) == list(range(20))
     assert all(set(row["seconds"]) == set(tasks.STAGES) for row in rows)
-    assert not store.beside(reference, "aside.jsonl").exists()
+    assert not store.beside(reference, "failed.jsonl").exists()
 
 
 def test_two_worker_processes_make_the_same_arrays(tmp_path: Path, small: Recipe, reference: Path) -> None:
@@ -136,7 +136,7 @@ def test_a_part_and_then_the_whole_is_the_whole_at_once(tmp_path: Path, small: R
 
 @pytest.mark.parametrize("shards", [0, 2])
 def test_an_interrupted_build_goes_on(tmp_path: Path, small: Recipe, reference: Path, shards: int) -> None:
-    def interrupt(done: int, total: int, aside: int) -> None:
+    def interrupt(done: int, total: int, failed: int) -> None:
         if done >= 8 * shards:
             raise KeyboardInterrupt
 
@@ -178,7 +178,7 @@ def test_disk_trouble_on_a_worker_ends_the_build(
 @pytest.mark.parametrize(
     ("stage", "distributed"), [("trace_frame", False), ("range_frame", False), ("beamform_frame", True)]
 )
-def test_frames_that_raise_are_set_aside_and_the_rest_goes_on(
+def test_frames_that_raise_fail_and_the_rest_goes_on(
     tmp_path: Path,
     small: Recipe,
     reference: Path,
@@ -204,12 +204,12 @@ def test_frames_that_raise_are_set_aside_and_the_rest_goes_on(
     assert all("raise ZeroDivisionError" in f.traceback for f in report.failures)
     assert store.frames_there(path) == [f for f in range(20) if f not in (3, 16)]
     assert store.verify(path).problems == ()
-    aside = store.beside(path, "aside.jsonl")
-    assert sorted(json.loads(line)["frame"] for line in aside.read_text().splitlines()) == [3, 16]
+    failed = store.beside(path, "failed.jsonl")
+    assert sorted(json.loads(line)["frame"] for line in failed.read_text().splitlines()) == [3, 16]
     left = build(small, path, workers=0)
     assert (left.written, sorted(f.frame for f in left.failures), left.there) == (0, [3, 16], 18)
     assert build(small, path, workers=0, retry_failed=True).ok
-    assert not aside.exists()
+    assert not failed.exists()
     assert_same(path, reference)
 
 

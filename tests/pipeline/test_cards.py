@@ -89,7 +89,7 @@ def test_the_card_says_what_was_planned_and_what_is_missing(built: Path) -> None
     for row in attrs["plan"]["left_out"]:
         assert f"| {row['what']} | {row['why']} | {row['bound']} |" in text
     assert "8 of 20 are there" in text
-    assert "- 12 of 20 frames are not there." in text
+    assert "- 12 of 20 frames are not built." in text
     assert f"| digest of the recipe | {attrs['recipe_digest']} |" in text
     assert attrs["provenance"]["recipe_as_written"].strip() in text
     assert "| train | 1 | 20 |" in text
@@ -121,11 +121,11 @@ def test_the_command_makes_them_again_the_same(built: Path, tmp_path: Path, caps
     assert (tmp_path / "out/small.zarr.card.md").read_text() == text
 
 
-def test_frames_set_aside_are_counted(built: Path, tmp_path: Path) -> None:
+def test_failed_frames_are_counted(built: Path, tmp_path: Path) -> None:
     path = Path(shutil.copytree(built, tmp_path / "s.zarr"))
     row = {"frame": 9, "stage": "trace", "error": "ValueError: no such ray", "traceback": ""}
-    store.beside(path, "aside.jsonl").write_text(json.dumps(row) + "\n" + json.dumps(row) + "\nnot json\n")
-    assert "- 1 frames were set aside (trace: ValueError)." in cards.markdown(cards.facts_of(path))
+    store.beside(path, "failed.jsonl").write_text(json.dumps(row) + "\n" + json.dumps(row) + "\nnot json\n")
+    assert "- 1 frames failed (trace: ValueError)." in cards.markdown(cards.facts_of(path))
 
 
 @pytest.mark.parametrize("how", ["nothing", "folder", "metadata"])

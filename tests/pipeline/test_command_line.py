@@ -65,20 +65,20 @@ def test_build_verify_and_build_again(command: Command, small_file: Path, tmp_pa
     assert json.loads(again.out)["written"] == 0
     other = command("build", small_file, path, "--workers", "0", "--set", "seed=4")
     assert other.status == 2
-    assert "(seed is 3 there and 4 now)" in one_line(other)
+    assert "(seed: 3, now 4)" in one_line(other)
     (path / "image/energy/c.0.0.0").unlink()
     damaged = command("verify", path)
     assert damaged.status == 4
     assert "DAMAGE image/energy/c.0.0.0: the file is missing" in damaged.out
 
 
-def test_frames_set_aside_are_status_3(
+def test_failed_frames_are_status_3(
     command: Command, small_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(pipeline, "trace_frame", lambda made, i: 1 / 0)
     answer = command("build", small_file, tmp_path / "s.zarr", "--workers", "0", "--frames", "3")
     assert answer.status == 3
-    assert "frame 3 set aside in trace: ZeroDivisionError: division by zero" in answer.out
+    assert "frame 3 failed in trace: ZeroDivisionError: division by zero" in answer.out
 
 
 def test_an_interrupted_build_is_status_130(
@@ -90,7 +90,7 @@ def test_an_interrupted_build_is_status_130(
     monkeypatch.setattr(pipeline, "trace_frame", stop)
     answer = command("build", small_file, tmp_path / "s.zarr", "--workers", "0")
     assert answer.status == 130
-    assert one_line(answer) == "interrupted; the same command goes on from here"
+    assert one_line(answer) == "interrupted; run the same command again to resume"
 
 
 def test_a_store_that_is_locked_is_status_4_and_one_that_is_not_there_status_2(
@@ -132,9 +132,9 @@ def test_a_folder_that_cannot_be_written_is_one_line(command: Command, small_fil
     ("arguments", "message"),
     [
         (["--frames", "0:21"], "--frames: '0:21' ends past the last frame, 19"),
-        (["--frames", "x"], "--frames: 'x' is no frame and no range such as 0:8"),
+        (["--frames", "x"], "--frames: 'x' is neither a frame number nor a range such as 0:8"),
         (["--products", "film"], "--products: 'film' is not a product; known: signals, image, cloud"),
-        (["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "--workers is for worker processes of our own"),
+        (["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "--workers starts processes on this machine"),
         (["--workers", "-1"], "Invalid value for '--workers'"),
         (["--wrokers", "1"], "No such option"),
         (["--set", "seed=-1"], "small.yaml:--set: seed: must be greater than or equal to 0, not -1"),
@@ -158,7 +158,9 @@ def test_a_target_below_the_bed_at_some_frame_is_named_with_its_line(
     small_file.write_text(small_file.read_text().replace("stop: [10, 1, -5]", "stop: [10, 1, -9]"))
     answer = command(of, small_file, *([tmp_path / "s.zarr"] if of == "build" else []))
     assert answer.status == 2
-    assert re.search(r"small\.yaml:9: scene\.world\.targets\.0\.motion: .*below the bed at frame \d+", one_line(answer))
+    assert re.search(
+        r"small\.yaml:9: scene\.world\.targets\.0\.motion: .*below the bottom at frame \d+", one_line(answer)
+    )
 
 
 def test_the_plan_for_people_and_for_programs(command: Command, small_file: Path) -> None:
@@ -218,7 +220,7 @@ def test_signals_end_a_build_and_its_workers_in_10_s_and_it_goes_on(
     os.killpg(building.pid, number)  # as Ctrl-C, or a batch system, does
     _, err = building.communicate(timeout=HANGING)
     assert building.returncode == 130
-    assert err.endswith("sonarsynth: interrupted; the same command goes on from here\n") and "Traceback" not in err
+    assert err.endswith("sonarsynth: interrupted; run the same command again to resume\n") and "Traceback" not in err
     assert psutil.wait_procs(family, timeout=HANGING)[1] == []
     assert not store.beside(path, "lock").exists()
     there = store.frames_there(path)
@@ -243,6 +245,6 @@ def test_sigterm_ends_a_build_that_can_go_on(small_file: Path, tmp_path: Path) -
     building.send_signal(signal.SIGTERM)
     _, err = building.communicate(timeout=HANGING)
     assert building.returncode == 130
-    assert err.endswith("sonarsynth: interrupted; the same command goes on from here\n")
+    assert err.endswith("sonarsynth: interrupted; run the same command again to resume\n")
     assert not store.beside(path, "lock").exists()
     assert store.frames_there(path) == list(range(8))

@@ -20,7 +20,7 @@ from tools.same_numbers import harbour
 
 ROOT = Path(__file__).resolve().parents[2]
 CONFIGS = ROOT / "configs"
-REPORTED = {"range of points on target", "whose echoes points are", "ranges useful", "snaps useful"}
+REPORTED = {"range of points on target", "origin of points", "ranges useful", "snaps useful"}
 """Figures of `verify` that depend on the scene: what they must be for one is asked by its test."""
 REAL = ROOT.parent / "shared" / "data"
 needs_real_input = pytest.mark.skipif(not REAL.is_dir(), reason="the real cast and hull lie beside the repository")
@@ -194,7 +194,7 @@ def test_the_target_crosses_20_m_ahead_9_m_to_the_right() -> None:
 
 
 def test_three_rays_in_the_tank() -> None:
-    """Figure 14: reflections from surface, bed and cylinder; between them the Snell invariant holds."""
+    """Figure 14: reflections from surface, bottom and cylinder; between them the Snell invariant holds."""
     rays = follow_rays(_plan("tank.yaml"), 0)
     events = [EVENTS[e] for e in rays.event]
     assert set(rays.ray) == {0, 1, 2}

@@ -140,7 +140,7 @@ def test_numbers_that_are_not_the_ones_written_are_found_though_files_and_marks_
     mark = store.marks.load_mark(path, 0)
     assert mark is not None
     store.marks.save_mark(path, store.Mark("0", mark.frames, "0" * 64, mark.files))
-    assert found(path) == {"shard 0": "its numbers are not the ones that were written"}
+    assert found(path) == {"shard 0": "its data are not those that were written"}
 
 
 def test_checks_of_what_a_store_says_are_run_and_count(whole: Path) -> None:
@@ -163,7 +163,7 @@ def test_no_store_at_all(tmp_path: Path) -> None:
     for name, message in (
         ("none", "no such store"),
         ("empty", "is not a store of sonarsynth"),
-        ("file", "it is no folder"),
+        ("file", "it is not a folder"),
     ):
         with pytest.raises(store.Mismatch, match=message):
             store.verify(tmp_path / name)

@@ -1,4 +1,4 @@
-"""Ghosts: targets that the array sees mirrored in surface and bed, read from a store and drawn at their place."""
+"""Ghosts: targets that the array sees mirrored in surface and bottom, read from a store and drawn at their place."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ def test_sequences_and_frames_are_selected(spanning: Path, tmp_path: Path, capfd
     assert store.frames_there(place) == [2, 3, 4, 5, 8, 14, 15]
     for options, message in (
         (("--sequences", "8"), "--sequences: '8' ends past the last sequence, 7"),
-        (("--sequences", "x"), "--sequences: 'x' is no sequence and no range such as 0:8"),
+        (("--sequences", "x"), "--sequences: 'x' is neither a sequence number nor a range such as 0:8"),
         (("--sequences", "4", "--frames", "0:8"), "--frames and --sequences have no frame in common"),
     ):
         assert said(capfd, *build, *options) == (2, "", f"sonarsynth: {message}\n")

@@ -89,7 +89,7 @@ def test_links_in_a_store_are_found_and_not_followed(
 def test_a_link_that_comes_while_a_shard_is_written_is_not_followed(path: Path, outside: Path, made: Plan) -> None:
     (path / ".marks/1.json").unlink()
 
-    def exchange(done: int, total: int, aside: int) -> None:
+    def exchange(done: int, total: int, failed: int) -> None:
         linked(path, outside, "image")
 
     before = state(outside)
@@ -119,7 +119,7 @@ def test_zarr_2_in_a_store_is_not_read(path: Path) -> None:
         zarr.open_group(store.files.place.opens(path / "image"), mode="r")
 
 
-BESIDE = ("lock", "writers", "log.jsonl", "times.jsonl", "aside.jsonl")
+BESIDE = ("lock", "writers", "log.jsonl", "times.jsonl", "failed.jsonl")
 
 
 @pytest.mark.parametrize("suffix", BESIDE)
@@ -229,7 +229,7 @@ def test_a_store_that_is_renamed_while_it_is_built_is_whole_under_its_new_name(
     if exchanged:
         store.create(tmp_path / "other.zarr", other)
 
-    def rename(done: int, total: int, aside: int) -> None:
+    def rename(done: int, total: int, failed: int) -> None:
         if done and not moved.exists():
             path.rename(moved)
             if exchanged:

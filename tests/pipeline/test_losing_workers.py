@@ -29,7 +29,7 @@ class Striking:
     def __init__(self, path: Path, shards: int) -> None:
         self.path, self.shards, self.struck = path, shards, 0
 
-    def __call__(self, done: int, total: int, aside: int) -> None:
+    def __call__(self, done: int, total: int, failed: int) -> None:
         if self.struck or not done:
             return
         wait_until(lambda: len(marked(self.path)) >= self.shards)

@@ -46,6 +46,6 @@ def test_ranges_that_err_are_blamed_on_what_makes_them_err(water: ss.Isovelocity
         shrimp=(ss.SnappingShrimp(name="rock", position=(3.0, 6.0)),),
     )
     scene = ss.Scene(world=world, processing=ss.Processing(ranging=ss.IsovelocityRange()))
-    (note,) = [line for line in ss.plan(ss.Recipe(scene=scene)).warnings if line.startswith("ranges err by")]
+    (note,) = [line for line in ss.plan(ss.Recipe(scene=scene)).warnings if line.startswith("range errors are")]
     assert why in note
     assert ("bend" in note) == (not isinstance(water, ss.Isovelocity))

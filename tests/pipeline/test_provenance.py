@@ -181,7 +181,7 @@ def test_a_build_with_other_numeric_libraries_goes_on_only_where_told_and_marks_
     assert "other libraries" not in card.read_text()
     for name, other in (("numpy", "2.0.1"), ("python", "CPython 3.9.1"), ("blas", "mkl 1")):
         monkeypatch.setattr(provenance, "versions", lambda name=name, other=other: here | {name: other})
-        with pytest.raises(store.Mismatch, match=f"{name} .* then and {other.removesuffix('.1')}"):
+        with pytest.raises(store.Mismatch, match=f"{name} .* now {other.removesuffix('.1')}"):
             schedule.build(small_plan, path, frames=range(16), workers=0)
     for name in ("zarr", "dask"):  # which carry numbers
         monkeypatch.setattr(provenance, "versions", lambda name=name: here | {name: "0"})

@@ -203,7 +203,7 @@ def test_the_schema_keeps_units_kinds_and_descriptions() -> None:
     assert schema["title"] == "Recipe"
     named = schema["$defs"]
     assert {"Scene", "Tabulated", "Romanis", "Box"} <= named.keys()
-    assert named["Environment"]["properties"]["depth"]["description"].startswith("Depth of the bed")
+    assert named["Environment"]["properties"]["depth"]["description"].startswith("Depth of the bottom")
     assert named["Box"]["properties"]["kind"]["const"] == "box"
     assert named["World"]["description"] == "What there is."
     depth, text = named["Environment"]["properties"]["depth"]["anyOf"]

@@ -132,14 +132,14 @@ def test_another_recipe_is_refused_and_restart_begins_anew(small_plan: Plan, cop
     from sonarsynth.recipe import reading
 
     other = planning.plan(reading.loads(small_text.replace("seed: 3", "seed: 4")))
-    with pytest.raises(store.Mismatch, match="seed is 3 there and 4 now"):
+    with pytest.raises(store.Mismatch, match="seed: 3, now 4"):
         schedule.build(other, copy, frames=range(8), workers=0)
     schedule.build(other, copy, frames=range(8), workers=0, restart=True)
     assert store.frames_there(copy) == list(range(8))
     assert store.verify(copy, quick=True).ok
 
 
-def test_frames_set_aside_are_known_the_next_time(
+def test_failed_frames_are_known_the_next_time(
     small_plan: Plan, place: Remote, whole: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from sonarsynth import pipeline
@@ -148,11 +148,11 @@ def test_frames_set_aside_are_known_the_next_time(
     with monkeypatch.context() as patch:
         patch.setattr(pipeline, "trace_frame", lambda plan, i: 1 / 0 if i == 3 else trace(plan, i))
         assert not schedule.build(small_plan, place, frames=FRAMES, workers=0).ok
-    assert store.beside(place, "aside.jsonl").exists()
+    assert store.beside(place, "failed.jsonl").exists()
     again = schedule.build(small_plan, place, frames=FRAMES, workers=0)
     assert [failure.frame for failure in again.failures] == [3]
     assert schedule.build(small_plan, place, frames=FRAMES, workers=0, retry_failed=True).ok
-    assert not store.beside(place, "aside.jsonl").exists()
+    assert not store.beside(place, "failed.jsonl").exists()
     assert contents(place) == contents(whole)
 
 

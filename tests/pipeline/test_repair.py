@@ -186,7 +186,7 @@ def test_another_version_is_refused_unless_told_otherwise(
         repair(copy, workers=0)
     assert contents(copy) == damaged
     (copy / "truth/zarr.json").unlink()
-    assert repair(copy, workers=0, anyway=True).ok
+    assert repair(copy, workers=0, force=True).ok
     assert_identical(copy, whole)
 
 
@@ -199,9 +199,7 @@ def test_numbers_that_come_out_differently_are_said(copy: Path, monkeypatch: pyt
     assert not report.ok
 
 
-def test_a_frame_that_cannot_be_made_again_is_set_aside(
-    copy: Path, whole: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_frame_that_cannot_be_rebuilt_fails(copy: Path, whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     works = pipeline.trace_frame
     os.truncate(copy / SHARD, 10)
     with monkeypatch.context() as patch:
@@ -210,7 +208,7 @@ def test_a_frame_that_cannot_be_made_again_is_set_aside(
     assert [f.frame for f in report.failures] == [9]
     assert not report.ok
     assert store.frames_there(copy) == [f for f in range(18) if f != 9]
-    assert json.loads(store.beside(copy, "aside.jsonl").read_text())["frame"] == 9
+    assert json.loads(store.beside(copy, "failed.jsonl").read_text())["frame"] == 9
 
 
 def test_numbers_that_are_not_the_ones_of_their_mark_are_made_again(copy: Path, whole: Path) -> None:
@@ -274,15 +272,15 @@ def test_the_command_says_what_it_did(copy: Path, tmp_path: Path, capfd: pytest.
     assert "restored zarr.json" in out
     assert "made again: 1 shards, frames 8:16" in out
     assert f"moved out: {copy}.foreign/notes.txt" in out
-    assert "whole and as written" in out
-    assert command("verify", copy, "--quick")[1].endswith("all files are as written\n")
+    assert "store is intact" in out
+    assert command("verify", copy, "--quick")[1].endswith("all files match their digests\n")
     status, out, _ = command("repair", copy, "--json")
     assert (status, json.loads(out)["ok"], json.loads(out)["shards"]) == (0, True, [])
     for arguments, message in (
-        ((copy, "--workers", "1", "--scheduler", "tcp://127.0.0.1:1"), "--workers is for"),
+        ((copy, "--workers", "1", "--scheduler", "tcp://127.0.0.1:1"), "--workers starts processes on this machine"),
         ((tmp_path / "none",), "none: no such store"),
         ((tmp_path,), "is not a store of sonarsynth"),
-        ((copy / "zarr.json",), "is not a store: it is no folder"),
+        ((copy / "zarr.json",), "is not a store: it is not a folder"),
     ):
         status, out, err = command("repair", *arguments)
         assert (status, out, err.count("\n")) == (2, "", 1)

@@ -141,7 +141,7 @@ def test_the_cost_is_the_median_of_the_frames_as_last_built(stores: dict[str, Pa
     tree = opened(stores["lobe"])
     rows = [
         {"frame": 0, "cpu": {"trace": 9.0, "beamform": 9.0, "range": 9.0}},  # built again below
-        {"frame": 1, "cpu": {"trace": 0.002}},  # set aside
+        {"frame": 1, "cpu": {"trace": 0.002}},  # failed
         {"frame": 2, "cpu": {"trace": 0.002, "beamform": 0.030, "range": 0.004}},
         {"frame": 3, "cpu": {"trace": 0.010, "beamform": 0.005, "range": 0.001}},
         {"frame": 0, "cpu": {"trace": 0.003, "beamform": 0.020, "range": 0.002}},
@@ -150,9 +150,9 @@ def test_the_cost_is_the_median_of_the_frames_as_last_built(stores: dict[str, Pa
     lines = [json.dumps(row | {"seconds": {}}) for row in rows]
     (tmp_path / "s.zarr.times.jsonl").write_text("\n".join([*lines, '{"frame": 2, "cpu": {"tra']))
     found = scores_of(tree, tmp_path / "s.zarr", [0, 1, 2, 3], heard(tree, [0, 1, 2, 3]))
-    costs = {name: value for name, value in found.items() if name.startswith(("CPU", "frames a second"))}
+    costs = {name: value for name, value in found.items() if name.startswith(("CPU", "frames per second"))}
     assert list(costs.values()) == ["3 ms", "20 ms", "2 ms", "25 ms", "40"]
-    assert list(costs)[-2:] == ["CPU a frame: all", "frames a second, one core"]
+    assert list(costs)[-2:] == ["CPU per frame: all", "frames per second, one core"]
     without = scores_of(tree, tmp_path / "none.zarr", [0], heard(tree, [0]))
     assert {without[name] for name in costs} == {"-"}
 

@@ -189,13 +189,13 @@ def test_a_fan_and_eigenrays_can_be_drawn_together(tmp_path: Path) -> None:
     files, text = show_rays(planning.plan(recipe(fan)), 0, tmp_path)
     value = json.loads(files[3].read_text())
     assert [ray["family"] for ray in value["rays"]].count("fan") == 9
-    assert "9 rays of a fan" in text
+    assert "9 rays: " in text
     assert all(ray["transmission_loss"] is None for ray in value["rays"] if ray["family"] == "fan")
 
 
 def test_a_fan_alone_has_a_table_of_one_line() -> None:
     lines = lines_of(recipe(RayRequest(azimuths=2, elevations=1, duration=0.01)))
-    assert table(lines).startswith("2 rays of a fan: ")
+    assert table(lines).startswith("2 rays: ")
 
 
 def test_without_a_snap_there_is_nothing_to_draw() -> None:

@@ -101,7 +101,7 @@ def test_slow_tails_are_among_the_warnings(tmp_path: Path) -> None:
     assert not any("falls off slowly" in note for note in plan(recipe).warnings)
     loud = reading.load(tmp_path / "recipe.yaml", sets)
     made = plan(loud)
-    assert any("falls off slowly: it is cut 0.02 s" in note for note in made.warnings)
+    assert any("decays slowly: it is cut 0.02 s" in note for note in made.warnings)
     assert made.windows.echo_start < 3e-3  # the echoes, from 7 ms on, are heard in spite of the tail
 
 

@@ -139,7 +139,7 @@ def test_a_shard_without_its_mark_is_missing(laid_out: Path, small_plan: Plan, m
 def test_another_recipe_is_refused_with_the_difference(laid_out: Path, small_plan: Plan, small_text: str) -> None:
     store.create(laid_out, small_plan)
     other = plan(loads(small_text.replace("frames: 20", "frames: 21")))
-    with pytest.raises(store.Mismatch, match=r"scene\.trajectory\.frames is 20 there and 21 now"):
+    with pytest.raises(store.Mismatch, match=r"scene\.trajectory\.frames: 20, now 21"):
         store.create(laid_out, other)
     with pytest.raises(store.Mismatch, match="products: "):
         store.create(laid_out, replace(small_plan, products=frozenset({"image"})))

@@ -106,7 +106,7 @@ def test_frames_that_end_their_worker_are_named_with_why_and_the_rest_goes_on(
     assert report.dashboard.partition("//")[2].startswith("127.0.0.1:")
     assert addresses == {"127.0.0.1"}
     events = [row["event"] for row in read_lines(store.beside(path, "log.jsonl"))]
-    assert events.count("aside") == 4
+    assert events.count("failed") == 4
     assert events[0] == "build"
     assert events[-1] == "end"
     assert {"workers", "worker lost"} <= set(events)
@@ -158,7 +158,7 @@ def test_a_scheduler_that_dies_ends_the_build_in_one_line_and_it_goes_on(
     scheduler, address = elsewhere
     path = tmp_path / "s.zarr"
 
-    def kill(done: int, total: int, aside: int) -> None:
+    def kill(done: int, total: int, failed: int) -> None:
         if done:
             scheduler.kill()
 
@@ -195,7 +195,7 @@ def test_what_does_not_fit_is_refused_before_anything_is_written_unless_agreed(
     tmp_path: Path, small_plan: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(disk_space.shutil, "disk_usage", lambda place: shutil._ntuple_diskusage(10**9, 10**9, 1000))
-    with pytest.raises(TooLarge, match=r"needs up to [\d.]+ [kM]B and 1 kB are free there: --yes"):
+    with pytest.raises(TooLarge, match=r"needs up to [\d.]+ [kM]B and 1 kB are free: use --yes"):
         build(small_plan, tmp_path / "s.zarr", workers=0)
     assert list(tmp_path.iterdir()) == []
     assert build(small_plan, tmp_path / "s.zarr", frames=[0], workers=0, agreed=True).ok
@@ -236,7 +236,7 @@ def test_a_disk_that_takes_no_more_is_one_line_and_the_build_goes_on(
     assert len(lines) == 2
     assert "No space left" in lines[0]
     assert "read-only" in lines[1]
-    assert all("the same command goes on" in line and "are free" in line for line in lines)
+    assert all("run the same command again to resume" in line and "are free" in line for line in lines)
     assert "Traceback" not in done.stderr
     assert different(tmp_path / "s.zarr", reference) == []
 
@@ -287,7 +287,7 @@ def test_options_that_cannot_be_are_refused(
 def test_another_code_is_shown_and_refused(tmp_path: Path, small: Recipe, monkeypatch: pytest.MonkeyPatch) -> None:
     build(small, tmp_path / "s.zarr", frames=[0], workers=0)
     monkeypatch.setattr("sonarsynth.store.creating.code_digest", lambda: "f" * 64)
-    with pytest.raises(store.Mismatch, match=r"digest of the code: [0-9a-f]{12} there and f{12} now"):
+    with pytest.raises(store.Mismatch, match=r"digest of the code: [0-9a-f]{12}, now f{12}"):
         build(small, tmp_path / "s.zarr", workers=0)
 
 

@@ -69,8 +69,8 @@ def test_a_body_too_small_for_the_lowest_frequency_is_noted(tmp_path: Path, caps
         (["{kind: sphere"], "is not YAML"),
         (["{kind: mesh_file, path: nowhere.stl}"], "nowhere.stl: no such file"),
         ([BOX, "--frequency", "0"], "--frequency: must be above 0 Hz"),
-        ([BOX, "--frequency", "1:2"], "--frequency: '1:2' is no number and no range"),
-        ([BOX, "--aspect", "0:360:0"], "--aspect: '0:360:0' holds no value"),
+        ([BOX, "--frequency", "1:2"], "--frequency: '1:2' is neither a number nor a range"),
+        ([BOX, "--aspect", "0:360:0"], "--aspect: '0:360:0' contains no value"),
         ([BOX, "--aspect", "0:90:0.001", "--frequency", "1e3:1e5:1"], "too many: use longer steps"),
         (
             [BOX, "--scattering", "{kind: kirchhoff, surface: hard}"],

@@ -76,12 +76,12 @@ CASES = {
     "rock": (
         "bed: {}",
         "bed: {reflection: {kind: sediment, name: rock}}",
-        [f"{WATER}bed.reflection: Rayleigh's bed without shear waves: speed ratio 2.5 is outside 0 to 1.5"],
+        [f"{WATER}bed.reflection: Rayleigh's bottom without shear waves: speed ratio 2.5 is outside 0 to 1.5"],
     ),
     "a fluid as fast as rock": (
         "bed: {}",
         "bed: {reflection: {kind: fluid, density_ratio: 2, speed_ratio: 2}}",
-        [f"{WATER}bed.reflection: Rayleigh's bed without shear waves: speed ratio 2 is outside 0 to 1.5"],
+        [f"{WATER}bed.reflection: Rayleigh's bottom without shear waves: speed ratio 2 is outside 0 to 1.5"],
     ),
     "low frequencies": (
         "    beams:",

@@ -1,4 +1,4 @@
-"""Reflection from the sea bed and the surface: published values, limits, and energy."""
+"""Reflection from the bottom and the surface: published values, limits, and energy."""
 
 import numpy as np
 import pytest
@@ -83,7 +83,7 @@ def test_a_boundary_of_density_alone_reflects_the_same_at_every_angle():
 @pytest.mark.parametrize("loss", [0.0, 1e-12, 0.01624, 0.5])
 @pytest.mark.parametrize("speed", [0.98, 1.1782])
 def test_the_wave_in_the_bed_goes_down_and_dies_away(speed, loss):
-    """exp(+i w t - i k w z) at a depth z in the bed, with w = m sin q (1 - V)/(1 + V): Im w <= 0 and Re w >= 0."""
+    """exp(+i w t - i k w z) at a depth z in the bottom, with w = m sin q (1 - V)/(1 + V): Im w <= 0 and Re w >= 0."""
     q = np.linspace(0.01, np.pi / 2, 200)
     v = rayleigh(q, 1.845, speed, loss)
     w = 1.845 * np.sin(q) * (1 - v) / (1 + v)

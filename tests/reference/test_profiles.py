@@ -80,7 +80,7 @@ def test_the_slopes_of_munk_are_those_of_its_speed() -> None:
 def errors(sound_speed: SoundSpeed, every: int) -> tuple[Floats, Ints, set[tuple[int, ...]]]:
     """Errors (s) of travel times in Munk's profile over 10 to 100 km, turning points, and which kinds of ray were seen.
 
-    Rays that reach surface or bed at less than 1 degree are left out: the formula may turn them just before it.
+    Rays that reach surface or bottom at less than 1 degree are left out: the formula may turn them just before it.
     """
     rng = np.random.default_rng(5)
     start, end = rng.uniform(100.0, 4500.0, (2, 6))
@@ -187,10 +187,12 @@ def test_formulas_that_no_water_follows_are_refused() -> None:
     ):
         with pytest.raises(ValueError, match=r"the sound speed at .* m is .* m/s; it must be 100 to 10000 m/s"):
             wrong()
-    with pytest.raises(ValueError, match="linear, goes down to 1400 m, where it is 100 m/s: not to the bed at 1500 m"):
+    with pytest.raises(
+        ValueError, match="linear, goes down to 1400 m, where it is 100 m/s: not to the bottom at 1500 m"
+    ):
         Environment(depth=1500.0, sound_speed=Linear(surface_speed=1500.0, gradient=-1.0))
     assert Environment(depth=1300.0, sound_speed=Linear(surface_speed=1500.0, gradient=-1.0)).depth == 1300.0
-    with pytest.raises(ValueError, match="not to the bed at 20000 m"):
+    with pytest.raises(ValueError, match="not to the bottom at 20000 m"):
         eigenrays(Munk(), 20e3, 10.0, 10.0, 10.0)
 
 

@@ -48,7 +48,7 @@ def test_uniform_water_has_image_sources(vertices: int, reflections: int) -> Non
 
 @pytest.mark.parametrize("gradient", [0.016, 1.0, -0.05])
 def test_hops_along_a_boundary_have_the_closed_form(gradient: float) -> None:
-    """Both ends on the surface (or the bed) of water that bends rays back to it: n equal arcs."""
+    """Both ends on the surface (or the bottom) of water that bends rays back to it: n equal arcs."""
     c, bed, r = 1500.0, 1000.0, 800.0
     speeds = np.array([c, c + gradient * bed]) if gradient > 0 else np.array([c - gradient * bed, c])
     water, end = ray_solutions.water(np.array([0.0, bed]), speeds, bed), 0.0 if gradient > 0 else bed
@@ -177,7 +177,7 @@ def test_no_family_is_missed_and_no_ray_comes_twice(
 
 
 def ends(rng: np.random.Generator, water: ray_solutions.Water, k: int) -> tuple[float, float]:
-    """Two depths: at random, the same, on surface, bed and nodes."""
+    """Two depths: at random, the same, on surface, bottom and nodes."""
     a, b = rng.uniform(0, 100, 2)
     choice: Floats = np.array([[a, b], [a, a], [0, b], [a, 100], [0, 100], [a, water.depth[len(water.depth) // 2]]])
     return float(choice[k % 6, 0]), float(choice[k % 6, 1])

@@ -99,7 +99,7 @@ def built(plan: Plan, path: Path, workers: int) -> dict[str, Any]:
     landed: list[tuple[float, int]] = []
     report = schedule.build(
         plan, path, workers=workers, restart=True,
-        progress=lambda done, total, aside: landed.append((time.perf_counter(), done)),
+        progress=lambda done, total, failed: landed.append((time.perf_counter(), done)),
     )  # fmt: skip
     start, end = landed[workers], landed[-1]  # the first is before any shard
     rate = (end[1] - start[1]) / (end[0] - start[0])

@@ -1,4 +1,4 @@
-"""`tools/bench reflections`: what paths by surface and bed cost a frame of the crossing over a thermocline."""
+"""`tools/bench reflections`: what paths by surface and bottom cost a frame of the crossing over a thermocline."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ class Watch:
         self.cpu: dict[str, dict[int, float]] = {}
         self.left = list(LOOKED_AT)
 
-    def __call__(self, done: int, total: int, aside: int) -> None:
+    def __call__(self, done: int, total: int, failed: int) -> None:
         """Look, where it is time."""
         while self.left and done >= self.left[0]:
             at = self.left.pop(0)

@@ -13,7 +13,17 @@ from sonarsynth.schedule.repairing import repair
 
 from .ground import FRAMES, Ground, on_ground
 
-BESIDE = ("lock", "writers", "log.jsonl", "times.jsonl", "aside.jsonl", "card.md", "croissant.json", "foreign", "doing")
+BESIDE = (
+    "lock",
+    "writers",
+    "log.jsonl",
+    "times.jsonl",
+    "failed.jsonl",
+    "card.md",
+    "croissant.json",
+    "foreign",
+    "doing",
+)
 KINDS = ("inside", "inside", "beside", "to the store")
 
 

@@ -30,18 +30,18 @@ def at(x: float, xs: Floats, ys: Floats) -> float:
 
 
 @njit(cache=True, nogil=True)
-def vertex(z: float, down: bool, fastest: float, bed: float, depth: Floats, speed: Floats) -> float:
+def vertex(z: float, down: bool, fastest: float, bottom: float, depth: Floats, speed: Floats) -> float:
     """Depth (m) at which a ray that goes down, or up, from z meets its turning speed (m/s), or the boundary."""
     last_z, last_c = z, at(z, depth, speed)
     step = 1 if down else -1
     i = np.searchsorted(depth, z, side="right") if down else np.searchsorted(depth, z) - 1
-    while 0 <= i < len(depth) and 0.0 < depth[i] < bed:
+    while 0 <= i < len(depth) and 0.0 < depth[i] < bottom:
         if speed[i] >= fastest:
             share = (fastest - last_c) / (speed[i] - last_c) if speed[i] > last_c else 0.0
             return float(last_z + min(max(share, 0.0), 1.0) * (depth[i] - last_z))
         last_z, last_c = depth[i], speed[i]
         i += step
-    edge = bed if down else 0.0
+    edge = bottom if down else 0.0
     c = at(edge, depth, speed)
     if c >= fastest and c > last_c:
         return float(last_z + min(max((fastest - last_c) / (c - last_c), 0.0), 1.0) * (edge - last_z))
@@ -64,13 +64,13 @@ def leg(a: float, b: float, p: float, bent: bool, water: tuple[Floats, Floats], 
 
 
 @njit(cache=True, nogil=True)
-def means(start: Floats, end: Floats, climb: Floats, vertices: Ints, bent: bool, bed: float,
+def means(start: Floats, end: Floats, climb: Floats, vertices: Ints, bent: bool, bottom: float,
           water: tuple[Floats, Floats], table: tuple[Floats, Floats], out: Floats) -> None:  # fmt: skip
     """Mean (ray,) along rays from depths start to end (ray,) m of a value of depth.
 
     climb (ray,): upward component of the unit vector in which each leaves; vertices (ray,): how many times it turns or
-    is reflected; bent: whether it follows Snell's law in water, depth and sound speed (node,), or is straight; bed (m);
-    table: depth and value (node,), both ascending in depth. A ray with vertices goes to and fro between two depths.
+    is reflected; bent: whether it follows Snell's law in water, depth and sound speed (node,), or is straight; bottom
+    (m); table: depth and value (node,), both ascending. A ray with vertices goes to and fro between two depths.
     """
     sums = np.zeros(2)
     for r in range(len(start)):
@@ -81,8 +81,8 @@ def means(start: Floats, end: Floats, climb: Floats, vertices: Ints, bent: bool,
             leg(z, other, p, bent, water, table, 1.0, sums)
         else:
             fastest = 1.0 / max(p, 1e-300) if bent else np.inf
-            upper = vertex(z, False, fastest, bed, water[0], water[1])
-            lower = vertex(z, True, fastest, bed, water[0], water[1])
+            upper = vertex(z, False, fastest, bottom, water[0], water[1])
+            lower = vertex(z, True, fastest, bottom, water[0], water[1])
             first_down = climb[r] < 0.0
             last_down = first_down == (n % 2 == 1)
             leg(z, lower if first_down else upper, p, bent, water, table, 1.0, sums)

@@ -16,7 +16,7 @@ from sonarsynth.equations.rays.ray_chain import node_above
 from sonarsynth.equations.rays.ray_in_layer import atanc, chord_time
 
 ON, TURN, SURFACE, BED, OVER = range(5)
-"""Why a step ended: step length or layer boundary, turning point, surface, bed, time over."""
+"""Why a step ended: step length or layer boundary, turning point, surface, bottom, time over."""
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -85,7 +85,7 @@ def step(
     """One arc within one layer: (why it ended, layer, dx, z, phi, length, time) after it.
 
     It ends at the layer's boundary, at a turning point, after `limit` (m), where its chord would leave it by more than
-    `sagitta` (m), or when time (s) is over. Surface and bed are reached, not reflected from. A jump is crossed, or
+    `sagitta` (m), or when time (s) is over. Surface and bottom are reached, not reflected from. A jump is crossed, or
     turned back from, in a step of no length.
     """
     layer, sense = heading(depth, speed, layer, z, phi)
@@ -153,9 +153,9 @@ def chords(
 ) -> int:
     """Nodes (node, 3) of polylines that keep within `sagitta` (m) of rays of some lengths: ray, distance and depth.
 
-    Rays leave depths z at angles phi and are reflected from surface and bed, where they have a node. Layers are passed
-    without one where the bend is small: a curve of length s whose direction varies by b keeps within s b/4 of its
-    chord. Returns the number of nodes, or -1 where there is no room for them.
+    Rays leave depths z at angles phi and are reflected from surface and bottom, where they have a node. Layers are
+    passed without one where the bend is small: a curve of length s whose direction varies by b keeps within s b/4 of
+    its chord. Returns the number of nodes, or -1 where there is no room for them.
     """
     count = 0
     for i in range(len(z)):

@@ -1,9 +1,9 @@
 """Sums over the layers of a ray: the chain of speeds that it meets, with how often it crosses each layer.
 
 A chain is the water that a ray goes through, from its upper vertex down to its lower one: node speeds c[i], and between
-nodes i and i + 1 the thickness dz[i]. A vertex is surface, bed, or a turning point in the layer beyond the first or the
-last node. Every family of rays is the same sums with other weights: how often it crosses each layer, and how often it
-turns above and below. So a bounce or a cycle costs nothing.
+nodes i and i + 1 the thickness dz[i]. A vertex is surface, bottom, or a turning point in the layer beyond the first or
+the last node. Every family of rays is the same sums with other weights: how often it crosses each layer, and how often
+it turns above and below. So a bounce or a cycle costs nothing.
 
 The weighted chain: k = crossings dz (c1 + c2), turn_up = (number of turns above)/gradient, turn_down likewise; 0 where
 the ray does not turn.

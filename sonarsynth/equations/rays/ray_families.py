@@ -3,8 +3,8 @@
 A ray keeps p, so it goes up and down between two vertices above and below both ends, each a boundary or the depth where
 c = 1/p. A family is a launch direction and a number of vertices: it says how often the ray passes above, between and
 below the ends. As c = 1/p grows from the fastest speed between the ends to infinity, vertices move out, from layer to
-layer and at last to surface and bed. In each interval of c in which neither changes layer, the range of every family is
-a sum of the same three legs (above, between, below), so the legs are summed once for all families.
+layer and at last to surface and bottom. In each interval of c in which neither changes layer, the range of every family
+is a sum of the same three legs (above, between, below), so the legs are summed once for all families.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def families_of_pair(
 ) -> int:  # fmt: skip
     """Rays of a pair with a vertex or more, into rows of out: their number, -1 when it is full.
 
-    family (2 vertices, COLUMNS): room for their list; reflections: most from surface and bed together; steepest:
+    family (2 vertices, COLUMNS): room for their list; reflections: most from surface and bottom together; steepest:
     tangent, at the slowest depth of the water, of the steepest ray that turns anywhere.
     """
     of = chain.of

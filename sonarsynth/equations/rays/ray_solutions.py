@@ -31,9 +31,9 @@ TOLERANCE = 1e-9  # m: ends this little outside the water are on its boundary
 
 @dataclass(frozen=True, eq=False)
 class Water:
-    """Sound speed (m/s) at depths (m) from the surface to the bed, linear between; two equal depths are a jump."""
+    """Sound speed (m/s) at depths (m) from the surface to the bottom, linear between; two equal depths are a jump."""
 
-    depth: Floats  # (node,) from 0 to the bed
+    depth: Floats  # (node,) from 0 to the bottom
     speed: Floats  # (node,)
 
 
@@ -51,34 +51,34 @@ class Eigenrays:
     end_speed: Floats  # (ray,) m/s
     amplitude: Floats  # (ray,) 1/m: pressure at the end over that at 1 m from the start
     upper: Floats  # (ray,) m: depth of its upper vertex, a turning depth or 0 at the surface; NaN without one
-    lower: Floats  # (ray,) m: depth of its lower vertex, a turning depth or that of the bed; NaN without one
+    lower: Floats  # (ray,) m: depth of its lower vertex, a turning depth or that of the bottom; NaN without one
     surface: Ints  # (ray,) reflections from the surface
-    bottom: Ints  # (ray,) reflections from the bed
+    bottom: Ints  # (ray,) reflections from the bottom
     turning: Ints  # (ray,) turning points
     caustics: Ints  # (ray,) caustics passed
     flag: Ints  # (ray,) see REASONS
 
 
 def water(depth: Floats, speed: Floats, bed: float) -> Water:
-    """The water down to the bed (m) of a profile at nodes (m, m/s), constant beyond its ends.
+    """The water down to the bottom (m) of a profile at nodes (m, m/s), constant beyond its ends.
 
-    Raises ValueError for nodes that are not finite or not in order, for a speed or a bed depth that is not positive.
+    Raises ValueError for nodes that are not finite or not in order, for a speed or a bottom depth that is not positive.
     """
     z, c = np.asarray(depth, float), np.asarray(speed, float)
     if z.ndim != 1 or z.shape != c.shape or len(z) == 0:
         raise ValueError("a profile needs as many speeds as depths, and one at least")
     if not (np.isfinite(z).all() and np.isfinite(c).all() and np.isfinite(bed)):
-        raise ValueError("a profile and its bed must be finite numbers")
+        raise ValueError("a profile and the bottom depth must be finite numbers")
     if (np.diff(z) < 0).any() or (c <= 0).any() or bed <= 0:
-        raise ValueError("a profile needs depths that do not decrease, positive speeds and a bed below the surface")
+        raise ValueError("a profile needs depths that do not decrease, positive speeds and a bottom below the surface")
     inside = (z > 0) & (z < bed)
     at_surface, at_bed = np.interp([0.0, bed], z, c)
-    at_bed = c[np.searchsorted(z, bed)] if bed in z else at_bed  # a jump on the bed: its upper side
+    at_bed = c[np.searchsorted(z, bed)] if bed in z else at_bed  # a jump on the bottom: its upper side
     return Water(np.concatenate([[0.0], z[inside], [bed]]), np.concatenate([[at_surface], c[inside], [at_bed]]))
 
 
 def within(water: Water, depth: Floats, what: str) -> Floats:
-    """Depths, those within rounding of surface or bed put on it; raises ValueError naming the first one outside."""
+    """Depths, those within rounding of surface or bottom put on it; raises ValueError naming the first one outside."""
     z = np.asarray(depth, float)
     bed = water.depth[-1]
     if z.size and z.min() >= 0.0 and z.max() <= bed:
@@ -95,11 +95,11 @@ def eigenrays(
 ) -> Eigenrays:
     """All rays from depths start (pair,) to depths end (pair,) at horizontal distances (pair,), in m.
 
-    vertices: most turning points and reflections together; reflections: most from surface and bed together. The default
-    is the direct family. A pair may have no ray (a shadow zone), one or several. Travel times are right to about 1e-15
-    of themselves, and the search is complete (`rays_search`). A ray that turns exactly at an end counts once; an end on
-    a jump is on the side of the other end, on the lower one if both are level. Raises ValueError for ends outside the
-    water, distances that are not finite or negative, and negative numbers of vertices.
+    vertices: most turning points and reflections together; reflections: most from surface and bottom together. The
+    default is the direct family. A pair may have no ray (a shadow zone), one or several. Travel times are right to
+    about 1e-15 of themselves, and the search is complete (`rays_search`). A ray that turns exactly at an end counts
+    once; an end on a jump is on the side of the other end, on the lower one if both are level. Raises ValueError for
+    ends outside the water, distances that are not finite or negative, and negative numbers of vertices.
     """
     from sonarsynth.equations.rays import ray_batches as kernels
 

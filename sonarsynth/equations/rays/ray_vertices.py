@@ -12,7 +12,7 @@ from sonarsynth.equations.rays.ray_chain import lay
 
 FIRST, UPPER_END, LOWER_END, LAST, ON_SURFACE, ON_BED, DESCENDS, NODE_UP, NODE_DOWN = range(9)
 """Columns of Chain.at: nodes of the chain (its first, those at the upper and the lower end, its last); whether it ends
-on surface and bed; whether the start is the upper end; the next nodes of the profile above and below the chain."""
+on surface and bottom; whether the start is the upper end; the next nodes of the profile above and below the chain."""
 Z_UP, Z_TOP, Z_BOTTOM, Z_DOWN, GRADIENT_UP, GRADIENT_DOWN, FASTEST, SLOWEST, AFTER = range(9)
 """Columns of Chain.of: depths (m) of those nodes; inverse gradients (s) of the layers beyond the chain, 0 on a
 boundary; fastest and slowest speed in the chain (m/s), and the speed at which its vertices next change layer."""

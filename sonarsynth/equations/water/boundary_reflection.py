@@ -1,7 +1,7 @@
-"""Reflection at the sea bed and at the surface, smooth and rough.
+"""Reflection at the bottom and at the surface, smooth and rough.
 
-Plane-wave coefficients for f > 0 in time dependence exp(+i 2 pi f t): below the critical angle of a fast bed the phase
-falls from pi at grazing to 0.
+Plane-wave coefficients for f > 0 in time dependence exp(+i 2 pi f t): below the critical angle of a fast bottom the
+phase falls from pi at grazing to 0.
 """
 
 from __future__ import annotations
@@ -59,10 +59,10 @@ def rayleigh(
 
         V = (m sin q - w)/(m sin q + w),   w = sqrt(n^2 - cos^2 q),   Im w <= 0
 
-    so that the wave in the bed dies away from the boundary. n^2 - cos^2 q is taken as (n^2 - 1) + sin^2 q, which keeps
-    its digits near grazing; V(0) = -1 for every bed but one of density alone (n = 1), where
-    V = (m - 1)/(m + 1) at every angle. Arguments broadcast. Exact for fluids; a bed that carries shear waves, as rock
-    does, takes part of the sound away in them, which is left out (`ranges.FLUID_BED`).
+    so that the wave in the bottom dies away from the boundary. n^2 - cos^2 q is taken as (n^2 - 1) + sin^2 q, which
+    keeps its digits near grazing; V(0) = -1 for every bottom but one of density alone (n = 1), where
+    V = (m - 1)/(m + 1) at every angle. Arguments broadcast. Exact for fluids; a bottom that carries shear waves, as
+    rock does, takes part of the sound away in them, which is left out (`ranges.FLUID_BED`).
     Source: Rayleigh; Brekhovskikh and Lysanov (2003), Fundamentals of Ocean Acoustics, section 3.1 (conjugated).
     """
     sine = np.abs(np.sin(np.asarray(grazing, float)))
@@ -77,7 +77,7 @@ def rayleigh(
 
 
 def critical_grazing(speed_ratio: npt.ArrayLike) -> Floats:
-    """Grazing angle (rad) below which a lossless bed of that speed ratio reflects everything; NaN for a slow bed."""
+    """Grazing angle (rad) below which a lossless bottom of that speed ratio reflects all; NaN for a slow bottom."""
     ratio = np.asarray(speed_ratio, float)
     return np.asarray(np.arccos(np.where(ratio >= 1.0, 1.0 / ratio, np.nan)))
 

@@ -120,7 +120,7 @@ AINSLIE_MCCOLM: Final = Range(
 )
 
 APL_SEDIMENTS: Final = Range("sediments of APL-UW TR 9407 (1994)", {"frequency": (10e3, 100e3, "Hz")})
-FLUID_BED: Final = Range("Rayleigh's bed without shear waves", {"speed_ratio": (0.0, 1.5, "")})
+FLUID_BED: Final = Range("Rayleigh's bottom without shear waves", {"speed_ratio": (0.0, 1.5, "")})
 """Shear waves matter little in loose sediments (the fastest, moraine, has a speed ratio of 1.3 and shear waves of 600
 m/s) and much in chalk (1.6, 1000 m/s) and rock: Jensen et al. (2011), Computational Ocean Acoustics, table 1.3."""
 PIERSON_MOSKOWITZ: Final = Range("waves of Pierson and Moskowitz (1964)", {"wind_speed": (10.0, 21.0, "m/s")})

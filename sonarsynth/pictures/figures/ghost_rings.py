@@ -1,4 +1,4 @@
-"""Ghosts in an energy image: a ring and a label where the array sees a target mirrored in surface or bed."""
+"""Ghosts in an energy image: a ring and a label where the array sees a target mirrored in surface or bottom."""
 
 from __future__ import annotations
 

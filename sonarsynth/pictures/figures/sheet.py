@@ -127,7 +127,7 @@ def draw_cloud(axes: Axes, onto: Figure, view: View, errors: Errors, space: Wind
     axes.tick_params(labelsize=7)
     axes.locator_params(nbins=5)
     outside = int((~inside).sum())
-    counts = f"{int(on.sum())} points on a target, {int(off.sum())} off it" + (
+    counts = f"{int(on.sum())} points on a target, {int(off.sum())} off target" + (
         f", {outside} outside" if outside else ""
     )
     axes.set_title(f"point cloud in the true hull: {counts}", fontsize=10, color=INK, loc="left", y=0.98)
@@ -142,9 +142,9 @@ def draw_beams(panels: list[Axes], beams: list[Beam]) -> None:
         grid(axes)
         axes.plot(1e3 * beam.time, factor * beam.pressure, color=colour, linewidth=0.9)
         if np.isfinite(beam.expected):
-            axes.axvline(1e3 * beam.expected, color=INK, linewidth=0.9, linestyle="--", label="echo by the truth")
+            axes.axvline(1e3 * beam.expected, color=INK, linewidth=0.9, linestyle="--", label="echo, true delay")
         if np.isfinite(beam.measured):
-            axes.axvline(1e3 * beam.measured, color=PALE, linewidth=0.9, linestyle=":", label="echo as ranged")
+            axes.axvline(1e3 * beam.measured, color=PALE, linewidth=0.9, linestyle=":", label="echo, measured delay")
         if np.isfinite([beam.expected, beam.measured]).any():
             axes.legend(loc="upper left", fontsize=7, frameon=False)
         axes.set_xlim(1e3 * first, 1e3 * last)

@@ -55,11 +55,11 @@ def mean_absorption(absorption: Absorption, passed: Passed, frequency: np.ndarra
 
 
 def shape_error(
-    absorption: Absorption, passed: Passed, band: tuple[float, float], bed: float, bounces: int = 0
+    absorption: Absorption, passed: Passed, band: tuple[float, float], bottom: float, bounces: int = 0
 ) -> float:
     """Largest error (dB) in a band (Hz) of any path: its loss at the centre is its own, its spectrum that of the mean.
 
-    bed (m): where paths are reflected, at most `bounces` times: as long a path close to the surface or to the bed
+    bottom (m): where paths are reflected, at most `bounces` times: as long a path close to the surface or to the bottom
     counts then, and one through all of the water so many times.
     """
     frequency = np.append(np.linspace(*band, FREQUENCIES), 0.5 * sum(band))
@@ -70,7 +70,7 @@ def shape_error(
     own = np.einsum("fps,ps->pf", each, passed.length)
     if bounces:
         longest = float(passed.length.sum(axis=1).max())
-        column = absorption_db_per_m(absorption, frequency, bed * (0.5 + 0.5 * _X)[:, None])
-        ends = absorption_db_per_m(absorption, frequency, np.array([[0.0], [bed]]))
-        own = np.concatenate([own, ends * longest, (0.5 * _W @ column)[None] * np.hypot(longest, bounces * bed)])
+        column = absorption_db_per_m(absorption, frequency, bottom * (0.5 + 0.5 * _X)[:, None])
+        ends = absorption_db_per_m(absorption, frequency, np.array([[0.0], [bottom]]))
+        own = np.concatenate([own, ends * longest, (0.5 * _W @ column)[None] * np.hypot(longest, bounces * bottom)])
     return float(np.abs(own - own[:, -1:] * (mean / mean[-1])).max())

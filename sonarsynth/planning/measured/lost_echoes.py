@@ -44,13 +44,13 @@ def lost_echoes(made: Plan) -> list[str]:
     if windows.direct_removed and rows:
         fall, below = (min([MOST, *(getattr(row, name) for row in rows)]) for name in ("fall", "below"))
         chosen = made.scene.processing.direct_pulse == "auto"
-        why = "echoes come before it is over" if chosen else "processing.direct_pulse"
+        why = "echoes arrive before it has passed" if chosen else "processing.direct_pulse"
         frames = ", ".join(str(row.frame) for row in rows)
         found.append(
-            f"the direct pulse is taken out ({why}): it falls by {fall:.0f} dB, and is {below:.0f} dB below the echoes "
+            f"the direct pulse is removed ({why}): it is reduced by {fall:.0f} dB, to {below:.0f} dB below the echoes "
             f"in their window (measured, frame {frames})"
         )
-    loss = "the direct pulse that is taken out" if windows.direct_removed else "the echo window"
+    loss = "the removal of the direct pulse" if windows.direct_removed else "the echo window"
     for target, name in enumerate(names):
         share, frame = max(((row.lost[target], row.frame) for row in rows if row.lost[target] >= 0), default=(0.0, 0))
         if share > NOTED:

@@ -37,16 +37,16 @@ def bending_error(scene: Scene, profile: Profile, frames: Iterable[Frame]) -> fl
     """
     bounces = scene.physics.tracing.bounces
     straight, refracted = Straight(bounces=bounces), Refracted(bounces=bounces)
-    bed, highest = scene.world.environment.depth, scene.sonar.band.high
+    bottom, highest = scene.world.environment.depth, scene.sonar.band.high
     worst = 0.0
     for frame in frames:
-        array, points = frame.sonar_pose.position, around(frame, bed)
+        array, points = frame.sonar_pose.position, around(frame, bottom)
         snaps = np.array([snap.position for snap in frame.moment.snaps]).reshape(-1, 3)
         start = np.concatenate([np.repeat(snaps, len(points), axis=0), points, snaps])
         end = np.concatenate([np.tile(points, (len(snaps), 1)), np.broadcast_to(array, (len(points) + len(snaps), 3))])
         if not len(start):
             continue
-        one, other = (model.connect(profile, bed, start, end) for model in (straight, refracted))
+        one, other = (model.connect(profile, bottom, start, end) for model in (straight, refracted))
         if not _alike(one, other):
             return np.inf
         late = 2.0 * np.pi * highest * np.abs(one.travel_time - other.travel_time)
@@ -58,14 +58,14 @@ def bending_error(scene: Scene, profile: Profile, frames: Iterable[Frame]) -> fl
     return worst
 
 
-def around(frame: Frame, bed: float) -> Floats:
+def around(frame: Frame, bottom: float) -> Floats:
     """Corners and middles (point, xyz) of the boxes round the bodies of a frame, in the water."""
     found = [np.empty((0, 3))]
     for body in frame.moment.bodies:
         low, high = body.mesh.box
         found += [body.pose.to_world(low + np.vstack([CORNERS, [0.5, 0.5, 0.5]]) * (high - low))]
     points = np.concatenate(found)
-    points[:, 2] = np.clip(points[:, 2], -bed, 0.0)
+    points[:, 2] = np.clip(points[:, 2], -bottom, 0.0)
     return points
 
 

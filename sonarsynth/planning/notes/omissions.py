@@ -27,58 +27,62 @@ ENOUGH = 10_000
 def left_out(plan: Plan) -> tuple[Omission, ...]:
     """What is not computed, why, and the bound on what that costs."""
     if not plan.products:
-        return (Omission("sound: paths, levels, signals, image, cloud", "truth alone is asked for", "0"),)
+        return (Omission("sound: paths, levels, signals, image, cloud", "only ground truth is requested", "0"),)
     scene, frame = plan.recipe.frame(0)
     environment = scene.world.environment
     rows = []
     if isinstance(plan.propagation, Straight):
         rows.append(Omission("refraction", "straight rays", _refraction_bound(plan, frame)))
     bounces = plan.propagation.bounces
-    kept = "the direct family" if not bounces else f"paths by at most {bounces} reflections of surface and bed in all"
-    rows.append(Omission("more reflections", f"asked for: {kept}", reflected_bound(plan)))
+    kept = (
+        "the direct family" if not bounces else f"paths by at most {bounces} reflections at surface and bottom in all"
+    )
+    rows.append(Omission("more reflections", f"requested: {kept}", reflected_bound(plan)))
     rough = [b for b in (environment.surface, environment.bed) if rms_height(b) > 0.0]
     if bounces and rough:
         rows.append(
             Omission(
                 "scattering by rough boundaries",
                 "reflections are coherent",
-                "the energy that roughness takes from them is scattered, and not simulated",
+                "the energy lost to roughness is not simulated as scattered sound",
             )
         )
     if environment.absorption.formula != "none":
-        bound = f"{plan.absorption_error:.1g} dB of any path in the band; at its centre each loses by its own depths"
-        rows.append(Omission("absorption over the band at each depth", "one spectrum for all paths", bound))
+        bound = f"{plan.absorption_error:.1g} dB on any path within the band; exact at its centre frequency"
+        rows.append(
+            Omission("depth dependence of the absorption spectrum", "one absorption spectrum for all paths", bound)
+        )
     rows += _facets_leave_out(plan)
     moving = any(b.velocity.any() for b in frame.moment.bodies) or frame.sonar_velocity.any()
     if moving and not scene.physics.doppler:
-        rows.append(Omission("Doppler", "not asked for: all is where it is at the instant of the frame", _moved(plan)))
+        rows.append(Omission("Doppler", "not requested: positions are those at the time of the frame", _moved(plan)))
     elif moving:
-        way = "bodies are posed where sound meets their middle; from there velocity and spin carry each facet"
-        rows.append(Omission("what motion does beyond that", way, _carried(plan, frame)))
+        way = "bodies are posed when sound meets their centre; from there constant velocity and spin"
+        rows.append(Omission("motion of targets beyond constant velocity and spin", way, _carried(plan, frame)))
     if environment.noise is None:
-        rows.append(Omission("ambient noise", "the scene describes none", "signals are free of noise"))
+        rows.append(Omission("ambient noise", "none in the recipe", "signals are free of noise"))
     return tuple(rows + _not_asked_for(plan) + _not_traced(plan) + _not_heard(plan))
 
 
 def _not_asked_for(plan: Plan) -> list[Omission]:
     """What the products of this build do not need."""
-    rows = [Omission(name, "not asked for", "0") for name in PRODUCTS if name not in plan.products]
+    rows = [Omission(name, "not requested", "0") for name in PRODUCTS if name not in plan.products]
     if "signals" not in plan.products:
-        why = "signals are not stored, so that nothing is compared with it"
+        why = "signals are not stored, so there is nothing to compare with it"
         rows.append(Omission("the loudest path of each kind by itself", why, "0"))
     elif plan.scene.sonar.converter is None:
-        rows.append(Omission("converter", "the sonar describes none", "0: pressure is stored as float32"))
+        rows.append(Omission("converter", "none in the recipe", "0: pressure is stored as float32"))
     return rows
 
 
 def _refraction_bound(plan: Plan, frame: Frame) -> str:
     if plan.profile.uniform:
-        return "0: the sound speed is the same everywhere"
+        return "0: uniform sound speed"
     bound = bending_error(plan.scene, plan.profile, [frame])
     if bound <= plan.recipe.accuracy.signal:
         return f"{bound:.1g} of the signals"
     varies = np.ptp(plan.profile.speed)
-    return f"asked for, but the sound speed varies by {varies:.3g} m/s: angles and delays are biased"
+    return f"requested, but the sound speed varies by {varies:.3g} m/s: angles and delays are biased"
 
 
 def _not_traced(plan: Plan) -> list[Omission]:
@@ -92,8 +96,10 @@ def _not_traced(plan: Plan) -> list[Omission]:
         rows.append(Omission("rays to each hydrophone", f"paths are expanded over {parts}", bound))
     if choices.negligible > 0.0:
         bound = f"{np.sqrt(choices.negligible):.1g} of the echo of each target"
-        rows.append(Omission("the faintest echoes", f"{-10 * np.log10(choices.negligible):.3g} dB below all", bound))
-    rows.append(Omission("facets in the dark, out of sight or turned away", "no ray meets them", "0"))
+        rows.append(
+            Omission("the faintest echoes", f"{-10 * np.log10(choices.negligible):.3g} dB below their sum", bound)
+        )
+    rows.append(Omission("facets that are occluded or face away", "no ray reaches them", "0"))
     return rows
 
 
@@ -102,13 +108,13 @@ def _not_heard(plan: Plan) -> list[Omission]:
     rows: list[Omission] = []
     dead, sonar = int((plan.elements.gain == 0.0).sum()), plan.scene.sonar
     if dead:
-        rows.append(Omission(f"{dead} dead hydrophones", "they hear nothing", "0"))
+        rows.append(Omission(f"{dead} dead hydrophones", "their gain is 0", "0"))
     chosen = sonar.antialias
     rows.append(
         Omission(
-            f"the spectrum over {stop_frequency(chosen) / 1e3:.4g} kHz",
+            f"the spectrum above {stop_frequency(chosen) / 1e3:.4g} kHz",
             "the filter stops it",
-            f"-{chosen.attenuation:g} dB of what is there",
+            f"attenuated by {chosen.attenuation:g} dB",
         )
     )
     return rows
@@ -127,8 +133,10 @@ def _facets_leave_out(plan: Plan) -> list[Omission]:
                 bound = "0: it has no curved surface"
             rows.append(Omission(f"curvature within facets of {target.name}", f"{len(mesh.faces)} flat facets", bound))
     if rows:
-        bound = "spheres over 26 wavelengths round: 0.3 dB to 60 degrees off backscatter, 2.6 dB to 120"
-        rows.append(Omission("waves that creep round bodies or pass inside", "facets are plane mirrors", bound))
+        bound = (
+            "spheres of circumference over 26 wavelengths: 0.3 dB within 60 degrees of backscatter, 2.6 dB within 120"
+        )
+        rows.append(Omission("creeping waves and waves inside bodies", "facets are plane mirrors", bound))
     return rows
 
 
@@ -147,7 +155,7 @@ def _carried(plan: Plan, frame: Frame) -> str:
         others = max((float(np.linalg.norm(body.pose.position - b.pose.position)) for b in bodies), default=0.0)
         off = max(off, v * (late + 2.0 * others / speed))
     radians = 4.0 * np.pi * plan.scene.sonar.band.high / speed * phase
-    return f"{radians:.1g} rad at the top of the band; who hides whom is off by {off:.1g} m at most"
+    return f"{radians:.1g} rad at the top of the band; occlusion by positions up to {off:.1g} m off"
 
 
 def _moved(plan: Plan) -> str:
@@ -158,7 +166,8 @@ def _moved(plan: Plan) -> str:
     stretch = 2 * fastest / float(plan.profile.speed.min())
     phase = 2 * np.pi * plan.scene.sonar.band.high * stretch * 50e-6
     metres = fastest * plan.windows.echo_stop
-    return f"echoes {metres:.2g} m off; time stretch {stretch:.2g}, {phase:.2g} rad over 50 us at the top of the band"
+    off = f"{phase:.2g} rad over 50 us at the top of the band"
+    return f"echoes up to {metres:.2g} m off; Doppler factor {stretch:.2g}, {off}"
 
 
 def reflected_bound(plan: Plan) -> str:
@@ -191,7 +200,7 @@ def reflected_bound(plan: Plan) -> str:
         kept, left = float(power[some & ~more].sum()), float(power[some & more].sum())
         if kept > 0.0 and left > 0.0:
             parts.append(f"{what} {10 * np.log10(left / kept):+.1f} dB")
-    return "one more would add, re what is kept in frame 0: " + (", ".join(parts) or "nothing")
+    return "one reflection more would add, re the paths kept in frame 0: " + (", ".join(parts) or "nothing")
 
 
 def _rough_moment(plan: Plan, frame: Frame) -> WorldState:

@@ -31,17 +31,17 @@ def notes(made: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
     found: list[str] = []
     if made.looked_at < recipe.frames:
         found.append(
-            f"{made.looked_at} of {recipe.frames} frames were looked at for the windows, and the ends of the "
-            "variations; each other frame is checked when it is rendered, and set aside where it does not fit"
+            f"the windows are based on {made.looked_at} of {recipe.frames} frames and the ends of the variations; "
+            "every other frame is checked when it is rendered, and fails if it does not fit"
         )
     found += _shared(recipe, looks)
     if made.windows.disturbed:
         found.append(
-            f"{made.windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest one"
+            f"{made.windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest snap"
         )
     cancelled = scene.processing.cancelling is not None
     if made.propagation.bounces and not cancelled and made.products & {"image", "cloud"} and made.sizes["snap"]:
-        found.append("the snap's own reflections enter the image: processing.cancelling takes them out before")
+        found.append("reflections of the snap itself enter the image: processing.cancelling removes them")
     found += lost_echoes(made) + _accuracy(made, looks) + off_the_bottom(scene)
     for look in noted(looks):
         found += mirror_notes(look) + overlap_notes(look)
@@ -68,12 +68,12 @@ def stored_validity(looks: Sequence[SampledScene]) -> tuple[str, ...]:
 
 def _extent(scene: Scene, profile: Profile) -> list[str]:
     """Where measured water ends before the real one."""
-    bed, first, last = scene.world.environment.depth, profile.depth[0], profile.depth[-1]
+    bottom, first, last = scene.world.environment.depth, profile.depth[0], profile.depth[-1]
     written = isinstance(scene.world.environment.sound_speed, (Tabulated, TemperatureSalinity, Cast))
-    if not written or max(first, bed - last) <= UNKNOWN * bed:
+    if not written or max(first, bottom - last) <= UNKNOWN * bottom:
         return []
     known = f"at {first:g} m only" if first == last else f"from {first:g} to {last:g} m"
-    return [f"the sound speed is given {known}, of {bed:g} m of water: beyond, it stays as it is there"]
+    return [f"the sound speed is given {known}, but the water is {bottom:g} m deep: it is held constant beyond"]
 
 
 def _shared(recipe: Recipe, looks: Sequence[SampledScene]) -> list[str]:
@@ -93,7 +93,7 @@ def _shared(recipe: Recipe, looks: Sequence[SampledScene]) -> list[str]:
     for what, splits in held.items():
         count = sum(len(some) > 1 for some in splits.values())
         if count:
-            found.append(f"{count} sets of {what} are the same in several splits: vary them, or see splits.undivided")
+            found.append(f"{count} sets of {what} occur in more than one split: vary them, or see splits.undivided")
     return found
 
 
@@ -105,8 +105,8 @@ def _cut(scene: Scene, uniform: bool) -> tuple[str, ...]:
     if max(tails, default=0.0) <= 10.0 * SUPPORT:
         return ()
     return (
-        f"turned in phase by a path, a snap falls off slowly: it is cut {LONGEST_TAIL:g} s from its collapse, at "
-        f"{max(tails):.1g} of its peak (no net impulse, or a filter without the lowest frequencies, helps)",
+        f"after a phase-shifting reflection a snap decays slowly: it is cut {LONGEST_TAIL:g} s from its collapse, at "
+        f"{max(tails):.1g} of its peak (a snap without net impulse, or a high-pass filter, helps)",
     )
 
 
@@ -115,34 +115,34 @@ def _accuracy(made: Plan, looks: Sequence[SampledScene]) -> list[str]:
     found, allowed, errors, parts = [], made.recipe.accuracy, made.errors, made.choices.subarrays
     if parts > 1 and errors.whole > 0.0:
         found.append(
-            f"accuracy.signal {allowed.signal:g} takes {parts} subarrays, each traced by itself: one would err by "
+            f"accuracy.signal {allowed.signal:g} needs {parts} subarrays, each traced by itself: with one the error is "
             f"{errors.whole:.2g}"
         )
     if made.choices.visibility == "hydrophones" and made.scene.physics.visibility == "auto":
         found.append(
-            f"accuracy.signal {allowed.signal:g} takes each hydrophone's own view of the targets: that from the middle "
-            f"of the array errs by {errors.whole:.2g}"
+            f"accuracy.signal {allowed.signal:g} needs the targets' visibility from each hydrophone: with that from "
+            f"the array centre the error is {errors.whole:.2g}"
         )
     if np.hypot(np.nan_to_num(errors.expansion), np.nan_to_num(errors.synthesis)) > allowed.signal:
         found.append(
-            f"signals err by {errors.expansion:.2g} (paths over the array) and {errors.synthesis:.2g} (synthesis): "
-            f"accuracy.signal allows {allowed.signal:g}, but the scene says how they are made (scene.physics)"
+            f"signal errors are {errors.expansion:.2g} (paths over the array) and {errors.synthesis:.2g} (synthesis): "
+            f"accuracy.signal allows {allowed.signal:g}, but the recipe fixes the method (scene.physics)"
         )
     tolerance = 20.0 * np.log10(1.0 + allowed.signal)
     if made.absorption_error > tolerance:
         found.append(
-            f"the spectrum of absorption is one for all paths, of their mean depth: {made.absorption_error:.2g} dB off "
-            f"at most at the ends of the band, where accuracy.signal allows {tolerance:.2g} dB"
+            f"all paths share the absorption spectrum at their mean depth: up to {made.absorption_error:.2g} dB off at "
+            f"the ends of the band, where accuracy.signal allows {tolerance:.2g} dB"
         )
     if errors.ranging > allowed.range_m:
         found.append(
-            f"ranges err by {errors.ranging:.2g} m{_why_ranges_err(made.scene, looks)}: accuracy.range_m allows "
-            f"{allowed.range_m:g}, but the scene asks for '{made.choices.ranging.kind}' (scene.processing.ranging)"
+            f"range errors are {errors.ranging:.2g} m{_why_ranges_err(made.scene, looks)}: accuracy.range_m allows "
+            f"{allowed.range_m:g}, but the recipe requests '{made.choices.ranging.kind}' (scene.processing.ranging)"
         )
     if errors.image > allowed.image_db:
         found.append(
-            f"beams err by {errors.image:.2g} dB where the focus is not theirs: accuracy.image_db allows "
-            f"{allowed.image_db:g}; more scene.processing.beamforming.zones, or kind dense"
+            f"beams out of focus have errors of {errors.image:.2g} dB: accuracy.image_db allows "
+            f"{allowed.image_db:g}; use more scene.processing.beamforming.zones, or kind dense"
         )
     return found
 
@@ -152,7 +152,7 @@ def off_the_bottom(scene: Scene) -> list[str]:
     if not (names := standing_off(scene)) or scene.processing.locating.on_bottom is False:
         return []
     told = scene.processing.locating.on_bottom is True
-    then = "the sonar takes it for being there" if told else "snaps are located by their wavefronts alone"
+    then = "the sonar assumes that it is" if told else "snaps are located by their wavefronts alone"
     return [f"{', '.join(names)}: not on the bottom; {then} (scene.processing.locating.on_bottom)"]
 
 

@@ -74,7 +74,7 @@ def read_inputs(scene: Scene) -> Profile:
 
 
 def _check_profile(scene: Scene, profile: Profile) -> None:
-    """The sound speed must be that of water, somewhere above the bed, and change at a rate that rays can follow."""
+    """The sound speed must be that of water, somewhere above the bottom, and change at a rate that rays can follow."""
     path = ("scene", "world", "environment", "sound_speed")
     measured = isinstance(scene.world.environment.sound_speed, (Tabulated, TemperatureSalinity, Cast))
     slowest, fastest = IN_WATER if measured else (SLOWEST, FASTEST)
@@ -84,12 +84,12 @@ def _check_profile(scene: Scene, profile: Profile) -> None:
         raise FieldError(
             path,
             f"is {profile.speed[odd[0]]:g} m/s at {profile.depth[odd[0]]:g} m, outside {slowest:g} to {fastest:g} m/s"
-            + (": is it in feet a second?" if feet else ""),
+            + (": is it in feet per second?" if feet else ""),
         )
     if profile.depth[0] > scene.world.environment.depth:
         raise FieldError(
             path,
-            f"is given from {profile.depth[0]:g} m down, below the bed at {scene.world.environment.depth:g} m",
+            f"is given from {profile.depth[0]:g} m down, below the bottom at {scene.world.environment.depth:g} m",
         )
     steep = np.flatnonzero(np.abs(np.diff(profile.speed)) > STEEPEST * np.diff(profile.depth))
     jumps = steep[np.diff(profile.depth)[steep] > 0]
@@ -97,7 +97,7 @@ def _check_profile(scene: Scene, profile: Profile) -> None:
         at, below = profile.depth[jumps[0]], profile.depth[jumps[0] + 1]
         raise FieldError(
             path,
-            f"changes by more than {STEEPEST:g} m/s a metre between {at:.12g} and {below:.12g} m",
+            f"changes by more than {STEEPEST:g} m/s per metre between {at:.12g} and {below:.12g} m",
         )
 
 
@@ -149,7 +149,7 @@ def check_frame(scene: Scene, frame: Frame) -> None:
             _check_speed(scene, frame, i)
             _check_met(scene, frame, i)
         if inside(body, frame.sonar_pose.position):
-            raise FieldError(path, f"target '{body.name}' has the sonar inside at frame {frame.index}")
+            raise FieldError(path, f"target '{body.name}' contains the sonar at frame {frame.index}")
     _check_snaps(scene, frame)
 
 
@@ -167,7 +167,7 @@ def _check_met(scene: Scene, frame: Frame, number: int) -> None:
             _check_depth(path, what, _places(there), bed, f"frame {frame.index}")
     for snap in snaps:
         if snap.time and inside(body.later(snap.time), snap.position):
-            raise FieldError(path, f"{what} has a snap inside at frame {frame.index}")
+            raise FieldError(path, f"{what} contains a snap at frame {frame.index}")
 
 
 def _check_speed(scene: Scene, frame: Frame, number: int) -> None:
@@ -240,7 +240,7 @@ def _check_snap(shrimp: SnappingShrimp, bed: float, sonar: Sonar) -> None:
     for width in {longest, 1.0 / longest}:
         part = heard_part(waveform(model, width), sonar.antialias)
         if not part >= FAINTEST:
-            raise ValueError(f"is not heard: the sonar's filter lets {part:.1g} of it pass")
+            raise ValueError(f"is not heard: the sonar's filter passes only {part:.1g} of it")
 
 
 def _check_depth(path: tuple[str | int, ...], what: str, points: Floats, bed: float, when: str) -> None:
@@ -250,4 +250,4 @@ def _check_depth(path: tuple[str | int, ...], what: str, points: Floats, bed: fl
     if shallow < -TOLERANCE:
         raise FieldError(path, f"{what} is {-shallow:.3g} m above the surface at {when}")
     if deep > bed + TOLERANCE:
-        raise FieldError(path, f"{what} is {deep - bed:.3g} m below the bed at {when}")
+        raise FieldError(path, f"{what} is {deep - bed:.3g} m below the bottom at {when}")

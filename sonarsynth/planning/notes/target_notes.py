@@ -86,8 +86,8 @@ def overlap_notes(look: SampledScene) -> list[str]:
             if how := known[key]:
                 when.setdefault((a.name, b.name, how), []).append(frame.index)
     return [
-        f"{a} and {b} {how} {said(indices, len(frames))}: no sound comes from within the other; of surfaces that "
-        "coincide one echo is heard, and labels, as both being seen, are of each by itself"
+        f"{a} and {b} {how} {said(indices, len(frames))}: surfaces inside the other body do not echo; surfaces that "
+        "coincide echo once; visibility and labels treat each body as if it were alone"
         for (a, b, how), indices in when.items()
     ]
 
@@ -96,7 +96,7 @@ def said(indices: Sequence[int], of: int) -> str:
     """Some frames out of so many, in words."""
     if len(indices) == of:
         return "in every frame" if of > 1 else f"in frame {indices[0]}"
-    return f"in {len(indices)} of {of} frames looked at (the first: frame {indices[0]})"
+    return f"in {len(indices)} of {of} frames examined (first: frame {indices[0]})"
 
 
 def _near(frame: Frame) -> Iterator[tuple[int, int]]:
@@ -132,12 +132,14 @@ def mirror_notes(look: SampledScene) -> list[str]:
             behind = UNIT_BOX.faces[(seen @ normal)[UNIT_BOX.faces].min(axis=1) < 0.0]
             if box_in_view(mirror_image(seen, normal), behind, sonar.beams).view <= View.PARTLY_IN_VIEW:
                 when.setdefault(target.name, []).append(frame.index)
-    plane = "the hydrophones lie in a plane and hear alike from both of its sides"
+    plane = "a planar array cannot tell its two sides apart"
     found = []
     if snaps:
-        found = [f"snaps come from behind the array {said(snaps, len(frames))}, taken for their mirror images: {plane}"]
+        found = [
+            f"snaps come from behind the array {said(snaps, len(frames))} and are taken for mirror images: {plane}"
+        ]
     return found + [
-        f"{name}: behind the array {said(indices, len(frames))}, and its mirror image is within the beams: points "
-        f"in front of the array that are not there; {plane}"
+        f"{name}: behind the array {said(indices, len(frames))}, and its mirror image is within the beams: false "
+        f"points appear in front of the array; {plane}"
         for name, indices in when.items()
     ]

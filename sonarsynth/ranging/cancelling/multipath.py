@@ -85,17 +85,17 @@ class Cancelled:
     outcomes: tuple[Outcome, ...]  # loudest expected first
 
 
-def images(position: Floats, pose: Pose, bed_depth: float, bounces: int) -> list[tuple[int, int, Floats]]:
-    """Reflections at surface and at bed, and image source (xyz, sonar frame), of every path of up to `bounces`.
+def images(position: Floats, pose: Pose, bottom_depth: float, bounces: int) -> list[tuple[int, int, Floats]]:
+    """Reflections at surface and at bottom, and image source (xyz, sonar frame), of every path of up to `bounces`.
 
-    Two paths of each number of reflections: the first at the surface, or at the bed.
+    Two paths of each number of reflections: the first at the surface, or at the bottom.
     """
     found = []
     for first in (0, 1):
         place = pose.to_world(position).copy()
         for n in range(bounces):
             at_bed = (first + n) % 2
-            place[2] = -2 * bed_depth * at_bed - place[2]
+            place[2] = -2 * bottom_depth * at_bed - place[2]
             bottom = (n + 1 + first) // 2
             found.append((n + 1 - bottom, bottom, pose.to_body(place)))
     return found
@@ -107,7 +107,7 @@ def cancel(
     elements: Elements,
     sonar: Sonar,
     pose: Pose,
-    bed_depth: float,
+    bottom_depth: float,
     window: tuple[float, float],
     limits: Limits,
 ) -> Cancelled:
@@ -117,7 +117,7 @@ def cancel(
     """
     if np.sum(elements.gain != 0) < SENSORS:
         return Cancelled(signals, ())
-    expected = expect(signals, bearings, elements, sonar, pose, bed_depth, limits.bounces)
+    expected = expect(signals, bearings, elements, sonar, pose, bottom_depth, limits.bounces)
     left, outcomes, taken = signals, [], []
     for each in sorted(expected, key=lambda e: -e.energy):
         reason = _out_of_question(each.front, bearings, elements, sonar, window)
@@ -135,7 +135,7 @@ def expect(
     elements: Elements,
     sonar: Sonar,
     pose: Pose,
-    bed_depth: float,
+    bottom_depth: float,
     bounces: int,
 ) -> list[Expected]:
     """Every reflected path of every located snap, by image sources and at the assumed sound speed."""
@@ -148,7 +148,7 @@ def expect(
         aligned = cut(signals, elements, direct.delays(elements, c), pulse_times.PULSE_HALF, sonar.band)
         wave = pulse_times.waveform(aligned, elements, c, direct.direction, direct.curvature, direct.time)
         density = 2 * aligned.spacing * np.abs(wave.template) ** 2
-        for surface, bottom, place in images(position, pose, bed_depth, bounces):
+        for surface, bottom, place in images(position, pose, bottom_depth, bounces):
             r = float(np.linalg.norm(place))
             front = PlaneWaveFit(place / r, 1 / r, float(time) + (r - distance) / c)
             across, up = front.direction[1:, None] * (elements.face / c)

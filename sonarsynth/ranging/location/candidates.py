@@ -115,7 +115,7 @@ def _sources(row: SourceFix, known: SonarKnowledge) -> list[Source]:
     k = max(row.curvature[0], 1 / FAR)
     direct = Source(row.time, row.chord / k, row.amplitude)
     speed, found = known.sonar.assumed_sound_speed, [direct]
-    for place in images(direct.place, known.pose, known.bed_depth, BOUNCES):
+    for place in images(direct.place, known.pose, known.bottom_depth, BOUNCES):
         distance = float(np.linalg.norm(place))
         longer = distance - 1 / k
         found.append(Source(row.time + longer / speed, place, row.amplitude / (k * distance)))

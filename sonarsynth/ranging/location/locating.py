@@ -76,7 +76,7 @@ def locate(
     elements: Elements,
     sonar: Sonar,
     pose: Pose,
-    bed_depth: float,
+    bottom_depth: float,
     snaps: int,
     bend: Bend | None = None,
     gradient: float = 0.0,
@@ -101,7 +101,7 @@ def locate(
     loud = pulse_times.loudness(signals, live, width)
     rounding = pulse_times.rounding(signals, loud.peak, pulse_times.half_length(sonar.band))
     quiet = pulse_times.quiet_bin(loud.quiet, int(live.sum()), sonar.band, pulse_times.half_length(sonar.band))
-    known = SonarKnowledge(elements, sonar, pose, bed_depth, gradient, rounding, quiet, on_bottom, kink)
+    known = SonarKnowledge(elements, sonar, pose, bottom_depth, gradient, rounding, quiet, on_bottom, kink)
     track, heard = loud.track.copy(), Candidates(known)
     for _ in range(4 * snaps):
         top = _loudest(track, heard, signals, snaps)

@@ -31,7 +31,7 @@ class FirstRays:
 
 
 def first_rays(profile: Profile, start: Floats, end: Floats) -> FirstRays:
-    """Fastest direct rays from `start` (pair, xyz) to `end` (pair, xyz), world frame; the bed is not in their way."""
+    """Fastest direct rays from `start` (pair, xyz) to `end` (pair, xyz), world frame; the bottom stops none."""
     a, b = np.broadcast_arrays(np.asarray(start, float), np.asarray(end, float))
     across = b[:, :2] - a[:, :2]
     distance = np.hypot(across[:, 0], across[:, 1])
@@ -39,8 +39,8 @@ def first_rays(profile: Profile, start: Floats, end: Floats) -> FirstRays:
     time = np.full(len(a), np.nan)
     departure, arrival = np.full(a.shape, np.nan), np.full(a.shape, np.nan)
     if wet.any():
-        bed = max(-a[wet, 2].min(), -b[wet, 2].min(), profile.depth[-1]) + 1.0
-        sea = water(profile.depth, profile.speed, float(bed))
+        bottom = max(-a[wet, 2].min(), -b[wet, 2].min(), profile.depth[-1]) + 1.0
+        sea = water(profile.depth, profile.speed, float(bottom))
         rays = eigenrays(sea, -a[wet, 2], -b[wet, 2], distance[wet])
         found, first = np.unique(rays.pair, return_index=True)
         pair = np.flatnonzero(wet)[found]

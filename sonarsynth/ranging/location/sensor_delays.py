@@ -17,9 +17,9 @@ class SensorDelays:
     """Direction and position from the time differences of the direct pulse over the sensors (Kuselan et al. 2011).
 
     Equation 6 of the thesis with its square and an intercept, then the sphere that fits the delays best, then the depth
-    of the bed. Delays are measured coherently in the band against the wave that all sensors hear, to about a
+    of the bottom. Delays are measured coherently in the band against the wave that all sensors hear, to about a
     thousandth of a sample. Standard errors are those of the lags that remain (and no less than the Cramer-Rao bound
-    for the noise), of the assumed sound speed, of the depth of the bed, and of the bending of rays where these are
+    for the noise), of the assumed sound speed, of the depth of the bottom, and of the bending of rays where these are
     taken for straight, through the Jacobians.
     """
 
@@ -42,7 +42,7 @@ class SensorDelays:
         elements: Elements,
         sonar: Sonar,
         sonar_pose: Pose,
-        bed_depth: float,
+        bottom_depth: float,
         snaps: int,
         profile: Profile,
     ) -> SourceEstimates:
@@ -52,8 +52,8 @@ class SensorDelays:
         from sonarsynth.ranging.location.refraction import bending
 
         on_bottom = self.on_bottom is not False
-        gradient = mean_gradient(profile, -float(sonar_pose.position[2]), bed_depth, elements.aperture)
-        where = signals, elements, sonar, sonar_pose, bed_depth, snaps
+        gradient = mean_gradient(profile, -float(sonar_pose.position[2]), bottom_depth, elements.aperture)
+        where = signals, elements, sonar, sonar_pose, bottom_depth, snaps
         kinked = kink(profile, -float(sonar_pose.position[2]), elements.aperture) if elements.aperture else 0.0
         if not self.refraction:
             return locate(*where, gradient=gradient, kink=kinked, on_bottom=on_bottom)

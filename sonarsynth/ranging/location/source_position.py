@@ -63,7 +63,7 @@ class SonarKnowledge:
     elements: Elements
     sonar: Sonar
     pose: Pose
-    bed_depth: float  # m
+    bottom_depth: float  # m
     gradient: float  # 1/s: size of the gradient of sound speed that rays taken for straight may have met; 0 for none
     rounding: float  # (Pa s)^2: power in a bin of what the converter and single precision round off
     quiet: float  # (Pa s)^2: power in a bin of the noise at a sensor
@@ -122,7 +122,7 @@ def place(wave: Wavefront, pulse: Pulse, known: SonarKnowledge, heard: Wavefront
     full = timing + np.outer(wave.by_sound_speed, wave.by_sound_speed) * sonar.sound_speed_error**2
     if not np.isfinite(full[2, 2]):  # too few sensors to tell the curvature: anything outside the array
         full[2, 2] = 1 / elements.aperture**2
-    fall = -known.bed_depth - pose.position[2]  # the bottom is this much above the sonar (negative: below it)
+    fall = -known.bottom_depth - pose.position[2]  # the bottom is this much above the sonar (negative: below it)
     slope, by_angle = float(pose.rotation[2] @ wave.direction), wave.tangents @ pose.rotation[2]
     from_depth = fall / slope if slope * fall > 0 else np.nan
     tilt = by_angle * (KINKED * known.kink * elements.aperture / sonar.assumed_sound_speed)

@@ -1,4 +1,4 @@
-"""What there is to say about a store: read from its metadata, its marks and what was set aside; no number is read."""
+"""What there is to say about a store: read from its metadata, its marks and what failed; no number is read."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Facts:
     complete: int  # frames that are there
     files: int
     bytes: int
-    aside: Mapping[str, int]  # frames set aside, by what went wrong
+    failed: Mapping[str, int]  # frames that failed, by what went wrong
     mixed: Mapping[str, int]  # frames made with other libraries than the rest, by these
 
     @property
@@ -151,7 +151,7 @@ def facts_of(store: Folder) -> Facts:
         complete=complete,
         files=files + len(records),
         bytes=size + sum(bytes_ for bytes_, _ in records.values()),
-        aside=_aside(store),
+        failed=_failed(store),
         mixed=mixed,
     )
 
@@ -175,11 +175,11 @@ def _type(name: Any) -> str:
     return str(name["name"] if isinstance(name, dict) else name)
 
 
-def _aside(store: Folder) -> dict[str, int]:
-    """Frames that were set aside, counted by the kind of what went wrong."""
+def _failed(store: Folder) -> dict[str, int]:
+    """Frames that failed, counted by the kind of what went wrong."""
     last: dict[int, str] = {}
     try:
-        lines = read_beside(beside(store, "aside.jsonl")).decode("utf-8", errors="replace").splitlines()
+        lines = read_beside(beside(store, "failed.jsonl")).decode("utf-8", errors="replace").splitlines()
     except OSError:
         return {}
     for line in lines:

@@ -13,14 +13,14 @@ from sonarsynth.store.cards.facts import Facts
 
 LIMITS: Final = (
     "Everything is simulated; nothing was measured at sea.",
-    "Frames that are not there read as NaN, or -1 in whole numbers.",
-    "Frames of a sequence resemble each other: divide by `split`, never by frame.",
+    "Frames that are not built read as NaN, or as -1 in integer variables.",
+    "Frames of a sequence resemble each other: split by `split`, never by frame.",
 )
 """What holds of every dataset."""
 
 DIGESTS: Final = (
-    "That finds damage, not forgery: who changes a store can write its digests anew. For that, compare `SHA-256` of "
-    "what you have with a list from its makers."
+    "That finds damage, not forgery: anyone who changes a store can also rewrite its digests. Against forgery, compare "
+    "the `SHA-256` of your copy with a list from its makers."
 )
 """What digests prove, and what they do not."""
 
@@ -40,12 +40,12 @@ def markdown(facts: Facts) -> str:
     sections = (
         _head(facts),
         _section("How to load it", _loading(facts)),
-        _section("What is in it", _variables(facts)),
+        _section("Contents", _variables(facts)),
         _section("Splits", _splits(facts)),
         _section("How it was made", _methods(facts)),
         _section("What is left out", _left_out(facts)),
         _section("Known limits", _limits(facts)),
-        _section("Where it comes from", _origin(facts)),
+        _section("Provenance", _origin(facts)),
         _section("The recipe", _recipe(facts)),
         _section("Licence and citation", _rights(facts)),
     )
@@ -126,16 +126,16 @@ def _methods(facts: Facts) -> str:
 
 def _left_out(facts: Facts) -> str:
     rows = _rows(facts.plan.get("left_out"), ("what", "why", "bound"))
-    return _table(("what", "why", "what that costs, at most"), rows) if rows else ""
+    return _table(("what", "why", "error bound"), rows) if rows else ""
 
 
 def _limits(facts: Facts) -> str:
     lines = [*LIMITS, *map(str, facts.plan.get("warnings", ()))]
     if facts.complete < facts.frames:
-        lines.append(f"{facts.frames - facts.complete} of {facts.frames} frames are not there.")
-    lines += [f"{count} frames were set aside ({why})." for why, count in facts.aside.items()]
+        lines.append(f"{facts.frames - facts.complete} of {facts.frames} frames are not built.")
+    lines += [f"{count} frames failed ({why})." for why, count in facts.failed.items()]
     lines += [
-        f"{count} frames were made with other libraries than the rest ({which}): last digits may differ."
+        f"{count} frames were made with different libraries from the rest ({which}): last digits may differ."
         for which, count in facts.mixed.items()
     ]
     return "\n".join(f"- {_text(line)}" for line in lines)
@@ -174,7 +174,7 @@ def _recipe(facts: Facts) -> str:
     cut = [f"# ... {len(lines) - _MOST_LINES} more lines, in the store"] if len(lines) > _MOST_LINES else []
     shown = "\n".join(lines[:_MOST_LINES] + cut)
     fence = "`" * max(3, *(len(run) + 1 for run in re.findall("`+", shown)), 3)
-    settings = [f"Set over it: {_code(str(s))}" for s in facts.provenance.get("recipe_settings", ())]
+    settings = [f"Overridden: {_code(str(s))}" for s in facts.provenance.get("recipe_settings", ())]
     text = "As written; as resolved, with every default, it is the attribute `recipe` of the store."
     return "\n\n".join([text, f"{fence}yaml\n{shown}\n{fence}", *settings])
 

@@ -84,7 +84,7 @@ def examine(path: Folder) -> Findings:
 def must_be_store(path: Folder) -> None:
     """Raise Mismatch where there is no store of ours: neither marks nor metadata with the digest of a recipe."""
     if not path.is_dir():
-        raise Mismatch(f"{path} is not a store: it is no folder" if there(path) else f"{path}: no such store")
+        raise Mismatch(f"{path} is not a store: it is not a folder" if there(path) else f"{path}: no such store")
     manifest = any(there(path, place) for place in MANIFESTS)
     if not (manifest or "recipe_digest" in root_attributes(path) or marked(path)):
         raise Mismatch(f"{path} is not a store of sonarsynth")

@@ -41,7 +41,7 @@ def read_back(path: Folder, mark: Mark) -> Iterator[Problem]:
         add_to_digest(digest, name, block)
         yield from _finite(name, block, mark.frames, shard * step)
     if digest.hexdigest() != mark.content:
-        yield Problem(f"shard {shard}", "its numbers are not the ones that were written", mark.frames)
+        yield Problem(f"shard {shard}", "its data are not those that were written", mark.frames)
 
 
 def _finite(name: str, block: np.ndarray, frames: tuple[int, ...], first: int) -> Iterator[Problem]:

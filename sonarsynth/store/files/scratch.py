@@ -23,7 +23,7 @@ MARKER: Final = ".made-by-sonarsynth"
 PARTIAL: Final = re.compile(r"\..+\.[0-9a-f]{32}\.partial")
 """Names of files that are being written, as `within.write_atomically` gives them."""
 
-BESIDE: Final = ("card.md", "croissant.json", "aside.jsonl")
+BESIDE: Final = ("card.md", "croissant.json", "failed.jsonl")
 """Files beside a store that are written so."""
 
 

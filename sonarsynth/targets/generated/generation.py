@@ -63,7 +63,7 @@ def _finer(own: float | None, edge: float) -> bool:
 def _inscribed(surface: Surface, true_volume: float) -> tuple[str, ...]:
     """The note that says how much smaller than the true body its inscribed mesh is."""
     missing = true_volume - volume(surface)
-    return (f"inscribed in the true surface: mean sagitta {1e3 * missing / area_of(surface):.3g} mm",)
+    return (f"mesh lies on average {1e3 * missing / area_of(surface):.2g} mm inside the true surface",)
 
 
 def _refined(surface: Surface, edge: float | None) -> Surface:

@@ -2,9 +2,10 @@
 
 Behind such a body the direct wave is left as it is, and the shadow wave of the facets that the snap lights cancels it
 (Babinet); beyond, both are the forward lobe. Ways to the facets and legs from them are those of all families, so that
-what reaches the array by surface or bed, before or after the body, is cancelled as well. The shadow wave goes through
-the body that sends it, and through all others that scatter forward: one that stands in the shadow of another is lit by
-none of the sound that the first takes away. Bodies that block hide its facets from the array as they hide the snap.
+what reaches the array by surface or bottom, before or after the body, is cancelled as well. The shadow wave goes
+through the body that sends it, and through all others that scatter forward: one that stands in the shadow of another is
+lit by none of the sound that the first takes away. Bodies that block hide its facets from the array as they hide the
+snap.
 """
 
 from __future__ import annotations

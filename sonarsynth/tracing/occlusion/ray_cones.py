@@ -27,10 +27,10 @@ def hidden(
 ) -> Bools:
     """Whether a body stands in rays (ray, xyz) that leave start in direction departure and end after length (m) at end.
 
-    bounces, turning (ray,): their reflections from surface and bed, and turning points. Straight rays and reflections
-    in uniform water are exact; bent rays are followed by chords within `SAGITTA_TOLERANCE`, but only where they may
-    pass a body: no ray is farther from the straight line between its ends, unfolded at its reflections, than its
-    largest curvature allows.
+    bounces, turning (ray,): their reflections from surface and bottom, and turning points. Straight rays and
+    reflections in uniform water are exact; bent rays are followed by chords within `SAGITTA_TOLERANCE`, but only where
+    they may pass a body: no ray is farther from the straight line between its ends, unfolded at its reflections, than
+    its largest curvature allows.
     """
     blocked = np.zeros(len(start), bool)
     if not bodies or not len(start):
@@ -111,9 +111,9 @@ def max_launch_deviation(
     """By how much (ray,) rad rays to within `spread` (m) of the end of some leave beside where the ends of straight
     rays are, at most; 0 in uniform water.
 
-    bed, end (m): depths, of the ends; spreading (ray,) 1/m; surface, bottom, turning (ray,): of the rays, and of those
-    beside them. A ray leaves within half of its length times its largest curvature of the straight line to its end,
-    unfolded at reflections. Where rays are nowhere nearly level, how far ends are apart for an angle at the start
+    bed, end (m): depths, of the ends; spreading (ray,) 1/m; surface, bottom, turning (ray,): of the rays, and of
+    those beside them. A ray leaves within half of its length times its largest curvature of the straight line to its
+    end, unfolded at reflections. Where rays are nowhere nearly level, how far ends are apart for an angle at the start
     varies slowly: twice what it is for the ray to the middle, by its spreading, and what it may vary by.
     """
     if profile.uniform:

@@ -47,10 +47,10 @@ def circle(g: float, one: float, other: float, distance: float) -> tuple[float, 
 def _gradients() -> Got:
     parts = []
     for g in (0.0, *(sign * 10.0**k for k in range(-12, 5) for sign in (1.0, -1.0))):
-        bed = min(1e3, 800.0 / abs(g)) if g else 1e3
+        bottom = min(1e3, 800.0 / abs(g)) if g else 1e3
         for a, b, share in ((0.4, 0.6, 0.1), (0.6, 0.4, 0.3), (0.5, 0.5, 0.2)):
-            ends = (a * bed, b * bed, share * bed)
-            got = found((0.0, bed), (C, C + g * bed), ends)
+            ends = (a * bottom, b * bottom, share * bottom)
+            got = found((0.0, bottom), (C, C + g * bottom), ends)
             exact = circle(g, C + g * ends[0], C + g * ends[1], float(np.hypot(ends[2], ends[1] - ends[0])))
             if not len(got.pair):
                 return Got(f"no ray for {g:g} /s", False)
@@ -86,9 +86,9 @@ def _layers() -> Got:
     return together(errors(np.array([C, 1480.0, 1530.0])), errors(np.array([C, 1700.0, 1495.0])))
 
 
-def _fermat(z: float, bed: float, speeds: tuple[float, float, float], ends: tuple[float, float, float]) -> float:
+def _fermat(z: float, bottom: float, speeds: tuple[float, float, float], ends: tuple[float, float, float]) -> float:
     """Least travel time (s) through a kink at depth z: two arcs that meet there, at the place that takes least."""
-    above, below = (speeds[1] - speeds[0]) / z, (speeds[2] - speeds[1]) / (bed - z)
+    above, below = (speeds[1] - speeds[0]) / z, (speeds[2] - speeds[1]) / (bottom - z)
     start, end = speeds[0] + above * ends[0], speeds[1] + below * (ends[1] - z)
 
     def time(x: float) -> float:
@@ -143,12 +143,12 @@ def _horizontal() -> Got:
 
 def _turning() -> Got:
     """Speed falls with depth: the circle that touches the surface is centred where it would be 0, R down."""
-    g, bed, z = 0.3, 100.0, 40.0
+    g, bottom, z = 0.3, 100.0, 40.0
     R = C / g
     limit = 2.0 * np.sqrt(z * (2.0 * R - z))
     counts, times = [], []
     for step in (-1e-6, -1e-9, 0.0, 1e-9, 1e-6):
-        got = found((0.0, bed), (C, C - g * bed), (z, z, limit * (1.0 + step)), 1, 1)
+        got = found((0.0, bottom), (C, C - g * bottom), (z, z, limit * (1.0 + step)), 1, 1)
         near = got.upper < 1.0
         counts.append(int(near.sum()))
         exact = circle(g, C - g * z, C - g * z, limit * (1.0 + step))[0]
@@ -225,18 +225,18 @@ def _caustic() -> Got:
 
 def _shadow() -> Got:
     """The last ray into depth touches the surface: two arcs of the same circle; beyond, none."""
-    g, bed, a, b = 0.3, 100.0, 40.0, 30.0
+    g, bottom, a, b = 0.3, 100.0, 40.0, 30.0
     limit = sum(np.sqrt(z * (2.0 * C / g - z)) for z in (a, b))
-    lit, dark = (found((0.0, bed), (C, C - g * bed), (a, b, limit * (1.0 + s)), 3, 0) for s in (-1e-7, 1e-7))
+    lit, dark = (found((0.0, bottom), (C, C - g * bottom), (a, b, limit * (1.0 + s)), 3, 0) for s in (-1e-7, 1e-7))
     exact = circle(g, C - g * a, C - g * b, float(np.hypot(limit * (1.0 - 1e-7), a - b)))[0]
     near = off(np.abs(lit.travel_time / exact - 1.0).min() if len(lit.pair) else np.nan, 1e-13, what="last ray")
     return together(near, holds(len(dark.pair) == 0, "no ray 1e-7 beyond"))
 
 
 def _deep() -> Got:
-    g, bed, parts = 0.0163, 11e3, []
-    for a, b, distance in ((0.0, bed, 0.0), (0.0, bed, 100.0), (10.0, 10.9e3, 8e3), (bed, 0.0, 1e4)):
-        got = found((0.0, bed), (C, C + g * bed), (a, b, distance))
+    g, bottom, parts = 0.0163, 11e3, []
+    for a, b, distance in ((0.0, bottom, 0.0), (0.0, bottom, 100.0), (10.0, 10.9e3, 8e3), (bottom, 0.0, 1e4)):
+        got = found((0.0, bottom), (C, C + g * bottom), (a, b, distance))
         arc = circle(g, C + g * a, C + g * b, float(np.hypot(distance, a - b)))
         parts += [relative(got.travel_time[:1], arc[:1], 1e-14), relative(got.amplitude[:1], arc[1:], 1e-11)]
     return together(parts)

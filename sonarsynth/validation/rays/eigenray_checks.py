@@ -55,7 +55,7 @@ def search(case: Case) -> tuple[Eigenrays, float]:
     """All eigenrays of a case, and the CPU time of one of them (us): the median of several runs, on a batch."""
     from sonarsynth.equations.rays import ray_solutions
 
-    water = ray_solutions.water(case.depth, case.speed, case.bed)
+    water = ray_solutions.water(case.depth, case.speed, case.bottom)
 
     def run(copies: int) -> tuple[Eigenrays, float]:
         start, end, distance = (np.tile(v, copies) for v in (case.start, case.end, case.distance))
@@ -99,7 +99,7 @@ def _complete(case: Case, reference: str, cost: float, found: Rays, exact: Rays,
 def _isovelocity(quick: bool) -> Iterator[Row]:
     for case in ray_cases.isovelocity(quick):
         found, cost = search(case)
-        exact = image_rays(float(case.speed[0]), case.bed, case.start, case.end, case.distance, case.vertices)
+        exact = image_rays(float(case.speed[0]), case.bottom, case.start, case.end, case.distance, case.vertices)
         yield from _complete(case, IMAGES, cost, rays_of(found), exact, _trusted(found))
 
 

@@ -22,7 +22,7 @@ class Case:
     """Water, and pairs of ends to be joined by rays with up to so many vertices and reflections."""
 
     name: str
-    depth: Floats  # (node,) m, from the surface to the bed
+    depth: Floats  # (node,) m, from the surface to the bottom
     speed: Floats  # (node,) m/s
     start: Floats  # (pair,) m
     end: Floats  # (pair,) m
@@ -34,8 +34,8 @@ class Case:
     """Rays that are compared, evenly taken."""
 
     @property
-    def bed(self) -> float:
-        """Depth of the bed (m)."""
+    def bottom(self) -> float:
+        """Depth of the bottom (m)."""
         return float(self.depth[-1])
 
 
@@ -57,11 +57,11 @@ def drawn(
     return Case(name, *nodes, start, end, distance, vertices, reflections, bounds, check)
 
 
-def cut(nodes: tuple[Floats, Floats], bed: float) -> tuple[Floats, Floats]:
-    """The nodes of a profile down to the bed (m)."""
-    above = nodes[0] < bed
-    speed = np.append(nodes[1][above], np.interp(bed, *nodes))
-    return np.append(nodes[0][above], bed), speed
+def cut(nodes: tuple[Floats, Floats], bottom: float) -> tuple[Floats, Floats]:
+    """The nodes of a profile down to the bottom (m)."""
+    above = nodes[0] < bottom
+    speed = np.append(nodes[1][above], np.interp(bottom, *nodes))
+    return np.append(nodes[0][above], bottom), speed
 
 
 def isovelocity(quick: bool) -> Iterator[Case]:
@@ -74,25 +74,25 @@ def isovelocity(quick: bool) -> Iterator[Case]:
 
 def gradients(quick: bool) -> Iterator[tuple[Case, Gradient]]:
     """One gradient: that of pressure and its opposite, that of a sharp thermocline, and hardly any."""
-    for slope, bed, farthest in ((0.0163, 4e3, 6e4), (-0.0163, 4e3, 6e4), (-4.3, 20.0, 300.0), (1e-6, 100.0, 1e4)):
-        water = Gradient(1500.0, slope, bed)
-        nodes = np.array([0.0, bed]), np.array([1500.0, 1500.0 + slope * bed])
+    for slope, bottom, farthest in ((0.0163, 4e3, 6e4), (-0.0163, 4e3, 6e4), (-4.3, 20.0, 300.0), (1e-6, 100.0, 1e4)):
+        water = Gradient(1500.0, slope, bottom)
+        nodes = np.array([0.0, bottom]), np.array([1500.0, 1500.0 + slope * bottom])
         name = f"gradient {slope:g} /s"
         yield drawn(name, nodes, 0.01 * farthest, farthest, 6 if quick else 30, 6, 6, check=10**6), water
 
 
-def random_layers(count: int, bed: float, spread: float) -> tuple[Floats, Floats]:
+def random_layers(count: int, bottom: float, spread: float) -> tuple[Floats, Floats]:
     """Layers between nodes at random depths (m), their speeds spread (m/s) about 1500 m/s."""
     rng = stream(SEED, "accuracy", "layers", count)
-    depth = np.concatenate([[0.0], np.sort(rng.uniform(0.0, bed, count - 1)), [bed]])
+    depth = np.concatenate([[0.0], np.sort(rng.uniform(0.0, bottom, count - 1)), [bottom]])
     return depth, 1500.0 + spread * rng.normal(size=count + 1)
 
 
-def noisy_cast(bed: float, step: float) -> tuple[Floats, Floats]:
-    """A cast every `step` (m) down to the bed: a thermocline, with noise of 0.05 m/s from node to node."""
+def noisy_cast(bottom: float, step: float) -> tuple[Floats, Floats]:
+    """A cast every `step` (m) down to the bottom: a thermocline, with noise of 0.05 m/s from node to node."""
     rng = stream(SEED, "accuracy", "cast")
-    depth = np.linspace(0.0, bed, round(bed / step) + 1)
-    smooth = 1538.0 - 8.0 / (1.0 + np.exp(-(depth - 0.4 * bed) / (0.05 * bed))) + 0.0163 * depth
+    depth = np.linspace(0.0, bottom, round(bottom / step) + 1)
+    smooth = 1538.0 - 8.0 / (1.0 + np.exp(-(depth - 0.4 * bottom) / (0.05 * bottom))) + 0.0163 * depth
     return depth, smooth + 0.05 * rng.normal(size=len(depth))
 
 
@@ -101,13 +101,13 @@ JUMP = np.array([0.0, 30.0, 30.0, 70.0, 70.0, 100.0]), np.array([1510.0, 1505.0,
 
 
 def thermocline() -> tuple[Floats, Floats]:
-    """The sharp thermocline of a shallow tropical site over a bed at 20 m."""
+    """The sharp thermocline of a shallow tropical site over a bottom at 20 m."""
     return cut(Thermocline().nodes, 20.0)
 
 
-def munk_layers(tolerance: float, bed: float = 5000.0) -> tuple[Floats, Floats]:
+def munk_layers(tolerance: float, bottom: float = 5000.0) -> tuple[Floats, Floats]:
     """The layers that stand for the canonical profile to a tolerance (s) at each turning point."""
-    return cut(Munk(tolerance=tolerance).nodes, bed)
+    return cut(Munk(tolerance=tolerance).nodes, bottom)
 
 
 def layered(quick: bool) -> Iterator[Case]:

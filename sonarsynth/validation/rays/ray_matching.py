@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from sonarsynth.equations.rays.ray_solutions import Eigenrays
 
 Family = tuple[int, int, int, int, int]
-"""Pair; launched up (1), level (0) or down (-1); surface, bed and turning points."""
+"""Pair; launched up (1), level (0) or down (-1); surface, bottom and turning points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class Rays:
 
     @property
     def vertices(self) -> Ints:
-        """(ray,) surface, bed and turning points together."""
+        """(ray,) surface, bottom and turning points together."""
         return self.surface + self.bottom + self.turning
 
     @property

@@ -1,4 +1,4 @@
-"""Rays in water of one sound speed: straight lines to the images of the receiver in surface and bed."""
+"""Rays in water of one sound speed: straight lines to the images of the receiver in surface and bottom."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ def image_rays(speed: float, bed: float, start: Floats, end: Floats, distance: F
     """Every ray with up to `bounces` reflections between depths start and end (pair,) m at distances (pair,) m.
 
     The receiver is mirrored in the boundaries that the ray meets, the last one first (e.g. Jensen, Kuperman, Porter and
-    Schmidt 2011, Computational Ocean Acoustics, section 2.4.4). speed in m/s, bed in m.
+    Schmidt 2011, Computational Ocean Acoustics, section 2.4.4). speed in m/s, bottom in m.
     """
     rows = []
     for down_first in (True, False):

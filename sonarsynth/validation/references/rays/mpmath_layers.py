@@ -26,7 +26,7 @@ STEPS = 8
 
 @dataclass(frozen=True, eq=False)
 class Layers:
-    """Sound speed (m/s) at nodes (m) from the surface to the bed, linear between; two equal depths are a jump."""
+    """Sound speed (m/s) at nodes (m) from the surface to the bottom, linear between; two equal depths are a jump."""
 
     depth: Floats  # (node,)
     speed: Floats  # (node,)
@@ -105,7 +105,7 @@ class Course:
     below: list[tuple[Any, Any, Any]]  # from the lower end down
 
     def sums(self, p: Any, start_low: bool, end_low: bool, down: bool, vertices: int) -> tuple[Sums, int, int, int]:
-        """Sums, surface, bed and turning points of the ray of slowness p."""
+        """Sums, surface, bottom and turning points of the ray of slowness p."""
         places = [start_low] + [down == (i % 2 == 0) for i in range(vertices)] + [end_low]
         crossed = sum(a != b for a, b in pairwise(places))
         lower = sum(places[1:-1])

@@ -2,7 +2,7 @@
 
 Over the arc length s, with the grazing angle t down positive, c linear in depth between the nodes:
     dx/ds = cos t,  dz/ds = sin t,  dt/ds = -c' cos t/c,  dT/ds = 1/c.
-The integration stops at every node, and goes on in the next layer; at surface and bed it is reflected; at a jump it
+The integration stops at every node, and goes on in the next layer; at surface and bottom it is reflected; at a jump it
 obeys Snell's law. For the change of depth with the launch angle neighbours of the ray are followed.
 """
 

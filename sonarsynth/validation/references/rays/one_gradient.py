@@ -24,7 +24,7 @@ DIGITS = 40
 
 @dataclass(frozen=True)
 class Gradient:
-    """Water in which the speed grows by `slope` (1/s; either sign) over the depth, down to the bed (m)."""
+    """Water in which the speed grows by `slope` (1/s; either sign) over the depth, down to the bottom (m)."""
 
     speed: float  # m/s at the surface
     slope: float

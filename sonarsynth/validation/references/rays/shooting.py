@@ -5,7 +5,7 @@ Over the horizontal distance x, with the grazing angle t down positive and c = c
 (e.g. Jensen, Kuperman, Porter and Schmidt 2011, Computational Ocean Acoustics, section 3.2) and, for their change with
 the launch angle a,
     d(dz/da)/dx = (dt/da)/cos^2 t,  d(dt/da)/dx = -(c''/c - (c'/c)^2) dz/da:
-the zeros of dz/da are the caustics. Only rays that meet neither surface nor bed are followed.
+the zeros of dz/da are the caustics. Only rays that meet neither surface nor bottom are followed.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ ROUNDS = 8  # of Newton's iteration
 
 @dataclass(frozen=True, eq=False)
 class Smooth:
-    """A smooth sound speed: speed (m/s), its first and second derivative at depths (m), and the bed (m)."""
+    """A smooth sound speed: speed (m/s), its first and second derivative at depths (m), and the bottom (m)."""
 
     name: str
     bed: float

@@ -25,7 +25,7 @@ ZOOM = 2000
 def count_rays(
     depth: Floats, speed: Floats, start: Floats, end: Floats, distance: Floats, vertices: int, reflections: int
 ) -> Counter[Family]:
-    """Rays of every family, for pairs of ends (pair,) m, in water of nodes (node,) m and m/s from surface to bed.
+    """Rays of every family, for pairs of ends (pair,) m, in water of nodes (node,) m and m/s from surface to bottom.
 
     Ends must lie off the nodes and at different depths.
     """
@@ -80,7 +80,7 @@ def _pair(
 
 
 def _family(count: int, lower_first: bool, turns: tuple[bool, bool]) -> tuple[int, int, int, int]:
-    """Launch sign, surface, bed and turning points."""
+    """Launch sign, surface, bottom and turning points."""
     lower = (count + lower_first) // 2
     upper = count - lower
     surface, bottom = upper * (not turns[0]), lower * (not turns[1])
