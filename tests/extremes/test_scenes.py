@@ -294,11 +294,14 @@ def test_no_echo_passes_for_the_direct_pulse_in_half_a_metre_of_water(bounces: i
     """Sound by the boundaries comes within a few pulses: the snap is found where it is, or refused with the reason."""
     made = plan(
         scene(
-            (ball((4.0, 0.3, -0.25), 0.1),), (shrimp(2.5, -1.5),), {"depth": 0.5},
-            {"array": PlanarLattice(columns=16, rows=8, pitch=0.01)}, {"sonar": Still(position=(0.0, 0.0, -0.25), heading=np.pi / 2)},
+            (ball((4.0, 0.3, -0.25), 0.1),),
+            (shrimp(2.5, -1.5),),
+            {"depth": 0.5},
+            {"array": PlanarLattice(columns=16, rows=8, pitch=0.01)},
+            {"sonar": Still(position=(0.0, 0.0, -0.25), heading=np.pi / 2)},
             physics=Physics(tracing=Straight(bounces=bounces)),
         )
-    )  # fmt: skip
+    )
     frame = render(made, 0)
     found, truth = frame["bearings"].dataset, frame["truth"].dataset
     accepted = found["reason"].values == 0

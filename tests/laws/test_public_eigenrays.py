@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-import sonarsynth.tracing.eigenrays
+import sonarsynth.propagation.eigenrays
 
 from sonarsynth import (
     Isovelocity,
