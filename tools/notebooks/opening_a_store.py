@@ -67,7 +67,7 @@ print("level in each frame (dB re 1 uPa):", level.compute().values.round(1))
 # %% [markdown]
 # ## By URL
 #
-# The path may be any URL that fsspec knows: `file://`, `s3://` (with `sonarsynth[remote]`), `https://` for reading.
+# The path may be any URL that fsspec knows: `file://`, `s3://` (with `sonarsynth[remote]`); HTTPS is read only.
 
 # %%
 remote = xr.open_datatree((work / "remus.zarr").as_uri(), engine="zarr", chunks={})
