@@ -11,6 +11,7 @@ import runpy
 import shlex
 import shutil
 import sys
+from functools import partial
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -137,7 +138,10 @@ def test_the_readme_is_short_and_names_rooms_and_recipes_that_are_there() -> Non
     assert [file.name for file in (ROOT / "configs").glob("*.yaml") if f"`configs/{file.name}`" not in text] == []
 
 
-def test_the_first_docstring_runs(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_first_docstring_runs(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sonarsynth, "build", partial(sonarsynth.build, workers=0))  # starting workers takes long
     text = sonarsynth.__doc__ or ""
     indented = "\n".join(line[4:] for line in text.splitlines() if line.startswith("    "))
     exec(compile(indented, "sonarsynth/__init__.py", "exec"), {"__name__": "__main__"})
