@@ -110,7 +110,7 @@ def install_packages() -> None:
 
 
 def install(what: str, *arguments: str | Path) -> None:
-    """By uv; by pip where that cannot: it needs a home for its cache, pip goes on without."""
+    """By uv, by pip where that cannot."""
     result = run(*uv("install"), *arguments)
     if result.returncode != 0:
         say(f"uv could not ({reason(result)}); trying pip")
@@ -120,7 +120,11 @@ def install(what: str, *arguments: str | Path) -> None:
 
 
 def uv(command: str) -> list[str | Path]:
-    return [VENV / "bin" / "uv", "pip", command, "--quiet", "--python", PYTHON]
+    """A command of uv, which fails where it cannot have a cache unless it is told to go on without."""
+    base = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
+    known = next(path for path in (base, *base.parents) if path.exists())
+    cache = () if "UV_CACHE_DIR" in os.environ or os.access(known, os.W_OK) else ("--no-cache",)
+    return [VENV / "bin" / "uv", "pip", command, "--quiet", "--python", PYTHON, *cache]
 
 
 def locked(name: str) -> str:

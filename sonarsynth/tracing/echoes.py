@@ -25,7 +25,7 @@ from sonarsynth.tracing.expansion.wavefront_polynomials import QUADRATIC_PROBES,
 from sonarsynth.tracing.occlusion.ray_cones import hidden, overlapping
 from sonarsynth.tracing.path_absorption import path_loss
 from sonarsynth.tracing.pruning import EchoLevels, loud_of_all, loud_ones
-from sonarsynth.tracing.receive_paths import ReceivePaths, may_face_receiver, usable
+from sonarsynth.tracing.receive_paths import ReceivePaths, may_face_receiver, path_pairs, usable
 from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, no_arrivals, ordered
 
 if TYPE_CHECKING:
@@ -174,7 +174,7 @@ def _loudest(array: FacetPaths, snap: Snap, parts: tuple[tuple[Component, ...], 
 def _found(array: FacetPaths, snap: Snap, parts: tuple[tuple[Component, ...], ...]) -> _EchoBlock:
     """All echoes of a snap from the facets of the legs."""
     out, fronts = _ways(array, snap), array.fronts
-    way, leg = _pairs(out.facet, array.legs.row, len(array.facets.facet))
+    way, leg = path_pairs(out.facet, array.legs.row, len(array.facets.facet))
     kept = np.flatnonzero(out.bounces[way] + array.legs.bounces[leg] <= array.propagation.bounces)
     out, leg, carried = out.select(way[kept]), leg[kept], None
     if array.meeting is not None:
@@ -248,15 +248,6 @@ def _hides(array: FacetPaths, bodies: tuple[PlacedTarget, ...], snap: Snap, out:
     return hidden(  # backwards, so that bodies are where a ray begins
         bodies, array.environment, array.bending, start, end, -out.arrival, out.length, out.bounces, out.turning
     )
-
-
-def _pairs(facet: Ints, row: Ints, facets: int) -> tuple[Ints, Ints]:
-    """Every pair of a way out to a facet and a leg from it; legs are sorted by facet, the pairs by leg."""
-    begin = np.searchsorted(row, np.arange(facets + 1))
-    count = np.diff(begin)[facet]
-    way = np.repeat(np.arange(len(facet)), count)
-    within = np.arange(len(way)) - np.repeat(np.cumsum(count) - count, count)
-    return way, begin[facet[way]] + within
 
 
 def _turned(found: _EchoBlock, most: float) -> ExpansionTerms:

@@ -20,6 +20,9 @@ from sonarsynth.propagation.reflections import Reflections, reflections
 from sonarsynth.tracing.occlusion.ray_cones import max_launch_deviation
 
 if TYPE_CHECKING:
+    pass
+
+if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
 
 
@@ -208,3 +211,12 @@ def may_face_receiver(
     steepest = np.abs(facets.normal[:, 2]) * np.sqrt((1.0 - cosine) * (1.0 + cosine))
     margin = 1e-9 + slack / np.maximum(distance, 1e-300)
     return np.asarray((ahead >= -margin) | (ahead * cosine + steepest > -margin))
+
+
+def path_pairs(facet: Ints, row: Ints, facets: int) -> tuple[Ints, Ints]:
+    """Every pair of a way out to a facet and a leg from it; legs are sorted by facet, the pairs by leg."""
+    begin = np.searchsorted(row, np.arange(facets + 1))
+    count = np.diff(begin)[facet]
+    way = np.repeat(np.arange(len(facet)), count)
+    within = np.arange(len(way)) - np.repeat(np.cumsum(count) - count, count)
+    return way, begin[facet[way]] + within

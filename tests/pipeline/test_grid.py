@@ -147,7 +147,7 @@ def test_plan_says_what_is_spanned(spanning: Path, capfd: pytest.CaptureFixture[
 def test_the_schema_covers_the_grid() -> None:
     schema = reading.schema()
     assert {"grid", "variations", "repeats", "splits"} <= schema["properties"].keys()
-    assert {"Axis", "Together", "Uniform", "Normal", "Choice", "Sobol", "Splits"} <= schema["$defs"].keys()
+    assert {"Axis", "Zip", "Uniform", "Normal", "Choice", "Sobol", "Splits"} <= schema["$defs"].keys()
     assert all("description" in schema["$defs"][name] for name in ("Axis", "Sobol", "Splits"))
 
 

@@ -18,7 +18,7 @@ from sonarsynth.schedule import connecting
 
 ROOT = Path(__file__).resolve().parents[2]
 ATTACK = """\
-import socket, ssl, sys
+import re, socket, ssl, sys
 from pathlib import Path
 
 said = []
@@ -50,7 +50,7 @@ for process in sys.argv[2].split(","):
 for file in Path(sys.argv[3]).rglob("*"):
     try:
         new = file.stat().st_mtime >= float(sys.argv[4])
-        if new and file.is_file() and b"PRIVATE KEY" in file.read_bytes():
+        if new and file.is_file() and re.match(b"-----BEGIN [A-Z ]*PRIVATE KEY", file.read_bytes()):
             said.append(f"{file} can be read")
     except OSError:
         pass

@@ -87,7 +87,7 @@ def add_segment(
 
     The stretch begins at `origin` (s) and at sample `first` of out, which may be negative, and has `samples`, even.
     highest (Hz) is the stop edge of the filter; method is width, oversampling, precision and tolerance of
-    `KernelDeposit`; fresh says that out is silent there.
+    `GriddedSynthesis`; fresh says that out is silent there.
     """
     width, oversampling, dtype, tolerance = method
     circle = 2 * int(next_fast_len(int(np.ceil(highest * oversampling / bins.step)) + width, real=True))
