@@ -134,13 +134,3 @@ def test_the_lock_holds_every_dependency() -> None:
     names = {re.split(r"[^\w.-]", entry)[0].lower().replace(".", "-") for entry in wanted}
     locked = set(re.findall(r"^([a-z0-9][\w.-]*)==", (ROOT / "tools" / "requirements.lock").read_text(), re.MULTILINE))
     assert names - locked == set()
-
-
-def test_the_readme_names_what_is_there_and_its_python_compiles() -> None:
-    text = (ROOT / "README.md").read_text()
-    for path in set(re.findall(r"(?<![\w/])(?:tools|configs|tests|sonarsynth|\.github)/[\w./-]*\w", text)):
-        assert (ROOT / path).exists(), f"README.md names {path}"
-    blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-    assert blocks
-    for block in blocks:
-        compile(block, "README.md", "exec")
