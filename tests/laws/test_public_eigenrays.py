@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-import sonarsynth.propagation.eigenrays
 
+import sonarsynth.propagation.eigenrays
 from sonarsynth import (
     Isovelocity,
     Linear,
