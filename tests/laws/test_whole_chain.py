@@ -162,7 +162,7 @@ def test_the_ledger_adds_up_and_matches_the_arrivals() -> None:
 
 def test_what_nobody_asked_for_is_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     made = plan(remus(), ("signals",))
-    monkeypatch.setattr("sonarsynth.pipeline.process", lambda *_: pytest.fail("signals were processed"))
+    monkeypatch.setattr("sonarsynth.pipeline.locate_and_image", lambda *_: pytest.fail("signals were processed"))
     heard = beamform_frame(made, 0, trace_frame(made, 0))
     assert heard.image is None and heard.bearings is None
 
