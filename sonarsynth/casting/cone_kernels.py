@@ -1,8 +1,8 @@
 """Narrow cones against triangles, compiled: what is empty, and what a surface closes, for all rays in a cone at once.
 
 A cone has its apex where the rays start, an axis of unit length and a slope: its radius over the distance along the
-axis. Places in it are (x, y, t): t along the axis, from the apex. Meshes are those of `casting.CastingMesh`, with the
-trees of `facet_tree`.
+axis. Places in it are (x, y, t): t along the axis, from the apex. Meshes are those of `ray_casting.CastingMesh`, with
+the trees of `facet_tree`.
 """
 
 from __future__ import annotations

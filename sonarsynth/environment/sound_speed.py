@@ -169,10 +169,10 @@ RayTimeError = Annotated[PositiveSeconds, Ge(1e-9), Le(1e-4)]
 class Munk:
     """The canonical deep sound channel, c1 (1 + eps (eta - 1 + exp(-eta))), eta = 2 (z - z1)/B (Munk 1974).
 
-    Rays go through layers of linear sound speed that stand for the formula (`world.profiles`). Travel times measured
-    against rays integrated through the formula (ends at 100 to 4500 m, up to 3 vertices; left out are rays that graze
-    the bottom at under 1 degree or for which the integration did not converge, 5 % at 50 km), largest and root mean
-    square error in s; `chords` are even nodes on the formula itself:
+    Rays go through layers of linear sound speed that stand for the formula (`environment.profiles`). Travel times
+    measured against rays integrated through the formula (ends at 100 to 4500 m, up to 3 vertices; left out are rays
+    that graze the bottom at under 1 degree or for which the integration did not converge, 5 % at 50 km), largest and
+    root mean square error in s; `chords` are even nodes on the formula itself:
 
         tolerance   nodes     10 km               50 km               100 km
         1e-5           53     3.6e-6   5.6e-7     1.2e-5   3.4e-6     1.9e-5   9.4e-6

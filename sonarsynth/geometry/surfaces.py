@@ -94,7 +94,7 @@ def split_long_edges(surface: Surface, edge: float) -> Surface:
     """Cut facets in two, three or four at the middles of edges longer than `edge` (m), again until none is left.
 
     Edges are cut for both facets that share them, so a closed surface stays closed; the surface itself stays as it is.
-    Raises MeshError where that would take more than `room.max_facets`.
+    Raises MeshError where that would take more than `memory.max_facets`.
     """
     vertices, faces = surface
     require_possible(area_of(surface), edge)

@@ -1,8 +1,8 @@
 """Beamformers: energy in each steered direction, from the signals of a window.
 
 The beam of each direction is the mean over live elements of their spectra, delayed to the array centre at the sound
-speed that the sonar assumes (`acoustics.beams`). Its energy follows by Parseval over the bins of the sonar's band: a
-plane wave p(t) in band, from a steered direction, has int p^2 dt there (Pa2 s).
+speed that the sonar assumes (`equations.arrays.beams`). Its energy follows by Parseval over the bins of the sonar's
+band: a plane wave p(t) in band, from a steered direction, has int p^2 dt there (Pa2 s).
 """
 
 from __future__ import annotations

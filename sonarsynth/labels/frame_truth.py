@@ -36,7 +36,7 @@ def label(
     range is the distance of that point from the array centre. `label` traces the bent ray by casting a straight one
     against the bodies as they appear: each vertex moved to (its arrival direction) * (its distance). A target's
     `image_box` bounds what the array sees of it within the spans of the beams; NaN where that is nothing, and `view`
-    says why (`labelling.views.View`).
+    says why (`views.View`).
     """
     seen = [_as_seen(body, sonar_pose, connect, straight) for body in moment.bodies]
     target, facet, distance = _label_beams(moment.bodies, seen, beams, sonar_pose, straight)

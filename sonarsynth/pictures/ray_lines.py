@@ -32,7 +32,7 @@ from sonarsynth.signals.filtered_pulse import snap_levels
 from sonarsynth.tracing.ray_fan import EVENTS, RayFan
 
 WORDS = {GOOD: "good", COINCIDENT: "coincident ends", CAUSTIC: "near a caustic", PASSED: "past a caustic"}
-"""Flags of eigenrays, `acoustics.rays.REASONS`, in the words of a table."""
+"""Flags of eigenrays, `ray_solutions.REASONS`, in the words of a table."""
 LETTERS = {"turning point": "T", "surface": "S", "bed": "B", "facet": "X", "target": "X"}
 """Vertices of a ray, in the order in which it meets them."""
 TARGET = "target"

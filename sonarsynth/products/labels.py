@@ -52,7 +52,7 @@ class Truth:
     position_at_echo: Floats  # (snap, target, xyz) m, world: the origin then; NaN where no direct path leads to it
     box: Floats  # (target, corner 8, xyz) m: oriented bounding box, sonar frame
     image_box: Floats  # (target, 4): azimuth min, max, elevation min, max (rad) of what is seen and in view; or NaN
-    view: npt.NDArray[np.int8]  # (target,) how much of it is in the view of the beams: `labelling.views.View`
+    view: npt.NDArray[np.int8]  # (target,) how much of it is in the view of the beams: `views.View`
     visible_fraction: Floats  # (target,) share of the area facing the array that the array sees, in view or not
     snap_position: Floats  # (snap, xyz) m, world
     snap_time: Floats  # (snap,) s

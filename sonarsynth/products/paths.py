@@ -29,7 +29,7 @@ class Paths:
     caustics: Ints  # (path,) caustics passed
     surface_grazing: Floats  # (path,) rad: grazing angle at the surface; NaN without a reflection there
     bottom_grazing: Floats  # (path,) rad: grazing angle at the bottom; NaN without a reflection there
-    flag: Ints  # (path,) 0 good; else why ray theory ends here (`acoustics.rays.REASONS`)
+    flag: Ints  # (path,) 0 good; else why ray theory ends here (`ray_solutions.REASONS`)
 
 
 FAMILIES = ("direct", "surface", "bed", "surface and bed")
@@ -44,7 +44,7 @@ class Arrivals:
         delay[e] + (|R d - q| - |R|)/sound_speed + delay_terms[e] @ aperture_terms(q)
     with d = direction[e], R = radius[e], and amplitude
         amplitude[e] * R/|R d - q| * (1 + amplitude_terms[e] @ aperture_terms(q)).
-    (`acoustics.arrays.aperture_terms`.) Water absorbs on what the way is longer by, its delay times sound_speed, as it
+    (`apertures.aperture_terms`.) Water absorbs on what the way is longer by, its delay times sound_speed, as it
     does on the way to the array centre: synthesis takes that off at each frequency. In isovelocity water the sphere is
     exact and delay_terms has no columns. Reflections on the way differ over the aperture: there the phase is phase[e] +
     phase_terms[e] @ aperture_terms(q), at every frequency, and the variance of the delay is delay_std[e]^2 +
@@ -53,7 +53,7 @@ class Arrivals:
     `height_delay_std` tells, another echo: what delay_std and amplitude together nearly say over the band. What moves
     is seen from another side there: the Doppler factor is doppler[e] + doppler_terms[e] @ aperture_terms(q). amplitude
     is the factor on the pressure waveform of the snap at 1 m: the product of the columns below it. Facets change the
-    waveform: its spectrum is multiplied by `acoustics.facet_pulses.facet_response` of coherent, corners, rough_share
+    waveform: its spectrum is multiplied by `facet_pulses.facet_response` of coherent, corners, rough_share
     and rough_delay, whose modulus is 1 at `centre` for a coherent facet that is small.
     """
 

@@ -45,7 +45,7 @@ class SourceEstimates:
 
     Rows of what was found come first, then those of pulses that were refused, `reason` says why. Standard errors are
     predicted from the data and the instrument alone (one sigma). Which true snap a row comes from is a label:
-    `labelling.estimates`.
+    `labels.estimate_labels`.
     """
 
     time: Floats  # (snap,) s: arrival at the array centre of the peak of the pulse's envelope in the band

@@ -1,6 +1,6 @@
 """How sound travels: propagation models that join points by rays, and what is traced with them.
 
-`Tracing` is the registry of models; `tracing.arrivals.trace` gives the arrivals of a frame, `tracing.fan.fan` follows
+`Tracing` is the registry of models; `arrivals.trace` gives the arrivals of a frame, `ray_fan.fan` follows
 rays wherever they go.
 """
 

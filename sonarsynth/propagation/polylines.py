@@ -2,7 +2,7 @@
 
 A ray is a chain of legs from vertex to vertex, a leg a chain of arcs, one a layer. Everything is written in
 h = sine/p = sqrt(v^2 + (c_m - c)(c_m + c)), where v is its value at the fastest depth c_m that the ray meets at an end
-or a node: sums of positive terms, as in `acoustics.rays_chain`. Nothing divides by a gradient.
+or a node: sums of positive terms, as in `equations.rays.ray_chain`. Nothing divides by a gradient.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ LEAST = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Polylines:
-    """Rays as points, sorted by ray and time; columns as in `tracing.fan.RayFan`."""
+    """Rays as points, sorted by ray and time; columns as in `ray_fan.RayFan`."""
 
     ray: Ints  # (point,) row of the eigenray
     position: Floats  # (point, xyz) m, world
     direction: Floats  # (point, xyz) unit vector of travel on leaving the point; NaN for coincident ends
     time: Floats  # (point,) s since the launch
     length: Floats  # (point,) m along the ray
-    event: Ints  # (point,) index into `tracing.marching.EVENTS`
+    event: Ints  # (point,) index into `ray_steps.EVENTS`
     miss: Floats  # (ray,) m: distance of the last point from the end; rounding
 
 
@@ -233,7 +233,7 @@ def _along(arcs: _Arcs, p: float, sine: Floats, dx: Floats, spacing: float, sagi
 
 
 def _lengths(arcs: _Arcs, p: float, sine: Floats) -> Floats:
-    """Arc length (arc,) in m; as `acoustics.rays_layers.layer_length` and `turn_length`."""
+    """Arc length (arc,) in m; as `ray_in_layer.layer_length` and `turn_length`."""
     total, thickness = np.maximum(sine.sum(axis=1), TINY), np.abs(arcs.z[:, 1] - arcs.z[:, 0])
     tangent = p * (arcs.c[:, 1] - arcs.c[:, 0]) / total
     across = 2.0 * thickness / total * _over(np.arctan(tangent), tangent)
@@ -245,7 +245,7 @@ def _lengths(arcs: _Arcs, p: float, sine: Floats) -> Floats:
 
 
 def _chord_time(chord: Floats, c1: Floats, c2: Floats, gradient: Floats) -> Floats:
-    """Travel time (s) along arcs over chords (m); as `acoustics.rays_layers.chord_time`."""
+    """Travel time (s) along arcs over chords (m); as `ray_in_layer.chord_time`."""
     mean = np.sqrt(c1 * c2)
     x = 0.5 * gradient * chord / mean
     return np.asarray(chord / mean * _over(np.arcsinh(x), x))

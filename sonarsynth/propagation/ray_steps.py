@@ -14,7 +14,7 @@ from sonarsynth.geometry.placed_target import PlacedTarget
 
 EVENTS = ("on the way", "turning point", "surface", "bed", "end", "facet", "launch", "arrival")
 ON, TURN, SURFACE, BED, END, FACET, LAUNCH, ARRIVAL = range(len(EVENTS))
-"""What happens at a point of a ray; the first five are those of `acoustics.rays_march`."""
+"""What happens at a point of a ray; the first five are those of `equations.rays.ray_arcs`."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -172,8 +172,8 @@ def pick(profiles: Profiles, image: EnergyImage, locality: float) -> Echoes:
 
     At the delay of its peak, no beam within a beam width may hold `locality` dB more, or the echo comes from there; and
     no beam at all `GHOST` dB more, or it comes through a side lobe or a grating lobe; and it must stand out of the
-    noise. Nearer to an end of the profile than half a pulse (`pulses.PULSE_HALF`) a peak is what the window left of an
-    echo, whose own peak may be outside: that is none.
+    noise. Nearer to an end of the profile than half a pulse (`pulse_times.PULSE_HALF`) a peak is what the window left
+    of an echo, whose own peak may be outside: that is none.
     """
     power, count = profiles.power, len(profiles.power)
     rows = np.arange(count)

@@ -67,7 +67,7 @@ def turned(spectrum: Any, delay: Any, first: float, spacing: float) -> Any:
 def face_responses(across: Any, up: Any, first: float, spacing: float, bins: int) -> Any:
     """sinc(f across) sinc(f up): (row, bin) at f = first + spacing * bin (Hz); across, up (row,) s: face times sine/c.
 
-    `acoustics.arrays.element_directivity` of many directions at evenly spaced frequencies. The sines follow by turning,
+    `apertures.element_directivity` of many directions at evenly spaced frequencies. The sines follow by turning,
     which keeps the relative precision of a small one.
     """
     response = np.empty((len(across), bins))

@@ -17,7 +17,7 @@ def mirror_normal(elements: Elements, wavelength: float) -> Floats | None:
     They are in a plane where no phase of a wave differs by `ALIKE` or more from that of the wave's mirror image: at
     most 4 pi/wavelength times the distance of a hydrophone from the plane. Sound from behind then is heard as from its
     mirror image in front, for elements have no back: a face hears alike from both sides
-    (`acoustics.arrays.element_directivity`). Of a line of hydrophones, which has many such planes, the one that faces
+    (`apertures.element_directivity`). Of a line of hydrophones, which has many such planes, the one that faces
     x most. None for a single hydrophone, which has no directions, and for one line of them along x.
     """
     live = elements.position[elements.gain > 0.0]

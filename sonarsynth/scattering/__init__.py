@@ -23,7 +23,7 @@ class ScatteringLaw(Protocol):
 
     @property
     def parts(self) -> tuple[Component, ...]:
-        """What an echo is made of, each a path of its own (`scattering.parts`)."""
+        """What an echo is made of, each a path of its own (`scattering.components`)."""
         ...
 
     @property

@@ -78,7 +78,8 @@ class Lobe:
 class CoherentKirchhoff:
     """The coherent part of a Kirchhoff facet: it mirrors as far as it is large, and the phases of facets add up.
 
-    f = V (i k/4 pi) A n.(ks - ki) 2 exp[corners] exp(-g^2/2) (`acoustics.kirchhoff`, `acoustics.roughness`).
+    f = V (i k/4 pi) A n.(ks - ki) 2 exp[corners] exp(-g^2/2) (`equations.scattering.kirchhoff_integral`,
+    `equations.scattering.roughness`).
     """
 
     law: KirchhoffSurface
@@ -138,7 +139,8 @@ class CoherentKirchhoff:
 
 @dataclass(frozen=True)
 class DiffuseKirchhoff:
-    """The incoherent part of a Kirchhoff facet: the lobe of the slopes and Lambert's floor (`acoustics.roughness`).
+    """The incoherent part of a Kirchhoff facet: the lobe of the slopes and Lambert's floor
+    (`equations.scattering.roughness`).
 
     It comes from one point of the facet, with one sign, both drawn once for each facet of a mesh.
     """
@@ -213,7 +215,7 @@ class DiffuseKirchhoff:
 
 @dataclass(frozen=True)
 class Shadow:
-    """The wave that makes the shadow behind lit facets, seen or not (`acoustics.kirchhoff.shadow_amplitude`).
+    """The wave that makes the shadow behind lit facets, seen or not (`kirchhoff_integral.shadow_amplitude`).
 
     f = (i k/4 pi) A n.(ki + ks) 2 exp[corners], whatever the surface is made of and however rough it is.
     """

@@ -50,7 +50,7 @@ class Isotropic:
     def amplitude(
         self, incident: Floats, scattered: Floats, normal: Floats, area: Floats, beyond: bool = False
     ) -> Floats:
-        """Far-field scattering amplitude (...) in m, directions in and away; `beyond`: as in `parts.Lobe`."""
+        """Far-field scattering amplitude (...) in m, directions in and away; `beyond`: as in `components.Lobe`."""
         return np.where(lit_and_seen(incident, scattered, normal, beyond), self.strength, 0.0)
 
     def polarity(self, mesh: Mesh) -> Floats:

@@ -37,7 +37,8 @@ class Kirchhoff:
     """Where the lit and seen part ends. Smooth: the body goes on in a curve, and the echo is tapered to 0 (it differs
     from sharp off backscatter only). Sharp: it ends in an edge, as a plate does. Auto: sharp for facets that lie in a
     plane with their neighbours, smooth for others; but `target_strength` of a closed convex body that is curved
-    everywhere takes the field of Fock on all of its surface (`acoustics.convex`), from light to shadow."""
+    everywhere takes the field of Fock on all of its surface (`equations.scattering.convex_bodies`), from light to
+    shadow."""
     roughness: NonNegativeMetres = 0.0
     """Rms height of the surface about the facets."""
     slope: Annotated[Number, Gt(0), Le(0.5)] = 0.1
@@ -75,7 +76,8 @@ class Kirchhoff:
         return size_note(body, lit_half, "Kirchhoff's integral", "soft" if self.surface == "soft" else "rigid")
 
     def validity(self, body: Scatterer) -> tuple[str, ...]:
-        """As `ScatteringLaw.validity`; how fine its facets are is for the mesh to say (`fineness.frame_mesh`)."""
+        """As `ScatteringLaw.validity`; how fine its facets are is for the mesh to say
+        (`mesh_resolution.frame_mesh`)."""
         near = (
             f"nearer than {NEAR * body.aperture:.2g} m, where the echo may be some per cent off at the rim of the "
             "array: facets have one direction to all hydrophones (shape.edge: a quarter wavelength helps)"
@@ -119,8 +121,9 @@ class Kirchhoff:
         """Power |f|^2 (frequency,) in m2 of unhidden facets, for unit vectors (xyz) of propagation, in and away.
 
         corners (facet, 3, xyz) m, counter-clockwise from outside, with normal (facet, xyz), area (facet,) m2 and
-        whether the surface is curved there (facet,); wavenumber (frequency,) rad/m. shape: `convex.shape_operators`
-        (facet, xyz, xyz) of a smooth convex body, all of whose facets are given: its light, shadow and what creeps.
+        whether the surface is curved there (facet,); wavenumber (frequency,) rad/m. shape:
+        `convex_bodies.shape_operators` (facet, xyz, xyz) of a smooth convex body, all of whose facets are given: its
+        light, shadow and what creeps.
         """
         from sonarsynth.equations.scattering.convex_kernels import convex_amplitude
         from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude

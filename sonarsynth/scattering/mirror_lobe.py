@@ -84,7 +84,7 @@ class MirrorLobe:
     def amplitude(
         self, incident: Floats, scattered: Floats, normal: Floats, area: Floats, beyond: bool = False
     ) -> Floats:
-        """Far-field scattering amplitude (...) in m, directions in and away; `beyond`: as in `parts.Lobe`."""
+        """Far-field scattering amplitude (...) in m, directions in and away; `beyond`: as in `components.Lobe`."""
         slope = float(slope_of_width(self.width))
         return lobe_amplitude(incident, scattered, normal, area, slope, self.reflectivity**2, self.diffuse, beyond)
 

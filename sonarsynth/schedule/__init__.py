@@ -64,8 +64,8 @@ def build(
     free, or over 1 TB; `insecure` uses a scheduler on another machine without TLS; `mixed_versions` goes on with other
     versions of libraries that touch numbers than the store was begun with, and marks those frames. `dashboard` starts
     that of Dask on 127.0.0.1, where every user of this machine can read it; `announce` gets its address. A `prediction`
-    of `schedule.predicting.predict` is compared with what is measured. The text of the recipe
-    is kept where its `source` is given (`config.read`).
+    of `predicting.predict` is compared with what is measured. The text of the recipe
+    is kept where its `source` is given (`reading.read`).
 
     `path` may be a URL that fsspec knows, such as s3://bucket/remus.zarr: the files beside it are objects there, but
     for the log and the run times, which are in ~/.local/state/sonarsynth.

@@ -43,7 +43,7 @@ class BuildReport:
     client_peak_bytes: int = 0
     failures: list[Failure] = field(default_factory=list)
     notes: tuple[str, ...] = ()  # what the plan warns of
-    warnings: tuple[str, ...] = ()  # what the finished store warns of (`verification.warnings`), where that is asked
+    warnings: tuple[str, ...] = ()  # what the finished store warns of (`evaluation.warnings`), where that is asked
     prediction: dict[str, Any] = field(default_factory=dict)  # predicted and measured, where a prediction was given
 
     @property

@@ -1,7 +1,7 @@
 """How long a build will take and how large its store will be; and what came of it.
 
-The plan alone gives costs by counts of work. A prediction is better: it makes some frames (`schedule.trials`). Where
-that cannot be, it goes by the counts, and says why.
+The plan alone gives costs by counts of work. A prediction is better: it makes some frames
+(`schedule.benchmark_frames`). Where that cannot be, it goes by the counts, and says why.
 """
 
 from __future__ import annotations

@@ -2,12 +2,12 @@
 
 A pulse of spectrum S, after a phase, a blur of variance v and a Doppler s, has the spectrum
     exp(i phase) exp(-v g(f)) (1 + s) S((1 + s) f),  g = (2 pi f)^2/2,  f > 0,
-times what its facet does (`acoustics.facet_pulses`), a point on a smooth surface of few dimensions. What all paths
-share is taken to the spectrum. What differs is expanded in modes, sum_k weight[path, k] spectrum[k, bin], and with it
-the absorption, which may then have no terms of its own: first in the cosine and sine of phase, in Chebyshev polynomials
-of Doppler, in mean powers of the delays over a facet, and in values of exp(-v g), of what is absorbed and of what a
-rough facet sends at some frequencies; then, by singular values, in the fewest that these paths need (Eckart and Young,
-1936).
+times what its facet does (`equations.scattering.facet_pulses`), a point on a smooth surface of few dimensions. What all
+paths share is taken to the spectrum. What differs is expanded in modes, sum_k weight[path, k] spectrum[k, bin], and
+with it the absorption, which may then have no terms of its own: first in the cosine and sine of phase, in Chebyshev
+polynomials of Doppler, in mean powers of the delays over a facet, and in values of exp(-v g), of what is absorbed and
+of what a rough facet sends at some frequencies; then, by singular values, in the fewest that these paths need (Eckart
+and Young, 1936).
 """
 
 from __future__ import annotations

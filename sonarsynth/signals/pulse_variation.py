@@ -2,7 +2,7 @@
 
 At a point of the aperture a path has the phase and the variance of its blur
     phase + turn,  variance + spread,
-both polynomials (`acoustics.arrays.aperture_terms`). The modes of its pulse (`shapes`) change with them: by the cosine
+both polynomials (`apertures.aperture_terms`). The modes of its pulse (`shapes`) change with them: by the cosine
 and the sine of turn, times its modes and those of the pulse a quarter of a period ahead; and by powers of spread, times
 those of the pulse times powers of -(2 pi f)^2/2. What all paths of a tile share of it the field of the tile takes.
 Doppler is seen from another side too: of doppler + bend, the first power of bend counts, with weights of their own.

@@ -40,8 +40,8 @@ def expected_error(mesh: Mesh, wavelength: float) -> float:
     """Relative error of the complex echo of a mesh for the curved surface that it stands for: mean over its curved
     area, 1 (all of it) at most.
 
-    The two-way phase 4 pi d/lambda of the mean distance d of each flat piece from the surface (`world.curvature.bend`):
-    `acoustics.facets.kirchhoff_error` where facets are equilateral, and the same for facets that are long along a
+    The two-way phase 4 pi d/lambda of the mean distance d of each flat piece from the surface (`curvature.bend`):
+    `facet_size.kirchhoff_error` where facets are equilateral, and the same for facets that are long along a
     direction in which the surface is flat, or cut in their plane. Against the exact Kirchhoff integral over a cylinder
     seen broadside it is within 6 % for the meshes that are made here, whatever the length of their facets.
     """

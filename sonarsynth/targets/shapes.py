@@ -99,7 +99,8 @@ class Remus100:
     """REMUS-100 autonomous underwater vehicle: a Myring hull with four fins, from published dimensions.
 
     Prestero (2001), "Verification of a six-degree of freedom simulation model for the REMUS autonomous underwater
-    vehicle", MIT: Myring parameters and fin geometry (`world.remus`). The origin is the middle of the hull's length.
+    vehicle", MIT: Myring parameters and fin geometry (`targets.generated.remus`). The origin is the middle of the
+    hull's length.
     """
 
     kind: Literal["remus100"] = "remus100"

@@ -65,11 +65,11 @@ def trace(
     centre of the band, at every depth or the same (dB/m) at all; propagation: how sound travels, and how many bounces
     are followed; laws: how the facets of each body scatter; band: Hz; moving: the track of the array, where it and
     bodies move while sound is under way (left out: all is where it is at the instant of the frame); shared:
-    `meetings.SHARED`; negligible: see `NEGLIGIBLE`; enough: `variation.QUADRATIC_TOLERANCE`; alike:
-    `variation.FACET_MEAN_TOLERANCE`; degree: of polynomials over the aperture. A facet counts where it is lit by the
+    `meetings.SHARED`; negligible: see `NEGLIGIBLE`; enough: `facet_paths.QUADRATIC_TOLERANCE`; alike:
+    `facet_paths.FACET_MEAN_TOLERANCE`; degree: of polynomials over the aperture. A facet counts where it is lit by the
     snap and seen, with no body in between, by the array centre; or, with `visibility`, by some hydrophone that it
     faces, and is heard by those. The snap itself is heard if no body stands in between, but for those that scatter
-    forward (`tracing.forward`). Raises ValueError for anything outside the water.
+    forward (`tracing.occlusion.forward_scattering`). Raises ValueError for anything outside the water.
     """
 
     def legs_to(pose: Pose, bodies: tuple[PlacedTarget, ...], targets: tuple[int, ...] | None = None) -> FacetPaths:

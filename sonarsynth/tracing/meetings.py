@@ -1,7 +1,7 @@
 """When and where the sound of each snap meets each body and the array: the poses that a frame is traced between.
 
 A body that moves is met elsewhere by each snap, and an array that moves hears the echoes of each body elsewhere. Snaps
-and bodies for which that is nearly the same are traced together; by what is left paths are carried (`tracing.moving`).
+and bodies for which that is nearly the same are traced together; by what is left paths are carried (`tracing.doppler`).
 """
 
 from __future__ import annotations

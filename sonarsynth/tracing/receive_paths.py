@@ -47,7 +47,7 @@ class ReceivePaths:
     phase: Floats  # (leg,) rad of reflections and caustics
     delay_std: Floats  # (leg,) s
     occluded: Bytes  # (leg, byte) as of `Arrivals`
-    open: Bools  # (leg,) bodies hide it from some hydrophones: which ones, is not known yet (`shading.settled`)
+    open: Bools  # (leg,) bodies hide it from some hydrophones: which ones, is not known yet (`sensor_occlusion.Occlusion`)
 
     def select(self, keep: Bools | Ints | slice) -> ReceivePaths:
         """The legs picked by a mask, by indices, or by a slice, which copies nothing."""
@@ -67,7 +67,7 @@ class ReceivePaths:
         return np.asarray(self.surface + self.bottom)
 
     def swerve(self, environment: Environment, profile: Profile, sonar_pose: Pose, spread: Floats | float) -> Floats:
-        """(leg,) rad as `shadows.max_launch_deviation`, of those to within `spread` (m) of the array centre."""
+        """(leg,) rad as `ray_cones.max_launch_deviation`, of those to within `spread` (m) of the array centre."""
         ray = self.departure, self.length, self.spreading, self.surface, self.bottom, self.turning
         return max_launch_deviation(
             environment.depth, profile, self.point, float(depth(sonar_pose.position)), *ray, spread

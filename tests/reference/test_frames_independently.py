@@ -1,5 +1,5 @@
 """Whole frames against a computation that shares nothing with the fast one: every path to every hydrophone from the
-description alone, in float64 (`accuracy.references.frame_pressure`)."""
+description alone, in float64 (`validation.references.frames.frame_pressure`)."""
 
 from dataclasses import replace
 from pathlib import Path

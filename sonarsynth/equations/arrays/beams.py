@@ -63,7 +63,7 @@ def lattice_beam_spectra(
 
     column, row (sensor,): 0 at port (+y) and at the top (+z), of `shape` (columns, rows) `pitch` (m) apart, centred on
     the origin in the plane x = 0. The delay of focusing is (sqrt(R^2 + q^2) - R)/c, so that rows and columns separate:
-    off the axis that is not quite a sphere (`beamforming.FocusedDelayAndSum` has a table). Beams of one elevation share
+    off the axis that is not quite a sphere (`imaging.FocusedDelayAndSum` has a table). Beams of one elevation share
     the sums over rows. Float32 sums: error 1e-6 of the largest |B| (508 elements), 3e-6 for 64 in a row, 1.3e-5 for
     300. Raises ValueError when no element is live.
     """

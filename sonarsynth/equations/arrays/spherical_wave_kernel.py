@@ -14,7 +14,7 @@ def normal_equations(
 ) -> Any:
     """J^T W J (4, 4), J^T W (t - tau) and J^T W tau (4,) of delays t (sensor,) about the wave's own, tau.
 
-    Also t - tau (sensor,) and J (sensor, 4); the order of parameters, and J, are those of `bearings.Wavefront`.
+    Also t - tau (sensor,) and J (sensor, 4); the order of parameters, and J, are those of `spherical_wave.Wavefront`.
     """
     sensors = len(delay)
     jacobian, late = np.empty((sensors, 4)), np.empty(sensors)

@@ -2,7 +2,7 @@
 
 Between boundaries, X(q) of q = cot(grazing angle)/c_m rises and is concave: one root, Newton from below cannot
 overshoot. With a turning point, X(v) of v = c_m tan(grazing angle) is a falling part (full layers) plus a rising one
-(the layers that it turns in): `rays_chain.bounds` gives rigorous bounds of value and slope on any interval, so that
+(the layers that it turns in): `ray_chain.bounds` gives rigorous bounds of value and slope on any interval, so that
 intervals are split until each is free of roots or monotone, and no root is missed or found twice.
 """
 

@@ -31,14 +31,15 @@ def convex_amplitude(
 
         f = (i k/4 pi) sum over all facets of [(1+V)/2 (G_i cos s + G_s cos i) - (1-V)/2 (C_i + C_s)] int exp(-i w.x) dS
 
-    cos i = -n.ki and cos s = n.ks, of either sign, w = k (ki - ks), G and C/m the fields of `convex.surface_field` that
-    a wave along ki and one along -ks would make on a rigid and on a soft surface: the mean of the two integrals over
-    the one field and the other, and so reciprocal. Where a facet is far in the light of both waves it is
-    `kirchhoff.facet_amplitude`. It holds what creeps round the body, and what cancels the direct wave behind it.
+    cos i = -n.ki and cos s = n.ks, of either sign, w = k (ki - ks), G and C/m the fields of
+    `convex_bodies.surface_field` that a wave along ki and one along -ks would make on a rigid and on a soft surface:
+    the mean of the two integrals over the one field and the other, and so reciprocal. Where a facet is far in the light
+    of both waves it is `kirchhoff_integral.facet_amplitude`. It holds what creeps round the body, and what cancels the
+    direct wave behind it.
 
-    corners (facet, 3, xyz) m, counter-clockwise from outside, with normal (facet, xyz) and `convex.shape_operators`
-    (facet, xyz, xyz); unit vectors of propagation (xyz), in and away; reflection V; roughness: rms height (m), as in
-    `kirchhoff_kernels.mesh_amplitude`.
+    corners (facet, 3, xyz) m, counter-clockwise from outside, with normal (facet, xyz) and
+    `convex_bodies.shape_operators` (facet, xyz, xyz); unit vectors of propagation (xyz), in and away; reflection V;
+    roughness: rms height (m), as in `kirchhoff_kernels.mesh_amplitude`.
 
     Spheres of k a 26 to 230 against the exact series: within 0.1 dB at backscatter, 0.25 dB up to 120 degrees off it,
     0.4 (rigid) or 0.9 dB (soft) beyond. Of k a from 5 on a rigid one is within 1 dB, from 3 on a soft one.
@@ -92,7 +93,8 @@ def _add(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _field(cosine: float, m: float, table: Complexes, soft: bool) -> complex:
-    """`convex.surface_field` where the incident wave meets a facet at that cosine, over that wave without a body."""
+    """`convex_bodies.surface_field` where the incident wave meets a facet at that cosine, over that wave without a
+    body."""
     if cosine > 0.0:
         xi, late = -m * cosine, 0.0
         if xi < LIT:

@@ -51,7 +51,8 @@ def mean_powers(corners: Floats, scale: float, count: int) -> Floats:
     """Means over facets of powers of the delay over `scale` (s), (t/scale)^j, j < count: (power, path).
 
     With corners (path, 3) (s) whose sum is 0, 2 exp[-i w t_0, t_1, t_2] = sum_j (-i w scale)^j mean_j/j!; mean_j =
-    2 j! h_j/((j+2)! scale^j), h_0 = 1, h_1 = 0, h_j = -e2 h_(j-2) + e3 h_(j-3) as in `kirchhoff.divided_exponential`.
+    2 j! h_j/((j+2)! scale^j), h_0 = 1, h_1 = 0, h_j = -e2 h_(j-2) + e3 h_(j-3) as in
+    `kirchhoff_integral.divided_exponential`.
     """
     a, b, c = np.ascontiguousarray((corners / scale).T)
     e2, e3 = a * (b + c) + b * c, a * b * c

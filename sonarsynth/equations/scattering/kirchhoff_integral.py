@@ -122,7 +122,8 @@ def shadow_amplitude(
 def local_grazing(incident: npt.ArrayLike, scattered: npt.ArrayLike) -> Floats:
     """Grazing angle (rad) (...) at which a facet would mirror one way into the other: sin q = |ki - ks|/2.
 
-    Where a facet's `reflection` depends on the angle: `boundaries.rayleigh` there keeps its amplitude reciprocal.
+    Where a facet's `reflection` depends on the angle: `boundary_reflection.rayleigh` there keeps its amplitude
+    reciprocal.
     """
     across = np.asarray(incident, float) - np.asarray(scattered, float)
     along = np.asarray(incident, float) + np.asarray(scattered, float)

@@ -1,4 +1,5 @@
-"""The Kirchhoff integral over many flat facets at many frequencies, compiled: `kirchhoff.facet_amplitude`, summed."""
+"""The Kirchhoff integral over many flat facets at many frequencies, compiled: `kirchhoff_integral.facet_amplitude`,
+summed."""
 
 from __future__ import annotations
 
@@ -215,7 +216,7 @@ def series(room: Floats, e2: float, e3: float, gap: float, tolerance: float) -> 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def divided(a: float, b: float, c: float) -> complex:
-    """`kirchhoff.divided_exponential` of phases a <= b <= c with mean 0."""
+    """`kirchhoff_integral.divided_exponential` of phases a <= b <= c with mean 0."""
     gap = c - a
     if gap >= SPREAD:
         late, early = _sinc(0.5 * (c - b)), _sinc(0.5 * (b - a))

@@ -6,8 +6,8 @@ With the delays t_j = (ki - ks).x_j/c of its corners, a facet in a plane wave wh
 
 over the distance, delayed by distance/c: N its vector area, V its real reflection coefficient, S[...] the second
 divided difference of the antiderivative S of the pulse. So a facet costs three look-ups. It is the transform of
-`kirchhoff.facet_amplitude`: a facet that mirrors differentiates the pulse, an edge repeats it, a corner integrates it.
-Source: Kim et al. (2010), Applied Acoustics 71, 321, for the facet's impulse response.
+`kirchhoff_integral.facet_amplitude`: a facet that mirrors differentiates the pulse, an edge repeats it, a corner
+integrates it. Source: Kim et al. (2010), Applied Acoustics 71, 321, for the facet's impulse response.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ SEDIMENTS: Final = MappingProxyType(
     }
 )
 """Density ratio, speed ratio (to the water above) and loss tangent: APL-UW TR 9407 (1994), section IV, table 2; for 10
-to 100 kHz (`ranges.APL_SEDIMENTS`)."""
+to 100 kHz (`formula_ranges.APL_SEDIMENTS`)."""
 
 GRAVITY: Final = 9.81  # m/s2
 PHILLIPS, DECAY = 8.1e-3, 0.74  # alpha and beta of the spectrum of Pierson and Moskowitz (1964)
@@ -62,7 +62,7 @@ def rayleigh(
     so that the wave in the bottom dies away from the boundary. n^2 - cos^2 q is taken as (n^2 - 1) + sin^2 q, which
     keeps its digits near grazing; V(0) = -1 for every bottom but one of density alone (n = 1), where
     V = (m - 1)/(m + 1) at every angle. Arguments broadcast. Exact for fluids; a bottom that carries shear waves, as
-    rock does, takes part of the sound away in them, which is left out (`ranges.FLUID_BED`).
+    rock does, takes part of the sound away in them, which is left out (`formula_ranges.FLUID_BED`).
     Source: Rayleigh; Brekhovskikh and Lysanov (2003), Fundamentals of Ocean Acoustics, section 3.1 (conjugated).
     """
     sine = np.abs(np.sin(np.asarray(grazing, float)))

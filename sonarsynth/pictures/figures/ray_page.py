@@ -20,7 +20,7 @@ DATA, SCRIPT = "@DATA@", "@SCRIPT@"
 
 
 def page(rays: Mapping[str, Any], hulls: Sequence[Hull]) -> str:
-    """The page (HTML, pure ASCII) of the rays that `show.rays.as_json` describes, with the targets in the world.
+    """The page (HTML, pure ASCII) of the rays that `ray_pictures.as_json` describes, with the targets in the world.
 
     It needs no network. The numbers are JSON in a script element of id `rays-data`.
     """

@@ -59,10 +59,10 @@ def remove(
     one wavefront.
 
     The sphere that fits the sensors' lags, and then each sensor's own lag and gain as far as its signal supports them
-    (rays that bend make no sphere), say how each hears the wave. What all sensors have of that wave (`fronts.part_of`)
-    is taken out within `length` (s) of the wavefront. Of an echo from elsewhere goes one part in as many as there are
-    sensors; of one that comes at the same time from within a beam width of the snap, or from a grating lobe of it,
-    nearly all.
+    (rays that bend make no sphere), say how each hears the wave. What all sensors have of that wave
+    (`plane_waves.part_of`) is taken out within `length` (s) of the wavefront. Of an echo from elsewhere goes one part
+    in as many as there are sensors; of one that comes at the same time from within a beam width of the snap, or from a
+    grating lobe of it, nearly all.
 
     Measured in configs/tank.yaml (128 sensors; rays bend, 6 ns root mean square off a sphere): the direct pulse falls
     by 54 dB along the sphere, 66 with lags, 80 with gains as well, from 19 dB above the echo to 78 dB below it in its

@@ -62,7 +62,7 @@ class WindowSegment:
 
 
 def cut(signals: Signals, elements: Elements, time: Floats, half: float, band: Band | None) -> Aligned:
-    """As `pulses.align`, for a window of `half` (s) to either side; without a band: all frequencies."""
+    """As `pulse_times.align`, for a window of `half` (s) to either side; without a band: all frequencies."""
     rate = signals.sampling_frequency
     samples = max(int(half * rate), 4)
     place = (time - signals.start) * rate

@@ -86,7 +86,7 @@ class _Views:
     amplitude: Floats  # (row, path) of `variation`
     probes: _Probes
     gradient: Floats  # (xyz, point, term) of the aperture terms; empty where there are none
-    bend: Floats  # (xyz, path) rad/m: how fast pulses change over the aperture (`changing.slopes`)
+    bend: Floats  # (xyz, path) rad/m: how fast pulses change over the aperture (`pulse_variation.slopes`)
     own: bool  # no nodes can stand for the hydrophones: a source is within or about that box, or paths miss some
 
 

@@ -15,7 +15,7 @@ def blocks(breaks: Sequence[Sequence[float]], solid: Bools, edge: float) -> Surf
 
     Each rectangle is cut in rows of facets, staggered by half a step, with no edge longer than `edge` (m): 2.5/edge^2
     facets a square metre, where halving takes 4 to 8. Rectangles share the vertices on their common sides.
-    Raises MeshError where that would take more than `room.most_facets`.
+    Raises MeshError where that would take more than `memory.max_facets`.
     """
     widths = [np.diff(b) for b in breaks]
     require_possible(2.0 * sum(w[0].sum() * w[1].sum() for w in (widths[:2], widths[1:], widths[::2])), edge)

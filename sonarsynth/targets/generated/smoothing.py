@@ -37,7 +37,7 @@ def curved(surface: Surface, edge: float, sagitta: float, crease: float) -> Surf
     """The surface cut until no edge is longer than `edge` (m), nor farther than `sagitta` (m) from its curve.
 
     Edges that turn by more than `crease` (rad) stay sharp, and straight where both sides are flat; corners stay where
-    they are. Raises MeshError where that would take more than `room.max_facets`.
+    they are. Raises MeshError where that would take more than `memory.max_facets`.
     """
     vertices, faces = surface
     if np.isfinite(edge):

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 TERMS = 20
-"""Terms over the aperture (`acoustics.arrays.aperture_terms`)."""
+"""Terms over the aperture (`apertures.aperture_terms`)."""
 
 
 @dataclass(frozen=True, eq=False)

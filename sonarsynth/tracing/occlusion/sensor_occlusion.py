@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 RAYS = 30_000
 """Rays that are looked at together."""
 NO_CONE = 3
-"""Rays that are in no narrow cone for certain, by `shadows.ray_cones`: of these the centre and the rim of the array are
-looked at, and where they do not see alike every hydrophone; what only those within the rim see is not found."""
+"""Rays that are in no narrow cone for certain, by `ray_cones.ray_cones`: of these the centre and the rim of the array
+are looked at, and where they do not see alike every hydrophone; what only those within the rim see is not found."""
 PARTS = 32
 """Parts of the array that are looked at as one where the whole does not see alike."""
 

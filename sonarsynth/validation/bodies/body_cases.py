@@ -109,7 +109,7 @@ def trade_rows(case: str, reference: str, points: Sequence[Point]) -> Iterator[R
     """Rows of ever finer meshes: the error of each, whether it was predicted within a factor 2, and the order.
 
     The error of a mesh is the rms over ways, at the highest frequency, where it is largest; its bound is twice what
-    `scattering.fineness.expected_error` says. That holds and the order shows from `ASYMPTOTIC` down.
+    `mesh_resolution.expected_error` says. That holds and the order shows from `ASYMPTOTIC` down.
     """
     for point in points:
         bound, got = 2.0 * float(point.predicted[-1]), float(point.rms[-1])

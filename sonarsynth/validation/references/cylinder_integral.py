@@ -17,7 +17,8 @@ def lit_cylinder(aspect: npt.ArrayLike, wavenumber: npt.ArrayLike, radius: float
     With x = 2 k a sin(aspect), over the side, (i k/2 pi) a sin(aspect) L sinc(k L cos(aspect)) times
     int_(-pi/2)^(pi/2) cos q exp(i x cos q) dq = 2 - pi H_1(x) + i pi J_1(x), H_1 Struve's function (Abramowitz and
     Stegun 1972, 12.1.7, and 9.1.21); over the end, the disc (i k/2 pi) cos(aspect) pi a^2 2 J_1(x)/x
-    exp(i k L cos(aspect)). Wavenumber k (rad/m), radius a and length L (m); phases as in `acoustics.kirchhoff`.
+    exp(i k L cos(aspect)). Wavenumber k (rad/m), radius a and length L (m); phases as in
+    `equations.scattering.kirchhoff_integral`.
     """
     k, angle = np.asarray(wavenumber, float), np.asarray(aspect, float)
     along = k * length * np.cos(angle)
