@@ -47,7 +47,7 @@ class ReceivePaths:
     phase: Floats  # (leg,) rad of reflections and caustics
     delay_std: Floats  # (leg,) s
     occluded: Bytes  # (leg, byte) as of `Arrivals`
-    open: Bools  # (leg,) bodies hide it from some hydrophones: which ones, is not known yet (`sensor_occlusion.Occlusion`)
+    open: Bools  # (leg,) bodies hide it from some hydrophones: which is not known yet (`sensor_occlusion.Occlusion`)
 
     def select(self, keep: Bools | Ints | slice) -> ReceivePaths:
         """The legs picked by a mask, by indices, or by a slice, which copies nothing."""
