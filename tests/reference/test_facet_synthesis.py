@@ -183,7 +183,7 @@ def test_what_is_no_facet_is_refused() -> None:
         ({"coherent_fraction": np.where(third, 1.1, 0.0)}, "arrival 2 has a rough_share that is not from 0 to 1"),
         ({"coherent_fraction": np.where(third, -0.1, 0.0)}, "arrival 2 has a rough_share"),
         ({"height_delay_std": np.where(third, -1e-9, 0.0)}, "arrival 2 has a negative rough_delay"),
-        ({"height_delay_std": np.where(third, np.inf, 0.0)}, "arrival 2 has rough_delay that is not a finite"),
+        ({"height_delay_std": np.where(third, np.inf, 0.0)}, "arrival 2 has height_delay_std that is not a finite"),
         ({"coherent": third, "centre": np.nan}, "centre of their band"),
     ):
         for method in (DirectSum(), GriddedSynthesis()):
