@@ -53,8 +53,8 @@ class Arrivals:
     `height_delay_std` tells, another echo: what delay_std and amplitude together nearly say over the band. What moves
     is seen from another side there: the Doppler factor is doppler[e] + doppler_terms[e] @ aperture_terms(q). amplitude
     is the factor on the pressure waveform of the snap at 1 m: the product of the columns below it. Facets change the
-    waveform: its spectrum is multiplied by `facet_pulses.facet_response` of coherent, corners, rough_share
-    and rough_delay, whose modulus is 1 at `centre` for a coherent facet that is small.
+    waveform: its spectrum is multiplied by `facet_pulses.facet_response` of coherent, corners, coherent_fraction
+    and height_delay_std, whose modulus is 1 at `centre` for a coherent facet that is small.
     """
 
     delay: Floats  # (path,) s at the array centre, snap time included
@@ -88,7 +88,7 @@ class Arrivals:
     coherent: Bools  # (path,) of a smooth facet, or its shadow: differentiated, i f/centre; phases count in sums
     corners: Floats  # (path, 3) s: of the facet about `delay`, a mean over it; 0: a point
     coherent_fraction: Floats  # (path,) w: of the power that is coherent where it is smooth
-    height_delay_std: Floats  # (path,) s: a rough facet sends sqrt(1 - w exp(-(2 pi f rough_delay)^2)); w = 0: all
+    height_delay_std: Floats  # (path,) s: a rough facet sends sqrt(1 - w exp(-(2 pi f height_delay_std)^2)); w = 0: all
     occluded: Bytes  # (path, byte) bits: a body hides it from the array centre, from each hydrophone; (path, 0): none
     centre: float  # Hz: centre of the band, where amplitudes hold
     sound_speed: float  # m/s of the water at the array centre

@@ -161,9 +161,9 @@ def _check_shapes(arrivals: Arrivals) -> None:
         (np.abs(arrivals.corners.T) >= LONGEST_CORNER, f"corners that are not within {LONGEST_CORNER:g} s"),
         (
             (arrivals.coherent_fraction < 0.0) | (arrivals.coherent_fraction > 1.0),
-            "a rough_share that is not from 0 to 1",
+            "a coherent_fraction that is not from 0 to 1",
         ),
-        (arrivals.height_delay_std < 0.0, "a negative rough_delay"),
+        (arrivals.height_delay_std < 0.0, "a negative height_delay_std"),
     ):
         if wrong.any():
             raise ValueError(f"arrival {np.flatnonzero(wrong)[0] % wrong.shape[-1]} has {what}")

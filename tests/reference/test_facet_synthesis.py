@@ -180,9 +180,9 @@ def test_what_is_no_facet_is_refused() -> None:
     for columns, message in (
         ({"corners": np.where(third[:, None], np.nan, np.zeros((n, 3)))}, "arrival 2 has corners that is not a finite"),
         ({"corners": np.where(third[:, None], [0.0, 0.02, 0.0], 0.0)}, "arrival 2 has corners that are not within"),
-        ({"coherent_fraction": np.where(third, 1.1, 0.0)}, "arrival 2 has a rough_share that is not from 0 to 1"),
-        ({"coherent_fraction": np.where(third, -0.1, 0.0)}, "arrival 2 has a rough_share"),
-        ({"height_delay_std": np.where(third, -1e-9, 0.0)}, "arrival 2 has a negative rough_delay"),
+        ({"coherent_fraction": np.where(third, 1.1, 0.0)}, "arrival 2 has a coherent_fraction that is not from 0 to 1"),
+        ({"coherent_fraction": np.where(third, -0.1, 0.0)}, "arrival 2 has a coherent_fraction"),
+        ({"height_delay_std": np.where(third, -1e-9, 0.0)}, "arrival 2 has a negative height_delay_std"),
         ({"height_delay_std": np.where(third, np.inf, 0.0)}, "arrival 2 has height_delay_std that is not a finite"),
         ({"coherent": third, "centre": np.nan}, "centre of their band"),
     ):

@@ -24,7 +24,8 @@ def facet_response(
 ) -> Complexes:
     """Factor (path, bin) on the spectra of pulses at frequencies (bin,) (Hz), exact.
 
-    coherent, rough_share, rough_delay (path,) and corners (path, 3) in s as in `products.Arrivals`; centre f_c (Hz).
+    coherent, coherent_fraction, height_delay_std (path,) and corners (path, 3) in s as in `products.Arrivals`; centre
+    f_c (Hz).
     """
     slope = np.where(coherent[:, None], 1j * frequency / centre, 1.0)
     return np.asarray(
