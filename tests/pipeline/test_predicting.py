@@ -87,7 +87,7 @@ def test_the_size_of_a_store_is_foreseen(small_plan: Plan, prediction: schedule.
 def test_nothing_is_left_of_a_trial(small_plan: Plan, tmp_path: Path) -> None:
     made = schedule.predict(small_plan, folder=tmp_path)
     assert list(tmp_path.iterdir()) == []
-    assert made.how.startswith("frames ")
+    assert made.how.startswith("timing frames on this machine (number")
     assert made.failures == ()
 
 
@@ -106,7 +106,7 @@ def test_where_nothing_can_be_tried_counts_serve(
     small_plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = schedule.predict(small_plan, folder=tmp_path / "not there")
-    assert made.how.startswith("counts of work: no frame could be tried")
+    assert made.how.startswith("counts of operations: no frame could be timed")
     assert made.frame_seconds == pytest.approx(sum(stage.seconds for stage in small_plan.stages))
     assert made.bytes > 0
     assert math.isfinite(made.seconds)
@@ -130,7 +130,7 @@ def test_a_frame_that_fails_is_named_and_the_others_serve(small_plan: Plan, monk
     monkeypatch.setattr(benchmark_frames, "trace_at", fails)
     made = schedule.predict(small_plan)
     assert made.failures == ("frame 12: ValueError: no water",)
-    assert made.how.startswith("frames ")
+    assert made.how.startswith("timing frames on this machine (number")
     assert "12" not in made.how
 
 
@@ -200,7 +200,7 @@ def test_the_commands_predict_and_compare(small_file: Path, tmp_path: Path, capf
     }
     assert 0 < answer["predicted_file_bytes"] < answer["predicted_bytes"]
     assert answer["predicted_frame_seconds"] * 20 < answer["predicted_core_seconds"]
-    assert re.search(r"predicted: .* for 20 frames with \d+ workers, .* on the disk", command("plan", small_file))
+    assert re.search(r"predicted: .* for 20 frames with \d+ workers, .* on disk", command("plan", small_file))
     built = json.loads(command("build", small_file, tmp_path / "s", "--workers", 0, "--frames", "0:8", "--json"))
     assert built["prediction"]["frames"] == 8
     assert built["prediction"]["bytes_ratio"] == pytest.approx(1.0, abs=0.1)

@@ -192,7 +192,7 @@ def test_a_build_with_other_numeric_libraries_goes_on_only_where_told_and_marks_
     assert any("other libraries" in note for note in report.notes)
     marks = [store.marks.load_mark(path, shard) for shard in (0, 1)]
     assert [mark.attributes for mark in marks if mark] == [{}, {"versions": {"numpy": "2.0.1"}}]
-    assert "8 frames were made with other libraries than the rest (numpy 2.0.1)" in card.read_text()
+    assert "8 frames were made with different libraries from the rest (numpy 2.0.1)" in card.read_text()
     monkeypatch.undo()
     writing._seen.clear()
     assert store.verify(path).ok
