@@ -266,11 +266,11 @@ def test_the_command_says_what_it_did(copy: Path, tmp_path: Path, capfd: pytest.
     (copy / "notes.txt").write_text("hello")
     status, out, _ = command("verify", copy, "--quick")
     assert status == 4
-    assert "damaged frames: 8:16; 'sonarsynth repair' makes them again" in out
+    assert "damaged frames: 8:16; run 'sonarsynth repair'" in out
     status, out, _ = command("repair", copy, "--workers", "0")
     assert status == 0
     assert "restored zarr.json" in out
-    assert "made again: 1 shards, frames 8:16" in out
+    assert "rebuilt: 1 shard, frames 8:16" in out
     assert f"moved out: {copy}.foreign/notes.txt" in out
     assert "store is intact" in out
     assert command("verify", copy, "--quick")[1].endswith("all files match their digests\n")
