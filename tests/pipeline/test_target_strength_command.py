@@ -20,7 +20,7 @@ def test_the_table_holds_what_the_call_returns(tmp_path: Path, capsys: pytest.Ca
     ranges = ["--frequency", "40e3:60e3:10e3", "--aspect", "0:90:15", "--out", str(tmp_path / "out")]
     assert run(app, ["target-strength", BOX, *ranges]) == 0
     said = capsys.readouterr().out
-    assert "21 levels: highest" in said
+    assert "21 levels: maximum" in said
     with (tmp_path / "out" / "target_strength.csv").open() as file:
         rows = list(csv.reader(file))
     assert rows[0] == ["aspect_deg", "frequency_hz", "target_strength_db"]
