@@ -208,7 +208,7 @@ def test_what_does_not_fit_is_refused_before_anything_is_written_unless_agreed(
         build(long, tmp_path / "l.zarr", workers=2)
     assert not (tmp_path / "l.zarr").exists()
     monkeypatch.setattr(disk_space.os, "statvfs", lambda place: SimpleNamespace(f_files=100, f_favail=3))
-    with pytest.raises(TooLarge, match=r"needs up to \d+ files and folders and 3 more fit there: --yes"):
+    with pytest.raises(TooLarge, match=r"needs up to \d+ files and folders and 3 more fit there: use --yes"):
         build(small_plan, tmp_path / "i.zarr", workers=0)
 
 
