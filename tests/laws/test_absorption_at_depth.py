@@ -84,7 +84,7 @@ def test_a_path_loses_its_own_mean_at_the_centre_and_over_the_band(planned: dict
             assert abs(got - exact) <= allowed, (frequency, got, exact)
     # of the scenes here one spectrum serves all paths, and the plan says how well
     assert made.absorption_error < 0.09
-    (row_said,) = [o for o in made.left_out if o.what.startswith("absorption over the band")]
+    (row_said,) = [o for o in made.left_out if o.what.startswith("depth dependence of the absorption")]
     assert row_said.bound.startswith(f"{made.absorption_error:.1g} dB")
 
 
@@ -107,7 +107,7 @@ def test_sources_far_apart_in_depth_are_noted_where_one_spectrum_does_not_serve_
     )
     made = replace(planned["straight up 3 km"], recipe=tight)
     assert made.absorption_error > 0.2
-    said = "spectrum of absorption is one for all paths"
+    said = "all paths share the absorption spectrum"
     assert any(said in note for note in plan(tight, ("signals",), Choices()).warnings)
     assert not any(said in note for note in planned["slant"].warnings)
 

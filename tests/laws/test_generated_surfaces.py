@@ -99,8 +99,8 @@ def test_a_myring_hull_converges_to_its_integrals():
     for edge in (0.04, 0.02, 0.01):
         mesh = mesh_of(Myring(**{**vars(hull), "edge": edge}))
         error.append(1 - volume((mesh.vertices, mesh.faces)) / exact)
-        sagitta = float(mesh.notes[0].split()[-2]) * 1e-3
-        assert sagitta == pytest.approx(error[-1] * exact / mesh.area.sum(), rel=0.01)
+        sagitta = float(mesh.notes[0].split()[4]) * 1e-3
+        assert sagitta == pytest.approx(error[-1] * exact / mesh.area.sum(), rel=0.05)  # two figures are said
     assert 3.0 < error[1] / error[2] < 5.2
     assert 0 < error[2] < 3e-3
 

@@ -94,12 +94,12 @@ def test_no_scene_mesh_pose_or_snap_is_shared_by_splits() -> None:
     for what, found in held.items():
         assert len(found) >= made.sequences, what
         assert all(len(some) == 1 for some in found.values()), what
-    assert not any("same in several splits" in note for note in plan(made).warnings)
+    assert not any("in more than one split" in note for note in plan(made).warnings)
 
 
 def test_what_splits_share_is_noted() -> None:
     made = recipe(variations=VARIED[2:], repeats=6, splits=Splits(train=0.5, test=0.5))
-    (note,) = [note for note in plan(made).warnings if "several splits" in note]
+    (note,) = [note for note in plan(made).warnings if "more than one split" in note]
     assert note.startswith("1 sets of target poses occur in more than one split")
 
 

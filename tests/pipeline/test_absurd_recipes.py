@@ -128,7 +128,9 @@ def test_it_is_refused_in_one_line_soon(
 def test_water_that_is_not_known_to_the_bed_is_noted(small_text: str, water: str, known: str) -> None:
     text = small_text.replace(SPEED, f"kind: tabulated, {water}")
     made = planning.plan(reading.loads(text), choices=planning.Choices())
-    assert any(f"the sound speed is given {known}" in note and "the water is 12 m deep" in note for note in made.warnings)
+    assert any(
+        f"the sound speed is given {known}" in note and "the water is 12 m deep" in note for note in made.warnings
+    )
     whole = small_text.replace(SPEED, "kind: tabulated, depth: [0.1, 11], speed: [1500, 1501]")
     made = planning.plan(reading.loads(whole), choices=planning.Choices())
     assert not any("is given" in note for note in made.warnings)
