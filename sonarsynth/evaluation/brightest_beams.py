@@ -47,8 +47,14 @@ def refused(tree: xr.DataTree, frame: int) -> bool:
     )
 
 
+GLINT = 10.0
+"""dB: a beam on a glint holds so much more of its echo than one on a hull that is seen aside (9 dB in
+thermocline.yaml), so a ghost may be brightest though its echoes are together fainter by this."""
+
+
 def on_ghost(tree: xr.DataTree, frame: int, azimuth: float, elevation: float) -> bool:
-    """Whether a direction (rad) is where the truth has a ghost of a target, by surface or bottom.
+    """Whether a direction (rad) is where the truth has a ghost of a target, by surface or bottom, no fainter than the
+    target's own echoes by more than `GLINT`.
 
     Ghosts are as wide as their target; the truth has the middle of their energy, so they reach that far either way.
     """
@@ -58,7 +64,9 @@ def on_ghost(tree: xr.DataTree, frame: int, azimuth: float, elevation: float) ->
     box = np.deg2rad(of_frame(tree, "truth/image_box", frame))[:, None]
     reach = np.nan_to_num(np.stack([box[..., 1] - box[..., 0], box[..., 3] - box[..., 2]])) + beam_width(tree)
     off = np.abs(np.stack([middle - angle for middle, angle in zip(at, (azimuth, elevation), strict=True)]))
-    return bool((off <= reach).all(axis=0).any())  # NaN where no echo comes that way
+    level = of_frame(tree, "truth/echo_level", frame)
+    loud = level[:, 1:] >= np.nan_to_num(level[:, :1], nan=-np.inf) - GLINT
+    return bool(((off <= reach).all(axis=0) & loud).any())  # NaN where no echo comes that way
 
 
 def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:

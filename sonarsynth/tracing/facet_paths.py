@@ -30,9 +30,6 @@ from sonarsynth.tracing.receive_paths import (
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation, Visibility
 
-if TYPE_CHECKING:
-    pass
-
 
 FACET_MEAN_TOLERANCE = 1e-3
 """Change of an echo over the aperture by the mean over its facet, over the strongest echo, that is left out."""

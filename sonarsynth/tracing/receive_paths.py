@@ -20,9 +20,6 @@ from sonarsynth.propagation.reflections import Reflections, reflections
 from sonarsynth.tracing.occlusion.ray_cones import max_launch_deviation
 
 if TYPE_CHECKING:
-    pass
-
-if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,9 +28,6 @@ from sonarsynth.state import meeting_times, model_of
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import MeshFile
 from sonarsynth.targets.target import mesh_for
-
-if TYPE_CHECKING:
-    pass
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 FARTHEST = 1e6
