@@ -26,7 +26,7 @@ if TYPE_CHECKING:
         PressureRelease,
         ReflectionTable,
         Rigid,
-        SeaBed,
+        SeaBottom,
         SeaSurface,
         Sediment,
     )
@@ -149,7 +149,7 @@ __all__ = [
     "Rigid",
     "Romanis",
     "Scene",
-    "SeaBed",
+    "SeaBottom",
     "SeaSurface",
     "Sediment",
     "SensorDelays",
@@ -195,7 +195,7 @@ __all__ = [
 
 _HOMES = {
     "description": "FieldError",
-    "environment.boundaries": "FluidHalfSpace PressureRelease ReflectionTable Rigid SeaBed SeaSurface Sediment",
+    "environment.boundaries": "FluidHalfSpace PressureRelease ReflectionTable Rigid SeaBottom SeaSurface Sediment",
     "environment.sea": (
         "Absorption Cast Catenary Environment FlatNoise Isovelocity Linear "
         "Munk Tabulated TemperatureSalinity Thermocline WenzNoise"

@@ -203,14 +203,18 @@ def family(found: ray_solutions.Eigenrays, i: int) -> Family:
     return int(np.sign(found.start_sine[i])), *counts, int(np.sign(found.end_sine[i]))
 
 
-def images(bed: float, start: float, end: float, reflections: int) -> list[tuple[int, int, int, int, float]]:
+def images(bottom_depth: float, start: float, end: float, reflections: int) -> list[tuple[int, int, int, int, float]]:
     """Paths in uniform water, shortest first: launch sign, surface, bottom, arrival sign, height gone (m)."""
     direct = int(np.sign(start - end))
     rows = [(direct, 0, 0, direct, abs(start - end))]
     for hits in range(1, reflections + 1):
         for up in (1, -1):
             last_up = up if hits % 2 else -up  # sense of travel before the last hit
-            height = (start if up > 0 else bed - start) + (hits - 1) * bed + (end if last_up > 0 else bed - end)
+            height = (
+                (start if up > 0 else bottom_depth - start)
+                + (hits - 1) * bottom_depth
+                + (end if last_up > 0 else bottom_depth - end)
+            )
             first, second = (hits + 1) // 2, hits // 2
             rows.append((up, first if up > 0 else second, second if up > 0 else first, -last_up, height))
     return sorted(rows, key=lambda row: row[4])

@@ -34,7 +34,7 @@ def remus(frames: int = 2, **sonar: Any) -> Recipe:
                         motion=Line(start=(20.0, 4.5, -4.5), stop=(20.0, -4.5, -4.5), duration=6.3),
                     ),
                 ),
-                shrimp=(SnappingShrimp(position=(14.0, -5.0)),),
+                sources=(SnappingShrimp(position=(14.0, -5.0)),),
             ),
             sonar=Sonar(**sonar),
             trajectory=Trajectory(frames=frames, interval=6.3 / max(frames - 1, 1)),
@@ -68,7 +68,7 @@ def point_scene(
                 targets=(
                     Target(name="point", shape=Sphere(radius=0.001), motion=Still(position=target, heading=heading)),
                 ),
-                shrimp=(SnappingShrimp(position=snap),),
+                sources=(SnappingShrimp(position=snap),),
             ),
             sonar=Sonar(assumed_sound_speed=1500.0, **sonar),
             trajectory=Trajectory(frames=1, sonar=Still(position=place, heading=heading)),

@@ -7,8 +7,9 @@ import signal
 import sys
 import tempfile
 import traceback
+import warnings
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import typer
@@ -28,7 +29,10 @@ def run(app: typer.Typer, arguments: list[str] | None = None) -> int:
         os.environ.setdefault(name, "1")
     before = signal.signal(signal.SIGTERM, _interrupt)
     try:
-        status = app(arguments, prog_name="sonarsynth", standalone_mode=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("default", FutureWarning)
+            warnings.showwarning = _show_note
+            status = app(arguments, prog_name="sonarsynth", standalone_mode=False)
         return _interrupted() if status == INTERRUPTED else status if isinstance(status, int) else 0
     except KeyboardInterrupt:
         return _interrupted()
@@ -41,6 +45,17 @@ def run(app: typer.Typer, arguments: list[str] | None = None) -> int:
         return _explain(error, "--debug" in arguments)
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+def _show_note(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+    """A warning about a recipe as one line; those of libraries as Python shows them."""
+    if category.__name__ == "RenamedKey":
+        _say(f"note: {message}", 0)
+    else:
+        _SHOW(message, category, *where, **more)
+
+
+_SHOW = warnings.showwarning
 
 
 def _interrupted() -> int:

@@ -173,7 +173,7 @@ class SeaSurface:
 
 
 @description
-class SeaBed:
+class SeaBottom:
     """The bottom: medium sand and smooth unless said otherwise."""
 
     reflection: Reflection = Sediment(name="medium sand")

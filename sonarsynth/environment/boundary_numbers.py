@@ -19,7 +19,7 @@ from sonarsynth.environment.boundaries import (
     Reflection,
     ReflectionTable,
     Rigid,
-    SeaBed,
+    SeaBottom,
     SeaSurface,
     Sediment,
 )
@@ -37,7 +37,7 @@ class Bounces:
 
 
 def bounces(
-    boundary: SeaSurface | SeaBed,
+    boundary: SeaSurface | SeaBottom,
     grazing: npt.ArrayLike,
     count: npt.ArrayLike,
     sound_speed: npt.ArrayLike,
@@ -56,7 +56,7 @@ def bounces(
     return Bounces(*(np.where(np.isnan(q), np.nan, x) for x in (modulus, phase, spread)))
 
 
-def coefficient(boundary: SeaSurface | SeaBed, grazing: npt.ArrayLike, frequency: float | None = None) -> Complexes:
+def coefficient(boundary: SeaSurface | SeaBottom, grazing: npt.ArrayLike, frequency: float | None = None) -> Complexes:
     """Reflection coefficient (path,) of the smooth boundary at grazing angles (path,) in rad; 1 where they are NaN.
 
     frequency (Hz) is needed for bubbles alone: their loss is taken there, as 10^(-loss/20), for the whole band.
@@ -74,7 +74,7 @@ def coefficient(boundary: SeaSurface | SeaBed, grazing: npt.ArrayLike, frequency
     return np.asarray(np.where(none, 1.0 + 0j, value))
 
 
-def rms_height(boundary: SeaSurface | SeaBed) -> float:
+def rms_height(boundary: SeaSurface | SeaBottom) -> float:
     """Root-mean-square height (m) of a boundary, as written or as the wind makes it."""
     if isinstance(boundary, SeaSurface) and boundary.wind_speed is not None:
         with formula_ranges.noted():
@@ -82,7 +82,7 @@ def rms_height(boundary: SeaSurface | SeaBed) -> float:
     return boundary.rms_height
 
 
-def delay_std(boundary: SeaSurface | SeaBed, grazing: npt.ArrayLike, sound_speed: npt.ArrayLike) -> Floats:
+def delay_std(boundary: SeaSurface | SeaBottom, grazing: npt.ArrayLike, sound_speed: npt.ArrayLike) -> Floats:
     """Time (path,) in s such that roughness takes exp(-(2 pi f delay_std)^2/2) off one reflection; 0 where grazing is
     NaN.
 
@@ -92,7 +92,7 @@ def delay_std(boundary: SeaSurface | SeaBed, grazing: npt.ArrayLike, sound_speed
     return boundary_reflection.roughness_blur(rms_height(boundary), q, sound_speed)
 
 
-def boundary_notes(boundary: SeaSurface | SeaBed, low: float, high: float) -> tuple[tuple[str, str], ...]:
+def boundary_notes(boundary: SeaSurface | SeaBottom, low: float, high: float) -> tuple[tuple[str, str], ...]:
     """Field and line for each formula of a boundary that is used outside its range, in a band low to high (Hz)."""
     notes: list[tuple[str, str]] = []
     reflection = boundary.reflection

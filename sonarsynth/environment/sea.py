@@ -9,7 +9,7 @@ from pydantic import model_validator
 
 from sonarsynth.conventions import Decibels, Number, PositiveMetres, PositiveSpeed
 from sonarsynth.description import BY_KIND, description
-from sonarsynth.environment.boundaries import SeaBed, SeaSurface
+from sonarsynth.environment.boundaries import SeaBottom, SeaSurface
 from sonarsynth.environment.hydrography import WaterSalinity, WaterTemperature
 from sonarsynth.environment.sound_speed import (
     Cast,
@@ -89,7 +89,7 @@ class Environment:
     """Depth of the bottom below the mean surface."""
     sound_speed: SoundSpeed
     surface: SeaSurface = SeaSurface()
-    bed: SeaBed = SeaBed()
+    bottom: SeaBottom = SeaBottom()
     absorption: Absorption = Absorption()
     noise: Noise | None = None
     """Ambient noise at the hydrophones; none if left out."""

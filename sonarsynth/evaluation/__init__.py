@@ -8,7 +8,12 @@ import xarray as xr
 from sonarsynth.evaluation.brightest_beams import beam_width, brightest_beam_on_target, near_target
 from sonarsynth.evaluation.checks import Check, every, numbered
 from sonarsynth.evaluation.error_bounds import bounds, warnings
-from sonarsynth.evaluation.level_checks import INAUDIBLE, LEDGER_TOLERANCE, ledger_adds_up, ledger_measured
+from sonarsynth.evaluation.level_checks import (
+    INAUDIBLE,
+    LINK_BUDGET_TOLERANCE,
+    link_budget_adds_up,
+    link_budget_measured,
+)
 from sonarsynth.evaluation.point_checks import kinds, points, range_errors
 from sonarsynth.evaluation.source_estimates import snap_located
 
@@ -16,7 +21,7 @@ __all__ = [
     "EXPANSION_AMPLITUDE",
     "EXPANSION_PHASE",
     "INAUDIBLE",
-    "LEDGER_TOLERANCE",
+    "LINK_BUDGET_TOLERANCE",
     "Check",
     "beam_width",
     "bounds",
@@ -24,8 +29,8 @@ __all__ = [
     "check",
     "expansions_hold",
     "kinds",
-    "ledger_adds_up",
-    "ledger_measured",
+    "link_budget_adds_up",
+    "link_budget_measured",
     "near_target",
     "nothing_outside",
     "points",
@@ -44,9 +49,9 @@ def check(tree: xr.DataTree) -> list[Check]:
     if not len(built):
         return [Check("frames", "at least one frame built", "none", False, {"frames": 0})]
     checks = [Check("frames", "at least one frame built", f"{len(built)}", True, {"frames": len(built)})]
-    if "ledger" in tree.children:
-        checks.append(ledger_adds_up(tree, built))
-        checks.append(ledger_measured(tree, built))
+    if "link_budget" in tree.children:
+        checks.append(link_budget_adds_up(tree, built))
+        checks.append(link_budget_measured(tree, built))
         checks.append(expansions_hold(tree, built))
     if "signals" in tree.children:
         checks.append(nothing_outside(tree, built))
@@ -75,8 +80,8 @@ def nothing_outside(tree: xr.DataTree, frames: np.ndarray) -> Check:
 
 def expansions_hold(tree: xr.DataTree, frames: np.ndarray) -> Check:
     """Wavefronts and amplitudes are expanded over the aperture; what that errs by, as traced to probes."""
-    phases = 2 * np.pi * float(tree.attrs["band_high"]) * every(tree, "truth/wavefront_error")[frames]
-    amplitudes = every(tree, "truth/amplitude_error")[frames]
+    phases = 2 * np.pi * float(tree.attrs["band_high"]) * every(tree, "link_budget/wavefront_error")[frames]
+    amplitudes = every(tree, "link_budget/amplitude_error")[frames]
     phase, amplitude = float(phases.max()), float(amplitudes.max())
     good_frames = (phases <= EXPANSION_PHASE) & (amplitudes <= EXPANSION_AMPLITUDE)
     got = f"{phase:.2g} rad at the top of the band, {100 * amplitude:.2g} % of the strongest echo"

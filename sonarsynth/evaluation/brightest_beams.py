@@ -23,7 +23,7 @@ def beam_width(tree: xr.DataTree) -> float:
 def _grid_step(tree: xr.DataTree) -> float:
     """Step (rad) of the beam grid, infinite for a single beam."""
     for axis in ("azimuth", "elevation"):
-        values = every(tree, f"truth/{axis}")
+        values = every(tree, f"truth/beams/{axis}")
         if len(values) > 1:
             return float(np.deg2rad(np.diff(values).mean()))
     return float("inf")
@@ -40,10 +40,10 @@ def near_target(tree: xr.DataTree, truth: np.ndarray) -> np.ndarray:
 
 def refused(tree: xr.DataTree, frame: int) -> bool:
     """Whether the snap that would be the clock was refused, and says why."""
-    if "bearings" not in tree.children or "reason" not in tree["bearings"].dataset:
+    if "source_estimates" not in tree.children or "reason" not in tree["source_estimates"].dataset:
         return False
-    return bool(of_frame(tree, "bearings/reason", frame)[0] > 0) and not np.isfinite(
-        of_frame(tree, "bearings/time", frame)[0]
+    return bool(of_frame(tree, "source_estimates/reason", frame)[0] > 0) and not np.isfinite(
+        of_frame(tree, "source_estimates/time", frame)[0]
     )
 
 
@@ -58,13 +58,13 @@ def on_ghost(tree: xr.DataTree, frame: int, azimuth: float, elevation: float) ->
 
     Ghosts are as wide as their target; the truth has the middle of their energy, so they reach that far either way.
     """
-    if "echo_azimuth" not in tree["truth"].dataset:
+    if "echo_azimuth" not in tree["truth/targets"].dataset:
         return False
-    at = (np.deg2rad(of_frame(tree, f"truth/echo_{axis}", frame)[:, 1:]) for axis in ("azimuth", "elevation"))
-    box = np.deg2rad(of_frame(tree, "truth/image_box", frame))[:, None]
+    at = (np.deg2rad(of_frame(tree, f"truth/targets/echo_{axis}", frame)[:, 1:]) for axis in ("azimuth", "elevation"))
+    box = np.deg2rad(of_frame(tree, "truth/targets/image_box", frame))[:, None]
     reach = np.nan_to_num(np.stack([box[..., 1] - box[..., 0], box[..., 3] - box[..., 2]])) + beam_width(tree)
     off = np.abs(np.stack([middle - angle for middle, angle in zip(at, (azimuth, elevation), strict=True)]))
-    level = of_frame(tree, "truth/echo_level", frame)
+    level = of_frame(tree, "truth/targets/echo_level", frame)
     loud = level[:, 1:] >= np.nan_to_num(level[:, :1], nan=-np.inf) - GLINT
     return bool(((off <= reach).all(axis=0) & loud).any())  # NaN where no echo comes that way
 
@@ -76,10 +76,10 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
     Frames without a target in view, or whose echoes are inaudible, do not count.
     """
     name, expected = "brightest beam on target", "every frame, or on a ghost by surface or bottom"
-    azimuth, elevation = (np.deg2rad(every(tree, f"truth/{axis}")) for axis in ("azimuth", "elevation"))
+    azimuth, elevation = (np.deg2rad(every(tree, f"truth/beams/{axis}")) for axis in ("azimuth", "elevation"))
     hits, ghosts, seen, missed = 0, 0, 0, []
     for i in frames:
-        energy, truth = of_frame(tree, "image/energy", i), of_frame(tree, "truth/target", i)
+        energy, truth = of_frame(tree, "image/energy", i), of_frame(tree, "truth/beams/target", i)
         if not ((truth >= 0).any() and echoes_heard(tree, i)):
             continue
         if not np.isfinite(energy).any():  # no clock, no image: a miss, unless no snap could be heard or made out

@@ -15,8 +15,8 @@ from sonarsynth.evaluation.source_estimates import snap_located
 from sonarsynth.store import Folder, Remote, folder_of
 from sonarsynth.store.files.place import opens
 
-FRAMES, FRAMES_REMOTE, CELLS = 200, 24, 20_000_000
-"""Frames that are looked at after a build, of a store on this machine and elsewhere, and cells of their beam grids."""
+FRAMES, FRAMES_REMOTE, ROWS = 200, 24, 20_000_000
+"""Frames that are looked at after a build, of a store on this machine and elsewhere, and points of them."""
 
 
 def useful_ranges(tree: xr.DataTree, frames: np.ndarray) -> Check:
@@ -30,7 +30,7 @@ def useful_ranges(tree: xr.DataTree, frames: np.ndarray) -> Check:
         return Check(name, expected, "no points on a target", None, {})
     frame, target = found.frame[found.judged], found.target[found.judged].astype(int)
     each, row = np.unique(frame, return_inverse=True)
-    corners = np.asarray(tree["truth/box"].isel(frame=each).values)
+    corners = np.asarray(tree["truth/targets/box"].isel(frame=each).values)
     apart = np.linalg.norm(corners[:, :, :, None] - corners[:, :, None, :], axis=-1).max(axis=(2, 3))
     size = apart[row, target]
     limit = np.fmax(size, beam_width(tree) * found.true_range[found.judged])
@@ -50,7 +50,7 @@ def useful_ranges(tree: xr.DataTree, frames: np.ndarray) -> Check:
 def bounds(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:
     """What of a store is of use, whatever it claims."""
     checks = []
-    if "bearings" in tree.children:
+    if "source_estimates" in tree.children:
         checks.append(snap_located(tree, frames))
     if has_labels(tree):
         checks.append(useful_ranges(tree, frames))
@@ -66,8 +66,8 @@ def warnings(store: Folder | str) -> list[str]:
     try:
         with xr.open_datatree(opens(path), engine="zarr", chunks=None) as tree:
             built = np.flatnonzero(np.isfinite(every(tree, "truth/sonar_position")[:, 0]))
-            cells = int(np.prod(tree["cloud/range"].shape[1:])) if "cloud" in tree.children else 1
-            most = min(FRAMES_REMOTE if isinstance(path, Remote) else FRAMES, max(CELLS // cells, 1), len(built))
+            room = tree["cloud"].sizes["point"] if "cloud" in tree.children else 1
+            most = min(FRAMES_REMOTE if isinstance(path, Remote) else FRAMES, max(ROWS // max(room, 1), 1), len(built))
             frames = built[np.linspace(0, len(built) - 1, most).round().astype(int)]
             checks = bounds(tree, frames) + (range_errors(tree, frames) if has_labels(tree) else [])
     except (OSError, KeyError, ValueError):

@@ -8,27 +8,27 @@ import xarray as xr
 from sonarsynth.evaluation.checks import Check, every, numbered, of_frame
 from sonarsynth.products import LINK_BUDGET
 
-LEDGER_TOLERANCE = 0.1  # dB
+LINK_BUDGET_TOLERANCE = 0.1  # dB
 
 INAUDIBLE = 120.0
 """dB under the direct snap: echoes weaker than this are below what a converter, or single precision, holds."""
 
 
-def ledger_adds_up(tree: xr.DataTree, frames: np.ndarray) -> Check:
+def link_budget_adds_up(tree: xr.DataTree, frames: np.ndarray) -> Check:
     """received = source - loss_out + scattering - loss_in - absorption - boundary for every path family."""
-    book = {name: every(tree, f"ledger/{name}")[frames] for name in LINK_BUDGET}
-    total = book["source_level"] + book["scattering"]
+    budget = {name: every(tree, f"link_budget/{name}")[frames] for name in LINK_BUDGET}
+    total = budget["source_level"] + budget["scattering"]
     for loss in ("transmission_loss_out", "transmission_loss_in", "absorption_loss", "boundary_loss"):
-        total = total - book[loss]
-    apart = np.abs(total - book["received_level"])
+        total = total - budget[loss]
+    apart = np.abs(total - budget["received_level"])
     worst = float(np.nanmax(apart, initial=0.0))
     return Check(
-        "ledger adds up",
-        f"within {LEDGER_TOLERANCE} dB",
+        "link budget adds up",
+        f"within {LINK_BUDGET_TOLERANCE} dB",
         f"{worst:.2g} dB",
-        worst <= LEDGER_TOLERANCE,
+        worst <= LINK_BUDGET_TOLERANCE,
         {"worst_db": worst},
-        numbered(frames[(apart > LEDGER_TOLERANCE).reshape(len(frames), -1).any(axis=1)]),
+        numbered(frames[(apart > LINK_BUDGET_TOLERANCE).reshape(len(frames), -1).any(axis=1)]),
     )
 
 
@@ -36,15 +36,17 @@ FAINTEST = -600.0
 """dB re 1 uPa: single precision holds nothing of fainter signals, so that nothing can be measured."""
 
 
-def ledger_measured(tree: xr.DataTree, frames: np.ndarray) -> Check:
+def link_budget_measured(tree: xr.DataTree, frames: np.ndarray) -> Check:
     """The level predicted for the loudest path of each family is that of the signals of this path alone.
 
     Such signals are made wherever signals are: a level that is missing there is a failure.
     """
-    name, expected = "ledger measured in signals", f"within {LEDGER_TOLERANCE} dB"
-    if "measured_level" not in tree["ledger"].dataset:
+    name, expected = "link budget measured in signals", f"within {LINK_BUDGET_TOLERANCE} dB"
+    if "measured_level" not in tree["link_budget"].dataset:
         return Check(name, expected, "not in this store", None, {})
-    predicted, measured = (every(tree, f"ledger/{level}")[frames] for level in ("isolated_level", "measured_level"))
+    predicted, measured = (
+        every(tree, f"link_budget/{level}")[frames] for level in ("isolated_level", "measured_level")
+    )
     predicted = np.where(predicted > FAINTEST, predicted, np.nan)
     made = np.isfinite(measured).any() or bool(tree.attrs.get("products"))
     count = int(np.isfinite(predicted).sum())
@@ -54,23 +56,23 @@ def ledger_measured(tree: xr.DataTree, frames: np.ndarray) -> Check:
     missing = int((~np.isfinite(apart)).sum())
     worst = float(np.max(apart, initial=0.0, where=np.isfinite(apart)))
     got = f"{worst:.2g} dB over {count - missing} paths" + (f", {missing} without a level" if missing else "")
-    good = worst <= LEDGER_TOLERANCE and not missing
-    bad = np.isfinite(predicted) & ~(np.abs(measured - predicted) <= LEDGER_TOLERANCE)
+    good = worst <= LINK_BUDGET_TOLERANCE and not missing
+    bad = np.isfinite(predicted) & ~(np.abs(measured - predicted) <= LINK_BUDGET_TOLERANCE)
     spoiled = numbered(frames[bad.reshape(len(frames), -1).any(axis=1)])
     return Check(name, expected, got, good, {"worst_db": worst, "paths": count, "missing": missing}, spoiled)
 
 
 def echoes_heard(tree: xr.DataTree, frame: int) -> bool:
-    """Whether the ledger, where there is one, has an echo less than INAUDIBLE below the direct snap."""
-    if "ledger" not in tree.children:
+    """Whether the link budget, where there is one, has an echo less than INAUDIBLE below the direct snap."""
+    if "link_budget" not in tree.children:
         return True
-    level = of_frame(tree, "ledger/received_level", frame)  # (snap, echo, family), the direct path last
+    level = of_frame(tree, "link_budget/received_level", frame)  # (snap, echo, family), the direct path last
     echo, direct = (np.max(part, initial=-np.inf, where=np.isfinite(part)) for part in (level[:, :-1], level[:, -1:]))
     return bool(echo > direct - INAUDIBLE)
 
 
 def snaps_heard(tree: xr.DataTree, frame: int) -> np.ndarray:
-    """(snap,) whether the snap reaches the array directly, by the ledger where there is one."""
-    if "ledger" not in tree.children:
+    """(snap,) whether the snap reaches the array directly, by the link budget where there is one."""
+    if "link_budget" not in tree.children:
         return np.zeros(0, bool)
-    return np.asarray(of_frame(tree, "ledger/paths", frame)[:, -1].sum(axis=1) > 0)
+    return np.asarray(of_frame(tree, "link_budget/paths", frame)[:, -1].sum(axis=1) > 0)

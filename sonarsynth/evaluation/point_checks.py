@@ -14,8 +14,8 @@ from sonarsynth.products import FAMILIES, ORIGINS
 OUTLIERS = 0.01
 """Share of the points that may be further off than three predicted errors; one may be whatever their number."""
 
-MOST_CELLS = 2_000_000
-"""Cells of beam grids that are read at once."""
+MOST_ROWS = 2_000_000
+"""Points, and room for points, that are read at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +23,7 @@ class Points:
     """The points of some frames."""
 
     frame: np.ndarray  # (point,)
-    beam: np.ndarray  # (point, 2) row and column of the beam
+    row: np.ndarray  # (point,) its number in the frame
     range: np.ndarray  # (point,) m
     range_error: np.ndarray  # (point,) m, predicted
     true_range: np.ndarray  # (point,) m
@@ -59,26 +59,26 @@ def points(tree: xr.DataTree, frames: Sequence[int] | np.ndarray) -> Points:
     """The points of some frames of a store whose points have labels."""
     cloud, at = tree["cloud"].dataset, np.asarray(frames)
     names = ("range", "range_error", "true_range", "target", "emission", "family", "origin")
-    count = max(MOST_CELLS // max(int(np.prod(cloud["range"].shape[1:])), 1), 1)
-    found: dict[str, list[np.ndarray]] = {name: [] for name in ("frame", "beam", *names)}
+    count = max(MOST_ROWS // max(cloud.sizes["point"], 1), 1)
+    found: dict[str, list[np.ndarray]] = {name: [] for name in ("frame", "row", *names)}
     for start in range(0, len(at), count):
         some = at[start : start + count]
-        grids = {name: np.asarray(cloud[name].isel(frame=some).values) for name in names}
-        frame, *beam = np.nonzero(np.isfinite(grids["range"]))
+        lists = {name: np.asarray(cloud[name].isel(frame=some).values) for name in names}
+        frame, row = np.nonzero(np.isfinite(lists["range"]))
         found["frame"].append(some[frame])
-        found["beam"].append(np.stack(beam, axis=1))
+        found["row"].append(row)
         for name in names:
-            found[name].append(grids[name][frame, *beam])
+            found[name].append(lists[name][frame, row])
     columns = {name: np.concatenate(parts) if parts else np.zeros(0) for name, parts in found.items()}
     return Points(**columns, clock=_clocks(tree, columns["frame"].astype(int)))
 
 
 def _clocks(tree: xr.DataTree, frames: np.ndarray) -> np.ndarray:
-    """The emission (row,) of the first bearing in frames (row,); -1 where that is not known."""
-    if "bearings" not in tree.children or "emission" not in tree["bearings"].dataset or not len(frames):
+    """The emission (row,) of the first source estimate in frames (row,); -1 where that is not known."""
+    if "source_estimates" not in tree.children or "emission" not in tree["source_estimates"].dataset or not len(frames):
         return np.full(len(frames), -1)
     each, row = np.unique(frames, return_inverse=True)
-    return np.asarray(tree["bearings"].dataset["emission"].isel(frame=each, snap=0).values)[row]
+    return np.asarray(tree["source_estimates"].dataset["emission"].isel(frame=each, estimate=0).values)[row]
 
 
 def range_errors(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:

@@ -53,7 +53,7 @@ def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
     snap that reaches the array and is not found, and errors as large as what is sought, are honest but of no use: a
     warning.
     """
-    if "emission" not in tree["bearings"].dataset:
+    if "emission" not in tree["source_estimates"].dataset:
         return Check(NAME, EXPECTED, "not in this store", None, {})
     tally = _Tally()
     for i in frames:
@@ -76,7 +76,9 @@ def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
 
 
 def _frame(tree: xr.DataTree, i: int, tally: _Tally) -> None:
-    column = {str(name): of_frame(tree, f"bearings/{name}", i) for name in tree["bearings"].dataset.data_vars}
+    column = {
+        str(name): of_frame(tree, f"source_estimates/{name}", i) for name in tree["source_estimates"].dataset.data_vars
+    }
     found = np.flatnonzero(np.isfinite(column["time"]))
     reached = int(snaps_heard(tree, i).sum())
     tally.rows += len(found)
@@ -86,7 +88,9 @@ def _frame(tree: xr.DataTree, i: int, tally: _Tally) -> None:
         tally.frames.add(i)
         refused = [REASONS[n] for n in column["reason"] if n not in (ACCEPTED, PLACELESS)]
         tally.reasons.update(refused[:missing])
-    truth = {name: of_frame(tree, f"truth/snap_{name}", i) for name in ("arrival", "azimuth", "elevation", "position")}
+    truth = {
+        name: of_frame(tree, f"truth/emissions/{name}", i) for name in ("arrival", "azimuth", "elevation", "position")
+    }
     pose = Pose(of_frame(tree, "truth/sonar_position", i), of_frame(tree, "truth/sonar_orientation", i))
     true = pose.to_body(truth["position"])
     for row in found:

@@ -95,7 +95,7 @@ def exact_plan(plan: Plan) -> Plan:
     choices = Choices(
         subarrays=plan.elements.count,
         degree=5,
-        visibility="hydrophones",
+        occlusion="sensors",
         negligible=0.0,
         synthesis=golden(plan),
         beamforming=DenseDelayAndSum(focus=image.focus, shading=image.shading),

@@ -40,7 +40,7 @@ class Whole:
                 sonar,
                 frame.sonar_pose,
                 environment.depth,
-                plan.sizes["snap"],
+                plan.sizes["emission"],
                 plan.profile,
             )
         )

@@ -120,12 +120,12 @@ def range_points(plan: Plan, frame: Frame, heard: BeamformedFrame) -> Iterator[P
 
 def cloud_of(plan: Plan, frame: Frame, heard: BeamformedFrame, method: IsovelocityRange | RefractedRange) -> PointCloud:
     """The point cloud of what a frame heard, by a method."""
-    assert heard.image is not None and heard.imaged is not None and heard.bearings is not None
-    bearings: SourceEstimates = heard.bearings
+    assert heard.image is not None and heard.imaged is not None and heard.estimates is not None
+    estimates: SourceEstimates = heard.estimates
     return method.cloud(
         heard.imaged,
         heard.image,
-        bearings,
+        estimates,
         plan.elements,
         plan.scene.sonar,
         frame.sonar_pose,
@@ -160,10 +160,10 @@ def range_point(
 def apart(cloud: PointCloud, exact: PointCloud) -> tuple[Floats, Floats, int]:
     """Differences of the points that two clouds share, in range (point,) m and direction (point,) rad; and how many
     points are in one of them alone."""
-    there, here = (np.isfinite(c.range) for c in (exact, cloud))
-    both = there & here
-    a, b = (np.asarray(c.position[both], float) for c in (cloud, exact))
+    mine, theirs = (c.azimuth + 1j * c.elevation for c in (cloud, exact))
+    shared, here, there = np.intersect1d(mine, theirs, assume_unique=True, return_indices=True)
+    a, b = cloud.position[here].astype(float), exact.position[there].astype(float)
     across = np.linalg.norm(np.cross(a, b), axis=1)
     angle = np.arctan2(across, np.einsum("pi,pi->p", a, b))
-    metres = np.abs(np.asarray(cloud.range[both], float) - exact.range[both])
-    return metres, angle, int(np.count_nonzero(there ^ here))
+    metres = np.abs(cloud.range[here].astype(float) - exact.range[there])
+    return metres, angle, len(cloud) + len(exact) - 2 * len(shared)

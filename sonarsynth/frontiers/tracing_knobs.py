@@ -53,7 +53,7 @@ class TracedBySensor:
     frame: Frame
     pieces: tuple[tuple[Subarray, Arrivals], ...]
     parts: int  # of the whole array
-    seconds: float  # of all parts; and of the whole array, which truth and ledger need
+    seconds: float  # of all parts; and of the whole array, which truth and link budget need
 
     @staticmethod
     def of(plan: Plan, frame: Frame, sensor: Ints) -> TracedBySensor:
@@ -109,8 +109,8 @@ def trace_points(exact: Exact, traced: TracedBySensor) -> Iterator[Point]:
     best = exact_plan(plan)
     usual = replace(best, choices=replace(best.choices, subarrays=plan.choices.subarrays))
     if plan.choices.subarrays < plan.elements.count:
-        degree, view = replace(usual.choices, degree=3), replace(usual.choices, visibility="centre")
-        for knob, choices, setting in (("degree", degree, "of degree 3"), ("visibility", view, "from the centre")):
+        degree, view = replace(usual.choices, degree=3), replace(usual.choices, occlusion="centre")
+        for knob, choices, setting in (("degree", degree, "of degree 3"), ("occlusion", view, "from the centre")):
             of = TracedBySensor.of(replace(usual, choices=choices), exact.frame, exact.sensor)
             yield _point(exact, of, knob, f"{setting}, {_cut(plan)}")
     for level in FAINTEST:
@@ -129,8 +129,8 @@ def _cheaper(plan: Plan) -> Iterator[tuple[str, Plan]]:
     for count in _counts(plan):
         if count < choices.subarrays:
             yield f"{count} part{'s' if count > 1 else ''}", replace(plan, choices=replace(choices, subarrays=count))
-    if choices.visibility == "hydrophones":
-        yield "seen from the centre", replace(plan, choices=replace(choices, visibility="centre"))
+    if choices.occlusion == "sensors":
+        yield "seen from the centre", replace(plan, choices=replace(choices, occlusion="centre"))
     if choices.degree == 5:
         yield "of degree 3", replace(plan, choices=replace(choices, degree=3))
     for level in FAINTEST:

@@ -43,7 +43,7 @@ def set_by_recipe(scene: Scene) -> set[str]:
     """Stages whose method the recipe sets itself."""
     physics, processing = scene.physics, scene.processing
     found = {
-        "trace": physics.subarrays != "auto" or physics.faintest != "auto" or physics.tracing.kind != "auto",
+        "trace": physics.subarrays != "auto" or physics.dynamic_range != "auto" or physics.tracing.kind != "auto",
         "synthesis": physics.synthesis.kind != "auto",
         "image": getattr(processing.beamforming, "kind", "") != "auto",
         "range": not isinstance(processing.ranging, AutoRange),

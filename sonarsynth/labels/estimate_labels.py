@@ -52,23 +52,23 @@ def heard_first(direct: Direct, snaps: int) -> tuple[Floats, Floats, Floats]:
     return time, azimuth, elevation
 
 
-def emissions(bearings: SourceEstimates, direct: Direct, bandwidth: float, beam: float) -> Ints:
+def emissions(estimates: SourceEstimates, direct: Direct, bandwidth: float, beam: float) -> Ints:
     """Index of the snap that each estimate (row,) came from, by time and direction; -1 for none.
 
     An estimate comes from the nearest direct path within its predicted errors and what the array resolves in time
     (1/`bandwidth`, Hz) and direction (`beam`, rad: half-power beam width). Nearest: by both, in those units. An image
     in surface or bottom, or an echo, is no snap.
     """
-    found = np.full(len(bearings.time), NO_TARGET)
+    found = np.full(len(estimates.time), NO_TARGET)
     if not len(direct.snap):
         return found
     with np.errstate(invalid="ignore"):
-        seen = towards(bearings.azimuth, bearings.elevation)
-        late = np.abs(bearings.time[:, None] - direct.time)
+        seen = towards(estimates.azimuth, estimates.elevation)
+        late = np.abs(estimates.time[:, None] - direct.time)
         aside = np.linalg.norm(seen[:, None] - direct.direction, axis=2)
-        turned = np.hypot(bearings.azimuth_error * np.cos(bearings.elevation), bearings.elevation_error)
+        turned = np.hypot(estimates.azimuth_error * np.cos(estimates.elevation), estimates.elevation_error)
         far = np.hypot(
-            late / (SIGMAS * bearings.time_error + PULSES / bandwidth)[:, None],
+            late / (SIGMAS * estimates.time_error + PULSES / bandwidth)[:, None],
             aside / (SIGMAS * turned + BEAMS * beam)[:, None],
         )
     far = np.where(np.isfinite(far), far, np.inf)

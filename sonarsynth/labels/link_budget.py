@@ -1,4 +1,4 @@
-"""The ledger: levels of each snap, target and family of paths that add up, and a path of each that can be checked."""
+"""The link budget: levels of each snap, target and family of paths that add up, and one path of each to check."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ QUIET = 1e-12
 def link_budget(
     arrivals: Arrivals, powers: Powers, band: Band, targets: int, snap_level: Floats, error: float
 ) -> LinkBudget:
-    """Levels (snap, target + 1, family, LEDGER) in the band that add up exactly, and the loudest path of each family.
+    """Levels (snap, target + 1, family, term) in the band that add up exactly, and the loudest path of each family.
 
     Each loss is the ratio of two sums of the powers of the paths, with one factor more in the second. Received is what
     they make together, with the phases of coherent paths, and scattering what is left: a target strength with what

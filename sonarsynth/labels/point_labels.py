@@ -26,31 +26,28 @@ of the echo window. A peak of noise that is ranged has 0.03 of all noise in the 
 
 def label_points(
     cloud: PointCloud,
-    azimuth: Floats,
-    elevation: Floats,
     arrivals: Arrivals,
     band: Band,
     moment: WorldState,
     listening: Listening,
 ) -> PointLabels:
-    """Labels of the points of a cloud on a grid of azimuth and elevation (rad).
+    """Labels of the points of a cloud.
 
     arrivals: paths of the frame; band: what each snap sends in the sonar's band; moment: the world at the frame's
     instant. Bodies and the array are where sound meets them.
     """
-    row, column = np.nonzero(np.isfinite(cloud.range))
-    beam = direction(azimuth[column], elevation[row])
-    late, most = (grid[row, column].astype(float) for grid in (cloud.delay, cloud.energy))
+    beam = direction(cloud.azimuth, cloud.elevation)
+    late, most = cloud.delay.astype(float), cloud.energy.astype(float)
     found = attribution(arrivals, band, listening, beam, late, most)
     explained = (found.owner >= 0) & (found.energy.sum(axis=1) >= EXPLAINED * most)
     labels: dict[str, np.ndarray] = {
-        "target": np.full(len(row), NO_TARGET, np.int16),
-        "emission": np.full(len(row), NO_TARGET, np.int16),
-        "family": np.full(len(row), NO_TARGET, np.int8),
-        "facet": np.full(len(row), NO_TARGET, np.int32),
-        "true_range": np.full(len(row), np.nan, np.float32),
-        "distance": np.full(len(row), np.nan, np.float32),
-        "origin": np.full(len(row), ORIGINS.index("unexplained"), np.int8),
+        "target": np.full(len(cloud), NO_TARGET, np.int16),
+        "emission": np.full(len(cloud), NO_TARGET, np.int16),
+        "family": np.full(len(cloud), NO_TARGET, np.int8),
+        "facet": np.full(len(cloud), NO_TARGET, np.int32),
+        "true_range": np.full(len(cloud), np.nan, np.float32),
+        "distance": np.full(len(cloud), np.nan, np.float32),
+        "origin": np.full(len(cloud), ORIGINS.index("unexplained"), np.int8),
     }
     some = np.flatnonzero(explained)
     owner, loudest = found.owner[some], found.first[some] + found.share[some].argmax(axis=1)
@@ -59,16 +56,9 @@ def label_points(
     labels["facet"][some] = found.paths.facet[loudest]
     labels["origin"][some] = _origins(found.paths.select(loudest), beam[some], listening, band)
     echo = np.flatnonzero(labels["target"] >= 0)
-    places = cloud.position[row, column][echo].astype(float)
-    near = _from_targets(found, echo, places, moment, listening)
+    near = _from_targets(found, echo, cloud.position[echo].astype(float), moment, listening)
     labels["true_range"][echo], labels["distance"][echo] = near
-    return PointLabels(**{name: _on_grid(values, row, column, cloud.range.shape) for name, values in labels.items()})
-
-
-def _on_grid(values: np.ndarray, row: Ints, column: Ints, shape: tuple[int, ...]) -> np.ndarray:
-    grid = np.full(shape, NO_TARGET if values.dtype.kind == "i" else np.nan, values.dtype)
-    grid[row, column] = values
-    return grid
+    return PointLabels(**labels)
 
 
 def _origins(paths: Arrivals, beam: Floats, listening: Listening, band: Band) -> Ints:

@@ -79,14 +79,13 @@ def _reference(frames: list[Stored]) -> float:
 
 
 def _view(tree: xr.DataTree, frame: Stored, reference: float) -> View:
-    found = frame.found
     title = tree.attrs.get("title") or "untitled"
     clock = f"   t = {frame.time:.2f} s" if np.isfinite(frame.time) else ""
     return View(
         title=f"{title}   frame {frame.index} (0 to {tree['truth'].sizes['frame'] - 1}){clock}",
         level=None if frame.energy is None else decibels(frame.energy, reference),
-        points=frame.points[found],
-        point_level=decibels(frame.point_energy[found], reference),
+        points=frame.points,
+        point_level=decibels(frame.point_energy, reference),
         hulls=frame.hulls,
         ghosts=frame.ghosts,
     )
@@ -104,7 +103,7 @@ def _write_sheet(
         say(f"sheet: without {', '.join(missing)}, which the store does not hold")
     elif not heard:
         say("sheet: without beam signals, for no beam of the frame points at a target")
-    errors = Errors(points=frame.points[frame.found], error=frame.range_error[frame.found])
+    errors = Errors(points=frame.points, error=frame.range_error)
     view = _view(tree, frame, _reference([frame]))
     made = sheet(*beam_grid(tree), view, errors, heard, window([view]), "energy re the brightest beam (dB)")
     path = folder / "sheet.png"

@@ -10,7 +10,7 @@ import numpy as np
 from sonarsynth.casting.ray_casting import OFFSET, occluded
 from sonarsynth.conventions import Floats, Ints, depth
 from sonarsynth.description import FieldError
-from sonarsynth.environment.boundaries import SeaBed, SeaSurface
+from sonarsynth.environment.boundaries import SeaBottom, SeaSurface
 from sonarsynth.environment.boundary_numbers import bounces
 from sonarsynth.equations.rays.ray_solutions import (
     CAUSTIC,
@@ -23,8 +23,9 @@ from sonarsynth.equations.rays.ray_solutions import (
     water,
 )
 from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.pictures.figures.ray_figure import FAMILIES, FAN
+from sonarsynth.pictures.figures.ray_figure import FAN
 from sonarsynth.planning import Plan
+from sonarsynth.products import FAMILIES
 from sonarsynth.propagation.polylines import Polylines, polylines
 from sonarsynth.propagation.ray_request import EigenrayRequest
 from sonarsynth.recipe.scene import Frame
@@ -33,7 +34,7 @@ from sonarsynth.tracing.ray_fan import EVENTS, RayFan
 
 WORDS = {GOOD: "good", COINCIDENT: "coincident ends", CAUSTIC: "near a caustic", PASSED: "past a caustic"}
 """Flags of eigenrays, `ray_solutions.REASONS`, in the words of a table."""
-LETTERS = {"turning point": "T", "surface": "S", "bed": "B", "facet": "X", "target": "X"}
+LETTERS = {"turning point": "T", "surface": "S", "bottom": "B", "facet": "X", "target": "X"}
 """Vertices of a ray, in the order in which it meets them."""
 TARGET = "target"
 """What happens to an eigenray at the target by way of which it goes."""
@@ -47,7 +48,7 @@ class RayLine:
     """A ray as points, and what is said of it. NaN: not known."""
 
     name: str  # what it joins
-    family: str  # direct, surface, bed, surface and bed; fan
+    family: str  # direct, surface, bottom, surface and bottom; fan
     position: Floats  # (point, xyz) m, world
     direction: Floats  # (point, xyz) unit vector of travel on leaving the point
     time: Floats  # (point,) s since the launch
@@ -74,7 +75,7 @@ class RayLine:
         lists = {n: getattr(self, n).tolist() for n in ("position", "time", "length")}
         angles = [_number(a) for a in self.elevation]
         single = {n: _number(getattr(self, n)) for n in ("transmission_loss", "level", "coefficient")}
-        counts = {what: sum(e == what for e in self.event) for what in ("surface", "bed", "turning point", "facet")}
+        counts = {what: sum(e == what for e in self.event) for what in ("surface", "bottom", "turning point", "facet")}
         return {
             "name": self.name,
             "family": self.family,
@@ -85,7 +86,7 @@ class RayLine:
             "path_length": float(self.length[-1]),
             **single,
             "surface": counts["surface"],
-            "bottom": counts["bed"],
+            "bottom": counts["bottom"],
             "turning": counts["turning point"],
             "caustics": self.caustics,
             "flags": list(self.flags),
@@ -136,7 +137,7 @@ def eigenray_lines(plan: Plan, frame: Frame, request: EigenrayRequest) -> list[R
     first = {s.position.tobytes(): n for n, s in reversed(list(enumerate(frame.moment.snaps)))}  # each place once
     snaps = {n: _End(frame.moment.snaps[n].position) for n in sorted(first.values())}
     if not snaps:
-        raise FieldError(("scene", "world", "shrimp"), "is empty: there are no eigenrays; ask for a fan with 'rays:'")
+        raise FieldError(("scene", "world", "sources"), "is empty: there are no eigenrays; ask for a fan with 'rays:'")
     array = _End(frame.sonar_pose.position)
     targets = _aims(frame, request)
     pairs = [(s, array) for s in snaps.values()]
@@ -190,9 +191,9 @@ def _legs(
 def _transmission_loss(plan: Plan, layers: Water, rays: Eigenrays, start: Floats, end: Floats) -> Floats:
     """Transmission loss (ray,) in dB at the centre of the band: spreading, boundaries, absorption; depths (pair,)."""
     environment, frequency = plan.scene.world.environment, plan.scene.sonar.band.centre
-    met: list[tuple[SeaSurface | SeaBed, Ints, float]] = [
+    met: list[tuple[SeaSurface | SeaBottom, Ints, float]] = [
         (environment.surface, rays.surface, layers.speed[0]),
-        (environment.bed, rays.bottom, layers.speed[-1]),
+        (environment.bottom, rays.bottom, layers.speed[-1]),
     ]
     factor = rays.amplitude.copy()
     for boundary, count, c in met:
@@ -236,7 +237,7 @@ def _joined(first: RayLine, second: RayLine) -> RayLine:
     middle = np.s_[1:]
     return replace(
         first,
-        family=_family("surface" in first.event + second.event, "bed" in first.event + second.event),
+        family=_family("surface" in first.event + second.event, "bottom" in first.event + second.event),
         position=np.concatenate([first.position, second.position[middle]]),
         direction=np.concatenate([first.direction[:-1], second.direction]),
         time=np.concatenate([first.time, first.time[-1] + second.time[middle]]),
@@ -253,8 +254,8 @@ def _bends(line: RayLine) -> int:
     return sum(event in LETTERS for event in line.event)
 
 
-def _family(surface: bool, bed: bool) -> str:
-    return FAMILIES[surface + 2 * bed]
+def _family(surface: bool, bottom: bool) -> str:
+    return FAMILIES[surface + 2 * bottom]
 
 
 def _flags(*words: str) -> tuple[str, ...]:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LONGEST_TABLE = 100
-REFLECTED = {"surface": "surface", "bed": "bottom", "facet": "target"}
+REFLECTED = {"surface": "surface", "bottom": "bottom", "facet": "target"}
 """Events of rays that are reflections, and from what."""
 
 HEADINGS = (
@@ -94,7 +94,7 @@ def as_json(plan: Plan, frame: Frame, lines: Sequence[RayLine]) -> dict[str, Any
         "frame": frame.index,
         "time": frame.time,
         "units": UNITS,
-        "bed": bottom,
+        "bottom": bottom,
         "profile": {"depth": layers.depth.tolist(), "speed": layers.speed.tolist()},
         "places": {name: place.tolist() for name, place in places.items()},
         "bearing": _bearing(frame, lines),
@@ -156,7 +156,7 @@ def _section(lines: Sequence[RayLine], hulls: Sequence[Hull], value: dict[str, A
         hulls,
         np.array(profile["depth"]),
         np.array(profile["speed"]),
-        value["bed"],
+        value["bottom"],
         value["bearing"],
         _looks(lines),
         _places(value),

@@ -51,7 +51,7 @@ def heard(tree: xr.DataTree, frames: Sequence[int]) -> EchoEnergies:
     peaks, means, points, beams = [], [], [], []
     for frame in frames:
         energy = needed(tree, "image/energy", frame).astype(float)
-        on = needed(tree, "truth/target", frame) >= 0
+        on = needed(tree, "truth/beams/target", frame) >= 0
         judged = points_of(tree, [frame]).judged if has_labels(tree) else np.zeros(0, bool)
         peaks.append(np.max(energy, initial=0.0, where=np.isfinite(energy)))
         means.append(energy[on].mean() if on.any() else np.nan)

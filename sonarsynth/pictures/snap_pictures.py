@@ -17,15 +17,15 @@ def snap(recipe: Recipe, out: Path | str = "snap.png") -> Path:
 
     Raises FieldError without a shrimp, or where its snap cannot be made.
     """
-    shrimp = recipe.scene.world.shrimp
+    shrimp = recipe.scene.world.sources
     if not shrimp:
-        raise FieldError(("scene", "world", "shrimp"), "is empty: there is no snap to draw")
+        raise FieldError(("scene", "world", "sources"), "is empty: there is no snap to draw")
     try:
         model = model_of(shrimp[0], recipe.scene.world.environment.depth)
         chosen = fir(recipe.scene.sonar.antialias)
         figure = snap_figure(lambda highest: pulse(model, 0.0, highest), chosen, shrimp[0].source_level)
     except ValueError as error:
-        raise FieldError(("scene", "world", "shrimp", 0, "snap"), str(error)) from None
+        raise FieldError(("scene", "world", "sources", 0, "snap"), str(error)) from None
     file = Path(out)
     file.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(file)

@@ -43,7 +43,7 @@ def beams(tree: xr.DataTree, frame: Stored) -> list[Beam]:
             time=time - clock,
             pressure=heard[i],
             expected=_expected(tree, frame, along[i] * frame.true_range[row, column]),
-            measured=float(frame.delay[row, column]),
+            measured=_measured(frame, azimuth[column], elevation[row], _step(azimuth)),
         )
         for i, (name, (row, column)) in enumerate(chosen.items())
     ]
@@ -87,12 +87,19 @@ def _step(centres: Floats) -> float:
 
 
 def direct_arrival(tree: xr.DataTree, frame: Stored) -> float:
-    """When the snap was heard at the array centre (s): as located; without bearings as it truly was."""
-    heard = read(tree, "bearings/time", frame.index)
+    """When the snap was heard at the array centre (s): as located; without source estimates as it truly was."""
+    heard = read(tree, "source_estimates/time", frame.index)
     if heard is not None and np.isfinite(heard).any():
         return float(heard[np.isfinite(heard)][0])
-    snap_time = needed(tree, "truth/snap_time", frame.index)
+    snap_time = needed(tree, "truth/emissions/time", frame.index)
     return float(snap_time[0] + np.linalg.norm(frame.snap[0]) / tree.attrs["assumed_sound_speed"])
+
+
+def _measured(frame: Stored, azimuth: float, elevation: float, step: float) -> float:
+    """Delay (s) of the point nearest to a direction (deg), NaN where there is none within half a step of the grid."""
+    apart = np.abs(frame.point_direction - [azimuth, elevation]).max(axis=1)
+    near = int(np.argmin(apart)) if len(apart) else 0
+    return float(frame.point_delay[near]) if len(apart) and apart[near] <= 0.51 * step else float("nan")
 
 
 def _expected(tree: xr.DataTree, frame: Stored, point: Floats) -> float:

@@ -13,8 +13,7 @@ from sonarsynth.evaluation.point_checks import has_labels, points
 from sonarsynth.geometry import Pose
 from sonarsynth.pictures.figures.frame_figure import Hull
 from sonarsynth.pictures.figures.ghost_rings import Ghost
-from sonarsynth.store import Folder, Remote, folder_of
-from sonarsynth.store.files.place import opens
+from sonarsynth.store import Folder, Mismatch, Remote, folder_of, open_store
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,15 +28,13 @@ class NothingToDraw(ValueError):
 
 def opened(store: str | Folder) -> xr.DataTree:
     """The store as a DataTree. Raises NothingToDraw when it is not one."""
-    import xarray as xr
-
     path = folder_of(store)
     if not path.is_dir():
         raise NothingToDraw(f"{path}: there is no such store")
     try:
-        tree = xr.open_datatree(opens(path), engine="zarr")
-    except (OSError, ValueError, KeyError) as problem:
-        raise NothingToDraw(f"{path}: not a store that xarray can open ({str(problem).splitlines()[0]})") from None
+        tree = open_store(path)
+    except Mismatch as problem:
+        raise NothingToDraw(str(problem)) from None
     if "truth" not in tree.children or "frame" not in tree["truth"].sizes:
         raise NothingToDraw(f"{path}: a store has a group /truth with frames; this has none")
     return tree
@@ -82,7 +79,7 @@ def built(tree: xr.DataTree) -> np.ndarray:
 
 def beam_grid(tree: xr.DataTree) -> tuple[Floats, Floats]:
     """Azimuth and elevation of the beams (deg, ascending)."""
-    return needed(tree, "truth/azimuth").astype(float), needed(tree, "truth/elevation").astype(float)
+    return needed(tree, "truth/beams/azimuth").astype(float), needed(tree, "truth/beams/elevation").astype(float)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,31 +90,21 @@ class Stored:
     time: float  # s since the start of the trajectory
     sonar: Pose
     energy: Floats | None  # (elevation, azimuth) Pa2 s; None where there is no image or the frame has none
-    points: Floats  # (elevation, azimuth, xyz) m; NaN where there is no point
-    range_error: Floats  # (elevation, azimuth) m: range less true range of direct echoes of targets; NaN elsewhere
-    point_energy: Floats  # (elevation, azimuth) Pa2 s
-    delay: Floats  # (elevation, azimuth) s after the direct arrival
+    points: Floats  # (point, xyz) m
+    range_error: Floats  # (point,) m: range less true range of direct echoes of targets; NaN elsewhere
+    point_energy: Floats  # (point,) Pa2 s
+    point_direction: Floats  # (point, 2) deg: azimuth and elevation
+    point_delay: Floats  # (point,) s after the direct arrival
     target: np.ndarray  # (elevation, azimuth) true target; -1 for none
     true_range: Floats  # (elevation, azimuth) m
     snap: Floats  # (snap, xyz) m, true positions
     hulls: tuple[Hull, ...]
     ghosts: tuple[Ghost, ...]
 
-    @property
-    def found(self) -> np.ndarray:
-        """(elevation, azimuth) true where there is a point."""
-        return np.asarray(np.isfinite(self.points).all(axis=-1))
-
 
 def stored(tree: xr.DataTree, index: int) -> Stored:
     """One frame as stored. A frame that was not built comes back full of NaN."""
-    target = needed(tree, "truth/target", index)
-    true_range = needed(tree, "truth/range", index).astype(float)
-    nowhere = np.full(target.shape, np.nan)
-    cloud = {
-        name: read(tree, f"cloud/{name}", index) for name in ("x", "y", "z", "range", "true_range", "energy", "delay")
-    }
-    layers = {name: nowhere if values is None else values.astype(float) for name, values in cloud.items()}
+    cloud = _points(tree, index)
     energy = read(tree, "image/energy", index)
     pose = _sonar(tree, index)
     time = read(tree, "time", index)
@@ -126,25 +113,30 @@ def stored(tree: xr.DataTree, index: int) -> Stored:
         time=float("nan") if time is None else float(time),
         sonar=pose,
         energy=None if energy is None or not np.isfinite(energy).any() else energy.astype(float),
-        points=np.stack([layers["x"], layers["y"], layers["z"]], axis=-1),
-        range_error=_range_errors(tree, index, np.where(target >= 0, layers["range"] - true_range, np.nan)),
-        point_energy=layers["energy"],
-        delay=layers["delay"],
-        target=target,
-        true_range=true_range,
-        snap=pose.to_body(needed(tree, "truth/snap_position", index)),
+        points=np.stack([cloud["x"], cloud["y"], cloud["z"]], axis=-1),
+        range_error=cloud["range_error"],
+        point_energy=cloud["energy"],
+        point_direction=np.stack([cloud["azimuth"], cloud["elevation"]], axis=-1),
+        point_delay=cloud["delay"],
+        target=needed(tree, "truth/beams/target", index),
+        true_range=needed(tree, "truth/beams/range", index).astype(float),
+        snap=pose.to_body(needed(tree, "truth/emissions/position", index)),
         hulls=hulls(tree, index),
         ghosts=ghosts(tree, index),
     )
 
 
-def _range_errors(tree: xr.DataTree, index: int, by_beam: Floats) -> Floats:
-    """Range errors (elevation, azimuth) by the labels of points; of a store without them by what beams point at."""
-    if not has_labels(tree):
-        return by_beam
-    errors, found = np.full(by_beam.shape, np.nan), points(tree, [index])
-    errors[tuple(found.beam[found.judged].T)] = found.error[found.judged]
-    return errors
+def _points(tree: xr.DataTree, index: int) -> dict[str, Floats]:
+    """Columns (point,) of the points of a frame, none in a store without a cloud; range_error by their labels."""
+    names = ("x", "y", "z", "azimuth", "elevation", "energy", "delay")
+    columns = {name: read(tree, f"cloud/{name}", index) for name in names}
+    there = columns["x"] is not None and has_labels(tree)
+    kept = {n: np.zeros(0) if v is None or not there else v[np.isfinite(v)].astype(float) for n, v in columns.items()}
+    kept["range_error"] = np.full(len(kept["x"]), np.nan)
+    if there:
+        found = points(tree, [index])
+        kept["range_error"][found.judged] = found.error[found.judged]
+    return kept
 
 
 def _sonar(tree: xr.DataTree, index: int) -> Pose:
@@ -156,7 +148,7 @@ def echo_levels(tree: xr.DataTree, frame: int) -> tuple[Floats, list[str]] | Non
 
     A target without a direct echo: re its strongest.
     """
-    level, families = read(tree, "truth/echo_level", frame), read(tree, "truth/family")
+    level, families = read(tree, "truth/targets/echo_level", frame), read(tree, "truth/targets/family")
     if level is None or families is None:
         return None
     names = [str(name) for name in families]
@@ -168,8 +160,8 @@ def echo_levels(tree: xr.DataTree, frame: int) -> tuple[Floats, list[str]] | Non
 def ghosts(tree: xr.DataTree, frame: int) -> tuple[Ghost, ...]:
     """Ghosts of all targets that are less than `FAINTEST` under the direct echo; none in a store without echoes."""
     found = echo_levels(tree, frame)
-    azimuth, elevation = (read(tree, f"truth/echo_{name}", frame) for name in ("azimuth", "elevation"))
-    targets = read(tree, "truth/target_name")
+    azimuth, elevation = (read(tree, f"truth/targets/echo_{name}", frame) for name in ("azimuth", "elevation"))
+    targets = read(tree, "truth/targets/target")
     if found is None or azimuth is None or elevation is None or targets is None:
         return ()
     level, families = found
@@ -203,17 +195,17 @@ def mesh_group(tree: xr.DataTree, name: str, target: int, index: int) -> str:
     group = f"targets/{name}"
     if read(tree, f"{group}/0/faces") is None:
         return group
-    return f"{group}/{int(needed(tree, 'truth/mesh', index)[target])}"
+    return f"{group}/{int(needed(tree, 'truth/targets/mesh', index)[target])}"
 
 
 def hulls(tree: xr.DataTree, index: int) -> tuple[Hull, ...]:
     """The targets of a frame where they truly are; none of a frame that was not built."""
     sonar = _sonar(tree, index)
-    names = read(tree, "truth/target_name")
+    names = read(tree, "truth/targets/target")
     if names is None or not np.isfinite(sonar.position).all():
         return ()
-    position = needed(tree, "truth/target_position", index)
-    orientation = needed(tree, "truth/target_orientation", index)
+    position = needed(tree, "truth/targets/position", index)
+    orientation = needed(tree, "truth/targets/orientation", index)
     made = []
     for i, name in enumerate(map(str, names)):
         group = mesh_group(tree, name, i, index)

@@ -18,7 +18,7 @@ VARIABLES = {
     "signals": "signals/pressure",
     "image": "image/energy",
     "cloud": "cloud/range",
-    "bearings": "bearings/position",
+    "sources": "source_estimates/position",
 }
 """The variable that stands for each group in a summary."""
 
@@ -48,13 +48,13 @@ def _shape(tree: xr.DataTree, name: str) -> str:
 
 
 def _targets(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
-    names = read(tree, "truth/target_name")
+    names = read(tree, "truth/targets/target")
     if names is None or not len(names):
         return ["  targets    none"]
-    sonar, where = needed(tree, "truth/sonar_position"), needed(tree, "truth/target_position")
+    sonar, where = needed(tree, "truth/sonar_position"), needed(tree, "truth/targets/position")
     away = np.linalg.norm(where[frames] - sonar[frames, None], axis=2)
-    seen = (needed(tree, "truth/visible_fraction")[frames] > 0).sum(axis=0)
-    view = read(tree, "truth/view")
+    seen = (needed(tree, "truth/targets/visible_fraction")[frames] > 0).sum(axis=0)
+    view = read(tree, "truth/targets/view")
     inside = None if view is None else np.isin(view[frames], (View.IN_VIEW, View.PARTLY_IN_VIEW)).sum(axis=0)
     lines = []
     for i, name in enumerate(map(str, names)):

@@ -1,8 +1,8 @@
 """render(plan, i): one frame from recipe to labelled data, pure. Labels enter here and nowhere below.
 
-    trace_frame       Plan -> Traced: Frame, Arrivals, Truth, Ledger
-    beamform_frame    Traced -> Heard: Signals, Bearings, EnergyImage
-    range_frame       Traced, Heard -> Values: everything that is stored, the PointCloud with it
+    trace_frame       Plan -> TracedFrame: Frame, Arrivals, Truth, LinkBudget
+    beamform_frame    TracedFrame -> BeamformedFrame: Signals, SourceEstimates, EnergyImage
+    range_frame       TracedFrame, BeamformedFrame -> Values: everything that is stored, the PointCloud with it
 
 The three are the tasks that the scheduler runs; what nobody asked for is not computed: of truth alone, `truth_frame`.
 """
@@ -78,7 +78,7 @@ class TracedFrame:
     frame: Frame
     arrivals: Arrivals
     truth: Truth
-    ledger: LinkBudget
+    budget: LinkBudget
     echoes: Echoes
 
 
@@ -87,10 +87,12 @@ class BeamformedFrame:
     """What the beamform task gives; None where no product needs it."""
 
     signals: Signals
-    bearings: SourceEstimates | None
+    estimates: SourceEstimates | None
     image: EnergyImage | None
     imaged: Signals | None = None  # what the image was made of: without the snap's own reflections, where these go
-    isolated: Floats | None = None  # (snap, target + 1, family) dB: isolated paths of the ledger as signals have them;
+    isolated: Floats | None = (
+        None  # (snap, target + 1, family) dB: isolated paths of the link budget as signals have them;
+    )
     # None where signals are not stored
 
 
@@ -128,10 +130,10 @@ def trace_at(plan: Plan, frame: Frame) -> TracedFrame:
     truth = _label(plan, frame, levels)
     band, targets = band_of(plan, frame.moment.snaps), len(frame.moment.bodies)
     powers = path_powers(seen, band)
-    book = link_budget(seen, powers, band, targets, levels, expansion_error(plan, seen))
+    budget = link_budget(seen, powers, band, targets, levels, expansion_error(plan, seen))
     heard = echo_levels(seen, powers, targets, levels)
     mark_stage("label")
-    return TracedFrame(frame, arrivals, truth, book, heard)
+    return TracedFrame(frame, arrivals, truth, budget, heard)
 
 
 def _label(plan: Plan, frame: Frame, levels: Floats) -> Truth:
@@ -162,23 +164,23 @@ def beamform_frame(plan: Plan, index: int, traced: TracedFrame) -> BeamformedFra
 def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFrame:
     """What the sonar makes of signals: where the snap is, and the energy image of the echo window."""
     processing, sonar, environment = plan.scene.processing, plan.scene.sonar, plan.scene.world.environment
-    snaps = plan.sizes["snap"]
+    snaps = plan.sizes["emission"]
     locating = processing.locating.resolve(on_bottom=not standing_off(plan.scene))
-    bearings = locating.locate(signals, plan.elements, sonar, frame.sonar_pose, environment.depth, snaps, plan.profile)
+    estimates = locating.locate(signals, plan.elements, sonar, frame.sonar_pose, environment.depth, snaps, plan.profile)
     mark_stage("locate")
-    heard = float(bearings.time[0]) if snaps else np.nan
+    heard = float(estimates.time[0]) if snaps else np.nan
     start, stop = heard + plan.windows.echo_start, heard + plan.windows.echo_stop
     end = signals.start + plan.windows.samples / signals.sampling_frequency
     imaged = signals
     if signals.start <= start and stop <= end:
         if processing.cancelling is not None:
             bottom, pose = environment.depth, frame.sonar_pose
-            imaged = processing.cancelling.cancel(signals, bearings, plan.elements, sonar, pose, bottom, (start, stop))
-        imaged, image = image_of(plan, imaged, bearings, (start, stop))
+            imaged = processing.cancelling.cancel(signals, estimates, plan.elements, sonar, pose, bottom, (start, stop))
+        imaged, image = image_of(plan, imaged, estimates, (start, stop))
     else:  # no direct pulse was found, or an echo was taken for it: no clock, so no image, rather than an arbitrary one
         image = no_image(sonar, np.nan, np.nan)
     mark_stage("beamform")
-    return BeamformedFrame(signals, bearings, image, imaged)
+    return BeamformedFrame(signals, estimates, image, imaged)
 
 
 def synthesise(plan: Plan, traced: TracedFrame) -> Signals:
@@ -199,14 +201,14 @@ def digitise(plan: Plan, frame: Frame, signals: Signals) -> Signals:
 
 
 def measure_isolated(plan: Plan, traced: TracedFrame) -> Floats:
-    """Levels (snap, target + 1, family) in dB of the isolated paths of the ledger, measured in signals of each."""
+    """Levels (snap, target + 1, family) in dB of the isolated paths of the link budget, measured in signals of each."""
     from sonarsynth.signals.isolated_paths import measured_levels
 
     plan = plan.at(traced.frame.index)
-    scene, book = plan.scene, traced.ledger
+    scene, budget = plan.scene, traced.budget
     method, snaps = plan.choices.synthesis, traced.frame.moment.snaps
-    measured = measured_levels(method, book.isolated, snaps, scene.sonar, plan.absorption)
-    return of_isolated(book, traced.truth.snap_level[book.isolated.snap] + measured)
+    measured = measured_levels(method, budget.isolated, snaps, scene.sonar, plan.absorption)
+    return of_isolated(budget, traced.truth.snap_level[budget.isolated.snap] + measured)
 
 
 def range_frame(plan: Plan, index: int, traced: TracedFrame, heard: BeamformedFrame) -> Values:
@@ -214,16 +216,16 @@ def range_frame(plan: Plan, index: int, traced: TracedFrame, heard: BeamformedFr
     plan = plan.at(index)
     frame = traced.frame
     values = _of_frame(plan, frame) | truth_values(traced.truth) | echo_values(traced.echoes, traced.arrivals)
-    values |= link_budget_values(traced.ledger, heard.isolated)
+    values |= link_budget_values(traced.budget, heard.isolated)
     direct = heard_directly(plan, traced.arrivals, frame.moment.snaps)
     values |= estimate_truth(direct, len(frame.moment.snaps))
     if "signals" in plan.products:
         counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
         values |= signal_values(heard.signals, counts)
-    if heard.image is None or heard.bearings is None or heard.imaged is None:
+    if heard.image is None or heard.estimates is None or heard.imaged is None:
         mark_stage("collect")
         return values
-    values |= source_estimate_values(heard.bearings) | emission_values(plan, direct, heard.bearings)
+    values |= source_estimate_values(heard.estimates) | emission_values(plan, direct, heard.estimates)
     if "image" in plan.products:
         values |= image_values(heard.image, plan.windows.direct_removed)
     mark_stage("collect")
@@ -232,15 +234,17 @@ def range_frame(plan: Plan, index: int, traced: TracedFrame, heard: BeamformedFr
         cloud = plan.choices.ranging.cloud(
             heard.imaged,
             heard.image,
-            heard.bearings,
+            heard.estimates,
             plan.elements,
             scene.sonar,
             frame.sonar_pose,
             plan.profile,
             heard.signals,
         )
+        cloud = cloud.loudest(plan.sizes["point"])
         mark_stage("range")
-        values |= cloud_values(cloud, point_labels(plan, frame, traced.arrivals, heard.bearings, cloud))
+        labels = point_labels(plan, frame, traced.arrivals, heard.estimates, cloud)
+        values |= cloud_values(cloud, labels, plan.sizes["point"])
         mark_stage("label")
     return values
 

@@ -11,7 +11,7 @@ from sonarsynth.receiver import Sonar
 
 
 def image_of(
-    plan: Plan, signals: Signals, bearings: SourceEstimates, window: tuple[float, float]
+    plan: Plan, signals: Signals, estimates: SourceEstimates, window: tuple[float, float]
 ) -> tuple[Signals, EnergyImage]:
     """The image of an echo window (start, stop) in s, and the signals that it was made of.
 
@@ -21,10 +21,10 @@ def image_of(
     method, elements, sonar = plan.choices.beamforming, plan.elements, plan.scene.sonar
     length = plan.windows.supports.clear
     if plan.scene.processing.direct_pulse != "keep":
-        signals = remove_others(signals, bearings, elements, sonar, length, window)
+        signals = remove_others(signals, estimates, elements, sonar, length, window)
     if not plan.windows.direct_removed:
         return signals, method.image(signals, elements, sonar, *window)
-    left = remove(signals, bearings, elements, sonar, length)
+    left = remove(signals, estimates, elements, sonar, length)
     if left is None:  # what was located is no wave that could be taken out: no echo is told from it
         return signals, no_image(sonar, *window, remainder=1.0)
 
@@ -32,7 +32,7 @@ def image_of(
         return method.image(some, elements, sonar, start, stop)
 
     image = imaging(left, *window)
-    return left, trusted(image, signals, left, sonar, imaging, float(bearings.time[0]) - length)
+    return left, trusted(image, signals, left, sonar, imaging, float(estimates.time[0]) - length)
 
 
 def no_image(sonar: Sonar, start: float, stop: float, remainder: float = np.nan) -> EnergyImage:

@@ -36,13 +36,13 @@ def heard_directly(plan: Plan, arrivals: Arrivals, snaps: tuple[Snap, ...]) -> D
 def estimate_truth(direct: Direct, snaps: int) -> Values:
     """When and from where the array hears each snap directly, in degrees."""
     time, azimuth, elevation = heard_first(direct, snaps)
-    return table("/truth", snap_arrival=time, snap_azimuth=np.rad2deg(azimuth), snap_elevation=np.rad2deg(elevation))
+    return table("/truth/emissions", arrival=time, azimuth=np.rad2deg(azimuth), elevation=np.rad2deg(elevation))
 
 
-def emission_values(plan: Plan, direct: Direct, bearings: SourceEstimates) -> Values:
+def emission_values(plan: Plan, direct: Direct, estimates: SourceEstimates) -> Values:
     """Which snap each estimate came from."""
     band = plan.scene.sonar.band
-    return table("/bearings", emission=emissions(bearings, direct, band.high - band.low, beam_width(plan)))
+    return table("/source_estimates", emission=emissions(estimates, direct, band.high - band.low, beam_width(plan)))
 
 
 def beam_width(plan: Plan) -> float:

@@ -36,7 +36,7 @@ def band_of(plan: Plan, snaps: tuple[Snap, ...]) -> Band:
 
 
 def point_labels(
-    plan: Plan, frame: Frame, arrivals: Arrivals, bearings: SourceEstimates, cloud: PointCloud
+    plan: Plan, frame: Frame, arrivals: Arrivals, estimates: SourceEstimates, cloud: PointCloud
 ) -> PointLabels:
     """Whose echo each point of a cloud is."""
     sonar = plan.scene.sonar
@@ -46,9 +46,9 @@ def point_labels(
         plan.elements,
         sonar.assumed_sound_speed,
         getattr(plan.choices.ranging, "focus", None),
-        float(bearings.time[0]) if len(bearings.time) else np.nan,
+        float(estimates.time[0]) if len(estimates.time) else np.nan,
         frame.sonar_pose,
         frame.sonar_velocity * moves,
     )
     band = band_of(plan, frame.moment.snaps)
-    return label_points(cloud, sonar.beams.azimuth, sonar.beams.elevation, arrivals, band, moment, listening)
+    return label_points(cloud, arrivals, band, moment, listening)

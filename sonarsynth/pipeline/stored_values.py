@@ -29,42 +29,46 @@ def table(group: str, **columns: object) -> Values:
 
 def truth_values(truth: Truth) -> Values:
     """Truth."""
-    stored = {name.removeprefix("beam_"): value for name, value in vars(truth).items()}
-    stored["image_box"] = np.rad2deg(truth.image_box)
-    return table("/truth", **stored)
+    groups = {"beam_": "/truth/beams", "snap_": "/truth/emissions", "sonar_": "/truth"}
+    values: Values = {}
+    for name, value in vars(truth).items():
+        prefix = next((start for start in groups if name.startswith(start)), "target_")
+        short = name if prefix == "sonar_" else name.removeprefix(prefix)
+        values[groups.get(prefix, "/truth/targets"), short] = np.asarray(value)
+    values["/truth/targets", "image_box"] = np.rad2deg(truth.image_box)
+    return values
 
 
 def echo_values(echoes: Echoes, arrivals: Arrivals) -> Values:
     """Echoes of targets, and the errors of the expansions of arrivals: NaN, not infinite, where a sensor has no ray."""
     stored: dict[str, object] = {f"echo_{name}": np.rad2deg(getattr(echoes, name)) for name in ("azimuth", "elevation")}
     stored["echo_level"] = echoes.level
-    for name in ("wavefront_error", "amplitude_error"):
-        error = float(getattr(arrivals, name))
-        stored[name] = error if np.isfinite(error) else float("nan")
-    return table("/truth", **stored)
+    errors = {name: float(getattr(arrivals, name)) for name in ("wavefront_error", "amplitude_error")}
+    bounds = {name: error if np.isfinite(error) else float("nan") for name, error in errors.items()}
+    return table("/truth/targets", **stored) | table("/link_budget", **bounds)
 
 
-def link_budget_values(book: LinkBudget, measured: Floats | None) -> Values:
+def link_budget_values(budget: LinkBudget, measured: Floats | None) -> Values:
     """Levels; measured (snap, target + 1, family) in dB, or None where signals are not stored.
 
     A path so faint that single precision holds nothing of it (hundreds of dB down a lobe) has no measured level: NaN.
     """
     measures = {} if measured is None else {"measured_level": np.where(np.isneginf(measured), np.nan, measured)}
     return table(
-        "/ledger",
-        **{name: book.level[..., n] for n, name in enumerate(LINK_BUDGET)},
-        paths=book.paths,
-        error_bound=book.error_bound,
-        isolated_facet=of_isolated(book, book.isolated.facet, NO_TARGET),
-        isolated_level=book.isolated_level,
+        "/link_budget",
+        **{name: budget.level[..., n] for n, name in enumerate(LINK_BUDGET)},
+        paths=budget.paths,
+        error_bound=budget.error_bound,
+        isolated_facet=of_isolated(budget, budget.isolated.facet, NO_TARGET),
+        isolated_level=budget.isolated_level,
         **measures,
     )
 
 
-def of_isolated(book: LinkBudget, values: np.ndarray, fill: float = np.nan) -> np.ndarray:
-    """Values of the isolated paths of a ledger (path,) as a table (snap, target + 1, family)."""
-    rows = np.full(book.isolated_level.shape, fill, values.dtype)
-    rows[np.isfinite(book.isolated_level)] = values
+def of_isolated(budget: LinkBudget, values: np.ndarray, fill: float = np.nan) -> np.ndarray:
+    """Values of the isolated paths of a link budget (path,) as a table (snap, target + 1, family)."""
+    rows = np.full(budget.isolated_level.shape, fill, values.dtype)
+    rows[np.isfinite(budget.isolated_level)] = values
     return rows
 
 
@@ -74,12 +78,12 @@ def signal_values(signals: Signals, counts: bool) -> Values:
     return table("/signals", pressure=pressure, start=signals.start, clipped=signals.clipped, outside=signals.outside)
 
 
-def source_estimate_values(bearings: SourceEstimates) -> Values:
-    """Bearings, in degrees."""
-    columns = dict(vars(bearings))
+def source_estimate_values(estimates: SourceEstimates) -> Values:
+    """Source estimates, in degrees."""
+    columns = dict(vars(estimates))
     for name in ("azimuth", "azimuth_error", "elevation", "elevation_error"):
         columns[name] = np.rad2deg(columns[name])
-    return table("/bearings", **columns)
+    return table("/source_estimates", **columns)
 
 
 def image_values(image: EnergyImage, direct_removed: bool) -> Values:
@@ -88,8 +92,17 @@ def image_values(image: EnergyImage, direct_removed: bool) -> Values:
     return values | table("/image", remainder=np.float32(image.remainder)) if direct_removed else values
 
 
-def cloud_values(cloud: PointCloud, labels: PointLabels) -> Values:
-    """The cloud, each coordinate apart, and whose echo each point is."""
-    x, y, z = np.moveaxis(cloud.position, -1, 0)
-    columns = {name: value for name, value in vars(cloud).items() if name != "position"}
-    return table("/cloud", **columns, x=x, y=y, z=z, **vars(labels))
+def cloud_values(cloud: PointCloud, labels: PointLabels, size: int) -> Values:
+    """The cloud, each coordinate apart, and whose echo each point is, padded to `size` points."""
+    x, y, z = cloud.position.T
+    columns = {name: value for name, value in vars(cloud).items() if name not in ("position", "overflow")}
+    columns |= {name: np.rad2deg(columns[name]).astype(np.float32) for name in ("azimuth", "elevation")}
+    columns |= {"x": x, "y": y, "z": z, **vars(labels)}
+    padded = {name: _padded(values, size) for name, values in columns.items()}
+    return table("/cloud", count=np.int32(len(cloud)), overflow=np.int32(cloud.overflow), **padded)
+
+
+def _padded(values: np.ndarray, size: int) -> np.ndarray:
+    rows = np.full(size, NO_TARGET if values.dtype.kind == "i" else np.nan, values.dtype)
+    rows[: len(values)] = values
+    return rows

@@ -10,7 +10,7 @@ from pydantic import TypeAdapter
 from sonarsynth.conventions import Number
 from sonarsynth.description import BY_KIND, description
 from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
-from sonarsynth.propagation import Visibility
+from sonarsynth.propagation import OcclusionPoint
 from sonarsynth.ranging import IsovelocityRange, RefractedRange
 from sonarsynth.signals import DirectSum, GriddedSynthesis
 
@@ -26,7 +26,7 @@ class Choices:
     """Parts that the array is cut into; as many as it has hydrophones: each is traced by itself."""
     degree: Degree = 3
     """Of the polynomials that paths are expanded in over the array, or a part of it."""
-    visibility: Visibility = "centre"
+    occlusion: OcclusionPoint = "centre"
     """From where facets must be seen to be heard: from the middle of the array or part, or from each hydrophone."""
     negligible: Annotated[Number, Ge(0), Lt(1)] = 1e-7
     """Share of the power of a target's echo that its faintest paths may have, and be left out."""

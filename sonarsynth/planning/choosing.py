@@ -23,7 +23,7 @@ from sonarsynth.planning.measured.sampled_arrivals import arrivals_of
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.plans import Errors, Plan
 from sonarsynth.products import Arrivals
-from sonarsynth.propagation import Visibility
+from sonarsynth.propagation import OcclusionPoint
 from sonarsynth.ranging import AutoRange, IsovelocityRange, RefractedRange
 from sonarsynth.receiver import Elements
 from sonarsynth.receiver.subarrays import subarray, subarrays, with_rim
@@ -73,9 +73,7 @@ def choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
     by_synthesis = deposit_error(synthesis) if isinstance(synthesis, GriddedSynthesis) else 0.0
     return replace(
         made,
-        choices=replace(
-            choices, subarrays=cut.parts, degree=cut.degree, visibility=cut.visibility, beamforming=steering
-        ),
+        choices=replace(choices, subarrays=cut.parts, degree=cut.degree, occlusion=cut.occlusion, beamforming=steering),
         errors=Errors(cut.error, cut.whole, by_synthesis, bent if straight else 0.0, blurred),
     )
 
@@ -96,8 +94,8 @@ def _some(looks: Sequence[SampledScene], count: int) -> list[SampledScene]:
 
 
 def _negligible(scene: Scene, accuracy: Accuracy) -> float:
-    if scene.physics.faintest != "auto":
-        return float(10.0 ** (-scene.physics.faintest / 10.0))
+    if scene.physics.dynamic_range != "auto":
+        return float(10.0 ** (-scene.physics.dynamic_range / 10.0))
     return 0.0 if accuracy.exact else FAINT * accuracy.cheap**2
 
 
@@ -119,7 +117,7 @@ class _ArrayModel(NamedTuple):
     """How paths reach the hydrophones."""
 
     parts: int  # that the array is cut into
-    visibility: Visibility
+    occlusion: OcclusionPoint
     degree: Degree  # of polynomials over each part
     error: float  # of signals
     whole: float = np.nan  # the same, where the array is not cut and its middle sees for all
@@ -129,7 +127,7 @@ def _subarrays(plan: Plan, indices: Sequence[int]) -> _ArrayModel:
     """The fewest parts of the array that will do; where one will not, each hydrophone's own view of the targets is
     tried first, and then polynomials of the fifth degree."""
     physics, count = plan.scene.physics, plan.elements.count
-    seeing: Visibility = "centre" if physics.visibility == "auto" else physics.visibility
+    seeing: OcclusionPoint = "centre" if physics.occlusion == "auto" else physics.occlusion
     if physics.subarrays == "sensors" or (physics.subarrays == "auto" and plan.recipe.accuracy.exact):
         return _ArrayModel(count, "centre", 3, 0.0)
     measures = [PerSensorReference.of(plan, index) for index in indices]
@@ -139,10 +137,10 @@ def _subarrays(plan: Plan, indices: Sequence[int]) -> _ArrayModel:
     degree: Degree = 3
     enough = np.inf if given else allowed
     whole = error = _worst(measures, first, seeing, degree, enough)
-    if error > allowed and physics.visibility == "auto":
-        better = _worst(measures, first, "hydrophones", degree, enough)
+    if error > allowed and physics.occlusion == "auto":
+        better = _worst(measures, first, "sensors", degree, enough)
         if better < WORTHWHILE_GAIN * error:
-            seeing, error = "hydrophones", better
+            seeing, error = "sensors", better
     if error > allowed and first < count:
         better = _worst(measures, first, seeing, 5, enough)
         if better < WORTHWHILE_GAIN * error:
@@ -161,12 +159,12 @@ def _subarrays(plan: Plan, indices: Sequence[int]) -> _ArrayModel:
 
 
 def _worst(
-    measures: Sequence[PerSensorReference], parts: int, visibility: Visibility, degree: Degree, allowed: float
+    measures: Sequence[PerSensorReference], parts: int, occlusion: OcclusionPoint, degree: Degree, allowed: float
 ) -> float:
     """Largest error of signals in some frames, or the first that is more than is allowed."""
     worst = 0.0
     for measure in measures:
-        worst = max(worst, measure.error(parts, visibility, degree))
+        worst = max(worst, measure.error(parts, occlusion, degree))
         if worst > allowed:
             break
     return worst
@@ -196,9 +194,9 @@ class PerSensorReference:
             plan, frame, sensor, (np.vstack([r[0] for r in rows]), np.vstack([r[1] for r in rows]))
         )
 
-    def error(self, parts: int, visibility: Visibility = "centre", degree: Degree = 3) -> float:
+    def error(self, parts: int, occlusion: OcclusionPoint = "centre", degree: Degree = 3) -> float:
         """Error of signals, relative, where the array is cut into so many parts: of echoes or direct arrivals."""
-        choices = replace(self.plan.choices, subarrays=parts, degree=degree, visibility=visibility)
+        choices = replace(self.plan.choices, subarrays=parts, degree=degree, occlusion=occlusion)
         plan = replace(self.plan, choices=choices)
         found = tuple(np.zeros_like(x) for x in self.exact)
         for part in subarrays(self.plan.elements, parts):

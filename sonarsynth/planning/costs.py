@@ -107,7 +107,7 @@ def _synthesis(plan: Plan) -> Row:
     """The row of the synthesis, in seconds of the reference machine."""
     scene, sizes = plan.scene, plan.sizes
     sensor_samples = sizes["sensor"] * sizes["sample"]
-    paths = _paths(plan) * max(sizes["snap"], 1) * _ways(plan)
+    paths = _paths(plan) * max(sizes["emission"], 1) * _ways(plan)
     each = SECONDS["synthesise path sensor"] + _solid_angle(plan) * SECONDS["synthesise path sensor steradian"]
     work = paths * sizes["sensor"] * each + sensor_samples * SECONDS["synthesise sensor sample"]
     if scene.world.environment.noise:
@@ -135,8 +135,8 @@ def _traced(plan: Plan) -> str:
         to = "each hydrophone separately"
     if plan.choices.degree > 3 and parts < plan.elements.count:
         to += f", degree {plan.choices.degree}"
-    if plan.choices.visibility == "hydrophones":
-        to += ", visibility from each hydrophone"
+    if plan.choices.occlusion == "sensors":
+        to += ", occlusion from each hydrophone"
     words = [f"{plan.propagation.kind} rays to {to}", f"{plan.propagation.bounces} bounces", laws]
     return ", ".join(word for word in words if word)
 
@@ -182,7 +182,7 @@ def _trace_rows(plan: Plan) -> list[Row]:
     if plan.products:
         traced = 1 if plan.choices.subarrays == 1 else 1 + plan.choices.subarrays
         why = "refraction is below the required accuracy" if straight else "the sound speed varies with depth"
-        seconds = _tracing(plan, kind) * max(sizes["snap"], 1) * _ways(plan) * traced
+        seconds = _tracing(plan, kind) * max(sizes["emission"], 1) * _ways(plan) * traced
         rows.append(("trace", _traced(plan), why, _expanded(plan), seconds, 0))
     beams = sizes["azimuth"] * sizes["elevation"]
     seconds = beams * SECONDS["label beam"] + _facets(plan) * SECONDS[f"label {kind}facet"]
@@ -193,7 +193,7 @@ def _signal_rows(plan: Plan) -> list[Row]:
     """Signals, where any product needs them, and paths measured in signals of their own."""
     rows = [_synthesis(plan)] if plan.products else []
     if "signals" in plan.products:
-        seconds = max(plan.sizes["snap"], 1) * (plan.sizes["target"] + 1) * SECONDS["measure path"]
+        seconds = max(plan.sizes["emission"], 1) * (plan.sizes["target"] + 1) * SECONDS["measure path"]
         rows.append(("measure", "loudest path of each kind alone", "verify compares levels", "none", seconds, 0))
     return rows
 
@@ -205,7 +205,9 @@ def _sonar_rows(plan: Plan) -> list[Row]:
     sonar, sizes = plan.scene.sonar, plan.sizes
     beams, gate = sizes["azimuth"] * sizes["elevation"], plan.windows.echo_stop - plan.windows.echo_start
     kind, seconds = plan.scene.processing.locating.kind, sizes["sensor"] * SECONDS["locate sensor"]
-    rows: list[Row] = [("locate", kind, "the echo window begins at the snap", "predicted, /bearings", seconds, 512)]
+    rows: list[Row] = [
+        ("locate", kind, "the echo window begins at the snap", "predicted, /source_estimates", seconds, 512)
+    ]
     image = sizes["sensor"] * gate * sonar.sampling_frequency * SECONDS["transform sensor sample"]
     image += beams * (sonar.band.high - sonar.band.low) * gate * SECONDS["image beam bin"]
     if plan.windows.direct_removed:  # and what is left of it imaged

@@ -164,10 +164,10 @@ class _ArrivalInterval:
 def _spans(look: SampledScene) -> list[_ArrivalInterval]:
     """When each frame is heard, with what straight lines between things at rest leave out."""
     scene, profile = look.scene, look.profile
-    bounces, bed = scene.physics.tracing.bounces, scene.world.environment.depth
+    bounces, bottom_depth = scene.physics.tracing.bounces, scene.world.environment.depth
     blurred, spans = blur_of(scene), []
     for frame in look.frames:
-        span = _span(frame, profile, bed, bounces)
+        span = _span(frame, profile, bottom_depth, bounces)
         slack = _slack(scene.physics.doppler, frame, span, profile)
         spans.append(
             replace(
@@ -182,25 +182,25 @@ def _spans(look: SampledScene) -> list[_ArrivalInterval]:
     return spans
 
 
-def _span(frame: Frame, profile: Profile, bed: float, bounces: int) -> _ArrivalInterval:
+def _span(frame: Frame, profile: Profile, bottom_depth: float, bounces: int) -> _ArrivalInterval:
     array = frame.sonar_pose.position
     snaps = frame.moment.snaps
     if not snaps:
         return _ArrivalInterval(0.0, 0.0, 0.0, np.nan, np.nan, 0.0)
-    direct = np.array([s.time + float(_straight_time(profile, bed, s.position, array)) for s in snaps])
+    direct = np.array([s.time + float(_straight_time(profile, bottom_depth, s.position, array)) for s in snaps])
     earliest, late_echo = np.full(len(snaps), np.inf), [-np.inf] * len(snaps)
     parts = [(body, some) for body in frame.moment.bodies for some in in_blocks(len(body.mesh.faces))]
     for body, some in parts:
         points = body.pose.to_world(body.mesh.centroid[some])
-        back = _straight_time(profile, bed, points, array)
+        back = _straight_time(profile, bottom_depth, points, array)
         for n, snap in enumerate(snaps):
-            echo = snap.time + _straight_time(profile, bed, snap.position, points) + back
+            echo = snap.time + _straight_time(profile, bottom_depth, snap.position, points) + back
             earliest[n] = min(earliest[n], echo.min(initial=np.inf))
             late_echo[n] = max(late_echo[n], echo.max(initial=-np.inf))
     echoes = bool(np.isfinite(earliest).all())
     late_direct = direct
     if bounces:
-        late_direct, late_echo = _reflected(frame, profile, bed, bounces)
+        late_direct, late_echo = _reflected(frame, profile, bottom_depth, bounces)
     last = np.array([max(d, e) for d, e in zip(late_direct, late_echo, strict=True)])
     heard = [
         level - 20 * np.log10(max(float(np.linalg.norm(s.position - array)), 1e-9))
@@ -220,7 +220,7 @@ def _span(frame: Frame, profile: Profile, bed: float, bounces: int) -> _ArrivalI
     )
 
 
-def _reflected(frame: Frame, profile: Profile, bed: float, bounces: int) -> tuple[Floats, list[float]]:
+def _reflected(frame: Frame, profile: Profile, bottom_depth: float, bounces: int) -> tuple[Floats, list[float]]:
     """Last direct arrival and last echo (s) of each snap by so many reflections, from the boxes round the bodies.
 
     The length of a path by image sources is convex in the point that it meets, so a corner of the box is the farthest.
@@ -229,13 +229,13 @@ def _reflected(frame: Frame, profile: Profile, bed: float, bounces: int) -> tupl
     low_high = [(b.pose, b.mesh.box) for b in frame.moment.bodies]
     corners = [p.to_world(low + CORNERS * (high - low)) for p, (low, high) in low_high]
     points = np.concatenate([np.empty((0, 3)), *corners])
-    points[:, 2] = np.clip(points[:, 2], -bed, 0.0)
-    back = straight.connect(profile, bed, points, np.broadcast_to(array, points.shape))
+    points[:, 2] = np.clip(points[:, 2], -bottom_depth, 0.0)
+    back = straight.connect(profile, bottom_depth, points, np.broadcast_to(array, points.shape))
     direct, echoes = [], []
     for snap in frame.moment.snaps:
         start = snap.position[None, :]
-        direct.append(snap.time + straight.connect(profile, bed, start, array[None, :]).travel_time.max())
-        out = straight.connect(profile, bed, np.broadcast_to(start, points.shape), points)
+        direct.append(snap.time + straight.connect(profile, bottom_depth, start, array[None, :]).travel_time.max())
+        out = straight.connect(profile, bottom_depth, np.broadcast_to(start, points.shape), points)
         latest = -np.inf
         for n in range(bounces + 1):
             first, second = (_latest(paths, k, len(points)) for paths, k in ((out, n), (back, bounces - n)))
@@ -257,13 +257,13 @@ def _disturbed(span: _ArrivalInterval, start: float, stop: float) -> bool:
     return any(first < span.clock + stop and last > span.clock + start for first, last in span.others)
 
 
-def _straight_time(profile: Profile, bed: float, a: Floats, b: Floats) -> Floats:
+def _straight_time(profile: Profile, bottom_depth: float, a: Floats, b: Floats) -> Floats:
     """Travel time (...) along straight lines a to b (..., xyz): distance times the mean slowness between them."""
     distance = np.asarray(np.linalg.norm(a - b, axis=-1))
     if profile.uniform:
         return np.asarray(distance / profile.speed[0])
     ends = np.broadcast_arrays(depth(a), depth(b))
-    slowness = mean_slowness(water(profile.depth, profile.speed, bed), *(np.atleast_1d(z) for z in ends))
+    slowness = mean_slowness(water(profile.depth, profile.speed, bottom_depth), *(np.atleast_1d(z) for z in ends))
     return np.asarray(distance * slowness.reshape(distance.shape))
 
 

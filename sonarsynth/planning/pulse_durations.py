@@ -67,7 +67,7 @@ def blur_of(scene: Scene) -> float:
     """By how much (s) rough boundaries and bodies lengthen the pulses that they reflect and leave anything of."""
     environment, bounces = scene.world.environment, scene.physics.tracing.bounces
     heights = [law.roughness for law in scene.laws if isinstance(law, Kirchhoff)]
-    roughest = max(rms_height(environment.surface), rms_height(environment.bed))
+    roughest = max(rms_height(environment.surface), rms_height(environment.bottom))
     most = np.hypot(max(heights, default=0.0), roughest * np.sqrt(bounces))
     if not most > 0.0:
         return 0.0
@@ -79,7 +79,7 @@ def blur_of(scene: Scene) -> float:
 def extreme_waveforms(scene: Scene) -> list[Waveform]:
     """What each shrimp may sound like at the most: as its model, as long as it may become, and as short."""
     found = []
-    for shrimp in scene.world.shrimp:
+    for shrimp in scene.world.sources:
         model, longest = model_of(shrimp, scene.world.environment.depth), largest_scales(shrimp.variation)[1]
         found += [at_longest(waveform(model, width)) for width in sorted({1.0, longest, 1.0 / longest})]
     return found

@@ -20,19 +20,17 @@ reflects), or from no path of the frame: noise, or what cancelling leaves."""
 class PointLabels:
     """Whose echo each point is: the target, snap and family whose paths bring most energy in the beam at its delay.
 
-    -1 and NaN where there is no point, or nothing explains it. The emission of a point is not that of the sonar's clock
+    -1 and NaN where nothing explains it. The emission of a point is not that of the sonar's clock
     where another snap lit it: its range is wrong then.
     """
 
-    target: npt.NDArray[np.int16]  # (elevation, azimuth) -1 for none: the snap itself
-    emission: npt.NDArray[np.int16]  # (elevation, azimuth) which snap
-    family: npt.NDArray[
-        np.int8
-    ]  # (elevation, azimuth) index into FAMILIES: how it reached the array; no direct: a ghost
-    facet: npt.NDArray[np.int32]  # (elevation, azimuth) that brings most; -1 for none
-    true_range: npt.NDArray[np.float32]  # (elevation, azimuth) m from the array centre to where the echo was made
-    distance: npt.NDArray[np.float32]  # (elevation, azimuth) m from the point to the nearest surface of the target
-    origin: npt.NDArray[np.int8]  # (elevation, azimuth) index into ORIGINS
+    target: npt.NDArray[np.int16]  # (point,) -1 for none: the snap itself
+    emission: npt.NDArray[np.int16]  # (point,) which snap
+    family: npt.NDArray[np.int8]  # (point,) index into FAMILIES: how it reached the array; no direct: a ghost
+    facet: npt.NDArray[np.int32]  # (point,) that brings most; -1 for none
+    true_range: npt.NDArray[np.float32]  # (point,) m from the array centre to where the echo was made
+    distance: npt.NDArray[np.float32]  # (point,) m from the point to the nearest surface of the target
+    origin: npt.NDArray[np.int8]  # (point,) index into ORIGINS
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +84,7 @@ LINK_BUDGET = (
     "boundary_loss",
     "received_level",
 )
-"""Ledger terms in dB: received = source - loss_out + scattering - loss_in - absorption - boundary.
+"""Terms of the link budget in dB: received = source - loss_out + scattering - loss_in - absorption - boundary.
 
 Source is the peak level of the snap at 1 m before any filter. Received is that, and the ratio of the energy in the band
 of the sonar that the paths of the family bring to the array centre over the energy that the snap has there at 1 m:
@@ -105,7 +103,7 @@ class LinkBudget:
     like the others; what is measured in the signals of that path alone must agree (`verification`).
     """
 
-    level: Floats  # (snap, target + 1, family, LEDGER) dB; the last target row is the direct path; NaN without paths
+    level: Floats  # (snap, target + 1, family, term) dB; the last target is the direct path; NaN without paths
     paths: Ints  # (snap, target + 1, family)
     error_bound: Floats  # (snap, target + 1, family) dB
     isolated_level: Floats  # (snap, target + 1, family) dB re 1 uPa at the array centre; NaN without a path

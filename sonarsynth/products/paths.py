@@ -32,7 +32,8 @@ class Paths:
     flag: Ints  # (path,) 0 good; else why ray theory ends here (`ray_solutions.REASONS`)
 
 
-FAMILIES = ("direct", "surface", "bed", "surface and bed")
+DIRECT = "direct"
+FAMILIES = (DIRECT, "surface", "bottom", "surface and bottom")
 """Families of paths: by which boundaries they touched."""
 
 

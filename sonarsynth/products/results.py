@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -41,30 +41,30 @@ alone is NaN: when and from where the pulse came is known; of all others nothing
 
 @dataclass(frozen=True, eq=False)
 class SourceEstimates:
-    """Where the array hears each snap: one row a snap, the loudest direct pulse first; NaN where none was found.
+    """Where the sonar thinks each snap was: one row a snap, the loudest direct pulse first; NaN where none was found.
 
     Rows of what was found come first, then those of pulses that were refused, `reason` says why. Standard errors are
     predicted from the data and the instrument alone (one sigma). Which true snap a row comes from is a label:
     `labels.estimate_labels`.
     """
 
-    time: Floats  # (snap,) s: arrival at the array centre of the peak of the pulse's envelope in the band
-    time_error: Floats  # (snap,) s
-    azimuth: Floats  # (snap,) rad, sonar frame, of the arriving wave as it is heard, whatever else is known
-    azimuth_error: Floats  # (snap,) rad
-    elevation: Floats  # (snap,) rad
-    elevation_error: Floats  # (snap,) rad
-    range_from_depth: Floats  # (snap,) m: where the bearing meets the known depth of the bottom
-    range_from_depth_error: Floats  # (snap,) m
-    range_from_curvature: Floats  # (snap,) m: from the curvature of the wavefront
-    range_from_curvature_error: Floats  # (snap,) m
-    position: Floats  # (snap, xyz) m, sonar frame: of the wavefront, and of the bottom's depth where it was used
-    position_covariance: Floats  # (snap, xyz, xyz) m2
-    residual: Floats  # (snap,) s: root mean square residual of the sensor delays
+    time: Floats  # (estimate,) s: arrival at the array centre of the peak of the pulse's envelope in the band
+    time_error: Floats  # (estimate,) s
+    azimuth: Floats  # (estimate,) rad, sonar frame, of the arriving wave as it is heard, whatever else is known
+    azimuth_error: Floats  # (estimate,) rad
+    elevation: Floats  # (estimate,) rad
+    elevation_error: Floats  # (estimate,) rad
+    range_from_depth: Floats  # (estimate,) m: where the bearing meets the known depth of the bottom
+    range_from_depth_error: Floats  # (estimate,) m
+    range_from_curvature: Floats  # (estimate,) m: from the curvature of the wavefront
+    range_from_curvature_error: Floats  # (estimate,) m
+    position: Floats  # (estimate, xyz) m, sonar frame: of the wavefront, and of the bottom's depth where it was used
+    position_covariance: Floats  # (estimate, xyz, xyz) m2
+    residual: Floats  # (estimate,) s: root mean square residual of the sensor delays
     bottom_used: (
-        Ints  # (snap,) 1 where the depth of the bottom entered the position, 0 where it did not, -1 without one
+        Ints  # (estimate,) 1 where the depth of the bottom entered the position, 0 where it did not, -1 without one
     )
-    reason: Ints  # (snap,) index into REASONS
+    reason: Ints  # (estimate,) index into REASONS
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,10 +81,35 @@ class EnergyImage:
 
 @dataclass(frozen=True, eq=False)
 class PointCloud:
-    """One organised cloud on the beam grid; NaN where there is no point. Sonar frame."""
+    """Where the echoes of a frame come from: a list of points, in the order of their beams. Sonar frame."""
 
-    range: npt.NDArray[np.float32]  # (elevation, azimuth) m from the array centre
-    range_error: npt.NDArray[np.float32]  # (elevation, azimuth) m, predicted standard error
-    delay: npt.NDArray[np.float32]  # (elevation, azimuth) s after the direct arrival
-    energy: npt.NDArray[np.float32]  # (elevation, azimuth) Pa2 s of the beam
-    position: npt.NDArray[np.float32]  # (elevation, azimuth, xyz) m
+    position: npt.NDArray[np.float32]  # (point, xyz) m
+    range: npt.NDArray[np.float32]  # (point,) m from the array centre
+    range_error: npt.NDArray[np.float32]  # (point,) m, predicted standard error
+    azimuth: Floats  # (point,) rad, port positive
+    elevation: Floats  # (point,) rad
+    delay: npt.NDArray[np.float32]  # (point,) s after the direct arrival
+    energy: npt.NDArray[np.float32]  # (point,) Pa2 s of the beam
+    overflow: int = 0  # points that were left out: the faintest
+
+    def __len__(self) -> int:
+        """Number of points."""
+        return len(self.range)
+
+    def select(self, rows: Ints) -> PointCloud:
+        """Some of the points."""
+        columns = {name: value[rows] for name, value in vars(self).items() if name != "overflow"}
+        return PointCloud(**columns, overflow=self.overflow)
+
+    def loudest(self, count: int) -> PointCloud:
+        """At most so many points, those of most energy, in the order in which they are; the others are counted."""
+        if len(self) <= count:
+            return self
+        kept = np.sort(np.argsort(-self.energy, kind="stable")[:count])
+        return replace(self.select(kept), overflow=self.overflow + len(self) - count)
+
+
+def no_points() -> PointCloud:
+    """A cloud without points."""
+    none = np.zeros(0, np.float32)
+    return PointCloud(np.zeros((0, 3), np.float32), none, none, np.zeros(0), np.zeros(0), none, none)

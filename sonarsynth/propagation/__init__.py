@@ -16,7 +16,7 @@ from sonarsynth.propagation.auto_propagation import AutoTracing
 from sonarsynth.propagation.refracted import Refracted
 from sonarsynth.propagation.straight import Straight
 
-Visibility = Literal["centre", "hydrophones"]
+OcclusionPoint = Literal["centre", "sensors"]
 """From where facets are seen: the middle of the array or part, or each hydrophone for itself."""
 
 

@@ -84,7 +84,7 @@ class RayArrivals:
 
 def eigenrays(
     sound_speed: SoundSpeed,
-    seabed_depth: npt.ArrayLike,
+    bottom_depth: npt.ArrayLike,
     source_depth: npt.ArrayLike,
     receiver_depth: npt.ArrayLike,
     horizontal_range: npt.ArrayLike,
@@ -110,15 +110,17 @@ def eigenrays(
         0   0.0674125     -8.5308       8.5308        1       0        0         0    40.10
         0   0.0687184     14.0362     -14.0362        0       1        0         0    40.26
     """
-    names = ("seabed_depth", "source_depth", "receiver_depth", "horizontal_range")
-    values = (seabed_depth, source_depth, receiver_depth, horizontal_range)
-    bed, start, end, distance = _together(names, [_numbers(n, value) for n, value in zip(names, values, strict=True)])
-    return _find(sound_speed, bed, start, end, distance, np.array([[1.0, 0.0]]), names, vertices)
+    names = ("bottom_depth", "source_depth", "receiver_depth", "horizontal_range")
+    values = (bottom_depth, source_depth, receiver_depth, horizontal_range)
+    bottom_depth, start, end, distance = _together(
+        names, [_numbers(n, value) for n, value in zip(names, values, strict=True)]
+    )
+    return _find(sound_speed, bottom_depth, start, end, distance, np.array([[1.0, 0.0]]), names, vertices)
 
 
 def eigenrays_between(
     sound_speed: SoundSpeed,
-    seabed_depth: npt.ArrayLike,
+    bottom_depth: npt.ArrayLike,
     source: npt.ArrayLike,
     receiver: npt.ArrayLike,
     *,
@@ -141,21 +143,21 @@ def eigenrays_between(
         if wrong.any():
             at = f" {int(np.argmax(wrong))}" if wrong.size > 1 else ""
             raise ValueError(f"{name}{at} must be finite, but is {position.reshape(-1, 3)[int(np.argmax(wrong))]}")
-    names = ("seabed_depth", "source", "receiver")
-    bed = _numbers("seabed_depth", seabed_depth)
-    beds, from_row, to_row = _together(names, [bed, _rows(start), _rows(end)])
+    names = ("bottom_depth", "source", "receiver")
+    bottom_depth = _numbers("bottom_depth", bottom_depth)
+    bottom_depths, from_row, to_row = _together(names, [bottom_depth, _rows(start), _rows(end)])
     start, end = start.reshape(-1, 3)[from_row.astype(int)], end.reshape(-1, 3)[to_row.astype(int)]
     span = end[:, :2] - start[:, :2]
     distance = np.hypot(span[:, 0], span[:, 1])
     with np.errstate(invalid="ignore", divide="ignore"):
         ahead = np.where(distance[:, None] > 0.0, span / distance[:, None], 0.0)
-    named = ("seabed_depth", "source", "receiver", "horizontal distance")
-    return _find(sound_speed, beds, -start[:, 2], -end[:, 2], distance, ahead, named, vertices)
+    named = ("bottom_depth", "source", "receiver", "horizontal distance")
+    return _find(sound_speed, bottom_depths, -start[:, 2], -end[:, 2], distance, ahead, named, vertices)
 
 
 def _find(
     sound_speed: SoundSpeed,
-    bed: Floats,
+    bottom_depth: Floats,
     start: Floats,
     end: Floats,
     distance: Floats,
@@ -173,14 +175,14 @@ def _find(
         raise ValueError(f"vertices must be a whole number, not {vertices!r}") from None
     if not 0 <= most <= MOST_VERTICES:
         raise ValueError(f"vertices must lie between 0 and {MOST_VERTICES}, but is {most}")
-    _check(names, bed, start, end, distance)
+    _check(names, bottom_depth, start, end, distance)
     profile = profile_of(sound_speed)
     for note in profile.notes:
         warnings.warn(note, OutOfRange, stacklevel=2)
     parts, pairs = [], []
-    for depth in np.unique(bed) if len(bed) else []:
+    for depth in np.unique(bottom_depth) if len(bottom_depth) else []:
         reaches(sound_speed, float(depth))
-        chosen = np.flatnonzero(bed == depth)
+        chosen = np.flatnonzero(bottom_depth == depth)
         water = kernel.water(profile.depth, profile.speed, float(depth))
         found = kernel.eigenrays(water, start[chosen], end[chosen], distance[chosen], most, most)
         parts.append(_arrivals(found, chosen[found.pair], ahead, distance))
@@ -240,20 +242,20 @@ def _together(names: tuple[str, ...], arrays: list[Floats]) -> list[Floats]:
         raise ValueError(f"these shapes do not broadcast: {shapes}") from None
 
 
-def _check(names: tuple[str, ...], bed: Floats, start: Floats, end: Floats, distance: Floats) -> None:
+def _check(names: tuple[str, ...], bottom_depth: Floats, start: Floats, end: Floats, distance: Floats) -> None:
     """Raises ValueError in one line that names what is wrong, and which of them."""
 
     def first(wrong: Bools, name: str, values: Floats, what: str) -> None:
         if wrong.any():
             i = int(np.argmax(wrong))
             which = f"{name} of pair {i}" if len(values) > 1 else name
-            raise ValueError(f"{which} {what.format(value=values[i], bed=bed[i])}")
+            raise ValueError(f"{which} {what.format(value=values[i], bottom_depth=bottom_depth[i])}")
 
-    for name, values in zip(names, (bed, start, end, distance), strict=True):
+    for name, values in zip(names, (bottom_depth, start, end, distance), strict=True):
         first(~np.isfinite(values), name, values, "must be finite, but is {value:g} m")
-    first(bed <= 0.0, names[0], bed, "must be positive, but is {value:g} m")
+    first(bottom_depth <= 0.0, names[0], bottom_depth, "must be positive, but is {value:g} m")
     for name, values in ((names[1], start), (names[2], end)):
-        wrong = (values < -kernel.TOLERANCE) | (values > bed + kernel.TOLERANCE)
-        first(wrong, name, values, "at {value:.12g} m depth is not in the water, which is {bed:.12g} m deep")
+        wrong = (values < -kernel.TOLERANCE) | (values > bottom_depth + kernel.TOLERANCE)
+        first(wrong, name, values, "at {value:.12g} m depth is not in the water, which is {bottom_depth:.12g} m deep")
     first(distance < 0.0, names[3], distance, "must not be negative, but is {value:g} m")
     first(distance > FARTHEST, names[3], distance, f"must be at most {FARTHEST:g} m, but is {{value:g}} m")

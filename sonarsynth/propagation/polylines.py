@@ -13,7 +13,7 @@ import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.equations.rays.ray_solutions import Eigenrays, Water
-from sonarsynth.propagation.ray_steps import ARRIVAL, BED, LAUNCH, ON, SURFACE, TURN
+from sonarsynth.propagation.ray_steps import ARRIVAL, BOTTOM, LAUNCH, ON, SURFACE, TURN
 
 __all__ = ["Polylines", "polylines"]
 
@@ -104,14 +104,14 @@ def _points(
     return made
 
 
-def _stops(rays: Eigenrays, i: int, z1: float, z2: float, bed: float) -> tuple[list[float], list[int], float]:
+def _stops(rays: Eigenrays, i: int, z1: float, z2: float, bottom_depth: float) -> tuple[list[float], list[int], float]:
     """Depths of the ends and of the vertices between them, what happens there, and the sense of the first leg."""
     count = int(rays.surface[i] + rays.bottom[i] + rays.turning[i])
     if count == 0:
         return [z1, z2], [ARRIVAL], 1.0 if z2 > z1 else -1.0
     sine = rays.start_sine[i] if rays.start_sine[i] != 0.0 else rays.end_sine[i] * (-1) ** count
     upper = (0.0, SURFACE) if rays.surface[i] else (rays.upper[i], TURN)
-    lower = (bed, BED) if rays.bottom[i] else (rays.lower[i], TURN)
+    lower = (bottom_depth, BOTTOM) if rays.bottom[i] else (rays.lower[i], TURN)
     up = bool(sine > 0.0) if sine != 0.0 else not np.isfinite(lower[0])
     depths, events = zip(*[(upper, lower)[(n + (not up)) % 2] for n in range(count)], strict=True)
     return [z1, *depths, z2], [*events, ARRIVAL], -1.0 if up else 1.0

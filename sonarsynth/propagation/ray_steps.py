@@ -12,8 +12,8 @@ from sonarsynth.equations.rays.ray_solutions import Water
 from sonarsynth.geometry import unit
 from sonarsynth.geometry.placed_target import PlacedTarget
 
-EVENTS = ("on the way", "turning point", "surface", "bed", "end", "facet", "launch", "arrival")
-ON, TURN, SURFACE, BED, END, FACET, LAUNCH, ARRIVAL = range(len(EVENTS))
+EVENTS = ("on the way", "turning point", "surface", "bottom", "end", "facet", "launch", "arrival")
+ON, TURN, SURFACE, BOTTOM, END, FACET, LAUNCH, ARRIVAL = range(len(EVENTS))
 """What happens at a point of a ray; the first five are those of `equations.rays.ray_arcs`."""
 
 
@@ -150,7 +150,7 @@ def planes(bodies: tuple[PlacedTarget, ...], target: Ints, facet: Ints) -> tuple
 
 def reflect(layers: Water, bodies: tuple[PlacedTarget, ...], rays: Rays, why: Ints, target: Ints, facet: Ints) -> Rays:
     """Rays turned at surface, bottom and facets by the mirror law, and counted."""
-    flat = (why == SURFACE) | (why == BED)
+    flat = (why == SURFACE) | (why == BOTTOM)
     phi, p, direction = np.where(flat, -rays.phi, rays.phi), rays.p.copy(), rays.direction.copy()
     direction[flat, 2] *= -1.0
     clear = rays.position.copy()

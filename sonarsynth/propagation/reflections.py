@@ -46,7 +46,7 @@ def at_boundaries(
     if not (surface.any() or bottom.any()):
         return Reflections(np.ones(surface.shape), np.zeros(surface.shape), np.zeros(surface.shape))
     over = bounces(environment.surface, surface_grazing, surface, float(profile.at(0.0)), centre)
-    under = bounces(environment.bed, bottom_grazing, bottom, float(profile.at(environment.depth)), centre)
+    under = bounces(environment.bottom, bottom_grazing, bottom, float(profile.at(environment.depth)), centre)
     return Reflections(
         over.modulus * under.modulus, over.phase + under.phase, np.hypot(over.delay_std, under.delay_std)
     )

@@ -56,7 +56,7 @@ class CancellingMethod(Protocol):
     def cancel(
         self,
         signals: Signals,
-        bearings: SourceEstimates,
+        estimates: SourceEstimates,
         elements: Elements,
         sonar: Sonar,
         sonar_pose: Pose,
@@ -77,14 +77,14 @@ class RangingMethod(Protocol):
         self,
         signals: Signals,
         image: EnergyImage,
-        bearings: SourceEstimates,
+        estimates: SourceEstimates,
         elements: Elements,
         sonar: Sonar,
         sonar_pose: Pose,
         profile: Profile,
         direct: Signals | None = None,
     ) -> PointCloud:
-        """Points on the beam grid from the first snap of `bearings`; NaN where there is none, or none to be trusted.
+        """Points lit by the first snap of `estimates`; none of a beam whose echo is not to be trusted.
 
         profile: the sound speed of the water, for methods that trace rays and were given none of their own. direct:
         signals with the direct pulse in them, where it was taken out of `signals`.

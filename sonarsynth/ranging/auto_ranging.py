@@ -37,7 +37,7 @@ class AutoRange:
         self,
         signals: Signals,
         image: EnergyImage,
-        bearings: SourceEstimates,
+        estimates: SourceEstimates,
         elements: Elements,
         sonar: Sonar,
         sonar_pose: Pose,
@@ -47,4 +47,4 @@ class AutoRange:
         """See `RangingMethod`. With no plan: the closed form where the sound speed is the assumed one everywhere."""
         straight = profile.uniform and profile.speed[0] == sonar.assumed_sound_speed
         method = self.resolve(straight=straight)
-        return method.cloud(signals, image, bearings, elements, sonar, sonar_pose, profile, direct)
+        return method.cloud(signals, image, estimates, elements, sonar, sonar_pose, profile, direct)

@@ -68,8 +68,9 @@ class Echoes:
     extent: Floats  # (beam,) s: root mean square distance from the peak of all echo in the beam
 
 
-def over_threshold(image: EnergyImage, threshold: float, loudest: float = 0.0) -> tuple[Ints, Ints]:
-    """Rows and columns of the beams within `threshold` dB of the loudest; none in silence or where none was heard.
+def over_threshold(image: EnergyImage, threshold: float, loudest: float = 0.0) -> tuple[tuple[Ints, Ints], int]:
+    """Rows and columns of the beams within `threshold` dB of the loudest, none in silence or where none was heard; and
+    how many are left out, the faintest of more than `MAX_BEAMS`.
 
     loudest: largest pressure (Pa) in the signals. An image no louder than `RESIDUE` of it all through the window is
     what rounding and the tail of the direct pulse leave, not an echo.
@@ -77,22 +78,23 @@ def over_threshold(image: EnergyImage, threshold: float, loudest: float = 0.0) -
     energy = np.where(np.isfinite(image.energy), image.energy, 0.0)
     peak = float(energy.max(initial=0.0))
     if not peak > (RESIDUE * loudest) ** 2 * (image.stop - image.start):
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+        return (np.zeros(0, np.int64), np.zeros(0, np.int64)), 0
     keep = energy >= peak * 10 ** (-threshold / 10)
-    if keep.sum() > MAX_BEAMS:
+    over = int(keep.sum())
+    if over > MAX_BEAMS:
         keep &= energy >= np.partition(energy, -MAX_BEAMS, axis=None)[-MAX_BEAMS]
     row, column = np.nonzero(keep)
-    return row, column
+    return (row, column), over - len(row)
 
 
 def direct_spectrum(
-    signals: Signals, bearings: SourceEstimates, elements: Elements, sonar: Sonar, length: int
+    signals: Signals, estimates: SourceEstimates, elements: Elements, sonar: Sonar, length: int
 ) -> Complexes:
-    """Spectrum (bin,) in Pa s of the direct pulse at the array centre, without the face, about `bearings.time`.
+    """Spectrum (bin,) in Pa s of the direct pulse at the array centre, without the face, about `estimates.time`.
 
     At the frequencies of an FFT of `length` samples.
     """
-    c, front = sonar.assumed_sound_speed, PlaneWaveFit.of(bearings)
+    c, front = sonar.assumed_sound_speed, PlaneWaveFit.of(estimates)
     aligned = pulse_times.align(signals, elements, sonar.band, front.delays(elements, c), whole=True)
     wave = pulse_times.waveform(aligned, elements, c, front.direction, front.curvature, front.time)
     return pulse_times.template_spectrum(wave.template, length)
@@ -101,7 +103,7 @@ def direct_spectrum(
 def range_profiles(
     signals: Signals,
     image: EnergyImage,
-    bearings: SourceEstimates,
+    estimates: SourceEstimates,
     elements: Elements,
     sonar: Sonar,
     beams: tuple[Ints, Ints],
@@ -121,7 +123,7 @@ def range_profiles(
     f, spectra = gated_spectra(signals.pressure, rate, first, count, band)
     spacing = frequency_spacing(count, rate)
     lowest = round(f[0] / spacing)
-    wave = direct_spectrum(direct, bearings, elements, sonar, fast_length(count))[lowest : lowest + len(f)]
+    wave = direct_spectrum(direct, estimates, elements, sonar, fast_length(count))[lowest : lowest + len(f)]
     density = np.abs(wave) ** 2
     place = (f - band[0]) / (band[1] - band[0])
     taper = np.sin(np.pi * np.clip(place, 0.0, 1.0)) ** 2
@@ -141,7 +143,7 @@ def range_profiles(
     spread = np.sum(taper**2)
     centre = f @ taper**2 / spread
     beta = np.sqrt(max((f - centre) ** 2 @ taper**2 / spread, spacing**2))
-    start = signals.start + first / rate - float(bearings.time[0])
+    start = signals.start + first / rate - float(estimates.time[0])
     return Profiles(row, column, u, power, start, step, _half_width(elements, centre / c), 1 / (2 * np.pi * beta))
 
 

@@ -1,4 +1,4 @@
-"""From echoes to an organised point cloud with predicted errors."""
+"""From echoes to a point cloud with predicted errors."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.bistatic_range import bistatic_range
-from sonarsynth.products import EnergyImage, PointCloud, Signals, SourceEstimates
+from sonarsynth.products import EnergyImage, PointCloud, Signals, SourceEstimates, no_points
 from sonarsynth.ranging.beam_echoes import over_threshold, pick, range_profiles
 from sonarsynth.receiver import Elements, Sonar
 
@@ -42,7 +42,7 @@ def isovelocity_solution(delay: Floats, beam: Floats, source: Floats, sound_spee
 def point_cloud(
     signals: Signals,
     image: EnergyImage,
-    bearings: SourceEstimates,
+    estimates: SourceEstimates,
     elements: Elements,
     sonar: Sonar,
     threshold: float,
@@ -53,30 +53,37 @@ def point_cloud(
 ) -> PointCloud:
     """Echoes of the beams over threshold, placed by `solve`; `direct`: signals with the direct pulse in them, where
     it was taken out of `signals`."""
-    shape = image.energy.shape
-    grids = {name: np.full(shape, np.nan, np.float32) for name in ("range", "range_error", "delay", "energy")}
-    position = np.full((*shape, 3), np.nan, np.float32)
-    beams = over_threshold(image, threshold, float(np.abs(signals.pressure).max(initial=0.0)))
-    located = len(bearings.time) > 0 and np.isfinite(bearings.time[0]) and np.isfinite(bearings.position[0]).all()
-    if located and len(beams[0]) > 0:
-        profiles = range_profiles(signals, image, bearings, elements, sonar, beams, focus, direct or signals)
-        echoes = pick(profiles, image, locality)
-        own = np.isfinite(echoes.delay)
-        solution = solve(echoes.delay[own], profiles.direction[own], bearings.position[0])
-        clock = np.hypot(echoes.delay_error, echoes.extent)[own]
-        error = range_error(solution, echoes.delay[own], clock, echoes.angle_error[own], bearings, sonar)
-        good = np.isfinite(solution.range) & (solution.range > 0) & np.isfinite(error)
-        at = profiles.row[own][good], profiles.column[own][good]
-        grids["range"][at] = solution.range[good]
-        grids["range_error"][at] = error[good]
-        grids["delay"][at] = echoes.delay[own][good]
-        grids["energy"][at] = image.energy[at]
-        position[at] = solution.position[good]
-    return PointCloud(position=position, **grids)
+    beams, left_out = over_threshold(image, threshold, float(np.abs(signals.pressure).max(initial=0.0)))
+    located = len(estimates.time) > 0 and np.isfinite(estimates.time[0]) and np.isfinite(estimates.position[0]).all()
+    if not (located and len(beams[0])):
+        return no_points()
+    profiles = range_profiles(signals, image, estimates, elements, sonar, beams, focus, direct or signals)
+    echoes = pick(profiles, image, locality)
+    own = np.isfinite(echoes.delay)
+    solution = solve(echoes.delay[own], profiles.direction[own], estimates.position[0])
+    clock = np.hypot(echoes.delay_error, echoes.extent)[own]
+    error = range_error(solution, echoes.delay[own], clock, echoes.angle_error[own], estimates, sonar)
+    row, column = profiles.row[own], profiles.column[own]
+    cloud = PointCloud(
+        position=solution.position.astype(np.float32),
+        range=solution.range.astype(np.float32),
+        range_error=error.astype(np.float32),
+        azimuth=image.azimuth[column],
+        elevation=image.elevation[row],
+        delay=echoes.delay[own].astype(np.float32),
+        energy=image.energy[row, column],
+        overflow=left_out,
+    )
+    return cloud.select(np.flatnonzero(np.isfinite(solution.range) & (solution.range > 0) & np.isfinite(error)))
 
 
 def range_error(
-    solution: Solution, delay: Floats, delay_error: Floats, angle_error: Floats, bearings: SourceEstimates, sonar: Sonar
+    solution: Solution,
+    delay: Floats,
+    delay_error: Floats,
+    angle_error: Floats,
+    estimates: SourceEstimates,
+    sonar: Sonar,
 ) -> Floats:
     """Predicted standard error (beam,) in m: beam width, clock, snap position, sound speed.
 
@@ -88,6 +95,6 @@ def range_error(
     beside = np.hypot(solution.by_angle, SLOPE * solution.range) * angle_error
     clock = solution.by_path * c * delay_error
     g = solution.by_source
-    snap = np.einsum("bi,ij,bj->b", g, bearings.position_covariance[0], g)
+    snap = np.einsum("bi,ij,bj->b", g, estimates.position_covariance[0], g)
     speed = solution.by_path * delay * sonar.sound_speed_error
     return np.asarray(np.sqrt(beside**2 + clock**2 + np.maximum(snap, 0.0) + speed**2))

@@ -46,7 +46,7 @@ class IsovelocityRange:
         self,
         signals: Signals,
         image: EnergyImage,
-        bearings: SourceEstimates,
+        estimates: SourceEstimates,
         elements: Elements,
         sonar: Sonar,
         sonar_pose: Pose,
@@ -59,7 +59,7 @@ class IsovelocityRange:
         return point_cloud(
             signals,
             image,
-            bearings,
+            estimates,
             elements,
             sonar,
             self.threshold,

@@ -33,7 +33,7 @@ class RefractedRange:
         self,
         signals: Signals,
         image: EnergyImage,
-        bearings: SourceEstimates,
+        estimates: SourceEstimates,
         elements: Elements,
         sonar: Sonar,
         sonar_pose: Pose,
@@ -50,7 +50,7 @@ class RefractedRange:
         return point_cloud(
             signals,
             image,
-            bearings,
+            estimates,
             elements,
             sonar,
             self.threshold,

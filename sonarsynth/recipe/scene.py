@@ -17,13 +17,14 @@ from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.motion import Motion, Still, Track, pose, velocity
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.imaging import AutoBeamforming, Beamformer
+from sonarsynth.products import DIRECT
 from sonarsynth.propagation import AutoTracing, Tracing
 from sonarsynth.randomness import stream
 from sonarsynth.ranging import AutoRange, Cancelling, Locator, Ranging, SensorDelays
 from sonarsynth.receiver import Sonar
 from sonarsynth.scattering import MirrorLobe, Scattering
 from sonarsynth.signals import AutoSynthesis, Synthesis
-from sonarsynth.sources.shrimp import SnappingShrimp
+from sonarsynth.sources.shrimp import SnappingShrimp, Source
 from sonarsynth.sources.snap_pulses import scales
 from sonarsynth.state import Snap, WorldState, snaps_of
 from sonarsynth.targets.target import Target, mesh_for
@@ -39,7 +40,7 @@ class World:
     environment: Environment
     targets: tuple[Target, ...] = ()
     """Bodies in the water."""
-    shrimp: tuple[SnappingShrimp, ...] = ()
+    sources: tuple[Source, ...] = ()
     """What makes the sound."""
 
     @field_validator("targets")
@@ -47,17 +48,19 @@ class World:
     def _check_names(cls, targets: tuple[Target, ...]) -> tuple[Target, ...]:
         names = set[str]()
         for target in targets:
+            if target.name == DIRECT:
+                raise ValueError(f"no target can be called '{DIRECT}': in the link budget that is the path without one")
             if target.name in names:
                 raise ValueError(f"two targets are called '{target.name}'")
             names.add(target.name)
         return targets
 
-    @field_validator("targets", "shrimp")
+    @field_validator("targets", "sources")
     @classmethod
     def _check_count(cls, several: tuple[Any, ...], info: ValidationInfo) -> tuple[Any, ...]:
         count = sum(len(one.snap_times) if isinstance(one, SnappingShrimp) else 1 for one in several)
         if count > MOST:
-            what = "snaps" if info.field_name == "shrimp" else "targets"
+            what = "snaps" if info.field_name == "sources" else "targets"
             raise ValueError(f"{count} {what} are more than {MOST}")
         return several
 
@@ -91,10 +94,10 @@ class Physics:
     subarrays: Literal["auto", "sensors"] | Annotated[int, Ge(1), Le(100_000)] = "auto"
     """Parts that the array is cut into: paths are traced to the middle of each and expanded from there to its
     hydrophones. `sensors`: every hydrophone by itself; `auto`: as few as the accuracy of the recipe allows."""
-    visibility: Literal["auto", "centre", "hydrophones"] = "auto"
-    """Whether a facet is heard where the middle of the array (or part) sees it, or by each hydrophone that sees it.
+    occlusion: Literal["auto", "centre", "sensors"] = "auto"
+    """From where bodies hide facets: from the middle of the array (or part) for all, or from each sensor by itself.
     `auto`: the latter where the accuracy of the recipe asks for it."""
-    faintest: Literal["auto"] | Annotated[Decibels, Gt(0), Le(300)] = "auto"
+    dynamic_range: Literal["auto"] | Annotated[Decibels, Gt(0), Le(300)] = "auto"
     """The faintest echoes of each target are left out, all of them together this far below the whole echo."""
     synthesis: Synthesis = Field(default_factory=AutoSynthesis)
     """How signals are made from arrivals."""
@@ -133,6 +136,8 @@ class Processing:
     """How the energy image is made."""
     ranging: Ranging = Field(default_factory=AutoRange)
     """How echoes are ranged and placed."""
+    max_points: Annotated[int, Ge(1), Le(1_000_000)] = 4096
+    """Room for points of a frame in the store: the loudest are kept, and how many were left out is stored."""
 
 
 @description
@@ -168,7 +173,7 @@ class Scene:
         )
         bottom = self.world.environment.depth
         snaps: list[Snap] = []
-        for i, shrimp in enumerate(self.world.shrimp):
+        for i, shrimp in enumerate(self.world.sources):
             drawn = scales(shrimp.variation, stream(seed, "snap", key, step, i), len(shrimp.snap_times))
             snaps += snaps_of(shrimp, bottom, drawn)
         return WorldState(time, bodies, tuple(snaps))

@@ -20,6 +20,7 @@ import numpy as np
 from sonarsynth.conventions import Ints
 from sonarsynth.description import FieldError
 from sonarsynth.randomness import number
+from sonarsynth.recipe.renamed_keys import as_drawn
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.recipe.splits import SPLITS, Splits, assign
 from sonarsynth.recipe.variation.grid import Axis, Zip, axes
@@ -100,7 +101,7 @@ class Sequences:
         of_point, dimension, found = _point(self, point[:-1])[1], 0, []
         key = f"{of_point} {point[-1]}"
         for i, variation in enumerate(self.variations):
-            path = variation.path[0]
+            path = as_drawn(variation.path[0])
             if isinstance(variation, Sobol):
                 value = variation.draw(self.seed, of_point, path, dimension, point[-1])
                 dimension += 1
@@ -249,4 +250,4 @@ def _point(sequences: Sequences, values: tuple[int, ...]) -> tuple[tuple[Setting
         for place, axis, taken in some:
             at = (*place, "values", n) if axis.values is not None else place
             found.append(Setting(at, name_of(axis), axis.path, taken[n]))
-    return tuple(found), json.dumps(sorted([list(s.paths), s.value.text] for s in found))
+    return tuple(found), json.dumps(sorted([[as_drawn(path) for path in s.paths], s.value.text] for s in found))

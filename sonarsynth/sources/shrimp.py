@@ -38,6 +38,7 @@ SnapModel = Annotated[LogarithmicBubble | KellerMiksis | RecordedSnap | Ricker |
 class SnappingShrimp:
     """A shrimp on the bottom that snaps at given times."""
 
+    kind: Literal["snapping_shrimp"] = "snapping_shrimp"
     name: str = "shrimp"
     """For people; nothing depends on it."""
     position: tuple[Metres, Metres] | Position
@@ -53,3 +54,7 @@ class SnappingShrimp:
     """How its snaps differ; left out: they do not."""
     snap_times: Annotated[tuple[Seconds, ...], MinLen(1)] = (0.0,)
     """Times of collapse (s) after the instant of each frame."""
+
+
+Source = Annotated[SnappingShrimp, BY_KIND]
+"""What makes sound, by `kind`."""

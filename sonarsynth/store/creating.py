@@ -32,6 +32,7 @@ from sonarsynth.store.files.scratch import clear, hidden, made, sweep
 from sonarsynth.store.files.within import Mismatch
 from sonarsynth.store.layout import ArrayLayout, Layout, layout_of
 from sonarsynth.store.marks import LAYOUT, MANIFESTS, Damage, Mark, all_files, load_layout, marked, save_mark
+from sonarsynth.store.opening import check_format
 from sonarsynth.store.provenance import begun, made_of, other_versions
 
 if TYPE_CHECKING:
@@ -62,6 +63,7 @@ def create(
     if there:
         stored = _identity_of(path)
         if not restart:
+            check_format(path, stored)
             sweep(path)
             _go_on(path, stored, plan, mixed_versions)
             return layout
@@ -96,6 +98,7 @@ def _create_there(
         if not unfinished:
             stored = _identity_of(path)
             if not restart:
+                check_format(path, stored)
                 _go_on(path, stored, plan, mixed_versions)
                 return layout
         (path / "zarr.json").unlink(missing_ok=True)

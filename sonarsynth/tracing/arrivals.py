@@ -36,7 +36,7 @@ from sonarsynth.tracing.receive_paths import rays_to_centre
 from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, by_target, join, no_arrivals
 
 if TYPE_CHECKING:
-    from sonarsynth.propagation import Propagation, Visibility
+    from sonarsynth.propagation import OcclusionPoint, Propagation
 
 
 def trace(
@@ -55,7 +55,7 @@ def trace(
     negligible: float = NEGLIGIBLE,
     enough: float = QUADRATIC_TOLERANCE,
     alike: float = FACET_MEAN_TOLERANCE,
-    visibility: Visibility = "centre",
+    occlusion: OcclusionPoint = "centre",
     degree: int = 3,
 ) -> Arrivals:
     """The arrivals of a frame, sorted by snap; of each first those that met no target, then echoes by target, then the
@@ -67,14 +67,14 @@ def trace(
     bodies move while sound is under way (left out: all is where it is at the instant of the frame); shared:
     `meetings.SHARED`; negligible: see `NEGLIGIBLE`; enough: `facet_paths.QUADRATIC_TOLERANCE`; alike:
     `facet_paths.FACET_MEAN_TOLERANCE`; degree: of polynomials over the aperture. A facet counts where it is lit by the
-    snap and seen, with no body in between, by the array centre; or, with `visibility`, by some hydrophone that it
+    snap and seen, with no body in between, by the array centre; or, with `occlusion`, by some hydrophone that it
     faces, and is heard by those. The snap itself is heard if no body stands in between, but for those that scatter
     forward (`tracing.occlusion.forward_scattering`). Raises ValueError for anything outside the water.
     """
 
     def legs_to(pose: Pose, bodies: tuple[PlacedTarget, ...], targets: tuple[int, ...] | None = None) -> FacetPaths:
         return facet_paths(
-            environment, profile, bodies, pose, elements, propagation, band, negligible, enough, alike, visibility,
+            environment, profile, bodies, pose, elements, propagation, band, negligible, enough, alike, occlusion,
             degree, targets,
         )  # fmt: skip
 

@@ -141,7 +141,7 @@ def echo_batches(
     """Echoes of pairs of a way and a leg (pair,), by body and part; those that are nothing are left out; carried: by
     how much pairs differ from those that were traced, where anything moves."""
     facets, found = array.facets, []
-    looked_for = array.visibility == "hydrophones" and array.elements.count > 1
+    looked_for = array.occlusion == "sensors" and array.elements.count > 1
     target = facets.target[out.facet]
     for number, (body, of_law) in enumerate(zip(array.bodies, parts, strict=True)):
         row = np.flatnonzero(target == number)

@@ -28,7 +28,7 @@ from sonarsynth.tracing.receive_paths import (
 )
 
 if TYPE_CHECKING:
-    from sonarsynth.propagation import Propagation, Visibility
+    from sonarsynth.propagation import OcclusionPoint, Propagation
 
 
 FACET_MEAN_TOLERANCE = 1e-3
@@ -65,7 +65,7 @@ class FacetPaths:
     alike: float = (
         FACET_MEAN_TOLERANCE  # change of an echo by the mean over its facet, over the aperture, that is left out
     )
-    visibility: Visibility = "centre"  # from where facets must be seen
+    occlusion: OcclusionPoint = "centre"  # from where facets must be seen
     first: int = 0  # of the legs, in the wavefronts
     degree: int = 3  # of polynomials over the aperture
     targets: tuple[int, ...] | None = None  # of the facets; None: all
@@ -94,7 +94,7 @@ class FacetPaths:
 
     def view(self, bodies: tuple[PlacedTarget, ...]) -> Occlusion:
         """Who looks, and which bodies stand in between."""
-        lookout = self.elements if self.visibility == "hydrophones" else None
+        lookout = self.elements if self.occlusion == "sensors" else None
         return Occlusion(
             bodies, self.environment, self.bending, self.sonar_pose, lookout, self.propagation, self.degree
         )
@@ -134,7 +134,7 @@ def facet_paths(
     negligible: float = NEGLIGIBLE,
     enough: float = QUADRATIC_TOLERANCE,
     alike: float = FACET_MEAN_TOLERANCE,
-    visibility: Visibility = "centre",
+    occlusion: OcclusionPoint = "centre",
     degree: int = 3,
     targets: tuple[int, ...] | None = None,
 ) -> FacetPaths:
@@ -145,7 +145,7 @@ def facet_paths(
     """
     require_in_water(bodies, environment)
     bent, centre = bending(profile, propagation, sonar_pose), 0.5 * (band[0] + band[1])
-    lookout = elements if visibility == "hydrophones" else None
+    lookout = elements if occlusion == "sensors" else None
     slack = elements.aperture if lookout is not None else 0.0
     view = Occlusion(bodies, environment, bent, sonar_pose, lookout, propagation, degree)
     found: tuple[list[ReceivePaths], list[Facets]] = [], []
@@ -168,7 +168,7 @@ def facet_paths(
     over = expansion_source(legs, group, environment, bent, sonar_pose, elements, propagation, band, degree)
     return FacetPaths(
         legs, over, facets, bodies, environment, profile, propagation, sonar_pose, elements, band, negligible, enough,
-        alike, visibility, degree=degree, targets=targets,
+        alike, occlusion, degree=degree, targets=targets,
     )  # fmt: skip
 
 

@@ -190,7 +190,7 @@ def receive_paths(
 
 
 def may_face_receiver(
-    facets: Facets, position: Floats, bounces: int, profile: Profile, bed: float, slack: float = 0.0
+    facets: Facets, position: Floats, bounces: int, profile: Profile, bottom_depth: float, slack: float = 0.0
 ) -> Bools:
     """(facet,) which may have a ray on their outer side to a point (xyz), or within `slack` (m) of it; exactly so in
     uniform water, unreflected.
@@ -202,7 +202,7 @@ def may_face_receiver(
         return np.asarray(np.einsum("ij,ij->i", facets.normal, position - facets.point) > -slack)
     level = position[:2] - facets.point[:, :2]
     distance = np.hypot(level[:, 0], level[:, 1])
-    flattest = distance / np.hypot(distance, (bounces + 2) * bed)
+    flattest = distance / np.hypot(distance, (bounces + 2) * bottom_depth)
     cosine = flattest * profile.speed.min() / profile.speed.max()
     ahead = np.einsum("ij,ij->i", facets.normal[:, :2], level) / np.maximum(distance, 1e-300)
     steepest = np.abs(facets.normal[:, 2]) * np.sqrt((1.0 - cosine) * (1.0 + cosine))

@@ -87,7 +87,7 @@ SURFACE = [
     "Rigid",
     "Romanis",
     "Scene",
-    "SeaBed",
+    "SeaBottom",
     "SeaSurface",
     "Sediment",
     "SensorDelays",

@@ -1,4 +1,4 @@
-"""Targets before, behind, upon and inside each other, and at the surface and the bed: nothing is counted twice."""
+"""Targets before, behind, upon and inside each other, and at the surface and the bottom: nothing is counted twice."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from sonarsynth.targets.target import Target
 from sonarsynth.tracing.arrivals import trace
 
 C = 1500.0
-BED = 30.0
-WATER = Environment(depth=BED, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"))
+BOTTOM_DEPTH = 30.0
+WATER = Environment(depth=BOTTOM_DEPTH, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"))
 ARRAY = np.array([0.0, 0.0, -15.0])
 EAST = quaternion(0.5 * np.pi)
 ROMANIS = elements(Romanis())
@@ -55,7 +55,7 @@ def heard(
     """Every path; all of them finite."""
     speed = np.array([C + 8.0, C - 7.0]) if bent else np.array([C])
     found = trace(
-        WATER, Profile(np.array([0.0, BED])[: len(speed)], speed), WorldState(0.0, bodies,
+        WATER, Profile(np.array([0.0, BOTTOM_DEPTH])[: len(speed)], speed), WorldState(0.0, bodies,
         (Snap(np.asarray(source), 0.0, LogarithmicBubble(), None),)), Pose(ARRAY, EAST), ROMANIS, 0.0,
         AutoTracing(bounces=bounces), laws, band=(25e3, 85e3),
     )  # fmt: skip
@@ -200,7 +200,7 @@ def test_two_halves_are_heard_as_one_body(law: Kirchhoff) -> None:
 
 @pytest.mark.parametrize("law", [Kirchhoff(), SCATTERED])
 @pytest.mark.parametrize(("bounces", "bent"), [(0, False), (2, False), (1, True)])
-@pytest.mark.parametrize("level", [-0.5, -BED + 0.5])
+@pytest.mark.parametrize("level", [-0.5, -BOTTOM_DEPTH + 0.5])
 def test_a_box_with_a_face_in_the_surface_or_the_bed_echoes_as_one_just_off_it(
     law: Kirchhoff, bounces: int, bent: bool, level: float
 ) -> None:
@@ -218,7 +218,7 @@ def scene(target: Target, depth: float) -> Recipe:
     sonar = Sonar(array=PlanarLattice(columns=6, rows=6, pitch=0.05))
     return Recipe(
         scene=Scene(
-            world=World(environment=environment, targets=(target,), shrimp=(SnappingShrimp(position=(14.0, -4.0)),)),
+            world=World(environment=environment, targets=(target,), sources=(SnappingShrimp(position=(14.0, -4.0)),)),
             sonar=sonar,
         )
     )
@@ -231,14 +231,14 @@ def test_a_body_that_goes_through_a_boundary_is_refused_in_one_line(z: float) ->
     with pytest.raises(FieldError, match=f"targets.0.motion: target 'ball' is .* m {where}") as refused:
         plan(scene(Target(name="ball", shape=shape, motion=Still(position=(10.0, 0.0, z))), 12.0), {"cloud"})
     assert "\n" not in str(refused.value)
-    up = z if z > -6 else z + 12.0 - BED
+    up = z if z > -6 else z + 12.0 - BOTTOM_DEPTH
     with pytest.raises(ValueError, match=f"target 'body' reaches {where}"):
         heard((placed(mesh_of(shape), 10, 0, up),), (Kirchhoff(),))
 
 
 def test_a_body_that_pokes_out_by_less_than_a_facet_is_refused() -> None:
     mesh = ball(0.5, 0.2)
-    for z, where in ((-0.495, "above the surface"), (-BED + 0.495, "below the bottom")):
+    for z, where in ((-0.495, "above the surface"), (-BOTTOM_DEPTH + 0.495, "below the bottom")):
         with pytest.raises(ValueError, match=f"target 'body' reaches {where}"):
             heard((placed(mesh, 10, 0, z),), (Kirchhoff(),))
 

@@ -56,12 +56,12 @@ def check(
 @pytest.mark.parametrize(("start", "end"), [(0.0, 40.0), (12.0, 31.0), (31.0, 12.0), (7.0, 7.0), (40.0, 0.0)])
 def test_straight_up_and_down(name: str, start: float, end: float) -> None:
     water = WATERS[name]
-    bed = water.depth[-1]
+    bottom_depth = water.depth[-1]
     found = one(water, start, end, 0.0, 5, 5)
-    whole = float(ray_solutions.mean_slowness(water, np.array([0.0]), np.array([bed]))[0]) * bed
+    whole = float(ray_solutions.mean_slowness(water, np.array([0.0]), np.array([bottom_depth]))[0]) * bottom_depth
     down = [float(ray_solutions.mean_slowness(water, np.array([0.0]), np.array([z]))[0]) * z for z in (start, end)]
     expected = images(whole, *down, 5)
-    tall = images(bed, start, end, 5)
+    tall = images(bottom_depth, start, end, 5)
     keep = [i for i, row in enumerate(tall) if row[4] > 0]
     moving = found.length > 0
     np.testing.assert_allclose(found.travel_time[moving], [expected[i][4] for i in keep], rtol=1e-14)
@@ -72,7 +72,7 @@ def test_straight_up_and_down(name: str, start: float, end: float) -> None:
     assert (found.flag[~moving] == ray_solutions.COINCIDENT).all()
     assert np.isfinite(found.amplitude[moving]).all()
     np.testing.assert_array_equal(found.upper[moving & (found.surface > 0)], 0.0)
-    np.testing.assert_array_equal(found.lower[moving & (found.bottom > 0)], bed)
+    np.testing.assert_array_equal(found.lower[moving & (found.bottom > 0)], bottom_depth)
 
 
 @pytest.mark.parametrize(

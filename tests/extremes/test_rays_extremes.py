@@ -115,7 +115,7 @@ def test_what_cannot_be_is_refused(start: float, end: float, distance: float, me
 
 
 @pytest.mark.parametrize(
-    ("depth", "speed", "bed"),
+    ("depth", "speed", "bottom"),
     [
         ([0.0, 1.0], [1500.0], 9.0),
         ([1.0, 0.0], [1.0, 1.0], 9.0),
@@ -124,6 +124,6 @@ def test_what_cannot_be_is_refused(start: float, end: float, distance: float, me
         ([0.0], [1.0], 0.0),
     ],
 )
-def test_profiles_that_cannot_be_are_refused(depth: list[float], speed: list[float], bed: float) -> None:
+def test_profiles_that_cannot_be_are_refused(depth: list[float], speed: list[float], bottom_depth: float) -> None:
     with pytest.raises(ValueError, match="profile"):
-        ray_solutions.water(np.array(depth), np.array(speed), bed)
+        ray_solutions.water(np.array(depth), np.array(speed), bottom_depth)

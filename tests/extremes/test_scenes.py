@@ -49,7 +49,7 @@ def scene(
     water = {"depth": 12.0, "sound_speed": Isovelocity(speed=1540.0)} | (environment or {})
     return Recipe(
         scene=Scene(
-            world=World(environment=Environment(**water), targets=targets, shrimp=snaps),
+            world=World(environment=Environment(**water), targets=targets, sources=snaps),
             sonar=Sonar(**({"array": LATTICE, "beams": BEAMS} | (sonar or {}))),
             trajectory=Trajectory(**(trajectory or {})),
             **more,
@@ -74,7 +74,7 @@ HEARD: dict[str, Recipe] = {
     "behind the array": scene((ball((-10.0, 0.0, -5.0)),)),
     "out of the field of view": scene((ball((3.0, 8.0, -5.0)),)),
     "touching the surface": scene((ball((10.0, 0.0, -0.5)),)),
-    "touching the bed": scene((ball((10.0, 0.0, -11.5)),)),
+    "touching the bottom": scene((ball((10.0, 0.0, -11.5)),)),
     "one target behind another": scene((ball((10.0, 0.0, -5.0), 0.8), ball((14.0, 0.0, -5.0), 0.3, "far"))),
     "two shrimp": scene(snaps=(shrimp(14.0, -4.0), shrimp(9.0, 6.0))),
     "two snaps": scene(snaps=(shrimp(14.0, -4.0, snap_times=(0.0, 0.02)),)),
@@ -159,30 +159,37 @@ def test_a_frame_whose_snap_is_heard_has_an_image(which: str) -> None:
 @pytest.mark.parametrize("which", UNHEARD)
 def test_a_frame_whose_snap_is_not_found_is_whole_and_says_nothing(which: str) -> None:
     _, tree = frame_of(UNHEARD[which])
-    for name in ("image/energy", "image/start", "image/stop", "cloud/range", "bearings/time", "bearings/position"):
+    for name in (
+        "image/energy",
+        "image/start",
+        "image/stop",
+        "cloud/range",
+        "source_estimates/time",
+        "source_estimates/position",
+    ):
         assert np.isnan(tree[name].values).all(), name
-    assert np.isfinite(tree["truth"].target_position).all()
+    assert np.isfinite(tree["truth/targets"].position).all()
 
 
 def test_a_strong_thermocline_across_the_array_is_said_to_be_beyond_the_expansion() -> None:
     """Some sensors have no ray from the snap: no wavefront over the aperture holds, and its error is NaN."""
     _, tree = frame_of(scene(environment=layered((0.0, 4.9, 5.1, 12.0), (1540.0, 1540.0, 1450.0, 1450.0))))
-    assert np.isnan(float(tree["truth"].wavefront_error))
+    assert np.isnan(float(tree["link_budget"].wavefront_error))
     assert np.isnan(tree["image"].energy.values).all()
 
 
 def test_the_snap_that_is_heard_best_starts_the_clock() -> None:
     """Of two shrimp the farther one is heard better, off the sides of the elements' beams: its echoes are imaged."""
     tree = render(HEARD["two shrimp"], 0)
-    time = tree["bearings"].time.values
+    time = tree["source_estimates"].time.values
     assert time[0] > time[1]
     assert float(tree["image"].start) > time[0]
 
 
 def test_a_target_that_hides_another() -> None:
     truth = render(HEARD["one target behind another"], 0)["truth"]
-    assert truth.visible_fraction.values == pytest.approx([1.0, 0.0])
-    assert set(np.unique(truth.target)) == {-1, 0}
+    assert truth["targets"].visible_fraction.values == pytest.approx([1.0, 0.0])
+    assert set(np.unique(truth["beams"].target)) == {-1, 0}
 
 
 def test_clipped_samples_are_counted() -> None:
@@ -193,8 +200,8 @@ def test_clipped_samples_are_counted() -> None:
 
 
 def test_less_is_computed_for_less() -> None:
-    groups, levels = {"truth", "targets"}, {"ledger"}
-    heard = (((), set()), (("signals",), {"signals"} | levels), (("image",), {"image", "bearings"} | levels))
+    groups, levels = {"truth", "targets"}, {"link_budget"}
+    heard = (((), set()), (("signals",), {"signals"} | levels), (("image",), {"image", "source_estimates"} | levels))
     for products, more in heard:
         assert set(render(plan(scene(), products), 0).children) == groups | more
 
@@ -209,7 +216,7 @@ def test_odd_stores_are_whole(which: str, tmp_path: Path) -> None:
     report = store.verify(tmp_path / "odd.zarr", [evaluation.check])
     assert not report.problems
     rows = {row.name: row for row in report.checks}
-    assert rows["ledger adds up"].ok
+    assert rows["link budget adds up"].ok
     if which in ("no shrimp", "the direct path is blocked"):  # nothing to find is nothing to blame
         assert rows["snap located"].ok is None and not rows["snap located"].warning
     if which == "one hydrophone":  # it was there to be heard
@@ -220,20 +227,20 @@ REFUSED = [
     (scene((ball((10.0, 0.0, -0.4)),)), "scene.world.targets.0.motion: target 'ball' is 0.1 m above the surface"),
     (scene((ball((1e200, 0.0, -5.0)),)), "scene.world.targets.0.motion: target 'ball' is more than 1e+06 m from"),
     (scene((ball((1e5, 0.0, -5.0)),)), "scene.processing.echo_window: a frame would take 8"),
-    (scene(snaps=(shrimp(1e200, 0.0),)), "scene.world.shrimp.0.position: is more than 1e+06 m from the origin"),
+    (scene(snaps=(shrimp(1e200, 0.0),)), "scene.world.sources.0.position: is more than 1e+06 m from the origin"),
     (
         scene(snaps=(shrimp(14.0, -4.0, snap_times=(0.0, 1000.0)),)),
         "scene.processing.echo_window: a frame would take 6",
     ),
     (
         scene(snaps=(shrimp(14.0, -4.0, snap=LogarithmicBubble(a=1e9)),)),
-        "scene.world.shrimp.0.snap: makes a source level",
+        "scene.world.sources.0.snap: makes a source level",
     ),
     (
         scene(snaps=(shrimp(14.0, -4.0, snap=LogarithmicBubble(m=-1e3)),)),
-        "scene.world.shrimp.0.snap: grows for 1e+03 s",
+        "scene.world.sources.0.snap: grows for 1e+03 s",
     ),
-    (scene(snaps=(shrimp(14.0, -4.0, snap=LogarithmicBubble(q=-1e-9)),)), "scene.world.shrimp.0.snap: grows for"),
+    (scene(snaps=(shrimp(14.0, -4.0, snap=LogarithmicBubble(q=-1e-9)),)), "scene.world.sources.0.snap: grows for"),
     (
         scene(processing=Processing(echo_window=EchoWindow(start=1e-3, stop=1.000001e-3))),
         "scene.processing.echo_window: is 1e-09 s long",
@@ -253,8 +260,8 @@ REFUSED = [
         scene(sonar={"array": PlanarLattice(columns=2, rows=2, pitch=0.1, dead=(4,))}),
         "scene.sonar.array: dead names an element outside 0..3",
     ),
-    (scene(snaps=(shrimp(10.0, 1.0, -5.0),)), "scene.world.shrimp.0.position: is inside target 'ball' at frame 0"),
-    (scene(snaps=(shrimp(0.0, 0.0, -5.0),)), "scene.world.shrimp.0.position: is at the centre of the array"),
+    (scene(snaps=(shrimp(10.0, 1.0, -5.0),)), "scene.world.sources.0.position: is inside target 'ball' at frame 0"),
+    (scene(snaps=(shrimp(0.0, 0.0, -5.0),)), "scene.world.sources.0.position: is at the centre of the array"),
     (
         scene((Target(name="dome", shape=Sphere(radius=1.0), motion=Still(position=(0.5, 0, -5))),)),
         "scene.world.targets.0.motion: target 'dome' contains the sonar at frame 0",
@@ -303,10 +310,10 @@ def test_no_echo_passes_for_the_direct_pulse_in_half_a_metre_of_water(bounces: i
         )
     )
     frame = render(made, 0)
-    found, truth = frame["bearings"].dataset, frame["truth"].dataset
+    found, truth = frame["source_estimates"].dataset, frame["truth/emissions"].dataset
     accepted = found["reason"].values == 0
     assert accepted.any() or bounces
     assert np.isnan(found["time"].values[~accepted]).all()
     for name in ("azimuth", "elevation"):
-        off = np.abs(found[name].values - truth[f"snap_{name}"].values)[accepted]
+        off = np.abs(found[name].values - truth[name].values)[accepted]
         assert (off <= 4.0 * found[f"{name}_error"].values[accepted]).all()

@@ -43,7 +43,7 @@ def recipe(
             world=World(
                 environment=environment,
                 targets=(target,),
-                shrimp=(SnappingShrimp(position=(14.0, -5.0), snap_times=(snap,)),),
+                sources=(SnappingShrimp(position=(14.0, -5.0), snap_times=(snap,)),),
             ),
             sonar=Sonar(array=PlanarLattice(columns=2, rows=2, pitch=0.5)),
             trajectory=Trajectory(frames=1, sonar=mount if sonar else still),

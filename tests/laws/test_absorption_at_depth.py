@@ -46,7 +46,7 @@ def scene(
     world = ss.World(
         environment=ss.Environment(depth=depth, sound_speed=ss.Isovelocity(speed=1500.0), absorption=COLD),
         targets=(ball,),
-        shrimp=(ss.SnappingShrimp(position=snap),),
+        sources=(ss.SnappingShrimp(position=snap),),
     )
     sonar = ss.Sonar(array=ss.PlanarLattice(columns=2, rows=2, pitch=0.02), beams=ss.BeamGrid(azimuths=3, elevations=3))
     trajectory = ss.Trajectory(sonar=ss.Still(position=array, heading=0.5 * np.pi))
@@ -101,9 +101,9 @@ def test_a_shallow_scene_in_deep_water_is_not_absorbed_as_if_half_way_down(plann
 def test_sources_far_apart_in_depth_are_noted_where_one_spectrum_does_not_serve_both(planned: dict[str, Plan]) -> None:
     recipe = planned["straight up 3 km"].recipe
     world = recipe.scene.world
-    both = (*world.shrimp, ss.SnappingShrimp(position=(1500.0, 0.0, -60.0), snap_times=(0.0,)))
+    both = (*world.sources, ss.SnappingShrimp(position=(1500.0, 0.0, -60.0), snap_times=(0.0,)))
     tight = replace(
-        recipe, scene=replace(recipe.scene, world=replace(world, shrimp=both)), accuracy=ss.Accuracy(signal=1e-3)
+        recipe, scene=replace(recipe.scene, world=replace(world, sources=both)), accuracy=ss.Accuracy(signal=1e-3)
     )
     made = replace(planned["straight up 3 km"], recipe=tight)
     assert made.absorption_error > 0.2
@@ -114,20 +114,20 @@ def test_sources_far_apart_in_depth_are_noted_where_one_spectrum_does_not_serve_
 
 def test_reflected_straight_paths_pass_the_depths_of_their_images() -> None:
     """Down to the bottom, up to the surface and back down: each leg by itself."""
-    bed, table = 3000.0, DepthAbsorption.of(COLD, 55e3, 3000.0)
+    bottom_depth, table = 3000.0, DepthAbsorption.of(COLD, 55e3, 3000.0)
     z1, z2, level = 500.0, 900.0, 700.0
-    drop = (bed - z1) + bed + z2
+    drop = (bottom_depth - z1) + bottom_depth + z2
     climb = -drop / np.hypot(drop, level)
     got = table.along(FLAT, np.array([z1]), np.array([z2]), np.array([climb]), np.array([2]))[0]
-    total = sum(quad(lambda z: fg(55e3, z), a, b)[0] for a, b in ((z1, bed), (0.0, bed), (0.0, z2)))
+    total = sum(quad(lambda z: fg(55e3, z), a, b)[0] for a, b in ((z1, bottom_depth), (0.0, bottom_depth), (0.0, z2)))
     assert got == pytest.approx(total / drop, rel=2e-5)
 
 
 @pytest.mark.parametrize(("start", "degrees", "vertices"), [(800.0, -6.0, 0), (800.0, -12.0, 1), (200.0, 10.0, 2)])
 def test_bent_rays_pass_the_depths_of_their_arcs(start: float, degrees: float, vertices: int) -> None:
     """In a constant gradient a ray is an arc of radius c/(g cos): integrated along its length, turning or reflected."""
-    c0, g, bed = 1480.0, 0.05, 4000.0
-    profile = Profile(np.array([0.0, bed]), np.array([c0, c0 + g * bed]))
+    c0, g, bottom_depth = 1480.0, 0.05, 4000.0
+    profile = Profile(np.array([0.0, bottom_depth]), np.array([c0, c0 + g * bottom_depth]))
     angle = np.deg2rad(degrees)  # up positive; the ray bends upwards by g cos/c
     radius = (c0 + g * start) / (g * np.cos(angle))
     at_turn = start + radius * (1.0 - np.cos(angle))
@@ -149,7 +149,7 @@ def test_bent_rays_pass_the_depths_of_their_arcs(start: float, degrees: float, v
         end_angle = np.deg2rad(2.0)
         pieces = [piece(angle, top), piece(-top, end_angle)]
     length, absorbed = np.sum(pieces, axis=0)
-    table = DepthAbsorption.of(COLD, 55e3, bed)
+    table = DepthAbsorption.of(COLD, 55e3, bottom_depth)
     ends = np.array([start]), np.array([along(end_angle)])
     got = table.along(profile, *ends, np.array([np.sin(angle)]), np.array([vertices]))[0]
     assert got == pytest.approx(absorbed / length, rel=3e-5)

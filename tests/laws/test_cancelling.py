@@ -37,7 +37,7 @@ C = 1540.0
 ARRAY = elements(Romanis())
 SONAR = Sonar(assumed_sound_speed=C)
 WATER = Profile(np.array([0.0]), np.array([C]))
-BED = 10.0
+BOTTOM_DEPTH = 10.0
 POSE = Pose(np.array([0.0, 0.0, -5.0]), quaternion(np.pi / 2))
 SNAP = np.array([14.0, -5.0, -5.0])
 BELOW = np.array([14.0, -5.0, -25.0])  # by the surface, then the bottom
@@ -61,13 +61,13 @@ def with_arrival(signals, amplitude=0.3, image=BELOW):
     return hear(signals, ARRAY, image, 0.0, amplitude)
 
 
-def locate(signals, pose=POSE, bed=BED):
-    return SensorDelays().locate(signals, ARRAY, SONAR, pose, bed, 1, WATER)
+def locate(signals, pose=POSE, bottom_depth=BOTTOM_DEPTH):
+    return SensorDelays().locate(signals, ARRAY, SONAR, pose, bottom_depth, 1, WATER)
 
 
-def cancelled(signals, bearings=None, sonar=SONAR, pose=POSE, bed=BED, window=WINDOW, limits=LIMITS):
-    found = locate(signals, pose, bed) if bearings is None else bearings
-    return cancel(signals, found, ARRAY, sonar, pose, bed, window, limits)
+def cancelled(signals, estimates=None, sonar=SONAR, pose=POSE, bottom_depth=BOTTOM_DEPTH, window=WINDOW, limits=LIMITS):
+    found = locate(signals, pose, bottom_depth) if estimates is None else estimates
+    return cancel(signals, found, ARRAY, sonar, pose, bottom_depth, window, limits)
 
 
 def energy(pressure):
@@ -89,17 +89,18 @@ def test_the_arrival_goes_and_the_echo_stays(late, most):
     """The echo, 11 dB fainter at the sensors, keeps its energy and its delay, even at the same time."""
     clean = with_echo(direct(), late)
     heard = with_arrival(clean)
-    bearings = locate(heard)
-    result = cancelled(heard, bearings)
+    estimates = locate(heard)
+    result = cancelled(heard, estimates)
     assert left(result, clean, heard) < most
     beam, cloud = FocusedDelayAndSum(), IsovelocityRange()
     true, got = (beam.image(s, ARRAY, SONAR, *WINDOW) for s in (clean, result.signals))
     top = np.unravel_index(true.energy.argmax(), true.energy.shape)
     assert abs(10 * np.log10(got.energy[top] / true.energy[top])) < 0.05
-    points = [
-        cloud.cloud(s, image, bearings, ARRAY, SONAR, POSE, WATER).delay[top]
-        for s, image in ((clean, true), (result.signals, got))
-    ]
+    points = []
+    for s, image in ((clean, true), (result.signals, got)):
+        found = cloud.cloud(s, image, estimates, ARRAY, SONAR, POSE, WATER)
+        (at,) = np.flatnonzero((found.azimuth == image.azimuth[top[1]]) & (found.elevation == image.elevation[top[0]]))
+        points.append(found.delay[at])
     assert abs(points[1] - points[0]) < 2e-8
     streaks = beam.image(heard, ARRAY, SONAR, *WINDOW).energy
     assert np.max(np.abs(got.energy - true.energy)) < 1e-3 * np.max(streaks - true.energy)
@@ -123,7 +124,7 @@ def test_without_an_arrival_nothing_changes(noise, echo):
     result = cancelled(heard)
     assert result.signals is heard
     assert reasons(result)[1, 1] in {OUTSIDE, FAINT}
-    assert WavefrontCancelling().cancel(heard, locate(heard), ARRAY, SONAR, POSE, BED, WINDOW) is heard
+    assert WavefrontCancelling().cancel(heard, locate(heard), ARRAY, SONAR, POSE, BOTTOM_DEPTH, WINDOW) is heard
 
 
 def test_nothing_heard_nothing_done():
@@ -170,7 +171,7 @@ def test_the_depth_of_the_bed_may_be_wrong(error):
     """The prediction is off by a beam width, the fit is not."""
     clean = with_echo(direct(), -0.8e-3)
     heard = with_arrival(clean)
-    result = cancelled(heard, bed=BED + error)
+    result = cancelled(heard, bottom_depth=BOTTOM_DEPTH + error)
     assert left(result, clean, heard) < -45
 
 
@@ -222,24 +223,24 @@ def test_dead_sensors_and_small_arrays():
     """A dead sensor counts for nothing and stays as it is; a few sensors cannot average echoes away."""
     heard = with_arrival(direct())
     patchy = elements(Romanis(dead=tuple(range(0, 508, 7))))
-    result = cancel(heard, locate(heard), patchy, SONAR, POSE, BED, WINDOW, LIMITS)
+    result = cancel(heard, locate(heard), patchy, SONAR, POSE, BOTTOM_DEPTH, WINDOW, LIMITS)
     live = patchy.gain != 0
     assert np.array_equal(result.signals.pressure[~live], heard.pressure[~live])
     assert energy(result.signals.pressure[live] - direct().pressure[live]) < 1e-4 * energy(
         heard.pressure[live] - direct().pressure[live]
     )
     few = elements(Romanis(dead=tuple(range(20, 508))))
-    assert cancel(heard, locate(heard), few, SONAR, POSE, BED, WINDOW, LIMITS).signals is heard
+    assert cancel(heard, locate(heard), few, SONAR, POSE, BOTTOM_DEPTH, WINDOW, LIMITS).signals is heard
 
 
 def test_image_sources_are_as_far_as_the_rays_are_long():
     """Against the eigenrays of the flat channel, every family of up to three reflections."""
     snap = np.array([9.0, 3.0, 1.5])
-    found = images(snap, POSE, BED, 3)
+    found = images(snap, POSE, BOTTOM_DEPTH, 3)
     place = POSE.to_world(snap)
     depths = np.array([-place[2]]), np.array([5.0])
     away = np.array([np.hypot(place[0], place[1])])
-    rays = eigenrays(water(WATER.depth, WATER.speed, BED), *depths, away, 3, 3)
+    rays = eigenrays(water(WATER.depth, WATER.speed, BOTTOM_DEPTH), *depths, away, 3, 3)
     bounced = rays.surface + rays.bottom > 0
     by_rays = sorted(zip(rays.surface[bounced], rays.bottom[bounced], rays.length[bounced], strict=True))
     by_images = sorted((s, b, np.linalg.norm(p)) for s, b, p in found)

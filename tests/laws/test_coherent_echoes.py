@@ -26,8 +26,8 @@ from sonarsynth.tracing.arrivals import trace
 from tests.spheres import exact_sphere
 
 C = 1500.0
-BED = 30.0
-WATER = Environment(depth=BED, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"))
+BOTTOM_DEPTH = 30.0
+WATER = Environment(depth=BOTTOM_DEPTH, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"))
 PROFILE = Profile(np.array([0.0]), np.array([C]))
 ARRAY = np.array([0.0, 0.0, -15.0])
 EAST = quaternion(0.5 * np.pi)
@@ -215,7 +215,7 @@ def test_each_target_has_its_law_and_hides_what_is_behind_it() -> None:
 @pytest.mark.parametrize("height", [0.3, 0.3 - 1e-12])
 def test_a_ball_that_lies_on_the_bed_echoes(height: float) -> None:
     ball = mesh_of(Sphere(radius=0.3, edge=0.02))
-    lying = body(ball, np.array([10.0, 0.0, height - BED + 1e-12]))
+    lying = body(ball, np.array([10.0, 0.0, height - BOTTOM_DEPTH + 1e-12]))
     found = echo((lying,), ARRAY + [0.0, 3.0, 0.0], (Kirchhoff(),), bounces=1)
     assert np.isfinite(found.amplitude).all() and len(found.delay) > 1000
     up = echo(

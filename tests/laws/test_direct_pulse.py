@@ -56,17 +56,17 @@ def located(signals):
     return SensorDelays().locate(signals, ARRAY, SONAR, POSE, 3.0 - SNAP[2], 1, Profile(np.zeros(1), np.full(1, C)))
 
 
-def without(signals, bearings=None):
-    return remove(signals, located(signals) if bearings is None else bearings, ARRAY, SONAR, LENGTH)
+def without(signals, estimates=None):
+    return remove(signals, located(signals) if estimates is None else estimates, ARRAY, SONAR, LENGTH)
 
 
 def energy(pressure):
     return float(np.sum(np.square(pressure, dtype=float)))
 
 
-def imaged(signals, excess, bearings=None):
+def imaged(signals, excess, estimates=None):
     """The image of what is left from `excess` less half a pulse on, NaN where it may hold the direct pulse."""
-    left = without(signals, bearings)
+    left = without(signals, estimates)
     window = CLOCK + excess - 2.5e-4, CLOCK + excess + 6e-4
 
     def imaging(some, start, stop):
@@ -97,9 +97,9 @@ def test_an_echo_loses_what_a_beam_on_the_snap_hears_of_it(target):
     """Of its energy, at each frequency: |sum over sensors of the phase between the two waves|^2 over their number."""
     alone, excess = direct(), 0.4e-3
     both = with_echo(alone, excess, target)
-    bearings = located(alone)
+    estimates = located(alone)
     echo = both.pressure.astype(float) - alone.pressure
-    kept = without(both, bearings).pressure.astype(float) - without(alone, bearings).pressure
+    kept = without(both, estimates).pressure.astype(float) - without(alone, estimates).pressure
     f = np.linspace(22e3, 88e3, 400)
     late = (np.linalg.norm(target - ARRAY.position, axis=1) - np.linalg.norm(SNAP - ARRAY.position, axis=1)) / C
     face = [
@@ -118,12 +118,12 @@ def test_a_later_snap_in_the_echo_window_is_taken_out_and_what_is_not_located_st
     later = hear(silence(ARRAY, START, 1000), ARRAY, 7.0 * direction(0.3, 0.1), CLOCK + excess - 7.0 / C, 0.5, C)
     both = replace(first, pressure=first.pressure + later.pressure)
     rows = vars(located(first)), vars(located(later))
-    bearings = SourceEstimates(**{name: np.concatenate([row[name] for row in rows]) for name in rows[0]})
+    estimates = SourceEstimates(**{name: np.concatenate([row[name] for row in rows]) for name in rows[0]})
     window = CLOCK + 0.8e-3, CLOCK + 1.6e-3
-    left = remove_others(both, bearings, ARRAY, SONAR, 0.5e-3, window)
+    left = remove_others(both, estimates, ARRAY, SONAR, 0.5e-3, window)
     assert energy(left.pressure - first.pressure) < 1e-5 * energy(later.pressure)
-    assert remove_others(both, bearings, ARRAY, SONAR, 0.5e-3, (window[0] - 2e-3, window[1] - 2e-3)) is both
-    nowhere = replace(bearings, position=np.where([[True], [False]], bearings.position, np.nan))
+    assert remove_others(both, estimates, ARRAY, SONAR, 0.5e-3, (window[0] - 2e-3, window[1] - 2e-3)) is both
+    nowhere = replace(estimates, position=np.where([[True], [False]], estimates.position, np.nan))
     assert remove_others(both, nowhere, ARRAY, SONAR, 0.5e-3, window) is both
 
 
@@ -164,13 +164,13 @@ def test_no_point_lies_at_an_end_of_the_window(end, off):
     """An echo that the window cuts, whichever side of the end its peak is on, makes no point; a whole one does."""
     excess = 2e-3
     signals = with_echo(direct(), excess)
-    bearings = located(signals)
+    estimates = located(signals)
     water = Profile(np.zeros(1), np.full(1, C))
 
     def delays(start, stop):
         image = IMAGE.image(signals, ARRAY, SONAR, CLOCK + start, CLOCK + stop)
-        cloud = IsovelocityRange(focus=None).cloud(signals, image, bearings, ARRAY, SONAR, POSE, water)
-        return cloud.delay[np.isfinite(cloud.range)]
+        cloud = IsovelocityRange(focus=None).cloud(signals, image, estimates, ARRAY, SONAR, POSE, water)
+        return cloud.delay
 
     window = (excess + off, excess + 0.8e-3) if end == "start" else (excess - 0.8e-3, excess + off)
     assert len(delays(*window)) == 0

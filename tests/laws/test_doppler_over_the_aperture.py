@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sonarsynth.conventions import Floats
-from sonarsynth.environment.boundaries import Rigid, SeaBed
+from sonarsynth.environment.boundaries import Rigid, SeaBottom
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
 from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.geometry import Pose, quaternion
@@ -61,7 +61,7 @@ def traced(
         depth=10.0,
         sound_speed=Isovelocity(speed=C),
         absorption=Absorption(formula="none"),
-        bed=SeaBed(reflection=Rigid()),
+        bottom=SeaBottom(reflection=Rigid()),
     )
     panel = PlacedTarget("panel", PANEL, Pose(np.array([12.0, 1.5, -4.8]), quaternion(0.6)), moving.target)
     rays = Straight if profile.uniform else Refracted

@@ -46,13 +46,13 @@ def tank() -> RayFan:
 
 
 def test_rays_reflect_at_the_angle_at_which_they_arrive(tank: RayFan) -> None:
-    for event in ("surface", "bed", "facet"):
+    for event in ("surface", "bottom", "facet"):
         assert len(at(tank, event)), event
-    flat = np.concatenate([at(tank, "surface"), at(tank, "bed")])
+    flat = np.concatenate([at(tank, "surface"), at(tank, "bottom")])
     before = unit(tank.position[flat] - tank.position[flat - 1])  # the chord: within its half turn of the ray
     after = tank.direction[flat]
     np.testing.assert_allclose(before * [1, 1, -1], after, atol=2e-3)
-    np.testing.assert_allclose(tank.position[at(tank, "bed"), 2], -0.3, atol=1e-15)
+    np.testing.assert_allclose(tank.position[at(tank, "bottom"), 2], -0.3, atol=1e-15)
     np.testing.assert_allclose(tank.position[at(tank, "surface"), 2], 0.0, atol=1e-15)
     hit = at(tank, "facet")
     target = cylinder()
@@ -167,8 +167,8 @@ def test_rays_that_meet_the_l_shape_are_sent_on_to_the_shrimp_with_the_lobes_coe
 
 def test_rays_stop_after_their_bounces() -> None:
     found = fan(TANK, TANK_PROFILE, (), np.array([0.0, 0.0, -0.1]), downward(45.0), 1.0, 3)
-    kinds = [EVENTS[e] for e in found.event if EVENTS[e] in ("surface", "bed")]
-    assert kinds == ["bed", "surface", "bed", "surface"]
+    kinds = [EVENTS[e] for e in found.event if EVENTS[e] in ("surface", "bottom")]
+    assert kinds == ["bottom", "surface", "bottom", "surface"]
     assert not len(at(found, "end"))
 
 
@@ -184,7 +184,7 @@ def test_a_level_ray_on_a_node_stays_or_bends_away_but_ends(speeds: tuple[float,
 def test_vertical_rays_go_up_and_down() -> None:
     found = fan(TANK, TANK_PROFILE, (), np.array([0.5, 0.5, -0.1]), np.array([[0.0, 0.0, -1.0]]), 2e-3)
     np.testing.assert_allclose(found.position[:, :2], 0.5, atol=1e-15)
-    assert {"surface", "bed"} <= {EVENTS[e] for e in found.event}
+    assert {"surface", "bottom"} <= {EVENTS[e] for e in found.event}
 
 
 def test_a_fan_without_an_end_or_outside_the_water_is_refused() -> None:

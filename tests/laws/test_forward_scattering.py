@@ -28,8 +28,8 @@ from sonarsynth.tracing.arrivals import trace
 from tests.spheres import exact_sphere
 
 C = 1500.0
-BED = 30.0
-WATER = Environment(depth=BED, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"))
+BOTTOM_DEPTH = 30.0
+WATER = Environment(depth=BOTTOM_DEPTH, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"))
 PROFILE = Profile(np.array([0.0]), np.array([C]))
 ARRAY = np.array([0.0, 0.0, -15.0])
 EAST = quaternion(0.5 * np.pi)
@@ -188,11 +188,11 @@ def test_straight_ahead_source_and_array_may_be_exchanged() -> None:
     np.testing.assert_allclose(there, back, atol=0.03 * np.abs(straight(source)).max())
 
 
-@pytest.mark.parametrize("boundary", ["surface", "bed"])
+@pytest.mark.parametrize("boundary", ["surface", "bottom"])
 @pytest.mark.parametrize("first", [True, False])
 def test_what_comes_by_a_boundary_is_shadowed_like_what_comes_straight(boundary: str, first: bool) -> None:
     """With the body after the reflection, or before it: as from the snap's image, or at the array's."""
-    level = 0.0 if boundary == "surface" else -BED
+    level = 0.0 if boundary == "surface" else -BOTTOM_DEPTH
     source = ARRAY + [24.0, 0.0, 3.0]
     flip = np.array([1.0, 1.0, -1.0])
     up = np.array([0.0, 0.0, 2.0 * level])
@@ -203,8 +203,8 @@ def test_what_comes_by_a_boundary_is_shadowed_like_what_comes_straight(boundary:
     found = heard(bodies, source, bounces=1)
     touched = found.surface if boundary == "surface" else found.bottom
     some = found.select((touched == 1) & (found.direct | ((found.arrives_by > 0) == (not first))))
-    free = Environment(depth=3 * BED, sound_speed=WATER.sound_speed, absorption=WATER.absorption)
-    lower = np.array([0.0, 0.0, -BED])
+    free = Environment(depth=3 * BOTTOM_DEPTH, sound_speed=WATER.sound_speed, absorption=WATER.absorption)
+    lower = np.array([0.0, 0.0, -BOTTOM_DEPTH])
     alone = trace(
         free, PROFILE, WorldState(0.0, (replace(bodies[0], pose=Pose(bodies[0].pose.position + lower, EAST)),),
         (Snap(start + lower, 0.0, LogarithmicBubble(), None),)), Pose(end + lower, EAST), ROMANIS, 0.0, AutoTracing(),
@@ -270,7 +270,7 @@ def test_a_body_that_moves_keeps_its_shadow() -> None:
 def test_bent_rays_are_cancelled_like_straight_ones() -> None:
     panel = mesh_of(Box(size=(0.02, 1.0, 1.0), edge=0.02))
     source = ARRAY + [20.0, 0.0, 0.0]
-    bends = Profile(np.array([0.0, BED]), np.array([1485.0, 1515.0]))
+    bends = Profile(np.array([0.0, BOTTOM_DEPTH]), np.array([1485.0, 1515.0]))
     sagged = 10.0 * 10.0 * 1.0 / (2.0 * C)  # of a ray between ends 20 m apart in 1/s
     found = [
         transfer(heard((body(panel, ARRAY + [10.0, 0.0, down]),), source, profile=profile))

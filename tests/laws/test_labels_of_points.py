@@ -68,7 +68,7 @@ def several(**more: Any) -> Recipe:
     shrimp = (SnappingShrimp(position=(9.0, 5.0)), SnappingShrimp(position=(10.0, -6.0), snap_times=(3e-3,)))
     scene = base.scene
     physics = replace(scene.physics, tracing=AutoTracing(bounces=1))
-    world = replace(scene.world, targets=targets, shrimp=shrimp)
+    world = replace(scene.world, targets=targets, sources=shrimp)
     return replace(base, scene=replace(scene, world=world, physics=physics, **more))
 
 
@@ -82,12 +82,11 @@ def labels_at(case: Made, beam: np.ndarray, delay: np.ndarray, energy: float = 1
     rows = []
     for u, t in zip(beam, delay, strict=True):
         azimuth, elevation = (np.atleast_1d(a) for a in azimuth_elevation(u))
-        grid = {name: np.full((1, 1), 20.0, np.float32) for name in ("range", "range_error")}
-        grid |= {"delay": np.full((1, 1), t - case.listening.clock), "energy": np.full((1, 1), energy)}
-        cloud = PointCloud(position=20.0 * u[None, None], **grid)
+        far, late = np.full(1, 20.0, np.float32), np.full(1, t - case.listening.clock)
+        cloud = PointCloud(20.0 * u[None], far, far, azimuth, elevation, late, np.full(1, energy))
         arrivals, moment = case.arrivals, case.frame.moment
-        found: PointLabels = label_points(cloud, azimuth, elevation, arrivals, case.band, moment, case.listening)
-        rows.append({name: value[0, 0] for name, value in vars(found).items()})
+        found: PointLabels = label_points(cloud, arrivals, case.band, moment, case.listening)
+        rows.append({name: value[0] for name, value in vars(found).items()})
     return rows
 
 
@@ -186,7 +185,7 @@ def test_a_point_on_a_path_is_of_its_target_snap_and_way(crowd: Made) -> None:
         assert abs(label["true_range"] - centre) < 0.6
         if FAMILIES[way] == "surface":
             assert a.direction[loudest, 2] > 0.3
-        if FAMILIES[way] == "bed":
+        if FAMILIES[way] == "bottom":
             assert a.direction[loudest, 2] < -0.2
     direct = {key[:2] for key in seen if key[2] == 0}
     assert {key[0] for key in direct} == {key[1] for key in direct} == {0, 1}
@@ -259,8 +258,8 @@ def test_true_ranges_are_of_where_the_sound_met_what_moves() -> None:
     target = replace(
         recipe.scene.world.targets[0], motion=ConstantVelocity(start=(20.0, 2.0, -50.0), heading=0.0, speed=velocity)
     )
-    shrimp = replace(recipe.scene.world.shrimp[0], snap_times=(-0.05,))
-    world = replace(recipe.scene.world, targets=(target,), shrimp=(shrimp,))
+    shrimp = replace(recipe.scene.world.sources[0], snap_times=(-0.05,))
+    world = replace(recipe.scene.world, targets=(target,), sources=(shrimp,))
     case = made(replace(recipe, scene=replace(recipe.scene, world=world)))
     a, met = case.arrivals, 0.0
     for _ in range(50):
@@ -289,18 +288,15 @@ def test_distances_from_a_surface_are_those_of_the_nearest_triangle() -> None:
     assert surface_distances(body, points) == pytest.approx(np.array(exact), rel=1e-9, abs=1e-12)
 
 
-def test_directions_are_the_beams_of_the_grid() -> None:
-    """A cloud on a grid: labels lie where its points do, and nowhere else."""
+def test_a_point_is_labelled_by_its_own_direction_and_not_by_that_of_others() -> None:
+    """Of two points at one delay the one towards the target is its echo; alone or beside others, alike."""
     case = made(point_scene((20.0, 0.0, -50.0), (12.0, 5.0, -60.0), array=ARRAY))
-    a = case.arrivals
-    grid = np.deg2rad(np.arange(-10.0, 11.0, 2.0))
-    empty = {name: np.full((11, 11), np.nan, np.float32) for name in ("range", "range_error", "delay", "energy")}
-    cloud = PointCloud(position=np.full((11, 11, 3), np.nan, np.float32), **empty)
-    late = a.delay[~a.direct][0] - case.listening.clock
-    for name, value in (("range", 20.0), ("delay", late), ("energy", 1e-300)):
-        getattr(cloud, name)[5, 5] = value
-    cloud.position[5, 5] = 20.0 * direction(0.0, 0.0)
-    found = label_points(cloud, grid, grid, a, case.band, case.frame.moment, case.listening)
-    there = np.zeros((11, 11), bool)
-    there[5, 5] = True
-    assert np.array_equal(found.target == 0, there) and np.array_equal(np.isfinite(found.distance), there)
+    late = case.arrivals.delay[~case.arrivals.direct][0] - case.listening.clock
+    azimuth, far = np.array([0.5, 0.0]), np.full(2, 20.0, np.float32)
+    place = 20.0 * direction(azimuth, np.zeros(2))
+    cloud = PointCloud(place, far, far, azimuth, np.zeros(2), np.full(2, late), np.full(2, 1e-300))
+    found = label_points(cloud, case.arrivals, case.band, case.frame.moment, case.listening)
+    assert found.target[1] == 0 and found.distance[1] < 0.1 and not found.distance[0] < 5.0
+    for i in range(2):
+        alone = label_points(cloud.select(np.array([i])), case.arrivals, case.band, case.frame.moment, case.listening)
+        assert all(np.array_equal(vars(found)[n][i], v[0], equal_nan=True) for n, v in vars(alone).items())

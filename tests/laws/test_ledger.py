@@ -1,4 +1,4 @@
-"""The ledger: levels are of energy in the band, add up, and are found again in the signals of single paths."""
+"""The link budget: levels are of energy in the band, add up, and are found again in the signals of single paths."""
 
 from __future__ import annotations
 
@@ -88,8 +88,8 @@ def power_of(of: Arrivals, band: Band) -> float:
     return float(band.weight[of.snap[0]] @ both)
 
 
-def levels_of(book: LinkBudget) -> dict[str, Floats]:
-    return dict(zip(LINK_BUDGET, np.moveaxis(book.level, -1, 0), strict=True))
+def levels_of(budget: LinkBudget) -> dict[str, Floats]:
+    return dict(zip(LINK_BUDGET, np.moveaxis(budget.level, -1, 0), strict=True))
 
 
 def booked(of: Arrivals, targets: int = 2) -> LinkBudget:
@@ -97,20 +97,20 @@ def booked(of: Arrivals, targets: int = 2) -> LinkBudget:
     return link_budget(of, path_powers(of, band), band, targets, LEVEL, 0.5)
 
 
-def assert_it_adds_up(book: LinkBudget) -> None:
-    terms = levels_of(book)
+def assert_it_adds_up(budget: LinkBudget) -> None:
+    terms = levels_of(budget)
     total = terms["source_level"] + terms["scattering"] - sum(terms[name] for name in LOSSES)
     np.testing.assert_allclose(total, terms["received_level"], atol=1e-9)
-    assert (np.isfinite(terms["received_level"]) == (book.paths > 0)).all()
+    assert (np.isfinite(terms["received_level"]) == (budget.paths > 0)).all()
 
 
 @pytest.mark.parametrize("coherent", [True, False, None])
 def test_levels_are_the_energy_of_the_sums_of_paths_in_the_band(coherent: bool | None) -> None:
     of = some_paths(300, 1, coherent=coherent)
-    book, band = booked(of), the_band()
-    assert_it_adds_up(book)
-    assert book.paths.sum() == 300
-    received = levels_of(book)["received_level"]
+    budget, band = booked(of), the_band()
+    assert_it_adds_up(budget)
+    assert budget.paths.sum() == 300
+    received = levels_of(budget)["received_level"]
     for snap, target, kind in np.ndindex(2, 2, 4):
         mine = of.select((of.snap == snap) & (of.target == target) & (family(of) == kind))
         expected = LEVEL[snap] + 10 * np.log10(power_of(mine, band))
@@ -141,10 +141,10 @@ def test_what_a_rough_facet_does_not_mirror_is_in_its_scattering_and_what_the_be
     of = replace(of, scattering=np.ones(1), corners=np.zeros((1, 3)))
 
     def terms(delay_std: float, echo_delay_std: float) -> tuple[float, float]:
-        book = levels_of(
+        budget = levels_of(
             booked(replace(of, delay_std=np.array([delay_std]), echo_delay_std=np.array([echo_delay_std])))
         )
-        return float(np.nanmax(book["scattering"])), float(np.nanmax(book["boundary_loss"]))
+        return float(np.nanmax(budget["scattering"])), float(np.nanmax(budget["boundary_loss"]))
 
     band = the_band()
     factor = (band.frequency / of.centre) ** 2

@@ -13,7 +13,7 @@ from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
-from sonarsynth.propagation import AutoTracing, Visibility
+from sonarsynth.propagation import AutoTracing, OcclusionPoint
 from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, elements
 from sonarsynth.scattering import Kirchhoff, PartlyReflecting
 from sonarsynth.scattering.components import CoherentKirchhoff
@@ -40,12 +40,12 @@ LAWS = [(Kirchhoff(), 5.0), (Kirchhoff(edges="sharp"), 50.0), (Kirchhoff(surface
 ROWS = ("position", "gain", "column", "row")
 
 
-def traced(law: Kirchhoff, place: Floats, array: Elements, visibility: Visibility = "hydrophones") -> Arrivals:
+def traced(law: Kirchhoff, place: Floats, array: Elements, occlusion: OcclusionPoint = "sensors") -> Arrivals:
     """Coherent echoes of a ball 8 m ahead, lit from the side."""
     ball = PlacedTarget("ball", BALL, Pose(PLACE + [8.0, 0.3, 0.2], EAST), np.zeros(3))
     found = trace(
         WATER, PROFILE, WorldState(0.0, (ball,), (SNAP,)), Pose(place, EAST), array, 0.0, AutoTracing(), (law,),
-        band=(SONAR.band.low, SONAR.band.high), negligible=0.0, enough=0.0, alike=0.0, visibility=visibility,
+        band=(SONAR.band.low, SONAR.band.high), negligible=0.0, enough=0.0, alike=0.0, occlusion=occlusion,
     )  # fmt: skip
     return found.select(found.coherent)
 
@@ -60,7 +60,7 @@ def alone(law: Kirchhoff, sensor: int) -> Arrivals:
 
 @pytest.mark.parametrize(("law", "better"), LAWS)
 def test_one_expansion_hears_what_each_hydrophone_sees(law: Kirchhoff, better: float) -> None:
-    found, centre = (traced(law, PLACE, ARRAY, visibility) for visibility in ("hydrophones", "centre"))
+    found, centre = (traced(law, PLACE, ARRAY, occlusion) for occlusion in ("sensors", "centre"))
     start, part = found.delay.min() - 2e-4, replace(ARRAY, **{n: getattr(ARRAY, n)[FAR] for n in ROWS})
     assert found.hidden(ARRAY.count)[:, FAR].any()
     exact = np.vstack([heard(alone(law, int(n)), SINGLE, start) for n in FAR])

@@ -16,7 +16,7 @@ from sonarsynth.planning.notes.scene_checks import check_frame
 from sonarsynth.propagation import Refracted, Straight
 from sonarsynth.receiver import BeamGrid
 from sonarsynth.state import WorldState
-from tests.laws.test_traced_families import BED, SONAR, THERMOCLINE, UNIFORM, C, ball
+from tests.laws.test_traced_families import BOTTOM_DEPTH, SONAR, THERMOCLINE, UNIFORM, C, ball
 from tests.laws.test_traced_families import snap as snap_at
 from tests.scenes import remus
 
@@ -43,7 +43,7 @@ def truth(motion, straight: bool = True, doppler: bool = True):
     rays, water = (Straight(), UNIFORM) if straight else (Refracted(), THERMOCLINE)
     beams = BeamGrid(azimuth_span=0.2, azimuths=3, elevation_span=0.2, elevations=3)
     levels = np.zeros(len(TIMES))
-    return label(moment, SONAR, beams, lambda a, b: rays.connect(water, BED, a, b), levels, straight, doppler)
+    return label(moment, SONAR, beams, lambda a, b: rays.connect(water, BOTTOM_DEPTH, a, b), levels, straight, doppler)
 
 
 @pytest.mark.parametrize("kind", MOTIONS)
@@ -65,7 +65,7 @@ def test_through_bent_water_the_direct_ray_says_when() -> None:
     found = truth(MOTIONS["course"], straight=False)
     for n, time in enumerate(TIMES):
         there = found.position_at_echo[n]
-        rays = Refracted().connect(THERMOCLINE, BED, found.snap_position[n][None], there)
+        rays = Refracted().connect(THERMOCLINE, BOTTOM_DEPTH, found.snap_position[n][None], there)
         assert found.meeting_time[n, 0] == pytest.approx(time + rays.travel_time[0], abs=1e-9)
         np.testing.assert_allclose(
             there[0], pose(MOTIONS["course"], NOW + found.meeting_time[n, 0]).position, atol=1e-9
@@ -96,8 +96,8 @@ def moved(motion, times: tuple[float, ...] = (0.0,)):
     recipe = remus(1)
     world = recipe.scene.world
     target = replace(world.targets[0], motion=motion)
-    shrimp = replace(world.shrimp[0], snap_times=times)
-    scene = replace(recipe.scene, world=replace(world, targets=(target,), shrimp=(shrimp,)))
+    shrimp = replace(world.sources[0], snap_times=times)
+    scene = replace(recipe.scene, world=replace(world, targets=(target,), sources=(shrimp,)))
     return replace(recipe, scene=scene)
 
 

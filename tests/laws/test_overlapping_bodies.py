@@ -80,7 +80,7 @@ def recipe(*targets: ss.Target, frames: int = 1) -> ss.Recipe:
     world = ss.World(
         environment=ss.Environment(depth=20.0, sound_speed=ss.Isovelocity(speed=1540.0)),
         targets=targets,
-        shrimp=(ss.SnappingShrimp(position=(6.0, 8.0)),),
+        sources=(ss.SnappingShrimp(position=(6.0, 8.0)),),
     )
     sonar = ss.Sonar(array=ss.PlanarLattice(columns=4, rows=4, pitch=0.05))
     trajectory = ss.Trajectory(

@@ -119,7 +119,7 @@ def test_the_filter_is_drawn_with_half_its_response_at_the_cutoff() -> None:
 def test_the_section_shows_the_profile_as_it_is() -> None:
     ray = np.array([[0.0, 0.0, -0.1], [0.3, 0.0, 0.0], [0.6, 0.0, -0.3]])
     depth, speed = np.array([0.0, 0.1, 0.3]), np.array([1500.0, 1510.0, 1490.0])
-    made = section_figure([ray], [Hull("ball", *sphere([0.5, 0.0, -0.15], 0.05))], depth, speed, bed=0.3)
+    made = section_figure([ray], [Hull("ball", *sphere([0.5, 0.0, -0.15], 0.05))], depth, speed, bottom_depth=0.3)
     section, profile = made.axes
     assert np.allclose(section.lines[2].get_xydata(), ray[:, [0, 2]])
     assert section.get_ylim()[0] < -0.3 < 0.0 < section.get_ylim()[1]

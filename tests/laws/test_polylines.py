@@ -42,15 +42,15 @@ WATERS = {
 def pairs(layers: Water, count: int = 40, seed: int = 1) -> tuple[Floats, Floats]:
     """Ends anywhere, and where it matters: on boundaries and nodes, one above the other, level, close."""
     rng = np.random.default_rng(seed)
-    bed = layers.depth[-1]
-    start = np.column_stack([rng.uniform(-0.5, 0.5, (count, 2)) * bed, -rng.uniform(0, bed, count)])
-    end = np.column_stack([rng.uniform(-3, 3, (count, 2)) * bed, -rng.uniform(0, bed, count)])
+    bottom_depth = layers.depth[-1]
+    start = np.column_stack([rng.uniform(-0.5, 0.5, (count, 2)) * bottom_depth, -rng.uniform(0, bottom_depth, count)])
+    end = np.column_stack([rng.uniform(-3, 3, (count, 2)) * bottom_depth, -rng.uniform(0, bottom_depth, count)])
     end[:4, :2] = start[:4, :2]
     end[4:8, 2] = start[4:8, 2]
-    start[8:10, 2], start[10:12, 2], end[12:14, 2], end[14:16, 2] = 0.0, -bed, 0.0, -bed
+    start[8:10, 2], start[10:12, 2], end[12:14, 2], end[14:16, 2] = 0.0, -bottom_depth, 0.0, -bottom_depth
     start[16:20, 2], end[18:22, 2] = -layers.depth[1], -layers.depth[1]
     end[22:24] = start[22:24] + [1e-6, 0.0, 0.0]
-    end[22:24, 2] = np.clip(end[22:24, 2] + 1e-6, -bed, 0.0)
+    end[22:24, 2] = np.clip(end[22:24, 2] + 1e-6, -bottom_depth, 0.0)
     return start, end
 
 
@@ -92,12 +92,12 @@ def test_times_lengths_angles_and_counts_are_those_of_the_eigenray(
     np.testing.assert_allclose(lines.length[last], rays.length, rtol=1e-12)
     np.testing.assert_allclose(lines.direction[first, 2], rays.start_sine, atol=1e-9)
     np.testing.assert_allclose(lines.direction[last, 2], rays.end_sine, atol=1e-9)
-    for name, count in (("surface", rays.surface), ("bed", rays.bottom), ("turning point", rays.turning)):
+    for name, count in (("surface", rays.surface), ("bottom", rays.bottom), ("turning point", rays.turning)):
         there = lines.event == event(name)
         np.testing.assert_array_equal(np.bincount(lines.ray[there], minlength=len(count)), count)
     z = depth(lines.position)
     assert (z[lines.event == event("surface")] == 0.0).all()
-    assert (z[lines.event == event("bed")] == layers.depth[-1]).all()
+    assert (z[lines.event == event("bottom")] == layers.depth[-1]).all()
     assert (z >= 0.0).all()
     assert (z <= layers.depth[-1]).all()
 
@@ -162,13 +162,13 @@ def test_polylines_and_rays_that_are_followed_are_the_same() -> None:
     rays = found(layers, start, end, 4)
     lines = polylines(layers, start, end, rays)
     first, _ = ends(lines)
-    assert {"surface", "bed", "turning point"} <= {EVENTS[e] for e in lines.event}
+    assert {"surface", "bottom", "turning point"} <= {EVENTS[e] for e in lines.event}
     for ray in range(len(rays.pair)):
         mine = lines.ray == ray
         aim = lines.direction[first[ray]][None]
         followed = fan(sea, Profile(nodes, speed), (), start[0], aim, rays.travel_time[ray])
         np.testing.assert_allclose(followed.position[-1], end[0], atol=1e-7)
-        for name in ("surface", "bed", "turning point"):
+        for name in ("surface", "bottom", "turning point"):
             ours, theirs = mine & (lines.event == event(name)), followed.event == event(name)
             np.testing.assert_allclose(lines.time[ours], followed.time[theirs], rtol=1e-9, atol=1e-12)
             np.testing.assert_allclose(lines.position[ours], followed.position[theirs], atol=1e-4)
@@ -197,7 +197,9 @@ def test_cutting_a_layer_in_two_changes_nothing() -> None:
     rays = found(WATERS["duct"], start, end)
     cut = layered([0, 15, 30, 40, 50, 70, 100], [1520, 1510, 1500, 1500, 1500, 1512, 1530])
     one, other = polylines(WATERS["duct"], start, end, rays), polylines(cut, start, end, rays)
-    vertices = [np.isin(lines.event, [event(e) for e in ("surface", "bed", "turning point")]) for lines in (one, other)]
+    vertices = [
+        np.isin(lines.event, [event(e) for e in ("surface", "bottom", "turning point")]) for lines in (one, other)
+    ]
     np.testing.assert_allclose(one.position[vertices[0]], other.position[vertices[1]], atol=1e-8)
     np.testing.assert_allclose(one.time[vertices[0]], other.time[vertices[1]], atol=1e-12)
     assert (other.miss <= MISS * rays.length).all()

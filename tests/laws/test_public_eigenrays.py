@@ -36,18 +36,18 @@ WATERS = [
 FIELDS = [field.name for field in dataclasses.fields(RayArrivals)]
 
 
-def images(bed: float, start: float, end: float, distance: float, most: int) -> list[tuple[float, ...]]:
+def images(bottom_depth: float, start: float, end: float, distance: float, most: int) -> list[tuple[float, ...]]:
     """(time, launch angle, surface, bottom) of straight rays to the receiver's mirror images, sorted."""
     found = []
-    for first in ("surface", "bed"):
+    for first in ("surface", "bottom"):
         for count in range(most + 1):
-            mirrors = [("surface", "bed")[(i + (first == "bed")) % 2] for i in range(count)]
+            mirrors = [("surface", "bottom")[(i + (first == "bottom")) % 2] for i in range(count)]
             image = end
             for mirror in reversed(mirrors):
-                image = -image if mirror == "surface" else 2 * bed - image
+                image = -image if mirror == "surface" else 2 * bottom_depth - image
             rise = image - start
             time = float(np.hypot(distance, rise)) / 1540.0
-            row = (time, float(np.arctan2(rise, distance)), mirrors.count("surface"), mirrors.count("bed"))
+            row = (time, float(np.arctan2(rise, distance)), mirrors.count("surface"), mirrors.count("bottom"))
             if row not in found:
                 found.append(row)
     return sorted(found)
@@ -55,9 +55,9 @@ def images(bed: float, start: float, end: float, distance: float, most: int) -> 
 
 @pytest.mark.parametrize("most", [0, 1, 2, 5])
 def test_isovelocity_rays_come_from_image_sources(most: int) -> None:
-    bed, start, end, distance = 20.0, 3.0, 11.0, 60.0
-    rays = eigenrays(WATER, bed, start, end, distance, vertices=most)
-    expected = np.array(images(bed, start, end, distance, most))
+    bottom_depth, start, end, distance = 20.0, 3.0, 11.0, 60.0
+    rays = eigenrays(WATER, bottom_depth, start, end, distance, vertices=most)
+    expected = np.array(images(bottom_depth, start, end, distance, most))
     assert len(rays) == len(expected) == 2 * most + 1
     np.testing.assert_allclose(rays.travel_time, expected[:, 0], rtol=1e-14)
     np.testing.assert_allclose(rays.launch_angle, expected[:, 1], rtol=1e-13)
@@ -127,11 +127,11 @@ def test_arguments_broadcast_and_pairs_number_them() -> None:
 
 
 def test_the_depth_of_the_bed_broadcasts_too() -> None:
-    bed = np.array([25.0, 20.0, 25.0])
-    rays = eigenrays(LAYERS, bed, 4.0, 12.0, 50.0)
+    bottom_depth = np.array([25.0, 20.0, 25.0])
+    rays = eigenrays(LAYERS, bottom_depth, 4.0, 12.0, 50.0)
     assert rays.pair.tolist() == sorted(rays.pair.tolist())
     for pair in range(3):
-        alone, mine = eigenrays(LAYERS, bed[pair], 4.0, 12.0, 50.0), rays.select(rays.pair == pair)
+        alone, mine = eigenrays(LAYERS, bottom_depth[pair], 4.0, 12.0, 50.0), rays.select(rays.pair == pair)
         np.testing.assert_array_equal(mine.travel_time, alone.travel_time)
         np.testing.assert_array_equal(mine.departure, alone.departure)
 
@@ -214,7 +214,7 @@ def test_the_examples_in_the_docstrings_are_true() -> None:
         ((WATER, 20.0, 5.0, -1.0, 1.0), "receiver_depth at -1 m depth is not in the water"),
         ((WATER, 20.0, 5.0, 1.0, -1.0), "horizontal_range must not be negative, but is -1 m"),
         ((WATER, 20.0, 5.0, 1.0, np.inf), "horizontal_range must be finite, but is inf m"),
-        ((WATER, [20.0, 0.0], 0.0, 0.0, 1.0), "seabed_depth of pair 1 must be positive, but is 0 m"),
+        ((WATER, [20.0, 0.0], 0.0, 0.0, 1.0), "bottom_depth of pair 1 must be positive, but is 0 m"),
         ((WATER, 20.0, np.nan, 1.0, 1.0), "source_depth must be finite"),
         ((WATER, 20.0, "deep", 1.0, 1.0), "source_depth must be numbers"),
         ((WATER, 20.0, [1.0, 2.0], [1.0, 2.0, 3.0], 1.0), r"do not broadcast: .* source_depth \(2,\), receiver_depth"),

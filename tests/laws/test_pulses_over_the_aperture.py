@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sonarsynth.conventions import Floats
-from sonarsynth.environment.boundaries import Rigid, SeaBed, SeaSurface, Sediment
+from sonarsynth.environment.boundaries import Rigid, SeaBottom, SeaSurface, Sediment
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
 from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.equations.scattering.facet_pulses import facet_response
@@ -31,8 +31,8 @@ PLACE = np.array([0.0, 0.0, -5.0])
 EAST = quaternion(0.5 * np.pi)
 ROMANIS = elements(Romanis())
 FACE = 49.53e-3
-SAND = SeaBed(reflection=Sediment(name="medium sand"))
-HARD = SeaBed(reflection=Rigid())
+SAND = SeaBottom(reflection=Sediment(name="medium sand"))
+HARD = SeaBottom(reflection=Rigid())
 ROUGH = SeaSurface(rms_height=0.006)
 SNAP = Snap(np.array([14.0, -5.0, -9.5]), 0.0, LogarithmicBubble(), None)
 SONAR = Sonar()
@@ -46,9 +46,15 @@ FAR = np.array(
 START = 0.006
 
 
-def traced(surface: SeaSurface, bed: SeaBed, law: ScatteringLaw, place: Floats, array: Elements = ROMANIS) -> Arrivals:
+def traced(
+    surface: SeaSurface, bottom: SeaBottom, law: ScatteringLaw, place: Floats, array: Elements = ROMANIS
+) -> Arrivals:
     water = Environment(
-        depth=10.0, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"), surface=surface, bed=bed
+        depth=10.0,
+        sound_speed=Isovelocity(speed=C),
+        absorption=Absorption(formula="none"),
+        surface=surface,
+        bottom=bottom,
     )
     panel = PlacedTarget("panel", PANEL, Pose(PLACE + [12.0, 1.5, 0.2], quaternion(0.7)), np.zeros(3))
     return trace(
@@ -115,7 +121,7 @@ def both(one: Arrivals, other: Arrivals) -> tuple[Arrivals, Arrivals]:
 
 
 SCENES = [
-    pytest.param((SeaSurface(), SAND, MirrorLobe(width=0.5)), 1e-3, id="lossy bed"),
+    pytest.param((SeaSurface(), SAND, MirrorLobe(width=0.5)), 1e-3, id="lossy bottom"),
     pytest.param((ROUGH, HARD, MirrorLobe(width=0.5)), 1e-3, id="rough surface"),
     pytest.param((SeaSurface(), HARD, LIME), 1e-2, id="partly reflecting body"),
     pytest.param((ROUGH, SAND, LIME), 1e-2, id="all"),

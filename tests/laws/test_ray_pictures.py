@@ -29,8 +29,11 @@ def look(family: str, *event: str, hidden: bool = False) -> Look:
     ("looks", "expected"),
     [
         ([look("surface", "surface", "target")], ["surface", "target"]),
-        ([look("bed", "bed"), look("surface", "surface")], ["surface", "bed"]),
-        ([look("surface and bed", "surface", "target", "bed")], ["surface and bed", "surface", "bed", "target"]),
+        ([look("bottom", "bottom"), look("surface", "surface")], ["surface", "bottom"]),
+        (
+            [look("surface and bottom", "surface", "target", "bottom")],
+            ["surface and bottom", "surface", "bottom", "target"],
+        ),
         ([look("direct", hidden=True)], ["direct", "hidden by a target"]),
         ([look("direct", "target"), look("direct", "facet")], ["direct", "target"]),
     ],

@@ -187,9 +187,9 @@ def test_the_bed_ends_the_water_that_a_ray_may_turn_in() -> None:
     vertex = ray_solutions.eigenrays(
         ray_solutions.water(*profile, 100.0), np.array([40.0]), np.array([40.0]), np.array([400.0])
     ).lower[0]
-    for bed, paths in ((vertex + 1e-6, 1), (vertex - 1e-6, 0)):
+    for bottom_depth, paths in ((vertex + 1e-6, 1), (vertex - 1e-6, 0)):
         found = ray_solutions.eigenrays(
-            ray_solutions.water(*profile, bed), np.array([40.0]), np.array([40.0]), np.array([400.0])
+            ray_solutions.water(*profile, bottom_depth), np.array([40.0]), np.array([40.0]), np.array([400.0])
         )
         assert len(found.pair) == paths
 

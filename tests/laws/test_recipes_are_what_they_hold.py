@@ -18,7 +18,7 @@ scene:
       - name: thing
         shape: {kind: mesh_file, path: thing.obj}
         motion: {kind: still, position: [10, 0, -5]}
-    shrimp: [{position: [8, -3]}]
+    sources: [{kind: snapping_shrimp, position: [8, -3]}]
 """
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 

@@ -12,7 +12,7 @@ from sonarsynth.environment.boundaries import (
     Reflection,
     ReflectionTable,
     Rigid,
-    SeaBed,
+    SeaBottom,
     SeaSurface,
     Sediment,
 )
@@ -41,15 +41,15 @@ EVERY: list[Reflection] = [
 
 @pytest.mark.parametrize("reflection", EVERY)
 def test_no_boundary_gives_energy(reflection: Reflection) -> None:
-    for boundary in (SeaSurface(reflection=reflection), SeaBed(reflection=reflection, rms_height=0.1)):
+    for boundary in (SeaSurface(reflection=reflection), SeaBottom(reflection=reflection, rms_height=0.1)):
         assert np.abs(coefficient(boundary, GRAZING)).max() <= 1 + 1e-14
 
 
 def test_a_lossless_bed_keeps_the_energy_of_every_wave() -> None:
     """What comes back and what goes on add up: |V|^2 + |1 + V|^2 Re(w)/(m sin q) = 1, w from V itself."""
-    bed = SeaBed(reflection=FluidHalfSpace(density_ratio=1.7, speed_ratio=1.15))
+    bottom = SeaBottom(reflection=FluidHalfSpace(density_ratio=1.7, speed_ratio=1.15))
     q = GRAZING[1:]
-    v = coefficient(bed, q)
+    v = coefficient(bottom, q)
     w = np.sqrt((1 / 1.15**2 - np.cos(q) ** 2).astype(complex))
     sent_on = np.abs(1 + v) ** 2 * w.real / (1.7 * np.sin(q))
     np.testing.assert_allclose(np.abs(v) ** 2 + sent_on, 1.0, rtol=0, atol=1e-12)
@@ -58,8 +58,8 @@ def test_a_lossless_bed_keeps_the_energy_of_every_wave() -> None:
 def test_a_lossy_bed_takes_energy_and_keeps_the_sign_of_the_phase() -> None:
     """In exp(+i 2 pi f t) the phase below the critical angle lies in (0, pi), and loss takes from the modulus."""
     q = np.linspace(0.05, 0.4, 50)
-    lossless = coefficient(SeaBed(reflection=FluidHalfSpace(density_ratio=1.8, speed_ratio=1.18)), q)
-    lossy = coefficient(SeaBed(reflection=FluidHalfSpace(density_ratio=1.8, speed_ratio=1.18, loss_tangent=0.02)), q)
+    lossless = coefficient(SeaBottom(reflection=FluidHalfSpace(density_ratio=1.8, speed_ratio=1.18)), q)
+    lossy = coefficient(SeaBottom(reflection=FluidHalfSpace(density_ratio=1.8, speed_ratio=1.18, loss_tangent=0.02)), q)
     assert lossless.imag.min() > 0.0
     assert lossy.imag.min() > 0.0
     assert np.all(np.abs(lossy) < np.abs(lossless))
@@ -68,7 +68,7 @@ def test_a_lossy_bed_takes_energy_and_keeps_the_sign_of_the_phase() -> None:
 
 def test_a_pulse_reflected_below_the_critical_angle_spreads_by_the_phase_alone() -> None:
     """The reflected spectrum is V for f > 0 and its conjugate for f < 0: a real pulse of the same energy."""
-    v = coefficient(SeaBed(reflection=FluidHalfSpace(density_ratio=1.8, speed_ratio=1.18)), [0.2])[0]
+    v = coefficient(SeaBottom(reflection=FluidHalfSpace(density_ratio=1.8, speed_ratio=1.18)), [0.2])[0]
     pulse = np.exp(-0.5 * ((np.arange(256) - 128) / 4.0) ** 2) * np.cos(1.1 * np.arange(256))
     spectrum = np.fft.rfft(pulse)
     spectrum[[0, -1]] = 0.0
@@ -81,12 +81,12 @@ def test_a_pulse_reflected_below_the_critical_angle_spreads_by_the_phase_alone()
 
 @pytest.mark.parametrize("q", [1e-3, 0.3, NORMAL])
 def test_heavy_and_light_media_are_rigid_and_soft(q: float) -> None:
-    heavy = SeaBed(reflection=FluidHalfSpace(density_ratio=1e9, speed_ratio=1.5))
-    light = SeaBed(reflection=FluidHalfSpace(density_ratio=1e-9, speed_ratio=1.5))
+    heavy = SeaBottom(reflection=FluidHalfSpace(density_ratio=1e9, speed_ratio=1.5))
+    light = SeaBottom(reflection=FluidHalfSpace(density_ratio=1e-9, speed_ratio=1.5))
     assert coefficient(heavy, q) == pytest.approx(1.0, abs=2e-6)
     assert coefficient(light, q) == pytest.approx(-1.0, abs=1e-8)
-    assert coefficient(SeaBed(reflection=Rigid()), q) == 1.0
-    assert coefficient(SeaBed(reflection=PressureRelease()), q) == -1.0
+    assert coefficient(SeaBottom(reflection=Rigid()), q) == 1.0
+    assert coefficient(SeaBottom(reflection=PressureRelease()), q) == -1.0
 
 
 def test_the_air_over_the_sea_is_almost_pressure_release() -> None:
@@ -95,14 +95,14 @@ def test_the_air_over_the_sea_is_almost_pressure_release() -> None:
 
 
 def test_more_of_the_same_water_reflects_nothing() -> None:
-    same = SeaBed(reflection=FluidHalfSpace(density_ratio=1.0, speed_ratio=1.0))
+    same = SeaBottom(reflection=FluidHalfSpace(density_ratio=1.0, speed_ratio=1.0))
     np.testing.assert_array_equal(coefficient(same, GRAZING), 0.0)
 
 
 @pytest.mark.parametrize("reflection", EVERY)
 def test_coefficients_are_continuous_at_grazing_and_normal_incidence(reflection: Reflection) -> None:
     for end, inside in ((0.0, 1e-12), (NORMAL, NORMAL - 1e-9)):
-        at, near = coefficient(SeaBed(reflection=reflection), np.array([end, inside]))
+        at, near = coefficient(SeaBottom(reflection=reflection), np.array([end, inside]))
         assert abs(at - near) < 1e-8
 
 
@@ -112,8 +112,8 @@ def test_coefficients_are_continuous_at_grazing_and_normal_incidence(reflection:
 def test_every_medium_that_may_be_described_has_finite_passive_coefficients(
     speed: float, density: float, loss: float
 ) -> None:
-    bed = SeaBed(reflection=FluidHalfSpace(density_ratio=density, speed_ratio=speed, loss_tangent=loss))
-    v = coefficient(bed, np.concatenate([[0.0, 1e-300, 1e-12], GRAZING]))
+    bottom = SeaBottom(reflection=FluidHalfSpace(density_ratio=density, speed_ratio=speed, loss_tangent=loss))
+    v = coefficient(bottom, np.concatenate([[0.0, 1e-300, 1e-12], GRAZING]))
     assert np.isfinite(v).all()
     assert np.abs(v).max() <= 1 + 1e-14
 
@@ -121,13 +121,13 @@ def test_every_medium_that_may_be_described_has_finite_passive_coefficients(
 def test_the_blur_is_eckarts_loss_at_every_frequency() -> None:
     f = np.geomspace(1.0, 1e6, 40)[:, None]
     q, height, c = GRAZING, 0.02, 1531.0
-    by_blur = np.exp(-0.5 * (2 * np.pi * f * delay_std(SeaBed(rms_height=height), q, c)) ** 2)
+    by_blur = np.exp(-0.5 * (2 * np.pi * f * delay_std(SeaBottom(rms_height=height), q, c)) ** 2)
     np.testing.assert_allclose(by_blur, eckart(2 * np.pi * f / c, height, q), rtol=1e-9, atol=1e-300)
 
 
 def test_eckarts_loss_is_the_mean_over_a_rough_boundary() -> None:
     """Each piece of the boundary at height h delays by 2 h sin q/c; Gaussian heights average to the blurred pulse."""
-    rough = SeaBed(rms_height=0.01)
+    rough = SeaBottom(rms_height=0.01)
     nodes, weights = np.polynomial.hermite_e.hermegauss(80)
     f, q, c = 40e3, 0.4, 1500.0
     delay = 2 * rough.rms_height * nodes * np.sin(q) / c
@@ -136,10 +136,10 @@ def test_eckarts_loss_is_the_mean_over_a_rough_boundary() -> None:
 
 
 def test_bounces_are_the_product_of_single_reflections() -> None:
-    bed = SeaBed(reflection=Sediment(name="fine sand"), rms_height=0.02)
+    bottom = SeaBottom(reflection=Sediment(name="fine sand"), rms_height=0.02)
     q, count, c = np.array([0.1, 0.1, 0.7, 1.5]), np.array([1, 3, 2, 5]), 1500.0
-    got = bounces(bed, q, count, c)
-    np.testing.assert_allclose(got.modulus * np.exp(1j * got.phase), coefficient(bed, q) ** count, rtol=1e-13)
+    got = bounces(bottom, q, count, c)
+    np.testing.assert_allclose(got.modulus * np.exp(1j * got.phase), coefficient(bottom, q) ** count, rtol=1e-13)
     f = 30e3
     np.testing.assert_allclose(
         np.exp(-0.5 * (2 * np.pi * f * got.delay_std) ** 2), eckart(2 * np.pi * f / c, 0.02, q) ** count, rtol=1e-11
@@ -147,20 +147,20 @@ def test_bounces_are_the_product_of_single_reflections() -> None:
 
 
 def test_a_path_without_reflections_is_left_as_it_is() -> None:
-    for boundary in (SeaSurface(wind_speed=9.0, bubbles=True), SeaBed(rms_height=0.1)):
+    for boundary in (SeaSurface(wind_speed=9.0, bubbles=True), SeaBottom(rms_height=0.1)):
         got = bounces(boundary, np.array([np.nan, 0.2]), np.array([0, 0]), np.nan, 50e3)
         assert got.modulus.tolist() == [1.0, 1.0]
         assert got.phase.tolist() == got.delay_std.tolist() == [0.0, 0.0]
 
 
 def test_a_reflection_at_no_angle_is_not_a_number() -> None:
-    got = bounces(SeaBed(), np.array([np.nan, 0.2]), np.array([1, 1]), 1500.0)
+    got = bounces(SeaBottom(), np.array([np.nan, 0.2]), np.array([1, 1]), 1500.0)
     for value in (got.modulus, got.phase, got.delay_std):
         assert np.isnan(value).tolist() == [True, False]
 
 
 def test_no_angle_is_no_reflection_to_the_single_coefficient() -> None:
-    for boundary in (SeaSurface(wind_speed=9.0, bubbles=True), SeaBed(), SeaBed(reflection=TABLE)):
+    for boundary in (SeaSurface(wind_speed=9.0, bubbles=True), SeaBottom(), SeaBottom(reflection=TABLE)):
         assert coefficient(boundary, [np.nan], 50e3).tolist() == [1.0]
         assert delay_std(boundary, [np.nan], 1500.0).tolist() == [0.0]
 
@@ -173,26 +173,28 @@ def test_a_change_of_sign_is_the_phase_pi(reflection: Reflection) -> None:
 
 
 def test_a_table_is_exact_at_its_nodes_and_linear_between() -> None:
-    bed = SeaBed(reflection=TABLE)
+    bottom = SeaBottom(reflection=TABLE)
     assert TABLE.modulus is not None
     modulus, phase = np.array(TABLE.modulus), np.array(TABLE.phase)
-    at_nodes = coefficient(bed, TABLE.grazing)
+    at_nodes = coefficient(bottom, TABLE.grazing)
     np.testing.assert_allclose(np.abs(at_nodes), modulus, rtol=1e-15)
     np.testing.assert_allclose(np.angle(at_nodes), phase, rtol=1e-14)
-    middle = coefficient(bed, 0.5 * (np.array(TABLE.grazing)[1:] + np.array(TABLE.grazing)[:-1]))
+    middle = coefficient(bottom, 0.5 * (np.array(TABLE.grazing)[1:] + np.array(TABLE.grazing)[:-1]))
     np.testing.assert_allclose(np.abs(middle), 0.5 * (modulus[1:] + modulus[:-1]), rtol=1e-14)
     np.testing.assert_allclose(np.angle(middle), 0.5 * (phase[1:] + phase[:-1]), rtol=1e-14)
 
 
 def test_a_table_in_decibels_is_linear_in_decibels() -> None:
-    bed = SeaBed(reflection=ReflectionTable(grazing=(0.0, 0.5, NORMAL), loss=(0.0, 6.0, 20.0), phase=(0.0, 0.0, 0.0)))
-    got = coefficient(bed, [0.0, 0.25, 0.5, NORMAL])
+    bottom = SeaBottom(
+        reflection=ReflectionTable(grazing=(0.0, 0.5, NORMAL), loss=(0.0, 6.0, 20.0), phase=(0.0, 0.0, 0.0))
+    )
+    got = coefficient(bottom, [0.0, 0.25, 0.5, NORMAL])
     np.testing.assert_allclose(-20 * np.log10(np.abs(got)), [0.0, 3.0, 6.0, 20.0], atol=1e-13)
 
 
 def test_a_fine_table_of_a_fluid_bed_is_that_bed() -> None:
     """Second order in the step, away from the critical angle."""
-    sand = SeaBed(reflection=Sediment(name="medium sand"))
+    sand = SeaBottom(reflection=Sediment(name="medium sand"))
     probes = np.linspace(0.65, 1.55, 77)
     error = []
     for rows in (91, 181):
@@ -201,7 +203,7 @@ def test_a_fine_table_of_a_fluid_bed_is_that_bed() -> None:
         table = ReflectionTable(
             grazing=tuple(angles), modulus=tuple(np.minimum(np.abs(v), 1.0)), phase=tuple(np.unwrap(np.angle(v)))
         )
-        error.append(np.abs(coefficient(SeaBed(reflection=table), probes) - coefficient(sand, probes)).max())
+        error.append(np.abs(coefficient(SeaBottom(reflection=table), probes) - coefficient(sand, probes)).max())
     assert error[0] < 5e-4
     assert error[1] < 0.4 * error[0]
 

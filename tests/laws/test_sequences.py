@@ -21,7 +21,7 @@ from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.targets.target import Target
 
 MOTION = "scene.world.targets.0.motion"
-SHRIMP = "scene.world.shrimp.0.position"
+SHRIMP = "scene.world.sources.0.position"
 
 
 def recipe(**more: Any) -> Recipe:
@@ -30,7 +30,7 @@ def recipe(**more: Any) -> Recipe:
         targets=(
             Target(name="body", shape=Sphere(radius=0.5), motion=ConstantVelocity(start=(10.0, 0.0, -7.0), speed=1.0)),
         ),
-        shrimp=(SnappingShrimp(position=(20.0, 0.0)),),
+        sources=(SnappingShrimp(position=(20.0, 0.0)),),
     )
     return Recipe(**({"seed": 5, "scene": Scene(world=world, trajectory=Trajectory(frames=3))} | more))
 
@@ -93,7 +93,7 @@ def test_zipped_entries_advance_together() -> None:
 def test_several_fields_can_get_the_same_value() -> None:
     made = recipe(grid=(Axis(path=[f"{MOTION}.start.0", f"{SHRIMP}.0"], values=(9.0,)),))
     world = made.scene_of(0).world
-    assert world.targets[0].motion.start[0] == world.shrimp[0].position[0] == 9.0
+    assert world.targets[0].motion.start[0] == world.sources[0].position[0] == 9.0
 
 
 def test_no_order_changes_a_draw() -> None:

@@ -41,15 +41,15 @@ def screened(edge: float) -> Recipe:
 def test_each_hydrophone_hears_what_it_sees() -> None:
     """Behind the edge of a screen: as each hydrophone traced by itself, which the middle's view is far from."""
     made = planning.plan(screened(0.02), {"signals"})
-    assert made.choices.visibility == "hydrophones"
+    assert made.choices.occlusion == "sensors"
     measure = PerSensorReference.of(made, 0)
     assert measure.error(1, "centre") > 0.1
-    assert measure.error(1, "hydrophones") < 2e-3
+    assert measure.error(1, "sensors") < 2e-3
 
 
 def test_paths_are_hidden_as_each_hydrophone_finds_for_itself() -> None:
     made = planning.plan(screened(0.02), {"signals"})
-    made = replace(made, choices=replace(made.choices, visibility="hydrophones", negligible=0.0))
+    made = replace(made, choices=replace(made.choices, occlusion="sensors", negligible=0.0))
     frame = made.recipe.frame(0)[1]
     whole = arrivals_of(made, frame)
     hidden = whole.hidden(made.elements.count)
@@ -65,18 +65,18 @@ def test_paths_are_hidden_as_each_hydrophone_finds_for_itself() -> None:
 def test_convex_and_alone_nothing_is_hidden_from_some() -> None:
     made = planning.plan(remus(2), {"signals"})
     frame = made.recipe.frame(0)[1]
-    seen = replace(made, choices=replace(made.choices, visibility="hydrophones"))
+    seen = replace(made, choices=replace(made.choices, occlusion="sensors"))
     one, other = arrivals_of(made, frame), arrivals_of(seen, frame)
     hidden = other.hidden(made.elements.count).any(axis=1)
     assert hidden.mean() < 0.1  # facets of the flanks, in the shade of others for some
     np.testing.assert_array_equal(np.sort(one.delay), np.sort(other.seen_from_centre.delay))
 
 
-def test_truth_and_ledger_are_of_the_centre() -> None:
+def test_truth_and_link_budget_are_of_the_centre() -> None:
     made = planning.plan(screened(0.02), {"signals"})
-    made, seen = (replace(made, choices=replace(made.choices, visibility=v)) for v in ("centre", "hydrophones"))
+    made, seen = (replace(made, choices=replace(made.choices, occlusion=v)) for v in ("centre", "sensors"))
     centre, own = trace_frame(made, 0), trace_frame(seen, 0)
-    np.testing.assert_array_equal(centre.ledger.level, own.ledger.level)
+    np.testing.assert_array_equal(centre.budget.level, own.budget.level)
     np.testing.assert_array_equal(centre.echoes.level, own.echoes.level)
     assert len(own.arrivals.delay) > len(centre.arrivals.delay)
 
@@ -85,11 +85,11 @@ def test_the_snap_is_not_heard_behind_a_screen() -> None:
     """The direct pulse reaches the hydrophones whose straight line to the snap passes beside the screen."""
     recipe = screened(0.0)
     world = recipe.scene.world
-    snap = replace(world.shrimp[0], position=(30.0, 0.0, -50.0))
+    snap = replace(world.sources[0], position=(30.0, 0.0, -50.0))
     ball = replace(world.targets[0], motion=Still(position=(20.0, 3.0, -50.0), heading=0.0))
-    world = replace(world, shrimp=(snap,), targets=(ball, world.targets[1]))
+    world = replace(world, sources=(snap,), targets=(ball, world.targets[1]))
     made = planning.plan(replace(recipe, scene=replace(recipe.scene, world=world)), {"signals"})
-    seen = replace(made, choices=replace(made.choices, visibility="hydrophones"))
+    seen = replace(made, choices=replace(made.choices, occlusion="sensors"))
     frame = made.recipe.frame(0)[1]
     arrivals = arrivals_of(seen, frame)
     hidden = arrivals.select(arrivals.direct).hidden(made.elements.count)[0]
@@ -103,7 +103,7 @@ def test_the_snap_is_not_heard_behind_a_screen() -> None:
 @pytest.mark.parametrize("bounces", [0, 2])
 def test_bent_rays_in_uniform_water_see_what_straight_ones_do(bounces: int) -> None:
     made = planning.plan(screened(0.02), {"signals"})
-    made = replace(made, choices=replace(made.choices, visibility="hydrophones", negligible=0.0))
+    made = replace(made, choices=replace(made.choices, occlusion="sensors", negligible=0.0))
     frame = made.recipe.frame(0)[1]
     slope = Profile(made.profile.depth[[0, -1]], made.profile.speed[[0, -1]] + np.array([0.0, 1e-9]))
     found = []
@@ -157,6 +157,6 @@ def test_errors_are_measured_where_each_hydrophone_sees_for_itself() -> None:
     scene = recipe.scene
     band = replace(scene.sonar, beams=BeamGrid(azimuths=5, elevations=5))
     points = measure(replace(recipe, scene=replace(scene, sonar=band)), (0,), hydrophones=3, peers=False).points
-    views = {p.setting: p.error for p in points if p.knob in ("subarrays", "visibility") and p.stage == "trace"}
+    views = {p.setting: p.error for p in points if p.knob in ("subarrays", "occlusion") and p.stage == "trace"}
     assert views["1 part"] < 2e-3
     assert views["from the centre, 1 part"] > 0.1

@@ -23,10 +23,12 @@ from sonarsynth.tracing.occlusion.ray_cones import hidden
 from sonarsynth.tracing.occlusion.sensor_occlusion import Occlusion, cells, rim
 from sonarsynth.tracing.receive_paths import ReceivePaths, facets_of, receive_paths
 
-BED = 30.0
-WATER = Environment(depth=BED, sound_speed=Isovelocity(speed=1500.0))
-UNIFORM = Profile(np.array([0.0, BED]), np.array([1500.0, 1500.0]))
-THERMOCLINE = Profile(np.array([0.0, 12.0, 14.0, 16.0, BED]), np.array([1540.0, 1539.0, 1533.0, 1529.0, 1528.0]))
+BOTTOM_DEPTH = 30.0
+WATER = Environment(depth=BOTTOM_DEPTH, sound_speed=Isovelocity(speed=1500.0))
+UNIFORM = Profile(np.array([0.0, BOTTOM_DEPTH]), np.array([1500.0, 1500.0]))
+THERMOCLINE = Profile(
+    np.array([0.0, 12.0, 14.0, 16.0, BOTTOM_DEPTH]), np.array([1540.0, 1539.0, 1533.0, 1529.0, 1528.0])
+)
 SONAR = Pose(np.array([0.0, 0.0, -15.0]), quaternion(0.5 * np.pi, 0.05, 0.02))
 
 

@@ -1,4 +1,4 @@
-"""Through water that bends rays, off surface and bed: the array sees what each hydrophone, traced by itself, sees."""
+"""Through bending water, off surface and bottom: the array sees what each hydrophone, traced by itself, sees."""
 
 import numpy as np
 import pytest

@@ -58,7 +58,7 @@ def snap(model: SnapModel, level: float | None = None, gain: float = 1.0, width:
 def with_shrimp(frames: int = 2, **of_shrimp: object) -> Recipe:
     recipe = remus(frames)
     shrimp = SnappingShrimp(position=(14.0, -5.0), **of_shrimp)  # type: ignore[arg-type]
-    return replace(recipe, scene=replace(recipe.scene, world=replace(recipe.scene.world, shrimp=(shrimp,))))
+    return replace(recipe, scene=replace(recipe.scene, world=replace(recipe.scene.world, sources=(shrimp,))))
 
 
 @EVERY
@@ -174,7 +174,7 @@ def test_what_varies_is_drawn_by_seed_frame_and_shrimp_alone() -> None:
     recipe = with_shrimp(30, variation=SnapVariation(level=3.0, width=0.1), snap_times=(0.0, 0.01))
     scene = recipe.scene
     world = scene.world
-    two = replace(recipe, scene=replace(scene, world=replace(world, shrimp=(*world.shrimp, *world.shrimp))))
+    two = replace(recipe, scene=replace(scene, world=replace(world, sources=(*world.sources, *world.sources))))
 
     def drawn(of: Recipe, index: int) -> list[tuple[float, float]]:
         return [(s.gain, s.width) for s in of.frame(index)[1].moment.snaps]

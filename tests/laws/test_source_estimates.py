@@ -184,7 +184,7 @@ def test_each_estimate_has_the_snap_that_it_came_from_or_none() -> None:
 
 def store(**changed: float) -> xr.DataTree:
     """Two frames with one estimate each, right by one predicted error in everything, but for what is changed."""
-    one, frames = np.ones((2, 1)), ("frame", "snap")
+    one, frames = np.ones((2, 1)), ("frame", "estimate")
     found: dict[str, object] = {
         "time": 0.01 * one + 1e-7,
         "time_error": 1e-7 * one,
@@ -197,22 +197,21 @@ def store(**changed: float) -> xr.DataTree:
     }
     spread = changed.pop("spread", 0.05)
     found |= {name: np.full((2, 1), value) for name, value in changed.items()}
-    bearings = {name: (frames, value) for name, value in found.items()}
-    bearings["position"] = ((*frames, "xyz"), np.full((2, 1, 3), [14.05, 5.0, -2.0]))
-    bearings["position_covariance"] = ((*frames, "xyz", "xyz_other"), np.tile(spread**2 * np.eye(3), (2, 1, 1, 1)))
+    estimates = {name: (frames, value) for name, value in found.items()}
+    estimates["position"] = ((*frames, "xyz"), np.full((2, 1, 3), [14.05, 5.0, -2.0]))
+    estimates["position_covariance"] = ((*frames, "xyz", "xyz_other"), np.tile(spread**2 * np.eye(3), (2, 1, 1, 1)))
     truth = {
         "sonar_position": (("frame", "xyz"), np.zeros((2, 3))),
         "sonar_orientation": (("frame", "wxyz"), np.tile(quaternion(0.0), (2, 1))),
-        "snap_arrival": (frames, 0.01 * one),
-        "snap_azimuth": (frames, 20.0 * one),
-        "snap_elevation": (frames, -10.0 * one),
     }
+    each = ("frame", "emission")
+    emitted = {"arrival": (each, 0.01 * one), "azimuth": (each, 20.0 * one), "elevation": (each, -10.0 * one)}
     pose = Pose(np.zeros(3), quaternion(0.0))
-    truth["snap_position"] = ((*frames, "xyz"), np.tile(pose.to_world(np.array([14.0, 5.0, -2.0])), (2, 1, 1)))
-    ledger = {"paths": (("frame", "snap", "echo", "family"), np.ones((2, 1, 1, 4), int))}
+    emitted["position"] = ((*each, "xyz"), np.tile(pose.to_world(np.array([14.0, 5.0, -2.0])), (2, 1, 1)))
+    budget = {"paths": ((*each, "target", "family"), np.ones((2, 1, 1, 4), int))}
     root = xr.Dataset(attrs={"band_low": 25e3, "band_high": 85e3, "assumed_sound_speed": C, "aperture_radius": 0.6})
-    groups = {"bearings": xr.Dataset(bearings), "truth": xr.Dataset(truth), "ledger": xr.Dataset(ledger)}
-    return xr.DataTree.from_dict({"/": root, **groups})
+    groups = {"source_estimates": estimates, "truth": truth, "truth/emissions": emitted, "link_budget": budget}
+    return xr.DataTree.from_dict({"/": root} | {name: xr.Dataset(group) for name, group in groups.items()})
 
 
 def test_each_quantity_is_verified_by_its_own_errors() -> None:
@@ -234,7 +233,7 @@ def test_errors_as_large_as_what_is_sought_are_a_warning(useless: dict[str, floa
 
 def test_a_snap_that_is_refused_is_a_warning_with_its_reason() -> None:
     tree = store(time=np.nan, emission=-1, reason=float(REASONS.index("not_resolved")))
-    tree["bearings/reason"] = tree["bearings/reason"].astype(int)
+    tree["source_estimates/reason"] = tree["source_estimates/reason"].astype(int)
     check = snap_located(tree, np.arange(2))
     assert check.ok is None and "not_resolved 2" in check.warning
 

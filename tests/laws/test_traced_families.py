@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from sonarsynth.environment.boundaries import FluidHalfSpace, Rigid, SeaBed, SeaSurface
+from sonarsynth.environment.boundaries import FluidHalfSpace, Rigid, SeaBottom, SeaSurface
 from sonarsynth.environment.sea import Environment, Isovelocity, Profile
 from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.equations.water.boundary_reflection import rayleigh
@@ -21,14 +21,14 @@ from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Snap, WorldState
 from sonarsynth.tracing.arrivals import trace
 
-BED, C = 12.0, 1530.0
+BOTTOM_DEPTH, C = 12.0, 1530.0
 SOURCE, ARRAY = np.array([6.0, 5.0, -9.0]), np.array([0.0, 0.0, -5.0])
 SONAR = Pose(ARRAY, quaternion(0.5 * np.pi))
 ROMANIS = elements(Romanis())
 ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
-UNIFORM = Profile(np.array([0.0, BED]), np.array([C, C]))
-THERMOCLINE = Profile(np.array([0.0, 7.0, 8.5, BED]), np.array([1541.0, 1541.0, 1534.6, 1534.5]))
-RIGID = Environment(depth=BED, sound_speed=Isovelocity(speed=C), bed=SeaBed(reflection=Rigid()))
+UNIFORM = Profile(np.array([0.0, BOTTOM_DEPTH]), np.array([C, C]))
+THERMOCLINE = Profile(np.array([0.0, 7.0, 8.5, BOTTOM_DEPTH]), np.array([1541.0, 1541.0, 1534.6, 1534.5]))
+RIGID = Environment(depth=BOTTOM_DEPTH, sound_speed=Isovelocity(speed=C), bottom=SeaBottom(reflection=Rigid()))
 BAND = (25e3, 85e3)
 
 
@@ -54,16 +54,16 @@ def run(bodies=None, profile=UNIFORM, environment=RIGID, bounces=2, law=None, ar
 
 
 def images(point: np.ndarray, most: int) -> list[tuple[np.ndarray, int, int]]:
-    """Images of a point in surface and bed, with the number of mirrors of each kind: one mirroring after another."""
+    """Images of a point in surface and bottom, with the number of mirrors of each kind: one mirroring after another."""
     found = [(point, 0, 0)]
-    for first in ("surface", "bed"):
+    for first in ("surface", "bottom"):
         place, counts, mirror = point, [0, 0], first
         for _ in range(most):
-            height = 0.0 if mirror == "surface" else -BED
+            height = 0.0 if mirror == "surface" else -BOTTOM_DEPTH
             place = np.array([place[0], place[1], 2 * height - place[2]])
-            counts[mirror == "bed"] += 1
+            counts[mirror == "bottom"] += 1
             found.append((place, *counts))
-            mirror = "bed" if mirror == "surface" else "surface"
+            mirror = "bottom" if mirror == "surface" else "surface"
     return found
 
 
@@ -92,7 +92,7 @@ def test_in_uniform_water_every_path_is_that_of_an_image_of_source_and_array(mos
 
 
 def test_rays_in_nearly_uniform_water_are_the_straight_ones() -> None:
-    nearly = Profile(np.array([0.0, BED]), np.array([C, C + 1e-7]))
+    nearly = Profile(np.array([0.0, BOTTOM_DEPTH]), np.array([C, C + 1e-7]))
     for law in (Isotropic(strength=1.0), MirrorLobe()):
         straight = run(law=law, array=ROMANIS, tracing=Straight(bounces=2))
         bent = run(law=law, array=ROMANIS, profile=nearly, tracing=Refracted(bounces=2))
@@ -113,13 +113,13 @@ def test_wavefronts_of_all_families_reach_every_sensor_when_rays_do(profile: Pro
     late = (far - found.radius[:, None]) / found.sound_speed
     if found.delay_terms.shape[1]:
         late = late + found.delay_terms @ aperture_terms(q, ROMANIS.aperture).T
-    centre = model.connect(profile, BED, found.point, np.broadcast_to(ARRAY, found.point.shape))
+    centre = model.connect(profile, BOTTOM_DEPTH, found.point, np.broadcast_to(ARRAY, found.point.shape))
     leg = {}
     for i in range(len(centre.pair)):
         leg.setdefault((centre.pair[i], centre.surface[i], centre.bottom[i]), []).append(centre.travel_time[i])
     checked = set()
     for i in np.linspace(0, len(found.delay) - 1, 60).astype(int):
-        paths = model.connect(profile, BED, np.broadcast_to(found.point[i], where.shape), where)
+        paths = model.connect(profile, BOTTOM_DEPTH, np.broadcast_to(found.point[i], where.shape), where)
         for family in set(zip(paths.surface, paths.bottom, strict=True)):
             some = (paths.surface == family[0]) & (paths.bottom == family[1])
             way = [0, 1, 2, 3][(family[0] > 0) + 2 * (family[1] > 0)]
@@ -137,14 +137,14 @@ def test_wavefronts_of_all_families_reach_every_sensor_when_rays_do(profile: Pro
 def test_the_bed_gives_its_coefficient_and_phase_and_the_surface_changes_the_sign() -> None:
     fluid = FluidHalfSpace(density_ratio=1.8, speed_ratio=1.15, loss_tangent=0.02)
     environment = Environment(
-        depth=BED,
+        depth=BOTTOM_DEPTH,
         sound_speed=Isovelocity(speed=C),
-        bed=SeaBed(reflection=fluid, rms_height=0.003),
+        bottom=SeaBottom(reflection=fluid, rms_height=0.003),
         surface=SeaSurface(rms_height=0.001),
     )
     found = run(bodies=(), environment=environment, bounces=1)
     assert list(zip(found.surface, found.bottom, strict=True)) == [(0, 0), (0, 1), (1, 0)]
-    drop = [np.hypot(SOURCE[2] - ARRAY[2], 0), 2 * BED + SOURCE[2] + ARRAY[2], -SOURCE[2] - ARRAY[2]]
+    drop = [np.hypot(SOURCE[2] - ARRAY[2], 0), 2 * BOTTOM_DEPTH + SOURCE[2] + ARRAY[2], -SOURCE[2] - ARRAY[2]]
     level = np.hypot(*(SOURCE - ARRAY)[:2])
     grazing = np.arctan2(drop, level)
     expected = complex(rayleigh(grazing[1], 1.8, 1.15, 0.02))
@@ -166,13 +166,13 @@ def plate(centre, half, normal_axis: int) -> PlacedTarget:
 
 
 @pytest.mark.parametrize("profile", [UNIFORM, THERMOCLINE])
-@pytest.mark.parametrize(("height", "hides"), [(-0.3, (1, 0)), (-BED + 0.3, (0, 1)), (-7.0, (0, 0))])
+@pytest.mark.parametrize(("height", "hides"), [(-0.3, (1, 0)), (-BOTTOM_DEPTH + 0.3, (0, 1)), (-7.0, (0, 0))])
 def test_a_board_hides_the_paths_that_it_stands_in_and_no_others(profile, height: float, hides) -> None:
     free = run(bodies=(), profile=profile, bounces=1)
     drop = {
         (0, 0): 0.5,
         (1, 0): ARRAY[2] / (ARRAY[2] + SOURCE[2]),
-        (0, 1): (BED + ARRAY[2]) / (2 * BED + ARRAY[2] + SOURCE[2]),
+        (0, 1): (BOTTOM_DEPTH + ARRAY[2]) / (2 * BOTTOM_DEPTH + ARRAY[2] + SOURCE[2]),
     }
     met = ARRAY + drop[hides] * (SOURCE - ARRAY)  # where the path meets the boundary, or its middle
     shaded = run(bodies=(plate((met[0], met[1], height), 0.6, 2),), profile=profile, bounces=1)
@@ -204,11 +204,11 @@ def test_the_echo_of_a_ghost_comes_from_the_mirrored_place() -> None:
 
 def test_a_snap_on_the_bed_and_its_image_there_are_one() -> None:
     """Of one strength to a snap a hair above the bottom, whose two ways add up when they come together."""
-    fluid = SeaBed(reflection=FluidHalfSpace(density_ratio=1.8, speed_ratio=1.15, loss_tangent=0.02))
-    environment = Environment(depth=BED, sound_speed=Isovelocity(speed=C), bed=fluid)
+    fluid = SeaBottom(reflection=FluidHalfSpace(density_ratio=1.8, speed_ratio=1.15, loss_tangent=0.02))
+    environment = Environment(depth=BOTTOM_DEPTH, sound_speed=Isovelocity(speed=C), bottom=fluid)
     totals = []
     for height in (0.0, 1e-7):
-        snaps = (Snap(np.array([6.0, 5.0, -BED + height]), 0.0, LogarithmicBubble(), None),)
+        snaps = (Snap(np.array([6.0, 5.0, -BOTTOM_DEPTH + height]), 0.0, LogarithmicBubble(), None),)
         found = trace(
             environment, UNIFORM, WorldState(0.0, (ball(),), snaps), SONAR, ONE, 0.0, AutoTracing(bounces=2),
             (Isotropic(strength=1.0),), band=BAND,
@@ -229,7 +229,7 @@ def test_a_snap_on_the_bed_and_its_image_there_are_one() -> None:
 def test_a_body_at_the_foot_of_a_ray_that_turns_and_then_meets_the_bed_hides_it_both_ways() -> None:
     """Launched upwards, it turns: the bottom is the first boundary that it meets."""
     falling = Profile(np.array([0.0, 20.0]), np.array([1520.0, 1500.0]))
-    environment = Environment(depth=20.0, sound_speed=Isovelocity(speed=1510.0), bed=SeaBed(reflection=Rigid()))
+    environment = Environment(depth=20.0, sound_speed=Isovelocity(speed=1510.0), bottom=SeaBottom(reflection=Rigid()))
     ends = np.array([[0.0, 0.0, -10.0], [360.0, 0.0, -10.0]])
     foot = ball((232.958, 0.0, -19.65))
     for source, array in (ends, ends[::-1]):
@@ -246,7 +246,7 @@ def test_a_body_at_the_foot_of_a_ray_that_turns_and_then_meets_the_bed_hides_it_
 
 
 def test_straight_rays_are_straight_in_any_water() -> None:
-    falling = Profile(np.array([0.0, BED]), np.array([1530.0, 1500.0]))
+    falling = Profile(np.array([0.0, BOTTOM_DEPTH]), np.array([1530.0, 1500.0]))
     middle = 0.5 * (SOURCE + ARRAY)
     found = run(bodies=(ball(tuple(middle), 0.05),), profile=falling, bounces=0, tracing=Straight())
     assert not found.direct.any()

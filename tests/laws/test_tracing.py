@@ -1,4 +1,4 @@
-"""Laws of the arrivals: geometry, wavefronts, reciprocity, scaling, visibility, and legs that are used again."""
+"""Laws of the arrivals: geometry, wavefronts, reciprocity, scaling, occlusion, and legs that are used again."""
 
 from __future__ import annotations
 

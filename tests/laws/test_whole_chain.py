@@ -141,9 +141,9 @@ def test_truth_agrees_with_the_arrivals_that_made_the_signals() -> None:
     assert 0.9 < truth.visible_fraction[0] <= 1.0
 
 
-def test_the_ledger_adds_up_and_matches_the_arrivals() -> None:
+def test_the_link_budget_adds_up_and_matches_the_arrivals() -> None:
     traced = trace_frame(_planned(remus()), 0)
-    terms = dict(zip(LINK_BUDGET, np.moveaxis(traced.ledger.level, -1, 0), strict=True))
+    terms = dict(zip(LINK_BUDGET, np.moveaxis(traced.budget.level, -1, 0), strict=True))
     total = terms["source_level"] + terms["scattering"]
     for loss in ("transmission_loss_out", "transmission_loss_in", "absorption_loss", "boundary_loss"):
         total = total - terms[loss]
@@ -164,7 +164,7 @@ def test_what_nobody_asked_for_is_not_computed(monkeypatch: pytest.MonkeyPatch) 
     made = plan(remus(), ("signals",))
     monkeypatch.setattr("sonarsynth.pipeline.locate_and_image", lambda *_: pytest.fail("signals were processed"))
     heard = beamform_frame(made, 0, trace_frame(made, 0))
-    assert heard.image is None and heard.bearings is None
+    assert heard.image is None and heard.estimates is None
 
 
 def _brightest(edge: float, phases: str) -> float:

@@ -23,8 +23,9 @@ scene:
       - name: box
         shape: {kind: box, size: [1, 1, 1], edge: 0.25}
         motion: {kind: line, start: [10, 0, -5], stop: [10, 1, -5], duration: 1}
-    shrimp:
+    sources:
       - position: [30, 1]
+        kind: snapping_shrimp
   sonar:
     array: {kind: planar_lattice, columns: 5, rows: 4, pitch: 5 cm}
     beams: {azimuths: 11, elevations: 9, azimuth_span: 30 deg, elevation_span: 30 deg}

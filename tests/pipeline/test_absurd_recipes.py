@@ -60,7 +60,7 @@ ABSURD = [
     (
         SHRIMP,
         f"{SHRIMP}\n        snap_times: {list(range(501))}",
-        "10: scene.world.shrimp: 501 snaps are more than 500",
+        "10: scene.world.sources: 501 snaps are more than 500",
     ),
     ("stop: [10, 1, -5], duration: 1", "stop: [10, 400, -5], duration: 1", "target 'box' moves at 400 m/s at frame 0"),
     (

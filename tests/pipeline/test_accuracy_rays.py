@@ -24,9 +24,9 @@ from sonarsynth.validation.references.rays.slowness_fan import count_rays
 from sonarsynth.validation.report import write
 
 
-def ends(bed: float, farthest: float, pairs: int = 6) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def ends(bottom_depth: float, farthest: float, pairs: int = 6) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     rng = np.random.default_rng(pairs)
-    start, end = rng.uniform(0.0, bed, (2, pairs))
+    start, end = rng.uniform(0.0, bottom_depth, (2, pairs))
     return start, end, np.geomspace(0.01, 1.0, pairs) * farthest
 
 
@@ -48,11 +48,11 @@ def test_the_search_is_within_every_bound(rows: list[Row]) -> None:
     assert all(row.counts["rays"] > 0 and row.cost > 0 and row.cost_unit == "us a ray" for row in rows)
 
 
-@pytest.mark.parametrize(("slope", "bed", "farthest"), [(0.0163, 4e3, 6e4), (-4.3, 20.0, 300.0), (1e-6, 100.0, 1e4)])
-def test_circles_digits_and_fan_agree(slope: float, bed: float, farthest: float) -> None:
-    start, end, distance = ends(bed, farthest)
-    circles = gradient_rays(Gradient(1500.0, slope, bed), start, end, distance, 5)
-    depth, speed = np.array([0.0, bed]), np.array([1500.0, 1500.0 + slope * bed])
+@pytest.mark.parametrize(("slope", "bottom", "farthest"), [(0.0163, 4e3, 6e4), (-4.3, 20.0, 300.0), (1e-6, 100.0, 1e4)])
+def test_circles_digits_and_fan_agree(slope: float, bottom_depth: float, farthest: float) -> None:
+    start, end, distance = ends(bottom_depth, farthest)
+    circles = gradient_rays(Gradient(1500.0, slope, bottom_depth), start, end, distance, 5)
+    depth, speed = np.array([0.0, bottom_depth]), np.array([1500.0, 1500.0 + slope * bottom_depth])
     p = np.cos(circles.start_angle) / np.interp(start[circles.pair], depth, speed)
     digits = exact_rays(Layers(depth, speed), circles, p, start, end, distance)
     assert circles.families == digits.families

@@ -14,7 +14,7 @@ import pytest
 from sonarsynth.cli import app
 from sonarsynth.cli.frontier_table import show
 from sonarsynth.cli.running import run
-from sonarsynth.environment.boundaries import SeaBed, Sediment
+from sonarsynth.environment.boundaries import SeaBottom, Sediment
 from sonarsynth.frontiers import Measured, Point, exact_frame, measure, usual_frames
 from sonarsynth.frontiers.exact_frame import differences, each_hydrophone, exact_plan, spread
 from sonarsynth.frontiers.frontier_report import write
@@ -228,8 +228,8 @@ def test_finufft_and_ours_agree(bounces: int, monkeypatch: pytest.MonkeyPatch) -
     from sonarsynth.frontiers.peer_rows import synthesis_peers
     from sonarsynth.planning import arrivals_of
 
-    recipe, bed = small(1e-4), SeaBed(reflection=Sediment(name="medium sand"))
-    world = replace(recipe.scene.world, environment=replace(recipe.scene.world.environment, bed=bed))
+    recipe, bottom = small(1e-4), SeaBottom(reflection=Sediment(name="medium sand"))
+    world = replace(recipe.scene.world, environment=replace(recipe.scene.world.environment, bottom=bottom))
     physics = replace(recipe.scene.physics, tracing=AutoTracing(bounces=bounces))
     recipe = replace(recipe, scene=replace(recipe.scene, world=world, physics=physics))
     made = plan(recipe, choices=Choices(synthesis=GriddedSynthesis(width=8, tolerance=1e-5)))

@@ -40,7 +40,7 @@ def nothing_is_rendered(monkeypatch: pytest.MonkeyPatch) -> None:
 WATER = "scene.world.environment"
 TARGET = "scene.world.targets.0"
 WRONG = [
-    ("beams: {azimuths", "beams: {azimuth", "14: scene.sonar.beams.azimuth: 'azimuth' is not a field here"),
+    ("beams: {azimuths", "beams: {azimuth", "15: scene.sonar.beams.azimuth: 'azimuth' is not a field here"),
     ("speed: 1540", "speed: 0", "5: scene.world.environment.sound_speed.speed: must be greater than 0"),
     ("kind: isovelocity, speed: 1540", "kind: cast, path: none.csv", f"5: {WATER}.sound_speed.path: no such file"),
     ("kind: isovelocity, speed: 1540", "kind: cast, path: small.yaml", f"5: {WATER}.sound_speed: "),
@@ -48,50 +48,50 @@ WRONG = [
     ("kind: box, size: [1, 1, 1], edge: 0.25", "kind: mesh_file, path: bad.stl", f"8: {TARGET}.shape: "),
     ("stop: [10, 1, -5]", "stop: [10, 1, 0]", f"9: {TARGET}.motion: target 'box'"),
     ("stop: [10, 1, -5]", "stop: [10, 1, -12]", f"9: {TARGET}.motion: target 'box'"),
-    ("pitch: 5 cm", "pitch: 5 km", "15: scene.trajectory.sonar: the array is "),
-    ("pitch: 5 cm", "pitch: 5 cm, dead: [20]", "13: scene.sonar.array: dead names an element outside 0..19"),
+    ("pitch: 5 cm", "pitch: 5 km", "16: scene.trajectory.sonar: the array is "),
+    ("pitch: 5 cm", "pitch: 5 cm, dead: [20]", "14: scene.sonar.array: dead names an element outside 0..19"),
     (
         "pitch: 5 cm}",
         "pitch: 5 cm}\n    sampling_frequency: 100 kHz",
-        "14: scene.sonar.sampling_frequency: 100000 Hz is",
+        "15: scene.sonar.sampling_frequency: 100000 Hz is",
     ),
     (
         "pitch: 5 cm}",
         "pitch: 5 cm}\n    assumed_sound_speed: 1 m/s",
-        "14: scene.sonar.assumed_sound_speed: must be greater",
+        "15: scene.sonar.assumed_sound_speed: must be greater",
     ),
     (
         "pitch: 5 cm}",
         "pitch: 5 cm}\n    filter: {kind: low_pass, cutoff: 90 kHz, transition: 1 Hz}",
-        "14: scene.sonar.filter.transition: must be greater than or equal to 100",
+        "15: scene.sonar.filter.transition: must be greater than or equal to 100",
     ),
     (
         "pitch: 5 cm}",
         "pitch: 5 cm}\n    filter: {kind: low_pass, cutoff: 9 kHz}",
-        "12: scene.sonar: nothing to sample: the filter stops the whole band",
+        "13: scene.sonar: nothing to sample: the filter stops the whole band",
     ),
     ("level: 40 dB", "level: 4000 dB", f"5: {WATER}.noise.level: must be less than or equal to 300"),
     (
         "position: [30, 1]",
         "position: [30, 1]\n        source_level: 1e4",
-        "12: scene.world.shrimp.0.source_level: must be less",
+        "12: scene.world.sources.0.source_level: must be less",
     ),
     (
         "position: [30, 1]",
         "position: [30, 1]\n        height: 13",
-        "11: scene.world.shrimp.0.position: depth -1 m is outside",
+        "11: scene.world.sources.0.position: depth -1 m is outside",
     ),
     (
         "position: [30, 1]",
         "position: [30, 1]\n        snap_times: []",
-        "12: scene.world.shrimp.0.snap_times: must have at least",
+        "12: scene.world.sources.0.snap_times: must have at least",
     ),
     (
         "position: [30, 1]",
         "position: [30, 1]\n        snap_times: [0, 1e5]",
         "scene.processing.echo_window: a frame would take",
     ),
-    ("position: [30, 1]", "position: [1e9, 1]", "11: scene.world.shrimp.0.position: is more than 1e+06 m"),
+    ("position: [30, 1]", "position: [1e9, 1]", "11: scene.world.sources.0.position: is more than 1e+06 m"),
     ("depth: 12 m", "depth: 120 km", "5: scene.world.environment.depth: must be less than or equal to 12000"),
     (
         "kind: isovelocity, speed: 1540",

@@ -241,10 +241,10 @@ def test_products_decide_what_is_stored(tmp_path: Path, small: Recipe, reference
     path = tmp_path / "s.zarr"
     build(small, path, products=["image"], workers=0)
     ours, all_of_it = arrays(path), arrays(reference)
-    assert {"image/energy", "truth/target", "ledger/paths", "step"} <= ours.keys()
+    assert {"image/energy", "truth/beams/target", "link_budget/paths", "step"} <= ours.keys()
     assert not any(name.startswith(("signals/", "cloud/")) for name in ours)
     assert [name for name in ours if ours[name] != all_of_it[name]] == []
-    assert "ledger/measured_level" not in ours  # nothing to compare it with
+    assert "link_budget/measured_level" not in ours  # nothing to compare it with
     with pytest.raises(store.Mismatch, match="products"):
         build(small, path, workers=0)
     with pytest.raises(ValueError, match="'film' is not a product"):
@@ -262,8 +262,8 @@ def test_truth_alone_is_made_without_sound(
     path = tmp_path / "s.zarr"
     assert build(small, path, products="truth", workers=0).ok
     ours, all_of_it = arrays(path), arrays(reference)
-    assert {"truth/target", "truth/box", "truth/snap_position", "step"} <= ours.keys()
-    assert not any(name.startswith(("signals/", "image/", "ledger/", "truth/echo_")) for name in ours)
+    assert {"truth/beams/target", "truth/targets/box", "truth/emissions/position", "step"} <= ours.keys()
+    assert not any(name.startswith(("signals/", "image/", "link_budget/", "truth/targets/echo_")) for name in ours)
     assert [name for name in ours if ours[name] != all_of_it[name]] == []
     assert all(check.ok for check in evaluation.check(xr.open_datatree(path, engine="zarr")))
     assert "holds | truth" in store.beside(path, "card.md").read_text()

@@ -139,7 +139,7 @@ def test_a_folder_that_cannot_be_written_is_one_line(command: Command, small_fil
         (["--wrokers", "1"], "No such option"),
         (["--set", "seed=-1"], "small.yaml:--set: seed: must be greater than or equal to 0, not -1"),
         (["--set", "scene.world.targets.0.motion.start.2=-20"], "small.yaml:--set: scene.world.targets.0.motion"),
-        (["--set", "scene.world.shrimp.0.position=[1, 2, 3]"], "small.yaml:--set: scene.world.shrimp.0.position: "),
+        (["--set", "scene.world.sources.0.position=[1, 2, 3]"], "small.yaml:--set: scene.world.sources.0.position: "),
     ],
 )
 def test_bad_input_is_status_2_and_one_line(

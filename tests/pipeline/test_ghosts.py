@@ -18,7 +18,7 @@ from sonarsynth.pictures.store_reading import FAINTEST, ghosts, opened, stored
 from sonarsynth.planning import plan
 from sonarsynth.recipe import reading
 
-FAMILIES = ["direct", "surface", "bed", "surface and bed"]
+FAMILIES = ["direct", "surface", "bottom", "surface and bottom"]
 FRAME = np.array([100.0, 50.0, 500.0, 650.0])
 AZIMUTH, ELEVATION = np.linspace(-25.0, 25.0, 51), np.linspace(-32.0, 32.0, 65)
 
@@ -31,8 +31,8 @@ def tree(
     rows = {"level": level, "elevation": elevation, "azimuth": azimuth or [0.0] * len(FAMILIES)}
     truth = xr.Dataset({f"echo_{name}": (dims, np.array([[row] * targets])) for name, row in rows.items()})
     names = [f"t{i}" for i in range(targets)]
-    truth = truth.assign_coords(family=FAMILIES, target_name=("target", names))
-    return xr.DataTree.from_dict({"truth": truth})
+    truth = truth.assign_coords(family=FAMILIES, target=names)
+    return xr.DataTree.from_dict({"truth/targets": truth})
 
 
 def names(found: tuple[Ghost, ...]) -> list[str]:
@@ -43,8 +43,8 @@ def test_ghosts_are_all_families_but_the_direct_one() -> None:
     found = ghosts(tree([120.0, 118.0, 117.0, 108.0], [1.0, 25.0, -27.0, 44.0], [5.0, 6.0, 7.0, 8.0]), 0)
     assert found == (
         Ghost("surface ghost", 0, 6.0, 25.0, -2.0),
-        Ghost("bed ghost", 0, 7.0, -27.0, -3.0),
-        Ghost("surface and bed ghost", 0, 8.0, 44.0, -12.0),
+        Ghost("bottom ghost", 0, 7.0, -27.0, -3.0),
+        Ghost("surface and bottom ghost", 0, 8.0, 44.0, -12.0),
     )
 
 
@@ -62,7 +62,7 @@ def test_without_a_direct_echo_levels_are_those_below_the_strongest() -> None:
 @pytest.mark.parametrize(("both", "drawn"), [(44.0, True), (-46.0, True), (10.5, False), (-3.0, False)])
 def test_the_mean_of_echoes_from_above_and_below_is_no_ghost(both: float, drawn: bool) -> None:
     found = ghosts(tree([120.0, 118.0, 118.0, 110.0], [1.0, 25.0, -27.0, both]), 0)
-    assert ("surface and bed ghost" in names(found)) == drawn
+    assert ("surface and bottom ghost" in names(found)) == drawn
 
 
 def test_several_targets_are_named_and_a_store_without_echoes_has_no_ghosts() -> None:
@@ -135,7 +135,7 @@ def test_ghosts_are_drawn_at_their_place_and_leave_nothing_behind(picture: Frame
 
 @pytest.mark.parametrize("where", [(0.0, 60.0), (0.0, -60.0), (70.0, 0.0), (-70.0, 0.0), (60.0, 60.0)])
 def test_a_ghost_outside_is_an_arrow_at_the_edge(picture: FramePicture, where: tuple[float, float]) -> None:
-    azimuth, elevation = changed(picture, Ghost("bed ghost", 0, *where, -2.0))
+    azimuth, elevation = changed(picture, Ghost("bottom ghost", 0, *where, -2.0))
     assert len(azimuth) > 40
     assert np.abs(azimuth).max() <= 25.5 and np.abs(elevation).max() <= 32.5
     reach = np.array([azimuth, elevation]).T @ np.sign(where)
@@ -165,12 +165,12 @@ def test_stored_ghosts_lie_where_the_mirror_images_are(
     files = show(tmp_path / "small.zarr", tmp_path / "pictures", say=said.append)
     assert files[0].read_bytes().startswith(b"\x89PNG")
     found = {ghost.name: ghost for ghost in stored(opened(tmp_path / "small.zarr"), 0).ghosts}
-    assert {"surface ghost", "bed ghost"} <= set(found)
-    images = {"surface ghost": [10.0], "bed ghost": [-14.0], "surface and bed ghost": [24.0, -24.0]}
+    assert {"surface ghost", "bottom ghost"} <= set(found)
+    images = {"surface ghost": [10.0], "bottom ghost": [-14.0], "surface and bottom ghost": [24.0, -24.0]}
     for name, ghost in found.items():
         image = np.rad2deg(np.arctan2(images[name], 10.0))
         assert np.abs(image - ghost.elevation).min() < 3.0  # half the box
         assert abs(ghost.azimuth) < 3.0
     (line,) = [line for line in said[0].splitlines() if line.startswith("  ghosts")]
-    assert f"box: surface {found['surface ghost'].level:+.1f} dB, bed {found['bed ghost'].level:+.1f} dB" in line
+    assert f"box: surface {found['surface ghost'].level:+.1f} dB, bottom {found['bottom ghost'].level:+.1f} dB" in line
     assert line.endswith(f"dB re its {reference} echo")

@@ -24,7 +24,7 @@ grid:
         path: scene.world.targets.0.shape
         values: [{kind: box, size: [1, 1, 1], edge: 0.5}, {kind: sphere, radius: 40 cm, edge: 0.3}]
 variations:
-  - {name: shrimp_x, path: scene.world.shrimp.0.position.0, kind: uniform, low: 20 m, high: 30 m}
+  - {name: shrimp_x, path: scene.world.sources.0.position.0, kind: uniform, low: 20 m, high: 30 m}
   - name: water
     path: scene.world.environment.sound_speed
     kind: choice
@@ -67,20 +67,20 @@ def test_a_store_holds_every_value_and_every_mesh(spanning: Path, tmp_path: Path
         assert first.repeat.values.tolist() == [0, 1] * 4
         assert first.hull.values.tolist() == [0, 0, 1, 1] * 2 and root.hull.attrs["flag_meanings"] == "box sphere"
         assert root.water.attrs["flag_meanings"] == "linear isovelocity"
-        assert np.array_equal(tree["truth/mesh"].values[::2, 0], first.hull.values)
-        assert np.array_equal(tree["truth/target_position"].values[::2, 0, 0], first.away.values)
-        assert np.array_equal(tree["truth/snap_position"].values[:, 0, 0], root.shrimp_x.values)
+        assert np.array_equal(tree["truth/targets/mesh"].values[::2, 0], first.hull.values)
+        assert np.array_equal(tree["truth/targets/position"].values[::2, 0, 0], first.away.values)
+        assert np.array_equal(tree["truth/emissions/position"].values[:, 0, 0], root.shrimp_x.values)
         assert len(np.unique(root.shrimp_x.values)) == 8
         faces = [tree[f"targets/box/{n}/faces"] for n in range(2)]
         for frame in range(16):
-            mesh = faces[int(tree["truth/mesh"][frame, 0])]
-            assert tree["truth/facet"].values[frame].max() < len(mesh)
+            mesh = faces[int(tree["truth/targets/mesh"][frame, 0])]
+            assert tree["truth/beams/facet"].values[frame].max() < len(mesh)
         assert np.bincount(first.split.values, minlength=3).tolist() == [4, 0, 4]
         assert set(other["away"].values) == {9.0, 11.0}, "every value is there before its frame is"
-        for name in ("signals/pressure", "cloud/range", "truth/target", "ledger/received_level"):
+        for name in ("signals/pressure", "cloud/range", "truth/beams/target", "link_budget/received_level"):
             assert np.array_equal(tree[name].values[13], other[name].values[13], equal_nan=True)
     one = render(recipe, 13)
-    assert float(one.coords["away"]) == 11.0 and int(one["truth"].coords["mesh"][0]) == 1
+    assert float(one.coords["away"]) == 11.0 and int(one["truth/targets"].coords["mesh"][0]) == 1
 
 
 def test_a_sequence_more_changes_no_number_of_the_others(spanning: Path, tmp_path: Path) -> None:
@@ -129,7 +129,7 @@ def test_settings_override_the_grid(spanning: Path) -> None:
     sets = ("grid.0.values=[12 m]", "repeats=3", "variations.0.high=21 m")
     recipe = reading.load(spanning, sets)
     assert recipe.sequences == 6
-    assert all(20 <= recipe.scene_of(n).world.shrimp[0].position[0] <= 21 for n in range(6))
+    assert all(20 <= recipe.scene_of(n).world.sources[0].position[0] <= 21 for n in range(6))
 
 
 def test_plan_says_what_is_spanned(spanning: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -153,55 +153,55 @@ def test_the_schema_covers_the_grid() -> None:
 
 START, SHAPE = "scene.world.targets.0.motion.start", "scene.world.targets.0.shape"
 WRONG = [
-    ("[9 m, 1100 cm]", "[9 m, 11 kHz]", f"17: grid.0.values.1: {START}.0: has unit 'kHz'; use one of m, km"),
-    ("[9 m, 1100 cm]", "[9 m, far]", f"17: grid.0.values.1: {START}.0: must be a number in m"),
-    ("[9 m, 1100 cm]", "[9 m, 9 m]", "17: grid.0: value 9 m is given twice"),
-    ("[9 m, 1100 cm]", "[]", "17: grid.0.values: "),
-    ("values: [9 m, 1100 cm]", "value: [9 m]", "17: grid.0.value: 'value' is not a field here; did you mean 'values'?"),
-    ("values: [9 m, 1100 cm]", "first: 9 m", "17: grid.0: needs values: [...], or first, last and one of step and"),
-    ("values: [9 m, 1100 cm]", "first: 9 m, last: 1 km, step: 1 m", "17: grid.0: must all have the same unit"),
-    ("values: [9 m, 1100 cm]", "first: 9 m, last: 8 m, step: 1 m", "17: grid.0: step 1 m does not lead from first"),
-    ("motion.start.0", "motion.strat.0", "17: grid.0.values.0: scene.world.targets.0.motion.strat: 'strat' is not a"),
-    ("motion.start.0", "motion.start.7", "17: grid.0.path: scene.world.targets.0.motion.start.7: '7' is not one of"),
-    ("motion.start.0", "motion.hedding", "17: grid.0.values.0: scene.world.targets.0.motion.hedding: 'hedding' is not"),
-    ("motion.start.0", "motion.speed.0", "17: grid.0.path: scene.world.targets.0.motion.speed.0: 'scene.world.targets"),
-    ("scene.world.targets.0.motion.start.0", "scene.sonar.beams.azimuths", "17: grid.0.path: 'scene.sonar.beams.az"),
-    ("scene.world.targets.0.motion.start.0", "scene.trajectory.frames", "17: grid.0.path: 'scene.trajectory.frames' c"),
-    ("scene.world.targets.0.motion.start.0", f"{SHAPE}.path", f"17: grid.0.path: '{SHAPE}.path' is the name of a fil"),
-    ("name: away", "name: time", "17: grid.0.name: 'time' is the name of another coordinate"),
-    ("name: away", "name: heading", "19: grid.1.zip.0.name: 'heading' is the name of another coordinate"),
-    ("motion.heading", "motion.start.0", "19: grid.1.zip.0.path: 'scene.world.targets.0.motion.start.0' is set by"),
-    ("count: 2", "count: 3", "18: grid.1.zip: the entries have 3, 2 values; they must have equally many"),
-    ("kind: sphere, radius", "kind: sphere, radios", f"22: grid.1.zip.1.values.1: {SHAPE}.radios: 'radios' is not a "),
-    ("40 cm, edge", "-40 cm, edge", f"22: grid.1.zip.1.values.1: {SHAPE}.radius: must be greater than 0"),
-    ("kind: sphere, radius: 40 cm", "kind: ball", f"22: grid.1.zip.1.values.1: {SHAPE}: input tag 'ball'"),
-    ("low: 20 m", "low: 31 m", "24: variations.0: low must be less than high: 31 m to 30 m"),
-    ("low: 20 m", "low: 20", "24: variations.0: must all have the same unit"),
+    ("[9 m, 1100 cm]", "[9 m, 11 kHz]", f"18: grid.0.values.1: {START}.0: has unit 'kHz'; use one of m, km"),
+    ("[9 m, 1100 cm]", "[9 m, far]", f"18: grid.0.values.1: {START}.0: must be a number in m"),
+    ("[9 m, 1100 cm]", "[9 m, 9 m]", "18: grid.0: value 9 m is given twice"),
+    ("[9 m, 1100 cm]", "[]", "18: grid.0.values: "),
+    ("values: [9 m, 1100 cm]", "value: [9 m]", "18: grid.0.value: 'value' is not a field here; did you mean 'values'?"),
+    ("values: [9 m, 1100 cm]", "first: 9 m", "18: grid.0: needs values: [...], or first, last and one of step and"),
+    ("values: [9 m, 1100 cm]", "first: 9 m, last: 1 km, step: 1 m", "18: grid.0: must all have the same unit"),
+    ("values: [9 m, 1100 cm]", "first: 9 m, last: 8 m, step: 1 m", "18: grid.0: step 1 m does not lead from first"),
+    ("motion.start.0", "motion.strat.0", "18: grid.0.values.0: scene.world.targets.0.motion.strat: 'strat' is not a"),
+    ("motion.start.0", "motion.start.7", "18: grid.0.path: scene.world.targets.0.motion.start.7: '7' is not one of"),
+    ("motion.start.0", "motion.hedding", "18: grid.0.values.0: scene.world.targets.0.motion.hedding: 'hedding' is not"),
+    ("motion.start.0", "motion.speed.0", "18: grid.0.path: scene.world.targets.0.motion.speed.0: 'scene.world.targets"),
+    ("scene.world.targets.0.motion.start.0", "scene.sonar.beams.azimuths", "18: grid.0.path: 'scene.sonar.beams.az"),
+    ("scene.world.targets.0.motion.start.0", "scene.trajectory.frames", "18: grid.0.path: 'scene.trajectory.frames' c"),
+    ("scene.world.targets.0.motion.start.0", f"{SHAPE}.path", f"18: grid.0.path: '{SHAPE}.path' is the name of a fil"),
+    ("name: away", "name: time", "18: grid.0.name: 'time' is the name of another coordinate"),
+    ("name: away", "name: heading", "20: grid.1.zip.0.name: 'heading' is the name of another coordinate"),
+    ("motion.heading", "motion.start.0", "20: grid.1.zip.0.path: 'scene.world.targets.0.motion.start.0' is set by"),
+    ("count: 2", "count: 3", "19: grid.1.zip: the entries have 3, 2 values; they must have equally many"),
+    ("kind: sphere, radius", "kind: sphere, radios", f"23: grid.1.zip.1.values.1: {SHAPE}.radios: 'radios' is not a "),
+    ("40 cm, edge", "-40 cm, edge", f"23: grid.1.zip.1.values.1: {SHAPE}.radius: must be greater than 0"),
+    ("kind: sphere, radius: 40 cm", "kind: ball", f"23: grid.1.zip.1.values.1: {SHAPE}: input tag 'ball'"),
+    ("low: 20 m", "low: 31 m", "25: variations.0: low must be less than high: 31 m to 30 m"),
+    ("low: 20 m", "low: 20", "25: variations.0: must all have the same unit"),
     (
         "kind: uniform",
         "kind: uniformly",
-        "24: variations.0.kind: 'uniformly' is not a kind here; did you mean 'uniform'",
+        "25: variations.0.kind: 'uniformly' is not a kind here; did you mean 'uniform'",
     ),
-    ("high: 30 m", "high: 9e9 m", "24: variations.0: scene.world.shrimp.0.position: is more than 1e+06 m"),
-    ("repeats: 2", "repeats: 0", "29: repeats: must be greater than or equal to 1"),
-    ("repeats: 2", "repeats: 900000", "16: grid: spans 3600000 sequences, more than 1000000"),
-    ("test: 0.5", "test: 0.4", "30: splits: train, validation and test must add up to 1, not 0.9"),
-    ("stratify: hull", "stratify: hall", "30: splits.stratify: 'hall' names nothing that varies; known: away"),
-    ("stratify: hull", "stratify: shrimp_x", "30: splits.stratify: 'shrimp_x' has another value in each sequence"),
+    ("high: 30 m", "high: 9e9 m", "25: variations.0: scene.world.sources.0.position: is more than 1e+06 m"),
+    ("repeats: 2", "repeats: 0", "30: repeats: must be greater than or equal to 1"),
+    ("repeats: 2", "repeats: 900000", "17: grid: spans 3600000 sequences, more than 1000000"),
+    ("test: 0.5", "test: 0.4", "31: splits: train, validation and test must add up to 1, not 0.9"),
+    ("stratify: hull", "stratify: hall", "31: splits.stratify: 'hall' names nothing that varies; known: away"),
+    ("stratify: hull", "stratify: shrimp_x", "31: splits.stratify: 'shrimp_x' has another value in each sequence"),
     (
         f"path: {START}.0, values: [9 m, 1100 cm]",
         "path: scene.world.targets, values: [[]]",
-        "21: grid.1.zip.1.path: scene.w",
+        "22: grid.1.zip.1.path: scene.w",
     ),
     (
         f"path: {START}.0, values: [9 m, 1100 cm]",
         f"path: {START}.2, values: [-5 m, -0.2 m]",
-        "17: grid.0.values.1: scene.world.targets.0.motion: target 'box' is 0.3 m above the surface at frame 8 (seq",
+        "18: grid.0.values.1: scene.world.targets.0.motion: target 'box' is 0.3 m above the surface at frame 8 (seq",
     ),
     (
         f"path: {START}.0, values: [9 m, 1100 cm]",
-        "path: scene.world.shrimp.0.snap_times, values: [[0], [0, 0.01]]",
-        "17: grid.0.values.1: scene.world.shrimp.0.snap_times: all sequences must have equally many: 1 and 2 (seq",
+        "path: scene.world.sources.0.snap_times, values: [[0], [0, 0.01]]",
+        "18: grid.0.values.1: scene.world.sources.0.snap_times: all sequences must have equally many: 1 and 2 (seq",
     ),
 ]
 
@@ -223,14 +223,14 @@ def test_what_is_wrong_is_named_with_file_line_and_field(
 def test_a_drawn_value_that_cannot_be_is_named(spanning: Path) -> None:
     spanning.write_text(
         spanning.read_text().replace(
-            "scene.world.shrimp.0.position.0, kind: uniform, low: 20 m, high: 30 m",
+            "scene.world.sources.0.position.0, kind: uniform, low: 20 m, high: 30 m",
             "scene.world.targets.0.motion.start.2, kind: uniform, low: -8 m, high: 6 m",
         )
     )
     source = reading.read(spanning)
     with pytest.raises(RecipeError) as caught, reading.locating(source):
         planning.plan(reading.recipe_of(source))
-    assert f"{spanning}:24: variations.0: scene.world.targets.0.motion: target 'box' is " in str(caught.value)
+    assert f"{spanning}:25: variations.0: scene.world.targets.0.motion: target 'box' is " in str(caught.value)
     assert "(sequence " in str(caught.value) and "shrimp_x = " in str(caught.value)
 
 
@@ -253,7 +253,7 @@ def test_too_many_meshes_are_refused(spanning: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(mesh_variants, "MOST_VARIANTS", 3)
     radius = f"path: {SHAPE}, kind: uniform, low: 1, high: 2"
     text = spanning.read_text().replace(
-        "path: scene.world.shrimp.0.position.0, kind: uniform, low: 20 m, high: 30 m", radius
+        "path: scene.world.sources.0.position.0, kind: uniform, low: 20 m, high: 30 m", radius
     )
     text = (
         text.replace("{kind: box, size: [1, 1, 1], edge: 0.25}", "{kind: sphere, radius: 0.3, edge: 0.3}")
@@ -264,7 +264,7 @@ def test_too_many_meshes_are_refused(spanning: Path, monkeypatch: pytest.MonkeyP
     spanning.write_text(text.replace("stratify: hull", "stratify: away"))
     source = reading.read(spanning)
     with (
-        pytest.raises(RecipeError, match=r"19: variations.0: makes more than 3 different meshes"),
+        pytest.raises(RecipeError, match=r"20: variations.0: makes more than 3 different meshes"),
         reading.locating(source),
     ):
         _ = reading.recipe_of(source).meshes
@@ -279,12 +279,12 @@ def test_a_path_too_faint_for_single_precision_has_no_measured_level() -> None:
 
     level = np.full((1, 1, 1), -1274.0)
     isolated = SimpleNamespace(facet=np.array([3]), level=np.array([-1274.0]))
-    book = SimpleNamespace(
+    budget = SimpleNamespace(
         level=np.zeros((1, 1, 1, len(LINK_BUDGET))),
         paths=level,
         error_bound=level,
         isolated=isolated,
         isolated_level=level,
     )
-    stored = link_budget_values(book, np.full((1, 1, 1), -np.inf))["/ledger", "measured_level"]  # type: ignore[arg-type]
+    stored = link_budget_values(budget, np.full((1, 1, 1), -np.inf))["/link_budget", "measured_level"]  # type: ignore[arg-type]
     assert np.isnan(stored).all()

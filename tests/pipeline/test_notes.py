@@ -17,7 +17,7 @@ def warnings(distance: float, law: ss.Kirchhoff | ss.MirrorLobe) -> str:
     world = ss.World(
         environment=ss.Environment(depth=20.0, sound_speed=ss.Isovelocity(speed=1540.0)),
         targets=(ball,),
-        shrimp=(ss.SnappingShrimp(name="rock", position=(3.0, 6.0)),),
+        sources=(ss.SnappingShrimp(name="rock", position=(3.0, 6.0)),),
     )
     quick = ss.Accuracy(signal=0.02)
     return "\n".join(ss.plan(ss.Recipe(scene=ss.Scene(world=world), accuracy=quick)).warnings)
@@ -43,7 +43,7 @@ def test_ranges_that_err_are_blamed_on_what_makes_them_err(water: ss.Isovelocity
         targets=(
             ss.Target(name="ball", shape=ss.Sphere(radius=0.3, edge=0.1), motion=ss.Still(position=(20.0, 0.0, -5.0))),
         ),
-        shrimp=(ss.SnappingShrimp(name="rock", position=(3.0, 6.0)),),
+        sources=(ss.SnappingShrimp(name="rock", position=(3.0, 6.0)),),
     )
     scene = ss.Scene(world=world, processing=ss.Processing(ranging=ss.IsovelocityRange()))
     (note,) = [line for line in ss.plan(ss.Recipe(scene=scene)).warnings if line.startswith("range errors are")]

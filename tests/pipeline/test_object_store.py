@@ -111,7 +111,7 @@ def reached(place: Remote, point: str) -> bool:
     names = place.sizes()
     if point == "layout":
         return ".marks/layout.json" in names
-    return any("/c.0." in name and name.startswith("ledger/") for name in names)
+    return any("/c.0." in name and name.startswith("link_budget/") for name in names)
 
 
 def test_killed_builds_are_resumed_to_the_same(bucket: str, small_file: Path, whole: Path) -> None:

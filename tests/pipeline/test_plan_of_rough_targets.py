@@ -15,5 +15,5 @@ def test_a_thousandth_takes_one_expansion(law: str) -> None:
     sets = ("accuracy.signal=1e-3", f"scene.physics.scattering={law}", "scene.trajectory.frames=8")
     made = planning.plan(reading.load(REMUS, sets), {"signals"})
     assert made.choices.subarrays == 1
-    assert made.choices.visibility == "hydrophones"
+    assert made.choices.occlusion == "sensors"
     assert made.errors.expansion < 5e-4

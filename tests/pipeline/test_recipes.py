@@ -30,11 +30,11 @@ from sonarsynth.targets import shapes
 from sonarsynth.targets.target import Target
 
 WRONG = [
-    ("beams:", "beems:", "14: scene.sonar.beems: 'beems' is not a field here; did you mean 'beams'?"),
-    ("azimuths: 11", "azimuths: 11.0", "14: scene.sonar.beams.azimuths: must be a valid integer, not 11.0"),
-    ("azimuths: 11", "azimuths: true", "14: scene.sonar.beams.azimuths: must be a valid integer, not true"),
-    ("azimuths: 11", "azimuths: 'no'", "14: scene.sonar.beams.azimuths: must be a valid integer, not 'no'"),
-    ("azimuths: 11", "azimuths: ", "14: scene.sonar.beams.azimuths: must be a valid integer, not nothing"),
+    ("beams:", "beems:", "15: scene.sonar.beems: 'beems' is not a field here; did you mean 'beams'?"),
+    ("azimuths: 11", "azimuths: 11.0", "15: scene.sonar.beams.azimuths: must be a valid integer, not 11.0"),
+    ("azimuths: 11", "azimuths: true", "15: scene.sonar.beams.azimuths: must be a valid integer, not true"),
+    ("azimuths: 11", "azimuths: 'no'", "15: scene.sonar.beams.azimuths: must be a valid integer, not 'no'"),
+    ("azimuths: 11", "azimuths: ", "15: scene.sonar.beams.azimuths: must be a valid integer, not nothing"),
     ("kind: box,", "kind: bux,", "8: scene.world.targets.0.shape.kind: 'bux' is not a kind here; did you mean 'box'?"),
     ("kind: flat,", "", "5: scene.world.environment.noise: needs a kind: one of flat, wenz"),
     ("[1, 1, 1]", "[1, .nan, 1]", "8: scene.world.targets.0.shape.size.1: must be a finite number, not .nan"),
@@ -44,7 +44,7 @@ WRONG = [
     ("[1, 1, 1]", "[1, 2 kHz, 1]", "8: scene.world.targets.0.shape.size.1: has unit 'kHz'; use one of m, km, cm"),
     ("[1, 1, 1]", "[1, 1]", "8: scene.world.targets.0.shape.size.2: is required"),
     ("[1, 1, 1]", "1", "8: scene.world.targets.0.shape.size: must be a list, not 1"),
-    ("    shrimp:\n      - position: [30, 1]", "    shrimp: [{}]", "10: scene.world.shrimp.0.position: is required"),
+    ("      - position: [30, 1]\n", "      - name: a\n", "11: scene.world.sources.0.position: is required"),
     ("depth: 12 m, ", "", "5: scene.world.environment.depth: is required"),
     ("seed: 3", "seed: 3\nseed: 4", "3: seed: is given twice"),
     ("seed: 3", "\tseed: 3", "2: tabs cannot indent YAML; use spaces"),
@@ -59,7 +59,7 @@ WRONG = [
     (
         "pitch: 5 cm}",
         "pitch: 5 cm}\n    sampling_frequency: 150 kHz",
-        "14: scene.sonar.sampling_frequency: 150000 Hz is",
+        "15: scene.sonar.sampling_frequency: 150000 Hz is",
     ),
     (
         "{kind: isovelocity, speed: 1540}",
@@ -266,7 +266,7 @@ recipes = st.builds(
             targets=st.lists(
                 st.builds(Target, name=names, shape=bodies, motion=motions), max_size=2, unique_by=lambda t: t.name
             ).map(tuple),
-            shrimp=st.lists(
+            sources=st.lists(
                 st.builds(SnappingShrimp, name=texts, position=st.tuples(numbers, numbers) | points), max_size=2
             ).map(tuple),
         ),

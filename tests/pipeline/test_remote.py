@@ -88,7 +88,7 @@ def flip(place: Remote) -> None:
 
 DAMAGES: dict[str, Callable[[Remote], None]] = {
     "a bit of a shard": lambda at: flip(at / "image/energy/c.0.0.0"),
-    "a shard cut short": lambda at: (at / "truth/box/c.1.0.0.0").write_bytes(b"short"),
+    "a shard cut short": lambda at: (at / "truth/targets/box/c.1.0.0.0").write_bytes(b"short"),
     "a shard gone": lambda at: (at / "signals/pressure/c.0.0.0").unlink(),
     "a mark gone": lambda at: (at / ".marks/1.json").unlink(),
     "a bit of a mark": lambda at: flip(at / ".marks/0.json"),

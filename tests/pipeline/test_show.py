@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from sonarsynth.conventions import direction
+from sonarsynth.conventions import azimuth_elevation, direction
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.pictures import show
 from sonarsynth.pictures.steered_beams import beams, choose
@@ -51,7 +51,9 @@ def _add(pressure: np.ndarray, delay: np.ndarray, amplitude: np.ndarray) -> None
     pressure[np.arange(len(delay))[:, None], samples] += amplitude[:, None] * pulse(samples / RATE - delay[:, None])
 
 
-def make_store(path: Path, size: Size, *, groups: str = "signals image cloud bearings", unbuilt: int = 0) -> Path:
+def make_store(
+    path: Path, size: Size, *, groups: str = "signals image cloud source_estimates", unbuilt: int = 0
+) -> Path:
     """A store with the documented variables: an ellipsoid 12 m ahead that moves to the right, and a square array."""
     y = (np.arange(size.side) - (size.side - 1) / 2) * size.pitch
     sensors = np.stack([np.zeros(size.side**2), *map(np.ravel, np.meshgrid(-y, -y))], axis=1)
@@ -96,6 +98,12 @@ def _frame(size, sonar, snap, vertices, faces, sensors, grid, step) -> dict[str,
     found = np.where(on, true + 0.01 * np.sin(np.arange(true.size)).reshape(true.shape), np.nan)
     cloud = grid * found[..., None]
     path = np.linalg.norm(cloud - s, axis=2) + found - np.linalg.norm(s)
+    points = {"range": found, "range_error": 0.02, "true_range": true, "energy": energy, "delay": path / SPEED}
+    points |= dict(zip("xyz", np.moveaxis(cloud, -1, 0), strict=True))
+    points |= dict(zip(("azimuth", "elevation"), np.rad2deg(azimuth_elevation(grid)), strict=True))
+    points = {name: (values, np.nan) for name, values in points.items()}
+    points["target"] = (np.where(facet >= 0, 0, -1).astype(np.int16), np.int16(-1))
+    points |= {name: (np.int16(0), np.int16(-1)) for name in ("emission", "family", "origin")}
     return {
         "/trajectory": np.array(0),
         "/step": np.array(step),
@@ -105,30 +113,25 @@ def _frame(size, sonar, snap, vertices, faces, sensors, grid, step) -> dict[str,
         "image/energy": energy.astype(np.float32),
         "image/start": np.array(window[0]),
         "image/stop": np.array(window[1]),
-        "cloud/range": found,
-        "cloud/range_error": np.where(on, 0.02, np.nan),
-        "cloud/energy": np.where(on, energy, np.nan),
-        "cloud/delay": path / SPEED,
-        "cloud/x": cloud[..., 0],
-        "cloud/y": cloud[..., 1],
-        "cloud/z": cloud[..., 2],
-        "bearings/time": np.array([np.linalg.norm(s) / SPEED]),
-        "bearings/position": snap + 0.01,
-        "bearings/position_covariance": 1e-4 * np.eye(3)[None],
-        **{f"bearings/{name}": np.array([0], np.int16) for name in ("emission", "reason")},
-        **{f"bearings/{name}": np.array([0.0]) for name in ("azimuth", "elevation")},
-        **{f"bearings/{name}_error": np.array([1e-7]) for name in ("time", "azimuth", "elevation")},
-        "truth/snap_arrival": np.array([np.linalg.norm(s) / SPEED]),
-        **{f"truth/snap_{name}": np.array([0.0]) for name in ("azimuth", "elevation")},
+        **{f"cloud/{name}": np.where(on, values, none).ravel() for name, (values, none) in points.items()},
+        "source_estimates/time": np.array([np.linalg.norm(s) / SPEED]),
+        "source_estimates/position": snap + 0.01,
+        "source_estimates/position_covariance": 1e-4 * np.eye(3)[None],
+        **{f"source_estimates/{name}": np.array([0], np.int16) for name in ("emission", "reason")},
+        **{f"source_estimates/{name}": np.array([0.0]) for name in ("azimuth", "elevation")},
+        **{f"source_estimates/{name}_error": np.array([1e-7]) for name in ("time", "azimuth", "elevation")},
+        "truth/emissions/arrival": np.array([np.linalg.norm(s) / SPEED]),
+        **{f"truth/emissions/{name}": np.array([0.0]) for name in ("azimuth", "elevation")},
         "truth/sonar_position": sonar.position,
         "truth/sonar_orientation": sonar.orientation,
-        "truth/target_position": target.position[None],
-        "truth/target_orientation": target.orientation[None],
-        "truth/visible_fraction": np.array([1.0]),
-        "truth/snap_position": sonar.to_world(snap),
-        "truth/snap_time": np.array([0.0]),
-        "truth/target": np.where(facet >= 0, 0, -1).astype(np.int16),
-        "truth/range": np.where(facet >= 0, true_range, np.nan).astype(np.float32),
+        "truth/targets/position": target.position[None],
+        "truth/targets/orientation": target.orientation[None],
+        "truth/targets/visible_fraction": np.array([1.0]),
+        "truth/targets/box": np.stack(np.meshgrid(*np.stack([there.min(0), there.max(0)], 1)), -1).reshape(1, 8, 3),
+        "truth/emissions/position": sonar.to_world(snap),
+        "truth/emissions/time": np.array([0.0]),
+        "truth/beams/target": np.where(facet >= 0, 0, -1).astype(np.int16),
+        "truth/beams/range": np.where(facet >= 0, true_range, np.nan).astype(np.float32),
     }
 
 
@@ -164,32 +167,36 @@ def _tree(frames, groups, size, angle, sensors, vertices, faces) -> xr.DataTree:
     dims = {
         "signals/pressure": ("frame", "sensor", "sample"),
         **dict.fromkeys(
-            ("bearings/time", *(f"bearings/{n}" for n in ("emission", "reason", "azimuth", "elevation"))),
-            ("frame", "snap"),
+            (
+                "source_estimates/time",
+                *(f"source_estimates/{n}" for n in ("emission", "reason", "azimuth", "elevation")),
+            ),
+            ("frame", "estimate"),
         ),
-        **{f"bearings/{name}_error": ("frame", "snap") for name in ("time", "azimuth", "elevation")},
-        **{f"truth/snap_{name}": ("frame", "snap") for name in ("arrival", "azimuth", "elevation")},
-        "bearings/position": ("frame", "snap", "xyz"),
-        "bearings/position_covariance": ("frame", "snap", "xyz", "xyz_other"),
+        **{f"source_estimates/{name}_error": ("frame", "estimate") for name in ("time", "azimuth", "elevation")},
+        **{f"truth/emissions/{name}": ("frame", "emission") for name in ("arrival", "azimuth", "elevation")},
+        "source_estimates/position": ("frame", "estimate", "xyz"),
+        "source_estimates/position_covariance": ("frame", "estimate", "xyz", "xyz_other"),
         "truth/sonar_position": ("frame", "xyz"),
         "truth/sonar_orientation": ("frame", "wxyz"),
-        "truth/target_position": ("frame", "target", "xyz"),
-        "truth/target_orientation": ("frame", "target", "wxyz"),
-        "truth/visible_fraction": ("frame", "target"),
-        "truth/snap_position": ("frame", "snap", "xyz"),
-        "truth/snap_time": ("frame", "snap"),
+        "truth/targets/position": ("frame", "target", "xyz"),
+        "truth/targets/orientation": ("frame", "target", "wxyz"),
+        "truth/targets/visible_fraction": ("frame", "target"),
+        "truth/targets/box": ("frame", "target", "corner", "xyz"),
+        "truth/emissions/position": ("frame", "emission", "xyz"),
+        "truth/emissions/time": ("frame", "emission"),
     }
     sets: dict[str, xr.Dataset] = {"/": xr.Dataset(), "truth": xr.Dataset()}
     for name in frames[0]:
         group, _, variable = name.rpartition("/")
-        if group and group != "truth" and group not in groups:
+        if group and not group.startswith("truth") and group not in groups:
             continue
         values = np.stack([frame[name] for frame in frames])
-        axes = dims.get(name, beam if values.ndim == 3 else ("frame",))
+        axes = dims.get(name, beam if values.ndim == 3 else ("frame", "point") if values.ndim == 2 else ("frame",))
         sets.setdefault(group or "/", xr.Dataset())[variable] = (axes, values)
-    for name in {"truth", "image", "cloud"} & set(sets):
+    for name in {"truth/beams", "image"} & set(sets):
         sets[name] = sets[name].assign_coords(azimuth=angle, elevation=angle)
-    sets["truth"]["target_name"] = ("target", ["hull"])
+    sets["truth/targets"] = sets["truth/targets"].assign_coords(target=["hull"])
     if "signals" in sets:
         sets["signals"]["position"] = (("sensor", "xyz"), sensors)
         sets["signals"]["gain"] = ("sensor", np.ones(len(sensors)))
@@ -282,7 +289,7 @@ def test_nothing_built_is_said_in_one_line(tmp_path: Path) -> None:
         show(empty, say=lambda _: None)
 
 
-@pytest.mark.parametrize("groups", ["cloud bearings", "image", "signals", ""])
+@pytest.mark.parametrize("groups", ["cloud source_estimates", "image", "signals", ""])
 def test_what_a_store_lacks_is_left_out_and_said(tmp_path: Path, groups: str) -> None:
     small = make_store(tmp_path / "part.zarr", Size(frames=1, side=4, beams=15, rings=8), groups=groups)
     said: list[str] = []

@@ -27,7 +27,7 @@ MIRRORS = "scene.physics.scattering={kind: kirchhoff}"
 ROUGH = "scene.physics.scattering={kind: kirchhoff, roughness: 2 mm}"
 BALL = [  # lit from the side of the sonar
     "scene.world.targets.0.shape={kind: sphere, radius: 40 cm, edge: 20 cm}",
-    "scene.world.shrimp.0.position=[6, -3]",
+    "scene.world.sources.0.position=[6, -3]",
     "scene.sonar.array.pitch=10 cm",
 ]
 FRAMES = {"lobe": range(5), "mirrors": range(5), "rough": range(1, 6)}
@@ -81,11 +81,11 @@ def _set(text: str, settings: tuple[str, ...]) -> reading.Source:
         (
             (
                 "scene.world.environment.surface.reflection={kind: sediment, name: medium sand}",
-                "scene.world.environment.bed.reflection={kind: pressure_release}",
+                "scene.world.environment.bottom.reflection={kind: pressure_release}",
             ),
             [
-                "surface reflection sediment, bed reflection sediment",
-                "surface reflection pressure release, bed reflection pressure release",
+                "surface reflection sediment, bottom reflection sediment",
+                "surface reflection pressure release, bottom reflection pressure release",
             ],
         ),
     ],
@@ -119,7 +119,7 @@ def test_numbers_are_those_of_the_arrays(stores: dict[str, Path]) -> None:
     frames = [1, 2, 3, 4]
     sound = heard(tree, frames)
     rows = scores_of(tree, stores["mirrors"], frames, sound)
-    energy, target = tree["image/energy"].values[1:5].astype(float), tree["truth/target"].values[1:5]
+    energy, target = tree["image/energy"].values[1:5].astype(float), tree["truth/beams/target"].values[1:5]
     each = [energy[i][target[i] >= 0].mean() for i in range(4)]
     assert sound.peak == energy.max()
     assert sound.on_target == pytest.approx(each)

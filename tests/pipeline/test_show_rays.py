@@ -14,7 +14,7 @@ import pytest
 
 from sonarsynth import planning
 from sonarsynth.description import FieldError
-from sonarsynth.environment.boundaries import FluidHalfSpace, SeaBed
+from sonarsynth.environment.boundaries import FluidHalfSpace, SeaBottom
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Tabulated
 from sonarsynth.equations.water.boundary_reflection import rayleigh
 from sonarsynth.geometry.motion import Still
@@ -31,7 +31,7 @@ from sonarsynth.targets.target import Target
 from tests.waiting import HANGING
 
 SNAP, ARRAY, TARGET = np.array([30.0, 10.0, -14.0]), np.array([0.0, 0.0, -6.0]), np.array([40.0, -8.0, -9.0])
-BED = FluidHalfSpace(density_ratio=1.9, speed_ratio=1.15, loss_tangent=0.01)
+BOTTOM_DEPTH = FluidHalfSpace(density_ratio=1.9, speed_ratio=1.15, loss_tangent=0.01)
 
 
 def box(place: np.ndarray, size: float = 1.0) -> Target:
@@ -43,10 +43,10 @@ def recipe(rays: RayRequest | None = None, *, target: np.ndarray = TARGET, size:
     sea = {
         "depth": 20.0,
         "sound_speed": Isovelocity(speed=1500.0),
-        "bed": SeaBed(reflection=BED),
+        "bottom": SeaBottom(reflection=BOTTOM_DEPTH),
         "absorption": Absorption(formula="none"),
     }
-    world: dict[str, Any] = {"shrimp": (SnappingShrimp(position=tuple(SNAP), source_level=190.0),)} | more
+    world: dict[str, Any] = {"sources": (SnappingShrimp(position=tuple(SNAP), source_level=190.0),)} | more
     sonar = Still(position=tuple(ARRAY), heading=0.5 * np.pi)
     environment = Environment(**sea | world.pop("environment", {}))
     made = World(environment=environment, targets=(box(target, size),), **world)
@@ -115,7 +115,12 @@ def test_transmission_loss_is_that_of_spreading_and_rayleighs_coefficient(
     rays = {ray["vertices"]: ray for ray in shown[2]["rays"]}
     for vertices, bounced in (("-", 0), ("S", 0), ("B", 1), ("S-B", 1), ("B-S", 1)):
         ray = rays[vertices]
-        v = rayleigh(abs(ray["launch_elevation"]), BED.density_ratio, BED.speed_ratio, BED.loss_tangent)
+        v = rayleigh(
+            abs(ray["launch_elevation"]),
+            BOTTOM_DEPTH.density_ratio,
+            BOTTOM_DEPTH.speed_ratio,
+            BOTTOM_DEPTH.loss_tangent,
+        )
         loss = 20 * np.log10(ray["path_length"]) - bounced * 20 * np.log10(abs(v))
         assert ray["transmission_loss"] == pytest.approx(loss, abs=1e-9)
         assert ray["level"] == pytest.approx(190.0 - loss, abs=1e-9)
@@ -129,7 +134,7 @@ def test_bent_rays_turn_where_the_speed_is_that_of_their_slowness() -> None:
     asked = recipe(
         RayRequest(fan=False, eigenrays=EigenrayRequest(vertices=3, targets="none")),
         environment={"sound_speed": speed},
-        shrimp=snap,
+        sources=snap,
     )
     lines = lines_of(asked)
     turned = [line for line in lines if "T" in line.vertices]
@@ -171,7 +176,7 @@ def test_rays_go_to_the_nearest_facet_or_to_no_target() -> None:
 
 def test_a_snap_on_the_bed_hears_its_reflection_there_at_once() -> None:
     asked = recipe(RayRequest(fan=False, eigenrays=EigenrayRequest(vertices=1, targets="none")),
-                   shrimp=(SnappingShrimp(position=(30.0, 10.0)),))  # fmt: skip
+                   sources=(SnappingShrimp(position=(30.0, 10.0)),))  # fmt: skip
     by = {line.vertices: line for line in lines_of(asked)}
     assert by["B"].flags == ("reflected at its end",)
     assert by["B"].time[-1] == pytest.approx(by["-"].time[-1], rel=1e-14)
@@ -180,7 +185,7 @@ def test_a_snap_on_the_bed_hears_its_reflection_there_at_once() -> None:
 
 def test_snaps_at_one_place_are_one() -> None:
     twice = (SnappingShrimp(position=tuple(SNAP), snap_times=(0.0, 0.01)), SnappingShrimp(position=(20.0, 0.0, -5.0)))
-    names = {line.name for line in lines_of(recipe(shrimp=twice))}
+    names = {line.name for line in lines_of(recipe(sources=twice))}
     assert {name for name in names if "box" not in name} == {"snap 0 to array", "snap 2 to array"}
 
 
@@ -199,8 +204,8 @@ def test_a_fan_alone_has_a_table_of_one_line() -> None:
 
 
 def test_without_a_snap_there_is_nothing_to_draw() -> None:
-    with pytest.raises(FieldError, match=r"shrimp: is empty: there are no eigenrays"):
-        lines_of(recipe(shrimp=()))
+    with pytest.raises(FieldError, match=r"sources: is empty: there are no eigenrays"):
+        lines_of(recipe(sources=()))
 
 
 def numbers_of(text: str) -> dict[str, Any]:
@@ -250,7 +255,7 @@ def test_the_program_of_the_page_draws_turns_and_answers(shown: tuple[dict[str, 
     told = json.loads(done.stdout)
     assert told["title"] == "A box & a </script> snap"
     assert told["about"] == "frame 0, 18 rays"
-    assert told["boxes"][:4] == ["direct", "surface", "bed", "surface and bed"]
+    assert told["boxes"][:4] == ["direct", "surface", "bottom", "surface and bottom"]
     assert told["boxes"][4:] == ["snap 0 to array", "snap 0 to box to array"]
     assert {"array", "snap 0"} <= set(told["places"])
     assert told["all"] == told["back"]

@@ -27,8 +27,9 @@ scene:
       - name: ball
         shape: {kind: sphere, radius: 0.3, edge: 0.05}
         motion: {kind: line, start: [18, 3, -5], stop: [18, -3, -5], duration: 0.1}
-    shrimp:
+    sources:
       - position: [14, -5]
+        kind: snapping_shrimp
         snap: SNAP
         variation: {level: 2 dB, width: 0.05}
   sonar:
@@ -59,7 +60,7 @@ def recipe_with(folder: Path, snap: str, *, more: str = "", loudness: float = 3e
 def test_a_dataset_with_each_model_verifies(tmp_path: Path, kind: str) -> None:
     """The image is brightest on the target, its ranges are right and the snap is where it is heard."""
     recipe = recipe_with(tmp_path, SNAPS[kind])
-    assert recipe.scene.world.shrimp[0].snap.kind == kind
+    assert recipe.scene.world.sources[0].snap.kind == kind
     assert reading.loads(reading.dump(recipe)) == recipe
     assert schedule.build(plan(recipe), tmp_path / "s.zarr", workers=0).ok
     report = verify(tmp_path / "s.zarr")
@@ -73,7 +74,7 @@ def test_a_frame_is_the_same_whatever_was_rendered_before(tmp_path: Path) -> Non
     first = render(made, 0)
     assert render(plan(recipe), 0).identical(first)
     assert render(plan(recipe), 1).identical(last)
-    levels = [float(np.squeeze(tree["truth/snap_level"].values)) for tree in (first, last)]
+    levels = [float(np.squeeze(tree["truth/emissions/level"].values)) for tree in (first, last)]
     assert levels[0] != levels[1]
 
 
@@ -88,7 +89,7 @@ def test_a_recording_lies_beside_its_recipe_and_what_it_holds_counts(tmp_path: P
         recipe_with(tmp_path / name, SNAPS["recorded_snap"], loudness=peak)
         for name, peak in (("a", 3e3), ("b", 3e3), ("c", 4e3))
     )
-    snap = first.scene.world.shrimp[0].snap
+    snap = first.scene.world.sources[0].snap
     assert isinstance(snap, RecordedSnap) and Path(snap.path) == tmp_path / "a" / "sounds" / "snap.csv"
     assert first.digest == same.digest != other.digest
 
@@ -106,16 +107,19 @@ def test_slow_tails_are_among_the_warnings(tmp_path: Path) -> None:
 
 
 WRONG = [
-    ("{kind: keller_miksis, gas_pressure: 50}", r"11: scene\.world\.shrimp\.0\.snap: the wall reaches .* largest_mach"),
-    ("{kind: keller_miksis, gas_pressure: 0}", r"11: scene\.world\.shrimp\.0\.snap: "),
-    ("{kind: keller_miksis, viscosity: 100}", r"11: scene\.world\.shrimp\.0\.snap: the bubble has no snap: .*settles"),
-    ("{kind: keller_miksis, radius: 3 m}", r"11: scene\.world\.shrimp\.0\.snap: lasts"),
-    ("{kind: recorded_snap, path: none.csv}", r"11: scene\.world\.shrimp\.0\.snap\.path: no such file: none\.csv"),
-    ("{kind: recorded_snap, path: recipe.yaml}", r"11: scene\.world\.shrimp\.0\.snap: .*recipe\.yaml"),
-    ("{kind: gabor, frequency: 500 kHz}", r"11: scene\.world\.shrimp\.0\.snap: is not heard"),
-    ("{kind: gabor, frequency: 50 kHz, peak: 1e14}", r"11: scene\.world\.shrimp\.0\.snap: makes a source level of"),
-    ("{kind: gabor, frequency: 50, cycles: 100}", r"11: scene\.world\.shrimp\.0\.snap: lasts .* a snap is over in"),
-    ("{kind: richter, frequency: 50}", r"11: scene\.world\.shrimp\.0\.snap\.kind: 'richter' is not a kind.*'ricker'"),
+    (
+        "{kind: keller_miksis, gas_pressure: 50}",
+        r"12: scene\.world\.sources\.0\.snap: the wall reaches .* largest_mach",
+    ),
+    ("{kind: keller_miksis, gas_pressure: 0}", r"12: scene\.world\.sources\.0\.snap: "),
+    ("{kind: keller_miksis, viscosity: 100}", r"12: scene\.world\.sources\.0\.snap: the bubble has no snap: .*settles"),
+    ("{kind: keller_miksis, radius: 3 m}", r"12: scene\.world\.sources\.0\.snap: lasts"),
+    ("{kind: recorded_snap, path: none.csv}", r"12: scene\.world\.sources\.0\.snap\.path: no such file: none\.csv"),
+    ("{kind: recorded_snap, path: recipe.yaml}", r"12: scene\.world\.sources\.0\.snap: .*recipe\.yaml"),
+    ("{kind: gabor, frequency: 500 kHz}", r"12: scene\.world\.sources\.0\.snap: is not heard"),
+    ("{kind: gabor, frequency: 50 kHz, peak: 1e14}", r"12: scene\.world\.sources\.0\.snap: makes a source level of"),
+    ("{kind: gabor, frequency: 50, cycles: 100}", r"12: scene\.world\.sources\.0\.snap: lasts .* a snap is over in"),
+    ("{kind: richter, frequency: 50}", r"12: scene\.world\.sources\.0\.snap\.kind: 'richter' is not a kind.*'ricker'"),
 ]
 
 
@@ -136,5 +140,5 @@ def test_the_schema_knows_every_kind() -> None:
     for snap in SNAPS.values():
         data = YAML(typ="safe", pure=True).load(TEXT.replace("SNAP", snap))
         assert not list(check.iter_errors(data))
-    data["scene"]["world"]["shrimp"][0]["snap"]["kinds"] = 1
+    data["scene"]["world"]["sources"][0]["snap"]["kinds"] = 1
     assert list(check.iter_errors(data))

@@ -37,7 +37,7 @@ def opened(path: Path) -> xr.DataTree:
 
 def test_the_layout_opens_in_plain_xarray_with_units_on_everything(laid_out: Path, small_plan: Plan) -> None:
     tree = opened(laid_out)
-    assert {"signals", "image", "cloud", "bearings", "truth", "ledger", "targets"} <= set(tree.children)
+    assert {"signals", "image", "cloud", "source_estimates", "truth", "link_budget", "targets"} <= set(tree.children)
     for node in tree.subtree:
         for name, variable in node.to_dataset(inherit=False).variables.items():
             assert variable.attrs.get("units"), f"{node.path}/{name}"
@@ -94,8 +94,11 @@ def test_only_whole_shards_are_written(small_plan: Plan) -> None:
         (lambda v: v.update({("/image", "colour"): np.zeros(3)}), "differ in image/colour"),
         (lambda v: v.update({("/image", "energy"): np.zeros((11, 9))}), "image/energy has shape"),
         (lambda v: v.update({("/image", "energy"): np.zeros((9, 11), complex)}), "image/energy is complex128"),
-        (lambda v: v.update({("/truth", "target"): np.full((9, 11), 40_000)}), "truth/target does not fit in int16"),
-        (lambda v: v.update({("/truth", "target"): np.zeros((9, 11))}), "truth/target is float64"),
+        (
+            lambda v: v.update({("/truth/beams", "target"): np.full((9, 11), 40_000)}),
+            "truth/beams/target does not fit in int16",
+        ),
+        (lambda v: v.update({("/truth/beams", "target"): np.zeros((9, 11))}), "truth/beams/target is float64"),
     ],
 )
 def test_values_that_do_not_fit_the_layout_are_refused_before_anything_is_written(
@@ -205,6 +208,6 @@ def test_scenes_without_targets_or_snaps_have_a_store(tmp_path: Path, small_text
     path = tmp_path / "empty.zarr"
     store.create(path, made)
     store.write_shard(path, made, 0, {frame: made_up(made, frame) for frame in range(8)})
-    assert opened(path)["truth/target_position"].shape == (20, 0, 3)
+    assert opened(path)["truth/targets/position"].shape == (20, 0, 3)
     assert store.verify(path).problems == ()
     shutil.rmtree(path)

@@ -105,7 +105,9 @@ def test_exact_is_every_slow_way() -> None:
 
 def test_choices_of_the_scene_are_kept_and_their_error_is_said() -> None:
     scene = remus(1).scene
-    physics = replace(scene.physics, subarrays=1, faintest=20.0, synthesis=GriddedSynthesis(width=4, tolerance=0.01))
+    physics = replace(
+        scene.physics, subarrays=1, dynamic_range=20.0, synthesis=GriddedSynthesis(width=4, tolerance=0.01)
+    )
     made = planning.plan(replace(remus(1), scene=replace(scene, physics=physics)))
     assert made.choices.subarrays == 1 and made.choices.synthesis == physics.synthesis
     assert made.choices.negligible == pytest.approx(0.01)

@@ -20,13 +20,13 @@ scene:
       depth: 12 m
       sound_speed: {kind: isovelocity, speed: 1540}
       surface: {}
-      bed: {}
+      bottom: {}
       absorption: {}
       noise: {kind: flat, level: 40}
     targets:
       - {name: box, shape: {kind: box, size: [1, 1, 1], edge: 0.25}, motion: {kind: still, position: [0, 15, -6]}}
-    shrimp:
-      - {position: [20, 1]}
+    sources:
+      - {kind: snapping_shrimp, position: [20, 1]}
   sonar:
     array: {kind: planar_lattice, columns: 4, rows: 3, pitch: 5 cm}
     beams: {azimuths: 3, elevations: 3}
@@ -38,7 +38,7 @@ scene:
 WATER = "scene.world.environment."
 COLD = "{kind: temperature_salinity, depth: [0, 12], temperature: [0.5, 1], salinity: [35, 35]}"
 CASES = {
-    "nothing": ("bed: {}", "bed: {}", []),
+    "nothing": ("bottom: {}", "bottom: {}", []),
     "cold water": (
         "{kind: isovelocity, speed: 1540}",
         COLD,
@@ -74,19 +74,19 @@ CASES = {
     ),
     "a strong wind": ("surface: {}", "surface: {wind_speed: 12, bubbles: true}", []),
     "rock": (
-        "bed: {}",
-        "bed: {reflection: {kind: sediment, name: rock}}",
-        [f"{WATER}bed.reflection: Rayleigh's bottom without shear waves: speed ratio 2.5 is outside 0 to 1.5"],
+        "bottom: {}",
+        "bottom: {reflection: {kind: sediment, name: rock}}",
+        [f"{WATER}bottom.reflection: Rayleigh's bottom without shear waves: speed ratio 2.5 is outside 0 to 1.5"],
     ),
     "a fluid as fast as rock": (
-        "bed: {}",
-        "bed: {reflection: {kind: fluid, density_ratio: 2, speed_ratio: 2}}",
-        [f"{WATER}bed.reflection: Rayleigh's bottom without shear waves: speed ratio 2 is outside 0 to 1.5"],
+        "bottom: {}",
+        "bottom: {reflection: {kind: fluid, density_ratio: 2, speed_ratio: 2}}",
+        [f"{WATER}bottom.reflection: Rayleigh's bottom without shear waves: speed ratio 2 is outside 0 to 1.5"],
     ),
     "low frequencies": (
         "    beams:",
         "    band: {low: 2 kHz, high: 8 kHz}\n    beams:",
-        [f"{WATER}bed.reflection: sediments of APL-UW TR 9407 (1994): frequency 2 kHz is outside 10 to 100 kHz"],
+        [f"{WATER}bottom.reflection: sediments of APL-UW TR 9407 (1994): frequency 2 kHz is outside 10 to 100 kHz"],
     ),
 }
 
@@ -109,7 +109,7 @@ def test_a_plan_says_each_once_with_its_field(case: str) -> None:
 
 
 def test_boundaries_that_no_path_meets_are_not_noted() -> None:
-    text = RECIPE.replace("bed: {}", "bed: {reflection: {kind: sediment, name: rock}}")
+    text = RECIPE.replace("bottom: {}", "bottom: {reflection: {kind: sediment, name: rock}}")
     assert _notes(ss.plan(ss.loads(text.replace("bounces: 1", "bounces: 0")))) == []
 
 

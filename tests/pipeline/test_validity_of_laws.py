@@ -31,7 +31,7 @@ def scene(radius: float, law: Scattering, snap: tuple[float, float, float] = (0.
     world = ss.World(
         environment=ss.Environment(depth=50.0, sound_speed=ss.Isovelocity(speed=C)),
         targets=(ball,),
-        shrimp=(ss.SnappingShrimp(position=snap),),
+        sources=(ss.SnappingShrimp(position=snap),),
     )
     sonar = ss.Sonar(array=ss.PlanarLattice(columns=2, rows=2, pitch=0.02), beams=ss.BeamGrid(azimuths=3, elevations=3))
     trajectory = ss.Trajectory(sonar=ss.Still(position=(0.0, 0.0, -25.0), heading=0.5 * np.pi))

@@ -10,7 +10,7 @@ from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.rays import ray_solutions
 from tests.following import families, family, follow, images, nodes, range_only
 
-BED = 100.0
+BOTTOM_DEPTH = 100.0
 nodes_of_water = st.lists(
     st.tuples(st.integers(0, 1000), st.integers(14900, 15100) | st.sampled_from([15000, 15010])), min_size=1, max_size=8
 )
@@ -24,7 +24,7 @@ few = settings(max_examples=60)
 def waters(draw: st.DrawFn) -> ray_solutions.Water:
     """Up to eight nodes on a grid of 0.1 m and 0.1 m/s: jumps and layers of one speed are common."""
     rows = sorted(draw(nodes_of_water), key=lambda row: row[0])
-    return ray_solutions.water(np.array([z / 10 for z, _ in rows]), np.array([c / 10 for _, c in rows]), BED)
+    return ray_solutions.water(np.array([z / 10 for z, _ in rows]), np.array([c / 10 for _, c in rows]), BOTTOM_DEPTH)
 
 
 def trace(
@@ -78,16 +78,16 @@ def test_there_and_back(water: ray_solutions.Water, rows: list[tuple[float, floa
 @few
 @given(waters(), pairs)
 def test_upside_down(water: ray_solutions.Water, rows: list[tuple[float, float, float]]) -> None:
-    mirrored = ray_solutions.Water(BED - water.depth[::-1], water.speed[::-1].copy())
-    above, below = trace(water, rows), trace(mirrored, [(BED - a, BED - b, r) for a, b, r in rows])
+    mirrored = ray_solutions.Water(BOTTOM_DEPTH - water.depth[::-1], water.speed[::-1].copy())
+    above, below = trace(water, rows), trace(mirrored, [(BOTTOM_DEPTH - a, BOTTOM_DEPTH - b, r) for a, b, r in rows])
     turned = altered(
         below,
         start_sine=-below.start_sine,
         end_sine=-below.end_sine,
         surface=below.bottom,
         bottom=below.surface,
-        upper=BED - below.lower,
-        lower=BED - below.upper,
+        upper=BOTTOM_DEPTH - below.lower,
+        lower=BOTTOM_DEPTH - below.upper,
     )
     same(above, turned)
 
@@ -97,7 +97,7 @@ def test_upside_down(water: ray_solutions.Water, rows: list[tuple[float, float, 
 def test_splitting_layers_changes_nothing(
     water: ray_solutions.Water, rows: list[tuple[float, float, float]], cuts: list[int]
 ) -> None:
-    extra = np.array([z for z in sorted({k / 10 + 0.03 for k in cuts}) if z < BED])
+    extra = np.array([z for z in sorted({k / 10 + 0.03 for k in cuts}) if z < BOTTOM_DEPTH])
     depth = np.concatenate([water.depth, extra])
     speed = np.concatenate([water.speed, np.interp(extra, water.depth, water.speed)])
     order = np.argsort(depth, kind="stable")
@@ -163,7 +163,7 @@ def test_snell_along_the_whole_ray(water: ray_solutions.Water, rows: list[tuple[
     slowest = np.array([np.min(water.speed)])
     assert (found.slowness * slowest <= 1 + 1e-14).all()
     for vertex in (found.upper, found.lower):
-        inside = np.isfinite(vertex) & (vertex > 0) & (vertex < BED)
+        inside = np.isfinite(vertex) & (vertex > 0) & (vertex < BOTTOM_DEPTH)
         off = np.min(np.abs(vertex[:, None] - water.depth), axis=1)
         smooth = inside & (off > 1e-9)
         level = np.interp(vertex[smooth], water.depth, water.speed)
@@ -238,10 +238,12 @@ def test_a_vanishing_gradient_goes_over_into_image_sources(
     power: float, sign: int, start: float, end: float, distance: float
 ) -> None:
     r, g = 10.0**distance, sign * 10.0**power
-    water = ray_solutions.water(np.array([0.0, BED]), np.array([1500.0 - 50 * g, 1500.0 + 50 * g]), BED)
+    water = ray_solutions.water(
+        np.array([0.0, BOTTOM_DEPTH]), np.array([1500.0 - 50 * g, 1500.0 + 50 * g]), BOTTOM_DEPTH
+    )
     found = ray_solutions.eigenrays(water, np.array([start]), np.array([end]), np.array([r]), 4, 4)
-    rows = images(BED, start, end, 4)
-    bend = abs(g) * (r + 5 * BED) / 1500.0
+    rows = images(BOTTOM_DEPTH, start, end, 4)
+    bend = abs(g) * (r + 5 * BOTTOM_DEPTH) / 1500.0
     assert len(found.pair) == len(rows)
     order = np.lexsort([np.sign(found.start_sine), found.bottom, found.surface])
     for i, (up, surface, bottom, arrives, height) in zip(

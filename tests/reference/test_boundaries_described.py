@@ -30,13 +30,15 @@ TABLE: dict[str, Any] = {"grazing": ["0 deg", "45 deg", "90 deg"], "phase": ["18
 
 @pytest.mark.parametrize("name", MODULUS)
 def test_named_sediments_reflect_as_published(name: Any) -> None:
-    got = coefficient(ss.SeaBed(reflection=ss.Sediment(name=name)), GRAZING)
+    got = coefficient(ss.SeaBottom(reflection=ss.Sediment(name=name)), GRAZING)
     np.testing.assert_allclose(np.abs(got), MODULUS[name], rtol=0, atol=5.1e-5)
 
 
 def test_medium_sand_is_the_bed_unless_said_otherwise() -> None:
-    np.testing.assert_allclose(np.abs(coefficient(ss.SeaBed(), GRAZING)), MODULUS["medium sand"], rtol=0, atol=5.1e-5)
-    assert -20 * np.log10(np.abs(coefficient(ss.SeaBed(), np.pi / 2))) == pytest.approx(8.64, abs=5e-3)
+    np.testing.assert_allclose(
+        np.abs(coefficient(ss.SeaBottom(), GRAZING)), MODULUS["medium sand"], rtol=0, atol=5.1e-5
+    )
+    assert -20 * np.log10(np.abs(coefficient(ss.SeaBottom(), np.pi / 2))) == pytest.approx(8.64, abs=5e-3)
     np.testing.assert_array_equal(coefficient(ss.SeaSurface(), GRAZING), -1.0)
 
 
@@ -68,12 +70,12 @@ def test_the_handbook_goes_from_hard_to_soft() -> None:
 
 
 def test_the_published_example_of_a_fluid_bed() -> None:
-    bed = ss.SeaBed(reflection=ss.FluidHalfSpace(density_ratio=1200 / 1022.72, speed_ratio=1600 / 1539.087))
-    got = coefficient(bed, np.radians([45, 90]))
+    bottom = ss.SeaBottom(reflection=ss.FluidHalfSpace(density_ratio=1200 / 1022.72, speed_ratio=1600 / 1539.087))
+    got = coefficient(bottom, np.radians([45, 90]))
     np.testing.assert_allclose(got, [0.1198, 0.0990], rtol=0, atol=5.1e-5)
     below, above = np.radians([15.861 - 0.01, 15.861 + 0.01])
-    assert np.abs(coefficient(bed, below)) == pytest.approx(1.0, abs=1e-14)
-    assert np.abs(coefficient(bed, above)) < 0.95
+    assert np.abs(coefficient(bottom, below)) == pytest.approx(1.0, abs=1e-14)
+    assert np.abs(coefficient(bottom, above)) < 0.95
     assert np.degrees(critical_grazing(1600 / 1539.087)) == pytest.approx(15.861, abs=6e-4)
 
 
@@ -99,8 +101,8 @@ def test_bubbles_take_the_published_loss(wind: float, frequency: float, degrees:
 
 
 def test_bellhops_example_of_a_table() -> None:
-    bed = ss.SeaBed(reflection=ss.ReflectionTable(modulus=(1.0, 0.95, 0.90), **TABLE))
-    got = coefficient(bed, np.radians([0, 22.5, 45, 90]))
+    bottom = ss.SeaBottom(reflection=ss.ReflectionTable(modulus=(1.0, 0.95, 0.90), **TABLE))
+    got = coefficient(bottom, np.radians([0, 22.5, 45, 90]))
     np.testing.assert_allclose(np.abs(got), [1.0, 0.975, 0.95, 0.90], rtol=1e-14)
     np.testing.assert_allclose(np.degrees(np.angle(got)), [180, 177.5, 175, 170], rtol=1e-13)
 
@@ -112,9 +114,9 @@ scene:
       depth: 12 m
       sound_speed: {kind: isovelocity, speed: 1540}
       surface: {wind_speed: 5 m/s, bubbles: true}
-      bed: {reflection: {kind: sediment, name: fine sand}, rms_height: 1 cm}
-    shrimp:
-      - {position: [30, 1]}
+      bottom: {reflection: {kind: sediment, name: fine sand}, rms_height: 1 cm}
+    sources:
+      - {kind: snapping_shrimp, position: [30, 1]}
   sonar: {}
   trajectory:
     sonar: {kind: still, position: [0, 0, -5]}
@@ -124,7 +126,7 @@ scene:
 def test_boundaries_are_written_and_read_as_yaml() -> None:
     recipe = ss.loads(RECIPE)
     water = recipe.scene.world.environment
-    assert water.bed == ss.SeaBed(reflection=ss.Sediment(name="fine sand"), rms_height=0.01)
+    assert water.bottom == ss.SeaBottom(reflection=ss.Sediment(name="fine sand"), rms_height=0.01)
     assert water.surface == ss.SeaSurface(wind_speed=5.0, bubbles=True)
     assert ss.loads(ss.dump(recipe)) == recipe
     assert isinstance(hash(water), int)
@@ -133,12 +135,20 @@ def test_boundaries_are_written_and_read_as_yaml() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("name: fine sand", "name: find sand", "bed.reflection.name: 'find sand' is not a sediment here; did you mean"),
-        ("name: fine sand", "name: 7", "bed.reflection.name: "),
-        ("kind: sediment", "kind: sand", "bed.reflection.kind: 'sand' is not a kind here; "),
-        ("kind: sediment, name: fine sand", "name: fine sand", "bed.reflection: needs a kind: one of pressure_release"),
-        ("rms_height: 1 cm", "rms_height: -1 cm", "bed.rms_height: must be greater than or equal to 0"),
-        ("rms_height: 1 cm", "roughness: 1 cm", "bed.roughness: 'roughness' is not a field here"),
+        (
+            "name: fine sand",
+            "name: find sand",
+            "bottom.reflection.name: 'find sand' is not a sediment here; did you mean",
+        ),
+        ("name: fine sand", "name: 7", "bottom.reflection.name: "),
+        ("kind: sediment", "kind: sand", "bottom.reflection.kind: 'sand' is not a kind here; "),
+        (
+            "kind: sediment, name: fine sand",
+            "name: fine sand",
+            "bottom.reflection: needs a kind: one of pressure_release",
+        ),
+        ("rms_height: 1 cm", "rms_height: -1 cm", "bottom.rms_height: must be greater than or equal to 0"),
+        ("rms_height: 1 cm", "roughness: 1 cm", "bottom.roughness: 'roughness' is not a field here"),
         ("wind_speed: 5 m/s", "rms_height: 1 cm", "surface.bubbles: need wind_speed"),
         ("bubbles: true", "rms_height: 1 cm", "surface.wind_speed: give either rms_height or wind_speed"),
     ],

@@ -24,8 +24,8 @@ SEDIMENTS = {  # APL-UW TR 9407: density ratio, speed ratio, loss tangent; |V| a
 
 @pytest.mark.parametrize("sediment", SEDIMENTS)
 def test_rayleigh_gives_the_table_of_sediments(sediment):
-    bed, expected = SEDIMENTS[sediment]
-    np.testing.assert_allclose(np.abs(rayleigh(GRAZING, *bed)), expected, rtol=0, atol=5.1e-5)
+    bottom, expected = SEDIMENTS[sediment]
+    np.testing.assert_allclose(np.abs(rayleigh(GRAZING, *bottom)), expected, rtol=0, atol=5.1e-5)
 
 
 def test_rayleigh_of_the_published_example():
@@ -69,9 +69,9 @@ def test_a_lossy_bed_never_gives_energy():
 
 
 def test_the_reflection_at_grazing_is_that_of_a_soft_surface():
-    beds = np.array([[1.845, 1.1782, 0.01624], [1.149, 0.9885, 0.00676], [1.845, 1.1782, 0.0]]).T
-    np.testing.assert_allclose(rayleigh(0.0, *beds), -1.0)
-    np.testing.assert_allclose(rayleigh(1e-9, *beds), -1.0, atol=1e-7)
+    sediments = np.array([[1.845, 1.1782, 0.01624], [1.149, 0.9885, 0.00676], [1.845, 1.1782, 0.0]]).T
+    np.testing.assert_allclose(rayleigh(0.0, *sediments), -1.0)
+    np.testing.assert_allclose(rayleigh(1e-9, *sediments), -1.0, atol=1e-7)
 
 
 def test_a_boundary_of_density_alone_reflects_the_same_at_every_angle():

@@ -62,7 +62,7 @@ def test_image_cloud_bearing_and_truth_follow_a_tilted_mount() -> None:
     axes, array = _axes(), np.array([0.0, 0.0, -5.0])
 
     snap = axes @ (np.array([14.0, -5.0, -10.0]) - array)
-    assert heard.bearings is not None and heard.bearings.position[0] == pytest.approx(snap, abs=0.01)
+    assert heard.estimates is not None and heard.estimates.position[0] == pytest.approx(snap, abs=0.01)
 
     corners = (body.pose.to_world(body.mesh.corners) - array) @ axes.T
     looks = direction(heard.image.azimuth, heard.image.elevation[:, None])
@@ -137,7 +137,7 @@ def test_a_target_half_in_the_shadow_is_labelled_where_it_is() -> None:
             targets=(
                 Target(name="ball", shape=Sphere(radius=0.9, edge=0.15), motion=Still(position=(50.0, 0.0, -1.5))),
             ),
-            shrimp=(SnappingShrimp(position=(10.0, -3.0)),),
+            sources=(SnappingShrimp(position=(10.0, -3.0)),),
         ),
         sonar=Sonar(beams=BeamGrid(azimuth_span=0.1, azimuths=21, elevation_span=0.3, elevations=61)),
         trajectory=Trajectory(sonar=Still(position=(0.0, 0.0, -1.2), heading=0.5 * np.pi)),
@@ -152,7 +152,7 @@ def test_a_loud_snap_after_a_quiet_one_still_gives_an_image() -> None:
     recipe = remus(frames=1)
     quiet = SnappingShrimp(name="quiet", position=(14.0, -5.0), source_level=180.0)
     loud = SnappingShrimp(name="loud", position=(10.0, 4.0), source_level=195.0, snap_times=(4e-3,))
-    world = replace(recipe.scene.world, shrimp=(quiet, loud))
+    world = replace(recipe.scene.world, sources=(quiet, loud))
     made = plan(replace(recipe, scene=replace(recipe.scene, world=world)))
     image = beamform_frame(made, 0, trace_frame(made, 0)).image
     assert image is not None and np.isfinite(image.energy).all()

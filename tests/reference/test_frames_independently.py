@@ -48,7 +48,7 @@ def away(made: Plan, sensors: list[int]) -> tuple[float, float]:
         ("tank", [0, 90], None),
         ("crowd", [5, 300], None),
         ("deep", [17, 200], None),
-        ("thermocline", [140], Choices(visibility="hydrophones")),  # what its plan chooses, in 14 s
+        ("thermocline", [140], Choices(occlusion="sensors")),  # what its plan chooses, in 14 s
     ],
 )
 def test_a_frame_of_a_shipped_recipe_is_what_its_description_says(
@@ -69,7 +69,7 @@ def crossing(target: Motion, sonar: Motion, edge: float = 0.15) -> Plan:
         world=World(
             environment=Environment(depth=60.0, sound_speed=Isovelocity(speed=1500.0)),
             targets=(Target(name="crate", shape=Box(size=(1.2, 0.7, 0.6), edge=edge), motion=target),),
-            shrimp=(SnappingShrimp(position=(12.0, -7.0, -33.0), snap_times=(-0.1, 0.0, 0.1)),),
+            sources=(SnappingShrimp(position=(12.0, -7.0, -33.0), snap_times=(-0.1, 0.0, 0.1)),),
         ),
         sonar=Sonar(array=PlanarLattice(columns=8, rows=6, pitch=0.05), assumed_sound_speed=1500.0),
         trajectory=Trajectory(start=1.0, sonar=sonar),

@@ -21,7 +21,7 @@ def munk_speed(z: float) -> tuple[float, float]:
     return 1500.0 * (1 + 0.00737 * (eta - 1 + np.exp(-eta))), 1500.0 * 0.00737 / 650.0 * (1 - np.exp(-eta))
 
 
-def shot(angle: float, start: float, distance: float, bed: float) -> tuple[Floats, int, int]:
+def shot(angle: float, start: float, distance: float, bottom_depth: float) -> tuple[Floats, int, int]:
     """(depth, angle, time) at a distance of the ray launched at an angle (down positive), and its reflections."""
 
     def slopes(x: float, state: Floats) -> list[float]:
@@ -31,15 +31,21 @@ def shot(angle: float, start: float, distance: float, bed: float) -> tuple[Float
     def at_surface(x: float, state: Floats) -> float:
         return float(state[0])
 
-    def at_bed(x: float, state: Floats) -> float:
-        return float(bed - state[0])
+    def at_bottom(x: float, state: Floats) -> float:
+        return float(bottom_depth - state[0])
 
-    for event in (at_surface, at_bed):
+    for event in (at_surface, at_bottom):
         event.terminal, event.direction = True, -1  # type: ignore[attr-defined]
     x, state, hits = 0.0, np.array([start, angle, 0.0]), [0, 0]
     while x < distance:
         leg = solve_ivp(
-            slopes, (x, distance), state, "DOP853", events=(at_surface, at_bed), rtol=1e-11, atol=[1e-7, 1e-12, 1e-12]
+            slopes,
+            (x, distance),
+            state,
+            "DOP853",
+            events=(at_surface, at_bottom),
+            rtol=1e-11,
+            atol=[1e-7, 1e-12, 1e-12],
         )
         x, state = leg.t[-1], leg.y[:, -1].copy()
         if leg.status == 1:
@@ -48,12 +54,14 @@ def shot(angle: float, start: float, distance: float, bed: float) -> tuple[Float
     return state, *hits
 
 
-def time_through_formula(angle: float, start: float, end: float, distance: float, bed: float) -> tuple[float, int, int]:
+def time_through_formula(
+    angle: float, start: float, end: float, distance: float, bottom_depth: float
+) -> tuple[float, int, int]:
     """Travel time of the ray through the formula near a launch angle, by the secant method; Fermat for what is left."""
-    before, step = shot(angle, start, distance, bed)[0][0], 1e-6
+    before, step = shot(angle, start, distance, bottom_depth)[0][0], 1e-6
     for _ in range(8):
         angle += step
-        (z, arrival, time), surface, bottom = shot(angle, start, distance, bed)
+        (z, arrival, time), surface, bottom = shot(angle, start, distance, bottom_depth)
         if abs(z - end) < 1e-2:
             break
         before, step = z, step * (end - z) / (z - before)

@@ -14,17 +14,19 @@ from tests.following import Visit, families, family, images, nodes, random_water
 @pytest.mark.parametrize(("vertices", "reflections"), [(6, 6), (6, 3), (2, 4), (1, 1), (3, 0), (0, 2)])
 def test_uniform_water_has_image_sources(vertices: int, reflections: int) -> None:
     rng = np.random.default_rng(vertices)
-    bed, c, size = 31.0, 1520.0, 60
-    water = ray_solutions.water(np.array([0.0, 7.0, 20.0]), np.full(3, c), bed)
-    z1, z2 = rng.uniform(0, bed, (2, size))
+    bottom_depth, c, size = 31.0, 1520.0, 60
+    water = ray_solutions.water(np.array([0.0, 7.0, 20.0]), np.full(3, c), bottom_depth)
+    z1, z2 = rng.uniform(0, bottom_depth, (2, size))
     r = 10 ** rng.uniform(-4, 5, size)
     z1[:20], z2[10:30], r[25:35] = rng.choice([0.0, 7.0, 31.0], 20), rng.choice([0.0, 20.0, 31.0], 20), 0.0
     z2[40:50] = z1[40:50]
-    boundary = (z1 == z2) & ((z1 == 0) | (z1 == bed))
+    boundary = (z1 == z2) & ((z1 == 0) | (z1 == bottom_depth))
     z2[boundary] = 5.0
     found = ray_solutions.eigenrays(water, z1, z2, r, vertices, reflections)
     for i in range(size):
-        expected = sorted(images(bed, z1[i], z2[i], min(vertices, reflections)), key=lambda row: (*row[1:3], row[0]))
+        expected = sorted(
+            images(bottom_depth, z1[i], z2[i], min(vertices, reflections)), key=lambda row: (*row[1:3], row[0])
+        )
         mine = np.flatnonzero(found.pair == i)
         assert (np.diff(found.travel_time[mine]) >= 0).all()
         order = np.lexsort([found.start_sine[mine], found.bottom[mine], found.surface[mine]])
@@ -43,15 +45,18 @@ def test_uniform_water_has_image_sources(vertices: int, reflections: int) -> Non
                 assert abs(found.end_sine[k] - arrives * height / d) < 1e-14
                 assert abs(found.slowness[k] * c - r[i] / d) < 1e-14
                 np.testing.assert_equal(found.upper[k], 0.0 if surface else np.nan)
-                np.testing.assert_equal(found.lower[k], bed if bottom else np.nan)
+                np.testing.assert_equal(found.lower[k], bottom_depth if bottom else np.nan)
 
 
 @pytest.mark.parametrize("gradient", [0.016, 1.0, -0.05])
 def test_hops_along_a_boundary_have_the_closed_form(gradient: float) -> None:
     """Both ends on the surface (or the bottom) of water that bends rays back to it: n equal arcs."""
-    c, bed, r = 1500.0, 1000.0, 800.0
-    speeds = np.array([c, c + gradient * bed]) if gradient > 0 else np.array([c - gradient * bed, c])
-    water, end = ray_solutions.water(np.array([0.0, bed]), speeds, bed), 0.0 if gradient > 0 else bed
+    c, bottom_depth, r = 1500.0, 1000.0, 800.0
+    speeds = np.array([c, c + gradient * bottom_depth]) if gradient > 0 else np.array([c - gradient * bottom_depth, c])
+    water, end = (
+        ray_solutions.water(np.array([0.0, bottom_depth]), speeds, bottom_depth),
+        0.0 if gradient > 0 else bottom_depth,
+    )
     found = ray_solutions.eigenrays(water, np.array([end]), np.array([end]), np.array([r]), 11, 11)
     g = abs(gradient)
     for hops in range(1, 6):
@@ -65,7 +70,7 @@ def test_hops_along_a_boundary_have_the_closed_form(gradient: float) -> None:
         )
         np.testing.assert_allclose(np.abs(found.start_sine[mine]), tangent / np.hypot(1, tangent), rtol=1e-12)
         deepest = c * (np.hypot(1, tangent) - 1) / g
-        vertex = found.lower[mine] if gradient > 0 else bed - found.upper[mine]
+        vertex = found.lower[mine] if gradient > 0 else bottom_depth - found.upper[mine]
         np.testing.assert_allclose(vertex, deepest, rtol=1e-9)
         assert set(found.caustics[mine]) == {hops - 1}
         assert sorted(np.sign(found.start_sine[mine])) == [-1, -1, 1, 1]

@@ -27,9 +27,9 @@ def duct(depth: Floats) -> Floats:
     return 1500.0 + 0.02 * depth - 4.0 * np.exp(-(((depth - 60.0) / 15.0) ** 2))
 
 
-def tabulated(profile: Callable[[Floats], Floats], bed: float, count: int) -> ray_solutions.Water:
-    depth = np.linspace(0, bed, count)
-    return ray_solutions.water(depth, profile(depth), bed)
+def tabulated(profile: Callable[[Floats], Floats], bottom_depth: float, count: int) -> ray_solutions.Water:
+    depth = np.linspace(0, bottom_depth, count)
+    return ray_solutions.water(depth, profile(depth), bottom_depth)
 
 
 def event(of: Callable[[Floats], float], direction: int, terminal: bool) -> Callable[[float, Floats], float]:
@@ -85,7 +85,7 @@ def shot(water: ray_solutions.Water, start: float, angle: float, counts: list[in
 
 
 @pytest.mark.parametrize(
-    ("profile", "bed", "count", "start", "end", "distance", "vertices"),
+    ("profile", "bottom", "count", "start", "end", "distance", "vertices"),
     [
         (thermocline, 25.0, 21, 9.0, 14.0, 300.0, 3),
         (duct, 150.0, 26, 55.0, 70.0, 2e3, 3),
@@ -94,14 +94,14 @@ def shot(water: ray_solutions.Water, start: float, angle: float, counts: list[in
 )
 def test_an_integrator_shoots_to_the_same_end(
     profile: Callable[[Floats], Floats],
-    bed: float,
+    bottom_depth: float,
     count: int,
     start: float,
     end: float,
     distance: float,
     vertices: int,
 ) -> None:
-    water = tabulated(profile, bed, count)
+    water = tabulated(profile, bottom_depth, count)
     found = ray_solutions.eigenrays(water, np.array([start]), np.array([end]), np.array([distance]), vertices, vertices)
     assert len(found.pair) >= 2 * vertices
     for i in range(len(found.pair)):

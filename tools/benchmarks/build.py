@@ -83,7 +83,7 @@ def stages(plan: Plan, path: Path) -> dict[str, float]:
         clock("compress", lambda blocks=blocks: [encoded(*block) for block in blocks])
     ms = {name: 1e3 * seconds / FRAMES for name, seconds in clock.seconds.items()}
     return {
-        "trace, with the ledger": ms["trace, label"] - ms["label"],
+        "trace, with the link budget": ms["trace, label"] - ms["label"],
         "label": ms["label"],
         "synthesise": ms["synthesise"],
         "measure paths alone": ms["measure paths alone"],

@@ -63,7 +63,7 @@ def bench(index: int = 32) -> dict[str, Any]:
             sonar,
             traced.frame.sonar_pose,
             scene.world.environment.depth,
-            plan.sizes["snap"],
+            plan.sizes["emission"],
             plan.profile,
         )
     )

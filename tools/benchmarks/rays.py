@@ -31,7 +31,7 @@ RECIPE = Path(__file__).resolve().parents[2] / "configs" / "remus.yaml"
 WATER = "scene.world.environment.sound_speed={kind: thermocline}"
 LAYERS = (1, 5, 50)
 FAMILIES = {"direct family": (1, 0), "two vertices": (2, 2)}
-BED = 100.0  # m
+BOTTOM_DEPTH = 100.0  # m
 RECEIVERS = 500
 SOURCES = 40
 CHECKED = 60
@@ -66,10 +66,10 @@ def bench(index: int = 32) -> dict[str, Any]:
 
 def searched(layers: int, family: str, vertices: int, reflections: int) -> dict[str, Any]:
     """Microseconds an eigenray, receivers one at a time and 500 at a time, from sources all over the water."""
-    nodes = random_layers(layers, BED, 5.0)
-    water = ray_solutions.water(*nodes, BED)
+    nodes = random_layers(layers, BOTTOM_DEPTH, 5.0)
+    water = ray_solutions.water(*nodes, BOTTOM_DEPTH)
     rng = stream(1, "bench", "rays", layers)
-    sources, receivers = rng.uniform(0.0, BED, SOURCES), rng.uniform(0.0, BED, RECEIVERS)
+    sources, receivers = rng.uniform(0.0, BOTTOM_DEPTH, SOURCES), rng.uniform(0.0, BOTTOM_DEPTH, RECEIVERS)
     distance = np.geomspace(10.0, 3e3, RECEIVERS)
 
     def many() -> list[ray_solutions.Eigenrays]:

@@ -27,7 +27,7 @@ from sonarsynth.store import layout_of
 
 ROUNDS = int(os.environ.get("READING_ROUNDS", "3"))
 BATCH = 32
-TRAINING = ("image/energy", "cloud/range", "truth/target")
+TRAINING = ("image/energy", "cloud/range", "truth/beams/target")
 """Arrays that a network is trained on."""
 
 Read = Callable[[slice], list[np.ndarray]]

@@ -28,8 +28,9 @@ scene:
       - name: box
         shape: {kind: box, size: [1, 1, 1], edge: 0.5}
         motion: {kind: line, start: [10, 0, -5], stop: [10, 1, -5], duration: 1}
-    shrimp:
+    sources:
       - position: [30, 1]
+        kind: snapping_shrimp
   sonar:
     array: {kind: planar_lattice, columns: 4, rows: 3, pitch: 5 cm}
     beams: {azimuths: 5, elevations: 3, azimuth_span: 30 deg, elevation_span: 30 deg}

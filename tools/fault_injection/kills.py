@@ -40,8 +40,9 @@ scene:
       - name: box
         shape: {kind: box, size: [1, 1, 1], edge: 1.0}
         motion: {kind: line, start: [10, 0, -5], stop: [10, 1, -5], duration: 1}
-    shrimp:
+    sources:
       - position: [30, 1]
+        kind: snapping_shrimp
   sonar:
     array: {kind: planar_lattice, columns: 3, rows: 2, pitch: 5 cm}
     beams: {azimuths: 5, elevations: 3, azimuth_span: 30 deg, elevation_span: 30 deg}

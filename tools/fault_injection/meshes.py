@@ -24,8 +24,9 @@ scene:
       - name: body
         shape: {{kind: mesh_file, path: {name}, smooth: {smooth}}}
         motion: {{kind: line, start: [10, 0, -5], stop: [10, 1, -5], duration: 1}}
-    shrimp:
+    sources:
       - position: [30, 1]
+        kind: snapping_shrimp
   sonar:
     array: {{kind: planar_lattice, columns: 5, rows: 4, pitch: 5 cm}}
     beams: {{azimuths: 11, elevations: 9, azimuth_span: 30 deg, elevation_span: 30 deg}}

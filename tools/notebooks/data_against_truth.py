@@ -29,7 +29,8 @@ frames = range(4, 64, 8)
 recipe = ss.load(root / "configs" / "remus.yaml", ["scene.sonar.assumed_sound_speed=1541 m/s"])
 ss.build(recipe, path, frames=frames, workers=0)
 store = ss.open(path).isel(frame=list(frames))
-image, cloud, estimates, truth = store["image"], store["cloud"], store["bearings"], store["truth"]
+image, cloud, estimates = store["image"], store["cloud"], store["source_estimates"]
+targets, emissions = store["truth/targets"], store["truth/emissions"]
 
 # %% [markdown]
 # ## The image and the box of the target
@@ -42,7 +43,7 @@ image, cloud, estimates, truth = store["image"], store["cloud"], store["bearings
 peak = image["energy"].argmax(["elevation", "azimuth"])
 azimuth = image["azimuth"].values[peak["azimuth"].values]
 elevation = image["elevation"].values[peak["elevation"].values]
-low_azimuth, high_azimuth, low_elevation, high_elevation = truth["image_box"].values[:, 0].T
+low_azimuth, high_azimuth, low_elevation, high_elevation = targets["image_box"].sel(target="remus").values.T
 beside_azimuth = np.maximum(np.maximum(low_azimuth - azimuth, azimuth - high_azimuth), 0)
 beside_elevation = np.maximum(np.maximum(low_elevation - elevation, elevation - high_elevation), 0)
 beside = np.hypot(beside_azimuth, beside_elevation)
@@ -74,13 +75,13 @@ print(
 
 # %%
 comparison = {
-    "time (ns)": ("time", "snap_arrival", 1e9),
-    "azimuth (mdeg)": ("azimuth", "snap_azimuth", 1e3),
-    "elevation (mdeg)": ("elevation", "snap_elevation", 1e3),
+    "time (ns)": ("time", "arrival", 1e9),
+    "azimuth (mdeg)": ("azimuth", "azimuth", 1e3),
+    "elevation (mdeg)": ("elevation", "elevation", 1e3),
 }
 source_errors = {}
 for label, (name, true_name, scale) in comparison.items():
-    found = (estimates[name] - truth[true_name]).values[:, 0]
+    found = (estimates[name].isel(estimate=0) - emissions[true_name].isel(emission=0)).values
     predicted = estimates[f"{name}_error"].values[:, 0]
     source_errors[label] = found / predicted
     print(f"{label}: error at most {np.abs(found).max() * scale:.3g}, predicted {predicted.max() * scale:.3g}")

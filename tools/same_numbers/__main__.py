@@ -15,6 +15,7 @@ import numpy as np
 import zarr
 
 from . import harbour
+from .as_format_3 import as_format_3
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -78,8 +79,10 @@ def _build(tree: Path, name: str, place: Path, frames: int) -> Path:
 
 def _compare(name: str, old: Path, new: Path, renamed: Mapping[str, str]) -> bool:
     """Print what differs between two stores, and what a frame costs in both. True where nothing does."""
-    before = {_renamed(path, renamed): array for path, array in _arrays(old).items()}
-    after = _arrays(new)
+    stored, after = _arrays(old), _arrays(new)
+    if _format(old) == "2" and _format(new) == "3":
+        stored = as_format_3(stored, after["cloud/range"].shape[1] if "cloud/range" in after else 0)
+    before = {_renamed(path, renamed): array for path, array in stored.items()}
     both = sorted(before.keys() & after.keys())
     different = {path: text for path in both if (text := _differs(before[path], after[path]))}
     print(
@@ -108,14 +111,18 @@ def _arrays(store: Path) -> dict[str, np.ndarray]:
     return {path: np.asarray(node[...]) for path, node in root.members(max_depth=None) if isinstance(node, zarr.Array)}
 
 
+def _format(store: Path) -> str:
+    return str(zarr.open_group(store, mode="r").attrs.get("sonarsynth_format"))
+
+
 def _differs(old: np.ndarray, new: np.ndarray) -> str:
     """How two arrays differ, "" where no bit does."""
     if (old.dtype, old.shape) != (new.dtype, new.shape):
         return f"{old.dtype} {old.shape}, now {new.dtype} {new.shape}"
+    if old.dtype.kind not in "fiu":
+        return "" if np.array_equal(old, new) else "other values"
     if old.tobytes() == new.tobytes():
         return ""
-    if old.dtype.kind not in "fiu":
-        return "other values"
     a, b = np.nan_to_num(old.astype(float)), np.nan_to_num(new.astype(float))
     apart, largest = np.abs(a - b).max(), np.abs(a).max()
     return f"{np.count_nonzero(old != new)} of {old.size} values, by {apart:.2g} at most (the largest is {largest:.2g})"

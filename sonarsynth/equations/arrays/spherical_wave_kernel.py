@@ -1,4 +1,4 @@
-"""The sums of a fit of a spherical wave over the sensors of an array: the compiled kernel of `bearings`."""
+"""The sums of a fit of a spherical wave over the sensors of an array: the compiled kernel of source estimates."""
 
 from __future__ import annotations
 

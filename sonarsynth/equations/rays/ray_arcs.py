@@ -15,7 +15,7 @@ from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.rays.ray_chain import node_above
 from sonarsynth.equations.rays.ray_in_layer import atanc, chord_time
 
-ON, TURN, SURFACE, BED, OVER = range(5)
+ON, TURN, SURFACE, BOTTOM, OVER = range(5)
 """Why a step ended: step length or layer boundary, turning point, surface, bottom, time over."""
 
 
@@ -49,7 +49,7 @@ def across(depth: Floats, layer: int, sense: float) -> tuple[int, int]:
     """Next layer beyond the boundary reached, and what the boundary is."""
     if sense < 0.0:
         return (layer - 1, ON) if layer > 0 else (0, SURFACE)
-    return (layer + 1, ON) if layer < len(depth) - 2 else (layer, BED)
+    return (layer + 1, ON) if layer < len(depth) - 2 else (layer, BOTTOM)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -172,7 +172,7 @@ def chords(
             why, layer, dx, at, angle, done, _ = step(depth, speed, layer, at, angle, p[i], left, sagitta, math.inf)
             x, left, run = x + dx, left - done, run + done
             low, high = min(low, angle), max(high, angle)
-            bounced = why in (SURFACE, BED)
+            bounced = why in (SURFACE, BOTTOM)
             kept = run * (high - low) > 4.0 * sagitta and was_run > 0.0
             if count + 2 > len(nodes):
                 return -1

@@ -59,7 +59,7 @@ class Eigenrays:
     flag: Ints  # (ray,) see REASONS
 
 
-def water(depth: Floats, speed: Floats, bed: float) -> Water:
+def water(depth: Floats, speed: Floats, bottom_depth: float) -> Water:
     """The water down to the bottom (m) of a profile at nodes (m, m/s), constant beyond its ends.
 
     Raises ValueError for nodes that are not finite or not in order, for a speed or a bottom depth that is not positive.
@@ -67,27 +67,31 @@ def water(depth: Floats, speed: Floats, bed: float) -> Water:
     z, c = np.asarray(depth, float), np.asarray(speed, float)
     if z.ndim != 1 or z.shape != c.shape or len(z) == 0:
         raise ValueError("a profile needs as many speeds as depths, and one at least")
-    if not (np.isfinite(z).all() and np.isfinite(c).all() and np.isfinite(bed)):
+    if not (np.isfinite(z).all() and np.isfinite(c).all() and np.isfinite(bottom_depth)):
         raise ValueError("a profile and the bottom depth must be finite numbers")
-    if (np.diff(z) < 0).any() or (c <= 0).any() or bed <= 0:
+    if (np.diff(z) < 0).any() or (c <= 0).any() or bottom_depth <= 0:
         raise ValueError("a profile needs depths that do not decrease, positive speeds and a bottom below the surface")
-    inside = (z > 0) & (z < bed)
-    at_surface, at_bed = np.interp([0.0, bed], z, c)
-    at_bed = c[np.searchsorted(z, bed)] if bed in z else at_bed  # a jump on the bottom: its upper side
-    return Water(np.concatenate([[0.0], z[inside], [bed]]), np.concatenate([[at_surface], c[inside], [at_bed]]))
+    inside = (z > 0) & (z < bottom_depth)
+    at_surface, at_bottom = np.interp([0.0, bottom_depth], z, c)
+    at_bottom = (
+        c[np.searchsorted(z, bottom_depth)] if bottom_depth in z else at_bottom
+    )  # a jump on the bottom: its upper side
+    return Water(
+        np.concatenate([[0.0], z[inside], [bottom_depth]]), np.concatenate([[at_surface], c[inside], [at_bottom]])
+    )
 
 
 def within(water: Water, depth: Floats, what: str) -> Floats:
     """Depths, those within rounding of surface or bottom put on it; raises ValueError naming the first one outside."""
     z = np.asarray(depth, float)
-    bed = water.depth[-1]
-    if z.size and z.min() >= 0.0 and z.max() <= bed:
+    bottom_depth = water.depth[-1]
+    if z.size and z.min() >= 0.0 and z.max() <= bottom_depth:
         return z
-    wrong = ~((z >= -TOLERANCE) & (z <= bed + TOLERANCE))
+    wrong = ~((z >= -TOLERANCE) & (z <= bottom_depth + TOLERANCE))
     if wrong.any():
         i = int(np.argmax(wrong))
-        raise ValueError(f"{what} {i} at depth {z.flat[i]:g} m is not in the water, which is {bed:g} m deep")
-    return np.asarray(np.clip(z, 0.0, bed))
+        raise ValueError(f"{what} {i} at depth {z.flat[i]:g} m is not in the water, which is {bottom_depth:g} m deep")
+    return np.asarray(np.clip(z, 0.0, bottom_depth))
 
 
 def eigenrays(

@@ -13,6 +13,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.pictures.figures.frame_figure import Hull
 from sonarsynth.pictures.figures.outlines import union_outline
 from sonarsynth.pictures.figures.style import ERROR_MAP, INK, MARKS, PALE, figure, grid, label
+from sonarsynth.products import FAMILIES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,12 +23,10 @@ if TYPE_CHECKING:
 RAYS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Okabe and Ito (2008)."""
 
-FAMILIES = ("direct", "surface", "bed", "surface and bed")
-"""Families of eigenrays, by the boundaries that they are reflected from."""
 FAN = "fan"
 COLOURS = dict(zip(FAMILIES, RAYS, strict=False)) | {FAN: "#9a9a9a"}
 
-MARKERS = {"surface": "^", "bed": "v", "turning point": "o", "target": "X", "facet": "X"}
+MARKERS = {"surface": "^", "bottom": "v", "turning point": "o", "target": "X", "facet": "X"}
 """Marks of vertices."""
 
 
@@ -45,21 +44,21 @@ def section_figure(
     hulls: Sequence[Hull],
     profile_depth: Floats,
     profile_speed: Floats,
-    bed: float,
+    bottom_depth: float,
     bearing: float = 0.0,
     looks: Sequence[Look] = (),
     places: Mapping[str, Floats] | None = None,
 ) -> Figure:
     """Rays (each (point, xyz) in m, world) seen on the vertical plane towards `bearing` (rad, from x to y).
 
-    Left the sound speed (m/s) over depth (m), right the water down to `bed` (m), with the outlines of the targets.
+    Left the sound speed (m/s) over depth (m), right the water down to `bottom_depth` (m), with outlines of targets.
     looks: of each ray; left out, rays are coloured in turn. places: points (xyz) to name.
     """
     made = figure(11.0, 4.6 if looks else 4.2, dpi=110)
     parts = made.add_gridspec(1, 2, width_ratios=[1.0, 4.0])
     section = made.add_subplot(parts[1])
     along = np.array([np.cos(bearing), np.sin(bearing), 0.0])
-    _water(section, bed)
+    _water(section, bottom_depth)
     for hull in hulls:
         flat = np.stack([hull.vertices @ along, hull.vertices[:, 2]], axis=1)
         for line in union_outline(flat, hull.faces):
@@ -74,7 +73,7 @@ def section_figure(
     named = [(name, (place @ along, place[2])) for name, place in (places or {}).items()]
     _name(section, named)
     label(section, _distance(bearing), "height over the mean surface, z (m)", f"{len(rays)} rays")
-    _profile(made.add_subplot(parts[0], sharey=section), profile_depth, profile_speed, bed)
+    _profile(made.add_subplot(parts[0], sharey=section), profile_depth, profile_speed, bottom_depth)
     _legend(made, looks)
     return made
 
@@ -142,17 +141,17 @@ def _legend(made: Figure, looks: Sequence[Look]) -> None:
     made.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=8, frameon=False)
 
 
-def _water(axes: Axes, bed: float) -> None:
+def _water(axes: Axes, bottom_depth: float) -> None:
     axes.axhline(0.0, color="#4a90c2", linewidth=1.5)
-    axes.axhline(-bed, color="#8c6d46", linewidth=1.5)
-    axes.set_ylim(-1.06 * bed, 0.06 * bed)
+    axes.axhline(-bottom_depth, color="#8c6d46", linewidth=1.5)
+    axes.set_ylim(-1.06 * bottom_depth, 0.06 * bottom_depth)
 
 
-def _profile(axes: Axes, depth: Floats, speed: Floats, bed: float) -> None:
-    inside = (depth > 0.0) & (depth < bed)
-    ends = np.interp([0.0, bed], depth, speed)
+def _profile(axes: Axes, depth: Floats, speed: Floats, bottom_depth: float) -> None:
+    inside = (depth > 0.0) & (depth < bottom_depth)
+    ends = np.interp([0.0, bottom_depth], depth, speed)
     grid(axes)
-    axes.plot([ends[0], *speed[inside], ends[1]], [0.0, *-depth[inside], -bed], color=INK, linewidth=1.2)
+    axes.plot([ends[0], *speed[inside], ends[1]], [0.0, *-depth[inside], -bottom_depth], color=INK, linewidth=1.2)
     axes.ticklabel_format(axis="x", useOffset=False)
     label(axes, "sound speed (m/s)", "z (m)", "profile")
     axes.locator_params(axis="x", nbins=4)

@@ -6,14 +6,14 @@ from dataclasses import replace
 from typing import Any
 
 from sonarsynth.pipeline.variables.static_variables import coordinates
-from sonarsynth.pipeline.variables.truth_variables import LEDGER_COMMENT
+from sonarsynth.pipeline.variables.truth_variables import HOW_LEVELS_ADD_UP
 from sonarsynth.pipeline.variables.variable import Variable
 from sonarsynth.pipeline.variables.variable_groups import VARIABLES
 from sonarsynth.planning import Plan
 
-__all__ = ["FORMAT_VERSION", "LEDGER_COMMENT", "VARIABLES", "Variable", "attributes", "coordinates", "variables"]
+__all__ = ["FORMAT_VERSION", "HOW_LEVELS_ADD_UP", "VARIABLES", "Variable", "attributes", "coordinates", "variables"]
 
-FORMAT_VERSION = "2"
+FORMAT_VERSION = "3"
 """Version of the layout of a store."""
 
 
@@ -23,7 +23,7 @@ def variables(plan: Plan) -> tuple[Variable, ...]:
     if plan.products:
         wanted.add("levels")
     if plan.products & {"image", "cloud"}:
-        wanted.add("bearings")
+        wanted.add("source_estimates")
     chosen = [v for v in VARIABLES if v.product in wanted]
     if not plan.windows.direct_removed:
         chosen = [v for v in chosen if (v.group, v.name) != ("/image", "remainder")]

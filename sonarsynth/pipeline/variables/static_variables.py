@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.planning import Plan
-from sonarsynth.products import FAMILIES
+from sonarsynth.products import DIRECT, FAMILIES
 from sonarsynth.recipe.varied_columns import columns
 
 WHICH_MESH = "which mesh the target has: its group under /targets/<name>"
@@ -27,23 +27,31 @@ def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.n
 
     beams = scene.sonar.beams
     add("/", "frame", ("frame",), np.arange(sizes["frame"]), "1", "frame of the dataset")
-    on_grid = "/truth" + "".join(f" /{p}" for p in ("image", "cloud") if p in plan.products)
+    on_grid = "/truth/beams" + (" /image" if "image" in plan.products else "")
     degrees = {"comment": "as the sonar looks"}
     add(on_grid, "azimuth", ("azimuth",), np.rad2deg(beams.azimuth), "degree", "azimuth, port positive", **degrees)
     add(
         on_grid, "elevation", ("elevation",), np.rad2deg(beams.elevation), "degree", "elevation, up positive", **degrees
     )
-    named = "/truth" + (" /bearings" if plan.products & {"image", "cloud"} else "")
-    add(named, "xyz", ("xyz",), list("xyz"), "1", "axis")
-    add("/truth", "wxyz", ("wxyz",), list("wxyz"), "1", "part of a unit quaternion, scalar first")
-    add("/truth", "target_name", ("target",), np.array(names, dtype=np.str_), "1", "name of the target")
+    estimates = " /source_estimates" if plan.products & {"image", "cloud"} else ""
+    add("/truth /truth/targets /truth/emissions" + estimates, "xyz", ("xyz",), list("xyz"), "1", "axis")
+    add("/truth /truth/targets", "wxyz", ("wxyz",), list("wxyz"), "1", "part of a unit quaternion, scalar first")
+    add("/truth/targets", "target", ("target",), np.array(names, dtype=np.str_), "1", "name of the target")
     bounds = ["azimuth_min", "azimuth_max", "elevation_min", "elevation_max"]
-    add("/truth", "bound", ("bound",), bounds, "1", "which bound of the image box")
+    add("/truth/targets", "bound", ("bound",), bounds, "1", "which bound of the image box")
     if plan.products:
-        add("/ledger", "echo", ("echo",), [*names, "direct"], "1", "target of the echo; direct: snap to array")
-        add("/ledger", "family", ("family",), list(FAMILIES), "1", "path family: boundaries touched on the whole way")
+        echoes = [*names, DIRECT]
+        add("/link_budget", "target", ("target",), echoes, "1", f"target of the echoes; {DIRECT}: snap to array")
+        add(
+            "/link_budget",
+            "family",
+            ("family",),
+            list(FAMILIES),
+            "1",
+            "family of paths: boundaries touched",
+        )
         touched = "boundaries touched on the way from the target to the array"
-        add("/truth", "family", ("family",), list(FAMILIES), "1", touched)
+        add("/truth/targets", "family", ("family",), list(FAMILIES), "1", touched)
     if "signals" in plan.products:
         _add_sensors(plan, add)
     for column in columns(plan.recipe.spanned):
@@ -63,7 +71,7 @@ def _add_meshes(plan: Plan, add: Any) -> None:
     if any(len(some) > 1 for some in meshes):
         numbers = np.repeat(plan.recipe.mesh_numbers().astype(np.int32), plan.recipe.steps, axis=0)
         add(
-            "/truth",
+            "/truth/targets",
             "mesh",
             ("frame", "target"),
             numbers,

@@ -1,22 +1,26 @@
-"""Stored truth, and the ledger of levels."""
+"""Stored truth, and the link budget of levels."""
 
 from __future__ import annotations
 
 from sonarsynth.labels.views import MEANINGS, View
-from sonarsynth.pipeline.variables.variable import BEAMS, CELL, ECHO, NONE, SNAP, TARGET, comment, group_of, row
+from sonarsynth.pipeline.variables.variable import BEAMS, CELL, ECHO, EMISSION, NONE, TARGET, comment, group_of, row
 
 _INSTANT = comment("at the instant of the frame; what is heard is of when sound met the target: position_at_echo")
 _MEETING = comment(
     "what echoes, images and points show is where the sound met the target; poses, boxes and beams of the truth are "
-    "those of the instant of the frame. Sound by surface or bed meets it later. NaN where no direct path leads to it"
+    "those of the instant of the frame. Sound by surface or bottom meets it later. NaN where no direct path leads to it"
 )
-TRUTH = group_of(
+_SONAR = group_of(
     "/truth",
     "truth",
     row("sonar_position", ("frame", "xyz"), "float64", "m", "position of the array centre in the world"),
     row("sonar_orientation", ("frame", "wxyz"), "float64", "1", "unit quaternion from the sonar frame to the world"),
+)
+_TARGETS = group_of(
+    "/truth/targets",
+    "truth",
     row(
-        "target_position",
+        "position",
         (*TARGET, "xyz"),
         "float64",
         "m",
@@ -25,7 +29,7 @@ TRUTH = group_of(
     ),
     row(
         "position_at_echo",
-        (*SNAP, "target", "xyz"),
+        (*EMISSION, "target", "xyz"),
         "float64",
         "m",
         "position of the target's origin in the world when the sound of the snap, by the direct path, met it",
@@ -33,21 +37,21 @@ TRUTH = group_of(
     ),
     row(
         "meeting_time",
-        (*SNAP, "target"),
+        (*EMISSION, "target"),
         "float64",
         "s",
         "time after the instant of the frame when the sound of the snap, by the direct path, met the target's origin",
         attributes=_MEETING,
     ),
     row(
-        "target_orientation",
+        "orientation",
         (*TARGET, "wxyz"),
         "float64",
         "1",
         "unit quaternion from the target's frame to the world",
         attributes=_INSTANT,
     ),
-    row("target_velocity", (*TARGET, "xyz"), "float64", "m s-1", "velocity of the target in the world"),
+    row("velocity", (*TARGET, "xyz"), "float64", "m s-1", "velocity of the target in the world"),
     row(
         "box",
         (*TARGET, "corner", "xyz"),
@@ -93,7 +97,7 @@ TRUTH = group_of(
         ECHO,
         "float64",
         "degree",
-        "elevation that they come from: ghosts by surface and bed",
+        "elevation that they come from: ghosts by surface and bottom",
         product="levels",
     ),
     row(
@@ -104,12 +108,16 @@ TRUTH = group_of(
         "level of the target's echoes re 1 uPa, of their energy in the band",
         product="levels",
     ),
-    row("snap_position", (*SNAP, "xyz"), "float64", "m", "position of the snap in the world"),
-    row("snap_time", SNAP, "float64", "s", "time of the snap after the instant of the frame"),
-    row("snap_level", SNAP, "float64", "dB", "peak source level of the snap re 1 uPa at 1 m"),
+)
+_EMISSIONS = group_of(
+    "/truth/emissions",
+    "truth",
+    row("position", (*EMISSION, "xyz"), "float64", "m", "position of the snap in the world"),
+    row("time", EMISSION, "float64", "s", "time of the snap after the instant of the frame"),
+    row("level", EMISSION, "float64", "dB", "peak source level of the snap re 1 uPa at 1 m"),
     row(
-        "snap_arrival",
-        SNAP,
+        "arrival",
+        EMISSION,
         "float64",
         "s",
         "arrival at the array centre of the snap's direct pulse, the peak of its envelope in the band, after the "
@@ -117,47 +125,37 @@ TRUTH = group_of(
         product="levels",
     ),
     row(
-        "snap_azimuth",
-        SNAP,
+        "azimuth",
+        EMISSION,
         "float64",
         "degree",
         "azimuth that the direct pulse arrives from, port positive",
         product="levels",
     ),
     row(
-        "snap_elevation",
-        SNAP,
+        "elevation",
+        EMISSION,
         "float64",
         "degree",
         "elevation that the direct pulse arrives from, up positive",
         product="levels",
     ),
+)
+_BEAMS = group_of(
+    "/truth/beams",
+    "truth",
     row("target", BEAMS, "int16", "1", "target that the beam points at", attributes=(*NONE, *_INSTANT)),
     row("facet", BEAMS, "int32", "1", "facet that the beam points at", attributes=(*NONE, *_INSTANT)),
     row("range", BEAMS, "float32", "m", "distance to the first surface in the beam's direction", attributes=_INSTANT),
-    row(
-        "wavefront_error",
-        ("frame",),
-        "float64",
-        "s",
-        "largest error of wavefronts measured at probes over the aperture; NaN where one has no ray",
-        product="levels",
-    ),
-    row(
-        "amplitude_error",
-        ("frame",),
-        "float64",
-        "1",
-        "largest error of amplitudes measured at those probes, relative to the strongest echo",
-        product="levels",
-    ),
 )
-LEDGER_COMMENT = (
+TRUTH = (*_SONAR, *_TARGETS, *_EMISSIONS, *_BEAMS)
+"""True poses, emissions and beams."""
+HOW_LEVELS_ADD_UP = (
     "received = source - transmission_loss_out + scattering - transmission_loss_in - absorption - boundary. Ratios of "
     "energies in the band of the sonar; of coherent paths the pressures are summed, of others the powers. Losses are "
     "means over the paths, weighted by power; scattering has what phases add or cancel."
 )
-"""Stored with each level of the ledger."""
+"""Stored with each level of the link budget."""
 
 _LEVELS = {
     "source_level": "peak source level of the snap re 1 uPa at 1 m",
@@ -165,13 +163,13 @@ _LEVELS = {
     "scattering": "scattering of all facets together: target strength",
     "transmission_loss_in": "spreading loss from target to array",
     "absorption_loss": "absorption along the whole path",
-    "boundary_loss": "loss at surface and bed",
+    "boundary_loss": "loss at surface and bottom",
     "received_level": "level at the array centre re 1 uPa: peak of a snap of the energy in the band",
 }
 LEVELS = group_of(
-    "/ledger",
+    "/link_budget",
     "levels",
-    *(row(name, CELL, "float64", "dB", text, attributes=comment(LEDGER_COMMENT)) for name, text in _LEVELS.items()),
+    *(row(name, CELL, "float64", "dB", text, attributes=comment(HOW_LEVELS_ADD_UP)) for name, text in _LEVELS.items()),
     row("paths", CELL, "int32", "1", "number of paths"),
     row("isolated_level", CELL, "float64", "dB", "received level of the loudest path of the family alone, predicted"),
     row(
@@ -190,5 +188,19 @@ LEVELS = group_of(
         "float64",
         "dB",
         "bound on the error of each level from the approximations made; NaN without one",
+    ),
+    row(
+        "wavefront_error",
+        ("frame",),
+        "float64",
+        "s",
+        "largest error of wavefronts measured at probes over the aperture; NaN where one has no ray",
+    ),
+    row(
+        "amplitude_error",
+        ("frame",),
+        "float64",
+        "1",
+        "largest error of amplitudes measured at those probes, relative to the strongest echo",
     ),
 )

@@ -22,10 +22,12 @@ class Variable:
 
 
 BEAMS = ("frame", "elevation", "azimuth")
-SNAP = ("frame", "snap")
+EMISSION = ("frame", "emission")
+ESTIMATE = ("frame", "estimate")
+POINT = ("frame", "point")
 TARGET = ("frame", "target")
 ECHO = (*TARGET, "family")
-CELL = ("frame", "snap", "echo", "family")
+CELL = ("frame", "emission", "target", "family")
 NONE = (("flag_values", [-1]), ("flag_meanings", "none"))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sonarsynth.pipeline.variables.truth_variables import LEVELS, TRUTH
-from sonarsynth.pipeline.variables.variable import BEAMS, NONE, SNAP, Variable, comment, flags, group_of, row
+from sonarsynth.pipeline.variables.variable import BEAMS, ESTIMATE, NONE, POINT, Variable, comment, flags, group_of, row
 from sonarsynth.products import FAMILIES, ORIGINS, REASONS
 from sonarsynth.recipe import SPLITS
 
@@ -47,52 +47,56 @@ _IMAGE = group_of(
 )
 WHOSE = comment(
     "of the paths that bring most energy in the beam of the point at its delay. A range is wrong where the emission is "
-    "not that of the first bearing. Targets are where the sound met them"
+    "not that of the first source estimate. Targets are where the sound met them"
 )
 _CLOUD = group_of(
     "/cloud",
     "cloud",
-    row("range", BEAMS, "float32", "m", "distance of the point from the array centre"),
-    row("range_error", BEAMS, "float32", "m", "predicted standard error of range"),
-    row("delay", BEAMS, "float32", "s", "delay of the echo after the direct arrival of the snap"),
-    row("energy", BEAMS, "float32", "Pa2 s", "energy of the beam of the point"),
-    row("x", BEAMS, "float32", "m", "position of the point, forward, in the sonar frame"),
-    row("y", BEAMS, "float32", "m", "position of the point, to port, in the sonar frame"),
-    row("z", BEAMS, "float32", "m", "position of the point, up, in the sonar frame"),
-    row("target", BEAMS, "int16", "1", "target whose echo the point is", attributes=(*NONE, *WHOSE)),
-    row("emission", BEAMS, "int16", "1", "snap that lit the point", attributes=(*NONE, *WHOSE)),
-    row("family", BEAMS, "int8", "1", "how the echo reached the array: a ghost but direct", attributes=flags(FAMILIES)),
-    row("facet", BEAMS, "int32", "1", "facet that brought most of the echo", attributes=NONE),
-    row("true_range", BEAMS, "float32", "m", "distance of the array centre from where the echo was made"),
-    row("distance", BEAMS, "float32", "m", "distance of the point from the nearest surface of its target"),
-    row("origin", BEAMS, "int8", "1", "how the array came to hear the point", attributes=flags(ORIGINS)),
+    row("count", ("frame",), "int32", "1", "points of the frame: the first ones along point, the rest is NaN and -1"),
+    row("overflow", ("frame",), "int32", "1", "points left out because there was no room: the faintest"),
+    row("azimuth", POINT, "float32", "degree", "azimuth of the point, port positive"),
+    row("elevation", POINT, "float32", "degree", "elevation of the point, up positive"),
+    row("range", POINT, "float32", "m", "distance of the point from the array centre"),
+    row("range_error", POINT, "float32", "m", "predicted standard error of range"),
+    row("delay", POINT, "float32", "s", "delay of the echo after the direct arrival of the snap"),
+    row("energy", POINT, "float32", "Pa2 s", "energy of the beam of the point"),
+    row("x", POINT, "float32", "m", "position of the point, forward, in the sonar frame"),
+    row("y", POINT, "float32", "m", "position of the point, to port, in the sonar frame"),
+    row("z", POINT, "float32", "m", "position of the point, up, in the sonar frame"),
+    row("target", POINT, "int16", "1", "target whose echo the point is", attributes=(*NONE, *WHOSE)),
+    row("emission", POINT, "int16", "1", "snap that lit the point", attributes=(*NONE, *WHOSE)),
+    row("family", POINT, "int8", "1", "how the echo reached the array: a ghost but direct", attributes=flags(FAMILIES)),
+    row("facet", POINT, "int32", "1", "facet that brought most of the echo", attributes=NONE),
+    row("true_range", POINT, "float32", "m", "distance of the array centre from where the echo was made"),
+    row("distance", POINT, "float32", "m", "distance of the point from the nearest surface of its target"),
+    row("origin", POINT, "int8", "1", "how the array came to hear the point", attributes=flags(ORIGINS)),
 )
-_BEARINGS = group_of(
-    "/bearings",
-    "bearings",
+_ESTIMATES = group_of(
+    "/source_estimates",
+    "source_estimates",
     row(
         "time",
-        SNAP,
+        ESTIMATE,
         "float64",
         "s",
         "arrival at the array centre of the direct pulse, the peak of its envelope in the band, after the instant of "
         "the frame",
     ),
-    row("time_error", SNAP, "float64", "s", "predicted standard error of time"),
-    row("azimuth", SNAP, "float64", "degree", "azimuth of the snap as the array hears it, port positive"),
-    row("azimuth_error", SNAP, "float64", "degree", "predicted standard error of azimuth"),
-    row("elevation", SNAP, "float64", "degree", "elevation of the snap as the array hears it, up positive"),
-    row("elevation_error", SNAP, "float64", "degree", "predicted standard error of elevation"),
-    row("range_from_depth", SNAP, "float64", "m", "distance at which the bearing meets the depth of the bed"),
-    row("range_from_depth_error", SNAP, "float64", "m", "predicted standard error of range_from_depth"),
-    row("range_from_curvature", SNAP, "float64", "m", "distance from the curvature of the wavefront"),
-    row("range_from_curvature_error", SNAP, "float64", "m", "predicted standard error of range_from_curvature"),
-    row("position", (*SNAP, "xyz"), "float64", "m", "position of the snap in the sonar frame"),
-    row("position_covariance", (*SNAP, "xyz", "xyz_other"), "float64", "m2", "predicted covariance of position"),
-    row("residual", SNAP, "float64", "s", "root mean square residual of the sensor delays"),
+    row("time_error", ESTIMATE, "float64", "s", "predicted standard error of time"),
+    row("azimuth", ESTIMATE, "float64", "degree", "azimuth of the snap as the array hears it, port positive"),
+    row("azimuth_error", ESTIMATE, "float64", "degree", "predicted standard error of azimuth"),
+    row("elevation", ESTIMATE, "float64", "degree", "elevation of the snap as the array hears it, up positive"),
+    row("elevation_error", ESTIMATE, "float64", "degree", "predicted standard error of elevation"),
+    row("range_from_depth", ESTIMATE, "float64", "m", "distance at which the bearing meets the depth of the bottom"),
+    row("range_from_depth_error", ESTIMATE, "float64", "m", "predicted standard error of range_from_depth"),
+    row("range_from_curvature", ESTIMATE, "float64", "m", "distance from the curvature of the wavefront"),
+    row("range_from_curvature_error", ESTIMATE, "float64", "m", "predicted standard error of range_from_curvature"),
+    row("position", (*ESTIMATE, "xyz"), "float64", "m", "position of the snap in the sonar frame"),
+    row("position_covariance", (*ESTIMATE, "xyz", "xyz_other"), "float64", "m2", "predicted covariance of position"),
+    row("residual", ESTIMATE, "float64", "s", "root mean square residual of the sensor delays"),
     row(
         "bottom_used",
-        SNAP,
+        ESTIMATE,
         "int8",
         "1",
         "whether the depth of the bottom entered the position",
@@ -100,7 +104,7 @@ _BEARINGS = group_of(
     ),
     row(
         "reason",
-        SNAP,
+        ESTIMATE,
         "int8",
         "1",
         "why an estimate was not accepted",
@@ -111,12 +115,12 @@ _BEARINGS = group_of(
     ),
     row(
         "emission",
-        SNAP,
+        ESTIMATE,
         "int16",
         "1",
-        "index along snap of the true snap that the estimate came from: a label",
+        "index of the true emission that the estimate came from: a label",
         attributes=NONE,
     ),
 )
-VARIABLES: tuple[Variable, ...] = (*_ROOT, *_SIGNALS, *_IMAGE, *_CLOUD, *_BEARINGS, *TRUTH, *LEVELS)
+VARIABLES: tuple[Variable, ...] = (*_ROOT, *_SIGNALS, *_IMAGE, *_CLOUD, *_ESTIMATES, *TRUTH, *LEVELS)
 """Every variable that a frame may have."""

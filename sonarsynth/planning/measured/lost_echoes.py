@@ -86,16 +86,16 @@ def losses(plan: Plan, index: int) -> Losses | None:
         return None
     heard = replace(direct, pressure=direct.pressure + sum(echo.pressure for echo in echoes))
     locating = plan.scene.processing.locating.resolve(on_bottom=not standing_off(plan.scene))
-    bearings = locating.locate(
+    estimates = locating.locate(
         heard, plan.elements, sonar, frame.sonar_pose, plan.scene.world.environment.depth, 1, plan.profile
     )
-    clock = float(bearings.time[0]) if np.isfinite(bearings.time[0]) else float(arrivals.delay[first])
+    clock = float(estimates.time[0]) if np.isfinite(estimates.time[0]) else float(arrivals.delay[first])
     ends = ((clock + edge - start) * sonar.sampling_frequency for edge in (windows.echo_start, windows.echo_stop))
     window = slice(*(max(int(np.ceil(end)), 0) for end in ends))
-    alone = _without(plan, direct, bearings)
+    alone = _without(plan, direct, estimates)
     kept = np.zeros(len(echoes))
     for target, echo in enumerate(echoes):
-        both = _without(plan, replace(direct, pressure=direct.pressure + echo.pressure), bearings)
+        both = _without(plan, replace(direct, pressure=direct.pressure + echo.pressure), estimates)
         kept[target] = _energy((both - alone)[:, window])
     lost = np.where(whole > FAINTEST * whole.sum(), 1 - kept / np.maximum(whole, 1e-300), np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -104,11 +104,11 @@ def losses(plan: Plan, index: int) -> Losses | None:
     return Losses(index, np.clip(lost, 0.0, 1.0), fall, below)
 
 
-def _without(plan: Plan, signals: Signals, bearings: SourceEstimates) -> np.ndarray:
+def _without(plan: Plan, signals: Signals, estimates: SourceEstimates) -> np.ndarray:
     """Pressure (sensor, sample) as it is imaged; that of the signals where nothing can be, or is to be, taken out."""
-    if not plan.windows.direct_removed or not np.isfinite(bearings.time[0]):
+    if not plan.windows.direct_removed or not np.isfinite(estimates.time[0]):
         return signals.pressure
-    left = remove(signals, bearings, plan.elements, plan.scene.sonar, plan.windows.supports.clear)
+    left = remove(signals, estimates, plan.elements, plan.scene.sonar, plan.windows.supports.clear)
     return (signals if left is None else left).pressure
 
 

@@ -41,7 +41,7 @@ def arrivals_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Arriv
         enough=AMPLITUDES * plan.recipe.accuracy.cheap,
         alike=FACETS * plan.recipe.accuracy.signal,
         degree=plan.choices.degree,
-        visibility=plan.choices.visibility if part is not None or plan.choices.subarrays == 1 else "centre",
+        occlusion=plan.choices.occlusion if part is not None or plan.choices.subarrays == 1 else "centre",
     )
 
 

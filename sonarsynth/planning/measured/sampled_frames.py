@@ -89,7 +89,7 @@ def check_alike(first: Scene, other: Scene) -> None:
     world, others = ("scene", "world"), other.world
     for what, one, more in (
         ("targets", first.world.targets, others.targets),
-        ("shrimp", first.world.shrimp, others.shrimp),
+        ("sources", first.world.sources, others.sources),
     ):
         if len(one) != len(more):
             raise FieldError((*world, what), f"all sequences must have equally many: {len(one)} and {len(more)}")
@@ -98,10 +98,10 @@ def check_alike(first: Scene, other: Scene) -> None:
             raise FieldError(
                 (*world, "targets", i, "name"), f"must be the same in all sequences: '{a.name}' and '{b.name}'"
             )
-    for i, (s, t) in enumerate(zip(first.world.shrimp, others.shrimp, strict=True)):
+    for i, (s, t) in enumerate(zip(first.world.sources, others.sources, strict=True)):
         if len(s.snap_times) != len(t.snap_times):
             raise FieldError(
-                (*world, "shrimp", i, "snap_times"),
+                (*world, "sources", i, "snap_times"),
                 f"all sequences must have equally many: {len(s.snap_times)} and {len(t.snap_times)}",
             )
     if first.trajectory.frames != other.trajectory.frames:

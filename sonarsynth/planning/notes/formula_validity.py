@@ -31,7 +31,7 @@ def validity(scene: Scene, profile: Profile) -> tuple[str, ...]:
             formula_ranges.WENZ.check(frequency=[band.low, band.high], wind_speed=environment.noise.wind_speed)
         found += [("noise", note) for note in notes]
     if scene.physics.tracing.bounces:
-        for name, boundary in (("surface", environment.surface), ("bed", environment.bed)):
+        for name, boundary in (("surface", environment.surface), ("bottom", environment.bottom)):
             found += [(f"{name}.{field}", note) for field, note in boundary_notes(boundary, band.low, band.high)]
     lines = [f"scene.world.environment.{field}: {note}" for field, note in found]
     return (*lines, *(f"{'.'.join(BELIEVED)}: {note}" for note in _believed(scene)))

@@ -38,7 +38,7 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
         "the direct family" if not bounces else f"paths by at most {bounces} reflections at surface and bottom in all"
     )
     rows.append(Omission("more reflections", f"requested: {kept}", reflected_bound(plan)))
-    rough = [b for b in (environment.surface, environment.bed) if rms_height(b) > 0.0]
+    rough = [b for b in (environment.surface, environment.bottom) if rms_height(b) > 0.0]
     if bounces and rough:
         rows.append(
             Omission(
@@ -143,13 +143,13 @@ def _facets_leave_out(plan: Plan) -> list[Omission]:
 def _carried(plan: Plan, frame: Frame) -> str:
     """What velocity and spin leave out of the first frame, from when a body's middle is met to when a facet is: the
     rest of the phase, and how far bodies are that hide others from where they are then."""
-    speed, bed = float(plan.profile.speed.min()), plan.scene.world.environment.depth
+    speed, bottom_depth = float(plan.profile.speed.min()), plan.scene.world.environment.depth
     bounces, phase, off = plan.propagation.bounces, 0.0, 0.0
     bodies, ends = frame.moment.bodies, [frame.sonar_pose.position, *(s.position for s in frame.moment.snaps)]
     for body in bodies:
         size = 2.0 * body.mesh.radius
         apart = max(float(np.linalg.norm(body.pose.position - end)) for end in ends)
-        late = (size + (np.hypot(apart, (bounces + 1) * bed) - apart if bounces else 0.0)) / speed
+        late = (size + (np.hypot(apart, (bounces + 1) * bottom_depth) - apart if bounces else 0.0)) / speed
         v, turn = float(np.linalg.norm(body.velocity)), float(np.linalg.norm(body.track.spin)) * late
         phase = max(phase, 0.5 * turn * (turn * size + v * late))
         others = max((float(np.linalg.norm(body.pose.position - b.pose.position)) for b in bodies), default=0.0)

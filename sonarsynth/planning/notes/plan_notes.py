@@ -40,7 +40,7 @@ def notes(made: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
             f"{made.windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest snap"
         )
     cancelled = scene.processing.cancelling is not None
-    if made.propagation.bounces and not cancelled and made.products & {"image", "cloud"} and made.sizes["snap"]:
+    if made.propagation.bounces and not cancelled and made.products & {"image", "cloud"} and made.sizes["emission"]:
         found.append("reflections of the snap itself enter the image: processing.cancelling removes them")
     found += lost_echoes(made) + _accuracy(made, looks) + off_the_bottom(scene)
     for look in noted(looks):
@@ -87,7 +87,7 @@ def _shared(recipe: Recipe, looks: Sequence[SampledScene]) -> list[str]:
             split, world = recipe.split(look.frames[0].index), look.scene.world
             trajectory = look.scene.trajectory
             poses = tuple((t.motion, trajectory.start, trajectory.interval) for t in world.targets)
-            snaps = tuple((s.position, s.height) for s in world.shrimp)
+            snaps = tuple((s.position, s.height) for s in world.sources)
             held["target poses"].setdefault(poses, set()).add(split)
             held["snap positions"].setdefault(snaps, set()).add(split)
     for what, splits in held.items():
@@ -118,9 +118,9 @@ def _accuracy(made: Plan, looks: Sequence[SampledScene]) -> list[str]:
             f"accuracy.signal {allowed.signal:g} needs {parts} subarrays, each traced by itself: with one the error is "
             f"{errors.whole:.2g}"
         )
-    if made.choices.visibility == "hydrophones" and made.scene.physics.visibility == "auto":
+    if made.choices.occlusion == "sensors" and made.scene.physics.occlusion == "auto":
         found.append(
-            f"accuracy.signal {allowed.signal:g} needs the targets' visibility from each hydrophone: with that from "
+            f"accuracy.signal {allowed.signal:g} needs the targets' occlusion from each hydrophone: with that from "
             f"the array centre the error is {errors.whole:.2g}"
         )
     if np.hypot(np.nan_to_num(errors.expansion), np.nan_to_num(errors.synthesis)) > allowed.signal:

@@ -99,48 +99,50 @@ def _check_profile(scene: Scene, profile: Profile) -> None:
 
 def _check_plain(scene: Scene, number: int) -> None:
     """A mesh file must be in the water as it stands, before it is cut into many facets: its unit may be wrong."""
-    target, bed = scene.world.targets[number], scene.world.environment.depth
+    target, bottom_depth = scene.world.targets[number], scene.world.environment.depth
     if not isinstance(target.shape, MeshFile):
         return
     plain = mesh_of(replace(target.shape, edge=None, smooth=False))
     body = PlacedTarget(target.name, plain, pose(target.motion, scene.trajectory.time(0)), np.zeros(3))
-    if not _box_in_water(body, bed):
+    if not _box_in_water(body, bottom_depth):
         size = float(np.ptp(plain.box, axis=0).max())
         what = f"target '{body.name}', {size:.3g} m long with numbers in {target.shape.unit},"
-        _check_depth(("scene", "world", "targets", number, "motion"), what, _places(body), bed, "the first frame")
+        _check_depth(
+            ("scene", "world", "targets", number, "motion"), what, _places(body), bottom_depth, "the first frame"
+        )
 
 
 def check_shrimp(scene: Scene) -> None:
     """Every shrimp must be in the water, and its snap one that can be made and heard."""
-    bed = scene.world.environment.depth
-    for i, shrimp in enumerate(scene.world.shrimp):
+    bottom_depth = scene.world.environment.depth
+    for i, shrimp in enumerate(scene.world.sources):
         position = shrimp.position
         if max(map(abs, position)) > FARTHEST:
             raise FieldError(
-                ("scene", "world", "shrimp", i, "position"), f"is more than {FARTHEST:g} m from the origin"
+                ("scene", "world", "sources", i, "position"), f"is more than {FARTHEST:g} m from the origin"
             )
-        down = -position[2] if len(position) > 2 else bed - shrimp.height
-        if not 0 <= down <= bed:
+        down = -position[2] if len(position) > 2 else bottom_depth - shrimp.height
+        if not 0 <= down <= bottom_depth:
             raise FieldError(
-                ("scene", "world", "shrimp", i, "position"),
-                f"depth {down:.12g} m is outside the water (0 to {bed:g} m)",
+                ("scene", "world", "sources", i, "position"),
+                f"depth {down:.12g} m is outside the water (0 to {bottom_depth:g} m)",
             )
         try:
-            _check_snap(shrimp, bed, scene.sonar)
+            _check_snap(shrimp, bottom_depth, scene.sonar)
         except ValueError as error:
-            raise FieldError(("scene", "world", "shrimp", i, "snap"), str(error)) from None
+            raise FieldError(("scene", "world", "sources", i, "snap"), str(error)) from None
 
 
 def check_frame(scene: Scene, frame: Frame) -> None:
     """The array and every body must be in the water, and no snap inside a body or the array."""
-    bed = scene.world.environment.depth
+    bottom_depth = scene.world.environment.depth
     reach = elements(scene.sonar.array).position
     when = f"frame {frame.index}"
-    _check_depth(("scene", "trajectory", "sonar"), "the array", frame.sonar_pose.to_world(reach), bed, when)
+    _check_depth(("scene", "trajectory", "sonar"), "the array", frame.sonar_pose.to_world(reach), bottom_depth, when)
     for i, body in enumerate(frame.moment.bodies):
         path = ("scene", "world", "targets", i, "motion")
-        if not _box_in_water(body, bed):
-            _check_depth(path, f"target '{body.name}'", _places(body), bed, when)
+        if not _box_in_water(body, bottom_depth):
+            _check_depth(path, f"target '{body.name}'", _places(body), bottom_depth, when)
         if scene.physics.doppler:
             _check_speed(scene, frame, i)
             _check_met(scene, frame, i)
@@ -156,11 +158,11 @@ def _check_met(scene: Scene, frame: Frame, number: int) -> None:
     if body.track.still or not snaps:
         return
     met = meeting_times([body.track], snaps, lambda start, end: np.linalg.norm(end - start, axis=1) / slowest)
-    bed, what = scene.world.environment.depth, f"target '{body.name}', where sound meets it,"
+    bottom_depth, what = scene.world.environment.depth, f"target '{body.name}', where sound meets it,"
     for late in {float(met.min()), float(met.max())}:
         there = body.later(late)
-        if not _box_in_water(there, bed):
-            _check_depth(path, what, _places(there), bed, f"frame {frame.index}")
+        if not _box_in_water(there, bottom_depth):
+            _check_depth(path, what, _places(there), bottom_depth, f"frame {frame.index}")
     for snap in snaps:
         if snap.time and inside(body.later(snap.time), snap.position):
             raise FieldError(path, f"{what} contains a snap at frame {frame.index}")
@@ -180,9 +182,9 @@ def _check_speed(scene: Scene, frame: Frame, number: int) -> None:
 
 def _check_snaps(scene: Scene, frame: Frame) -> None:
     """No shrimp is at the centre of the array, or inside a target."""
-    owners = [i for i, shrimp in enumerate(scene.world.shrimp) for _ in shrimp.snap_times]
+    owners = [i for i, shrimp in enumerate(scene.world.sources) for _ in shrimp.snap_times]
     for owner, snap in zip(owners, frame.moment.snaps, strict=True):
-        path = ("scene", "world", "shrimp", owner, "position")
+        path = ("scene", "world", "sources", owner, "position")
         if np.linalg.norm(snap.position - frame.sonar_pose.position) < CLOSEST:
             raise FieldError(path, f"is at the centre of the array at frame {frame.index}")
         for body in frame.moment.bodies:
@@ -200,12 +202,12 @@ def check_methods(scene: Scene, products: frozenset[str]) -> None:
         )
 
 
-def _box_in_water(body: PlacedTarget, bed: float) -> bool:
+def _box_in_water(body: PlacedTarget, bottom_depth: float) -> bool:
     """Whether the box round a body is in the water: then all of the body is."""
     low, high = body.mesh.box
     corners = body.pose.to_world(low + CORNERS * (high - low))
     down = depth(corners)
-    return bool(down.min() >= 0.0 and down.max() <= bed and np.abs(corners).max() <= FARTHEST)
+    return bool(down.min() >= 0.0 and down.max() <= bottom_depth and np.abs(corners).max() <= FARTHEST)
 
 
 def _places(body: PlacedTarget) -> Floats:
@@ -217,9 +219,9 @@ def _places(body: PlacedTarget) -> Floats:
     return np.concatenate(extreme)
 
 
-def _check_snap(shrimp: SnappingShrimp, bed: float, sonar: Sonar) -> None:
+def _check_snap(shrimp: SnappingShrimp, bottom_depth: float, sonar: Sonar) -> None:
     """Whether the snap can be made, is short, neither too loud nor out of the sonar's band; else ValueError."""
-    model = model_of(shrimp, bed)
+    model = model_of(shrimp, bottom_depth)
     gain, longest = largest_scales(shrimp.variation)
     if isinstance(model, LogarithmicBubble):
         duration = -onset(bubble(model))
@@ -239,11 +241,11 @@ def _check_snap(shrimp: SnappingShrimp, bed: float, sonar: Sonar) -> None:
             raise ValueError(f"is not heard: the sonar's filter passes only {part:.1g} of it")
 
 
-def _check_depth(path: tuple[str | int, ...], what: str, points: Floats, bed: float, when: str) -> None:
+def _check_depth(path: tuple[str | int, ...], what: str, points: Floats, bottom_depth: float, when: str) -> None:
     if not np.abs(points).max() <= FARTHEST:
         raise FieldError(path, f"{what} is more than {FARTHEST:g} m from the origin at {when}")
     shallow, deep = float(depth(points).min()), float(depth(points).max())
     if shallow < -TOLERANCE:
         raise FieldError(path, f"{what} is {-shallow:.3g} m above the surface at {when}")
-    if deep > bed + TOLERANCE:
-        raise FieldError(path, f"{what} is {deep - bed:.3g} m below the bottom at {when}")
+    if deep > bottom_depth + TOLERANCE:
+        raise FieldError(path, f"{what} is {deep - bottom_depth:.3g} m below the bottom at {when}")

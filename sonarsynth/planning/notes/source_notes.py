@@ -12,5 +12,5 @@ OFF = 3.0
 def standing_off(scene: Scene) -> tuple[str, ...]:
     """Names of the shrimp that are not on the bottom, to what the sonar knows of its depth."""
     bottom, error = scene.world.environment.depth, scene.sonar.bed_depth_error
-    height = {shrimp.name: float(source_position(shrimp, bottom)[2]) + bottom for shrimp in scene.world.shrimp}
+    height = {shrimp.name: float(source_position(shrimp, bottom)[2]) + bottom for shrimp in scene.world.sources}
     return tuple(name for name, up in height.items() if up > OFF * error)

@@ -94,8 +94,8 @@ def images(position: Floats, pose: Pose, bottom_depth: float, bounces: int) -> l
     for first in (0, 1):
         place = pose.to_world(position).copy()
         for n in range(bounces):
-            at_bed = (first + n) % 2
-            place[2] = -2 * bottom_depth * at_bed - place[2]
+            at_bottom = (first + n) % 2
+            place[2] = -2 * bottom_depth * at_bottom - place[2]
             bottom = (n + 1 + first) // 2
             found.append((n + 1 - bottom, bottom, pose.to_body(place)))
     return found
@@ -103,7 +103,7 @@ def images(position: Floats, pose: Pose, bottom_depth: float, bounces: int) -> l
 
 def cancel(
     signals: Signals,
-    bearings: SourceEstimates,
+    estimates: SourceEstimates,
     elements: Elements,
     sonar: Sonar,
     pose: Pose,
@@ -117,10 +117,10 @@ def cancel(
     """
     if np.sum(elements.gain != 0) < SENSORS:
         return Cancelled(signals, ())
-    expected = expect(signals, bearings, elements, sonar, pose, bottom_depth, limits.bounces)
+    expected = expect(signals, estimates, elements, sonar, pose, bottom_depth, limits.bounces)
     left, outcomes, taken = signals, [], []
     for each in sorted(expected, key=lambda e: -e.energy):
-        reason = _out_of_question(each.front, bearings, elements, sonar, window)
+        reason = _out_of_question(each.front, estimates, elements, sonar, window)
         outcome = Outcome(each, reason) if reason != CANCELLED else find(left, elements, sonar, each, limits)
         outcomes.append(outcome)
         if outcome.reason == CANCELLED and outcome.found is not None:
@@ -131,7 +131,7 @@ def cancel(
 
 def expect(
     signals: Signals,
-    bearings: SourceEstimates,
+    estimates: SourceEstimates,
     elements: Elements,
     sonar: Sonar,
     pose: Pose,
@@ -140,7 +140,7 @@ def expect(
 ) -> list[Expected]:
     """Every reflected path of every located snap, by image sources and at the assumed sound speed."""
     c, found = sonar.assumed_sound_speed, []
-    for time, position in zip(bearings.time, bearings.position, strict=True):
+    for time, position in zip(estimates.time, estimates.position, strict=True):
         distance = float(np.linalg.norm(position))
         if not (np.isfinite(time) and np.isfinite(distance) and distance > 0):
             continue
@@ -158,7 +158,7 @@ def expect(
 
 
 def _out_of_question(
-    front: PlaneWaveFit, bearings: SourceEstimates, elements: Elements, sonar: Sonar, window: tuple[float, float]
+    front: PlaneWaveFit, estimates: SourceEstimates, elements: Elements, sonar: Sonar, window: tuple[float, float]
 ) -> int:
     """Why an arrival is not even looked for; `CANCELLED` where it is."""
     c = sonar.assumed_sound_speed
@@ -166,7 +166,7 @@ def _out_of_question(
     if not (when.min() - HALF < window[1] and when.max() + HALF > window[0]):
         return OUTSIDE
     apart = pulse_times.transit(elements, c) + 2 * HALF
-    if np.any((bearings.time > when.min() - apart) & (bearings.time < when.max() + apart)):
+    if np.any((estimates.time > when.min() - apart) & (estimates.time < when.max() + apart)):
         return DIRECT
     return SEEN if in_view(front.direction, elements, sonar) else CANCELLED
 

@@ -55,7 +55,7 @@ class WavefrontCancelling:
     def cancel(
         self,
         signals: Signals,
-        bearings: SourceEstimates,
+        estimates: SourceEstimates,
         elements: Elements,
         sonar: Sonar,
         sonar_pose: Pose,
@@ -66,4 +66,4 @@ class WavefrontCancelling:
         from sonarsynth.ranging.cancelling.multipath import Limits, cancel
 
         limits = Limits(self.bounces, self.search, self.excess, self.weakest)
-        return cancel(signals, bearings, elements, sonar, sonar_pose, bottom_depth, window, limits).signals
+        return cancel(signals, estimates, elements, sonar, sonar_pose, bottom_depth, window, limits).signals

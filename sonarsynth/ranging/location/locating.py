@@ -30,7 +30,7 @@ from sonarsynth.ranging.location.source_position import (
     UNRESOLVED,
     SonarKnowledge,
     SourceFix,
-    as_bearings,
+    as_estimates,
     place,
     refused,
 )
@@ -90,11 +90,11 @@ def locate(
     refused follow those that are not, loudest first.
     """
     if unlocatable(elements) is not None:
-        return as_bearings([], snaps, ARRAY)
+        return as_estimates([], snaps, ARRAY)
     if pulse_times.half_length(sonar.band) > pulse_times.LONGEST_HALF:
-        return as_bearings([], snaps, BAND)
+        return as_estimates([], snaps, BAND)
     if not signals.pressure.shape[1] or not snaps:
-        return as_bearings([], snaps)
+        return as_estimates([], snaps)
     live = elements.gain != 0
     half = pulse_times.transit(elements, sonar.assumed_sound_speed) + 2 * pulse_times.half_length(sonar.band)
     width = int(2 * half * signals.sampling_frequency) | 1
@@ -110,7 +110,7 @@ def locate(
         centre = signals.start + top / signals.sampling_frequency
         heard.found.append(Candidate(centre, float(track[top]), candidate(signals, known, centre, half, bend)))
         track[max(top - width, 0) : top + width + 1] = 0.0
-    return as_bearings(heard.rows, snaps)
+    return as_estimates(heard.rows, snaps)
 
 
 def _loudest(track: Floats, heard: Candidates, signals: Signals, snaps: int) -> int | None:

@@ -37,14 +37,14 @@ class PlaneWaveFit:
     time: float  # s at the array centre
 
     @staticmethod
-    def of(bearings: SourceEstimates, row: int = 0) -> PlaneWaveFit:
+    def of(estimates: SourceEstimates, row: int = 0) -> PlaneWaveFit:
         """The direct pulse of a located snap; plane where nothing says how far away that is."""
-        radius = float(bearings.range_from_curvature[row])
+        radius = float(estimates.range_from_curvature[row])
         if not np.isfinite(radius):
-            radius = float(np.linalg.norm(bearings.position[row]))
+            radius = float(np.linalg.norm(estimates.position[row]))
         curvature = 1 / radius if np.isfinite(radius) else 0.0
-        towards = direction(bearings.azimuth[row], bearings.elevation[row])
-        return PlaneWaveFit(towards, curvature, float(bearings.time[row]))
+        towards = direction(estimates.azimuth[row], estimates.elevation[row])
+        return PlaneWaveFit(towards, curvature, float(estimates.time[row]))
 
     def delays(self, elements: Elements, sound_speed: float) -> Floats:
         """When each sensor hears it (sensor,), in s."""

@@ -268,7 +268,7 @@ def refused(reason: int) -> SourceFix:
     )
 
 
-def as_bearings(rows: list[SourceFix], snaps: int, reason: int = SILENT) -> SourceEstimates:
+def as_estimates(rows: list[SourceFix], snaps: int, reason: int = SILENT) -> SourceEstimates:
     """Rows as `SourceEstimates` of `snaps` rows; NaN beyond those there are, for a reason."""
     rows = [*rows[:snaps], *[refused(reason)] * (snaps - len(rows))]
 

@@ -10,8 +10,10 @@ from __future__ import annotations
 import io
 import json
 import re
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,11 +25,16 @@ from ruamel.yaml import YAML
 from sonarsynth.description import FieldError
 from sonarsynth.recipe import FILE_KINDS, Recipe
 from sonarsynth.recipe.reading.messages import explain
+from sonarsynth.recipe.reading.old_keys import new_setting, with_new_keys
 from sonarsynth.recipe.reading.yaml_source import SET, RecipeError, Source, Where, override, read_file, read_text
 
-__all__ = ["RecipeError", "Source", "dump", "load", "loads", "locating", "read", "recipe_of", "schema"]
+__all__ = ["RecipeError", "RenamedKey", "Source", "dump", "load", "loads", "locating", "read", "recipe_of", "schema"]
 
 _ADAPTER: Final[TypeAdapter[Recipe]] = TypeAdapter(Recipe)
+
+
+class RenamedKey(FutureWarning):
+    """A key of a recipe has another name now; the old one is read for one version."""
 
 
 def load(path: Path | str, sets: Sequence[str] = ()) -> Recipe:
@@ -41,19 +48,26 @@ def loads(text: str, name: str = "recipe", folder: Path | str = ".", *, resolved
     `resolved` says that `dump` wrote the text, maybe before it gave angles their unit: bare ones are then in rad.
     Raises RecipeError.
     """
-    return recipe_of(read_text(text, name, Path(folder).absolute()), check_files=False, resolved=resolved)
+    source = with_new_keys(read_text(text, name, Path(folder).absolute()))
+    return recipe_of(source, check_files=False, resolved=resolved)
 
 
 def read(path: Path | str, sets: Sequence[str] = ()) -> Source:
     """A recipe file as plain values with their lines, and settings over it. Raises RecipeError."""
-    source = read_file(path)
+    source = with_new_keys(read_file(path))
     for setting in sets:
-        source = override(source, setting)
+        renamed, notes = new_setting(setting)
+        source = with_new_keys(replace(override(source, renamed), notes=(*source.notes, *notes)))
     return source
 
 
 def recipe_of(source: Source, *, check_files: bool = True, resolved: bool = False) -> Recipe:
-    """The recipe that a source describes, files resolved to absolute paths. Raises RecipeError."""
+    """The recipe that a source describes, files resolved to absolute paths. Raises RecipeError.
+
+    Warns (RenamedKey) of each old key that has another name now.
+    """
+    for note in source.notes:
+        warnings.warn(f"{source.name}: {note}", RenamedKey, stacklevel=2)
     data = _resolved(source, source.data, (), check_files)
     try:
         return _ADAPTER.validate_json(json.dumps(data), strict=True, context={"resolved": resolved})

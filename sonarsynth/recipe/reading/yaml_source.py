@@ -57,6 +57,8 @@ class Source:
     """The text as written."""
     settings: tuple[str, ...] = ()
     """What `--set` set over it, in order."""
+    notes: tuple[str, ...] = ()
+    """What is to be said of it: keys that are called otherwise now."""
 
     def place(self, where: Where) -> str:
         """Line of a value, or of the nearest one that holds it; `--set` where that set a part of the value."""
@@ -125,6 +127,7 @@ def override(source: Source, setting: str) -> Source:
         places | reader.places | {where: SET},
         source.text,
         (*source.settings, setting),
+        source.notes,
     )
 
 

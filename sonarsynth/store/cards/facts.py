@@ -122,7 +122,7 @@ class Facts:
             parts.append(f"of an array of {sizes['sensor']} hydrophones")
         return (
             f"Synthetic passive sonar that is lit by snapping shrimp: {' '.join(parts)}, simulated, each with the "
-            "truth that made it: where targets and shrimp are, what each beam meets, and a ledger of levels."
+            "truth that made it: where targets and shrimp are, what each beam meets, and a link budget of levels."
         )
 
 

@@ -54,7 +54,7 @@ def markdown(facts: Facts) -> str:
 
 def _holds(facts: Facts) -> list[str]:
     products = [str(product) for product in facts.attributes.get("products", [])]
-    return [*products, "truth", *(["ledger"] if products else [])]
+    return [*products, "truth", *(["link_budget"] if products else [])]
 
 
 def _head(facts: Facts) -> str:

@@ -25,6 +25,7 @@ from sonarsynth.store.marks import (
     marked,
     read_mark,
 )
+from sonarsynth.store.opening import check_format
 
 MOST_FRAMES: Final = 1_000_000
 """Frames of a shard that are counted, whatever a store says of itself."""
@@ -82,12 +83,14 @@ def examine(path: Folder) -> Findings:
 
 
 def must_be_store(path: Folder) -> None:
-    """Raise Mismatch where there is no store of ours: neither marks nor metadata with the digest of a recipe."""
+    """Raise Mismatch where there is no store of ours (no mark, no digest of a recipe), or one of another format."""
     if not path.is_dir():
         raise Mismatch(f"{path} is not a store: it is not a folder" if there(path) else f"{path}: no such store")
     manifest = any(there(path, place) for place in MANIFESTS)
-    if not (manifest or "recipe_digest" in root_attributes(path) or marked(path)):
+    attributes = root_attributes(path)
+    if not (manifest or "recipe_digest" in attributes or marked(path)):
         raise Mismatch(f"{path} is not a store of sonarsynth")
+    check_format(path, attributes)
 
 
 def _manifests(path: Folder, problems: list[Problem]) -> frozenset[str]:

@@ -96,7 +96,7 @@ def ray_cones(
 
 
 def max_launch_deviation(
-    bed: float,
+    bottom_depth: float,
     profile: Profile,
     start: Floats,
     end: float,
@@ -111,17 +111,17 @@ def max_launch_deviation(
     """By how much (ray,) rad rays to within `spread` (m) of the end of some leave beside where the ends of straight
     rays are, at most; 0 in uniform water.
 
-    bed, end (m): depths, of the ends; spreading (ray,) 1/m; surface, bottom, turning (ray,): of the rays, and of
-    those beside them. A ray leaves within half of its length times its largest curvature of the straight line to its
-    end, unfolded at reflections. Where rays are nowhere nearly level, how far ends are apart for an angle at the start
-    varies slowly: twice what it is for the ray to the middle, by its spreading, and what it may vary by.
+    bottom_depth, end (m): depths, of the ends; spreading (ray,) 1/m; surface, bottom, turning (ray,): of the rays,
+    and of those beside them. A ray leaves within half of its length times its largest curvature of the straight line to
+    its end, unfolded at reflections. Where rays are nowhere nearly level, how far ends are apart for an angle at the
+    start varies slowly: twice what it is for the ray to the middle, by its spreading, and what it may vary by.
     """
     if profile.uniform:
         return np.zeros(len(start))
-    z, speed = depth(start), profile.at(np.append(profile.depth[profile.depth < bed], bed))
+    z, speed = depth(start), profile.at(np.append(profile.depth[profile.depth < bottom_depth], bottom_depth))
     slowest, fastest = float(speed.min()), float(speed.max())
     top = np.where((surface > 0) | (turning > 0), 0.0, np.minimum(z, end - spread))
-    low = np.where((bottom > 0) | (turning > 0), bed, np.maximum(z, end + spread))
+    low = np.where((bottom > 0) | (turning > 0), bottom_depth, np.maximum(z, end + spread))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         bend = _curvature_about(profile, 0.5 * (top + low), 0.5 * (low - top))
         bound = bend * (length + spread) * length / np.maximum(length - spread, 0.0)

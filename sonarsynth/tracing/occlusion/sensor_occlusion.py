@@ -34,7 +34,7 @@ PARTS = 32
 
 @lru_cache(maxsize=16)
 def rim(elements: Elements) -> Ints:
-    """The hydrophones that are farthest out in 26 directions, ascending: where visibility is looked at first."""
+    """The hydrophones that are farthest out in 26 directions, ascending: where occlusion is looked at first."""
     towards = np.array([v for v in product((-1.0, 0.0, 1.0), repeat=3) if any(v)])
     return np.unique((elements.position @ towards.T).argmax(axis=0))
 

@@ -17,7 +17,7 @@ from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.targets.target import mesh_for
 from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, together
-from sonarsynth.validation.extremes.plain_scenes import BED, POSE, PROFILE, C, body, snap, traced, transfer
+from sonarsynth.validation.extremes.plain_scenes import BOTTOM_DEPTH, POSE, PROFILE, C, body, snap, traced, transfer
 
 ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
 BESIDE = np.array([0.0, 1e-6, 0.0])
@@ -90,7 +90,7 @@ def _bearings() -> Got:
     from sonarsynth.state import WorldState
 
     beams, mesh = BeamGrid(azimuths=3, elevations=3), mesh_of(Box(size=(0.5, 3.0, 1.0)))
-    connect = partial(Straight().connect, PROFILE, BED)
+    connect = partial(Straight().connect, PROFILE, BOTTOM_DEPTH)
     edge, parts, flags = 0.5 * beams.azimuth_span, [], set()
     for bearing in np.deg2rad(np.arange(0.0, 181.0, 5.0)):
         boxes = []

@@ -45,7 +45,7 @@ def recipe(
     processing = more.pop("processing", Processing())
     parts: dict[str, Any] = {"array": LATTICE, "beams": BEAMS}
     sonar = Sonar(**(parts | more))
-    world = World(environment=Environment(depth=depth, sound_speed=speed), targets=placed, shrimp=shrimp)
+    world = World(environment=Environment(depth=depth, sound_speed=speed), targets=placed, sources=shrimp)
     return Recipe(scene=Scene(world=world, sonar=sonar, processing=processing))
 
 
@@ -58,22 +58,22 @@ def frame(of: Recipe, products: tuple[str, ...] = ("signals", "image", "cloud"))
 
 
 REASONS: dict[str, tuple[str, Callable[[Any], Any]]] = {
-    "/truth/range": ("target", lambda target: target < 0),
-    "/truth/image_box": ("view", lambda view: view > View.PARTLY_IN_VIEW),
-    "/ledger/error_bound": ("paths", lambda paths: paths == 0),
-    "/ledger/measured_level": ("paths", lambda paths: paths == 0),
-    "/ledger/isolated_level": ("paths", lambda paths: paths == 0),
-    **{f"/ledger/{term}": ("paths", lambda paths: paths == 0) for term in LINK_BUDGET},
+    "/truth/beams/range": ("target", lambda target: target < 0),
+    "/truth/targets/image_box": ("view", lambda view: view > View.PARTLY_IN_VIEW),
+    "/link_budget/error_bound": ("paths", lambda paths: paths == 0),
+    "/link_budget/measured_level": ("paths", lambda paths: paths == 0),
+    "/link_budget/isolated_level": ("paths", lambda paths: paths == 0),
+    **{f"/link_budget/{term}": ("paths", lambda paths: paths == 0) for term in LINK_BUDGET},
 }
 """Where numbers may be none, what stands beside them, and what that says then."""
 ELSEWHERE = (
     "/image",
     "/cloud",
-    "/bearings",
-    "/truth/echo_",
-    "/truth/snap_a",
-    "/truth/snap_elev",
-    "/truth/wavefront_error",
+    "/source_estimates",
+    "/truth/targets/echo_",
+    "/truth/emissions/a",
+    "/truth/emissions/elev",
+    "/link_budget/wavefront_error",
 )
 """Where the reason is another: no snap was found, no point; echoes from no side, or several."""
 
@@ -87,12 +87,13 @@ def reasoned(tree: xr.DataTree) -> Got:
             if variable.dtype.kind == "f":
                 wrong += [path] if not _explained(path, variable.values, node) else []
     if "cloud" in tree.children:
-        grids = {str(name): v.values for name, v in tree["cloud"].data_vars.items()}
-        of_targets = [np.isnan(grids.pop(name)) for name in ("true_range", "distance")]
-        wrong += ["/cloud"] if not all((none == (grids["target"] < 0)).all() for none in of_targets) else []
-        whose = np.isnan(grids["range"]) & np.any([grids[name] >= 0 for name in ("target", "origin")], axis=0)
+        columns = {str(name): v.values for name, v in tree["cloud"].data_vars.items() if v.dims}
+        of_targets = [np.isnan(columns.pop(name)) for name in ("true_range", "distance")]
+        wrong += ["/cloud"] if not all((none == (columns["target"] < 0)).all() for none in of_targets) else []
+        whose = np.isnan(columns["range"]) & np.any([columns[name] >= 0 for name in ("target", "origin")], axis=0)
         wrong += ["/cloud"] if whose.any() else []
-        points = [np.isnan(grid) for grid in grids.values() if grid.dtype.kind == "f"]
+        wrong += ["/cloud/count"] if int(tree["cloud"]["count"]) != np.isfinite(columns["range"]).sum() else []
+        points = [np.isnan(column) for column in columns.values() if column.dtype.kind == "f"]
         clock = np.isfinite(float(tree["image"].start))
         unheard = bool(np.isnan(tree["image"].energy.values).any())
         wrong += ["/cloud"] if not all((p == points[0]).all() for p in points) else []
@@ -114,12 +115,12 @@ def _explained(path: str, values: Any, node: xr.DataTree) -> bool:
 def _wall() -> Got:
     """A wall 1 m ahead, wider than the view: every beam meets it, at 1/cos of both angles."""
     tree = frame(recipe(((Box(size=(0.1, 8.0, 8.0)), (1.05, 0.0, 0.0)),), (-3.0, 3.0, -5.0)))
-    truth = tree["truth"]
+    truth = tree["truth/beams"]
     exact = 1.0 / np.cos(BEAMS.azimuth[None, :]) / np.cos(BEAMS.elevation[:, None])
     return together(
         holds(bool((truth.target.values == 0).all()), "every beam meets it"),
         off(truth.range.values / exact - 1.0, 1e-6, what="range"),
-        off(float(truth.visible_fraction[0]) - 1.0, 1e-12, what="visible share"),
+        off(float(tree["truth/targets"].visible_fraction[0]) - 1.0, 1e-12, what="visible share"),
         reasoned(tree),
     )
 
@@ -131,7 +132,7 @@ def _beside_view() -> Got:
         edge = (near if step < 0 else far) * np.tan(0.5 * SPAN) * (1.0 + step)
         half = 0.5
         tree = frame(recipe(((Box(size=(far - near, 2 * half, 1.0)), (0.5 * (near + far), edge + half, 0.0)),)))
-        hit = tree["truth"].target.values == 0
+        hit = tree["truth/beams"].target.values == 0
         columns = sorted(set(np.nonzero(hit)[1].tolist()))
         parts.append(holds(columns == ([] if step > 0 else [20]), f"columns {columns} meet it"))
         parts.append(reasoned(tree))
@@ -142,8 +143,10 @@ def _behind() -> Got:
     """The body stands before the snap: nothing direct is heard, so no bearing, no image and no cloud."""
     tree = frame(recipe(((Sphere(radius=0.6, edge=0.1), (7.0, 0.0, 0.0)),), (14.0, 0.0, -5.0)))
     silent = not tree["signals"].pressure.values.any()
-    none = all(np.isnan(np.asarray(tree[name])).all() for name in ("bearings/position", "image/energy", "cloud/range"))
-    direct = tree["ledger"].paths.values[0, -1].sum()
+    none = all(
+        np.isnan(np.asarray(tree[name])).all() for name in ("source_estimates/position", "image/energy", "cloud/range")
+    )
+    direct = tree["link_budget"].paths.values[0, -1].sum()
     return together(
         holds(direct == 0 and silent, "no direct path, silence"),
         holds(none, "no bearing, image, cloud"),
@@ -156,7 +159,7 @@ def _beyond() -> Got:
     tree = frame(recipe(((Sphere(radius=0.6, edge=0.1), (17.0, 0.0, 0.0)),), (9.0, 0.0, -5.0)))
     return together(
         holds(bool(np.isfinite(tree["image"].energy.values).all()), "an image"),
-        off(np.nanmin(tree["truth"].range.values) - 16.4, 1e-3, "m", "nearest range"),
+        off(np.nanmin(tree["truth/beams"].range.values) - 16.4, 1e-3, "m", "nearest range"),
         reasoned(tree),
     )
 
@@ -184,20 +187,20 @@ def _shadow_zone() -> Got:
     limit = sum(np.sqrt(z * (2.0 * 1540.0 / 0.5 - z)) for z in (5.0, 10.0))
     return together(
         holds(limit < 2000.0, f"the last ray comes {limit:.0f} m"),
-        holds(not tree["ledger"].paths.values.any(), "no path"),
+        holds(not tree["link_budget"].paths.values.any(), "no path"),
         holds(not tree["signals"].pressure.values.any(), "silence"),
         reasoned(tree),
     )
 
 
-def _ledger() -> Got:
+def _link_budget() -> Got:
     """Two targets 100 dB apart and one that is hidden: levels add up to rounding, NaN where there is no path."""
     far = (Sphere(radius=0.5, edge=0.1), (9.0, 1.0, 0.0)), (Sphere(radius=2e-5), (30.0, -2.0, 0.0))
     hidden = ((Sphere(radius=0.05), (12.0, 1.3, 0.0)),)
     tree = frame(recipe(far + hidden, (14.0, -4.0), depth=60.0), ("signals",))
-    book: dict[str, Any] = {str(name): np.asarray(v) for name, v in tree["ledger"].data_vars.items()}
-    source, out, scattering, back, absorption, boundary, received = (book[term] for term in LINK_BUDGET)
-    paths = book["paths"]
+    budget: dict[str, Any] = {str(name): np.asarray(v) for name, v in tree["link_budget"].data_vars.items()}
+    source, out, scattering, back, absorption, boundary, received = (budget[term] for term in LINK_BUDGET)
+    paths = budget["paths"]
     left = source - out + scattering - back - absorption - boundary - received
     there = paths > 0
     apart = float(received[0, 0, 0] - received[0, 1, 0])
@@ -227,6 +230,8 @@ CASES = (
     Case("target behind the source", "an image; the range of the nearest point", _beyond),
     Case("a target on the source-array baseline", "no point, ill-conditioned", _on_line),
     Case("a whole frame in a shadow zone", "no path, silence, and NaN with its reason", _shadow_zone),
-    Case("the ledger of loud, faint and hidden targets", "levels add up; NaN where there is no path", _ledger),
+    Case(
+        "the link budget of loud, faint and hidden targets", "levels add up; NaN where there is no path", _link_budget
+    ),
     Case("frames of one sensor and of two at one place", "no bearing, so no image; NaN with its reason", _arrays),
 )

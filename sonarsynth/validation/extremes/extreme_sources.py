@@ -11,7 +11,7 @@ from sonarsynth.products import REASONS, Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.receiver import Band, Elements, PlanarLattice, Sonar, elements
 from sonarsynth.validation.extremes.outcomes import Case, Got, holds, together
-from sonarsynth.validation.extremes.plain_scenes import BED, POSE, PROFILE, RATE, C, direct
+from sonarsynth.validation.extremes.plain_scenes import BOTTOM_DEPTH, POSE, PROFILE, RATE, C, direct
 
 LATTICE = PlanarLattice(columns=16, rows=16, pitch=0.08, face=0.0)
 BAND = Band(low=25e3, high=85e3)
@@ -33,7 +33,7 @@ def _located(
     signals: Signals, array: Elements, rows: int, band: Band = BAND, *, refraction: bool = False
 ) -> SourceEstimates:
     sonar = Sonar(array=LATTICE, band=band, sampling_frequency=RATE, assumed_sound_speed=C, sound_speed_error=0.1)
-    return SensorDelays(refraction=refraction).locate(signals, array, sonar, POSE, BED, rows, PROFILE)
+    return SensorDelays(refraction=refraction).locate(signals, array, sonar, POSE, BOTTOM_DEPTH, rows, PROFILE)
 
 
 def _honest(found: SourceEstimates, places: Sequence[Floats]) -> Got:

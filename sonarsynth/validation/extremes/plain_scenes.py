@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from sonarsynth.scattering import ScatteringLaw
     from sonarsynth.signals import SignalSynthesis
 
-C, BED, RATE = 1500.0, 12e3, 250e3
+C, BOTTOM_DEPTH, RATE = 1500.0, 12e3, 250e3
 PULSE = Ricker(frequency=20e3)
 SONAR = Sonar(sampling_frequency=RATE, filter=LowPass(cutoff=110e3))
-ARRAY = np.array([0.0, 0.0, -0.5 * BED])
+ARRAY = np.array([0.0, 0.0, -0.5 * BOTTOM_DEPTH])
 POSE = Pose(ARRAY, quaternion(0.5 * np.pi))
 """The sonar frame is the world's, but for its place: x forward."""
-WATER = Environment(depth=BED, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"))
+WATER = Environment(depth=BOTTOM_DEPTH, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"))
 PROFILE = Profile(np.array([0.0]), np.array([C]))
 
 

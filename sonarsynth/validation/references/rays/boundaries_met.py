@@ -10,7 +10,7 @@ from sonarsynth.environment.boundaries import (
     PressureRelease,
     ReflectionTable,
     Rigid,
-    SeaBed,
+    SeaBottom,
     SeaSurface,
 )
 from sonarsynth.environment.sea import Environment
@@ -33,7 +33,7 @@ def reflected(
     total, variance = np.ones(len(cosine), complex), np.zeros(len(cosine))
     for boundary, depth, count in (
         (environment.surface, 0.0, family.bounces - family.bottom),
-        (environment.bed, water.bottom, family.bottom),
+        (environment.bottom, water.bottom, family.bottom),
     ):
         if count:
             c = float(water.at(np.asarray(depth)))
@@ -43,14 +43,14 @@ def reflected(
     return total, variance
 
 
-def _height(boundary: SeaSurface | SeaBed) -> float:
+def _height(boundary: SeaSurface | SeaBottom) -> float:
     """Rms height (m): as written, or of a sea that the wind has raised (Pierson and Moskowitz 1964)."""
     if isinstance(boundary, SeaSurface) and boundary.wind_speed is not None:
         return float(boundary.wind_speed**2 / (2.0 * GRAVITY) * np.sqrt(PHILLIPS / DECAY))
     return boundary.rms_height
 
 
-def _coefficient(boundary: SeaSurface | SeaBed, sine: Floats, frequency: float) -> np.ndarray:
+def _coefficient(boundary: SeaSurface | SeaBottom, sine: Floats, frequency: float) -> np.ndarray:
     value = _smooth(boundary, sine)
     if isinstance(boundary, SeaSurface) and boundary.bubbles and boundary.wind_speed is not None:
         u = boundary.wind_speed  # APL-UW TR 9407 (1994), II-21
@@ -59,7 +59,7 @@ def _coefficient(boundary: SeaSurface | SeaBed, sine: Floats, frequency: float) 
     return value
 
 
-def _smooth(boundary: SeaSurface | SeaBed, sine: Floats) -> np.ndarray:
+def _smooth(boundary: SeaSurface | SeaBottom, sine: Floats) -> np.ndarray:
     """Plane-wave coefficient at grazing angles of these sines."""
     of = boundary.reflection
     if isinstance(of, PressureRelease):

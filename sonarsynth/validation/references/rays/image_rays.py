@@ -8,7 +8,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.validation.rays.ray_matching import Rays
 
 
-def image_rays(speed: float, bed: float, start: Floats, end: Floats, distance: Floats, bounces: int) -> Rays:
+def image_rays(speed: float, bottom_depth: float, start: Floats, end: Floats, distance: Floats, bounces: int) -> Rays:
     """Every ray with up to `bounces` reflections between depths start and end (pair,) m at distances (pair,) m.
 
     The receiver is mirrored in the boundaries that the ray meets, the last one first (e.g. Jensen, Kuperman, Porter and
@@ -19,10 +19,10 @@ def image_rays(speed: float, bed: float, start: Floats, end: Floats, distance: F
         for count in range(bounces + 1):
             if count == 0 and not down_first:
                 continue
-            at_bed = (np.arange(count) % 2 == 0) == down_first
+            at_bottom = (np.arange(count) % 2 == 0) == down_first
             image = np.array(end, float)
-            for bed_hit in at_bed[::-1]:
-                image = 2.0 * bed - image if bed_hit else -image
+            for bottom_hit in at_bottom[::-1]:
+                image = 2.0 * bottom_depth - image if bottom_hit else -image
             rise = start - image
             length = np.hypot(distance, rise)
             angle = np.arctan2(rise, distance)
@@ -33,7 +33,7 @@ def image_rays(speed: float, bed: float, start: Floats, end: Floats, distance: F
                     angle,
                     last,
                     1.0 / length,
-                    *(np.full(len(rise), np.sum(hits)) for hits in (~at_bed, at_bed)),
+                    *(np.full(len(rise), np.sum(hits)) for hits in (~at_bottom, at_bottom)),
                 ]
             )
     time, first, last, amplitude, surface, bottom = (np.concatenate(column) for column in zip(*rows, strict=True))

@@ -132,9 +132,9 @@ def exact_rays(water: Layers, found: Rays, slowness: Floats, start: Floats, end:
     with mp.workdps(DIGITS):
         for i, pair in enumerate(found.pair):
             a, b, far = (mp.mpf(float(v[pair])) for v in (start, end, distance))
-            top, bottom, bed = min(a, b), max(a, b), water.nodes[-1][0]
+            top, bottom, bottom_depth = min(a, b), max(a, b), water.nodes[-1][0]
             above = [(dz, below, over) for dz, over, below in reversed(water.down(mp.mpf(0), top))]
-            course = Course(above, water.down(top, bottom), water.down(bottom, bed))
+            course = Course(above, water.down(top, bottom), water.down(bottom, bottom_depth))
             ways = (a > b, a <= b, bool(found.start_angle[i] < 0), int(found.vertices[i]))
             c = [_speed(course, low, water) for low in ways[:2]]
             rows.append(_ray(course, mp.mpf(float(slowness[i])), far, ways, c))

@@ -28,7 +28,7 @@ class Gradient:
 
     speed: float  # m/s at the surface
     slope: float
-    bed: float
+    bottom_depth: float
 
 
 def gradient_rays(water: Gradient, start: Floats, end: Floats, distance: Floats, vertices: int) -> Rays:
@@ -38,7 +38,7 @@ def gradient_rays(water: Gradient, start: Floats, end: Floats, distance: Floats,
     rows = []
     with mp.workdps(DIGITS):
         g = abs(mp.mpf(water.slope))
-        c0, deep = mp.mpf(water.speed), mp.mpf(water.bed)
+        c0, deep = mp.mpf(water.speed), mp.mpf(water.bottom_depth)
         slowest, fastest = sorted((c0 / g, (c0 + mp.mpf(water.slope) * deep) / g))
         for pair, (z1, z2, far) in enumerate(zip(start, end, distance, strict=True)):
             y1, y2 = ((c0 + mp.mpf(water.slope) * mp.mpf(float(z))) / g for z in (z1, z2))

@@ -28,13 +28,13 @@ class Smooth:
     """A smooth sound speed: speed (m/s), its first and second derivative at depths (m), and the bottom (m)."""
 
     name: str
-    bed: float
+    bottom_depth: float
     speed: Callable[[Floats], Floats]
     first: Callable[[Floats], Floats]
     second: Callable[[Floats], Floats]
 
 
-def munk(name: str = "Munk", bed: float = 5000.0, axis: float = 1300.0, scale: float = 650.0) -> Smooth:
+def munk(name: str = "Munk", bottom_depth: float = 5000.0, axis: float = 1300.0, scale: float = 650.0) -> Smooth:
     """The canonical profile of Munk (1974), c = 1500 (1 + 0.00737 (e^-n + n - 1)) m/s with n = (z - axis)/scale."""
     low, perturbation = 1500.0, 0.00737
 
@@ -43,7 +43,7 @@ def munk(name: str = "Munk", bed: float = 5000.0, axis: float = 1300.0, scale: f
 
     return Smooth(
         name,
-        bed,
+        bottom_depth,
         lambda z: low * (1.0 + perturbation * (np.exp(-reduced(z)) + reduced(z) - 1.0)),
         lambda z: low * perturbation / scale * (1.0 - np.exp(-reduced(z))),
         lambda z: low * perturbation / scale**2 * np.exp(-reduced(z)),
@@ -70,7 +70,7 @@ def fly(water: Smooth, start: float, launch: Floats, distance: float, tolerance:
 
     def slopes(x: float, state: Floats) -> Floats:
         z, t, _, stretch, turn = state.reshape(5, count)
-        z = np.clip(z, -0.1 * water.bed, 1.1 * water.bed)
+        z = np.clip(z, -0.1 * water.bottom_depth, 1.1 * water.bottom_depth)
         t = np.clip(t, -1.5, 1.5)
         c, bend = water.speed(z), water.first(z)
         relative, cosine = bend / c, np.cos(t)
@@ -81,7 +81,7 @@ def fly(water: Smooth, start: float, launch: Floats, distance: float, tolerance:
     scale = np.repeat([1.0, 1e-2, distance / 1500.0, distance, 1.0], count)
     way = solve_ivp(slopes, (0.0, distance), first, method="DOP853", rtol=tolerance, atol=tolerance * scale)
     z, t, time, stretch, _ = way.y.reshape(5, count, -1)
-    lost = (z <= 0.0).any(axis=1) | (z >= water.bed).any(axis=1)
+    lost = (z <= 0.0).any(axis=1) | (z >= water.bottom_depth).any(axis=1)
     turning = np.sum(np.signbit(t[:, 1:]) != np.signbit(t[:, :-1]), axis=1)
     caustics = np.sum(np.signbit(stretch[:, 2:]) != np.signbit(stretch[:, 1:-1]), axis=1)
     ends = (z[:, -1], t[:, -1], time[:, -1], stretch[:, -1], turning, caustics)

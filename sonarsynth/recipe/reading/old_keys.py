@@ -1,0 +1,105 @@
+"""Old keys of recipes: read for one version, with a note of the new name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from sonarsynth.recipe.reading.yaml_source import Source, Where, dotted
+from sonarsynth.recipe.renamed_keys import RENAMED, new_path
+
+
+def new_setting(text: str) -> tuple[str, tuple[str, ...]]:
+    """A `path=value` of the command line in the words of today, and a note where it was in others."""
+    path, equals, value = text.partition("=")
+    renamed = _new_text(path.strip())
+    if not equals or renamed == path.strip():
+        return text, ()
+    return f"{renamed}={value}", (_note(path.strip(), renamed),)
+
+
+def _new_text(path: str) -> str:
+    return dotted(new_path(tuple(path.split("."))))
+
+
+def _note(old: str, new: str) -> str:
+    return f"{old} is called {new} now"
+
+
+def with_new_keys(source: Source) -> Source:
+    """A recipe as read with the new names of old keys and values, and a note of each.
+
+    Raises RecipeError where both names are there.
+    """
+    data, notes = source.data, list(source.notes)
+    for old in RENAMED:
+        holder = _at(data, old[:-1])
+        if isinstance(holder, dict) and old[-1] in holder:
+            data = _changed(data, old[:-1], partial(_renamed, source, old))
+            notes.append(_note(dotted(old), dotted(new_path(old))))
+            if old[-1] == "shrimp":
+                data = _changed(data, new_path(old), _with_kinds)
+    data = _changed(data, ("scene", "physics", "occlusion"), _sensors)
+    for block in ("grid", "variations"):
+        data = _changed(data, (block,), partial(_new_paths, notes))
+    if data is source.data:
+        return source
+    places = {new_path(where): place for where, place in source.places.items()}
+    return replace(source, data=data, places=places, notes=tuple(dict.fromkeys(notes)))
+
+
+def _renamed(source: Source, old: Where, fields: dict[str, Any]) -> dict[str, Any]:
+    new = RENAMED[old]
+    if new in fields:
+        raise source.error(old, f"'{old[-1]}' is the old name of '{new}', which is there too")
+    return {new if key == old[-1] else key: value for key, value in fields.items()}
+
+
+def _with_kinds(sources: Any) -> Any:
+    """Sources of a recipe of before they had kinds: all were shrimp."""
+    if not isinstance(sources, list):
+        return sources
+    return [{"kind": "snapping_shrimp"} | one if isinstance(one, dict) else one for one in sources]
+
+
+def _sensors(value: Any) -> Any:
+    return "sensors" if value == "hydrophones" else value
+
+
+def _new_paths(notes: list[str], part: Any) -> Any:
+    """Axes of a grid, or variations, with the paths of what they change."""
+    if isinstance(part, list):
+        return [_new_paths(notes, one) for one in part]
+    if not isinstance(part, dict):
+        return part
+    changed = {}
+    for key, value in part.items():
+        if key != "path":
+            changed[key] = _new_paths(notes, value)
+            continue
+        one = [value] if isinstance(value, str) else value
+        if not isinstance(one, list) or not all(isinstance(path, str) for path in one):
+            return part  # which is for the schema to refuse
+        paths = [_new_text(path) for path in one]
+        notes.extend(_note(a, b) for a, b in zip(one, paths, strict=True) if a != b)
+        changed[key] = paths[0] if isinstance(value, str) else paths
+    return changed
+
+
+def _at(data: Any, where: Where) -> Any:
+    for key in where:
+        data = data.get(key) if isinstance(data, dict) else None
+    return data
+
+
+def _changed(data: Any, where: Where, change: Callable[[Any], Any]) -> Any:
+    """`data` with the value at a path changed; the same object where nothing is, or where there is no such path."""
+    if not where:
+        new = change(data)
+        return data if new == data else new
+    if not isinstance(data, dict) or where[0] not in data:
+        return data
+    inner = _changed(data[where[0]], where[1:], change)
+    return data if inner is data[where[0]] else data | {where[0]: inner}
