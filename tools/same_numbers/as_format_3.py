@@ -65,4 +65,4 @@ def _reworded(values: np.ndarray) -> np.ndarray:
     """Names of families, which said bed."""
     if values.dtype.kind in "fiu":
         return values
-    return np.array([str(text).replace("bed", "bottom") for text in values.ravel()], object).reshape(values.shape)
+    return np.array([str(text).replace("bed", "bottom") for text in values.ravel()]).reshape(values.shape)
