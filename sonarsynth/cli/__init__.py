@@ -78,6 +78,7 @@ def build(
     recipe: RecipeFile,
     store: Annotated[str, typer.Argument(help="Where to write the dataset: a folder or a URL.", show_default=False)],
     settings: Settings = [],  # noqa: B006 - typer copies it
+    *,
     frames: Annotated[
         str | None, typer.Option(metavar="A:B", help="Only these frames, such as 0:8 or 0:8,12 (end excluded).")
     ] = None,

@@ -27,6 +27,7 @@ def accuracy(
             help="A recipe: each setting is varied around the planner's choice, all others exact.", show_default=False
         ),
     ] = None,
+    *,
     reference: Annotated[str | None, typer.Option(metavar="NAME", help=HELP, show_default="rays")] = None,
     extremes: Annotated[
         bool, typer.Option("--extremes", help="Run stiff and extreme cases of every stage instead.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from sonarsynth.evaluation.checks import Check, every, numbered, of_frame
+from sonarsynth.evaluation.checks import Check, SmallVariables, blocks, every, numbered, of_frame
 from sonarsynth.evaluation.level_checks import echoes_heard, snaps_heard
 
 
@@ -38,13 +38,12 @@ def near_target(tree: xr.DataTree, truth: np.ndarray) -> np.ndarray:
     return np.asarray(binary_dilation(truth >= 0, x * x + y * y <= steps * steps))
 
 
-def refused(tree: xr.DataTree, frame: int) -> bool:
+def refused(some: SmallVariables, frame: int) -> bool:
     """Whether the snap that would be the clock was refused, and says why."""
-    if "source_estimates" not in tree.children or "reason" not in tree["source_estimates"].dataset:
+    if not some.has("source_estimates/reason"):
         return False
-    return bool(of_frame(tree, "source_estimates/reason", frame)[0] > 0) and not np.isfinite(
-        of_frame(tree, "source_estimates/time", frame)[0]
-    )
+    time = some.of("source_estimates/time", frame)[0]
+    return bool(some.of("source_estimates/reason", frame)[0] > 0) and not np.isfinite(time)
 
 
 GLINT = 10.0
@@ -52,19 +51,19 @@ GLINT = 10.0
 thermocline.yaml), so a ghost may be brightest though its echoes are together fainter by this."""
 
 
-def on_ghost(tree: xr.DataTree, frame: int, azimuth: float, elevation: float) -> bool:
+def on_ghost(some: SmallVariables, frame: int, azimuth: float, elevation: float) -> bool:
     """Whether a direction (rad) is where the truth has a ghost of a target, by surface or bottom, no fainter than the
     target's own echoes by more than `GLINT`.
 
     Ghosts are as wide as their target; the truth has the middle of their energy, so they reach that far either way.
     """
-    if "echo_azimuth" not in tree["truth/targets"].dataset:
+    if not some.has("truth/targets/echo_azimuth"):
         return False
-    at = (np.deg2rad(of_frame(tree, f"truth/targets/echo_{axis}", frame)[:, 1:]) for axis in ("azimuth", "elevation"))
-    box = np.deg2rad(of_frame(tree, "truth/targets/image_box", frame))[:, None]
-    reach = np.nan_to_num(np.stack([box[..., 1] - box[..., 0], box[..., 3] - box[..., 2]])) + beam_width(tree)
+    at = (np.deg2rad(some.of(f"truth/targets/echo_{axis}", frame)[:, 1:]) for axis in ("azimuth", "elevation"))
+    box = np.deg2rad(some.of("truth/targets/image_box", frame))[:, None]
+    reach = np.nan_to_num(np.stack([box[..., 1] - box[..., 0], box[..., 3] - box[..., 2]])) + beam_width(some.tree)
     off = np.abs(np.stack([middle - angle for middle, angle in zip(at, (azimuth, elevation), strict=True)]))
-    level = of_frame(tree, "truth/targets/echo_level", frame)
+    level = some.of("truth/targets/echo_level", frame)
     loud = level[:, 1:] >= np.nan_to_num(level[:, :1], nan=-np.inf) - GLINT
     return bool(((off <= reach).all(axis=0) & loud).any())  # NaN where no echo comes that way
 
@@ -78,17 +77,17 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
     name, expected = "brightest beam on target", "every frame, or on a ghost by surface or bottom"
     azimuth, elevation = (np.deg2rad(every(tree, f"truth/beams/{axis}")) for axis in ("azimuth", "elevation"))
     hits, ghosts, seen, missed = 0, 0, 0, []
-    for i in frames:
+    for some, i in ((block, i) for block in blocks(tree, frames) for i in block.frames):
         energy, truth = of_frame(tree, "image/energy", i), of_frame(tree, "truth/beams/target", i)
-        if not ((truth >= 0).any() and echoes_heard(tree, i)):
+        if not ((truth >= 0).any() and echoes_heard(some, i)):
             continue
         if not np.isfinite(energy).any():  # no clock, no image: a miss, unless no snap could be heard or made out
             hit = ghost = False
-            counts = bool(snaps_heard(tree, i).any()) and not refused(tree, i)
+            counts = bool(snaps_heard(some, i).any()) and not refused(some, i)
         else:
             row, column = np.unravel_index(np.nanargmax(energy), energy.shape)
             hit, counts = bool(near_target(tree, truth)[row, column]), True
-            ghost = not hit and on_ghost(tree, i, azimuth[column], elevation[row])
+            ghost = not hit and on_ghost(some, i, azimuth[column], elevation[row])
         seen += counts
         hits += hit
         ghosts += ghost

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +34,38 @@ def every(tree: xr.DataTree, name: str) -> np.ndarray:
 def of_frame(tree: xr.DataTree, name: str, index: int) -> np.ndarray:
     """Values of a variable in one frame."""
     return np.asarray(tree[name].isel(frame=index).values)
+
+
+BLOCK = 1000
+"""Frames whose small variables are read at once: to read one by one takes longer than to check it."""
+
+
+class SmallVariables:
+    """Variables of some frames of a store, without pressure and images: each is read once, when it is asked for."""
+
+    def __init__(self, tree: xr.DataTree, frames: np.ndarray) -> None:
+        self.tree, self.frames = tree, frames
+        self._row = {int(frame): row for row, frame in enumerate(frames)}
+        self._read: dict[str, np.ndarray] = {}
+
+    def has(self, name: str) -> bool:
+        """Whether the store has a group, or a variable of one."""
+        group, _, variable = name.rpartition("/")
+        if name in self.tree.groups or f"/{name}" in self.tree.groups:
+            return True
+        return f"/{group}" in self.tree.groups and variable in self.tree[group].dataset
+
+    def of(self, name: str, frame: int) -> np.ndarray:
+        """Values of a variable in one of the frames."""
+        if name not in self._read:
+            self._read[name] = np.asarray(self.tree[name].isel(frame=self.frames).values)
+        return np.asarray(self._read[name][self._row[int(frame)]])
+
+
+def blocks(tree: xr.DataTree, frames: np.ndarray) -> Iterator[SmallVariables]:
+    """Small variables of the frames, some frames after the other."""
+    for start in range(0, len(frames), BLOCK):
+        yield SmallVariables(tree, np.asarray(frames[start : start + BLOCK]))
 
 
 def numbered(frames: Iterable[int] | np.ndarray) -> tuple[int, ...]:

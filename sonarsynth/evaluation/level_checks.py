@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from sonarsynth.evaluation.checks import Check, every, numbered, of_frame
+from sonarsynth.evaluation.checks import Check, SmallVariables, every, numbered
 from sonarsynth.products import LINK_BUDGET
 
 LINK_BUDGET_TOLERANCE = 0.1  # dB
@@ -62,17 +62,17 @@ def link_budget_measured(tree: xr.DataTree, frames: np.ndarray) -> Check:
     return Check(name, expected, got, good, {"worst_db": worst, "paths": count, "missing": missing}, spoiled)
 
 
-def echoes_heard(tree: xr.DataTree, frame: int) -> bool:
+def echoes_heard(some: SmallVariables, frame: int) -> bool:
     """Whether the link budget, where there is one, has an echo less than INAUDIBLE below the direct snap."""
-    if "link_budget" not in tree.children:
+    if not some.has("link_budget"):
         return True
-    level = of_frame(tree, "link_budget/received_level", frame)  # (snap, echo, family), the direct path last
+    level = some.of("link_budget/received_level", frame)  # (snap, echo, family), the direct path last
     echo, direct = (np.max(part, initial=-np.inf, where=np.isfinite(part)) for part in (level[:, :-1], level[:, -1:]))
     return bool(echo > direct - INAUDIBLE)
 
 
-def snaps_heard(tree: xr.DataTree, frame: int) -> np.ndarray:
+def snaps_heard(some: SmallVariables, frame: int) -> np.ndarray:
     """(snap,) whether the snap reaches the array directly, by the link budget where there is one."""
-    if "link_budget" not in tree.children:
+    if not some.has("link_budget"):
         return np.zeros(0, bool)
-    return np.asarray(of_frame(tree, "link_budget/paths", frame)[:, -1].sum(axis=1) > 0)
+    return np.asarray(some.of("link_budget/paths", frame)[:, -1].sum(axis=1) > 0)

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from sonarsynth.evaluation.brightest_beams import beam_width
-from sonarsynth.evaluation.checks import Check, numbered, of_frame
+from sonarsynth.evaluation.checks import Check, SmallVariables, blocks, numbered
 from sonarsynth.evaluation.level_checks import snaps_heard
 from sonarsynth.geometry import Pose
 from sonarsynth.products import REASONS
@@ -56,8 +56,9 @@ def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
     if "emission" not in tree["source_estimates"].dataset:
         return Check(NAME, EXPECTED, "not in this store", None, {})
     tally = _Tally()
-    for i in frames:
-        _frame(tree, int(i), tally)
+    for some in blocks(tree, frames):
+        for i in some.frames:
+            _frame(some, int(i), tally)
     if not tally.rows:
         got = f"none of {tally.unheard} found" if tally.unheard else "no snap reaches the array"
         return Check(NAME, EXPECTED, got, None, {"found": 0}, numbered(sorted(tally.frames)), _warning(tally))
@@ -75,12 +76,11 @@ def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
     return Check(NAME, EXPECTED, got, good, numbers, numbered(sorted(tally.frames)), _warning(tally))
 
 
-def _frame(tree: xr.DataTree, i: int, tally: _Tally) -> None:
-    column = {
-        str(name): of_frame(tree, f"source_estimates/{name}", i) for name in tree["source_estimates"].dataset.data_vars
-    }
+def _frame(some: SmallVariables, i: int, tally: _Tally) -> None:
+    names = map(str, some.tree["source_estimates"].dataset.data_vars)
+    column = {name: some.of(f"source_estimates/{name}", i) for name in names}
     found = np.flatnonzero(np.isfinite(column["time"]))
-    reached = int(snaps_heard(tree, i).sum())
+    reached = int(snaps_heard(some, i).sum())
     tally.rows += len(found)
     missing = max(reached - len(set(column["emission"][found]) - {-1}), 0)
     if missing:
@@ -88,10 +88,8 @@ def _frame(tree: xr.DataTree, i: int, tally: _Tally) -> None:
         tally.frames.add(i)
         refused = [REASONS[n] for n in column["reason"] if n not in (ACCEPTED, PLACELESS)]
         tally.reasons.update(refused[:missing])
-    truth = {
-        name: of_frame(tree, f"truth/emissions/{name}", i) for name in ("arrival", "azimuth", "elevation", "position")
-    }
-    pose = Pose(of_frame(tree, "truth/sonar_position", i), of_frame(tree, "truth/sonar_orientation", i))
+    truth = {name: some.of(f"truth/emissions/{name}", i) for name in ("arrival", "azimuth", "elevation", "position")}
+    pose = Pose(some.of("truth/sonar_position", i), some.of("truth/sonar_orientation", i))
     true = pose.to_body(truth["position"])
     for row in found:
         emission = int(column["emission"][row])
@@ -112,7 +110,7 @@ def _frame(tree: xr.DataTree, i: int, tally: _Tally) -> None:
             tally.misses.append(float(np.linalg.norm(error)))
             within["position"] = bool(error @ np.linalg.solve(one["position_covariance"], error) <= NEAR)
         tally.add(i, within)
-        tally.useless += _useless(tree, one)
+        tally.useless += _useless(some.tree, one)
 
 
 def _useless(tree: xr.DataTree, one: dict[str, np.ndarray]) -> bool:

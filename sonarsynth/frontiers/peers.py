@@ -125,7 +125,7 @@ def plain(arrivals: Arrivals, plan: Plan, frame: Frame) -> Arrivals:
         doppler=nought,
         doppler_terms=np.zeros((len(nought), 0)),
         coherent=np.zeros(len(nought), bool),
-        corners=np.zeros((len(nought), 3)),
+        corner_delays=np.zeros((len(nought), 3)),
         coherent_fraction=nought,
         height_delay_std=nought,
         phase_terms=np.zeros((len(nought), 0)),

@@ -76,7 +76,9 @@ def focus_error(
         # The array may be lopsided: each beam in another quadrant than the one before.
         mirror = np.array([1.0 - 2.0 * (which % 2), 1.0 - 2.0 * (which // 2 % 2)])
         array = elements.position[live][:, 1:] * mirror
-        error = _beam_error(array, weight[live], elements.pitch, glass, zone, u[at], _view(beams), band, within)
+        error = _beam_error(
+            array, weight[live], elements.pitch, glass, zone, u[at], view=_view(beams), band=band, within=within
+        )
         found = max(found, error)
     return found
 
@@ -87,7 +89,7 @@ def _view(beams: BeamGrid) -> Floats:
 
 
 def _beam_error(
-    array: Floats, weight: Floats, pitch: float, glass: Lens, zone: Zone, u: Floats, view: Floats, band: Band,
+    array: Floats, weight: Floats, pitch: float, glass: Lens, zone: Zone, u: Floats, *, view: Floats, band: Band,
     within: float,
 ) -> float:  # fmt: skip
     """Largest error (dB) of the beam of direction u (yz) for sources that it hears; array (sensor, yz) m."""

@@ -108,7 +108,7 @@ def attribution(
     elements, width = listening.elements, band.high - band.low
     gate, reach = GATE / width, elements.aperture / listening.sound_speed
     moment = _clock(arrivals, listening.clock, gate) + late
-    longer = float(np.abs(arrivals.corners).max(initial=0.0))
+    longer = float(np.abs(arrivals.corner_delays).max(initial=0.0))
     slowness = listening.sound_speed / arrivals.sound_speed
     across = gate + reach * _apart(slowness * arrivals.direction, beam)
     window = np.array([[-1.0], [1.0]]) * (across + longer)
@@ -136,7 +136,7 @@ def attribution(
         slowness,
         paths.delay,
         curvature,
-        np.abs(paths.corners).max(axis=1),
+        np.abs(paths.corner_delays).max(axis=1),
         group,
         groups[0] < 0,
         _spectra(paths, elements, fine),
@@ -197,11 +197,11 @@ def _spectra(paths: Arrivals, elements: Elements, band: Band) -> kernels.Complex
     heard = kernels.path_spectra(
         amplitude, paths.phase, paths.delay_std, paths.absorption, sine, frequency, band.relative
     )
-    shaped = paths.coherent | paths.corners.any(axis=1) | (paths.coherent_fraction > 0.0)
+    shaped = paths.coherent | paths.corner_delays.any(axis=1) | (paths.coherent_fraction > 0.0)
     if shaped.any():
         some = paths.select(shaped)
         shape = facet_response(
-            frequency, some.coherent, some.corners, some.coherent_fraction, some.height_delay_std, some.centre
+            frequency, some.coherent, some.corner_delays, some.coherent_fraction, some.height_delay_std, some.centre
         )
         heard[shaped] *= shape
     return heard

@@ -77,12 +77,12 @@ def exact_powers(paths: Arrivals, band: Band) -> Floats:
     """Power (path,) over that of the snap at 1 m in the band, from the columns of each: for few paths."""
     if not len(paths.delay):
         return np.zeros(0)
-    longest = float(np.ptp(paths.corners, axis=1).max())
+    longest = float(np.ptp(paths.corner_delays, axis=1).max())
     fine = band.sliced(min(max(64.0, 4.0 * (band.high - band.low) * longest), SLICES))
     f = fine.frequency
     amplitude = paths.spreading_out * paths.scattering * paths.spreading_in * paths.boundary
     facet = facet_response(
-        f, paths.coherent, paths.corners, paths.coherent_fraction, paths.height_delay_std, paths.centre
+        f, paths.coherent, paths.corner_delays, paths.coherent_fraction, paths.height_delay_std, paths.centre
     )
     lost = 10.0 ** (-np.outer(paths.absorption, 1.0 + fine.relative) / 10.0)
     delay_std = np.exp(-((2.0 * np.pi * np.outer(paths.delay_std, f)) ** 2))

@@ -82,7 +82,9 @@ def _groups(arrivals: Arrivals, rows: Ints, apart: float) -> tuple[Ints, Ints, F
 
     Groups are paths of one snap, target and family; silences longer than `apart` (s) divide them.
     """
-    delay, early, late = (x[rows] for x in (arrivals.delay, arrivals.corners.min(axis=1), arrivals.corners.max(axis=1)))
+    delay, early, late = (
+        x[rows] for x in (arrivals.delay, arrivals.corner_delays.min(axis=1), arrivals.corner_delays.max(axis=1))
+    )
     cell = (arrivals.snap[rows] * (arrivals.target.max() + 1) + arrivals.target[rows]) * len(FAMILIES)
     cell = cell + family(arrivals)[rows]
     order = np.lexsort((delay + early, cell))
@@ -127,7 +129,7 @@ def _coherent(arrivals: Arrivals, rows: Ints, band: Band) -> tuple[Floats, _Toge
         some.amplitude,
         some.phase,
         some.delay - middle[group],
-        some.corners,
+        some.corner_delays,
         some.absorption - loss[group],
         np.maximum(some.delay_std**2 - least[group] ** 2, 0.0),
         some.direction,

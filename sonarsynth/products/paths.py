@@ -45,17 +45,17 @@ class Arrivals:
         delay[e] + (|R d - q| - |R|)/sound_speed + delay_terms[e] @ aperture_terms(q)
     with d = direction[e], R = radius[e], and amplitude
         amplitude[e] * R/|R d - q| * (1 + amplitude_terms[e] @ aperture_terms(q)).
-    (`apertures.aperture_terms`.) Water absorbs on what the way is longer by, its delay times sound_speed, as it
-    does on the way to the array centre: synthesis takes that off at each frequency. In isovelocity water the sphere is
-    exact and delay_terms has no columns. Reflections on the way differ over the aperture: there the phase is phase[e] +
+    (`apertures.aperture_terms`.) Water absorbs on what the way is longer by, its delay times sound_speed, as it does on
+    the way to the array centre: synthesis takes that off at each frequency. In isovelocity water the sphere is exact
+    and delay_terms has no columns. Reflections on the way differ over the aperture: there the phase is phase[e] +
     phase_terms[e] @ aperture_terms(q), at every frequency, and the variance of the delay is delay_std[e]^2 +
-    delay_variance_terms[e] @ aperture_terms(q), which may be below 0: the delays over a facet, whose mean `corners` is
-    that at the centre, have another variance there, and heights of a rough facet, of which the centre's
-    `height_delay_std` tells, another echo: what delay_std and amplitude together nearly say over the band. What moves
-    is seen from another side there: the Doppler factor is doppler[e] + doppler_terms[e] @ aperture_terms(q). amplitude
-    is the factor on the pressure waveform of the snap at 1 m: the product of the columns below it. Facets change the
-    waveform: its spectrum is multiplied by `facet_pulses.facet_response` of coherent, corners, coherent_fraction
-    and height_delay_std, whose modulus is 1 at `centre` for a coherent facet that is small.
+    delay_variance_terms[e] @ aperture_terms(q), which may be below 0: the delays over a facet, whose mean
+    `corner_delays` is that at the centre, have another variance there, and heights of a rough facet, of which the
+    centre's `height_delay_std` tells, another echo: what delay_std and amplitude together nearly say over the band.
+    What moves is seen from another side there: the Doppler factor is doppler[e] + doppler_terms[e] @ aperture_terms(q).
+    amplitude is the factor on the pressure waveform of the snap at 1 m: the product of the columns below it. Facets
+    change the waveform: its spectrum is multiplied by `facet_pulses.facet_response` of coherent, corner_delays,
+    coherent_fraction and height_delay_std, whose modulus is 1 at `centre` for a coherent facet that is small.
     """
 
     delay: Floats  # (path,) s at the array centre, snap time included
@@ -87,7 +87,7 @@ class Arrivals:
     doppler: Floats  # (path,) Doppler: the pulse is p((t - delay)/(1 + doppler))
     doppler_terms: Floats  # (path, term); (path, 0) where all hydrophones have the Doppler of the centre
     coherent: Bools  # (path,) of a smooth facet, or its shadow: differentiated, i f/centre; phases count in sums
-    corners: Floats  # (path, 3) s: of the facet about `delay`, a mean over it; 0: a point
+    corner_delays: Floats  # (path, 3) s: of the facet about `delay`, a mean over it; 0: a point
     coherent_fraction: Floats  # (path,) w: of the power that is coherent where it is smooth
     height_delay_std: Floats  # (path,) s: a rough facet sends sqrt(1 - w exp(-(2 pi f height_delay_std)^2)); w = 0: all
     occluded: Bytes  # (path, byte) bits: a body hides it from the array centre, from each hydrophone; (path, 0): none

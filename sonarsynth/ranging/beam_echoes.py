@@ -155,7 +155,16 @@ def _beams(
         return beam_spectra(spectra, f, elements.position, elements.gain, u, c, focus)
     shape = elements.columns, elements.rows
     return lattice_beam_spectra(
-        spectra, f, elements.column, elements.row, shape, elements.pitch, elements.gain, u, c, focus
+        spectra,
+        f,
+        elements.column,
+        elements.row,
+        shape,
+        pitch=elements.pitch,
+        gain=elements.gain,
+        directions=u,
+        sound_speed=c,
+        focus=focus,
     )
 
 

@@ -45,6 +45,7 @@ def point_cloud(
     estimates: SourceEstimates,
     elements: Elements,
     sonar: Sonar,
+    *,
     threshold: float,
     locality: float,
     focus: float | None,

@@ -55,7 +55,7 @@ class PulseResponse(NamedTuple):
     """What facets do to a pulse beside its amplitude, a row a path; columns as in `products.Arrivals`."""
 
     coherent: Bools  # (path,)
-    corners: Floats  # (path, 3) s
+    corner_delays: Floats  # (path, 3) s
     coherent_fraction: Floats  # (path,)
     height_delay_std: Floats  # (path,) s
     late: Floats  # (path,) s: from the middle of the facet to the point that echoes

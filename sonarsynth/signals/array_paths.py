@@ -39,7 +39,7 @@ FINITE = (
         "delay_std",
         "doppler",
     ),
-    *("phase_terms", "delay_variance_terms", "doppler_terms", "corners", "coherent_fraction", "height_delay_std"),
+    *("phase_terms", "delay_variance_terms", "doppler_terms", "corner_delays", "coherent_fraction", "height_delay_std"),
 )
 """What of the arrivals must be finite."""
 
@@ -64,7 +64,7 @@ class ArrayPaths:
     variance: Floats  # (path,) s2: of the Gaussian that the pulse is blurred with
     doppler: Floats  # (path,) the pulse lasts 1 + doppler times as long
     coherent: Bools  # (path,) the pulse is differentiated, i f/centre
-    corners: Floats  # (path, 3) s: delays over which the pulse is a mean; their sum is 0
+    corner_delays: Floats  # (path, 3) s: delays over which the pulse is a mean; their sum is 0
     coherent_fraction: Floats  # (path,) and
     height_delay_std: Floats  # (path,) s: of `facet_pulses.rough_factor`
     dark: Bools  # (path, sensor) hydrophones that a path does not reach; (path, 0): it reaches all
@@ -131,7 +131,7 @@ def array_paths(
         variance=np.minimum(arrivals.delay_std, LONGEST_BLUR) ** 2,
         doppler=arrivals.doppler,
         coherent=arrivals.coherent,
-        corners=corners,
+        corner_delays=corners,
         coherent_fraction=arrivals.coherent_fraction,
         height_delay_std=np.minimum(arrivals.height_delay_std, LONGEST_BLUR),
         dark=arrivals.hidden(elements.count),
@@ -144,10 +144,10 @@ def array_paths(
 
 def _centred(arrivals: Arrivals) -> tuple[Floats, Floats]:
     """Delays (path,) of the middle of facets, and those (path, 3) of their corners about it."""
-    if not arrivals.corners.any():
-        return arrivals.delay, arrivals.corners
-    middle = np.einsum("pc->p", arrivals.corners) / 3.0
-    return arrivals.delay + middle, arrivals.corners - middle[:, None]
+    if not arrivals.corner_delays.any():
+        return arrivals.delay, arrivals.corner_delays
+    middle = np.einsum("pc->p", arrivals.corner_delays) / 3.0
+    return arrivals.delay + middle, arrivals.corner_delays - middle[:, None]
 
 
 def _check_shapes(arrivals: Arrivals) -> None:
@@ -158,7 +158,7 @@ def _check_shapes(arrivals: Arrivals) -> None:
             np.abs(arrivals.doppler) + np.abs(arrivals.doppler_terms).sum(axis=1) >= MAX_DOPPLER,
             f"a Doppler factor that is not within +-{MAX_DOPPLER:g}",
         ),
-        (np.abs(arrivals.corners.T) >= LONGEST_CORNER, f"corners that are not within {LONGEST_CORNER:g} s"),
+        (np.abs(arrivals.corner_delays.T) >= LONGEST_CORNER, f"corners that are not within {LONGEST_CORNER:g} s"),
         (
             (arrivals.coherent_fraction < 0.0) | (arrivals.coherent_fraction > 1.0),
             "a coherent_fraction that is not from 0 to 1",
@@ -275,7 +275,7 @@ def reference_of(front: ArrayPaths, middle: Floats, turn_terms: Floats, spread_t
         variance=np.zeros(1),
         doppler=np.zeros(1),
         coherent=np.zeros(1, bool),
-        corners=np.zeros((1, 3)),
+        corner_delays=np.zeros((1, 3)),
         coherent_fraction=np.zeros(1),
         height_delay_std=np.zeros(1),
         dark=np.zeros((1, 0), bool),

@@ -40,7 +40,7 @@ def exact_spectra(
 ) -> np.ndarray:
     """Transfer functions (sensor, bin) from the snap at 1 m to each hydrophone, delays counted from `origin` (s); but
     for Doppler, which is the snap's."""
-    facets = bool(front.coherent.any() or front.corners.any() or front.coherent_fraction.any())
+    facets = bool(front.coherent.any() or front.corner_delays.any() or front.coherent_fraction.any())
     total = np.zeros((elements.count, frequency.size), complex)
     for e in range(front.count):
         one = front.select(np.array([e]))
@@ -53,7 +53,7 @@ def exact_spectra(
         shape = np.exp(1j * one.phase[0] - 0.5 * one.variance[0] * (2.0 * np.pi * frequency) ** 2)
         if facets:
             shape = shape * facet_response(
-                frequency, one.coherent, one.corners, one.coherent_fraction, one.height_delay_std, one.centre
+                frequency, one.coherent, one.corner_delays, one.coherent_fraction, one.height_delay_std, one.centre
             )
         if one.turn_terms.any() or one.spread_terms.any():
             shape = shape * changed(one, elements.position, frequency)

@@ -110,9 +110,9 @@ class GriddedSynthesis:
                 paths,
                 elements,
                 bins,
-                start + part.first / fs,
-                stop_frequency(sonar.antialias),
-                method,
+                origin=start + part.first / fs,
+                highest=stop_frequency(sonar.antialias),
+                method=method,
                 fresh=not any(p.first < part.first + part.samples and part.first < p.first + p.samples for p in done),
             )
             done.append(part)

@@ -123,8 +123,8 @@ def shape_modes(
         weight, factor = _softened(front, frequency, decay, tolerance)
         fewer = reduction(weight, factor * spectrum, loudness, tolerance)
         weight, factor = weight @ fewer.onto, fewer.back @ factor
-    if front.corners.any():
-        powers, waves = _powers(front.corners, frequency, spectrum, tolerance)
+    if front.corner_delays.any():
+        powers, waves = _powers(front.corner_delays, frequency, spectrum, tolerance)
         fewer = reduction(powers, waves * spectrum, loudness, tolerance)
         powers, waves = powers @ fewer.onto, fewer.back @ waves
         weight = (weight[:, :, None] * powers[:, None, :]).reshape(front.count, -1)

@@ -13,24 +13,23 @@ import warnings
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import zarr
-from zarr.codecs import BloscCodec, Crc32cCodec
-from zarr.core.chunk_key_encodings import ChunkKeyEncodingParams
+from zarr.core.group import GroupMetadata
 from zarr.errors import ZarrUserWarning
+from zarr.storage import LocalStore
 
 from sonarsynth.pipeline import attributes, coordinates
 from sonarsynth.recipe.reading import RecipeError, dump
 from sonarsynth.recipe.reading.yaml_source import read_text
+from sonarsynth.store.array_metadata import fixed_array, framed_array
 from sonarsynth.store.code_digest import code_digest
-from sonarsynth.store.encoding import CODEC, LEVEL
 from sonarsynth.store.files.place import Folder, Opened, absolute, read, record, records, upload
 from sonarsynth.store.files.remote import Remote
 from sonarsynth.store.files.scratch import clear, hidden, made, sweep
 from sonarsynth.store.files.within import Mismatch
-from sonarsynth.store.layout import ArrayLayout, Layout, layout_of
+from sonarsynth.store.layout import Layout, layout_of
 from sonarsynth.store.marks import LAYOUT, MANIFESTS, Damage, Mark, all_files, load_layout, marked, save_mark
 from sonarsynth.store.opening import check_format
 from sonarsynth.store.provenance import begun, made_of, other_versions
@@ -38,9 +37,6 @@ from sonarsynth.store.provenance import begun, made_of, other_versions
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan
     from sonarsynth.recipe.reading import Source
-
-FLAT: Final[ChunkKeyEncodingParams] = {"name": "default", "separator": "."}
-"""Shards lie in the folder of their array: with the usual "/", each has as many folders of its own as axes."""
 
 
 def create(
@@ -234,65 +230,25 @@ def _flat(value: Any, where: str = "") -> dict[str, Any]:
 def lay_out(path: Path, plan: Plan, layout: Layout, attrs_of_root: Mapping[str, Any]) -> None:
     """Write everything but frames: metadata and the arrays that no frame changes."""
     static = coordinates(plan)
-    root = zarr.create_group(path, zarr_format=3, attributes=dict(attrs_of_root))
     framed = {a.variable.group for a in layout.arrays}
+    groups: dict[str, dict[str, Any]] = {"": dict(attrs_of_root)}
     for group in sorted({g for g, _ in static} | framed):
         extra = sorted(name for g, name in static if g == group and static[g, name][0] != (name,))
         attrs = {"coordinates": " ".join(extra)} if extra and group in framed else {}
-        if group.strip("/"):
-            root.create_group(group.strip("/"), attributes=attrs)
-        else:
-            root.update_attributes(attrs)
-    for array in layout.arrays:
-        _create_array(root, array)
-    for (group, name), (dims, values, attrs) in static.items():
-        _write_static(root, f"{group}/{name}".strip("/"), dims, values, attrs)
-    with warnings.catch_warnings():
+        groups.setdefault(group.strip("/"), {}).update(attrs)
+    fixed = {f"{group}/{name}".strip("/"): each for (group, name), each in static.items()}
+    nodes: dict[str, Any] = (
+        {name: GroupMetadata(attributes=attrs) for name, attrs in groups.items()}
+        | {array.path: framed_array(array) for array in layout.arrays}
+        | {name: fixed_array(*each) for name, each in fixed.items()}
+    )
+    with warnings.catch_warnings(), zarr.config.set({"array.write_empty_chunks": True}):
+        made = dict(zarr.create_hierarchy(store=LocalStore(path), nodes=nodes))  # at once: one by one takes a second
+        for name, (_, values, _) in fixed.items():
+            array = made[name]
+            if values.size and isinstance(array, zarr.Array):
+                array[...] = values.astype(object) if values.dtype.kind == "U" else values
         # zarr-python: "Consolidated metadata is currently not part in the Zarr format 3 specification". Readers that
         # do not know it use the metadata of each array; xarray warns without it.
         warnings.simplefilter("ignore", ZarrUserWarning)
         zarr.consolidate_metadata(path)
-
-
-def _create_array(root: zarr.Group, array: ArrayLayout) -> None:
-    variable, inner = array.variable, tuple(max(1, n) for n in array.shape[1:])
-    attrs: dict[str, Any] = {"units": variable.units, "long_name": variable.long_name, **dict(variable.attributes)}
-    if "scale_factor" in attrs:  # packed: readers must know the fill value to give NaN
-        attrs["_FillValue"] = int(variable.fill)
-    root.create_array(
-        array.path,
-        shape=array.shape,
-        dtype=array.dtype,
-        chunks=(array.chunk, *inner),
-        shards=(array.shard, *inner) if array.chunk != array.shard else None,
-        chunk_key_encoding=FLAT,
-        compressors=_codecs(array.dtype),
-        fill_value=variable.fill,
-        dimension_names=variable.dims,
-        attributes=attrs,
-        config={"write_empty_chunks": True},  # a file for every shard: one that is missing is a loss, not a fill value
-    )
-
-
-def _write_static(
-    root: zarr.Group, path: str, dims: tuple[str, ...], values: np.ndarray, attrs: dict[str, Any]
-) -> None:
-    text = values.dtype.kind == "U"
-    array = root.create_array(
-        path,
-        shape=values.shape,
-        dtype="str" if text else values.dtype,
-        chunks=tuple(max(1, n) for n in values.shape),
-        chunk_key_encoding=FLAT,
-        compressors=(Crc32cCodec(),) if text else _codecs(values.dtype),
-        dimension_names=dims,
-        attributes=attrs,
-        config={"write_empty_chunks": True},
-    )
-    if values.size:
-        array[...] = values.astype(object) if text else values
-
-
-def _codecs(dtype: np.dtype[Any]) -> tuple[BloscCodec, Crc32cCodec]:
-    """Blosc (zstd) with the bits of the numbers shuffled (noisy float32: smaller and faster than bytes); a checksum."""
-    return BloscCodec(cname=CODEC, clevel=LEVEL, shuffle="bitshuffle", typesize=dtype.itemsize), Crc32cCodec()

@@ -74,8 +74,8 @@ def trace(
 
     def legs_to(pose: Pose, bodies: tuple[PlacedTarget, ...], targets: tuple[int, ...] | None = None) -> FacetPaths:
         return facet_paths(
-            environment, profile, bodies, pose, elements, propagation, band, negligible, enough, alike, occlusion,
-            degree, targets,
+            environment, profile, bodies, pose, elements, propagation, band,
+            negligible=negligible, enough=enough, alike=alike, occlusion=occlusion, degree=degree, targets=targets,
         )  # fmt: skip
 
     if moving is None or (moving.still and all(body.track.still for body in moment.bodies)) or not moment.snaps:
@@ -142,8 +142,8 @@ def _direct(
     legs = view.visible(legs, legs.point, None)
     legs = view.settled(legs, legs.point, None)
     over = array_expansion(
-        legs, np.zeros(len(legs.row), int), environment, array.bending, sonar_pose, array.elements, array.propagation,
-        array.band, array.degree,
+        legs, np.zeros(len(legs.row), int), environment, array.bending, sonar_pose, array.elements,
+        propagation=array.propagation, band=array.band, degree=array.degree,
     )  # fmt: skip
     plain = PulseResponse.plain(len(legs.row))
     one, none = np.ones(len(legs.row)), np.full(len(legs.row), NO_TARGET)
@@ -152,7 +152,21 @@ def _direct(
     rest = MetPaths.at_rest(count, snap.time)
     legs = legs if meeting is None else received(legs, rest, meeting, profile)
     loss = path_loss(array, absorption, snap, legs)
-    made = assemble(legs, over.terms, none_out, index, snap.time, loss, none, none, one, variation, plain)
+    made = assemble(
+        legs,
+        over.terms,
+        none_out,
+        index,
+        snap.time,
+        loss,
+        target=none,
+        facet=none,
+        scattering=one,
+        variation=variation,
+        pulses=plain,
+    )
     if meeting is None:
         return made
-    return apply_doppler(made, legs, none_out, rest, meeting, profile, array.elements, None, array.enough)
+    return apply_doppler(
+        made, legs, none_out, rest, meeting, profile, elements=array.elements, departure=None, enough=array.enough
+    )

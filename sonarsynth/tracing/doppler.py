@@ -243,6 +243,7 @@ def apply_doppler(
     of: MetPaths,
     meeting: Meeting,
     profile: Profile,
+    *,
     elements: Elements,
     departure: Callable[[], Floats] | None = None,
     enough: float = 0.0,

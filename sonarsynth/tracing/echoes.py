@@ -135,10 +135,16 @@ def echoes(
         target, facet = array.facets.target[out.facet], array.facets.facet[out.facet]
         amplitude, sign = _columns(some.groups, "amplitude", "sign")
         scattered, vary, loss = sign * amplitude, (variation, error), path_loss(array, absorption, snap, legs, out)
-        one = assemble(legs, over, out, index, snap.time, loss, target, facet, scattered, vary, some.pulses)
+        one = assemble(
+            legs, over, out, index, snap.time, loss,
+            target=target, facet=facet, scattering=scattered, variation=vary, pulses=some.pulses,
+        )  # fmt: skip
         if meeting is not None and some.carried is not None:
-            place = meeting, array.profile, array.elements
-            one = apply_doppler(one, legs, out, some.carried, *place, view, array.enough)
+            met = some.carried
+            one = apply_doppler(
+                one, legs, out, met, meeting, array.profile,
+                elements=array.elements, departure=view, enough=array.enough,
+            )  # fmt: skip
         if spot.any() and array.bending.uniform:
             one = shift_to_scattering_points(one, legs, spot, array.sonar_pose)
         made.append(replace(one, delay=one.delay + some.pulses.late))
@@ -246,8 +252,9 @@ def _hides(array: FacetPaths, bodies: tuple[PlacedTarget, ...], snap: Snap, out:
     """Whether any of some bodies stands in ways (way,) from a snap to points near facets, start (way, xyz)."""
     end = np.broadcast_to(snap.position, start.shape)
     return hidden(  # backwards, so that bodies are where a ray begins
-        bodies, array.environment, array.bending, start, end, -out.arrival, out.length, out.bounces, out.turning
-    )
+        bodies, array.environment, array.bending, start, end, -out.arrival, out.length,
+        bounces=out.bounces, turning=out.turning,
+    )  # fmt: skip
 
 
 def _turned(found: _EchoBlock, most: float) -> ExpansionTerms:
@@ -279,7 +286,7 @@ def _spreads(found: _EchoBlock, most: float) -> bool:
     if not any(g.spreads for g in found.groups):
         return False
     share, turn = np.abs(found.strength) / max(most, 1e-300), array.elements.aperture / array.legs.length[found.leg]
-    late = np.split(found.pulses.corners, np.cumsum([len(g.row) for g in found.groups])[:-1])
+    late = np.split(found.pulses.corner_delays, np.cumsum([len(g.row) for g in found.groups])[:-1])
     of = zip(found.groups, late, strict=True)
     bound = np.concatenate([g.most_spread(corners, turn[g.row], array.centre) for g, corners in of])
     return bool(0.5 * rate**2 * (share * bound).max(initial=0.0) > array.alike)

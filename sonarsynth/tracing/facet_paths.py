@@ -131,6 +131,7 @@ def facet_paths(
     elements: Elements,
     propagation: Propagation,
     band: tuple[float, float],
+    *,
     negligible: float = NEGLIGIBLE,
     enough: float = QUADRATIC_TOLERANCE,
     alike: float = FACET_MEAN_TOLERANCE,
@@ -165,7 +166,9 @@ def facet_paths(
         seen += len(kept)
     legs, facets = concatenate(found[0]), concatenate(found[1])
     group = facets.target[legs.row]
-    over = expansion_source(legs, group, environment, bent, sonar_pose, elements, propagation, band, degree)
+    over = expansion_source(
+        legs, group, environment, bent, sonar_pose, elements, propagation=propagation, band=band, degree=degree
+    )
     return FacetPaths(
         legs, over, facets, bodies, environment, profile, propagation, sonar_pose, elements, band, negligible, enough,
         alike, occlusion, degree=degree, targets=targets,

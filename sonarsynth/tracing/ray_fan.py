@@ -79,7 +79,16 @@ def fan(
             raise ValueError("sending rays on towards a point needs scattering laws, a propagation model, a frequency")
         for group in landed:
             onward = _send_on(
-                environment, profile, layers, bodies, group, towards, laws, propagation, centre, coefficient
+                environment,
+                profile,
+                layers,
+                bodies,
+                group,
+                towards,
+                laws=laws,
+                propagation=propagation,
+                centre=centre,
+                coefficient=coefficient,
             )
             points += _follow(layers, (), onward, 0, spacing, sagitta, None, ARRIVAL)
     columns = {f.name: np.concatenate(c) for f, c in zip(fields(RayFan), zip(*points, strict=True), strict=False)}
@@ -137,6 +146,7 @@ def _send_on(
     bodies: tuple[PlacedTarget, ...],
     landed: _Landed,
     towards: Floats,
+    *,
     laws: tuple[ScatteringLaw, ...],
     propagation: Propagation,
     centre: float,

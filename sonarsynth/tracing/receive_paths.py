@@ -65,9 +65,18 @@ class ReceivePaths:
 
     def swerve(self, environment: Environment, profile: Profile, sonar_pose: Pose, spread: Floats | float) -> Floats:
         """(leg,) rad as `ray_cones.max_launch_deviation`, of those to within `spread` (m) of the array centre."""
-        ray = self.departure, self.length, self.spreading, self.surface, self.bottom, self.turning
         return max_launch_deviation(
-            environment.depth, profile, self.point, float(depth(sonar_pose.position)), *ray, spread
+            environment.depth,
+            profile,
+            self.point,
+            float(depth(sonar_pose.position)),
+            self.departure,
+            self.length,
+            spreading=self.spreading,
+            surface=self.surface,
+            bottom=self.bottom,
+            turning=self.turning,
+            spread=spread,
         )
 
 

@@ -79,7 +79,7 @@ class TransmitPaths:
 
 def assemble(
     legs: ReceivePaths, over: ExpansionTerms, out: TransmitPaths, index: int, time: float, loss: Floats,
-    target: Ints, facet: Ints, scattering: Floats, variation: tuple[Floats, float], pulses: PulseResponse,
+    *, target: Ints, facet: Ints, scattering: Floats, variation: tuple[Floats, float], pulses: PulseResponse,
 ) -> Arrivals:  # fmt: skip
     """Arrivals of snap `index` at `time` (s) from both halves of their paths; over: the wavefronts; loss: absorption of
     each (dB); variation: terms of the amplitude and their error; pulses: what facets make of the snap."""
@@ -118,7 +118,7 @@ def assemble(
         doppler=np.zeros(len(length)),
         doppler_terms=np.empty((len(length), 0)),
         coherent=pulses.coherent,
-        corners=pulses.corners,
+        corner_delays=pulses.corner_delays,
         coherent_fraction=pulses.coherent_fraction,
         height_delay_std=pulses.height_delay_std,
         occluded=legs.occluded,
@@ -132,8 +132,19 @@ def assemble(
 def no_arrivals(legs: ReceivePaths) -> Arrivals:
     """No arrivals at all: what a frame without a snap has."""
     none, zero = np.empty(0), np.empty(0, int)
-    empty = legs.select(zero), ExpansionTerms.none(0), TransmitPaths.none(0)
-    return assemble(*empty, 0, 0.0, none, zero, zero, none, (np.empty((0, 0)), 0.0), PulseResponse.plain(0))
+    return assemble(
+        legs.select(zero),
+        ExpansionTerms.none(0),
+        TransmitPaths.none(0),
+        0,
+        0.0,
+        none,
+        target=zero,
+        facet=zero,
+        scattering=none,
+        variation=(np.empty((0, 0)), 0.0),
+        pulses=PulseResponse.plain(0),
+    )
 
 
 def join(parts: list[Arrivals], sound_speed: float, centre: float) -> Arrivals:

@@ -11,6 +11,8 @@ PACKAGE = Path(__file__).resolve().parents[2] / "sonarsynth"
 FILES = sorted(PACKAGE.rglob("*.py"))
 ROOM = 12
 """Files in a folder at most."""
+PLACES = 8
+"""Parameters that a function takes by their place, at most."""
 
 
 def name_of(file: Path) -> str:
@@ -50,3 +52,14 @@ def test_every_file_name_is_there_once() -> None:
 def test_rooms_are_of_a_dozen_files_at_most() -> None:
     rooms = Counter(file.parent.relative_to(PACKAGE).as_posix() for file in FILES)
     assert {room: count for room, count in rooms.items() if count > ROOM} == {}
+
+
+def test_at_most_eight_parameters_go_by_their_place() -> None:
+    """Others go by name. Compiled kernels are let be: numba knows no arguments that go by name alone."""
+    long = []
+    for file in FILES:
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.FunctionDef) and "jit(" not in "".join(map(ast.unparse, node.decorator_list)):
+                places = [a.arg for a in (*node.args.posonlyargs, *node.args.args) if a.arg not in ("self", "cls")]
+                long += [f"{name_of(file)}.{node.name}"] if len(places) > PLACES else []
+    assert long == []

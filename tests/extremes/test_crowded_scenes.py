@@ -73,7 +73,7 @@ def echoes(*args: object, **kwargs: object) -> Arrivals:
 def transfer(found: Arrivals) -> Floats:
     """Pressure (frequency,) at the array centre for a snap of unit spectrum at 1 m."""
     shape = facet_response(
-        F, found.coherent, found.corners, found.coherent_fraction, found.height_delay_std, found.centre
+        F, found.coherent, found.corner_delays, found.coherent_fraction, found.height_delay_std, found.centre
     )
     phase = found.phase[:, None] - 2.0 * np.pi * found.delay[:, None] * F
     return (found.amplitude[:, None] * shape * np.exp(1j * phase)).sum(axis=0)

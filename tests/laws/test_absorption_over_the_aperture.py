@@ -61,7 +61,7 @@ def from_points(points: Floats, place: Floats, loss: float) -> Arrivals:
         echo_delay_std=zero,
         doppler=zero,
         coherent=np.zeros(n, bool),
-        corners=np.zeros((n, 3)),
+        corner_delays=np.zeros((n, 3)),
         coherent_fraction=zero,
         height_delay_std=zero,
         occluded=np.zeros((n, 0), np.uint8),

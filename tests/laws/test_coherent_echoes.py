@@ -53,7 +53,7 @@ def echo(
 def transfer(found: Arrivals) -> Floats:
     """Pressure (frequency,) at the array centre for a snap of unit spectrum at 1 m."""
     shape = facet_response(
-        F, found.coherent, found.corners, found.coherent_fraction, found.height_delay_std, found.centre
+        F, found.coherent, found.corner_delays, found.coherent_fraction, found.height_delay_std, found.centre
     )
     phase = found.phase[:, None] - 2.0 * np.pi * found.delay[:, None] * F
     left = np.exp(-0.5 * np.multiply.outer(found.delay_std, 2.0 * np.pi * F) ** 2)
@@ -97,7 +97,7 @@ def test_roughness_takes_from_the_coherent_echo_what_it_scatters() -> None:
     np.testing.assert_allclose(left, np.exp(-0.5 * (2.0 * np.pi * F / C * height * 2.0 * cosine) ** 2), rtol=2e-2)
     rough = found.select(~found.coherent)
     shape = facet_response(
-        F, rough.coherent, rough.corners, rough.coherent_fraction, rough.height_delay_std, rough.centre
+        F, rough.coherent, rough.corner_delays, rough.coherent_fraction, rough.height_delay_std, rough.centre
     )
     np.testing.assert_allclose(np.abs(shape[0]) ** 2, 1.0 - np.abs(left) ** 2, atol=2e-3)
     power = ((rough.scattering**2) * np.abs(shape[:, -1]) ** 2).sum()

@@ -76,7 +76,7 @@ def echo_of(corners: Floats, incident: Floats, scattered: Floats, delay: float) 
         delay + middle @ across / C,
         CENTRE / C * 0.5 * np.abs(area @ across),
         coherent=np.ones(len(corners), bool),
-        corners=(corners - middle[:, None]) @ across / C,
+        corner_delays=(corners - middle[:, None]) @ across / C,
     )
 
 
@@ -95,7 +95,7 @@ def test_amplitude_and_response_are_the_kirchhoff_integral(size: float) -> None:
     corners, incident, scattered = facet(1, size)
     of = echo_of(corners[None], incident, scattered, 0.0)
     f = np.linspace(0.0, 1e5, 257)
-    response = facet_response(f, of.coherent, of.corners, of.coherent_fraction, of.height_delay_std, of.centre)
+    response = facet_response(f, of.coherent, of.corner_delays, of.coherent_fraction, of.height_delay_std, of.centre)
     exact = facet_amplitude(corners, incident, scattered, 2.0 * np.pi * f / C)
     np.testing.assert_allclose(of.amplitude[0] * response[0], exact, atol=1e-14 * of.amplitude[0])
 
@@ -161,7 +161,7 @@ def test_many_tiny_facets_are_one_that_is_large() -> None:
     for _ in range(4):
         parts = split(parts)
         points = echo_of(parts, incident, scattered, 0.03)
-        points = replace(points, corners=np.zeros_like(points.corners))
+        points = replace(points, corner_delays=np.zeros_like(points.corner_delays))
         errors.append(error(exact_signals(points, SNAPS, ONE, SHARP, None, start, samples)[0][0], exact))
     assert errors[-1] < 2e-3
     np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 4.0, rtol=0.1)
@@ -177,7 +177,7 @@ def test_a_mirror_differentiates_and_an_edge_repeats(method: DirectSum | Gridded
     )
     # a long strip, one of its ends at 0: what comes from there is the pulse itself, of 1/(pi f_c) over its length
     far = 1e-3
-    edge = replace(mirror, delay=np.array([0.03 + far / 3.0]), corners=far * np.array([[-1.0, -1.0, 2.0]]) / 3.0)
+    edge = replace(mirror, delay=np.array([0.03 + far / 3.0]), corner_delays=far * np.array([[-1.0, -1.0, 2.0]]) / 3.0)
     t = window(mirror)[0] + np.arange(plain.size) / SHARP.sampling_frequency - 0.03
     start, samples = window(mirror)
     got = exact_signals(edge, SNAPS, ONE, SHARP, None, start, samples)[0][0]
@@ -231,10 +231,10 @@ def test_columns_that_say_nothing_change_no_bit(method: DirectSum | GriddedSynth
 @pytest.mark.parametrize("method", [DirectSum(), PRECISE])
 def test_corners_have_no_order_and_their_middle_is_a_delay(method: DirectSum | GriddedSynthesis) -> None:
     corners = np.array([[-6e-6, 1e-6, 3e-6], [2e-6, -4e-6, 1e-6]])
-    of = paths([0.03, 0.03002], [1.0, -0.7], coherent=np.ones(2, bool), corners=corners)
+    of = paths([0.03, 0.03002], [1.0, -0.7], coherent=np.ones(2, bool), corner_delays=corners)
     off = np.array([7e-6, -3e-6])
-    turned = replace(of, corners=corners[:, [2, 0, 1]])
-    moved = replace(of, delay=of.delay - off, corners=corners + off[:, None])
+    turned = replace(of, corner_delays=corners[:, [2, 0, 1]])
+    moved = replace(of, delay=of.delay - off, corner_delays=corners + off[:, None])
     start, samples = window(of)
 
     def one(x: Arrivals) -> Floats:
@@ -242,7 +242,7 @@ def test_corners_have_no_order_and_their_middle_is_a_delay(method: DirectSum | G
 
     assert error(one(turned), one(of)) < 2e-7
     assert error(one(moved), one(of)) < 2e-7
-    assert error(one(replace(of, corners=corners + off[:, None])), one(of)) > 0.1
+    assert error(one(replace(of, corner_delays=corners + off[:, None])), one(of)) > 0.1
 
 
 @pytest.mark.parametrize("chosen", [None, SHARP.filter, LowPass(cutoff=80e3, transition=15e3, attenuation=120)])

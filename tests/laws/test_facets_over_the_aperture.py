@@ -66,7 +66,7 @@ def means(found: Arrivals, q: Floats) -> Floats:
     )
     soft = np.exp(-0.5 * np.multiply.outer(found.delay_std**2 + more, (2.0 * np.pi * EDGES) ** 2))
     return soft * facet_response(
-        EDGES, found.coherent, found.corners, found.coherent_fraction, found.height_delay_std, found.centre
+        EDGES, found.coherent, found.corner_delays, found.coherent_fraction, found.height_delay_std, found.centre
     )
 
 

@@ -62,7 +62,7 @@ def heard(
 def transfer(found: Arrivals, sensor: Floats | None = None) -> Floats:
     """Pressure (frequency,) at the array centre, or at a sensor (xyz), for a snap of unit spectrum at 1 m."""
     shape = facet_response(
-        F, found.coherent, found.corners, found.coherent_fraction, found.height_delay_std, found.centre
+        F, found.coherent, found.corner_delays, found.coherent_fraction, found.height_delay_std, found.centre
     )
     delay, amplitude = found.delay, found.amplitude
     if sensor is not None:

@@ -65,7 +65,7 @@ def some_paths(count: int, seed: int, *, coherent: bool | None = None, spread: f
         phase=rng.uniform(-3.0, 3.0, count),
         delay_std=rng.choice([0.0, 2e-6], count) * rng.uniform(0.5, 1.0, count),
         coherent=phases,
-        corners=(corners - corners.mean(axis=1, keepdims=True)) * phases[:, None],
+        corner_delays=(corners - corners.mean(axis=1, keepdims=True)) * phases[:, None],
         coherent_fraction=np.where(phases, 0.0, rng.uniform(0.0, 1.0, count)),
         height_delay_std=np.where(phases, 0.0, rng.uniform(0.0, 1e-5, count)),
     )
@@ -73,7 +73,7 @@ def some_paths(count: int, seed: int, *, coherent: bool | None = None, spread: f
 
 def transfer(of: Arrivals, f: Floats, relative: Floats) -> np.ndarray:
     """(path, bin) of each path, written out."""
-    facet = facet_response(f, of.coherent, of.corners, of.coherent_fraction, of.height_delay_std, of.centre)
+    facet = facet_response(f, of.coherent, of.corner_delays, of.coherent_fraction, of.height_delay_std, of.centre)
     turn = np.exp(1j * of.phase[:, None] - 2j * np.pi * np.outer(of.delay, f))
     lost = 10.0 ** (-np.outer(of.absorption, relative) / 20.0) * np.exp(
         -0.5 * (2 * np.pi * np.outer(of.delay_std, f)) ** 2
@@ -138,7 +138,7 @@ def test_what_a_rough_facet_does_not_mirror_is_in_its_scattering_and_what_the_be
     own, others = 2e-6, 1.5e-6
     of = some_paths(1, 9, coherent=True)
     of = replace(of, boundary=np.ones(1), absorption=np.zeros(1), amplitude=of.spreading_out * of.spreading_in)
-    of = replace(of, scattering=np.ones(1), corners=np.zeros((1, 3)))
+    of = replace(of, scattering=np.ones(1), corner_delays=np.zeros((1, 3)))
 
     def terms(delay_std: float, echo_delay_std: float) -> tuple[float, float]:
         budget = levels_of(
@@ -195,7 +195,7 @@ def test_a_facet_may_be_split() -> None:
     for size in (3e-6, 40e-6, 400e-6):
         whole = arrivals([0.01], [[1.0, 0.0, 0.0]], [20.0], [0.1])
         corners = size * np.array([[-0.7, -0.3, 1.0]])
-        whole = replace(whole, coherent=np.ones(1, bool), corners=corners, scattering=np.array([0.1]))
+        whole = replace(whole, coherent=np.ones(1, bool), corner_delays=corners, scattering=np.array([0.1]))
         middle = 0.5 * (corners[0] + np.roll(corners[0], 1))
         parts = np.array([middle, *([corners[0, k], middle[k], middle[(k + 1) % 3]] for k in range(3))])
         centre = parts.mean(axis=1)
@@ -205,7 +205,7 @@ def test_a_facet_may_be_split() -> None:
             amplitude=four.amplitude / 4,
             scattering=four.scattering / 4,
             delay=0.01 + centre,
-            corners=parts - centre[:, None],
+            corner_delays=parts - centre[:, None],
         )
         received = [levels_of(booked(of, 1))["received_level"][0, 0, 0] for of in (whole, four)]
         assert received[1] == pytest.approx(received[0], abs=2e-3)

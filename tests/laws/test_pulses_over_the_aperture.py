@@ -95,7 +95,7 @@ def heard(found: Arrivals, q: Floats) -> Floats:
         -0.5 * np.multiply.outer(found.delay_std**2 + over(found.delay_variance_terms), (2.0 * np.pi * EDGES) ** 2)
     )
     shape = facet_response(
-        EDGES, found.coherent, found.corners, found.coherent_fraction, found.height_delay_std, found.centre
+        EDGES, found.coherent, found.corner_delays, found.coherent_fraction, found.height_delay_std, found.centre
     )
     turn = np.exp(1j * (phase[:, None] - 2.0 * np.pi * late[:, None] * EDGES))
     return amplitude[:, None] * soft * shape * turn

@@ -55,8 +55,9 @@ def seen_alone(view: Occlusion, legs: ReceivePaths, start: Floats, normal: Float
         ahead += launch_deviation(legs, view.elements.position[[sensor]], *where)[:, 0]
         ahead /= np.linalg.norm(ahead, axis=1)[:, None]
     end = np.broadcast_to(view.sonar_pose.position + offset, start.shape)
-    ray = start, end, ahead, length, legs.bounces, legs.turning
-    blocked = hidden(view.bodies, view.environment, view.bending, *ray)
+    ray = start, end, ahead, length
+    how = {"bounces": legs.bounces, "turning": legs.turning}
+    blocked = hidden(view.bodies, view.environment, view.bending, *ray, **how)
     return np.asarray(blocked | (np.einsum("ij,ij->i", ahead, normal) <= 0.0))
 
 

@@ -83,7 +83,7 @@ def arrivals(
         echo_delay_std=np.zeros(n),
         doppler=np.zeros(n),
         coherent=np.zeros(n, bool),
-        corners=np.zeros((n, 3)),
+        corner_delays=np.zeros((n, 3)),
         coherent_fraction=np.zeros(n),
         height_delay_std=np.zeros(n),
         occluded=np.zeros((n, 0), np.uint8),

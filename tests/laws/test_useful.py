@@ -11,7 +11,7 @@ import xarray as xr
 from sonarsynth.evaluation import bounds, range_errors
 from sonarsynth.products import ORIGINS
 
-BEAMS = (4, 10, 10)
+BEAMS = (4, 100)
 
 
 def tree(

@@ -28,8 +28,8 @@ SHRIMP = "position: [30, 1]"
 RANGE = "path: scene.world.environment.depth, first: 11, last: 15"
 BEAMS = "beams: {azimuths"
 ABSURD = [
-    ("frames: 20", "frames: 1e12", "15: scene.trajectory.frames: must be a valid integer"),
-    ("frames: 20", "frames: 1000000000000", "15: scene.trajectory.frames: must be less than or equal to 10000000"),
+    ("frames: 20", "frames: 1e12", "16: scene.trajectory.frames: must be a valid integer"),
+    ("frames: 20", "frames: 1000000000000", "16: scene.trajectory.frames: must be less than or equal to 10000000"),
     ("seed: 3", "seed: 3\nrepeats: 100000000", "3: repeats: must be less than or equal to 1000000"),
     ("seed: 3", "seed: 3\nrepeats: 1000000", "1: grid: spans 1000000 sequences: more than 10000000 frames"),
     ("seed: 3", f"seed: 3\ngrid: [{{{RANGE}, count: 1000000000}}]", "3: grid.0.count: must be less than or equal"),
@@ -44,11 +44,11 @@ ABSURD = [
         "3: grid: spans 9.9997e+14 sequences, more than 1000000",
     ),
     (BEAMS, f"sampling_frequency: 1e15\n    {BEAMS}", "sampling_frequency: must be less than or equal to 10000000"),
-    ("columns: 5, rows: 4", "columns: 32000, rows: 32000", "13: scene.sonar.array.columns: must be less than or equal"),
+    ("columns: 5, rows: 4", "columns: 32000, rows: 32000", "14: scene.sonar.array.columns: must be less than or equal"),
     (
         "columns: 5, rows: 4",
         "columns: 4000, rows: 4000",
-        "13: scene.sonar.array: has 16000000 places, more than 100000",
+        "14: scene.sonar.array: has 16000000 places, more than 100000",
     ),
     (
         SHAPE,
@@ -66,7 +66,7 @@ ABSURD = [
     (
         "frames: 20,",
         "sonar: {kind: line, start: [0, 0, -5], stop: [0, 999, -5], duration: 1}, frames: 20,",
-        "15: scene.trajectory.sonar: the array moves at 999 m/s at frame 0, too fast for sound in water",
+        "16: scene.trajectory.sonar: the array moves at 999 m/s at frame 0, too fast for sound in water",
     ),
     (
         SPEED,

@@ -48,7 +48,7 @@ def facets(
     return replace(
         of,
         coherent=rng.random(n) < coherent,
-        corners=rng.uniform(-corners, corners, (n, 3)) * rng.random((n, 1)),
+        corner_delays=rng.uniform(-corners, corners, (n, 3)) * rng.random((n, 1)),
         coherent_fraction=np.where(rng.random(n) < 0.5, share, rng.uniform(0.0, share, n)),
         height_delay_std=rng.uniform(0.0, rough, n),
     )
@@ -131,7 +131,7 @@ def sphere(radius: float, distance: float, parts: int) -> tuple[Arrivals, Floats
     late = np.einsum("pcx,px->pc", corners - middle[:, None], across) / C
     delay = (out + back) / C
     of = arrivals(delay, middle, back, f / (out * back) + 1e-300, loss=0.018 * C * delay)
-    of = replace(of, coherent=np.ones(len(f), bool), corners=late, centre=SONAR.band.centre)
+    of = replace(of, coherent=np.ones(len(f), bool), corner_delays=late, centre=SONAR.band.centre)
     lit = np.flatnonzero(f > 0.0)
     return of.select(lit), f[lit]
 
@@ -150,7 +150,9 @@ def test_a_coherent_body_whose_facets_cancel() -> None:
     assert error(got[some], exact) < 1e-4
     # as loud as the echo of a sphere: half its radius
     point = replace(one, amplitude=one.amplitude * 0.05 / f[np.argmax(of.amplitude)], coherent=np.zeros(1, bool))
-    ball, _ = exact_signals(replace(point, corners=np.zeros((1, 3))), SNAPS, part, SONAR, absorption, start, samples)
+    ball, _ = exact_signals(
+        replace(point, corner_delays=np.zeros((1, 3))), SNAPS, part, SONAR, absorption, start, samples
+    )
     assert np.sqrt((exact**2).sum() / (ball**2).sum()) == pytest.approx(1.0, abs=0.05)
 
 
@@ -166,7 +168,8 @@ def test_facets_of_half_a_wavelength_are_few_modes() -> None:
     )
     modes = shape_modes(front, f, spectrum, np.zeros(f.size), none, 0.0, 3e-6)
     exact = (
-        facet_response(f, np.zeros(n, bool), front.corners, of.coherent_fraction, of.height_delay_std, 1.0) * spectrum
+        facet_response(f, np.zeros(n, bool), front.corner_delays, of.coherent_fraction, of.height_delay_std, 1.0)
+        * spectrum
     )
     apart = np.abs(modes.weight @ modes.spectrum - exact).mean(axis=1).max()
     assert apart < 1e-5 * np.abs(spectrum).mean()
@@ -178,8 +181,14 @@ def test_what_is_no_facet_is_refused() -> None:
     start, samples = window(of, SONAR)
     n, third = 4, np.arange(4) == 2
     for columns, message in (
-        ({"corners": np.where(third[:, None], np.nan, np.zeros((n, 3)))}, "arrival 2 has corners that is not a finite"),
-        ({"corners": np.where(third[:, None], [0.0, 0.02, 0.0], 0.0)}, "arrival 2 has corners that are not within"),
+        (
+            {"corner_delays": np.where(third[:, None], np.nan, np.zeros((n, 3)))},
+            "arrival 2 has corner_delays that is not a finite",
+        ),
+        (
+            {"corner_delays": np.where(third[:, None], [0.0, 0.02, 0.0], 0.0)},
+            "arrival 2 has corners that are not within",
+        ),
         ({"coherent_fraction": np.where(third, 1.1, 0.0)}, "arrival 2 has a coherent_fraction that is not from 0 to 1"),
         ({"coherent_fraction": np.where(third, -0.1, 0.0)}, "arrival 2 has a coherent_fraction"),
         ({"height_delay_std": np.where(third, -1e-9, 0.0)}, "arrival 2 has a negative height_delay_std"),
@@ -198,7 +207,7 @@ def test_facets_too_large_for_modes_are_refused_and_the_exact_sum_takes_them() -
     start, samples = window(of, SONAR)
 
     def of_size(size: float) -> Arrivals:
-        return replace(of, corners=size * np.array([[-1.0, 0.0, 1.0]] * 3 + [[-0.5, 0.0, 0.5]]))
+        return replace(of, corner_delays=size * np.array([[-1.0, 0.0, 1.0]] * 3 + [[-0.5, 0.0, 0.5]]))
 
     exact, _ = exact_signals(of_size(0.99 * limit), SNAPS, array, SONAR, None, start, samples)
     got, _ = GriddedSynthesis().pressure(of_size(0.99 * limit), SNAPS, array, SONAR, None, start, samples)
@@ -206,6 +215,8 @@ def test_facets_too_large_for_modes_are_refused_and_the_exact_sum_takes_them() -
     with pytest.raises(ValueError, match="split them, or use direct_sum"):
         GriddedSynthesis().pressure(of_size(1.1 * limit), SNAPS, array, SONAR, None, start, samples)
     assert np.isfinite(exact_signals(of_size(1.1 * limit), SNAPS, array, SONAR, None, start, samples)[0]).all()
-    alike = replace(of, corners=np.tile([-3e-5, 0.0, 3e-5], (4, 1)))  # one shape for all is exact, whatever its size
+    alike = replace(
+        of, corner_delays=np.tile([-3e-5, 0.0, 3e-5], (4, 1))
+    )  # one shape for all is exact, whatever its size
     exact, _ = exact_signals(alike, SNAPS, array, SONAR, None, start, samples)
     assert error(GriddedSynthesis().pressure(alike, SNAPS, array, SONAR, None, start, samples)[0], exact) < 1e-4

@@ -33,7 +33,16 @@ def random_spectra(sensors, bins):
 def lattice_beams(spectra, frequencies, array, u, focus):
     shape = array.columns, array.rows
     return lattice_beam_spectra(
-        spectra, frequencies, array.column, array.row, shape, array.pitch, array.gain, u, SPEED, focus
+        spectra,
+        frequencies,
+        array.column,
+        array.row,
+        shape,
+        pitch=array.pitch,
+        gain=array.gain,
+        directions=u,
+        sound_speed=SPEED,
+        focus=focus,
     )
 
 

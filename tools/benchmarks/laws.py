@@ -35,7 +35,7 @@ def plain(arrivals: Arrivals) -> Arrivals:
     return replace(
         arrivals,
         coherent=none.astype(bool),
-        corners=0.0 * arrivals.corners,
+        corner_delays=0.0 * arrivals.corner_delays,
         coherent_fraction=none,
         height_delay_std=none,
         delay_std=none,

@@ -121,7 +121,9 @@ def batch(plan: Plan, index: int, bounces: int) -> dict[str, Any]:
     (delay, of_fronts), seconds_evaluate = median(lambda: expanded(plan, made))
     group = made.facets.target[legs.row]
     _, seconds_fronts = median(
-        lambda: array_expansion(legs, group, environment, plan.profile, pose, plan.elements, propagation, band)
+        lambda: array_expansion(
+            legs, group, environment, plan.profile, pose, plan.elements, propagation=propagation, band=band
+        )
     )
     time_exact, gain_exact = of_legs(found, made, some, sensors, time_on)
     paths = len(legs.row) * sensors

@@ -53,6 +53,7 @@ def lattice_beam_spectra(
     column: Ints,
     row: Ints,
     shape: tuple[int, int],
+    *,
     pitch: float,
     gain: npt.ArrayLike,
     directions: npt.ArrayLike,
@@ -75,7 +76,9 @@ def lattice_beam_spectra(
     step = np.asarray(directions, float) * (-pitch / sound_speed)
     odd = shape[1] % 2 == 1, shape[0] % 2 == 1
     first, spacing = first_and_spacing(frequencies)
-    return lattice_sums(spectra, places, weight, delay, step[:, 2], step[:, 1], odd, first, spacing)
+    return lattice_sums(
+        spectra, places, weight, delay, step[:, 2], step[:, 1], odd=odd, frequency=first, spacing=spacing
+    )
 
 
 def beam_energy(beams: npt.NDArray[np.complexfloating], spacing: float, sampling_frequency: float) -> Floats:

@@ -95,6 +95,7 @@ def lattice_sums(
     delay: Floats,
     rise: Floats,
     across: Floats,
+    *,
     odd: tuple[bool, bool],
     frequency: float,
     spacing: float,

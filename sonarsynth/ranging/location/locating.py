@@ -78,6 +78,7 @@ def locate(
     pose: Pose,
     bottom_depth: float,
     snaps: int,
+    *,
     bend: Bend | None = None,
     gradient: float = 0.0,
     kink: float = 0.0,

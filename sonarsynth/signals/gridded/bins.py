@@ -89,7 +89,7 @@ def bins_of(
     if front.variance.any():
         front = _loud(front, frequency, spectrum, tolerance)
     relative = relative_absorption(absorption, frequency, sonar.band.centre)
-    if front.corners.any():
+    if front.corner_delays.any():
         _check_corners(front, float(frequency[-1]))
     if front.count > 1:
         front = _changing(front, frequency[-1:], tolerance)
@@ -101,7 +101,9 @@ def bins_of(
 
 def _shaped(front: ArrayPaths) -> bool:
     """Whether pulses have shapes, beside Doppler."""
-    found = bool(front.variance.any() or front.phase.any() or front.corners.any() or front.coherent_fraction.any())
+    found = bool(
+        front.variance.any() or front.phase.any() or front.corner_delays.any() or front.coherent_fraction.any()
+    )
     return found or (front.count > 1 and bool(front.turn_terms.any() or front.spread_terms.any()))
 
 
@@ -133,7 +135,7 @@ def _bent(
 def _check_corners(front: ArrayPaths, highest: float) -> None:
     """Raise ValueError where a facet is too large for the series in its corners."""
     longest = MOST_PHASE / (2.0 * np.pi * highest)
-    far = np.abs(front.corners).max()
+    far = np.abs(front.corner_delays).max()
     if far > longest:
         raise ValueError(
             f"facets up to {1e6 * far:.3g} us from middle to corner are too large for synthesis in modes up to "
@@ -163,7 +165,7 @@ def _with_modes(
     every = with_changes(front) if front.count > 1 or bent else front
     weight, modes, bends = shape_modes(every, frequency, spectrum, decay, series, widest, SHAPES * tolerance, bent)
     weight, bends = weight[: front.count], bends[: front.count]
-    if front.corners.any() or front.coherent_fraction.any():
+    if front.corner_delays.any() or front.coherent_fraction.any():
         spectrum = modes[0]  # what paths mostly send: the colour of the errors
     return replace(front, modes=weight, bends=bends, loss=np.zeros(front.count) if few else front.loss), spectrum, modes
 
@@ -193,7 +195,7 @@ def _shared(
         turn = np.exp(1j * phase)
         spectrum, series = spectrum * turn, series * turn
         front = replace(front, phase=np.zeros(front.count))
-    if front.corners.any() or front.coherent_fraction.any():
+    if front.corner_delays.any() or front.coherent_fraction.any():
         front, facet = _shared_facet(front, frequency)
         spectrum, series = spectrum * facet, series * facet
     return front, spectrum, series
@@ -202,9 +204,9 @@ def _shared(
 def _shared_facet(front: ArrayPaths, frequency: Floats) -> tuple[ArrayPaths, ComplexArray]:
     """Paths without what all facets do alike to the pulse, and that (bin,)."""
     one, facet = front.select(np.arange(1)), np.ones(frequency.size, complex)
-    if (front.corners == one.corners).all():
-        facet = facet * facet_mean(frequency, one.corners)[0]
-        front = replace(front, corners=np.zeros((front.count, 3)))
+    if (front.corner_delays == one.corner_delays).all():
+        facet = facet * facet_mean(frequency, one.corner_delays)[0]
+        front = replace(front, corner_delays=np.zeros((front.count, 3)))
     if not (np.ptp(front.coherent_fraction) or np.ptp(front.height_delay_std)):
         facet = facet * rough_factor(frequency, one.coherent_fraction, one.height_delay_std)[0]
         front = replace(front, coherent_fraction=np.zeros(front.count))

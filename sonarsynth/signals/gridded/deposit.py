@@ -32,7 +32,6 @@ from sonarsynth.signals.pulse_variation import PulseVariation, bend, changed, sh
 
 RELAXING = np.log(4.0)
 """Chebyshev coefficients of absorption over the band fall by this (Np) from each degree to the next, or by more."""
-
 LARGEST = 1 << 20
 """Most numbers in a deposit grid: nodes are taken in groups of so many."""
 
@@ -78,6 +77,7 @@ def add_segment(
     front: ArrayPaths,
     elements: Elements,
     bins: Bins,
+    *,
     origin: float,
     highest: float,
     method: tuple[int, float, str, float],

@@ -104,12 +104,15 @@ def array_expansion(
     profile: Profile,
     sonar_pose: Pose,
     elements: Elements,
+    *,
     propagation: Propagation,
     band: tuple[float, float],
     degree: int = 3,
 ) -> ArrayExpansion:
     """Wavefronts of all legs, as `expansion_source`."""
-    made = expansion_source(legs, group, environment, profile, sonar_pose, elements, propagation, band, degree)
+    made = expansion_source(
+        legs, group, environment, profile, sonar_pose, elements, propagation=propagation, band=band, degree=degree
+    )
     return made.of(slice(0, len(legs.row)))
 
 
@@ -120,6 +123,7 @@ def expansion_source(
     profile: Profile,
     sonar_pose: Pose,
     elements: Elements,
+    *,
     propagation: Propagation,
     band: tuple[float, float],
     degree: int = 3,

@@ -60,5 +60,7 @@ def forward_paths(array: FacetPaths, laws: tuple[ScatteringLaw, ...]) -> FacetPa
     kept, row = np.unique(legs.row, return_inverse=True)
     legs, facets = legs.numbered(row), every.select(kept)
     group = facets.target[legs.row]
-    over = expansion_source(legs, group, environment, array.bending, pose, array.elements, propagation, array.band)
+    over = expansion_source(
+        legs, group, environment, array.bending, pose, array.elements, propagation=propagation, band=array.band
+    )
     return replace(array, legs=legs, wavefronts=over, facets=facets)

@@ -22,6 +22,7 @@ def hidden(
     end: Floats,
     departure: Floats,
     length: Floats,
+    *,
     bounces: Ints | None = None,
     turning: Ints | None = None,
 ) -> Bools:
@@ -61,6 +62,7 @@ def ray_cones(
     departure: Floats,
     length: Floats,
     spread: Floats,
+    *,
     bounces: Ints,
     turning: Ints,
     swerve: Floats | float = 0.0,
@@ -102,6 +104,7 @@ def max_launch_deviation(
     end: float,
     departure: Floats,
     length: Floats,
+    *,
     spreading: Floats,
     surface: Ints,
     bottom: Ints,

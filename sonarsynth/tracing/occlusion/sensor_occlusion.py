@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -60,7 +60,9 @@ class Occlusion:
         """
         if self.elements is None or self.elements.count == 1 or not self.bodies:
             end = np.broadcast_to(self.sonar_pose.position, start.shape)
-            return legs.select(~self._hides(start, end, legs.departure, legs.length, legs.bounces, legs.turning))
+            return legs.select(
+                ~self._hides(start, end, legs.departure, legs.length, bounces=legs.bounces, turning=legs.turning)
+            )
         certain = self._certain(legs, start, normal)
         kept, mixed = certain != CLOSED, certain == UNKNOWN
         first = np.append(0, 1 + rim(self.elements))
@@ -124,9 +126,18 @@ class Occlusion:
         if ahead is not None:
             found[ahead[1] < 0.0] = CLOSED
             rows = np.flatnonzero(ahead[0] > 0.0)
-        end, counts = (self.sonar_pose.position + offset)[rows], (legs.bounces[rows], legs.turning[rows])
-        ray = start[rows], end, away[rows], length[rows], spread[rows], *counts, swerve[rows]
-        slope, reach, far = ray_cones(self.bodies, self.environment, self.bending, *ray)
+        end = (self.sonar_pose.position + offset)[rows]
+        ray = start[rows], end, away[rows], length[rows]
+        slope, reach, far = ray_cones(
+            self.bodies,
+            self.environment,
+            self.bending,
+            *ray,
+            spread[rows],
+            bounces=legs.bounces[rows],
+            turning=legs.turning[rows],
+            swerve=swerve[rows],
+        )
         sure = np.flatnonzero(np.isfinite(slope))
         found[rows], rows = NO_CONE, rows[sure]
         found[rows] = classify_cones(self.bodies, start[rows], away[rows], slope[sure], reach[sure], far[sure])
@@ -179,12 +190,12 @@ class Occlusion:
         if normal is not None:
             unseen = np.einsum("rx,rx->r", ahead, normal[leg]) <= 0.0
         ray = np.flatnonzero(~unseen)
-        end, times, turns = self.sonar_pose.position + offset[ray], legs.bounces[ray], legs.turning[ray]
-        unseen[ray] = self._hides(start[leg[ray]], end, ahead[ray], length[ray], times, turns)
+        end, how = self.sonar_pose.position + offset[ray], {"bounces": legs.bounces[ray], "turning": legs.turning[ray]}
+        unseen[ray] = self._hides(start[leg[ray]], end, ahead[ray], length[ray], **how)
         return unseen
 
-    def _hides(self, *ray: Any) -> Bools:
-        return hidden(self.bodies, self.environment, self.bending, *ray)
+    def _hides(self, *ray: Floats, bounces: Ints, turning: Ints) -> Bools:
+        return hidden(self.bodies, self.environment, self.bending, *ray, bounces=bounces, turning=turning)
 
 
 def _towards(legs: ReceivePaths, offset: Floats) -> tuple[Floats, Floats]:

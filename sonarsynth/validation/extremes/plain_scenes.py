@@ -99,7 +99,7 @@ def transfer(found: Arrivals, frequency: Floats) -> Floats:
     for some in np.array_split(np.arange(len(found.delay)), len(found.delay) // 100_000 + 1):
         part = found.select(some)
         shape = facet_response(
-            frequency, part.coherent, part.corners, part.coherent_fraction, part.height_delay_std, part.centre
+            frequency, part.coherent, part.corner_delays, part.coherent_fraction, part.height_delay_std, part.centre
         )  # fmt: skip
         phase = part.phase[:, None] - 2.0 * np.pi * part.delay[:, None] * frequency
         total += (part.amplitude[:, None] * shape * np.exp(1j * phase)).sum(axis=0)

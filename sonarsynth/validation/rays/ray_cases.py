@@ -46,6 +46,7 @@ def drawn(
     farthest: float,
     pairs: int,
     vertices: int,
+    *,
     reflections: int,
     bounds: Bounds = TIGHT,
     check: int = 60,
@@ -67,9 +68,11 @@ def cut(nodes: tuple[Floats, Floats], bottom: float) -> tuple[Floats, Floats]:
 def isovelocity(quick: bool) -> Iterator[Case]:
     """One speed: in 100 m, and in 5 km out to 100 km."""
     pairs = 12 if quick else 60
-    yield drawn("isovelocity", (np.array([0.0, 100.0]), np.full(2, 1500.0)), 1.0, 1e4, pairs, 4, 4, check=10**6)
+    yield drawn(
+        "isovelocity", (np.array([0.0, 100.0]), np.full(2, 1500.0)), 1.0, 1e4, pairs, 4, reflections=4, check=10**6
+    )
     deep = np.array([0.0, 5000.0]), np.full(2, 1500.0)
-    yield drawn("isovelocity, 100 km", deep, 1e3, 1e5, pairs, 4, 4, check=10**6)
+    yield drawn("isovelocity, 100 km", deep, 1e3, 1e5, pairs, 4, reflections=4, check=10**6)
 
 
 def gradients(quick: bool) -> Iterator[tuple[Case, Gradient]]:
@@ -78,7 +81,7 @@ def gradients(quick: bool) -> Iterator[tuple[Case, Gradient]]:
         water = Gradient(1500.0, slope, bottom)
         nodes = np.array([0.0, bottom]), np.array([1500.0, 1500.0 + slope * bottom])
         name = f"gradient {slope:g} /s"
-        yield drawn(name, nodes, 0.01 * farthest, farthest, 6 if quick else 30, 6, 6, check=10**6), water
+        yield drawn(name, nodes, 0.01 * farthest, farthest, 6 if quick else 30, 6, reflections=6, check=10**6), water
 
 
 def random_layers(count: int, bottom: float, spread: float) -> tuple[Floats, Floats]:
@@ -113,22 +116,24 @@ def munk_layers(tolerance: float, bottom: float = 5000.0) -> tuple[Floats, Float
 def layered(quick: bool) -> Iterator[Case]:
     """Layers: few, many, a thermocline, a duct, jumps, a noisy cast."""
     many, few = (6, 8) if quick else (40, 120)
-    yield drawn("3 layers", random_layers(3, 100.0, 5.0), 10.0, 3e3, many, 4, 4, check=few)
-    yield drawn("5 layers", random_layers(5, 100.0, 5.0), 10.0, 3e3, many, 4, 4, check=few)
-    yield drawn("50 layers", random_layers(50, 200.0, 5.0), 10.0, 3e3, many, 3, 3, LOOSE, check=few // 2)
-    yield drawn("thermocline", thermocline(), 1.0, 500.0, many, 4, 4, check=few)
-    yield drawn("duct", DUCT, 50.0, 5e3, many, 8, 1, check=few)
-    yield drawn("jumps", JUMP, 10.0, 5e3, many, 4, 4, check=few)
+    yield drawn("3 layers", random_layers(3, 100.0, 5.0), 10.0, 3e3, many, 4, reflections=4, check=few)
+    yield drawn("5 layers", random_layers(5, 100.0, 5.0), 10.0, 3e3, many, 4, reflections=4, check=few)
+    yield drawn(
+        "50 layers", random_layers(50, 200.0, 5.0), 10.0, 3e3, many, 3, reflections=3, bounds=LOOSE, check=few // 2
+    )
+    yield drawn("thermocline", thermocline(), 1.0, 500.0, many, 4, reflections=4, check=few)
+    yield drawn("duct", DUCT, 50.0, 5e3, many, 8, reflections=1, check=few)
+    yield drawn("jumps", JUMP, 10.0, 5e3, many, 4, reflections=4, check=few)
     cast = noisy_cast(100.0, 2.0 if quick else 0.5)
-    yield drawn("noisy cast", cast, 10.0, 1e3, many // 2, 3, 2, LOOSE, check=few // 4)
+    yield drawn("noisy cast", cast, 10.0, 1e3, many // 2, 3, reflections=2, bounds=LOOSE, check=few // 4)
 
 
 def shot(quick: bool) -> Iterator[Case]:
     """Layers whose rays are integrated: a thermocline, a duct, jumps, and the canonical profile out to 50 km."""
     many, few = (4, 3) if quick else (20, 40)
-    yield drawn("thermocline", thermocline(), 5.0, 300.0, many, 3, 3, check=few)
-    yield drawn("duct", DUCT, 50.0, 3e3, many, 6, 1, check=few)
-    yield drawn("jumps", JUMP, 10.0, 3e3, many, 4, 2, check=few)
+    yield drawn("thermocline", thermocline(), 5.0, 300.0, many, 3, reflections=3, check=few)
+    yield drawn("duct", DUCT, 50.0, 3e3, many, 6, reflections=1, check=few)
+    yield drawn("jumps", JUMP, 10.0, 3e3, many, 4, reflections=2, check=few)
     if not quick:
         layers = munk_layers(1e-4)
         ends = np.array([310.0, 800.0, 1310.0, 2000.0])

@@ -67,7 +67,7 @@ def _unreflected(mp: Any, g: Any, y1: Any, y2: Any, r: Any, fastest: Any) -> lis
     legs = [(mp.hypot(r, y2 - y1), y1, y2)]
     arrival = r - centre
     spread = 1 / centre + 1 / arrival  # dX/dradius over the radius
-    return [_ray(mp, g, radius, turning, legs, (-centre, arrival), (y1, y2), r, spread)]
+    return [_ray(mp, g, radius, turning, legs, (-centre, arrival), y=(y1, y2), r=r, spread=spread)]
 
 
 def _reflected(
@@ -100,7 +100,7 @@ def _reflected(
                 legs += [(2 * h, slowest, slowest)] * (n - 1)
                 spread = 2 * n / h + e1 / roots[0] + e2 / roots[1]
                 offsets = (-e1 * roots[0], e2 * roots[1])
-                rays.append(_ray(mp, g, radius, turning, legs, offsets, (y1, y2), r, spread))
+                rays.append(_ray(mp, g, radius, turning, legs, offsets, y=(y1, y2), r=r, spread=spread))
     return rays
 
 
@@ -124,7 +124,7 @@ def _roots(mp: Any, coefficients: list[Any], scale: Any) -> list[Any]:
 
 
 def _ray(
-    mp: Any, g: Any, radius: Any, turning: int, legs: list[Any], offsets: Any, y: Any, r: Any, spread: Any
+    mp: Any, g: Any, radius: Any, turning: int, legs: list[Any], offsets: Any, *, y: Any, r: Any, spread: Any
 ) -> tuple[Any, ...]:
     """(turning, time, start angle, end angle, amplitude, radius); offsets: of the ends from their circle's centre.
 
