@@ -12,17 +12,14 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.frontiers.rows import Point
-from sonarsynth.imaging import DenseDelayAndSum
 from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import Refracted, Straight
-from sonarsynth.ranging import RefractedRange
 from sonarsynth.receiver import Elements
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.recipe.scene import Frame
-from sonarsynth.signals import DirectSum, GriddedSynthesis
+from sonarsynth.signals import DirectSum, GriddedSynthesis, Synthesis
 from sonarsynth.signals.auto_synthesis import deposit_for
-from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.validation.references.frames.frame_pressure import FramePressure
 
 SMALL = 1e-3
@@ -90,18 +87,14 @@ def exact_plan(plan: Plan) -> Plan:
     """The plan (that of a sequence) with everything done the slow, exact way."""
     bounces = plan.propagation.bounces
     paths = Straight(bounces=bounces) if plan.profile.uniform else Refracted(bounces=bounces)
-    image, range_ = plan.choices.beamforming, plan.choices.ranging
-    profile = range_.profile if isinstance(range_, RefractedRange) else None
     choices = Choices(
         subarrays=plan.elements.count,
         degree=5,
         occlusion="sensors",
         negligible=0.0,
         synthesis=golden(plan),
-        beamforming=DenseDelayAndSum(focus=image.focus, shading=image.shading),
-        ranging=RefractedRange(
-            threshold=range_.threshold, locality=range_.locality, focus=range_.focus, profile=profile
-        ),
+        beamforming=plan.choices.beamforming.exact(),
+        ranging=plan.choices.ranging.exact(),
     )
     return replace(plan, propagation=paths, choices=choices)
 
@@ -181,18 +174,16 @@ def spread(live: Ints, count: int) -> Ints:
     return np.unique(live[np.floor(turns * len(live)).astype(int)])
 
 
-def pressures(
-    plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements, method: GriddedSynthesis | DirectSum
-) -> Heard:
+def pressures(plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements, method: Synthesis) -> Heard:
     """Echoes and direct arrivals (element, sample) in Pa, each by itself."""
     start, samples = frame_start(plan, frame), plan.windows.samples
     sonar, snaps = plan.scene.sonar, frame.moment.snaps
-    make = method.pressure if isinstance(method, GriddedSynthesis) else exact_signals
-    echoes, direct = (
-        make(arrivals.select(some), snaps, elements, sonar, plan.absorption, start, samples)[0]
-        for some in (~arrivals.direct, arrivals.direct)
-    )
-    return np.asarray(echoes, float), np.asarray(direct, float)
+    found = []
+    for some in (~arrivals.direct, arrivals.direct):
+        given = arrivals.select(some), snaps, elements, sonar, plan.absorption, start, samples
+        unrounded = getattr(method, "pressure", None)
+        found.append(unrounded(*given)[0] if unrounded is not None else method.signals(*given).pressure)
+    return np.asarray(found[0], float), np.asarray(found[1], float)
 
 
 def differences(found: Sequence[Floats], exact: Sequence[Floats]) -> tuple[float, float]:

@@ -13,11 +13,11 @@ import numpy.typing as npt
 from sonarsynth.conventions import Floats
 from sonarsynth.frontiers.exact_frame import exact_plan
 from sonarsynth.frontiers.rows import Point, timed
-from sonarsynth.imaging import FocusedDelayAndSum
+from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.pipeline import BeamformedFrame
 from sonarsynth.planning import Plan
 from sonarsynth.products import EnergyImage, PointCloud, SourceEstimates
-from sonarsynth.ranging import IsovelocityRange, RefractedRange
+from sonarsynth.ranging import IsovelocityRange, Ranging
 from sonarsynth.recipe.scene import Frame
 
 BRIGHT = 20.0
@@ -33,13 +33,13 @@ def image_points(plan: Plan, heard: BeamformedFrame) -> Iterator[Point]:
         return
     exact, slowest = timed(lambda: image_of(plan, heard, slow))
     settings: list[tuple[str, str, Any]] = []
-    if plan.elements.on_lattice:
-        fast: Any = FocusedDelayAndSum(focus=chosen.focus, shading=chosen.shading)
+    if plan.elements.on_lattice and isinstance(slow, DenseDelayAndSum):
+        fast: Any = FocusedDelayAndSum(focus=slow.focus, shading=slow.shading)
         if any(f.name == "zones" for f in fields(fast)):
             settings += [("zones", f"{n} zones", replace(fast, zones=n)) for n in ZONES]
         else:
             settings += [("focus", "focused", fast)]
-        if chosen.focus is not None:
+        if slow.focus is not None:
             settings += [("focus", "plane waves", replace(fast, focus=None))]
     for knob, setting, method in [("chosen", named(chosen), chosen), *settings]:
         if knob != "chosen" and method == chosen:
@@ -109,8 +109,8 @@ def range_points(plan: Plan, frame: Frame, heard: BeamformedFrame) -> Iterator[P
     if not imaged(heard):
         return
     exact, slowest = timed(lambda: cloud_of(plan, frame, heard, slow))
-    closed = IsovelocityRange(threshold=chosen.threshold, locality=chosen.locality, focus=chosen.focus)
-    for method in dict.fromkeys((chosen, closed, slow)):
+    same = {name: getattr(slow, name) for name in ("threshold", "locality", "focus") if hasattr(slow, name)}
+    for method in dict.fromkeys((chosen, IsovelocityRange(**same), slow)):
         if method == slow:
             made, seconds = exact, slowest
         else:
@@ -118,7 +118,7 @@ def range_points(plan: Plan, frame: Frame, heard: BeamformedFrame) -> Iterator[P
         yield range_point(plan, made, exact, method, seconds, chosen=method == chosen)
 
 
-def cloud_of(plan: Plan, frame: Frame, heard: BeamformedFrame, method: IsovelocityRange | RefractedRange) -> PointCloud:
+def cloud_of(plan: Plan, frame: Frame, heard: BeamformedFrame, method: Ranging) -> PointCloud:
     """The point cloud of what a frame heard, by a method."""
     assert heard.image is not None and heard.imaged is not None and heard.estimates is not None
     estimates: SourceEstimates = heard.estimates

@@ -77,8 +77,8 @@ def image_peers(plan: Plan, frame: Frame, arrivals: Arrivals, heard: BeamformedF
     if not imaged(heard):
         return
     assert heard.image is not None and heard.imaged is not None
-    method, sonar = plan.choices.beamforming, plan.scene.sonar
-    slow = DenseDelayAndSum(focus=method.focus, shading="uniform")
+    sonar, focus = plan.scene.sonar, getattr(plan.choices.beamforming, "focus", None)
+    slow = DenseDelayAndSum(focus=focus, shading="uniform")
     exact = np.asarray(image_of(plan, heard, slow).energy, float)
     bright = np.flatnonzero(exact.ravel() >= 0.01 * exact.max())
     beams = bright[np.linspace(0, len(bright) - 1, min(THESIS_BEAMS, len(bright))).astype(int)]
@@ -92,7 +92,7 @@ def image_peers(plan: Plan, frame: Frame, arrivals: Arrivals, heard: BeamformedF
     if not installed("acoular"):
         yield absent("image", "Acoular")
         return
-    energy, seconds = acoular_image(plan, heard.imaged, heard.image.start, heard.image.stop, method.focus or 1e6)
+    energy, seconds = acoular_image(plan, heard.imaged, heard.image.start, heard.image.stop, focus or 1e6)
     yield _image_row(plan, "Acoular", likeness(energy, exact), seconds, "whatever the scale")
 
 

@@ -13,9 +13,10 @@ from sonarsynth.frontiers.rows import Point
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor
 from sonarsynth.planning import frame_start
 from sonarsynth.receiver.subarrays import subarray
-from sonarsynth.signals import DirectSum, GriddedSynthesis
-from sonarsynth.signals.auto_synthesis import PRECISIONS, deposit_for, kernel_error
+from sonarsynth.signals import DirectSum, GriddedSynthesis, Synthesis
+from sonarsynth.signals.auto_synthesis import PRECISIONS, deposit_for
 from sonarsynth.signals.direct_sum import exact_signals
+from sonarsynth.signals.gridded_synthesis import kernel_error
 
 WIDEST = 14
 OVER_KERNEL = (1.0, 10.0, 100.0)
@@ -29,8 +30,6 @@ FINER = 0.01
 """Error of what is compared with, over that of the exact way's synthesis."""
 SUMMED_HYDROPHONES, SUMMED_PATHS = (1, 8), 50
 """What the direct sum is timed on."""
-
-Method = GriddedSynthesis | DirectSum
 
 
 def synthesis_points(traced: TracedBySensor) -> Iterator[Point]:
@@ -72,12 +71,12 @@ def _rounded(method: GriddedSynthesis, times: float) -> GriddedSynthesis:
     return replace(method, tolerance=float(f"{min(max(wanted, 1e-10), 0.05):.0e}"))
 
 
-def _heard(traced: TracedBySensor, method: Method, n: int) -> Heard:
+def _heard(traced: TracedBySensor, method: Synthesis, n: int) -> Heard:
     part, arrivals = traced.few[n]
     return pressures(traced.plan, traced.frame, arrivals, part.elements, method)
 
 
-def _point(traced: TracedBySensor, exact: list[Heard], method: Method, knob: str, *, chosen: bool = False) -> Point:
+def _point(traced: TracedBySensor, exact: list[Heard], method: Synthesis, knob: str, *, chosen: bool = False) -> Point:
     plan, few = traced.plan, traced.few
     made = [_heard(traced, method, n) for n in range(len(few))]
     error, largest = differences(
@@ -98,7 +97,7 @@ def _point(traced: TracedBySensor, exact: list[Heard], method: Method, knob: str
     )
 
 
-def named(method: Method) -> str:
+def named(method: Synthesis) -> str:
     """A method in a few words."""
     if not isinstance(method, GriddedSynthesis):
         return "direct sum"

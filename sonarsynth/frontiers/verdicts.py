@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from math import hypot, inf, isnan
 
 from sonarsynth.frontiers.rows import STAGES, Point, Verdict
-from sonarsynth.ranging import AutoRange
 from sonarsynth.recipe.scene import Scene
 
 SLOWER = 1.5
@@ -46,7 +45,7 @@ def set_by_recipe(scene: Scene) -> set[str]:
         "trace": physics.subarrays != "auto" or physics.dynamic_range != "auto" or physics.tracing.kind != "auto",
         "synthesis": physics.synthesis.kind != "auto",
         "image": getattr(processing.beamforming, "kind", "") != "auto",
-        "range": not isinstance(processing.ranging, AutoRange),
+        "range": processing.ranging.kind != "auto",
     }
     return {stage for stage, own in found.items() if own}
 

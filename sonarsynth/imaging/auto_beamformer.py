@@ -6,6 +6,7 @@ from typing import Literal
 
 from sonarsynth.conventions import PositiveMetres
 from sonarsynth.description import description
+from sonarsynth.description.method import Demand, Method
 from sonarsynth.imaging.dense import DenseDelayAndSum
 from sonarsynth.imaging.focused import AUTO_ERROR, FocusedDelayAndSum
 from sonarsynth.imaging.image_window import Shading
@@ -14,7 +15,7 @@ from sonarsynth.receiver import Elements, Sonar
 
 
 @description
-class AutoBeamforming:
+class AutoBeamforming(Method):
     """Delay and sum: `focused` with the fewest zones that `focus_error` allows, `dense` where the array is no lattice
     or 32 do not suffice."""
 
@@ -24,7 +25,19 @@ class AutoBeamforming:
     shading: Shading = "uniform"
     """Weights over the aperture: all alike, or falling off towards the rim (lower side lobes, a wider beam)."""
 
-    def resolve(self, elements: Elements, sonar: Sonar, error_db: float) -> FocusedDelayAndSum | DenseDelayAndSum:
+    def resolve(self, demand: Demand) -> tuple[FocusedDelayAndSum | DenseDelayAndSum, float]:
+        """`focused` where that errs by no more than is allowed (dB), as measured; else `dense`."""
+        focused = FocusedDelayAndSum(focus=self.focus, shading=self.shading)
+        if demand.exact or focused.refusal(demand.elements):
+            return self.exact(), 0.0
+        method, error = focused.resolve(demand)
+        return (method, error) if error <= demand.allowed else (self.exact(), 0.0)
+
+    def exact(self) -> DenseDelayAndSum:
+        """Every sensor in every beam, with the same focus and weights."""
+        return DenseDelayAndSum(focus=self.focus, shading=self.shading)
+
+    def estimated(self, elements: Elements, sonar: Sonar, error_db: float) -> FocusedDelayAndSum | DenseDelayAndSum:
         """The method whose `focus_error`, an estimate and no bound, is not above `error_db` (dB)."""
         if elements.on_lattice:
             from sonarsynth.imaging.focus_error import zones_needed
@@ -36,4 +49,4 @@ class AutoBeamforming:
 
     def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
         """Image of the window from start to stop (s), resolved for 0.1 dB."""
-        return self.resolve(elements, sonar, AUTO_ERROR).image(signals, elements, sonar, start, stop)
+        return self.estimated(elements, sonar, AUTO_ERROR).image(signals, elements, sonar, start, stop)

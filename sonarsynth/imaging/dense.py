@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from sonarsynth.conventions import Floats, PositiveMetres, direction
 from sonarsynth.description import description
+from sonarsynth.description.method import Demand, Method
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.equations.arrays.beams import first_and_spacing
 from sonarsynth.imaging.image_window import Shading, energy_image, weights, window_spectra
@@ -19,7 +20,7 @@ BEAMS_AT_ONCE = 128
 
 
 @description
-class DenseDelayAndSum:
+class DenseDelayAndSum(Method):
     """Delay and sum for any array, with the exact spherical delay to the focus in every direction, in float64."""
 
     kind: Literal["dense"] = "dense"
@@ -27,6 +28,10 @@ class DenseDelayAndSum:
     """Range at which the array is focused; left out (none), plane waves."""
     shading: Shading = "uniform"
     """Weights over the aperture: all alike, or falling off towards the rim (lower side lobes, a wider beam)."""
+
+    def resolve(self, demand: Demand) -> tuple[DenseDelayAndSum, float]:
+        """Itself: exact."""
+        return self, 0.0
 
     def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
         """Image of the window from start to stop (s)."""

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from annotated_types import Ge, Le
 
 from sonarsynth.conventions import PositiveMetres
 from sonarsynth.description import description
+from sonarsynth.description.method import Demand, Method
+from sonarsynth.imaging.dense import DenseDelayAndSum
 from sonarsynth.imaging.image_window import Shading, energy_image, weights, window_spectra
 from sonarsynth.products import EnergyImage, Signals
 from sonarsynth.receiver import Elements, Sonar
 
+ZONES = (1, 2, 4, 8, 16, 32)
+"""Numbers of zones that a plan tries."""
 AUTO_ERROR = 0.1
 """dB, by `focus_error`, that zones are chosen for when nobody says how many."""
 
 
 @description
-class FocusedDelayAndSum:
+class FocusedDelayAndSum(Method):
     """Delay and sum on a lattice; masks, dead elements and weights are free.
 
     With one zone the delay of focusing is that on the acoustic axis, in every direction. Off the axis it is not quite
@@ -57,6 +62,32 @@ class FocusedDelayAndSum:
     zones: Annotated[int, Ge(1), Le(32)] | Literal["auto"] = "auto"
     """Zones across the upper and lower edge of the picture, each focused on its own centre; elsewhere as few as are as
     good. Auto: as many as `focus_error` puts at 0.1 dB, or 32 where none do."""
+
+    def resolve(self, demand: Demand) -> tuple[FocusedDelayAndSum | DenseDelayAndSum, float]:
+        """As many zones as the recipe says; left to the plan, the fewest that err by no more than is allowed (dB)."""
+        if demand.exact:
+            return self.exact(), 0.0
+        if self.zones != "auto":
+            return self, demand.error(self)
+        method, error = replace(self, zones=1), float("inf")
+        for zones in ZONES if self.focus is not None else (1,):
+            method = replace(self, zones=zones)
+            error = demand.error(method)
+            if error <= demand.allowed:
+                break
+        return method, error
+
+    def exact(self) -> DenseDelayAndSum:
+        """Every sensor in every beam, with the same focus and weights."""
+        return DenseDelayAndSum(focus=self.focus, shading=self.shading)
+
+    def row(self) -> str:
+        """Its kind, and the zones where there are several."""
+        return f"{self.kind}, {self.zones} zones" if self.zones not in ("auto", 1) else self.kind
+
+    def refusal(self, elements: Elements) -> str:
+        """Only lattices are separable."""
+        return "" if elements.on_lattice else "'focused' needs an array on a lattice; use 'dense' for other arrays"
 
     def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
         """Image of the window from start to stop (s). Raises ValueError for an array that is not a lattice."""

@@ -8,11 +8,11 @@ from annotated_types import Ge, Lt
 from pydantic import TypeAdapter
 
 from sonarsynth.conventions import Number
-from sonarsynth.description import BY_KIND, description
-from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
+from sonarsynth.description import description
+from sonarsynth.imaging import Beamformer, FocusedDelayAndSum
 from sonarsynth.propagation import OcclusionPoint
-from sonarsynth.ranging import IsovelocityRange, RefractedRange
-from sonarsynth.signals import DirectSum, GriddedSynthesis
+from sonarsynth.ranging import IsovelocityRange, Ranging
+from sonarsynth.signals import GriddedSynthesis, Synthesis
 
 Degree = Literal[3, 5]
 
@@ -30,9 +30,9 @@ class Choices:
     """From where facets must be seen to be heard: from the middle of the array or part, or from each hydrophone."""
     negligible: Annotated[Number, Ge(0), Lt(1)] = 1e-7
     """Share of the power of a target's echo that its faintest paths may have, and be left out."""
-    synthesis: Annotated[GriddedSynthesis | DirectSum, BY_KIND] = GriddedSynthesis()
-    beamforming: Annotated[FocusedDelayAndSum | DenseDelayAndSum, BY_KIND] = FocusedDelayAndSum()
-    ranging: Annotated[IsovelocityRange | RefractedRange, BY_KIND] = IsovelocityRange()
+    synthesis: Synthesis = GriddedSynthesis()
+    beamforming: Beamformer = FocusedDelayAndSum()
+    ranging: Ranging = IsovelocityRange()
 
     def as_json(self) -> dict[str, Any]:
         """The choices as plain JSON values."""

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
-from sonarsynth.imaging import DenseDelayAndSum
+from sonarsynth.description.method import Demand
 from sonarsynth.planning.choices import Choices, Degree
 from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.focus_zones import beamformer
@@ -24,13 +24,11 @@ from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.plans import Errors, Plan
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import OcclusionPoint
-from sonarsynth.ranging import AutoRange, IsovelocityRange, RefractedRange
 from sonarsynth.receiver import Elements
 from sonarsynth.receiver.subarrays import subarray, subarrays, with_rim
 from sonarsynth.recipe import Accuracy
 from sonarsynth.recipe.scene import Frame, Scene
-from sonarsynth.signals import AutoSynthesis, DirectSum, GriddedSynthesis
-from sonarsynth.signals.auto_synthesis import deposit_error, deposit_for
+from sonarsynth.signals.auto_synthesis import deposit_for
 
 FAINT, SYNTHESIS, EXPANSION = 0.1, 0.4, 0.5
 """Shares of the square of the error allowed to signals: of paths left out, of the synthesis, of expansions."""
@@ -57,24 +55,22 @@ def choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
         return plan
     some = _some(looks, 1 if _facets(scene) > LARGE_MESH_FACETS else MEASURED)
     bent = max((ranging_error(look.scene, look.profile, look.frames) for look in some), default=0.0)
-    synthesis, imaged = _synthesis(scene, accuracy), bool(plan.products & {"image", "cloud"})
-    choices = Choices(
-        subarrays=1,
-        negligible=_negligible(scene, accuracy),
-        synthesis=synthesis,
-        beamforming=DenseDelayAndSum(),
-        ranging=_ranging(scene, accuracy, bent),
+    synthesis, by_synthesis = scene.physics.synthesis.resolve(
+        Demand(np.sqrt(SYNTHESIS) * accuracy.cheap, accuracy.exact, lambda method: 0.0, plan.elements)
     )
+    ranging, by_rays = scene.processing.ranging.resolve(
+        Demand(accuracy.range_m, accuracy.exact, lambda method: bent, plan.elements)
+    )
+    choices = Choices(subarrays=1, negligible=_negligible(scene, accuracy), synthesis=synthesis, ranging=ranging)
     made = replace(plan, choices=choices)
     indices = [look.frames[0].index for look in some]
     cut = _subarrays(made, indices)
+    imaged = bool(plan.products & {"image", "cloud"})
     steering, blurred = beamformer(made, indices) if imaged else (choices.beamforming, 0.0)
-    straight = isinstance(choices.ranging, IsovelocityRange)
-    by_synthesis = deposit_error(synthesis) if isinstance(synthesis, GriddedSynthesis) else 0.0
     return replace(
         made,
         choices=replace(choices, subarrays=cut.parts, degree=cut.degree, occlusion=cut.occlusion, beamforming=steering),
-        errors=Errors(cut.error, cut.whole, by_synthesis, bent if straight else 0.0, blurred),
+        errors=Errors(cut.error, cut.whole, by_synthesis, by_rays, blurred),
     )
 
 
@@ -97,20 +93,6 @@ def _negligible(scene: Scene, accuracy: Accuracy) -> float:
     if scene.physics.dynamic_range != "auto":
         return float(10.0 ** (-scene.physics.dynamic_range / 10.0))
     return 0.0 if accuracy.exact else FAINT * accuracy.cheap**2
-
-
-def _synthesis(scene: Scene, accuracy: Accuracy) -> GriddedSynthesis | DirectSum:
-    method = scene.physics.synthesis
-    if not isinstance(method, AutoSynthesis):
-        return method
-    return DirectSum() if accuracy.exact else method.resolve(np.sqrt(SYNTHESIS) * accuracy.cheap)
-
-
-def _ranging(scene: Scene, accuracy: Accuracy, bent: float) -> IsovelocityRange | RefractedRange:
-    method = scene.processing.ranging
-    if not isinstance(method, AutoRange):
-        return method
-    return method.resolve(straight=bent == 0.0 if accuracy.exact else bent <= accuracy.range_m)
 
 
 class _ArrayModel(NamedTuple):

@@ -12,12 +12,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.planning.plan_tables import Stage
 from sonarsynth.planning.plans import Plan
 from sonarsynth.propagation import Straight
 from sonarsynth.scattering import Kirchhoff
-from sonarsynth.signals import DirectSum
 
 REFERENCE_TRANSFORM = 1.42e-3
 """Seconds of the transforms in `machine_factor` on the machine where the constants below were measured."""
@@ -61,6 +59,8 @@ def machine_factor() -> float:
         best = min(best, time.thread_time() - began)
     return float(best / REFERENCE_TRANSFORM)
 
+
+UNSTATED = "not stated by the method"
 
 QUINTIC_COST = 1.6
 """Times what cubics over the array take, polynomials of the fifth degree take to trace."""
@@ -113,17 +113,10 @@ def _synthesis(plan: Plan) -> Row:
     if scene.world.environment.noise:
         work += sensor_samples * SECONDS["noise sensor sample"]
     stored = sensor_samples * (2 if scene.sonar.converter else 4) if "signals" in plan.products else 0
-    error = f"{plan.errors.synthesis:.1g} of the peak" if plan.errors.synthesis > 0.0 else "rounding"
+    error = f"{plan.errors.synthesis:.1g} of the peak" if plan.errors.synthesis else "rounding"
+    error = UNSTATED if np.isnan(plan.errors.synthesis) else error
     why = "requested" if "signals" in plan.products else f"needed by the {' and the '.join(sorted(plan.products))}"
-    return ("synthesise", _synthesised(plan), why, error, work, stored)
-
-
-def _synthesised(plan: Plan) -> str:
-    """The method of synthesis in words."""
-    method = plan.choices.synthesis
-    if isinstance(method, DirectSum):
-        return method.kind
-    return f"{method.kind}, width {method.width}, tolerance {method.tolerance:.1g}, {method.precision}"
+    return ("synthesise", plan.choices.synthesis.row(), why, error, work, stored)
 
 
 def _traced(plan: Plan) -> str:
@@ -141,17 +134,11 @@ def _traced(plan: Plan) -> str:
     return ", ".join(word for word in words if word)
 
 
-def _beams(plan: Plan) -> str:
-    """The beamformer in words."""
-    method, without = plan.choices.beamforming, ", direct pulse removed" if plan.windows.direct_removed else ""
-    if isinstance(method, FocusedDelayAndSum) and method.zones != "auto" and method.zones > 1:
-        return f"{method.kind}, {method.zones} zones{without}"
-    return method.kind + without
-
-
 def _steered(plan: Plan) -> str:
     """What the beamformer errs by, in words."""
-    if isinstance(plan.choices.beamforming, DenseDelayAndSum):
+    if np.isnan(plan.errors.image):
+        return UNSTATED
+    if plan.errors.image == 0.0:
         return "rounding"
     return f"{plan.errors.image:.1g} dB rms of beams within 20 dB of the brightest, measured"
 
@@ -214,10 +201,11 @@ def _sonar_rows(plan: Plan) -> list[Row]:
         image = 2 * image + sizes["sensor"] * SECONDS["remove sensor"]
     asked = "image" in plan.products
     why = "requested" if asked else "needed by the cloud"
-    rows.append(("beamform", _beams(plan), why, _steered(plan), image, 4 * beams * asked))
+    without = ", direct pulse removed" if plan.windows.direct_removed else ""
+    rows.append(("beamform", plan.choices.beamforming.row() + without, why, _steered(plan), image, 4 * beams * asked))
     if "cloud" in plan.products:
         error, seconds = "predicted, /cloud/range_error" + _bent(plan), RANGED_BEAMS * SECONDS["range beam"]
-        rows.append(("range", plan.choices.ranging.kind, "requested", error, seconds, 46 * beams))
+        rows.append(("range", plan.choices.ranging.row(), "requested", error, seconds, 54 * sizes["point"]))
     return rows
 
 

@@ -8,6 +8,7 @@ from annotated_types import Ge, Gt
 
 from sonarsynth.conventions import Decibels, PositiveMetres
 from sonarsynth.description import description
+from sonarsynth.description.method import Demand, Method
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose
 from sonarsynth.products import EnergyImage, PointCloud, Signals, SourceEstimates
@@ -17,7 +18,7 @@ from sonarsynth.receiver import Elements, Sonar
 
 
 @description
-class AutoRange:
+class AutoRange(Method):
     """`IsovelocityRange` where it errs by less than the accuracy of the recipe allows, else `RefractedRange`."""
 
     kind: Literal["auto"] = "auto"
@@ -28,10 +29,17 @@ class AutoRange:
     focus: PositiveMetres | None = 20.0
     """Distance at which the ranged beams are focused; none: plane waves."""
 
-    def resolve(self, *, straight: bool) -> IsovelocityRange | RefractedRange:
-        """The method: whether straight paths at the assumed sound speed will do."""
-        method = IsovelocityRange if straight else RefractedRange
-        return method(threshold=self.threshold, locality=self.locality, focus=self.focus)
+    def resolve(self, demand: Demand) -> tuple[IsovelocityRange | RefractedRange, float]:
+        """The closed form where bent rays make its ranges wrong by no more than is allowed (m)."""
+        method, error = self._straight().resolve(demand)
+        return (method, error) if error <= (0.0 if demand.exact else demand.allowed) else (self.exact(), 0.0)
+
+    def exact(self) -> RefractedRange:
+        """Along rays."""
+        return self._straight().exact()
+
+    def _straight(self) -> IsovelocityRange:
+        return IsovelocityRange(threshold=self.threshold, locality=self.locality, focus=self.focus)
 
     def cloud(
         self,
@@ -46,5 +54,5 @@ class AutoRange:
     ) -> PointCloud:
         """See `RangingMethod`. With no plan: the closed form where the sound speed is the assumed one everywhere."""
         straight = profile.uniform and profile.speed[0] == sonar.assumed_sound_speed
-        method = self.resolve(straight=straight)
+        method = self._straight() if straight else self.exact()
         return method.cloud(signals, image, estimates, elements, sonar, sonar_pose, profile, direct)

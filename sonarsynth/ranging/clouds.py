@@ -10,7 +10,7 @@ import numpy as np
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.bistatic_range import bistatic_range
 from sonarsynth.products import EnergyImage, PointCloud, Signals, SourceEstimates, no_points
-from sonarsynth.ranging.beam_echoes import over_threshold, pick, range_profiles
+from sonarsynth.ranging.beam_echoes import Echoes, Profiles, over_threshold, pick, range_profiles
 from sonarsynth.receiver import Elements, Sonar
 
 SLOPE = 0.7
@@ -30,6 +30,8 @@ class Solution:
 
 Solve = Callable[[Floats, Floats, Floats], Solution]
 """Of delays (beam,) after the direct arrival, beams (beam, xyz) and the source position (xyz)."""
+Pick = Callable[[Profiles, EnergyImage, float], Echoes]
+"""The echo of each profile, of those of an image; the number is how local it must be (dB)."""
 
 
 def isovelocity_solution(delay: Floats, beam: Floats, source: Floats, sound_speed: float) -> Solution:
@@ -51,15 +53,16 @@ def point_cloud(
     focus: float | None,
     solve: Solve,
     direct: Signals | None = None,
+    picking: Pick = pick,
 ) -> PointCloud:
     """Echoes of the beams over threshold, placed by `solve`; `direct`: signals with the direct pulse in them, where
-    it was taken out of `signals`."""
+    it was taken out of `signals`; `picking`: which echo of a beam's profile is taken."""
     beams, left_out = over_threshold(image, threshold, float(np.abs(signals.pressure).max(initial=0.0)))
     located = len(estimates.time) > 0 and np.isfinite(estimates.time[0]) and np.isfinite(estimates.position[0]).all()
     if not (located and len(beams[0])):
         return no_points()
     profiles = range_profiles(signals, image, estimates, elements, sonar, beams, focus, direct or signals)
-    echoes = pick(profiles, image, locality)
+    echoes = picking(profiles, image, locality)
     own = np.isfinite(echoes.delay)
     solution = solve(echoes.delay[own], profiles.direction[own], estimates.position[0])
     clock = np.hypot(echoes.delay_error, echoes.extent)[own]

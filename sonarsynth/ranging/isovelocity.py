@@ -8,14 +8,16 @@ from annotated_types import Ge, Gt
 
 from sonarsynth.conventions import Decibels, PositiveMetres
 from sonarsynth.description import description
+from sonarsynth.description.method import Demand, Method
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose
 from sonarsynth.products import EnergyImage, PointCloud, Signals, SourceEstimates
+from sonarsynth.ranging.refracted_ranging import RefractedRange
 from sonarsynth.receiver import Elements, Sonar
 
 
 @description
-class IsovelocityRange:
+class IsovelocityRange(Method):
     """Range by the closed form for straight paths at the assumed sound speed, from the delay after the direct arrival.
 
     For the beams over threshold the peak of the beam's signal is the echo, as in the thesis, after the snap's own
@@ -41,6 +43,14 @@ class IsovelocityRange:
     focus: PositiveMetres | None = 20.0
     """Distance at which the ranged beams are focused; none: plane waves. On a lattice that is the focus of
     `FocusedDelayAndSum`, the acoustic axis's in every direction (its table says what that costs); elsewhere exact."""
+
+    def resolve(self, demand: Demand) -> tuple[IsovelocityRange, float]:
+        """Itself, and by how much (m) bent rays make its ranges wrong."""
+        return self, demand.error(self)
+
+    def exact(self) -> RefractedRange:
+        """Along rays."""
+        return RefractedRange(threshold=self.threshold, locality=self.locality, focus=self.focus)
 
     def cloud(
         self,

@@ -8,6 +8,7 @@ from annotated_types import Ge, Gt
 
 from sonarsynth.conventions import Decibels, PositiveMetres
 from sonarsynth.description import description
+from sonarsynth.description.method import Demand, Method
 from sonarsynth.environment.sea import Profile, SoundSpeed
 from sonarsynth.geometry import Pose
 from sonarsynth.products import EnergyImage, PointCloud, Signals, SourceEstimates
@@ -15,7 +16,7 @@ from sonarsynth.receiver import Elements, Sonar
 
 
 @description
-class RefractedRange:
+class RefractedRange(Method):
     """Range by travel times through a sound-speed profile, along the beam's ray and the eigenray to the snap."""
 
     kind: Literal["refracted"] = "refracted"
@@ -28,6 +29,10 @@ class RefractedRange:
     `FocusedDelayAndSum`, the acoustic axis's in every direction (its table says what that costs); elsewhere exact."""
     profile: SoundSpeed | None = None
     """Sound speed that the sonar believes in; left out: that of the water."""
+
+    def resolve(self, demand: Demand) -> tuple[RefractedRange, float]:
+        """Itself: as exact as its profile."""
+        return self, 0.0
 
     def cloud(
         self,

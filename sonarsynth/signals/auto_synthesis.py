@@ -9,36 +9,19 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.description import description
+from sonarsynth.description.method import Demand, Method
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.receiver import Elements, Sonar
-from sonarsynth.signals.gridded_synthesis import GriddedSynthesis
+from sonarsynth.signals.direct_sum import DirectSum
+from sonarsynth.signals.gridded_synthesis import ROUNDING, SPENT, GriddedSynthesis, kernel_error
 from sonarsynth.state import Snap
 
 DEFAULT_ERROR = 3e-4
 """Error of the synthesis where no plan says what is allowed."""
 PRECISIONS: Final[tuple[Literal["float32", "float64"], ...]] = ("float32", "float64")
-ROUNDING: Final[dict[str, float]] = {"float32": 3e-6, "float64": 1e-9}
-"""What the precision of the grid and its table of the kernel leave."""
-SPENT = 0.4
-"""Error of the signals over the tolerance of each other approximation of `GriddedSynthesis`, at most (its table)."""
 LEFT = 0.3
 """Share of the error allowed that kernel and precision must leave to the other approximations."""
 LEAST_TOLERANCE, MOST_TOLERANCE = 1e-10, 1e-2
-
-
-def kernel_error(width: int, oversampling: float) -> float:
-    """Error of spreading a path over so many samples: 2 exp(-pi width sqrt(1 - 1/oversampling)).
-
-    Source: Barnett, Magland and af Klinteberg (2019), SIAM J. Sci. Comput. 41, C479, eq. 1.8 (their kernel; ours has
-    the same decay).
-    """
-    return float(2.0 * np.exp(-np.pi * width * np.sqrt(1.0 - 1.0 / oversampling)))
-
-
-def deposit_error(method: GriddedSynthesis) -> float:
-    """Error of echoes relative to their peak, a bound on what was measured (the tables of `GriddedSynthesis`)."""
-    kernel = kernel_error(method.width, method.oversampling)
-    return kernel + SPENT * method.tolerance + ROUNDING[method.precision]
 
 
 def deposit_for(error: float) -> GriddedSynthesis:
@@ -56,14 +39,14 @@ def deposit_for(error: float) -> GriddedSynthesis:
 
 
 @description
-class AutoSynthesis:
+class AutoSynthesis(Method):
     """`GriddedSynthesis`, as exact as the accuracy of the recipe asks for."""
 
     kind: Literal["auto"] = "auto"
 
-    def resolve(self, error: float = DEFAULT_ERROR) -> GriddedSynthesis:
-        """The method whose echoes err by no more, relative to their peak."""
-        return deposit_for(error)
+    def resolve(self, demand: Demand) -> tuple[GriddedSynthesis | DirectSum, float]:
+        """The cheapest method whose echoes err by no more than is allowed, relative to their peak."""
+        return DirectSum().resolve(demand) if demand.exact else deposit_for(demand.allowed).resolve(demand)
 
     def signals(
         self,
@@ -76,4 +59,4 @@ class AutoSynthesis:
         samples: int,
     ) -> Signals:
         """Pressure at each hydrophone, to `DEFAULT_ERROR`; arguments and errors as in `SignalSynthesis`."""
-        return self.resolve().signals(arrivals, snaps, elements, sonar, absorption, start, samples)
+        return deposit_for(DEFAULT_ERROR).signals(arrivals, snaps, elements, sonar, absorption, start, samples)

@@ -9,6 +9,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.description import description
+from sonarsynth.description.method import Demand, Method
 from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.products import Arrivals, Signals
@@ -71,11 +72,15 @@ def through(before: np.ndarray, at: np.ndarray, after: np.ndarray, x: Floats) ->
 
 
 @description
-class DirectSum:
+class DirectSum(Method):
     """Sum of every path at every hydrophone and frequency, in float64, with exact delay, amplitude, directivity,
     phase, blur, Doppler and mean over its facet."""
 
     kind: Literal["direct_sum"] = "direct_sum"
+
+    def resolve(self, demand: Demand) -> tuple[DirectSum, float]:
+        """Itself: exact but for rounding."""
+        return self, 0.0
 
     def signals(
         self,
@@ -89,6 +94,20 @@ class DirectSum:
     ) -> Signals:
         """Pressure at each hydrophone; the period of the transform is the window and a pulse at either end."""
         return exact_signals(arrivals, snaps, elements, sonar, absorption, start, samples)[1]
+
+    def pressure(
+        self,
+        arrivals: Arrivals,
+        snaps: tuple[Snap, ...],
+        elements: Elements,
+        sonar: Sonar,
+        absorption: Callable[[Floats], Floats] | None,
+        start: float,
+        samples: int,
+    ) -> tuple[np.ndarray, int]:
+        """Pressure (sensor, sample) in float64, and the number of arrivals that the window cuts."""
+        pressure, made = exact_signals(arrivals, snaps, elements, sonar, absorption, start, samples)
+        return pressure, made.outside
 
 
 def exact_signals(

@@ -4,7 +4,7 @@ domain."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,7 @@ from annotated_types import Ge, Gt, Le, Lt, MultipleOf
 
 from sonarsynth.conventions import Floats, Number
 from sonarsynth.description import description
+from sonarsynth.description.method import Demand, Method
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.receiver import Elements, Sonar, stop_frequency
 from sonarsynth.signals.array_paths import array_paths
@@ -21,9 +22,29 @@ from sonarsynth.signals.gridded.deposit import add_segment
 from sonarsynth.signals.segments import Segment, layout
 from sonarsynth.state import Snap
 
+ROUNDING: Final[dict[str, float]] = {"float32": 3e-6, "float64": 1e-9}
+"""What the precision of the grid and its table of the kernel leave."""
+SPENT = 0.4
+"""Error of the signals over the tolerance of each other approximation of `GriddedSynthesis`, at most (its table)."""
+
+
+def kernel_error(width: int, oversampling: float) -> float:
+    """Error of spreading a path over so many samples: 2 exp(-pi width sqrt(1 - 1/oversampling)).
+
+    Source: Barnett, Magland and af Klinteberg (2019), SIAM J. Sci. Comput. 41, C479, eq. 1.8 (their kernel; ours has
+    the same decay).
+    """
+    return float(2.0 * np.exp(-np.pi * width * np.sqrt(1.0 - 1.0 / oversampling)))
+
+
+def deposit_error(method: GriddedSynthesis) -> float:
+    """Error of echoes relative to their peak, a bound on what was measured (the tables of `GriddedSynthesis`)."""
+    kernel = kernel_error(method.width, method.oversampling)
+    return kernel + SPENT * method.tolerance + ROUNDING[method.precision]
+
 
 @description
-class GriddedSynthesis:
+class GriddedSynthesis(Method):
     """Synthesis by a Kaiser-Bessel kernel, Chebyshev nodes over the aperture and polynomial directivity.
 
     Measured: 508 hydrophones with faces, 2000 echoes of a body of 1.6 m and the direct snap, absorption; largest error
@@ -69,6 +90,14 @@ class GriddedSynthesis:
     tolerance: Annotated[Number, Gt(0), Lt(0.1)] = 1.5e-4
     """Error allowed to each of the other approximations, relative to what a path gives: nodes along each axis of the
     aperture, terms of directivity and of absorption; the quiet ends of the spectrum get 3 % of it each."""
+
+    def resolve(self, demand: Demand) -> tuple[GriddedSynthesis, float]:
+        """Itself, and the bound on what it errs by, relative to the peak of an echo."""
+        return self, deposit_error(self)
+
+    def row(self) -> str:
+        """Its kind and what it is set to."""
+        return f"{self.kind}, width {self.width}, tolerance {self.tolerance:.1g}, {self.precision}"
 
     def signals(
         self,

@@ -164,14 +164,14 @@ def test_auto_is_right_to_a_tenth_of_a_decibel_where_one_zone_is_not():
 
 def test_auto_is_dense_where_zones_will_not_do_and_focused_elsewhere():
     sonar, parts = Sonar(array=RECTANGLE, beams=grid(50, 31)), elements(RECTANGLE)
-    assert AutoBeamforming(focus=None).resolve(parts, sonar, 0.1) == FocusedDelayAndSum(focus=None, zones=1)
-    near = AutoBeamforming(focus=5.0, shading="hann").resolve(parts, sonar, 0.5)
+    assert AutoBeamforming(focus=None).estimated(parts, sonar, 0.1) == FocusedDelayAndSum(focus=None, zones=1)
+    near = AutoBeamforming(focus=5.0, shading="hann").estimated(parts, sonar, 0.5)
     assert isinstance(near, FocusedDelayAndSum)
     assert (near.shading, near.focus) == ("hann", 5.0)
     assert near.zones != "auto" and near.zones > 1
-    assert AutoBeamforming(focus=5.0).resolve(parts, sonar, 1e-9) == DenseDelayAndSum(focus=5.0)
+    assert AutoBeamforming(focus=5.0).estimated(parts, sonar, 1e-9) == DenseDelayAndSum(focus=5.0)
     table = elements(PositionTable(positions=((0.0, 0.0, 0.0), (0.0, 0.1, 0.03))))
-    assert AutoBeamforming().resolve(table, sonar, 0.1) == DenseDelayAndSum()
+    assert AutoBeamforming().estimated(table, sonar, 0.1) == DenseDelayAndSum()
 
 
 @pytest.mark.parametrize("zones", [0, 33, "some"])

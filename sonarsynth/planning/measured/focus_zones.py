@@ -1,17 +1,16 @@
-"""How many zones the focus of an image needs, as measured in a few frames against exact delays."""
+"""What a beamformer errs by, as measured in a few frames against exact delays."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from sonarsynth.conventions import direction
+from sonarsynth.description.method import Demand
 from sonarsynth.equations.arrays.apertures import focus_delay
-from sonarsynth.imaging import AutoBeamforming, DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.imaging.dense import dense_energies
-from sonarsynth.imaging.focus_error import MOST_ZONES
 from sonarsynth.imaging.image_window import weights, window_spectra
 from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.sampled_arrivals import arrivals_of
@@ -20,7 +19,6 @@ from sonarsynth.products import Signals
 from sonarsynth.signals.auto_synthesis import DEFAULT_ERROR, deposit_for
 from sonarsynth.signals.filtered_pulse import snap_levels
 
-ZONES = (1, 2, 4, 8, 16, MOST_ZONES)
 WITHIN = 20.0
 """dB below the brightest beam: down to there beams are compared."""
 COMPARED = 1000
@@ -29,27 +27,23 @@ SAFETY = 1.25
 """What was measured in some frames may be so much more in others."""
 
 
-def beamformer(plan: Plan, indices: Sequence[int]) -> tuple[FocusedDelayAndSum | DenseDelayAndSum, float]:
+def beamformer(plan: Plan, indices: Sequence[int]) -> tuple[Any, float]:
     """The beamformer of a plan, and its error: root mean square in dB, over beams within 20 dB of the brightest."""
-    method, accuracy = plan.scene.processing.beamforming, plan.recipe.accuracy
-    dense = DenseDelayAndSum(focus=method.focus, shading=method.shading)
-    if isinstance(method, DenseDelayAndSum) or accuracy.exact or not plan.elements.on_lattice:
-        return dense, 0.0
-    focused = FocusedDelayAndSum(focus=method.focus, shading=method.shading, zones=1)
-    heard = [found for found in (_heard(plan, index) for index in indices) if found is not None]
-    if isinstance(method, FocusedDelayAndSum) and method.zones != "auto":
-        return method, max((image_error(plan, method, *one) for one in heard), default=0.0)
-    error = np.inf
-    for zones in ZONES if method.focus is not None else (1,):
-        focused = replace(focused, zones=zones)
-        error = max((image_error(plan, focused, *one) for one in heard), default=0.0)
-        if error <= accuracy.image_db / SAFETY:
-            return focused, error
-    return (dense, 0.0) if isinstance(method, AutoBeamforming) else (focused, error)
+    accuracy, heard = plan.recipe.accuracy, list[tuple[Signals, float, float]]()
+
+    def error(method: Any) -> float:
+        if not heard:
+            heard.extend(found for found in (_heard(plan, index) for index in indices) if found is not None)
+        return max((image_error(plan, method, *one) for one in heard), default=0.0)
+
+    demand = Demand(accuracy.image_db / SAFETY, accuracy.exact, error, plan.elements)
+    return plan.scene.processing.beamforming.resolve(demand)
 
 
-def image_error(plan: Plan, method: FocusedDelayAndSum, signals: Signals, start: float, stop: float) -> float:
-    """Root mean square error (dB) of an image of signals from start to stop (s), over its bright beams."""
+def image_error(plan: Plan, method: Any, signals: Signals, start: float, stop: float) -> float:
+    """Root mean square error (dB) of an image of signals from start to stop (s), over its bright beams, against the
+    exact delay and sum of its focus and weights."""
+    slow = method.exact()
     elements, sonar = plan.elements, plan.scene.sonar
     energy = method.image(signals, elements, sonar, start, stop).energy.astype(float)
     if not energy.any():
@@ -59,8 +53,8 @@ def image_error(plan: Plan, method: FocusedDelayAndSum, signals: Signals, start:
     row, column = row[::every], column[::every]
     frequencies, spectra, unit = window_spectra(signals, sonar, start, stop)
     beams = direction(sonar.beams.azimuth[column], sonar.beams.elevation[row])
-    delay = focus_delay(elements.position, beams, method.focus, sonar.assumed_sound_speed)
-    exact = unit * dense_energies(spectra, delay, weights(elements, method.shading), frequencies)
+    delay = focus_delay(elements.position, beams, slow.focus, sonar.assumed_sound_speed)
+    exact = unit * dense_energies(spectra, delay, weights(elements, slow.shading), frequencies)
     wrong = 10.0 * np.log10(energy[row, column] / exact)
     return float(np.sqrt(np.mean(wrong**2)))
 

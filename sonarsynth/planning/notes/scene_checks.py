@@ -17,7 +17,6 @@ from sonarsynth.equations.rays.ray_solutions import TOLERANCE
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.motion import pose
 from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.receiver import Sonar, elements
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals.array_paths import MAX_DOPPLER
@@ -194,12 +193,9 @@ def _check_snaps(scene: Scene, frame: Frame) -> None:
 
 def check_methods(scene: Scene, products: frozenset[str]) -> None:
     """The beamformer must be able to use the array."""
-    fast = isinstance(scene.processing.beamforming, FocusedDelayAndSum)
-    if fast and products & {"image", "cloud"} and not elements(scene.sonar.array).on_lattice:
-        raise FieldError(
-            ("scene", "processing", "beamforming", "kind"),
-            "'focused' needs an array on a lattice; use 'dense' for a table of positions",
-        )
+    line = scene.processing.beamforming.refusal(elements(scene.sonar.array))
+    if line and products & {"image", "cloud"}:
+        raise FieldError(("scene", "processing", "beamforming", "kind"), line)
 
 
 def _box_in_water(body: PlacedTarget, bottom_depth: float) -> bool:

@@ -1,0 +1,42 @@
+"""What the planner asks of a method beside its mathematics: a new method may leave all of it as it is here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+UNSTATED = float("nan")
+"""The error of a method that says none."""
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What a plan asks of the methods of a family."""
+
+    allowed: float  # error that the method may have, in the unit of its family
+    exact: bool  # the recipe asks for no error at all
+    error: Callable[[Any], float]  # what a method errs by against the exact one of the family, measured in some frames
+    elements: Any = None  # of the array
+
+
+class Method:
+    """How a method answers the planner. One that stands for several (`auto`) makes itself concrete in `resolve`."""
+
+    kind: str
+
+    def resolve(self, demand: Demand) -> tuple[Any, float]:
+        """The method that runs, and what it errs by in the unit of its family; NaN where it does not say."""
+        return self, UNSTATED
+
+    def exact(self) -> Any:
+        """The exact, slow method that this one is to be judged by; itself where there is none."""
+        return self
+
+    def row(self) -> str:
+        """The method in a few words, as `plan` prints it."""
+        return self.kind
+
+    def refusal(self, elements: Any) -> str:
+        """Why it cannot serve an array, in one line; empty where it can."""
+        return ""

@@ -1,0 +1,142 @@
+"""A method is added with one file and one name, as the page on extending says: it runs, and plan and store say so.
+
+The files are those of the page. They are laid into a copy of the package whose other files are links to ours, so that
+compiled kernels are shared; a frame is built by that copy in a process of its own.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = ROOT / "sonarsynth"
+PAGE = (ROOT / "tools" / "docs" / "extending.md").read_text()
+FILES = dict(re.findall(r"^```python file=(\S+)\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE))
+UNIONS = {"imaging": "Beamformer", "ranging": "Ranging", "signals": "Synthesis"}
+KINDS = {
+    "scene.processing.beamforming": "capon",
+    "scene.processing.ranging": "first_echo",
+    "scene.physics.synthesis": "whole_samples",
+}
+SCRIPT = """
+import json, sys
+import numpy as np
+import sonarsynth as ss
+from sonarsynth import schedule
+
+assert ss.__file__.startswith(sys.argv[1]), ss.__file__
+base = [f"scene.sonar.beams.{axis}=31" for axis in ("azimuths", "elevations")]
+base += ["scene.sonar.array={kind: planar_lattice, columns: 8, rows: 6, pitch: 3 cm}", "scene.trajectory.frames=1"]
+said = {}
+for which in json.loads(sys.argv[2]):
+    sets = [f"{path}={{kind: {kind}}}" for path, kind in which.items()]
+    plan = ss.plan(ss.load(sys.argv[3], base + sets))
+    name = " ".join(which.values()) or "usual"
+    assert schedule.build(plan, f"{name}.zarr", workers=0).ok
+    tree = ss.open(f"{name}.zarr")
+    cloud = tree["cloud"].dataset.isel(frame=0)
+    count = int(cloud["count"])
+    said[name] = {
+        "rows": {row.stage: [row.method, row.error] for row in plan.stages},
+        "choices": {name: tree.attrs["choices"][name] for name in ("beamforming", "ranging", "synthesis")},
+        "energy": np.asarray(tree["image/energy"][0]).tolist(),
+        "delay": cloud["delay"].values[:count].tolist(),
+        "range": cloud["range"].values[:count].tolist(),
+        "pressure": np.asarray(tree["signals/pressure"][0, 0]).tolist(),
+    }
+print(json.dumps(said))
+"""
+
+
+def extended(folder: Path) -> Path:
+    """A copy of the package with the files of the page, and their names in the unions."""
+    copy = folder / "sonarsynth"
+    copy.mkdir()
+    families = {name.partition("/")[0] for name in FILES}
+    for entry in PACKAGE.iterdir():
+        if entry.name not in families:
+            (copy / entry.name).symlink_to(entry)
+    for family in families:
+        (copy / family).mkdir()
+        for entry in (PACKAGE / family).iterdir():
+            if entry.name not in ("__init__.py", "__pycache__"):
+                (copy / family / entry.name).symlink_to(entry)
+    for name, text in FILES.items():
+        family, _, file = name.partition("/")
+        (copy / name).write_text(text)
+        (described,) = re.findall(r"^@description\nclass (\w+)", text, re.MULTILINE)
+        registry = (PACKAGE / family / "__init__.py").read_text()
+        union = re.search(rf"^{UNIONS[family]} = Annotated\[(.+), BY_KIND\]$", registry, re.MULTILINE)
+        assert union is not None, "the union is one line"
+        line = union[0].replace(union[1], f"{union[1]} | {described}")
+        module = f"from sonarsynth.{family}.{file.removesuffix('.py')} import {described}\n"
+        (copy / family / "__init__.py").write_text(registry.replace(union[0], f"{module}{line}"))
+    return copy
+
+
+@pytest.fixture(scope="module")
+def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What plan, store and data say of a frame by the usual methods, by each new one, and by all three."""
+    folder = tmp_path_factory.mktemp("extended")
+    extended(folder)
+    which = [{}, *({path: kind} for path, kind in KINDS.items()), KINDS]
+    recipe = str(ROOT / "configs" / "tank.yaml")
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", SCRIPT, str(folder), json.dumps(which), recipe],
+        env=os.environ | {"PYTHONPATH": str(folder)}, cwd=folder, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-3000:]
+    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+def test_the_page_has_a_file_for_each_family_whose_methods_answer_the_planner() -> None:
+    assert {name.partition("/")[0] for name in FILES} == set(UNIONS)
+
+
+@pytest.mark.parametrize(
+    ("kind", "stage", "choice"),
+    [
+        ("capon", "beamform", "beamforming"),
+        ("first_echo", "range", "ranging"),
+        ("whole_samples", "synthesise", "synthesis"),
+    ],
+)
+def test_it_runs_and_plan_and_store_say_so(said: dict[str, Any], kind: str, stage: str, choice: str) -> None:
+    alone, usual, together = said[kind], said["usual"], said[" ".join(KINDS.values())]
+    for one in (alone, together):
+        assert one["rows"][stage][0].startswith(kind)
+        assert one["choices"][choice]["kind"] == kind
+    assert not usual["rows"][stage][0].startswith(kind)
+    stated = alone["rows"][stage][1]
+    assert "not stated" in stated if kind == "capon" else stated
+
+
+def test_the_data_are_those_of_the_method(said: dict[str, Any]) -> None:
+    usual, capon, first, whole = (said[name] for name in ("usual", *KINDS.values()))
+    plain, least = (np.array(one["energy"]) for one in (usual, capon))
+    assert (least <= 1.1 * plain + 0.02 * plain.max()).all(), "no beam passes less than Capon's, by Cauchy and Schwarz"
+    assert np.median(least / plain) < 0.7
+    assert (
+        np.abs(np.subtract(*(np.unravel_index(e.argmax(), e.shape) for e in (plain, least)))).max() <= 3
+    )  # in a beam width
+    assert first["energy"] == usual["energy"] and first["pressure"] == usual["pressure"]
+    assert len(first["delay"]) > 0 and max(first["delay"]) <= max(usual["delay"])
+    early = {round(a, 9) for a in first["delay"]} - {round(a, 9) for a in usual["delay"]}
+    assert early, "some points are earlier"
+    wrong = [abs(a - b) for a, b in zip(whole["pressure"], usual["pressure"], strict=True)]
+    assert 0.0 < max(wrong) < max(map(abs, usual["pressure"]))
+
+
+def test_the_points_of_a_new_image_are_ranged(said: dict[str, Any]) -> None:
+    for name in ("capon", " ".join(KINDS.values())):
+        assert said[name]["range"] and all(0.3 < r < 3.0 for r in said[name]["range"])
