@@ -115,7 +115,7 @@ def test_what_cannot_be_is_refused(start: float, end: float, distance: float, me
 
 
 @pytest.mark.parametrize(
-    ("depth", "speed", "bottom"),
+    ("depth", "speed", "bottom_depth"),
     [
         ([0.0, 1.0], [1500.0], 9.0),
         ([1.0, 0.0], [1.0, 1.0], 9.0),

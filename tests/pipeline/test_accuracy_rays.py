@@ -48,7 +48,9 @@ def test_the_search_is_within_every_bound(rows: list[Row]) -> None:
     assert all(row.counts["rays"] > 0 and row.cost > 0 and row.cost_unit == "us a ray" for row in rows)
 
 
-@pytest.mark.parametrize(("slope", "bottom", "farthest"), [(0.0163, 4e3, 6e4), (-4.3, 20.0, 300.0), (1e-6, 100.0, 1e4)])
+@pytest.mark.parametrize(
+    ("slope", "bottom_depth", "farthest"), [(0.0163, 4e3, 6e4), (-4.3, 20.0, 300.0), (1e-6, 100.0, 1e4)]
+)
 def test_circles_digits_and_fan_agree(slope: float, bottom_depth: float, farthest: float) -> None:
     start, end, distance = ends(bottom_depth, farthest)
     circles = gradient_rays(Gradient(1500.0, slope, bottom_depth), start, end, distance, 5)

@@ -116,7 +116,7 @@ def test_the_thesis_scene_is_imaged_ranged_and_located(built: Callable[[str], Pa
     with xr.open_datatree(built("remus.yaml"), engine="zarr") as tree:
         found = evaluation.points(tree, range(0, 64, 9))
         beam = evaluation.beam_width(tree) * found.true_range[found.judged]
-        distance = tree["cloud/distance"].values[found.frame, *found.beam.T][found.judged]
+        distance = tree["cloud/distance"].values[found.frame, found.row][found.judged]
     assert found.judged.mean() > 0.9 and (found.target == 0).all()  # nothing else is in the water
     assert (distance < beam).all() and np.median(distance) < 0.3 * beam.mean()
 

@@ -59,7 +59,7 @@ def test_a_flipped_bit_is_found_wherever_it_is(copy: Path) -> None:
     files = sorted(f for f in copy.rglob("*") if f.is_file())
     chosen = [
         f
-        for name in ("zarr.json", "signals/pressure/c.1.0.0", "time/c.0", "truth/azimuth/c.0", ".marks/0.json")
+        for name in ("zarr.json", "signals/pressure/c.1.0.0", "time/c.0", "truth/beams/azimuth/c.0", ".marks/0.json")
         if (f := copy / name).exists()
     ]
     chosen += [files[i] for i in random.choice(len(files), 10, replace=False)]
@@ -124,8 +124,8 @@ def test_values_that_are_not_finite_are_found(
     store.create(path, small_plan)
     values = {frame: made_up(small_plan, frame) for frame in range(8)}
     values[3]["/signals", "pressure"][2, 5] = np.nan
-    values[4]["/cloud", "x"][2, 5] = np.nan
-    values[5]["/cloud", "x"][2, 5] = np.inf
+    values[4]["/cloud", "x"][25] = np.nan
+    values[5]["/cloud", "x"][25] = np.inf
     store.write_shard(path, small_plan, 0, values)
     assert found(path) == {
         "signals/pressure, frame 3": "1 values are not finite",

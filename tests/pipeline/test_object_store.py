@@ -99,10 +99,10 @@ def test_damage_in_a_bucket_is_found_and_mended(bucket: str, whole: Path) -> Non
     flipped = bytearray((place / "image/energy/c.1.0.0").read_bytes())
     flipped[3] ^= 1
     (place / "image/energy/c.1.0.0").write_bytes(bytes(flipped))
-    (place / "truth/range/c.0.0.0").unlink()
+    (place / "truth/beams/range/c.0.0.0").unlink()
     (place / "stranger").write_bytes(b"mine")
     where = {problem.where for problem in store.verify(place, quick=True).problems}
-    assert where == {"image/energy/c.1.0.0", "truth/range/c.0.0.0", "stranger"}
+    assert where == {"image/energy/c.1.0.0", "truth/beams/range/c.0.0.0", "stranger"}
     assert repair(place, workers=0, quick=True).ok
     assert contents(place) == contents(whole)
 

@@ -85,7 +85,7 @@ def shot(water: ray_solutions.Water, start: float, angle: float, counts: list[in
 
 
 @pytest.mark.parametrize(
-    ("profile", "bottom", "count", "start", "end", "distance", "vertices"),
+    ("profile", "bottom_depth", "count", "start", "end", "distance", "vertices"),
     [
         (thermocline, 25.0, 21, 9.0, 14.0, 300.0, 3),
         (duct, 150.0, 26, 55.0, 70.0, 2e3, 3),

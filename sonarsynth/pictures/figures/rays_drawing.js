@@ -2,8 +2,8 @@
 "use strict";
 const data = JSON.parse(document.getElementById("rays-data").textContent);
 const byId = (id) => document.getElementById(id);
-const INK = "#222222", PALE = "#8a8a8a", SURFACE = "74,144,194", BED = "140,109,70";
-const MARKED = new Set(["surface", "bed", "turning point", "target", "facet"]);
+const INK = "#222222", PALE = "#8a8a8a", SURFACE = "74,144,194", BOTTOM = "140,109,70";
+const MARKED = new Set(["surface", "bottom", "turning point", "target", "facet"]);
 
 // ---- what is there: the box of everything, rays cut finely enough to be sorted by depth, what is switched on
 const weight = (ray) => ray.event.filter((e) => MARKED.has(e)).length + (ray.family === "fan" ? 1e6 : 0);
@@ -12,10 +12,10 @@ const rays = data.rays.map((ray) => ({ ...ray, way: wayOf(ray) }));
 rays.sort((a, b) => weight(b) - weight(a));  // those with fewer vertices last, on top
 const box = boxOf([...rays.flatMap((r) => r.position), ...data.targets.flatMap((t) => t.vertices),
                    ...Object.values(data.places)]);
-box.low[2] = -data.bed;
+box.low[2] = -data.bottom;
 box.high[2] = 0;
 const across = Math.max(box.high[0] - box.low[0], box.high[1] - box.low[1]);
-const size = Math.max(across, data.bed);
+const size = Math.max(across, data.bottom);
 for (const axis of [0, 1]) {
   const missing = Math.max(0, 0.15 * size - (box.high[axis] - box.low[axis])) / 2 + 0.04 * size;
   box.low[axis] -= missing;
@@ -23,7 +23,7 @@ for (const axis of [0, 1]) {
 }
 const middle = [0, 1, 2].map((a) => 0.5 * (box.low[a] + box.high[a]));
 const shown = { family: new Set(rays.map((r) => r.family)), way: new Set(data.rays.map(wayOf)) };
-const plainStretch = Math.max(1, Math.round(across / data.bed / 4));
+const plainStretch = Math.max(1, Math.round(across / data.bottom / 4));
 const view = { turn: 0, tilt: 0, scale: 1, shift: [0, 0], stretch: plainStretch };
 let hovered = null;
 
@@ -107,7 +107,7 @@ function fit(width, height) {
   Object.assign(view, { scale: 1, shift: [0, 0] });
   const corners = [];
   for (const x of [box.low[0], box.high[0]]) {
-    for (const y of [box.low[1], box.high[1]]) for (const z of [-data.bed, 0]) corners.push(eye(0, 0)([x, y, z]));
+    for (const y of [box.low[1], box.high[1]]) for (const z of [-data.bottom, 0]) corners.push(eye(0, 0)([x, y, z]));
   }
   const reach = boxOf(corners), [w, h] = [0, 1].map((a) => reach.high[a] - reach.low[a]);
   view.scale = 0.94 * Math.min(width / w, height / h);
@@ -170,7 +170,7 @@ function strokes(see) {
 function drawSpace() {
   const { pen, width, height } = sheet("space");
   const see = eye(width, height), fromAbove = view.tilt >= 0;
-  plate(pen, see, fromAbove ? -data.bed : 0, fromAbove ? BED : SURFACE);
+  plate(pen, see, fromAbove ? -data.bottom : 0, fromAbove ? BOTTOM : SURFACE);
   const things = [...facets(see), ...strokes(see)].sort((a, b) => a.near - b.near);
   pen.lineJoin = "round";
   for (const thing of things) {
@@ -190,7 +190,7 @@ function drawSpace() {
       dot(pen, thing.dot, 2.6, thing.ray.colour);
     }
   }
-  plate(pen, see, fromAbove ? 0 : -data.bed, fromAbove ? SURFACE : BED);
+  plate(pen, see, fromAbove ? 0 : -data.bottom, fromAbove ? SURFACE : BOTTOM);
   pen.setLineDash([]);
   for (const [name, place] of Object.entries(data.places)) {
     const p = see(place);
@@ -253,7 +253,7 @@ function drawSection() {
   const along = (p) => [p[0] * Math.cos(data.bearing) + p[1] * Math.sin(data.bearing), p[2]];
   const reach = boxOf([...rays.filter(visible).flatMap((r) => r.position), ...Object.values(data.places),
                        ...data.targets.flatMap((t) => t.vertices)].map((p) => [...along(p), 0]));
-  const margin = 0.04 * (reach.high[0] - reach.low[0]) || 1, zs = [-1.06 * data.bed, 0.06 * data.bed];
+  const margin = 0.04 * (reach.high[0] - reach.low[0]) || 1, zs = [-1.06 * data.bottom, 0.06 * data.bottom];
   const speeds = data.profile.speed, spare = 0.1 * (Math.max(...speeds) - Math.min(...speeds)) || 1;
   const left = axes(pen, [60, 22, 200, height - 24], [Math.min(...speeds) - spare, Math.max(...speeds) + spare], zs,
                     "sound speed (m/s), z (m)");
@@ -264,7 +264,7 @@ function drawSection() {
   const towards = Math.round(((90 - (data.bearing * 180) / Math.PI) % 360 + 360) % 360);
   const at = axes(pen, [262, 22, width - 16, height - 24], [reach.low[0] - margin, reach.high[0] + margin], zs,
                   `distance towards ${towards} deg (m)`);
-  for (const [z, colour] of [[0, SURFACE], [-data.bed, BED]]) {
+  for (const [z, colour] of [[0, SURFACE], [-data.bottom, BOTTOM]]) {
     path(pen, [at([reach.low[0] - margin, z]), at([reach.high[0] + margin, z])]);
     pen.strokeStyle = `rgb(${colour})`;
     pen.lineWidth = 2;

@@ -34,8 +34,8 @@ def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.n
         on_grid, "elevation", ("elevation",), np.rad2deg(beams.elevation), "degree", "elevation, up positive", **degrees
     )
     estimates = " /source_estimates" if plan.products & {"image", "cloud"} else ""
-    add("/truth /truth/targets /truth/emissions" + estimates, "xyz", ("xyz",), list("xyz"), "1", "axis")
-    add("/truth /truth/targets", "wxyz", ("wxyz",), list("wxyz"), "1", "part of a unit quaternion, scalar first")
+    add("/truth" + estimates, "xyz", ("xyz",), list("xyz"), "1", "axis")
+    add("/truth", "wxyz", ("wxyz",), list("wxyz"), "1", "part of a unit quaternion, scalar first")
     add("/truth/targets", "target", ("target",), np.array(names, dtype=np.str_), "1", "name of the target")
     bounds = ["azimuth_min", "azimuth_max", "elevation_min", "elevation_max"]
     add("/truth/targets", "bound", ("bound",), bounds, "1", "which bound of the image box")
