@@ -15,7 +15,6 @@ import numpy as np
 from sonarsynth.planning.plan_tables import Stage
 from sonarsynth.planning.plans import Plan
 from sonarsynth.propagation import Straight
-from sonarsynth.scattering import Kirchhoff
 
 REFERENCE_TRANSFORM = 1.42e-3
 """Seconds of the transforms in `machine_factor` on the machine where the constants below were measured."""
@@ -74,7 +73,7 @@ def _paths(plan: Plan) -> float:
     """Paths of one snap and family, each with the weight of its cost in the synthesis."""
     pairs = zip(plan.scene.laws, plan.scene.meshes, strict=True)
     shares = {True: COHERENT * FILTERED_PULSE_COST, False: ILLUMINATED_FRACTION}
-    return sum(len(mesh.faces) * len(law.parts) * shares[isinstance(law, Kirchhoff)] for law, mesh in pairs)
+    return sum(len(mesh.faces) * len(law.parts) * shares[law.coherent] for law, mesh in pairs)
 
 
 def _tracing(plan: Plan, kind: str) -> float:
@@ -82,7 +81,7 @@ def _tracing(plan: Plan, kind: str) -> float:
     pairs = zip(plan.scene.laws, plan.scene.meshes, strict=True)
     extra = SECONDS["trace coherent facet"] - SECONDS["trace facet"]
     each = SECONDS[f"trace {kind}facet"]
-    whole = sum(len(mesh.faces) * (each + extra * isinstance(law, Kirchhoff)) for law, mesh in pairs)
+    whole = sum(len(mesh.faces) * (each + extra * law.coherent) for law, mesh in pairs)
     return whole * (QUINTIC_COST if plan.choices.degree > 3 else 1.0)
 
 

@@ -13,7 +13,6 @@ from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.plans import PulseDurations
 from sonarsynth.receiver import elements
 from sonarsynth.recipe.scene import Scene
-from sonarsynth.scattering import Kirchhoff, PartlyReflecting
 from sonarsynth.signals import pulse_support
 from sonarsynth.signals.filtered_pulse import PULSE_FEET, at_longest, silencing_blur
 from sonarsynth.sources.snap_pulses import Waveform, largest_scales, waveform
@@ -35,7 +34,7 @@ def supports_of(looks: Sequence[SampledScene]) -> PulseDurations:
     for look in looks:
         scene, profile = look.scene, look.profile
         across = elements(scene.sonar.array).aperture / profile.speed.min()  # of a wave, from the centre to the edge
-        lossy = any(isinstance(law, Kirchhoff) and isinstance(law.surface, PartlyReflecting) for law in scene.laws)
+        lossy = any(law.turns_phase for law in scene.laws)
         turned = lossy or scene.physics.tracing.bounces > 0 or not profile.uniform  # also caustics turn the phase
         before, after = _support(scene, SUPPORT, turned=turned) + across
         plain = _support(scene, SUPPORT, turned=False)[1]
@@ -51,12 +50,12 @@ def _support(scene: Scene, tolerance: float, *, turned: bool) -> Floats:
     chosen, waveforms = scene.sonar.antialias, extreme_waveforms(scene)
     supports = [(0.0, 0.0), *(pulse_support(w, chosen, tolerance, turned=turned) for w in waveforms)]
     for law, mesh in zip(scene.laws, scene.meshes, strict=True):
-        if isinstance(law, Kirchhoff):
+        if law.coherent:
             smooth = [pulse_support(w, chosen, tolerance, turned=turned, sloped=True) for w in waveforms]
             rough = [
-                pulse_support(w, chosen, tolerance, turned=turned, rough=2.0 * law.roughness / SLOWEST)
+                pulse_support(w, chosen, tolerance, turned=turned, rough=2.0 * law.rms_roughness / SLOWEST)
                 for w in waveforms
-                if law.roughness > 0
+                if law.rms_roughness > 0
             ]
             corner = 2.0 * farthest_corner(mesh) / SLOWEST
             supports += [(before + corner, after + corner) for before, after in smooth + rough]
@@ -66,7 +65,7 @@ def _support(scene: Scene, tolerance: float, *, turned: bool) -> Floats:
 def blur_of(scene: Scene) -> float:
     """By how much (s) rough boundaries and bodies lengthen the pulses that they reflect and leave anything of."""
     environment, bounces = scene.world.environment, scene.physics.tracing.bounces
-    heights = [law.roughness for law in scene.laws if isinstance(law, Kirchhoff)]
+    heights = [law.rms_roughness for law in scene.laws]
     roughest = max(rms_height(environment.surface), rms_height(environment.bottom))
     most = np.hypot(max(heights, default=0.0), roughest * np.sqrt(bounces))
     if not most > 0.0:

@@ -11,34 +11,20 @@ from sonarsynth.conventions import Floats, Metres
 from sonarsynth.description import description
 from sonarsynth.equations.scattering.lobes import lit_and_seen
 from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.scattering.components import Component, Lobe
+from sonarsynth.scattering.facet_law import FacetLaw
 from sonarsynth.scattering.law_validity import COARSE, Scatterer, facets_note
 
 
 @description
-class Isotropic:
+class Isotropic(FacetLaw):
     """Every facet that is lit and seen scatters alike, whatever its area."""
 
     kind: Literal["isotropic"] = "isotropic"
     strength: Annotated[Metres, Gt(0)] = 1.0
     """Scattering amplitude of a facet (m): a target strength of 20 log10 of it."""
 
-    @property
-    def parts(self) -> tuple[Component, ...]:
-        """Of an echo: one, in the shape of the snap."""
-        return (Lobe(self),)
-
-    @property
-    def coherent(self) -> bool:
-        """False: each facet is a point of its own."""
-        return False
-
-    def too_small(self, body: Scatterer) -> str | None:
-        """None: the level is what is asked for."""
-        return None
-
     def validity(self, body: Scatterer) -> tuple[str, ...]:
-        """As `ScatteringLaw.validity`: it is the echo of no body, whatever ka and angle."""
+        """As `FacetLaw.validity`: it is the echo of no body, whatever ka and angle."""
         level, count = 20.0 * np.log10(self.strength), len(body.mesh.faces)
         said = (
             f"each of {count} facets echoes by {level:.3g} dB re 1 m2, whatever its area, ka and angle: that is for "

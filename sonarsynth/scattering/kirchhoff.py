@@ -13,13 +13,14 @@ from sonarsynth.equations.scattering.kirchhoff_integral import shadow_taper
 from sonarsynth.equations.scattering.lobes import lit_and_seen
 from sonarsynth.equations.scattering.roughness import incoherent_power, roughness_parameter
 from sonarsynth.scattering.components import CoherentKirchhoff, Component, DiffuseKirchhoff
+from sonarsynth.scattering.facet_law import FacetLaw
 from sonarsynth.scattering.kirchhoff_surface import PartlyReflecting, reflection
 from sonarsynth.scattering.law_notes import concave_note
 from sonarsynth.scattering.law_validity import NEAR, Scatterer, aside_note, lit_half, size_note, slopes_note
 
 
 @description
-class Kirchhoff:
+class Kirchhoff(FacetLaw):
     """Facets scatter as pieces of plane mirrors, exact for each of them, and add with their phases.
 
     |f|^2 = |sum of facets exp(-g^2/2)|^2 + sum of area times the lobe of the slopes, the second for rough surfaces.
@@ -71,12 +72,22 @@ class Kirchhoff:
         """True, but for what a rough surface scatters."""
         return True
 
+    @property
+    def rms_roughness(self) -> float:
+        """Rms height (m) of the surface about the facets."""
+        return self.roughness
+
+    @property
+    def turns_phase(self) -> bool:
+        """Of surfaces that sound enters."""
+        return isinstance(self.surface, PartlyReflecting)
+
     def too_small(self, body: Scatterer) -> str | None:
-        """As `ScatteringLaw.too_small`."""
+        """As `FacetLaw.too_small`."""
         return size_note(body, lit_half, "Kirchhoff's integral", "soft" if self.surface == "soft" else "rigid")
 
     def validity(self, body: Scatterer) -> tuple[str, ...]:
-        """As `ScatteringLaw.validity`; how fine its facets are is for the mesh to say
+        """As `FacetLaw.validity`; how fine its facets are is for the mesh to say
         (`mesh_resolution.frame_mesh`)."""
         near = (
             f"nearer than {NEAR * body.aperture:.2g} m, where the echo may be some per cent off at the rim of the "

@@ -12,7 +12,7 @@ from sonarsynth.conventions import Floats, Number, Radians
 from sonarsynth.description import description
 from sonarsynth.equations.scattering.lobes import lobe_amplitude, slope_of_width
 from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.scattering.components import Component, Lobe
+from sonarsynth.scattering.facet_law import FacetLaw
 from sonarsynth.scattering.law_validity import (
     COARSE,
     Scatterer,
@@ -26,7 +26,7 @@ from sonarsynth.scattering.random_signs import random_polarity
 
 
 @description
-class MirrorLobe:
+class MirrorLobe(FacetLaw):
     """Sound leaves a facet in a lobe around the mirror direction; the smoother the surface, the narrower the lobe.
 
     |f|^2 = area (reflectivity^2 sigma0 + diffuse floor): powers add by area, so splitting a facet changes no sum of
@@ -56,22 +56,12 @@ class MirrorLobe:
             )
         return value
 
-    @property
-    def parts(self) -> tuple[Component, ...]:
-        """Of an echo: one, in the shape of the snap."""
-        return (Lobe(self),)
-
-    @property
-    def coherent(self) -> bool:
-        """False: facets have signs, not phases."""
-        return False
-
     def too_small(self, body: Scatterer) -> str | None:
-        """As `ScatteringLaw.too_small`: of a sphere it is that of geometry at every frequency."""
+        """As `FacetLaw.too_small`: of a sphere it is that of geometry at every frequency."""
         return size_note(body, geometric)
 
     def validity(self, body: Scatterer) -> tuple[str, ...]:
-        """As `ScatteringLaw.validity`."""
+        """As `FacetLaw.validity`."""
         wide = grazing_note(float(slope_of_width(self.width))) if self.reflectivity > 0.0 else None
         alike = (
             "with phases alike, facets within a wavelength of path add in phase: the level depends on their number"

@@ -15,7 +15,7 @@ from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import Elements
-from sonarsynth.scattering import ScatteringLaw
+from sonarsynth.scattering import FacetLaw
 from sonarsynth.scattering.facet_geometry import PulseResponse
 from sonarsynth.state import Snap, WorldState
 from sonarsynth.tracing.doppler import Meeting, MetPaths, apply_doppler, received
@@ -47,7 +47,7 @@ def trace(
     elements: Elements,
     absorption: float | DepthAbsorption,
     propagation: Propagation,
-    laws: tuple[ScatteringLaw, ...],
+    laws: tuple[FacetLaw, ...],
     *,
     band: tuple[float, float],
     moving: Track | None = None,
@@ -106,7 +106,7 @@ def _hearing(array: FacetPaths, snap: Snap, sonar: Track) -> FacetPaths:
 
 
 def arrivals(
-    array: FacetPaths, snaps: tuple[Snap, ...], absorption: float | DepthAbsorption, laws: tuple[ScatteringLaw, ...]
+    array: FacetPaths, snaps: tuple[Snap, ...], absorption: float | DepthAbsorption, laws: tuple[FacetLaw, ...]
 ) -> Arrivals:
     """As `trace`, of what is at rest, from legs that are traced already; shadows of targets have legs of their own."""
     numbered = dict(enumerate(snaps))
@@ -119,7 +119,7 @@ def arrivals(
 
 
 def _echoes(
-    array: FacetPaths, snaps: dict[int, Snap], absorption: float | DepthAbsorption, laws: tuple[ScatteringLaw, ...]
+    array: FacetPaths, snaps: dict[int, Snap], absorption: float | DepthAbsorption, laws: tuple[FacetLaw, ...]
 ) -> list[tuple[tuple[int, int], Arrivals]]:
     """Echoes (1) and shadow waves (2) of numbered snaps, each with the number of its snap."""
     parts, through = [], forward_paths(array, laws)
@@ -133,7 +133,7 @@ def _echoes(
 
 
 def _direct(
-    array: FacetPaths, index: int, snap: Snap, absorption: float | DepthAbsorption, laws: tuple[ScatteringLaw, ...]
+    array: FacetPaths, index: int, snap: Snap, absorption: float | DepthAbsorption, laws: tuple[FacetLaw, ...]
 ) -> Arrivals:
     """Snap to array, where no body stands in between that sound does not pass."""
     environment, profile, sonar_pose = array.environment, array.profile, array.sonar_pose

@@ -140,11 +140,8 @@ def echoes(
             target=target, facet=facet, scattering=scattered, variation=vary, pulses=some.pulses,
         )  # fmt: skip
         if meeting is not None and some.carried is not None:
-            met = some.carried
-            one = apply_doppler(
-                one, legs, out, met, meeting, array.profile,
-                elements=array.elements, departure=view, enough=array.enough,
-            )  # fmt: skip
+            moving = partial(apply_doppler, elements=array.elements, departure=view, enough=array.enough)
+            one = moving(one, legs, out, some.carried, meeting, array.profile)
         if spot.any() and array.bending.uniform:
             one = shift_to_scattering_points(one, legs, spot, array.sonar_pose)
         made.append(replace(one, delay=one.delay + some.pulses.late))
@@ -251,10 +248,8 @@ def _ways(array: FacetPaths, snap: Snap) -> TransmitPaths:
 def _hides(array: FacetPaths, bodies: tuple[PlacedTarget, ...], snap: Snap, out: TransmitPaths, start: Floats) -> Bools:
     """Whether any of some bodies stands in ways (way,) from a snap to points near facets, start (way, xyz)."""
     end = np.broadcast_to(snap.position, start.shape)
-    return hidden(  # backwards, so that bodies are where a ray begins
-        bodies, array.environment, array.bending, start, end, -out.arrival, out.length,
-        bounces=out.bounces, turning=out.turning,
-    )  # fmt: skip
+    stand_in = partial(hidden, bounces=out.bounces, turning=out.turning)  # backwards: bodies are where a ray begins
+    return stand_in(bodies, array.environment, array.bending, start, end, -out.arrival, out.length)
 
 
 def _turned(found: _EchoBlock, most: float) -> ExpansionTerms:

@@ -13,7 +13,7 @@ from sonarsynth.equations.rays.ray_solutions import Water, water, within
 from sonarsynth.geometry import unit
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.propagation.ray_steps import ARRIVAL, END, EVENTS, FACET, LAUNCH, Rays, launch, reflect, step
-from sonarsynth.scattering import ScatteringLaw
+from sonarsynth.scattering import FacetLaw
 from sonarsynth.scattering.components import size_at
 from sonarsynth.scattering.facet_geometry import patches
 from sonarsynth.tracing.occlusion.ray_cones import hidden
@@ -51,7 +51,7 @@ def fan(
     spacing: float = np.inf,
     sagitta: float = 1e-4,
     towards: Floats | None = None,
-    laws: tuple[ScatteringLaw, ...] = (),
+    laws: tuple[FacetLaw, ...] = (),
     propagation: Propagation | None = None,
     centre: float | None = None,
 ) -> RayFan:
@@ -147,7 +147,7 @@ def _send_on(
     landed: _Landed,
     towards: Floats,
     *,
-    laws: tuple[ScatteringLaw, ...],
+    laws: tuple[FacetLaw, ...],
     propagation: Propagation,
     centre: float,
     coefficient: Floats,

@@ -102,7 +102,7 @@ def test_labels_are_the_same_whatever_the_block(monkeypatch: pytest.MonkeyPatch,
 
 def test_tables_of_a_mesh_are_the_same_whatever_the_block(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = hull(4)
-    corners = whole.corner_delays
+    corners = whole.corners
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     np.testing.assert_array_equal(whole.area, 0.5 * np.linalg.norm(cross, axis=1))
     monkeypatch.setattr(meshes, "BLOCK", 333)

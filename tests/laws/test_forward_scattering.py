@@ -160,7 +160,7 @@ def test_sound_is_blocked_or_scattered_forward_never_both() -> None:
     beside = ARRAY + [3.0, 6.0, 1.0]
     echoes, more = (heard((body(mesh, place),), beside, (law,)) for law in (Kirchhoff(), SCATTERED))
     assert len(more.delay) > len(echoes.delay)
-    for name in ("amplitude", "delay", "corners", "facet", "amplitude_terms"):
+    for name in ("amplitude", "delay", "corner_delays", "facet", "amplitude_terms"):
         np.testing.assert_array_equal(getattr(more, name)[: len(echoes.delay)], getattr(echoes, name))
 
 

@@ -39,8 +39,8 @@ def test_each_isolated_path_is_found_in_its_signals(method: GriddedSynthesis | D
     [
         {"delay_std": 3e-5},  # 110 dB less
         {"absorption": 200.0},
-        {"corners": (-0.7e-3, -0.3e-3, 1e-3)},  # 400 rad over the facet
-        {"corners": (0.0, 0.0, 0.0)},
+        {"corner_delays": (-0.7e-3, -0.3e-3, 1e-3)},  # 400 rad over the facet
+        {"corner_delays": (0.0, 0.0, 0.0)},
         {"doppler": -0.09},
         {"coherent_fraction": 1.0, "height_delay_std": 1e-10},
         {"scattering": 1e-12},
@@ -48,7 +48,7 @@ def test_each_isolated_path_is_found_in_its_signals(method: GriddedSynthesis | D
     ids=str,
 )
 def test_extreme_paths_are_found_too(extreme: dict[str, float]) -> None:
-    one = replace(some_paths(1, 9, coherent="corners" in extreme), delay_std=np.zeros(1))
+    one = replace(some_paths(1, 9, coherent="corner_delays" in extreme), delay_std=np.zeros(1))
     one = replace(one, **{name: np.array([value]) for name, value in extreme.items()})
     product = one.scattering * one.spreading_out * one.spreading_in * one.boundary
     budget = booked(replace(one, amplitude=product * 10.0 ** (-one.absorption / 20.0)))

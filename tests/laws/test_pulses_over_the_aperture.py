@@ -17,7 +17,7 @@ from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, elements
-from sonarsynth.scattering import Kirchhoff, MirrorLobe, PartlyReflecting, ScatteringLaw
+from sonarsynth.scattering import FacetLaw, Kirchhoff, MirrorLobe, PartlyReflecting
 from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Snap, WorldState
@@ -46,9 +46,7 @@ FAR = np.array(
 START = 0.006
 
 
-def traced(
-    surface: SeaSurface, bottom: SeaBottom, law: ScatteringLaw, place: Floats, array: Elements = ROMANIS
-) -> Arrivals:
+def traced(surface: SeaSurface, bottom: SeaBottom, law: FacetLaw, place: Floats, array: Elements = ROMANIS) -> Arrivals:
     water = Environment(
         depth=10.0,
         sound_speed=Isovelocity(speed=C),

@@ -21,11 +21,12 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "sonarsynth"
 PAGE = (ROOT / "tools" / "docs" / "extending.md").read_text()
 FILES = dict(re.findall(r"^```python file=(\S+)\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE))
-UNIONS = {"imaging": "Beamformer", "ranging": "Ranging", "signals": "Synthesis"}
+UNIONS = {"imaging": "Beamformer", "ranging": "Ranging", "signals": "Synthesis", "scattering": "Scattering"}
 KINDS = {
     "scene.processing.beamforming": "capon",
     "scene.processing.ranging": "first_echo",
     "scene.physics.synthesis": "whole_samples",
+    "scene.physics.scattering": "power_cosine",
 }
 SCRIPT = """
 import json, sys
@@ -46,6 +47,7 @@ for which in json.loads(sys.argv[2]):
     cloud = tree["cloud"].dataset.isel(frame=0)
     count = int(cloud["count"])
     said[name] = {
+        "recipe": tree.attrs["recipe"],
         "rows": {row.stage: [row.method, row.error] for row in plan.stages},
         "choices": {name: tree.attrs["choices"][name] for name in ("beamforming", "ranging", "synthesis")},
         "energy": np.asarray(tree["image/energy"][0]).tolist(),
@@ -122,7 +124,7 @@ def test_it_runs_and_plan_and_store_say_so(said: dict[str, Any], kind: str, stag
 
 
 def test_the_data_are_those_of_the_method(said: dict[str, Any]) -> None:
-    usual, capon, first, whole = (said[name] for name in ("usual", *KINDS.values()))
+    usual, capon, first, whole, cosine = (said[name] for name in ("usual", *KINDS.values()))
     plain, least = (np.array(one["energy"]) for one in (usual, capon))
     assert (least <= 1.1 * plain + 0.02 * plain.max()).all(), "no beam passes less than Capon's, by Cauchy and Schwarz"
     assert np.median(least / plain) < 0.7
@@ -135,6 +137,8 @@ def test_the_data_are_those_of_the_method(said: dict[str, Any]) -> None:
     assert early, "some points are earlier"
     wrong = [abs(a - b) for a, b in zip(whole["pressure"], usual["pressure"], strict=True)]
     assert 0.0 < max(wrong) < max(map(abs, usual["pressure"]))
+    assert cosine["rows"]["trace"][0].endswith("power_cosine") and "kind: power_cosine" in cosine["recipe"]
+    assert np.abs(np.log10(np.max(cosine["energy"]) / np.max(usual["energy"]))) > 0.05
 
 
 def test_the_points_of_a_new_image_are_ranged(said: dict[str, Any]) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 from sonarsynth.casting.ray_casting import inside
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.scattering import Component, Kirchhoff, ScatteringLaw
+from sonarsynth.scattering import Component, FacetLaw, Kirchhoff
 from sonarsynth.scattering.components import Shadow
 from sonarsynth.tracing.expansion.array_expansion import expansion_source
 from sonarsynth.tracing.receive_paths import facets_of, rays_to_centre
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
     from sonarsynth.tracing.facet_paths import FacetPaths
 
 
-def shadow_parts(law: ScatteringLaw) -> tuple[Component, ...]:
+def shadow_parts(law: FacetLaw) -> tuple[Component, ...]:
     """What facets send beside echoes; nothing unless the law scatters forward."""
     return (Shadow(),) if isinstance(law, Kirchhoff) and law.forward == "scattered" else ()
 
 
 def blocking_bodies(
-    bodies: tuple[PlacedTarget, ...], laws: tuple[ScatteringLaw, ...], source: Floats | None = None
+    bodies: tuple[PlacedTarget, ...], laws: tuple[FacetLaw, ...], source: Floats | None = None
 ) -> tuple[PlacedTarget, ...]:
     """The bodies that sound does not pass on its way to the array, with any that its source (xyz) is inside of."""
     return tuple(
@@ -43,7 +43,7 @@ def blocking_bodies(
     )
 
 
-def forward_paths(array: FacetPaths, laws: tuple[ScatteringLaw, ...]) -> FacetPaths | None:
+def forward_paths(array: FacetPaths, laws: tuple[FacetLaw, ...]) -> FacetPaths | None:
     """Facet to array, for every facet of the bodies that scatter forward, seen or not; None where there is none."""
     solid = blocking_bodies(array.bodies, laws)
     if len(solid) == len(array.bodies):

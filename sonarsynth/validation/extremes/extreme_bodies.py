@@ -11,7 +11,7 @@ import numpy as np
 from sonarsynth.conventions import Floats, direction
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.receiver import BeamGrid, PositionTable, elements
-from sonarsynth.scattering import Isotropic, Kirchhoff, MirrorLobe, Scatterer, ScatteringLaw
+from sonarsynth.scattering import FacetLaw, Isotropic, Kirchhoff, MirrorLobe, Scatterer
 from sonarsynth.scattering.law_validity import OFF
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
@@ -35,7 +35,7 @@ MESHED = 0.6
 """dB: of the mesh (5 %), and of 200 radii of distance."""
 
 
-def echo(law: ScatteringLaw, mesh: Mesh, radius: float, frequency: Floats) -> Floats:
+def echo(law: FacetLaw, mesh: Mesh, radius: float, frequency: Floats) -> Floats:
     """Target strength (frequency,) in dB re 1 m2 of what a frame has of a sphere 200 radii off."""
     far = 200.0 * radius
     band = float(frequency[0]), float(frequency[-1])

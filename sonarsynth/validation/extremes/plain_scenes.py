@@ -19,7 +19,7 @@ from sonarsynth.state import Snap, WorldState
 
 if TYPE_CHECKING:
     from sonarsynth.products import Arrivals, Signals
-    from sonarsynth.scattering import ScatteringLaw
+    from sonarsynth.scattering import FacetLaw
     from sonarsynth.signals import SignalSynthesis
 
 C, BOTTOM_DEPTH, RATE = 1500.0, 12e3, 250e3
@@ -46,7 +46,7 @@ def traced(
     snaps: Sequence[Snap],
     elements: Elements,
     bodies: Sequence[PlacedTarget] = (),
-    laws: Sequence[ScatteringLaw] = (),
+    laws: Sequence[FacetLaw] = (),
     band: tuple[float, float] = (25e3, 85e3),
 ) -> Arrivals:
     """Every path, none of which has a number that is none."""

@@ -1,0 +1,57 @@
+"""What a scattering law says of itself beside its amplitude: a new law may leave all of it as it is here."""
+
+from __future__ import annotations
+
+from sonarsynth.conventions import Floats
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.scattering.components import Component, Lobe
+from sonarsynth.scattering.law_validity import Scatterer
+from sonarsynth.scattering.random_signs import random_polarity
+
+
+class FacetLaw:
+    """A law that repeats the pulse, by facets that have a random sign each and no phases: powers add."""
+
+    kind: str
+
+    def amplitude(
+        self, incident: Floats, scattered: Floats, normal: Floats, area: Floats, beyond: bool = False
+    ) -> Floats:
+        """Far-field scattering amplitude (...) in m, for unit vectors of propagation in and away (..., xyz), facets'
+        normals (..., xyz) and areas (...) in m2; 0 where a facet is not lit or, unless `beyond`, not seen."""
+        raise NotImplementedError(f"{type(self).__name__} has no amplitude")
+
+    @property
+    def parts(self) -> tuple[Component, ...]:
+        """What an echo is made of, each a path of its own: here one, in the shape of the snap."""
+        return (Lobe(self),)
+
+    @property
+    def coherent(self) -> bool:
+        """Whether the echoes of facets add with their phases, and facets change the pulse."""
+        return False
+
+    @property
+    def rms_roughness(self) -> float:
+        """Rms height (m) about the facets that spreads the pulse."""
+        return 0.0
+
+    @property
+    def turns_phase(self) -> bool:
+        """Whether the reflection coefficient has a phase, which changes the shape of the pulse."""
+        return False
+
+    def polarity(self, mesh: Mesh) -> Floats:
+        """Sign (facet,) of the echo of each facet: random, and the same whenever the mesh is."""
+        return random_polarity(mesh)
+
+    def too_small(self, body: Scatterer) -> str | None:
+        """One line if the body is too small against the wavelengths for this law, and by how many dB; None if not."""
+        return None
+
+    def validity(self, body: Scatterer) -> tuple[str, ...]:
+        """Where this law does not hold for a body in a band, one line each: ka, facets against the wavelength, angles.
+
+        `plan` says these, and the store has them (root attribute `validity`).
+        """
+        return ()
