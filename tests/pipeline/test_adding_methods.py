@@ -91,7 +91,8 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     recipe = str(ROOT / "configs" / "tank.yaml")
     done = subprocess.run(
         [sys.executable, "-P", "-c", SCRIPT, str(folder), json.dumps([{}, *KINDS]), recipe],
-        env=os.environ | {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}, cwd=folder, capture_output=True, text=True, check=False,
+        env=os.environ | {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"},
+        cwd=folder, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-3000:]
     found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
