@@ -14,6 +14,7 @@ from sonarsynth.cli.running import run
 from sonarsynth.pipeline import VARIABLES
 from sonarsynth.products import PointCloud
 from sonarsynth.recipe.reading import loads
+from tools.fault_injection.hostile import _sealed
 
 
 @pytest.fixture(scope="module")
@@ -108,3 +109,16 @@ def test_a_store_of_an_older_format_is_refused_in_one_line(
 def test_every_group_of_the_schema_is_on_the_page_of_the_store() -> None:
     page = Path("tools/docs/the-store.md").read_text()
     assert all(f"`{group}`" in page for group in {v.group for v in VARIABLES} - {"/"})
+
+
+@pytest.mark.parametrize("forged", [[], {"kind": "0", "must_understand": False, "metadata": {}}])
+def test_forged_consolidated_metadata_are_a_problem_and_no_traceback(
+    forged: object, tmp_path: Path, small_text: str
+) -> None:
+    path = tmp_path / "s.zarr"
+    assert schedule.build(loads(small_text), path, frames=(0,), workers=0, products=()).ok
+    root = json.loads((path / "zarr.json").read_text())
+    root["consolidated_metadata"] = forged
+    _sealed(path, root)
+    report = store.verify(path)
+    assert not report.ok and any("cannot be" in problem.what for problem in report.problems)

@@ -24,7 +24,11 @@ def read_back(path: Folder, mark: Mark) -> Iterator[Problem]:
     """Decode a shard: its contents must have the digest of its mark, and be finite where they must be."""
     import zarr
 
-    root = zarr.open_group(opens(path), mode="r")
+    try:
+        root = zarr.open_group(opens(path), mode="r")
+    except Exception as error:  # whatever zarr raises on metadata that somebody forged
+        yield Problem("zarr.json", f"cannot be read by zarr: {error}", mark.frames)
+        return
     shard, step = int(mark.name), root_attributes(path).get("shard_frames")
     if not isinstance(step, int) or step < 1:
         yield Problem(f"shard {shard}", "the store does not say how many frames are in one", mark.frames)
