@@ -50,10 +50,8 @@ class SmallVariables:
 
     def has(self, name: str) -> bool:
         """Whether the store has a group, or a variable of one."""
-        group, _, variable = name.rpartition("/")
-        if name in self.tree.groups or f"/{name}" in self.tree.groups:
-            return True
-        return f"/{group}" in self.tree.groups and variable in self.tree[group].dataset
+        group, _, variable = f"/{name}".rpartition("/")
+        return f"/{name}" in self.tree.groups or (group in self.tree.groups and variable in self.tree[group].dataset)
 
     def of(self, name: str, frame: int) -> np.ndarray:
         """Values of a variable in one of the frames."""

@@ -129,14 +129,11 @@ def stored(tree: xr.DataTree, index: int) -> Stored:
 def _points(tree: xr.DataTree, index: int) -> dict[str, Floats]:
     """Columns (point,) of the points of a frame, none in a store without a cloud; range_error by their labels."""
     names = ("x", "y", "z", "azimuth", "elevation", "energy", "delay")
-    columns = {name: read(tree, f"cloud/{name}", index) for name in names}
-    there = columns["x"] is not None and has_labels(tree)
-    kept = {n: np.zeros(0) if v is None or not there else v[np.isfinite(v)].astype(float) for n, v in columns.items()}
-    kept["range_error"] = np.full(len(kept["x"]), np.nan)
-    if there:
-        found = points(tree, [index])
-        kept["range_error"][found.judged] = found.error[found.judged]
-    return kept
+    if not has_labels(tree):
+        return dict.fromkeys((*names, "range_error"), np.zeros(0))
+    found = points(tree, [index])
+    kept = {name: needed(tree, f"cloud/{name}", index)[found.row].astype(float) for name in names}
+    return kept | {"range_error": np.where(found.judged, found.error, np.nan)}
 
 
 def _sonar(tree: xr.DataTree, index: int) -> Pose:

@@ -59,7 +59,7 @@ def machine_factor() -> float:
     return float(best / REFERENCE_TRANSFORM)
 
 
-UNSTATED = "not stated by the method"
+NOT_STATED = "not stated by the method"
 
 QUINTIC_COST = 1.6
 """Times what cubics over the array take, polynomials of the fifth degree take to trace."""
@@ -113,7 +113,7 @@ def _synthesis(plan: Plan) -> Row:
         work += sensor_samples * SECONDS["noise sensor sample"]
     stored = sensor_samples * (2 if scene.sonar.converter else 4) if "signals" in plan.products else 0
     error = f"{plan.errors.synthesis:.1g} of the peak" if plan.errors.synthesis else "rounding"
-    error = UNSTATED if np.isnan(plan.errors.synthesis) else error
+    error = NOT_STATED if np.isnan(plan.errors.synthesis) else error
     why = "requested" if "signals" in plan.products else f"needed by the {' and the '.join(sorted(plan.products))}"
     return ("synthesise", plan.choices.synthesis.row(), why, error, work, stored)
 
@@ -136,7 +136,7 @@ def _traced(plan: Plan) -> str:
 def _steered(plan: Plan) -> str:
     """What the beamformer errs by, in words."""
     if np.isnan(plan.errors.image):
-        return UNSTATED
+        return NOT_STATED
     if plan.errors.image == 0.0:
         return "rounding"
     return f"{plan.errors.image:.1g} dB rms of beams within 20 dB of the brightest, measured"
