@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonarsynth.casting import cone_kernels
 from sonarsynth.casting.ray_casting import casting_mesh
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.geometry.placed_target import PlacedTarget
@@ -21,8 +22,6 @@ def classify_cones(
     apex, axis: (cone, xyz) world, axes of unit length; slope (cone,): radius of the cone over the distance along it.
     Holds for any line that stays in the cone, bent or not, from its apex to where it ends.
     """
-    from sonarsynth.casting import cone_kernels
-
     found = np.full(len(apex), EMPTY)
     for body in bodies:
         left = np.flatnonzero(found != CLOSED)

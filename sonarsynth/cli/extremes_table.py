@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING
 import typer
 from rich.table import Table
 
+from sonarsynth.cli.printing import console
+from sonarsynth.validation.extremes import extremes, groups
+
 if TYPE_CHECKING:
     from sonarsynth.validation.extremes import Extreme
 
 
 def extremes_table(out: Path, *, as_json: bool) -> None:
     """Run every case, write <out>/extremes.json and print the table; raises typer.Exit(1) where one is not right."""
-    from sonarsynth.validation.extremes import extremes, groups
-
     total, rows = sum(len(cases) for cases in groups().values()), []
     for row in extremes():
         rows.append(row)
@@ -41,8 +42,6 @@ def extremes_table(out: Path, *, as_json: bool) -> None:
 
 def _show(rows: list[Extreme]) -> None:
     """A section a group, and how many are right."""
-    from sonarsynth.cli.printing import console
-
     table = Table("case", "expected", "result", title="stiff and extreme cases", title_justify="left")
     table.add_column("s", justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)

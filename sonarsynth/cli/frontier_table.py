@@ -11,8 +11,12 @@ from typing import TYPE_CHECKING
 import typer
 from rich.table import Table
 
+from sonarsynth.cli.printing import console
 from sonarsynth.cli.running import BadOption
 from sonarsynth.cli.selecting import frame_numbers
+from sonarsynth.frontiers import measure
+from sonarsynth.frontiers.frontier_report import write
+from sonarsynth.recipe import reading
 
 if TYPE_CHECKING:
     from sonarsynth.frontiers import Measured, Point, Verdict
@@ -43,10 +47,6 @@ def recipe_table(
 ) -> None:
     """Walk the knobs of a recipe, write <out>/<recipe>.json and .png, print the table; raises typer.Exit(1) where a
     verdict is not good."""
-    from sonarsynth.frontiers import measure
-    from sonarsynth.frontiers.frontier_report import write
-    from sonarsynth.recipe import reading
-
     count = _hydrophones(hydrophones)
     source = reading.read(recipe, settings)
     made_from = reading.recipe_of(source)
@@ -85,8 +85,6 @@ def _say(text: str) -> None:
 
 def show(measured: Measured) -> None:
     """A section a stage, then the verdicts."""
-    from sonarsynth.cli.printing import console
-
     table = Table(title=measured.title, title_justify="left")
     table.add_column("stage", no_wrap=True)
     table.add_column("parameter")

@@ -12,6 +12,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
 
 from sonarsynth.conventions import counted, format_bytes
+from sonarsynth.planning.plan_tables import as_tables
+from sonarsynth.store import ranges
 
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan
@@ -131,8 +133,6 @@ def _compared(found: dict[str, Any]) -> Iterator[str]:
 
 def plan_report(plan: Plan, prediction: Prediction) -> None:
     """Stages, what is left out, sizes and predicted cost."""
-    from sonarsynth.planning.plan_tables import as_tables
-
     out = console()
     for table in as_tables(plan.recipe.title, plan.stages, plan.left_out):
         out.print(table)
@@ -181,16 +181,12 @@ def verify_report(report: StoreReport) -> None:
         out.print(f"and {len(report.problems) - 50} more")
     spoiled = sorted({frame for problem in report.problems for frame in problem.frames})
     if report.problems and spoiled:
-        from sonarsynth.store import ranges
-
         out.print(f"damaged frames: {ranges(spoiled)}; run 'sonarsynth repair' to rebuild them", markup=False)
     for check in report.checks:
         word = {True: "ok", False: "FAILED", None: "info"}[check.ok]
         expected = "" if check.ok is None else f" (expected: {check.expected})"
         out.print(f"{word}: {check.name}: {check.got}{expected}", markup=False)
         if check.ok is False and check.frames:
-            from sonarsynth.store import ranges
-
             out.print(f"    in frames {ranges(check.frames)}", markup=False)
     for check in report.checks:
         if check.warning:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.environment.sea import Absorption, Profile
+from sonarsynth.equations.rays import path_means
 from sonarsynth.equations.water import seawater
 from sonarsynth.equations.water.formula_ranges import noted
 
@@ -46,8 +47,6 @@ class DepthAbsorption:
         profile: what bends them, a uniform one if nothing does; climb (path,): upward component of the unit vector in
         which each leaves; vertices (path,): reflections and turning points.
         """
-        from sonarsynth.equations.rays import path_means
-
         out = np.empty(len(start))
         water, table = (profile.depth, profile.speed), (self.depth, self.value)
         bent = not profile.uniform

@@ -8,6 +8,7 @@ from sonarsynth.conventions import PositiveMetres
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand, Method
 from sonarsynth.imaging.dense import DenseDelayAndSum
+from sonarsynth.imaging.focus_error import zones_needed
 from sonarsynth.imaging.focused import AUTO_ERROR, FocusedDelayAndSum
 from sonarsynth.imaging.image_window import Shading
 from sonarsynth.products import EnergyImage, Signals
@@ -40,8 +41,6 @@ class AutoBeamforming(Method):
     def estimated(self, elements: Elements, sonar: Sonar, error_db: float) -> FocusedDelayAndSum | DenseDelayAndSum:
         """The method whose `focus_error`, an estimate and no bound, is not above `error_db` (dB)."""
         if elements.on_lattice:
-            from sonarsynth.imaging.focus_error import zones_needed
-
             zones = zones_needed(elements, self.shading, sonar, self.focus, error_db)
             if zones is not None:
                 return FocusedDelayAndSum(focus=self.focus, shading=self.shading, zones=zones)

@@ -11,7 +11,9 @@ from sonarsynth.conventions import PositiveMetres
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand, Method
 from sonarsynth.imaging.dense import DenseDelayAndSum
+from sonarsynth.imaging.focus_error import MOST_ZONES, zones_needed
 from sonarsynth.imaging.image_window import Shading, energy_image, weights, window_spectra
+from sonarsynth.imaging.lattice_image import check_lattice, focused_energies, steered_zones, zoned_energies
 from sonarsynth.products import EnergyImage, Signals
 from sonarsynth.receiver import Elements, Sonar
 
@@ -91,8 +93,6 @@ class FocusedDelayAndSum(Method):
 
     def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
         """Image of the window from start to stop (s). Raises ValueError for an array that is not a lattice."""
-        from sonarsynth.imaging.lattice_image import check_lattice, focused_energies, steered_zones, zoned_energies
-
         frequencies, spectra, unit = window_spectra(signals, sonar, start, stop)
         check_lattice(elements)
         weight, grid, speed = weights(elements, self.shading), sonar.beams, sonar.assumed_sound_speed
@@ -106,6 +106,4 @@ class FocusedDelayAndSum(Method):
         return energy_image(unit * energy, sonar, start, stop)
 
     def _zones(self, elements: Elements, sonar: Sonar) -> int:
-        from sonarsynth.imaging.focus_error import MOST_ZONES, zones_needed
-
         return zones_needed(elements, self.shading, sonar, self.focus, AUTO_ERROR) or MOST_ZONES

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
+from sonarsynth.equations.noise.path_sums import coherent_sums, mean_powers
 from sonarsynth.labels.level_band import SLICES, Band
 from sonarsynth.products import FAMILIES, Arrivals
 
@@ -53,8 +54,6 @@ class _Together(NamedTuple):
 
 def path_powers(arrivals: Arrivals, band: Band) -> Powers:
     """Powers in the band of each path, and of coherent ones together."""
-    from sonarsynth.equations.noise.path_sums import mean_powers
-
     few = band.sliced(FEWEST)
     columns = arrivals.coherent, arrivals.coherent_fraction, arrivals.height_delay_std, arrivals.absorption
     blurs = arrivals.delay_std, arrivals.echo_delay_std
@@ -112,8 +111,6 @@ def _runs(sorted_values: Ints) -> zip[tuple[int, int]]:
 
 def _coherent(arrivals: Arrivals, rows: Ints, band: Band) -> tuple[Floats, _Together]:
     """Mean power (row,) of what each facet does to the pulse, and the powers of the paths of these rows together."""
-    from sonarsynth.equations.noise.path_sums import coherent_sums
-
     apart = band.pulse
     group, part, middle, longest = _groups(arrivals, rows, apart)
     fine = band.sliced(float(np.clip((band.high - band.low) * (longest + apart), FEWEST, MOST)))

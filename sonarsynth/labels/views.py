@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.labels import view_kernels
 from sonarsynth.receiver import BeamGrid
 
 
@@ -40,8 +41,6 @@ def box_in_view(seen: Floats, faces: np.ndarray, beams: BeamGrid) -> BoxInView:
     """
     if not len(faces):
         return BoxInView(np.full(4, np.nan), View.HIDDEN)
-    from sonarsynth.labels import view_kernels
-
     spans = 0.5 * beams.azimuth_span, 0.5 * beams.elevation_span
     bounds = np.array([np.inf, -np.inf, np.inf, -np.inf])
     inside, outside = view_kernels.bounds(np.ascontiguousarray(seen, float), faces, *spans, bounds)

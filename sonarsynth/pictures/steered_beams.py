@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Floats, direction
+from sonarsynth.equations.arrays.beams import beam_spectra
+from sonarsynth.equations.arrays.gates import gated_spectra
 from sonarsynth.evaluation import beam_width
 from sonarsynth.pictures.figures.sheet import Beam
 from sonarsynth.pictures.store_reading import Stored, beam_grid, needed, read
@@ -116,9 +118,6 @@ def steer(tree: xr.DataTree, frame: Stored, pressure: Floats, start: float, alon
 
     pressure (sensor, sample) from `start` (s); along (beam, xyz). Focused on the middle of the target.
     """
-    from sonarsynth.equations.arrays.beams import beam_spectra
-    from sonarsynth.equations.arrays.gates import gated_spectra
-
     rate = float(needed(tree, "signals/sampling_frequency"))
     band = (float(tree.attrs["band_low"]), float(tree.attrs["band_high"]))
     first, count = _echo_window(tree, frame, pressure.shape[1], rate, start)

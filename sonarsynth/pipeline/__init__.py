@@ -42,7 +42,9 @@ from sonarsynth.propagation import Straight
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
+from sonarsynth.signals import add_noise, convert
 from sonarsynth.signals.filtered_pulse import snap_levels
+from sonarsynth.signals.isolated_paths import measured_levels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -191,8 +193,6 @@ def synthesise(plan: Plan, traced: TracedFrame) -> Signals:
 
 def digitise(plan: Plan, frame: Frame, signals: Signals) -> Signals:
     """Signals as the sonar has them: with ambient noise, through the converter; `plan` is that of the sequence."""
-    from sonarsynth.signals import add_noise, convert
-
     sonar, noise = plan.scene.sonar, plan.scene.world.environment.noise
     if noise is not None:
         random = stream(frame.seed, "noise", frame.key, frame.step)
@@ -202,8 +202,6 @@ def digitise(plan: Plan, frame: Frame, signals: Signals) -> Signals:
 
 def measure_isolated(plan: Plan, traced: TracedFrame) -> Floats:
     """Levels (snap, target + 1, family) in dB of the isolated paths of the link budget, measured in signals of each."""
-    from sonarsynth.signals.isolated_paths import measured_levels
-
     plan = plan.at(traced.frame.index)
     scene, budget = plan.scene, traced.budget
     method, snaps = plan.choices.synthesis, traced.frame.moment.snaps

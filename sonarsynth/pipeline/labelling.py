@@ -10,6 +10,8 @@ from sonarsynth.labels import SLICES, Band, Listening, label_points
 from sonarsynth.planning import Plan
 from sonarsynth.products import Arrivals, PointCloud, PointLabels, SourceEstimates
 from sonarsynth.recipe.scene import Frame
+from sonarsynth.signals.direct_sum import relative_absorption
+from sonarsynth.signals.isolated_paths import energy_in_slices
 from sonarsynth.state import Snap
 
 
@@ -26,9 +28,6 @@ def expansion_error(plan: Plan, arrivals: Arrivals) -> float:
 
 def band_of(plan: Plan, snaps: tuple[Snap, ...]) -> Band:
     """The band that levels are taken in."""
-    from sonarsynth.signals.direct_sum import relative_absorption
-    from sonarsynth.signals.isolated_paths import energy_in_slices
-
     sonar = plan.scene.sonar
     energy = np.array([energy_in_slices(snap.waveform, sonar, SLICES) for snap in snaps]).reshape(-1, SLICES)
     band = Band(sonar.band.low, sonar.band.high, energy, np.zeros(SLICES))

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from sonarsynth.description import FieldError
 from sonarsynth.planning import Plan
+from sonarsynth.tracing.ray_fan import fan
 
 if TYPE_CHECKING:
     from sonarsynth.tracing.ray_fan import RayFan
@@ -13,8 +14,6 @@ if TYPE_CHECKING:
 
 def follow_rays(plan: Plan, index: int) -> RayFan:
     """The rays that the recipe asks for, followed through a frame. Raises FieldError where it asks for none."""
-    from sonarsynth.tracing.ray_fan import fan
-
     request = plan.recipe.rays
     if request is None:
         raise FieldError((), "the recipe asks for no rays: add 'rays:', with directions or a grid")

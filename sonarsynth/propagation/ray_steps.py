@@ -8,6 +8,7 @@ import numpy as np
 
 from sonarsynth.casting.ray_casting import OFFSET, first_hit
 from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints, depth
+from sonarsynth.equations.rays import ray_arcs
 from sonarsynth.equations.rays.ray_solutions import Water
 from sonarsynth.geometry import unit
 from sonarsynth.geometry.placed_target import PlacedTarget
@@ -59,8 +60,6 @@ def snell(layers: Water, layer: Ints, z: Floats, direction: Floats) -> tuple[Flo
 
 def move(layers: Water, state: Rays, limit: Floats, sagitta: float) -> tuple[Rays, Ints]:
     """Rays after one arc each of at most `limit` (ray,) m, and why it ended."""
-    from sonarsynth.equations.rays import ray_arcs
-
     n = len(state.ray)
     layer, phi, z = state.layer.copy(), state.phi.copy(), np.clip(depth(state.position), 0.0, layers.depth[-1])
     why, dx, length, time = np.empty(n, np.int64), np.empty(n), np.empty(n), np.empty(n)

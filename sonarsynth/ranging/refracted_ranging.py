@@ -9,6 +9,7 @@ from annotated_types import Ge, Gt
 from sonarsynth.conventions import Decibels, PositiveMetres
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand, Method
+from sonarsynth.environment.casts import profile_of
 from sonarsynth.environment.sea import Profile, SoundSpeed
 from sonarsynth.geometry import Pose
 from sonarsynth.products import EnergyImage, PointCloud, Signals, SourceEstimates
@@ -46,7 +47,6 @@ class RefractedRange(Method):
         direct: Signals | None = None,
     ) -> PointCloud:
         """See `RangingMethod`. Positions lie where the rays lead; a range is the straight distance to there."""
-        from sonarsynth.environment.casts import profile_of
         from sonarsynth.ranging.clouds import point_cloud
         from sonarsynth.ranging.location.refraction import refracted_solution
 

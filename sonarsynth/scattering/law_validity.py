@@ -8,7 +8,9 @@ from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Floats, direction
+from sonarsynth.equations.scattering.lobes import slope_lobe
+from sonarsynth.equations.scattering.modal_series import sphere_amplitude
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.surfaces import longest_edge
 
@@ -55,8 +57,6 @@ Amplitude = Callable[[Floats], Floats]
 
 def sphere_errors(amplitude: Amplitude, boundary: Literal["rigid", "soft"], ka: Floats) -> Floats:
     """Error (dB) of a law at backscatter of a sphere at products ka, by the exact series; positive: too loud."""
-    from sonarsynth.equations.scattering.modal_series import sphere_amplitude
-
     exact = np.abs(sphere_amplitude(ka / (2.0 * np.pi), np.pi, radius=1.0, sound_speed=1.0, boundary=boundary))
     return np.asarray(20.0 * np.log10(amplitude(ka) / exact))
 
@@ -130,9 +130,6 @@ def slopes_note(height: float, slope: float, body: Scatterer) -> str | None:
 @lru_cache(maxsize=64)
 def returned(slope: float, incidence: float) -> float:
     """Share of the power that the lobe of an rms slope sends back, of what arrives at an angle (rad) off the normal."""
-    from sonarsynth.conventions import direction
-    from sonarsynth.equations.scattering.lobes import slope_lobe
-
     azimuth, elevation = np.deg2rad(np.arange(0.5, 360.0)), np.deg2rad(np.arange(0.125, 90.0, 0.25))
     away = direction(azimuth[None, :], elevation[:, None])
     incident = np.array([np.sin(incidence), 0.0, -np.cos(incidence)])

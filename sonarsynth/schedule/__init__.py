@@ -13,6 +13,7 @@ from sonarsynth.description.memory import free_bytes
 from sonarsynth.planning import PRODUCTS, Plan, choices_from, chosen_products, plan
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.reading import Source
+from sonarsynth.schedule import connecting
 from sonarsynth.schedule.build_log import append_lines, read_lines, write_lines
 from sonarsynth.schedule.build_report import BuildProgress, BuildReport, Progress
 from sonarsynth.schedule.disk_space import Room, TooLarge, check_space, told_when_full
@@ -144,8 +145,6 @@ def _check_files(path: Folder, made: Plan) -> None:
 def _dashboard(shown: bool) -> AbstractContextManager[None]:
     if not shown:
         return nullcontext()
-    from sonarsynth.schedule import connecting
-
     return connecting.dashboard_shown()
 
 
@@ -175,8 +174,6 @@ def _check(
     if worker_memory is not None and worker_memory < LEAST_MEMORY:
         raise ValueError(f"worker_memory must be {LEAST_MEMORY:g} bytes or more, not {worker_memory}")
     if scheduler is not None:
-        from sonarsynth.schedule import connecting
-
         connecting.check_address(scheduler, insecure)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from sonarsynth.planning import Plan
-from sonarsynth.schedule import tasks, worker_status
+from sonarsynth.schedule import cluster, connecting, tasks, worker_status
 from sonarsynth.schedule.tasks import Job, Written
 from sonarsynth.store import Folder, Remote, Unreachable
 
@@ -65,8 +65,6 @@ def make_shards(
         for shard, frames in todo.items():
             done(tasks.write(job, shard, [[tasks.render_frame(job, frame) for frame in frames]]))
         return
-    from sonarsynth.schedule import cluster, connecting
-
     count = min(usable_cores() if workers is None else workers, len(todo))
     with connecting.connected(count, scheduler, memory) as client:
         started(len(client.nthreads()), client.dashboard_link or "")

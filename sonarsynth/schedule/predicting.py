@@ -20,6 +20,7 @@ from sonarsynth import store
 from sonarsynth.planning import Plan, Stage
 from sonarsynth.planning.costs import machine_factor
 from sonarsynth.schedule.benchmark_frames import Sizes, Trial, disk_use, try_frames
+from sonarsynth.schedule.making import usable_cores
 
 if TYPE_CHECKING:
     from sonarsynth.schedule.build_report import BuildReport
@@ -199,8 +200,6 @@ def predict(
     given, or for a compiler, whose work is kept). Never raises for a frame or a disk that fails: costs are
     by counts of work then, and `how` says why.
     """
-    from sonarsynth.schedule.making import usable_cores
-
     cores = usable_cores()
     counted = {stage.stage: stage.seconds for stage in plan.stages}
     usual = PREPARED * machine_factor()

@@ -12,6 +12,7 @@ from sonarsynth.description import FieldError
 from sonarsynth.planning import Plan, choices_from, plan
 from sonarsynth.schedule.build_log import append_lines
 from sonarsynth.schedule.build_report import Progress
+from sonarsynth.schedule.connecting import check_address
 from sonarsynth.schedule.making import job_of, make_shards, reachable_by_workers
 from sonarsynth.schedule.tasks import Failure, Written
 from sonarsynth.store import Findings, Folder, Mismatch, Problem, Remote, cards, provenance
@@ -76,8 +77,6 @@ def repair(
     written; ValueError for a scheduler on another machine without TLS, unless `insecure`.
     """
     if scheduler is not None:
-        from sonarsynth.schedule.connecting import check_address
-
         check_address(scheduler, insecure)
     path = reachable_by_workers(store.absolute(path), workers)
     store.must_be_store(path)

@@ -101,7 +101,7 @@ def array_paths(
         raise ValueError(f"arrival {np.flatnonzero(arrivals.amplitude == 0.0)[0]} has no amplitude")
     if count and not (arrivals.radius > 0.0).all():
         raise ValueError(f"arrival {np.flatnonzero(~(arrivals.radius > 0.0))[0]} has a radius that is not positive")
-    _check_shapes(arrivals)
+    _check_shapes(arrivals, elements)
     if arrivals.occluded.shape[1] not in (0, 1 + elements.count // 8):
         raise ValueError(f"arrivals are hidden from hydrophones of another array, not of one of {elements.count}")
     if count and not (arrivals.snap.min() >= 0 and arrivals.snap.max() < len(snaps)):
@@ -150,14 +150,15 @@ def _centred(arrivals: Arrivals) -> tuple[Floats, Floats]:
     return arrivals.delay + middle, arrivals.corner_delays - middle[:, None]
 
 
-def _check_shapes(arrivals: Arrivals) -> None:
+def _check_shapes(arrivals: Arrivals, elements: Elements) -> None:
     """Raise ValueError for a path whose pulse has no shape."""
+    doppler = np.abs(arrivals.doppler)
+    if (terms := arrivals.doppler_terms).shape[1]:  # each at its largest at a hydrophone: a thin array excites few
+        values = aperture_terms(elements.position, elements.aperture or 1.0, terms.shape[1])
+        doppler = doppler + np.abs(terms) @ np.abs(values).max(axis=0)
     for wrong, what in (
         (arrivals.delay_std < 0.0, "a negative delay_std"),
-        (
-            np.abs(arrivals.doppler) + np.abs(arrivals.doppler_terms).sum(axis=1) >= MAX_DOPPLER,
-            f"a Doppler factor that is not within +-{MAX_DOPPLER:g}",
-        ),
+        (doppler >= MAX_DOPPLER, f"a Doppler factor that is not within +-{MAX_DOPPLER:g}"),
         (np.abs(arrivals.corner_delays.T) >= LONGEST_CORNER, f"corners that are not within {LONGEST_CORNER:g} s"),
         (
             (arrivals.coherent_fraction < 0.0) | (arrivals.coherent_fraction > 1.0),

@@ -13,7 +13,7 @@ from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.equations.scattering.facet_size import FIVE_PERCENT
 from sonarsynth.geometry.curvature import bend
 from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.geometry.surfaces import longest_edge
+from sonarsynth.geometry.surfaces import longest_edge, volume
 from sonarsynth.targets.meshes import file_stamp, mesh_of, refined_mesh
 from sonarsynth.targets.shapes import Box, Cylinder, LShape, MeshFile, Remus100, Shape, Sphere
 
@@ -165,8 +165,6 @@ def convex(shape: Shape | None, mesh: Mesh) -> bool:
     if shape is not None and not isinstance(shape, MeshFile):
         return isinstance(shape, (Sphere, Cylinder, Box))
     from scipy.spatial import ConvexHull, QhullError
-
-    from sonarsynth.geometry.surfaces import volume
 
     try:
         hull = float(ConvexHull(mesh.vertices).volume)

@@ -14,6 +14,9 @@ from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.geometry.mesh import Mesh, read_only
 from sonarsynth.geometry.surfaces import MeshError, Surface, halve_longest_edges, split_long_edges
 from sonarsynth.targets.generated.generation import generate
+from sonarsynth.targets.generated.smoothing import curved
+from sonarsynth.targets.mesh_readers.mesh_files import read_surface
+from sonarsynth.targets.mesh_readers.mesh_repair import check, repair
 from sonarsynth.targets.shapes import Cylinder, MeshFile, Myring, Remus100, Shape
 
 __all__ = ["MeshError", "file_stamp", "mesh_of", "refined_mesh"]
@@ -71,8 +74,6 @@ def refined_mesh(shape: Shape, edge: float = np.inf, sagitta: float = np.inf) ->
 
 
 def _read(shape: MeshFile, edge: float, sagitta: float) -> tuple[Surface, tuple[str, ...]]:
-    from sonarsynth.targets.generated.smoothing import curved
-
     surface, notes = _repaired(replace(shape, edge=None, smooth=False, crease=SHARP), file_stamp(shape))
     longest = min(edge, np.inf if shape.edge is None else shape.edge)
     if np.isinf(longest) and not (shape.smooth and np.isfinite(sagitta)):
@@ -89,9 +90,6 @@ def _read(shape: MeshFile, edge: float, sagitta: float) -> tuple[Surface, tuple[
 def _repaired(shape: MeshFile, stamp: tuple[int, int] | None) -> tuple[Surface, tuple[str, ...]]:
     """What a file holds, before any refinement, read once for all of them."""
     from scipy.spatial.transform import Rotation
-
-    from sonarsynth.targets.mesh_readers.mesh_files import read_surface
-    from sonarsynth.targets.mesh_readers.mesh_repair import check, repair
 
     path = Path(shape.path)
     vertices, faces = read_surface(path)

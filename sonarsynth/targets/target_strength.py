@@ -8,8 +8,12 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from sonarsynth.casting.ray_casting import OFFSET, first_hit
 from sonarsynth.conventions import FASTEST, SLOWEST, Bools, Floats
+from sonarsynth.equations.scattering.convex_bodies import shape_operators
+from sonarsynth.geometry.curvature import CREASE, curvature_radius, neighbours
 from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.geometry.surfaces import weld
 from sonarsynth.scattering import Scattering
 from sonarsynth.scattering.kirchhoff import Kirchhoff
 from sonarsynth.scattering.law_notes import SmallBody
@@ -70,8 +74,6 @@ class _Body:
     """A mesh, its law, and what each direction sees of it."""
 
     def __init__(self, target: Mesh | Shape | Target, law: Scattering, wavelength: float, longest: float) -> None:
-        from sonarsynth.geometry.curvature import curvature_radius
-
         shape = target.shape if isinstance(target, Target) else target
         coherent = isinstance(law, Kirchhoff)
         if isinstance(shape, Mesh):
@@ -92,10 +94,6 @@ class _Body:
 
     def _round(self) -> Floats | None:
         """Shape operators (facet, xyz, xyz) of a closed convex body, curved everywhere, without creases; else None."""
-        from sonarsynth.equations.scattering.convex_bodies import shape_operators
-        from sonarsynth.geometry.curvature import CREASE, neighbours
-        from sonarsynth.geometry.surfaces import weld
-
         if not (self.convex and self.curved.all()):
             return None
         pairs = neighbours(self.mesh)
@@ -118,8 +116,6 @@ class _Body:
 
     def seen_from(self, towards: Floats) -> Bools:
         """Facets (facet,) that face a direction (xyz) with no other facet before their middles; kept for the last."""
-        from sonarsynth.casting.ray_casting import OFFSET, first_hit
-
         towards = towards + 0.0
         key = towards.tobytes()
         if key not in self.unhidden:

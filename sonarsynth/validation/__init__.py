@@ -8,31 +8,27 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from sonarsynth.validation.bodies.cylinder import cylinder_accuracy
+from sonarsynth.validation.bodies.plate import plate_accuracy
+from sonarsynth.validation.bodies.sphere import sphere_accuracy
+from sonarsynth.validation.bubbles.all_bubbles import bubble_accuracy
 from sonarsynth.validation.rays.eigenray_checks import ray_accuracy
 from sonarsynth.validation.validation_rows import Row
 
 
 def _sphere(quick: bool) -> list[Row]:
-    from sonarsynth.validation.bodies.sphere import sphere_accuracy
-
     return sphere_accuracy(quick)
 
 
 def _cylinder(quick: bool) -> list[Row]:
-    from sonarsynth.validation.bodies.cylinder import cylinder_accuracy
-
     return cylinder_accuracy(quick)
 
 
 def _plate(quick: bool) -> list[Row]:
-    from sonarsynth.validation.bodies.plate import plate_accuracy
-
     return plate_accuracy(quick)
 
 
 def _bubble(quick: bool) -> list[Row]:
-    from sonarsynth.validation.bubbles.all_bubbles import bubble_accuracy
-
     return bubble_accuracy(quick)
 
 

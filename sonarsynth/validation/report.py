@@ -8,6 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from sonarsynth.pictures.accuracy_figures.accuracy_figure import Line, Mark, error_and_time_figure
+from sonarsynth.pictures.accuracy_figures.bodies_figure import Trade, bodies_figure
+from sonarsynth.validation.bodies.level_curves import cylinder_panels, plate_panels, sphere_panels
+from sonarsynth.validation.bubbles.bubbles_solvers import solver_picture
 from sonarsynth.validation.validation_rows import Row
 
 if TYPE_CHECKING:
@@ -50,8 +53,6 @@ def _knobs(rows: Sequence[Row]) -> dict[str, list[Row]]:
 
 def _trades(rows: Sequence[Row], quantity: str) -> list[Trade]:
     """Those of one quantity."""
-    from sonarsynth.pictures.accuracy_figures.bodies_figure import Trade
-
     made = []
     for name, of in _knobs([row for row in rows if row.quantity == quantity]).items():
         columns = [r.counts["facets"] for r in of], [r.cost for r in of], [r.got for r in of], [r.expected for r in of]
@@ -60,32 +61,21 @@ def _trades(rows: Sequence[Row], quantity: str) -> list[Trade]:
 
 
 def _sphere(rows: Sequence[Row]) -> Figure:
-    from sonarsynth.pictures.accuracy_figures.bodies_figure import bodies_figure
-    from sonarsynth.validation.bodies.level_curves import sphere_panels
-
     trades = {RELATIVE: _trades(rows, "amplitude"), "error of the level, largest (dB)": _trades(rows, "level")}
     return bodies_figure("Spheres of facets against exact computations", trades, sphere_panels())
 
 
 def _cylinder(rows: Sequence[Row]) -> Figure:
-    from sonarsynth.pictures.accuracy_figures.bodies_figure import bodies_figure
-    from sonarsynth.validation.bodies.level_curves import cylinder_panels
-
     trades = {RELATIVE: _trades(rows, "amplitude")}
     return bodies_figure("Cylinders of facets against exact computations", trades, cylinder_panels())
 
 
 def _plate(rows: Sequence[Row]) -> Figure:
-    from sonarsynth.pictures.accuracy_figures.bodies_figure import bodies_figure
-    from sonarsynth.validation.bodies.level_curves import plate_panels
-
     trades = {"error over area/wavelength, largest": _trades(rows, "amplitude")}
     return bodies_figure("Flat plates: facets, however cut, against closed forms", trades, plate_panels())
 
 
 def _bubble(rows: Sequence[Row]) -> Figure | None:
-    from sonarsynth.validation.bubbles.bubbles_solvers import solver_picture
-
     drawn: Figure | None = solver_picture(rows)
     return drawn
 

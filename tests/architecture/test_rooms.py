@@ -25,14 +25,17 @@ MODULES = {name_of(file): file for file in FILES}
 
 def imported(file: Path) -> set[str]:
     """The modules of the package that a file imports, anywhere in it, for types too."""
-    found = set()
-    for node in ast.walk(ast.parse(file.read_text())):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names if alias.name in MODULES}
-        elif isinstance(node, ast.ImportFrom) and node.module in MODULES:
-            names = [f"{node.module}.{alias.name}" for alias in node.names]
-            found |= {name if name in MODULES else node.module for name in names}
-    return found
+    return set().union(*(own_modules(node) for node in ast.walk(ast.parse(file.read_text()))))
+
+
+def own_modules(node: ast.AST) -> set[str]:
+    """The modules of the package that a statement imports."""
+    if isinstance(node, ast.Import):
+        return {alias.name for alias in node.names if alias.name in MODULES}
+    if isinstance(node, ast.ImportFrom) and node.module in MODULES:
+        names = [f"{node.module}.{alias.name}" for alias in node.names]
+        return {name if name in MODULES else node.module for name in names}
+    return set()
 
 
 def test_no_circle_of_modules() -> None:
@@ -63,3 +66,35 @@ def test_at_most_eight_parameters_go_by_their_place() -> None:
                 places = [a.arg for a in (*node.args.posonlyargs, *node.args.args) if a.arg not in ("self", "cls")]
                 long += [f"{name_of(file)}.{node.name}"] if len(places) > PLACES else []
     assert long == []
+
+
+HEAVY = {"numba", "matplotlib", "distributed", "dask", "xarray", "zarr", "scipy", "trimesh", "embreex"}
+
+
+def loads_heavy(name: str, known: dict[str, bool]) -> bool:
+    """Whether importing a module of the package loads a library that takes long to import."""
+    if name not in known:
+        known[name] = False  # while it is looked at
+        top = [
+            node for node in ast.parse(MODULES[name].read_text()).body if isinstance(node, ast.Import | ast.ImportFrom)
+        ]
+        names = {alias.name for node in top if isinstance(node, ast.Import) for alias in node.names}
+        names |= {node.module or "" for node in top if isinstance(node, ast.ImportFrom)}
+        own = set().union(*(own_modules(node) for node in top)) if top else set()
+        known[name] = bool({n.partition(".")[0] for n in names} & HEAVY) or any(loads_heavy(n, known) for n in own)
+    return known[name]
+
+
+def test_only_what_loads_a_heavy_library_is_imported_within_functions() -> None:
+    """The commands are the exception: each imports what it runs, so that help is there at once."""
+    light, seen, known = [], 0, {}
+    for file in FILES:
+        if file.parent.name == "cli":
+            continue
+        for function in (n for n in ast.walk(ast.parse(file.read_text())) if isinstance(n, ast.FunctionDef)):
+            inner = [n for n in ast.walk(function) if isinstance(n, ast.Import | ast.ImportFrom)]
+            names = set().union(*(own_modules(node) for node in inner)) if inner else set()
+            seen += len(names)
+            light += [f"{name_of(file)} imports {name}" for name in names if not loads_heavy(name, known)]
+    assert seen > 10
+    assert light == []

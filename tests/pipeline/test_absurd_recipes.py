@@ -63,6 +63,7 @@ ABSURD = [
         "10: scene.world.sources: 501 snaps are more than 500",
     ),
     ("stop: [10, 1, -5], duration: 1", "stop: [10, 400, -5], duration: 1", "target 'box' moves at 400 m/s at frame 0"),
+    ("stop: [10, 1, -5], duration: 1", "stop: [10, 1, -5], duration: 5e-300", "target 'box' moves at 2e+299 m/s"),
     (
         "frames: 20,",
         "sonar: {kind: line, start: [0, 0, -5], stop: [0, 999, -5], duration: 1}, frames: 20,",

@@ -11,6 +11,7 @@ from sonarsynth.environment.sea import Profile
 from sonarsynth.products import Paths
 from sonarsynth.propagation import AutoTracing, Refracted, Straight
 from sonarsynth.ranging.clouds import isovelocity_solution
+from sonarsynth.ranging.location.refraction import refracted_solution
 from sonarsynth.receiver import elements
 from sonarsynth.recipe.scene import Frame, Scene
 
@@ -79,8 +80,6 @@ def _alike(one: Paths, other: Paths) -> bool:
 
 def ranging_error(scene: Scene, profile: Profile, frames: Iterable[Frame]) -> float:
     """Largest difference (m) of ranges by the closed form from those along rays, over the boxes round the bodies."""
-    from sonarsynth.ranging.location.refraction import refracted_solution
-
     speed, worst = scene.sonar.assumed_sound_speed, 0.0
     if profile.uniform and profile.speed[0] == speed:
         return 0.0

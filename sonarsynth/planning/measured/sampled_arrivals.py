@@ -7,6 +7,7 @@ from sonarsynth.planning.plans import Plan
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver.subarrays import Subarray
 from sonarsynth.recipe.scene import Frame
+from sonarsynth.tracing.arrivals import trace
 
 FACETS = 10.0
 """Change of an echo by the mean over its facet, over the array, that is left out, over the error of signals: the whole
@@ -21,8 +22,6 @@ def arrivals_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Arriv
     What is not traced to any hydrophone, as where parts are, is seen by the array's middle alone. `plan` is that of
     the frame's sequence. Raises ValueError for anything outside the water.
     """
-    from sonarsynth.tracing.arrivals import trace
-
     scene, sonar = plan.scene, plan.scene.sonar
     sonar_track = frame.sonar_track if part is None else frame.sonar_track.part(part.centre)
     return trace(

@@ -19,6 +19,7 @@ from sonarsynth.scattering import MirrorLobe
 from sonarsynth.state import WorldState
 from sonarsynth.targets.mesh_resolution import expected_error
 from sonarsynth.targets.meshes import mesh_of
+from sonarsynth.tracing.arrivals import trace
 
 ENOUGH = 10_000
 """Facets of a target that its reflections are estimated from."""
@@ -176,8 +177,6 @@ def reflected_bound(plan: Plan) -> str:
     Of targets as they were described, by a lobe where they are coherent (powers of facets add), and of `ENOUGH` of
     their facets at most: a level to go by, at little cost.
     """
-    from sonarsynth.tracing.arrivals import trace
-
     scene, frame = plan.recipe.frame(0)
     sonar, bounces = scene.sonar, plan.propagation.bounces
     if not frame.moment.snaps or bounces >= MOST_BOUNCES:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -169,8 +170,8 @@ def _check_met(scene: Scene, frame: Frame, number: int) -> None:
 
 def _check_speed(scene: Scene, frame: Frame, number: int) -> None:
     """Nothing moves so fast that the pulses are stretched beyond what the synthesis can do (`MAX_DOPPLER`)."""
-    body, array = frame.moment.bodies[number], float(np.linalg.norm(frame.sonar_velocity))
-    own = float(np.linalg.norm(body.velocity))
+    body, array = frame.moment.bodies[number], math.hypot(*frame.sonar_velocity)
+    own = math.hypot(*body.velocity)  # which squares nothing, so that absurd speeds do not overflow
     slowest = float(profile_of(scene.world.environment.sound_speed).speed.min())
     if array + 2.0 * own > 0.9 * MAX_DOPPLER * slowest:
         sonar = array > 2.0 * own

@@ -7,6 +7,7 @@ from typing import Literal
 
 from sonarsynth.description import description
 from sonarsynth.environment.sea import Profile
+from sonarsynth.environment.sound_speed import kink, mean_gradient
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.receiver import Elements, Sonar
@@ -47,7 +48,6 @@ class SensorDelays:
         profile: Profile,
     ) -> SourceEstimates:
         """See `LocatingMethod`. An array that cannot locate gives NaN rows (`locating.unlocatable` says why)."""
-        from sonarsynth.environment.sound_speed import kink, mean_gradient
         from sonarsynth.ranging.location.locating import locate
         from sonarsynth.ranging.location.refraction import bending
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from sonarsynth.store.files import within
+from sonarsynth.store.files.guarded import Guarded
 from sonarsynth.store.files.remote import Remote
 from sonarsynth.store.files.within import Held
 
@@ -100,8 +101,6 @@ def opens(folder: Folder) -> Any:
     """What zarr and xarray open, to read: Zarr 3 alone, and of a disk no link."""
     if isinstance(folder, Remote):
         return folder.zarr_store()
-    from sonarsynth.store.files.guarded import Guarded
-
     return Guarded(folder, read_only=True)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints, depth
 from sonarsynth.environment.sea import Environment, Profile
+from sonarsynth.equations.rays import ray_continuation
 from sonarsynth.equations.rays.ray_solutions import water
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry import Pose
@@ -123,8 +124,6 @@ def rays_to_probes(
     propagation: Propagation,
 ) -> tuple[Floats, Floats, Floats]:
     """Delay over the sphere's (s), gain over it (leg, probe), departure (leg, probe, xyz): rays to every probe."""
-    from sonarsynth.equations.rays import ray_continuation
-
     position = sonar_pose.to_world(probe.position)
     layers = water(profile.depth, profile.speed, environment.depth)
     count, sensors = len(legs.row), len(position)

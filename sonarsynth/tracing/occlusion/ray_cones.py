@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonarsynth.casting import intersections
 from sonarsynth.casting.ray_casting import enclosing, occluded
 from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.environment.sea import Environment, Profile
+from sonarsynth.equations.rays import ray_arcs
 from sonarsynth.equations.rays.ray_solutions import water
 from sonarsynth.geometry.placed_target import PlacedTarget
 
@@ -194,8 +196,6 @@ def _near(
     bow: Floats,
 ) -> tuple[Bools, Floats]:
     """Which rays (ray,) may pass a body far from their start, and how far from it (m) others may still be in one."""
-    from sonarsynth.casting import intersections
-
     far, first = np.zeros(len(start), bool), np.zeros(len(start))
     for body in bodies:
         centre, radius = enclosing(body)
@@ -243,8 +243,6 @@ def chords(
     sagitta: float = SAGITTA_TOLERANCE,
 ) -> tuple[np.ndarray, Floats]:
     """Polylines that keep within `sagitta` (m) of rays from start (ray, xyz): ray of each node, node (node, xyz)."""
-    from sonarsynth.equations.rays import ray_arcs
-
     layers = water(profile.depth, profile.speed, environment.depth)
     z = np.clip(depth(start), 0.0, environment.depth)
     flat = np.hypot(departure[:, 0], departure[:, 1])

@@ -11,8 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
 from sonarsynth.equations.scattering.lobes import lit_and_seen
 from sonarsynth.randomness import stream
+from sonarsynth.targets.mesh_resolution import expected_error
 from sonarsynth.validation.validation_rows import Row
 
 if TYPE_CHECKING:
@@ -73,8 +75,6 @@ def timed(run: Callable[[], T], repeats: int = 3) -> tuple[T, float]:
 
 def backscatter(mesh: Mesh, towards: Floats, frequency: Floats) -> Complexes:
     """Far-field amplitude (frequency,) (m) that a convex rigid mesh sends back to a direction (xyz)."""
-    from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
-
     lit = lit_and_seen(-towards, towards, mesh.normal)
     return mesh_amplitude(mesh.corners, -towards, towards, wavenumber(frequency), lit)
 
@@ -97,8 +97,6 @@ class Point:
 
 def measured(mesh: Mesh, towards: Floats, exact: Complexes) -> Point:
     """Backscatter of a rigid convex mesh to directions (way, xyz) against exact amplitudes (frequency,) over `BAND`."""
-    from sonarsynth.targets.mesh_resolution import expected_error
-
     echoes, cost = timed(lambda: np.array([backscatter(mesh, way, BAND) for way in towards]), repeats=1)
     predicted = expected_error(mesh, SOUND_SPEED / BAND[-1]) * (BAND / BAND[-1])  # in proportion while it is small
     edge = float(np.linalg.norm(mesh.corners - np.roll(mesh.corners, -1, axis=1), axis=2).mean())

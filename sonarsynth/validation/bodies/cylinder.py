@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
 from sonarsynth.equations.scattering.lobes import lit_and_seen
 from sonarsynth.equations.scattering.modal_series import cylinder_amplitude
 from sonarsynth.geometry.mesh import Mesh
@@ -100,8 +101,6 @@ def _facets(radius: float, length: float) -> int:
 
 def _side(case: str, radius: float, length: float, mesh: Mesh, quick: bool) -> Iterator[Row]:
     """The side alone, as in the series, round to 45 degrees: lobe by lobe, over the rms in the band."""
-    from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
-
     side = np.abs(mesh.normal[:, 0]) < 0.5
     aspects = np.arange(90.0, 44.0, -15.0 if quick else -1.0)
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.scattering.kirchhoff_integral import circular_plate, rectangular_plate
+from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
 from sonarsynth.randomness import stream
 from sonarsynth.targets.shapes import Box
 from sonarsynth.targets.target_strength import target_strength
@@ -49,8 +50,6 @@ def rectangle() -> Floats:
 
 def echoes(corners: Floats, incident: Floats, scattered: Floats, frequency: Floats) -> Complexes:
     """Far-field amplitudes (pair, frequency) (m) of rigid facets, for pairs of directions (pair, xyz)."""
-    from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
-
     k = wavenumber(frequency)
     pairs = zip(incident, scattered, strict=True)
     return np.array([mesh_amplitude(corners, one, other, k) for one, other in pairs])

@@ -10,6 +10,7 @@ import numpy as np
 
 from sonarsynth.equations.bubble import bubble_collapse
 from sonarsynth.equations.bubble.bubble_collapse import Cavity, Method
+from sonarsynth.pictures.accuracy_figures.bubble_figure import SolverLine, solver_figure
 from sonarsynth.validation.bubbles.bubble_checks import SERIES, TOLERANCE, described, exact
 from sonarsynth.validation.references.bubble_forms import Form, Run, solve
 from sonarsynth.validation.validation_rows import Row
@@ -74,8 +75,6 @@ def solver_points(quick: bool) -> list[Point]:
 
 def solver_picture(rows: Sequence[Row]) -> Figure | None:
     """Error against run time of the solvers among the rows; None where there are none."""
-    from sonarsynth.pictures.accuracy_figures.bubble_figure import solver_figure
-
     drawn = [row for row in rows if row.quantity == QUANTITY and row.knob is not None]
     knobs = dict.fromkeys(row.knob for row in drawn if row.knob is not None)
     lines = {knob: _line(knob, [row for row in drawn if row.knob == knob]) for knob in knobs}
@@ -84,8 +83,6 @@ def solver_picture(rows: Sequence[Row]) -> Figure | None:
 
 
 def _line(knob: str, rows: Sequence[Row]) -> SolverLine:
-    from sonarsynth.pictures.accuracy_figures.bubble_figure import SolverLine
-
     form, method = knob.removesuffix(DEFAULTS).split(", ")
     cost, count = tuple(r.cost for r in rows), tuple(r.counts["evaluations"] for r in rows)
     return SolverLine(form, method, cost, count, tuple(r.got for r in rows))

@@ -4,6 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from sonarsynth.validation.extremes import (
+    extreme_bodies,
+    extreme_bubbles,
+    extreme_chains,
+    extreme_facets,
+    extreme_rays,
+    extreme_signals,
+    extreme_sources,
+    extreme_targets,
+)
 from sonarsynth.validation.extremes.outcomes import Case, Extreme, outcome, outcomes
 
 __all__ = ["Case", "Extreme", "extremes", "groups", "outcome"]
@@ -11,17 +21,6 @@ __all__ = ["Case", "Extreme", "extremes", "groups", "outcome"]
 
 def groups() -> dict[str, tuple[Case, ...]]:
     """All cases, by what they are about."""
-    from sonarsynth.validation.extremes import (
-        extreme_bodies,
-        extreme_bubbles,
-        extreme_chains,
-        extreme_facets,
-        extreme_rays,
-        extreme_signals,
-        extreme_sources,
-        extreme_targets,
-    )
-
     return {
         "rays": extreme_rays.CASES,
         "signals": extreme_signals.CASES,

@@ -9,10 +9,15 @@ from typing import Literal
 import numpy as np
 
 from sonarsynth.conventions import Floats, direction
+from sonarsynth.equations.scattering.modal_series import sphere_amplitude
 from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.labels import label
+from sonarsynth.labels.views import View
+from sonarsynth.propagation import Straight
 from sonarsynth.receiver import BeamGrid, PositionTable, elements
 from sonarsynth.scattering import FacetLaw, Isotropic, Kirchhoff, MirrorLobe, Scatterer
 from sonarsynth.scattering.law_validity import OFF
+from sonarsynth.state import WorldState
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.targets.target import mesh_for
@@ -48,8 +53,6 @@ def echo(law: FacetLaw, mesh: Mesh, radius: float, frequency: Floats) -> Floats:
 
 def _law(law: MirrorLobe | Kirchhoff) -> Got:
     """Each sphere is as exact as the law says without a word, or as far off as its note says."""
-    from sonarsynth.equations.scattering.modal_series import sphere_amplitude
-
     soft = isinstance(law, Kirchhoff) and law.surface == "soft"
     boundary: Literal["rigid", "soft"] = "soft" if soft else "rigid"
     parts = []
@@ -84,11 +87,6 @@ def _isotropic() -> Got:
 
 def _bearings() -> Got:
     """Bounds within the view, mirrored with the bearing, none exactly where a flag says so."""
-    from sonarsynth.labels import label
-    from sonarsynth.labels.views import View
-    from sonarsynth.propagation import Straight
-    from sonarsynth.state import WorldState
-
     beams, mesh = BeamGrid(azimuths=3, elevations=3), mesh_of(Box(size=(0.5, 3.0, 1.0)))
     connect = partial(Straight().connect, PROFILE, BOTTOM_DEPTH)
     edge, parts, flags = 0.5 * beams.azimuth_span, [], set()

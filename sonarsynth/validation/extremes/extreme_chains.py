@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sonarsynth.environment.sea import Environment, Isovelocity, Tabulated
+from sonarsynth.equations.arrays.bistatic_range import bistatic_range
 from sonarsynth.geometry.motion import Still
 from sonarsynth.imaging import DenseDelayAndSum
 from sonarsynth.labels.views import View
+from sonarsynth.pipeline import render
+from sonarsynth.planning import plan
 from sonarsynth.products import LINK_BUDGET
 from sonarsynth.receiver import BeamGrid, PlanarLattice, PositionTable, Sonar
 from sonarsynth.recipe import Recipe
@@ -51,9 +54,6 @@ def recipe(
 
 def frame(of: Recipe, products: tuple[str, ...] = ("signals", "image", "cloud")) -> xr.DataTree:
     """The first frame."""
-    from sonarsynth.pipeline import render
-    from sonarsynth.planning import plan
-
     return render(plan(of, products), 0)
 
 
@@ -166,8 +166,6 @@ def _beyond() -> Got:
 
 def _on_line() -> Got:
     """A small target half way to the snap, off the line by a tenth of a metre: its range is ill-conditioned."""
-    from sonarsynth.equations.arrays.bistatic_range import bistatic_range
-
     ahead = np.array([1.0, 0.0, 0.0])
     on = bistatic_range(0.0, ahead, 20.0 * ahead)
     tree = frame(recipe(((Sphere(radius=0.05), (7.0, 0.1, 0.0)),), (14.0, 0.0, -5.0)))

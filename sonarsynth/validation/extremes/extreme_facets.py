@@ -5,10 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.scattering.convex_bodies import surface_field
+from sonarsynth.equations.scattering.kirchhoff_integral import facet_amplitude, triangle_integral
+from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
+from sonarsynth.equations.scattering.modal_series import sphere_amplitude
+from sonarsynth.equations.scattering.roughness import coherent_factor, incoherent_power, roughness_parameter
+from sonarsynth.geometry.surfaces import volume
 from sonarsynth.receiver import PositionTable, elements
 from sonarsynth.scattering.kirchhoff import Kirchhoff
+from sonarsynth.signals import GriddedSynthesis
+from sonarsynth.targets.generated.smoothing import curved
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
+from sonarsynth.targets.target_strength import target_strength
 from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, refused, together
 from sonarsynth.validation.extremes.plain_scenes import C, body, heard, snap, traced, transfer
 
@@ -18,8 +27,6 @@ TRIANGLE = np.array([[0.2, -0.1, 0.0], [-0.15, 0.25, 0.0], [-0.05, -0.15, 0.0]])
 
 def _waves() -> Got:
     """In the mirror direction f is k A/2 pi at any k; elsewhere it falls; none at backscatter along the facet."""
-    from sonarsynth.equations.scattering.kirchhoff_integral import facet_amplitude, triangle_integral
-
     down, up, along = np.array([0.0, 0, -1.0]), np.array([0.0, 0, 1.0]), np.array([1.0, 0.0, 0.0])
     k = 10.0 ** np.arange(-12.0, 10.0)
     area = 0.5 * np.linalg.norm(np.cross(TRIANGLE[1] - TRIANGLE[0], TRIANGLE[2] - TRIANGLE[0]))
@@ -37,8 +44,6 @@ def _waves() -> Got:
 
 def _mirror() -> Got:
     """Through the mirror direction, from 1e-18 to 0.1 rad off it: the sinc of a square, no step anywhere."""
-    from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
-
     square = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]])[[[0, 1, 2], [0, 2, 3]]]
     parts, k = [], np.array([300.0])
     for tilt in (0.0, *10.0 ** np.arange(-18.0, 0.0)):
@@ -52,8 +57,6 @@ def _mirror() -> Got:
 
 def _rough() -> Got:
     """No height: the smooth echo. Any height: the coherent and the incoherent share of the power are all of it."""
-    from sonarsynth.equations.scattering.roughness import coherent_factor, incoherent_power, roughness_parameter
-
     mesh, band = mesh_of(Box(size=(0.1, 0.3, 0.3), edge=0.02)), (40e3, 80e3)
     f = np.array(band)
     smooth, rough = (
@@ -83,10 +86,6 @@ def _rough_frame() -> Got:
 
 def _fock() -> Got:
     """Limits, and spheres of k a 20 to 300 at all angles against the exact series."""
-    from sonarsynth.equations.scattering.convex_bodies import surface_field
-    from sonarsynth.equations.scattering.modal_series import sphere_amplitude
-    from sonarsynth.targets.target_strength import target_strength
-
     lit, dark = surface_field(np.array([-1e9, -1e3, -30.0]), "rigid"), surface_field(np.array([11.9]), "rigid")
     parts = [
         off(np.abs(lit - 1.0), 1e-5, what="far in the light:"),
@@ -106,8 +105,6 @@ def _fock() -> Got:
 
 def _large() -> Got:
     """Facets too long for their echo to be a pulse in a window are refused; and a body of one huge facet a side."""
-    from sonarsynth.signals import GriddedSynthesis
-
     plate = mesh_of(Box(size=(1.0, 2e3, 2e3)))
     snaps = [snap((1.0, 900.0, 0.0))]
     found = traced(snaps, ONE, [body(plate, (3e3, 0.0, 0.0))], [Kirchhoff()])
@@ -130,9 +127,6 @@ def _icosahedron() -> tuple[Floats, np.ndarray]:
 
 def _smoothing() -> Got:
     """Twenty facets become a sphere; a cube stays a cube; needles and far places change nothing."""
-    from sonarsynth.geometry.surfaces import volume
-    from sonarsynth.targets.generated.smoothing import curved
-
     parts = []
     for scale, away in ((1.0, 0.0), (1e-3, 0.0), (1e3, 0.0), (1.0, 100.0)):
         vertices, faces = _icosahedron()

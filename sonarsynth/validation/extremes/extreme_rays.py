@@ -13,6 +13,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.rays import ray_solutions
 from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, relative, together
 
 if TYPE_CHECKING:
@@ -29,8 +30,6 @@ def found(
     hits: int = 0,
 ) -> Eigenrays:
     """Rays between the ends (depth, depth, distance; m) in water down to the last node."""
-    from sonarsynth.equations.rays import ray_solutions
-
     water = ray_solutions.water(np.array(depth), np.array(speed), depth[-1])
     start, end, distance = (np.array([x]) for x in ends)
     return ray_solutions.eigenrays(water, start, end, distance, vertices, hits)
@@ -159,8 +158,6 @@ def _turning() -> Got:
 
 
 def _coincident() -> Got:
-    from sonarsynth.equations.rays import ray_solutions
-
     parts = []
     for z in (0.0, 20.0, 50.0):
         got = found((0.0, 50.0), (C, C), (z, z, 0.0), 2, 2)
@@ -198,8 +195,6 @@ FOLD = 30.0, 10.0, 18.0, 0.5
 
 def _caustic() -> Got:
     """Down through the uniform layer and back: X = H/u + 2 (c/g) u, u the tangent of the angle; least at a fold."""
-    from sonarsynth.equations.rays import ray_solutions
-
     foot, a, b, g = FOLD
     H, bend = 2.0 * foot - a - b, 2.0 * C / g
     fold = 2.0 * np.sqrt(H * bend)

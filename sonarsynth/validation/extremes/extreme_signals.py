@@ -7,8 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.imaging import FocusedDelayAndSum
+from sonarsynth.ranging import IsovelocityRange, SensorDelays
+from sonarsynth.ranging.location.locating import unlocatable
 from sonarsynth.receiver import Band, BeamGrid, LowPass, PlanarLattice, PositionTable, Sonar, elements
 from sonarsynth.scattering.isotropic import Isotropic
+from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.sources.snap_models import Gabor, Ricker
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Sphere
@@ -42,8 +46,6 @@ FINE = 1e-4
 
 def methods() -> tuple[SignalSynthesis, ...]:
     """The fast synthesis and the exact one."""
-    from sonarsynth.signals import DirectSum, GriddedSynthesis
-
     return GriddedSynthesis(), DirectSum()
 
 
@@ -82,8 +84,6 @@ def _long() -> Got:
 
 
 def _one_sample() -> Got:
-    from sonarsynth.imaging import FocusedDelayAndSum
-
     place = (9.0, 2.0, -3.0)
     snaps = (snap(place),)
     found, parts, peak = traced(snaps, FEW), [], 1.0 / float(np.linalg.norm(place))
@@ -144,9 +144,6 @@ def _loud_and_faint() -> Got:
 
 
 def _silence() -> Got:
-    from sonarsynth.imaging import FocusedDelayAndSum
-    from sonarsynth.ranging import IsovelocityRange, SensorDelays
-
     quiet = heard(methods()[0], traced((), FEW), (), FEW, 0.0, 2000)
     sonar = Sonar(array=PlanarLattice(columns=4, rows=4, pitch=0.1, face=0.0), beams=BeamGrid(azimuths=5, elevations=5))
     found = SensorDelays().locate(quiet, FEW, sonar, POSE, 100.0, 1, PROFILE)
@@ -161,9 +158,6 @@ def _silence() -> Got:
 
 
 def _few_sensors() -> Got:
-    from sonarsynth.ranging import SensorDelays
-    from sonarsynth.ranging.location.locating import unlocatable
-
     place, parts = (9.0, 2.0, -3.0), []
     snaps, start = (snap(place),), 0.004
     for array, reason in ((ONE, "1 live sensor"), (TWO, "2 live sensors")):
@@ -180,8 +174,6 @@ def _few_sensors() -> Got:
 def _ten_thousand() -> Got:
     """Every hydrophone; and the beam that is focused at the snap, whose energy in the band is the pulse's over r^2."""
     from scipy.integrate import quad
-
-    from sonarsynth.imaging import FocusedDelayAndSum
 
     array = PlanarLattice(columns=100, rows=100, pitch=0.01, face=0.0)
     band = Band(low=10e3, high=40e3)

@@ -6,13 +6,18 @@ import numpy as np
 from scipy.special import fresnel, spherical_jn
 
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
+from sonarsynth.equations.scattering.modal_series import sphere_amplitude
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.receiver import PositionTable, elements
 from sonarsynth.scattering.isotropic import Isotropic
 from sonarsynth.scattering.kirchhoff import Kirchhoff
 from sonarsynth.scattering.mirror_lobe import MirrorLobe
+from sonarsynth.targets.mesh_readers.mesh_repair import repair
 from sonarsynth.targets.meshes import mesh_of, refined_mesh
 from sonarsynth.targets.shapes import Box, Shape, Sphere
+from sonarsynth.targets.target import mesh_for
+from sonarsynth.targets.target_strength import target_strength
 from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, together
 from sonarsynth.validation.extremes.plain_scenes import C, body, snap, traced, transfer
 
@@ -23,8 +28,6 @@ BESIDE = np.array([0.0, 1e-6, 0.0])
 
 def echo(shape: Shape, far: float, band: tuple[float, float]) -> Floats:
     """The coherent echo (frequency,) at the ends of a band of a body whose middle is so far ahead (m)."""
-    from sonarsynth.targets.target import mesh_for
-
     law = Kirchhoff()
     mesh = mesh_for(shape, law, C / band[1])
     found = traced([snap(BESIDE)], ONE, [body(mesh, (far, 0.0, 0.0))], [law], band)
@@ -57,9 +60,6 @@ def _distances() -> Got:
 
 def _sizes() -> Got:
     """In a frame, in bands that suit them; and far away, where all sizes are alike at one k a."""
-    from sonarsynth.equations.scattering.modal_series import sphere_amplitude
-    from sonarsynth.targets.target_strength import target_strength
-
     parts = [
         _sphere(0.5e-6, 1.0, (40e3, 80e3), 0.03),
         _sphere(0.5e-3, 1.0, (40e3, 80e3), 0.03),
@@ -85,8 +85,6 @@ def needles(count: int) -> Floats:
 
 
 def _needles() -> Got:
-    from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
-
     corners = needles(400)
     parts = []
     for tilt, turn in ((0.0, 0.0), (0.01, 0.3), (0.7, 0.0), (1.2, 2.0)):
@@ -101,8 +99,6 @@ def _needles() -> Got:
 
 def _degenerate() -> Got:
     """A cube with points and lines for facets, and its corners twice."""
-    from sonarsynth.targets.mesh_readers.mesh_repair import repair
-
     cube = mesh_of(Box(size=(1.0, 1.0, 1.0)))
     extra = np.array([[0, 0, 0], [0, 1, 1], [2, 3, 2]], np.int64)
     line = np.array([[0.0, 0.0, 0.5], [0.25, 0.25, 0.5], [0.5, 0.5, 0.5]])
@@ -121,8 +117,6 @@ def _degenerate() -> Got:
 def _many(facets: int, *, framed: bool) -> Got:
     """A sphere of that many: its area, and Kirchhoff's integral over its lit half; framed: and its echo in a frame."""
     import resource
-
-    from sonarsynth.equations.scattering.kirchhoff_kernels import mesh_amplitude
 
     radius = 0.5
     n = round(np.sqrt(facets / 20.0))

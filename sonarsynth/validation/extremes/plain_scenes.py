@@ -9,13 +9,16 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
+from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
+from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import Elements, LowPass, Sonar
 from sonarsynth.sources.shrimp import SnapModel
 from sonarsynth.sources.snap_models import Ricker
 from sonarsynth.state import Snap, WorldState
+from sonarsynth.tracing.arrivals import trace
 
 if TYPE_CHECKING:
     from sonarsynth.products import Arrivals, Signals
@@ -50,9 +53,6 @@ def traced(
     band: tuple[float, float] = (25e3, 85e3),
 ) -> Arrivals:
     """Every path, none of which has a number that is none."""
-    from sonarsynth.propagation import AutoTracing
-    from sonarsynth.tracing.arrivals import trace
-
     moment = WorldState(0.0, tuple(bodies), tuple(snaps))
     found = trace(WATER, PROFILE, moment, POSE, elements, 0.0, AutoTracing(), tuple(laws), band=band)
     for name, value in vars(found).items():
@@ -93,8 +93,6 @@ def direct(elements: Elements, place: Sequence[float], time: Floats, frequency: 
 
 def transfer(found: Arrivals, frequency: Floats) -> Floats:
     """Pressure (frequency,) at the array centre for a snap of unit spectrum at 1 m: complex, of all paths."""
-    from sonarsynth.equations.scattering.facet_pulses import facet_response
-
     total = np.zeros(len(frequency), complex)
     for some in np.array_split(np.arange(len(found.delay)), len(found.delay) // 100_000 + 1):
         part = found.select(some)

@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Bools
+from sonarsynth.equations.rays import ray_solutions
+from sonarsynth.equations.rays.ray_solutions import CAUSTIC
 from sonarsynth.validation.rays import ray_cases
 from sonarsynth.validation.rays.ray_cases import Case
 from sonarsynth.validation.rays.ray_matching import Rays, errors, matched, miscounted, nearest, rays_of, worst
@@ -53,8 +55,6 @@ def ray_accuracy(quick: bool = False) -> list[Row]:
 
 def search(case: Case) -> tuple[Eigenrays, float]:
     """All eigenrays of a case, and the CPU time of one of them (us): the median of several runs, on a batch."""
-    from sonarsynth.equations.rays import ray_solutions
-
     water = ray_solutions.water(case.depth, case.speed, case.bottom)
 
     def run(copies: int) -> tuple[Eigenrays, float]:
@@ -83,8 +83,6 @@ def _counts(case: Case, rays: int) -> dict[str, int]:
 
 
 def _trusted(found: Eigenrays) -> Bools:
-    from sonarsynth.equations.rays.ray_solutions import CAUSTIC
-
     return np.asarray(found.flag != CAUSTIC)
 
 

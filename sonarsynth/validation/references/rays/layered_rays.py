@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints
-from sonarsynth.validation.references.rays.layers_crossed import Water
+from sonarsynth.validation.references.rays.layers_crossed import Water, crossed
 
 if TYPE_CHECKING:
     from sonarsynth.validation.references.rays.layers_crossed import Crossed
@@ -109,8 +109,6 @@ def _straight(water: Water, r: Floats, first: Floats, last: Floats) -> Found:
 
 
 def _bent(water: Water, r: Floats, first: Floats, last: Floats) -> Found:
-    from sonarsynth.validation.references.rays.layers_crossed import crossed
-
     pieces = crossed(water, first, last)
     sigma = _root(pieces, r)
     x, slope = pieces.distance(sigma)
