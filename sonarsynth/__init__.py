@@ -30,19 +30,18 @@ if TYPE_CHECKING:
         SeaSurface,
         Sediment,
     )
+    from sonarsynth.environment.noise import FlatNoise, WenzNoise
     from sonarsynth.environment.sea import (
         Absorption,
         Cast,
         Catenary,
         Environment,
-        FlatNoise,
         Isovelocity,
         Linear,
         Munk,
         Tabulated,
         TemperatureSalinity,
         Thermocline,
-        WenzNoise,
     )
     from sonarsynth.frontiers import measure as accuracy
     from sonarsynth.geometry.motion import Circle, ConstantVelocity, Line, Still, Waypoint, Waypoints
@@ -196,9 +195,9 @@ __all__ = [
 _HOMES = {
     "description": "FieldError",
     "environment.boundaries": "FluidHalfSpace PressureRelease ReflectionTable Rigid SeaBottom SeaSurface Sediment",
+    "environment.noise": "FlatNoise WenzNoise",
     "environment.sea": (
-        "Absorption Cast Catenary Environment FlatNoise Isovelocity Linear "
-        "Munk Tabulated TemperatureSalinity Thermocline WenzNoise"
+        "Absorption Cast Catenary Environment Isovelocity Linear Munk Tabulated TemperatureSalinity Thermocline"
     ),
     "geometry.motion": "Circle ConstantVelocity Line Still Waypoint Waypoints",
     "imaging": "DenseDelayAndSum FocusedDelayAndSum",

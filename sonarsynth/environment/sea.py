@@ -7,10 +7,11 @@ from typing import Annotated, Literal
 from annotated_types import Ge, Le
 from pydantic import model_validator
 
-from sonarsynth.conventions import Decibels, Number, PositiveMetres, PositiveSpeed
-from sonarsynth.description import BY_KIND, description
+from sonarsynth.conventions import Number, PositiveMetres
+from sonarsynth.description import description
 from sonarsynth.environment.boundaries import SeaBottom, SeaSurface
 from sonarsynth.environment.hydrography import WaterSalinity, WaterTemperature
+from sonarsynth.environment.noise import Noise
 from sonarsynth.environment.sound_speed import (
     Cast,
     Catenary,
@@ -30,17 +31,14 @@ __all__ = [
     "Cast",
     "Catenary",
     "Environment",
-    "FlatNoise",
     "Isovelocity",
     "Linear",
     "Munk",
-    "Noise",
     "Profile",
     "SoundSpeed",
     "Tabulated",
     "TemperatureSalinity",
     "Thermocline",
-    "WenzNoise",
 ]
 
 
@@ -57,28 +55,6 @@ class Absorption:
     salinity: WaterSalinity = 35.0
     ph: Annotated[Number, Ge(0), Le(14)] = 8.1
     """pH of the water; it matters under some 10 kHz, where boric acid absorbs."""
-
-
-@description
-class FlatNoise:
-    """Gaussian noise, independent between hydrophones, flat over the band."""
-
-    kind: Literal["flat"] = "flat"
-    level: Annotated[Decibels, Ge(-200), Le(300)]
-    """Spectral level in dB re 1 uPa2/Hz."""
-
-
-@description
-class WenzNoise:
-    """Gaussian noise, independent between hydrophones: turbulence, shipping, wind and thermal (Coates 1989)."""
-
-    kind: Literal["wenz"] = "wenz"
-    shipping: Annotated[Number, Ge(0), Le(1)] = 0.5
-    """How busy the sea is, from 0 to 1."""
-    wind_speed: Annotated[PositiveSpeed, Le(60)] = 5.0
-
-
-Noise = Annotated[FlatNoise | WenzNoise, BY_KIND]
 
 
 @description

@@ -196,7 +196,7 @@ def digitise(plan: Plan, frame: Frame, signals: Signals) -> Signals:
     sonar, noise = plan.scene.sonar, plan.scene.world.environment.noise
     if noise is not None:
         random = stream(frame.seed, "noise", frame.key, frame.step)
-        signals = add_noise(signals, noise, sonar, plan.elements, random)
+        signals = add_noise(signals, noise, sonar, plan.elements, random, frame.sonar_pose)
     return signals if sonar.converter is None else convert(signals, sonar.converter)
 
 

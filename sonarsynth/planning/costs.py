@@ -29,7 +29,6 @@ SECONDS = {
     "synthesise path sensor": 1.0e-9,
     "synthesise path sensor steradian": 3.6e-6,  # the wider a target, the more nodes and tiles
     "synthesise sensor sample": 4.5e-9,
-    "noise sensor sample": 10e-9,
     "measure path": 1.3e-3,  # alone, at one hydrophone
     "locate sensor": 8e-6,
     "remove sensor": 36e-6,
@@ -109,13 +108,15 @@ def _synthesis(plan: Plan) -> Row:
     paths = _paths(plan) * max(sizes["emission"], 1) * _ways(plan)
     each = SECONDS["synthesise path sensor"] + _solid_angle(plan) * SECONDS["synthesise path sensor steradian"]
     work = paths * sizes["sensor"] * each + sensor_samples * SECONDS["synthesise sensor sample"]
-    if scene.world.environment.noise:
-        work += sensor_samples * SECONDS["noise sensor sample"]
+    noise = scene.world.environment.noise
+    if noise is not None:
+        work += noise.seconds(sizes["sensor"], sizes["sample"])
     stored = sensor_samples * (2 if scene.sonar.converter else 4) if "signals" in plan.products else 0
     error = f"{plan.errors.synthesis:.1g} of the peak" if plan.errors.synthesis else "rounding"
     error = NOT_STATED if np.isnan(plan.errors.synthesis) else error
     why = "requested" if "signals" in plan.products else f"needed by the {' and the '.join(sorted(plan.products))}"
-    return ("synthesise", plan.choices.synthesis.row(), why, error, work, stored)
+    method = plan.choices.synthesis.row() + ("" if noise is None else f", {noise.row()} noise")
+    return ("synthesise", method, why, error, work, stored)
 
 
 def _traced(plan: Plan) -> str:

@@ -10,9 +10,9 @@ import numpy.typing as npt
 from scipy.fft import irfft
 
 from sonarsynth.conventions import Floats
-from sonarsynth.environment.sea import FlatNoise, Noise
-from sonarsynth.equations.noise.ambient_noise import power_density, wenz_level
+from sonarsynth.environment.noise import NoiseField
 from sonarsynth.equations.noise.filters import duration, response
+from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Converter, Elements, Filter, Sonar
 from sonarsynth.signals.filtered_pulse import fir
@@ -22,31 +22,41 @@ QUIETEST = 1e-7
 """Bins of less noise power than this, relative to the loudest, are left empty."""
 
 
-def noise_density(noise: Noise, frequency: Floats) -> Floats:
-    """One-sided power spectral density (Pa2/Hz) of ambient noise at frequencies (Hz, positive)."""
-    if isinstance(noise, FlatNoise):
-        return power_density(np.full(frequency.shape, noise.level))
-    return power_density(wenz_level(frequency, noise.shipping, noise.wind_speed))
+MATRIX_ELEMENTS = 1 << 22
+"""Of cross spectral densities that are made at once."""
 
 
 @lru_cache(maxsize=16)
 def _noise_size(
-    noise: Noise, antialias: Filter, sampling_frequency: float, length: int
-) -> tuple[int, npt.NDArray[np.float32]]:
-    """First bin of `rfft` that is drawn, and the standard deviation of the real and of the imaginary part of each."""
-    f = np.asarray(np.arange(1, length // 2) * (sampling_frequency / length), float)
-    power = noise_density(noise, f) * response(f, fir(antialias)) ** 2
+    noise: NoiseField, antialias: Filter, sampling_frequency: float, length: int
+) -> tuple[int, npt.NDArray[np.float32], Floats]:
+    """First bin of `rfft` that is drawn; the standard deviation of the real and of the imaginary part of each; and what
+    that is of noise of 1 Pa2/Hz."""
+    f = _frequencies(1, length // 2, sampling_frequency, length)
+    passed = response(f, fir(antialias)) ** 2
+    power = noise.density(f) * passed
     heard = np.flatnonzero(power > QUIETEST * power.max())
     # half of the power of a bin in each part; irfft divides by the length
-    size = np.sqrt(power * sampling_frequency * length) / 2.0
-    return 1 + int(heard[0]), size[heard[0] : heard[-1] + 1].astype(np.float32)
+    size, gain = (np.sqrt(x * sampling_frequency * length) / 2.0 for x in (power, passed))
+    drawn = slice(heard[0], heard[-1] + 1)
+    return 1 + int(heard[0]), size[drawn].astype(np.float32), gain[drawn]
+
+
+def _frequencies(first: int, end: int, sampling_frequency: float, length: int) -> Floats:
+    """Of the bins of `rfft` from first to end, in Hz."""
+    return np.asarray(np.arange(first, end) * (sampling_frequency / length), float)
 
 
 def add_noise(
-    signals: Signals, noise: Noise | None, sonar: Sonar, elements: Elements, rng: np.random.Generator
+    signals: Signals,
+    noise: NoiseField | None,
+    sonar: Sonar,
+    elements: Elements,
+    rng: np.random.Generator,
+    pose: Pose | None = None,
 ) -> Signals:
-    """Signals with Gaussian noise, independent between hydrophones, through the anti-alias filter; a dead element stays
-    silent.
+    """Signals with Gaussian noise through the anti-alias filter; a dead element stays silent. pose: of the array, which
+    noise that is correlated between hydrophones may depend on; none: that of the world's axes.
 
     Drawn in the frequency domain over a period longer than the window by the filter's length, so that the ends are not
     alike.
@@ -56,15 +66,43 @@ def add_noise(
     sensors, samples = signals.pressure.shape
     fs = signals.sampling_frequency
     length = fast_length(samples + int(np.ceil(duration(fir(sonar.antialias)) * fs)))
-    low, size = _noise_size(noise, sonar.antialias, fs, length)
+    low, size, gain = _noise_size(noise, sonar.antialias, fs, length)
     high = low + size.size
     spectrum = np.zeros((sensors, length // 2 + 1), np.complex64)
     fast = np.random.Generator(np.random.SFC64(rng.integers(0, 1 << 32, 4, np.uint32)))  # half the time of Philox
-    drawn = fast.standard_normal((sensors, 2 * (high - low)), dtype=np.float32).view(np.complex64)
-    np.multiply(drawn, size, out=spectrum[:, low:high])
+    if noise.correlated:
+        position = elements.position if pose is None else pose.to_world(elements.position)
+        _draw_correlated(spectrum[:, low:high], noise, _frequencies(low, high, fs, length), gain, position, fast)
+    else:
+        drawn = fast.standard_normal((sensors, 2 * (high - low)), dtype=np.float32).view(np.complex64)
+        np.multiply(drawn, size, out=spectrum[:, low:high])
     if not np.all(elements.gain == 1.0):
         spectrum *= elements.gain[:, None].astype(np.float32)
     return replace(signals, pressure=signals.pressure + irfft(spectrum, length, axis=1, overwrite_x=True)[:, :samples])
+
+
+def _draw_correlated(
+    out: npt.NDArray[np.complex64],
+    noise: NoiseField,
+    frequency: Floats,
+    gain: Floats,
+    position: Floats,
+    rng: np.random.Generator,
+) -> None:
+    """Fills spectra (sensor, bin) of the cross spectral density of a noise, bin by bin, so that blocks do not matter.
+
+    Raises ValueError for factors that are not finite.
+    """
+    block = max(MATRIX_ELEMENTS // len(position) ** 2, 1)
+    for first in range(0, len(frequency), block):
+        some = slice(first, first + block)
+        factors = noise.factors(frequency[some], position)
+        assert factors is not None, "noise that is correlated has factors"
+        if not np.isfinite(factors).all():
+            raise ValueError(f"{noise.kind} noise: its cross spectral density is not finite")
+        drawn = rng.standard_normal((len(factors), factors.shape[2], 2), dtype=np.float32).astype(float)
+        sound = np.einsum("fsk,fk->sf", factors, drawn[..., 0] + 1j * drawn[..., 1], optimize=True)
+        out[:, some] = gain[some] * sound
 
 
 def convert(signals: Signals, converter: Converter | None) -> Signals:

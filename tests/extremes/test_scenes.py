@@ -11,7 +11,8 @@ import xarray as xr
 
 from sonarsynth import evaluation, store
 from sonarsynth.description import FieldError
-from sonarsynth.environment.sea import Environment, FlatNoise, Isovelocity, Tabulated, WenzNoise
+from sonarsynth.environment.noise import FlatNoise, WenzNoise
+from sonarsynth.environment.sea import Environment, Isovelocity, Tabulated
 from sonarsynth.geometry.motion import Circle, Still
 from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.pipeline import render

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonarsynth.environment.sea import FlatNoise, WenzNoise
+from sonarsynth.environment.noise import FlatNoise, WenzNoise
 from sonarsynth.equations.noise.ambient_noise import power_density, wenz_level
 from sonarsynth.equations.noise.filters import response
 from sonarsynth.products import Signals

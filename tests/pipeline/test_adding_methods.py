@@ -21,10 +21,17 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "sonarsynth"
 PAGE = (ROOT / "tools" / "docs" / "extending.md").read_text()
 FILES = dict(re.findall(r"^```python file=(\S+)\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE))
-UNIONS = {"imaging": "Beamformer", "ranging": "Ranging", "signals": "Synthesis", "scattering": "Scattering"}
+UNIONS = {
+    "imaging": "Beamformer",
+    "ranging": "Ranging",
+    "signals": "Synthesis",
+    "scattering": "Scattering",
+    "environment/noise": "Noise",
+}
 KINDS = (
     {"scene.processing.beamforming": "capon", "scene.processing.ranging": "first_echo"},
     {"scene.physics.synthesis": "whole_samples", "scene.physics.scattering": "power_cosine"},
+    {"scene.world.environment.noise": "isotropic_noise"},
 )
 SCRIPT = """
 import json, sys
@@ -60,25 +67,23 @@ print(json.dumps(said))
 def extended(folder: Path) -> Path:
     """A copy of the package with the files of the page, and their names in the unions."""
     copy = folder / "sonarsynth"
-    copy.mkdir()
-    families = {name.partition("/")[0] for name in FILES}
-    for entry in PACKAGE.iterdir():
-        if entry.name not in families:
-            (copy / entry.name).symlink_to(entry)
-    for family in families:
-        (copy / family).mkdir()
-        for entry in (PACKAGE / family).iterdir():
-            if entry.name != "__init__.py":  # compiled kernels among them
-                (copy / family / entry.name).symlink_to(entry)
+    families = {name.rpartition("/")[0] for name in FILES}
+    rooms = {"", *families, *(str(parent) for family in families for parent in Path(family).parents)} - {"."}
+    for room in sorted(rooms):
+        (copy / room).mkdir()
+        for entry in (PACKAGE / room).iterdir():
+            own = entry.relative_to(PACKAGE).as_posix() in rooms or (room in families and entry.name == "__init__.py")
+            if not own:  # compiled kernels among them
+                (copy / room / entry.name).symlink_to(entry)
     for name, text in FILES.items():
-        family, _, file = name.partition("/")
+        family, _, file = name.rpartition("/")
         (copy / name).write_text(text)
         (described,) = re.findall(r"^@description\nclass (\w+)", text, re.MULTILINE)
         registry = (PACKAGE / family / "__init__.py").read_text()
         union = re.search(rf"^{UNIONS[family]} = Annotated\[(.+), BY_KIND\]$", registry, re.MULTILINE)
         assert union is not None, "the union is one line"
         line = union[0].replace(union[1], f"{union[1]} | {described}")
-        module = f"from sonarsynth.{family}.{file.removesuffix('.py')} import {described}\n"
+        module = f"from sonarsynth.{family.replace('/', '.')}.{file.removesuffix('.py')} import {described}\n"
         (copy / family / "__init__.py").write_text(registry.replace(union[0], f"{module}{line}"))
     return copy
 
@@ -100,7 +105,7 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 
 
 def test_the_page_has_a_file_for_each_family_whose_methods_answer_the_planner() -> None:
-    assert {name.partition("/")[0] for name in FILES} == set(UNIONS)
+    assert {name.rpartition("/")[0] for name in FILES} == set(UNIONS)
 
 
 @pytest.mark.parametrize(
@@ -110,6 +115,7 @@ def test_the_page_has_a_file_for_each_family_whose_methods_answer_the_planner() 
         ("first_echo", "range", "ranging"),
         ("whole_samples", "synthesise", "synthesis"),
         ("power_cosine", "trace", ""),
+        ("isotropic_noise", "synthesise", ""),
     ],
 )
 def test_it_runs_and_plan_and_store_say_so(said: dict[str, Any], kind: str, stage: str, choice: str) -> None:
@@ -120,8 +126,13 @@ def test_it_runs_and_plan_and_store_say_so(said: dict[str, Any], kind: str, stag
     assert ("not stated" in mine["rows"][stage][1]) == (kind == "capon")
 
 
+def test_the_noise_is_as_loud_as_it_says(said: dict[str, Any]) -> None:
+    heard = np.subtract(said["isotropic_noise"]["pressure"], said["usual"]["pressure"])
+    assert np.std(heard) == pytest.approx(np.sqrt(50e3), rel=0.3)  # 120 dB re 1 uPa2/Hz is 1 Pa2/Hz, over 50 kHz
+
+
 def test_the_data_are_those_of_the_method(said: dict[str, Any]) -> None:
-    usual, sonar, sound = (said[name] for name in ("usual", *(" ".join(some.values()) for some in KINDS)))
+    usual, sonar, sound = (said[name] for name in ("usual", *(" ".join(some.values()) for some in KINDS[:2])))
     assert sonar["pressure"] == usual["pressure"]
     plain, least = (np.array(one["energy"]) for one in (usual, sonar))
     assert (least <= 1.1 * plain + 0.02 * plain.max()).all(), "no beam passes less than Capon's, by Cauchy and Schwarz"

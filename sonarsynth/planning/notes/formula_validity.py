@@ -9,8 +9,7 @@ from sonarsynth.description import FieldError
 from sonarsynth.environment.absorption import absorption_notes
 from sonarsynth.environment.boundary_numbers import boundary_notes
 from sonarsynth.environment.casts import profile_of
-from sonarsynth.environment.sea import Profile, WenzNoise
-from sonarsynth.equations.water import formula_ranges
+from sonarsynth.environment.sea import Profile
 from sonarsynth.ranging import RefractedRange
 from sonarsynth.recipe.scene import Scene
 
@@ -26,10 +25,8 @@ def validity(scene: Scene, profile: Profile) -> tuple[str, ...]:
         ("absorption", note)
         for note in absorption_notes(environment.absorption, [[band.low], [band.high]], [0.0, environment.depth])
     ]
-    if isinstance(environment.noise, WenzNoise):
-        with formula_ranges.noted() as notes:
-            formula_ranges.WENZ.check(frequency=[band.low, band.high], wind_speed=environment.noise.wind_speed)
-        found += [("noise", note) for note in notes]
+    if environment.noise is not None:
+        found += [("noise", note) for note in environment.noise.validity(band.low, band.high)]
     if scene.physics.tracing.bounces:
         for name, boundary in (("surface", environment.surface), ("bottom", environment.bottom)):
             found += [(f"{name}.{field}", note) for field, note in boundary_notes(boundary, band.low, band.high)]
