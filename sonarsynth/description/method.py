@@ -18,6 +18,7 @@ class Demand:
     exact: bool  # the recipe asks for no error at all
     error: Callable[[Any], float]  # what a method errs by against the exact one of the family, measured in some frames
     elements: Any = None  # of the array
+    off_bottom: bool = False  # some source is not on the bottom
 
 
 class Method:

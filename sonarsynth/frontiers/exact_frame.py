@@ -14,7 +14,6 @@ from sonarsynth.conventions import Floats, Ints
 from sonarsynth.frontiers.rows import Point
 from sonarsynth.planning import Choices, Plan, arrivals_of, frame_start
 from sonarsynth.products import Arrivals
-from sonarsynth.propagation import Refracted, Straight
 from sonarsynth.receiver import Elements
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.recipe.scene import Frame
@@ -85,8 +84,7 @@ class Exact:
 
 def exact_plan(plan: Plan) -> Plan:
     """The plan (that of a sequence) with everything done the slow, exact way."""
-    bounces = plan.propagation.bounces
-    paths = Straight(bounces=bounces) if plan.profile.uniform else Refracted(bounces=bounces)
+    paths = plan.propagation if plan.profile.uniform else plan.propagation.exact()
     choices = Choices(
         subarrays=plan.elements.count,
         degree=5,

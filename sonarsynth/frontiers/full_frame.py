@@ -14,6 +14,7 @@ from sonarsynth.frontiers.rows import Point, timed
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor
 from sonarsynth.pipeline import BeamformedFrame, digitise, locate_and_image
 from sonarsynth.planning import frame_start
+from sonarsynth.planning.notes.source_notes import locator
 from sonarsynth.products import Signals
 
 
@@ -31,7 +32,7 @@ class Whole:
         plan, frame = exact.plan, exact.frame
         recorded = digitise(plan, frame, signals)
         heard = locate_and_image(plan, frame, recorded)
-        locating = plan.scene.processing.locating
+        locating = locator(plan.scene)
         environment, sonar = plan.scene.world.environment, plan.scene.sonar
         _, seconds = timed(
             lambda: locating.locate(

@@ -29,7 +29,7 @@ from sonarsynth.frontiers.exact_frame import (
 from sonarsynth.frontiers.rows import Point, timed
 from sonarsynth.planning import Plan, arrivals_of, frame_start
 from sonarsynth.products import Arrivals
-from sonarsynth.propagation import Refracted, Straight
+from sonarsynth.propagation import Straight
 from sonarsynth.receiver.subarrays import Subarray, subarrays, with_rim
 from sonarsynth.recipe.scene import Frame
 
@@ -137,7 +137,7 @@ def _cheaper(plan: Plan) -> Iterator[tuple[str, Plan]]:
         share = 10.0 ** (-level / 10.0)
         if share > 1.001 * choices.negligible:
             yield f"faintest {level:.0f} dB", replace(plan, choices=replace(choices, negligible=share))
-    if isinstance(plan.propagation, Refracted):
+    if plan.propagation.bends:
         yield "straight rays", replace(plan, propagation=Straight(bounces=plan.propagation.bounces))
 
 

@@ -36,9 +36,8 @@ from sonarsynth.pipeline.stored_values import (
 from sonarsynth.pipeline.synthesis import frame_signals
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, variables
 from sonarsynth.planning import Plan, arrivals_of, check_unsampled_frame, plan
-from sonarsynth.planning.notes.source_notes import standing_off
+from sonarsynth.planning.notes.source_notes import locator
 from sonarsynth.products import Arrivals, Echoes, EnergyImage, LinkBudget, Signals, SourceEstimates, Truth
-from sonarsynth.propagation import Straight
 from sonarsynth.randomness import stream
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
@@ -140,7 +139,7 @@ def trace_at(plan: Plan, frame: Frame) -> TracedFrame:
 
 def _label(plan: Plan, frame: Frame, levels: Floats) -> Truth:
     """Truth of a frame; levels: (snap,) dB re 1 uPa at 1 m."""
-    straight = isinstance(plan.propagation, Straight)
+    straight = not plan.propagation.bends
     beams, doppler = plan.scene.sonar.beams, plan.scene.physics.doppler
     return label(frame.moment, frame.sonar_pose, beams, plan.connect, levels, straight, doppler)
 
@@ -167,7 +166,7 @@ def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFr
     """What the sonar makes of signals: where the snap is, and the energy image of the echo window."""
     processing, sonar, environment = plan.scene.processing, plan.scene.sonar, plan.scene.world.environment
     snaps = plan.sizes["emission"]
-    locating = processing.locating.resolve(on_bottom=not standing_off(plan.scene))
+    locating = locator(plan.scene)
     estimates = locating.locate(signals, plan.elements, sonar, frame.sonar_pose, environment.depth, snaps, plan.profile)
     mark_stage("locate")
     heard = float(estimates.time[0]) if snaps else np.nan

@@ -14,7 +14,6 @@ import numpy as np
 
 from sonarsynth.planning.plan_tables import Stage
 from sonarsynth.planning.plans import Plan
-from sonarsynth.propagation import Straight
 
 REFERENCE_TRANSFORM = 1.42e-3
 """Seconds of the transforms in `machine_factor` on the machine where the constants below were measured."""
@@ -30,7 +29,6 @@ SECONDS = {
     "synthesise path sensor steradian": 3.6e-6,  # the wider a target, the more nodes and tiles
     "synthesise sensor sample": 4.5e-9,
     "measure path": 1.3e-3,  # alone, at one hydrophone
-    "locate sensor": 8e-6,
     "remove sensor": 36e-6,
     "transform sensor sample": 1.6e-9,
     "image beam bin": 1.2e-9,
@@ -130,7 +128,7 @@ def _traced(plan: Plan) -> str:
         to += f", degree {plan.choices.degree}"
     if plan.choices.occlusion == "sensors":
         to += ", occlusion from each hydrophone"
-    words = [f"{plan.propagation.kind} rays to {to}", f"{plan.propagation.bounces} bounces", laws]
+    words = [f"{plan.propagation.row()} to {to}", f"{plan.propagation.bounces} bounces", laws]
     return ", ".join(word for word in words if word)
 
 
@@ -164,7 +162,7 @@ Row = tuple[str, str, str, str, float, int]
 def _trace_rows(plan: Plan) -> list[Row]:
     """Paths, where any product needs them, and truth."""
     sizes = plan.sizes
-    straight = isinstance(plan.propagation, Straight)
+    straight = not plan.propagation.bends
     kind, rows = "" if straight else "refracted ", list[Row]()
     if plan.products:
         traced = 1 if plan.choices.subarrays == 1 else 1 + plan.choices.subarrays
@@ -191,17 +189,21 @@ def _sonar_rows(plan: Plan) -> list[Row]:
         return []
     sonar, sizes = plan.scene.sonar, plan.sizes
     beams, gate = sizes["azimuth"] * sizes["elevation"], plan.windows.echo_stop - plan.windows.echo_start
-    kind, seconds = plan.scene.processing.locating.kind, sizes["sensor"] * SECONDS["locate sensor"]
+    locating, cancelling = plan.scene.processing.locating, plan.scene.processing.cancelling
+    seconds = locating.seconds(sizes["sensor"])
     rows: list[Row] = [
-        ("locate", kind, "the echo window begins at the snap", "predicted, /source_estimates", seconds, 512)
+        ("locate", locating.row(), "the echo window begins at the snap", "predicted, /source_estimates", seconds, 512)
     ]
     image = sizes["sensor"] * gate * sonar.sampling_frequency * SECONDS["transform sensor sample"]
     image += beams * (sonar.band.high - sonar.band.low) * gate * SECONDS["image beam bin"]
     if plan.windows.direct_removed:  # and what is left of it imaged
         image = 2 * image + sizes["sensor"] * SECONDS["remove sensor"]
+    if cancelling is not None:
+        image += cancelling.seconds(sizes["sensor"])
     asked = "image" in plan.products
     why = "requested" if asked else "needed by the cloud"
     without = ", direct pulse removed" if plan.windows.direct_removed else ""
+    without += "" if cancelling is None else f", {cancelling.row()} cancelling"
     rows.append(("beamform", plan.choices.beamforming.row() + without, why, _steered(plan), image, 4 * beams * asked))
     if "cloud" in plan.products:
         error, seconds = "predicted, /cloud/range_error" + _bent(plan), RANGED_BEAMS * SECONDS["range beam"]

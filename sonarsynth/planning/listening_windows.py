@@ -14,6 +14,7 @@ from sonarsynth.description.memory import frame_bytes, free_bytes
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.rays.ray_solutions import mean_slowness, water
 from sonarsynth.geometry.mesh import in_blocks
+from sonarsynth.planning.measured.ray_bending import unlike_straight
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.notes.scene_checks import CORNERS
 from sonarsynth.planning.plans import Plan, PulseDurations, Windows
@@ -169,6 +170,8 @@ def _spans(look: SampledScene) -> list[_ArrivalInterval]:
     for frame in look.frames:
         span = _span(frame, profile, bottom_depth, bounces)
         slack = _slack(scene.physics.doppler, frame, span, profile)
+        if not scene.physics.tracing.layered:
+            slack += unlike_straight(scene.physics.tracing, frame, profile, bottom_depth)
         spans.append(
             replace(
                 span,

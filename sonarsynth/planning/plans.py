@@ -18,7 +18,7 @@ from sonarsynth.planning.measured.ray_bending import propagation
 from sonarsynth.planning.notes.scene_checks import check_shrimp, read_inputs
 from sonarsynth.planning.plan_tables import Omission, Stage, as_html, as_text
 from sonarsynth.products import Paths
-from sonarsynth.propagation import Refracted, Straight
+from sonarsynth.propagation import Propagation
 from sonarsynth.receiver import Elements, elements
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Scene
@@ -72,7 +72,7 @@ class Plan:
     recipe: Recipe
     products: frozenset[str]
     profile: Profile
-    propagation: Straight | Refracted
+    propagation: Propagation
     windows: Windows
     choices: Choices = field(default_factory=Choices)
     errors: Errors = field(default_factory=Errors)
@@ -138,9 +138,7 @@ class Plan:
 
     def connect(self, start: Floats, end: Floats) -> Paths:
         """Rays between pairs of points in this plan's water, those of the direct family."""
-        return replace(self.propagation, bounces=0).connect(
-            self.profile, self.scene.world.environment.depth, start, end
-        )
+        return self.propagation.direct.connect(self.profile, self.scene.world.environment.depth, start, end)
 
     @property
     def predicted_seconds(self) -> float:

@@ -13,10 +13,12 @@ from sonarsynth.equations.rays.ray_solutions import COINCIDENT, GOOD, mean_slown
 from sonarsynth.products import Paths
 from sonarsynth.propagation.bounces import Bounces
 from sonarsynth.propagation.images import images, order
+from sonarsynth.propagation.path_model import PathModel
+from sonarsynth.propagation.refracted import Refracted
 
 
 @description
-class Straight:
+class Straight(PathModel):
     """Straight rays at the mean slowness of the depths that they cross: exact where the sound speed is uniform."""
 
     kind: Literal["straight"] = "straight"
@@ -25,11 +27,24 @@ class Straight:
 
     @property
     def bends(self) -> bool:
-        """Whether rays bend where the sound speed varies."""
+        """As `PathModel.bends`."""
         return False
 
+    @property
+    def layered(self) -> bool:
+        """As `PathModel.layered`."""
+        return True
+
+    def straight(self, profile: Profile) -> bool:
+        """As `PathModel.straight`."""
+        return True
+
+    def exact(self) -> Refracted:
+        """Bent rays."""
+        return Refracted(bounces=self.bounces)
+
     def connect(self, profile: Profile, environment_depth: float, start: Floats, end: Floats) -> Paths:
-        """One path a pair and family, 1/r; arguments and errors as in `Propagation`. Coincident ends are flagged."""
+        """One path a pair and family, 1/r; arguments and errors as in `PathModel`. Coincident ends are flagged."""
         layers = water(profile.depth, profile.speed, environment_depth)
         z1, z2 = within(layers, depth(start), "start"), within(layers, depth(end), "end")
         level = np.asarray(end, float)[:, :2] - np.asarray(start, float)[:, :2]

@@ -9,8 +9,12 @@ from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose
 from sonarsynth.products import EnergyImage, PointCloud, Signals, SourceEstimates
 from sonarsynth.ranging.auto_ranging import AutoRange
+from sonarsynth.ranging.cancelling import Cancelling
+from sonarsynth.ranging.cancelling.cancelling_method import CancellingMethod
 from sonarsynth.ranging.cancelling.reflection_cancelling import WavefrontCancelling
 from sonarsynth.ranging.isovelocity import IsovelocityRange
+from sonarsynth.ranging.location import Locator
+from sonarsynth.ranging.location.locating_method import LocatingMethod
 from sonarsynth.ranging.location.sensor_delays import SensorDelays
 from sonarsynth.ranging.refracted_ranging import RefractedRange
 from sonarsynth.receiver import Elements, Sonar
@@ -28,46 +32,6 @@ __all__ = [
     "SensorDelays",
     "WavefrontCancelling",
 ]
-
-
-class LocatingMethod(Protocol):
-    """Finds where snaps are from what the array hears."""
-
-    def locate(
-        self,
-        signals: Signals,
-        elements: Elements,
-        sonar: Sonar,
-        sonar_pose: Pose,
-        bottom_depth: float,
-        snaps: int,
-        profile: Profile,
-    ) -> SourceEstimates:
-        """The `snaps` loudest direct pulses, loudest first, one row each; NaN rows for those that were not found.
-
-        bottom_depth (m, positive down) is where the snaps are known to be; profile the sound speed of the water, as the
-        sonar knows it from a cast: for tracing rays, or for what straight ones may cost.
-        """
-
-
-class CancellingMethod(Protocol):
-    """Takes what reaches the array by surface and bottom without an echo out of what it hears."""
-
-    def cancel(
-        self,
-        signals: Signals,
-        estimates: SourceEstimates,
-        elements: Elements,
-        sonar: Sonar,
-        sonar_pose: Pose,
-        bottom_depth: float,
-        window: tuple[float, float],
-    ) -> Signals:
-        """The signals without the reflections of the located snaps in the echo window (start, stop), in s.
-
-        The same object where nothing is taken out; `quantum` stays that of the converter, though pressures are no
-        whole multiples of it where something is. bottom_depth in m, positive down.
-        """
 
 
 class RangingMethod(Protocol):
@@ -91,6 +55,4 @@ class RangingMethod(Protocol):
         """
 
 
-Locator = Annotated[SensorDelays, BY_KIND]
-Cancelling = Annotated[WavefrontCancelling, BY_KIND]
 Ranging = Annotated[AutoRange | IsovelocityRange | RefractedRange, BY_KIND]

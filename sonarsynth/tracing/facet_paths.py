@@ -155,8 +155,11 @@ def facet_paths(
         every = facets_of(bodies, some)
         if targets is not None and len(targets) < len(bodies):
             every = every.select(np.isin(every.target, targets))
-        reached = may_face_receiver(every, sonar_pose.position, propagation.bounces, profile, environment.depth, slack)
-        every = every.select(reached)
+        if propagation.layered:
+            place = sonar_pose.position
+            every = every.select(
+                may_face_receiver(every, place, propagation.bounces, profile, environment.depth, slack)
+            )
         part = receive_paths(every, environment, profile, sonar_pose, propagation, centre, slack)
         side = every.clear[part.row], every.normal[part.row]
         part = view.visible(part, *side)

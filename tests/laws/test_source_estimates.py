@@ -14,8 +14,7 @@ from sonarsynth.environment.sea import Profile
 from sonarsynth.evaluation import snap_located
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.labels.estimate_labels import Direct, emissions
-from sonarsynth.planning.notes.plan_notes import off_the_bottom
-from sonarsynth.planning.notes.source_notes import standing_off
+from sonarsynth.planning.notes.source_notes import off_the_bottom, standing_off
 from sonarsynth.products import REASONS, Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.receiver import Band, PlanarLattice, Sonar, elements

@@ -27,11 +27,19 @@ UNIONS = {
     "signals": "Synthesis",
     "scattering": "Scattering",
     "environment/noise": "Noise",
+    "propagation": "Tracing",
+    "ranging/location": "Locator",
+    "ranging/cancelling": "Cancelling",
 }
 KINDS = (
     {"scene.processing.beamforming": "capon", "scene.processing.ranging": "first_echo"},
     {"scene.physics.synthesis": "whole_samples", "scene.physics.scattering": "power_cosine"},
-    {"scene.world.environment.noise": "isotropic_noise"},
+    {
+        "scene.world.environment.noise": "isotropic_noise",
+        "scene.processing.locating": "surveyed_source, position: [0.6, -0.25, -0.3]",
+        "scene.processing.cancelling": "time_gate",
+    },
+    {"scene.physics.tracing": "measured_current"},
 )
 SCRIPT = """
 import json, sys
@@ -46,7 +54,7 @@ said = {}
 for which in json.loads(sys.argv[2]):
     sets = [f"{path}={{kind: {kind}}}" for path, kind in which.items()]
     plan = ss.plan(ss.load(sys.argv[3], base + sets))
-    name = " ".join(which.values()) or "usual"
+    name = " ".join(kind.partition(",")[0] for kind in which.values()) or "usual"
     assert schedule.build(plan, f"{name}.zarr", workers=0).ok
     tree = ss.open(f"{name}.zarr")
     cloud = tree["cloud"].dataset.isel(frame=0)
@@ -59,6 +67,13 @@ for which in json.loads(sys.argv[2]):
         "delay": cloud["delay"].values[:count].tolist(),
         "range": cloud["range"].values[:count].tolist(),
         "pressure": np.asarray(tree["signals/pressure"][0, 0]).tolist(),
+        "sensors": np.asarray(tree["signals/pressure"][0]).tolist(),
+        "position": np.asarray(tree["signals/position"]).tolist(),
+        "source": np.asarray(tree["source_estimates/position"][0, 0]).tolist(),
+        "heard": float(tree["source_estimates/time"][0, 0]),
+        "true": float(tree["truth/emissions/arrival"][0, 0]),
+        "start": float(tree["signals/start"][0]),
+        "meeting": float(tree["truth/targets/meeting_time"][0, 0, 0]),
     }
 print(json.dumps(said))
 """
@@ -108,6 +123,13 @@ def test_the_page_has_a_file_for_each_family_whose_methods_answer_the_planner() 
     assert {name.rpartition("/")[0] for name in FILES} == set(UNIONS)
 
 
+def of(said: dict[str, Any], kind: str) -> dict[str, Any]:
+    """What is said of the frame of a kind."""
+    (mine,) = (one for name, one in said.items() if kind in name.split())
+    found: dict[str, Any] = mine
+    return found
+
+
 @pytest.mark.parametrize(
     ("kind", "stage", "choice"),
     [
@@ -116,19 +138,53 @@ def test_the_page_has_a_file_for_each_family_whose_methods_answer_the_planner() 
         ("whole_samples", "synthesise", "synthesis"),
         ("power_cosine", "trace", ""),
         ("isotropic_noise", "synthesise", ""),
+        ("measured_current", "trace", ""),
+        ("surveyed_source", "locate", ""),
+        ("time_gate", "beamform", ""),
     ],
 )
 def test_it_runs_and_plan_and_store_say_so(said: dict[str, Any], kind: str, stage: str, choice: str) -> None:
-    (mine,) = (one for name, one in said.items() if kind in name.split())
+    mine = of(said, kind)
     assert kind in mine["rows"][stage][0] and kind not in said["usual"]["rows"][stage][0]
-    assert f"kind: {kind}" in mine["recipe"]
+    assert f"kind: {kind}" in mine["recipe"].replace("'", "")
     assert not choice or mine["choices"][choice]["kind"] == kind
     assert ("not stated" in mine["rows"][stage][1]) == (kind == "capon")
 
 
+def direct_pulse(one: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (Hz) of the band, and spectra (sensor, bin) of the direct pulse of the tank, on the clock."""
+    rate, count = 196e3, 1024
+    early = np.array(one["sensors"])[:, : int((0.75e-3 - one["start"]) * rate)]  # the first echo comes at 0.95 ms
+    f = np.fft.rfftfreq(count, 1.0 / rate)
+    inside = (f > 35e3) & (f < 75e3)
+    turned = np.exp(-2j * np.pi * f * one["start"])
+    return f[inside], (np.fft.rfft(early, count) * turned)[:, inside]
+
+
+def test_the_current_is_in_direct_sound_at_each_hydrophone_and_in_the_truth(said: dict[str, Any]) -> None:
+    mine, usual, current = said["measured_current"], said["usual"], np.array([10.0, 10.0, 0.0])
+    (f, with_it), (_, still) = direct_pulse(mine), direct_pulse(usual)
+    turned = np.angle(with_it * still.conj())
+    weight = np.abs(still) ** 2
+    late = -(turned * f * weight).sum(axis=1) / (2.0 * np.pi * f**2 * weight).sum(axis=1)
+    place = np.array(mine["position"]) + [0.0, 0.0, -0.15]
+    expected = -(place - [0.6, -0.25, -0.3]) @ current / 1483.5**2
+    assert np.ptp(expected) > 8e-7, "it differs over the array: rays to the probes must know it"
+    np.testing.assert_allclose(late, expected, atol=2e-8)
+    met = mine["meeting"] - usual["meeting"]
+    assert met == pytest.approx(-(np.array([1.0, 0.0, -0.16]) - [0.6, -0.25, -0.3]) @ current / 1483.5**2, rel=0.02)
+
+
+def test_the_source_is_where_it_was_surveyed_and_its_reflection_is_gated(said: dict[str, Any]) -> None:
+    mine, usual = of(said, "surveyed_source"), said["usual"]
+    np.testing.assert_allclose(mine["source"], [0.6, -0.25, -0.15], atol=1e-6)  # the array looks along x of the world
+    assert mine["heard"] == pytest.approx(mine["true"], abs=2e-6)
+    assert 0.0 < np.sum(mine["energy"]) < 0.999 * np.sum(usual["energy"])
+
+
 def test_the_noise_is_as_loud_as_it_says(said: dict[str, Any]) -> None:
-    heard = np.subtract(said["isotropic_noise"]["pressure"], said["usual"]["pressure"])
-    assert np.std(heard) == pytest.approx(np.sqrt(50e3), rel=0.3)  # 120 dB re 1 uPa2/Hz is 1 Pa2/Hz, over 50 kHz
+    heard = np.subtract(of(said, "isotropic_noise")["pressure"], said["usual"]["pressure"])
+    assert np.std(heard) == pytest.approx(0.01 * np.sqrt(50e3), rel=0.3)  # 80 dB re 1 uPa2/Hz, over 50 kHz
 
 
 def test_the_data_are_those_of_the_method(said: dict[str, Any]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from sonarsynth.conventions import Floats
 from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.sampled_arrivals import arrivals_of
-from sonarsynth.planning.notes.source_notes import standing_off
+from sonarsynth.planning.notes.source_notes import locator
 from sonarsynth.planning.plans import Plan
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.cancelling.direct_pulse import remove
@@ -85,8 +85,7 @@ def losses(plan: Plan, index: int) -> Losses | None:
     if not whole.sum() > 0:
         return None
     heard = replace(direct, pressure=direct.pressure + sum(echo.pressure for echo in echoes))
-    locating = plan.scene.processing.locating.resolve(on_bottom=not standing_off(plan.scene))
-    estimates = locating.locate(
+    estimates = locator(plan.scene).locate(
         heard, plan.elements, sonar, frame.sonar_pose, plan.scene.world.environment.depth, 1, plan.profile
     )
     clock = float(estimates.time[0]) if np.isfinite(estimates.time[0]) else float(arrivals.delay[first])

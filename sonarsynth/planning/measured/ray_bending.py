@@ -7,9 +7,10 @@ from collections.abc import Iterable
 import numpy as np
 
 from sonarsynth.conventions import Floats, depth
+from sonarsynth.description.method import Demand
 from sonarsynth.environment.sea import Profile
 from sonarsynth.products import Paths
-from sonarsynth.propagation import AutoTracing, Refracted, Straight
+from sonarsynth.propagation import Propagation, Straight
 from sonarsynth.ranging.clouds import isovelocity_solution
 from sonarsynth.ranging.location.refraction import refracted_solution
 from sonarsynth.receiver import elements
@@ -20,34 +21,34 @@ SHARE = 0.3
 """Of the error allowed to signals that straight rays may take."""
 
 
-def propagation(scene: Scene, profile: Profile, frames: Iterable[Frame], signal: float) -> Straight | Refracted:
-    """How sound travels in this water: straight where that errs by less than a share of `signal`, or is asked for."""
-    tracing = scene.physics.tracing
-    if not isinstance(tracing, AutoTracing):
-        return tracing
-    if profile.uniform or bending_error(scene, profile, frames) <= SHARE * signal:
-        return Straight(bounces=tracing.bounces)
-    return Refracted(bounces=tracing.bounces)
+def propagation(scene: Scene, profile: Profile, frames: Iterable[Frame], signal: float) -> Propagation:
+    """How sound travels in this water; a model may err by a share of `signal`."""
+
+    def error(model: Propagation) -> float:
+        return bending_error(model, scene, profile, frames)
+
+    found: Propagation = scene.physics.tracing.resolve(Demand(SHARE * signal, signal == 0.0, error))[0]
+    return found
 
 
-def bending_error(scene: Scene, profile: Profile, frames: Iterable[Frame]) -> float:
-    """Error of signals, relative, that straight rays make in some frames; inf where paths differ in number.
+def bending_error(model: Propagation, scene: Scene, profile: Profile, frames: Iterable[Frame]) -> float:
+    """Error of signals, relative, that a model makes in some frames against its exact one, in water whose sound speed
+    varies; inf where paths differ in number.
 
     The phase of the highest frequency by which travel times differ, and by which the direction at the array does at
     its rim; and the difference of amplitudes; over the ways out to the boxes round the bodies, back, and straight in.
     """
-    bounces = scene.physics.tracing.bounces
-    straight, refracted = Straight(bounces=bounces), Refracted(bounces=bounces)
+    if profile.uniform:
+        return 0.0
+    exact = model.exact()
     bottom, highest = scene.world.environment.depth, scene.sonar.band.high
     worst = 0.0
     for frame in frames:
-        array, points = frame.sonar_pose.position, around(frame, bottom)
-        snaps = np.array([snap.position for snap in frame.moment.snaps]).reshape(-1, 3)
-        start = np.concatenate([np.repeat(snaps, len(points), axis=0), points, snaps])
-        end = np.concatenate([np.tile(points, (len(snaps), 1)), np.broadcast_to(array, (len(points) + len(snaps), 3))])
+        array = frame.sonar_pose.position
+        start, end = _ways(frame, bottom)
         if not len(start):
             continue
-        one, other = (model.connect(profile, bottom, start, end) for model in (straight, refracted))
+        one, other = (rays.connect(profile, bottom, start, end) for rays in (model, exact))
         if not _alike(one, other):
             return np.inf
         late = 2.0 * np.pi * highest * np.abs(one.travel_time - other.travel_time)
@@ -57,6 +58,23 @@ def bending_error(scene: Scene, profile: Profile, frames: Iterable[Frame]) -> fl
         louder = np.abs(one.spreading / other.spreading - 1.0)
         worst = max(worst, 2.0 * float(np.max(late + over + louder, initial=0.0)))
     return worst
+
+
+def _ways(frame: Frame, bottom: float) -> tuple[Floats, Floats]:
+    """Starts and ends (pair, xyz) from each snap to `around` bodies, from there to the array, and straight in."""
+    array, points = frame.sonar_pose.position, around(frame, bottom)
+    snaps = np.array([snap.position for snap in frame.moment.snaps]).reshape(-1, 3)
+    start = np.concatenate([np.repeat(snaps, len(points), axis=0), points, snaps])
+    end = np.concatenate([np.tile(points, (len(snaps), 1)), np.broadcast_to(array, (len(points) + len(snaps), 3))])
+    return start, end
+
+
+def unlike_straight(model: Propagation, frame: Frame, profile: Profile, bottom: float) -> float:
+    """By how much (s) direct paths of a model are later or earlier than straight lines, with room: the most of those to
+    `around` bodies and the array, and half as much more."""
+    start, end = _ways(frame, bottom)
+    paths, lines = (some.connect(profile, bottom, start, end) for some in (model.direct, Straight()))
+    return 1.5 * float(np.max(np.abs(paths.travel_time - lines.travel_time[paths.pair]), initial=0.0))
 
 
 def around(frame: Frame, bottom: float) -> Floats:

@@ -11,7 +11,6 @@ from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.planning.measured.ray_bending import bending_error
 from sonarsynth.planning.plan_tables import Omission
 from sonarsynth.planning.plans import PRODUCTS, Plan
-from sonarsynth.propagation import Straight
 from sonarsynth.propagation.bounces import MOST_BOUNCES
 from sonarsynth.receiver import stop_frequency
 from sonarsynth.recipe.scene import Frame
@@ -32,7 +31,7 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
     scene, frame = plan.recipe.frame(0)
     environment = scene.world.environment
     rows = []
-    if isinstance(plan.propagation, Straight):
+    if not plan.propagation.bends:
         rows.append(Omission("refraction", "straight rays", _refraction_bound(plan, frame)))
     bounces = plan.propagation.bounces
     kept = (
@@ -79,7 +78,7 @@ def _not_asked_for(plan: Plan) -> list[Omission]:
 def _refraction_bound(plan: Plan, frame: Frame) -> str:
     if plan.profile.uniform:
         return "0: uniform sound speed"
-    bound = bending_error(plan.scene, plan.profile, [frame])
+    bound = bending_error(plan.propagation, plan.scene, plan.profile, [frame])
     if bound <= plan.recipe.accuracy.signal:
         return f"{bound:.1g} of the signals"
     varies = np.ptp(plan.profile.speed)
@@ -188,7 +187,7 @@ def reflected_bound(plan: Plan) -> str:
         frame.sonar_pose,
         plan.elements,
         plan.absorption_at_depths,
-        replace(plan.propagation, bounces=bounces + 1),
+        plan.propagation.reflected(bounces + 1),
         tuple(MirrorLobe() if law.coherent else law for law in scene.laws),
         band=(sonar.band.low, sonar.band.high),
     )

@@ -11,7 +11,7 @@ from sonarsynth.environment.sound_speed import Cast, Tabulated, TemperatureSalin
 from sonarsynth.planning.measured.lost_echoes import lost_echoes
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.notes.formula_validity import validity
-from sonarsynth.planning.notes.source_notes import standing_off
+from sonarsynth.planning.notes.source_notes import off_the_bottom
 from sonarsynth.planning.notes.target_notes import held, law_notes, mirror_notes, overlap_notes
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.pulse_durations import SUPPORT, extreme_waveforms
@@ -145,15 +145,6 @@ def _accuracy(made: Plan, looks: Sequence[SampledScene]) -> list[str]:
             f"{allowed.image_db:g}; use more scene.processing.beamforming.zones, or kind dense"
         )
     return found
-
-
-def off_the_bottom(scene: Scene) -> list[str]:
-    """Which shrimp the sonar does not find where it may look for them."""
-    if not (names := standing_off(scene)) or scene.processing.locating.on_bottom is False:
-        return []
-    told = scene.processing.locating.on_bottom is True
-    then = "the sonar assumes that it is" if told else "snaps are located by their wavefronts alone"
-    return [f"{', '.join(names)}: not on the bottom; {then} (scene.processing.locating.on_bottom)"]
 
 
 def _why_ranges_err(scene: Scene, looks: Sequence[SampledScene]) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from sonarsynth.description.method import Demand
+from sonarsynth.ranging import LocatingMethod
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.state import source_position
 
@@ -14,3 +16,16 @@ def standing_off(scene: Scene) -> tuple[str, ...]:
     bottom, error = scene.world.environment.depth, scene.sonar.bed_depth_error
     height = {shrimp.name: float(source_position(shrimp, bottom)[2]) + bottom for shrimp in scene.world.sources}
     return tuple(name for name, up in height.items() if up > OFF * error)
+
+
+def locator(scene: Scene) -> LocatingMethod:
+    """How the sonar locates sources, knowing what it is told of where they stand."""
+    demand = Demand(0.0, False, lambda method: 0.0, off_bottom=bool(standing_off(scene)))
+    found: LocatingMethod = scene.processing.locating.resolve(demand)[0]
+    return found
+
+
+def off_the_bottom(scene: Scene) -> list[str]:
+    """Which shrimp the sonar does not find where it may look for them."""
+    names, note = standing_off(scene), scene.processing.locating.off_bottom_note()
+    return [f"{', '.join(names)}: not on the bottom; {note}"] if names and note else []

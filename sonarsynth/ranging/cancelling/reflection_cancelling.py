@@ -11,11 +11,12 @@ from sonarsynth.conventions import Decibels, PositiveRadians
 from sonarsynth.description import description
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals, SourceEstimates
+from sonarsynth.ranging.cancelling.cancelling_method import CancellingMethod
 from sonarsynth.receiver import Elements, Sonar
 
 
 @description
-class WavefrontCancelling:
+class WavefrontCancelling(CancellingMethod):
     """Find the snap's reflections that come from outside the field of view, and take their wavefronts out.
 
     Through surface and bottom the snap reaches a shallow array again while echoes are heard, far louder than they are,

@@ -6,15 +6,17 @@ from dataclasses import replace
 from typing import Literal
 
 from sonarsynth.description import description
+from sonarsynth.description.method import UNSTATED, Demand
 from sonarsynth.environment.sea import Profile
 from sonarsynth.environment.sound_speed import kink, mean_gradient
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals, SourceEstimates
+from sonarsynth.ranging.location.locating_method import LocatingMethod
 from sonarsynth.receiver import Elements, Sonar
 
 
 @description
-class SensorDelays:
+class SensorDelays(LocatingMethod):
     """Direction and position from the time differences of the direct pulse over the sensors (Kuselan et al. 2011).
 
     Equation 6 of the thesis with its square and an intercept, then the sphere that fits the delays best, then the depth
@@ -33,9 +35,17 @@ class SensorDelays:
     """Whether sources are known to be on the bottom. True: its depth is used where the wavefront agrees;
     false (pingers, vehicles, fish): places are those of the wavefront alone. Left out: as the sources of the recipe."""
 
-    def resolve(self, *, on_bottom: bool) -> SensorDelays:
+    def resolve(self, demand: Demand) -> tuple[SensorDelays, float]:
         """With what the recipe says of its sources, where this is left out."""
-        return self if self.on_bottom is not None else replace(self, on_bottom=on_bottom)
+        told = self if self.on_bottom is not None else replace(self, on_bottom=not demand.off_bottom)
+        return told, UNSTATED
+
+    def off_bottom_note(self) -> str:
+        """As `LocatingMethod.off_bottom_note`."""
+        if self.on_bottom is False:
+            return ""
+        then = "the sonar assumes that it is" if self.on_bottom else "snaps are located by their wavefronts alone"
+        return f"{then} (scene.processing.locating.on_bottom)"
 
     def locate(
         self,

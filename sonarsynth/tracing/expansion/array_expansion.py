@@ -90,7 +90,7 @@ class ExpansionSource:
             else:
                 made.put(rows, ApertureSamples(**{name: value[first:last] for name, value in vars(kept).items()}))
         none = np.empty((count, 0))
-        terms = none if self.place.profile.uniform and not made.terms.any() else made.terms
+        terms = none if self.place.propagation.straight(self.place.profile) and not made.terms.any() else made.terms
         phase, delay_std = (value if value.any() else none for value in (made.phase, made.delay_std))
         return ArrayExpansion(
             ExpansionTerms(terms, phase, delay_std, made.error), legs, self.place, made.departure, made.gain
@@ -134,11 +134,12 @@ def expansion_source(
     that miss is in `error`, as delays that are as much at the upper edge of the band.
     """
     place = ReceiverGeometry(environment, profile, sonar_pose, probes(elements, degree), propagation, band)
-    if profile.uniform and not legs.bounces.any():
+    straight = propagation.straight(profile)
+    if straight and not legs.bounces.any():
         return ExpansionSource(legs, place, (), True)
     families: list[tuple[Ints, ApertureSamples | _FacetInterpolant | None]] = []
     for members in _families(legs, group):
-        if profile.uniform and not legs.bounces[members[0]]:
+        if straight and not legs.bounces[members[0]]:
             families.append((members, None))
             continue
         chosen = members[_spread(legs.point[members])]

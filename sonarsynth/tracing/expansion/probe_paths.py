@@ -9,10 +9,9 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints, depth
 from sonarsynth.environment.sea import Environment, Profile
-from sonarsynth.equations.rays import ray_continuation
-from sonarsynth.equations.rays.ray_solutions import water
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry import Pose
+from sonarsynth.propagation.path_model import KnownRays
 from sonarsynth.propagation.reflections import at_boundaries
 from sonarsynth.tracing.expansion.wavefront_polynomials import BRANCH, Probes, pick_branch, sphere
 from sonarsynth.tracing.receive_paths import ReceivePaths
@@ -66,7 +65,7 @@ def traced(legs: ReceivePaths, place: ReceiverGeometry) -> ApertureSamples:
     """Legs at the probes, each of them traced."""
     environment, profile, band = place.environment, place.profile, place.band
     made = ApertureSamples.room(len(legs.row), *place.probe.basis.shape)
-    if profile.uniform:
+    if place.propagation.straight(profile):
         departure, left, gain = image(legs, place.probe, place.sonar_pose), np.zeros(made.gain.shape), made.gain
         if not legs.bounces.any():
             return replace(made, departure=departure)
@@ -125,21 +124,10 @@ def rays_to_probes(
 ) -> tuple[Floats, Floats, Floats]:
     """Delay over the sphere's (s), gain over it (leg, probe), departure (leg, probe, xyz): rays to every probe."""
     position = sonar_pose.to_world(probe.position)
-    layers = water(profile.depth, profile.speed, environment.depth)
-    count, sensors = len(legs.row), len(position)
-    z, ends = np.clip(depth(legs.point), 0.0, environment.depth), np.clip(depth(position), 0.0, environment.depth)
-    c_start = np.interp(z, layers.depth, layers.speed)
-    level = position[None, :, :2] - legs.point[:, None, :2]
-    distance = np.hypot(level[..., 0], level[..., 1])
-    time, sine, spreading = (np.empty((count, sensors)) for _ in range(3))
-    ray_continuation.rays_nearby(
-        layers.depth, layers.speed, z, np.hypot(legs.departure[:, 0], legs.departure[:, 1]) / c_start,
-        (legs.departure[:, 2] > 0).astype(np.int64), legs.bounces + legs.turning, np.arange(sensors), ends, distance,
-        time, sine, spreading,
-    )  # fmt: skip
-    ahead = np.divide(level, distance[..., None], out=np.zeros_like(level), where=distance[..., None] > 0)
-    cosine = np.sqrt(np.maximum((1.0 - sine) * (1.0 + sine), 0.0))
-    departure = np.concatenate([ahead * cosine[..., None], sine[..., None]], axis=2)
+    known = KnownRays(legs.point, legs.departure, legs.bounces + legs.turning)
+    nothing = np.full((len(legs.row), len(position)), np.nan)
+    beside = propagation.beside(profile, environment.depth, known, position)
+    time, spreading, departure = beside or (nothing, nothing.copy(), np.zeros((*nothing.shape, 3)))
     c = float(profile.at(depth(sonar_pose.position)))
     farther = sphere(legs.direction, legs.radius, probe.position)
     predicted = legs.travel_time[:, None] + farther / c

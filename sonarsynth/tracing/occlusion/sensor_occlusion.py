@@ -167,7 +167,7 @@ class Occlusion:
     def _swerve(self, legs: ReceivePaths, point: Ints) -> Floats | None:
         """(leg, point, xyz) as `launch_deviation`, of the centre, or the hydrophones from 1; None where rays are
         straight."""
-        if self.bending.uniform or self.elements is None:
+        if self.propagation.straight(self.bending) or self.elements is None:
             return None
         where = self.environment, self.bending, self.sonar_pose, self.elements
         return launch_deviation(legs, self._points[point], *where, self.propagation, self.degree)

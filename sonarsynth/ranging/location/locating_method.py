@@ -1,0 +1,38 @@
+"""What a method that locates sources says of itself: one that is added needs no more than `locate`."""
+
+from __future__ import annotations
+
+from sonarsynth.description.method import Method
+from sonarsynth.environment.sea import Profile
+from sonarsynth.geometry import Pose
+from sonarsynth.products import Signals, SourceEstimates
+from sonarsynth.receiver import Elements, Sonar
+
+
+class LocatingMethod(Method):
+    """Finds where snaps are from what the array hears. `Demand.off_bottom` tells `resolve` of the recipe's sources."""
+
+    def locate(
+        self,
+        signals: Signals,
+        elements: Elements,
+        sonar: Sonar,
+        sonar_pose: Pose,
+        bottom_depth: float,
+        snaps: int,
+        profile: Profile,
+    ) -> SourceEstimates:
+        """The `snaps` loudest direct pulses, loudest first, one row each; NaN rows for those that were not found.
+
+        bottom_depth (m, positive down) is where the snaps are known to be; profile the sound speed of the water, as the
+        sonar knows it from a cast: for tracing rays, or for what straight ones may cost.
+        """
+        raise NotImplementedError(f"{type(self).__name__} locates nothing")
+
+    def off_bottom_note(self) -> str:
+        """What it does of sources that are not on the bottom, in a few words; empty where that is nothing special."""
+        return ""
+
+    def seconds(self, sensors: int) -> float:
+        """Seconds that a frame takes on one core of the machine that costs are measured on."""
+        return 8e-6 * sensors
