@@ -8,8 +8,6 @@ from sonarsynth.description import FieldError
 from sonarsynth.pictures.figures.snap_figure import snap_figure
 from sonarsynth.recipe import Recipe
 from sonarsynth.signals.filtered_pulse import fir
-from sonarsynth.sources.snap_pulses import pulse
-from sonarsynth.state import model_of
 
 
 def snap(recipe: Recipe, out: Path | str = "snap.png") -> Path:
@@ -17,15 +15,15 @@ def snap(recipe: Recipe, out: Path | str = "snap.png") -> Path:
 
     Raises FieldError without a shrimp, or where its snap cannot be made.
     """
-    shrimp = recipe.scene.world.sources
-    if not shrimp:
+    sources = recipe.scene.world.sources
+    if not sources:
         raise FieldError(("scene", "world", "sources"), "is empty: there is no snap to draw")
     try:
-        model = model_of(shrimp[0], recipe.scene.world.environment.depth)
+        model = sources[0].model(recipe.scene.world.environment.depth)
         chosen = fir(recipe.scene.sonar.antialias)
-        figure = snap_figure(lambda highest: pulse(model, 0.0, highest), chosen, shrimp[0].source_level)
+        figure = snap_figure(lambda highest: model.pulse(0.0, highest), chosen, sources[0].level)
     except ValueError as error:
-        raise FieldError(("scene", "world", "sources", 0, "snap"), str(error)) from None
+        raise FieldError(("scene", "world", "sources", 0, sources[0].pulse_field), str(error)) from None
     file = Path(out)
     file.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(file)

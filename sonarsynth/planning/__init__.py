@@ -115,7 +115,7 @@ def chosen_products(names: Iterable[str]) -> frozenset[str]:
 def _sizes(recipe: Recipe, windows: Windows) -> dict[str, int]:
     scene = recipe.scene_of(0)
     beams = scene.sonar.beams
-    snaps = sum(len(s.snap_times) for s in scene.world.sources)
+    snaps = sum(len(s.times) for s in scene.world.sources)
     return {
         "frame": recipe.frames,
         "sensor": elements(scene.sonar.array).count,

@@ -128,7 +128,8 @@ def _traced(plan: Plan) -> str:
         to += f", degree {plan.choices.degree}"
     if plan.choices.occlusion == "sensors":
         to += ", occlusion from each hydrophone"
-    words = [f"{plan.propagation.row()} to {to}", f"{plan.propagation.bounces} bounces", laws]
+    sources = ", ".join(dict.fromkeys(source.row() for source in plan.scene.world.sources))
+    words = [f"{plan.propagation.row()} to {to}", f"{plan.propagation.bounces} bounces", laws, sources]
     return ", ".join(word for word in words if word)
 
 

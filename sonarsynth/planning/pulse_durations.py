@@ -15,8 +15,7 @@ from sonarsynth.receiver import elements
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.signals import pulse_support
 from sonarsynth.signals.filtered_pulse import PULSE_FEET, at_longest, silencing_blur
-from sonarsynth.sources.snap_pulses import Waveform, largest_scales, waveform
-from sonarsynth.state import model_of
+from sonarsynth.sources.snap_pulses import Waveform, waveform
 
 SUPPORT = 1e-7
 """The sample window holds every pulse down to this part of its peak; so long after the direct one begin the echoes."""
@@ -76,9 +75,9 @@ def blur_of(scene: Scene) -> float:
 
 
 def extreme_waveforms(scene: Scene) -> list[Waveform]:
-    """What each shrimp may sound like at the most: as its model, as long as it may become, and as short."""
+    """What each source may sound like at the most: as its model, as long as it may become, and as short."""
     found = []
-    for shrimp in scene.world.sources:
-        model, longest = model_of(shrimp, scene.world.environment.depth), largest_scales(shrimp.variation)[1]
+    for source in scene.world.sources:
+        model, longest = source.model(scene.world.environment.depth), source.largest_scales[1]
         found += [at_longest(waveform(model, width)) for width in sorted({1.0, longest, 1.0 / longest})]
     return found

@@ -24,9 +24,8 @@ from sonarsynth.ranging import AutoRange, Cancelling, Locator, Ranging, SensorDe
 from sonarsynth.receiver import Sonar
 from sonarsynth.scattering import MirrorLobe, Scattering
 from sonarsynth.signals import AutoSynthesis, Synthesis
-from sonarsynth.sources.shrimp import SnappingShrimp, Source
-from sonarsynth.sources.snap_pulses import scales
-from sonarsynth.state import Snap, WorldState, snaps_of
+from sonarsynth.sources import Source
+from sonarsynth.state import Snap, WorldState
 from sonarsynth.targets.target import Target, mesh_for
 
 MOST = 500
@@ -58,9 +57,10 @@ class World:
     @field_validator("targets", "sources")
     @classmethod
     def _check_count(cls, several: tuple[Any, ...], info: ValidationInfo) -> tuple[Any, ...]:
-        count = sum(len(one.snap_times) if isinstance(one, SnappingShrimp) else 1 for one in several)
+        sources = info.field_name == "sources"
+        count = sum(len(one.times) for one in several) if sources else len(several)
         if count > MOST:
-            what = "snaps" if info.field_name == "sources" else "targets"
+            what = "snaps" if sources else "targets"
             raise ValueError(f"{count} {what} are more than {MOST}")
         return several
 
@@ -173,9 +173,8 @@ class Scene:
         )
         bottom = self.world.environment.depth
         snaps: list[Snap] = []
-        for i, shrimp in enumerate(self.world.sources):
-            drawn = scales(shrimp.variation, stream(seed, "snap", key, step, i), len(shrimp.snap_times))
-            snaps += snaps_of(shrimp, bottom, drawn)
+        for i, source in enumerate(self.world.sources):
+            snaps += source.emissions(bottom, stream(seed, "snap", key, step, i))
         return WorldState(time, bodies, tuple(snaps))
 
     def frame(

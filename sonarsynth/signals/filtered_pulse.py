@@ -18,10 +18,8 @@ from sonarsynth.equations.noise.filters import Fir
 from sonarsynth.equations.scattering.facet_pulses import rough_factor
 from sonarsynth.receiver import Filter, LowPass, stop_frequency
 from sonarsynth.signals.gridded.nodes import analysis, chebyshev, rounded_up
-from sonarsynth.sources.recordings import Stamp
-from sonarsynth.sources.shrimp import LogarithmicBubble, SnapModel
-from sonarsynth.sources.snap_models import KellerMiksis
-from sonarsynth.sources.snap_pulses import Waveform, pulse
+from sonarsynth.sources.pulse_model import PulseModel, Stamp
+from sonarsynth.sources.snap_pulses import Waveform
 from sonarsynth.state import Snap
 
 LONGEST_TAIL = 0.02
@@ -32,11 +30,6 @@ MOST_SAMPLES = 1 << 23
 
 PULSE_FEET = float(np.sqrt(-2.0 * np.log(filters.SUPPORT_TOLERANCE)))
 """A Gaussian blur makes the support of a pulse longer at both ends by so many of its standard deviations."""
-
-
-def bubble(model: LogarithmicBubble) -> Bubble:
-    """The constants of a described snap, as the equations take them."""
-    return Bubble(model.a, model.k, model.m, model.q, model.density)
 
 
 def fir(chosen: Filter) -> Fir:
@@ -103,8 +96,8 @@ def at_longest(waveform: Waveform) -> Waveform:
 
 @lru_cache(maxsize=64)
 def _plain_support(waveform: Waveform, chosen: Filter, tolerance: float) -> tuple[float, float]:
-    if isinstance(waveform.model, LogarithmicBubble):
-        a, k, m, q, density = bubble(waveform.model)
+    if waveform.model.bubble is not None:
+        a, k, m, q, density = waveform.model.bubble
         longer = waveform.width
         return filters.pulse_support(Bubble(a, k / longer, m * longer, q / longer, density), fir(chosen), tolerance)
     return pulses.support(_pulse(waveform, pulses.reach(fir(chosen))), fir(chosen), tolerance)
@@ -188,10 +181,10 @@ def _bins(sampling_frequency: float, samples: int) -> Floats:
 
 
 @lru_cache(maxsize=32)
-def _made(model: SnapModel, stamp: Stamp | None, highest: float) -> Pulse:
-    if isinstance(model, KellerMiksis) and model.depth is None:
-        raise ValueError("a keller_miksis snap needs the depth of its shrimp")
-    return pulse(model, 0.0, highest)
+def _made(model: PulseModel, stamp: Stamp | None, highest: float) -> Pulse:
+    if model.at_depth(0.0) != model:
+        raise ValueError(f"a {model.kind} snap needs the depth of its source")
+    return model.pulse(0.0, highest)
 
 
 def _pulse(waveform: Waveform, highest: float) -> Pulse:

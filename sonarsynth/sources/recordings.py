@@ -8,19 +8,21 @@ import warnings
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Annotated, Literal
 
 import numpy as np
+from annotated_types import Ge, Gt, Le
 
-from sonarsynth.conventions import UNITS, Floats
-from sonarsynth.description import named_files
-from sonarsynth.sources.snap_models import RecordedSnap
+from sonarsynth.conventions import UNITS, Floats, Number, PositiveHertz, PositiveMetres, Seconds
+from sonarsynth.description import description, named_files
+from sonarsynth.equations.bubble import waveforms
+from sonarsynth.equations.bubble.pulses import Pulse
+from sonarsynth.sources.pulse_model import PulseModel, Stamp
 
 MOST_SAMPLES = 1 << 18
 """A longer file is a recording of the sea, not of a snap."""
 
 MOST_BYTES = 1 << 26
-
-Stamp = tuple[int, int]
 
 QUIET = 1e-2
 """What a recording may be at its ends, relative to its peak: a step there is heard at all frequencies."""
@@ -37,6 +39,37 @@ class Recording:
     pressure: Floats  # (sample,) Pa
     sampling_frequency: float  # Hz
     zero: float  # sample of the collapse, a fraction too
+
+
+@description
+class RecordedSnap(PulseModel):
+    """A recorded waveform: CSV or text (time and pressure, or pressure alone), or WAV."""
+
+    kind: Literal["recorded_snap"] = "recorded_snap"
+    path: str
+    """Relative to the recipe."""
+    distance: PositiveMetres = 1.0
+    """From the snap to the hydrophone that recorded it: the pressure is brought to 1 m as 1/r."""
+    pascals: Annotated[Number, Gt(0)] = 1.0
+    """Pressure (Pa) of the number 1 in the file; the full scale of a WAV of whole numbers is 1."""
+    sampling_frequency: PositiveHertz | None = None
+    """For a file without times; others have their own."""
+    channel: Annotated[int, Ge(0)] = 0
+    """Of a WAV, or the column of pressure after the time, from 0."""
+    time: Seconds | None = None
+    """Time of the collapse, on the file's own clock (a WAV's begins at 0); left out: of the largest pressure."""
+    fade: Annotated[Number, Ge(0), Le(0.5)] = 0.0
+    """Part of the recording that fades in, and that fades out: for one that is not quiet at its ends."""
+
+    @property
+    def file(self) -> Stamp:
+        """As `PulseModel.file`."""
+        return stamp(self)
+
+    def pulse(self, depth: float, highest: float) -> Pulse:
+        """As `PulseModel.pulse`. Raises RecordingError where the file has none."""
+        recording = read_recording(self)
+        return waveforms.recorded(recording.pressure, recording.sampling_frequency, recording.zero, highest)
 
 
 def read_recording(snap: RecordedSnap) -> Recording:

@@ -1,18 +1,25 @@
-"""Sources: snapping shrimp, and the snap that they make."""
+"""Snapping shrimp, and the snap that they make."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
+import numpy as np
 from annotated_types import Ge, Gt, Le, Lt, MinLen
 
-from sonarsynth.conventions import Decibels, Metres, NonNegativeMetres, Number, Position, Seconds
+from sonarsynth.conventions import Decibels, Floats, Metres, NonNegativeMetres, Number, Position, Seconds
 from sonarsynth.description import BY_KIND, description
+from sonarsynth.equations.bubble import waveforms
+from sonarsynth.equations.bubble.pulses import Pulse
+from sonarsynth.equations.bubble.snap_pressure import Bubble, onset
+from sonarsynth.sources.pulse_model import PulseModel
 from sonarsynth.sources.snap_models import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
+from sonarsynth.sources.snap_pulses import largest_scales, scales
+from sonarsynth.sources.sound_source import Snap, SoundSource
 
 
 @description
-class LogarithmicBubble:
+class LogarithmicBubble(PulseModel):
     """The thesis's snap (eq. 7 and 8): R(t) = a (1 + erf(k (t - m)/sqrt 2)) ln(1 + q t), t <= 0, in metres and seconds.
 
     The printed constants b, c, d are permuted: b is our q, c is k, d is m. The collapse is at t = 0.
@@ -29,13 +36,31 @@ class LogarithmicBubble:
     density: Annotated[Number, Gt(0)] = 1000.0
     """Water density (kg/m3) in p = (rho/r) d(R^2 R')/dt; sea water of 1025 makes a snap 0.21 dB louder."""
 
+    @property
+    def bubble(self) -> Bubble:
+        """The constants, as the equations take them."""
+        return Bubble(self.a, self.k, self.m, self.q, self.density)
+
+    def pulse(self, depth: float, highest: float) -> Pulse:
+        """As `PulseModel.pulse`."""
+        return waveforms.logarithmic(self.bubble, highest)
+
+    def fault(self, longest: float, most: float) -> str:
+        """As `PulseModel.fault`."""
+        duration = -onset(self.bubble)
+        if not 1.0 / -self.q < duration:
+            return f"grows for {duration:.3g} s and has no time to collapse: q is too small"
+        if not longest * duration <= most:
+            return f"grows for {longest * duration:.3g} s; a snap is over in {most:g} s"
+        return ""
+
 
 SnapModel = Annotated[LogarithmicBubble | KellerMiksis | RecordedSnap | Ricker | Gabor, BY_KIND]
 """The models of a snap, by `kind`."""
 
 
 @description
-class SnappingShrimp:
+class SnappingShrimp(SoundSource):
     """A shrimp on the bottom that snaps at given times."""
 
     kind: Literal["snapping_shrimp"] = "snapping_shrimp"
@@ -55,6 +80,35 @@ class SnappingShrimp:
     snap_times: Annotated[tuple[Seconds, ...], MinLen(1)] = (0.0,)
     """Times of collapse (s) after the instant of each frame."""
 
+    times_field: ClassVar[str] = "snap_times"
+    pulse_field: ClassVar[str] = "snap"
 
-Source = Annotated[SnappingShrimp, BY_KIND]
-"""What makes sound, by `kind`."""
+    def place(self, bottom: float) -> Floats:
+        """As `SoundSource.place`."""
+        x, y, *z = self.position
+        return np.array([x, y, z[0] if z else self.height - bottom])
+
+    @property
+    def times(self) -> tuple[float, ...]:
+        """As `SoundSource.times`."""
+        return self.snap_times
+
+    def model(self, bottom: float) -> PulseModel:
+        """As `SoundSource.model`."""
+        return self.snap.at_depth(-float(self.place(bottom)[2]))
+
+    @property
+    def level(self) -> float | None:
+        """As `SoundSource.level`."""
+        return self.source_level
+
+    @property
+    def largest_scales(self) -> tuple[float, float]:
+        """As `SoundSource.largest_scales`."""
+        return largest_scales(self.variation)
+
+    def emissions(self, bottom: float, random: np.random.Generator) -> tuple[Snap, ...]:
+        """As `SoundSource.emissions`: each snap as loud and as long as is drawn for it."""
+        position, model, drawn = self.place(bottom), self.model(bottom), scales(self.variation, random, len(self.times))
+        each = zip(self.times, drawn.gain.tolist(), drawn.width.tolist(), strict=True)
+        return tuple(Snap(position, time, model, self.level, gain, width) for time, gain, width in each)

@@ -1,8 +1,9 @@
-"""Snaps beside the logarithmic bubble: a physical bubble, a recording, and plain test pulses; how snaps vary."""
+"""Snaps beside the logarithmic bubble: a physical bubble, and plain test pulses; how snaps vary."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from dataclasses import replace
+from typing import Annotated, Literal, Self
 
 from annotated_types import Ge, Gt, Le
 
@@ -15,14 +16,20 @@ from sonarsynth.conventions import (
     Pascals,
     PositiveHertz,
     PositiveMetres,
-    Seconds,
     WaterSoundSpeed,
 )
 from sonarsynth.description import description
+from sonarsynth.equations.bubble import bubble_collapse, bubble_pulse, waveforms
+from sonarsynth.equations.bubble.bubble_collapse import Cavity, Collapse
+from sonarsynth.equations.bubble.pulses import Pulse
+from sonarsynth.sources.pulse_model import PulseModel
+from sonarsynth.sources.recordings import RecordedSnap
+
+__all__ = ["Gabor", "KellerMiksis", "RecordedSnap", "Ricker", "SnapVariation"]
 
 
 @description
-class KellerMiksis:
+class KellerMiksis(PulseModel):
     """A bubble of vapour and a little gas that collapses from rest (Keller and Miksis 1980). The defaults, in water of
     20 degC at 5 m, give 206 dB re 1 uPa at 1 m, peak to peak, below 200 kHz.
 
@@ -63,30 +70,55 @@ class KellerMiksis:
     """A bubble whose wall moves faster than this times the speed of sound is refused: the equation is of first order.
     Below 200 kHz even Mach 0.7 changes little."""
 
+    def at_depth(self, depth: float) -> Self:
+        """As `PulseModel.at_depth`."""
+        return replace(self, depth=max(depth, 0.0)) if self.depth is None else self
+
+    def pulse(self, depth: float, highest: float) -> Pulse:
+        """As `PulseModel.pulse`. Raises ValueError as `collapse`."""
+        found = self.collapse(depth)
+        made = bubble_pulse.pulse(found, highest, self.fade)
+        if self.level_below is None:
+            return made
+        return replace(made, peak=bubble_pulse.peak_below(found, self.level_below, self.fade))
+
+    def cavity(self, depth: float) -> Cavity:
+        """The bubble at its own depth, or else at this one (m), as the equations take it."""
+        where = depth if self.depth is None else self.depth
+        ambient = bubble_collapse.ambient_pressure(where, self.density, surface=self.surface_pressure)
+        core = (
+            bubble_collapse.hard_core(self.radius, self.gas_pressure, ambient, self.core_ratio)
+            if self.core_ratio
+            else 0.0
+        )
+        return Cavity(
+            radius=self.radius,
+            gas_pressure=self.gas_pressure,
+            ambient_pressure=ambient,
+            vapour_pressure=self.vapour_pressure,
+            surface_tension=self.surface_tension,
+            viscosity=self.viscosity,
+            density=self.density,
+            sound_speed=self.sound_speed,
+            exponent=self.exponent,
+            core=core,
+        )
+
+    def collapse(self, depth: float) -> Collapse:
+        """The solved bubble. Raises ValueError where it does not collapse, or faster than `largest_mach`."""
+        found = bubble_collapse.collapse(self.cavity(depth), self.rebounds)
+        if found.flag in {bubble_collapse.SETTLED, bubble_collapse.SINGULAR}:
+            raise ValueError(f"the bubble has no snap: {found.reason}")
+        if found.mach > self.largest_mach:
+            raise ValueError(
+                f"the wall reaches {found.mach:.3g} times the speed of sound, over largest_mach "
+                f"{self.largest_mach:.3g}: first-order theory does not hold; more gas_pressure slows it"
+            )
+        return found
+
 
 @description
-class RecordedSnap:
-    """A recorded waveform: CSV or text (time and pressure, or pressure alone), or WAV."""
-
-    kind: Literal["recorded_snap"] = "recorded_snap"
-    path: str
-    """Relative to the recipe."""
-    distance: PositiveMetres = 1.0
-    """From the snap to the hydrophone that recorded it: the pressure is brought to 1 m as 1/r."""
-    pascals: Annotated[Number, Gt(0)] = 1.0
-    """Pressure (Pa) of the number 1 in the file; the full scale of a WAV of whole numbers is 1."""
-    sampling_frequency: PositiveHertz | None = None
-    """For a file without times; others have their own."""
-    channel: Annotated[int, Ge(0)] = 0
-    """Of a WAV, or the column of pressure after the time, from 0."""
-    time: Seconds | None = None
-    """Time of the collapse, on the file's own clock (a WAV's begins at 0); left out: of the largest pressure."""
-    fade: Annotated[Number, Ge(0), Le(0.5)] = 0.0
-    """Part of the recording that fades in, and that fades out: for one that is not quiet at its ends."""
-
-
-@description
-class Ricker:
+class Ricker(PulseModel):
     """A test pulse: the second derivative of a Gaussian, upside down. Its spectrum is exact."""
 
     kind: Literal["ricker"] = "ricker"
@@ -95,9 +127,13 @@ class Ricker:
     peak: Annotated[Pascals, Gt(0)] = 1.0
     """Pressure at 1 m at t = 0."""
 
+    def pulse(self, depth: float, highest: float) -> Pulse:
+        """As `PulseModel.pulse`."""
+        return waveforms.ricker(self.frequency, self.peak, highest)
+
 
 @description
-class Gabor:
+class Gabor(PulseModel):
     """A test pulse: a tone in a Gaussian. Its spectrum is exact."""
 
     kind: Literal["gabor"] = "gabor"
@@ -106,6 +142,10 @@ class Gabor:
     """Of the tone in the Gaussian's width at half its height."""
     peak: Annotated[Pascals, Gt(0)] = 1.0
     """Pressure at 1 m at t = 0."""
+
+    def pulse(self, depth: float, highest: float) -> Pulse:
+        """As `PulseModel.pulse`."""
+        return waveforms.gabor(self.frequency, self.cycles, self.peak, highest)
 
 
 @description

@@ -10,8 +10,9 @@ import numpy as np
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.sources.shrimp import SnapModel, SnappingShrimp
-from sonarsynth.sources.snap_pulses import Scales, Waveform, at_depth, waveform
+from sonarsynth.sources.sound_source import Snap
+
+__all__ = ["Snap", "TravelTime", "WorldState", "meeting_times", "positions"]
 
 TravelTime = Callable[[Floats, Floats], Floats]
 """Travel times (pair,) in s from points (pair, xyz) to points (pair, xyz) of the world; NaN where no sound arrives."""
@@ -21,47 +22,12 @@ MEETINGS, MET = 20, 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Snap:
-    """One snap of one shrimp: gain p(t/width) of its model."""
-
-    position: Floats  # (xyz) m, world
-    time: float  # s of the collapse on the clock of the frame
-    model: SnapModel  # a bubble at its depth
-    source_level: float | None  # dB re 1 uPa at 1 m peak of the model (see `level_below`); None: its own
-    gain: float = 1.0
-    width: float = 1.0
-
-    @property
-    def waveform(self) -> Waveform:
-        """What it shares with snaps that sound alike, but for how loud they are."""
-        return waveform(self.model, self.width)
-
-
-@dataclass(frozen=True, eq=False)
 class WorldState:
     """Everything that is in the water at the instant of a frame."""
 
     time: float  # s since the start of the trajectory
     bodies: tuple[PlacedTarget, ...]
     snaps: tuple[Snap, ...]
-
-
-def source_position(shrimp: SnappingShrimp, bottom: float) -> Floats:
-    """Where a shrimp is (xyz) in m, over a bottom at this depth (m)."""
-    x, y, *z = shrimp.position
-    return np.array([x, y, z[0] if z else shrimp.height - bottom])
-
-
-def model_of(shrimp: SnappingShrimp, bottom: float) -> SnapModel:
-    """The model of a shrimp's snaps, where it is."""
-    return at_depth(shrimp.snap, -float(source_position(shrimp, bottom)[2]))
-
-
-def snaps_of(shrimp: SnappingShrimp, bottom: float, scales: Scales) -> tuple[Snap, ...]:
-    """The snaps of a shrimp, with the scales (snap,) that were drawn for them."""
-    position, model = source_position(shrimp, bottom), model_of(shrimp, bottom)
-    drawn = zip(shrimp.snap_times, scales.gain.tolist(), scales.width.tolist(), strict=True)
-    return tuple(Snap(position, time, model, shrimp.source_level, gain, width) for time, gain, width in drawn)
 
 
 def meeting_times(tracks: Sequence[Track], snaps: tuple[Snap, ...], travel_time: TravelTime) -> Floats:

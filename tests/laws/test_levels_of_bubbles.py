@@ -12,7 +12,6 @@ from sonarsynth.equations.noise import filters
 from sonarsynth.equations.noise.filters import Fir
 from sonarsynth.signals.filtered_pulse import snap_gains, snap_levels
 from sonarsynth.sources.snap_models import KellerMiksis
-from sonarsynth.sources.snap_pulses import pulse
 from sonarsynth.state import Snap
 
 GASES = (300.0, 1000.0, 3000.0)
@@ -27,7 +26,7 @@ def collapsed(gas: float, depth: float = 5.0) -> Collapse:
 def heard(model: KellerMiksis, source_level: float) -> float:
     """Peak level (dB) of a snap with an imposed level, at 1 m, behind the hydrophone."""
     snap = Snap(np.zeros(3), 0.0, model, source_level, 1.0, 1.0)
-    made = pulses.scaled(pulse(model, 0.0, pulses.reach(EAR)), float(snap_gains((snap,))[0]), 1.0)
+    made = pulses.scaled(model.pulse(0.0, pulses.reach(EAR)), float(snap_gains((snap,))[0]), 1.0)
     return pulses.levels(made, EAR).peak
 
 
@@ -69,10 +68,10 @@ def test_the_level_that_is_stored_is_of_the_same_peak() -> None:
 
 
 def test_what_it_is_of_changes_no_waveform() -> None:
-    one, two = (pulse(KellerMiksis(level_below=f), 5.0, 2e5) for f in (50e3, None))
+    one, two = (KellerMiksis(level_below=f).pulse(5.0, 2e5) for f in (50e3, None))
     assert (one.strength == two.strength).all() and (one.time == two.time).all()
     assert one.peak < two.peak
-    assert pulse(KellerMiksis(level_below=50e3), 5.0, 3e5).peak == one.peak  # whatever waves the pulse is made for
+    assert KellerMiksis(level_below=50e3).pulse(5.0, 3e5).peak == one.peak  # whatever waves the pulse is made for
 
 
 def test_a_point_has_a_level_in_a_band_and_one_that_settles_has_none() -> None:

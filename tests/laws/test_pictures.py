@@ -11,7 +11,6 @@ from sonarsynth.pictures.figures.outlines import CELLS, union_outline, view_outl
 from sonarsynth.pictures.figures.ray_figure import section_figure, space_figure
 from sonarsynth.pictures.figures.snap_figure import snap_figure
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.sources.snap_pulses import pulse
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 SQUARE_FACES = np.array([[0, 1, 2], [0, 2, 3]])
@@ -107,7 +106,7 @@ def test_the_cloud_from_above_has_port_on_the_left_and_counts_what_it_does_not_s
 
 def test_the_filter_is_drawn_with_half_its_response_at_the_cutoff() -> None:
     b = LogarithmicBubble()
-    drawn = snap_figure(lambda highest: pulse(b, 0.0, highest), Fir(0.0, 110e3, 10e3, 80.0), source_level=190.0)
+    drawn = snap_figure(lambda highest: b.pulse(0.0, highest), Fir(0.0, 110e3, 10e3, 80.0), source_level=190.0)
     waveform, levels, response = drawn.axes
     frequency, decibels = response.lines[0].get_data()
     assert np.interp(110.0, frequency, decibels) == pytest.approx(-6.02, abs=0.05)

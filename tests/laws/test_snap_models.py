@@ -26,8 +26,8 @@ from sonarsynth.signals.filtered_pulse import (
 )
 from sonarsynth.sources.shrimp import LogarithmicBubble, SnapModel, SnappingShrimp
 from sonarsynth.sources.snap_models import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
-from sonarsynth.sources.snap_pulses import largest_scales, pulse, waveform
-from sonarsynth.state import Snap, model_of
+from sonarsynth.sources.snap_pulses import largest_scales, waveform
+from sonarsynth.state import Snap
 from tests.laws.test_synthesis import absorption, arrivals, error, some_of, target_at
 from tests.scenes import remus
 
@@ -64,7 +64,7 @@ def with_shrimp(frames: int = 2, **of_shrimp: object) -> Recipe:
 @EVERY
 def test_a_source_level_is_imposed_and_a_gain_comes_on_top(model: SnapModel) -> None:
     heard = (snap(model), snap(model, 187.0), snap(model, 187.0, gain=2.0), snap(model, gain=0.5))
-    peak = pulse(model, 0.0, 1e5).peak
+    peak = model.pulse(0.0, 1e5).peak
     own = 20.0 * np.log10(peak * 1e6)
     expected = [own, 187.0, 187.0 + 20.0 * np.log10(2.0), own - 20.0 * np.log10(2.0)]
     assert snap_levels(heard) == pytest.approx(expected, abs=1e-9)
@@ -75,7 +75,7 @@ def test_a_source_level_is_imposed_and_a_gain_comes_on_top(model: SnapModel) -> 
 @pytest.mark.parametrize("chosen", [SONAR.antialias, LOW], ids=["band", "low"])
 def test_a_pulse_is_over_after_its_support(model: SnapModel, chosen: LowPass) -> None:
     for width in (1.0, 1.3):
-        made = pulses.scaled(pulse(model, 0.0, 2.0 * pulses.reach(fir(chosen))), 1.0, width)
+        made = pulses.scaled(model.pulse(0.0, 2.0 * pulses.reach(fir(chosen))), 1.0, width)
         before, after = pulse_support(waveform(model, width), chosen, 1e-4)
         t = np.arange(-before - 2e-3, after + 2e-3, 2e-6)
         size = np.abs(pulses.filtered(t, made, fir(chosen)))
@@ -88,7 +88,7 @@ def test_a_width_stretches_the_pulse_before_the_filter(model: SnapModel) -> None
     """w S(w f) H(f), as Doppler does; and of a width and Doppler the product counts."""
     rate, samples, width = SONAR.sampling_frequency, 600, 1.2
     f, got = pulse_spectrum(waveform(model, width), SONAR.antialias, rate, samples)
-    made = pulse(model, 0.0, 1.5 * f[-1])
+    made = model.pulse(0.0, 1.5 * f[-1])
     exact = width * pulses.spectrum(width * f, made) * filters.response(f, fir(SONAR.antialias))
     size = np.abs(exact).max()
     assert np.abs(got - exact)[f < 0.5 * rate].max() < 1e-9 * size
@@ -123,7 +123,7 @@ def test_a_path_gives_the_pulse_itself(width: float) -> None:
     start, samples = 0.047, 1200
     for model in MODELS:
         got, _ = exact_signals(of, (snap(model, gain=1.5, width=width),), ONE, SONAR, None, start, samples)
-        made = pulses.scaled(pulse(model, 0.0, 2.0 * pulses.reach(fir(SONAR.antialias))), 1.5, width)
+        made = pulses.scaled(model.pulse(0.0, 2.0 * pulses.reach(fir(SONAR.antialias))), 1.5, width)
         t = start + np.arange(samples) / SONAR.sampling_frequency - 0.05
         assert error(got[0], pulses.filtered(t, made, fir(SONAR.antialias))) < 1e-3  # the filter's stop band is cut
 
@@ -134,7 +134,7 @@ def test_slow_tails_of_turned_pulses_are_bounded_and_said(tmp_path: Path) -> Non
     slow = waveform(recorded(tmp_path, wave))
     assert pulse_support(slow, LOW, turned=True) == (LONGEST_TAIL, LONGEST_TAIL)
     t = np.linspace(-1e-4, 1e-4, 801)
-    top = np.abs(pulses.filtered(t, pulse(slow.model, 0.0, 3e5), fir(LOW))).max()
+    top = np.abs(pulses.filtered(t, slow.model.pulse(0.0, 3e5), fir(LOW))).max()
     impulse = np.sqrt(np.pi) * 20e-6
     assert cut_tail(slow, LOW) == pytest.approx(impulse / (np.pi * LONGEST_TAIL) / top, rel=0.2)
     quick = waveform(RICKER)
@@ -152,10 +152,10 @@ def test_supports_of_varied_widths_are_bounds_of_few_kinds() -> None:
 
 def test_a_bubble_collapses_at_the_depth_of_its_shrimp() -> None:
     for position, height, depth in (((1.0, 2.0), 0.5, 9.5), ((1.0, 2.0, -3.0), 0.0, 3.0), ((1.0, 2.0, 0.0), 0.0, 0.0)):
-        got = model_of(SnappingShrimp(position=position, height=height, snap=KellerMiksis()), 10.0)
+        got = SnappingShrimp(position=position, height=height, snap=KellerMiksis()).model(10.0)
         assert got == KellerMiksis(depth=depth)
     own = KellerMiksis(depth=4.0)
-    assert model_of(SnappingShrimp(position=(0.0, 0.0), snap=own), 10.0) == own
+    assert SnappingShrimp(position=(0.0, 0.0), snap=own).model(10.0) == own
     with pytest.raises(ValueError, match="needs the depth"):
         pulse_support(waveform(KellerMiksis()), LOW)
 

@@ -16,7 +16,7 @@ from sonarsynth.products import FAMILIES, LINK_BUDGET
 from sonarsynth.receiver import PositionTable
 from sonarsynth.recipe import Recipe
 from sonarsynth.scattering import MirrorLobe
-from sonarsynth.signals.filtered_pulse import bubble, fir
+from sonarsynth.signals.filtered_pulse import fir
 from sonarsynth.targets.shapes import Remus100
 from tests.scenes import point_scene, remus
 
@@ -50,7 +50,7 @@ def test_a_point_scatterer_gives_the_closed_form() -> None:
     look = traced.frame.sonar_pose.turn_to_body(point - sensors) / back[:, None]
     padded = 4 * samples
     f = np.fft.rfftfreq(padded, 1 / rate)
-    pulse = spectrum(f, bubble(snap.model)) * response(f, fir(sonar.antialias))
+    pulse = spectrum(f, snap.model.bubble) * response(f, fir(sonar.antialias))
     closed = np.exp(-2j * np.pi * f * arrives[:, None]) * pulse * 1e-4 / (out * back)[:, None]
     closed *= element_directivity(f, look[:, None, :], made.elements.face, 1500.0)
     exact = np.fft.irfft(closed, padded, axis=1)[:, :samples] * rate

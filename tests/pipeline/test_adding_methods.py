@@ -30,6 +30,7 @@ UNIONS = {
     "propagation": "Tracing",
     "ranging/location": "Locator",
     "ranging/cancelling": "Cancelling",
+    "sources": "Source",
 }
 KINDS = (
     {"scene.processing.beamforming": "capon", "scene.processing.ranging": "first_echo"},
@@ -40,6 +41,7 @@ KINDS = (
         "scene.processing.cancelling": "time_gate",
     },
     {"scene.physics.tracing": "measured_current"},
+    {"scene.world.sources.0": "pinger, position: [0.6, -0.25, -0.3]"},
 )
 SCRIPT = """
 import json, sys
@@ -93,7 +95,7 @@ def extended(folder: Path) -> Path:
     for name, text in FILES.items():
         family, _, file = name.rpartition("/")
         (copy / name).write_text(text)
-        (described,) = re.findall(r"^@description\nclass (\w+)", text, re.MULTILINE)
+        described = re.findall(r"^@description\nclass (\w+)", text, re.MULTILINE)[-1]
         registry = (PACKAGE / family / "__init__.py").read_text()
         union = re.search(rf"^{UNIONS[family]} = Annotated\[(.+), BY_KIND\]$", registry, re.MULTILINE)
         assert union is not None, "the union is one line"
@@ -141,6 +143,7 @@ def of(said: dict[str, Any], kind: str) -> dict[str, Any]:
         ("measured_current", "trace", ""),
         ("surveyed_source", "locate", ""),
         ("time_gate", "beamform", ""),
+        ("pinger", "trace", ""),
     ],
 )
 def test_it_runs_and_plan_and_store_say_so(said: dict[str, Any], kind: str, stage: str, choice: str) -> None:
@@ -180,6 +183,20 @@ def test_the_source_is_where_it_was_surveyed_and_its_reflection_is_gated(said: d
     np.testing.assert_allclose(mine["source"], [0.6, -0.25, -0.15], atol=1e-6)  # the array looks along x of the world
     assert mine["heard"] == pytest.approx(mine["true"], abs=2e-6)
     assert 0.0 < np.sum(mine["energy"]) < 0.999 * np.sum(usual["energy"])
+
+
+def test_the_pinger_sweeps_at_its_level(said: dict[str, Any]) -> None:
+    mine, rate = of(said, "pinger"), 196e3
+    sound, place = np.array(mine["sensors"]), np.array(mine["position"]) + [0.0, 0.0, -0.15]
+    distance = np.linalg.norm(place - [0.6, -0.25, -0.3], axis=1)
+    middle = (distance / 1483.5 - mine["start"]) * rate
+    for row, at, far in zip(sound, middle, distance, strict=True):
+        ping = row[int(at - 1e-4 * rate) : int(at + 1e-4 * rate)]
+        assert 0.8 < np.abs(ping).max() * far / 10.0 ** ((170.0 - 120.0) / 20.0) < 1.05
+        assert not row[: int(at - 2.5e-4 * rate)].any() or np.abs(row[: int(at - 2.5e-4 * rate)]).max() < 1e-3
+        halves = np.abs(np.fft.rfft(ping[: ping.size // 2 * 2].reshape(2, -1), 256)) ** 2
+        early, late = (float(np.average(np.fft.rfftfreq(256, 1.0 / rate), weights=half)) for half in halves)
+        assert 40e3 < early < 55e3 < late < 70e3
 
 
 def test_the_noise_is_as_loud_as_it_says(said: dict[str, Any]) -> None:

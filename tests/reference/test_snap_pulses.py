@@ -18,7 +18,7 @@ from sonarsynth.randomness import stream
 from sonarsynth.sources.recordings import read_recording
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.sources.snap_models import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
-from sonarsynth.sources.snap_pulses import cavity, collapse, largest_scales, pulse, scales
+from sonarsynth.sources.snap_pulses import largest_scales, scales
 
 MODEL = LogarithmicBubble()
 BUBBLE = Bubble(MODEL.a, MODEL.k, MODEL.m, MODEL.q, MODEL.density)
@@ -28,10 +28,10 @@ EVERY = (MODEL, KellerMiksis(), Ricker(frequency=40e3), Gabor(frequency=50e3, cy
 
 
 def test_logarithmic_bubble_is_that_of_its_own_module() -> None:
-    got = pulse(MODEL, 5.0, 200e3)
+    got = MODEL.pulse(5.0, 200e3)
     own = snap_pressure.spectrum(FREQUENCY, BUBBLE)
     assert np.abs(pulses.spectrum(FREQUENCY, got) - own).max() < 1e-13 * np.abs(own).max()
-    heard = pulse(MODEL, 5.0, pulses.reach(FIR))
+    heard = MODEL.pulse(5.0, pulses.reach(FIR))
     t = np.linspace(-3e-4, 5e-5, 60)
     exact = filters.filtered_pulse(t, BUBBLE, FIR)
     assert np.abs(pulses.filtered(t, heard, FIR) - exact).max() < 1e-6 * np.abs(exact).max()
@@ -71,7 +71,7 @@ def test_exact_spectra_are_integrals_of_the_waveforms() -> None:
 
 @pytest.mark.parametrize("model", EVERY, ids=lambda m: m.kind)
 def test_uneven_frequencies_give_the_same_spectrum(model: LogarithmicBubble) -> None:
-    made = pulse(model, 5.0, 200e3)
+    made = model.pulse(5.0, 200e3)
     even = pulses.spectrum(FREQUENCY, made)
     order = np.random.default_rng(1).permutation(FREQUENCY.size)
     assert np.abs(pulses.spectrum(FREQUENCY[order], made) - even[order]).max() < 1e-13 * np.abs(even).max()
@@ -82,7 +82,7 @@ def test_uneven_frequencies_give_the_same_spectrum(model: LogarithmicBubble) -> 
 
 @pytest.mark.parametrize("model", EVERY, ids=lambda m: m.kind)
 def test_filtered_waveform_is_the_filtered_spectrum(model: LogarithmicBubble) -> None:
-    made = pulse(model, 5.0, pulses.reach(FIR))
+    made = model.pulse(5.0, pulses.reach(FIR))
     n, step = 4096, 1e-6
     f = np.fft.rfftfreq(n, step)
     inside = f <= pulses.reach(FIR)
@@ -100,29 +100,29 @@ def test_filtered_waveform_is_the_filtered_spectrum(model: LogarithmicBubble) ->
 
 @pytest.mark.parametrize("model", EVERY, ids=lambda m: m.kind)
 def test_scaling_stretches_the_spectrum(model: LogarithmicBubble) -> None:
-    made = pulse(model, 5.0, 200e3)
+    made = model.pulse(5.0, 200e3)
     f = FREQUENCY[FREQUENCY < 90e3]
     got = pulses.spectrum(f, pulses.scaled(made, 1.5, 2.0))
     assert got == pytest.approx(3.0 * pulses.spectrum(2.0 * f, made), abs=1e-12 * np.abs(got).max())
 
 
 def test_a_shrimp_snaps_at_its_own_depth_unless_told() -> None:
-    assert cavity(KellerMiksis(), 5.0).ambient_pressure == pytest.approx(101325.0 + 998.0 * 9.81 * 5.0)
-    assert cavity(KellerMiksis(depth=2.0), 5.0) == cavity(KellerMiksis(), 2.0)
-    cored = cavity(KellerMiksis(gas_pressure=1000.0, core_ratio=8.86), 5.0)
+    assert KellerMiksis().cavity(5.0).ambient_pressure == pytest.approx(101325.0 + 998.0 * 9.81 * 5.0)
+    assert KellerMiksis(depth=2.0).cavity(5.0) == KellerMiksis().cavity(2.0)
+    cored = KellerMiksis(gas_pressure=1000.0, core_ratio=8.86).cavity(5.0)
     assert cored.core == pytest.approx(74.30e-6, abs=5e-9)
-    shallow, deep = (pulse(KellerMiksis(), z, pulses.reach(FIR)) for z in (2.0, 20.0))
+    shallow, deep = (KellerMiksis().pulse(z, pulses.reach(FIR)) for z in (2.0, 20.0))
     assert deep.peak > shallow.peak and deep.start > shallow.start
 
 
 def test_a_bubble_too_fast_for_its_equation_is_refused() -> None:
     with pytest.raises(ValueError, match=r"reaches 0\.739 times .* largest_mach 0\.5"):
-        collapse(KellerMiksis(gas_pressure=100.0), 5.0)
-    assert collapse(KellerMiksis(gas_pressure=100.0, largest_mach=0.8), 5.0).flag == 2
+        KellerMiksis(gas_pressure=100.0).collapse(5.0)
+    assert KellerMiksis(gas_pressure=100.0, largest_mach=0.8).collapse(5.0).flag == 2
     with pytest.raises(ValueError, match="nothing stops"):
-        pulse(KellerMiksis(gas_pressure=0.0, largest_mach=1e9), 5.0, 1e5)
+        KellerMiksis(gas_pressure=0.0, largest_mach=1e9).pulse(5.0, 1e5)
     with pytest.raises(ValueError, match="settles"):
-        pulse(KellerMiksis(viscosity=100.0), 5.0, 1e5)
+        KellerMiksis(viscosity=100.0).pulse(5.0, 1e5)
 
 
 def written(path: Path, rate: float, wave: np.ndarray, start: float = -2e-4) -> RecordedSnap:
@@ -138,11 +138,11 @@ def test_a_recording_of_a_known_pulse_has_its_spectrum(tmp_path: Path, highest: 
     time = -2e-4 + np.arange(201) / rate
     u = (np.pi * 40e3 * time) ** 2
     model = written(tmp_path / "snap.csv", rate, 3e-3 * (1 - 2 * u) * np.exp(-u))
-    got = pulses.spectrum(FREQUENCY, pulse(model, 5.0, highest))
+    got = pulses.spectrum(FREQUENCY, model.pulse(5.0, highest))
     exact = waveforms.ricker_spectrum(FREQUENCY, 40e3, 6.0)
     assert np.abs(got - exact).max() < 1e-7 * np.abs(exact).max()
     if highest > rate:
-        above = pulses.spectrum(np.array([300e3, 700e3]), pulse(model, 5.0, highest))
+        above = pulses.spectrum(np.array([300e3, 700e3]), model.pulse(5.0, highest))
         assert np.abs(above).max() < 1e-7 * np.abs(exact).max()
 
 

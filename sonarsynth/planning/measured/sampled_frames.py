@@ -99,10 +99,10 @@ def check_alike(first: Scene, other: Scene) -> None:
                 (*world, "targets", i, "name"), f"must be the same in all sequences: '{a.name}' and '{b.name}'"
             )
     for i, (s, t) in enumerate(zip(first.world.sources, others.sources, strict=True)):
-        if len(s.snap_times) != len(t.snap_times):
+        if len(s.times) != len(t.times):
             raise FieldError(
-                (*world, "sources", i, "snap_times"),
-                f"all sequences must have equally many: {len(s.snap_times)} and {len(t.snap_times)}",
+                (*world, "sources", i, s.times_field),
+                f"all sequences must have equally many: {len(s.times)} and {len(t.times)}",
             )
     if first.trajectory.frames != other.trajectory.frames:
         raise FieldError(("scene", "trajectory", "frames"), "all sequences must have equally many frames")

@@ -87,7 +87,7 @@ def _shared(recipe: Recipe, looks: Sequence[SampledScene]) -> list[str]:
             split, world = recipe.split(look.frames[0].index), look.scene.world
             trajectory = look.scene.trajectory
             poses = tuple((t.motion, trajectory.start, trajectory.interval) for t in world.targets)
-            snaps = tuple((s.position, s.height) for s in world.sources)
+            snaps = tuple(tuple(s.place(world.environment.depth).tolist()) for s in world.sources)
             held["target poses"].setdefault(poses, set()).add(split)
             held["snap positions"].setdefault(snaps, set()).add(split)
     for what, splits in held.items():

@@ -13,7 +13,6 @@ from sonarsynth.description import FieldError
 from sonarsynth.environment.casts import profile_of
 from sonarsynth.environment.sea import Profile
 from sonarsynth.environment.sound_speed import Cast, Tabulated, TemperatureSalinity
-from sonarsynth.equations.bubble.snap_pressure import onset
 from sonarsynth.equations.rays.ray_solutions import TOLERANCE
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.motion import pose
@@ -21,10 +20,10 @@ from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.receiver import Sonar, elements
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals.array_paths import MAX_DOPPLER
-from sonarsynth.signals.filtered_pulse import bubble, heard_part
-from sonarsynth.sources.shrimp import LogarithmicBubble, SnappingShrimp
-from sonarsynth.sources.snap_pulses import largest_scales, pulse, waveform
-from sonarsynth.state import meeting_times, model_of
+from sonarsynth.signals.filtered_pulse import heard_part
+from sonarsynth.sources.snap_pulses import waveform
+from sonarsynth.sources.sound_source import SoundSource
+from sonarsynth.state import meeting_times
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import MeshFile
 from sonarsynth.targets.target import mesh_for
@@ -113,24 +112,24 @@ def _check_plain(scene: Scene, number: int) -> None:
 
 
 def check_shrimp(scene: Scene) -> None:
-    """Every shrimp must be in the water, and its snap one that can be made and heard."""
+    """Every source must be in the water, and its pulse one that can be made and heard."""
     bottom_depth = scene.world.environment.depth
-    for i, shrimp in enumerate(scene.world.sources):
-        position = shrimp.position
-        if max(map(abs, position)) > FARTHEST:
+    for i, source in enumerate(scene.world.sources):
+        place = source.place(bottom_depth)
+        if not np.abs(place).max() <= FARTHEST:
             raise FieldError(
                 ("scene", "world", "sources", i, "position"), f"is more than {FARTHEST:g} m from the origin"
             )
-        down = -position[2] if len(position) > 2 else bottom_depth - shrimp.height
+        down = -float(place[2])
         if not 0 <= down <= bottom_depth:
             raise FieldError(
                 ("scene", "world", "sources", i, "position"),
                 f"depth {down:.12g} m is outside the water (0 to {bottom_depth:g} m)",
             )
         try:
-            _check_snap(shrimp, bottom_depth, scene.sonar)
+            _check_pulse(source, bottom_depth, scene.sonar)
         except ValueError as error:
-            raise FieldError(("scene", "world", "sources", i, "snap"), str(error)) from None
+            raise FieldError(("scene", "world", "sources", i, source.pulse_field), str(error)) from None
 
 
 def check_frame(scene: Scene, frame: Frame) -> None:
@@ -181,8 +180,8 @@ def _check_speed(scene: Scene, frame: Frame, number: int) -> None:
 
 
 def _check_snaps(scene: Scene, frame: Frame) -> None:
-    """No shrimp is at the centre of the array, or inside a target."""
-    owners = [i for i, shrimp in enumerate(scene.world.sources) for _ in shrimp.snap_times]
+    """No source is at the centre of the array, or inside a target."""
+    owners = [i for i, source in enumerate(scene.world.sources) for _ in source.times]
     for owner, snap in zip(owners, frame.moment.snaps, strict=True):
         path = ("scene", "world", "sources", owner, "position")
         if np.linalg.norm(snap.position - frame.sonar_pose.position) < CLOSEST:
@@ -216,17 +215,13 @@ def _places(body: PlacedTarget) -> Floats:
     return np.concatenate(extreme)
 
 
-def _check_snap(shrimp: SnappingShrimp, bottom_depth: float, sonar: Sonar) -> None:
-    """Whether the snap can be made, is short, neither too loud nor out of the sonar's band; else ValueError."""
-    model = model_of(shrimp, bottom_depth)
-    gain, longest = largest_scales(shrimp.variation)
-    if isinstance(model, LogarithmicBubble):
-        duration = -onset(bubble(model))
-        if not 1.0 / -model.q < duration:
-            raise ValueError(f"grows for {duration:.3g} s and has no time to collapse: q is too small")
-        if not longest * duration <= LONGEST_SNAP:
-            raise ValueError(f"grows for {longest * duration:.3g} s; a snap is over in {LONGEST_SNAP:g} s")
-    made = pulse(model, 0.0, 0.0)
+def _check_pulse(source: SoundSource, bottom_depth: float, sonar: Sonar) -> None:
+    """Whether the pulse can be made, is short, neither too loud nor out of the sonar's band; else ValueError."""
+    model = source.model(bottom_depth)
+    gain, longest = source.largest_scales
+    if fault := model.fault(longest, LONGEST_SNAP):
+        raise ValueError(fault)
+    made = model.pulse(0.0, 0.0)
     if not longest * (made.end - made.start) <= LONGEST_SNAP:
         raise ValueError(f"lasts {longest * (made.end - made.start):.3g} s; a snap is over in {LONGEST_SNAP:g} s")
     level = float(20.0 * np.log10(gain * made.peak / REFERENCE_PRESSURE))

@@ -5,16 +5,15 @@ from __future__ import annotations
 from sonarsynth.description.method import Demand
 from sonarsynth.ranging import LocatingMethod
 from sonarsynth.recipe.scene import Scene
-from sonarsynth.state import source_position
 
 OFF = 3.0
 """A source this many standard errors of the bottom's depth above the bottom stands off it."""
 
 
 def standing_off(scene: Scene) -> tuple[str, ...]:
-    """Names of the shrimp that are not on the bottom, to what the sonar knows of its depth."""
+    """Names of the sources that are not on the bottom, to what the sonar knows of its depth."""
     bottom, error = scene.world.environment.depth, scene.sonar.bed_depth_error
-    height = {shrimp.name: float(source_position(shrimp, bottom)[2]) + bottom for shrimp in scene.world.sources}
+    height = {source.name: float(source.place(bottom)[2]) + bottom for source in scene.world.sources}
     return tuple(name for name, up in height.items() if up > OFF * error)
 
 
@@ -26,6 +25,6 @@ def locator(scene: Scene) -> LocatingMethod:
 
 
 def off_the_bottom(scene: Scene) -> list[str]:
-    """Which shrimp the sonar does not find where it may look for them."""
+    """Which sources the sonar does not find where it may look for them."""
     names, note = standing_off(scene), scene.processing.locating.off_bottom_note()
     return [f"{', '.join(names)}: not on the bottom; {note}"] if names and note else []

@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 
 from sonarsynth.sources.snap_models import KellerMiksis
-from sonarsynth.sources.snap_pulses import cavity, pulse
 from sonarsynth.validation.bubbles.bubble_checks import (
     SERIES,
     TOLERANCE,
@@ -53,7 +52,7 @@ def extreme_rows(quick: bool) -> Iterator[Row]:
 def verdict(model: KellerMiksis, depth: float) -> str:
     """Why a described snap is refused at a depth (m), in one line; nothing for one that is solved."""
     try:
-        made = pulse(model, depth, HIGHEST)
+        made = model.pulse(depth, HIGHEST)
     except ValueError as error:
         return str(error)
     return "" if np.isfinite(made.strength).all() and np.isfinite(made.peak) else "its pulse is not finite, unsaid"
@@ -62,7 +61,7 @@ def verdict(model: KellerMiksis, depth: float) -> str:
 def _solved_or_refused(gas: float, depth: float) -> Iterator[Row]:
     """The snap's verdict against the wall speed of the series; and what was solved, whether refused or not."""
     model = KellerMiksis(gas_pressure=gas)
-    of = cavity(model, depth)
+    of = model.cavity(depth)
     found, cost = timed(of)
     best = exact(of)
     case = f"Keller-Miksis, {gas:g} Pa at {depth:g} m"

@@ -9,7 +9,6 @@ import numpy as np
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.sea import Absorption
 from sonarsynth.receiver import Filter, LowPass
-from sonarsynth.sources.snap_pulses import pulse
 from sonarsynth.state import Snap
 from sonarsynth.validation.references.frames.path_sum import point_spectrum
 
@@ -19,7 +18,7 @@ MICROPASCAL = 1e-6
 def spectrum(snap: Snap, step: float, bins: int, longer: float = 0.0) -> np.ndarray:
     """Spectrum (bin,) in Pa s, at frequencies bin * step (Hz), of a snap at 1 m that lasts 1 + longer times as long:
     of gain p(t/width), its collapse at 0."""
-    made = pulse(snap.model, 0.0, step * bins * snap.width * (1.0 + max(longer, 0.1)))
+    made = snap.model.pulse(0.0, step * bins * snap.width * (1.0 + max(longer, 0.1)))
     level = 1.0 if snap.source_level is None else MICROPASCAL * 10.0 ** (snap.source_level / 20.0) / made.peak
     times = snap.width * (1.0 + longer)
     return snap.gain * level * times * point_spectrum(times * made.time, made.strength, step, bins)
@@ -43,7 +42,7 @@ def _passed(chosen: Filter) -> tuple[Floats, Floats, float, float]:
 
 def duration(snap: Snap, chosen: Filter) -> float:
     """How long (s) either side of its collapse a filtered snap lasts at most."""
-    made = pulse(snap.model, 0.0, 0.0 if isinstance(chosen, LowPass) else chosen.high)
+    made = snap.model.pulse(0.0, 0.0 if isinstance(chosen, LowPass) else chosen.high)
     ringing = (chosen.attenuation - 7.95) / (2.285 * 4.0 * np.pi * chosen.transition)
     return float(ringing + snap.width * max(-made.start, made.end))
 

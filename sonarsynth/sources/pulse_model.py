@@ -1,0 +1,43 @@
+"""What a model of a pulse says of itself: one that is added needs no more than `pulse`."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from sonarsynth.description.method import Method
+from sonarsynth.equations.bubble.pulses import Pulse
+from sonarsynth.equations.bubble.snap_pressure import Bubble
+
+Stamp = tuple[int, int]
+"""What changes when a file does."""
+
+
+class PulseModel(Method):
+    """What a source sounds like at 1 m."""
+
+    def pulse(self, depth: float, highest: float) -> Pulse:
+        """The pulse (Pa at 1 m) at a depth (m), for waves up to `highest` (Hz); time 0 is the collapse of a bubble.
+
+        Its `peak` is what a source level is of: the largest pressure before any filter, or as the model takes it.
+        Raises ValueError in one line where the model has none.
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no pulse")
+
+    def at_depth(self, depth: float) -> Self:
+        """The model where its source is (m), if it has no depth of its own."""
+        return self
+
+    @property
+    def file(self) -> Stamp | None:
+        """The stamp of the file that it is read from; none without one. Raises ValueError for a file that is gone."""
+        return None
+
+    @property
+    def bubble(self) -> Bubble | None:
+        """The closed form of its pressure, where it is a logarithmic bubble."""
+        return None
+
+    def fault(self, longest: float, most: float) -> str:
+        """Why there is no such pulse, `longest` times as long and over in `most` seconds, before it is made; empty
+        where nothing is wrong so far."""
+        return ""
