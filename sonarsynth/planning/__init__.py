@@ -16,7 +16,7 @@ from sonarsynth.planning.measured.sampled_arrivals import arrivals_of
 from sonarsynth.planning.measured.sampled_frames import SampledScene, check_alike, sample_frames
 from sonarsynth.planning.notes.omissions import left_out
 from sonarsynth.planning.notes.plan_notes import notes, stored_validity
-from sonarsynth.planning.notes.scene_checks import check_frame, check_methods, read_inputs
+from sonarsynth.planning.notes.scene_checks import check_frame, check_located, check_methods, read_inputs
 from sonarsynth.planning.plan_tables import Omission, Stage
 from sonarsynth.planning.plans import PRODUCTS, Errors, Plan, Windows
 from sonarsynth.receiver import elements
@@ -73,6 +73,11 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS, choices: Choices | 
         profile = read_inputs(scene)
         check_methods(scene, products)
     looks = sample_frames(recipe)
+    for look in looks:
+        if look.real:
+            with recipe.spanned.naming(look.frames[0].index // recipe.steps):
+                for frame in look.frames:
+                    check_located(look.scene, frame, products)
     ends = (looks[0].frames[0], looks[0].frames[-1])
     paths = propagation(scene, profile, ends, recipe.accuracy.signal)
     windows = listening_windows(recipe, looks)
@@ -138,4 +143,5 @@ def check_unsampled_frame(plan: Plan, frame: Frame) -> None:
         with plan.recipe.spanned.naming(plan.sequence):
             check_alike(plan.recipe.scene_of(0), plan.scene)
             check_frame(plan.scene, frame)
+            check_located(plan.scene, frame, plan.products)
             frame_start(plan, frame)

@@ -32,7 +32,7 @@ CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 FARTHEST = 1e6
 """m from the origin: beyond, travel times lose their microseconds."""
 CLOSEST = 1e-3
-"""m: a snap no nearer to the centre of the array."""
+"""m: a snap no nearer to the centre of the array, or to a hydrophone."""
 LOUDEST = 300.0
 """dB re 1 uPa at 1 m: single precision holds the signals of no louder snap everywhere."""
 LONGEST_SNAP = 0.1
@@ -180,15 +180,33 @@ def _check_speed(scene: Scene, frame: Frame, number: int) -> None:
 
 
 def _check_snaps(scene: Scene, frame: Frame) -> None:
-    """No source is at the centre of the array, or inside a target."""
+    """No source is at the centre of the array, at a hydrophone, or inside a target."""
     owners = [i for i, source in enumerate(scene.world.sources) for _ in source.times]
+    hydrophones = frame.sonar_pose.to_world(elements(scene.sonar.array).position)
     for owner, snap in zip(owners, frame.moment.snaps, strict=True):
         path = ("scene", "world", "sources", owner, "position")
         if np.linalg.norm(snap.position - frame.sonar_pose.position) < CLOSEST:
             raise FieldError(path, f"is at the centre of the array at frame {frame.index}")
+        nearest = int(np.argmin(np.linalg.norm(hydrophones - snap.position, axis=1)))
+        if np.linalg.norm(hydrophones[nearest] - snap.position) < CLOSEST:
+            raise FieldError(path, f"is at hydrophone {nearest} of the array at frame {frame.index}")
         for body in frame.moment.bodies:
             if inside(body, snap.position):
                 raise FieldError(path, f"is inside target '{body.name}' at frame {frame.index}")
+
+
+def check_located(scene: Scene, frame: Frame, products: frozenset[str]) -> None:
+    """No source is so near that it cannot be located, where image or cloud need that."""
+    least = scene.processing.locating.nearest(elements(scene.sonar.array))
+    owners = [i for i, source in enumerate(scene.world.sources) for _ in source.times]
+    for owner, snap in zip(owners, frame.moment.snaps, strict=True):
+        away = float(np.linalg.norm(snap.position - frame.sonar_pose.position))
+        if away < least and products & {"image", "cloud"}:
+            raise FieldError(
+                ("scene", "world", "sources", owner, "position"),
+                f"is {away:.3g} m from the centre of the array at frame {frame.index}, among its hydrophones, which "
+                f"reach {least:.3g} m: it cannot be located, so there would be no image",
+            )
 
 
 def check_methods(scene: Scene, products: frozenset[str]) -> None:

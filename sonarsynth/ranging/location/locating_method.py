@@ -33,6 +33,10 @@ class LocatingMethod(Method):
         """What it does of sources that are not on the bottom, in a few words; empty where that is nothing special."""
         return ""
 
+    def nearest(self, elements: Elements) -> float:
+        """Distance (m) from the array centre within which it locates nothing."""
+        return 0.0
+
     def seconds(self, sensors: int) -> float:
         """Seconds that a frame takes on one core of the machine that costs are measured on."""
         return 8e-6 * sensors

@@ -40,6 +40,10 @@ class SensorDelays(LocatingMethod):
         told = self if self.on_bottom is not None else replace(self, on_bottom=not demand.off_bottom)
         return told, UNSTATED
 
+    def nearest(self, elements: Elements) -> float:
+        """As `LocatingMethod.nearest`: there is no wavefront over an array that its source is in."""
+        return elements.aperture
+
     def off_bottom_note(self) -> str:
         """As `LocatingMethod.off_bottom_note`."""
         if self.on_bottom is False:
