@@ -54,7 +54,16 @@ if TYPE_CHECKING:
     from sonarsynth.propagation import AutoTracing, Refracted, Straight
     from sonarsynth.propagation.eigenrays import RayArrivals, eigenrays, eigenrays_between
     from sonarsynth.propagation.ray_request import EigenrayRequest, RayRequest
-    from sonarsynth.ranging import AutoRange, IsovelocityRange, RefractedRange, SensorDelays, WavefrontCancelling
+    from sonarsynth.ranging import (
+        AutoPlacing,
+        BeamAxis,
+        FirstEcho,
+        IsovelocityPlacing,
+        Peaks,
+        RefractedPlacing,
+        SensorDelays,
+        WavefrontCancelling,
+    )
     from sonarsynth.receiver import (
         Band,
         BandPass,
@@ -85,12 +94,13 @@ if TYPE_CHECKING:
 __all__ = [
     "Absorption",
     "Accuracy",
-    "AutoRange",
+    "AutoPlacing",
     "AutoSynthesis",
     "AutoTracing",
     "Axis",
     "Band",
     "BandPass",
+    "BeamAxis",
     "BeamGrid",
     "Box",
     "BuildReport",
@@ -107,6 +117,7 @@ __all__ = [
     "EigenrayRequest",
     "Environment",
     "FieldError",
+    "FirstEcho",
     "FlatNoise",
     "FluidHalfSpace",
     "FocusedDelayAndSum",
@@ -114,7 +125,7 @@ __all__ = [
     "GriddedSynthesis",
     "Isotropic",
     "Isovelocity",
-    "IsovelocityRange",
+    "IsovelocityPlacing",
     "KellerMiksis",
     "Kirchhoff",
     "LShape",
@@ -128,6 +139,7 @@ __all__ = [
     "Myring",
     "Normal",
     "PartlyReflecting",
+    "Peaks",
     "Physics",
     "Plan",
     "PlanarLattice",
@@ -141,7 +153,7 @@ __all__ = [
     "RecordedSnap",
     "ReflectionTable",
     "Refracted",
-    "RefractedRange",
+    "RefractedPlacing",
     "Remus100",
     "RepairReport",
     "Ricker",
@@ -209,7 +221,9 @@ _HOMES = {
     "propagation": "AutoTracing Refracted Straight",
     "propagation.eigenrays": "RayArrivals eigenrays eigenrays_between",
     "propagation.ray_request": "EigenrayRequest RayRequest",
-    "ranging": "AutoRange IsovelocityRange RefractedRange SensorDelays WavefrontCancelling",
+    "ranging": (
+        "AutoPlacing BeamAxis FirstEcho IsovelocityPlacing Peaks RefractedPlacing SensorDelays WavefrontCancelling"
+    ),
     "receiver": "Band BandPass BeamGrid Converter LowPass PlanarLattice PositionTable Romanis Sonar",
     "recipe": "Accuracy Axis Choice Normal Recipe Sobol Splits Zip Uniform",
     "recipe.reading": "RecipeError dump load loads schema",

@@ -38,6 +38,10 @@ class Method:
         """The method in a few words, as `plan` prints it."""
         return self.kind
 
+    def notes(self) -> tuple[str, ...]:
+        """What users should know of its settings, a line each."""
+        return ()
+
     def refusal(self, elements: Any) -> str:
         """Why it cannot serve an array, in one line; empty where it can."""
         return ""

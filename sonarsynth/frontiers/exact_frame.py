@@ -92,7 +92,8 @@ def exact_plan(plan: Plan) -> Plan:
         negligible=0.0,
         synthesis=golden(plan),
         beamforming=plan.choices.beamforming.exact(),
-        ranging=plan.choices.ranging.exact(),
+        picking=plan.choices.picking,
+        placing=plan.choices.placing.exact(),
     )
     return replace(plan, propagation=paths, choices=choices)
 

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonarsynth.frontiers.exact_frame import Exact, differences, exact_plan, pressures
-from sonarsynth.frontiers.image_knobs import apart, cloud_of, imaged, off_by
+from sonarsynth.frontiers.image_knobs import apart, imaged, off_by
 from sonarsynth.frontiers.rows import Point, timed
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor
-from sonarsynth.pipeline import BeamformedFrame, digitise, locate_and_image
+from sonarsynth.pipeline import BeamformedFrame, cloud_of, digitise, locate_and_image
 from sonarsynth.planning import frame_start
 from sonarsynth.planning.notes.source_notes import locator
 from sonarsynth.products import Signals
@@ -78,7 +78,7 @@ def whole_points(whole: Whole, traced: TracedBySensor, seconds: float) -> Iterat
     best = locate_and_image(slow, frame, digitise(plan, frame, signals))
     if not imaged(best):
         return
-    cloud = cloud_of(slow, frame, best, slow.choices.ranging)
+    cloud = cloud_of(slow, frame, best)
     slowest = time.process_time() - began + sum(exact.each.seconds)
     yield Point("frame", "exact", "everything exact", 0.0, "relative", accuracy.signal, slowest)
     assert whole.heard.image is not None and best.image is not None
@@ -94,7 +94,7 @@ def whole_points(whole: Whole, traced: TracedBySensor, seconds: float) -> Iterat
         chosen=True,
         also={"largest_db": float(np.abs(off).max(initial=0.0)), "beams": len(off)},
     )
-    metres, angle, alone = apart(cloud_of(plan, frame, whole.heard, plan.choices.ranging), cloud)
+    metres, angle, alone = apart(cloud_of(plan, frame, whole.heard), cloud)
     yield Point(
         stage="frame",
         knob="range",

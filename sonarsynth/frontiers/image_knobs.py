@@ -9,20 +9,23 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import cKDTree
 
 from sonarsynth.conventions import Floats
 from sonarsynth.frontiers.exact_frame import exact_plan
 from sonarsynth.frontiers.rows import Point, timed
 from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
-from sonarsynth.pipeline import BeamformedFrame
+from sonarsynth.pipeline import BeamformedFrame, cloud_of
 from sonarsynth.planning import Plan
-from sonarsynth.products import EnergyImage, PointCloud, SourceEstimates
-from sonarsynth.ranging import IsovelocityRange, Ranging
+from sonarsynth.products import EnergyImage, PointCloud
+from sonarsynth.ranging import IsovelocityPlacing, Placing
 from sonarsynth.recipe.scene import Frame
 
 BRIGHT = 20.0
 """dB under the brightest beam: beams that count."""
 ZONES = (1, 2, 4, 8, 16)
+BESIDE = 0.02
+"""rad of direction, and m of path: points of two clouds that are further apart are not one."""
 
 
 def image_points(plan: Plan, heard: BeamformedFrame) -> Iterator[Point]:
@@ -104,34 +107,22 @@ def image_point(
 
 
 def range_points(plan: Plan, frame: Frame, heard: BeamformedFrame) -> Iterator[Point]:
-    """Walk the methods of ranging on the image of a frame; nothing where it has none."""
-    chosen, slow = plan.choices.ranging, exact_plan(plan).choices.ranging
+    """Walk the methods of placing on what is picked of a frame; nothing where it has no image."""
+    chosen, slow = plan.choices.placing, exact_plan(plan).choices.placing
     if not imaged(heard):
         return
-    exact, slowest = timed(lambda: cloud_of(plan, frame, heard, slow))
-    same = {name: getattr(slow, name) for name in ("threshold", "locality", "focus") if hasattr(slow, name)}
-    for method in dict.fromkeys((chosen, IsovelocityRange(**same), slow)):
+    exact, slowest = timed(lambda: placed(plan, frame, heard, slow))
+    for method in dict.fromkeys((chosen, IsovelocityPlacing(), slow)):
         if method == slow:
             made, seconds = exact, slowest
         else:
-            made, seconds = timed(partial(cloud_of, plan, frame, heard, method))
+            made, seconds = timed(partial(placed, plan, frame, heard, method))
         yield range_point(plan, made, exact, method, seconds, chosen=method == chosen)
 
 
-def cloud_of(plan: Plan, frame: Frame, heard: BeamformedFrame, method: Ranging) -> PointCloud:
-    """The point cloud of what a frame heard, by a method."""
-    assert heard.image is not None and heard.imaged is not None and heard.estimates is not None
-    estimates: SourceEstimates = heard.estimates
-    return method.cloud(
-        heard.imaged,
-        heard.image,
-        estimates,
-        plan.elements,
-        plan.scene.sonar,
-        frame.sonar_pose,
-        plan.profile,
-        heard.signals,
-    )
+def placed(plan: Plan, frame: Frame, heard: BeamformedFrame, method: Placing) -> PointCloud:
+    """The point cloud of what a frame heard, its echoes placed by a method."""
+    return cloud_of(replace(plan, choices=replace(plan.choices, placing=method)), frame, heard)
 
 
 def range_point(
@@ -159,11 +150,19 @@ def range_point(
 
 def apart(cloud: PointCloud, exact: PointCloud) -> tuple[Floats, Floats, int]:
     """Differences of the points that two clouds share, in range (point,) m and direction (point,) rad; and how many
-    points are in one of them alone."""
-    mine, theirs = (c.azimuth + 1j * c.elevation for c in (cloud, exact))
-    shared, here, there = np.intersect1d(mine, theirs, assume_unique=True, return_indices=True)
+    points are in one of them alone.
+
+    Points are shared that are each other's nearest in direction and delay, within `BESIDE` rad and metres.
+    """
+    if not (len(cloud) and len(exact)):
+        return np.zeros(0), np.zeros(0), len(cloud) + len(exact)
+    mine, theirs = (np.column_stack([c.azimuth, c.elevation, 1500.0 * c.delay]) for c in (cloud, exact))
+    far, there = cKDTree(theirs).query(mine, distance_upper_bound=BESIDE)
+    here = np.flatnonzero(np.isfinite(far))
+    back = cKDTree(mine).query(theirs[there[here]])[1]
+    here = here[back == here]
+    there = there[here]
     a, b = cloud.position[here].astype(float), exact.position[there].astype(float)
-    across = np.linalg.norm(np.cross(a, b), axis=1)
-    angle = np.arctan2(across, np.einsum("pi,pi->p", a, b))
+    angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("pi,pi->p", a, b))
     metres = np.abs(cloud.range[here].astype(float) - exact.range[there])
-    return metres, angle, len(cloud) + len(exact) - 2 * len(shared)
+    return metres, angle, len(cloud) + len(exact) - 2 * len(here)

@@ -45,7 +45,7 @@ def set_by_recipe(scene: Scene) -> set[str]:
         "trace": physics.subarrays != "auto" or physics.dynamic_range != "auto" or physics.tracing.kind != "auto",
         "synthesis": physics.synthesis.kind != "auto",
         "image": getattr(processing.beamforming, "kind", "") != "auto",
-        "range": processing.ranging.kind != "auto",
+        "range": processing.placing.kind != "auto",
     }
     return {stage for stage, own in found.items() if own}
 

@@ -13,10 +13,11 @@ from sonarsynth.description import BY_KIND
 from sonarsynth.imaging.auto_beamformer import AutoBeamforming
 from sonarsynth.imaging.dense import DenseDelayAndSum
 from sonarsynth.imaging.focused import FocusedDelayAndSum
-from sonarsynth.products import EnergyImage, Signals
+from sonarsynth.imaging.steering import Steering
+from sonarsynth.products import BeamSpectra, EnergyImage, Signals
 from sonarsynth.receiver import Elements, Sonar
 
-__all__ = ["AutoBeamforming", "Beamformer", "BeamformingMethod", "DenseDelayAndSum", "FocusedDelayAndSum"]
+__all__ = ["AutoBeamforming", "Beamformer", "BeamformingMethod", "DenseDelayAndSum", "FocusedDelayAndSum", "Steering"]
 
 
 class BeamformingMethod(Protocol):
@@ -28,6 +29,11 @@ class BeamformingMethod(Protocol):
         Raises ValueError when the window reaches outside the signals, when it is too short to resolve the sonar's band,
         when no element is live, or when the method cannot take the array.
         """
+        ...
+
+    def beams(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> BeamSpectra:
+        """Beams of the same window in any direction, that echoes are picked from: of `Steering`, delay and sum, where
+        a method has none of its own (`Steering.steer`)."""
         ...
 
 

@@ -6,17 +6,18 @@ from typing import Literal
 
 from sonarsynth.conventions import PositiveMetres
 from sonarsynth.description import description
-from sonarsynth.description.method import Demand, Method
+from sonarsynth.description.method import Demand
 from sonarsynth.imaging.dense import DenseDelayAndSum
 from sonarsynth.imaging.focus_error import zones_needed
 from sonarsynth.imaging.focused import AUTO_ERROR, FocusedDelayAndSum
 from sonarsynth.imaging.image_window import Shading
+from sonarsynth.imaging.steering import Steering
 from sonarsynth.products import EnergyImage, Signals
 from sonarsynth.receiver import Elements, Sonar
 
 
 @description
-class AutoBeamforming(Method):
+class AutoBeamforming(Steering):
     """Delay and sum: `focused` with the fewest zones that `focus_error` allows, `dense` where the array is no lattice
     or 32 do not suffice."""
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import Floats, PositiveMetres, direction
 from sonarsynth.description import description
-from sonarsynth.description.method import Demand, Method
+from sonarsynth.description.method import Demand
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.equations.arrays.beams import first_and_spacing
 from sonarsynth.imaging.image_window import Shading, energy_image, weights, window_spectra
+from sonarsynth.imaging.steering import Steering
 from sonarsynth.products import EnergyImage, Signals
 from sonarsynth.receiver import Elements, Sonar
 
@@ -20,9 +21,10 @@ BEAMS_AT_ONCE = 128
 
 
 @description
-class DenseDelayAndSum(Method):
+class DenseDelayAndSum(Steering):
     """Delay and sum for any array, with the exact spherical delay to the focus in every direction, in float64."""
 
+    separable: ClassVar[bool] = False
     kind: Literal["dense"] = "dense"
     focus: PositiveMetres | None = 20.0
     """Range at which the array is focused; left out (none), plane waves."""

@@ -9,11 +9,12 @@ from annotated_types import Ge, Le
 
 from sonarsynth.conventions import PositiveMetres
 from sonarsynth.description import description
-from sonarsynth.description.method import Demand, Method
+from sonarsynth.description.method import Demand
 from sonarsynth.imaging.dense import DenseDelayAndSum
 from sonarsynth.imaging.focus_error import MOST_ZONES, zones_needed
 from sonarsynth.imaging.image_window import Shading, energy_image, weights, window_spectra
 from sonarsynth.imaging.lattice_image import check_lattice, focused_energies, steered_zones, zoned_energies
+from sonarsynth.imaging.steering import Steering
 from sonarsynth.products import EnergyImage, Signals
 from sonarsynth.receiver import Elements, Sonar
 
@@ -24,7 +25,7 @@ AUTO_ERROR = 0.1
 
 
 @description
-class FocusedDelayAndSum(Method):
+class FocusedDelayAndSum(Steering):
     """Delay and sum on a lattice; masks, dead elements and weights are free.
 
     With one zone the delay of focusing is that on the acoustic axis, in every direction. Off the axis it is not quite

@@ -37,8 +37,20 @@ from sonarsynth.pipeline.synthesis import frame_signals
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, variables
 from sonarsynth.planning import Plan, arrivals_of, check_unsampled_frame, plan
 from sonarsynth.planning.notes.source_notes import locator
-from sonarsynth.products import Arrivals, Echoes, EnergyImage, LinkBudget, Signals, SourceEstimates, Truth
+from sonarsynth.products import (
+    Arrivals,
+    Echoes,
+    EnergyImage,
+    LinkBudget,
+    PointCloud,
+    Signals,
+    SourceEstimates,
+    Truth,
+    no_points,
+)
 from sonarsynth.randomness import stream
+from sonarsynth.ranging.clouds import point_cloud
+from sonarsynth.ranging.received_window import ReceivedWindow
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals import add_noise, convert
@@ -57,6 +69,7 @@ __all__ = [
     "Variable",
     "attributes",
     "beamform_frame",
+    "cloud_of",
     "coordinates",
     "digitise",
     "follow_rays",
@@ -219,7 +232,7 @@ def range_frame(plan: Plan, index: int, traced: TracedFrame, heard: BeamformedFr
     if "signals" in plan.products:
         counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
         values |= signal_values(heard.signals, counts)
-    if heard.image is None or heard.estimates is None or heard.imaged is None:
+    if heard.image is None or heard.estimates is None:
         mark_stage("collect")
         return values
     values |= source_estimate_values(heard.estimates) | emission_values(plan, direct, heard.estimates)
@@ -227,23 +240,24 @@ def range_frame(plan: Plan, index: int, traced: TracedFrame, heard: BeamformedFr
         values |= image_values(heard.image, plan.windows.direct_removed)
     mark_stage("collect")
     if "cloud" in plan.products:
-        scene = plan.scene
-        cloud = plan.choices.ranging.cloud(
-            heard.imaged,
-            heard.image,
-            heard.estimates,
-            plan.elements,
-            scene.sonar,
-            frame.sonar_pose,
-            plan.profile,
-            heard.signals,
-        )
-        cloud = cloud.loudest(plan.sizes["point"])
+        cloud = cloud_of(plan, frame, heard).loudest(plan.sizes["point"])
         mark_stage("range")
         labels = point_labels(plan, frame, traced.arrivals, heard.estimates, cloud)
         values |= cloud_values(cloud, labels, plan.sizes["point"])
         mark_stage("label")
     return values
+
+
+def cloud_of(plan: Plan, frame: Frame, heard: BeamformedFrame) -> PointCloud:
+    """The points of a frame that has an image; `plan` is that of its sequence."""
+    image, signals, estimates = heard.image, heard.imaged, heard.estimates
+    if image is None or signals is None or estimates is None or not np.isfinite(image.start):
+        return no_points()
+    elements, sonar, choices = plan.elements, plan.scene.sonar, plan.choices
+    beams = choices.beamforming.beams(signals, elements, sonar, image.start, image.stop)
+    loudest = float(np.abs(signals.pressure).max(initial=0.0))
+    window = ReceivedWindow(elements, sonar, image, beams, loudest, heard.signals, estimates)
+    return point_cloud(window, choices.picking, choices.placing, frame.sonar_pose, plan.profile)
 
 
 def _values(plan: Plan, index: int) -> Values:

@@ -96,7 +96,8 @@ def cloud_values(cloud: PointCloud, labels: PointLabels, size: int) -> Values:
     """The cloud, each coordinate apart, and whose echo each point is, padded to `size` points."""
     x, y, z = cloud.position.T
     columns = {name: value for name, value in vars(cloud).items() if name not in ("position", "overflow")}
-    columns |= {name: np.rad2deg(columns[name]).astype(np.float32) for name in ("azimuth", "elevation")}
+    angles = ("azimuth", "azimuth_error", "elevation", "elevation_error")
+    columns |= {name: np.rad2deg(columns[name]).astype(np.float32) for name in angles}
     columns |= {"x": x, "y": y, "z": z, **vars(labels)}
     padded = {name: _padded(values, size) for name, values in columns.items()}
     return table("/cloud", count=np.int32(len(cloud)), overflow=np.int32(cloud.overflow), **padded)

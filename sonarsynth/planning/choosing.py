@@ -58,10 +58,17 @@ def choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
     synthesis, by_synthesis = scene.physics.synthesis.resolve(
         Demand(np.sqrt(SYNTHESIS) * accuracy.cheap, accuracy.exact, lambda method: 0.0, plan.elements)
     )
-    ranging, by_rays = scene.processing.ranging.resolve(
+    placing, by_rays = scene.processing.placing.resolve(
         Demand(accuracy.range_m, accuracy.exact, lambda method: bent, plan.elements)
     )
-    choices = Choices(subarrays=1, negligible=_negligible(scene, accuracy), synthesis=synthesis, ranging=ranging)
+    picking, _ = scene.processing.picking.resolve(Demand(np.inf, accuracy.exact, lambda method: 0.0, plan.elements))
+    choices = Choices(
+        subarrays=1,
+        negligible=_negligible(scene, accuracy),
+        synthesis=synthesis,
+        picking=picking,
+        placing=placing,
+    )
     made = replace(plan, choices=choices)
     indices = [look.frames[0].index for look in some]
     cut = _subarrays(made, indices)

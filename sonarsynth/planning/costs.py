@@ -208,7 +208,8 @@ def _sonar_rows(plan: Plan) -> list[Row]:
     rows.append(("beamform", plan.choices.beamforming.row() + without, why, _steered(plan), image, 4 * beams * asked))
     if "cloud" in plan.products:
         error, seconds = "predicted, /cloud/range_error" + _bent(plan), RANGED_BEAMS * SECONDS["range beam"]
-        rows.append(("range", plan.choices.ranging.row(), "requested", error, seconds, 54 * sizes["point"]))
+        method = f"{plan.choices.picking.row()}, {plan.choices.placing.row()}"
+        rows.append(("range", method, "requested", error, seconds, 66 * sizes["point"]))
     return rows
 
 

@@ -87,9 +87,12 @@ class PointCloud:
     range: npt.NDArray[np.float32]  # (point,) m from the array centre
     range_error: npt.NDArray[np.float32]  # (point,) m, predicted standard error
     azimuth: Floats  # (point,) rad, port positive
+    azimuth_error: Floats  # (point,) rad, predicted standard error
     elevation: Floats  # (point,) rad
+    elevation_error: Floats  # (point,) rad
     delay: npt.NDArray[np.float32]  # (point,) s after the direct arrival
     energy: npt.NDArray[np.float32]  # (point,) Pa2 s of the beam
+    snr: npt.NDArray[np.float32]  # (point,) dB: power of the echo's peak over the mean power of noise in its beam
     overflow: int = 0  # points that were left out: the faintest
 
     def __len__(self) -> int:
@@ -111,5 +114,5 @@ class PointCloud:
 
 def no_points() -> PointCloud:
     """A cloud without points."""
-    none = np.zeros(0, np.float32)
-    return PointCloud(np.zeros((0, 3), np.float32), none, none, np.zeros(0), np.zeros(0), none, none)
+    none, angle = np.zeros(0, np.float32), np.zeros(0)
+    return PointCloud(np.zeros((0, 3), np.float32), none, none, angle, angle, angle, angle, none, none, none)

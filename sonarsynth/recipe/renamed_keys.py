@@ -12,6 +12,7 @@ RENAMED: Final[dict[Path, str]] = {
     ("scene", "world", "environment", "bed"): "bottom",
     ("scene", "physics", "visibility"): "occlusion",
     ("scene", "physics", "faintest"): "dynamic_range",
+    ("scene", "processing", "ranging"): "placing",
 }
 """Old path to the new last word of it."""
 

@@ -20,7 +20,7 @@ from sonarsynth.imaging import AutoBeamforming, Beamformer
 from sonarsynth.products import DIRECT
 from sonarsynth.propagation import AutoTracing, Tracing
 from sonarsynth.randomness import stream
-from sonarsynth.ranging import AutoRange, Cancelling, Locator, Ranging, SensorDelays
+from sonarsynth.ranging import AutoPlacing, Cancelling, Locator, Peaks, Picking, Placing, SensorDelays
 from sonarsynth.receiver import Sonar
 from sonarsynth.scattering import MirrorLobe, Scattering
 from sonarsynth.signals import AutoSynthesis, Synthesis
@@ -134,8 +134,10 @@ class Processing:
     But for `keep`, direct pulses of other located snaps are taken out wherever they are heard in the echo window."""
     beamforming: Beamformer = Field(default_factory=AutoBeamforming)
     """How the energy image is made."""
-    ranging: Ranging = Field(default_factory=AutoRange)
-    """How echoes are ranged and placed."""
+    picking: Picking = Field(default_factory=Peaks)
+    """Which peaks of the beams are echoes."""
+    placing: Placing = Field(default_factory=AutoPlacing)
+    """How delays and directions become places."""
     max_points: Annotated[int, Ge(1), Le(1_000_000)] = 4096
     """Room for points of a frame in the store: the loudest are kept, and how many were left out is stored."""
 

@@ -180,7 +180,8 @@ def _compare(path: Folder, stored: Mapping[str, Any], wanted: Mapping[str, Any])
     differing = [key for key in [*new, *old] if old.get(key) != new.get(key)]
     if differing:
         key = differing[0]
-        how, difference = "from a different recipe", f"{key}: {old.get(key, 'absent')}, now {new.get(key, 'absent')}"
+        was, now = (_short(some.get(key, "absent")) for some in (old, new))
+        how, difference = "from a different recipe", f"{key}: {was}, now {now}"
     else:
         names = {
             "products": "products",
@@ -206,8 +207,8 @@ def spelled(odd: Mapping[str, tuple[str, str]]) -> str:
 
 
 def _short(value: Any) -> str:
-    """A value as people compare it: a digest by its beginning."""
-    text = str(value)
+    """A value as people compare it, in one line: a digest by its beginning."""
+    text = str(value) if str(value).isprintable() else ascii(value)
     return text if len(text) < 64 else text[:12]
 
 

@@ -11,8 +11,8 @@ from sonarsynth.description.method import Demand
 from sonarsynth.environment.sea import Profile
 from sonarsynth.products import Paths
 from sonarsynth.propagation import Propagation, Straight
-from sonarsynth.ranging.clouds import isovelocity_solution
 from sonarsynth.ranging.location.refraction import refracted_solution
+from sonarsynth.ranging.placing.solution import isovelocity_solution
 from sonarsynth.receiver import elements
 from sonarsynth.recipe.scene import Frame, Scene
 

@@ -8,9 +8,7 @@ from __future__ import annotations
 from sonarsynth.description import FieldError
 from sonarsynth.environment.absorption import absorption_notes
 from sonarsynth.environment.boundary_numbers import boundary_notes
-from sonarsynth.environment.casts import profile_of
 from sonarsynth.environment.sea import Profile
-from sonarsynth.ranging import RefractedRange
 from sonarsynth.recipe.scene import Scene
 
 
@@ -34,15 +32,12 @@ def validity(scene: Scene, profile: Profile) -> tuple[str, ...]:
     return (*lines, *(f"{'.'.join(BELIEVED)}: {note}" for note in _believed(scene)))
 
 
-BELIEVED = ("scene", "processing", "ranging", "profile")
+BELIEVED = ("scene", "processing", "placing", "profile")
 
 
 def _believed(scene: Scene) -> tuple[str, ...]:
     """Notes on the sound speed that the sonar ranges with."""
-    ranging = scene.processing.ranging
-    if not isinstance(ranging, RefractedRange) or ranging.profile is None:
-        return ()
     try:
-        return profile_of(ranging.profile).notes
+        return scene.processing.placing.notes()
     except (ValueError, OSError, ImportError) as error:
         raise FieldError(BELIEVED, str(error)) from None

@@ -137,7 +137,7 @@ def _accuracy(made: Plan, looks: Sequence[SampledScene]) -> list[str]:
     if errors.ranging > allowed.range_m:
         found.append(
             f"range errors are {errors.ranging:.2g} m{_why_ranges_err(made.scene, looks)}: accuracy.range_m allows "
-            f"{allowed.range_m:g}, but the recipe requests '{made.choices.ranging.kind}' (scene.processing.ranging)"
+            f"{allowed.range_m:g}, but the recipe requests '{made.choices.placing.kind}' (scene.processing.placing)"
         )
     if errors.image > allowed.image_db:
         found.append(

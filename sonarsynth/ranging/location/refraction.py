@@ -11,8 +11,8 @@ from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.arrays.bistatic_range import bistatic_range
 from sonarsynth.equations.rays.ray_solutions import eigenrays, water
 from sonarsynth.geometry import Pose, unit
-from sonarsynth.ranging.clouds import Solution
 from sonarsynth.ranging.location.locating import Bend
+from sonarsynth.ranging.placing.solution import Solution
 from sonarsynth.receiver import Elements
 
 STEPS = 20

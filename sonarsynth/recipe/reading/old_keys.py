@@ -41,6 +41,8 @@ def with_new_keys(source: Source) -> Source:
             notes.append(_note(dotted(old), dotted(new_path(old))))
             if old[-1] == "shrimp":
                 data = _changed(data, new_path(old), _with_kinds)
+            if old[-1] == "ranging":
+                data = _changed(data, old[:-1], partial(_with_picking, notes))
     data = _changed(data, ("scene", "physics", "occlusion"), _sensors)
     for block in ("grid", "variations"):
         data = _changed(data, (block,), partial(_new_paths, notes))
@@ -62,6 +64,22 @@ def _with_kinds(sources: Any) -> Any:
     if not isinstance(sources, list):
         return sources
     return [{"kind": "snapping_shrimp"} | one if isinstance(one, dict) else one for one in sources]
+
+
+def _with_picking(notes: list[str], processing: dict[str, Any]) -> dict[str, Any]:
+    """Processing of before picking and placing were two choices, and beams were those of the image."""
+    placing = processing["placing"]
+    if not isinstance(placing, dict):
+        return processing
+    picking = {name: placing[name] for name in ("threshold", "locality") if name in placing}
+    left = {name: value for name, value in placing.items() if name not in ("threshold", "locality", "focus")}
+    if "focus" in placing:
+        notes.append("scene.processing.ranging.focus is not used: echoes are picked from the beams of the beamformer")
+    changed = processing | {"placing": left}
+    if picking and "picking" not in processing:
+        notes.append("scene.processing.ranging's threshold and locality are those of picking: {kind: beam_axis} now")
+        changed["picking"] = {"kind": "beam_axis"} | picking
+    return changed
 
 
 def _sensors(value: Any) -> Any:

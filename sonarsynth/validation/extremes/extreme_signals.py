@@ -8,8 +8,10 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.imaging import FocusedDelayAndSum
-from sonarsynth.ranging import IsovelocityRange, SensorDelays
+from sonarsynth.ranging import IsovelocityPlacing, Peaks, SensorDelays
+from sonarsynth.ranging.clouds import point_cloud
 from sonarsynth.ranging.location.locating import unlocatable
+from sonarsynth.ranging.received_window import ReceivedWindow
 from sonarsynth.receiver import Band, BeamGrid, LowPass, PlanarLattice, PositionTable, Sonar, elements
 from sonarsynth.scattering.isotropic import Isotropic
 from sonarsynth.signals import DirectSum, GriddedSynthesis
@@ -148,7 +150,9 @@ def _silence() -> Got:
     sonar = Sonar(array=PlanarLattice(columns=4, rows=4, pitch=0.1, face=0.0), beams=BeamGrid(azimuths=5, elevations=5))
     found = SensorDelays().locate(quiet, FEW, sonar, POSE, 100.0, 1, PROFILE)
     image = FocusedDelayAndSum().image(quiet, FEW, sonar, 1e-3, 6e-3)
-    cloud = IsovelocityRange().cloud(quiet, image, found, FEW, sonar, POSE, PROFILE)
+    beams = FocusedDelayAndSum().beams(quiet, FEW, sonar, 1e-3, 6e-3)
+    window = ReceivedWindow(FEW, sonar, image, beams, 0.0, quiet, found)
+    cloud = point_cloud(window, Peaks(), IsovelocityPlacing(), POSE, PROFILE)
     return together(
         holds(not quiet.pressure.any() and quiet.outside == 0, "no pressure"),
         holds(not image.energy.any(), "no energy in any beam"),

@@ -1,0 +1,43 @@
+"""How many peaks Gaussian noise has in a volume that is searched."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+from scipy.optimize import brentq
+
+from sonarsynth.conventions import Floats
+
+LOWEST = 3.0
+"""Of the mean power: peaks under this are not told from each other, so that no threshold is lower."""
+HIGHEST = 1e3
+
+
+def expected_peaks(level: float, size: Floats) -> float:
+    """Expected number of peaks of |z|^2 over `level`, z complex Gaussian noise with E|z|^2 = 1 in a box.
+
+    size (axis,): lengths of the box along up to three axes, in units of 1/sqrt(lambda), lambda the variance of the
+    derivative of Re z along the axis over the variance of Re z. High peaks are counted by the Euler characteristic of
+    the set over the level: sum over d of mu_d rho_d, mu_d the intrinsic volumes of the box, with, at u = 2 level,
+
+        rho_0 = e, rho_1 = (u/2 pi)^1/2 e, rho_2 = (u - 1) e/(2 pi), rho_3 = (u^2 - 3 u) e/((2 pi)^3/2 u^1/2),
+
+    e = exp(-u/2). An axis that is not resolved (size well below one) adds nothing.
+    Source: Worsley (1994), Advances in Applied Probability 26, 13, theorem 3.5, for chi-squared fields, two degrees of
+    freedom.
+    """
+    u, volumes = 2.0 * level, np.array([1.0, 0.0, 0.0, 0.0])
+    for length in np.asarray(size, float):
+        volumes[1:] += length * volumes[:-1]
+    densities = [1.0, (u / (2 * pi)) ** 0.5, (u - 1.0) / (2 * pi), (u**2 - 3 * u) / ((2 * pi) ** 1.5 * u**0.5)]
+    return float(np.exp(-level) * (volumes @ densities))
+
+
+def peak_level(false_alarms: float, size: Floats) -> float:
+    """Level, over the mean power of noise, that so many peaks exceed on average (`expected_peaks`)."""
+
+    def excess(level: float) -> float:
+        return expected_peaks(level, size) - false_alarms
+
+    return LOWEST if excess(LOWEST) <= 0.0 else float(brentq(excess, LOWEST, HIGHEST))

@@ -1,0 +1,141 @@
+"""The echoes of beams on their axes: when each comes after the direct pulse, and whether it is that beam's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import maximum_filter1d
+
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.products import EnergyImage
+from sonarsynth.ranging import ranging_kernels
+from sonarsynth.ranging.location import pulse_times
+from sonarsynth.ranging.picking.picked_echoes import PickedEchoes, no_echoes
+from sonarsynth.ranging.range_profiles import OVERSAMPLING, Profiles, loudest_beams, over_threshold, range_profiles
+from sonarsynth.ranging.received_window import ReceivedWindow
+
+GHOST = 8.0
+"""An echo is a ghost or a side lobe where another beam holds this many dB more at the same delay."""
+NOISE = 16.0
+"""An echo must stand this many dB above the median of its own beam: noise does so once in 10^12 samples."""
+EXTENT = 0.05
+"""Share of a profile's peak above which it is echo: how far that spreads is the depth of the target in the beam."""
+OWN_WIDTH = 0.3
+"""Standard angle between a beam and the echo that is loudest in it, in half widths."""
+INTERFERENCE = 0.5
+"""Standard error of a peak's delay where echoes overlap, in units of the resolution."""
+SLOPE = 0.7
+"""Standard slope of a surface against the beam: its range changes by this share of the distance across the beam."""
+
+
+@dataclass(frozen=True, eq=False)
+class AxisEchoes:
+    """One echo a beam: the peak of its profile. NaN delay where there is none of its own."""
+
+    delay: Floats  # (beam,) s after the direct arrival
+    delay_error: Floats  # (beam,) s
+    angle_error: Floats  # (beam,) rad: how far from the beam the echo may come from
+    snr: Floats  # (beam,) dB
+
+
+def axis_echoes(
+    heard: ReceivedWindow,
+    threshold: float,
+    locality: float,
+    change: Callable[[Profiles, AxisEchoes], AxisEchoes] = lambda _, echoes: echoes,
+) -> PickedEchoes:
+    """The loudest echo of each beam within `threshold` dB of the loudest beam, on its axis; `change`: of what is
+    picked, before it is taken."""
+    beams, left_out = loudest_beams(heard.image, over_threshold(heard.image, threshold, heard.loudest))
+    if not len(beams[0]):
+        return no_echoes(heard.image, left_out)
+    profiles = range_profiles(heard, beams)
+    echoes = change(profiles, pick(profiles, heard.image, locality))
+    own = np.isfinite(echoes.delay)
+    row, column = profiles.row[own], profiles.column[own]
+    angle = echoes.angle_error[own]
+    return PickedEchoes(
+        azimuth=heard.image.azimuth[column],
+        elevation=heard.image.elevation[row],
+        azimuth_error=angle / np.maximum(np.cos(heard.image.elevation[row]), 0.1),
+        elevation_error=angle,
+        delay=echoes.delay[own],
+        delay_error=echoes.delay_error[own],
+        energy=heard.image.energy[row, column],
+        snr=echoes.snr[own],
+        slope=np.full(len(angle), SLOPE),
+        overflow=left_out,
+    )
+
+
+def pick(profiles: Profiles, image: EnergyImage, locality: float) -> AxisEchoes:
+    """The peak of every profile, kept where it is the beam's own.
+
+    At the delay of its peak, no beam within a beam width may hold `locality` dB more, or the echo comes from there; and
+    no beam at all `GHOST` dB more, or it comes through a side lobe or a grating lobe; and it must stand out of the
+    noise. Nearer to an end of the profile than half a pulse (`pulse_times.PULSE_HALF`) a peak is what the window left
+    of an echo, whose own peak may be outside: that is none. Where a beam holds echoes of several delays its axis may
+    meet the surface of another than the loudest: their spread is in the error of the delay.
+    """
+    power, count = profiles.power, len(profiles.power)
+    rows = np.arange(count)
+    top = np.clip(power.argmax(axis=1), 1, power.shape[1] - 2)
+    own = power[rows, top]
+    place, _ = pulse_times.parabola(*(np.sqrt(power[rows, top + i]) for i in (-1, 0, 1)))
+    near = np.maximum(_loudest_near(profiles, image, top), own)
+    anywhere = maximum_filter1d(power.max(axis=0), profiles.about * 2 + 1)[top]
+    noise = np.median(power[:, ::OVERSAMPLING], axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        excess = 10 * np.log10(near / own)
+        good = (own > 0) & (excess <= locality) & (own * 10 ** (GHOST / 10) >= anywhere)
+        good &= own >= noise * 10 ** (NOISE / 10)
+        good &= np.minimum(top, power.shape[1] - 1 - top) * profiles.step >= pulse_times.PULSE_HALF
+        off_beam = profiles.width * np.hypot(np.sqrt(excess / 3), OWN_WIDTH)
+        jitter = profiles.resolution * np.hypot(np.sqrt(0.5 * noise / own), INTERFERENCE)
+        snr = 10 * np.log10(own / noise * np.log(2.0))
+    delay = profiles.first + (top + place) * profiles.step
+    clock = np.hypot(jitter, _extent(profiles, top, own))
+    return AxisEchoes(np.where(good, delay, np.nan), clock, off_beam, snr)
+
+
+def _extent(profiles: Profiles, top: Ints, own: npt.NDArray[np.float32]) -> Floats:
+    """Root mean square distance (beam,) in s of a beam's echo from its peak; 0 for one glint, but for its own width."""
+    echo = np.where(profiles.power >= EXTENT * own[:, None], profiles.power, np.float32(0.0))
+    steps = np.arange(echo.shape[1], dtype=np.float32)
+    total = np.maximum(echo.sum(axis=1), np.finfo(np.float32).tiny)
+    mean = echo @ steps / total
+    square = np.einsum("bt,bt->b", echo, (steps - mean[:, None]) ** 2) / total
+    spread = profiles.step * np.sqrt(square + (mean - top) ** 2)
+    return np.asarray(np.sqrt(np.maximum(spread**2 - profiles.resolution**2, 0.0)))
+
+
+def _loudest_near(profiles: Profiles, image: EnergyImage, top: Ints) -> npt.NDArray[np.float32]:
+    """Largest power (beam,), about the delay of each beam's own peak, in the beams within a beam width of it."""
+    rows, columns = image.energy.shape
+    index = np.full((rows, columns), -1)
+    index[profiles.row, profiles.column] = np.arange(len(top))
+    reach = 2 * profiles.width
+    up, across = (_cells(grid, reach) for grid in (image.elevation, image.azimuth))
+    return np.asarray(
+        ranging_kernels.loudest_near(
+            profiles.power,
+            top,
+            profiles.about,
+            profiles.row,
+            profiles.column,
+            index,
+            up,
+            across,
+            profiles.direction,
+            reach,
+        )
+    )
+
+
+def _cells(grid: Floats, reach: float) -> int:
+    """Grid cells within `reach` (rad), one at least, where there is more than one."""
+    step = float(grid[1] - grid[0]) if len(grid) > 1 else np.inf
+    return min(max(int(np.ceil(reach / step)), 1), len(grid) - 1)

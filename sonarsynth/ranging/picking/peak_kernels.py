@@ -1,0 +1,88 @@
+"""Local maxima of beams over elevation, azimuth and delay, and what an array hears beside its beams: compiled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba as nb
+import numpy as np
+
+
+@nb.njit(cache=True, nogil=True)
+def exceeded(power: Any, index: Any, i: int, j: int, t: int, about: int) -> Any:
+    """Whether the value of the beam at (i, j) and delay t has a neighbour that exceeds it, or equals it and comes
+    before; neighbours: within one beam and `about` delays. Arrays as for `local_maxima`."""
+    rows, columns = index.shape
+    here = index[i, j]
+    value = power[here, t]
+    for k in range(max(i - 1, 0), min(i + 2, rows)):
+        for m in range(max(j - 1, 0), min(j + 2, columns)):
+            other = index[k, m]
+            if other >= 0:
+                for s in range(t - about, t + about + 1):
+                    x = power[other, s]
+                    before = other < here or (other == here and s < t)
+                    if x > value or (x == value and before):
+                        return True
+    return False
+
+
+@nb.njit(cache=True, nogil=True)
+def local_maxima(power: Any, index: Any, row: Any, column: Any, floor: Any, edge: Any, about: int, end: int) -> Any:
+    """Beams and delays (peak,) of values over `floor` (beam,) that no neighbour exceeds.
+
+    power (beam, delay); index (elevation, azimuth) the beam there, -1 for none; row, column (beam,) of each beam. None
+    within `end` delays of an end, which is more than `about`, and none in a beam at the edge of an axis of which edge
+    (2,) says that peaks are resolved: theirs may be outside.
+    """
+    rows, columns = index.shape
+    found = np.zeros(power.shape, np.bool_)
+    for b in range(len(power)):
+        i, j = row[b], column[b]
+        if (edge[0] and (i == 0 or i == rows - 1)) or (edge[1] and (j == 0 or j == columns - 1)):
+            continue
+        for t in range(end, power.shape[1] - end):
+            top = power[b, t] > floor[b] and power[b, t] >= power[b, t + 1] and power[b, t] > power[b, t - 1]
+            found[b, t] = top and not exceeded(power, index, i, j, t, about)
+    return np.nonzero(found)
+
+
+@nb.njit(cache=True, nogil=True)
+def lobe_power(
+    direction: Any, delay: Any, power: Any, position: Any, weight: Any, frequency: Any, taper: Any, near: Any
+) -> Any:
+    """Power (peak,) that louder peaks bring to each by the side lobes and grating lobes of the array.
+
+    direction (peak, xyz) over the speed of sound, s/m; delay (peak,) s; power (peak,), descending; position (sensor,
+    xyz) m; weight (sensor,) of sum one; frequency (bin,) evenly spaced, taper (bin,) of an echo's amplitude there;
+    near: two peaks within that (s/m) of each other are in one beam. A wave from v is heard by a beam to u at the delay
+    t as |sum_f T(f) sum_q w_q exp(i 2 pi f (x_q.(u - v) + t))|^2/(sum_f T)^2.
+    """
+    peaks, sensors, bins = len(power), len(weight), len(frequency)
+    brought = np.zeros(peaks)
+    reach = 0.0
+    for q in range(sensors):
+        reach = max(reach, np.sqrt(np.sum(position[q] ** 2)))
+    spacing = frequency[1] - frequency[0]
+    lasting = 2.0 / (frequency[-1] - frequency[0])
+    whole = np.sum(taper)
+    for i in range(peaks):
+        for j in range(i):
+            apart = direction[i] - direction[j]
+            far = np.sqrt(np.sum(apart**2))
+            late = delay[i] - delay[j]
+            if far <= near or abs(late) > reach * far + lasting:
+                continue
+            heard = np.zeros(bins, np.complex128)
+            for q in range(sensors):
+                x = position[q, 0] * apart[0] + position[q, 1] * apart[1] + position[q, 2] * apart[2] + late
+                phasor = weight[q] * np.exp(2j * np.pi * frequency[0] * x)
+                turn = np.exp(2j * np.pi * spacing * x)
+                for k in range(bins):
+                    heard[k] += phasor
+                    phasor *= turn
+            total = 0j
+            for k in range(bins):
+                total += taper[k] * heard[k]
+            brought[i] += power[j] * (total.real**2 + total.imag**2) / whole**2
+    return brought

@@ -1,0 +1,38 @@
+"""Echoes as they are picked: when, from where, and how well that is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.products import EnergyImage
+
+
+@dataclass(frozen=True, eq=False)
+class PickedEchoes:
+    """Echoes in the order of their beams. Errors are predicted standard errors."""
+
+    azimuth: Floats  # (echo,) rad
+    elevation: Floats  # (echo,) rad
+    azimuth_error: Floats  # (echo,) rad
+    elevation_error: Floats  # (echo,) rad
+    delay: Floats  # (echo,) s after the direct arrival
+    delay_error: Floats  # (echo,) s
+    energy: npt.NDArray[np.float32]  # (echo,) Pa2 s of the beam
+    snr: Floats  # (echo,) dB: power of the peak over the mean power of noise in its beam
+    slope: Floats  # (echo,) m/m: by how much the range may differ across `azimuth_error`, beside what geometry says
+    overflow: int = 0  # beams that were not looked at, the faintest
+
+    def select(self, rows: Ints | Bools) -> PickedEchoes:
+        """Some of the echoes."""
+        columns = {name: value[rows] for name, value in vars(self).items() if name != "overflow"}
+        return PickedEchoes(**columns, overflow=self.overflow)
+
+
+def no_echoes(image: EnergyImage, overflow: int = 0) -> PickedEchoes:
+    """None."""
+    none = np.zeros(0)
+    return PickedEchoes(none, none, none, none, none, none, image.energy.ravel()[:0], none, none, overflow)

@@ -1,0 +1,36 @@
+"""Placing by the closed form for straight paths."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from sonarsynth.conventions import Floats
+from sonarsynth.description import description
+from sonarsynth.description.method import Demand, Method
+from sonarsynth.environment.sea import Profile
+from sonarsynth.geometry import Pose
+from sonarsynth.ranging.placing.refracted_placing import RefractedPlacing
+from sonarsynth.ranging.placing.solution import Solution, isovelocity_solution
+from sonarsynth.receiver import Sonar
+
+
+@description
+class IsovelocityPlacing(Method):
+    """Range by the closed form for straight paths at the assumed sound speed, from the delay after the direct arrival
+    (`equations.arrays.bistatic_range`)."""
+
+    kind: Literal["isovelocity"] = "isovelocity"
+
+    def resolve(self, demand: Demand) -> tuple[IsovelocityPlacing, float]:
+        """Itself, and by how much (m) bent rays make its ranges wrong."""
+        return self, demand.error(self)
+
+    def exact(self) -> RefractedPlacing:
+        """Along rays."""
+        return RefractedPlacing()
+
+    def place(
+        self, delay: Floats, beam: Floats, source: Floats, sonar: Sonar, sonar_pose: Pose, profile: Profile
+    ) -> Solution:
+        """See `PlacingMethod`."""
+        return isovelocity_solution(delay, beam, source, sonar.assumed_sound_speed)

@@ -1,0 +1,28 @@
+"""Where echoes come from, with what that depends on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.equations.arrays.bistatic_range import bistatic_range
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Where echoes come from; NaN where there is no answer or an ill-conditioned one. Sonar frame."""
+
+    position: Floats  # (echo, xyz) m
+    range: Floats  # (echo,) m
+    by_path: Floats  # (echo,) dr/dx, x the excess path
+    by_angle: Floats  # (echo,) m/rad
+    by_source: Floats  # (echo, xyz) dr/dS
+
+
+def isovelocity_solution(delay: Floats, beam: Floats, source: Floats, sound_speed: float) -> Solution:
+    """Closed form; NaN where the target would be too near the line from source to array."""
+    found = bistatic_range(sound_speed * delay, beam, source)
+    r = np.where(found.ill_conditioned, np.nan, found.range)
+    return Solution(r[:, None] * beam, r, found.by_path, found.by_angle, found.by_source)

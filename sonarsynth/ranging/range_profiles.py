@@ -1,0 +1,177 @@
+"""Power against delay in the beams over threshold: the echo with the pulse's own waveform taken out.
+
+The beams are compared with the direct pulse as the same array hears it, so that the snap's own waveform, the filter and
+the clock cancel: what is left is the delay.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.fft import ifft, next_fast_len
+
+from sonarsynth.conventions import Floats, Ints, direction
+from sonarsynth.equations.arrays.apertures import live_gain
+from sonarsynth.equations.arrays.gates import fast_length
+from sonarsynth.products import EnergyImage, Signals, SourceEstimates
+from sonarsynth.ranging import ranging_kernels
+from sonarsynth.ranging.location import pulse_times
+from sonarsynth.ranging.location.plane_waves import PlaneWaveFit
+from sonarsynth.ranging.location.pulse_times import Complexes
+from sonarsynth.ranging.received_window import ReceivedWindow
+from sonarsynth.receiver import Elements, Sonar
+
+MAX_BEAMS = 16384
+"""No more beams are ranged, the loudest of them: a bound on memory where a whole image is loud."""
+BEAMS_AT_ONCE = 512
+OVERSAMPLING = 4
+"""Delays of a profile for each that its bandwidth needs."""
+WHITENING = 0.03
+"""Share of the pulse's largest power density below which the spectrum is no more flattened (-15 dB)."""
+RESIDUE = 1e-6
+"""Of the loudest pressure: what single precision and the cut tail of a pulse (1e-7 of its peak) may leave anywhere."""
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """Of what an echo, and of what white noise, has in a profile: how sharp one is, how rough the other."""
+
+    centre: float  # Hz: mean frequency of an echo's amplitude
+    echo_band: float  # Hz: root mean square distance of its frequencies from there
+    noise_band: float  # Hz: the same of noise, by its power
+    noise_own_band: float  # Hz: of noise, about its own mean
+    echo_frequency: float  # Hz: root mean square frequency of an echo's amplitude
+    noise_frequency: float  # Hz: of noise, by its power
+
+
+@dataclass(frozen=True, eq=False)
+class Profiles:
+    """Power against delay of some beams: the echo with the pulse's waveform taken out."""
+
+    row: Ints  # (beam,) elevation index
+    column: Ints  # (beam,) azimuth index
+    direction: Floats  # (beam, xyz)
+    power: npt.NDArray[np.float32]  # (beam, delay) relative
+    first: float  # s after the direct arrival
+    step: float  # s
+    width: float  # rad: half of the half-power width of a beam
+    resolution: float  # s: 1/(2 pi beta), beta the root mean square bandwidth
+    moments: Moments
+
+    @property
+    def about(self) -> int:
+        """Steps of delay within which two beams hear the same echo."""
+        return max(round(0.7 * self.resolution / self.step), 1)
+
+
+def over_threshold(image: EnergyImage, threshold: float, loudest: float = 0.0) -> npt.NDArray[np.bool_]:
+    """The beams (elevation, azimuth) within `threshold` dB of the loudest; none in silence or where none was heard.
+
+    loudest: largest pressure (Pa) in the signals. An image no louder than `RESIDUE` of it all through the window is
+    what rounding and the tail of the direct pulse leave, not an echo.
+    """
+    energy = np.where(np.isfinite(image.energy), image.energy, 0.0)
+    peak = float(energy.max(initial=0.0))
+    if not peak > (RESIDUE * loudest) ** 2 * (image.stop - image.start):
+        return np.zeros(energy.shape, bool)
+    return np.asarray(energy >= peak * 10 ** (-threshold / 10))
+
+
+def loudest_beams(image: EnergyImage, some: npt.NDArray[np.bool_]) -> tuple[tuple[Ints, Ints], int]:
+    """Rows and columns of some beams, and how many are left out: the faintest of more than `MAX_BEAMS`."""
+    over = int(some.sum())
+    if over > MAX_BEAMS:
+        energy = np.where(some & np.isfinite(image.energy), image.energy, -1.0)
+        some = some & (energy >= np.partition(energy, -MAX_BEAMS, axis=None)[-MAX_BEAMS])
+    row, column = np.nonzero(some)
+    return (row, column), over - len(row)
+
+
+def direct_spectrum(
+    signals: Signals, estimates: SourceEstimates, elements: Elements, sonar: Sonar, length: int
+) -> Complexes:
+    """Spectrum (bin,) in Pa s of the direct pulse at the array centre, without the face, about `estimates.time`.
+
+    At the frequencies of an FFT of `length` samples.
+    """
+    c, front = sonar.assumed_sound_speed, PlaneWaveFit.of(estimates)
+    aligned = pulse_times.align(signals, elements, sonar.band, front.delays(elements, c), whole=True)
+    wave = pulse_times.waveform(aligned, elements, c, front.direction, front.curvature, front.time)
+    return pulse_times.template_spectrum(wave.template, length)
+
+
+def range_profiles(heard: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profiles:
+    """Profiles of the beams (row, column): matched to the direct pulse as this beam would hear it, whitened, tapered.
+
+    With W the direct pulse at the array centre and D the face directivity towards the beam, the profile is the envelope
+    of the inverse transform of B conj(W) D/(|W|^2 + w max|W|^2): all of the band counts alike, which is as sharp as the
+    band allows in delay, and sharper in angle than the snap's own falling spectrum. D is divided by its root mean
+    square over an echo's spectrum, or an echo would be loudest where the face hears best, nearer to the axis.
+    """
+    made, sonar, elements = heard.beams, heard.sonar, heard.elements
+    c, f, spacing = sonar.assumed_sound_speed, made.frequency, made.spacing
+    lowest = round(f[0] / spacing)
+    wave = direct_spectrum(heard.direct, heard.estimates, elements, sonar, fast_length(made.samples))
+    wave = wave[lowest : lowest + len(f)]
+    density = np.abs(wave) ** 2
+    taper = np.sin(np.pi * np.clip((f - sonar.band.low) / (sonar.band.high - sonar.band.low), 0.0, 1.0)) ** 2
+    matched = wave.conj() * taper / (density + WHITENING * density.max()) if density.max() > 0 else 0 * wave
+    share = np.abs(wave * matched) + np.finfo(float).tiny
+    share /= share.sum()
+    length = next_fast_len(OVERSAMPLING * len(f))
+    step = 1 / (length * spacing)
+    row, column = beams
+    u = direction(heard.image.azimuth[column], heard.image.elevation[row])
+    power = np.empty((len(u), min(int(made.samples / made.sampling_frequency / step) + 1, length)), np.float32)
+    for part in range(0, len(u), BEAMS_AT_ONCE):
+        here = slice(part, part + BEAMS_AT_ONCE)
+        sine = u[here] * (elements.face / c)
+        face = ranging_kernels.face_responses(sine[:, 1], sine[:, 2], f[0], spacing, len(f))
+        face /= np.sqrt(face**2 @ share)[:, None]
+        echo = ifft(made.spectra(u[here]) * (face * matched).astype(np.complex64), length, axis=1)
+        power[here] = echo.real[:, : power.shape[1]] ** 2 + echo.imag[:, : power.shape[1]] ** 2
+    spread = np.sum(taper**2)
+    centre = f @ taper**2 / spread
+    beta = np.sqrt(max((f - centre) ** 2 @ taper**2 / spread, spacing**2))
+    return Profiles(
+        row=row,
+        column=column,
+        direction=u,
+        power=power,
+        first=made.start - float(heard.estimates.time[0]),
+        step=step,
+        width=half_width(elements, centre / c),
+        resolution=1 / (2 * np.pi * beta),
+        moments=_moments(f, share, np.abs(matched) ** 2, spacing),
+    )
+
+
+def _moments(f: Floats, echo: Floats, noise: Floats, spacing: float) -> Moments:
+    """Moments of profiles in which an echo has the spectrum `echo` (bin,), and white noise the power `noise` (bin,)."""
+    echo, noise = (x / x.sum() if x.sum() > 0.0 else np.full(len(x), 1.0 / len(x)) for x in (echo, noise))
+    centre, own = float(f @ echo), float(f @ noise)
+
+    def spread(share: Floats, middle: float) -> float:
+        return float(np.sqrt(max(float((f - middle) ** 2 @ share), spacing**2)))
+
+    frequencies = (float((f**2 @ share) ** 0.5) for share in (echo, noise))
+    return Moments(centre, spread(echo, centre), spread(noise, centre), spread(noise, own), *frequencies)
+
+
+def half_width(elements: Elements, wavenumber: float) -> float:
+    """Angle (rad) at which a beam of `wavenumber` (1/m) is down 3 dB, from the second moment of the aperture.
+
+    0.808/(k s), s the root mean square extent in y and z: exact for a uniform disc (2 J1(x)/x at x = 1.616).
+    """
+    live = elements.position[elements.gain != 0][:, 1:]
+    extent = float(np.sqrt(np.mean((live - live.mean(axis=0)) ** 2))) if len(live) else 0.0
+    return min(0.808 / (2 * np.pi * wavenumber * extent), 1.0) if extent > 0 else 1.0
+
+
+def aperture_moments(elements: Elements) -> Floats:
+    """Second moments (xyz, xyz) in m2 of the positions of live elements about their centre, by their gains."""
+    weight = live_gain(elements.gain)
+    about = elements.position - weight @ elements.position
+    return np.asarray((weight[:, None] * about).T @ about)

@@ -1,0 +1,29 @@
+"""What a sonar has at hand when it ranges the echoes of a window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonarsynth.products import BeamSpectra, EnergyImage, Signals, SourceEstimates
+from sonarsynth.receiver import Elements, Sonar
+
+
+@dataclass(frozen=True, eq=False)
+class ReceivedWindow:
+    """The array, its beams in the echo window, and the located snap."""
+
+    elements: Elements
+    sonar: Sonar
+    image: EnergyImage
+    beams: BeamSpectra
+    loudest: float  # Pa: largest pressure in the signals that the beams are made of
+    direct: Signals  # with the direct pulse in them
+    estimates: SourceEstimates
+
+    @property
+    def located(self) -> bool:
+        """Whether there is a snap to range by."""
+        some = self.estimates
+        return bool(len(some.time) and np.isfinite(some.time[0]) and np.isfinite(some.position[0]).all())
