@@ -5,10 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from sonarsynth.equations.arrays.spherical_wave import envelope_peak
+from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.products import Signals
+from sonarsynth.ranging import IsovelocityPlacing, Peaks
+from sonarsynth.ranging.clouds import point_cloud
+from sonarsynth.ranging.received_window import ReceivedWindow
 from sonarsynth.receiver import Elements
 
 RATE = 196e3
+PEAKS, STRAIGHT = Peaks(), IsovelocityPlacing()
 
 
 def pulse_spectrum(f):
@@ -21,6 +26,19 @@ def envelope_late() -> float:
     """Time (s) after which the envelope of the pulse peaks in the band of the default sonar."""
     f = np.linspace(22e3, 88e3, 1321)
     return envelope_peak(f, pulse_spectrum(f), 25e3, 85e3)[0]
+
+
+def cloud_of(
+    signals, image, estimates, elements, sonar, pose, profile, *,
+    picking=PEAKS, placing=STRAIGHT, focus=20.0, direct=None,
+):  # fmt: skip
+    """The points of the window of an image."""
+    beams = None
+    if np.isfinite(image.start):
+        beams = FocusedDelayAndSum(focus=focus).beams(signals, elements, sonar, image.start, image.stop)
+    loudest = float(np.abs(signals.pressure).max(initial=0.0))
+    window = ReceivedWindow(elements, sonar, image, beams, loudest, direct or signals, estimates)
+    return point_cloud(window, picking, placing, pose, profile)
 
 
 def silence(elements: Elements, start: float, samples: int, quantum: float = 0.0) -> Signals:
@@ -92,5 +110,9 @@ def hear_echoes(
     start = round((direct - 1.5e-3) * RATE) / RATE
     samples = int((back.max() - start + 3e-3) * RATE)
     signals = hear(silence(elements, start, samples), elements, source, 0.0, 1.0, sound_speed)
-    signals = hear(signals, elements, points, out / sound_speed, amplitude / out, sound_speed, samples=1024)
+    together = np.ptp(back) < 4e-3  # in one stretch, where they fit
+    for some in [slice(None)] if together else [slice(n, n + 1) for n in range(len(points))]:
+        signals = hear(
+            signals, elements, points[some], out[some] / sound_speed, (amplitude / out)[some], sound_speed, samples=1024
+        )
     return signals, float(back.min()), float(back.max())

@@ -13,10 +13,10 @@ from sonarsynth.equations.arrays.bistatic_range import bistatic_range, excess_pa
 from sonarsynth.equations.arrays.spherical_wave import plane_wave, spherical_wave, wavefront_delays
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.products import REASONS, EnergyImage
-from sonarsynth.ranging import IsovelocityRange, RefractedRange, SensorDelays
+from sonarsynth.ranging import IsovelocityPlacing, RefractedPlacing, SensorDelays
 from sonarsynth.ranging.location.locating import unlocatable
 from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
-from tests.heard import add_noise, hear_direct, hear_echoes, silence
+from tests.heard import add_noise, cloud_of, hear_direct, hear_echoes, silence
 
 C = 1540.0
 AHEAD = np.array([1.0, 0.0, 0.0])
@@ -190,12 +190,12 @@ def heard_target(array, target, source):
     return signals, first - 5e-4, last + 5e-4
 
 
-def cloud_of(method, array, sonar, signals, image, source):
+def points_of(method, array, sonar, signals, image, source):
     found = SensorDelays().locate(signals, array, sonar, POSE, 5.0 - source[2], 1, WATER)
-    return method.cloud(signals, image, found, array, sonar, POSE, WATER)
+    return cloud_of(signals, image, found, array, sonar, POSE, WATER, placing=method)
 
 
-@pytest.mark.parametrize("method", [IsovelocityRange(), RefractedRange()])
+@pytest.mark.parametrize("method", [IsovelocityPlacing(), RefractedPlacing()])
 def test_clouds_of_nothing(method):
     array = elements(PlanarLattice(columns=8, rows=8, pitch=0.1))
     grid = BeamGrid(azimuths=5, elevations=3)
@@ -208,18 +208,18 @@ def test_clouds_of_nothing(method):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for heard, image in ((signals, empty), (signals, unheard), (nobody, full), (nobody, empty)):
-            cloud = cloud_of(method, array, sonar, heard, image, np.array([9.0, -5.0, -6.0]))
+            cloud = points_of(method, array, sonar, heard, image, np.array([9.0, -5.0, -6.0]))
             assert len(cloud) == 0 and cloud.position.shape == (0, 3) and cloud.overflow == 0
 
 
-@pytest.mark.parametrize("method", [IsovelocityRange(locality=60.0), RefractedRange(locality=60.0)])
+@pytest.mark.parametrize("method", [IsovelocityPlacing(), RefractedPlacing()])
 def test_a_target_on_the_baseline_gives_no_point(method):
     array = elements(PlanarLattice(columns=12, rows=12, pitch=0.05))
     source = np.array([18.0, 0.5, -1.0])
     sonar = Sonar(assumed_sound_speed=C, beams=BeamGrid(azimuths=1, elevations=1, azimuth_span=0.1, elevation_span=0.1))
     signals, start, stop = heard_target(array, 0.5 * source + [0.0, 0.3, 0.3], source)
     image = EnergyImage(np.ones((1, 1), np.float32), sonar.beams.azimuth, sonar.beams.elevation, start, stop)
-    assert len(cloud_of(method, array, sonar, signals, image, source)) == 0
+    assert len(points_of(method, array, sonar, signals, image, source)) == 0
 
 
 def test_one_beam_suffices_for_a_point():
@@ -228,8 +228,8 @@ def test_one_beam_suffices_for_a_point():
     sonar = Sonar(assumed_sound_speed=C, beams=BeamGrid(azimuths=1, elevations=1))
     signals, start, stop = heard_target(array, target, source)
     image = EnergyImage(np.ones((1, 1), np.float32), sonar.beams.azimuth, sonar.beams.elevation, start, stop)
-    for method in (IsovelocityRange(), RefractedRange()):
-        cloud = cloud_of(method, array, sonar, signals, image, source)
+    for method in (IsovelocityPlacing(), RefractedPlacing()):
+        cloud = points_of(method, array, sonar, signals, image, source)
         assert cloud.range[0] == pytest.approx(20.0, abs=0.01)
         assert np.allclose(cloud.position[0], target, atol=0.01)
 

@@ -14,11 +14,11 @@ from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.planning import plan
 from sonarsynth.planning.measured.lost_echoes import losses
 from sonarsynth.products import SourceEstimates
-from sonarsynth.ranging import IsovelocityRange, SensorDelays
+from sonarsynth.ranging import SensorDelays
 from sonarsynth.ranging.cancelling.direct_pulse import remove, remove_others, trusted
 from sonarsynth.receiver import BeamGrid, PlanarLattice, Sonar, elements
 from sonarsynth.recipe.scene import Processing
-from tests.heard import add_noise, hear, pulse_spectrum, silence
+from tests.heard import add_noise, cloud_of, hear, pulse_spectrum, silence
 from tests.scenes import point_scene
 
 C = 1500.0
@@ -169,8 +169,7 @@ def test_no_point_lies_at_an_end_of_the_window(end, off):
 
     def delays(start, stop):
         image = IMAGE.image(signals, ARRAY, SONAR, CLOCK + start, CLOCK + stop)
-        cloud = IsovelocityRange(focus=None).cloud(signals, image, estimates, ARRAY, SONAR, POSE, water)
-        return cloud.delay
+        return cloud_of(signals, image, estimates, ARRAY, SONAR, POSE, water, focus=None).delay
 
     window = (excess + off, excess + 0.8e-3) if end == "start" else (excess - 0.8e-3, excess + off)
     assert len(delays(*window)) == 0

@@ -11,10 +11,11 @@ from sonarsynth.conventions import azimuth_elevation, direction
 from sonarsynth.environment.sea import Profile, Tabulated
 from sonarsynth.geometry import Pose, quaternion, unit
 from sonarsynth.imaging import FocusedDelayAndSum
-from sonarsynth.ranging import IsovelocityRange, RefractedRange, SensorDelays
+from sonarsynth.ranging import BeamAxis, IsovelocityPlacing, RefractedPlacing, SensorDelays
 from sonarsynth.ranging.location.refraction import first_rays, refracted_solution
+from sonarsynth.ranging.placing.solution import isovelocity_solution
 from sonarsynth.receiver import Romanis, Sonar, elements
-from tests.heard import add_noise, hear, hear_echoes
+from tests.heard import STRAIGHT, add_noise, cloud_of, hear, hear_echoes
 
 C = 1540.0
 ARRAY = elements(Romanis())
@@ -22,13 +23,15 @@ SONAR = Sonar(assumed_sound_speed=C)
 POSE = Pose(np.array([0.0, 0.0, -8.0]), quaternion(np.pi / 2))
 SNAP = np.array([9.0, -5.0, -6.0])
 WATER = Profile(np.array([0.0]), np.array([C]))
+AXIS = BeamAxis()
 MARGIN = 6e-4  # s before the first and after the last echo
 
 
-def process(signals, first, last, method, source=SNAP, pose=POSE, profile=WATER):
+def process(signals, first, last, method=AXIS, source=SNAP, pose=POSE, profile=WATER, placing=STRAIGHT):
     found = SensorDelays().locate(signals, ARRAY, SONAR, pose, -pose.to_world(source)[2], 1, WATER)
     image = FocusedDelayAndSum().image(signals, ARRAY, SONAR, first - MARGIN, last + MARGIN)
-    return method.cloud(signals, image, found, ARRAY, SONAR, pose, profile), image
+    how = {"picking": method, "placing": placing}
+    return cloud_of(signals, image, found, ARRAY, SONAR, pose, profile, **how), image
 
 
 def points(cloud):
@@ -36,11 +39,11 @@ def points(cloud):
 
 
 @pytest.mark.parametrize("target", [(20.0, 0.0, 0.0), (18.0, 4.0, -3.0), (19.0, -6.0, 4.0), (22.0, 5.0, 6.0)])
-@pytest.mark.parametrize("method", [IsovelocityRange(), RefractedRange()])
-def test_a_point_scatterer_is_where_it_is(target, method):
+@pytest.mark.parametrize("placing", [IsovelocityPlacing(), RefractedPlacing()])
+def test_a_point_scatterer_is_where_it_is(target, placing):
     target = np.array(target)
     signals, first, last = hear_echoes(ARRAY, SNAP, [target], np.array([1.0]))
-    cloud, _ = process(signals, first, last, method)
+    cloud, _ = process(signals, first, last, placing=placing)
     place, r, error = points(cloud)
     assert 1 <= len(cloud) <= 12
     miss = np.linalg.norm(place - target, axis=1)
@@ -55,7 +58,7 @@ def test_a_point_scatterer_is_where_it_is(target, method):
 def test_two_echoes_in_one_beam_take_the_louder():
     target = np.array([20.0, 0.0, 0.0])
     signals, first, last = hear_echoes(ARRAY, SNAP, [target, 1.03 * target], np.array([1.0, 0.5]))
-    _, r, error = points(process(signals, first, last, IsovelocityRange())[0])
+    _, r, error = points(process(signals, first, last)[0])
     assert np.all(np.abs(r - 20.0) < 3 * error)
     assert np.abs(r - 20.0).min() < 0.05
 
@@ -64,7 +67,7 @@ def test_a_weak_target_beside_a_strong_one_is_no_ghost_but_ghosts_are():
     """10 dB weaker, elsewhere and at another delay: kept; side lobes of the strong one at its delay: not."""
     strong, weak = np.array([20.0, 3.0, 0.0]), np.array([19.0, -4.0, 2.0])
     signals, first, last = hear_echoes(ARRAY, SNAP, [strong, weak], np.array([1.0, 0.35]))
-    cloud, _ = process(signals, first, last, IsovelocityRange(threshold=20.0))
+    cloud, _ = process(signals, first, last, BeamAxis(threshold=20.0))
     u = unit(cloud.position.astype(float))
     cosine = np.stack([u @ unit(strong), u @ unit(weak)])
     assert np.all(np.degrees(np.arccos(np.clip(cosine.max(axis=0), -1, 1))) < 2.0)
@@ -75,7 +78,7 @@ def test_a_weak_target_beside_a_strong_one_is_no_ghost_but_ghosts_are():
 def test_a_higher_threshold_only_takes_points_away():
     targets = [np.array([20.0, y, z]) for y, z in ((4.0, 0.0), (-3.0, 3.0), (1.0, -4.0))]
     signals, first, last = hear_echoes(ARRAY, SNAP, targets, np.array([1.0, 0.6, 0.4]))
-    clouds = [process(signals, first, last, IsovelocityRange(threshold=t))[0] for t in (12.0, 6.0, 1.0)]
+    clouds = [process(signals, first, last, BeamAxis(threshold=t))[0] for t in (12.0, 6.0, 1.0)]
     kept = [set(zip(cloud.azimuth, cloud.elevation, cloud.range, strict=True)) for cloud in clouds]
     assert kept[0] > kept[1] > kept[2] > set()
 
@@ -83,7 +86,7 @@ def test_a_higher_threshold_only_takes_points_away():
 def test_noise_gives_no_points():
     signals, first, last = hear_echoes(ARRAY, SNAP, [np.array([20.0, 0.0, 0.0])], np.array([1e-6]))
     noisy = add_noise(signals, 1e-3, np.random.default_rng(0))
-    cloud, image = process(noisy, first, last, IsovelocityRange())
+    cloud, image = process(noisy, first, last)
     assert (image.energy > image.energy.max() / 10**1.2).mean() > 0.5  # the threshold alone would give thousands
     assert len(cloud) == 0
 
@@ -156,7 +159,7 @@ SNAPS = [(9.0, -5.0, -6.0), (12.0, 6.0, -5.0)]
 @lru_cache
 def hull_statistics(locality, speed=C):
     rows = [
-        hull_frame(*frame, np.array(snap), IsovelocityRange(locality=locality), speed)
+        hull_frame(*frame, np.array(snap), BeamAxis(locality=locality), speed)
         for frame, snap in zip(FRAMES, SNAPS + SNAPS + SNAPS[:1], strict=True)
     ]
     miss, error, off, near = zip(*rows, strict=True)
@@ -193,11 +196,11 @@ def test_a_louder_snap_changes_no_delay():
     """Ten times louder, and its echo too: the same points."""
     target = np.array([20.0, 2.0, 1.0])
     signals, first, last = hear_echoes(ARRAY, SNAP, [target], np.array([1.0]))
-    cloud, _ = process(signals, first, last, IsovelocityRange())
+    cloud, _ = process(signals, first, last)
     far = np.linalg.norm(target - SNAP)
     louder = hear(signals, ARRAY, SNAP, 0.0, 9.0)
     louder = hear(louder, ARRAY, target, far / C, 9.0 / far)
-    again, _ = process(louder, first, last, IsovelocityRange())
+    again, _ = process(louder, first, last)
     assert np.allclose(again.delay, cloud.delay, atol=2e-8, equal_nan=True)
     assert np.allclose(again.range, cloud.range, rtol=1e-6, equal_nan=True)
 
@@ -232,8 +235,6 @@ def test_refraction_is_nothing_in_uniform_water():
     random = np.random.default_rng(3)
     beam = direction(random.uniform(-0.4, 0.4, 50), random.uniform(-0.3, 0.3, 50))
     delay = random.uniform(0.005, 0.03, 50)
-    from sonarsynth.ranging.clouds import isovelocity_solution
-
     straight = isovelocity_solution(delay, beam, SNAP, C)
     bent = refracted_solution(delay, beam, SNAP, C, POSE, WATER)
     wet = np.isfinite(bent.range)
@@ -246,9 +247,9 @@ def test_the_description_of_the_water_overrides_the_water():
     target = np.array([20.0, 0.0, 0.0])
     signals, first, last = hear_echoes(ARRAY, SNAP, [target], np.array([1.0]))
     wrong = Profile(np.array([0.0]), np.array([1500.0]))
-    believed = RefractedRange(profile=Tabulated(depth=(0.0,), speed=(C,)))
-    right, _ = process(signals, first, last, believed, profile=wrong)
-    plain, _ = process(signals, first, last, RefractedRange(), profile=WATER)
-    off, _ = process(signals, first, last, RefractedRange(), profile=wrong)
+    believed = RefractedPlacing(profile=Tabulated(depth=(0.0,), speed=(C,)))
+    right, _ = process(signals, first, last, placing=believed, profile=wrong)
+    plain, _ = process(signals, first, last, placing=RefractedPlacing(), profile=WATER)
+    off, _ = process(signals, first, last, placing=RefractedPlacing(), profile=wrong)
     assert np.array_equal(right.range, plain.range, equal_nan=True)
     assert np.nanmax(np.abs(off.range - plain.range)) > 0.2

@@ -23,7 +23,8 @@ PAGE = (ROOT / "tools" / "docs" / "extending.md").read_text()
 FILES = dict(re.findall(r"^```python file=(\S+)\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE))
 UNIONS = {
     "imaging": "Beamformer",
-    "ranging": "Ranging",
+    "ranging/picking": "Picking",
+    "ranging/placing": "Placing",
     "signals": "Synthesis",
     "scattering": "Scattering",
     "environment/noise": "Noise",
@@ -33,7 +34,11 @@ UNIONS = {
     "sources": "Source",
 }
 KINDS = (
-    {"scene.processing.beamforming": "capon", "scene.processing.ranging": "first_echo"},
+    {
+        "scene.processing.beamforming": "capon",
+        "scene.processing.picking": "loudest",
+        "scene.processing.placing": "monostatic",
+    },
     {"scene.physics.synthesis": "whole_samples", "scene.physics.scattering": "power_cosine"},
     {
         "scene.world.environment.noise": "isotropic_noise",
@@ -64,7 +69,7 @@ for which in json.loads(sys.argv[2]):
     said[name] = {
         "recipe": tree.attrs["recipe"],
         "rows": {row.stage: [row.method, row.error] for row in plan.stages},
-        "choices": {name: tree.attrs["choices"][name] for name in ("beamforming", "ranging", "synthesis")},
+        "choices": {name: tree.attrs["choices"][name] for name in ("beamforming", "picking", "placing", "synthesis")},
         "energy": np.asarray(tree["image/energy"][0]).tolist(),
         "delay": cloud["delay"].values[:count].tolist(),
         "range": cloud["range"].values[:count].tolist(),
@@ -136,7 +141,8 @@ def of(said: dict[str, Any], kind: str) -> dict[str, Any]:
     ("kind", "stage", "choice"),
     [
         ("capon", "beamform", "beamforming"),
-        ("first_echo", "range", "ranging"),
+        ("loudest", "range", "picking"),
+        ("monostatic", "range", "placing"),
         ("whole_samples", "synthesise", "synthesis"),
         ("power_cosine", "trace", ""),
         ("isotropic_noise", "synthesise", ""),
@@ -211,7 +217,9 @@ def test_the_data_are_those_of_the_method(said: dict[str, Any]) -> None:
     assert (least <= 1.1 * plain + 0.02 * plain.max()).all(), "no beam passes less than Capon's, by Cauchy and Schwarz"
     assert np.median(least / plain) < 0.7
     assert np.abs(np.subtract(*(np.unravel_index(e.argmax(), e.shape) for e in (plain, least)))).max() <= 3  # a beam
-    assert sonar["delay"] and set(sonar["delay"]) != set(usual["delay"])
+    assert len(sonar["delay"]) == 1 < len(usual["delay"]), "the loudest alone"
+    straight = 0.5 * (1484.0 * sonar["delay"][0] + np.linalg.norm([0.6, -0.25, -0.15]))
+    assert sonar["range"][0] == pytest.approx(straight, rel=0.01)
     assert all(0.3 < r < 3.0 for r in sonar["range"]), "points of Capon's image lie in the tank"
     wrong = [abs(a - b) for a, b in zip(sound["pressure"], usual["pressure"], strict=True)]
     assert 0.0 < max(wrong) < max(map(abs, usual["pressure"]))

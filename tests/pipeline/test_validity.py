@@ -114,10 +114,10 @@ def test_boundaries_that_no_path_meets_are_not_noted() -> None:
 
 
 def test_what_the_sonar_believes_in_is_noted_as_well() -> None:
-    text = RECIPE + "  processing: {ranging: {kind: refracted, profile: " + COLD + "}}\n"
+    text = RECIPE + "  processing: {placing: {kind: refracted, profile: " + COLD + "}}\n"
     (note,) = _notes(ss.plan(ss.loads(text)))
-    assert note.startswith("scene.processing.ranging.profile: Mackenzie (1981): temperature 0.5 degC is outside 2 to")
-    missing = RECIPE + "  processing: {ranging: {kind: refracted, profile: {kind: cast, path: none.csv}}}\n"
+    assert note.startswith("scene.processing.placing.profile: Mackenzie (1981): temperature 0.5 degC is outside 2 to")
+    missing = RECIPE + "  processing: {placing: {kind: refracted, profile: {kind: cast, path: none.csv}}}\n"
     with pytest.raises(ValueError, match=r"none\.csv"):
         ss.plan(ss.loads(missing))
 

@@ -1,0 +1,179 @@
+"""Peaks of the volume: finer than the grid, no more false alarms than asked for, errors that keep their word."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scipy.ndimage import maximum_filter
+
+from sonarsynth.conventions import azimuth_elevation, direction
+from sonarsynth.environment.sea import Profile
+from sonarsynth.equations.arrays.noise_peaks import expected_peaks, peak_level
+from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.imaging import FocusedDelayAndSum
+from sonarsynth.ranging import Peaks, SensorDelays
+from sonarsynth.ranging.picking.peak_kernels import lobe_power, local_maxima
+from sonarsynth.receiver import BeamGrid, PlanarLattice, Romanis, Sonar, elements
+from tests.heard import add_noise, cloud_of, hear_echoes
+
+C = 1540.0
+ARRAY = elements(Romanis())
+POSE = Pose(np.array([0.0, 0.0, -8.0]), quaternion(np.pi / 2))
+SNAP = np.array([9.0, -5.0, -6.0])
+WATER = Profile(np.array([0.0]), np.array([C]))
+MARGIN = 6e-4
+
+
+def sonar(step: float = 0.5, span: float = 30.0) -> Sonar:
+    """A sonar that knows the speed of sound exactly; step and span of its beams in degrees."""
+    count, wide = round(span / step) + 1, np.radians(span)
+    grid = BeamGrid(azimuths=count, elevations=count, azimuth_span=wide, elevation_span=wide)
+    return Sonar(assumed_sound_speed=C, sound_speed_error=0.0, beams=grid)
+
+
+@lru_cache
+def heard(targets, strengths=None):
+    """Signals of a direct pulse and of echoes of points, first and last echo, and the snap as exactly known."""
+    places = [np.array(target) for target in targets]
+    signals, first, last = hear_echoes(ARRAY, SNAP, places, np.array(strengths or [1.0] * len(places)))
+    found = SensorDelays().locate(signals, ARRAY, sonar(), POSE, -POSE.to_world(SNAP)[2], 1, WATER)
+    known = replace(found, position=SNAP[None], position_covariance=np.zeros((1, 3, 3)))
+    return signals, first, last, known
+
+
+def points(targets, noise=0.0, seed=0, instrument=None, strengths=None, picking=Peaks()):  # noqa: B008
+    signals, first, last, known = heard(targets, strengths)
+    instrument = instrument or sonar()
+    noisy = add_noise(signals, noise, np.random.default_rng(seed))
+    image = FocusedDelayAndSum().image(noisy, ARRAY, instrument, first - MARGIN, last + MARGIN)
+    return cloud_of(noisy, image, known, ARRAY, instrument, POSE, WATER, picking=picking)
+
+
+def spherical(r, azimuth, elevation):
+    return tuple(r * direction(np.array([azimuth]), np.array([elevation]))[0])
+
+
+@pytest.mark.parametrize("step", [0.25, 0.5, 0.75])
+@pytest.mark.parametrize(("azimuth", "elevation", "r"), [(0.0, 0.0, 20.0), (0.103, -0.148, 20.0), (-0.2, 0.07, 23.0)])
+def test_a_point_is_where_it_is_finer_than_the_grid(azimuth, elevation, r, step):
+    """To 0.25 mrad, a fiftieth of the beam, wherever it lies between beams; the axis of the nearest is up to 6 off."""
+    cloud = points((spherical(r, azimuth, elevation),), instrument=sonar(step))
+    assert len(cloud) == 1
+    assert abs(cloud.azimuth[0] - azimuth) < 2.5e-4
+    assert abs(cloud.elevation[0] - elevation) < 2.5e-4
+    assert abs(cloud.range[0] - r) < 2e-3
+
+
+def test_two_echoes_in_one_direction_are_two_points_and_closer_than_the_pulse_one():
+    far = [spherical(r, 0.05, 0.02) for r in (20.0, 20.1)]
+    cloud = points(tuple(far))
+    assert np.sort(cloud.range) == pytest.approx([20.0, 20.1], abs=0.01)
+    near = [spherical(r, 0.05, 0.02) for r in (20.0, 20.002)]
+    cloud = points(tuple(near))
+    assert len(cloud) == 1 and 19.99 < cloud.range[0] < 20.012
+
+
+def test_errors_are_as_predicted():
+    """Pulls of azimuth, elevation and range, of echoes 11 to 35 dB over the noise, 400 and more of them."""
+    random, pulls = np.random.default_rng(1), []
+    for scene in range(6):
+        places = [
+            spherical(r, *random.uniform(-0.2, 0.2, 2)) for r in 17.0 + np.arange(6) + random.uniform(-0.2, 0.2, 6)
+        ]
+        for draw in range(12):
+            noise = 10 ** random.uniform(-2.4, -1.1)
+            cloud = points(tuple(places), noise, 100 * scene + draw, picking=Peaks(false_alarms=1e-3))
+            near = np.linalg.norm(cloud.position[:, None] - np.array(places), axis=2)
+            for i, p in zip(near.argmin(axis=0), range(6), strict=True):
+                if near[i, p] < 0.5:
+                    azimuth, elevation = azimuth_elevation(np.array(places[p]))
+                    pulls.append(
+                        [
+                            (cloud.azimuth[i] - azimuth) / cloud.azimuth_error[i],
+                            (cloud.elevation[i] - elevation) / cloud.elevation_error[i],
+                            (cloud.range[i] - np.linalg.norm(places[p])) / cloud.range_error[i],
+                        ]
+                    )
+    assert len(pulls) >= 400
+    spread = np.sqrt(np.mean(np.square(pulls), axis=0))
+    assert ((spread > 0.8) & (spread < 1.2)).all(), spread
+
+
+@pytest.mark.parametrize("kind", ["gaussian", "impulsive"])
+def test_as_many_false_alarms_as_asked_for(kind):
+    """Within a factor 1.5, in noise alone: 5 a frame, in 16 frames. Impulsive: one sample in 20 ten times larger."""
+    signals, first, _, known = heard(((20.0, 0.0, 0.0),), (1e-9,))
+    instrument, random, count = sonar(), np.random.default_rng(4), 0
+    start, stop = first - 2e-3, first + 2e-3
+    for _ in range(16):
+        rough = random.standard_normal(signals.pressure.shape, dtype=np.float32)
+        if kind == "impulsive":
+            rough *= np.where(random.random(rough.shape, dtype=np.float32) < 0.05, 10.0, 1.0)
+        noisy = replace(signals, pressure=(1e-4 * rough).astype(np.float32))
+        image = FocusedDelayAndSum().image(noisy, ARRAY, instrument, start, stop)
+        picking = Peaks(false_alarms=5.0, threshold=30.0, dynamic_range=60.0, side_lobes=60.0)
+        cloud = cloud_of(noisy, image, known, ARRAY, instrument, POSE, WATER, picking=picking, direct=signals)
+        count += len(cloud)
+    assert 80 / 1.5 < count < 80 * 1.5
+
+
+def test_peaks_of_noise_in_one_dimension_are_the_upcrossings_of_rice():
+    """Of an envelope: sqrt(lambda/pi) sqrt(I) exp(-I) a unit length (Rice, 1944), and exp(-I) for where it starts."""
+    level, length = 9.0, 40.0
+    rice = length * np.sqrt(level / np.pi) * np.exp(-level) + np.exp(-level)
+    assert expected_peaks(level, np.array([length])) == pytest.approx(rice, rel=1e-12)
+    assert expected_peaks(level, np.array([length, 0.0, 0.0])) == pytest.approx(rice, rel=1e-12)
+    sizes = np.array([40.0, 30.0, 200.0])
+    assert expected_peaks(peak_level(0.1, sizes), sizes) == pytest.approx(0.1, rel=1e-9)
+    assert peak_level(0.01, sizes) > peak_level(0.1, sizes) > peak_level(0.1, sizes[:2])
+
+
+def test_local_maxima_are_those_of_a_filter():
+    random = np.random.default_rng(0)
+    volume = random.random((7, 9, 60)).astype(np.float32)
+    row, column = (x.ravel() for x in np.mgrid[:7, :9])
+    index = np.arange(63).reshape(7, 9)
+    edge = np.array([True, True])
+    b, t = local_maxima(volume.reshape(63, 60), index, row, column, np.full(63, 0.5, np.float32), edge, 3, 5)
+    top = (volume == maximum_filter(volume, (3, 3, 7), mode="constant")) & (volume > 0.5)
+    top[[0, -1]] = top[:, [0, -1]] = False
+    top[:, :, :5] = top[:, :, -5:] = False
+    expected = np.argwhere(top)
+    assert len(expected) > 5
+    assert {(int(row[i]), int(column[i]), int(s)) for i, s in zip(b, t, strict=True)} == set(map(tuple, expected))
+
+
+def test_what_lobes_bring_is_what_a_beam_hears_of_a_wave():
+    """Against beams of a wave with that spectrum, made sensor by sensor, at the grating lobe and elsewhere."""
+    array = elements(PlanarLattice(columns=12, rows=8, pitch=0.05, face=0.0))
+    f, taper = np.linspace(25e3, 85e3, 48), np.sin(np.pi * (np.arange(48) + 0.5) / 48) ** 2
+    u = direction(np.array([0.1, -0.38, 0.3]), np.array([0.0, 0.02, 0.1]))
+    delay, power = np.array([0.0, 2e-5, -1e-5]), np.array([3.0, 2.0, 1.0])
+    weight = np.full(96, 1.0 / 96)
+    got = lobe_power(u / C, delay, power, array.position, weight, f, taper, 1e-5)
+    expected = np.zeros(3)
+    for i in range(3):
+        for j in range(i):
+            wave = taper * np.exp(2j * np.pi * f * (array.position @ (u[i] - u[j]) / C + delay[i] - delay[j])[:, None])
+            expected[i] += power[j] * abs(weight @ wave.sum(axis=1) / taper.sum()) ** 2
+    np.testing.assert_allclose(got, expected, rtol=1e-9)
+    assert got[0] == 0.0 and got[1] > 1e-4
+
+
+def test_a_grating_lobe_is_no_echo_and_an_echo_there_is():
+    """A loud echo 14 degrees to port, and what a lattice with 5 cm between its elements hears of it at -18."""
+    loud = spherical(20.0, 0.245, 0.0)
+    wide = sonar(span=50.0)
+    assert len(points((loud,), instrument=wide, picking=Peaks(side_lobes=30.0, dynamic_range=22.0))) == 1
+    both = points((loud, spherical(21.0, -0.2, 0.05)), instrument=wide, strengths=(1.0, 0.3))
+    assert np.sort(both.azimuth) == pytest.approx([-0.2, 0.245], abs=1e-3)
+
+
+def test_no_echo_is_picked_at_the_edge_of_the_view():
+    """Its peak may be outside: a target half a beam beyond the last beam makes no point."""
+    narrow = sonar(span=10.0)
+    assert len(points((spherical(20.0, np.radians(5.4), 0.0),), instrument=narrow)) == 0
+    assert len(points((spherical(20.0, np.radians(4.0), 0.0),), instrument=narrow)) == 1
