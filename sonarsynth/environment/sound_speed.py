@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Ge, Le, MinLen
@@ -22,6 +22,7 @@ from sonarsynth.conventions import (
 from sonarsynth.description import BY_KIND, description
 from sonarsynth.environment.hydrography import Latitude, Longitude, SpeedFormula, WaterSalinity, WaterTemperature
 from sonarsynth.environment.profiles import carried_on, catenary_nodes, munk_nodes
+from sonarsynth.environment.speed_model import SpeedModel
 
 Depths = Annotated[tuple[NonNegativeMetres, ...], MinLen(1)]
 
@@ -41,7 +42,7 @@ def _as_long_as_depth(values: tuple[float, ...], info: ValidationInfo) -> tuple[
 
 
 @description
-class Isovelocity:
+class Isovelocity(SpeedModel):
     """The same sound speed everywhere."""
 
     kind: Literal["isovelocity"] = "isovelocity"
@@ -49,10 +50,11 @@ class Isovelocity:
 
 
 @description
-class Tabulated:
+class Tabulated(SpeedModel):
     """Sound speed at depths, linear between them, constant beyond the ends. Two equal depths make a jump."""
 
     kind: Literal["tabulated"] = "tabulated"
+    measured: ClassVar[bool] = True
     depth: Depths
     """Depths below the surface (m), not decreasing."""
     speed: tuple[WaterSoundSpeed, ...]
@@ -63,7 +65,7 @@ class Tabulated:
 
 
 @description
-class TemperatureSalinity:
+class TemperatureSalinity(SpeedModel):
     """Sound speed from temperature and salinity at depths; linear between the depths.
 
     Between 2 and 30 degC and 30 and 40 psu the formulas differ by 0.43 m/s at most over the upper 200 m (Mackenzie, Del
@@ -71,6 +73,7 @@ class TemperatureSalinity:
     """
 
     kind: Literal["temperature_salinity"] = "temperature_salinity"
+    measured: ClassVar[bool] = True
     depth: Depths
     """Depths below the surface (m), not decreasing."""
     temperature: tuple[WaterTemperature, ...]
@@ -89,7 +92,7 @@ class TemperatureSalinity:
 
 
 @description
-class Cast:
+class Cast(SpeedModel):
     """A CTD cast in a CSV file, as the instrument exported it (CastAway), or with named columns.
 
     Comment lines begin with '%' or '#'; then a line of column names. Depth (m or dbar) and either sound speed or
@@ -97,6 +100,7 @@ class Cast:
     """
 
     kind: Literal["cast"] = "cast"
+    measured: ClassVar[bool] = True
     path: str
     """Path of the file, relative to the recipe."""
     quantity: Literal["auto", "sound_speed", "temperature_salinity"] = "auto"
@@ -114,7 +118,7 @@ class Cast:
 
 
 @description
-class Linear:
+class Linear(SpeedModel):
     """Sound speed of one gradient, to the depth where it would leave 100 to 10 000 m/s, which no water reaches."""
 
     kind: Literal["linear"] = "linear"
@@ -129,7 +133,7 @@ class Linear:
 
 
 @description
-class Thermocline:
+class Thermocline(SpeedModel):
     """A warm mixed layer, a thermocline and the water below it: three straight pieces, exactly.
 
     The defaults are those of a shallow tropical site. Mixed water of 29.2 degC and 32.4 psu has 1541 m/s (Mackenzie
@@ -166,7 +170,7 @@ RayTimeError = Annotated[PositiveSeconds, Ge(1e-9), Le(1e-4)]
 
 
 @description
-class Munk:
+class Munk(SpeedModel):
     """The canonical deep sound channel, c1 (1 + eps (eta - 1 + exp(-eta))), eta = 2 (z - z1)/B (Munk 1974).
 
     Rays go through layers of linear sound speed that stand for the formula (`environment.profiles`). Travel times
@@ -209,7 +213,7 @@ class Munk:
 
 
 @description
-class Catenary:
+class Catenary(SpeedModel):
     """A deep duct with closed forms, c1 cosh((z - z1)/g): every ray meets the axis again after pi g, at once.
 
     In units of travel time it is a sphere and its rays are great circles. The perfect lens, for checks; in layers like

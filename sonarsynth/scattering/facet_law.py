@@ -32,6 +32,17 @@ class FacetLaw:
         return False
 
     @property
+    def mesh_tolerance(self) -> float | None:
+        """Error of the echo by which a mesh may miss its curved surface, of a law that sums phases; none: the mesh
+        stays as it is described."""
+        return None
+
+    @property
+    def passes_sound(self) -> bool:
+        """Whether bodies let sound pass and send a wave of their own that cancels it behind them, by diffraction."""
+        return False
+
+    @property
     def rms_roughness(self) -> float:
         """Rms height (m) about the facets that spreads the pulse."""
         return 0.0

@@ -59,6 +59,16 @@ class Kirchhoff(FacetLaw):
     """In frames, shapes are meshed as finely as makes the expected error of the echo this (0.05: 0.4 dB)."""
 
     @property
+    def mesh_tolerance(self) -> float:
+        """As `FacetLaw.mesh_tolerance`."""
+        return self.mesh_error
+
+    @property
+    def passes_sound(self) -> bool:
+        """As `FacetLaw.passes_sound`."""
+        return self.forward == "scattered"
+
+    @property
     def parts(self) -> tuple[Component, ...]:
         """Of an echo: the coherent one, and what a rough or diffuse surface scatters."""
         rough = self.roughness > 0 or self.diffuse > 0

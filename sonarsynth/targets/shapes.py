@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -10,13 +11,28 @@ from pydantic import ValidationInfo, field_validator
 
 from sonarsynth.conventions import NonNegativeMetres, Number, Position, PositiveMetres, Radians
 from sonarsynth.description import BY_KIND, description
+from sonarsynth.description.method import Method
 
 Size = Annotated[PositiveMetres, Ge(1e-9), Le(10e3)]
 """Of a body, or of a part of it."""
 
 
+class BodyShape(Method):
+    """What a target looks like."""
+
+    @property
+    def plain(self) -> MeshFile | None:
+        """What is read from a file before its facets are cut, to be looked at first; none of what is generated."""
+        return None
+
+    @property
+    def read_as(self) -> str:
+        """How a file is understood, for messages."""
+        return ""
+
+
 @description
-class MeshFile:
+class MeshFile(BodyShape):
     """A mesh in a file: STL, OBJ, PLY, OFF or GLB."""
 
     kind: Literal["mesh_file"] = "mesh_file"
@@ -41,9 +57,19 @@ class MeshFile:
     crease: Annotated[Radians, Gt(0), Lt(np.pi)] = np.deg2rad(40.0)
     """Edges that turn by more stay sharp. Nothing where not smooth."""
 
+    @property
+    def plain(self) -> MeshFile:
+        """As `BodyShape.plain`."""
+        return replace(self, edge=None, smooth=False)
+
+    @property
+    def read_as(self) -> str:
+        """As `BodyShape.read_as`."""
+        return f"with numbers in {self.unit}"
+
 
 @description
-class Sphere:
+class Sphere(BodyShape):
     """A sphere, refined on the true surface."""
 
     kind: Literal["sphere"] = "sphere"
@@ -53,7 +79,7 @@ class Sphere:
 
 
 @description
-class Cylinder:
+class Cylinder(BodyShape):
     """A solid circular cylinder along x, with flat ends, centred on the origin; refined on the true surface."""
 
     kind: Literal["cylinder"] = "cylinder"
@@ -64,7 +90,7 @@ class Cylinder:
 
 
 @description
-class Box:
+class Box(BodyShape):
     """A box, centred on the origin."""
 
     kind: Literal["box"] = "box"
@@ -75,7 +101,7 @@ class Box:
 
 
 @description
-class LShape:
+class LShape(BodyShape):
     """Two plates, an L seen from the side: one upright in the plane x = 0, one lying forward of its foot.
 
     The origin is where their inner faces meet, in the middle of the width: a corner that opens forward and up.
@@ -95,7 +121,7 @@ class LShape:
 
 
 @description
-class Remus100:
+class Remus100(BodyShape):
     """REMUS-100 autonomous underwater vehicle: a Myring hull with four fins, from published dimensions.
 
     Prestero (2001), "Verification of a six-degree of freedom simulation model for the REMUS autonomous underwater
@@ -113,7 +139,7 @@ class Remus100:
 
 
 @description
-class Myring:
+class Myring(BodyShape):
     """A body of revolution along x by Myring (1976), centred on the origin; refined on the true surface.
 
     Nose of length a, r = (d/2) (1 - t^2)^(1/exponent) at t a before the middle; middle of length b and diameter d; tail

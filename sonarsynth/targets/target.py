@@ -9,7 +9,7 @@ from pydantic import StringConstraints
 from sonarsynth.description import description
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.motion import Motion
-from sonarsynth.scattering import Kirchhoff, Scattering
+from sonarsynth.scattering import Scattering
 from sonarsynth.targets.mesh_resolution import frame_mesh
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Shape
@@ -35,4 +35,5 @@ class Target:
 def mesh_for(shape: Shape, law: Scattering, wavelength: float) -> Mesh:
     """The mesh that a shape is traced with: as described, or fine enough for a law that sums phases, at the shortest
     wavelength (m) of the band. Raises MeshError as `mesh_of`."""
-    return frame_mesh(shape, wavelength, law.mesh_error) if isinstance(law, Kirchhoff) else mesh_of(shape)
+    error = law.mesh_tolerance
+    return mesh_of(shape) if error is None else frame_mesh(shape, wavelength, error)

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from sonarsynth.environment.sea import Profile
-from sonarsynth.environment.sound_speed import Cast, Tabulated, TemperatureSalinity
 from sonarsynth.planning.measured.lost_echoes import lost_echoes
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.notes.formula_validity import validity
@@ -69,7 +68,7 @@ def stored_validity(looks: Sequence[SampledScene]) -> tuple[str, ...]:
 def _extent(scene: Scene, profile: Profile) -> list[str]:
     """Where measured water ends before the real one."""
     bottom, first, last = scene.world.environment.depth, profile.depth[0], profile.depth[-1]
-    written = isinstance(scene.world.environment.sound_speed, (Tabulated, TemperatureSalinity, Cast))
+    written = scene.world.environment.sound_speed.measured
     if not written or max(first, bottom - last) <= UNKNOWN * bottom:
         return []
     known = f"at {first:g} m only" if first == last else f"from {first:g} to {last:g} m"

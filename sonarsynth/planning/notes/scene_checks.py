@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +11,6 @@ from sonarsynth.conventions import FASTEST, REFERENCE_PRESSURE, SLOWEST, Floats,
 from sonarsynth.description import FieldError
 from sonarsynth.environment.casts import profile_of
 from sonarsynth.environment.sea import Profile
-from sonarsynth.environment.sound_speed import Cast, Tabulated, TemperatureSalinity
 from sonarsynth.equations.rays.ray_solutions import TOLERANCE
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.motion import pose
@@ -25,7 +23,6 @@ from sonarsynth.sources.snap_pulses import waveform
 from sonarsynth.sources.sound_source import SoundSource
 from sonarsynth.state import meeting_times
 from sonarsynth.targets.meshes import mesh_of
-from sonarsynth.targets.shapes import MeshFile
 from sonarsynth.targets.target import mesh_for
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
@@ -71,7 +68,7 @@ def read_inputs(scene: Scene) -> Profile:
 def _check_profile(scene: Scene, profile: Profile) -> None:
     """The sound speed must be that of water, somewhere above the bottom, and change at a rate that rays can follow."""
     path = ("scene", "world", "environment", "sound_speed")
-    measured = isinstance(scene.world.environment.sound_speed, (Tabulated, TemperatureSalinity, Cast))
+    measured = scene.world.environment.sound_speed.measured
     slowest, fastest = IN_WATER if measured else (SLOWEST, FASTEST)
     odd = np.flatnonzero(~((profile.speed >= slowest) & (profile.speed <= fastest)))
     if len(odd):
@@ -99,13 +96,13 @@ def _check_profile(scene: Scene, profile: Profile) -> None:
 def _check_plain(scene: Scene, number: int) -> None:
     """A mesh file must be in the water as it stands, before it is cut into many facets: its unit may be wrong."""
     target, bottom_depth = scene.world.targets[number], scene.world.environment.depth
-    if not isinstance(target.shape, MeshFile):
+    if target.shape.plain is None:
         return
-    plain = mesh_of(replace(target.shape, edge=None, smooth=False))
+    plain = mesh_of(target.shape.plain)
     body = PlacedTarget(target.name, plain, pose(target.motion, scene.trajectory.time(0)), np.zeros(3))
     if not _box_in_water(body, bottom_depth):
         size = float(np.ptp(plain.box, axis=0).max())
-        what = f"target '{body.name}', {size:.3g} m long with numbers in {target.shape.unit},"
+        what = f"target '{body.name}', {size:.3g} m long {target.shape.read_as},"
         _check_depth(
             ("scene", "world", "targets", number, "motion"), what, _places(body), bottom_depth, "the first frame"
         )

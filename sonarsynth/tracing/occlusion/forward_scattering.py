@@ -18,7 +18,7 @@ import numpy as np
 from sonarsynth.casting.ray_casting import inside
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.scattering import Component, FacetLaw, Kirchhoff
+from sonarsynth.scattering import Component, FacetLaw
 from sonarsynth.scattering.components import Shadow
 from sonarsynth.tracing.expansion.array_expansion import expansion_source
 from sonarsynth.tracing.receive_paths import facets_of, rays_to_centre
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 def shadow_parts(law: FacetLaw) -> tuple[Component, ...]:
     """What facets send beside echoes; nothing unless the law scatters forward."""
-    return (Shadow(),) if isinstance(law, Kirchhoff) and law.forward == "scattered" else ()
+    return (Shadow(),) if law.passes_sound else ()
 
 
 def blocking_bodies(
