@@ -9,7 +9,6 @@ import numpy as np
 from sonarsynth.conventions import Bools, Floats, depth
 from sonarsynth.description import description
 from sonarsynth.environment.sea import Profile
-from sonarsynth.equations.rays import ray_continuation
 from sonarsynth.equations.rays.ray_solutions import eigenrays, water
 from sonarsynth.products import Paths
 from sonarsynth.propagation.bounces import Bounces
@@ -59,6 +58,8 @@ class Refracted(PathModel):
 
     def beside(self, profile: Profile, environment_depth: float, rays: KnownRays, end: Floats) -> RaysBeside:
         """By Newton's method from each known ray, along the layers that it crosses."""
+        from sonarsynth.equations.rays import ray_continuation
+
         layers = water(profile.depth, profile.speed, environment_depth)
         count, ends = len(rays.start), len(end)
         z, at = (np.clip(depth(point), 0.0, environment_depth) for point in (rays.start, end))
