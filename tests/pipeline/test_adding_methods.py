@@ -188,7 +188,7 @@ def test_the_source_is_where_it_was_surveyed_and_its_reflection_is_gated(said: d
     mine, usual = of(said, "surveyed_source"), said["usual"]
     np.testing.assert_allclose(mine["source"], [0.6, -0.25, -0.15], atol=1e-6)  # the array looks along x of the world
     assert mine["heard"] == pytest.approx(mine["true"], abs=2e-6)
-    assert np.any(usual["energy"]) and not np.any(mine["energy"]) and not mine["delay"], "the gate holds all echoes"
+    assert usual["delay"] and not mine["delay"] and np.isnan(mine["energy"]).all(), "the gate leaves no sound to image"
 
 
 def test_the_pinger_sweeps_at_its_level(said: dict[str, Any]) -> None:
@@ -198,11 +198,11 @@ def test_the_pinger_sweeps_at_its_level(said: dict[str, Any]) -> None:
     middle = (distance / 1483.5 - mine["start"]) * rate
     for row, at, far in zip(sound, middle, distance, strict=True):
         ping = row[int(at - 1e-4 * rate) : int(at + 1e-4 * rate)]
-        assert 0.8 < np.abs(ping).max() * far / 10.0 ** ((170.0 - 120.0) / 20.0) < 1.05
-        assert not row[: int(at - 2.5e-4 * rate)].any() or np.abs(row[: int(at - 2.5e-4 * rate)]).max() < 1e-3
+        assert 0.3 < np.abs(ping).max() * far / 10.0 ** ((170.0 - 120.0) / 20.0) < 1.05, "but for a hydrophone's face"
+        assert np.abs(row[: int(at - 2.5e-4 * rate)]).max() < 1e-3 * np.abs(ping).max(), "silence before"
         halves = np.abs(np.fft.rfft(ping[: ping.size // 2 * 2].reshape(2, -1), 256)) ** 2
         early, late = (float(np.average(np.fft.rfftfreq(256, 1.0 / rate), weights=half)) for half in halves)
-        assert 40e3 < early < 55e3 < late < 70e3
+        assert 40e3 < early < late - 4e3 < 66e3
 
 
 def test_the_noise_is_as_loud_as_it_says(said: dict[str, Any]) -> None:
