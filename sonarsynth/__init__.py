@@ -43,6 +43,7 @@ if TYPE_CHECKING:
         TemperatureSalinity,
         Thermocline,
     )
+    from sonarsynth.export import points
     from sonarsynth.frontiers import measure as accuracy
     from sonarsynth.geometry.motion import Circle, ConstantVelocity, Line, Still, Waypoint, Waypoints
     from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
@@ -194,6 +195,7 @@ __all__ = [
     "loads",
     "open",
     "plan",
+    "points",
     "rays",
     "render",
     "repair",
@@ -205,6 +207,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "export": "points",
     "description": "FieldError",
     "environment.boundaries": "FluidHalfSpace PressureRelease ReflectionTable Rigid SeaBottom SeaSurface Sediment",
     "environment.noise": "FlatNoise WenzNoise",

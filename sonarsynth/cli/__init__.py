@@ -16,6 +16,7 @@ import typer
 
 from sonarsynth.cli.accuracy_command import accuracy
 from sonarsynth.cli.card_command import card
+from sonarsynth.cli.export_command import export
 from sonarsynth.cli.repair_command import repair
 from sonarsynth.cli.running import BadOption, run
 from sonarsynth.cli.selecting import chosen_frames, product_names
@@ -236,6 +237,7 @@ def show(
 
 app.command()(accuracy)
 app.command()(card)
+app.command()(export)
 app.command()(repair)
 app.command("target-strength")(target_strength)
 

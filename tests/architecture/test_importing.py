@@ -125,6 +125,7 @@ SURFACE = [
     "loads",
     "open",
     "plan",
+    "points",
     "rays",
     "render",
     "repair",

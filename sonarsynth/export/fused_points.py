@@ -1,0 +1,128 @@
+"""Clouds of many frames fused in one frame of reference."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.description import FieldError
+from sonarsynth.geometry import Pose
+from sonarsynth.store import open_store
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+KEPT = ("energy", "snr", "range", "range_error", "target", "emission", "family", "facet", "distance", "origin")
+"""What is kept of each point beside its place."""
+
+
+def points(
+    store: str | Path | xr.DataTree, frames: Iterable[int] | None = None, *, relative_to: str = "sonar"
+) -> xr.Dataset:
+    """The points of some frames of a store as one cloud.
+
+    Parameters
+    ----------
+    store: path, URL or opened tree.
+    frames: numbers of frames; left out: all.
+    relative_to: the axes of `position`: "sonar", those of the array at each frame; "world"; or the name of a target, as
+        it was when the sound met it, so that points on its hull fall together whatever it does.
+
+    Returns
+    -------
+    A dataset along `point`: `position` and `normal` (point, xyz), m and of unit length: the normal of the true facet
+    that brought most of the echo, NaN where none did; `frame`; and the columns of /cloud (`energy` in Pa2 s, `target`
+    and the other labels). A frame that was not built gives no points.
+
+    Raises
+    ------
+    FieldError where the store has no cloud, or no target of that name; IndexError for a frame that it has not.
+    """
+    import xarray as xr
+
+    tree = store if isinstance(store, xr.DataTree) else open_store(store)
+    if "cloud" not in tree.children:
+        raise FieldError(("relative_to",), "the store has no cloud: it was built without that product")
+    names = [str(name) for name in tree["truth/targets"].coords["target"].values]
+    if relative_to not in ("sonar", "world", *names):
+        raise FieldError(
+            ("relative_to",), f"must be sonar, world or a target ({', '.join(names)}), not {relative_to!r}"
+        )
+    cloud = tree["cloud"].dataset
+    some = range(cloud.sizes["frame"]) if frames is None else list(frames)
+    parts = [_frame(tree, int(index), relative_to, names) for index in some]
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts else {}
+    variables = {
+        name: (("point", "xyz") if values.ndim == 2 else ("point",), values, _attributes(cloud, name))
+        for name, values in columns.items()
+    }
+    return xr.Dataset(variables, attrs={"relative_to": relative_to})
+
+
+def _attributes(cloud: xr.Dataset, name: str) -> dict[str, object]:
+    own: dict[str, dict[str, object]] = {
+        "position": {"units": "m", "long_name": "place of the point"},
+        "normal": {"units": "1", "long_name": "outward normal of the facet that brought most of the echo"},
+        "frame": {"units": "1", "long_name": "frame of the point"},
+    }
+    return own[name] if name in own else dict(cloud[name].attrs)
+
+
+def _frame(tree: xr.DataTree, index: int, relative_to: str, names: list[str]) -> dict[str, np.ndarray]:
+    """Columns (point,) of the points of a frame."""
+    cloud, truth = (tree[group].dataset.isel(frame=index) for group in ("cloud", "truth"))
+    bodies = tree["truth/targets"].dataset.isel(frame=index)
+    there = np.isfinite(cloud["range"].values)
+    columns = {name: cloud[name].values[there] for name in KEPT if name in cloud}
+    place = np.stack([cloud[axis].values[there] for axis in "xyz"], axis=-1).astype(float)
+    sonar = Pose(truth["sonar_position"].values, truth["sonar_orientation"].values)
+    turn = _Turn(sonar, bodies, relative_to, names, columns["emission"])
+    return {
+        "position": turn.place(place),
+        "normal": turn.vector(_normals(tree, bodies, columns["target"], columns["facet"], names)),
+        "frame": np.full(len(place), index, np.int32),
+        **columns,
+    }
+
+
+class _Turn:
+    """From the sonar's frame, and from the world's, into another."""
+
+    def __init__(self, sonar: Pose, bodies: xr.Dataset, to: str, names: list[str], emission: Ints) -> None:
+        self.sonar, self.to, self.origin = sonar, to, np.zeros((1, 3))
+        self.pose = sonar if to == "sonar" else Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+        if to in names:
+            body = bodies.isel(target=names.index(to))
+            self.pose = Pose(np.zeros(3), body["orientation"].values)
+            met = body["position_at_echo"].values[np.maximum(emission, 0)]
+            self.origin = np.where(np.isfinite(met), met, body["position"].values)
+
+    def place(self, own: Floats) -> Floats:
+        """Places (point, xyz) of the sonar's frame."""
+        if self.to == "sonar":
+            return own
+        return self.pose.turn_to_body(self.sonar.to_world(own) - self.origin)
+
+    def vector(self, world: Floats) -> Floats:
+        """Vectors (point, xyz) of the world."""
+        return self.pose.turn_to_body(world)
+
+
+def _normals(tree: xr.DataTree, bodies: xr.Dataset, target: Ints, facet: Ints, names: list[str]) -> Floats:
+    """Outward normals (point, xyz), world, of the facets that brought the echoes; NaN where none did."""
+    found = np.full((len(target), 3), np.nan)
+    for number, name in enumerate(names):
+        group = f"targets/{name}"
+        some = np.flatnonzero((target == number) & (facet >= 0))
+        if group not in tree or not len(some):
+            continue
+        mesh = tree[group].dataset
+        a, b, c = np.moveaxis(mesh["vertices"].values.astype(float)[mesh["faces"].values[facet[some]]], 1, 0)
+        across = np.cross(b - a, c - a)
+        own = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
+        found[some] = Pose(np.zeros(3), bodies["orientation"].values[number]).turn_to_world(own)
+    return found

@@ -1,0 +1,56 @@
+"""Files of points, as Open3D writes them: colours by energy, normals and labels with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FORMATS = ("ply", "pcd")
+DECIBELS = 25.0
+"""Range of the colours, below the point of most energy."""
+
+
+def write_points(points: xr.Dataset, path: str | Path) -> Path:
+    """Write the points of `sonarsynth.points` to a file whose name ends as one of `FORMATS`.
+
+    Positions in m, normals (0 where there is none), colours by energy over 25 dB, and `frame`, `target`, `family`,
+    `energy`, `snr` and `range_error` of each point by those names. Raises ValueError for another ending, or where there
+    is no point; ImportError where Open3D is not installed; OSError where the file cannot be written.
+    """
+    import open3d as o3d
+    from matplotlib import colormaps
+
+    file = Path(path)
+    if file.suffix.lower().lstrip(".") not in FORMATS:
+        raise ValueError(f"{file}: the name must end in .{' or .'.join(FORMATS)}")
+    if not points.sizes.get("point"):
+        raise ValueError(f"{file}: there is no point to write")
+    cloud = o3d.t.geometry.PointCloud()
+    energy = np.maximum(points["energy"].values.astype(float), np.finfo(float).tiny)
+    level = 10.0 * np.log10(energy / energy.max())
+    shade = colormaps["viridis"](np.clip(1.0 + level / DECIBELS, 0.0, 1.0))[:, :3]
+
+    def put(name: str, values: np.ndarray, kind: type) -> None:
+        rows = values if values.ndim == 2 else values[:, None]
+        cloud.point[name] = o3d.core.Tensor(np.ascontiguousarray(rows, kind))
+
+    put("positions", points["position"].values, np.float32)
+    put("normals", np.nan_to_num(points["normal"].values), np.float32)
+    put("colors", np.rint(255.0 * shade), np.uint8)
+    for name, kind in (
+        ("frame", np.int32),
+        ("target", np.int32),
+        ("family", np.int32),
+        ("energy", np.float32),
+        ("snr", np.float32),
+        ("range_error", np.float32),
+    ):
+        put(name, points[name].values, kind)
+    if not o3d.t.io.write_point_cloud(str(file), cloud, write_ascii=False):
+        raise OSError(f"{file} cannot be written")
+    return file
