@@ -24,7 +24,7 @@ scene:
         shape: {kind: box, size: [1, 1, 1], edge: 0.25}
         motion: {kind: line, start: [10, 0, -5], stop: [10, 1, -5], duration: 1}
     sources:
-      - position: [30, 1]
+      - position: [12, 8]
         kind: snapping_shrimp
   sonar:
     array: {kind: planar_lattice, columns: 5, rows: 4, pitch: 5 cm}

@@ -68,19 +68,11 @@ def test_a_dataset_is_whole_and_says_what_it_cost(reference: Path) -> None:
     assert not store.beside(reference, "failed.jsonl").exists()
 
 
-def test_two_worker_processes_make_the_same_arrays(tmp_path: Path, small: Recipe, reference: Path) -> None:
-    report = build(small, tmp_path / "s.zarr", workers=2)
-    assert report.ok
-    assert (report.written, report.workers) == (20, 2)
-    assert report.worker_peak_bytes > 1e7
-    assert_same(tmp_path / "s.zarr", reference)
-
-
 def test_a_worker_of_a_running_scheduler_makes_the_same_arrays(
-    tmp_path: Path, small: Recipe, reference: Path, here: str
+    tmp_path: Path, small_plan: Plan, reference: Path, here: str
 ) -> None:
     seen: list[tuple[int, int, int]] = []
-    report = build(small, tmp_path / "s.zarr", scheduler=here, progress=lambda *counts: seen.append(counts))
+    report = build(small_plan, tmp_path / "s.zarr", scheduler=here, progress=lambda *counts: seen.append(counts))
     assert report.ok
     assert seen[0] == (0, 20, 0)
     assert seen[-1] == (20, 20, 0)
@@ -120,36 +112,36 @@ def test_a_task_is_of_one_frame_where_they_are_long(small_plan: Plan) -> None:
     assert block(1e-9, large) == 1  # 33 MB of signals a frame
 
 
-def test_a_part_and_then_the_whole_is_the_whole_at_once(tmp_path: Path, small: Recipe, reference: Path) -> None:
+def test_a_part_and_then_the_whole_is_the_whole_at_once(tmp_path: Path, small_plan: Plan, reference: Path) -> None:
     path = tmp_path / "s.zarr"
-    part = build(small, path, frames=[*range(5), 17], workers=0)
+    part = build(small_plan, path, frames=[*range(5), 17], workers=0)
     assert (part.written, part.shards, part.wanted, part.frames) == (6, 2, 6, 20)
     assert store.frames_there(path) == [0, 1, 2, 3, 4, 17]
     assert np.isnan(zarr.open_array(path / "truth/sonar_position", mode="r")[5:17]).all()
-    again = build(small, path, frames=range(3), workers=0)
+    again = build(small_plan, path, frames=range(3), workers=0)
     assert (again.written, again.there) == (0, 3)
-    rest = build(small, path, workers=0)
+    rest = build(small_plan, path, workers=0)
     assert (rest.written, rest.shards, rest.there) == (20, 3, 0)
-    assert build(small, path, workers=0).written == 0
+    assert build(small_plan, path, workers=0).written == 0
     assert_same(path, reference)
 
 
 @pytest.mark.parametrize("shards", [0, 2])
-def test_an_interrupted_build_goes_on(tmp_path: Path, small: Recipe, reference: Path, shards: int) -> None:
+def test_an_interrupted_build_goes_on(tmp_path: Path, small_plan: Plan, reference: Path, shards: int) -> None:
     def interrupt(done: int, total: int, failed: int) -> None:
         if done >= 8 * shards:
             raise KeyboardInterrupt
 
     path = tmp_path / "s.zarr"
     with pytest.raises(KeyboardInterrupt):
-        build(small, path, workers=0, progress=interrupt)
+        build(small_plan, path, workers=0, progress=interrupt)
     assert store.frames_there(path) == list(range(8 * shards))
-    assert build(small, path, workers=0).written == 20 - 8 * shards
+    assert build(small_plan, path, workers=0).written == 20 - 8 * shards
     assert_same(path, reference)
 
 
 def test_a_build_that_dies_within_a_shard_goes_on(
-    tmp_path: Path, small: Recipe, reference: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, small_plan: Plan, reference: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "s.zarr"
     with monkeypatch.context() as patch:
@@ -157,21 +149,21 @@ def test_a_build_that_dies_within_a_shard_goes_on(
             "sonarsynth.store.writing.save_mark", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left"))
         )
         with pytest.raises(OSError, match="No space left"):
-            build(small, path, workers=0)
+            build(small_plan, path, workers=0)
     assert store.frames_there(path) == []
     assert "without a completion mark" in store.verify(path).problems[0].what
-    assert build(small, path, workers=0).written == 20
+    assert build(small_plan, path, workers=0).written == 20
     assert_same(path, reference)
 
 
 def test_disk_trouble_on_a_worker_ends_the_build(
-    tmp_path: Path, small: Recipe, here: str, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, small_plan: Plan, here: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
         "sonarsynth.store.writing.save_mark", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left"))
     )
     with pytest.raises(OSError, match="No space left"):
-        build(small, tmp_path / "s.zarr", scheduler=here)
+        build(small_plan, tmp_path / "s.zarr", scheduler=here)
     assert not store.beside(tmp_path / "s.zarr", "lock").exists()
 
 
@@ -180,7 +172,7 @@ def test_disk_trouble_on_a_worker_ends_the_build(
 )
 def test_frames_that_raise_fail_and_the_rest_goes_on(
     tmp_path: Path,
-    small: Recipe,
+    small_plan: Plan,
     reference: Path,
     here: str,
     stage: str,
@@ -198,7 +190,7 @@ def test_frames_that_raise_fail_and_the_rest_goes_on(
     where = {"scheduler": here} if distributed else {"workers": 0}
     with monkeypatch.context() as patch:
         patch.setattr(pipeline, stage, fails)
-        report = build(small, path, **where)
+        report = build(small_plan, path, **where)
     assert sorted(f.frame for f in report.failures) == [3, 16]
     assert {(f.stage, f.error) for f in report.failures} == {(stage.partition("_")[0], "ZeroDivisionError: no way")}
     assert all("raise ZeroDivisionError" in f.traceback for f in report.failures)
@@ -206,34 +198,34 @@ def test_frames_that_raise_fail_and_the_rest_goes_on(
     assert store.verify(path).problems == ()
     failed = store.beside(path, "failed.jsonl")
     assert sorted(json.loads(line)["frame"] for line in failed.read_text().splitlines()) == [3, 16]
-    left = build(small, path, workers=0)
+    left = build(small_plan, path, workers=0)
     assert (left.written, sorted(f.frame for f in left.failures), left.there) == (0, [3, 16], 18)
-    assert build(small, path, workers=0, retry_failed=True).ok
+    assert build(small_plan, path, workers=0, retry_failed=True).ok
     assert not failed.exists()
     assert_same(path, reference)
 
 
 def test_values_that_do_not_fit_set_their_frame_aside(
-    tmp_path: Path, small: Recipe, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, small_plan: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     works = pipeline.range_frame
     monkeypatch.setattr(pipeline, "range_frame", lambda made, i, *parts: {} if i == 2 else works(made, i, *parts))
-    report = build(small, tmp_path / "s.zarr", workers=0)
+    report = build(small_plan, tmp_path / "s.zarr", workers=0)
     assert [(f.frame, f.stage) for f in report.failures] == [(2, "range")]
 
 
 def test_a_shard_with_no_good_frame_is_not_marked(
-    tmp_path: Path, small: Recipe, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, small_plan: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(pipeline, "trace_frame", lambda made, i: 1 / 0)
-    report = build(small, tmp_path / "s.zarr", frames=range(10), workers=0)
+    report = build(small_plan, tmp_path / "s.zarr", frames=range(10), workers=0)
     assert (report.written, report.shards, len(report.failures)) == (0, 0, 10)
     assert store.frames_there(tmp_path / "s.zarr") == []
 
 
-def test_a_build_is_refused_while_another_runs(tmp_path: Path, small: Recipe) -> None:
+def test_a_build_is_refused_while_another_runs(tmp_path: Path, small_plan: Plan) -> None:
     with store.lock(tmp_path / "s.zarr"), pytest.raises(store.Locked):
-        build(small, tmp_path / "s.zarr", workers=0)
+        build(small_plan, tmp_path / "s.zarr", workers=0)
     assert not (tmp_path / "s.zarr").exists()
 
 

@@ -237,7 +237,8 @@ def test_sigterm_ends_a_build_that_can_go_on(small_file: Path, tmp_path: Path) -
         "from sonarsynth import pipeline as render\nfrom sonarsynth.cli import main\nimport time\n"
         "whole = render.trace_frame\n"
         "def slow(made, i):\n    time.sleep(1e4 if i > 9 else 0)\n    return whole(made, i)\n"
-        f"render.trace_frame = slow\nmain(['build', {str(small_file)!r}, {str(path)!r}, '--workers', '0'])"
+        "render.trace_frame = slow\n"
+        f"main(['build', {str(small_file)!r}, {str(path)!r}, '--workers', '0', '--no-predict'])"
     )
     environment = {**os.environ, "PYTHONPATH": str(HERE)}
     building = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True, env=environment)

@@ -93,7 +93,9 @@ def test_the_tank_without_the_echo_says_so() -> None:
     assert not np.isfinite(render(made, 0)["cloud/range"].values).any()
 
 
+@cache
 def _plan(name: str, sets: tuple[str, ...] = ()) -> Plan:
+    """A plan is made once: that of the thermocline takes as long as its frames."""
     return planning.plan(reading.load(CONFIGS / name, sets))
 
 

@@ -158,7 +158,7 @@ def test_stored_ghosts_lie_where_the_mirror_images_are(
 
     The images are 10 m above and 14 m below, and by two bounces 24 m above and below.
     """
-    text = small_text.replace("elevation_span: 30 deg", "elevation_span: 140 deg").replace("[30, 1]", f"[{shrimp}, 1]")
+    text = small_text.replace("elevation_span: 30 deg", "elevation_span: 140 deg").replace("[12, 8]", f"[{shrimp}, 1]")
     made = plan(reading.loads(text + "  physics: {tracing: {kind: auto, bounces: 2}}\n"))
     assert schedule.build(made, tmp_path / "small.zarr", frames=range(1), workers=0).ok
     said: list[str] = []

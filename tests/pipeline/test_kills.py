@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import subprocess
@@ -38,18 +39,12 @@ def test_what_the_tool_cannot_do_is_said(arguments: tuple[str, ...]) -> None:
     assert "Traceback" not in done.stderr
 
 
-def test_a_changed_store_is_seen(tmp_path: Path) -> None:
-    script = """
-import sys
-from pathlib import Path
-from fault_injection import kills
-folder = Path(sys.argv[1])
-(folder / "tiny.yaml").write_text(kills.RECIPE)
-whole = kills._undisturbed(folder / "tiny.yaml", folder / "whole.zarr")
-assert kills._different(whole.path, whole) == [] == kills._bad_marks(whole.path, whole)
-file = next(whole.path.glob("signals/pressure/c.1.*"))
-file.write_bytes(file.read_bytes()[:-1])
-assert kills._different(whole.path, whole) and kills._bad_marks(whole.path, whole)
-"""
-    paths = os.pathsep.join([str(ROOT), str(ROOT / "tools")])
-    subprocess.run([sys.executable, "-c", script, str(tmp_path)], env=os.environ | {"PYTHONPATH": paths}, check=True)
+def test_a_changed_store_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT / "tools")
+    kills = importlib.import_module("fault_injection.kills")
+    (tmp_path / "tiny.yaml").write_text(kills.RECIPE)
+    whole = kills._undisturbed(tmp_path / "tiny.yaml", tmp_path / "whole.zarr")
+    assert kills._different(whole.path, whole) == [] == kills._bad_marks(whole.path, whole)
+    file = next(whole.path.glob("signals/pressure/c.1.*"))
+    file.write_bytes(file.read_bytes()[:-1])
+    assert kills._different(whole.path, whole) and kills._bad_marks(whole.path, whole)

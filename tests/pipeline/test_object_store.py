@@ -114,7 +114,7 @@ def reached(place: Remote, point: str) -> bool:
     return any("/c.0." in name and name.startswith("link_budget/") for name in names)
 
 
-def test_killed_builds_are_resumed_to_the_same(bucket: str, small_file: Path, whole: Path) -> None:
+def test_killed_builds_are_resumed_to_the_same(bucket: str, small_file: Path, small_plan: Plan, whole: Path) -> None:
     place = Remote(f"{bucket}/killed/s.zarr")
     command = [sys.executable, "-m", "sonarsynth", "build", str(small_file), str(place), "--frames", FRAMES]
     command += ["--workers", "0", "--no-predict"]
@@ -129,8 +129,7 @@ def test_killed_builds_are_resumed_to_the_same(bucket: str, small_file: Path, wh
             assert isinstance(mark, store.Mark), number
             found = dict(store.files.place.records(place, mark.files))
             assert all(found[name] == kept or kept == store.marks.ABSENT for name, kept in mark.files.items())
-    done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    assert schedule.build(small_plan, place, frames=range(10), workers=0).ok
     assert same(place, whole)
     assert store.verify(place, quick=True).ok
 

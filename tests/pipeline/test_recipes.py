@@ -44,7 +44,7 @@ WRONG = [
     ("[1, 1, 1]", "[1, 2 kHz, 1]", "8: scene.world.targets.0.shape.size.1: has unit 'kHz'; use one of m, km, cm"),
     ("[1, 1, 1]", "[1, 1]", "8: scene.world.targets.0.shape.size.2: is required"),
     ("[1, 1, 1]", "1", "8: scene.world.targets.0.shape.size: must be a list, not 1"),
-    ("      - position: [30, 1]\n", "      - name: a\n", "11: scene.world.sources.0.position: is required"),
+    ("      - position: [12, 8]\n", "      - name: a\n", "11: scene.world.sources.0.position: is required"),
     ("depth: 12 m, ", "", "5: scene.world.environment.depth: is required"),
     ("seed: 3", "seed: 3\nseed: 4", "3: seed: is given twice"),
     ("seed: 3", "\tseed: 3", "2: tabs cannot indent YAML; use spaces"),

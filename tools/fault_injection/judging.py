@@ -26,7 +26,7 @@ from typing import Any
 
 import typer
 
-from sonarsynth import cli, planning, schedule, store
+from sonarsynth import cli, evaluation, planning, schedule, store
 from sonarsynth.cli import printing
 from sonarsynth.cli.running import run
 from sonarsynth.description import FieldError
@@ -116,7 +116,7 @@ def _verdict(status: int, out: str, err: str, memory: int, checked: bool) -> str
     return REFUSED if found["line"] or found["what"].startswith(PLACELESS) else "refused without a line"
 
 
-IMPORTED = (printing, schedule)
+IMPORTED = (evaluation, printing, schedule)
 """What commands import when they run: it is there before a process is forked."""
 
 UNEXPECTED = {1: "traceback", 2: "traceback", 3: "build and plan differ, or a recipe that cannot be read back"}

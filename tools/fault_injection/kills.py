@@ -41,7 +41,7 @@ scene:
         shape: {kind: box, size: [1, 1, 1], edge: 1.0}
         motion: {kind: line, start: [10, 0, -5], stop: [10, 1, -5], duration: 1}
     sources:
-      - position: [30, 1]
+      - position: [12, 8]
         kind: snapping_shrimp
   sonar:
     array: {kind: planar_lattice, columns: 3, rows: 2, pitch: 5 cm}
