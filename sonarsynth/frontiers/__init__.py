@@ -93,7 +93,7 @@ def measure(
 
 
 def _frame(made: Plan, index: int, hydrophones: int | None, say: Say, *, peers: bool) -> tuple[list[Point], float, int]:
-    """The points of one frame; seconds of what nothing is chosen for; and hydrophones heard exactly."""
+    """The points of one frame; seconds of what nothing is chosen for; and hydrophones computed exactly."""
     say(f"frame {index}: exactly")
     exact = exact_frame(made, index, hydrophones)
     plan, frame = exact.plan, exact.frame

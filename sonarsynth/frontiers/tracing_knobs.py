@@ -116,7 +116,7 @@ def trace_points(exact: Exact, traced: TracedBySensor) -> Iterator[Point]:
     for level in FAINTEST:
         share = 10.0 ** (-level / 10.0)
         some = replace(best, choices=replace(best.choices, negligible=share))
-        yield _each_point(exact, some, "faintest", f"{level:.0f} dB")
+        yield _each_point(exact, some, "dynamic range", f"{level:.0f} dB")
     if not plan.profile.uniform:
         some = replace(best, propagation=Straight(bounces=plan.propagation.bounces))
         yield _each_point(exact, some, "rays", "straight")
@@ -136,7 +136,7 @@ def _cheaper(plan: Plan) -> Iterator[tuple[str, Plan]]:
     for level in FAINTEST:
         share = 10.0 ** (-level / 10.0)
         if share > 1.001 * choices.negligible:
-            yield f"faintest {level:.0f} dB", replace(plan, choices=replace(choices, negligible=share))
+            yield f"dynamic range {level:.0f} dB", replace(plan, choices=replace(choices, negligible=share))
     if plan.propagation.bends:
         yield "straight rays", replace(plan, propagation=Straight(bounces=plan.propagation.bounces))
 

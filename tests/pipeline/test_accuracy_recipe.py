@@ -68,14 +68,14 @@ def test_the_exact_way_errs_by_nothing_and_is_itself_checked(measured: Measured)
 
 def test_every_curve_tends_to_nothing_as_its_knob_goes_to_exact(measured: Measured) -> None:
     """With all else exact, what is left is how far two computations differ that share nothing: of a moving target."""
-    curves = {knob: [p.error for p in rows(measured, "trace", knob)] for knob in ("subarrays", "faintest")}
+    curves = {knob: [p.error for p in rows(measured, "trace", knob)] for knob in ("subarrays", "dynamic range")}
     curves["subarrays"] = [p.error for p in rows(measured, "trace", "subarrays") if not p.chosen]
     for errors in curves.values():
         assert len(errors) >= 2
         assert errors[-1] < 0.01 * measured.points[1].allowed
         assert errors[-1] <= min(errors) * 1.01 + 1e-6
-    assert curves["faintest"][0] > 1e-3
-    faint = curves["faintest"]
+    assert curves["dynamic range"][0] > 1e-3
+    faint = curves["dynamic range"]
     assert all(b <= a * 1.05 + 1e-6 for a, b in pairwise(faint))
     auto = [p.error for p in rows(measured, "synthesis", "auto")]
     assert len(auto) >= 4
@@ -253,19 +253,19 @@ def test_the_command(
         return replace(measured, verdicts=tuple(replace(v, ok=True) for v in measured.verdicts))
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sonarsynth.frontiers.measure", measures)
+        patch.setattr("sonarsynth.cli.frontier_table.measure", measures)
         options = ["--set", "accuracy.signal=0.003", "--frames", "1", "--hydrophones", "7", "--seed", "5", "--no-peers"]
         assert run(app, ["accuracy", str(file), *options, "--out", str(tmp_path)]) == 0
     assert asked == [0.003, (1,), 7, 5, False]
     said = capsys.readouterr().out
-    assert "verdicts" in said and "faintest" in said and "not installed" in said
+    assert "verdicts" in said and "dynamic" in said and "not installed" in said
     assert str(tmp_path / "scene.json") in said and (tmp_path / "scene.png").exists()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sonarsynth.frontiers.measure", lambda *a, **k: replace(measured, verdicts=()))
+        patch.setattr("sonarsynth.cli.frontier_table.measure", lambda *a, **k: replace(measured, verdicts=()))
         assert run(app, ["accuracy", str(file), "--json", "--out", str(tmp_path)]) == 0
         assert len(json.loads(capsys.readouterr().out)) == len(measured.points)
         wrong = (replace(measured.verdicts[0], ok=False),)
-        patch.setattr("sonarsynth.frontiers.measure", lambda *a, **k: replace(measured, verdicts=wrong))
+        patch.setattr("sonarsynth.cli.frontier_table.measure", lambda *a, **k: replace(measured, verdicts=wrong))
         assert run(app, ["accuracy", str(file), "--out", str(tmp_path)]) == 1
         assert "FAILED" in capsys.readouterr().out
 

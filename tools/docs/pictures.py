@@ -1,4 +1,7 @@
-"""Draws the thumbnails of README again: python tools/docs/pictures.py."""
+"""Draws pictures of README and of the pages again: python tools/docs/pictures.py [thumbnails ghosts laws accuracy].
+
+Left out: all of them, which takes minutes.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +13,22 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import sonarsynth as ss
+from sonarsynth.frontiers.frontier_report import write
+from sonarsynth.pictures import _reference, _view
+from sonarsynth.pictures.compare import show_beside
+from sonarsynth.pictures.figures.frame_figure import FramePicture, window
+from sonarsynth.pictures.store_reading import beam_grid, opened, stored
 
 ROOT = Path(__file__).resolve().parents[2]
 FRAMES = {"remus": 40, "thermocline": 40, "crowd": 0, "deep": 8, "tank": 0, "l_shape": 0, "grid": 3, "harbour": 8}
 """The frame of each shipped recipe that is drawn."""
+GHOSTS = 46
+"""The frame of thermocline.yaml whose ghosts are drawn."""
+LAWS = {
+    "lobe": "{kind: mirror_lobe}",
+    "smooth": "{kind: kirchhoff}",
+    "rough": "{kind: kirchhoff, roughness: 2 mm, slope: 0.2}",
+}
 
 
 def thumbnail(name: str, frame: int, sets: list[str]) -> None:
@@ -32,14 +47,51 @@ def thumbnail(name: str, frame: int, sets: list[str]) -> None:
     plt.close(figure)
 
 
-def main() -> None:
-    """Draw all."""
+def thumbnails(folder: Path) -> None:
+    """One of each shipped recipe."""
     sys.path.insert(0, str(ROOT / "tools"))
     from same_numbers import harbour
 
-    with tempfile.TemporaryDirectory() as folder:
-        for name, frame in FRAMES.items():
-            thumbnail(name, frame, harbour.written(Path(folder)) if name == "harbour" else [])
+    for name, frame in FRAMES.items():
+        thumbnail(name, frame, harbour.written(folder) if name == "harbour" else [])
+
+
+def ghosts(folder: Path) -> None:
+    """A frame with every path, as a film shows it."""
+    path = folder / "ghosts.zarr"
+    ss.build(ss.load(ROOT / "configs" / "thermocline.yaml"), path, frames=[GHOSTS], workers=0)
+    tree = opened(path)
+    one = stored(tree, GHOSTS)
+    view = _view(tree, one, _reference([one]))
+    picture = FramePicture(*beam_grid(tree), window([view]), "energy re the brightest beam (dB)")
+    picture.show(view)
+    picture.figure.savefig(ROOT / ".github" / "ghosts.png", dpi=100, metadata={"Software": None})
+
+
+def laws(folder: Path) -> None:
+    """The pass of remus.yaml by three laws of scattering, side by side."""
+    stores = [folder / f"{name}.zarr" for name in LAWS]
+    for law, path in zip(LAWS.values(), stores, strict=True):
+        recipe = ss.load(ROOT / "configs" / "remus.yaml", [f"scene.world.targets.0.scattering={law}"])
+        ss.build(recipe, path, workers=0)
+    (drawn,) = show_beside(stores, folder / "laws", film=False)
+    drawn.replace(ROOT / ".github" / "laws.png")
+
+
+def accuracy(folder: Path) -> None:
+    """Error against run time of tank.yaml, with the other programs that are installed."""
+    measured = ss.accuracy(ss.load(ROOT / "configs" / "tank.yaml"), say=print)
+    write(measured, folder, "accuracy")[1].replace(ROOT / ".github" / "accuracy.png")
+
+
+DRAWN = {"thumbnails": thumbnails, "ghosts": ghosts, "laws": laws, "accuracy": accuracy}
+
+
+def main() -> None:
+    """Draw what is named."""
+    for name in sys.argv[1:] or DRAWN:
+        with tempfile.TemporaryDirectory() as folder:
+            DRAWN[name](Path(folder))
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ root = next(folder for folder in (here, *here.parents) if (folder / "configs" / 
 path = Path(tempfile.mkdtemp()) / "remus.zarr"
 
 # %%
-frames = range(4, 64, 8)
+frames = range(8, 64, 12)
 recipe = ss.load(root / "configs" / "remus.yaml", ["scene.sonar.assumed_sound_speed=1541 m/s"])
 ss.build(recipe, path, frames=frames, workers=0)
 store = ss.open(path).isel(frame=list(frames))
