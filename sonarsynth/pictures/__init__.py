@@ -32,9 +32,9 @@ def show(
 ) -> list[Path]:
     """Draw a store into the folder `out` (left out: `<store>.pictures`), say a summary, return the files written.
 
-    film.mp4 (film.gif without ffmpeg): every frame that was built. sheet.png: frame number `frame` (left out: the one
-    with most points on a target). What the store does not hold is left out of the pictures and said. Raises
-    NothingToDraw, a ValueError, where there is no store, or not that frame.
+    film.mp4 (film.gif without ffmpeg): every frame that was built, at `frames_per_second`. sheet.png: frame number
+    `frame` (left out: the one with most points on a target). What the store does not hold is left out of the pictures
+    and said. Raises NothingToDraw, a ValueError, where there is no store, or not that frame.
     """
     path = folder_of(store)
     tree = opened(path)

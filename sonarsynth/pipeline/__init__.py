@@ -269,7 +269,11 @@ def _values(plan: Plan, index: int) -> Values:
 
 
 def render(recipe: Recipe | Plan, index: int) -> xr.DataTree:
-    """One frame of a recipe as a labelled DataTree: groups and names as in a store, without the frame axis. Pure."""
+    """Compute frame number `index` of a recipe, from 0. Pure: the same frame is the same, bit for bit.
+
+    Returns a labelled DataTree: groups, names and units (attributes) as in a store, without the frame axis. Raises
+    FieldError as `plan` does, IndexError for a frame that is not there.
+    """
     import xarray as xr
 
     made = plan(recipe) if isinstance(recipe, Recipe) else recipe

@@ -56,7 +56,7 @@ def build(
     running Dask scheduler. `products` counts where a recipe is given; a Plan has its own. The arrays are the same
     whatever the number of workers, the order, the interruptions. Beside the store: a log in `<store>.log.jsonl`, run
     times in `<store>.times.jsonl`, frames that failed in `<store>.failed.jsonl`, a card in `<store>.card.md`, Croissant
-    metadata in `<store>.croissant.json`. From a script, call it under
+    metadata in `<store>.croissant.json`. `restart` replaces a store of something else. From a script, call it under
     `if __name__ == "__main__":`, as all multiprocessing needs.
 
     A frame fails and is skipped if it raises; on worker processes also if it crashes, takes `frame_timeout` seconds for
@@ -65,17 +65,17 @@ def build(
     free, or over 1 TB; `insecure` uses a scheduler on another machine without TLS; `mixed_versions` goes on with other
     versions of libraries that touch numbers than the store was begun with, and marks those frames. `dashboard` starts
     that of Dask on 127.0.0.1, where every user of this machine can read it; `announce` gets its address. A `prediction`
-    of `predicting.predict` is compared with what is measured. The text of the recipe
-    is kept where its `source` is given (`reading.read`).
+    of `predicting.predict` is compared with what is measured. `progress` gets the numbers of frames done, wanted and
+    failed. The text of the recipe is kept where its `source` is given (`reading.read`).
 
     `path` may be a URL that fsspec knows, such as s3://bucket/remus.zarr: the files beside it are objects there, but
     for the log and the run times, which are in ~/.local/state/sonarsynth.
 
-    Raises FieldError for a scene that cannot be, IndexError for frames that are not there, store.Mismatch for a store
-    of something else, store.Locked while another build runs, store.Damage where the store cannot go on, TooLarge where
-    `agreed` is needed, OSError where it cannot be written or the scheduler is gone, store.Unreachable for a URL that
-    cannot be used, RuntimeError where workers do not start, ValueError for options that cannot be. After any of these,
-    and after an interruption, the same call resumes where it ended.
+    Returns counts, times (s) and failures. Raises FieldError for a scene that cannot be, IndexError for frames that are
+    not there, store.Mismatch for a store of something else, store.Locked while another build runs, store.Damage where
+    the store cannot go on, TooLarge where `agreed` is needed, OSError where it cannot be written or the scheduler is
+    gone, store.Unreachable for a URL that cannot be used, RuntimeError where workers do not start, ValueError for
+    options that cannot be. After any of these, and after an interruption, the same call resumes where it ended.
     """
     made = what if isinstance(what, Plan) else plan(what, chosen_products(products))
     _check(workers, scheduler, frame_timeout, worker_memory, insecure)

@@ -29,7 +29,8 @@ def open_store(path: Folder | str) -> xr.DataTree:
     """A store as a DataTree, read lazily: what `xarray.open_datatree(path, engine="zarr")` gives, but no link in the
     store is followed, and counts of the converter decode to float32 (plain xarray: float64).
 
-    path: a folder or a URL. Raises Mismatch where there is no store that xarray can open, or one of another format.
+    path: a folder or a URL. Returns the tree. Raises Mismatch where there is no store that xarray can open, or one of
+    another format.
     """
     import xarray as xr
 

@@ -8,8 +8,8 @@
 # # Error against run time
 #
 # Every approximation is a setting with an error. `ss.accuracy` computes a frame the slow, exact way, varies one
-# setting after the other, and says where the choice of the planner lies. The recipe is small and only a few
-# hydrophones are computed exactly, so that the page takes seconds.
+# setting after the other, and says where the choice of the planner lies. The array is small, the snap is a test pulse,
+# and only two hydrophones are computed exactly, so that the page takes seconds.
 
 # %%
 from collections import defaultdict
@@ -25,7 +25,9 @@ root = next(folder for folder in (here, *here.parents) if (folder / "configs" / 
 
 # %%
 small = "scene.sonar.array={kind: planar_lattice, columns: 6, rows: 4, pitch: 5 cm}"
-measured = ss.accuracy(ss.load(root / "configs" / "grid.yaml", [small]), frames=[0], hydrophones=2, peers=False)
+pulse = "scene.world.sources.0.snap={kind: ricker, frequency: 40 kHz}"
+recipe = ss.load(root / "configs" / "grid.yaml", [small, pulse])
+measured = ss.accuracy(recipe, frames=[0], hydrophones=2, peers=False)
 print(f"{measured.title}: {measured.hydrophones} hydrophones computed exactly")
 
 # %% [markdown]

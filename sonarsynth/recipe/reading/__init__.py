@@ -38,15 +38,19 @@ class RenamedKey(FutureWarning):
 
 
 def load(path: Path | str, sets: Sequence[str] = ()) -> Recipe:
-    """The recipe of a YAML file, with `path=value` settings over it. Raises RecipeError."""
+    """Read a recipe from a YAML file; `sets` are settings `path=value` that replace fields, such as
+    `scene.trajectory.frames=8`.
+
+    Returns the checked recipe. Raises RecipeError, which names file, line and field.
+    """
     return recipe_of(read(path, sets))
 
 
 def loads(text: str, name: str = "recipe", folder: Path | str = ".", *, resolved: bool = False) -> Recipe:
-    """The recipe of a YAML text; its paths are relative to `folder`.
+    """Read a recipe from a YAML text; `name` stands for the file in messages, paths are relative to `folder`.
 
-    `resolved` says that `dump` wrote the text, maybe before it gave angles their unit: bare ones are then in rad.
-    Raises RecipeError.
+    Returns the checked recipe. `resolved` says that `dump` wrote the text, maybe before it gave angles their unit: bare
+    ones are then in rad. Raises RecipeError.
     """
     source = with_new_keys(read_text(text, name, Path(folder).absolute()))
     return recipe_of(source, check_files=False, resolved=resolved)
@@ -87,7 +91,7 @@ def locating(source: Source) -> Iterator[None]:
 
 
 def dump(recipe: Recipe) -> str:
-    """YAML of a recipe, every default written out; `loads` gives an equal recipe."""
+    """Returns the YAML text of a recipe, every default written out; `loads` gives an equal recipe."""
     text = io.StringIO()
     yaml: Any = YAML(typ="safe", pure=True)
     yaml.default_flow_style = None  # mappings and lists of plain values in one line, the rest as blocks

@@ -115,7 +115,8 @@ def verify(path: Folder | str, checks: Sequence[Check] = (), *, quick: bool = Fa
     """Compare marks, digests and files of a store, read every number back, and run checks on what it says.
 
     `quick` compares files with their digests and no more. Of a store that is being built, what is complete is looked
-    at, and no checks are run. Raises Mismatch where there is no store of ours.
+    at, and no checks are run. `path` is a folder or a URL. Returns problems, the results of checks, and frames. Raises
+    Mismatch where there is no store of ours.
     """
     path = absolute(path)
     building, stamped = held_by(path), stamps(path, MARKS)
