@@ -37,7 +37,7 @@ def write_points(points: xr.Dataset, path: str | Path) -> Path:
 
     def put(name: str, values: np.ndarray, kind: type) -> None:
         rows = values if values.ndim == 2 else values[:, None]
-        cloud.point[name] = o3d.core.Tensor(np.ascontiguousarray(rows, kind))
+        cloud.point[name] = o3d.core.Tensor.from_numpy(np.ascontiguousarray(rows, kind))
 
     put("positions", points["position"].values, np.float32)
     put("normals", np.nan_to_num(points["normal"].values), np.float32)
@@ -51,6 +51,6 @@ def write_points(points: xr.Dataset, path: str | Path) -> Path:
         ("range_error", np.float32),
     ):
         put(name, points[name].values, kind)
-    if not o3d.t.io.write_point_cloud(str(file), cloud, write_ascii=False):
+    if not o3d.t.io.write_point_cloud(file, cloud, write_ascii=False):
         raise OSError(f"{file} cannot be written")
     return file

@@ -27,7 +27,7 @@ from sonarsynth.ranging.received_window import ReceivedWindow
 
 BESIDE = 2
 """Cells beside the beams over threshold that are looked at too: a peak there has its neighbours."""
-LOBES = 4.0
+LOBES = 8.0
 """Times what lobes bring of louder peaks that a peak must exceed: echoes are of more than their peaks."""
 LOBE_BINS = 48
 """Frequencies that lobes are summed over."""
