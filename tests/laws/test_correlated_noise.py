@@ -35,7 +35,7 @@ def isotropic() -> NoiseField:
     module = sys.modules["isotropic_noise"] = ModuleType("isotropic_noise")
     exec(compile(text, "extending.md", "exec"), vars(module))
     del sys.modules["isotropic_noise"]
-    found: NoiseField = module.IsotropicNoise()
+    found: NoiseField = module.IsotropicNoise(level=120.0)
     return found
 
 
