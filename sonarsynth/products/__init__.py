@@ -6,10 +6,10 @@ Unless said otherwise arrays are float64, positions in m in the sonar frame, tim
 the instant of the frame; a snap at `Snap.time` is heard a travel time later).
 """
 
-from sonarsynth.products.beams import BeamSpectra
 from sonarsynth.products.labels import LINK_BUDGET, ORIGINS, Echoes, LinkBudget, PointLabels, Truth
 from sonarsynth.products.paths import DIRECT, FAMILIES, Arrivals, Paths
 from sonarsynth.products.results import REASONS, EnergyImage, PointCloud, Signals, SourceEstimates, no_points
+from sonarsynth.products.steered_spectra import BeamSpectra
 
 __all__ = [
     "DIRECT",
