@@ -54,10 +54,10 @@ class ArrayPaths:
     amplitude: Floats  # (path,)
     loss: Floats  # (path,) dB of absorption at the band centre, inside amplitude
     delay_terms: Floats  # (path, term) s
-    gain_terms: Floats  # (path, term)
-    turn_terms: Floats  # (path, term) rad: phase over that at the centre
-    spread_terms: Floats  # (path, term) s2: variance over that at the centre
-    bend_terms: Floats  # (path, term) doppler over that at the centre
+    amplitude_terms: Floats  # (path, term)
+    phase_terms: Floats  # (path, term) rad: phase over that at the centre
+    delay_variance_terms: Floats  # (path, term) s2: variance over that at the centre
+    doppler_terms: Floats  # (path, term) doppler over that at the centre
     sound_speed: float  # m/s
     aperture: float  # m: scale of the terms
     phase: Floats  # (path,) rad, -pi/2 to pi/2: whole half turns are signs of the amplitude
@@ -67,7 +67,7 @@ class ArrayPaths:
     corner_delays: Floats  # (path, 3) s: delays over which the pulse is a mean; their sum is 0
     coherent_fraction: Floats  # (path,) and
     height_delay_std: Floats  # (path,) s: of `facet_pulses.rough_factor`
-    dark: Bools  # (path, sensor) hydrophones that a path does not reach; (path, 0): it reaches all
+    occluded: Bools  # (path, sensor) hydrophones that a path does not reach; (path, 0): it reaches all
     modes: Floats  # (path, mode) weights of the modes of a stretch of time (`shapes`); none as yet
     bends: Floats  # (path, mode) what they change by for each unit of doppler more; none as yet
     centre: float  # Hz, where the amplitudes hold
@@ -121,10 +121,10 @@ def array_paths(
         amplitude=arrivals.amplitude * gain[arrivals.snap] * sign if count else arrivals.amplitude,
         loss=arrivals.absorption,
         delay_terms=arrivals.delay_terms,
-        gain_terms=arrivals.amplitude_terms,
-        turn_terms=arrivals.phase_terms,
-        spread_terms=arrivals.delay_variance_terms,
-        bend_terms=arrivals.doppler_terms,
+        amplitude_terms=arrivals.amplitude_terms,
+        phase_terms=arrivals.phase_terms,
+        delay_variance_terms=arrivals.delay_variance_terms,
+        doppler_terms=arrivals.doppler_terms,
         sound_speed=arrivals.sound_speed,
         aperture=elements.aperture or 1.0,
         phase=phase,
@@ -134,7 +134,7 @@ def array_paths(
         corner_delays=corners,
         coherent_fraction=arrivals.coherent_fraction,
         height_delay_std=np.minimum(arrivals.height_delay_std, LONGEST_BLUR),
-        dark=arrivals.hidden(elements.count),
+        occluded=arrivals.hidden(elements.count),
         modes=np.zeros((count, 0)),
         bends=np.zeros((count, 0)),
         centre=arrivals.centre,
@@ -203,7 +203,7 @@ def tilt(front: ArrayPaths, gradient: Floats) -> Floats:
     return np.asarray(-front.sound_speed * slope.swapaxes(0, 1))
 
 
-def faced(front: ArrayPaths, points: Floats) -> Floats:
+def arrival_directions(front: ArrayPaths, points: Floats) -> Floats:
     """Slownesses of the wavefronts at points (point, xyz), times the speed of sound at the centre, (path, point, xyz):
     what element faces hear, and unit vectors of `towards` where rays are straight."""
     u, _ = towards(front, points)
@@ -236,8 +236,8 @@ def delay_and_gain(front: ArrayPaths, points: Floats) -> tuple[Floats, Floats]:
     delay, gain = path / front.sound_speed, 1.0 / n
     if front.delay_terms.shape[1]:
         delay = delay + over(front.delay_terms, points, front.aperture)
-    if front.gain_terms.shape[1]:
-        gain = gain * (1.0 + over(front.gain_terms, points, front.aperture))
+    if front.amplitude_terms.shape[1]:
+        gain = gain * (1.0 + over(front.amplitude_terms, points, front.aperture))
     if front.attenuation:
         gain = gain * lost(front.attenuation * front.sound_speed * delay)
     return delay, gain
@@ -253,7 +253,7 @@ def reach(front: ArrayPaths) -> Floats:
     return np.asarray(front.aperture / front.sound_speed + np.abs(front.delay_terms).sum(axis=1))
 
 
-def reference_of(front: ArrayPaths, middle: Floats, turn_terms: Floats, spread_terms: Floats) -> ArrayPaths:
+def reference_of(front: ArrayPaths, middle: Floats, phase_terms: Floats, delay_variance_terms: Floats) -> ArrayPaths:
     """The front that a tile of paths is steered to, from the middle (column,) of their directions, curvatures,
     absorption and delay terms, and the change over the aperture that it takes."""
     norm = np.linalg.norm(middle[:3])
@@ -266,10 +266,10 @@ def reference_of(front: ArrayPaths, middle: Floats, turn_terms: Floats, spread_t
         amplitude=np.ones(1),
         loss=middle[4:5],
         delay_terms=middle[None, 5 : 5 + terms],
-        gain_terms=np.zeros((1, 0)),
-        turn_terms=turn_terms[None],
-        spread_terms=spread_terms[None],
-        bend_terms=np.zeros((1, 0)),
+        amplitude_terms=np.zeros((1, 0)),
+        phase_terms=phase_terms[None],
+        delay_variance_terms=delay_variance_terms[None],
+        doppler_terms=np.zeros((1, 0)),
         sound_speed=front.sound_speed,
         aperture=front.aperture,
         phase=np.zeros(1),
@@ -279,7 +279,7 @@ def reference_of(front: ArrayPaths, middle: Floats, turn_terms: Floats, spread_t
         corner_delays=np.zeros((1, 3)),
         coherent_fraction=np.zeros(1),
         height_delay_std=np.zeros(1),
-        dark=np.zeros((1, 0), bool),
+        occluded=np.zeros((1, 0), bool),
         modes=np.zeros((1, 0)),
         bends=np.zeros((1, 0)),
         centre=front.centre,

@@ -14,7 +14,7 @@ from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.receiver import Elements, Sonar
-from sonarsynth.signals.array_paths import ArrayPaths, array_paths, delay_and_gain, faced, lost, reach
+from sonarsynth.signals.array_paths import ArrayPaths, array_paths, arrival_directions, delay_and_gain, lost, reach
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.signals.pulse_variation import bend, changed
 from sonarsynth.signals.segments import fast_length, layout
@@ -46,7 +46,7 @@ def exact_spectra(
     for e in range(front.count):
         one = front.select(np.array([e]))
         delay, gain = delay_and_gain(one, elements.position)
-        u = faced(one, elements.position)
+        u = arrival_directions(one, elements.position)
         late = one.delay[0] - origin + delay[0]
         face = element_directivity(frequency, u[0][:, None, :], elements.face, one.sound_speed)
         farther = one.attenuation * one.sound_speed * delay[0]  # dB
@@ -56,9 +56,9 @@ def exact_spectra(
             shape = shape * facet_response(
                 frequency, one.coherent, one.corner_delays, one.coherent_fraction, one.height_delay_std, one.centre
             )
-        if one.turn_terms.any() or one.spread_terms.any():
+        if one.phase_terms.any() or one.delay_variance_terms.any():
             shape = shape * changed(one, elements.position, frequency)
-        heard = elements.gain * ~one.dark[0] if one.dark.shape[1] else elements.gain
+        heard = elements.gain * ~one.occluded[0] if one.occluded.shape[1] else elements.gain
         total += (one.amplitude[0] * gain[0] * heard)[:, None] * (
             face * loss * shape * np.exp(-2j * np.pi * late[:, None] * frequency)
         )
@@ -137,7 +137,7 @@ def exact_signals(
             frequency, spectrum = pulse_spectrum(waveform, sonar.antialias, fs, length, float(doppler))
             relative = relative_absorption(absorption, frequency, sonar.band.centre)
             some = front.select(rows[front.doppler[rows] == doppler])
-            if not some.bend_terms.any():
+            if not some.doppler_terms.any():
                 transfer = exact_spectra(some, elements, frequency, relative, start - spread / fs)
                 pressure += np.fft.irfft(transfer * spectrum, length)[:, spread : spread + samples] * fs
                 continue

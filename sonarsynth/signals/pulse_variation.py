@@ -43,27 +43,27 @@ UNCHANGING = PulseVariation((), np.zeros((0, 0, 0)), 0.0)
 
 def widest_turn(front: ArrayPaths) -> Floats:
     """Bound (path,) on |turn| (rad) over the aperture."""
-    return np.asarray(np.abs(front.turn_terms).sum(axis=1))
+    return np.asarray(np.abs(front.phase_terms).sum(axis=1))
 
 
 def widest_spread(front: ArrayPaths) -> Floats:
     """Bound (path,) on |spread| (s2) over the aperture."""
-    return np.asarray(np.abs(front.spread_terms).sum(axis=1))
+    return np.asarray(np.abs(front.delay_variance_terms).sum(axis=1))
 
 
 def widest_bend(front: ArrayPaths) -> Floats:
     """Bound (path,) on |bend| over the aperture."""
-    return np.asarray(np.abs(front.bend_terms).sum(axis=1))
+    return np.asarray(np.abs(front.doppler_terms).sum(axis=1))
 
 
 def bend(front: ArrayPaths, points: Floats) -> Floats:
     """Doppler (path, point) at points (point, xyz), over that at the centre."""
-    return over(front.bend_terms, points, front.aperture)
+    return over(front.doppler_terms, points, front.aperture)
 
 
 def turn_and_spread(front: ArrayPaths, points: Floats) -> tuple[Floats, Floats]:
     """Turn (rad) and spread (s2), (path, point) each, at points (point, xyz)."""
-    return over(front.turn_terms, points, front.aperture), over(front.spread_terms, points, front.aperture)
+    return over(front.phase_terms, points, front.aperture), over(front.delay_variance_terms, points, front.aperture)
 
 
 def changed(front: ArrayPaths, points: Floats, frequency: Floats) -> ComplexArray:
@@ -75,7 +75,7 @@ def changed(front: ArrayPaths, points: Floats, frequency: Floats) -> ComplexArra
 
 def aperture_gradient(front: ArrayPaths, points: Floats) -> Floats:
     """Gradient (xyz, point, term) of the aperture terms at points (point, xyz); empty where no front has such terms."""
-    every = front.delay_terms, front.turn_terms, front.spread_terms, front.bend_terms
+    every = front.delay_terms, front.phase_terms, front.delay_variance_terms, front.doppler_terms
     widest = max(terms.shape[1] for terms in every)
     if not widest:
         return np.zeros((3, 0, 0))
@@ -90,16 +90,16 @@ def slopes(front: ArrayPaths, gradient: Floats, lowest: float, highest: float) -
     """
     total = np.zeros((3, front.count))
     for terms, scale in (
-        (front.turn_terms, highest / lowest),
-        (front.spread_terms, 0.5 * (2.0 * np.pi * highest) ** 2),
+        (front.phase_terms, highest / lowest),
+        (front.delay_variance_terms, 0.5 * (2.0 * np.pi * highest) ** 2),
     ):
         if terms.shape[1]:
             total += scale * np.abs(np.einsum("et,ipt->ipe", terms, gradient[:, :, : terms.shape[1]])).max(axis=1)
     if front.bends.shape[1]:
         share = np.linalg.norm(front.bends, axis=1) / np.maximum(np.linalg.norm(front.modes, axis=1), 1e-300)
-        steep = np.abs(np.einsum("et,ipt->ipe", front.bend_terms, gradient[:, :, : front.bend_terms.shape[1]])).max(
-            axis=1
-        )
+        steep = np.abs(
+            np.einsum("et,ipt->ipe", front.doppler_terms, gradient[:, :, : front.doppler_terms.shape[1]])
+        ).max(axis=1)
         total += highest / lowest * share * steep
     return total
 
@@ -134,7 +134,7 @@ def _loudest(loud: Floats) -> Ints:
 
 def changes(front: ArrayPaths, frequency: Floats, spectrum: ComplexArray) -> PulseVariation:
     """What the pulses of paths change by, from the spectra (mode, bin) of modes that hold it (`with_changes`)."""
-    turns, spreads = bool(front.turn_terms.any()), bool(front.spread_terms.any())
+    turns, spreads = bool(front.phase_terms.any()), bool(front.delay_variance_terms.any())
     if not (turns or spreads):
         return UNCHANGING
     exponent = 0.5 * (2.0 * np.pi * frequency) ** 2
@@ -152,8 +152,8 @@ def changes(front: ArrayPaths, frequency: Floats, spectrum: ComplexArray) -> Pul
 class Rest(NamedTuple):
     """What pulses of a tile change by beside the reference, which the whole field of the tile changes with."""
 
-    turn_terms: Floats  # (term,) rad of the reference; none where it does not change
-    spread_terms: Floats  # (term,) s2
+    phase_terms: Floats  # (term,) rad of the reference; none where it does not change
+    delay_variance_terms: Floats  # (term,) s2
     which: Ints  # (some,) changes that count
     size: Floats  # (some, path) bounds on how much there is of each in some paths of the tile
     bent: bool  # whether their Doppler's change counts
@@ -169,8 +169,8 @@ def rest(front: ArrayPaths, paths: Ints, found: PulseVariation, tolerance: float
     bent = front.bends.shape[1] > 0 and _counts(_bent(front, some), loud * np.linalg.norm(weight, axis=1), tolerance)
     if not found.kinds:
         return Rest(none, none, np.zeros(0, int), np.zeros((0, some.size)), bent, some)
-    turn, turned = _middle(front.turn_terms, some)
-    spread, softer = _middle(front.spread_terms, some)
+    turn, turned = _middle(front.phase_terms, some)
+    spread, softer = _middle(front.delay_variance_terms, some)
     share = np.array([np.minimum(turned, 1.0) ** a * (softer * found.rate) ** p for p, a in found.kinds])
     size = np.sqrt((np.tensordot(weight, found.onto, (1, 1)) ** 2).sum(axis=2)).T * share * loud
     mean = np.sqrt((size**2).sum(axis=1) / (loud**2).sum())
@@ -181,7 +181,7 @@ def rest(front: ArrayPaths, paths: Ints, found: PulseVariation, tolerance: float
 def _bent(front: ArrayPaths, some: Ints) -> Floats:
     """Bounds (path,) on what Doppler's change over the aperture adds to some paths."""
     size = np.linalg.norm(front.bends[some], axis=1) * np.abs(front.amplitude[some])
-    return np.asarray(size * np.abs(front.bend_terms[some]).sum(axis=1))
+    return np.asarray(size * np.abs(front.doppler_terms[some]).sum(axis=1))
 
 
 def _counts(size: Floats, loud: Floats, tolerance: float) -> bool:

@@ -94,7 +94,7 @@ def _supports(
     chosen, rough = sonar.antialias, front.coherent_fraction > 0.0
     spread = widest_spread(front)
     delay_std, least = np.sqrt(front.variance + spread), np.sqrt(np.maximum(front.variance - spread, 0.0))
-    turned = (front.phase != 0.0) | front.turn_terms.any(axis=1)
+    turned = (front.phase != 0.0) | front.phase_terms.any(axis=1)
     longest = [at_longest(s.waveform) for s in snaps]
     roughest = float(front.height_delay_std[rough].max(initial=0.0))
 

@@ -16,7 +16,7 @@ from sonarsynth.propagation import Refracted
 from sonarsynth.receiver import Elements, Romanis, Sonar, elements
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.signals import DirectSum, GriddedSynthesis
-from sonarsynth.signals.array_paths import array_paths, faced, towards
+from sonarsynth.signals.array_paths import array_paths, arrival_directions, towards
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Snap, WorldState
@@ -58,7 +58,7 @@ def slownesses(gradient: float, array: Elements) -> tuple[float, float]:
     """Largest error of slownesses across faces at three hydrophones, times the sound speed: of wavefronts, and of
     straight rays."""
     front, errors = array_paths(traced(gradient, array, POSE), SNAPS, array), []
-    bent, straight = faced(front, array.position), towards(front, array.position)[0]
+    bent, straight = arrival_directions(front, array.position), towards(front, array.position)[0]
     for sensor in FAR:
         own, _ = alone(gradient, array, int(sensor))
         exact = own.direction * front.sound_speed / own.sound_speed
@@ -80,7 +80,7 @@ def test_the_straight_limit_is_that_of_straight_rays() -> None:
     gap = slownesses(1e-3, ROMANIS)[1]
     assert gap < 1e-3 * slownesses(1.0, ROMANIS)[1] * 1.1
     front = array_paths(traced(0.0, ROMANIS, POSE), SNAPS, ROMANIS)
-    assert (faced(front, ROMANIS.position) == towards(front, ROMANIS.position)[0]).all()
+    assert (arrival_directions(front, ROMANIS.position) == towards(front, ROMANIS.position)[0]).all()
 
 
 def test_the_motion_of_the_array_turns_no_wave() -> None:
@@ -88,7 +88,7 @@ def test_the_motion_of_the_array_turns_no_wave() -> None:
     moving = Track(POSE, np.array([1.0, 2.0, 0.0]))
     front = array_paths(traced(0.0, ROMANIS, POSE, moving), SNAPS, ROMANIS)
     assert front.delay_terms.any()
-    assert np.abs(faced(front, ROMANIS.position) - towards(front, ROMANIS.position)[0]).max() < 1e-12
+    assert np.abs(arrival_directions(front, ROMANIS.position) - towards(front, ROMANIS.position)[0]).max() < 1e-12
 
 
 def test_signals_of_one_expansion_are_those_of_each_hydrophone() -> None:

@@ -35,10 +35,10 @@ def variation(front: ArrayPaths, elements: Elements) -> Floats:
     First the root mean square over the hydrophones; then, of each axis, bounds on the Chebyshev coefficients of degree
     0 to 3. No rows where the amplitude is that of the sphere alone.
     """
-    if not front.gain_terms.shape[1]:
+    if not front.amplitude_terms.shape[1]:
         return np.zeros((0, front.count))
-    shape, basis, heard = _basis(elements, front.aperture, front.gain_terms.shape[1])
-    terms = front.gain_terms.T.copy()
+    shape, basis, heard = _basis(elements, front.aperture, front.amplitude_terms.shape[1])
+    terms = front.amplitude_terms.T.copy()
     terms[0] += 1.0
     rows = np.zeros((1 + 3 * DEGREES, front.count))
     rows[0] = np.sqrt(((heard @ terms) ** 2).sum(axis=0))

@@ -104,7 +104,7 @@ def _shaped(front: ArrayPaths) -> bool:
     found = bool(
         front.variance.any() or front.phase.any() or front.corner_delays.any() or front.coherent_fraction.any()
     )
-    return found or (front.count > 1 and bool(front.turn_terms.any() or front.spread_terms.any()))
+    return found or (front.count > 1 and bool(front.phase_terms.any() or front.delay_variance_terms.any()))
 
 
 def _changing(front: ArrayPaths, highest: Floats, tolerance: float) -> ArrayPaths:
@@ -114,22 +114,24 @@ def _changing(front: ArrayPaths, highest: Floats, tolerance: float) -> ArrayPath
     turn = np.linalg.norm(widest_turn(front) * loud)
     spread = np.linalg.norm(widest_spread(front) * loud) * float(blur_exponent(highest)[0])
     least = SHAPES * tolerance * loud.max()
-    terms = (v if size > least else v[:, :0] for size, v in ((turn, front.turn_terms), (spread, front.spread_terms)))
-    turn_terms, spread_terms = terms
-    return replace(front, turn_terms=turn_terms, spread_terms=spread_terms)
+    terms = (
+        v if size > least else v[:, :0] for size, v in ((turn, front.phase_terms), (spread, front.delay_variance_terms))
+    )
+    phase_terms, delay_variance_terms = terms
+    return replace(front, phase_terms=phase_terms, delay_variance_terms=delay_variance_terms)
 
 
 def _bent(
     front: ArrayPaths, spectrum: ComplexArray, series: ComplexArray, widest: float, tolerance: float
 ) -> ArrayPaths:
     """Paths without what their Doppler changes by over the aperture, where that is nothing beside the loudest."""
-    if not front.bend_terms.shape[1]:
+    if not front.doppler_terms.shape[1]:
         return front
     loud, longer = np.abs(front.amplitude), widest_bend(front)
     slope = bending(series, front.doppler[:1] / widest) @ series / widest
     rate = float(np.abs(slope).sum() / np.abs(spectrum).sum())
     size = max(np.linalg.norm(loud * longer) / np.linalg.norm(loud), (loud * longer).max() / loud.max())
-    return front if rate * size > SHAPES * tolerance else replace(front, bend_terms=front.bend_terms[:, :0])
+    return front if rate * size > SHAPES * tolerance else replace(front, doppler_terms=front.doppler_terms[:, :0])
 
 
 def _check_corners(front: ArrayPaths, highest: float) -> None:
@@ -161,12 +163,12 @@ def _with_modes(
         front, spectrum, series = replace(front, loss=front.loss - middle), spectrum * lost, series * lost
     else:
         decay = np.zeros(frequency.size)
-    bent = front.count if len(series) and front.bend_terms.shape[1] else 0
+    bent = front.count if len(series) and front.doppler_terms.shape[1] else 0
     every = with_changes(front) if front.count > 1 or bent else front
     weight, modes, bends = shape_modes(every, frequency, spectrum, decay, series, widest, SHAPES * tolerance, bent)
     weight, bends = weight[: front.count], bends[: front.count]
     if front.corner_delays.any() or front.coherent_fraction.any():
-        spectrum = modes[0]  # what paths mostly send: the colour of the errors
+        spectrum = modes[0]  # what paths mostly send: the spectrum of the errors
     return replace(front, modes=weight, bends=bends, loss=np.zeros(front.count) if few else front.loss), spectrum, modes
 
 
@@ -182,7 +184,7 @@ def _shared(
         # the ends of a smooth series differ most
         bend = stretched(series, np.array([low, high]) / widest) @ series
         if np.abs(bend[1] - bend[0]).sum() <= SHAPES * tolerance * np.abs(spectrum).sum():
-            series, front = series[:0], replace(front, bend_terms=front.bend_terms[:, :0])
+            series, front = series[:0], replace(front, doppler_terms=front.doppler_terms[:, :0])
     least = float(front.variance.min())
     spread = float(front.variance.max()) - least
     if least > 0.0:

@@ -15,8 +15,8 @@ from sonarsynth.receiver import Elements
 from sonarsynth.signals.array_paths import (
     NEPER,
     ArrayPaths,
+    arrival_directions,
     delay_and_gain,
-    faced,
     lost,
     over,
     terms_gradient,
@@ -25,7 +25,7 @@ from sonarsynth.signals.array_paths import (
 )
 from sonarsynth.signals.gridded.bins import Bins
 from sonarsynth.signals.gridded.interpolation import to_sensors
-from sonarsynth.signals.gridded.low_rank import colour, face_pairs, recipe, sinc_polynomials
+from sonarsynth.signals.gridded.low_rank import face_pairs, sinc_polynomials, spectral_quantiles, term_products
 from sonarsynth.signals.gridded.nodes import DEGREES, Axis, chebyshev, interpolation, nodes_for, polynomials_for
 from sonarsynth.signals.gridded.tiles import Tile, TileSettings, tiles
 from sonarsynth.signals.pulse_variation import PulseVariation, bend, changed, shares
@@ -97,7 +97,7 @@ def add_segment(
     aim = TileSettings(
         elements=elements,
         highest=highest,
-        weights=colour(bins.frequency, bins.spectrum, highest),
+        weights=spectral_quantiles(bins.frequency, bins.spectrum, highest),
         steepest=float(np.abs(bins.relative[bins.frequency <= highest]).max(initial=0.0)),
         fading=float(np.abs(bins.relative) @ np.abs(bins.spectrum) / np.abs(bins.spectrum).sum()),
         tolerance=tolerance,
@@ -126,13 +126,13 @@ def _add_tile(heard: npt.NDArray[Any], tile: Tile, part: ArrayPaths, stage: Stag
     points = tile.nodes(elements)
     alone = part.count == 1
     field = _alone(tile, part, points, stage) if alone else _deposited(tile, part, points, stage)
-    if tile.reference.turn_terms.any() or tile.reference.spread_terms.any():
+    if tile.reference.phase_terms.any() or tile.reference.delay_variance_terms.any():
         field = _changed(field, tile, points, stage)
     delay, gain = delay_and_gain(tile.reference, elements.position)
     late = delay[0] + (part.delay[0] - stage.origin if alone else 0.0)
     gain = gain[0] * elements.gain * (part.amplitude[0] if alone else 1.0)
-    if alone and part.dark.shape[1]:
-        gain = gain * ~part.dark[0]
+    if alone and part.occluded.shape[1]:
+        gain = gain * ~part.occluded[0]
     onto, column, weight = to_sensors(elements, tile.axes, dtype.name)
     field = field.reshape(len(points) // weight.shape[1], -1)
     if onto is not None:
@@ -188,7 +188,7 @@ def _deposits(
     points, grid, reference = nodes[some], stage.grid, tile.reference
     rate = grid.circle * stage.bins.step
     steer, _ = delay_and_gain(reference, points)
-    middle, level = faced(reference, points), towards(reference, points)[1]
+    middle, level = arrival_directions(reference, points), towards(reference, points)[1]
     late, louder, lean = np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0, 0))
     share = shares(part, reference, tile.changes, tile.bent, stage.bins.changes, points, stage.dtype)
     if part.delay_terms.shape[1]:
@@ -197,10 +197,10 @@ def _deposits(
             lean = np.ascontiguousarray(
                 tilt(part, terms_gradient(points, part.aperture, part.delay_terms.shape[1])[1:])
             )
-    if part.gain_terms.shape[1]:
-        louder = np.ascontiguousarray(over(part.gain_terms, points, part.aperture).T)
-    if part.dark.any():
-        louder = np.where(part.dark.T[some], -1.0, louder if louder.size else 0.0)
+    if part.amplitude_terms.shape[1]:
+        louder = np.ascontiguousarray(over(part.amplitude_terms, points, part.aperture).T)
+    if part.occluded.any():
+        louder = np.where(part.occluded.T[some], -1.0, louder if louder.size else 0.0)
     farther = part.attenuation * part.sound_speed / rate  # dB a sample
     out = np.zeros((len(points), len(tile.terms), grid.circle + grid.lanes), stage.dtype)
     deposit(
@@ -217,7 +217,7 @@ def _deposits(
         louder,
         lean,
         share,
-        recipe(tile.terms),
+        term_products(tile.terms),
         grid.taps,
         0.5 * grid.width,
         grid.lanes,
@@ -270,7 +270,7 @@ def _faces(tile: Tile, points: Floats, stage: Stage) -> npt.NDArray[Any]:
     degrees, _ = face_pairs(tile.terms)
     if face == 0.0 and not reference.attenuation:
         return np.broadcast_to(np.ones(1, dtype), (len(points), len(degrees), f.size))
-    u = faced(reference, points)[0, :, 1:].T
+    u = arrival_directions(reference, points)[0, :, 1:].T
     middle, half = 0.5 * (f[-1] + f[0]), 0.5 * (f[-1] - f[0])
     scale = face / reference.sound_speed
     deviation = np.array(tile.deviation[:2])[:, None]

@@ -99,18 +99,18 @@ def _mix(weight: Any, share: Any, node: int, first: int, size: int, modes: int, 
 
 
 @njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
-def _expand(value: Any, weight: Any, recipe: Any, modes: bool) -> None:
+def _expand(value: Any, weight: Any, term_products: Any, modes: bool) -> None:
     """Terms of a block of paths, from row 4 of value on; there is the amplitude, which with modes moves to row 3."""
     if modes:
         value[3 * BLOCK : 4 * BLOCK] = value[4 * BLOCK : 5 * BLOCK]
-    for t in range(0 if modes else 1, recipe.shape[0]):
-        a, b, c = (4 + recipe[t, 0]) * BLOCK, recipe[t, 1] * BLOCK, (4 + t) * BLOCK
-        if recipe[t, 1] < 3:
+    for t in range(0 if modes else 1, term_products.shape[0]):
+        a, b, c = (4 + term_products[t, 0]) * BLOCK, term_products[t, 1] * BLOCK, (4 + t) * BLOCK
+        if term_products[t, 1] < 3:
             _multiply(value[a : a + BLOCK], value[b : b + BLOCK], value[c : c + BLOCK])
         else:
             _multiply(value[a : a + BLOCK], weight[b - 3 * BLOCK :], value[c : c + BLOCK])
-        if recipe[t, 2] >= 0:
-            d = (4 + recipe[t, 2]) * BLOCK
+        if term_products[t, 2] >= 0:
+            d = (4 + term_products[t, 2]) * BLOCK
             _recur(value[c : c + BLOCK], value[d : d + BLOCK])
 
 
@@ -142,7 +142,7 @@ def deposit(
     louder: Any,
     lean: Any,
     share: Any,
-    recipe: Any,
+    term_products: Any,
     taps: Any,
     half: float,
     lanes: int,
@@ -156,11 +156,11 @@ def deposit(
     nodes, taken off: steer (node,) its delay in samples, level (node,) its gain, middle (node, 2) its direction y, z.
     scale (2,) is one over the deviation of y and z; absorbed (2,) what a sample more of the way takes, in Np and in
     deviations of absorption. late (samples) and louder (node, path) and lean (node, y or z, path) are the wavefront's
-    terms, or empty; share (change, node, path) is how much the modes are of each change, or empty. recipe (term, 3)
-    makes terms. taps (row * 4 * lane,) is the kernel, a cubic a row, and half its half width in samples. rate is in
+    terms, or empty; share (change, node, path) is how much the modes are of each change, or empty. term_products (term,
+    3) makes terms. taps (row * 4 * lane,) is the kernel, a cubic a row, and half its half width in samples. rate is in
     samples/m; the grid is a circle of `length` samples.
     """
-    terms, stride = recipe.shape[0], length + lanes
+    terms, stride = term_products.shape[0], length + lanes
     cubes = taps.size // (4 * lanes)
     place, more, fraction = np.empty(BLOCK), np.zeros(BLOCK), np.empty(BLOCK, grid.dtype)
     begin, row = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
@@ -181,9 +181,9 @@ def deposit(
                 _amplify(value[4 * BLOCK :], louder[m, first : first + size])
             if share.size:
                 _mix(block[ROWS * BLOCK :], share, m, first, size, modes, mixed)
-                _expand(value, mixed, recipe, True)
+                _expand(value, mixed, term_products, True)
             else:
-                _expand(value, block[ROWS * BLOCK :], recipe, rows > ROWS)
+                _expand(value, block[ROWS * BLOCK :], term_products, rows > ROWS)
             _split(place, half, cubes, length, begin, row, fraction)
             for i in range(size):
                 for lane in range(0, lanes, 8):

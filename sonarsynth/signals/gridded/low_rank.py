@@ -14,10 +14,10 @@ from math import factorial
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.signals.gridded.nodes import Colour, analysis, chebyshev, rounded_up
+from sonarsynth.signals.gridded.nodes import SpectralQuantiles, analysis, chebyshev, rounded_up
 
 
-def colour(frequency: Floats, spectrum: np.ndarray, highest: float) -> Colour:
+def spectral_quantiles(frequency: Floats, spectrum: np.ndarray, highest: float) -> SpectralQuantiles:
     """Quantiles of the modulus of a spectrum over frequency, over `highest` (Hz), rounded up to a twentieth."""
     mass = np.cumsum(np.abs(spectrum))
     found = np.interp((np.arange(8) + 0.5) / 8.0, mass / mass[-1], frequency / highest)
@@ -29,8 +29,8 @@ FACTORIALS = np.array([float(factorial(n)) for n in DEGREES])
 
 
 @lru_cache(maxsize=512)
-def face_terms(deviation: float, weights: Colour) -> Floats:
-    """Bounds (degree,) on the terms of sinc(a + x), |x| <= `deviation` at the highest frequency, weighted by colour.
+def face_terms(deviation: float, weights: SpectralQuantiles) -> Floats:
+    """Bounds (degree,) on the terms of sinc(a + x), |x| <= `deviation` at the highest frequency, by the spectrum.
 
     The Chebyshev coefficient of exp(2 pi i x s), |s| <= 1/2, is 2 J_n(2 pi x s) <= 2 (pi x s)^n/n!, and its mean over s
     is taken.
@@ -48,7 +48,11 @@ PLAIN: tuple[float, ...] = (1.0,)
 
 
 def terms_for(
-    face: tuple[float, float], loss: float, weights: Colour, tolerance: float, modes: tuple[float, ...] = PLAIN
+    face: tuple[float, float],
+    loss: float,
+    weights: SpectralQuantiles,
+    tolerance: float,
+    modes: tuple[float, ...] = PLAIN,
 ) -> tuple[Term, ...]:
     """Terms to keep: deviations of face argument in y and z, of absorption (Np), and sizes of modes are given. Closed:
     the factors of each are there.
@@ -61,7 +65,7 @@ def terms_for(
 
 @lru_cache(maxsize=1024)
 def _terms(
-    y: float, z: float, loss: float, modes: tuple[float, ...], weights: Colour, tolerance: float
+    y: float, z: float, loss: float, modes: tuple[float, ...], weights: SpectralQuantiles, tolerance: float
 ) -> tuple[Term, ...]:
     sizes = [face_terms(y, weights), face_terms(z, weights), loss**DEGREES / FACTORIALS, np.array(modes)]
     if len(modes) > 1:  # the product of four is large: without what is nothing
@@ -85,7 +89,7 @@ def face_pairs(terms: tuple[Term, ...]) -> tuple[np.ndarray, np.ndarray]:
 
 
 @lru_cache(maxsize=256)
-def recipe(terms: tuple[Term, ...]) -> np.ndarray:
+def term_products(terms: tuple[Term, ...]) -> np.ndarray:
     """How to make each term from earlier ones (term, 3); -1 is given, the amplitude.
 
     Columns: which term; times which factor (0 y, 1 z, 2 absorption, 3 and on the modes); and, where it is twice that

@@ -29,7 +29,7 @@ WIDER = 1.05
 DEGREES = 4
 """Degrees, from 0 on, of the polynomials that a wave may be multiplied by."""
 
-Colour = tuple[float, ...]
+SpectralQuantiles = tuple[float, ...]
 """Frequencies, over the highest, that halve each eighth of the pulse's spectrum: what an error at a frequency
 weighs."""
 
@@ -39,7 +39,7 @@ class Axis(NamedTuple):
 
     nodes: int
     phase: float = inf  # rad, half range of the waves that are fitted; inf for polynomials
-    weights: Colour = ()  # of the frequencies that they are fitted for
+    weights: SpectralQuantiles = ()  # of the frequencies that they are fitted for
 
 
 def rounded_up(value: float, by: float = 1.1) -> float:
@@ -96,7 +96,7 @@ def _fit(axis: Axis) -> Floats:
 
 
 @lru_cache(maxsize=4096)
-def _errors(axis: Axis, phase: float, weights: Colour) -> tuple[float, ...]:
+def _errors(axis: Axis, phase: float, weights: SpectralQuantiles) -> tuple[float, ...]:
     """Largest errors (degree,) of T_d(x) exp(i k x), |k| <= `phase` at the highest frequency, mean over the colours."""
     x = np.cos(np.linspace(0.0, np.pi, 4 * axis.nodes + 17))
     k = np.linspace(0.0, 1.0, 17 + 2 * int(phase))
@@ -123,7 +123,7 @@ def _tails() -> tuple[Floats, Floats]:
 
 
 @lru_cache(maxsize=64)
-def _mean_tails(weights: Colour) -> Floats:
+def _mean_tails(weights: SpectralQuantiles) -> Floats:
     """Error (node count - 1, phase) at the phases of `_tails`, mean over the colours; never falls with phase."""
     phase, tails = _tails()
     mean = np.mean([[np.interp(phase * w, phase, tail) for tail in tails] for w in weights], axis=0)
@@ -131,7 +131,7 @@ def _mean_tails(weights: Colour) -> Floats:
 
 
 @lru_cache(maxsize=4096)
-def _by_polynomials(phase: float, weights: Colour, tolerance: float, degrees: tuple[float, ...]) -> int:
+def _by_polynomials(phase: float, weights: SpectralQuantiles, tolerance: float, degrees: tuple[float, ...]) -> int:
     at = int(np.searchsorted(_tails()[0], phase))
     if at == _tails()[0].size or not np.isfinite(degrees).all():
         return MOST_NODES + 1
@@ -144,12 +144,14 @@ def _by_polynomials(phase: float, weights: Colour, tolerance: float, degrees: tu
     return int(np.argmax(np.append(bound, 0.0) <= tolerance)) + 1
 
 
-def polynomials_for(phase: float, weights: Colour, tolerance: float, degrees: tuple[float, ...] = (1.0,)) -> Axis:
+def polynomials_for(
+    phase: float, weights: SpectralQuantiles, tolerance: float, degrees: tuple[float, ...] = (1.0,)
+) -> Axis:
     """As `nodes_for`, by polynomials, which more nodes may then be given for what is no wave."""
     return Axis(_by_polynomials(rounded_up(phase, 1.04), weights, tolerance, tuple(map(rounded_up, degrees))))
 
 
-def nodes_for(phase: float, weights: Colour, tolerance: float, degrees: tuple[float, ...] = (1.0,)) -> Axis:
+def nodes_for(phase: float, weights: SpectralQuantiles, tolerance: float, degrees: tuple[float, ...] = (1.0,)) -> Axis:
     """Nodes that interpolate waves of phase within +-`phase` (rad) to `tolerance`; MOST_NODES + 1 where none do.
 
     The waves may bear an amplitude that is a polynomial: `degrees` bounds its Chebyshev coefficients of degree 0 to 3.

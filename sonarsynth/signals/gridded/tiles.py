@@ -14,7 +14,7 @@ from sonarsynth.signals.array_paths import NEPER, ArrayPaths, reference_of
 from sonarsynth.signals.gridded.amplitude_nodes import degrees, variation
 from sonarsynth.signals.gridded.interpolation import Axes, box_nodes, columns
 from sonarsynth.signals.gridded.low_rank import PLAIN, Term, terms_for
-from sonarsynth.signals.gridded.nodes import MOST_NODES, Colour, nodes_for
+from sonarsynth.signals.gridded.nodes import MOST_NODES, SpectralQuantiles, nodes_for
 from sonarsynth.signals.pulse_shapes import main_modes
 from sonarsynth.signals.pulse_variation import PulseVariation, aperture_gradient, pulses, rest, slopes
 
@@ -24,11 +24,11 @@ MOST_TERMS = 24
 
 @dataclass(frozen=True, eq=False)
 class TileSettings:
-    """What the tiles are for: the array, its highest frequency, the pulse's colour, and the error allowed."""
+    """What the tiles are for: the array, its highest frequency, the spectral quantiles, and the error allowed."""
 
     elements: Elements
     highest: float  # Hz
-    weights: Colour
+    weights: SpectralQuantiles
     steepest: float  # largest change of absorption over the band, over that at the centre
     fading: float  # mean of it over the pulse
     tolerance: float
@@ -147,7 +147,7 @@ def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
     columns = views.columns if whole else np.take(views.columns, paths, axis=1)
     low, high = columns.min(axis=1), columns.max(axis=1)
     over = rest(views.front, paths, aim.changes, 0.1 * aim.tolerance)
-    reference = reference_of(views.front, 0.5 * (low + high), over.turn_terms, over.spread_terms)
+    reference = reference_of(views.front, 0.5 * (low + high), over.phase_terms, over.delay_variance_terms)
     probes = views.probes
     own = _columns(reference, probes.points, views.gradient)[:, 0]
     far = np.maximum(high - own, own - low)
@@ -233,7 +233,7 @@ def tiles(front: ArrayPaths, aim: TileSettings) -> list[Tile]:
     second.
 
     Paths that miss some hydrophones are apart: each of these is a node of their tiles."""
-    missed = front.dark.any(axis=1)
+    missed = front.occluded.any(axis=1)
     if not missed.any() or missed.all():
         return _tiles(front, aim, bool(missed.any()))
     rows = [np.flatnonzero(~missed), np.flatnonzero(missed)]
@@ -262,7 +262,7 @@ def _tiles(front: ArrayPaths, aim: TileSettings, missed: bool) -> list[Tile]:
 
 def _alone_pays(tile: Tile, front: ArrayPaths, aim: TileSettings) -> bool:
     """Whether the paths of a tile cost less one by one, each steered to the hydrophones that it does not miss."""
-    steered = 4.0 * aim.bins * float(np.count_nonzero(~front.dark[tile.paths]))
+    steered = 4.0 * aim.bins * float(np.count_nonzero(~front.occluded[tile.paths]))
     return tile.paths.size > 1 and 2e5 * tile.paths.size + steered < tile.cost
 
 
