@@ -19,9 +19,8 @@ from sonarsynth.state import WorldState
 
 FIRST_NULL = 1.9
 """rad of phase, root mean square over the aperture, at the first null of a beam: 1.915 of a disc, 1.81 of a line."""
-EXPLAINED = 0.01
-"""Of the energy of its beam that the paths of a frame must bring a point, or noise made it: one resolution in a hundred
-of the echo window. A peak of noise that is ranged has 0.03 of all noise in the window of shipped scenes."""
+EXPLAINED = 0.05
+"""Of the energy of a point that the paths of a frame must bring, or noise made it."""
 
 
 def label_points(

@@ -91,7 +91,7 @@ class PointCloud:
     elevation: Floats  # (point,) rad
     elevation_error: Floats  # (point,) rad
     delay: npt.NDArray[np.float32]  # (point,) s after the direct arrival
-    energy: npt.NDArray[np.float32]  # (point,) Pa2 s of the beam
+    energy: npt.NDArray[np.float32]  # (point,) Pa2 s: of the echo, or of its beam, as it was picked
     snr: npt.NDArray[np.float32]  # (point,) dB: power of the echo's peak over the mean power of noise in its beam
     overflow: int = 0  # points that were left out: the faintest
 

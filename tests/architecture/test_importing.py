@@ -69,7 +69,6 @@ SURFACE = [
     "Myring",
     "Normal",
     "PartlyReflecting",
-    "Physics",
     "Peaks",
     "Physics",
     "Plan",

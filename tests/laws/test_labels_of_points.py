@@ -83,7 +83,7 @@ def labels_at(case: Made, beam: np.ndarray, delay: np.ndarray, energy: float = 1
     for u, t in zip(beam, delay, strict=True):
         azimuth, elevation = (np.atleast_1d(a) for a in azimuth_elevation(u))
         far, late = np.full(1, 20.0, np.float32), np.full(1, t - case.listening.clock)
-        cloud = PointCloud(20.0 * u[None], far, far, azimuth, elevation, late, np.full(1, energy))
+        cloud = PointCloud(20.0 * u[None], far, far, azimuth, far, elevation, far, late, np.full(1, energy), far)
         arrivals, moment = case.arrivals, case.frame.moment
         found: PointLabels = label_points(cloud, arrivals, case.band, moment, case.listening)
         rows.append({name: value[0] for name, value in vars(found).items()})
@@ -294,7 +294,8 @@ def test_a_point_is_labelled_by_its_own_direction_and_not_by_that_of_others() ->
     late = case.arrivals.delay[~case.arrivals.direct][0] - case.listening.clock
     azimuth, far = np.array([0.5, 0.0]), np.full(2, 20.0, np.float32)
     place = 20.0 * direction(azimuth, np.zeros(2))
-    cloud = PointCloud(place, far, far, azimuth, np.zeros(2), np.full(2, late), np.full(2, 1e-300))
+    energy = np.full(2, 1e-300)
+    cloud = PointCloud(place, far, far, azimuth, far, np.zeros(2), far, np.full(2, late), energy, far)
     found = label_points(cloud, case.arrivals, case.band, case.frame.moment, case.listening)
     assert found.target[1] == 0 and found.distance[1] < 0.1 and not found.distance[0] < 5.0
     for i in range(2):

@@ -54,7 +54,7 @@ def test_the_cloud_is_a_list_whose_first_rows_are_its_points(built: Path) -> Non
 def test_the_loudest_points_are_kept_in_their_order_and_the_rest_are_counted() -> None:
     energy = np.array([3.0, 9.0, 1.0, 9.0, 5.0], np.float32)
     n = np.arange(5.0, dtype=np.float32)
-    cloud = PointCloud(np.stack([n, n, n], axis=1), n, n, n.astype(float), n.astype(float), n, energy, overflow=2)
+    cloud = PointCloud(np.stack([n, n, n], axis=1), n, n, *[n.astype(float)] * 4, n, energy, n, overflow=2)
     few = cloud.loudest(3)
     assert few.range.tolist() == [1.0, 3.0, 4.0] and few.overflow == 4 and few.position[:, 2].tolist() == [1, 3, 4]
     assert cloud.loudest(5) is cloud and len(cloud.loudest(1)) == 1

@@ -21,7 +21,7 @@ class PickedEchoes:
     elevation_error: Floats  # (echo,) rad
     delay: Floats  # (echo,) s after the direct arrival
     delay_error: Floats  # (echo,) s
-    energy: npt.NDArray[np.float32]  # (echo,) Pa2 s of the beam
+    energy: npt.NDArray[np.float32]  # (echo,) Pa2 s: of the echo, or of its beam
     snr: Floats  # (echo,) dB: power of the peak over the mean power of noise in its beam
     slope: Floats  # (echo,) m/m: by how much the range may differ across `azimuth_error`, beside what geometry says
     overflow: int = 0  # beams that were not looked at, the faintest
