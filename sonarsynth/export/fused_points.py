@@ -116,11 +116,10 @@ def _normals(tree: xr.DataTree, bodies: xr.Dataset, target: Ints, facet: Ints, n
     """Outward normals (point, xyz), world, of the facets that brought the echoes; NaN where none did."""
     found = np.full((len(target), 3), np.nan)
     for number, name in enumerate(names):
-        group = f"targets/{name}"
         some = np.flatnonzero((target == number) & (facet >= 0))
-        if group not in tree or not len(some):
+        if not len(some) or "targets" not in tree.children or name not in tree["targets"].children:
             continue
-        mesh = tree[group].dataset
+        mesh = tree["targets"].children[name].dataset
         a, b, c = np.moveaxis(mesh["vertices"].values.astype(float)[mesh["faces"].values[facet[some]]], 1, 0)
         across = np.cross(b - a, c - a)
         own = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)

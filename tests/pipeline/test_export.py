@@ -1,0 +1,89 @@
+"""Clouds of many frames in one frame of reference, and files of them for other programs."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sonarsynth as ss
+from sonarsynth import schedule
+from sonarsynth.cli import app
+from sonarsynth.cli.running import run
+from sonarsynth.export import write_points
+from sonarsynth.geometry import Pose
+from sonarsynth.recipe.reading import load
+
+
+@pytest.fixture(scope="module")
+def crossing(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Five frames of a hull that crosses."""
+    path = tmp_path_factory.mktemp("export") / "remus.zarr"
+    recipe = load("configs/remus.yaml", [])
+    assert schedule.build(recipe, path, frames=(0, 16, 32, 40, 63), workers=0, products="cloud").ok
+    return path
+
+
+def test_points_are_the_same_in_every_frame_of_reference(crossing: Path) -> None:
+    tree = ss.open(crossing)
+    sonar, world, hull = (ss.points(tree, relative_to=to) for to in ("sonar", "world", "remus"))
+    assert sonar.sizes["point"] == world.sizes["point"] == int(tree["cloud/count"].where(tree["cloud/count"] > 0).sum())
+    assert set(np.unique(sonar["frame"])) == {0, 16, 32, 40, 63}
+    cloud, truth = tree["cloud"].dataset, tree["truth"].dataset
+    for index in (0, 32):
+        rows = np.flatnonzero(sonar["frame"].values == index)
+        stored = np.stack([cloud[axis][index].values[: len(rows)] for axis in "xyz"], axis=-1)
+        np.testing.assert_allclose(sonar["position"].values[rows], stored, rtol=1e-6)
+        pose = Pose(truth["sonar_position"][index].values, truth["sonar_orientation"][index].values)
+        np.testing.assert_allclose(world["position"].values[rows], pose.to_world(stored.astype(float)), atol=1e-5)
+    np.testing.assert_allclose(
+        np.linalg.norm(hull["normal"].values[hull["target"].values == 0], axis=1), 1.0, rtol=1e-6
+    )
+
+
+def test_points_of_a_moving_hull_fall_together_on_it(crossing: Path) -> None:
+    hull = ss.points(crossing, relative_to="remus")
+    own = (hull["target"].values == 0) & (hull["origin"].values == 0)
+    place = hull["position"].values[own]
+    assert own.mean() > 0.9
+    assert np.mean(hull["distance"].values[own] < 0.05) > 0.95
+    assert np.abs(place[:, 0]).max() < 0.9 and np.abs(place[:, 1:]).max() < 0.2
+    world = ss.points(crossing, relative_to="world")["position"].values[own]
+    assert np.ptp(world[:, 1]) > 5.0 > 3.0 * np.ptp(place[:, 0]), "it crossed 9 m of water"
+
+
+def test_files_hold_the_points_with_colours_normals_and_labels(crossing: Path, tmp_path: Path) -> None:
+    import open3d as o3d
+
+    cloud = ss.points(crossing, relative_to="remus")
+    for ending in ("ply", "pcd"):
+        back = o3d.t.io.read_point_cloud(str(write_points(cloud, tmp_path / f"a.{ending}")))
+        assert np.allclose(back.point.positions.numpy(), cloud["position"].values, atol=1e-6)
+        assert {"colors", "normals", "target", "frame", "snr"} <= set(dir(back.point)) | {
+            k for k, _ in back.point.items()
+        }
+        assert np.array_equal(back.point["target"].numpy()[:, 0], cloud["target"].values)
+    assert back.point.colors.numpy().std() > 0.0
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--relative-to", "whale"], "must be sonar, world or a target (remus), not 'whale'"),
+        (["--to", "las"], "--to must be one of ply, pcd, not las"),
+        (["--frames", "5:70"], "ends past the last frame, 63"),
+        (["--frames", "1:3"], "there is no point to write"),
+    ],
+)
+def test_bad_input_gets_one_line(
+    crossing: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], said: str
+) -> None:
+    assert run(app, ["export", str(crossing), "--out", str(tmp_path / "x"), *options]) == 2
+    error = capsys.readouterr().err
+    assert said in error and error.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_command_writes_beside_the_store(crossing: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(app, ["export", str(crossing), "--relative-to", "remus"]) == 0
+    assert crossing.with_suffix(".ply").stat().st_size > 1000
+    assert "points" in capsys.readouterr().out
