@@ -67,6 +67,17 @@ def test_a_point_is_where_it_is_finer_than_the_grid(azimuth, elevation, r, step)
     assert abs(cloud.range[0] - r) < 2e-3
 
 
+def test_a_slope_at_the_rim_of_the_beams_looked_at_is_no_peak():
+    """However few beams are looked at, the points are those of all of them."""
+    targets = (spherical(20.0, 0.05, 0.02), spherical(20.6, 0.09, 0.02))
+    all_of_them = points(targets, strengths=(1.0, 0.5), picking=Peaks(threshold=40.0))
+    assert len(all_of_them) == 2
+    for threshold in (0.1, 3.0, 12.0):
+        some = points(targets, strengths=(1.0, 0.5), picking=Peaks(threshold=threshold))
+        far = np.linalg.norm(some.position[:, None] - all_of_them.position, axis=2).min(axis=1)
+        assert 1 <= len(some) <= 2 and (far < 1e-3).all()
+
+
 def test_two_echoes_in_one_direction_are_two_points_and_closer_than_the_pulse_one():
     far = [spherical(r, 0.05, 0.02) for r in (20.0, 20.1)]
     cloud = points(tuple(far))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import binary_dilation, maximum_filter1d, uniform_filter
+from scipy.ndimage import binary_dilation, binary_erosion, maximum_filter1d, uniform_filter
 
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.equations.arrays.apertures import live_gain
@@ -72,6 +72,8 @@ def peak_echoes(
     end = max(int(np.ceil(pulse_times.PULSE_HALF / profiles.step)), profiles.about) + 1
     index = np.full(image.energy.shape, -1)
     index[beams] = np.arange(len(power))
+    inner = binary_erosion(index >= 0, np.ones((3, 3)), border_value=1)
+    floor[~inner[beams]] = np.inf  # at the rim a slope would pass for a peak
     b, t = local_maxima(power, index, *beams, floor, grid.resolved, profiles.about, end)
     anywhere = maximum_filter1d(power.max(axis=0), 2 * profiles.about + 1)
     good = (power[b, t] * 10 ** (side_lobes / 10) >= anywhere[t]) & ~_cut(power, b, t, end)
