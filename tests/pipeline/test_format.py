@@ -125,3 +125,15 @@ def test_forged_consolidated_metadata_are_a_problem_and_no_traceback(
     _sealed(path, root)
     report = store.verify(path)
     assert not report.ok and any("cannot be" in problem.what for problem in report.problems)
+
+
+@pytest.mark.parametrize("name", ["code_digest", "shard_frames", "sonarsynth_version"])
+def test_what_a_forged_attribute_holds_is_said_in_one_line(name: str, tmp_path: Path, small_text: str) -> None:
+    path = tmp_path / "s.zarr"
+    assert schedule.build(loads(small_text), path, frames=(0,), workers=0, products=()).ok
+    root = json.loads((path / "zarr.json").read_text())
+    root["attributes"][name] = "x\n# y"
+    _sealed(path, root)
+    with pytest.raises(store.Mismatch) as refused:
+        schedule.build(loads(small_text), path, frames=(0,), workers=0, products=())
+    assert str(refused.value).isprintable() and name[:4] in str(refused.value)
