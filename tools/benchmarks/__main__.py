@@ -6,7 +6,7 @@ import json
 import sys
 from importlib import import_module
 
-BENCHMARKS = ("frame", "build", "rays", "reflections", "scattering", "scheduling", "reading", "laws", "memory")
+BENCHMARKS = ("frame", "build", "rays", "reflections", "scattering", "scheduling", "reading", "laws", "memory", "cloud")
 """Modules beside this one; each has a function `bench`."""
 
 

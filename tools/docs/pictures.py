@@ -1,6 +1,6 @@
-"""Draws pictures of README and of the pages again: python tools/docs/pictures.py [thumbnails ghosts laws accuracy].
+"""Draws pictures of README and of the pages again: python tools/docs/pictures.py [NAME ...].
 
-Left out: all of them, which takes minutes.
+Names: cloud, thumbnails, ghosts, laws, accuracy; left out: all of them, which takes minutes.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.collections import PolyCollection
 
 import sonarsynth as ss
 from sonarsynth.frontiers.frontier_report import write
@@ -85,7 +86,29 @@ def accuracy(folder: Path) -> None:
     write(measured, folder, "accuracy")[1].replace(ROOT / ".github" / "accuracy.png")
 
 
-DRAWN = {"thumbnails": thumbnails, "ghosts": ghosts, "laws": laws, "accuracy": accuracy}
+def cloud(folder: Path) -> None:
+    """The points of all frames of remus.yaml, fused on the hull: from above, from the sonar's side, and from ahead."""
+    path = folder / "remus.zarr"
+    ss.build(ss.load(ROOT / "configs" / "remus.yaml"), path, products="cloud", workers=0)
+    tree = ss.open(path)
+    points = ss.points(tree, relative_to="remus")
+    own = points.isel(point=np.flatnonzero(points["target"].values == 0))
+    mesh, place = tree["targets/remus"].dataset, own["position"].values
+    edges = mesh["vertices"].values[mesh["faces"].values]
+    time = np.asarray(tree["time"].values)[own["frame"].values]
+    figure, axes = plt.subplots(2, 1, figsize=(8.4, 4.6), dpi=100, sharex=True, layout="compressed")
+    for panel, (u, v, name) in zip(axes, ((0, 1, "to port (m)"), (0, 2, "up (m)")), strict=True):
+        panel.add_collection(PolyCollection(edges[:, :, (u, v)], facecolor="0.93", edgecolor="0.82", linewidth=0.15))
+        drawn = panel.scatter(place[:, u], place[:, v], c=time, s=9, cmap="viridis", linewidth=0)
+        panel.set(aspect="equal", xlim=(-0.75, 0.75), ylim=(-0.2, 0.2), ylabel=name)
+    axes[0].set_title(f"{len(place)} points of {tree.sizes['frame']} frames at 20 m, on the true hull", fontsize=11)
+    axes[1].set_xlabel("forward (m)")
+    figure.colorbar(drawn, ax=axes, label="time of the frame (s)")
+    figure.savefig(ROOT / ".github" / "cloud.png", metadata={"Software": None})
+    plt.close(figure)
+
+
+DRAWN = {"cloud": cloud, "thumbnails": thumbnails, "ghosts": ghosts, "laws": laws, "accuracy": accuracy}
 
 
 def main() -> None:

@@ -31,7 +31,7 @@ class Peaks(Method):
     """Beams further below the loudest beam of the image are not looked at, but for those beside others."""
     dynamic_range: Annotated[Decibels, Gt(0)] = 25.0
     """Peaks further below the largest are left out."""
-    false_alarms: Annotated[Number, Gt(0), Le(1000)] = 0.1
+    false_alarms: Annotated[Number, Gt(0), Le(1000)] = 0.01
     """Peaks of Gaussian noise that are taken for echoes, a frame, on average."""
     side_lobes: Annotated[Decibels, Ge(0)] = 8.0
     """Peaks further below the largest at the same delay are taken for its side lobes."""

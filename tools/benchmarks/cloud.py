@@ -1,0 +1,103 @@
+"""`tools/bench cloud`: points by the thesis's picking, by axes of beams, and by peaks, from the same signals.
+
+Distances are to the true surface, in the frame of the target. Covered: the share of the lit surface (facing snap and
+array) with a point of that frame within 10 cm. Chamfer: the mean of both one-way mean distances between the fused
+points and the surface lit in any frame, sampled at 1 cm.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import trimesh
+from scipy.spatial import cKDTree
+
+from sonarsynth.geometry import Pose
+from sonarsynth.labels.point_labels import surface_distances
+from sonarsynth.pipeline import BeamformedFrame, beamform_frame, cloud_of, trace_frame
+from sonarsynth.planning import Plan, plan
+from sonarsynth.ranging import BeamAxis, FirstEcho, Peaks
+from sonarsynth.recipe import reading
+from sonarsynth.recipe.scene import Frame
+
+RECIPE, EVERY = "configs/remus.yaml", 4
+SCENES = {
+    "silent": [],
+    "45 dB of noise": ["scene.world.environment.noise={kind: flat, level: 45 dB}"],
+    "Kirchhoff facets": ["scene.physics.scattering={kind: kirchhoff}"],
+}
+PICKINGS: dict[str, Any] = {
+    "first echo, the thesis's": FirstEcho(locality=60.0),
+    "beam axis, 3 dB": BeamAxis(),
+    "peaks": Peaks(),
+}
+NEAR, TOUCHED = 0.05, 0.10
+"""m: points that lie on the surface, and surface that points cover."""
+
+
+def lit(frame: Frame, places: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Whether samples of the surface (sample, xyz), in the frame of the body, face the array and the snap."""
+    body = frame.moment.bodies[0]
+    eyes = [frame.sonar_pose.position, *(snap.position for snap in frame.moment.snaps)]
+    seen = [np.sum(normals * (body.pose.to_body(eye[None]) - places), axis=1) > 0.0 for eye in eyes]
+    return np.logical_and.reduce(seen)
+
+
+def scored(made: Plan, heard: list[tuple[Frame, BeamformedFrame]], picking: Any) -> dict[str, float]:
+    """Figures of the points of some frames."""
+    mesh = made.scene.meshes[0]
+    shape = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    places, facets = trimesh.sample.sample_surface(shape, int(shape.area / 1e-4), seed=1)
+    normals = shape.face_normals[facets]
+    fused, ever, near, covered, spent = [], np.zeros(len(places), bool), [], [], []
+    chosen = replace(made, choices=replace(made.choices, picking=picking))
+    for frame, sound in heard:
+        cloud_of(chosen, frame, sound)  # compiles, and fills caches
+        began = time.process_time()
+        cloud = cloud_of(chosen, frame, sound)
+        spent.append(1e3 * (time.process_time() - began))
+        body, own = frame.moment.bodies[0], cloud.position.astype(float)
+        world = frame.sonar_pose.to_world(own)
+        near.append(surface_distances(body, world))
+        fused.append(Pose(body.pose.position, body.pose.orientation).to_body(world))
+        seen = lit(frame, places, normals)
+        ever |= seen
+        far = cKDTree(fused[-1]).query(places[seen])[0] if len(own) else np.full(seen.sum(), np.inf)
+        covered.append(float(np.mean(far < TOUCHED)))
+    distance, points = np.concatenate(near), np.concatenate(fused)
+    there, back = cKDTree(places[ever]).query(points)[0], cKDTree(points).query(places[ever])[0]
+    return {
+        "points_a_frame": len(points) / len(heard),
+        "within_5_cm": float(np.mean(distance < NEAR)),
+        "median_cm": 100.0 * float(np.median(distance)),
+        "covered": statistics.mean(covered),
+        "chamfer_cm": 50.0 * float(there.mean() + back.mean()),
+        "ms": statistics.median(spent),
+    }
+
+
+def bench() -> dict[str, Any]:
+    """Every fourth frame of the recipe, in three scenes, by three ways of picking."""
+    found: dict[str, Any] = {"recipe": RECIPE}
+    for scene, settings in SCENES.items():
+        made = plan(reading.recipe_of(reading.read(RECIPE, settings)))
+        heard = []
+        for index in range(0, made.recipe.frames, EVERY):
+            traced = trace_frame(made, index)
+            heard.append((traced.frame, beamform_frame(made, index, traced)))
+        found[scene] = {name: scored(made, heard, picking) for name, picking in PICKINGS.items()}
+    return found
+
+
+def table(result: dict[str, Any]) -> str:
+    """The figures as a table."""
+    columns = ("points_a_frame", "within_5_cm", "median_cm", "covered", "chamfer_cm", "ms")
+    lines = [f"{'':44}" + "".join(f"{name:>15}" for name in columns)]
+    for scene in SCENES:
+        for name, row in result[scene].items():
+            lines.append(f"{scene + ', ' + name:44}" + "".join(f"{row[column]:15.3g}" for column in columns))
+    return "\n".join(lines)
