@@ -89,7 +89,8 @@ def accuracy(folder: Path) -> None:
 def cloud(folder: Path) -> None:
     """The points of all frames of remus.yaml, fused on the hull: from above, from the sonar's side, and from ahead."""
     path = folder / "remus.zarr"
-    ss.build(ss.load(ROOT / "configs" / "remus.yaml"), path, products="cloud", workers=0)
+    recipe = ss.load(ROOT / "configs" / "remus.yaml", ["scene.processing.picking={kind: peaks}"])
+    ss.build(recipe, path, products="cloud", workers=0)
     tree = ss.open(path)
     points = ss.points(tree, relative_to="remus")
     own = points.isel(point=np.flatnonzero(points["target"].values == 0))
