@@ -17,7 +17,6 @@ from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
 from sonarsynth.signals.array_paths import array_paths, folded
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.signals.filtered_pulse import (
-    bubble,
     fir,
     pulse_spectrum,
     silencing_blur,
@@ -89,7 +88,7 @@ def test_a_blur_is_a_gaussian_in_time() -> None:
     t, got = alone(SHARP, delay_std=delay_std)
     near = np.abs(t) < 3e-4
     x, w = np.polynomial.hermite_e.hermegauss(24)
-    delayed = [filters.filtered_pulse(t[near] - delay_std * late, bubble(MODEL), fir(SHARP.antialias)) for late in x]
+    delayed = [filters.filtered_pulse(t[near] - delay_std * late, MODEL.bubble, fir(SHARP.antialias)) for late in x]
     expected = w @ delayed / w.sum()
     assert error(got[near], expected) < 1e-8
 
@@ -98,7 +97,7 @@ def test_a_blur_is_a_gaussian_in_time() -> None:
 def test_a_stretched_snap_is_that_of_a_slower_bubble(doppler: float) -> None:
     """p(t/(1 + s)) is (1 + s)^2 times the pressure of the bubble that lives 1 + s times as long; then the filter."""
     t, got = alone(SHARP, doppler=doppler)
-    one = bubble(MODEL)
+    one = MODEL.bubble
     longer = 1.0 + doppler
     slower = Bubble(one.a, one.k / longer, one.m * longer, one.q / longer, one.density)
     near = np.abs(t) < 3e-4
