@@ -30,6 +30,7 @@ class Points:
     target: np.ndarray  # (point,)
     emission: np.ndarray  # (point,)
     family: np.ndarray  # (point,)
+    lit_by: np.ndarray  # (point,)
     origin: np.ndarray  # (point,)
     clock: np.ndarray  # (point,) the emission that delays are counted from; -1: not known
 
@@ -41,7 +42,8 @@ class Points:
     @property
     def judged(self) -> np.ndarray:
         """(point,) of a target, directly, in the main lobe, by the right snap: their ranges are claimed to be right."""
-        there = (self.target >= 0) & (self.family == 0) & (self.origin == ORIGINS.index("main lobe"))
+        there = (self.target >= 0) & (self.family == 0) & (self.lit_by == 0)
+        there &= self.origin == ORIGINS.index("main lobe")
         return np.asarray(there & ~self.strange)
 
     @property
@@ -52,13 +54,13 @@ class Points:
 
 def has_labels(tree: xr.DataTree) -> bool:
     """Whether the points of a store have labels."""
-    return "cloud" in tree.children and "origin" in tree["cloud"].dataset
+    return "cloud" in tree.children and "lit_by" in tree["cloud"].dataset
 
 
 def points(tree: xr.DataTree, frames: Sequence[int] | np.ndarray) -> Points:
     """The points of some frames of a store whose points have labels."""
     cloud, at = tree["cloud"].dataset, np.asarray(frames)
-    names = ("range", "range_error", "true_range", "target", "emission", "family", "origin")
+    names = ("range", "range_error", "true_range", "target", "emission", "family", "lit_by", "origin")
     count = max(MOST_ROWS // max(cloud.sizes["point"], 1), 1)
     found: dict[str, list[np.ndarray]] = {name: [] for name in ("frame", "row", *names)}
     for start in range(0, len(at), count):
@@ -135,6 +137,7 @@ def kinds(found: Points) -> dict[str, np.ndarray]:
     }
     rows |= {"mirror images": of["mirror image"]}
     rows |= {f"ghosts by {word}": found.family == n for n, word in enumerate(FAMILIES) if n}
+    rows |= {f"lit by way of {word}": found.lit_by == n for n, word in enumerate(FAMILIES) if n}
     rows |= {"in side lobes": of["side lobe"], "in grating lobes": of["grating lobe"]}
     left = ~found.judged
     for word, mask in rows.items():

@@ -84,13 +84,14 @@ def pattern_of(elements: Elements, speed: float, curvature: Floats, focus: float
 
 @dataclass(frozen=True, eq=False)
 class Attribution:
-    """Whose energy beams hold at delays: groups of paths of one target, snap and way to the array."""
+    """Whose energy beams hold at delays: groups of paths of one snap and target, and of one way to each."""
 
     paths: Arrivals  # that may be heard, ascending in delay
     first: Ints  # (point,) the first path that may be heard then
     target: Ints  # (group,) -1: the snap itself
     snap: Ints  # (group,)
-    family: Ints  # (group,) index into FAMILIES
+    family: Ints  # (group,) index into FAMILIES: on the way to the array
+    lit_by: Ints  # (group,) index into FAMILIES: on the way to the target
     power: Floats  # (point, group) at the delay, in any unit
     energy: Floats  # (point, group) Pa2 s about it
     owner: Ints  # (point,) the loudest group, -1 without any
@@ -117,7 +118,7 @@ def attribution(
     paths = arrivals.select(some[np.argsort(arrivals.delay[some], kind="stable")])
     first, last = np.searchsorted(paths.delay, moment + window)
     _, example, group = np.unique(_code(paths, len(band.energy)), return_index=True, return_inverse=True)
-    groups = paths.target[example], paths.snap[example], paths.arrives_by[example]
+    groups = paths.target[example], paths.snap[example], paths.arrives_by[example], paths.lit_by[example]
     if not len(some):
         none = np.zeros((len(beam), 0))
         owner, share = np.full(len(beam), NO_TARGET), np.zeros((len(beam), 1))
@@ -153,8 +154,9 @@ def attribution(
 
 
 def _code(paths: Arrivals, snaps: int) -> Ints:
-    """Number (path,) of the target, snap and way to the array of each."""
-    return np.asarray(((paths.target + 1) * snaps + paths.snap) * len(FAMILIES) + paths.arrives_by)
+    """Number (path,) of the target, snap and ways to target and array of each."""
+    ways = paths.lit_by * len(FAMILIES) + paths.arrives_by
+    return np.asarray(((paths.target + 1) * snaps + paths.snap) * len(FAMILIES) ** 2 + ways)
 
 
 def _loud(arrivals: Arrivals, snaps: int) -> Bools:

@@ -43,6 +43,7 @@ def label_points(
         "target": np.full(len(cloud), NO_TARGET, np.int16),
         "emission": np.full(len(cloud), NO_TARGET, np.int16),
         "family": np.full(len(cloud), NO_TARGET, np.int8),
+        "lit_by": np.full(len(cloud), NO_TARGET, np.int8),
         "facet": np.full(len(cloud), NO_TARGET, np.int32),
         "true_range": np.full(len(cloud), np.nan, np.float32),
         "distance": np.full(len(cloud), np.nan, np.float32),
@@ -50,7 +51,7 @@ def label_points(
     }
     some = np.flatnonzero(explained)
     owner, loudest = found.owner[some], found.first[some] + found.share[some].argmax(axis=1)
-    for name in ("target", "emission", "family"):
+    for name in ("target", "emission", "family", "lit_by"):
         labels[name][some] = getattr(found, "snap" if name == "emission" else name)[owner]
     labels["facet"][some] = found.paths.facet[loudest]
     labels["origin"][some] = _origins(found.paths.select(loudest), beam[some], listening, band)

@@ -26,7 +26,8 @@ class PointLabels:
 
     target: npt.NDArray[np.int16]  # (point,) -1 for none: the snap itself
     emission: npt.NDArray[np.int16]  # (point,) which snap
-    family: npt.NDArray[np.int8]  # (point,) index into FAMILIES: how it reached the array; no direct: a ghost
+    family: npt.NDArray[np.int8]  # (point,) index into FAMILIES: how it reached the array; not direct: a ghost
+    lit_by: npt.NDArray[np.int8]  # (point,) index into FAMILIES: how sound reached the target; not direct: too far off
     facet: npt.NDArray[np.int32]  # (point,) that brings most; -1 for none
     true_range: npt.NDArray[np.float32]  # (point,) m from the array centre to where the echo was made
     distance: npt.NDArray[np.float32]  # (point,) m from the point to the nearest surface of the target

@@ -80,6 +80,7 @@ class Arrivals:
     bottom: Ints  # (path,) bottom reflections
     turning: Ints  # (path,) turning points
     caustics: Ints  # (path,) caustics passed
+    lit_by: Ints  # (path,) index into FAMILIES: which boundaries it touched first, on its way to the target
     arrives_by: Ints  # (path,) index into FAMILIES: which boundaries it touched last, on its way to the array
     phase: Floats  # (path,) rad: constant phase of the pulse over frequency, from caustics and lossy reflections
     delay_std: Floats  # (path,) s: roughness takes exp(-(2 pi f delay_std)^2/2) off the spectrum, a Gaussian in time

@@ -111,6 +111,7 @@ def assemble(
         bottom=out.bottom + legs.bottom,
         turning=out.turning + legs.turning,
         caustics=out.caustics + legs.caustics,
+        lit_by=np.asarray((out.surface > 0) + 2 * (out.bottom > 0)),
         arrives_by=np.asarray((legs.surface > 0) + 2 * (legs.bottom > 0)),
         phase=phase,
         delay_std=np.hypot(np.hypot(out.delay_std, legs.delay_std), pulses.delay_std),

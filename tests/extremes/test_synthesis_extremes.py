@@ -54,6 +54,7 @@ def arrivals(delay: Floats, direction: Floats, radius: Floats, amplitude: Floats
         bottom=zero,
         turning=zero,
         caustics=zero,
+        lit_by=zero,
         arrives_by=zero,
         phase=np.zeros(n),
         delay_std=np.zeros(n),

@@ -55,6 +55,7 @@ def from_points(points: Floats, place: Floats, loss: float) -> Arrivals:
         bottom=whole,
         turning=whole,
         caustics=whole,
+        lit_by=whole,
         arrives_by=whole,
         phase=zero,
         delay_std=zero,

@@ -96,13 +96,13 @@ def held(case: Made, beam: np.ndarray, delay: np.ndarray) -> float:
     return float(attribution(case.arrivals, case.band, case.listening, beam, delay - clock, np.ones(1)).energy.sum())
 
 
-def groups(arrivals: Arrivals) -> dict[tuple[int, int, int], np.ndarray]:
-    """Paths of each target, snap and way to the array."""
-    keys = np.stack([arrivals.target, arrivals.snap, arrivals.arrives_by], axis=1)
+def groups(arrivals: Arrivals) -> dict[tuple[int, ...], np.ndarray]:
+    """Paths of each target and snap, of one way to the array and one to the target."""
+    keys = np.stack([arrivals.target, arrivals.snap, arrivals.arrives_by, arrivals.lit_by], axis=1)
     return {tuple(key): np.flatnonzero((keys == key).all(axis=1)) for key in np.unique(keys, axis=0).tolist()}
 
 
-def heard_alone(case: Made, beam: np.ndarray, delay: np.ndarray) -> tuple[list[tuple[int, int, int]], np.ndarray]:
+def heard_alone(case: Made, beam: np.ndarray, delay: np.ndarray) -> tuple[list[tuple[int, ...]], np.ndarray]:
     """Power (point, group) of each group alone: signals, spherical beams, the pulse taken out, at the delay."""
     sonar, c = case.plan.scene.sonar, case.listening.sound_speed
     snaps, fs, samples = case.frame.moment.snaps, sonar.sampling_frequency, 8192
@@ -138,7 +138,7 @@ def test_what_each_group_brings_is_what_its_signals_alone_have_there(crowd: Made
     names, exact = heard_alone(crowd, beam, delay)
     most = np.full(32, np.inf)  # what a beam holds bounds nothing
     found = attribution(a, crowd.band, crowd.listening, beam, delay - crowd.listening.clock, most)
-    ours = list(zip(found.target.tolist(), found.snap.tolist(), found.family.tolist(), strict=True))
+    ours = [tuple(row) for row in np.stack([found.target, found.snap, found.family, found.lit_by], axis=1).tolist()]
     exact = exact[:, [names.index(name) for name in ours]]
     order = np.sort(exact, axis=1)
     clear = order[:, -1] > 2.0 * order[:, -2]
@@ -170,11 +170,11 @@ def test_a_table_of_the_pattern_says_what_the_sensors_say(crowd: Made) -> None:
 def test_a_point_on_a_path_is_of_its_target_snap_and_way(crowd: Made) -> None:
     """By the loudest path of each group: ghosts come by surface and bottom, from where the images are."""
     a, seen = crowd.arrivals, set()
-    for (target, snap, way), paths in groups(a).items():
+    for (target, snap, way, lit), paths in groups(a).items():
         rows = paths[(a.target[paths] >= 0) & (a.direction[paths, 0] > 0.2)]
         for loudest in rows[np.argsort(-np.abs(a.amplitude[rows]))[:10]]:
             (label,) = labels_at(crowd, a.direction[[loudest]], a.delay[[loudest]])
-            if (label["target"], label["emission"], label["family"]) == (target, snap, way):
+            if tuple(label[name] for name in ("target", "emission", "family", "lit_by")) == (target, snap, way, lit):
                 break  # else another group is louder there: how often is asked below
         else:
             continue
@@ -201,7 +201,7 @@ def test_the_snap_itself_is_no_target_and_what_no_path_brings_is_unexplained(cro
     assert (label["target"], label["emission"], label["facet"]) == (-1, 1, -1) and np.isnan(label["true_range"])
     (label,) = labels_at(crowd, a.direction[other], a.delay.max(keepdims=True) + 5e-3, energy)
     assert ORIGINS[label["origin"]] == "unexplained"
-    assert all(label[name] == -1 for name in ("target", "emission", "family", "facet"))
+    assert all(label[name] == -1 for name in ("target", "emission", "family", "lit_by", "facet"))
     assert np.isnan(label["true_range"]) and np.isnan(label["distance"])
 
 

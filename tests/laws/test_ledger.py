@@ -61,6 +61,7 @@ def some_paths(count: int, seed: int, *, coherent: bool | None = None, spread: f
         boundary=boundary,
         surface=rng.integers(0, 2, count),
         bottom=rng.integers(0, 2, count),
+        lit_by=rng.integers(0, 2, count),
         arrives_by=rng.integers(0, 2, count),
         phase=rng.uniform(-3.0, 3.0, count),
         delay_std=rng.choice([0.0, 2e-6], count) * rng.uniform(0.5, 1.0, count),

@@ -77,6 +77,7 @@ def arrivals(
         bottom=zero,
         turning=zero,
         caustics=zero,
+        lit_by=zero,
         arrives_by=zero,
         phase=np.zeros(n),
         delay_std=np.zeros(n),

@@ -27,7 +27,7 @@ def tree(
         "range": 20.0 + error * random.normal(size=BEAMS),
         "range_error": np.full(BEAMS, predicted),
         "true_range": np.full(BEAMS, 20.0),
-        **{name: np.zeros(BEAMS, np.int16) for name in ("target", "emission", "family", "origin")},
+        **{name: np.zeros(BEAMS, np.int16) for name in ("target", "emission", "family", "lit_by", "origin")},
     }
     for name, (count, value) in labels.items():
         columns[name][:, :count] = value
@@ -138,7 +138,7 @@ def test_what_no_range_is_judged_of_is_named_counted_and_warned_of(labels: dict[
 
 def test_a_store_whose_points_have_no_labels_is_not_judged_by_them() -> None:
     old = tree()
-    del old["cloud"]["origin"]
+    del old["cloud"]["lit_by"]
     (check,) = range_errors(old, ALL)
     assert check.ok is None and "no labels" in check.got
     assert [c.name for c in bounds(old, ALL)] == ["snap located"]

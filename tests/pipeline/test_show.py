@@ -103,7 +103,7 @@ def _frame(size, sonar, snap, vertices, faces, sensors, grid, step) -> dict[str,
     points |= dict(zip(("azimuth", "elevation"), np.rad2deg(azimuth_elevation(grid)), strict=True))
     points = {name: (values, np.nan) for name, values in points.items()}
     points["target"] = (np.where(facet >= 0, 0, -1).astype(np.int16), np.int16(-1))
-    points |= {name: (np.int16(0), np.int16(-1)) for name in ("emission", "family", "origin")}
+    points |= {name: (np.int16(0), np.int16(-1)) for name in ("emission", "family", "lit_by", "origin")}
     return {
         "/trajectory": np.array(0),
         "/step": np.array(step),

@@ -75,6 +75,7 @@ _CLOUD = group_of(
     row("target", POINT, "int16", "1", "target whose echo the point is", attributes=(*NONE, *WHOSE)),
     row("emission", POINT, "int16", "1", "snap that lit the point", attributes=(*NONE, *WHOSE)),
     row("family", POINT, "int8", "1", "how the echo reached the array: a ghost but direct", attributes=flags(FAMILIES)),
+    row("lit_by", POINT, "int8", "1", "how sound reached the target", attributes=flags(FAMILIES)),
     row("facet", POINT, "int32", "1", "facet that brought most of the echo", attributes=NONE),
     row("true_range", POINT, "float32", "m", "distance of the array centre from where the echo was made"),
     row("distance", POINT, "float32", "m", "distance of the point from the nearest surface of its target"),
