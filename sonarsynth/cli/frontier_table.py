@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Sequence
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,8 @@ SECOND = (
     ("largest_db", "largest ", " dB"),
     ("direction_rad", "direction ", " rad"),
     ("correlation", "correlation ", ""),
+    ("points", "points ", ""),
+    ("within_5_cm", "within 5 cm ", ""),
 )
 """Numbers that are shown beside the errors: names, words, units; the file has the others too."""
 
@@ -111,7 +114,8 @@ def show(measured: Measured) -> None:
 def _numbers(point: Point) -> tuple[str, str, str]:
     if point.error != point.error:
         return "", "", ""
-    return f"{point.error:.2g} {point.unit}", f"{point.allowed:g}", f"{1e3 * point.seconds:.3g}"
+    allowed = f"{point.allowed:g}" if isfinite(point.allowed) else ""
+    return f"{point.error:.2g} {point.unit}", allowed, f"{1e3 * point.seconds:.3g}"
 
 
 def _mark(point: Point) -> str:
@@ -119,7 +123,8 @@ def _mark(point: Point) -> str:
         return ""
     if point.role == "check":
         return "ok" if point.meets else "FAILED"
-    return ("chosen, " if point.chosen else "") + ("within" if point.meets else "exceeds")
+    kept = ("within" if point.meets else "exceeds") if isfinite(point.allowed) else ""
+    return ", ".join(word for word in ("chosen" if point.chosen else "", kept) if word)
 
 
 def _also(point: Point) -> str:

@@ -34,6 +34,10 @@ class Method:
         """The exact, slow method that this one is to be judged by; itself where there is none."""
         return self
 
+    def variants(self) -> dict[str, Any]:
+        """Other settings of it that `accuracy` walks, by what they are called: the knob, "at", the value."""
+        return {}
+
     def row(self) -> str:
         """The method in a few words, as `plan` prints it."""
         return self.kind

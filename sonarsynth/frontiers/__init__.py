@@ -11,6 +11,7 @@ from sonarsynth.frontiers.exact_frame import Exact, exact_frame, synthesis_check
 from sonarsynth.frontiers.full_frame import Whole, whole_points
 from sonarsynth.frontiers.image_knobs import image_points, range_points
 from sonarsynth.frontiers.peer_rows import image_peers, synthesis_peers
+from sonarsynth.frontiers.picking_knobs import picking_points
 from sonarsynth.frontiers.rows import Point, Verdict, finite, merged
 from sonarsynth.frontiers.signal_knobs import synthesis_points
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor, trace_points
@@ -110,11 +111,12 @@ def _frame(made: Plan, index: int, hydrophones: int | None, say: Say, *, peers: 
     say(f"frame {index}: image and range")
     points += image_points(plan, whole.heard)
     points += range_points(plan, frame, whole.heard)
+    points += picking_points(plan, frame, arrivals, whole.heard)
     if peers:
         say(f"frame {index}: peers")
         points += synthesis_peers(plan, frame, arrivals.seen_from_centre)  # peers know no shade
         points += image_peers(plan, frame, arrivals.seen_from_centre, whole.heard)
     say(f"frame {index}: everything exact")
-    spent = whole.seconds + sum(p.seconds for p in points if p.chosen and p.stage != "synthesis")
+    spent = whole.seconds + sum(p.seconds for p in points if p.chosen and p.stage not in ("synthesis", "picking"))
     points += whole_points(whole, traced, spent)
     return points, whole.seconds, len(exact.sensor)

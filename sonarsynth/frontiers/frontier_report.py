@@ -17,6 +17,7 @@ TITLES: Final = {
     "synthesis": "synthesis of the traced paths",
     "image": "image: beams within 20 dB of the brightest, root mean square",
     "range": "cloud: largest error of a range by the method",
+    "picking": "cloud: median distance of points from the target, by how echoes are picked",
 }
 
 

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field, replace
 from math import isfinite, nan
 from typing import Any, Final, Literal, TypeVar
 
-STAGES: Final = ("trace", "synthesis", "image", "range", "frame")
+STAGES: Final = ("trace", "synthesis", "image", "range", "picking", "frame")
 """Parts of a frame that are walked, and the whole."""
 Role = Literal["point", "peer", "check"]
 T = TypeVar("T")

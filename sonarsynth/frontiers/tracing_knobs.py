@@ -33,7 +33,7 @@ from sonarsynth.propagation import Straight
 from sonarsynth.receiver.subarrays import Subarray, subarrays, with_rim
 from sonarsynth.recipe.scene import Frame
 
-FAINTEST = (30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 100.0)
+DYNAMIC_RANGES = (30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 100.0)
 """dB: levels under which the faintest echoes of each target are left out."""
 TIMED = 6
 """Parts that the synthesis is timed on."""
@@ -113,7 +113,7 @@ def trace_points(exact: Exact, traced: TracedBySensor) -> Iterator[Point]:
         for knob, choices, setting in (("degree", degree, "of degree 3"), ("occlusion", view, "from the centre")):
             of = TracedBySensor.of(replace(usual, choices=choices), exact.frame, exact.sensor)
             yield _point(exact, of, knob, f"{setting}, {_cut(plan)}")
-    for level in FAINTEST:
+    for level in DYNAMIC_RANGES:
         share = 10.0 ** (-level / 10.0)
         some = replace(best, choices=replace(best.choices, negligible=share))
         yield _each_point(exact, some, "dynamic range", f"{level:.0f} dB")
@@ -133,7 +133,7 @@ def _cheaper(plan: Plan) -> Iterator[tuple[str, Plan]]:
         yield "seen from the centre", replace(plan, choices=replace(choices, occlusion="centre"))
     if choices.degree == 5:
         yield "of degree 3", replace(plan, choices=replace(choices, degree=3))
-    for level in FAINTEST:
+    for level in DYNAMIC_RANGES:
         share = 10.0 ** (-level / 10.0)
         if share > 1.001 * choices.negligible:
             yield f"dynamic range {level:.0f} dB", replace(plan, choices=replace(choices, negligible=share))

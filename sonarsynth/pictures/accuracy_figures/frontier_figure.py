@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from sonarsynth.pictures.figures.ray_figure import RAYS
@@ -39,7 +40,7 @@ class Panel:
 
     title: str
     unit: str
-    allowed: float
+    allowed: float  # inf: nothing is asked for
     lines: tuple[Line, ...]
     chosen: tuple[float, float]  # ms, error
 
@@ -56,12 +57,13 @@ def frontier_figure(title: str, panels: Sequence[Panel], note: str) -> Figure:
 
 
 def _draw(axes: Axes, panel: Panel) -> None:
-    errors = [panel.allowed, *(e for line in panel.lines for e in line.error)]
+    errors = [e for e in (panel.allowed, *(e for line in panel.lines for e in line.error)) if isfinite(e)]
     floor = min(e for e in errors if e > 0.0) * 10.0**-DECADES
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.axhline(floor, color=PALE, linewidth=0.6, linestyle=":")
-    axes.axhline(panel.allowed, color=INK, linewidth=0.9, linestyle="--", label=f"allowed, {panel.allowed:g}")
+    if isfinite(panel.allowed):
+        axes.axhline(panel.allowed, color=INK, linewidth=0.9, linestyle="--", label=f"allowed, {panel.allowed:g}")
     _frontier(axes, panel, floor)
     for peer, shapes in ((False, SHAPES), (True, PEERS)):
         for n, line in enumerate(line for line in panel.lines if line.peer == peer):
