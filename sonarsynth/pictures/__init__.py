@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sonarsynth.conventions import Floats
 from sonarsynth.pictures.figures.frame_figure import FramePicture, View, window
 from sonarsynth.pictures.figures.sheet import Errors, sheet
 from sonarsynth.pictures.figures.style import decibels
@@ -60,10 +62,26 @@ def show(
             say(f"film: {len(filmed)} of {len(frames)} frames")
         in_order = [read[i] for i in filmed]
         reference = _reference(in_order)
-        views = [_view(tree, one, reference) for one in in_order]
-        picture = FramePicture(*beam_grid(tree), window(views), "energy re the brightest beam of all frames (dB)")
+        each = zip(in_order, earlier_points(in_order), strict=True)
+        views = [replace(_view(tree, one, reference), earlier=before) for one, before in each]
+        picture = FramePicture(
+            *beam_grid(tree), window(views), "beams and points: energy re the brightest beam of all frames (dB)"
+        )
         files.append(write_film(picture, views, folder, frames_per_second))
     return files
+
+
+def earlier_points(frames: list[Stored]) -> Iterator[Floats]:
+    """For each frame the points (point, xyz) of those before it on targets, carried along with these, in
+    its sonar frame."""
+    found: dict[int, list[Floats]] = {}
+    for frame in frames:
+        poses = {t: pose for t, pose in enumerate(frame.poses) if np.isfinite(pose.position).all()}
+        carried = [frame.sonar.to_body(poses[t].to_world(np.concatenate(found[t]))) for t in found if t in poses]
+        yield np.concatenate([np.zeros((0, 3)), *carried])
+        for t, pose in poses.items():
+            if (own := (frame.point_target == t) & np.isfinite(frame.range_error)).any():
+                found.setdefault(t, []).append(pose.to_body(frame.sonar.to_world(frame.points[own])))
 
 
 def _interest(frame: Stored) -> tuple[int, int]:

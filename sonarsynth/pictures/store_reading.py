@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, direction
+from sonarsynth.conventions import Floats, Ints, direction
 from sonarsynth.evaluation.point_checks import has_labels, points
 from sonarsynth.geometry import Pose
 from sonarsynth.pictures.figures.frame_figure import Hull
@@ -95,9 +95,11 @@ class Stored:
     point_energy: Floats  # (point,) Pa2 s
     point_direction: Floats  # (point, 2) deg: azimuth and elevation
     point_delay: Floats  # (point,) s after the direct arrival
+    point_target: Ints  # (point,) whose echo it is; -1 of none
     target: np.ndarray  # (elevation, azimuth) true target; -1 for none
     true_range: Floats  # (elevation, azimuth) m
     snap: Floats  # (snap, xyz) m, true positions
+    poses: tuple[Pose, ...]  # of the targets in the world; NaN of one that is not there
     hulls: tuple[Hull, ...]
     ghosts: tuple[Ghost, ...]
 
@@ -118,9 +120,11 @@ def stored(tree: xr.DataTree, index: int) -> Stored:
         point_energy=cloud["energy"],
         point_direction=np.stack([cloud["azimuth"], cloud["elevation"]], axis=-1),
         point_delay=cloud["delay"],
+        point_target=cloud["target"].astype(int),
         target=needed(tree, "truth/beams/target", index),
         true_range=needed(tree, "truth/beams/range", index).astype(float),
         snap=pose.to_body(needed(tree, "truth/emissions/position", index)),
+        poses=_poses(tree, index),
         hulls=hulls(tree, index),
         ghosts=ghosts(tree, index),
     )
@@ -128,7 +132,7 @@ def stored(tree: xr.DataTree, index: int) -> Stored:
 
 def _points(tree: xr.DataTree, index: int) -> dict[str, Floats]:
     """Columns (point,) of the points of a frame, none in a store without a cloud; range_error by their labels."""
-    names = ("x", "y", "z", "azimuth", "elevation", "energy", "delay")
+    names = ("x", "y", "z", "azimuth", "elevation", "energy", "delay", "target")
     if not has_labels(tree):
         return dict.fromkeys((*names, "range_error"), np.zeros(0))
     found = points(tree, [index])
@@ -138,6 +142,14 @@ def _points(tree: xr.DataTree, index: int) -> dict[str, Floats]:
 
 def _sonar(tree: xr.DataTree, index: int) -> Pose:
     return Pose(needed(tree, "truth/sonar_position", index), needed(tree, "truth/sonar_orientation", index))
+
+
+def _poses(tree: xr.DataTree, index: int) -> tuple[Pose, ...]:
+    """The poses of the targets; none in a store without."""
+    position, orientation = (read(tree, f"truth/targets/{name}", index) for name in ("position", "orientation"))
+    if position is None or orientation is None:
+        return ()
+    return tuple(Pose(*pose) for pose in zip(position, orientation, strict=True))
 
 
 def echo_levels(tree: xr.DataTree, frame: int) -> tuple[Floats, list[str]] | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 ABSENT = "#9b9b9b"
 """Beams without a number."""
+
+EARLIER = "#8f8f96"
+"""Points of earlier frames."""
 
 PLAN = (1, 0)
 SIDE = (0, 2)
@@ -48,6 +51,7 @@ class View:
     point_level: Floats  # (point,) dB re the same
     hulls: tuple[Hull, ...]
     ghosts: tuple[Ghost, ...] = ()
+    earlier: Floats = field(default_factory=lambda: np.zeros((0, 3)))  # (point, xyz) m: points of frames before
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +145,7 @@ class CloudPanel:
         label(axes, names[plane[0]], names[plane[1]], f"point cloud {name}")
         self._hulls: PolyCollection = PolyCollection([], linewidths=1.0)
         axes.add_collection(self._hulls, autolim=False)
+        self._earlier: PathCollection = axes.scatter([], [], s=4, linewidths=0, color=EARLIER)
         self._points: PathCollection = axes.scatter(
             [], [], c=[], s=9, linewidths=0, cmap=ENERGY_MAP, vmin=-DYNAMIC_RANGE, vmax=0
         )
@@ -155,11 +160,13 @@ class CloudPanel:
         self.axes.set_xlim(centre[across] - sign * reach, centre[across] + sign * reach)
         self.axes.set_ylim(centre[up] - reach / 1.6, centre[up] + reach / 1.6)
         fill_hulls(self._hulls, view.hulls, self.plane)
+        self._earlier.set_offsets(view.earlier[:, self.plane])
         at = view.points[:, self.plane]
         self._points.set_offsets(at)
         self._points.set_array(clipped(view.point_level))
         outside = int((np.abs(at - centre[[across, up]]) > [reach, reach / 1.6]).any(axis=1).sum())
-        self._note.set_text(f"{len(at)} points" + (f", {outside} of them outside" if outside else ""))
+        before = f", grey: {len(view.earlier)} of earlier frames" if len(view.earlier) else ""
+        self._note.set_text(f"{len(at)} points" + (f", {outside} of them outside" if outside else "") + before)
 
 
 def clipped(level: Floats) -> Floats:
