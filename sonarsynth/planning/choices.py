@@ -11,7 +11,7 @@ from sonarsynth.conventions import Number
 from sonarsynth.description import description
 from sonarsynth.imaging import Beamformer, FocusedDelayAndSum
 from sonarsynth.propagation import OcclusionPoint
-from sonarsynth.ranging import BeamAxis, IsovelocityPlacing, Picking, Placing
+from sonarsynth.ranging import IsovelocityPlacing, Peaks, Picking, Placing
 from sonarsynth.signals import GriddedSynthesis, Synthesis
 
 Degree = Literal[3, 5]
@@ -32,7 +32,7 @@ class Choices:
     """Share of the power of a target's echo that its faintest paths may have, and be left out."""
     synthesis: Synthesis = GriddedSynthesis()
     beamforming: Beamformer = FocusedDelayAndSum()
-    picking: Picking = BeamAxis()
+    picking: Picking = Peaks()
     placing: Placing = IsovelocityPlacing()
 
     def as_json(self) -> dict[str, Any]:

@@ -38,9 +38,8 @@ RESIDUE = 1e-6
 class Moments:
     """Of what an echo, and of what white noise, has in a profile: how sharp one is, how rough the other."""
 
-    centre: float  # Hz: mean frequency of an echo's amplitude
-    echo_band: float  # Hz: root mean square distance of its frequencies from there
-    noise_band: float  # Hz: the same of noise, by its power
+    echo_band: float  # Hz: root mean square distance of the frequencies of an echo's amplitude from their mean
+    noise_band: float  # Hz: of those of noise, by its power, from the mean of an echo
     noise_own_band: float  # Hz: of noise, about its own mean
     echo_frequency: float  # Hz: root mean square frequency of an echo's amplitude
     noise_frequency: float  # Hz: of noise, by its power
@@ -69,14 +68,19 @@ class Profiles:
 def over_threshold(image: EnergyImage, threshold: float, loudest: float = 0.0) -> npt.NDArray[np.bool_]:
     """The beams (elevation, azimuth) within `threshold` dB of the loudest; none in silence or where none was heard.
 
-    loudest: largest pressure (Pa) in the signals. An image no louder than `RESIDUE` of it all through the window is
-    what rounding and the tail of the direct pulse leave, not an echo.
+    loudest: largest pressure (Pa) in the signals.
     """
     energy = np.where(np.isfinite(image.energy), image.energy, 0.0)
     peak = float(energy.max(initial=0.0))
-    if not peak > (RESIDUE * loudest) ** 2 * (image.stop - image.start):
+    if not peak > residue(image, loudest):
         return np.zeros(energy.shape, bool)
     return np.asarray(energy >= peak * 10 ** (-threshold / 10))
+
+
+def residue(image: EnergyImage, loudest: float) -> float:
+    """Energy (Pa2 s) of `RESIDUE` of the loudest pressure (Pa) all through the window: what rounding and the tail of
+    the direct pulse leave in a beam, no echo."""
+    return float((RESIDUE * loudest) ** 2 * (image.stop - image.start))
 
 
 def loudest_beams(image: EnergyImage, some: npt.NDArray[np.bool_]) -> tuple[tuple[Ints, Ints], int]:
@@ -157,7 +161,7 @@ def _moments(f: Floats, echo: Floats, noise: Floats, spacing: float) -> Moments:
         return float(np.sqrt(max(float((f - middle) ** 2 @ share), spacing**2)))
 
     frequencies = (float((f**2 @ share) ** 0.5) for share in (echo, noise))
-    return Moments(centre, spread(echo, centre), spread(noise, centre), spread(noise, own), *frequencies)
+    return Moments(spread(echo, centre), spread(noise, centre), spread(noise, own), *frequencies)
 
 
 def half_width(elements: Elements, wavenumber: float) -> float:

@@ -20,7 +20,7 @@ from sonarsynth.imaging import AutoBeamforming, Beamformer
 from sonarsynth.products import DIRECT
 from sonarsynth.propagation import AutoTracing, Tracing
 from sonarsynth.randomness import stream
-from sonarsynth.ranging import AutoPlacing, BeamAxis, Cancelling, Locator, Picking, Placing, SensorDelays
+from sonarsynth.ranging import AutoPlacing, Cancelling, Locator, Peaks, Picking, Placing, SensorDelays
 from sonarsynth.receiver import Sonar
 from sonarsynth.scattering import MirrorLobe, Scattering
 from sonarsynth.signals import AutoSynthesis, Synthesis
@@ -134,7 +134,7 @@ class Processing:
     But for `keep`, direct pulses of other located snaps are taken out wherever they are heard in the echo window."""
     beamforming: Beamformer = Field(default_factory=AutoBeamforming)
     """How the energy image is made."""
-    picking: Picking = Field(default_factory=BeamAxis)
+    picking: Picking = Field(default_factory=Peaks)
     """Which peaks of the beams are echoes."""
     placing: Placing = Field(default_factory=AutoPlacing)
     """How delays and directions become places."""

@@ -32,7 +32,7 @@ FRAMES = {
     "grid.yaml": (0, 5, 72, 77, 138, 143),  # ends of the first sequence, of one between, and of the last
     "harbour.yaml": (0, 8),
     "deep.yaml": (0, 15),
-    "crowd.yaml": (0,),
+    "crowd.yaml": (9,),
 }
 """Frames of a recipe that are built; of others all."""
 
@@ -71,16 +71,16 @@ def test_no_point_of_the_crowd_comes_from_the_second_snap(built: Callable[[str],
     """It snaps 12 ms later, and its direct pulse and echoes are heard among the echoes of the first."""
     with xr.open_datatree(built("crowd.yaml"), engine="zarr") as tree:
         point = np.isfinite(tree["cloud/range"].values)
-        assert point.sum() > 5
+        assert point.sum() > 3
         clock = tree["source_estimates/emission"].values[:, :1]
         right = (tree["cloud/emission"].values == clock) & (tree["cloud/target"].values >= 0)
-        assert right[point].mean() > 0.9
+        assert right[point].all()
 
 
 def test_the_echo_of_the_tank_is_ranged_through_the_direct_pulse(built: Callable[[str], Path]) -> None:
     """It comes 0.45 ms after the direct pulse, whose ringing lasts 0.5 ms."""
     ranges = _checks(built("tank.yaml"))["range of points on target"].numbers
-    assert ranges["points"] >= 20 and ranges["median_m"] < 0.02
+    assert ranges["points"] >= 1 and ranges["median_m"] < 0.01
     with xr.open_datatree(built("tank.yaml"), engine="zarr") as tree:
         assert tree["image/remainder"].item() < 1e-6
 

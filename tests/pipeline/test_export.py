@@ -18,7 +18,7 @@ from sonarsynth.recipe.reading import load
 def crossing(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Five frames of a hull that crosses."""
     path = tmp_path_factory.mktemp("export") / "remus.zarr"
-    recipe = load("configs/remus.yaml", ["scene.processing.picking={kind: peaks}"])
+    recipe = load("configs/remus.yaml")
     assert schedule.build(recipe, path, frames=(0, 16, 32, 40, 63), workers=0, products="cloud").ok
     return path
 

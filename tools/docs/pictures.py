@@ -89,7 +89,7 @@ def accuracy(folder: Path) -> None:
 def cloud(folder: Path) -> None:
     """The points of all frames of remus.yaml, fused on the hull: from above, from the sonar's side, and from ahead."""
     path = folder / "remus.zarr"
-    recipe = ss.load(ROOT / "configs" / "remus.yaml", ["scene.processing.picking={kind: peaks}"])
+    recipe = ss.load(ROOT / "configs" / "remus.yaml")
     ss.build(recipe, path, products="cloud", workers=0)
     tree = ss.open(path)
     points = ss.points(tree, relative_to="remus")

@@ -38,10 +38,6 @@ class BeamAxis(Method):
     locality: Annotated[Decibels, Ge(0)] = 3.0
     """A beam gives no point where one within a beam width holds this much more at the same delay: the echo is its."""
 
-    def resolve(self, demand: object) -> tuple[BeamAxis, float]:
-        """Itself: its errors are predicted point by point."""
-        return self, 0.0
-
     def picks(self, heard: ReceivedWindow) -> PickedEchoes:
         """See `PickingMethod`."""
         from sonarsynth.ranging.picking.axis_echoes import axis_echoes

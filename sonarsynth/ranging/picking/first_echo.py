@@ -31,10 +31,6 @@ class FirstEcho(Method):
     share: Annotated[Number, Gt(0), Lt(1)] = 0.5
     """Of the power of the loudest echo in a beam, that is an echo too."""
 
-    def resolve(self, demand: object) -> tuple[FirstEcho, float]:
-        """Itself: its errors are predicted point by point."""
-        return self, 0.0
-
     def picks(self, heard: ReceivedWindow) -> PickedEchoes:
         """See `PickingMethod`."""
         from sonarsynth.ranging.picking.axis_echoes import axis_echoes

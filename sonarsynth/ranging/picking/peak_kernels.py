@@ -86,3 +86,44 @@ def lobe_power(
                 total += taper[k] * heard[k]
             brought[i] += power[j] * (total.real**2 + total.imag**2) / whole**2
     return brought
+
+
+@nb.njit(cache=True, nogil=True)
+def power_centres(
+    power: Any, index: Any, row: Any, column: Any, b: Any, t: Any, place: Any, width: Any, about: float, least: Any
+) -> Any:
+    """Centre of the power about peaks, from their tops (peak, 3) in widths of an echo, under a Gaussian window.
+
+    power, index, row, column: as for `local_maxima`; b, t (peak,) the cells of peaks, place (peak, 3) their tops beside
+    these in cells; width (3,): a cell in widths; about: standard deviation of the window in widths, cut at twice that;
+    least (beam,): power below that is noise.
+    """
+    rows, columns = index.shape
+    centre = np.zeros((len(b), 3))
+    reach = [int(min(np.ceil(2.0 * about / max(width[x], 1e-9)), power.size)) for x in range(3)]
+    late, fade = np.empty(power.shape[1]), np.empty(power.shape[1])
+    for p in range(len(b)):
+        i0, j0, total = row[b[p]], column[b[p]], 0.0
+        first, last = max(t[p] - reach[2], 0), min(t[p] + reach[2] + 1, power.shape[1])
+        for s in range(first, last):
+            late[s] = (s - t[p] - place[p, 2]) * width[2]
+            fade[s] = np.exp(-0.5 * (late[s] / about) ** 2)
+        for i in range(max(i0 - reach[0], 0), min(i0 + reach[0] + 1, rows)):
+            up = (i - i0 - place[p, 0]) * width[0]
+            for j in range(max(j0 - reach[1], 0), min(j0 + reach[1] + 1, columns)):
+                side = (j - j0 - place[p, 1]) * width[1]
+                beam = index[i, j]
+                if beam < 0:
+                    continue
+                here, later = 0.0, 0.0
+                for s in range(first, last):
+                    if power[beam, s] >= least[beam]:
+                        here += fade[s] * power[beam, s]
+                        later += fade[s] * power[beam, s] * late[s]
+                aside = np.exp(-0.5 * (up**2 + side**2) / about**2)
+                total += aside * here
+                centre[p, 0] += aside * here * up
+                centre[p, 1] += aside * here * side
+                centre[p, 2] += aside * later
+        centre[p] /= total
+    return centre

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import binary_dilation, binary_erosion, maximum_filter1d, uniform_filter
+from scipy.ndimage import maximum_filter, maximum_filter1d, minimum_filter, uniform_filter
 
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.equations.arrays.apertures import live_gain
 from sonarsynth.equations.arrays.noise_peaks import peak_level
 from sonarsynth.products import EnergyImage
 from sonarsynth.ranging.location import pulse_times
-from sonarsynth.ranging.picking.peak_kernels import lobe_power, local_maxima
+from sonarsynth.ranging.picking.peak_kernels import lobe_power, local_maxima, power_centres
 from sonarsynth.ranging.picking.picked_echoes import PickedEchoes, no_echoes
 from sonarsynth.ranging.range_profiles import (
     OVERSAMPLING,
@@ -22,6 +22,7 @@ from sonarsynth.ranging.range_profiles import (
     loudest_beams,
     over_threshold,
     range_profiles,
+    residue,
 )
 from sonarsynth.ranging.received_window import ReceivedWindow
 
@@ -31,26 +32,23 @@ LOBES = 8.0
 """Times what lobes bring of louder peaks that a peak must exceed: echoes are of more than their peaks."""
 NOISE_WIDTHS = 3.0
 """Beam widths on either side of a beam whose noise is taken for its own."""
+LOUDER = 2.0
+"""Amplitude of noise, in units of its root mean square, that may be in a peak."""
 LOBE_BINS = 48
 """Frequencies that lobes are summed over."""
 RESOLVED = 1.0
 """An axis of the grid as long as this, in units of the roughness of noise along it, has peaks along it."""
 SIXTH = 1.0 / 6.0
-OVERLAP = 0.15
-"""Standard error of a peak for each part by which its width is not that of one echo, in units of its width."""
-UNLIKE = 0.02
-"""Part of the width that is not told from one."""
+ABOUT = 1.4
+"""Standard deviation, in widths of a peak, of the window about it in which the centre of power is looked for."""
+NOISE_PEAKS = 4.0
+"""Power below that, in units of the mean power of noise, is not counted there."""
+BESIDE_ERROR = 1.3
+"""Standard error of a peak for each part by which the centre of power is beside it."""
+EXTENDED = np.array([0.04, 0.04, 0.15])
+"""Standard error along elevation, azimuth and delay, in widths, of echoes of surfaces rather than points."""
 UNKNOWN = 0.5
 """Standard error of a direction along an axis that is not resolved, in half widths of the beam."""
-
-
-@dataclass(frozen=True, eq=False)
-class Tops:
-    """Peaks between the points of the grid along one axis."""
-
-    place: Floats  # (peak,) steps from the grid point
-    gain: Floats  # (peak,) amplitude at the top over that on the grid
-    bend: Floats  # (peak,) minus the second difference of the amplitude over the amplitude
 
 
 def peak_echoes(
@@ -59,32 +57,61 @@ def peak_echoes(
     """The peaks of the beams about those over threshold that are echoes, see `Peaks`."""
     image = heard.image
     some = over_threshold(image, threshold, heard.loudest)
-    wide = binary_dilation(some, np.ones((2 * BESIDE + 1,) * 2)) & np.isfinite(image.energy)
+    wide = maximum_filter(some, 2 * BESIDE + 1, mode="constant") & np.isfinite(image.energy)
     beams, left_out = loudest_beams(image, wide)
     if not len(beams[0]):
         return no_echoes(image, left_out)
     profiles = range_profiles(heard, beams)
-    grid = BeamAxes.of(heard, profiles)
+    axes = Axes.of(heard, profiles)
     noise = noise_power(profiles, image)
-    least = noise * peak_level(false_alarms, grid.sizes(profiles))
-    power = profiles.power
+    least = noise * peak_level(false_alarms, axes.sizes(profiles))
+    power, index = profiles.power, np.full(image.energy.shape, -1)
+    index[beams] = np.arange(len(power))
+    b, t = _maxima(profiles, axes, index, least, dynamic_range, side_lobes)
+    place, gain = _tops(power, index, beams, axes.resolved, b, t)
+    height = power[b, t] * gain**2
+    energy = _energies(heard, profiles, axes, b, height)
+    keep = (height >= least[b]) & (energy > residue(image, heard.loudest))
+    keep[keep] = _own(heard, profiles, b[keep], t[keep], height[keep], noise[b[keep]])
+    b, t, place, height, energy = b[keep], t[keep], place[keep], height[keep], energy[keep]
+    beside = power_centres(power, index, *beams, b, t, place, axes.step * axes.sharpness, ABOUT, NOISE_PEAKS * noise)
+    snr = height / noise[b]
+    error = axes.errors(snr, beside)
+    offset = place * axes.step
+    return PickedEchoes(
+        elevation=image.elevation[profiles.row[b]] + offset[:, 0],
+        azimuth=image.azimuth[profiles.column[b]] + offset[:, 1],
+        delay=profiles.first + t * profiles.step + offset[:, 2],
+        elevation_error=error[:, 0],
+        azimuth_error=error[:, 1],
+        delay_error=error[:, 2],
+        energy=energy.astype(np.float32),
+        snr=10 * np.log10(snr),
+        slope=np.zeros(len(b)),
+        overflow=left_out,
+    )
+
+
+def _maxima(
+    profiles: Profiles, axes: Axes, index: Ints, least: Floats, dynamic_range: float, side_lobes: float
+) -> tuple[Ints, Ints]:
+    """Beams and delays (peak,) of local maxima within both (dB), half of `least` (beam,) at least."""
+    power, beams = profiles.power, (profiles.row, profiles.column)
     floor = np.maximum(0.5 * least, power.max() * 10 ** (-dynamic_range / 10)).astype(np.float32)
     end = max(int(np.ceil(pulse_times.PULSE_HALF / profiles.step)), profiles.about) + 1
-    index = np.full(image.energy.shape, -1)
-    index[beams] = np.arange(len(power))
-    inner = binary_erosion(index >= 0, np.ones((3, 3)), border_value=1)
+    inner = minimum_filter(index >= 0, 3, mode="constant", cval=True)
     floor[~inner[beams]] = np.inf  # at the rim a slope would pass for a peak
-    b, t = local_maxima(power, index, *beams, floor, grid.resolved, profiles.about, end)
+    b, t = local_maxima(power, index, *beams, floor, axes.resolved, profiles.about, end)
     anywhere = maximum_filter1d(power.max(axis=0), 2 * profiles.about + 1)
     good = (power[b, t] * 10 ** (side_lobes / 10) >= anywhere[t]) & ~_cut(power, b, t, end)
-    b, t = b[good], t[good]
-    tops = _tops(power, index, beams, grid.resolved, b, t)
-    height = power[b, t] * (tops[0].gain * tops[1].gain * tops[2].gain) ** 2
-    keep = height >= least[b]
-    keep[keep] = _own(heard, profiles, b[keep], t[keep], height[keep])
-    found = [Tops(top.place[keep], top.gain[keep], top.bend[keep]) for top in tops]
-    b, t, height = b[keep], t[keep], height[keep]
-    return _echoes(heard, profiles, grid, found, b, t, height, noise[b], left_out=left_out)
+    return b[good], t[good]
+
+
+def _energies(heard: ReceivedWindow, profiles: Profiles, axes: Axes, b: Ints, height: Floats) -> Floats:
+    """Energies (peak,) in Pa2 s: of a peak h exp(-(sharpness t)^2), as a share of all that is in its beam."""
+    whole = profiles.step * profiles.power[b].sum(axis=1, dtype=float)
+    share = height * np.sqrt(np.pi) / axes.sharpness[2] / whole
+    return np.asarray(np.minimum(share, 1.0) * heard.image.energy[profiles.row[b], profiles.column[b]])
 
 
 def _cut(power: npt.NDArray[np.float32], b: Ints, t: Ints, end: int) -> Bools:
@@ -96,61 +123,60 @@ def _cut(power: npt.NDArray[np.float32], b: Ints, t: Ints, end: int) -> Bools:
 
 
 @dataclass(frozen=True, eq=False)
-class BeamAxes:
-    """The axes of the beam grid, elevation and azimuth: steps, and how a beam and noise change along them."""
+class Axes:
+    """The axes of the volume, elevation (rad), azimuth (rad) and delay (s): how an echo and noise change along them."""
 
-    step: Floats  # (2,) rad; 0 of an axis of one beam
-    cells: Ints  # (2,)
-    moments: Floats  # (2, 2) m2: second moments of the aperture across the middle of the beams
-    wave: Floats  # (2,) rad/m: root mean square wave number of an echo, and of noise
-    centre: tuple[float, float]  # rad: elevation and azimuth there
+    step: Floats  # (3,) 0 of an axis of one beam
+    cells: Ints  # (3,)
+    sharpness: Floats  # (3,) the amplitude of an echo falls as 1 - (sharpness x)^2/2; 1/sharpness: its width
+    roughness: Floats  # (3,) standard deviation of the derivative of noise over that of noise, where an echo is
 
     @staticmethod
-    def of(heard: ReceivedWindow, profiles: Profiles) -> BeamAxes:
+    def of(heard: ReceivedWindow, profiles: Profiles) -> Axes:
         """Of the beams of an image."""
-        axes = heard.image.elevation, heard.image.azimuth
-        step = np.array(_steps(heard.image))
-        centre = float(np.mean(axes[0][profiles.row])), float(np.mean(axes[1][profiles.column]))
-        up, side = _tangents(*centre)
-        across = np.array([up, side])
+        image, moments = heard.image, profiles.moments
+        middle = float(np.mean(image.elevation[profiles.row])), float(np.mean(image.azimuth[profiles.column]))
+        across = _tangents(*middle)
+        aperture = np.sqrt(np.einsum("ax,xy,ay->a", across, aperture_moments(heard.elements), across))  # m, rms
         k = 2 * np.pi / heard.sonar.assumed_sound_speed
-        wave = k * np.array([profiles.moments.echo_frequency, profiles.moments.noise_frequency])
-        moments = across @ aperture_moments(heard.elements) @ across.T
-        return BeamAxes(step, np.array([len(axis) for axis in axes]), moments, wave, centre)
-
-    @property
-    def sharpness(self) -> Floats:
-        """(2,) 1/rad: the amplitude of a beam falls as 1 - (sharpness x angle)^2/2."""
-        return np.asarray(self.wave[0] * np.sqrt(np.diag(self.moments)))
-
-    @property
-    def roughness(self) -> Floats:
-        """(2,) 1/rad: standard deviation of the derivative of noise over that of noise."""
-        return np.asarray(self.wave[1] * np.sqrt(np.diag(self.moments)))
+        return Axes(
+            step=np.array([*_steps(image), profiles.step]),
+            cells=np.array([*image.energy.shape, profiles.power.shape[1]]),
+            sharpness=np.append(k * moments.echo_frequency * aperture, 2 * np.pi * moments.echo_band),
+            roughness=np.append(k * moments.noise_frequency * aperture, 2 * np.pi * moments.noise_band),
+        )
 
     @property
     def resolved(self) -> Bools:
-        """(2,) whether peaks are told along an axis: it is longer than noise is smooth, of three beams at least."""
+        """(3,) whether peaks are told along an axis: it is longer than noise is smooth, of three cells at least."""
         return np.asarray((self.cells >= 3) & (self.step * self.cells * self.roughness > RESOLVED))
 
     def sizes(self, profiles: Profiles) -> Floats:
         """Lengths (3,) of the volume that is searched, as `peak_level` takes them."""
-        solid = np.maximum(self.step, 1e-12).prod() * len(profiles.power)  # of the beams, whatever their outline
-        whole = np.maximum(self.step * self.cells, 1e-12)
-        angle = whole * np.sqrt(solid / whole.prod()) * self.roughness * self.resolved
-        delay = power_length(profiles) * 2 * np.pi * profiles.moments.noise_own_band
-        return np.array([*angle, delay])
+        step = np.maximum(self.step[:2], 1e-12)
+        share = len(profiles.power) / self.cells[:2].prod()  # of all beams, whatever the outline of those looked at
+        angle = step * self.cells[:2] * np.sqrt(share) * self.roughness[:2] * self.resolved[:2]
+        lasting = max(profiles.power.shape[1] * profiles.step - 2 * pulse_times.PULSE_HALF, profiles.step)  # s
+        return np.append(angle, lasting * 2 * np.pi * profiles.moments.noise_own_band)
+
+    def errors(self, snr: Floats, beside: Floats) -> Floats:
+        """Predicted standard errors (peak, 3) of peaks of signal-to-noise ratio `snr` (peak,).
+
+        Noise moves the top of an amplitude that falls as 1 - (sharp x)^2/2 by its derivative over the bend, of standard
+        deviation rough/(sharp^2 (2 snr)^1/2). Where echoes overlap the centre of their power is beside their peak, by
+        `beside` (peak, 3) widths: the peak is taken to err by about as much (`BESIDE_ERROR`).
+        """
+        sharp = np.maximum(self.sharpness, [1e-3, 1e-3, 0.0])
+        noise = self.roughness / (sharp**2 * np.sqrt(2.0 * snr[:, None]))
+        known = np.sqrt(noise**2 + (EXTENDED**2 + (BESIDE_ERROR * beside) ** 2) / sharp**2)
+        unknown = UNKNOWN * np.maximum(1.0 / sharp, 0.5 * self.step)
+        return np.asarray(np.minimum(np.where(self.resolved, known, unknown), [np.pi, np.pi, np.inf]))
 
 
-def power_length(profiles: Profiles) -> float:
-    """Length (s) of the profiles, without their ends, where no echo is picked."""
-    return float(max(profiles.power.shape[1] * profiles.step - 2 * pulse_times.PULSE_HALF, profiles.step))
-
-
-def _tangents(elevation: float, azimuth: float) -> tuple[Floats, Floats]:
-    """Unit vectors (xyz) in which a direction moves as its elevation, and its azimuth, grow; the second times cos."""
+def _tangents(elevation: float, azimuth: float) -> Floats:
+    """Vectors (2, xyz): how a direction moves as its elevation, and its azimuth, grow."""
     se, ce, sa, ca = np.sin(elevation), np.cos(elevation), np.sin(azimuth), np.cos(azimuth)
-    return np.array([-se * ca, -se * sa, ce]), np.array([-ce * sa, ce * ca, 0.0])
+    return np.array([[-se * ca, -se * sa, ce], [-ce * sa, ce * ca, 0.0]])
 
 
 def noise_power(profiles: Profiles, image: EnergyImage) -> Floats:
@@ -178,13 +204,16 @@ def _steps(image: EnergyImage) -> tuple[float, float]:
 
 def _tops(
     power: npt.NDArray[np.float32], index: Ints, beams: tuple[Ints, Ints], resolved: Bools, b: Ints, t: Ints
-) -> tuple[Tops, Tops, Tops]:
-    """Parabolas through peaks and their neighbours, along elevation, azimuth and delay: through the cube roots of
-    amplitudes, which the main lobe of a disc makes a parabola up to the fourth order (1 - y/2 + y^2/12 does)."""
+) -> tuple[Floats, Floats]:
+    """Where the tops of peaks are, in steps (peak, 3) from the grid, and their amplitude over that on the grid (peak,).
+
+    Parabolas through peaks and their neighbours on each axis: through the cube roots of amplitudes, which the main lobe
+    of a disc makes a parabola up to the fourth order (1 - y/2 + y^2/12 does).
+    """
     row, column = beams[0][b], beams[1][b]
     top = power[b, t].astype(float) ** SIXTH
-    found = []
-    for axis, (up, side, late) in enumerate(((1, 0, 0), (0, 1, 0), (0, 0, 1))):
+    place, gain = np.zeros((len(b), 3)), np.ones(len(b))
+    for axis, (up, side, late) in enumerate(np.eye(3, dtype=int)):
         sides = []
         for way in (-1, 1):
             i = np.clip(row + way * up, 0, index.shape[0] - 1)
@@ -192,15 +221,13 @@ def _tops(
             other = index[i, j]
             there = np.where(other >= 0, power[other, t + way * late].astype(float) ** SIXTH, top)
             sides.append(np.minimum(there, top))
-        place, height = pulse_times.parabola(sides[0], top, sides[1])
-        bend = 3 * (2 * top - sides[0] - sides[1]) / top
-        told = axis == 2 or bool(resolved[axis])
-        gain = (height / top) ** 3
-        found.append(Tops(place * told, gain if told else np.ones(len(b)), bend if told else np.zeros(len(b))))
-    return found[0], found[1], found[2]
+        if resolved[axis]:
+            place[:, axis], height = pulse_times.parabola(sides[0], top, sides[1])
+            gain *= (height / top) ** 3
+    return place, gain
 
 
-def _own(heard: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: Floats) -> Bools:
+def _own(heard: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: Floats, noise: Floats) -> Bools:
     """Whether peaks (peak,) are more than what the lobes of the array bring of louder ones."""
     loud = np.argsort(-height, kind="stable")
     band, live = heard.sonar.band, np.flatnonzero(heard.elements.gain)
@@ -217,58 +244,6 @@ def _own(heard: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: Fl
         2.0 * profiles.width / c,
     )
     own = np.empty(len(b), bool)
-    own[loud] = height[loud] > LOBES * brought
+    least = np.maximum(np.sqrt(height) - LOUDER * np.sqrt(noise), 0.0) ** 2  # without what noise may add
+    own[loud] = least[loud] > LOBES * brought
     return own
-
-
-def _echoes(
-    heard: ReceivedWindow,
-    profiles: Profiles,
-    grid: BeamAxes,
-    tops: list[Tops],
-    b: Ints,
-    t: Ints,
-    height: Floats,
-    noise: Floats,
-    *,
-    left_out: int,
-) -> PickedEchoes:
-    """Peaks with their directions, delays and errors; height, noise (peak,): their power, and the mean of noise."""
-    image, snr = heard.image, height / noise
-    row, column, moments = profiles.row[b], profiles.column[b], profiles.moments
-    angles: list[Floats] = []
-    errors: list[Floats] = []
-    for axis, cells, place in ((image.elevation, row, tops[0]), (image.azimuth, column, tops[1])):
-        n = len(angles)
-        angles.append(axis[cells] + place.place * grid.step[n])
-        sharp, rough = grid.sharpness[n], grid.roughness[n]
-        if grid.resolved[n]:
-            errors.append(_error(place.bend, grid.step[n], sharp, rough, snr))
-        else:
-            errors.append(np.full(len(b), UNKNOWN * max(1.0 / max(sharp, 1e-3), 0.5 * grid.step[n])))
-    sharp, rough = 2 * np.pi * moments.echo_band, 2 * np.pi * moments.noise_band
-    whole = profiles.step * profiles.power[b].sum(axis=1, dtype=float)
-    share = np.minimum(height * np.sqrt(np.pi) / (sharp * whole), 1.0)  # a peak h exp(-(sharp t)^2) of all in its beam
-    return PickedEchoes(
-        azimuth=angles[1],
-        elevation=angles[0],
-        azimuth_error=np.minimum(errors[1], np.pi),
-        elevation_error=np.minimum(errors[0], np.pi),
-        delay=profiles.first + (t + tops[2].place) * profiles.step,
-        delay_error=_error(tops[2].bend, profiles.step, sharp, rough, snr),
-        energy=(share * image.energy[row, column]).astype(np.float32),
-        snr=10 * np.log10(snr),
-        slope=np.zeros(len(b)),
-        overflow=left_out,
-    )
-
-
-def _error(bend: Floats, step: float, sharp: float, rough: float, snr: Floats) -> Floats:
-    """Predicted standard error (peak,) of a peak along an axis, in the unit of `step`.
-
-    Noise moves the top of an amplitude that falls as 1 - (sharp x)^2/2 by its derivative over the bend, of standard
-    deviation rough/(sharp^2 (2 snr)^1/2). Echoes that overlap make a peak of another width than one echo has.
-    """
-    noise = rough / (sharp**2 * np.sqrt(2.0 * snr))
-    unlike = np.maximum(np.abs(bend / (sharp * step) ** 2 - 1.0), UNLIKE)
-    return np.asarray(np.hypot(noise, OVERLAP * unlike / sharp))

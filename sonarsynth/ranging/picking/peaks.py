@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from annotated_types import Ge, Gt, Le
@@ -23,8 +24,8 @@ class Peaks(Method):
     alone gives `false_alarms` a frame, and is not what the array hears beside its beam: within `side_lobes` of the
     largest at the same delay, and over what side lobes and grating lobes bring of louder echoes at theirs.
 
-    Measured by `tools/bench cloud`. Errors are predicted for single echoes in noise: where echoes overlap, as on large
-    glints, more of them than a normal distribution has are further off than three.
+    Measured by `tools/bench cloud`. Errors are those of noise, and of echoes that overlap: by how far the centre of the
+    power about a peak is from it.
     """
 
     kind: Literal["peaks"] = "peaks"
@@ -37,9 +38,11 @@ class Peaks(Method):
     side_lobes: Annotated[Decibels, Ge(0)] = 8.0
     """Peaks further below the largest at the same delay are taken for its side lobes."""
 
-    def resolve(self, demand: object) -> tuple[Peaks, float]:
-        """Itself: its errors are predicted point by point."""
-        return self, 0.0
+    def variants(self) -> dict[str, Peaks]:
+        """Settings on either side of it."""
+        levels = {f"threshold at {x:g} dB": replace(self, threshold=x) for x in (3.0, 6.0, 12.0, 20.0)}
+        levels |= {f"dynamic range at {x:g} dB": replace(self, dynamic_range=x) for x in (10.0, 15.0, 25.0, 35.0)}
+        return levels | {f"false alarms at {x:g}": replace(self, false_alarms=x) for x in (1e-4, 1e-2, 1.0)}
 
     def picks(self, heard: ReceivedWindow) -> PickedEchoes:
         """See `PickingMethod`."""
