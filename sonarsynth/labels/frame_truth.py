@@ -14,8 +14,9 @@ from sonarsynth.geometry.mesh import Mesh, in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels.views import box_in_view
 from sonarsynth.products import Paths, Truth
+from sonarsynth.propagation import Propagation
 from sonarsynth.receiver import BeamGrid
-from sonarsynth.state import WorldState, meeting_times, positions
+from sonarsynth.state import FrameContext, meeting_times, positions
 
 Connect = Callable[[Floats, Floats], Paths]
 """Rays from (pair, xyz) to (pair, xyz) in the world: a propagation model bound to its water."""
@@ -23,46 +24,41 @@ Connect = Callable[[Floats, Floats], Paths]
 _CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 
 
-def label(
-    moment: WorldState, sonar_pose: Pose, beams: BeamGrid, connect: Connect, snap_level: Floats, straight: bool,
-    doppler: bool = True,
-) -> Truth:  # fmt: skip
-    """Truth of a frame.
+def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -> Truth:
+    """Truth of a frame, on the grid of beams of its sonar; snap_level: (snap,) dB re 1 uPa at 1 m.
 
-    moment: the world; sonar_pose: of the array; beams: the grid that beams are labelled on; connect: the propagation
-    model of the frame; snap_level: (snap,) dB re 1 uPa at 1 m; straight: rays are straight, so bodies look as they are;
-    doppler: bodies move while sound is under way, so that it meets them elsewhere (`position_at_echo`).
     A beam's label is the first surface that a ray launched from the array centre in the beam's direction meets; its
     range is the distance of that point from the array centre. `label` traces the bent ray by casting a straight one
-    against the bodies as they appear: each vertex moved to (its arrival direction) * (its distance). A target's
-    `image_box` bounds what the array sees of it within the spans of the beams; NaN where that is nothing, and `view`
-    says why (`views.View`).
+    against the bodies as they appear: each vertex moved to (its arrival direction) * (its distance); straight rays show
+    them as they are. A target's `image_box` bounds what the array sees of it within the spans of the beams; NaN where
+    that is nothing, and `view` says why (`views.View`).
     """
-    seen = [_as_seen(body, sonar_pose, connect, straight) for body in moment.bodies]
-    target, facet, distance = _label_beams(moment.bodies, seen, beams, sonar_pose, straight)
-    visible = [
-        _visible(body, corners, moment.bodies, sonar_pose) for body, corners in zip(moment.bodies, seen, strict=True)
-    ]
+    bodies, sonar_pose, beams = context.bodies, context.receiver.pose, context.receiver.sonar.beams
+    straight, medium = not propagation.bends, context.medium
+    connect = partial(propagation.direct.connect, medium.profile, medium.depth)
+    seen = [_as_seen(body, sonar_pose, connect, straight) for body in bodies]
+    target, facet, distance = _label_beams(bodies, seen, beams, sonar_pose, straight)
+    visible = [_visible(body, corners, bodies, sonar_pose) for body, corners in zip(bodies, seen, strict=True)]
     boxes = [
         box_in_view(corners, body.mesh.faces[facets], beams)
-        for body, corners, (facets, _) in zip(moment.bodies, seen, visible, strict=True)
+        for body, corners, (facets, _) in zip(bodies, seen, visible, strict=True)
     ]
-    tracks = [body.track if doppler else body.frozen.track for body in moment.bodies]
-    met = meeting_times(tracks, moment.snaps, partial(_direct_times, connect))
+    tracks = [body.track if context.receiver.track else body.frozen.track for body in bodies]
+    met = meeting_times(tracks, context.snaps, partial(_direct_times, connect))
     return Truth(
         sonar_position=sonar_pose.position,
         sonar_orientation=sonar_pose.orientation,
-        target_position=_rows([b.pose.position for b in moment.bodies], 3),
-        target_orientation=_rows([b.pose.orientation for b in moment.bodies], 4),
-        target_velocity=_rows([b.velocity for b in moment.bodies], 3),
+        target_position=_rows([b.pose.position for b in bodies], 3),
+        target_orientation=_rows([b.pose.orientation for b in bodies], 4),
+        target_velocity=_rows([b.velocity for b in bodies], 3),
         meeting_time=met,
         position_at_echo=positions(tracks, met),
-        box=np.array([_box(b, sonar_pose) for b in moment.bodies]).reshape(-1, 8, 3),
+        box=np.array([_box(b, sonar_pose) for b in bodies]).reshape(-1, 8, 3),
         image_box=_rows([box.bounds for box in boxes], 4),
         view=np.array([box.view for box in boxes], np.int8),
         visible_fraction=np.array([fraction for _, fraction in visible]),
-        snap_position=_rows([s.position for s in moment.snaps], 3),
-        snap_time=np.array([s.time for s in moment.snaps]),
+        snap_position=_rows([s.position for s in context.snaps], 3),
+        snap_time=np.array([s.time for s in context.snaps]),
         snap_level=np.asarray(snap_level, float),
         beam_target=target,
         beam_facet=facet,

@@ -35,7 +35,7 @@ from sonarsynth.pipeline.stored_values import (
 )
 from sonarsynth.pipeline.synthesis import frame_signals
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, variables
-from sonarsynth.planning import Plan, arrivals_of, check_unsampled_frame, plan
+from sonarsynth.planning import Plan, check_unsampled_frame, context_of, plan
 from sonarsynth.planning.notes.source_notes import locator
 from sonarsynth.products import (
     Arrivals,
@@ -56,6 +56,7 @@ from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals import add_noise, convert
 from sonarsynth.signals.filtered_pulse import snap_levels
 from sonarsynth.signals.isolated_paths import measured_levels
+from sonarsynth.tracing.arrivals import trace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -117,7 +118,7 @@ def truth_frame(plan: Plan, index: int) -> Values:
 
 def truth_at(plan: Plan, frame: Frame) -> Values:
     """The same of a frame that is at hand; `plan` is that of its sequence."""
-    truth = _label(plan, frame, snap_levels(frame.moment.snaps))
+    truth = label(context_of(plan, frame), plan.propagation, snap_levels(frame.moment.snaps))
     mark_stage("label")
     return _of_frame(plan, frame) | truth_values(truth)
 
@@ -137,24 +138,18 @@ def _checked(plan: Plan, index: int) -> tuple[Plan, Frame]:
 
 def trace_at(plan: Plan, frame: Frame) -> TracedFrame:
     """Every path of a frame that is at hand, and its truth; `plan` is that of its sequence."""
-    arrivals = arrivals_of(plan, frame)
+    context = context_of(plan, frame)
+    arrivals = trace(context, plan.propagation)
     mark_stage("trace")
     seen = arrivals.seen_from_centre
-    levels = snap_levels(frame.moment.snaps)
-    truth = _label(plan, frame, levels)
-    band, targets = band_of(plan, frame.moment.snaps), len(frame.moment.bodies)
+    levels = snap_levels(context.snaps)
+    truth = label(context, plan.propagation, levels)
+    band, targets = band_of(plan, context.snaps), len(context.bodies)
     powers = path_powers(seen, band)
     budget = link_budget(seen, powers, band, targets, levels, expansion_error(plan, seen))
     heard = echo_levels(seen, powers, targets, levels)
     mark_stage("label")
     return TracedFrame(frame, arrivals, truth, budget, heard)
-
-
-def _label(plan: Plan, frame: Frame, levels: Floats) -> Truth:
-    """Truth of a frame; levels: (snap,) dB re 1 uPa at 1 m."""
-    straight = not plan.propagation.bends
-    beams, doppler = plan.scene.sonar.beams, plan.scene.physics.doppler
-    return label(frame.moment, frame.sonar_pose, beams, plan.connect, levels, straight, doppler)
 
 
 def _of_frame(plan: Plan, frame: Frame) -> Values:

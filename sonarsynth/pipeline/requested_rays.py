@@ -22,8 +22,7 @@ def follow_rays(plan: Plan, index: int) -> RayFan:
     if request.towards_shrimp and not frame.moment.snaps:
         raise FieldError(("rays", "towards_shrimp"), "the scene has no shrimp")
     return fan(
-        scene.world.environment,
-        plan.profile,
+        plan.medium,
         frame.moment.bodies,
         frame.sonar_pose.position,
         frame.sonar_pose.turn_to_world(request.rays()),

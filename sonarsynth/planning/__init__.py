@@ -12,7 +12,7 @@ from sonarsynth.planning.choosing import choose
 from sonarsynth.planning.costs import machine_factor, stages
 from sonarsynth.planning.listening_windows import check_windows, frame_start, listening_windows
 from sonarsynth.planning.measured.ray_bending import propagation
-from sonarsynth.planning.measured.sampled_arrivals import arrivals_of
+from sonarsynth.planning.measured.sampled_arrivals import arrivals_of, context_of
 from sonarsynth.planning.measured.sampled_frames import SampledScene, check_alike, sample_frames
 from sonarsynth.planning.notes.omissions import left_out
 from sonarsynth.planning.notes.plan_notes import notes, stored_validity
@@ -35,6 +35,7 @@ __all__ = [
     "check_unsampled_frame",
     "choices_from",
     "chosen_products",
+    "context_of",
     "frame_start",
     "listening_windows",
     "plan",

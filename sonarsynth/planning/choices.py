@@ -10,9 +10,9 @@ from pydantic import TypeAdapter
 from sonarsynth.conventions import Number
 from sonarsynth.description import description
 from sonarsynth.imaging import Beamformer, FocusedDelayAndSum
-from sonarsynth.propagation import OcclusionPoint
 from sonarsynth.ranging import IsovelocityPlacing, Peaks, Picking, Placing
 from sonarsynth.signals import GriddedSynthesis, Synthesis
+from sonarsynth.state import OcclusionPoint
 
 Degree = Literal[3, 5]
 

@@ -23,12 +23,12 @@ from sonarsynth.planning.measured.sampled_arrivals import arrivals_of
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.plans import Errors, Plan
 from sonarsynth.products import Arrivals
-from sonarsynth.propagation import OcclusionPoint
 from sonarsynth.receiver import Elements
 from sonarsynth.receiver.subarrays import subarray, subarrays, with_rim
 from sonarsynth.recipe import Accuracy
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals.auto_synthesis import deposit_for
+from sonarsynth.state import OcclusionPoint
 
 FAINT, SYNTHESIS, EXPANSION = 0.1, 0.4, 0.5
 """Shares of the square of the error allowed to signals: of paths left out, of the synthesis, of expansions."""

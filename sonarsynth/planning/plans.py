@@ -17,11 +17,11 @@ from sonarsynth.planning.measured.absorption_error import Passed, mean_absorptio
 from sonarsynth.planning.measured.ray_bending import propagation
 from sonarsynth.planning.notes.scene_checks import check_shrimp, read_inputs
 from sonarsynth.planning.plan_tables import Omission, Stage, as_html, as_text
-from sonarsynth.products import Paths
 from sonarsynth.propagation import Propagation
 from sonarsynth.receiver import Elements, elements
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Scene
+from sonarsynth.state import Medium
 
 PRODUCTS = ("signals", "image", "cloud")
 """What a build can be asked for. Truth is always written; with any of these, levels of what is traced too."""
@@ -116,6 +116,11 @@ class Plan:
         """
         return mean_absorption(self.scene.world.environment.absorption, self._passed, frequency)
 
+    @property
+    def medium(self) -> Medium:
+        """The water of the sequence."""
+        return Medium(self.scene.world.environment, self.profile, self.absorption_at_depths)
+
     @cached_property
     def absorption_at_depths(self) -> DepthAbsorption:
         """Absorption at the centre of the band, which each path loses by the depths that it passes."""
@@ -135,10 +140,6 @@ class Plan:
         environment, band = self.scene.world.environment, self.scene.sonar.band
         ends, bounces = (band.low, band.high), self.propagation.bounces
         return shape_error(environment.absorption, self._passed, ends, environment.depth, bounces)
-
-    def connect(self, start: Floats, end: Floats) -> Paths:
-        """Rays between pairs of points in this plan's water, those of the direct family."""
-        return self.propagation.direct.connect(self.profile, self.scene.world.environment.depth, start, end)
 
     @property
     def predicted_seconds(self) -> float:

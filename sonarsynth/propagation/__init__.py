@@ -6,16 +6,13 @@ rays wherever they go.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from sonarsynth.description import BY_KIND
 from sonarsynth.propagation.auto_propagation import AutoTracing
 from sonarsynth.propagation.path_model import PathModel
 from sonarsynth.propagation.refracted import Refracted
 from sonarsynth.propagation.straight import Straight
-
-OcclusionPoint = Literal["centre", "sensors"]
-"""From where facets are seen: the middle of the array or part, or each hydrophone for itself."""
 
 Propagation = PathModel
 """A model of how sound travels between two points."""

@@ -1,18 +1,40 @@
-"""The world at one instant: placed bodies and the snaps of that instant. What a frame is traced in."""
+"""The world at one instant: water, placed bodies, the snaps of that instant, the array. What a frame is traced in."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Floats, depth
+from sonarsynth.environment.sea import Environment, Profile
+from sonarsynth.geometry import Pose
 from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
+from sonarsynth.receiver import Elements, Sonar
+from sonarsynth.scattering import FacetLaw
 from sonarsynth.sources.sound_source import Snap
 
-__all__ = ["Snap", "TravelTime", "WorldState", "meeting_times", "positions"]
+if TYPE_CHECKING:
+    from sonarsynth.environment.absorption import DepthAbsorption
+
+__all__ = [
+    "FrameContext",
+    "Medium",
+    "OcclusionPoint",
+    "Receiver",
+    "Snap",
+    "Tolerances",
+    "TravelTime",
+    "WorldState",
+    "meeting_times",
+    "positions",
+]
+
+OcclusionPoint = Literal["centre", "sensors"]
+"""From where facets are seen: the middle of the array or part, or each hydrophone for itself."""
 
 TravelTime = Callable[[Floats, Floats], Floats]
 """Travel times (pair,) in s from points (pair, xyz) to points (pair, xyz) of the world; NaN where no sound arrives."""
@@ -28,6 +50,76 @@ class WorldState:
     time: float  # s since the start of the trajectory
     bodies: tuple[PlacedTarget, ...]
     snaps: tuple[Snap, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Medium:
+    """The water between surface and bottom."""
+
+    environment: Environment
+    profile: Profile  # sound speed, as rays go through it
+    absorption: float | DepthAbsorption = 0.0  # dB/m at the centre of the band: the same at all depths, or at each
+
+    @property
+    def depth(self) -> float:
+        """Depth of the bottom in m."""
+        return self.environment.depth
+
+
+@dataclass(frozen=True, eq=False)
+class Receiver:
+    """The array, or a part of it, where it is."""
+
+    pose: Pose
+    elements: Elements
+    sonar: Sonar = field(default_factory=Sonar)
+    track: Track | None = None  # of the array, if it and bodies move while sound is under way; None: all stays
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """Hz: its lowest and highest frequency."""
+        return self.sonar.band.low, self.sonar.band.high
+
+    @property
+    def centre(self) -> float:
+        """Hz: centre of the band."""
+        return self.sonar.band.centre
+
+    def speed(self, medium: Medium) -> float:
+        """Of sound at the middle of the array, m/s."""
+        return float(medium.profile.at(depth(self.pose.position)))
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """What tracing may leave out."""
+
+    negligible: float = 1e-7
+    """The faintest echoes of a snap from each target are left out, so many that their powers together stay below this
+    part of the power of all from there (70 dB); each counts with the largest amplitude that it has anywhere on the
+    array. Of coherent ones, which add by amplitude, so many that their amplitudes together stay below the root of this
+    part of that of the largest."""
+    quadratic: float = 1e-4
+    """Error of amplitudes over the aperture, of the strongest echo's, at which polynomials of the second degree do."""
+    facet_mean: float = 1e-3
+    """Change of an echo over the aperture by the mean over its facet, over the strongest echo, that is left out."""
+    shared: float = 1e-2
+    """What moves by less than this part of the radius of a body from one snap to another, and keeps as near to what
+    its velocity and spin say, in radians of the highest frequency, is traced for both together."""
+    occlusion: OcclusionPoint = "centre"
+    """From where facets must be seen."""
+    degree: int = 3
+    """Of polynomials over the aperture."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrameContext(WorldState):
+    """All that the paths of a frame depend on but how sound travels. It is truth: what locates and ranges sees none."""
+
+    medium: Medium
+    receiver: Receiver
+    laws: tuple[FacetLaw, ...] = ()  # how the facets of each body scatter
+    tolerances: Tolerances = Tolerances()
 
 
 def meeting_times(tracks: Sequence[Track], snaps: tuple[Snap, ...], travel_time: TravelTime) -> Floats:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 SAME_FACET_CHANGE = 10.0
 """How much more what heights take from echoes counts, where it changes over the aperture, than means over facets do: it
-is alike on all facets, where these make up for each other (`FacetPaths.alike`)."""
+is alike on all facets, where these make up for each other (`Tolerances.facet_mean`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,10 +140,10 @@ def echo_batches(
 ) -> list[EchoBatch]:
     """Echoes of pairs of a way and a leg (pair,), by body and part; those that are nothing are left out; carried: by
     how much pairs differ from those that were traced, where anything moves."""
-    facets, found = array.facets, []
-    looked_for = array.occlusion == "sensors" and array.elements.count > 1
+    facets, context, receiver, found = array.facets, array.context, array.context.receiver, []
+    looked_for = context.tolerances.occlusion == "sensors" and receiver.elements.count > 1
     target = facets.target[out.facet]
-    for number, (body, of_law) in enumerate(zip(array.bodies, parts, strict=True)):
+    for number, (body, of_law) in enumerate(zip(context.bodies, parts, strict=True)):
         row = np.flatnonzero(target == number)
         facet = facets.facet[out.facet[row]]
         arrival, departure = out.arrival[row], array.legs.departure[leg[row]]
@@ -152,8 +152,8 @@ def echo_batches(
             arrival = mine.turned_back(arrival)
             departure = mine.turned_back(mine.departure(array.legs.length[leg[row]], departure))
         incident, scattered = body.pose.turn_to_body(arrival), body.pose.turn_to_body(departure)
-        speed = array.profile.at(depth(array.legs.point[leg[row]]))
-        wavenumber = 2.0 * np.pi * array.centre / speed
+        speed = context.medium.profile.at(depth(array.legs.point[leg[row]]))
+        wavenumber = 2.0 * np.pi * receiver.centre / speed
         for part in (
             replace(p, beyond=True) if looked_for and isinstance(p, Lobe | CoherentKirchhoff | DiffuseKirchhoff) else p
             for p in of_law
@@ -161,7 +161,7 @@ def echo_batches(
             patch = patches(body.mesh, not isinstance(part, Lobe)).select(facet)
             amplitude = part.amplitude(incident, scattered, patch, wavenumber)
             sign = part.polarity(body.mesh)[facet]
-            group = EchoBatch(body, part, row, patch, incident, scattered, wavenumber, array.band, amplitude, sign)
+            group = EchoBatch(body, part, row, patch, incident, scattered, wavenumber, receiver.band, amplitude, sign)
             found.append(group.select(np.flatnonzero(amplitude)))
     return found
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints, depth
-from sonarsynth.environment.absorption import DepthAbsorption
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
@@ -99,22 +98,19 @@ class _EchoBlock:
         most = np.maximum(np.abs(self.few).max(axis=1, initial=0.0), np.abs(amplitude)) * self.factor[row]
         target = self.array.facets.target[self.out.facet[row]]
         number = np.repeat(np.arange(len(self.groups)), [len(g.row) for g in self.groups])
-        return EchoLevels(most * in_band(self.pulses, self.array.band), self.pulses.coherent, target, number)
+        return EchoLevels(
+            most * in_band(self.pulses, self.array.context.receiver.band), self.pulses.coherent, target, number
+        )
 
 
-def echoes(
-    array: FacetPaths,
-    index: int,
-    snap: Snap,
-    absorption: float | DepthAbsorption,
-    parts: tuple[tuple[Component, ...], ...],
-) -> Arrivals:
+def echoes(array: FacetPaths, index: int, parts: tuple[tuple[Component, ...], ...]) -> Arrivals:
     """Snap `index` to facet to array, over every facet of the legs that is lit; parts: of the law of each body.
 
     Facets are taken in blocks, so that little is held at a time; the echoes are those of one block, in its order.
     """
     if not any(parts):
         return no_arrivals(array.legs)
+    snap, receiver, profile = array.context.snaps[index], array.context.receiver, array.context.medium.profile
     found = _loudest(array, snap, parts)
     terms, error = variations(found)
     most = max(float(np.abs(some.strength).max(initial=0.0)) for some in found)
@@ -126,24 +122,25 @@ def echoes(
         over = _turned(some, most)
         over = _spread(some, over, most) if spread else over
         spot = np.concatenate([g.spot for g in some.groups])
-        if spot.any() and not some.array.bending.uniform:
+        if spot.any() and not some.array.bending.profile.uniform:
             over = delay_to_scattering_points(over, some.array, some.leg, spot)
         array, out, legs, meeting = some.array, some.out, some.array.settled(some.leg), some.array.meeting
         view = partial(_away, array, legs, some.leg, some.carried)
         if meeting is not None and some.carried is not None:
-            legs = received(legs, some.carried, meeting, array.profile)
+            legs = received(legs, some.carried, meeting, profile)
         target, facet = array.facets.target[out.facet], array.facets.facet[out.facet]
         amplitude, sign = _columns(some.groups, "amplitude", "sign")
-        scattered, vary, loss = sign * amplitude, (variation, error), path_loss(array, absorption, snap, legs, out)
+        scattered, vary, loss = sign * amplitude, (variation, error), path_loss(array, snap, legs, out)
         one = assemble(
             legs, over, out, index, snap.time, loss,
             target=target, facet=facet, scattering=scattered, variation=vary, pulses=some.pulses,
         )  # fmt: skip
         if meeting is not None and some.carried is not None:
-            moving = partial(apply_doppler, elements=array.elements, departure=view, enough=array.enough)
-            one = moving(one, legs, out, some.carried, meeting, array.profile)
-        if spot.any() and array.bending.uniform:
-            one = shift_to_scattering_points(one, legs, spot, array.sonar_pose)
+            enough = array.context.tolerances.quadratic
+            moving = partial(apply_doppler, elements=receiver.elements, departure=view, enough=enough)
+            one = moving(one, legs, out, some.carried, meeting, profile)
+        if spot.any() and array.bending.profile.uniform:
+            one = shift_to_scattering_points(one, legs, spot, receiver.pose)
         made.append(replace(one, delay=one.delay + some.pulses.late))
     return ordered(made, group)
 
@@ -157,16 +154,16 @@ def _loudest(array: FacetPaths, snap: Snap, parts: tuple[tuple[Component, ...], 
     blocks = in_blocks(len(array.facets.facet))
     if len(blocks) == 1:
         found = _found(array, snap, parts)
-        return [found.select(loud_ones(found.seen(), array.negligible))]
+        return [found.select(loud_ones(found.seen(), array.context.tolerances.negligible))]
     held: list[_EchoBlock] = []
     seen: list[EchoLevels] = []
     kept: list[Bools] = []
     for some in blocks:
         found = _found(array.part(some), snap, parts)
         seen.append(found.seen())
-        kept.append(loud_of_all(seen, PRUNE_MARGIN * array.negligible)[-1])
+        kept.append(loud_of_all(seen, PRUNE_MARGIN * array.context.tolerances.negligible)[-1])
         held.append(found.select(kept[-1]))
-    for n, wanted in enumerate(loud_of_all(seen, array.negligible)):
+    for n, wanted in enumerate(loud_of_all(seen, array.context.tolerances.negligible)):
         if (wanted & ~kept[n]).any():
             held[n] = _found(array.part(blocks[n]), snap, parts).select(wanted)
         else:
@@ -186,7 +183,7 @@ def _found(array: FacetPaths, snap: Snap, parts: tuple[tuple[Component, ...], ..
     factor = array.legs.spreading[leg] * array.legs.boundary[leg] * out.spreading * out.boundary
     away = [_departure(array, leg[g.row], carried and carried.select(g.row), QUADRATIC_PROBES) for g in groups]
     few = np.concatenate([g.over(of) for g, of in zip(groups, away, strict=True)])
-    pulses = PulseResponse.join([g.pulses(array.centre) for g in groups])
+    pulses = PulseResponse.join([g.pulses(array.context.receiver.centre) for g in groups])
     rows = leg[_columns(groups, "row")[0]]
     gain, over = fronts.gain(rows, QUADRATIC_PROBES), fronts.terms.select(rows)
     return _EchoBlock(array, groups, out, leg, factor, few, gain, over, pulses, carried)
@@ -197,9 +194,9 @@ def _carried(array: FacetPaths, snap: Snap, out: TransmitPaths, leg: Ints) -> tu
     meeting, facets = array.meeting, array.facets
     assert meeting is not None
     target, point = facets.target[out.facet], facets.point[out.facet]
-    velocity, spin = velocities(array.bodies, target, point)
+    velocity, spin = velocities(array.context.bodies, target, point)
     met = meeting.met[target]
-    there, late = meets(out, met, velocity, snap.time, array.profile.at(depth(point)))
+    there, late = meets(out, met, velocity, snap.time, array.context.medium.profile.at(depth(point)))
     return there, met_paths(array.legs, leg, met, late, velocity, spin, meeting)
 
 
@@ -225,19 +222,16 @@ def _columns(groups: list[EchoBatch], *names: str) -> list[np.ndarray]:
 
 def _ways(array: FacetPaths, snap: Snap) -> TransmitPaths:
     """Ways from a snap to the lit side of facets that no body hides; of facets in one place, the first body's."""
-    environment, profile, facets = array.environment, array.profile, array.facets
-    row = np.flatnonzero(
-        may_face_receiver(facets, snap.position, array.propagation.bounces, profile, environment.depth)
-    )
+    medium, bodies, facets = array.context.medium, array.context.bodies, array.facets
+    row = np.flatnonzero(may_face_receiver(facets, snap.position, array.propagation.bounces, medium))
     start = np.broadcast_to(snap.position, (len(row), 3))
-    paths = array.propagation.connect(profile, environment.depth, start, facets.point[row])
+    paths = array.propagation.connect(medium.profile, medium.depth, start, facets.point[row])
     facet = row[paths.pair]
     lit = usable(paths) & (np.einsum("ij,ij->i", facets.normal[facet], paths.arrival) < 0)
-    out = TransmitPaths.of(paths, reflections(environment, profile, paths, array.centre), facet).select(
-        np.flatnonzero(lit)
-    )
-    out = out.select(~_hides(array, array.bodies, snap, out, facets.clear[out.facet]))
-    for number, before in overlapping(array.bodies):
+    bounced = reflections(medium.environment, medium.profile, paths, array.context.receiver.centre)
+    out = TransmitPaths.of(paths, bounced, facet).select(np.flatnonzero(lit))
+    out = out.select(~_hides(array, bodies, snap, out, facets.clear[out.facet]))
+    for number, before in overlapping(bodies):
         mine = np.flatnonzero(facets.target[out.facet] == number)
         of = out.facet[mine]
         again = _hides(array, before, snap, out.select(mine), 2.0 * facets.point[of] - facets.clear[of])  # from under
@@ -249,7 +243,7 @@ def _hides(array: FacetPaths, bodies: tuple[PlacedTarget, ...], snap: Snap, out:
     """Whether any of some bodies stands in ways (way,) from a snap to points near facets, start (way, xyz)."""
     end = np.broadcast_to(snap.position, start.shape)
     stand_in = partial(hidden, bounces=out.bounces, turning=out.turning)  # backwards: bodies are where a ray begins
-    return stand_in(bodies, array.environment, array.bending, start, end, -out.arrival, out.length)
+    return stand_in(bodies, array.bending, start, end, -out.arrival, out.length)
 
 
 def _turned(found: _EchoBlock, most: float) -> ExpansionTerms:
@@ -267,24 +261,27 @@ def _turned(found: _EchoBlock, most: float) -> ExpansionTerms:
     leaps = np.abs(shift).max(axis=1, initial=0.0) > MAX_PHASE_CHANGE
     if not shift.any():
         return over
-    probe = probes(array.elements, array.degree)
+    probe = probes(array.context.receiver.elements, array.context.tolerances.degree)
     terms = probe.fit(np.where(leaps[:, None], 0.0, shift))
     share = np.abs(found.strength) / max(most, 1e-300)
-    error = over.error + share * np.where(leaps, 0.0, probe.misfit(shift, terms)) / (2.0 * np.pi * array.band[1])
+    error = over.error + share * np.where(leaps, 0.0, probe.misfit(shift, terms)) / (
+        2.0 * np.pi * array.context.receiver.band[1]
+    )
     return over._replace(phase=over.phase + terms if over.phase.shape[1] else terms, error=error)
 
 
 def _spreads(found: _EchoBlock, most: float) -> bool:
-    """Whether what facets spread echoes by in time changes any of them over the array by more than `FacetPaths.alike`
-    of the strongest of all."""
-    array, rate = found.array, 2.0 * np.pi * found.array.band[1]
+    """Whether what facets spread echoes by in time changes any of them over the array by more than
+    `Tolerances.facet_mean` of the strongest of all."""
+    array, receiver = found.array, found.array.context.receiver
+    rate = 2.0 * np.pi * receiver.band[1]
     if not any(g.spreads for g in found.groups):
         return False
-    share, turn = np.abs(found.strength) / max(most, 1e-300), array.elements.aperture / array.legs.length[found.leg]
+    share, turn = np.abs(found.strength) / max(most, 1e-300), receiver.elements.aperture / array.legs.length[found.leg]
     late = np.split(found.pulses.corner_delays, np.cumsum([len(g.row) for g in found.groups])[:-1])
     of = zip(found.groups, late, strict=True)
-    bound = np.concatenate([g.most_spread(corners, turn[g.row], array.centre) for g, corners in of])
-    return bool(0.5 * rate**2 * (share * bound).max(initial=0.0) > array.alike)
+    bound = np.concatenate([g.most_spread(corners, turn[g.row], receiver.centre) for g, corners in of])
+    return bool(0.5 * rate**2 * (share * bound).max(initial=0.0) > array.context.tolerances.facet_mean)
 
 
 def _spread(found: _EchoBlock, over: ExpansionTerms, most: float) -> ExpansionTerms:
@@ -293,8 +290,8 @@ def _spread(found: _EchoBlock, over: ExpansionTerms, most: float) -> ExpansionTe
     Their delays over a facet have another variance there; the mean over a facet is that of the centre, blurred by what
     it is more.
     """
-    array, share = found.array, np.abs(found.strength) / max(most, 1e-300)
-    more = np.concatenate([g.spread(found.departure(g.row, QUADRATIC_PROBES), array.centre) for g in found.groups])
-    terms, misfit = probes(array.elements, array.degree).fit_few(more)
+    receiver, share = found.array.context.receiver, np.abs(found.strength) / max(most, 1e-300)
+    more = np.concatenate([g.spread(found.departure(g.row, QUADRATIC_PROBES), receiver.centre) for g in found.groups])
+    terms, misfit = probes(receiver.elements, found.array.context.tolerances.degree).fit_few(more)
     delay_std = over.delay_std + terms if over.delay_std.shape[1] else terms
-    return over._replace(delay_std=delay_std, error=over.error + share * np.pi * array.band[1] * misfit)
+    return over._replace(delay_std=delay_std, error=over.error + share * np.pi * receiver.band[1] * misfit)

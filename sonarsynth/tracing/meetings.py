@@ -11,15 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sonarsynth.conventions import Floats, depth
-from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.state import Snap, meeting_times, positions
+from sonarsynth.state import FrameContext, meeting_times, positions
 from sonarsynth.tracing.doppler import Meeting
-
-SHARED = 1e-2
-"""What moves by less than this part of the radius of a body from one snap to another, and keeps as near to what its
-velocity and spin say, in radians of the highest frequency, is traced for both together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,25 +75,16 @@ class _Times:
         return bool((off + size * np.linalg.norm(then.rotation.T - turned)) * self.wavenumber <= self.shared)
 
 
-def occasions(
-    bodies: tuple[PlacedTarget, ...],
-    snaps: tuple[Snap, ...],
-    sonar: Track,
-    profile: Profile,
-    *,
-    highest: float,
-    aperture: float,
-    shared: float = SHARED,
-) -> list[Occasion]:
-    """Poses to trace the echoes of each snap from each body between, by the times of straight lines.
-
-    bodies, sonar: at the instant of the frame; highest: frequency, Hz; aperture: m of the array; shared: see `SHARED`.
-    """
-    speed = float(profile.at(depth(sonar.pose.position)))
+def occasions(context: FrameContext, sonar: Track) -> list[Occasion]:
+    """Poses to trace the echoes of each snap from each body between, by the times of straight lines; sonar: of the
+    array."""
+    bodies, snaps, receiver = context.bodies, context.snaps, context.receiver
+    speed = float(context.medium.profile.at(depth(sonar.pose.position)))
     tracks = [body.track.part(0.5 * np.sum(body.mesh.box, axis=0)) for body in bodies]
     met = meeting_times(tracks, snaps, lambda start, end: np.linalg.norm(end - start, axis=1) / speed)
     heard = hearing_times(positions(tracks, met), met, sonar, speed)
-    times = _Times(bodies, sonar, met, heard, shared, 2.0 * np.pi * highest / speed, aperture)
+    wavenumber = 2.0 * np.pi * receiver.band[1] / speed
+    times = _Times(bodies, sonar, met, heard, context.tolerances.shared, wavenumber, receiver.elements.aperture)
     found: list[Occasion] = []
     for snap in range(len(snaps)):
         for targets in times.classes(snap):

@@ -16,21 +16,13 @@ if TYPE_CHECKING:
     from sonarsynth.tracing.transmit_paths import TransmitPaths
 
 
-def path_loss(
-    array: FacetPaths,
-    absorption: float | DepthAbsorption,
-    snap: Snap,
-    legs: ReceivePaths,
-    out: TransmitPaths | None = None,
-) -> Floats:
-    """Absorption (path,) in dB along legs to the array and, of echoes, along the ways out to where they start.
-
-    absorption: at every depth, or the same (dB/m) at all of them.
-    """
+def path_loss(array: FacetPaths, snap: Snap, legs: ReceivePaths, out: TransmitPaths | None = None) -> Floats:
+    """Absorption (path,) in dB along legs to the array and, of echoes, along the ways out to where they start."""
+    absorption = array.context.medium.absorption
     if not isinstance(absorption, DepthAbsorption):
         return np.asarray(absorption * (legs.length if out is None else out.length + legs.length))
-    start, profile = depth(legs.point), array.bending
-    end = np.full(len(start), float(depth(array.sonar_pose.position)))
+    start, profile = depth(legs.point), array.bending.profile
+    end = np.full(len(start), float(depth(array.context.receiver.pose.position)))
     lost = legs.length * absorption.along(profile, start, end, legs.departure[:, 2], legs.bounces + legs.turning)
     if out is None:
         return np.asarray(lost)

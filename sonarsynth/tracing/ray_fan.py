@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import NO_TARGET, Floats, Ints, depth
-from sonarsynth.environment.sea import Environment, Profile
 from sonarsynth.equations.rays.ray_solutions import Water, water, within
 from sonarsynth.geometry import unit
 from sonarsynth.geometry.placed_target import PlacedTarget
@@ -16,6 +15,7 @@ from sonarsynth.propagation.ray_steps import ARRIVAL, END, EVENTS, FACET, LAUNCH
 from sonarsynth.scattering import FacetLaw
 from sonarsynth.scattering.components import size_at
 from sonarsynth.scattering.facet_geometry import patches
+from sonarsynth.state import Medium
 from sonarsynth.tracing.occlusion.ray_cones import hidden
 
 if TYPE_CHECKING:
@@ -40,8 +40,7 @@ class RayFan:
 
 
 def fan(
-    environment: Environment,
-    profile: Profile,
+    medium: Medium,
     bodies: tuple[PlacedTarget, ...],
     origin: Floats,
     directions: Floats,
@@ -65,7 +64,7 @@ def fan(
     """
     if not (np.isfinite(duration) and duration >= 0):
         raise ValueError("a fan of rays needs a finite duration")
-    layers = water(profile.depth, profile.speed, environment.depth)
+    layers = water(medium.profile.depth, medium.profile.speed, medium.depth)
     within(layers, np.atleast_1d(depth(origin)), "origin")
     start, heading = np.tile(np.asarray(origin, float), (len(directions), 1)), unit(directions)
     zero = np.zeros(len(start))
@@ -79,8 +78,7 @@ def fan(
             raise ValueError("sending rays on towards a point needs scattering laws, a propagation model, a frequency")
         for group in landed:
             onward = _send_on(
-                environment,
-                profile,
+                medium,
                 layers,
                 bodies,
                 group,
@@ -140,8 +138,7 @@ def _follow(
 
 
 def _send_on(
-    environment: Environment,
-    profile: Profile,
+    medium: Medium,
     layers: Water,
     bodies: tuple[PlacedTarget, ...],
     landed: _Landed,
@@ -155,7 +152,7 @@ def _send_on(
     """Rays about to leave the facets where they landed for a point; writes their coefficients (ray,)."""
     rays = landed.rays
     end = np.broadcast_to(np.asarray(towards, float), rays.position.shape)
-    paths = propagation.connect(profile, environment.depth, rays.clear, end)
+    paths = propagation.connect(medium.profile, medium.depth, rays.clear, end)
     row, first = np.unique(paths.pair, return_index=True)  # the earliest: paths are sorted by time
     going, time = paths.departure[first], paths.travel_time[first]
     strength = np.zeros(len(row))
@@ -163,13 +160,13 @@ def _send_on(
         mine = np.flatnonzero(landed.target[row] == number)
         on = row[mine]
         patch = patches(body.mesh).select(landed.facet[on])
-        c = profile.at(depth(rays.position[on]))
+        c = medium.profile.at(depth(rays.position[on]))
         incident, mirrored, away = (
             body.pose.turn_to_body(v) for v in (landed.incident[on], rays.direction[on], going[mine])
         )
         lobe, mirror = (size_at(law.parts, incident, v, patch, centre, c) for v in (away, mirrored))
         strength[mine] = np.divide(lobe, mirror, out=np.zeros_like(lobe), where=mirror > 0)
-    strength[hidden(bodies, environment, profile, rays.clear[row], end[row], going, paths.length[first])] = 0.0
+    strength[hidden(bodies, medium, rays.clear[row], end[row], going, paths.length[first])] = 0.0
     coefficient[rays.ray] = 0.0
     coefficient[rays.ray[row]] = strength
     on = row[strength > 0]

@@ -10,13 +10,12 @@ import numpy as np
 
 from sonarsynth.casting.ray_casting import OFFSET
 from sonarsynth.conventions import Bools, Bytes, Floats, Ints, depth
-from sonarsynth.environment.sea import Environment, Profile
 from sonarsynth.equations.rays.ray_solutions import COINCIDENT, TOLERANCE
-from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Paths
 from sonarsynth.propagation.reflections import Reflections, reflections
+from sonarsynth.state import Medium, Receiver
 from sonarsynth.tracing.occlusion.ray_cones import max_launch_deviation
 
 if TYPE_CHECKING:
@@ -63,13 +62,13 @@ class ReceivePaths:
         """(leg,) reflections from surface and bottom."""
         return np.asarray(self.surface + self.bottom)
 
-    def swerve(self, environment: Environment, profile: Profile, sonar_pose: Pose, spread: Floats | float) -> Floats:
+    def swerve(self, medium: Medium, receiver: Receiver, spread: Floats | float) -> Floats:
         """(leg,) rad as `ray_cones.max_launch_deviation`, of those to within `spread` (m) of the array centre."""
         return max_launch_deviation(
-            environment.depth,
-            profile,
+            medium.depth,
+            medium.profile,
             self.point,
-            float(depth(sonar_pose.position)),
+            float(depth(receiver.pose.position)),
             self.departure,
             self.length,
             spreading=self.spreading,
@@ -113,21 +112,19 @@ def usable(paths: Paths) -> Bools:
     return np.asarray((paths.flag != COINCIDENT) & np.isfinite(paths.spreading))
 
 
-def rays_to_centre(
-    environment: Environment, profile: Profile, point: Floats, sonar_pose: Pose, propagation: Propagation, centre: float
-) -> ReceivePaths:
-    """All rays from points (point, xyz) in the world to the array centre, sorted by point; centre (Hz): of the band."""
-    end = np.broadcast_to(sonar_pose.position, point.shape)
-    paths = propagation.connect(profile, environment.depth, point, end)
+def rays_to_centre(medium: Medium, point: Floats, receiver: Receiver, propagation: Propagation) -> ReceivePaths:
+    """All rays from points (point, xyz) in the world to the array centre, sorted by point."""
+    end = np.broadcast_to(receiver.pose.position, point.shape)
+    paths = propagation.connect(medium.profile, medium.depth, point, end)
     keep = np.flatnonzero(usable(paths))
     start = point[paths.pair[keep]]
-    bounced: Reflections = reflections(environment, profile, paths, centre)
+    bounced: Reflections = reflections(medium.environment, medium.profile, paths, receiver.centre)
     return ReceivePaths(
         point=start,
         row=paths.pair[keep],
         departure=paths.departure[keep],
         arrival=paths.arrival[keep],
-        direction=-sonar_pose.turn_to_body(paths.arrival[keep]),
+        direction=-receiver.pose.turn_to_body(paths.arrival[keep]),
         radius=paths.length[keep],
         travel_time=paths.travel_time[keep],
         length=paths.length[keep],
@@ -144,18 +141,16 @@ def rays_to_centre(
     )
 
 
-def require_in_water(bodies: tuple[PlacedTarget, ...], environment: Environment) -> None:
-    """Raises ValueError for a body that reaches out of the water."""
+def require_in_water(bodies: tuple[PlacedTarget, ...], bottom: float) -> None:
+    """Raises ValueError for a body that reaches out of water of that depth (m)."""
     for body in bodies:
-        highest, deepest = environment.depth, 0.0
+        highest, deepest = bottom, 0.0
         for some in in_blocks(len(body.mesh.vertices)):
             down = depth(body.pose.to_world(body.mesh.vertices[some]))
             highest, deepest = float(down.min(initial=highest)), float(down.max(initial=deepest))
-        if highest < -TOLERANCE or deepest > environment.depth + TOLERANCE:
+        if highest < -TOLERANCE or deepest > bottom + TOLERANCE:
             where = "above the surface" if highest < -TOLERANCE else "below the bottom"
-            raise ValueError(
-                f"target '{body.name}' reaches {where} ({highest:g} to {deepest:g} m in {environment.depth:g} m)"
-            )
+            raise ValueError(f"target '{body.name}' reaches {where} ({highest:g} to {deepest:g} m in {bottom:g} m)")
 
 
 def facets_of(bodies: tuple[PlacedTarget, ...], some: slice) -> Facets:
@@ -179,40 +174,32 @@ def facets_of(bodies: tuple[PlacedTarget, ...], some: slice) -> Facets:
 
 
 def receive_paths(
-    facets: Facets,
-    environment: Environment,
-    profile: Profile,
-    sonar_pose: Pose,
-    propagation: Propagation,
-    centre: float,
-    slack: float = 0.0,
+    facets: Facets, medium: Medium, receiver: Receiver, propagation: Propagation, slack: float = 0.0
 ) -> ReceivePaths:
     """Facet to array: rays that leave a facet on its outer side, whether or not a body stands in them; rows are facets.
 
     Or that may on their way to a point within `slack` (m) of the array centre.
     """
-    legs = rays_to_centre(environment, profile, facets.point, sonar_pose, propagation, centre)
+    legs = rays_to_centre(medium, facets.point, receiver, propagation)
     ahead = np.einsum("ij,ij->i", facets.normal[legs.row], legs.departure) * legs.length
     if slack and propagation.bends:
-        ahead += legs.swerve(environment, profile, sonar_pose, slack) * (legs.length + slack)
+        ahead += legs.swerve(medium, receiver, slack) * (legs.length + slack)
     return legs.select(np.flatnonzero(ahead > -slack))
 
 
-def may_face_receiver(
-    facets: Facets, position: Floats, bounces: int, profile: Profile, bottom_depth: float, slack: float = 0.0
-) -> Bools:
+def may_face_receiver(facets: Facets, position: Floats, bounces: int, medium: Medium, slack: float = 0.0) -> Bools:
     """(facet,) which may have a ray on their outer side to a point (xyz), or within `slack` (m) of it; exactly so in
     uniform water, unreflected.
 
     A ray rises and falls by (bounces + 2) bottom depths at most over its distance, so somewhere it has that slope or
     less, and by Snell's law its cosine is nowhere less than there times the ratio of the extreme sound speeds.
     """
-    if not bounces and profile.uniform:
+    if not bounces and medium.profile.uniform:
         return np.asarray(np.einsum("ij,ij->i", facets.normal, position - facets.point) > -slack)
     level = position[:2] - facets.point[:, :2]
     distance = np.hypot(level[:, 0], level[:, 1])
-    flattest = distance / np.hypot(distance, (bounces + 2) * bottom_depth)
-    cosine = flattest * profile.speed.min() / profile.speed.max()
+    flattest = distance / np.hypot(distance, (bounces + 2) * medium.depth)
+    cosine = flattest * medium.profile.speed.min() / medium.profile.speed.max()
     ahead = np.einsum("ij,ij->i", facets.normal[:, :2], level) / np.maximum(distance, 1e-300)
     steepest = np.abs(facets.normal[:, 2]) * np.sqrt((1.0 - cosine) * (1.0 + cosine))
     margin = 1e-9 + slack / np.maximum(distance, 1e-300)

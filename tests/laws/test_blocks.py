@@ -16,10 +16,10 @@ from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels import label
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing, Refracted, Straight
-from sonarsynth.receiver import BeamGrid, Romanis, elements
+from sonarsynth.receiver import BeamGrid, Romanis, Sonar, elements
 from sonarsynth.scattering import Kirchhoff, MirrorLobe, PartlyReflecting, Scattering
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Snap, WorldState
+from sonarsynth.state import FrameContext, Medium, Receiver, Snap
 from sonarsynth.tracing import echoes
 from sonarsynth.tracing.arrivals import trace
 
@@ -39,10 +39,8 @@ BODIES = tuple(
     PlacedTarget(name, hull(n), Pose(np.array(place), quaternion(0.4, 0.1, 0.2)), np.array([1.0, -2.0, 0.1]))
     for name, n, place in (("large", 5, (20.0, 1.0, -11.0)), ("small", 3, (15.0, 0.5, -11.5)))
 )
-MOMENT = WorldState(
-    0.0,
-    BODIES,
-    tuple(Snap(np.array(at), 1e-3 * at[0], LogarithmicBubble(), None) for at in ((3.0, 6.0, -30.0), (9.0, -6.0, -30))),
+SNAPS = tuple(
+    Snap(np.array(at), 1e-3 * at[0], LogarithmicBubble(), None) for at in ((3.0, 6.0, -30.0), (9.0, -6.0, -30))
 )
 CASES: dict[str, tuple[Profile, int, Scattering]] = {
     "straight": (UNIFORM, 0, MirrorLobe(width=0.3)),
@@ -56,12 +54,9 @@ CASES: dict[str, tuple[Profile, int, Scattering]] = {
 
 
 def found(profile: Profile, bounces: int, law: Scattering) -> Arrivals:
-    moving = Track(SONAR, np.array([0.5, 0.0, 0.0]))
-    tracing = AutoTracing(bounces=bounces)
-    laws = (law, MirrorLobe())
-    return trace(
-        ENVIRONMENT, profile, MOMENT, SONAR, ROMANIS, 0.02, tracing, laws, band=(25e3, 85e3), moving=moving
-    )  # fmt: skip
+    receiver = Receiver(SONAR, ROMANIS, track=Track(SONAR, np.array([0.5, 0.0, 0.0])))
+    water, laws = Medium(ENVIRONMENT, profile, 0.02), (law, MirrorLobe())
+    return trace(FrameContext(0.0, BODIES, SNAPS, water, receiver, laws), AutoTracing(bounces=bounces))
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -90,8 +85,9 @@ def test_labels_are_the_same_whatever_the_block(monkeypatch: pytest.MonkeyPatch,
     beams = BeamGrid(azimuth_span=0.5, azimuths=41, elevation_span=0.5, elevations=41)
 
     def labels() -> dict[str, object]:
-        levels = np.zeros(len(MOMENT.snaps))
-        return vars(label(MOMENT, SONAR, beams, lambda a, b: rays.connect(profile, 30.0, a, b), levels, straight))
+        receiver = Receiver(SONAR, ROMANIS, Sonar(beams=beams), Track(SONAR, np.zeros(3)))
+        context = FrameContext(0.0, BODIES, SNAPS, Medium(ENVIRONMENT, profile), receiver)
+        return vars(label(context, rays, np.zeros(len(SNAPS))))
 
     whole = labels()
     assert (np.asarray(whole["visible_fraction"]) > 0.0).all() and (np.asarray(whole["beam_target"]) >= 0).any()

@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 
 from sonarsynth.conventions import azimuth_elevation, direction
+from sonarsynth.environment.sea import Environment, Isovelocity, Profile
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels import label
 from sonarsynth.labels.views import MEANINGS, View, box_in_view
 from sonarsynth.products import Truth
-from sonarsynth.receiver import BeamGrid
-from sonarsynth.state import WorldState
+from sonarsynth.propagation import Straight
+from sonarsynth.receiver import BeamGrid, Romanis, Sonar, elements
+from sonarsynth.state import FrameContext, Medium, Receiver
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
 
@@ -21,6 +23,8 @@ BEAMS = BeamGrid(azimuth_span=np.deg2rad(50.0), azimuths=11, elevation_span=np.d
 HALF = np.deg2rad([25.0, 25.0, 15.0, 15.0]) * [-1, 1, -1, 1]
 SONAR = Pose(np.array([0.0, 0.0, -50.0]), np.array([1.0, 0.0, 0.0, 0.0]))
 STRAIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+WATER = Environment(depth=100.0, sound_speed=Isovelocity(speed=1500.0))
+STILL = Profile(np.array([0.0]), np.array([1500.0]))
 
 
 def truth(*bodies: tuple[Mesh, np.ndarray]) -> Truth:
@@ -28,7 +32,8 @@ def truth(*bodies: tuple[Mesh, np.ndarray]) -> Truth:
         PlacedTarget(f"body{n}", mesh, Pose(SONAR.position + place, STRAIGHT), np.zeros(3))
         for n, (mesh, place) in enumerate(bodies)
     )
-    return label(WorldState(0.0, placed, ()), SONAR, BEAMS, None, np.zeros(0), True)  # type: ignore[arg-type]
+    receiver, water = Receiver(SONAR, elements(Romanis()), Sonar(beams=BEAMS)), Medium(WATER, STILL)
+    return label(FrameContext(0.0, placed, (), water, receiver), Straight(), np.zeros(0))
 
 
 def sampled(corners: np.ndarray, rng: np.random.Generator, count: int) -> np.ndarray:

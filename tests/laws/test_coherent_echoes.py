@@ -19,7 +19,7 @@ from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import Romanis, elements
 from sonarsynth.scattering import Isotropic, Kirchhoff, MirrorLobe, PartlyReflecting
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Snap, WorldState
+from sonarsynth.state import FrameContext, Medium, Receiver, Snap
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.tracing.arrivals import trace
@@ -43,10 +43,10 @@ def echo(
     bodies: tuple[PlacedTarget, ...], source: Floats, laws: tuple[object, ...], bounces: int = 0, array: Floats = ARRAY
 ) -> Arrivals:
     snaps = (Snap(np.array(source, float), 0.0, LogarithmicBubble(), None),)
+    receiver = Receiver(Pose(array, EAST), ROMANIS)
     found = trace(
-        WATER, PROFILE, WorldState(0.0, bodies, snaps), Pose(array, EAST), ROMANIS, 0.0, AutoTracing(bounces=bounces),
-        laws, band=(25e3, 85e3),
-    )  # fmt: skip
+        FrameContext(0.0, bodies, snaps, Medium(WATER, PROFILE), receiver, laws), AutoTracing(bounces=bounces)
+    )
     return found.select(~found.direct)
 
 
@@ -182,12 +182,7 @@ def test_source_and_array_exchanged_hear_the_same() -> None:
     place, source = ARRAY + [9.0, 2.0, 1.0], ARRAY + [3.0, -6.0, -2.0]
     law = Kirchhoff(surface=PartlyReflecting(density_ratio=2.0, speed_ratio=1.3), roughness=0.001)
     there = echo((body(mesh, place),), source, (law,))
-    snaps = (Snap(ARRAY, 0.0, LogarithmicBubble(), None),)
-    back = trace(
-        WATER, PROFILE, WorldState(0.0, (body(mesh, place),), snaps), Pose(source, EAST), ROMANIS, 0.0, AutoTracing(),
-        (law,), band=(25e3, 85e3),
-    )  # fmt: skip
-    back = back.select(~back.direct)
+    back = echo((body(mesh, place),), ARRAY, (law,), array=np.array(source, float))
     for part in (True, False):
         one, other = (a.select(a.coherent == part) for a in (there, back))
         np.testing.assert_allclose(transfer(one), transfer(other), rtol=5e-4)  # but for the faintest

@@ -23,7 +23,7 @@ from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.array_paths import array_paths, delay_and_gain
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Snap, WorldState
+from sonarsynth.state import FrameContext, Medium, Receiver, Snap, Tolerances
 from sonarsynth.tracing.arrivals import trace
 from sonarsynth.tracing.expansion.wavefront_polynomials import terms_of
 
@@ -38,10 +38,9 @@ TANK = Path(__file__).parents[2] / "configs" / "tank.yaml"
 
 
 def traced(array: Elements, pose: Pose, degree: int = 3) -> Arrivals:
-    return trace(
-        WATER, PROFILE, WorldState(0.0, (), (SNAP,)), pose, array, 0.0, Refracted(bounces=0), (),
-        band=(SONAR.band.low, SONAR.band.high), degree=degree,
-    )  # fmt: skip
+    receiver, left = Receiver(pose, array, SONAR), Tolerances(degree=degree)
+    context = FrameContext(0.0, (), (SNAP,), Medium(WATER, PROFILE), receiver, tolerances=left)
+    return trace(context, Refracted(bounces=0))
 
 
 def error(degree: int, share: float) -> float:

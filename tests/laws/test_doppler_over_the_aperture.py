@@ -24,11 +24,10 @@ from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.array_paths import array_paths, delay_and_gain
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Snap, WorldState
+from sonarsynth.state import FrameContext, Medium, Receiver, Snap, Tolerances
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box
 from sonarsynth.tracing.arrivals import trace
-from sonarsynth.tracing.facet_paths import QUADRATIC_TOLERANCE
 
 C = 1500.0
 PROFILE = Profile(np.array([0.0]), np.array([C]))
@@ -36,7 +35,6 @@ POSE = Pose(np.array([0.0, 0.0, -5.0]), quaternion(0.5 * np.pi))
 ROMANIS = elements(Romanis())
 SNAP = Snap(np.array([14.0, -5.0, -9.5]), 0.0, LogarithmicBubble(), None)
 SONAR = Sonar()
-BAND = (SONAR.band.low, SONAR.band.high)
 PANEL = mesh_of(Box(size=(0.006, 0.3, 0.2), edge=0.05))
 FRONT = np.flatnonzero(PANEL.normal[:, 0] < -0.9)
 STILL, FAST = np.zeros(3), np.array([1.0, 6.0, -2.0])
@@ -65,10 +63,10 @@ def traced(
     )
     panel = PlacedTarget("panel", PANEL, Pose(np.array([12.0, 1.5, -4.8]), quaternion(0.6)), moving.target)
     rays = Straight if profile.uniform else Refracted
-    found = trace(
-        water, profile, WorldState(0.0, (panel,), (SNAP,)), pose, array, 0.0, rays(bounces=bounces), (Isotropic(),),
-        band=BAND, moving=Track(pose, moving.sonar), enough=enough, negligible=0.0,
-    )  # fmt: skip
+    receiver = Receiver(pose, array, SONAR, Track(pose, moving.sonar))
+    left = Tolerances(negligible=0.0, quadratic=enough)
+    context = FrameContext(0.0, (panel,), (SNAP,), Medium(water, profile), receiver, (Isotropic(),), left)
+    found = trace(context, rays(bounces=bounces))
     return found.select(found.direct | np.isin(found.facet, FRONT))  # those that no hydrophone sees from their edge
 
 
@@ -175,9 +173,9 @@ def test_one_path_alone_is_the_direct_sum() -> None:
 
 def test_nothing_is_carried_where_it_would_not_be_heard() -> None:
     slow = Moving(0.1 * FAST, STILL)
-    assert traced(slow, ROMANIS, POSE, enough=QUADRATIC_TOLERANCE).doppler_terms.shape[1] == 0
+    assert traced(slow, ROMANIS, POSE, enough=Tolerances().quadratic).doppler_terms.shape[1] == 0
     assert traced(Moving(STILL, STILL), ROMANIS, POSE).doppler_terms.shape[1] == 0
-    assert traced(MOVING["target"], ROMANIS, POSE, enough=QUADRATIC_TOLERANCE).doppler_terms.shape[1] > 0
+    assert traced(MOVING["target"], ROMANIS, POSE, enough=Tolerances().quadratic).doppler_terms.shape[1] > 0
 
 
 def test_delays_of_bent_rays_from_what_moves_are_those_of_each_hydrophone() -> None:

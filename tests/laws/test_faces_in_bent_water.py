@@ -19,7 +19,7 @@ from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.array_paths import array_paths, arrival_directions, towards
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Snap, WorldState
+from sonarsynth.state import FrameContext, Medium, Receiver, Snap
 from sonarsynth.tracing.arrivals import trace
 
 C = 1500.0
@@ -38,10 +38,8 @@ def profile(gradient: float) -> Profile:
 
 
 def traced(gradient: float, array: Elements, pose: Pose, moving: Track | None = None) -> Arrivals:
-    return trace(
-        WATER, profile(gradient), WorldState(0.0, (), SNAPS), pose, array, 0.0, Refracted(bounces=0), (),
-        band=(SONAR.band.low, SONAR.band.high), moving=moving,
-    )  # fmt: skip
+    water, receiver = Medium(WATER, profile(gradient)), Receiver(pose, array, SONAR, moving)
+    return trace(FrameContext(0.0, (), SNAPS, water, receiver), Refracted(bounces=0))
 
 
 def alone(gradient: float, array: Elements, sensor: int) -> tuple[Arrivals, Elements]:

@@ -20,7 +20,7 @@ from sonarsynth.scattering import Kirchhoff
 from sonarsynth.signals import GriddedSynthesis
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Snap, WorldState
+from sonarsynth.state import FrameContext, Medium, Receiver, Snap, Tolerances
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box
 from sonarsynth.tracing.arrivals import trace
@@ -40,10 +40,9 @@ SINGLE = elements(PositionTable(positions=((0.0, 0.0, 0.0),), face=ROMANIS.face)
 
 def traced(law: Kirchhoff, place: Floats, array: Elements, alike: float) -> Arrivals:
     panel = PlacedTarget("panel", PANEL, Pose(PLACE + [3.0, 0.2, 0.2], quaternion(0.3)), np.zeros(3))
-    found = trace(
-        WATER, PROFILE, WorldState(0.0, (panel,), (SNAP,)), Pose(place, EAST), array, 0.0, AutoTracing(), (law,),
-        band=(SONAR.band.low, SONAR.band.high), negligible=0.0, alike=alike,
-    )  # fmt: skip
+    receiver, left = Receiver(Pose(place, EAST), array, SONAR), Tolerances(negligible=0.0, facet_mean=alike)
+    context = FrameContext(0.0, (panel,), (SNAP,), Medium(WATER, PROFILE), receiver, (law,), left)
+    found = trace(context, AutoTracing())
     return found.select(~found.direct)
 
 

@@ -13,6 +13,7 @@ from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.propagation import AutoTracing, Refracted
 from sonarsynth.scattering import MirrorLobe
+from sonarsynth.state import Medium
 from sonarsynth.tracing.ray_fan import EVENTS, RayFan, fan
 
 TANK = Environment(depth=0.3, sound_speed=Isovelocity(speed=1480.0))
@@ -42,7 +43,7 @@ def at(found: RayFan, event: str) -> np.ndarray:
 def tank() -> RayFan:
     origin = np.array([0.0, 0.0, -0.15])
     aims = np.concatenate([downward(-25.0, 3.0, 40.0), downward(-2.0, 5.0, azimuth=0.08)])
-    return fan(TANK, TANK_PROFILE, (cylinder(),), origin, aims, 1.2e-3)
+    return fan(Medium(TANK, TANK_PROFILE), (cylinder(),), origin, aims, 1.2e-3)
 
 
 def test_rays_reflect_at_the_angle_at_which_they_arrive(tank: RayFan) -> None:
@@ -92,7 +93,7 @@ def test_times_and_lengths_grow_evenly_and_end_on_time(tank: RayFan) -> None:
 def test_a_ray_in_one_gradient_is_an_arc_of_the_closed_form_radius() -> None:
     deep = Environment(depth=2000.0, sound_speed=Isovelocity(speed=1500.0))
     profile = Profile(np.array([0.0, 2000.0]), np.array([1450.0, 1550.0]))  # 0.05 per second
-    found = fan(deep, profile, (), np.array([0.0, 0.0, -1000.0]), downward(10.0, 0.0, -2.0), 4.0, spacing=50.0)
+    found = fan(Medium(deep, profile), (), np.array([0.0, 0.0, -1000.0]), downward(10.0, 0.0, -2.0), 4.0, spacing=50.0)
     for ray, angle in enumerate(np.deg2rad([10.0, 0.0, -2.0])):
         x, z = found.position[found.ray == ray][:, [0, 2]].T
         radius = 1500.0 / (0.05 * np.cos(angle))
@@ -107,7 +108,7 @@ def test_a_ray_in_one_gradient_is_an_arc_of_the_closed_form_radius() -> None:
 
 def test_arcs_do_not_depend_on_where_they_are_cut() -> None:
     origin, aims = np.array([0.0, 0.0, -0.12]), downward(-20.0, 0.0, 7.0)
-    coarse, fine = (fan(TANK, TANK_PROFILE, (), origin, aims, 2e-3, spacing=s) for s in (np.inf, 0.01))
+    coarse, fine = (fan(Medium(TANK, TANK_PROFILE), (), origin, aims, 2e-3, spacing=s) for s in (np.inf, 0.01))
     assert len(fine.ray) > 3 * len(coarse.ray)
     np.testing.assert_allclose(fine.position[at(fine, "end")], coarse.position[at(coarse, "end")], atol=1e-10)
 
@@ -115,7 +116,7 @@ def test_arcs_do_not_depend_on_where_they_are_cut() -> None:
 def test_a_fan_and_an_eigenray_agree() -> None:
     start, end = np.array([[0.0, 0.0, -0.05]]), np.array([[2.0, 1.0, -0.25]])
     path = Refracted().connect(TANK_PROFILE, 0.3, start, end)
-    followed = fan(TANK, TANK_PROFILE, (), start[0], path.departure[:1], float(path.travel_time[0]))
+    followed = fan(Medium(TANK, TANK_PROFILE), (), start[0], path.departure[:1], float(path.travel_time[0]))
     np.testing.assert_allclose(followed.position[-1], end[0], atol=1e-9)
     np.testing.assert_allclose(followed.length[-1], path.length[0], rtol=1e-9)
     np.testing.assert_allclose(followed.direction[-1], path.arrival[0], atol=1e-9)
@@ -139,7 +140,7 @@ def test_rays_that_meet_the_l_shape_are_sent_on_to_the_shrimp_with_the_lobes_coe
         Profile(np.array([0.0, 20.0]), np.array([1545.0, 1530.0])),
     ):
         found = fan(
-            water, profile, (l_shape(),), np.array([0.0, 0.0, -9.0]), aims, 0.03,
+            Medium(water, profile), (l_shape(),), np.array([0.0, 0.0, -9.0]), aims, 0.03,
             towards=shrimp, laws=(law,), propagation=AutoTracing(), centre=55e3,
         )  # fmt: skip
         arrived, hit = at(found, "arrival"), at(found, "facet")
@@ -166,7 +167,7 @@ def test_rays_that_meet_the_l_shape_are_sent_on_to_the_shrimp_with_the_lobes_coe
 
 
 def test_rays_stop_after_their_bounces() -> None:
-    found = fan(TANK, TANK_PROFILE, (), np.array([0.0, 0.0, -0.1]), downward(45.0), 1.0, 3)
+    found = fan(Medium(TANK, TANK_PROFILE), (), np.array([0.0, 0.0, -0.1]), downward(45.0), 1.0, 3)
     kinds = [EVENTS[e] for e in found.event if EVENTS[e] in ("surface", "bottom")]
     assert kinds == ["bottom", "surface", "bottom", "surface"]
     assert not len(at(found, "end"))
@@ -175,22 +176,22 @@ def test_rays_stop_after_their_bounces() -> None:
 @pytest.mark.parametrize("speeds", [(1500.0, 1490.0, 1500.0), (1500.0, 1510.0, 1500.0), (1500.0, 1500.0, 1500.0)])
 def test_a_level_ray_on_a_node_stays_or_bends_away_but_ends(speeds: tuple[float, float, float]) -> None:
     profile = Profile(np.array([0.0, 0.15, 0.3]), np.array(speeds))
-    found = fan(TANK, profile, (), np.array([0.0, 0.0, -0.15]), np.array([[0.0, 1.0, 0.0]]), 1e-3)
+    found = fan(Medium(TANK, profile), (), np.array([0.0, 0.0, -0.15]), np.array([[0.0, 1.0, 0.0]]), 1e-3)
     assert found.time[-1] == pytest.approx(1e-3)
     assert np.isfinite(found.position).all()
     assert (speeds[1] > speeds[0]) == (abs(found.position[-1, 2] + 0.15) > 1e-3)
 
 
 def test_vertical_rays_go_up_and_down() -> None:
-    found = fan(TANK, TANK_PROFILE, (), np.array([0.5, 0.5, -0.1]), np.array([[0.0, 0.0, -1.0]]), 2e-3)
+    found = fan(Medium(TANK, TANK_PROFILE), (), np.array([0.5, 0.5, -0.1]), np.array([[0.0, 0.0, -1.0]]), 2e-3)
     np.testing.assert_allclose(found.position[:, :2], 0.5, atol=1e-15)
     assert {"surface", "bottom"} <= {EVENTS[e] for e in found.event}
 
 
 def test_a_fan_without_an_end_or_outside_the_water_is_refused() -> None:
     with pytest.raises(ValueError, match="finite duration"):
-        fan(TANK, TANK_PROFILE, (), np.zeros(3), downward(3.0), np.inf)
+        fan(Medium(TANK, TANK_PROFILE), (), np.zeros(3), downward(3.0), np.inf)
     with pytest.raises(ValueError, match="not in the water"):
-        fan(TANK, TANK_PROFILE, (), np.array([0.0, 0.0, -1.0]), downward(3.0), 1.0)
+        fan(Medium(TANK, TANK_PROFILE), (), np.array([0.0, 0.0, -1.0]), downward(3.0), 1.0)
     with pytest.raises(ValueError, match="laws, a propagation"):
-        fan(TANK, TANK_PROFILE, (), np.array([0.0, 0.0, -0.1]), downward(3.0), 1e-3, towards=np.zeros(3))
+        fan(Medium(TANK, TANK_PROFILE), (), np.array([0.0, 0.0, -0.1]), downward(3.0), 1e-3, towards=np.zeros(3))

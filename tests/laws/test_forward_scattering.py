@@ -21,7 +21,7 @@ from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import Romanis, elements
 from sonarsynth.scattering import Kirchhoff, MirrorLobe, PartlyReflecting
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Snap, WorldState
+from sonarsynth.state import FrameContext, Medium, Receiver, Snap
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.tracing.arrivals import trace
@@ -51,12 +51,11 @@ def heard(
     bounces: int = 0,
     profile: Profile = PROFILE,
     moving: Track | None = None,
+    water: Environment = WATER,
 ) -> Arrivals:
     snaps = (Snap(np.array(source, float), 0.0, LogarithmicBubble(), None),)
-    return trace(
-        WATER, profile, WorldState(0.0, bodies, snaps), Pose(np.array(array, float), EAST), ROMANIS, 0.0,
-        AutoTracing(bounces=bounces), laws, band=(25e3, 85e3), moving=moving,
-    )  # fmt: skip
+    receiver = Receiver(Pose(np.array(array, float), EAST), ROMANIS, track=moving)
+    return trace(FrameContext(0.0, bodies, snaps, Medium(water, profile), receiver, laws), AutoTracing(bounces=bounces))
 
 
 def transfer(found: Arrivals, sensor: Floats | None = None) -> Floats:
@@ -205,11 +204,8 @@ def test_what_comes_by_a_boundary_is_shadowed_like_what_comes_straight(boundary:
     some = found.select((touched == 1) & (found.direct | ((found.arrives_by > 0) == (not first))))
     free = Environment(depth=3 * BOTTOM_DEPTH, sound_speed=WATER.sound_speed, absorption=WATER.absorption)
     lower = np.array([0.0, 0.0, -BOTTOM_DEPTH])
-    alone = trace(
-        free, PROFILE, WorldState(0.0, (replace(bodies[0], pose=Pose(bodies[0].pose.position + lower, EAST)),),
-        (Snap(start + lower, 0.0, LogarithmicBubble(), None),)), Pose(end + lower, EAST), ROMANIS, 0.0, AutoTracing(),
-        (SCATTERED,), band=(25e3, 85e3),
-    )  # fmt: skip
+    below = (replace(bodies[0], pose=Pose(bodies[0].pose.position + lower, EAST)),)
+    alone = heard(below, start + lower, array=end + lower, water=free)
     expected = transfer(alone)
     assert np.abs(expected[-1]) < 0.3 * np.abs(straight(start, end)[-1])
     sign = np.exp(1j * found.phase[touched == 1][0]) * np.sign(found.boundary[touched == 1][0])

@@ -13,14 +13,14 @@ from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
-from sonarsynth.propagation import AutoTracing, OcclusionPoint
+from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, elements
 from sonarsynth.scattering import Kirchhoff, PartlyReflecting
 from sonarsynth.scattering.components import CoherentKirchhoff
 from sonarsynth.scattering.facet_geometry import patches
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Snap, WorldState
+from sonarsynth.state import FrameContext, Medium, OcclusionPoint, Receiver, Snap, Tolerances
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Sphere
 from sonarsynth.tracing.arrivals import trace
@@ -43,10 +43,10 @@ ROWS = ("position", "gain", "column", "row")
 def traced(law: Kirchhoff, place: Floats, array: Elements, occlusion: OcclusionPoint = "sensors") -> Arrivals:
     """Coherent echoes of a ball 8 m ahead, lit from the side."""
     ball = PlacedTarget("ball", BALL, Pose(PLACE + [8.0, 0.3, 0.2], EAST), np.zeros(3))
-    found = trace(
-        WATER, PROFILE, WorldState(0.0, (ball,), (SNAP,)), Pose(place, EAST), array, 0.0, AutoTracing(), (law,),
-        band=(SONAR.band.low, SONAR.band.high), negligible=0.0, enough=0.0, alike=0.0, occlusion=occlusion,
-    )  # fmt: skip
+    receiver = Receiver(Pose(place, EAST), array, SONAR)
+    none = Tolerances(negligible=0.0, quadratic=0.0, facet_mean=0.0, occlusion=occlusion)
+    context = FrameContext(0.0, (ball,), (SNAP,), Medium(WATER, PROFILE), receiver, (law,), none)
+    found = trace(context, AutoTracing())
     return found.select(found.coherent)
 
 

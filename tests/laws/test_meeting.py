@@ -9,14 +9,14 @@ import pytest
 from scipy.optimize import brentq
 
 from sonarsynth.description import FieldError
-from sonarsynth.geometry.motion import Circle, ConstantVelocity, Still, Waypoint, Waypoints, pose, spin, velocity
+from sonarsynth.geometry.motion import Circle, ConstantVelocity, Still, Track, Waypoint, Waypoints, pose, spin, velocity
 from sonarsynth.labels import label
 from sonarsynth.planning import Choices, plan
 from sonarsynth.planning.notes.scene_checks import check_frame
 from sonarsynth.propagation import Refracted, Straight
-from sonarsynth.receiver import BeamGrid
-from sonarsynth.state import WorldState
-from tests.laws.test_traced_families import BOTTOM_DEPTH, SONAR, THERMOCLINE, UNIFORM, C, ball
+from sonarsynth.receiver import BeamGrid, Sonar
+from sonarsynth.state import FrameContext, Medium, Receiver
+from tests.laws.test_traced_families import BOTTOM_DEPTH, ONE, RIGID, SONAR, THERMOCLINE, UNIFORM, C, ball
 from tests.laws.test_traced_families import snap as snap_at
 from tests.scenes import remus
 
@@ -39,11 +39,12 @@ MOTIONS = {
 
 def truth(motion, straight: bool = True, doppler: bool = True):
     body = replace(ball(), pose=pose(motion, NOW), velocity=velocity(motion, NOW), motion=motion, time=NOW)
-    moment = WorldState(NOW, (body,), tuple(snap_at(time) for time in TIMES))
     rays, water = (Straight(), UNIFORM) if straight else (Refracted(), THERMOCLINE)
     beams = BeamGrid(azimuth_span=0.2, azimuths=3, elevation_span=0.2, elevations=3)
-    levels = np.zeros(len(TIMES))
-    return label(moment, SONAR, beams, lambda a, b: rays.connect(water, BOTTOM_DEPTH, a, b), levels, straight, doppler)
+    track = Track(SONAR, np.zeros(3)) if doppler else None
+    receiver, snaps = Receiver(SONAR, ONE, Sonar(beams=beams), track), tuple(snap_at(time) for time in TIMES)
+    context = FrameContext(NOW, (body,), snaps, Medium(RIGID, water), receiver)
+    return label(context, rays, np.zeros(len(TIMES)))
 
 
 @pytest.mark.parametrize("kind", MOTIONS)

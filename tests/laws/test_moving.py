@@ -15,11 +15,10 @@ from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing
 from sonarsynth.scattering import Isotropic, MirrorLobe
-from sonarsynth.state import WorldState
+from sonarsynth.state import FrameContext, Medium, Receiver
 from sonarsynth.tracing.arrivals import trace
 from tests.laws.test_traced_families import (
     ARRAY,
-    BAND,
     ONE,
     RIGID,
     ROMANIS,
@@ -40,18 +39,10 @@ def run(v=STILL, u=STILL, *times: float, bodies=None, bounces=0, array=ONE, law=
     """Arrivals at an array that moves at u m/s of snaps at some times, from bodies that move at v."""
     bodies = (ball(),) if bodies is None else bodies
     bodies = tuple(b if b.motion else replace(b, velocity=np.array(v)) for b in bodies)
-    return trace(
-        RIGID,
-        more.pop("profile", UNIFORM),
-        WorldState(0.0, bodies, tuple(snap(t) for t in times or (0.0,))),
-        sonar,
-        array,
-        0.0,
-        AutoTracing(bounces=bounces),
-        (law or Isotropic(strength=1.0),) * len(bodies),
-        band=BAND,
-        **{"moving": Track(sonar, np.array(u, float))} | more,
-    )
+    receiver = Receiver(sonar, array, track=more.get("moving", Track(sonar, np.array(u, float))))
+    water, laws = Medium(RIGID, more.get("profile", UNIFORM)), (law or Isotropic(strength=1.0),) * len(bodies)
+    snaps = tuple(snap(t) for t in times or (0.0,))
+    return trace(FrameContext(0.0, bodies, snaps, water, receiver, laws), AutoTracing(bounces=bounces))
 
 
 def heard(emitted: float, centre, v, u, source, array) -> tuple[float, float]:
@@ -170,10 +161,9 @@ def test_a_body_hides_another_where_it_is_when_the_sound_passes() -> None:
 
     def lit(time: float) -> int:
         moved = tuple(replace(b, velocity=w) for b, w in zip(bodies, (STILL, v), strict=True))
-        found = trace(
-            RIGID, UNIFORM, WorldState(0.0, moved, (snap(time),)), SONAR, ONE, 0.0, AutoTracing(bounces=0),
-            (Isotropic(strength=1.0),) * 2, band=BAND, moving=Track(SONAR, STILL),
-        )  # fmt: skip
+        receiver, laws = Receiver(SONAR, ONE, track=Track(SONAR, STILL)), (Isotropic(strength=1.0),) * 2
+        context = FrameContext(0.0, moved, (snap(time),), Medium(RIGID, UNIFORM), receiver, laws)
+        found = trace(context, AutoTracing(bounces=0))
         return int((found.target == 0).sum())
 
     assert lit(0.0) > 100

@@ -23,7 +23,7 @@ from sonarsynth.propagation.path_model import KnownRays
 from sonarsynth.receiver import Romanis, elements
 from sonarsynth.scattering import Isotropic
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Snap, WorldState
+from sonarsynth.state import FrameContext, Medium, Receiver, Snap, Tolerances
 from sonarsynth.tracing.arrivals import trace
 
 DEPTH = 12.0
@@ -54,9 +54,9 @@ def traced(model: PathModel, profile: Profile) -> Arrivals:
     mesh = Mesh(np.asarray(shape.vertices), np.asarray(shape.faces, np.int32))
     ball = PlacedTarget("ball", mesh, Pose(np.array([15.0, 1.0, -6.0]), quaternion(0.0)), np.zeros(3))
     snap = Snap(np.array([6.0, 5.0, -9.0]), 0.0, LogarithmicBubble(), None)
-    world = WorldState(0.0, (ball,), (snap,))
-    law = (Isotropic(strength=1.0),)
-    return trace(WATER, profile, world, SONAR, ARRAY, 0.0, model, law, band=(25e3, 85e3), negligible=0.0)
+    law, all_of_it = (Isotropic(strength=1.0),), Tolerances(negligible=0.0)
+    water, receiver = Medium(WATER, profile), Receiver(SONAR, ARRAY)
+    return trace(FrameContext(0.0, (ball,), (snap,), water, receiver, law, all_of_it), model)
 
 
 def wavefronts(found: Arrivals) -> Floats:

@@ -11,6 +11,7 @@ from sonarsynth.conventions import Floats, depth
 from sonarsynth.environment.sea import Environment, Isovelocity, Profile
 from sonarsynth.equations.rays.ray_solutions import Eigenrays, Water, eigenrays, water
 from sonarsynth.propagation.polylines import Polylines, polylines
+from sonarsynth.state import Medium
 from sonarsynth.tracing.ray_fan import EVENTS, fan
 
 MISS = 1e-12
@@ -166,7 +167,7 @@ def test_polylines_and_rays_that_are_followed_are_the_same() -> None:
     for ray in range(len(rays.pair)):
         mine = lines.ray == ray
         aim = lines.direction[first[ray]][None]
-        followed = fan(sea, Profile(nodes, speed), (), start[0], aim, rays.travel_time[ray])
+        followed = fan(Medium(sea, Profile(nodes, speed)), (), start[0], aim, rays.travel_time[ray])
         np.testing.assert_allclose(followed.position[-1], end[0], atol=1e-7)
         for name in ("surface", "bottom", "turning point"):
             ours, theirs = mine & (lines.event == event(name)), followed.event == event(name)

@@ -20,7 +20,7 @@ from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, element
 from sonarsynth.scattering import FacetLaw, Kirchhoff, MirrorLobe, PartlyReflecting
 from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Snap, WorldState
+from sonarsynth.state import FrameContext, Medium, Receiver, Snap
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box
 from sonarsynth.tracing.arrivals import trace
@@ -55,17 +55,8 @@ def traced(surface: SeaSurface, bottom: SeaBottom, law: FacetLaw, place: Floats,
         bottom=bottom,
     )
     panel = PlacedTarget("panel", PANEL, Pose(PLACE + [12.0, 1.5, 0.2], quaternion(0.7)), np.zeros(3))
-    return trace(
-        water,
-        PROFILE,
-        WorldState(0.0, (panel,), (SNAP,)),
-        Pose(place, EAST),
-        array,
-        0.0,
-        AutoTracing(bounces=2),
-        (law,),
-        band=(BAND.low, BAND.high),
-    )
+    receiver = Receiver(Pose(place, EAST), array, SONAR)
+    return trace(FrameContext(0.0, (panel,), (SNAP,), Medium(water, PROFILE), receiver, (law,)), AutoTracing(bounces=2))
 
 
 def alone(*scene: object, sensor: int) -> Arrivals:

@@ -20,7 +20,7 @@ from sonarsynth.scattering import Kirchhoff
 from sonarsynth.signals import GriddedSynthesis
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Snap, WorldState
+from sonarsynth.state import FrameContext, Medium, Receiver, Snap, Tolerances
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box
 from sonarsynth.tracing.arrivals import trace
@@ -68,10 +68,10 @@ def traced(
     """What the front of the panel echoes without phase in common."""
     panel = PlacedTarget("panel", PANEL, Pose(PLACE + view.place, quaternion(view.heading)), np.zeros(3))
     snap = Snap(PLACE + view.snap, 0.0, LogarithmicBubble(), None)
-    found = trace(
-        WATER, profile, WorldState(0.0, (panel,), (snap,)), Pose(place, EAST), array, 0.0, AutoTracing(bounces=bounces),
-        (law,), band=(SONAR.band.low, SONAR.band.high), negligible=0.0, enough=0.0, alike=0.0,
-    )  # fmt: skip
+    receiver = Receiver(Pose(place, EAST), array, SONAR)
+    none = Tolerances(negligible=0.0, quadratic=0.0, facet_mean=0.0)
+    context = FrameContext(0.0, (panel,), (snap,), Medium(WATER, profile), receiver, (law,), none)
+    found = trace(context, AutoTracing(bounces=bounces))
     front = np.isin(found.facet, np.flatnonzero(PANEL.normal[:, 0] > 0.9))
     return found.select(~found.direct & ~found.coherent & front)
 

@@ -15,6 +15,7 @@ from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.propagation import Propagation, Refracted, Straight
 from sonarsynth.receiver import Elements, Romanis, elements
 from sonarsynth.receiver.subarrays import subarray
+from sonarsynth.state import Medium, Receiver, Tolerances
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Cylinder, LShape, Remus100, Shape, Sphere
 from sonarsynth.tracing.facet_paths import bending
@@ -44,28 +45,29 @@ def body(shape: Shape, place: tuple[float, float, float], *turned: float) -> Pla
 
 def seen_alone(view: Occlusion, legs: ReceivePaths, start: Floats, normal: Floats, sensor: int) -> Bools:
     """(leg,) whether a hydrophone does not see a leg, by the one ray to it."""
-    assert view.elements is not None
-    offset = view.sonar_pose.turn_to_world(view.elements.position[sensor])
+    array = view.receiver.elements.position
+    offset = view.receiver.pose.turn_to_world(array[sensor])
     image = np.where((legs.bounces % 2 == 1)[:, None], offset * [1.0, 1.0, -1.0], offset)
     ahead = legs.length[:, None] * legs.departure + image
     length = np.linalg.norm(ahead, axis=1)
     ahead /= length[:, None]
-    if not view.bending.uniform:
-        where = view.environment, view.bending, view.sonar_pose, view.elements, view.propagation, view.degree
-        ahead += launch_deviation(legs, view.elements.position[[sensor]], *where)[:, 0]
+    if not view.bending.profile.uniform:
+        where = view.bending, view.receiver, view.propagation, view.tolerances.degree
+        ahead += launch_deviation(legs, array[[sensor]], *where)[:, 0]
         ahead /= np.linalg.norm(ahead, axis=1)[:, None]
-    end = np.broadcast_to(view.sonar_pose.position + offset, start.shape)
+    end = np.broadcast_to(view.receiver.pose.position + offset, start.shape)
     ray = start, end, ahead, length
     how = {"bounces": legs.bounces, "turning": legs.turning}
-    blocked = hidden(view.bodies, view.environment, view.bending, *ray, **how)
+    blocked = hidden(view.bodies, view.bending, *ray, **how)
     return np.asarray(blocked | (np.einsum("ij,ij->i", ahead, normal) <= 0.0))
 
 
 def shaded(bodies: tuple[PlacedTarget, ...], array: Elements, rays: Propagation, profile: Profile) -> Bools:
     """Hold every leg against each hydrophone by itself: (leg, sensor) which do not see it."""
     facets = facets_of(bodies, slice(0, sum(len(b.mesh.faces) for b in bodies)))
-    legs = receive_paths(facets, WATER, profile, SONAR, rays, 50e3, array.aperture)
-    view = Occlusion(bodies, WATER, bending(profile, rays, SONAR), SONAR, array, rays)
+    water, receiver = Medium(WATER, profile), Receiver(SONAR, array)
+    legs = receive_paths(facets, water, receiver, rays, array.aperture)
+    view = Occlusion(bodies, bending(water, rays, receiver), receiver, rays, Tolerances(occlusion="sensors"))
     side = facets.clear[legs.row], facets.normal[legs.row]
     alone = np.stack([seen_alone(view, legs, *side, sensor) for sensor in range(array.count)], axis=1)
     numbered = replace(legs, caustics=np.arange(len(legs.row)))

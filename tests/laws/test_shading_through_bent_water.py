@@ -9,6 +9,7 @@ from sonarsynth.geometry import Pose
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.propagation import Propagation, Refracted
 from sonarsynth.receiver import Elements
+from sonarsynth.state import Medium, Receiver, Tolerances
 from sonarsynth.targets.shapes import Sphere
 from sonarsynth.tracing.occlusion.launch_deviation import launch_deviation, towards
 from sonarsynth.tracing.occlusion.sensor_occlusion import Occlusion
@@ -36,8 +37,9 @@ def seen_by(
 ) -> Ints:
     """Names of the legs to one place that no body hides."""
     pose = Pose(place, SONAR.orientation)
-    legs = receive_paths(facets, WATER, profile, pose, rays, 50e3)
-    view = Occlusion(bodies, WATER, profile, pose, None, rays)
+    water, receiver = Medium(WATER, profile), Receiver(pose, ARRAY)
+    legs = receive_paths(facets, water, receiver, rays)
+    view = Occlusion(bodies, water, receiver, rays, Tolerances())
     return names(view.visible(legs, facets.clear[legs.row], facets.normal[legs.row]))
 
 
@@ -45,8 +47,9 @@ def seen_by_all(
     bodies: tuple[PlacedTarget, ...], facets: Facets, rays: Propagation, profile: Profile, array: Elements, degree: int
 ) -> tuple[Ints, Bools]:
     """Names of the legs that any hydrophone sees, and from which they are hidden (leg, sensor)."""
-    legs = receive_paths(facets, WATER, profile, SONAR, rays, 50e3, array.aperture)
-    view = Occlusion(bodies, WATER, profile, SONAR, array, rays, degree)
+    water, receiver = Medium(WATER, profile), Receiver(SONAR, array)
+    legs = receive_paths(facets, water, receiver, rays, array.aperture)
+    view = Occlusion(bodies, water, receiver, rays, Tolerances(occlusion="sensors", degree=degree))
     legs = view.visible(legs, facets.clear[legs.row], facets.normal[legs.row])
     legs = view.settled(legs, facets.clear[legs.row], facets.normal[legs.row])
     hidden = np.unpackbits(legs.occluded, axis=1, count=1 + array.count)[:, 1:]
@@ -80,17 +83,17 @@ def test_rays_leave_for_hydrophones_as_those_traced_from_them(profile: Profile) 
     """The directions themselves, and that they are within what is allowed for; towards the images they are not."""
     _, facets = some_facets(1)
     rays = Refracted(bounces=2)
-    legs = receive_paths(facets, WATER, profile, SONAR, rays, 50e3, ARRAY.aperture)
-    where = WATER, profile, SONAR, ARRAY, rays, 5
-    swerve = launch_deviation(legs, ARRAY.position, *where)
+    water, receiver = Medium(WATER, profile), Receiver(SONAR, ARRAY)
+    legs = receive_paths(facets, water, receiver, rays, ARRAY.aperture)
+    swerve = launch_deviation(legs, ARRAY.position, water, receiver, rays, 5)
     size = np.linalg.norm(swerve, axis=2).max(axis=1)
-    bound = legs.swerve(WATER, profile, SONAR, ARRAY.aperture)
+    bound = legs.swerve(water, receiver, ARRAY.aperture)
     assert (size <= bound).all()
     assert size.max() > 2e-4
     away = towards(legs, SONAR.turn_to_world(ARRAY.position)) + swerve
     for sensor in (0, 17, 44):
         pose = Pose(SONAR.to_world(ARRAY.position[[sensor]])[0], SONAR.orientation)
-        own = receive_paths(facets, WATER, profile, pose, rays, 50e3, 2.0 * ARRAY.aperture)
+        own = receive_paths(facets, water, Receiver(pose, ARRAY), rays, 2.0 * ARRAY.aperture)
         _, first, second = np.intersect1d(names(legs), names(own), return_indices=True)
         assert len(first) > 0.95 * len(legs.row)
         np.testing.assert_allclose(away[first, sensor], own.departure[second], atol=1e-6)
@@ -98,9 +101,9 @@ def test_rays_leave_for_hydrophones_as_those_traced_from_them(profile: Profile) 
 
 def test_straight_rays_leave_for_images() -> None:
     _, facets = some_facets(1)
-    uniform = Profile(DEPTHS[[0, -1]], np.array([1500.0, 1500.0]))
-    rays = Refracted(bounces=2)
-    legs = receive_paths(facets, WATER, uniform, SONAR, rays, 50e3, ARRAY.aperture)
-    assert not legs.swerve(WATER, uniform, SONAR, ARRAY.aperture).any()
-    found = launch_deviation(legs, ARRAY.position, WATER, uniform, SONAR, ARRAY, rays, 3)
+    uniform = Medium(WATER, Profile(DEPTHS[[0, -1]], np.array([1500.0, 1500.0])))
+    rays, receiver = Refracted(bounces=2), Receiver(SONAR, ARRAY)
+    legs = receive_paths(facets, uniform, receiver, rays, ARRAY.aperture)
+    assert not legs.swerve(uniform, receiver, ARRAY.aperture).any()
+    found = launch_deviation(legs, ARRAY.position, uniform, receiver, rays, 3)
     np.testing.assert_allclose(found, 0.0, atol=1e-9)

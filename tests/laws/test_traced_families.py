@@ -18,7 +18,7 @@ from sonarsynth.propagation import AutoTracing, Refracted, Straight
 from sonarsynth.receiver import PositionTable, Romanis, elements
 from sonarsynth.scattering import Isotropic, MirrorLobe
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Snap, WorldState
+from sonarsynth.state import FrameContext, Medium, Receiver, Snap
 from sonarsynth.tracing.arrivals import trace
 
 BOTTOM_DEPTH, C = 12.0, 1530.0
@@ -29,7 +29,6 @@ ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
 UNIFORM = Profile(np.array([0.0, BOTTOM_DEPTH]), np.array([C, C]))
 THERMOCLINE = Profile(np.array([0.0, 7.0, 8.5, BOTTOM_DEPTH]), np.array([1541.0, 1541.0, 1534.6, 1534.5]))
 RIGID = Environment(depth=BOTTOM_DEPTH, sound_speed=Isovelocity(speed=C), bottom=SeaBottom(reflection=Rigid()))
-BAND = (25e3, 85e3)
 
 
 def ball(place=(15.0, 1.0, -6.0), radius: float = 0.3, subdivisions: int = 2) -> PlacedTarget:
@@ -42,15 +41,15 @@ def snap(time: float = 0.0) -> Snap:
     return Snap(SOURCE, time, LogarithmicBubble(), None)
 
 
-def run(bodies=None, profile=UNIFORM, environment=RIGID, bounces=2, law=None, array=ONE, **more) -> Arrivals:
-    snaps = (snap(more.pop("time", 0.0)),)
+def run(
+    bodies=None, profile=UNIFORM, environment=RIGID, bounces=2, law=None, array=ONE, tracing=None, source=SOURCE,
+    sonar=SONAR,
+) -> Arrivals:  # fmt: skip
+    snaps = (Snap(source, 0.0, LogarithmicBubble(), None),)
     bodies = (ball(),) if bodies is None else bodies
-    tracing = more.pop("tracing", AutoTracing(bounces=bounces))
-    return trace(
-        environment, profile, WorldState(0.0, bodies, snaps), SONAR, array, 0.0, tracing,
-        (law or Isotropic(strength=1.0),) * len(bodies),
-        band=BAND, **more,
-    )  # fmt: skip
+    tracing = tracing or AutoTracing(bounces=bounces)
+    laws = (law or Isotropic(strength=1.0),) * len(bodies)
+    return trace(FrameContext(0.0, bodies, snaps, Medium(environment, profile), Receiver(sonar, array), laws), tracing)
 
 
 def images(point: np.ndarray, most: int) -> list[tuple[np.ndarray, int, int]]:
@@ -208,11 +207,7 @@ def test_a_snap_on_the_bed_and_its_image_there_are_one() -> None:
     environment = Environment(depth=BOTTOM_DEPTH, sound_speed=Isovelocity(speed=C), bottom=fluid)
     totals = []
     for height in (0.0, 1e-7):
-        snaps = (Snap(np.array([6.0, 5.0, -BOTTOM_DEPTH + height]), 0.0, LogarithmicBubble(), None),)
-        found = trace(
-            environment, UNIFORM, WorldState(0.0, (ball(),), snaps), SONAR, ONE, 0.0, AutoTracing(bounces=2),
-            (Isotropic(strength=1.0),), band=BAND,
-        )  # fmt: skip
+        found = run(environment=environment, source=np.array([6.0, 5.0, -BOTTOM_DEPTH + height]))
         echo = found.select(~found.direct)
         value = np.zeros((320, 4), complex)
         np.add.at(value, (echo.facet, echo.arrives_by), echo.amplitude * np.exp(1j * echo.phase))
@@ -233,14 +228,8 @@ def test_a_body_at_the_foot_of_a_ray_that_turns_and_then_meets_the_bed_hides_it_
     ends = np.array([[0.0, 0.0, -10.0], [360.0, 0.0, -10.0]])
     foot = ball((232.958, 0.0, -19.65))
     for source, array in (ends, ends[::-1]):
-        snaps, pose = (Snap(source, 0.0, LogarithmicBubble(), None),), Pose(array, quaternion(0.5 * np.pi))
-        kept = [
-            trace(
-                environment, falling, WorldState(0.0, bodies, snaps), pose, ONE, 0.0, Refracted(bounces=1),
-                (Isotropic(strength=1.0),) * len(bodies), band=BAND,
-            )
-            for bodies in ((), (foot,))
-        ]  # fmt: skip
+        where = {"source": source, "sonar": Pose(array, quaternion(0.5 * np.pi)), "tracing": Refracted(bounces=1)}
+        kept = [run(bodies, falling, environment, **where) for bodies in ((), (foot,))]
         by_bed = [int((a.bottom[a.direct] == 1).sum()) for a in kept]
         assert by_bed == [2, 1]
 

@@ -19,7 +19,7 @@ from sonarsynth.propagation import AutoTracing, Refracted, Straight
 from sonarsynth.receiver import Elements, PositionTable, Romanis, elements
 from sonarsynth.scattering import Isotropic, MirrorLobe
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Snap, WorldState
+from sonarsynth.state import FrameContext, Medium, Receiver, Snap
 from sonarsynth.tracing.arrivals import arrivals, trace
 from sonarsynth.tracing.expansion.wavefront_polynomials import probes
 from sonarsynth.tracing.facet_paths import facet_paths
@@ -59,17 +59,9 @@ def run(
     absorption: float = 0.02,
     bounces: int = 0,
 ) -> Arrivals:
-    return trace(
-        ENVIRONMENT,
-        profile,
-        WorldState(0.0, bodies, snaps),
-        sonar,
-        array,
-        absorption,
-        AutoTracing(bounces=bounces),
-        (law or MirrorLobe(),) * len(bodies),
-        band=(25e3, 85e3),
-    )
+    medium = Medium(ENVIRONMENT, profile, absorption)
+    laws = (law or MirrorLobe(),) * len(bodies)
+    return trace(FrameContext(0.0, bodies, snaps, medium, Receiver(sonar, array), laws), AutoTracing(bounces=bounces))
 
 
 def delays(found: Arrivals, q: Floats) -> Floats:
@@ -130,9 +122,10 @@ def test_arrivals_are_sorted_by_snap_target_and_facet() -> None:
 @pytest.mark.parametrize("profile", [UNIFORM, LAYERED])
 def test_legs_of_the_array_side_serve_a_moved_shrimp(profile: Profile) -> None:
     bodies = (body((20.0, 1.0, -11.0)), body((15.0, 0.5, -11.5), name="other"))
-    legs = facet_paths(ENVIRONMENT, profile, bodies, SONAR, ROMANIS, AutoTracing(), (25e3, 85e3))
+    water, laws = Medium(ENVIRONMENT, profile, 0.02), (MirrorLobe(),) * 2
+    legs = facet_paths(FrameContext(0.0, bodies, (), water, Receiver(SONAR, ROMANIS), laws), AutoTracing())
     for place in ((3.0, 6.0, -30.0), (10.0, -9.0, -29.0), (25.0, 3.0, -30.0)):
-        again = arrivals(legs, (snap(place),), 0.02, (MirrorLobe(),) * 2)
+        again = arrivals(replace(legs, context=replace(legs.context, snaps=(snap(place),))))
         anew = run(bodies, (snap(place),), profile)
         for name, value in vars(anew).items():
             np.testing.assert_array_equal(getattr(again, name), value, err_msg=name)

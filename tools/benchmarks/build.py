@@ -21,7 +21,6 @@ from benchmarks.frame import RECIPE
 from sonarsynth import pipeline, planning, schedule, store
 from sonarsynth.labels import label
 from sonarsynth.planning import Plan
-from sonarsynth.propagation import Straight
 from sonarsynth.recipe import reading
 from sonarsynth.signals.filtered_pulse import snap_levels
 from sonarsynth.store.encoding import encoded
@@ -58,9 +57,8 @@ class Clock:
 def one(plan: Plan, index: int, clock: Clock) -> pipeline.Values:
     """A frame, with its parts again where they are part of a task."""
     traced = clock("trace, label", lambda: pipeline.trace_frame(plan, index))
-    moment, pose, beams = traced.frame.moment, traced.frame.sonar_pose, plan.scene.sonar.beams
-    straight, levels = isinstance(plan.propagation, Straight), snap_levels(traced.frame.moment.snaps)
-    clock("label", lambda: label(moment, pose, beams, plan.connect, levels, straight))
+    context, levels = planning.context_of(plan, traced.frame), snap_levels(traced.frame.moment.snaps)
+    clock("label", lambda: label(context, plan.propagation, levels))
     heard = clock("hear", lambda: pipeline.beamform_frame(plan, index, traced))
     clock("synthesise", lambda: pipeline.synthesise(plan, traced))
     clock("measure paths alone", lambda: pipeline.measure_isolated(plan, traced))

@@ -104,15 +104,13 @@ def _frame(stages: Stages, plan: Any) -> int:
     """Make the first frame of a plan by stages; how many paths it has."""
     from sonarsynth import pipeline
     from sonarsynth.labels import label
-    from sonarsynth.propagation import Straight
+    from sonarsynth.planning import context_of
     from sonarsynth.signals.filtered_pulse import snap_levels
 
     traced = stages.run("trace and label", lambda: pipeline.trace_frame(plan, 0))
     found, frame = traced.arrivals, traced.frame
-    straight = isinstance(plan.propagation, Straight)
-    levels = snap_levels(frame.moment.snaps)
-    beams = plan.scene.sonar.beams
-    stages.run("label", lambda: label(frame.moment, frame.sonar_pose, beams, plan.connect, levels, straight))
+    context, levels = context_of(plan, frame), snap_levels(frame.moment.snaps)
+    stages.run("label", lambda: label(context, plan.propagation, levels))
     stages.run("synthesise", lambda: pipeline.synthesise(plan, traced))
     heard = stages.run("beamform", lambda: pipeline.beamform_frame(plan, 0, replace(traced)))
     stages.run("range", lambda: pipeline.range_frame(plan, 0, traced, heard))

@@ -101,10 +101,9 @@ def searched(layers: int, family: str, vertices: int, reflections: int) -> dict[
 def batch(plan: Plan, index: int, bounces: int) -> dict[str, Any]:
     """Nanoseconds a path from facet to hydrophone by search, by continuation and by wavefronts, and their errors."""
     scene, frame = plan.recipe.frame(index)
-    environment, sonar = scene.world.environment, scene.sonar
-    band, propagation = (sonar.band.low, sonar.band.high), Refracted(bounces=bounces)
-    bodies, pose = frame.moment.bodies, frame.sonar_pose
-    made = facet_paths(environment, plan.profile, bodies, pose, plan.elements, propagation, band)
+    environment, pose = scene.world.environment, frame.sonar_pose
+    propagation, context = Refracted(bounces=bounces), planning.context_of(plan, frame)
+    made = facet_paths(context, propagation)
     legs = made.legs
     some = np.unique(np.linspace(0, len(legs.row) - 1, FACETS).astype(int))
     position = pose.to_world(plan.elements.position)
@@ -120,11 +119,7 @@ def batch(plan: Plan, index: int, bounces: int) -> dict[str, Any]:
     (time_on, gain_on), seconds_on = median(lambda: continued(water, made, position, distance))
     (delay, of_fronts), seconds_evaluate = median(lambda: expanded(plan, made))
     group = made.facets.target[legs.row]
-    _, seconds_fronts = median(
-        lambda: array_expansion(
-            legs, group, environment, plan.profile, pose, plan.elements, propagation=propagation, band=band
-        )
-    )
+    _, seconds_fronts = median(lambda: array_expansion(legs, group, plan.medium, context.receiver, propagation))
     time_exact, gain_exact = of_legs(found, made, some, sensors, time_on)
     paths = len(legs.row) * sensors
     return {
@@ -175,7 +170,7 @@ def continued(
 def expanded(plan: Plan, made: FacetPaths) -> tuple[np.ndarray, np.ndarray]:
     """Times (leg, sensor) by the wavefronts of the product (`products.Arrivals`), and the errors that they state."""
     legs, over, elements = made.legs, made.fronts, plan.elements
-    c = float(plan.profile.at(depth(made.sonar_pose.position)))
+    c = float(plan.profile.at(depth(made.context.receiver.pose.position)))
     farther = sphere(legs.direction, legs.radius, elements.position) / c
     terms = aperture_terms(elements.position, elements.aperture)
     return legs.travel_time[:, None] + farther + over.terms.delay @ terms.T, over.terms.error

@@ -7,6 +7,7 @@ from sonarsynth.planning.plans import Plan
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver.subarrays import Subarray
 from sonarsynth.recipe.scene import Frame
+from sonarsynth.state import FrameContext, Receiver, Tolerances
 from sonarsynth.tracing.arrivals import trace
 
 FACETS = 10.0
@@ -19,29 +20,34 @@ AMPLITUDES = 0.1
 def arrivals_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Arrivals:
     """Every path of a frame to the middle of the array, or of a part of it, expanded over its hydrophones.
 
-    What is not traced to any hydrophone, as where parts are, is seen by the array's middle alone. `plan` is that of
-    the frame's sequence. Raises ValueError for anything outside the water.
+    `plan` is that of the frame's sequence. Raises ValueError for anything outside the water.
     """
-    scene, sonar = plan.scene, plan.scene.sonar
-    sonar_track = frame.sonar_track if part is None else frame.sonar_track.part(part.centre)
-    return trace(
-        scene.world.environment,
-        plan.profile,
-        frame.moment,
+    return trace(context_of(plan, frame, part), plan.propagation)
+
+
+def context_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> FrameContext:
+    """What a frame is traced in, at the array or a part of it.
+
+    What is not traced to any hydrophone, as where parts are, is seen by the array's middle alone.
+    """
+    choices, accuracy = plan.choices, plan.recipe.accuracy
+    track = frame.sonar_track if part is None else frame.sonar_track.part(part.centre)
+    receiver = Receiver(
         frame.sonar_pose if part is None else subarray_pose(frame.sonar_pose, part),
         plan.elements if part is None else part.elements,
-        plan.absorption_at_depths,
-        plan.propagation,
-        scene.laws,
-        band=(sonar.band.low, sonar.band.high),
-        moving=sonar_track if scene.physics.doppler else None,
-        shared=plan.recipe.accuracy.signal,
-        negligible=plan.choices.negligible,
-        enough=AMPLITUDES * plan.recipe.accuracy.cheap,
-        alike=FACETS * plan.recipe.accuracy.signal,
-        degree=plan.choices.degree,
-        occlusion=plan.choices.occlusion if part is not None or plan.choices.subarrays == 1 else "centre",
+        plan.scene.sonar,
+        track if plan.scene.physics.doppler else None,
     )
+    tolerances = Tolerances(
+        negligible=choices.negligible,
+        quadratic=AMPLITUDES * accuracy.cheap,
+        facet_mean=FACETS * accuracy.signal,
+        shared=accuracy.signal,
+        occlusion=choices.occlusion if part is not None or choices.subarrays == 1 else "centre",
+        degree=choices.degree,
+    )
+    world = frame.moment
+    return FrameContext(world.time, world.bodies, world.snaps, plan.medium, receiver, plan.scene.laws, tolerances)
 
 
 def subarray_pose(pose: Pose, part: Subarray) -> Pose:

@@ -8,6 +8,7 @@ import numpy as np
 
 from sonarsynth.environment.boundary_numbers import rms_height
 from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.planning.measured.ray_bending import bending_error
 from sonarsynth.planning.plan_tables import Omission
 from sonarsynth.planning.plans import PRODUCTS, Plan
@@ -15,7 +16,7 @@ from sonarsynth.propagation.bounces import MOST_BOUNCES
 from sonarsynth.receiver import stop_frequency
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.scattering import MirrorLobe
-from sonarsynth.state import WorldState
+from sonarsynth.state import FrameContext, Receiver
 from sonarsynth.targets.mesh_resolution import expected_error
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.tracing.arrivals import trace
@@ -180,17 +181,10 @@ def reflected_bound(plan: Plan) -> str:
     sonar, bounces = scene.sonar, plan.propagation.bounces
     if not frame.moment.snaps or bounces >= MOST_BOUNCES:
         return "not computed"
-    found = trace(
-        scene.world.environment,
-        plan.profile,
-        _rough_moment(plan, frame),
-        frame.sonar_pose,
-        plan.elements,
-        plan.absorption_at_depths,
-        plan.propagation.reflected(bounces + 1),
-        tuple(MirrorLobe() if law.coherent else law for law in scene.laws),
-        band=(sonar.band.low, sonar.band.high),
-    )
+    laws = tuple(MirrorLobe() if law.coherent else law for law in scene.laws)
+    receiver, bodies = Receiver(frame.sonar_pose, plan.elements, sonar), _rough_bodies(plan, frame)
+    context = FrameContext(frame.time, bodies, frame.moment.snaps, plan.medium, receiver, laws)
+    found = trace(context, plan.propagation.reflected(bounces + 1))
     delay_std = np.exp(-0.5 * (2 * np.pi * sonar.band.centre * found.delay_std) ** 2)
     power, more = (found.amplitude * delay_std) ** 2, found.surface + found.bottom > bounces
     parts = []
@@ -201,14 +195,14 @@ def reflected_bound(plan: Plan) -> str:
     return "one reflection more would add, re the paths kept in frame 0: " + (", ".join(parts) or "nothing")
 
 
-def _rough_moment(plan: Plan, frame: Frame) -> WorldState:
-    """The moment of a frame with few facets."""
+def _rough_bodies(plan: Plan, frame: Frame) -> tuple[PlacedTarget, ...]:
+    """The bodies of a frame with few facets."""
     bodies = []
     for target, body in zip(plan.scene.world.targets, frame.moment.bodies, strict=True):
         mesh = mesh_of(target.shape)
         every = -(-len(mesh.faces) // ENOUGH)
         bodies.append(replace(body, mesh=mesh if every == 1 else _every(mesh, every)))
-    return replace(frame.moment, bodies=tuple(bodies))
+    return tuple(bodies)
 
 
 def _every(mesh: Mesh, step: int) -> Mesh:

@@ -45,10 +45,12 @@ class Varying(Protocol):
 def variations(blocks: Sequence[Varying]) -> tuple[list[Floats], float]:
     """Polynomials (echo, term) of the amplitude over the aperture for echoes of each block, and the error of all.
 
-    The second degree serves where it errs by no more than `enough` of the legs.
+    The second degree serves where it errs by no more than `Tolerances.quadratic`.
     """
     terms, error = _fitted(blocks, QUADRATIC_PROBES)
-    return (terms, error) if not blocks or error <= blocks[0].array.enough else _fitted(blocks, None)
+    return (
+        (terms, error) if not blocks or error <= blocks[0].array.context.tolerances.quadratic else _fitted(blocks, None)
+    )
 
 
 def _fitted(blocks: Sequence[Varying], few: int | None) -> tuple[list[Floats], float]:
@@ -85,7 +87,7 @@ def _fit(array: FacetPaths, gain: Floats, strength: Floats, few: int | None) -> 
     loudest = float(np.nanmax(np.abs(strength)[:, None] * np.abs(gain), initial=0.0))
     if (gain == 1.0).all():
         return np.empty((len(gain), 0)), 0.0, loudest
-    probe = probes(array.elements, array.degree)
+    probe = probes(array.context.receiver.elements, array.context.tolerances.degree)
     left = gain - 1.0
     if few is None or len(probe.sensor) < QUADRATIC_PROBES:
         terms = probe.fit(left)

@@ -13,11 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
-from sonarsynth.environment.sea import Environment, Profile
 from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.equations.kernels.row_products import row_products
-from sonarsynth.geometry import Pose
-from sonarsynth.receiver import Elements
+from sonarsynth.state import Medium, Receiver
 from sonarsynth.tracing.expansion.probe_paths import ApertureSamples, ReceiverGeometry, image, traced
 from sonarsynth.tracing.expansion.wavefront_polynomials import ExpansionTerms, probes
 from sonarsynth.tracing.receive_paths import ReceivePaths
@@ -53,7 +51,7 @@ class ArrayExpansion:
         """Where each probe, or the first few, is seen from the points of some legs: (row, probe, xyz), world."""
         if self.probe_departure is not None:
             return self.probe_departure[:, :few][rows]
-        return image(self.legs.select(rows), self.place.probe, self.place.sonar_pose, few)
+        return image(self.legs.select(rows), self.place.probe, self.place.receiver.pose, few)
 
     def gain(self, rows: Ints, few: int | None = None) -> Floats:
         """Amplitude at each probe, or the first few, over that of the sphere (row, probe); 1 in uniform water."""
@@ -90,7 +88,9 @@ class ExpansionSource:
             else:
                 made.put(rows, ApertureSamples(**{name: value[first:last] for name, value in vars(kept).items()}))
         none = np.empty((count, 0))
-        terms = none if self.place.propagation.straight(self.place.profile) and not made.terms.any() else made.terms
+        terms = (
+            none if self.place.propagation.straight(self.place.medium.profile) and not made.terms.any() else made.terms
+        )
         phase, delay_std = (value if value.any() else none for value in (made.phase, made.delay_std))
         return ArrayExpansion(
             ExpansionTerms(terms, phase, delay_std, made.error), legs, self.place, made.departure, made.gain
@@ -98,43 +98,22 @@ class ExpansionSource:
 
 
 def array_expansion(
-    legs: ReceivePaths,
-    group: Ints,
-    environment: Environment,
-    profile: Profile,
-    sonar_pose: Pose,
-    elements: Elements,
-    *,
-    propagation: Propagation,
-    band: tuple[float, float],
-    degree: int = 3,
+    legs: ReceivePaths, group: Ints, medium: Medium, receiver: Receiver, propagation: Propagation, degree: int = 3
 ) -> ArrayExpansion:
     """Wavefronts of all legs, as `expansion_source`."""
-    made = expansion_source(
-        legs, group, environment, profile, sonar_pose, elements, propagation=propagation, band=band, degree=degree
-    )
-    return made.of(slice(0, len(legs.row)))
+    return expansion_source(legs, group, medium, receiver, propagation, degree).of(slice(0, len(legs.row)))
 
 
 def expansion_source(
-    legs: ReceivePaths,
-    group: Ints,
-    environment: Environment,
-    profile: Profile,
-    sonar_pose: Pose,
-    elements: Elements,
-    *,
-    propagation: Propagation,
-    band: tuple[float, float],
-    degree: int = 3,
+    legs: ReceivePaths, group: Ints, medium: Medium, receiver: Receiver, propagation: Propagation, degree: int = 3
 ) -> ExpansionSource:
-    """Wavefronts of legs. group (leg,): legs of one body; band (Hz); degree: of their polynomials.
+    """Wavefronts of legs. group (leg,): legs of one body; medium: what bends them; degree: of their polynomials.
 
     Reflections turn and blur the pulse by the grazing angle, which varies over the aperture. What the polynomials in
     that miss is in `error`, as delays that are as much at the upper edge of the band.
     """
-    place = ReceiverGeometry(environment, profile, sonar_pose, probes(elements, degree), propagation, band)
-    straight = propagation.straight(profile)
+    place = ReceiverGeometry(medium, receiver, probes(receiver.elements, degree), propagation)
+    straight = propagation.straight(medium.profile)
     if straight and not legs.bounces.any():
         return ExpansionSource(legs, place, (), True)
     families: list[tuple[Ints, ApertureSamples | _FacetInterpolant | None]] = []
@@ -146,7 +125,7 @@ def expansion_source(
         exact = traced(legs.select(chosen), place)
         kept: ApertureSamples | _FacetInterpolant | None = exact
         if len(chosen) < len(members):
-            kept = _over_body(legs.point[members], legs.point[chosen], exact, 2.0 * np.pi * band[1])
+            kept = _over_body(legs.point[members], legs.point[chosen], exact, 2.0 * np.pi * receiver.band[1])
         families.append((members, kept or traced(legs.select(members), place)))
     return ExpansionSource(legs, place, tuple(families), False)
 

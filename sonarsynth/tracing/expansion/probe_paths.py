@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Floats, Ints, depth
-from sonarsynth.environment.sea import Environment, Profile
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry import Pose
 from sonarsynth.propagation.path_model import KnownRays
 from sonarsynth.propagation.reflections import at_boundaries
+from sonarsynth.state import Medium, Receiver
 from sonarsynth.tracing.expansion.wavefront_polynomials import BRANCH, Probes, pick_branch, sphere
 from sonarsynth.tracing.receive_paths import ReceivePaths
 
@@ -28,12 +28,10 @@ TERMS = 20
 class ReceiverGeometry:
     """Where legs go, and through what."""
 
-    environment: Environment
-    profile: Profile
-    sonar_pose: Pose
+    medium: Medium  # as rays bend in it
+    receiver: Receiver
     probe: Probes
     propagation: Propagation
-    band: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,18 +61,15 @@ class ApertureSamples:
 
 def traced(legs: ReceivePaths, place: ReceiverGeometry) -> ApertureSamples:
     """Legs at the probes, each of them traced."""
-    environment, profile, band = place.environment, place.profile, place.band
     made = ApertureSamples.room(len(legs.row), *place.probe.basis.shape)
-    if place.propagation.straight(profile):
-        departure, left, gain = image(legs, place.probe, place.sonar_pose), np.zeros(made.gain.shape), made.gain
+    if place.propagation.straight(place.medium.profile):
+        departure, left, gain = image(legs, place.probe, place.receiver.pose), np.zeros(made.gain.shape), made.gain
         if not legs.bounces.any():
             return replace(made, departure=departure)
     else:
-        left, gain, departure = rays_to_probes(
-            legs, environment, profile, place.sonar_pose, place.probe, place.propagation
-        )
-    probe, rate = place.probe, 2.0 * np.pi * band[1]
-    turned, loss, softer = _boundaries(legs, departure, environment, profile, 0.5 * (band[0] + band[1]))
+        left, gain, departure = rays_to_probes(legs, place)
+    probe, rate = place.probe, 2.0 * np.pi * place.receiver.band[1]
+    turned, loss, softer = _boundaries(legs, departure, place.medium, place.receiver.centre)
     turned, softer = (np.where(np.isnan(left), np.nan, value) for value in (turned, softer))
     terms, phase, delay_std = probe.fit(left), probe.fit(turned), probe.fit(softer)
     error = (
@@ -92,20 +87,18 @@ def image(legs: ReceivePaths, probe: Probes, sonar_pose: Pose, few: int | None =
     return np.asarray(span / np.sqrt(dot(span, span))[..., None])
 
 
-def _boundaries(
-    legs: ReceivePaths, departure: Floats, environment: Environment, profile: Profile, centre: float
-) -> tuple[Floats, Floats, Floats]:
+def _boundaries(legs: ReceivePaths, departure: Floats, medium: Medium, centre: float) -> tuple[Floats, Floats, Floats]:
     """Phase (leg, probe) that the reflections to each probe add to those to the centre, ratio of their moduli, and
     what their squared blurs (s2) add; centre: of the band (Hz)."""
-    shape = departure.shape[:2]
+    shape, profile = departure.shape[:2], medium.profile
     shift, ratio, softer = np.zeros(shape), np.ones(shape), np.zeros(shape)
     some = np.flatnonzero(legs.bounces > 0)
     if not len(some):
         return shift, ratio, softer
     p = np.hypot(departure[some, :, 0], departure[some, :, 1]) / profile.at(depth(legs.point[some]))[:, None]
     surface, bottom = (np.repeat(n[some, None], p.shape[1], axis=1) for n in (legs.surface, legs.bottom))
-    angles = [np.arccos(np.minimum(p * float(profile.at(z)), 1.0)) for z in (0.0, environment.depth)]
-    seen = at_boundaries(environment, profile, angles[0], surface, angles[1], bottom, centre)
+    angles = [np.arccos(np.minimum(p * float(profile.at(z)), 1.0)) for z in (0.0, medium.depth)]
+    seen = at_boundaries(medium.environment, profile, angles[0], surface, angles[1], bottom, centre)
     turned = seen.phase - (legs.phase - 0.5 * np.pi * legs.caustics)[some, None]
     shift[some] = turned - 2.0 * np.pi * np.rint(turned / (2.0 * np.pi))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -114,29 +107,21 @@ def _boundaries(
     return shift, ratio, softer
 
 
-def rays_to_probes(
-    legs: ReceivePaths,
-    environment: Environment,
-    profile: Profile,
-    sonar_pose: Pose,
-    probe: Probes,
-    propagation: Propagation,
-) -> tuple[Floats, Floats, Floats]:
+def rays_to_probes(legs: ReceivePaths, place: ReceiverGeometry) -> tuple[Floats, Floats, Floats]:
     """Delay over the sphere's (s), gain over it (leg, probe), departure (leg, probe, xyz): rays to every probe."""
-    position = sonar_pose.to_world(probe.position)
+    medium, probe = place.medium, place.probe
+    position = place.receiver.pose.to_world(probe.position)
     known = KnownRays(legs.point, legs.departure, legs.bounces + legs.turning)
     nothing = np.full((len(legs.row), len(position)), np.nan)
-    beside = propagation.beside(profile, environment.depth, known, position)
+    beside = place.propagation.beside(medium.profile, medium.depth, known, position)
     time, spreading, departure = beside or (nothing, nothing.copy(), np.zeros((*nothing.shape, 3)))
-    c = float(profile.at(depth(sonar_pose.position)))
+    c = place.receiver.speed(medium)
     farther = sphere(legs.direction, legs.radius, probe.position)
     predicted = legs.travel_time[:, None] + farther / c
     lost = np.flatnonzero(np.isnan(time).any(axis=1))
     if len(lost):
         some = legs.select(lost)
-        found = _searched(
-            some, position, predicted[lost], BRANCH * probe.aperture / c, environment, profile, propagation
-        )
+        found = _searched(some, position, predicted[lost], BRANCH * probe.aperture / c, place)
         time[lost], spreading[lost] = found[0], found[1]
         departure[lost] = np.where(np.isnan(found[0])[..., None], some.departure[:, None, :], found[2])
     expected = legs.spreading[:, None] * legs.radius[:, None] / (legs.radius[:, None] + farther)
@@ -144,18 +129,12 @@ def rays_to_probes(
 
 
 def _searched(
-    legs: ReceivePaths,
-    position: Floats,
-    predicted: Floats,
-    tolerance: float,
-    environment: Environment,
-    profile: Profile,
-    propagation: Propagation,
+    legs: ReceivePaths, position: Floats, predicted: Floats, tolerance: float, place: ReceiverGeometry
 ) -> tuple[Floats, Floats, Floats]:
     """Time, spreading (leg, probe) and departure of the rays nearest in time among all; NaN where there is none."""
     count, sensors = predicted.shape
     start, end = np.repeat(legs.point, sensors, axis=0), np.tile(position, (count, 1))
-    paths = propagation.connect(profile, environment.depth, start, end)
+    paths = place.propagation.connect(place.medium.profile, place.medium.depth, start, end)
     same = (paths.surface == legs.surface[paths.pair // sensors]) & (paths.bottom == legs.bottom[paths.pair // sensors])
     found = pick_branch(paths, predicted, tolerance, same)
     missing = found < 0

@@ -41,8 +41,8 @@ def delay_to_scattering_points(over: ExpansionTerms, array: FacetPaths, leg: Int
     nearer to the middle than to the array."""
     some = np.flatnonzero(spot.any(axis=1))
     away = array.fronts.departure(leg[some]) - array.legs.departure[leg[some], None]
-    speed = array.profile.at(depth(array.legs.point[leg[some]]))
+    speed = array.context.medium.profile.at(depth(array.legs.point[leg[some]]))
     late = -dot(spot[some, None], away) / speed[:, None]
     delay = over.delay.copy()
-    delay[some] += probes(array.elements, array.degree).fit(late)
+    delay[some] += probes(array.context.receiver.elements, array.context.tolerances.degree).fit(late)
     return over._replace(delay=delay)

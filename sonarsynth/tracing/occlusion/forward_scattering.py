@@ -20,6 +20,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.scattering import Component, FacetLaw
 from sonarsynth.scattering.components import Shadow
+from sonarsynth.state import FrameContext
 from sonarsynth.tracing.expansion.array_expansion import expansion_source
 from sonarsynth.tracing.receive_paths import facets_of, rays_to_centre
 
@@ -32,35 +33,31 @@ def shadow_parts(law: FacetLaw) -> tuple[Component, ...]:
     return (Shadow(),) if law.passes_sound else ()
 
 
-def blocking_bodies(
-    bodies: tuple[PlacedTarget, ...], laws: tuple[FacetLaw, ...], source: Floats | None = None
-) -> tuple[PlacedTarget, ...]:
+def blocking_bodies(context: FrameContext, source: Floats | None = None) -> tuple[PlacedTarget, ...]:
     """The bodies that sound does not pass on its way to the array, with any that its source (xyz) is inside of."""
     return tuple(
         body
-        for body, law in zip(bodies, laws, strict=True)
+        for body, law in zip(context.bodies, context.laws, strict=True)
         if not shadow_parts(law) or (source is not None and inside(body, source))
     )
 
 
-def forward_paths(array: FacetPaths, laws: tuple[FacetLaw, ...]) -> FacetPaths | None:
+def forward_paths(array: FacetPaths) -> FacetPaths | None:
     """Facet to array, for every facet of the bodies that scatter forward, seen or not; None where there is none."""
-    solid = blocking_bodies(array.bodies, laws)
-    if len(solid) == len(array.bodies):
+    context, propagation = array.context, array.propagation
+    bodies, laws, receiver = context.bodies, context.laws, context.receiver
+    solid = blocking_bodies(context)
+    if len(solid) == len(bodies):
         return None
-    environment, profile, pose, propagation = array.environment, array.profile, array.sonar_pose, array.propagation
-    every = facets_of(array.bodies, slice(0, sum(len(body.mesh.faces) for body in array.bodies)))
+    every = facets_of(bodies, slice(0, sum(len(body.mesh.faces) for body in bodies)))
     mine = range(len(laws)) if array.targets is None else array.targets
     scatters = np.array([bool(shadow_parts(law)) and number in mine for number, law in enumerate(laws)])
     every = every.select(scatters[every.target])
-    legs = rays_to_centre(environment, profile, every.point, pose, propagation, array.centre)
+    legs = rays_to_centre(context.medium, every.point, receiver, propagation)
     view = array.view(solid)
     legs = view.visible(legs, every.clear[legs.row], None)
     legs = view.settled(legs, every.clear[legs.row], None)
     kept, row = np.unique(legs.row, return_inverse=True)
     legs, facets = legs.numbered(row), every.select(kept)
-    group = facets.target[legs.row]
-    over = expansion_source(
-        legs, group, environment, array.bending, pose, array.elements, propagation=propagation, band=array.band
-    )
+    over = expansion_source(legs, facets.target[legs.row], array.bending, receiver, propagation)
     return replace(array, legs=legs, wavefronts=over, facets=facets)

@@ -11,12 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, depth
-from sonarsynth.environment.sea import Environment, Profile
 from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.equations.scattering.lobes import dot
-from sonarsynth.geometry import Pose
-from sonarsynth.receiver import Elements
-from sonarsynth.tracing.expansion.probe_paths import rays_to_probes
+from sonarsynth.state import Medium, Receiver
+from sonarsynth.tracing.expansion.probe_paths import ReceiverGeometry, rays_to_probes
 from sonarsynth.tracing.expansion.wavefront_polynomials import probes, terms_of
 from sonarsynth.tracing.receive_paths import ReceivePaths
 
@@ -28,28 +26,21 @@ SAME = 1e-9
 
 
 def launch_deviation(
-    legs: ReceivePaths,
-    points: Floats,
-    environment: Environment,
-    profile: Profile,
-    sonar_pose: Pose,
-    elements: Elements,
-    propagation: Propagation,
-    degree: int,
+    legs: ReceivePaths, points: Floats, medium: Medium, receiver: Receiver, propagation: Propagation, degree: int
 ) -> Floats:
     """(leg, point, xyz) what is between the directions in which rays leave for points (point, xyz) m of the sonar
-    frame, on the aperture, and those towards their images; profile: what bends them.
+    frame, on the aperture, and those towards their images; medium: what bends them.
 
     Polynomials of a degree through rays to the probes of the aperture: arcs where these do not leave a layer of
     constant gradient, others traced. Where a probe has no ray, it is taken to be where straight ones are.
     """
-    probe = probes(elements, degree)
-    offset = sonar_pose.turn_to_world(probe.position)
-    away, arc = _arcs(legs, sonar_pose.position, offset, environment, profile)
+    place = ReceiverGeometry(medium, receiver, probes(receiver.elements, degree), propagation)
+    probe, offset = place.probe, receiver.pose.turn_to_world(place.probe.position)
+    away, arc = _arcs(legs, receiver.pose.position, offset, medium)
     image = towards(legs, offset)
     rest = np.flatnonzero(~arc)
     if len(rest):
-        left, _, bent = rays_to_probes(legs.select(rest), environment, profile, sonar_pose, probe, propagation)
+        left, _, bent = rays_to_probes(legs.select(rest), place)
         away[rest] = np.where(np.isnan(left)[..., None], image[rest], bent)
     away -= image
     basis = aperture_terms(points, probe.aperture, terms_of(degree))
@@ -66,9 +57,7 @@ def towards(legs: ReceivePaths, offset: Floats) -> Floats:
     return np.asarray(ahead / np.maximum(np.sqrt(dot(ahead, ahead)), 1e-300)[..., None])
 
 
-def _arcs(
-    legs: ReceivePaths, centre: Floats, offset: Floats, environment: Environment, profile: Profile
-) -> tuple[Floats, Bools]:
+def _arcs(legs: ReceivePaths, centre: Floats, offset: Floats, medium: Medium) -> tuple[Floats, Bools]:
     """Directions (leg, point, xyz) of rays to places beside the centre (point, xyz) m, world, of legs that keep to one
     layer, with some room; and which (leg,) legs these are.
 
@@ -76,12 +65,12 @@ def _arcs(
     both ends, so the tangent of the grazing angle at the start, down positive, is (dz (c + c') / X + g X) / 2 c.
     """
     made = np.zeros((len(legs.row), len(offset), 3))
-    nodes, speed = profile.depth, profile.speed
+    nodes, speed = medium.profile.depth, medium.profile.speed
     ends = np.append(depth(centre + offset), depth(centre))
     layer = np.searchsorted(nodes, ends.min(), "right") - 1
     if layer < 0 or layer + 1 >= len(nodes):
         return made, np.zeros(len(legs.row), bool)
-    top, low = float(nodes[layer]), min(float(nodes[layer + 1]), environment.depth)
+    top, low = float(nodes[layer]), min(float(nodes[layer + 1]), medium.depth)
     gradient = float((speed[layer + 1] - speed[layer]) / (nodes[layer + 1] - top))
     z = depth(legs.point)
     bow = abs(gradient) / float(speed[layer : layer + 2].min()) * (legs.length + np.abs(offset).sum(axis=1).max()) ** 2

@@ -7,10 +7,11 @@ import numpy as np
 from sonarsynth.casting import intersections
 from sonarsynth.casting.ray_casting import enclosing, occluded
 from sonarsynth.conventions import Bools, Floats, Ints, depth
-from sonarsynth.environment.sea import Environment, Profile
+from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.rays import ray_arcs
 from sonarsynth.equations.rays.ray_solutions import water
 from sonarsynth.geometry.placed_target import PlacedTarget
+from sonarsynth.state import Medium
 
 SAGITTA_TOLERANCE = 1e-3
 """Largest distance (m) of a bent ray from the chords that stand for it when it is tested against bodies."""
@@ -18,8 +19,7 @@ SAGITTA_TOLERANCE = 1e-3
 
 def hidden(
     bodies: tuple[PlacedTarget, ...],
-    environment: Environment,
-    profile: Profile,
+    medium: Medium,
     start: Floats,
     end: Floats,
     departure: Floats,
@@ -39,26 +39,25 @@ def hidden(
     if not bodies or not len(start):
         return blocked
     times = np.zeros(len(start), np.int64) if bounces is None else bounces
-    bow = _curvature(profile) * length**2 / 8.0
+    bow = _curvature(medium.profile) * length**2 / 8.0
     broken = (bow > SAGITTA_TOLERANCE) | (times > 0)
     blocked[~broken] = occluded(bodies, start[~broken], end[~broken])
     rest = np.flatnonzero(broken)
-    whole, first = _near(bodies, environment, start[rest], end[rest], departure[rest], times[rest], bow[rest])
+    whole, first = _near(bodies, medium.depth, start[rest], end[rest], departure[rest], times[rest], bow[rest])
     if turning is not None:
         whole |= (times[rest] > 0) & (turning[rest] > 0)  # which boundary comes first, a turn may have changed
     for some, part in ((rest[whole], length[rest[whole]]), (rest[~whole], np.minimum(first, length[rest])[~whole])):
         leaves = np.flatnonzero(part > 0.0)
         rows = some[leaves]
         blocked[rows] = _along_chords(
-            bodies, environment, profile, start[rows], end[rows], departure[rows], part[leaves], length[rows]
+            bodies, medium, start[rows], end[rows], departure[rows], part[leaves], length[rows]
         )
     return blocked
 
 
 def ray_cones(
     bodies: tuple[PlacedTarget, ...],
-    environment: Environment,
-    profile: Profile,
+    medium: Medium,
     start: Floats,
     end: Floats,
     departure: Floats,
@@ -77,20 +76,22 @@ def ray_cones(
     reflected rays that may meet a body again.
     """
     longest, shortest = length + spread, length - spread
-    bow = _curvature(profile) * longest**2 / 8.0
-    straight = (bounces == 0) & (_curvature(profile) * shortest**2 <= 8.0 * SAGITTA_TOLERANCE)  # some of them
-    again, first = _near(bodies, environment, start, end, departure, bounces, bow + spread)
+    bow = _curvature(medium.profile) * longest**2 / 8.0
+    straight = (bounces == 0) & (_curvature(medium.profile) * shortest**2 <= 8.0 * SAGITTA_TOLERANCE)  # some of them
+    again, first = _near(bodies, medium.depth, start, end, departure, bounces, bow + spread)
     whole = straight | again | ((bounces > 0) & (turning > 0))
     reach = np.where(whole, longest, np.minimum(first, longest))
     with np.errstate(invalid="ignore", over="ignore"):  # where the speed jumps, rays bend by any angle
         far = 0.98 * np.where(whole, shortest, np.minimum(first - 2.0 * (bow + spread), shortest))
-        angle = _subtended(spread, length) + 0.5 * _curvature_about(profile, depth(start), reach) * reach + swerve
+        angle = (
+            _subtended(spread, length) + 0.5 * _curvature_about(medium.profile, depth(start), reach) * reach + swerve
+        )
     ahead = end - start
     distance = np.linalg.norm(ahead, axis=1)
     off = np.linalg.norm(np.cross(departure, ahead), axis=1) / np.maximum(distance, 1e-300)
     angle = np.where(whole, np.maximum(angle, np.arcsin(np.minimum(off, 1.0)) + _subtended(spread, distance)), angle)
     slope = 1.02 * np.tan(np.minimum(angle, 0.5)) + 2e-5  # more than what casting may err by
-    room = np.where(departure[:, 2] > 0.0, -start[:, 2], environment.depth + start[:, 2])
+    room = np.where(departure[:, 2] > 0.0, -start[:, 2], medium.depth + start[:, 2])
     bounced = (bounces > 0) & (whole | (reach * (np.abs(departure[:, 2]) + slope) >= room))
     return (
         np.where(bounced | (angle > 0.4) | (bounces > 0) & (np.abs(departure[:, 2]) <= slope), np.nan, slope),
@@ -188,7 +189,7 @@ def _curvature(profile: Profile) -> float:
 
 def _near(
     bodies: tuple[PlacedTarget, ...],
-    environment: Environment,
+    bottom: float,
     start: Floats,
     end: Floats,
     departure: Floats,
@@ -203,7 +204,7 @@ def _near(
         leave = np.where(inside, 2.0 * (radius + bow), 0.0)
         near = np.empty(len(start), bool)
         intersections.folded_pass_near(
-            start, end, departure[:, 2] > 0, bounces, environment.depth, leave, bow, centre, radius, near
+            start, end, departure[:, 2] > 0, bounces, bottom, leave, bow, centre, radius, near
         )
         far |= near
         first = np.maximum(first, leave)
@@ -212,8 +213,7 @@ def _near(
 
 def _along_chords(
     bodies: tuple[PlacedTarget, ...],
-    environment: Environment,
-    profile: Profile,
+    medium: Medium,
     start: Floats,
     end: Floats,
     departure: Floats,
@@ -224,7 +224,7 @@ def _along_chords(
     blocked = np.zeros(len(start), bool)
     if not len(start):
         return blocked
-    ray, points = chords(environment, profile, start, departure, part)
+    ray, points = chords(medium, start, departure, part)
     last = np.flatnonzero(np.diff(ray, append=-1))
     points[last] = np.where((part < length)[:, None], points[last], end)
     points[np.flatnonzero(np.diff(ray, prepend=-1))] = start
@@ -235,16 +235,15 @@ def _along_chords(
 
 
 def chords(
-    environment: Environment,
-    profile: Profile,
+    medium: Medium,
     start: Floats,
     departure: Floats,
     length: Floats,
     sagitta: float = SAGITTA_TOLERANCE,
 ) -> tuple[np.ndarray, Floats]:
     """Polylines that keep within `sagitta` (m) of rays from start (ray, xyz): ray of each node, node (node, xyz)."""
-    layers = water(profile.depth, profile.speed, environment.depth)
-    z = np.clip(depth(start), 0.0, environment.depth)
+    layers = water(medium.profile.depth, medium.profile.speed, medium.depth)
+    z = np.clip(depth(start), 0.0, medium.depth)
     flat = np.hypot(departure[:, 0], departure[:, 1])
     p = flat / np.interp(z, layers.depth, layers.speed)
     angle = -np.arctan2(departure[:, 2], flat)

@@ -11,11 +11,10 @@ import numpy as np
 
 from sonarsynth.casting.cones import CLOSED, UNKNOWN, classify_cones
 from sonarsynth.conventions import Bools, Floats, Ints
-from sonarsynth.environment.sea import Environment, Profile
 from sonarsynth.equations.scattering.lobes import dot
-from sonarsynth.geometry import Pose
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.receiver import Elements
+from sonarsynth.state import Medium, Receiver, Tolerances
 from sonarsynth.tracing.occlusion.launch_deviation import launch_deviation
 from sonarsynth.tracing.occlusion.ray_cones import hidden, ray_cones
 from sonarsynth.tracing.receive_paths import ReceivePaths
@@ -44,12 +43,15 @@ class Occlusion:
     """What stands between points in the water and those who look at them."""
 
     bodies: tuple[PlacedTarget, ...]
-    environment: Environment
-    bending: Profile
-    sonar_pose: Pose
-    elements: Elements | None  # None: the array centre looks for all
+    bending: Medium  # what bends rays
+    receiver: Receiver
     propagation: Propagation
-    degree: int = 3  # of polynomials over the aperture
+    tolerances: Tolerances
+
+    @property
+    def elements(self) -> Elements | None:
+        """Those who look; None: the array centre looks for all."""
+        return self.receiver.elements if self.tolerances.occlusion == "sensors" else None
 
     def visible(self, legs: ReceivePaths, start: Floats, normal: Floats | None) -> ReceivePaths:
         """The legs that no body hides from the array centre; or, with elements, from every hydrophone, some of them
@@ -59,7 +61,7 @@ class Occlusion:
         outer side; None where they have none.
         """
         if self.elements is None or self.elements.count == 1 or not self.bodies:
-            end = np.broadcast_to(self.sonar_pose.position, start.shape)
+            end = np.broadcast_to(self.receiver.pose.position, start.shape)
             return legs.select(
                 ~self._hides(start, end, legs.departure, legs.length, bounces=legs.bounces, turning=legs.turning)
             )
@@ -101,13 +103,13 @@ class Occlusion:
         points = self._points
         spread = np.full(len(start), 1.001 * float(np.linalg.norm(points, axis=1).max()))
         middle = np.zeros((len(start), 3))
-        swerve = legs.swerve(self.environment, self.bending, self.sonar_pose, spread)
+        swerve = legs.swerve(self.bending, self.receiver, spread)
         if normal is None:
             return self._cones(legs, start, middle, spread, None, swerve)
         least, most = _within(legs, normal, spread, swerve)
         rows = np.flatnonzero((least <= 0.0) & (most >= 0.0))
         flip = np.where(legs.bounces[rows] % 2 == 1, -1.0, 1.0)  # of the mirrored array
-        across = self.sonar_pose.turn_to_body(normal[rows] * np.column_stack([np.ones((len(rows), 2)), flip]))
+        across = self.receiver.pose.turn_to_body(normal[rows] * np.column_stack([np.ones((len(rows), 2)), flip]))
         beside, ahead = across @ points.T, 0.5 * (least + most)[rows]
         margin = 1e-9 * legs.length[rows] + (swerve * (legs.length + spread))[rows]
         least[rows] = ahead + beside.min(axis=1, initial=np.inf) - margin
@@ -126,11 +128,10 @@ class Occlusion:
         if ahead is not None:
             found[ahead[1] < 0.0] = CLOSED
             rows = np.flatnonzero(ahead[0] > 0.0)
-        end = (self.sonar_pose.position + offset)[rows]
+        end = (self.receiver.pose.position + offset)[rows]
         ray = start[rows], end, away[rows], length[rows]
         slope, reach, far = ray_cones(
             self.bodies,
-            self.environment,
             self.bending,
             *ray,
             spread[rows],
@@ -148,7 +149,11 @@ class Occlusion:
         see alike are looked at together."""
         parts = cells(self.elements)
         row, cell = np.repeat(rows, len(parts.radius)), np.tile(np.arange(len(parts.radius)), len(rows))
-        some, offset, spread = legs.select(row), self.sonar_pose.turn_to_world(parts.centre)[cell], parts.radius[cell]
+        some, offset, spread = (
+            legs.select(row),
+            self.receiver.pose.turn_to_world(parts.centre)[cell],
+            parts.radius[cell],
+        )
         swerve = self._swerve(legs.select(rows), np.arange(len(self._points)))
         beside = np.zeros(len(row))
         if swerve is not None:
@@ -167,10 +172,10 @@ class Occlusion:
     def _swerve(self, legs: ReceivePaths, point: Ints) -> Floats | None:
         """(leg, point, xyz) as `launch_deviation`, of the centre, or the hydrophones from 1; None where rays are
         straight."""
-        if self.propagation.straight(self.bending) or self.elements is None:
+        if self.propagation.straight(self.bending.profile) or self.elements is None:
             return None
-        where = self.environment, self.bending, self.sonar_pose, self.elements
-        return launch_deviation(legs, self._points[point], *where, self.propagation, self.degree)
+        points, degree = self._points[point], self.tolerances.degree
+        return launch_deviation(legs, points, self.bending, self.receiver, self.propagation, degree)
 
     def _unseen(
         self, legs: ReceivePaths, start: Floats, normal: Floats | None, leg: Ints, point: Ints, swerve: Floats | None
@@ -181,7 +186,7 @@ class Occlusion:
         To each point a ray leaves for where it is beside the image of the array centre, which is exact for straight
         rays; bent ones off that by `swerve`, some for each ray.
         """
-        legs, offset = legs.select(leg), self.sonar_pose.turn_to_world(self._points)[point]
+        legs, offset = legs.select(leg), self.receiver.pose.turn_to_world(self._points)[point]
         ahead, length = _towards(legs, offset)
         if swerve is not None:
             ahead += swerve.reshape(ahead.shape)
@@ -190,12 +195,15 @@ class Occlusion:
         if normal is not None:
             unseen = np.einsum("rx,rx->r", ahead, normal[leg]) <= 0.0
         ray = np.flatnonzero(~unseen)
-        end, how = self.sonar_pose.position + offset[ray], {"bounces": legs.bounces[ray], "turning": legs.turning[ray]}
+        end, how = (
+            self.receiver.pose.position + offset[ray],
+            {"bounces": legs.bounces[ray], "turning": legs.turning[ray]},
+        )
         unseen[ray] = self._hides(start[leg[ray]], end, ahead[ray], length[ray], **how)
         return unseen
 
     def _hides(self, *ray: Floats, bounces: Ints, turning: Ints) -> Bools:
-        return hidden(self.bodies, self.environment, self.bending, *ray, bounces=bounces, turning=turning)
+        return hidden(self.bodies, self.bending, *ray, bounces=bounces, turning=turning)
 
 
 def _towards(legs: ReceivePaths, offset: Floats) -> tuple[Floats, Floats]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -14,15 +13,15 @@ from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.labels import label
 from sonarsynth.labels.views import View
 from sonarsynth.propagation import Straight
-from sonarsynth.receiver import BeamGrid, PositionTable, elements
+from sonarsynth.receiver import BeamGrid, PositionTable, Romanis, Sonar, elements
 from sonarsynth.scattering import FacetLaw, Isotropic, Kirchhoff, MirrorLobe, Scatterer
 from sonarsynth.scattering.law_validity import OFF
-from sonarsynth.state import WorldState
+from sonarsynth.state import FrameContext, Medium, Receiver
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.targets.target import mesh_for
 from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, together
-from sonarsynth.validation.extremes.plain_scenes import BOTTOM_DEPTH, POSE, PROFILE, C, body, snap, traced, transfer
+from sonarsynth.validation.extremes.plain_scenes import POSE, PROFILE, WATER, C, body, snap, traced, transfer
 
 ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
 BESIDE = np.array([0.0, 1e-6, 0.0])
@@ -88,15 +87,14 @@ def _isotropic() -> Got:
 def _bearings() -> Got:
     """Bounds within the view, mirrored with the bearing, none exactly where a flag says so."""
     beams, mesh = BeamGrid(azimuths=3, elevations=3), mesh_of(Box(size=(0.5, 3.0, 1.0)))
-    connect = partial(Straight().connect, PROFILE, BOTTOM_DEPTH)
+    receiver = Receiver(POSE, elements(Romanis()), Sonar(beams=beams))
     edge, parts, flags = 0.5 * beams.azimuth_span, [], set()
     for bearing in np.deg2rad(np.arange(0.0, 181.0, 5.0)):
         boxes = []
         for side in (bearing, -bearing):
-            moment = WorldState(
-                0.0, (body(mesh, 5.0 * direction(np.array(side), np.array(0.0)), 0.5 * np.pi - side),), ()
-            )
-            found = label(moment, POSE, beams, connect, np.zeros(0), True)
+            there = body(mesh, 5.0 * direction(np.array(side), np.array(0.0)), 0.5 * np.pi - side)
+            context = FrameContext(0.0, (there,), (), Medium(WATER, PROFILE), receiver)
+            found = label(context, Straight(), np.zeros(0))
             boxes.append(found.image_box[0])
             flags.add(int(found.view[0]))
             none = bool(np.isnan(boxes[-1]).all())

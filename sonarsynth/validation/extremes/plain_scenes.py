@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,10 +15,10 @@ from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.propagation import AutoTracing
-from sonarsynth.receiver import Elements, LowPass, Sonar
+from sonarsynth.receiver import Band, Elements, LowPass, Sonar
 from sonarsynth.sources.shrimp import SnapModel
 from sonarsynth.sources.snap_models import Ricker
-from sonarsynth.state import Snap, WorldState
+from sonarsynth.state import FrameContext, Medium, Receiver, Snap
 from sonarsynth.tracing.arrivals import trace
 
 if TYPE_CHECKING:
@@ -53,8 +54,9 @@ def traced(
     band: tuple[float, float] = (25e3, 85e3),
 ) -> Arrivals:
     """Every path, none of which has a number that is none."""
-    moment = WorldState(0.0, tuple(bodies), tuple(snaps))
-    found = trace(WATER, PROFILE, moment, POSE, elements, 0.0, AutoTracing(), tuple(laws), band=band)
+    receiver = Receiver(POSE, elements, replace(SONAR, band=Band(low=band[0], high=band[1])))
+    context = FrameContext(0.0, tuple(bodies), tuple(snaps), Medium(WATER, PROFILE), receiver, tuple(laws))
+    found = trace(context, AutoTracing())
     for name, value in vars(found).items():
         if isinstance(value, np.ndarray) and not np.isfinite(value).all():
             raise ArithmeticError(f"{name} of a path is not finite")
