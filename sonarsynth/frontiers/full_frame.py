@@ -13,7 +13,7 @@ from sonarsynth.frontiers.image_knobs import apart, imaged, off_by
 from sonarsynth.frontiers.rows import Point, timed
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor
 from sonarsynth.pipeline import BeamformedFrame, cloud_of, digitise, locate_and_image
-from sonarsynth.planning import frame_start
+from sonarsynth.planning import frame_start, receiver_of
 from sonarsynth.planning.notes.source_notes import locator
 from sonarsynth.products import Signals
 
@@ -32,19 +32,8 @@ class Whole:
         plan, frame = exact.plan, exact.frame
         recorded = digitise(plan, frame, signals)
         heard = locate_and_image(plan, frame, recorded)
-        locating = locator(plan.scene)
-        environment, sonar = plan.scene.world.environment, plan.scene.sonar
-        _, seconds = timed(
-            lambda: locating.locate(
-                recorded,
-                plan.elements,
-                sonar,
-                frame.sonar_pose,
-                environment.depth,
-                plan.sizes["emission"],
-                plan.profile,
-            )
-        )
+        locating, receiver, snaps = locator(plan.scene), receiver_of(plan, frame), plan.sizes["emission"]
+        _, seconds = timed(lambda: locating.locate(recorded, receiver, plan.survey, snaps))
         return Whole(exact, heard, seconds)
 
 

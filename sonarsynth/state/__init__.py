@@ -26,6 +26,7 @@ __all__ = [
     "OcclusionPoint",
     "Receiver",
     "Snap",
+    "Survey",
     "Tolerances",
     "TravelTime",
     "WorldState",
@@ -88,6 +89,14 @@ class Receiver:
     def speed(self, medium: Medium) -> float:
         """Of sound at the middle of the array, m/s."""
         return float(medium.profile.at(depth(self.pose.position)))
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """The water as the sonar knows it."""
+
+    bottom: float  # m: depth of the bottom, positive down, where sources are known to be
+    profile: Profile  # sound speed, from a cast: to trace rays through, or for what straight ones may cost
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from sonarsynth.products import REASONS, EnergyImage
 from sonarsynth.ranging import IsovelocityPlacing, RefractedPlacing, SensorDelays
 from sonarsynth.ranging.location.locating import unlocatable
 from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
+from sonarsynth.state import Receiver, Survey
 from tests.heard import add_noise, cloud_of, hear_direct, hear_echoes, silence
 
 C = 1540.0
@@ -85,7 +86,7 @@ def nothing(found, reason):
 
 def locate(signals, array, depth, snaps=1, **sonar):
     return SensorDelays().locate(
-        signals, array, Sonar(assumed_sound_speed=C, **sonar), POSE, float(depth), snaps, WATER
+        signals, Receiver(POSE, array, Sonar(assumed_sound_speed=C, **sonar)), Survey(float(depth), WATER), snaps
     )
 
 
@@ -191,7 +192,7 @@ def heard_target(array, target, source):
 
 
 def points_of(method, array, sonar, signals, image, source):
-    found = SensorDelays().locate(signals, array, sonar, POSE, 5.0 - source[2], 1, WATER)
+    found = SensorDelays().locate(signals, Receiver(POSE, array, sonar), Survey(5.0 - source[2], WATER), 1)
     return cloud_of(signals, image, found, array, sonar, POSE, WATER, placing=method)
 
 
@@ -259,7 +260,7 @@ def test_gradients_of_any_size_leave_a_bearing(gradient):
     array, source = elements(Romanis()), np.array([20.0, 3.0, -0.05])
     profile = Profile(np.array([0.0, 10.0]), C + gradient * np.array([-5.0, 5.0]))
     found = SensorDelays().locate(
-        hear_direct(array, source), array, Sonar(assumed_sound_speed=C), POSE, 5.05, 1, profile
+        hear_direct(array, source), Receiver(POSE, array, Sonar(assumed_sound_speed=C)), Survey(5.05, profile), 1
     )
     assert found.elevation[0] == pytest.approx(np.arcsin(source[2] / np.linalg.norm(source)), abs=1e-5)
     known = np.isfinite(found.position_covariance).all()

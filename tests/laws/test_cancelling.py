@@ -30,6 +30,7 @@ from sonarsynth.ranging.cancelling.multipath import (
 )
 from sonarsynth.receiver import BeamGrid, Romanis, Sonar, elements
 from sonarsynth.recipe.scene import EchoWindow, Physics, Processing
+from sonarsynth.state import Receiver, Survey
 from tests.heard import add_noise, cloud_of, hear, silence
 from tests.scenes import remus
 
@@ -62,12 +63,12 @@ def with_arrival(signals, amplitude=0.3, image=BELOW):
 
 
 def locate(signals, pose=POSE, bottom_depth=BOTTOM_DEPTH):
-    return SensorDelays().locate(signals, ARRAY, SONAR, pose, bottom_depth, 1, WATER)
+    return SensorDelays().locate(signals, Receiver(pose, ARRAY, SONAR), Survey(bottom_depth, WATER), 1)
 
 
 def cancelled(signals, estimates=None, sonar=SONAR, pose=POSE, bottom_depth=BOTTOM_DEPTH, window=WINDOW, limits=LIMITS):
     found = locate(signals, pose, bottom_depth) if estimates is None else estimates
-    return cancel(signals, found, ARRAY, sonar, pose, bottom_depth, window, limits)
+    return cancel(signals, found, Receiver(pose, ARRAY, sonar), bottom_depth, window, limits)
 
 
 def energy(pressure):
@@ -124,7 +125,8 @@ def test_without_an_arrival_nothing_changes(noise, echo):
     result = cancelled(heard)
     assert result.signals is heard
     assert reasons(result)[1, 1] in {OUTSIDE, FAINT}
-    assert WavefrontCancelling().cancel(heard, locate(heard), ARRAY, SONAR, POSE, BOTTOM_DEPTH, WINDOW) is heard
+    known = Receiver(POSE, ARRAY, SONAR), Survey(BOTTOM_DEPTH, WATER)
+    assert WavefrontCancelling().cancel(heard, locate(heard), *known, WINDOW) is heard
 
 
 def test_nothing_heard_nothing_done():
@@ -223,14 +225,14 @@ def test_dead_sensors_and_small_arrays():
     """A dead sensor counts for nothing and stays as it is; a few sensors cannot average echoes away."""
     heard = with_arrival(direct())
     patchy = elements(Romanis(dead=tuple(range(0, 508, 7))))
-    result = cancel(heard, locate(heard), patchy, SONAR, POSE, BOTTOM_DEPTH, WINDOW, LIMITS)
+    result = cancel(heard, locate(heard), Receiver(POSE, patchy, SONAR), BOTTOM_DEPTH, WINDOW, LIMITS)
     live = patchy.gain != 0
     assert np.array_equal(result.signals.pressure[~live], heard.pressure[~live])
     assert energy(result.signals.pressure[live] - direct().pressure[live]) < 1e-4 * energy(
         heard.pressure[live] - direct().pressure[live]
     )
     few = elements(Romanis(dead=tuple(range(20, 508))))
-    assert cancel(heard, locate(heard), few, SONAR, POSE, BOTTOM_DEPTH, WINDOW, LIMITS).signals is heard
+    assert cancel(heard, locate(heard), Receiver(POSE, few, SONAR), BOTTOM_DEPTH, WINDOW, LIMITS).signals is heard
 
 
 def test_image_sources_are_as_far_as_the_rays_are_long():

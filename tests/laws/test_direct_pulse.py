@@ -18,6 +18,7 @@ from sonarsynth.ranging import SensorDelays
 from sonarsynth.ranging.cancelling.direct_pulse import remove, remove_others, trusted
 from sonarsynth.receiver import BeamGrid, PlanarLattice, Sonar, elements
 from sonarsynth.recipe.scene import Processing
+from sonarsynth.state import Receiver, Survey
 from tests.heard import add_noise, cloud_of, hear, pulse_spectrum, silence
 from tests.scenes import point_scene
 
@@ -53,7 +54,8 @@ def with_echo(signals, excess, target=TARGET, amplitude=1e-2):
 
 
 def located(signals):
-    return SensorDelays().locate(signals, ARRAY, SONAR, POSE, 3.0 - SNAP[2], 1, Profile(np.zeros(1), np.full(1, C)))
+    survey = Survey(3.0 - SNAP[2], Profile(np.zeros(1), np.full(1, C)))
+    return SensorDelays().locate(signals, Receiver(POSE, ARRAY, SONAR), survey, 1)
 
 
 def without(signals, estimates=None):

@@ -18,6 +18,7 @@ from sonarsynth.ranging import SensorDelays
 from sonarsynth.ranging.location.refraction import first_rays
 from sonarsynth.ranging.location.source_position import bending_covariance
 from sonarsynth.receiver import PlanarLattice, Romanis, Sonar, elements
+from sonarsynth.state import Receiver, Survey
 from tests.heard import RATE, envelope_late, hear, hear_direct, silence
 
 C = 1540.0
@@ -33,8 +34,8 @@ def locate(
 ) -> SourceEstimates:
     """With the bottom where the source is, but for depth_error."""
     depth = -pose.to_world(np.asarray(source, float))[2] + depth_error
-    method = method or SensorDelays()
-    return method.locate(signals, array, sonar or Sonar(assumed_sound_speed=C), pose, float(depth), snaps, profile)
+    method, receiver = method or SensorDelays(), Receiver(pose, array, sonar or Sonar(assumed_sound_speed=C))
+    return method.locate(signals, receiver, Survey(float(depth), profile), snaps)
 
 
 @pytest.mark.parametrize("azimuth", [-0.4, 0.5])

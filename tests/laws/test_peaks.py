@@ -17,6 +17,7 @@ from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.ranging import Peaks, SensorDelays
 from sonarsynth.ranging.picking.peak_kernels import lobe_power, local_maxima
 from sonarsynth.receiver import BeamGrid, PlanarLattice, Romanis, Sonar, elements
+from sonarsynth.state import Receiver, Survey
 from tests.heard import add_noise, cloud_of, hear_echoes
 
 C = 1540.0
@@ -39,7 +40,7 @@ def heard(targets, strengths=None):
     """Signals of a direct pulse and of echoes of points, first and last echo, and the snap as exactly known."""
     places = [np.array(target) for target in targets]
     signals, first, last = hear_echoes(ARRAY, SNAP, places, np.array(strengths or [1.0] * len(places)))
-    found = SensorDelays().locate(signals, ARRAY, sonar(), POSE, -POSE.to_world(SNAP)[2], 1, WATER)
+    found = SensorDelays().locate(signals, Receiver(POSE, ARRAY, sonar()), Survey(-POSE.to_world(SNAP)[2], WATER), 1)
     known = replace(found, position=SNAP[None], position_covariance=np.zeros((1, 3, 3)))
     return signals, first, last, known
 

@@ -15,6 +15,7 @@ from sonarsynth.ranging import BeamAxis, IsovelocityPlacing, RefractedPlacing, S
 from sonarsynth.ranging.location.refraction import first_rays, refracted_solution
 from sonarsynth.ranging.placing.solution import isovelocity_solution
 from sonarsynth.receiver import Romanis, Sonar, elements
+from sonarsynth.state import Receiver, Survey
 from tests.heard import STRAIGHT, add_noise, cloud_of, hear, hear_echoes
 
 C = 1540.0
@@ -28,7 +29,7 @@ MARGIN = 6e-4  # s before the first and after the last echo
 
 
 def process(signals, first, last, method=AXIS, source=SNAP, pose=POSE, profile=WATER, placing=STRAIGHT):
-    found = SensorDelays().locate(signals, ARRAY, SONAR, pose, -pose.to_world(source)[2], 1, WATER)
+    found = SensorDelays().locate(signals, Receiver(pose, ARRAY, SONAR), Survey(-pose.to_world(source)[2], WATER), 1)
     image = FocusedDelayAndSum().image(signals, ARRAY, SONAR, first - MARGIN, last + MARGIN)
     how = {"picking": method, "placing": placing}
     return cloud_of(signals, image, found, ARRAY, SONAR, pose, profile, **how), image

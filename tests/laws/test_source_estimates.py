@@ -18,6 +18,7 @@ from sonarsynth.planning.notes.source_notes import off_the_bottom, standing_off
 from sonarsynth.products import REASONS, Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.receiver import Band, PlanarLattice, Sonar, elements
+from sonarsynth.state import Receiver, Survey
 from tests.heard import RATE, add_noise, envelope_late, hear, hear_direct, silence
 from tests.scenes import point_scene
 
@@ -32,7 +33,8 @@ def locate(
     signals: Signals, bottom: float, snaps: int = 1, method: SensorDelays | None = None, **sonar
 ) -> SourceEstimates:
     described = Sonar(array=WIDE, assumed_sound_speed=C, **sonar)
-    return (method or SensorDelays()).locate(signals, elements(WIDE), described, POSE, bottom, snaps, WATER)
+    receiver = Receiver(POSE, elements(WIDE), described)
+    return (method or SensorDelays()).locate(signals, receiver, Survey(bottom, WATER), snaps)
 
 
 @pytest.mark.parametrize("refraction", [False, True])
@@ -128,7 +130,9 @@ def pulls(draws: int) -> tuple[np.ndarray, np.ndarray]:
             signals = hear_direct(elements(array), source, speed, 0.2 / distance, random, samples=700)
             pose = Pose(np.array([0.0, 0.0, -5.0]), quaternion(np.pi / 2))
             bottom = 5.0 - source[2] + above + 0.05 * random.standard_normal()
-            found = SensorDelays().locate(signals, elements(array), sonar, pose, float(bottom), 1, WATER)
+            found = SensorDelays().locate(
+                signals, Receiver(pose, elements(array), sonar), Survey(float(bottom), WATER), 1
+            )
             azimuth, elevation = azimuth_elevation(source)
             error = found.position[0] - source
             rows.append(

@@ -50,27 +50,17 @@ def relative(got: np.ndarray, exact: np.ndarray) -> float:
 def bench(index: int = 32) -> dict[str, Any]:
     """Measure one frame of the remus scene."""
     plan = planning.plan(reading.load(RECIPE))
-    scene, sonar = plan.scene, plan.scene.sonar
-    stages: dict[str, dict[str, Any]] = {}
+    sonar, stages = plan.scene.sonar, dict[str, dict[str, Any]]()
     full, seconds = cpu(lambda: pipeline.trace_frame(plan, index))
     stages["trace and label"] = {"ms": 1e3 * seconds, "facets": len(full.frame.moment.bodies[0].mesh.faces)}
     traced = replace(full, arrivals=thin(full.arrivals, PATHS))
     signals, again = cpu(lambda: pipeline.synthesise(plan, traced))
-    seconds = synthesis_of_new_frames(plan)
-    stages["synthesise"] = {"ms": 1e3 * seconds, "ms_same_frame_again": 1e3 * again, **synthesis_error(plan, traced)}
-    located, seconds = cpu(
-        lambda: scene.processing.locating.locate(
-            signals,
-            plan.elements,
-            sonar,
-            traced.frame.sonar_pose,
-            scene.world.environment.depth,
-            plan.sizes["emission"],
-            plan.profile,
-        )
-    )
-    true = traced.frame.sonar_pose.to_body(traced.frame.moment.snaps[0].position)
-    stages["locate"] = {"ms": 1e3 * seconds, "error_m": float(np.linalg.norm(located.position[0] - true))}
+    new = {"ms": 1e3 * synthesis_of_new_frames(plan), "ms_same_frame_again": 1e3 * again}
+    stages["synthesise"] = new | synthesis_error(plan, traced)
+    receiver, locating = planning.receiver_of(plan, traced.frame), plan.scene.processing.locating
+    located, seconds = cpu(lambda: locating.locate(signals, receiver, plan.survey, plan.sizes["emission"]))
+    off = located.position[0] - receiver.pose.to_body(traced.frame.moment.snaps[0].position)
+    stages["locate"] = {"ms": 1e3 * seconds, "error_m": float(np.linalg.norm(off))}
     start, stop = (float(located.time[0]) + t for t in (plan.windows.echo_start, plan.windows.echo_stop))
     beamformer = plan.choices.beamforming
     image, image_seconds = cpu(lambda: beamformer.image(signals, plan.elements, sonar, start, stop))

@@ -30,14 +30,7 @@ def context_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> FrameC
 
     What is not traced to any hydrophone, as where parts are, is seen by the array's middle alone.
     """
-    choices, accuracy = plan.choices, plan.recipe.accuracy
-    track = frame.sonar_track if part is None else frame.sonar_track.part(part.centre)
-    receiver = Receiver(
-        frame.sonar_pose if part is None else subarray_pose(frame.sonar_pose, part),
-        plan.elements if part is None else part.elements,
-        plan.scene.sonar,
-        track if plan.scene.physics.doppler else None,
-    )
+    choices, accuracy, receiver = plan.choices, plan.recipe.accuracy, receiver_of(plan, frame, part)
     tolerances = Tolerances(
         negligible=choices.negligible,
         quadratic=AMPLITUDES * accuracy.cheap,
@@ -48,6 +41,14 @@ def context_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> FrameC
     )
     world = frame.moment
     return FrameContext(world.time, world.bodies, world.snaps, plan.medium, receiver, plan.scene.laws, tolerances)
+
+
+def receiver_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Receiver:
+    """The array of a frame, or a part of it."""
+    pose, track, own = frame.sonar_pose, frame.sonar_track, plan.elements
+    if part is not None:
+        pose, track, own = subarray_pose(pose, part), track.part(part.centre), part.elements
+    return Receiver(pose, own, plan.scene.sonar, track if plan.scene.physics.doppler else None)
 
 
 def subarray_pose(pose: Pose, part: Subarray) -> Pose:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from sonarsynth.description.method import Method
-from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals, SourceEstimates
-from sonarsynth.receiver import Elements, Sonar
+from sonarsynth.state import Receiver, Survey
 
 
 class CancellingMethod(Method):
@@ -15,16 +14,14 @@ class CancellingMethod(Method):
         self,
         signals: Signals,
         estimates: SourceEstimates,
-        elements: Elements,
-        sonar: Sonar,
-        sonar_pose: Pose,
-        bottom_depth: float,
+        receiver: Receiver,
+        survey: Survey,
         window: tuple[float, float],
     ) -> Signals:
         """The signals without the reflections of the located snaps in the echo window (start, stop), in s.
 
         The same object where nothing is taken out; `quantum` stays that of the converter, though pressures are no
-        whole multiples of it where something is. bottom_depth in m, positive down.
+        whole multiples of it where something is.
         """
         raise NotImplementedError(f"{type(self).__name__} cancels nothing")
 

@@ -26,6 +26,7 @@ from sonarsynth.ranging.location.plane_waves import (
     subtract,
 )
 from sonarsynth.receiver import Elements, Sonar
+from sonarsynth.state import Receiver
 
 SENSORS: Final = 32
 """Fewer live sensors cancel nothing: an echo would lose more than one part in so many (0.14 dB)."""
@@ -104,20 +105,19 @@ def images(position: Floats, pose: Pose, bottom_depth: float, bounces: int) -> l
 def cancel(
     signals: Signals,
     estimates: SourceEstimates,
-    elements: Elements,
-    sonar: Sonar,
-    pose: Pose,
-    bottom_depth: float,
+    receiver: Receiver,
+    bottom: float,
     window: tuple[float, float],
     limits: Limits,
 ) -> Cancelled:
-    """Signals without the located snaps' reflections in the echo `window` (start, stop), in s.
+    """Signals without the located snaps' reflections in the echo `window` (start, stop), in s; bottom: its depth (m).
 
     See `WavefrontCancelling`. Loudest first, so that each is looked for with the louder ones gone.
     """
+    elements, sonar = receiver.elements, receiver.sonar
     if np.sum(elements.gain != 0) < SENSORS:
         return Cancelled(signals, ())
-    expected = expect(signals, estimates, elements, sonar, pose, bottom_depth, limits.bounces)
+    expected = expect(signals, estimates, receiver, bottom, limits.bounces)
     left, outcomes, taken = signals, [], []
     for each in sorted(expected, key=lambda e: -e.energy):
         reason = _out_of_question(each.front, estimates, elements, sonar, window)
@@ -130,16 +130,11 @@ def cancel(
 
 
 def expect(
-    signals: Signals,
-    estimates: SourceEstimates,
-    elements: Elements,
-    sonar: Sonar,
-    pose: Pose,
-    bottom_depth: float,
-    bounces: int,
+    signals: Signals, estimates: SourceEstimates, receiver: Receiver, bottom_depth: float, bounces: int
 ) -> list[Expected]:
     """Every reflected path of every located snap, by image sources and at the assumed sound speed."""
-    c, found = sonar.assumed_sound_speed, []
+    elements, sonar, found = receiver.elements, receiver.sonar, []
+    c = sonar.assumed_sound_speed
     for time, position in zip(estimates.time, estimates.position, strict=True):
         distance = float(np.linalg.norm(position))
         if not (np.isfinite(time) and np.isfinite(distance) and distance > 0):
@@ -148,7 +143,7 @@ def expect(
         aligned = cut(signals, elements, direct.delays(elements, c), pulse_times.PULSE_HALF, sonar.band)
         wave = pulse_times.waveform(aligned, elements, c, direct.direction, direct.curvature, direct.time)
         density = 2 * aligned.spacing * np.abs(wave.template) ** 2
-        for surface, bottom, place in images(position, pose, bottom_depth, bounces):
+        for surface, bottom, place in images(position, receiver.pose, bottom_depth, bounces):
             r = float(np.linalg.norm(place))
             front = PlaneWaveFit(place / r, 1 / r, float(time) + (r - distance) / c)
             across, up = front.direction[1:, None] * (elements.face / c)

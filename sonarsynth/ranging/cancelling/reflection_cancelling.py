@@ -9,10 +9,9 @@ from annotated_types import Ge, Le
 
 from sonarsynth.conventions import Decibels, PositiveRadians
 from sonarsynth.description import description
-from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.cancelling.cancelling_method import CancellingMethod
-from sonarsynth.receiver import Elements, Sonar
+from sonarsynth.state import Receiver, Survey
 
 
 @description
@@ -57,14 +56,12 @@ class WavefrontCancelling(CancellingMethod):
         self,
         signals: Signals,
         estimates: SourceEstimates,
-        elements: Elements,
-        sonar: Sonar,
-        sonar_pose: Pose,
-        bottom_depth: float,
+        receiver: Receiver,
+        survey: Survey,
         window: tuple[float, float],
     ) -> Signals:
         """See `CancellingMethod`."""
         from sonarsynth.ranging.cancelling.multipath import Limits, cancel
 
         limits = Limits(self.bounces, self.search, self.excess, self.weakest)
-        return cancel(signals, estimates, elements, sonar, sonar_pose, bottom_depth, window, limits).signals
+        return cancel(signals, estimates, receiver, survey.bottom, window, limits).signals

@@ -16,7 +16,6 @@ from sonarsynth.equations.arrays.spherical_wave import (
     spherical_wave,
     wavefront_delays,
 )
-from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.location import pulse_times
 from sonarsynth.ranging.location.candidates import Candidate, Candidates
@@ -35,6 +34,7 @@ from sonarsynth.ranging.location.source_position import (
     refused,
 )
 from sonarsynth.receiver import Elements, Sonar
+from sonarsynth.state import Receiver
 
 ROUNDS = 3
 """Alignments of the sensors on the wavefront; each improves the last, and the lags left settle the fit."""
@@ -73,10 +73,8 @@ def unlocatable(elements: Elements) -> str | None:
 
 def locate(
     signals: Signals,
-    elements: Elements,
-    sonar: Sonar,
-    pose: Pose,
-    bottom_depth: float,
+    receiver: Receiver,
+    bottom: float,
     snaps: int,
     *,
     bend: Bend | None = None,
@@ -84,12 +82,13 @@ def locate(
     kink: float = 0.0,
     on_bottom: bool = True,
 ) -> SourceEstimates:
-    """The `snaps` loudest direct pulses, loudest first; see `ranging.SensorDelays`.
+    """The `snaps` loudest direct pulses, loudest first; see `ranging.SensorDelays`. bottom: its depth (m).
 
     Paths bend as `bend` says; without it they are taken for straight, and the errors hold what a `gradient` (1/s) of
     the sound speed may do, and those of directions what its change over the array does, a `kink` (1/s). Pulses that are
     refused follow those that are not, loudest first.
     """
+    elements, sonar = receiver.elements, receiver.sonar
     if unlocatable(elements) is not None:
         return as_estimates([], snaps, ARRAY)
     if pulse_times.half_length(sonar.band) > pulse_times.LONGEST_HALF:
@@ -102,7 +101,7 @@ def locate(
     loud = pulse_times.loudness(signals, live, width)
     rounding = pulse_times.rounding(signals, loud.peak, pulse_times.half_length(sonar.band))
     quiet = pulse_times.quiet_bin(loud.quiet, int(live.sum()), sonar.band, pulse_times.half_length(sonar.band))
-    known = SonarKnowledge(elements, sonar, pose, bottom_depth, gradient, rounding, quiet, on_bottom, kink)
+    known = SonarKnowledge(elements, sonar, receiver.pose, bottom, gradient, rounding, quiet, on_bottom, kink)
     track, heard = loud.track.copy(), Candidates(known)
     for _ in range(4 * snaps):
         top = _loudest(track, heard, signals, snaps)

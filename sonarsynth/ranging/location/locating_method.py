@@ -3,30 +3,16 @@
 from __future__ import annotations
 
 from sonarsynth.description.method import Method
-from sonarsynth.environment.sea import Profile
-from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals, SourceEstimates
-from sonarsynth.receiver import Elements, Sonar
+from sonarsynth.receiver import Elements
+from sonarsynth.state import Receiver, Survey
 
 
 class LocatingMethod(Method):
     """Finds where snaps are from what the array hears. `Demand.off_bottom` tells `resolve` of the recipe's sources."""
 
-    def locate(
-        self,
-        signals: Signals,
-        elements: Elements,
-        sonar: Sonar,
-        sonar_pose: Pose,
-        bottom_depth: float,
-        snaps: int,
-        profile: Profile,
-    ) -> SourceEstimates:
-        """The `snaps` loudest direct pulses, loudest first, one row each; NaN rows for those that were not found.
-
-        bottom_depth (m, positive down) is where the snaps are known to be; profile the sound speed of the water, as the
-        sonar knows it from a cast: for tracing rays, or for what straight ones may cost.
-        """
+    def locate(self, signals: Signals, receiver: Receiver, survey: Survey, snaps: int) -> SourceEstimates:
+        """The `snaps` loudest direct pulses, loudest first, one row each; NaN rows for those that were not found."""
         raise NotImplementedError(f"{type(self).__name__} locates nothing")
 
     def off_bottom_note(self) -> str:

@@ -13,7 +13,7 @@ from sonarsynth.equations.rays.ray_solutions import eigenrays, water
 from sonarsynth.geometry import Pose, unit
 from sonarsynth.ranging.location.locating import Bend
 from sonarsynth.ranging.placing.solution import Solution
-from sonarsynth.receiver import Elements
+from sonarsynth.state import Receiver
 
 STEPS = 20
 """Newton steps at most; five or six are usual."""
@@ -52,13 +52,13 @@ def first_rays(profile: Profile, start: Floats, end: Floats) -> FirstRays:
     return FirstRays(time, departure, arrival)
 
 
-def bending(profile: Profile, elements: Elements, pose: Pose, sound_speed: float, gradient: float) -> Bend:
-    """What rays through the profile add to straight delays at `sound_speed` (m/s) over the array."""
-    sensors = np.vstack([elements.position, np.zeros(3)])
+def bending(profile: Profile, receiver: Receiver, gradient: float) -> Bend:
+    """What rays through the profile add to straight delays over the array, at the speed that the sonar assumes."""
+    sensors, pose = np.vstack([receiver.elements.position, np.zeros(3)]), receiver.pose
 
     def delays(source: Floats) -> Floats:
         rays = first_rays(profile, pose.to_world(source)[None], pose.to_world(sensors))
-        straight = np.linalg.norm(source - sensors, axis=1) / sound_speed
+        straight = np.linalg.norm(source - sensors, axis=1) / receiver.sonar.assumed_sound_speed
         extra = rays.travel_time - straight
         return np.asarray(extra[:-1] - extra[-1])
 

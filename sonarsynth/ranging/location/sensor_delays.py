@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
+from sonarsynth.conventions import depth
 from sonarsynth.description import description
 from sonarsynth.description.method import UNSTATED, Demand
-from sonarsynth.environment.sea import Profile
 from sonarsynth.environment.sound_speed import kink, mean_gradient
-from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.location.locating_method import LocatingMethod
-from sonarsynth.receiver import Elements, Sonar
+from sonarsynth.receiver import Elements
+from sonarsynth.state import Receiver, Survey
 
 
 @description
@@ -51,25 +51,15 @@ class SensorDelays(LocatingMethod):
         then = "the sonar assumes that it is" if self.on_bottom else "snaps are located by their wavefronts alone"
         return f"{then} (scene.processing.locating.on_bottom)"
 
-    def locate(
-        self,
-        signals: Signals,
-        elements: Elements,
-        sonar: Sonar,
-        sonar_pose: Pose,
-        bottom_depth: float,
-        snaps: int,
-        profile: Profile,
-    ) -> SourceEstimates:
+    def locate(self, signals: Signals, receiver: Receiver, survey: Survey, snaps: int) -> SourceEstimates:
         """See `LocatingMethod`. An array that cannot locate gives NaN rows (`locating.unlocatable` says why)."""
         from sonarsynth.ranging.location.locating import locate
         from sonarsynth.ranging.location.refraction import bending
 
-        on_bottom = self.on_bottom is not False
-        gradient = mean_gradient(profile, -float(sonar_pose.position[2]), bottom_depth, elements.aperture)
-        where = signals, elements, sonar, sonar_pose, bottom_depth, snaps
-        kinked = kink(profile, -float(sonar_pose.position[2]), elements.aperture) if elements.aperture else 0.0
-        if not self.refraction:
-            return locate(*where, gradient=gradient, kink=kinked, on_bottom=on_bottom)
-        bend = bending(profile, elements, sonar_pose, sonar.assumed_sound_speed, gradient)
-        return locate(*where, bend=bend, kink=kinked, on_bottom=on_bottom)
+        profile, aperture, own = survey.profile, receiver.elements.aperture, float(depth(receiver.pose.position))
+        gradient = mean_gradient(profile, own, survey.bottom, aperture)
+        bend = bending(profile, receiver, gradient) if self.refraction else None
+        return locate(
+            signals, receiver, survey.bottom, snaps, bend=bend, gradient=0.0 if bend else gradient,
+            kink=kink(profile, own, aperture) if aperture else 0.0, on_bottom=self.on_bottom is not False,
+        )  # fmt: skip

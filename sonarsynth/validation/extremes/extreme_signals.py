@@ -16,6 +16,7 @@ from sonarsynth.receiver import Band, BeamGrid, LowPass, PlanarLattice, Position
 from sonarsynth.scattering.isotropic import Isotropic
 from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.sources.snap_models import Gabor, Ricker
+from sonarsynth.state import Receiver, Survey
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Sphere
 from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, refused, together
@@ -148,7 +149,7 @@ def _loud_and_faint() -> Got:
 def _silence() -> Got:
     quiet = heard(methods()[0], traced((), FEW), (), FEW, 0.0, 2000)
     sonar = Sonar(array=PlanarLattice(columns=4, rows=4, pitch=0.1, face=0.0), beams=BeamGrid(azimuths=5, elevations=5))
-    found = SensorDelays().locate(quiet, FEW, sonar, POSE, 100.0, 1, PROFILE)
+    found = SensorDelays().locate(quiet, Receiver(POSE, FEW, sonar), Survey(100.0, PROFILE), 1)
     image = FocusedDelayAndSum().image(quiet, FEW, sonar, 1e-3, 6e-3)
     beams = FocusedDelayAndSum().beams(quiet, FEW, sonar, 1e-3, 6e-3)
     window = ReceivedWindow(FEW, sonar, image, beams, 0.0, quiet, found)
@@ -167,7 +168,7 @@ def _few_sensors() -> Got:
     for array, reason in ((ONE, "1 live sensor"), (TWO, "2 live sensors")):
         got = heard(methods()[0], traced(snaps, array), snaps, array, start, 1000)
         parts.append(_against(got, direct(array, place, times(start, 1000))))
-        found = SensorDelays().locate(got, array, SONAR, POSE, 100.0, 1, PROFILE)
+        found = SensorDelays().locate(got, Receiver(POSE, array, SONAR), Survey(100.0, PROFILE), 1)
         said = unlocatable(array) or ""
         parts.append(holds(bool(np.isnan(found.azimuth).all()) and reason in said, f"no bearing: {said}"))
         if array is TWO:

@@ -10,6 +10,7 @@ from sonarsynth.conventions import Floats, azimuth_elevation, direction
 from sonarsynth.products import REASONS, Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.receiver import Band, Elements, PlanarLattice, Sonar, elements
+from sonarsynth.state import Receiver, Survey
 from sonarsynth.validation.extremes.outcomes import Case, Got, holds, together
 from sonarsynth.validation.extremes.plain_scenes import BOTTOM_DEPTH, POSE, PROFILE, RATE, C, direct
 
@@ -33,7 +34,9 @@ def _located(
     signals: Signals, array: Elements, rows: int, band: Band = BAND, *, refraction: bool = False
 ) -> SourceEstimates:
     sonar = Sonar(array=LATTICE, band=band, sampling_frequency=RATE, assumed_sound_speed=C, sound_speed_error=0.1)
-    return SensorDelays(refraction=refraction).locate(signals, array, sonar, POSE, BOTTOM_DEPTH, rows, PROFILE)
+    return SensorDelays(refraction=refraction).locate(
+        signals, Receiver(POSE, array, sonar), Survey(BOTTOM_DEPTH, PROFILE), rows
+    )
 
 
 def _honest(found: SourceEstimates, places: Sequence[Floats]) -> Got:
