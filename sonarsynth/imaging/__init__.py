@@ -23,6 +23,11 @@ __all__ = ["AutoBeamforming", "Beamformer", "BeamformingMethod", "DenseDelayAndS
 class BeamformingMethod(Protocol):
     """One way to make an image from signals."""
 
+    @property
+    def focus(self) -> float | None:
+        """Range (m) at which the array is focused; none: plane waves."""
+        ...
+
     def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
         """Image of the window from start to stop (s, clock of the signals) on the sonar's beam grid.
 

@@ -11,16 +11,20 @@ from sonarsynth.conventions import Floats
 from sonarsynth.description.method import Method
 from sonarsynth.equations.arrays.beams import beam_spectra, first_and_spacing, lattice_beam_spectra
 from sonarsynth.equations.arrays.gates import gate_samples
-from sonarsynth.imaging.image_window import weights, window_spectra
+from sonarsynth.imaging.image_window import Shading, weights, window_spectra
 from sonarsynth.products import BeamSpectra, Signals
 from sonarsynth.receiver import Elements, Sonar
 
 
 class Steering(Method):
-    """A beamformer, as far as it is not its own: delay and sum with its `focus` and `shading`, where it has them."""
+    """A beamformer, as far as it is not its own: delay and sum with its `focus` and `shading`."""
 
     separable: ClassVar[bool] = True
     """Whether beams of a lattice are made by rows and columns, focused in every direction as on the axis."""
+    focus: float | None = None
+    """Range (m) at which the array is focused; none: plane waves."""
+    shading: Shading = "uniform"
+    """Weights over the aperture."""
 
     def beams(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> BeamSpectra:
         """Beams of the window from start to stop (s), made when they are asked for. Raises ValueError as `image`."""
@@ -44,8 +48,8 @@ class Steering(Method):
     ) -> npt.NDArray[np.complex64]:
         """Spectra (beam, bin) in `direction` (beam, xyz) of those of the sensors (sensor, bin) at evenly spaced
         frequencies (bin,) Hz."""
-        focus, c = getattr(self, "focus", None), sonar.assumed_sound_speed
-        gain = weights(elements, getattr(self, "shading", "uniform"))
+        focus, c = self.focus, sonar.assumed_sound_speed
+        gain = weights(elements, self.shading)
         if not (elements.on_lattice and self.separable):
             return beam_spectra(spectra, frequency, elements.position, gain, direction, c, focus)
         return lattice_beam_spectra(

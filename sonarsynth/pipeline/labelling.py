@@ -44,7 +44,7 @@ def point_labels(
     listening = Listening(
         plan.elements,
         sonar.assumed_sound_speed,
-        getattr(plan.choices.beamforming, "focus", None),
+        plan.choices.beamforming.focus,
         float(estimates.time[0]) if len(estimates.time) else np.nan,
         frame.sonar_pose,
         frame.sonar_velocity * moves,
