@@ -107,7 +107,7 @@ def probes(elements: Elements, degree: int = 3) -> Probes:
     fitted = max(len(sensor) - HELD_OUT, min(rank, len(sensor)), 1)
     basis = aperture_terms(position[sensor], scale, terms)
     solve = np.vstack([np.zeros(fitted), np.linalg.pinv(basis[:fitted, 1:], rcond=1e-10)])
-    few = max(min(QUADRATIC_PROBES, len(sensor)) - HELD_OUT, 1)
+    few = len(sensor) if len(sensor) < QUADRATIC_PROBES else QUADRATIC_PROBES - HELD_OUT  # of a small array, all
     second = np.linalg.pinv(basis[:few, 1:SECOND_DEGREE], rcond=1e-10)
     return Probes(sensor, position[sensor], fitted, solve, basis, scale, np.vstack([np.zeros(few), second]))
 
