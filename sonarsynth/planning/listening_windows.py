@@ -196,11 +196,11 @@ def _span(frame: Frame, profile: Profile, bottom_depth: float, bounces: int) -> 
     for body, some in parts:
         points = body.pose.to_world(body.mesh.centroid[some])
         back = _straight_time(profile, bottom_depth, points, array)
-        for n, snap in enumerate(snaps):
+        for n, snap in ((n, snap) for n, snap in enumerate(snaps) if snap.illuminates):
             echo = snap.time + _straight_time(profile, bottom_depth, snap.position, points) + back
             earliest[n] = min(earliest[n], echo.min(initial=np.inf))
             late_echo[n] = max(late_echo[n], echo.max(initial=-np.inf))
-    echoes = bool(np.isfinite(earliest).all())
+    echoes = bool(np.isfinite(earliest).any())
     late_direct = direct
     if bounces:
         late_direct, late_echo = _reflected(frame, profile, bottom_depth, bounces)
@@ -240,7 +240,7 @@ def _reflected(frame: Frame, profile: Profile, bottom_depth: float, bounces: int
         direct.append(snap.time + straight.connect(profile, bottom_depth, start, array[None, :]).travel_time.max())
         out = straight.connect(profile, bottom_depth, np.broadcast_to(start, points.shape), points)
         latest = -np.inf
-        for n in range(bounces + 1):
+        for n in range(bounces + 1 if snap.illuminates else 0):
             first, second = (_latest(paths, k, len(points)) for paths, k in ((out, n), (back, bounces - n)))
             latest = max(latest, float(np.max(first + second, initial=-np.inf)))
         echoes.append(snap.time + latest)

@@ -176,7 +176,7 @@ class Scene:
         bottom = self.world.environment.depth
         snaps: list[Snap] = []
         for i, source in enumerate(self.world.sources):
-            snaps += source.emissions(bottom, stream(seed, "snap", key, step, i))
+            snaps += source.emissions(bottom, stream(seed, "snap", key, step, i), time)
         return WorldState(time, bodies, tuple(snaps))
 
     def frame(

@@ -83,7 +83,7 @@ class SnappingShrimp(SoundSource):
     times_field: ClassVar[str] = "snap_times"
     pulse_field: ClassVar[str] = "snap"
 
-    def place(self, bottom: float) -> Floats:
+    def place(self, bottom: float, time: float = 0.0) -> Floats:
         """As `SoundSource.place`."""
         x, y, *z = self.position
         return np.array([x, y, z[0] if z else self.height - bottom])
@@ -107,8 +107,8 @@ class SnappingShrimp(SoundSource):
         """As `SoundSource.largest_scales`."""
         return largest_scales(self.variation)
 
-    def emissions(self, bottom: float, random: np.random.Generator) -> tuple[Snap, ...]:
+    def emissions(self, bottom: float, random: np.random.Generator, start: float) -> tuple[Snap, ...]:
         """As `SoundSource.emissions`: each snap as loud and as long as is drawn for it."""
-        position, model, drawn = self.place(bottom), self.model(bottom), scales(self.variation, random, len(self.times))
+        drawn = scales(self.variation, random, len(self.times))
         each = zip(self.times, drawn.gain.tolist(), drawn.width.tolist(), strict=True)
-        return tuple(Snap(position, time, model, self.level, gain, width) for time, gain, width in each)
+        return tuple(self.emission(bottom, start, *snap) for snap in each)

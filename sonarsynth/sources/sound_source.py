@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -11,6 +12,10 @@ from sonarsynth.conventions import Floats
 from sonarsynth.description.method import Method
 from sonarsynth.sources.pulse_model import PulseModel
 from sonarsynth.sources.snap_pulses import Waveform, waveform
+
+Directivity = Callable[[Floats], Floats]
+"""Pressure (...) in directions (..., xyz), unit vectors of the world in which sound leaves, over that which the source
+level is of. Negative where the phase is turned by pi. One pattern for all of the band: that at its centre."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +28,9 @@ class Snap:
     source_level: float | None  # dB re 1 uPa at 1 m peak of the model (see `level_below`); None: its own
     gain: float = 1.0
     width: float = 1.0
+    velocity: Floats = field(default_factory=lambda: np.zeros(3))  # (xyz) m/s of the source at that time, world
+    directivity: Directivity | None = None  # None: the same in all directions
+    illuminates: bool = True  # whether echoes of it are traced; if not, it is heard directly alone
 
     @property
     def waveform(self) -> Waveform:
@@ -31,7 +39,8 @@ class Snap:
 
 
 class SoundSource(Method):
-    """Something that makes sound at given times of every frame, from where it is, the same in all directions."""
+    """Something that makes sound at given times of every frame, at rest and alike in all directions unless it says
+    otherwise."""
 
     name: str
     """For people; nothing depends on it."""
@@ -40,10 +49,20 @@ class SoundSource(Method):
     """The field that gives the times, to be named where they are wrong."""
     pulse_field: ClassVar[str] = "kind"
     """The field that gives the pulse."""
+    illuminates: bool = True
+    """Whether its echoes are traced; if not, it is heard directly alone."""
 
-    def place(self, bottom: float) -> Floats:
-        """Where it is (xyz) in m, over a bottom at this depth (m)."""
+    def place(self, bottom: float, time: float = 0.0) -> Floats:
+        """Where it is (xyz) in m, over a bottom at this depth (m), at a time (s) since the start of the motions."""
         raise NotImplementedError(f"{type(self).__name__} is nowhere")
+
+    def velocity(self, time: float) -> Floats:
+        """How it moves (xyz) in m/s then: pulses are shorter ahead of it (Doppler)."""
+        return np.zeros(3)
+
+    def directivity(self, time: float) -> Directivity | None:
+        """How loud it is in each direction then; none: alike in all."""
+        return None
 
     @property
     def times(self) -> tuple[float, ...]:
@@ -64,7 +83,13 @@ class SoundSource(Method):
         """Bounds on the gain and the width of what it emits, over its model's; the smallest are their inverses."""
         return 1.0, 1.0
 
-    def emissions(self, bottom: float, random: np.random.Generator) -> tuple[Snap, ...]:
-        """What it emits in a frame, one a time; random: a stream of its own in each frame."""
-        place, model = self.place(bottom), self.model(bottom)
-        return tuple(Snap(place, time, model, self.level) for time in self.times)
+    def emissions(self, bottom: float, random: np.random.Generator, start: float) -> tuple[Snap, ...]:
+        """What it emits in a frame, one a time; random: a stream of its own in each frame; start: time (s) of the
+        frame since the start of the motions."""
+        return tuple(self.emission(bottom, start, time) for time in self.times)
+
+    def emission(self, bottom: float, start: float, time: float, gain: float = 1.0, width: float = 1.0) -> Snap:
+        """What it emits `time` (s) after the instant of a frame, gain times as loud and width times as long."""
+        now, model = start + time, self.model(bottom)
+        motion = self.velocity(now), self.directivity(now)
+        return Snap(self.place(bottom, now), time, model, self.level, gain, width, *motion, self.illuminates)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,12 +18,13 @@ from sonarsynth.tracing.doppler import Meeting, MetPaths, apply_doppler, receive
 from sonarsynth.tracing.echoes import echoes
 from sonarsynth.tracing.expansion.amplitude_polynomials import fitted
 from sonarsynth.tracing.expansion.array_expansion import array_expansion
+from sonarsynth.tracing.expansion.wavefront_polynomials import QUADRATIC_PROBES
 from sonarsynth.tracing.facet_paths import FacetPaths, facet_paths
 from sonarsynth.tracing.meetings import hearing_times, occasions
 from sonarsynth.tracing.occlusion.forward_scattering import blocking_bodies, forward_paths, shadow_parts
 from sonarsynth.tracing.path_absorption import path_loss
 from sonarsynth.tracing.receive_paths import rays_to_centre
-from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, by_target, join, no_arrivals
+from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, by_target, directed, join, no_arrivals
 
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
@@ -39,7 +41,8 @@ def trace(context: FrameContext, propagation: Propagation) -> Arrivals:
     """
     receiver, snaps = context.receiver, context.snaps
     moving = receiver.track
-    if moving is None or (moving.still and all(body.track.still for body in context.bodies)) or not snaps:
+    still = all(body.track.still for body in context.bodies) and not any(snap.velocity.any() for snap in snaps)
+    if moving is None or (moving.still and still) or not snaps:
         return arrivals(facet_paths(context, propagation))
     parts: list[tuple[tuple[int, int], Arrivals]] = []
     begun = set[int]()
@@ -77,6 +80,8 @@ def _echoes(array: FacetPaths, snaps: Iterable[int]) -> list[tuple[tuple[int, in
     """Echoes (1) and shadow waves (2) of some snaps, each with the number of its snap."""
     parts, through, laws = [], forward_paths(array), array.context.laws
     for index in snaps:
+        if not array.context.snaps[index].illuminates:
+            continue
         parts.append(((index, 1), echoes(array, index, tuple(law.parts for law in laws))))
         if through is not None:
             parts.append(((index, 2), echoes(through, index, tuple(shadow_parts(law) for law in laws))))
@@ -88,6 +93,7 @@ def _direct(array: FacetPaths, index: int) -> Arrivals:
     context, meeting = array.context, array.meeting
     medium, receiver, snap = context.medium, context.receiver, context.snaps[index]
     legs = rays_to_centre(medium, snap.position[None, :], receiver, array.propagation)
+    legs = legs.select(np.flatnonzero(directed(snap, legs.departure)[0] * legs.spreading))
     view = array.view(blocking_bodies(context, snap.position))
     legs = view.visible(legs, legs.point, None)
     legs = view.settled(legs, legs.point, None)
@@ -95,9 +101,14 @@ def _direct(array: FacetPaths, index: int) -> Arrivals:
     degree = context.tolerances.degree
     over = array_expansion(legs, np.zeros(count, int), array.bending, receiver, array.propagation, degree)
     one, none, none_out = np.ones(count), np.full(count, NO_TARGET), TransmitPaths.none(count)
-    variation = fitted(array, over.gain(np.arange(count)), legs.spreading)
-    rest = MetPaths.at_rest(count, snap.time)
-    legs = legs if meeting is None else received(legs, rest, meeting, medium.profile)
+    rows, (loud, turned) = np.arange(count), directed(snap, legs.departure)
+    gain, met = over.gain(rows), MetPaths.direct(count, snap)
+    if snap.directivity is not None:  # seen from the source, hydrophones are in other directions than the centre
+        gain = gain * (snap.directivity(over.departure(rows)) / snap.directivity(legs.departure)[:, None])
+    variation = fitted(array, gain, legs.spreading)
+    away = partial(over.departure, rows, QUADRATIC_PROBES) if snap.velocity.any() else None
+    legs = replace(legs, spreading=legs.spreading * loud, phase=legs.phase + turned)
+    legs = legs if meeting is None else received(legs, met, meeting, medium.profile)
     made = assemble(
         legs, over.terms, none_out, index, snap.time, path_loss(array, snap, legs),
         target=none, facet=none, scattering=one, variation=variation, pulses=PulseResponse.plain(count),
@@ -105,6 +116,6 @@ def _direct(array: FacetPaths, index: int) -> Arrivals:
     if meeting is None:
         return made
     return apply_doppler(
-        made, legs, none_out, rest, meeting, medium.profile, elements=receiver.elements,
+        made, legs, none_out, met, meeting, medium.profile, elements=receiver.elements, departure=away,
         enough=context.tolerances.quadratic,
     )  # fmt: skip

@@ -11,8 +11,9 @@ m and h those of the poses that rays were traced between,
 and each leg is longer by its curvature, as a straight one of its length is (`path_elongation`), so that times are exact
 in uniform water. Directions at facet and array, and spreading, are those of the lengthened leg, exact there as well. v
 is the velocity of the facet: its body may turn, by omega tau_1 till then, and with it all that its law asks for. The
-pulse is longer by dt_2/dt_s. Left out in bent water: how much more or less than straight rays the rays turn and spread
-for the remainder v tau_1; of a moving array, u/c of the curvature of the wavefront.
+pulse is longer by dt_2/dt_s; of a source that moves at w by 1 - w.n/c times as much, n the direction in which the ray
+leaves it. Of direct sound the source is the facet. Left out in bent water: how much more or less than straight rays the
+rays turn and spread for the remainder v tau_1; of a moving array, u/c of the curvature of the wavefront.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import Elements
+from sonarsynth.state import Snap
 from sonarsynth.tracing.expansion.probe_paths import TERMS
 from sonarsynth.tracing.expansion.wavefront_polynomials import QUADRATIC_PROBES, SECOND_DEGREE, probes, sphere
 from sonarsynth.tracing.receive_paths import ReceivePaths
@@ -67,10 +69,10 @@ class MetPaths:
         return MetPaths(**{name: value[rows] for name, value in vars(self).items()})
 
     @staticmethod
-    def at_rest(count: int, time: float) -> MetPaths:
-        """Paths from what does not move, at a time (s)."""
+    def direct(count: int, snap: Snap) -> MetPaths:
+        """Paths from a snap itself, which is where it is when it sounds."""
         zero, none = np.zeros(count), np.zeros((count, 3))
-        return MetPaths(zero + time, zero, none, none, none)
+        return MetPaths(zero + snap.time, zero, none + snap.velocity, none, none)
 
     def departure(self, length: Floats, away: Floats) -> Floats:
         """Directions (path, ..., xyz) to the array or probes of it, of rays of some length (path,) m that left in
@@ -178,6 +180,7 @@ class _Doppler(NamedTuple):
 
     velocity: Floats  # (path, xyz) m/s of the facet, world
     mirrored: Floats  # (path, xyz) m/s of where it seems to be
+    approach: Floats  # (path,) of the source to the facet,
     rate_out: Floats  # (path,) of the way to it,
     rate_in: Floats  # (path,) and from there
     of_array: Floats  # (path,) by the motion of the array
@@ -216,7 +219,9 @@ def _over_aperture(
     if departure is not None:
         away = departure()[some]
         rate_in = -np.einsum("px,pqx->pq", rates.velocity, away) / profile.at(depth(leg.point))[:, None]
-    there = (1.0 + rate_in) / ((1.0 - rates.rate_out[:, None]) * (1.0 - of_array)) - 1.0
+    there = (1.0 - rates.approach[:, None]) * (1.0 + rate_in) / (
+        (1.0 - rates.rate_out[:, None]) * (1.0 - of_array)
+    ) - 1.0
     straight = np.einsum("px,pqx->pq", pose.turn_to_body(rates.mirrored), turn) / c_array
     both = there - rates.doppler[:, None], rate_in - rates.rate_in[:, None] - straight
     found = np.zeros((2, len(of.doppler), SECOND_DEGREE))
@@ -252,8 +257,8 @@ def apply_doppler(
 
     An array that moves meets a wavefront later, or sooner, the farther it has still to go: delays over the aperture (m)
     are longer by u.b/c, which goes into their linear terms. departure: makes the directions (path, FEW, xyz) in which
-    the first probes are seen from the facets, world; None for direct paths; enough: error of signals that is left, of
-    Doppler over the aperture.
+    the first probes are seen from the facets, or the source, world; None of a source at rest; enough: error of signals
+    that is left, of Doppler over the aperture.
     """
     if not len(made.delay):
         return made
@@ -261,8 +266,10 @@ def apply_doppler(
     c, c_array = profile.at(depth(legs.point)), float(profile.at(depth(array.pose.position)))
     rate_out, rate_in = dot(of.velocity, out.arrival) / c, -dot(of.velocity, legs.departure) / c
     of_array = dot(legs.arrival, array.velocity) / c_array
-    doppler = (1.0 + rate_in) / ((1.0 - rate_out) * (1.0 - of_array)) - 1.0
-    rates = _Doppler(of.velocity, mirrored(of.velocity, legs.bounces), rate_out, rate_in, of_array, doppler)
+    doppler = (1.0 - out.approach) * (1.0 + rate_in) / ((1.0 - rate_out) * (1.0 - of_array)) - 1.0
+    rates = _Doppler(
+        of.velocity, mirrored(of.velocity, legs.bounces), out.approach, rate_out, rate_in, of_array, doppler
+    )
     over, faster = _over_aperture(rates, legs, array, profile, elements, departure, enough)
     along = (of_array / (1.0 - of_array) * elements.aperture / c_array)[:, None] * legs.direction
     moves = array.velocity.any() and elements.aperture > 0.0

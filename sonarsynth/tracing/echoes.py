@@ -229,7 +229,9 @@ def _ways(array: FacetPaths, snap: Snap) -> TransmitPaths:
     facet = row[paths.pair]
     lit = usable(paths) & (np.einsum("ij,ij->i", facets.normal[facet], paths.arrival) < 0)
     bounced = reflections(medium.environment, medium.profile, paths, array.context.receiver.centre)
-    out = TransmitPaths.of(paths, bounced, facet).select(np.flatnonzero(lit))
+    speed = float(medium.profile.at(depth(snap.position)))
+    out = TransmitPaths.of(paths, bounced, facet, snap, speed)
+    out = out.select(np.flatnonzero(lit & (out.spreading != 0.0)))
     out = out.select(~_hides(array, bodies, snap, out, facets.clear[out.facet]))
     for number, before in overlapping(bodies):
         mine = np.flatnonzero(facets.target[out.facet] == number)

@@ -11,6 +11,7 @@ from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.products import Arrivals, Paths
 from sonarsynth.propagation.reflections import Reflections, as_sign
 from sonarsynth.scattering.facet_geometry import PulseResponse
+from sonarsynth.state import Snap
 from sonarsynth.tracing.expansion.wavefront_polynomials import ExpansionTerms
 from sonarsynth.tracing.receive_paths import ReceivePaths
 
@@ -34,13 +35,16 @@ class TransmitPaths:
     boundary: Floats  # (way,)
     phase: Floats  # (way,) rad
     delay_std: Floats  # (way,) s
+    approach: Floats  # (way,) speed of the source along the way, over that of sound: pulses are shorter by it
 
     @staticmethod
-    def of(paths: Paths, bounced: Reflections, facet: Ints) -> TransmitPaths:
-        """Of paths to facets (path,)."""
+    def of(paths: Paths, bounced: Reflections, facet: Ints, snap: Snap, speed: float) -> TransmitPaths:
+        """Of paths to facets (path,) from a snap where sound has this speed (m/s)."""
+        loud, turned = directed(snap, paths.departure)
         return TransmitPaths(
-            facet, paths.arrival, paths.travel_time, paths.length, paths.spreading, paths.surface, paths.bottom,
-            paths.turning, paths.caustics, bounced.modulus, bounced.phase, bounced.delay_std,
+            facet, paths.arrival, paths.travel_time, paths.length, paths.spreading * loud, paths.surface, paths.bottom,
+            paths.turning, paths.caustics, bounced.modulus, bounced.phase + turned, bounced.delay_std,
+            paths.departure @ snap.velocity / speed,
         )  # fmt: skip
 
     @staticmethod
@@ -48,7 +52,7 @@ class TransmitPaths:
         """No way at all, of paths that come straight from the snap; its spreading is that of the leg."""
         zero, none = np.zeros(count), np.zeros(count, int)
         return TransmitPaths(
-            none, np.zeros((count, 3)), zero, zero, zero + 1.0, none, none, none, none, zero + 1.0, zero, zero
+            none, np.zeros((count, 3)), zero, zero, zero + 1.0, none, none, none, none, zero + 1.0, zero, zero, zero
         )
 
     def select(self, keep: Bools | Ints) -> TransmitPaths:
@@ -75,6 +79,14 @@ class TransmitPaths:
     def bounces(self) -> Ints:
         """(way,) reflections from surface and bottom."""
         return np.asarray(self.surface + self.bottom)
+
+
+def directed(snap: Snap, departure: Floats) -> tuple[Floats | float, Floats | float]:
+    """What a snap sends in directions (path, xyz), world: modulus and phase (rad) over that of its level."""
+    if snap.directivity is None:
+        return 1.0, 0.0
+    factor = snap.directivity(departure)
+    return np.abs(factor), np.where(factor < 0.0, np.pi, 0.0)
 
 
 def assemble(

@@ -54,7 +54,12 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
             Omission("depth dependence of the absorption spectrum", "one absorption spectrum for all paths", bound)
         )
     rows += _facets_leave_out(plan)
-    moving = any(b.velocity.any() for b in frame.moment.bodies) or frame.sonar_velocity.any()
+    moved = [
+        frame.sonar_velocity,
+        *(b.velocity for b in frame.moment.bodies),
+        *(s.velocity for s in frame.moment.snaps),
+    ]
+    moving = np.any(moved)
     if moving and not scene.physics.doppler:
         rows.append(Omission("Doppler", "not requested: positions are those at the time of the frame", _moved(plan)))
     elif moving:

@@ -180,6 +180,7 @@ def _check_snaps(scene: Scene, frame: Frame) -> None:
     """No source is at the centre of the array, at a hydrophone, or inside a target."""
     owners = [i for i, source in enumerate(scene.world.sources) for _ in source.times]
     hydrophones = frame.sonar_pose.to_world(elements(scene.sonar.array).position)
+    slowest, bottom = float(profile_of(scene.world.environment.sound_speed).speed.min()), scene.world.environment.depth
     for owner, snap in zip(owners, frame.moment.snaps, strict=True):
         path = ("scene", "world", "sources", owner, "position")
         if np.linalg.norm(snap.position - frame.sonar_pose.position) < CLOSEST:
@@ -187,6 +188,9 @@ def _check_snaps(scene: Scene, frame: Frame) -> None:
         nearest = int(np.argmin(np.linalg.norm(hydrophones - snap.position, axis=1)))
         if np.linalg.norm(hydrophones[nearest] - snap.position) < CLOSEST:
             raise FieldError(path, f"is at hydrophone {nearest} of the array at frame {frame.index}")
+        _check_depth(path, "a source", snap.position[None], bottom, f"frame {frame.index}")
+        if scene.physics.doppler and math.hypot(*snap.velocity, *frame.sonar_velocity) > 0.4 * MAX_DOPPLER * slowest:
+            raise FieldError(path, f"moves too fast for sound in water at frame {frame.index}")
         for body in frame.moment.bodies:
             if inside(body, snap.position):
                 raise FieldError(path, f"is inside target '{body.name}' at frame {frame.index}")

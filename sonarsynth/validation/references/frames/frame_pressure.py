@@ -71,6 +71,8 @@ class FramePressure:
     @property
     def unknown(self) -> str:
         """Why this frame cannot be computed here; empty where it can."""
+        if any(snap.velocity.any() or snap.directivity for snap in self.frame.moment.snaps):
+            return "sources that move, or are not alike in all directions, are not in the independent computation"
         wrong = [type(law).__name__ for law in self.scene.laws if not known(law)]
         return f"{wrong[0]} is not among the laws of the independent computation" if wrong else ""
 
@@ -79,7 +81,7 @@ class FramePressure:
         of the frame."""
         out = np.zeros((2, len(sensors), samples))
         for snap in self.frame.moment.snaps:
-            lit = [part for body in self.bodies for part in self._lit(snap, body)]
+            lit = [part for body in self.bodies for part in self._lit(snap, body) if snap.illuminates]
             for n, sensor in enumerate(sensors):
                 if elements(self.scene.sonar.array).gain[sensor]:
                     place = elements(self.scene.sonar.array).position[sensor]
