@@ -7,7 +7,7 @@ the instant of the frame; a snap at `Snap.time` is heard a travel time later).
 """
 
 from sonarsynth.products.labels import LINK_BUDGET, ORIGINS, Echoes, LinkBudget, PointLabels, Truth
-from sonarsynth.products.paths import DIRECT, FAMILIES, Arrivals, Paths
+from sonarsynth.products.paths import DIRECT, FAMILIES, Arrivals, Kind, Paths
 from sonarsynth.products.results import REASONS, EnergyImage, PointCloud, Signals, SourceEstimates, no_points
 from sonarsynth.products.steered_spectra import BeamSpectra
 
@@ -21,6 +21,7 @@ __all__ = [
     "BeamSpectra",
     "Echoes",
     "EnergyImage",
+    "Kind",
     "LinkBudget",
     "Paths",
     "PointCloud",

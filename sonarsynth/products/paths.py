@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from sonarsynth.conventions import Bools, Bytes, Floats, Ints
 
@@ -37,63 +39,106 @@ FAMILIES = (DIRECT, "surface", "bottom", "surface and bottom")
 """Families of paths: by which boundaries they touched."""
 
 
+class Kind(IntEnum):
+    """What an arrival met on its way."""
+
+    DIRECT = 0
+    """From the source to the array, by surface and bottom or not: it met no target."""
+    ECHO = 1
+    """Scattered by a facet of a target."""
+    FORWARD = 2
+    """The shadow of a facet that scatters forward: with the direct wave, it is what is heard behind the target."""
+    REVERBERATION = 3
+    """Scattered by surface, bottom or what floats in the water."""
+
+
 @dataclass(frozen=True, eq=False)
 class Arrivals:
-    """Every path of a frame as it reaches the array: snap to facet to array, and snap to array.
+    """Every path of a frame as it reaches the array. xyz: in the sonar frame, but for `point`.
 
-    The wavefront of path e reaches sensor position q (sonar frame) at
-        delay[e] + (|R d - q| - |R|)/sound_speed + delay_terms[e] @ aperture_terms(q)
-    with d = direction[e], R = radius[e], and amplitude
-        amplitude[e] * R/|R d - q| * (1 + amplitude_terms[e] @ aperture_terms(q)).
-    (`apertures.aperture_terms`.) Water absorbs on what the way is longer by, its delay times sound_speed, as it does on
-    the way to the array centre: synthesis takes that off at each frequency. In isovelocity water the sphere is exact
-    and delay_terms has no columns. Reflections on the way differ over the aperture: there the phase is phase[e] +
-    phase_terms[e] @ aperture_terms(q), at every frequency, and the variance of the delay is delay_std[e]^2 +
-    delay_variance_terms[e] @ aperture_terms(q), which may be below 0: the delays over a facet, whose mean
-    `corner_delays` is that at the centre, have another variance there, and heights of a rough facet, of which the
-    centre's `height_delay_std` tells, another echo: what delay_std and amplitude together nearly say over the band.
-    What moves is seen from another side there: the Doppler factor is doppler[e] + doppler_terms[e] @ aperture_terms(q).
-    amplitude is the factor on the pressure waveform of the snap at 1 m: the product of the columns below it. Facets
-    change the waveform: its spectrum is multiplied by `facet_pulses.facet_response` of coherent, corner_delays,
-    coherent_fraction and height_delay_std, whose modulus is 1 at `centre` for a coherent facet that is small.
+    geometry
+    tau         delay (path,)                     s    at the array centre, time of the emission included
+    d           direction (path, xyz)             1    from the array centre to where the path seems to come from
+    R           radius (path,)                    m    of curvature of the reference sphere
+    L           length (path,)                    m    of the whole path
+    x           point (path, xyz)                 m    world: of the facet where the sound met it; of the source
+    amplitude   at the centre of the band
+    A           amplitude (path,)                 1/m  s_out f s_in V 10^(-a/20): pressure over the source's at 1 m
+    s_out       spreading_out (path,)             1/m  source to facet (or array), with the source's directivity
+    f           scattering (path,)                m    far-field amplitude of the facet, signed (1 of direct paths)
+    s_in        spreading_in (path,)              1/m  facet to array (1 of direct paths)
+    V           boundary (path,)                  1    moduli of reflection, multiplied; times -1 for a phase of pi
+    a           absorption (path,)                dB   along the whole path
+                occluded (path, byte)             bits a body hides it from the centre, from each hydrophone; none: 0
+    pulse       spectrum S(f): times exp(i phi) exp(-(2 pi f sigma)^2/2) facet_response(f), of p((t - tau)/(1 + delta))
+    phi         phase (path,)                     rad  of caustics and lossy reflections, at all frequencies
+    sigma       delay_std (path,)                 s    of roughness, as a Gaussian in time
+    sigma_f     echo_delay_std (path,)            s    the facet's part of it: squares of both parts add up
+    delta       doppler (path,)                   1    how much longer the pulse lasts
+                coherent (path,)                  bool differentiated, i f/f_c, of smooth facets; phases count in sums
+    t_1..3      corner_delays (path, 3)           s    of the facet about tau, a mean over it; 0: a point
+    w           coherent_fraction (path,)         1    of the power that is coherent where the facet is smooth
+    sigma_h     height_delay_std (path,)          s    of its heights: sqrt(1 - w exp(-(2 pi f sigma_h)^2)); w = 0: all
+    array expansion: b(q) are `apertures.aperture_terms` of a sensor at q; no columns where all have what the centre has
+                delay_terms (path, term)          s    tau(q) = tau + (|R d - q| - R)/c + delay_terms b(q)
+                amplitude_terms (path, term)      1    A(q) = A R/|R d - q| (1 + amplitude_terms b(q))
+                phase_terms (path, term)          rad  phi(q) = phi + phase_terms b(q)
+                delay_variance_terms (path, term) s2   sigma(q)^2 = sigma^2 + delay_variance_terms b(q)
+                doppler_terms (path, term)        1    delta(q) = delta + doppler_terms b(q)
+    provenance
+                kind (path,)                           `Kind`
+                snap (path,)                           index of the emission
+                target (path,)                         index of the target, -1 of direct paths
+                facet (path,)                          index in the mesh of the target, -1 of direct paths
+                surface, bottom (path,)                reflections there
+                turning, caustics (path,)              turning points and caustics passed
+                lit_by (path,)                         index into FAMILIES: boundaries touched on the way to the target
+                arrives_by (path,)                     index into FAMILIES: boundaries touched on the way to the array
+
+    Water absorbs on what the way to a sensor is longer by, its delay times c, as it does on the way to the array
+    centre: synthesis takes that off at each frequency. delay_variance_terms may be below 0: the delays over a facet,
+    whose mean `corner_delays` is that at the centre, have another variance elsewhere, and heights of a rough facet
+    another echo: what sigma and A together nearly say over the band. The modulus of `facet_pulses.facet_response` is 1
+    at f_c for a coherent facet that is small.
     """
 
-    delay: Floats  # (path,) s at the array centre, snap time included
-    direction: Floats  # (path, xyz) unit vector from the array centre towards where the path seems to come from
-    radius: Floats  # (path,) m: radius of curvature of the reference sphere
-    delay_terms: Floats  # (path, term) s; (path, 0) where the sphere is exact
-    amplitude_terms: Floats  # (path, term); (path, 0) where R/|R d - q| is exact
-    phase_terms: Floats  # (path, term) rad; (path, 0) where all hydrophones have the phase of the centre
-    delay_variance_terms: Floats  # (path, term) s2; (path, 0) where all have that of the centre
-    amplitude: Floats  # (path,) signed: spreading_out * scattering * spreading_in * boundary * 10^(-absorption/20)
-    spreading_out: Floats  # (path,) 1/m: snap to facet (snap to array for the direct path)
-    spreading_in: Floats  # (path,) 1/m: facet to array (1 for the direct path)
-    scattering: Floats  # (path,) m, signed: far-field amplitude f of the facet (1 for the direct path)
-    boundary: Floats  # (path,) product of the moduli of reflection coefficients, and -1 for a phase of pi
-    absorption: Floats  # (path,) dB along the whole path at the centre of the band
-    length: Floats  # (path,) m: whole path
-    snap: Ints  # (path,) index of the snap
-    target: Ints  # (path,) index of the target, -1 for the direct path
-    facet: Ints  # (path,) index of the facet in its target's mesh, -1 for the direct path
-    point: Floats  # (path, xyz) m, world: scattering point where the sound met it (direct path: the snap)
-    surface: Ints  # (path,) surface reflections
-    bottom: Ints  # (path,) bottom reflections
-    turning: Ints  # (path,) turning points
-    caustics: Ints  # (path,) caustics passed
-    lit_by: Ints  # (path,) index into FAMILIES: which boundaries it touched first, on its way to the target
-    arrives_by: Ints  # (path,) index into FAMILIES: which boundaries it touched last, on its way to the array
-    phase: Floats  # (path,) rad: constant phase of the pulse over frequency, from caustics and lossy reflections
-    delay_std: Floats  # (path,) s: roughness takes exp(-(2 pi f delay_std)^2/2) off the spectrum, a Gaussian in time
-    echo_delay_std: Floats  # (path,) s: the facet's part of delay_std; the squares of both parts add up
-    doppler: Floats  # (path,) Doppler: the pulse is p((t - delay)/(1 + doppler))
-    doppler_terms: Floats  # (path, term); (path, 0) where all hydrophones have the Doppler of the centre
-    coherent: Bools  # (path,) of a smooth facet, or its shadow: differentiated, i f/centre; phases count in sums
-    corner_delays: Floats  # (path, 3) s: of the facet about `delay`, a mean over it; 0: a point
-    coherent_fraction: Floats  # (path,) w: of the power that is coherent where it is smooth
-    height_delay_std: Floats  # (path,) s: a rough facet sends sqrt(1 - w exp(-(2 pi f height_delay_std)^2)); w = 0: all
-    occluded: Bytes  # (path, byte) bits: a body hides it from the array centre, from each hydrophone; (path, 0): none
-    centre: float  # Hz: centre of the band, where amplitudes hold
-    sound_speed: float  # m/s of the water at the array centre
+    delay: Floats
+    direction: Floats
+    radius: Floats
+    length: Floats
+    point: Floats
+    amplitude: Floats
+    spreading_out: Floats
+    scattering: Floats
+    spreading_in: Floats
+    boundary: Floats
+    absorption: Floats
+    occluded: Bytes
+    phase: Floats
+    delay_std: Floats
+    echo_delay_std: Floats
+    doppler: Floats
+    coherent: Bools
+    corner_delays: Floats
+    coherent_fraction: Floats
+    height_delay_std: Floats
+    delay_terms: Floats
+    amplitude_terms: Floats
+    phase_terms: Floats
+    delay_variance_terms: Floats
+    doppler_terms: Floats
+    kind: npt.NDArray[np.int8]
+    snap: Ints
+    target: Ints
+    facet: Ints
+    surface: Ints
+    bottom: Ints
+    turning: Ints
+    caustics: Ints
+    lit_by: Ints
+    arrives_by: Ints
+    centre: float  # f_c, Hz: centre of the band, where amplitudes hold
+    sound_speed: float  # c, m/s of the water at the array centre
     wavefront_error: float  # s: largest error of the wavefronts that was measured, at probes spread over the aperture
     amplitude_error: float = 0.0  # largest error of the amplitudes measured there, relative to the strongest echo
 
@@ -127,4 +172,4 @@ class Arrivals:
     @property
     def direct(self) -> Bools:
         """(path,) true for paths that met no target."""
-        return self.target < 0
+        return np.asarray(self.kind == Kind.DIRECT)

@@ -11,7 +11,7 @@ import numpy as np
 
 from sonarsynth.conventions import NO_TARGET, depth
 from sonarsynth.geometry.motion import Track
-from sonarsynth.products import Arrivals
+from sonarsynth.products import Arrivals, Kind
 from sonarsynth.scattering.facet_geometry import PulseResponse
 from sonarsynth.state import FrameContext, Snap
 from sonarsynth.tracing.doppler import Meeting, MetPaths, apply_doppler, received
@@ -24,7 +24,7 @@ from sonarsynth.tracing.meetings import hearing_times, occasions
 from sonarsynth.tracing.occlusion.forward_scattering import blocking_bodies, forward_paths, shadow_parts
 from sonarsynth.tracing.path_absorption import path_loss
 from sonarsynth.tracing.receive_paths import rays_to_centre
-from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, by_target, directed, join, no_arrivals
+from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, directed, join, no_arrivals
 
 if TYPE_CHECKING:
     from sonarsynth.propagation import Propagation
@@ -44,17 +44,16 @@ def trace(context: FrameContext, propagation: Propagation) -> Arrivals:
     still = all(body.track.still for body in context.bodies) and not any(snap.velocity.any() for snap in snaps)
     if moving is None or (moving.still and still) or not snaps:
         return arrivals(facet_paths(context, propagation))
-    parts: list[tuple[tuple[int, int], Arrivals]] = []
+    parts: list[Arrivals] = []
     begun = set[int]()
     for some in occasions(context, moving):
         there = replace(receiver, pose=some.meeting.sonar.pose)
         met = facet_paths(replace(context, bodies=some.bodies, receiver=there), propagation, some.targets)
         array = replace(met, meeting=some.meeting)
-        for index in set(some.snaps) - begun:
-            parts.append(((index, 0), _direct(_hearing(array, snaps[index], moving), index)))
+        parts += [_direct(_hearing(array, snaps[index], moving), index) for index in set(some.snaps) - begun]
         parts += _echoes(array, some.snaps)
         begun |= set(some.snaps)
-    return by_target(parts, receiver.speed(context.medium), receiver.centre)
+    return join(parts, receiver.speed(context.medium), receiver.centre)
 
 
 def _hearing(array: FacetPaths, snap: Snap, sonar: Track) -> FacetPaths:
@@ -69,22 +68,19 @@ def _hearing(array: FacetPaths, snap: Snap, sonar: Track) -> FacetPaths:
 def arrivals(array: FacetPaths) -> Arrivals:
     """As `trace`, of what is at rest, from legs that are traced already; shadows of targets have legs of their own."""
     context, every = array.context, range(len(array.context.snaps))
-    parts = [((index, 0), _direct(array, index)) for index in every] + _echoes(array, every)
-    parts.sort(key=lambda part: part[0])
-    heard = [no_arrivals(array.legs), *(part for _, part in parts)]
-    parts.clear()
-    return join(heard, context.receiver.speed(context.medium), context.receiver.centre)
+    parts = [no_arrivals(array.legs), *(_direct(array, index) for index in every), *_echoes(array, every)]
+    return join(parts, context.receiver.speed(context.medium), context.receiver.centre)
 
 
-def _echoes(array: FacetPaths, snaps: Iterable[int]) -> list[tuple[tuple[int, int], Arrivals]]:
-    """Echoes (1) and shadow waves (2) of some snaps, each with the number of its snap."""
+def _echoes(array: FacetPaths, snaps: Iterable[int]) -> list[Arrivals]:
+    """Echoes and shadow waves of some snaps."""
     parts, through, laws = [], forward_paths(array), array.context.laws
     for index in snaps:
         if not array.context.snaps[index].illuminates:
             continue
-        parts.append(((index, 1), echoes(array, index, tuple(law.parts for law in laws))))
+        parts.append(echoes(array, index, tuple(law.parts for law in laws), Kind.ECHO))
         if through is not None:
-            parts.append(((index, 2), echoes(through, index, tuple(shadow_parts(law) for law in laws))))
+            parts.append(echoes(through, index, tuple(shadow_parts(law) for law in laws), Kind.FORWARD))
     return parts
 
 
@@ -111,7 +107,8 @@ def _direct(array: FacetPaths, index: int) -> Arrivals:
     legs = legs if meeting is None else received(legs, met, meeting, medium.profile)
     made = assemble(
         legs, over.terms, none_out, index, snap.time, path_loss(array, snap, legs),
-        target=none, facet=none, scattering=one, variation=variation, pulses=PulseResponse.plain(count),
+        kind=Kind.DIRECT, target=none, facet=none, scattering=one, variation=variation,
+        pulses=PulseResponse.plain(count),
     )  # fmt: skip
     if meeting is None:
         return made

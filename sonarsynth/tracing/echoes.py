@@ -11,7 +11,7 @@ import numpy as np
 from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.products import Arrivals
+from sonarsynth.products import Arrivals, Kind
 from sonarsynth.propagation.reflections import reflections
 from sonarsynth.scattering import Component
 from sonarsynth.scattering.facet_geometry import PulseResponse
@@ -103,7 +103,7 @@ class _EchoBlock:
         )
 
 
-def echoes(array: FacetPaths, index: int, parts: tuple[tuple[Component, ...], ...]) -> Arrivals:
+def echoes(array: FacetPaths, index: int, parts: tuple[tuple[Component, ...], ...], kind: Kind) -> Arrivals:
     """Snap `index` to facet to array, over every facet of the legs that is lit; parts: of the law of each body.
 
     Facets are taken in blocks, so that little is held at a time; the echoes are those of one block, in its order.
@@ -133,7 +133,7 @@ def echoes(array: FacetPaths, index: int, parts: tuple[tuple[Component, ...], ..
         scattered, vary, loss = sign * amplitude, (variation, error), path_loss(array, snap, legs, out)
         one = assemble(
             legs, over, out, index, snap.time, loss,
-            target=target, facet=facet, scattering=scattered, variation=vary, pulses=some.pulses,
+            kind=kind, target=target, facet=facet, scattering=scattered, variation=vary, pulses=some.pulses,
         )  # fmt: skip
         if meeting is not None and some.carried is not None:
             enough = array.context.tolerances.quadratic

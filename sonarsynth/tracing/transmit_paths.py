@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints
-from sonarsynth.products import Arrivals, Paths
+from sonarsynth.products import Arrivals, Kind, Paths
 from sonarsynth.propagation.reflections import Reflections, as_sign
 from sonarsynth.scattering.facet_geometry import PulseResponse
 from sonarsynth.state import Snap
@@ -91,15 +91,17 @@ def directed(snap: Snap, departure: Floats) -> tuple[Floats | float, Floats | fl
 
 def assemble(
     legs: ReceivePaths, over: ExpansionTerms, out: TransmitPaths, index: int, time: float, loss: Floats,
-    *, target: Ints, facet: Ints, scattering: Floats, variation: tuple[Floats, float], pulses: PulseResponse,
+    *, kind: Kind, target: Ints, facet: Ints, scattering: Floats, variation: tuple[Floats, float],
+    pulses: PulseResponse,
 ) -> Arrivals:  # fmt: skip
     """Arrivals of snap `index` at `time` (s) from both halves of their paths; over: the wavefronts; loss: absorption of
     each (dB); variation: terms of the amplitude and their error; pulses: what facets make of the snap."""
     length = out.length + legs.length
     sign, phase = as_sign(out.phase + legs.phase + pulses.phase)
     boundary = sign * out.boundary * legs.boundary
-    direct = target < 0
-    first, second = np.where(direct, legs.spreading, out.spreading), np.where(direct, 1.0, legs.spreading)
+    first, second = out.spreading, legs.spreading
+    if kind == Kind.DIRECT:
+        first, second = second, first
     return Arrivals(
         delay=time + (out.travel_time + legs.travel_time),
         direction=legs.direction,
@@ -115,6 +117,7 @@ def assemble(
         boundary=boundary,
         absorption=loss,
         length=length,
+        kind=np.full(len(length), kind, np.int8),
         snap=np.full(len(length), index),
         target=target,
         facet=facet,
@@ -152,6 +155,7 @@ def no_arrivals(legs: ReceivePaths) -> Arrivals:
         0,
         0.0,
         none,
+        kind=Kind.DIRECT,
         target=zero,
         facet=zero,
         scattering=none,
@@ -161,26 +165,16 @@ def no_arrivals(legs: ReceivePaths) -> Arrivals:
 
 
 def join(parts: list[Arrivals], sound_speed: float, centre: float) -> Arrivals:
-    """Arrivals of all snaps, in order, at the centre of a band (Hz); terms that some of them lack are 0.
+    """Arrivals of all parts, sorted by snap, kind and target, at the centre of a band (Hz); terms that some of them
+    lack are 0.
 
     What absorption leaves nothing of is out. The list is emptied.
     """
-    heard = np.concatenate([part.amplitude for part in parts]) != 0.0
-    return replace(_stacked(parts, None if heard.all() else heard), sound_speed=sound_speed, centre=centre)
-
-
-def by_target(parts: list[tuple[tuple[int, int], Arrivals]], sound_speed: float, centre: float) -> Arrivals:
-    """As `join`, of parts of numbered snaps and kinds (snap, kind), sorted by these, then by target."""
-    parts.sort(key=lambda part: part[0])
-    number = np.repeat(np.arange(len(parts)), [len(part.delay) for _, part in parts])
-    key = np.array([snap * 3 + kind for (snap, kind), _ in parts])[number]
-    target = np.concatenate([part.target for _, part in parts])
-    heard = [part for _, part in parts]
-    parts.clear()
-    order = np.lexsort((target, key))
-    if (np.diff(order) == 1).all():
-        return join(heard, sound_speed, centre)
-    return join([_stacked(heard, order)], sound_speed, centre)
+    parts.sort(key=lambda part: [*part.snap[:1], *part.kind[:1]])
+    order = np.lexsort([np.concatenate([getattr(part, name) for part in parts]) for name in ("target", "kind", "snap")])
+    heard = order[np.concatenate([part.amplitude for part in parts])[order] != 0.0]
+    every = len(heard) == len(order) and bool((np.diff(heard) == 1).all())
+    return replace(_stacked(parts, None if every else heard), sound_speed=sound_speed, centre=centre)
 
 
 def ordered(parts: list[Arrivals], group: list[Ints]) -> Arrivals:

@@ -9,7 +9,7 @@ import pytest
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.bubble import snap_pressure
-from sonarsynth.products import Arrivals
+from sonarsynth.products import Arrivals, Kind
 from sonarsynth.receiver import Elements, LowPass, PositionTable, Sonar, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
 from sonarsynth.signals.direct_sum import exact_signals
@@ -47,6 +47,7 @@ def arrivals(delay: Floats, direction: Floats, radius: Floats, amplitude: Floats
         absorption=np.zeros(n),
         length=one,
         snap=zero,
+        kind=np.full(n, Kind.ECHO, np.int8),
         target=zero,
         facet=zero,
         point=np.zeros((n, 3)),
@@ -151,7 +152,7 @@ def test_levels_from_whisper_to_explosion() -> None:
 
 def test_an_echo_120_db_below_the_direct_snap_keeps_its_accuracy() -> None:
     of = arrivals([0.01, 0.02], [[1.0, 0.1, 0.1], [1.0, -0.2, 0.0]], [20.0, 25.0], [1.0, 1e-6])
-    of = replace(of, target=np.array([-1, 0]))
+    of = replace(of, target=np.array([-1, 0]), kind=np.array([Kind.DIRECT, Kind.ECHO], np.int8))
     start, samples = window(of, ARRAY)
     exact, _ = exact_signals(of, SNAPS, ARRAY, SONAR, None, start, samples)
     got = GriddedSynthesis().signals(of, SNAPS, ARRAY, SONAR, None, start, samples).pressure

@@ -7,7 +7,7 @@ import pytest
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.water.seawater import ainslie_mccolm
-from sonarsynth.products import Arrivals
+from sonarsynth.products import Arrivals, Kind
 from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.direct_sum import exact_signals
@@ -48,6 +48,7 @@ def from_points(points: Floats, place: Floats, loss: float) -> Arrivals:
         absorption=loss * distance,
         length=distance,
         snap=whole,
+        kind=np.full(n, Kind.ECHO, np.int8),
         target=whole,
         facet=whole,
         point=points,

@@ -11,7 +11,7 @@ import pytest
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.equations.noise import filters
-from sonarsynth.products import Arrivals
+from sonarsynth.products import Arrivals, Kind
 from sonarsynth.receiver import BandPass, Elements, LowPass, PositionTable, Romanis, Sonar, elements
 from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
 from sonarsynth.signals.direct_sum import exact_signals
@@ -70,6 +70,7 @@ def arrivals(
         absorption=np.zeros(n) if loss is None else loss,
         length=np.asarray(radius, float),
         snap=zero if snap is None else np.asarray(snap, np.int64),
+        kind=np.where(zero if target is None else np.asarray(target) < 0, Kind.DIRECT, Kind.ECHO).astype(np.int8),
         target=zero if target is None else np.asarray(target, np.int64),
         facet=zero,
         point=np.zeros((n, 3)),
