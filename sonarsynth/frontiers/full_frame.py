@@ -13,7 +13,7 @@ from sonarsynth.frontiers.image_knobs import apart, imaged, off_by
 from sonarsynth.frontiers.rows import Point, timed
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor
 from sonarsynth.pipeline import BeamformedFrame, cloud_of, digitise, locate_and_image
-from sonarsynth.planning import frame_start, receiver_of
+from sonarsynth.planning import frame_start, receiver_of, survey_of
 from sonarsynth.planning.notes.source_notes import locator
 from sonarsynth.products import Signals
 
@@ -32,8 +32,12 @@ class Whole:
         plan, frame = exact.plan, exact.frame
         recorded = digitise(plan, frame, signals)
         heard = locate_and_image(plan, frame, recorded)
-        locating, receiver, snaps = locator(plan.scene), receiver_of(plan, frame), plan.sizes["emission"]
-        _, seconds = timed(lambda: locating.locate(recorded, receiver, plan.survey, snaps))
+        locating, known, snaps = (
+            locator(plan.scene),
+            (receiver_of(plan, frame), survey_of(plan, frame)),
+            plan.sizes["emission"],
+        )
+        _, seconds = timed(lambda: locating.locate(recorded, *known, snaps))
         return Whole(exact, heard, seconds)
 
 

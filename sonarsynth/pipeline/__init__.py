@@ -35,7 +35,7 @@ from sonarsynth.pipeline.stored_values import (
 )
 from sonarsynth.pipeline.synthesis import frame_signals
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, variables
-from sonarsynth.planning import Plan, check_unsampled_frame, context_of, plan, receiver_of
+from sonarsynth.planning import Plan, check_unsampled_frame, context_of, plan, receiver_of, survey_of
 from sonarsynth.planning.notes.source_notes import locator
 from sonarsynth.products import (
     Arrivals,
@@ -173,7 +173,8 @@ def beamform_frame(plan: Plan, index: int, traced: TracedFrame) -> BeamformedFra
 def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFrame:
     """What the sonar makes of signals: where the snap is, and the energy image of the echo window."""
     processing, receiver, snaps = plan.scene.processing, receiver_of(plan, frame), plan.sizes["emission"]
-    estimates = locator(plan.scene).locate(signals, receiver, plan.survey, snaps)
+    survey = survey_of(plan, frame)
+    estimates = locator(plan.scene).locate(signals, receiver, survey, snaps)
     mark_stage("locate")
     heard = float(estimates.time[0]) if snaps else np.nan
     start, stop = heard + plan.windows.echo_start, heard + plan.windows.echo_stop
@@ -181,7 +182,7 @@ def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFr
     imaged = signals
     if signals.start <= start and stop <= end:
         if processing.cancelling is not None:
-            imaged = processing.cancelling.cancel(signals, estimates, receiver, plan.survey, (start, stop))
+            imaged = processing.cancelling.cancel(signals, estimates, receiver, survey, (start, stop))
         imaged, image = image_of(plan, imaged, estimates, (start, stop))
     else:  # no direct pulse was found, or an echo was taken for it: no clock, so no image, rather than an arbitrary one
         image = no_image(receiver.sonar, np.nan, np.nan)

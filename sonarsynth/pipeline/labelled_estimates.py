@@ -4,31 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonarsynth.equations.arrays.spherical_wave import envelope_peak
+from sonarsynth.conventions import Floats
 from sonarsynth.labels.estimate_labels import Direct, direct_paths, emissions, heard_first
 from sonarsynth.pipeline.stored_values import Values, table
 from sonarsynth.planning import Plan
 from sonarsynth.products import Arrivals, SourceEstimates
 from sonarsynth.signals.direct_sum import relative_absorption
-from sonarsynth.signals.filtered_pulse import pulse_spectrum
+from sonarsynth.signals.filtered_pulse import envelope_delay
 from sonarsynth.state import Snap
-
-LONGEST = 1 << 18
-"""Samples of the pulses whose envelopes are looked at, at most."""
 
 
 def heard_directly(plan: Plan, arrivals: Arrivals, snaps: tuple[Snap, ...]) -> Direct:
     """The direct paths of a frame, with the time at which the envelope of each pulse peaks in the band."""
     sonar = plan.scene.sonar
-    band, rate = sonar.band, sonar.sampling_frequency
-    samples = 1 << int(np.ceil(np.log2(max(2048.0, 32 * rate / (band.high - band.low)))))
 
     def envelope(snap: int, absorption: float) -> float:
-        f, wave = pulse_spectrum(snaps[snap].waveform, sonar.antialias, rate, min(samples, LONGEST))
-        kept = (f >= band.low) & (f <= band.high)
-        f, wave = f[kept], wave[kept]
-        loss = absorption * (1 + relative_absorption(plan.absorption, f, band.centre))
-        return envelope_peak(f, wave * 10.0 ** (-(loss - absorption) / 20), band.low, band.high)[0]
+        def loss(f: Floats) -> Floats:
+            return absorption * (1 + relative_absorption(plan.absorption, f, sonar.band.centre)) - absorption
+
+        return envelope_delay(snaps[snap].waveform, sonar, loss)
 
     return direct_paths(arrivals, envelope)
 

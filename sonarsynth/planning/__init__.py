@@ -12,7 +12,7 @@ from sonarsynth.planning.choosing import choose
 from sonarsynth.planning.costs import machine_factor, stages
 from sonarsynth.planning.listening_windows import check_windows, frame_start, listening_windows
 from sonarsynth.planning.measured.ray_bending import propagation
-from sonarsynth.planning.measured.sampled_arrivals import arrivals_of, context_of, receiver_of
+from sonarsynth.planning.measured.sampled_arrivals import arrivals_of, context_of, receiver_of, survey_of
 from sonarsynth.planning.measured.sampled_frames import SampledScene, check_alike, sample_frames
 from sonarsynth.planning.notes.omissions import left_out
 from sonarsynth.planning.notes.plan_notes import notes, stored_validity
@@ -40,6 +40,7 @@ __all__ = [
     "listening_windows",
     "plan",
     "receiver_of",
+    "survey_of",
 ]
 
 SHARD_BYTES = 64e6

@@ -21,7 +21,7 @@ from sonarsynth.propagation import Propagation
 from sonarsynth.receiver import Elements, elements
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Scene
-from sonarsynth.state import Medium, Survey
+from sonarsynth.state import Medium
 
 PRODUCTS = ("signals", "image", "cloud")
 """What a build can be asked for. Truth is always written; with any of these, levels of what is traced too."""
@@ -120,11 +120,6 @@ class Plan:
     def medium(self) -> Medium:
         """The water of the sequence."""
         return Medium(self.scene.world.environment, self.profile, self.absorption_at_depths)
-
-    @property
-    def survey(self) -> Survey:
-        """What the sonar knows of that water."""
-        return Survey(self.scene.world.environment.depth, self.profile)
 
     @cached_property
     def absorption_at_depths(self) -> DepthAbsorption:

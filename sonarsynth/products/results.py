@@ -41,7 +41,8 @@ alone is NaN: when and from where the pulse came is known; of all others nothing
 
 @dataclass(frozen=True, eq=False)
 class SourceEstimates:
-    """Where the sonar thinks each snap was: one row a snap, the loudest direct pulse first; NaN where none was found.
+    """Where the sonar thinks each snap was, as measured from its direct pulse or as known from its trigger: one row a
+    snap, the loudest direct pulse first; NaN where none was found.
 
     Rows of what was found come first, then those of pulses that were refused, `reason` says why. Standard errors are
     predicted from the data and the instrument alone (one sigma). Which true snap a row comes from is a label:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from math import inf
 from typing import NamedTuple
@@ -10,17 +11,21 @@ import numpy as np
 from scipy.fft import ifft, irfft, rfft
 
 from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
+from sonarsynth.equations.arrays.spherical_wave import envelope_peak
 from sonarsynth.equations.bubble import pulses
 from sonarsynth.equations.bubble.pulses import Pulse
 from sonarsynth.equations.bubble.snap_pressure import Bubble, ComplexArray
 from sonarsynth.equations.noise import filters
 from sonarsynth.equations.noise.filters import Fir
 from sonarsynth.equations.scattering.facet_pulses import rough_factor
-from sonarsynth.receiver import Filter, LowPass, stop_frequency
+from sonarsynth.receiver import Filter, LowPass, Sonar, stop_frequency
 from sonarsynth.signals.gridded.nodes import analysis, chebyshev, rounded_up
 from sonarsynth.sources.pulse_model import PulseModel, Stamp
 from sonarsynth.sources.snap_pulses import Waveform
 from sonarsynth.state import Snap
+
+LONGEST_ENVELOPE = 1 << 18
+"""Samples of the pulses whose envelopes are looked at, at most."""
 
 LONGEST_TAIL = 0.02
 """s, times the width: the tails of turned pulses are cut there, unless the pulse itself is longer."""
@@ -275,3 +280,15 @@ def snap_gains(heard: tuple[Snap, ...]) -> Floats:
     return np.array(
         [s.gain * pulses.gain_for_level(_made(s.model, s.waveform.stamp, 0.0), s.source_level) for s in heard]
     )
+
+
+def envelope_delay(waveform: Waveform, sonar: Sonar, loss: Callable[[Floats], Floats] | None = None) -> float:
+    """When the envelope of a pulse peaks in the band of the sonar, s after its time 0; loss: dB at frequencies (Hz)."""
+    band, rate = sonar.band, sonar.sampling_frequency
+    samples = 1 << int(np.ceil(np.log2(max(2048.0, 32 * rate / (band.high - band.low)))))
+    f, wave = pulse_spectrum(waveform, sonar.antialias, rate, min(samples, LONGEST_ENVELOPE))
+    kept = (f >= band.low) & (f <= band.high)
+    f, wave = f[kept], wave[kept]
+    if loss is not None:
+        wave = wave * 10.0 ** (-loss(f) / 20)
+    return envelope_peak(f, wave, band.low, band.high)[0]

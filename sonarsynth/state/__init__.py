@@ -29,6 +29,7 @@ __all__ = [
     "Survey",
     "Tolerances",
     "TravelTime",
+    "Trigger",
     "WorldState",
     "meeting_times",
     "positions",
@@ -92,11 +93,20 @@ class Receiver:
 
 
 @dataclass(frozen=True, eq=False)
+class Trigger:
+    """What the sonar is told of an emission."""
+
+    time: float  # s on the clock of the frame: peak of the envelope of its pulse in the band, where it is emitted
+    position: Floats  # (xyz) m, world
+
+
+@dataclass(frozen=True, eq=False)
 class Survey:
-    """The water as the sonar knows it."""
+    """The water as the sonar knows it, and the emissions that it is told of."""
 
     bottom: float  # m: depth of the bottom, positive down, where sources are known to be
     profile: Profile  # sound speed, from a cast: to trace rays through, or for what straight ones may cost
+    triggers: tuple[Trigger, ...] = ()  # loudest first, as far as it has any
 
 
 @dataclass(frozen=True)

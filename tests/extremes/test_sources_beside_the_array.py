@@ -8,6 +8,13 @@ import numpy as np
 import pytest
 
 import sonarsynth as ss
+from sonarsynth.environment.sea import Profile
+from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.ranging.location.triggered import Triggered
+from sonarsynth.receiver import Romanis, elements
+from sonarsynth.sources.shrimp import LogarithmicBubble
+from sonarsynth.state import Receiver, Snap, Survey
+from tests.heard import silence
 
 TANK = Path(__file__).resolve().parents[2] / "configs" / "tank.yaml"
 FEW = ["scene.sonar.beams.azimuths=11", "scene.sonar.beams.elevations=11"]
@@ -54,3 +61,32 @@ def test_beside_the_hydrophones_it_is_located_and_imaged() -> None:
     assert float(beside["source_estimates/time"][0]) == pytest.approx(
         float(beside["truth/emissions/arrival"][0]), abs=1e-7
     )
+
+
+def test_among_the_hydrophones_its_trigger_tells_when_and_where() -> None:
+    """A ping: its time and place are known, so that it need not be located; its echoes come from the target."""
+    told = "scene.processing.locating={kind: trigger, time_error: 1e-9 s, position_error: 1e-6 m}"
+    ping = ss.render(tank(0.03, 0.01, -0.15, told), 0)
+    found, cloud = ping["source_estimates"], ping["cloud"]
+    assert float(found["time"][0]) == pytest.approx(float(ping["truth/emissions/arrival"][0]), abs=1e-7)
+    np.testing.assert_allclose(found["position"][0], [0.03, 0.01, 0.0], atol=1e-5)  # in the frame of the sonar
+    assert int(found["emission"][0]) == 0 and np.isfinite(ping["image/energy"].values).all()
+    count = int(cloud["count"])
+    assert count > 5 and (cloud["target"].values[:count] == 0).all()
+    assert np.sort(cloud["distance"].values[:count])[:3].max() < 0.005, "where beams meet it, points are on it"
+
+
+def test_a_trigger_errs_as_it_says() -> None:
+    method, random = Triggered(time_error=3e-6, position_error=0.02), np.random.default_rng(3)
+    receiver = Receiver(Pose(np.array([0.0, 0.0, -5.0]), quaternion(0.5 * np.pi)), elements(Romanis()))
+    snap = Snap(np.array([1.0, 0.5, -4.0]), 0.25, LogarithmicBubble(), None)
+    told = [method.told((snap,), receiver, random)[0] for _ in range(400)]
+    off = np.array([(t.position - snap.position) / 0.02 for t in told])
+    late = np.array([t.time for t in told]) - 0.25
+    assert np.std(off) == pytest.approx(1.0, abs=0.08) and abs(np.mean(off)) < 0.1
+    assert np.std(late) == pytest.approx(3e-6, rel=0.15) and abs(late.mean()) < 1e-5
+    survey = Survey(10.0, Profile(np.array([0.0]), np.array([1540.0])), (told[0],))
+    found = method.locate(silence(receiver.elements, 0.0, 0), receiver, survey, 2)
+    assert found.reason.tolist() == [0, 1] and np.isnan(found.time[1])
+    np.testing.assert_allclose(receiver.pose.to_world(found.position[0]), told[0].position, atol=1e-12)
+    assert found.time_error[0] > 3e-6

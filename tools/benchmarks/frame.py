@@ -57,8 +57,10 @@ def bench(index: int = 32) -> dict[str, Any]:
     signals, again = cpu(lambda: pipeline.synthesise(plan, traced))
     new = {"ms": 1e3 * synthesis_of_new_frames(plan), "ms_same_frame_again": 1e3 * again}
     stages["synthesise"] = new | synthesis_error(plan, traced)
-    receiver, locating = planning.receiver_of(plan, traced.frame), plan.scene.processing.locating
-    located, seconds = cpu(lambda: locating.locate(signals, receiver, plan.survey, plan.sizes["emission"]))
+    receiver, survey = planning.receiver_of(plan, traced.frame), planning.survey_of(plan, traced.frame)
+    located, seconds = cpu(
+        lambda: plan.scene.processing.locating.locate(signals, receiver, survey, plan.sizes["emission"])
+    )
     off = located.position[0] - receiver.pose.to_body(traced.frame.moment.snaps[0].position)
     stages["locate"] = {"ms": 1e3 * seconds, "error_m": float(np.linalg.norm(off))}
     start, stop = (float(located.time[0]) + t for t in (plan.windows.echo_start, plan.windows.echo_stop))

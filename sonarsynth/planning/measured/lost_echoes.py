@@ -8,7 +8,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.planning.listening_windows import frame_start
-from sonarsynth.planning.measured.sampled_arrivals import arrivals_of, receiver_of
+from sonarsynth.planning.measured.sampled_arrivals import arrivals_of, receiver_of, survey_of
 from sonarsynth.planning.notes.source_notes import locator
 from sonarsynth.planning.plans import Plan
 from sonarsynth.products import Signals, SourceEstimates
@@ -85,7 +85,7 @@ def losses(plan: Plan, index: int) -> Losses | None:
     if not whole.sum() > 0:
         return None
     heard = replace(direct, pressure=direct.pressure + sum(echo.pressure for echo in echoes))
-    estimates = locator(plan.scene).locate(heard, receiver_of(plan, frame), plan.survey, 1)
+    estimates = locator(plan.scene).locate(heard, receiver_of(plan, frame), survey_of(plan, frame), 1)
     clock = float(estimates.time[0]) if np.isfinite(estimates.time[0]) else float(arrivals.delay[first])
     ends = ((clock + edge - start) * sonar.sampling_frequency for edge in (windows.echo_start, windows.echo_stop))
     window = slice(*(max(int(np.ceil(end)), 0) for end in ends))

@@ -5,9 +5,10 @@ from __future__ import annotations
 from sonarsynth.geometry import Pose
 from sonarsynth.planning.plans import Plan
 from sonarsynth.products import Arrivals
+from sonarsynth.randomness import stream
 from sonarsynth.receiver.subarrays import Subarray
 from sonarsynth.recipe.scene import Frame
-from sonarsynth.state import FrameContext, Receiver, Tolerances
+from sonarsynth.state import FrameContext, Receiver, Survey, Tolerances
 from sonarsynth.tracing.arrivals import trace
 
 FACETS = 10.0
@@ -49,6 +50,13 @@ def receiver_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Recei
     if part is not None:
         pose, track, own = subarray_pose(pose, part), track.part(part.centre), part.elements
     return Receiver(pose, own, plan.scene.sonar, track if plan.scene.physics.doppler else None)
+
+
+def survey_of(plan: Plan, frame: Frame) -> Survey:
+    """What the sonar knows of the water of a frame, and what a trigger tells it."""
+    random = stream(frame.seed, "trigger", frame.key, frame.step)
+    told = plan.scene.processing.locating.told(frame.moment.snaps, receiver_of(plan, frame), random)
+    return Survey(plan.scene.world.environment.depth, plan.profile, told)
 
 
 def subarray_pose(pose: Pose, part: Subarray) -> Pose:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from sonarsynth.description.method import Method
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.receiver import Elements
-from sonarsynth.state import Receiver, Survey
+from sonarsynth.state import Receiver, Snap, Survey, Trigger
 
 
 class LocatingMethod(Method):
@@ -14,6 +16,13 @@ class LocatingMethod(Method):
     def locate(self, signals: Signals, receiver: Receiver, survey: Survey, snaps: int) -> SourceEstimates:
         """The `snaps` loudest direct pulses, loudest first, one row each; NaN rows for those that were not found."""
         raise NotImplementedError(f"{type(self).__name__} locates nothing")
+
+    def told(self, snaps: tuple[Snap, ...], receiver: Receiver, random: np.random.Generator) -> tuple[Trigger, ...]:
+        """What a trigger tells the sonar of the emissions of a frame, loudest first; nothing, unless it has one.
+
+        random: a stream of its own in each frame.
+        """
+        return ()
 
     def off_bottom_note(self) -> str:
         """What it does of sources that are not on the bottom, in a few words; empty where that is nothing special."""
