@@ -84,7 +84,7 @@ def _groups(arrivals: Arrivals, rows: Ints, apart: float) -> tuple[Ints, Ints, F
     delay, early, late = (
         x[rows] for x in (arrivals.delay, arrivals.corner_delays.min(axis=1), arrivals.corner_delays.max(axis=1))
     )
-    cell = (arrivals.snap[rows] * (arrivals.target.max() + 1) + arrivals.target[rows]) * len(FAMILIES)
+    cell = (arrivals.snap[rows] * (arrivals.target.max() + 2) + arrivals.target[rows] + 1) * len(FAMILIES)
     cell = cell + family(arrivals)[rows]
     order = np.lexsort((delay + early, cell))
     new = np.ones(len(rows), bool)
