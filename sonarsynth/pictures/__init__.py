@@ -15,7 +15,15 @@ from sonarsynth.pictures.figures.sheet import Errors, sheet
 from sonarsynth.pictures.figures.style import decibels
 from sonarsynth.pictures.film import thinned, write_film
 from sonarsynth.pictures.steered_beams import beams
-from sonarsynth.pictures.store_reading import NothingToDraw, Stored, beam_grid, built, opened, pictures_of, stored
+from sonarsynth.pictures.store_reading import (
+    NothingToDraw,
+    Stored,
+    beam_grid,
+    built,
+    every_stored,
+    opened,
+    pictures_of,
+)
 from sonarsynth.pictures.summary import summary
 from sonarsynth.store import Folder, folder_of
 
@@ -52,9 +60,8 @@ def show(
     folder = pictures_of(path) if out is None else Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     filmed = thinned(frames.tolist())
-    read = {i: stored(tree, i) for i in filmed}
-    if frame is not None and frame not in read:
-        read[frame] = stored(tree, frame)
+    wanted = filmed if frame is None or frame in filmed else [*filmed, frame]
+    read = dict(zip(wanted, every_stored(tree, wanted), strict=True))
     chosen = frame if frame is not None else max(read, key=lambda i: _interest(read[i]))
     files = [_write_sheet(tree, read[chosen], folder, say)]
     if film and len(frames) > 1:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
@@ -48,20 +50,36 @@ def write_film(
     picture: Picture[View_contra], views: Sequence[View_contra], folder: Path, frames_per_second: float
 ) -> Path:
     """Draw views one after another into `folder`/film.mp4 or film.gif; returns its path."""
-    from matplotlib.animation import FFMpegWriter
-
-    if FFMpegWriter.isAvailable():
+    if shutil.which("ffmpeg"):
         path = folder / "film.mp4"
-        maker = FFMpegWriter(fps=frames_per_second)  # type: ignore[arg-type]  # any number
-        try:
-            with maker.saving(picture.figure, str(path), dpi=100):
-                for view in views:
-                    picture.show(view)
-                    maker.grab_frame()
+        if _mp4(picture, views, path, frames_per_second):
             return path
-        except (OSError, subprocess.CalledProcessError):  # an ffmpeg without the codec
-            path.unlink(missing_ok=True)
+        path.unlink(missing_ok=True)  # an ffmpeg without the codec
     return _gif(picture, views, folder / "film.gif", frames_per_second)
+
+
+def _mp4(picture: Picture[View_contra], views: Sequence[View_contra], path: Path, frames_per_second: float) -> bool:
+    """Whether ffmpeg took all frames, as raw pixels."""
+    maker: subprocess.Popen[bytes] | None = None
+    try:
+        for view in views:
+            picture.show(view)
+            shot = picture.pixels()
+            if maker is None:
+                size = f"{shot.shape[1]}x{shot.shape[0]}"
+                raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(frames_per_second), "-i", "-"]
+                even = ["-vf", "crop=trunc(iw/2)*2:trunc(ih/2)*2", "-pix_fmt", "yuv420p"]  # what players take
+                command = ["ffmpeg", "-y", "-loglevel", "error", *raw, *even, str(path)]
+                maker = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL)
+            assert maker.stdin is not None
+            maker.stdin.write(shot.tobytes())
+    except OSError:
+        pass
+    finally:
+        if maker is not None:
+            with suppress(OSError):
+                maker.communicate()
+    return maker is not None and maker.returncode == 0
 
 
 def _gif(picture: Picture[View_contra], views: Sequence[View_contra], path: Path, frames_per_second: float) -> Path:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,8 @@ from sonarsynth.store import Folder, Mismatch, Remote, folder_of, open_store
 if TYPE_CHECKING:
     import xarray as xr
 
+READ = ("", "truth", "targets", "image", "cloud", "source_estimates")
+"""Groups that frames are drawn from, with those in them."""
 FAINTEST = 40.0
 """Ghosts this many dB under the direct echo of their target are not drawn."""
 
@@ -102,6 +105,21 @@ class Stored:
     poses: tuple[Pose, ...]  # of the targets in the world; NaN of one that is not there
     hulls: tuple[Hull, ...]
     ghosts: tuple[Ghost, ...]
+
+
+def every_stored(tree: xr.DataTree, frames: Sequence[int]) -> list[Stored]:
+    """Some frames as stored, each group read at once: a store has many small variables."""
+    import xarray as xr
+
+    some = {}
+    for group in tree.subtree:
+        path = group.path.strip("/")
+        if path.partition("/")[0] in READ and (data := group.dataset).variables:
+            inherited = [name for name in data.coords if name not in group.to_dataset(inherit=False).coords]
+            here = data.drop_vars(inherited)
+            some[f"/{path}"] = (here.isel(frame=list(frames)) if "frame" in here.dims else here).load()
+    loaded = xr.DataTree.from_dict(some)
+    return [replace(stored(loaded, row), index=index) for row, index in enumerate(frames)]
 
 
 def stored(tree: xr.DataTree, index: int) -> Stored:

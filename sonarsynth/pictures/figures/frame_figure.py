@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,9 @@ from sonarsynth.pictures.figures.outlines import union_outline, view_outline
 from sonarsynth.pictures.figures.style import BACKDROP, DYNAMIC_RANGE, ENERGY_MAP, INK, OUTLINES, figure, label
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import PathCollection, PolyCollection
     from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
@@ -102,7 +104,8 @@ class FramePicture:
             CloudPanel(self.figure.add_subplot(parts[0, 1]), PLAN, "from above"),
             CloudPanel(self.figure.add_subplot(parts[1, 1]), SIDE, "from starboard"),
         ]
-        self._laid_out = False
+        self._behind: Any = None
+        """The figure without what changes from frame to frame."""
 
     def show(self, view: View) -> None:
         """Draw a frame in place of the last."""
@@ -115,19 +118,40 @@ class FramePicture:
         outlines = set_outlines(self._outlines, view.hulls)
         for panel in self._clouds:
             panel.show(view, self.window)
-        if not self._laid_out:  # arrange once: axes that move from frame to frame are hard to watch
-            self.figure.canvas.draw()
-            self.figure.set_layout_engine("none")
-            self._laid_out = True
+        if self._behind is None:
+            self._lay_out()
         self._ghosts.show(view.ghosts, outlines)
+
+    def _lay_out(self) -> None:
+        """Arrange once, for axes that move from frame to frame are hard to watch, and draw what stays."""
+        self.figure.canvas.draw()
+        self.figure.set_layout_engine("none")
+        changing = self._changing()
+        for artist in changing:
+            artist.set_visible(False)
+        self.figure.canvas.draw()
+        self._behind = self._canvas().copy_from_bbox(self.figure.bbox)
+        for artist in changing:
+            artist.set_visible(True)
+
+    def _changing(self) -> list[Artist]:
+        """What is drawn anew in each frame, the rearmost first."""
+        clouds = [artist for panel in self._clouds for artist in panel.changing]
+        edges = [spine for axes in self.figure.axes for spine in axes.spines.values()]  # images lie on them
+        return [self._title, self._image, self._outlines, *self._ghosts.drawn, *clouds, *edges]
+
+    def _canvas(self) -> FigureCanvasAgg:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+        assert isinstance(self.figure.canvas, FigureCanvasAgg)
+        return self.figure.canvas
 
     def pixels(self) -> np.ndarray:
         """The figure as drawn: (row, column, rgb) uint8."""
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-        canvas = self.figure.canvas
-        assert isinstance(canvas, FigureCanvasAgg)
-        canvas.draw()
+        canvas = self._canvas()
+        canvas.restore_region(self._behind)
+        for artist in self._changing():
+            self.figure.draw_artist(artist)
         return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
@@ -138,7 +162,7 @@ class CloudPanel:
         """Set up the axes; `plane` is `PLAN` or `SIDE`."""
         from matplotlib.collections import PolyCollection
 
-        names = ("forward, x (m)", "port, y (m)", "up, z (m)")
+        names = ("beyond the target (m)", "port of the target (m)", "above the target (m)")
         self.axes, self.plane = axes, plane
         axes.set_facecolor(BACKDROP)
         axes.set_aspect("equal", adjustable="box")
@@ -151,20 +175,25 @@ class CloudPanel:
         )
         self._note: Text = axes.text(0.02, 0.04, "", transform=axes.transAxes, fontsize=8, color="#e8e8e8")
 
+    @property
+    def changing(self) -> list[Artist]:
+        """What is drawn anew in each frame, the rearmost first."""
+        return [self._hulls, self._earlier, self._points, self._note]
+
     def show(self, view: View, space: Window) -> None:
         """Draw a frame in place of the last."""
         across, up = self.plane
         centre, half = space.centre(view), space.half
         reach = max(half[across], 1.6 * half[up])
         sign = -1.0 if across == 1 else 1.0  # port on the left
-        self.axes.set_xlim(centre[across] - sign * reach, centre[across] + sign * reach)
-        self.axes.set_ylim(centre[up] - reach / 1.6, centre[up] + reach / 1.6)
-        fill_hulls(self._hulls, view.hulls, self.plane)
-        self._earlier.set_offsets(view.earlier[:, self.plane])
-        at = view.points[:, self.plane]
+        self.axes.set_xlim(-sign * reach, sign * reach)
+        self.axes.set_ylim(-reach / 1.6, reach / 1.6)
+        fill_hulls(self._hulls, view.hulls, self.plane, centre)
+        self._earlier.set_offsets((view.earlier - centre)[:, self.plane])
+        at = (view.points - centre)[:, self.plane]
         self._points.set_offsets(at)
         self._points.set_array(clipped(view.point_level))
-        outside = int((np.abs(at - centre[[across, up]]) > [reach, reach / 1.6]).any(axis=1).sum())
+        outside = int((np.abs(at) > [reach, reach / 1.6]).any(axis=1).sum())
         before = f", grey: {len(view.earlier)} of earlier frames" if len(view.earlier) else ""
         self._note.set_text(f"{len(at)} points" + (f", {outside} of them outside" if outside else "") + before)
 
@@ -227,13 +256,13 @@ def set_outlines(artist: PolyCollection, hulls: tuple[Hull, ...]) -> list[Floats
     return lines
 
 
-def fill_hulls(artist: PolyCollection, hulls: tuple[Hull, ...], plane: tuple[int, int]) -> None:
-    """Draw the hulls of targets projected on a plane of the sonar frame (m)."""
+def fill_hulls(artist: PolyCollection, hulls: tuple[Hull, ...], plane: tuple[int, int], centre: Floats) -> None:
+    """Draw the hulls of targets projected on a plane of the sonar frame (m), from `centre` (xyz)."""
     from matplotlib.colors import to_rgba
 
     lines, colours = [], []
     for i, hull in enumerate(hulls):
-        seen = union_outline(hull.vertices[:, plane], hull.faces)
+        seen = union_outline((hull.vertices - centre)[:, plane], hull.faces)
         lines += seen
         colours += [OUTLINES[i % len(OUTLINES)]] * len(seen)
     artist.set_verts(lines)

@@ -42,16 +42,17 @@ class GhostMarks:
 
     def __init__(self, axes: Axes) -> None:
         self._axes = axes
-        self._drawn: list[Artist] = []
+        self.drawn: list[Artist] = []
+        """What is drawn of this frame."""
 
     def show(self, ghosts: tuple[Ghost, ...], outlines: list[Floats], clear: float = GAP) -> None:
         """Draw ghosts, labels `clear` points off the outlines of targets: lines (point, azimuth and elevation) in deg.
 
         The axes must have their final place: labels are laid out on it. A ghost outside is an arrow at the edge.
         """
-        for artist in self._drawn:
+        for artist in self.drawn:
             artist.remove()
-        self._drawn = []
+        self.drawn = []
         axes = self._axes
         point = axes.figure.dpi / 72.0  # in pixels
         frame = np.asarray(axes.get_window_extent().extents)
@@ -69,7 +70,7 @@ class GhostMarks:
             middle = place(at, size, (0.5 * RING + GAP) * point, inside, taken)
             text.xyann = (middle - at) / point
             taken.append(np.concatenate([middle - 0.5 * size, middle + 0.5 * size]))
-            self._drawn += [ring, text]
+            self.drawn += [ring, text]
 
     def _mark(self, ghost: Ghost, at: Floats, marker: str) -> tuple[Line2D, Annotation]:
         """Its ring or arrow at a pixel (x, y), and its label, still in the middle of it."""

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import Floats, azimuth_elevation
-
-if TYPE_CHECKING:
-    from PIL.Image import Image
 
 CELLS = 512
 """An outline is found on a grid of this many cells over the larger side of the shape: it errs by less than a cell."""
@@ -37,6 +32,8 @@ def union_outline(points: npt.ArrayLike, faces: npt.ArrayLike) -> list[Floats]:
     """
     from contourpy import contour_generator
 
+    from sonarsynth.pictures.figures.painting_kernel import paint
+
     corners = np.asarray(points, float)[np.asarray(faces)]
     corners = corners[np.isfinite(corners).all(axis=(1, 2))]
     if not len(corners):
@@ -46,16 +43,7 @@ def union_outline(points: npt.ArrayLike, faces: npt.ArrayLike) -> list[Floats]:
     if cell <= 0.0:
         return []
     size = np.ceil((high - low) / cell).astype(int) + 5  # two empty cells all round: every line closes
-    mask = np.asarray(_painted((corners - low) / cell + 2.0, (int(size[0]), int(size[1]))), float)
+    mask = np.zeros((size[1], size[0]), np.uint8)
+    paint((corners - low) / cell + 2.0, mask)
     x, y = (low[axis] + (np.arange(size[axis]) - 2.0) * cell for axis in (0, 1))
-    return [np.asarray(line) for line in contour_generator(x, y, mask).lines(0.5)]
-
-
-def _painted(triangles: Floats, size: tuple[int, int]) -> Image:
-    from PIL import Image, ImageDraw
-
-    canvas = Image.new("L", size)
-    pen = ImageDraw.Draw(canvas)
-    for triangle in triangles.reshape(-1, 6).tolist():
-        pen.polygon(triangle, fill=1)
-    return canvas
+    return [np.asarray(line) for line in contour_generator(x, y, mask.astype(float)).lines(0.5)]
