@@ -229,23 +229,3 @@ def test_signals_end_a_build_and_its_workers_in_10_s_and_it_goes_on(
     assert all("without a completion mark" in problem.what for problem in report.problems)
     again = schedule.build(reading.load(small_file), path, frames=range(len(there) + 1), workers=0)
     assert again.ok and set(there) <= set(store.frames_there(path))
-
-
-def test_sigterm_ends_a_build_that_can_go_on(small_file: Path, tmp_path: Path) -> None:
-    path = tmp_path / "s.zarr"
-    code = (
-        "from sonarsynth import pipeline as render\nfrom sonarsynth.cli import main\nimport time\n"
-        "whole = render.trace_frame\n"
-        "def slow(made, i):\n    time.sleep(1e4 if i > 9 else 0)\n    return whole(made, i)\n"
-        "render.trace_frame = slow\n"
-        f"main(['build', {str(small_file)!r}, {str(path)!r}, '--workers', '0', '--no-predict'])"
-    )
-    environment = {**os.environ, "PYTHONPATH": str(HERE)}
-    building = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True, env=environment)
-    wait_until((path / ".marks/0.json").exists, lambda: building.poll() is None)
-    building.send_signal(signal.SIGTERM)
-    _, err = building.communicate(timeout=HANGING)
-    assert building.returncode == 130
-    assert err.endswith("sonarsynth: interrupted; run the same command again to resume\n")
-    assert not store.beside(path, "lock").exists()
-    assert store.frames_there(path) == list(range(8))
