@@ -14,7 +14,7 @@ from sonarsynth.planning import arrivals_of
 from sonarsynth.planning.choosing import PerSensorReference
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import Refracted, Straight
-from sonarsynth.receiver import BeamGrid
+from sonarsynth.receiver import BeamGrid, PlanarLattice
 from sonarsynth.receiver.subarrays import subarray
 from sonarsynth.recipe import Recipe
 from sonarsynth.signals import GriddedSynthesis
@@ -155,7 +155,8 @@ def test_errors_are_measured_where_each_hydrophone_sees_for_itself() -> None:
     """Every knob of `accuracy RECIPE`: subarrays and views of the targets, syntheses, images."""
     recipe = screened(0.02)
     scene = recipe.scene
-    band = replace(scene.sonar, beams=BeamGrid(azimuths=5, elevations=5))
+    few = PlanarLattice(columns=12, rows=8, pitch=0.1)
+    band = replace(scene.sonar, array=few, beams=BeamGrid(azimuths=5, elevations=5))
     points = measure(replace(recipe, scene=replace(scene, sonar=band)), (0,), hydrophones=3, peers=False).points
     views = {p.setting: p.error for p in points if p.knob in ("subarrays", "occlusion") and p.stage == "trace"}
     assert views["1 part"] < 2e-3

@@ -33,6 +33,7 @@ scene:
         snap: SNAP
         variation: {level: 2 dB, width: 0.05}
   sonar:
+    array: {kind: planar_lattice, columns: 16, rows: 12, pitch: 5 cm}
     beams: {azimuths: 61, elevations: 21, elevation_span: 10 deg}
   trajectory: {frames: 2, interval: 0.1}
 """

@@ -180,26 +180,36 @@ def test_a_damaged_layout_is_not_built_on(laid_out: Path, small_plan: Plan) -> N
         store.create(laid_out, small_plan)
 
 
-def test_two_builders_exclude_each_other(tmp_path: Path) -> None:
+OTHER = """\
+import os, sys
+from sonarsynth.store import Locked
+from sonarsynth.store.files.lock import lock
+try:
+    with lock(sys.argv[1]):
+        pass
+except Locked as locked:
+    print(locked, flush=True)
+with lock(sys.argv[1] + ".dies"):
+    os._exit(9)
+"""
+"""Another process: it is refused a store that this one builds, and dies while it builds one itself."""
+
+
+def test_two_builders_exclude_each_other_and_one_that_dies_leaves_no_lock(tmp_path: Path) -> None:
     path = tmp_path / "s.zarr"
     with store.lock(path):
         with pytest.raises(store.Locked, match=r"s\.zarr is being built by process \d+ on "), store.lock(path):
             raise AssertionError
-        other = "import sys; from sonarsynth.store.files.lock import lock\nwith lock(sys.argv[1]): pass"
-        done = subprocess.run([sys.executable, "-c", other, path], capture_output=True, text=True, check=False)
-        assert "is being built by process" in done.stderr
+        done = subprocess.run([sys.executable, "-c", OTHER, path], capture_output=True, text=True, check=False)
+        assert "is being built by process" in done.stdout
     with store.lock(path):
+        pass
+    assert done.returncode == 9
+    died = tmp_path / "s.zarr.dies"
+    assert [file.name for file in tmp_path.iterdir()] == [f"{died.name}.lock"]
+    with store.lock(died):
         pass
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_holder_that_dies_leaves_no_lock(tmp_path: Path) -> None:
-    path = tmp_path / "s.zarr"
-    dying = "import os, sys; from sonarsynth.store.files.lock import lock\nwith lock(sys.argv[1]): os._exit(9)"
-    assert subprocess.run([sys.executable, "-c", dying, path], check=False).returncode == 9
-    assert (tmp_path / "s.zarr.lock").exists()
-    with store.lock(path):
-        pass
 
 
 def test_scenes_without_targets_or_snaps_have_a_store(tmp_path: Path, small_text: str, made_up: MadeUp) -> None:

@@ -100,7 +100,7 @@ def test_a_plan_says_each_once_with_its_field(case: str) -> None:
     old, new, expected = CASES[case]
     assert old in RECIPE
     recipe = ss.loads(RECIPE.replace(old, new))
-    for _ in range(2):  # the second time, profiles are kept
+    for _ in range(2 if new.startswith(COLD[:20]) else 1):  # the second time, profiles are kept
         found = _notes(ss.plan(recipe))
         assert len(found) == len(expected)
         for note, beginning in zip(found, expected, strict=True):
