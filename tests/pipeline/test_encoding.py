@@ -41,7 +41,7 @@ def numbers(array: ArrayLayout, frames: int, seed: int, noise: float) -> np.ndar
     return made.astype(array.dtype)
 
 
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(seed=st.integers(0, 99), shard=st.integers(0, 2), gone=st.sets(st.integers(0, 7)), noise=st.sampled_from([0, 1]))
 def test_every_array_is_encoded_as_by_zarr(
     laid_out: Path, small_plan: Plan, seed: int, shard: int, gone: set[int], noise: int
