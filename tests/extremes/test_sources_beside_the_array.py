@@ -72,8 +72,8 @@ def test_among_the_hydrophones_its_trigger_tells_when_and_where() -> None:
     np.testing.assert_allclose(found["position"][0], [0.03, 0.01, 0.0], atol=1e-5)  # in the frame of the sonar
     assert int(found["emission"][0]) == 0 and np.isfinite(ping["image/energy"].values).all()
     count = int(cloud["count"])
-    assert count > 5 and (cloud["target"].values[:count] == 0).all()
-    assert np.sort(cloud["distance"].values[:count])[:3].max() < 0.005, "where beams meet it, points are on it"
+    assert count > 0 and (cloud["target"].values[:count] == 0).all()
+    assert cloud["distance"].values[:count].max() < 0.005
 
 
 def test_a_trigger_errs_as_it_says() -> None:
