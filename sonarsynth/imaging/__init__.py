@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import Annotated, Protocol
 
 from sonarsynth.description import BY_KIND
-from sonarsynth.imaging.auto_beamformer import AutoBeamforming
-from sonarsynth.imaging.dense import DenseDelayAndSum
-from sonarsynth.imaging.focused import FocusedDelayAndSum
+from sonarsynth.imaging.delay_and_sum.auto_beamformer import AutoBeamforming
+from sonarsynth.imaging.delay_and_sum.dense import DenseDelayAndSum
+from sonarsynth.imaging.delay_and_sum.focused import FocusedDelayAndSum
 from sonarsynth.imaging.steering import Steering
 from sonarsynth.products import BeamSpectra, EnergyImage, Signals
 from sonarsynth.receiver import Elements, Sonar

@@ -8,8 +8,8 @@ import pytest
 from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
-from sonarsynth.imaging.dense import dense_energies
-from sonarsynth.imaging.lattice_image import focused_energies
+from sonarsynth.imaging.delay_and_sum.dense import dense_energies
+from sonarsynth.imaging.delay_and_sum.lattice_image import focused_energies
 from sonarsynth.products import Signals
 from sonarsynth.receiver import BeamGrid, PlanarLattice, Romanis, Sonar, elements
 

@@ -9,7 +9,7 @@ import pytest
 
 from sonarsynth.conventions import direction
 from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
-from sonarsynth.imaging.lattice_image import focused_energies
+from sonarsynth.imaging.delay_and_sum.lattice_image import focused_energies
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.equations.arrays.gates import gate_samples, gate_taper
-from sonarsynth.imaging.dense import dense_energies
-from sonarsynth.imaging.lattice_image import focused_energies
+from sonarsynth.imaging.delay_and_sum.dense import dense_energies
+from sonarsynth.imaging.delay_and_sum.lattice_image import focused_energies
 from sonarsynth.receiver import BeamGrid, PlanarLattice, elements
 
 

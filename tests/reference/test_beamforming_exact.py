@@ -10,8 +10,8 @@ from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.equations.arrays.beams import beam_energy, beam_spectra
 from sonarsynth.equations.arrays.gates import fast_length, frequency_spacing, gate_samples, gate_taper, gated_spectra
-from sonarsynth.imaging.dense import dense_energies
-from sonarsynth.imaging.lattice_image import focused_energies
+from sonarsynth.imaging.delay_and_sum.dense import dense_energies
+from sonarsynth.imaging.delay_and_sum.lattice_image import focused_energies
 from sonarsynth.receiver import BeamGrid, PlanarLattice, Romanis, elements
 
 SPEED = 1540.0

@@ -8,10 +8,10 @@ import pytest
 from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.imaging import AutoBeamforming, DenseDelayAndSum, FocusedDelayAndSum
-from sonarsynth.imaging.dense import dense_energies
-from sonarsynth.imaging.focus_error import focus_error, zones_for
-from sonarsynth.imaging.lattice_image import focused_energies, steered_zones, zoned_energies
-from sonarsynth.imaging.zones import corners, for_sensors, lens, quadrant, zones_of
+from sonarsynth.imaging.delay_and_sum.dense import dense_energies
+from sonarsynth.imaging.delay_and_sum.focus_error import focus_error, zones_for
+from sonarsynth.imaging.delay_and_sum.lattice_image import focused_energies, steered_zones, zoned_energies
+from sonarsynth.imaging.delay_and_sum.zones import corners, for_sensors, lens, quadrant, zones_of
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
 

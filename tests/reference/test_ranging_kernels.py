@@ -8,7 +8,7 @@ import pytest
 from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import element_directivity, focus_delay
 from sonarsynth.equations.arrays.beams import beam_energy, beam_spectra, lattice_beam_spectra
-from sonarsynth.imaging.lattice_image import focused_energies
+from sonarsynth.imaging.delay_and_sum.lattice_image import focused_energies
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location.pulse_times import in_band, template_spectrum
 from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, Romanis, elements

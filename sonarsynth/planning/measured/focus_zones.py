@@ -10,7 +10,7 @@ import numpy as np
 from sonarsynth.conventions import direction
 from sonarsynth.description.method import Demand
 from sonarsynth.equations.arrays.apertures import focus_delay
-from sonarsynth.imaging.dense import dense_energies
+from sonarsynth.imaging.delay_and_sum.dense import dense_energies
 from sonarsynth.imaging.image_window import weights, window_spectra
 from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.sampled_arrivals import arrivals_of

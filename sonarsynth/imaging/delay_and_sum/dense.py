@@ -38,10 +38,17 @@ class DenseDelayAndSum(Steering):
     def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
         """Image of the window from start to stop (s)."""
         frequencies, spectra, unit = window_spectra(signals, sonar, start, stop)
+        return energy_image(unit * self.energies(spectra, frequencies, elements, sonar), sonar, start, stop)
+
+    def energies(
+        self, spectra: npt.NDArray[np.complexfloating], frequencies: Floats, elements: Elements, sonar: Sonar
+    ) -> Floats:
+        """Sum over bins of |B|^2 of the beams of the grid: (elevation, azimuth), in the unit of spectra (sensor, bin)
+        squared; frequencies (bin,) Hz, evenly spaced. Raises ValueError when no element is live."""
         beams = direction(sonar.beams.azimuth, sonar.beams.elevation[:, None])
         delay = focus_delay(elements.position, beams.reshape(-1, 3), self.focus, sonar.assumed_sound_speed)
         energy = dense_energies(spectra, delay, weights(elements, self.shading), frequencies)
-        return energy_image(unit * energy.reshape(beams.shape[:2]), sonar, start, stop)
+        return energy.reshape(beams.shape[:2])
 
 
 def dense_energies(

@@ -28,7 +28,7 @@ from sonarsynth.equations.kernels.phasors import (
     turned,
     weighted,
 )
-from sonarsynth.imaging.lattice_kernel import seeds
+from sonarsynth.imaging.delay_and_sum.lattice_kernel import seeds
 
 TERM = 4 * LANES
 """float32 numbers of one term of a sum: two complex numbers (sum and difference of a pair) of sixteen frequencies."""

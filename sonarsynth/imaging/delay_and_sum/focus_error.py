@@ -19,8 +19,8 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.apertures import focus_delay
+from sonarsynth.imaging.delay_and_sum.zones import Lens, Zone, corners, for_sensors, lens, quadrant, zones_of
 from sonarsynth.imaging.image_window import Shading, weights
-from sonarsynth.imaging.zones import Lens, Zone, corners, for_sensors, lens, quadrant, zones_of
 from sonarsynth.receiver import Band, BeamGrid, Elements, Sonar
 
 MOST_ZONES = 32

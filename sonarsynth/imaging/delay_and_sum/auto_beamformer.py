@@ -7,9 +7,9 @@ from typing import Literal
 from sonarsynth.conventions import PositiveMetres
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand
-from sonarsynth.imaging.dense import DenseDelayAndSum
-from sonarsynth.imaging.focus_error import zones_needed
-from sonarsynth.imaging.focused import AUTO_ERROR, FocusedDelayAndSum
+from sonarsynth.imaging.delay_and_sum.dense import DenseDelayAndSum
+from sonarsynth.imaging.delay_and_sum.focus_error import zones_needed
+from sonarsynth.imaging.delay_and_sum.focused import AUTO_ERROR, FocusedDelayAndSum
 from sonarsynth.imaging.image_window import Shading
 from sonarsynth.imaging.steering import Steering
 from sonarsynth.products import EnergyImage, Signals

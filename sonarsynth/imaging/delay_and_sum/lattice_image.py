@@ -11,8 +11,8 @@ import numpy as np
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.arrays.beams import first_and_spacing
 from sonarsynth.equations.arrays.lattices import axial_focus_delay, half_coordinates, mirrored_sensors
+from sonarsynth.imaging.delay_and_sum.zones import Lens, Zone, for_sensors, lens, quadrant, zones_of
 from sonarsynth.imaging.image_window import Shading, weights
-from sonarsynth.imaging.zones import Lens, Zone, for_sensors, lens, quadrant, zones_of
 from sonarsynth.receiver import Band, BeamGrid, Elements
 
 
@@ -55,7 +55,7 @@ def focused_energies(
     """
     from sonarsynth.equations.kernels.lanes import LANES
     from sonarsynth.equations.kernels.phasors import padded_bins
-    from sonarsynth.imaging.lattice_kernel import lattice_energies
+    from sonarsynth.imaging.delay_and_sum.lattice_kernel import lattice_energies
 
     places, heights = fold(elements)
     heard = padded_bins(spectra, elements.count + 1, LANES)
@@ -137,8 +137,8 @@ def zoned_energies(
     """As `focused_energies`, each zone with its own delays of focusing: (elevation, azimuth)."""
     from sonarsynth.equations.kernels.lanes import LANES
     from sonarsynth.equations.kernels.phasors import padded_bins
-    from sonarsynth.imaging.lattice_kernel import lattice_energies
-    from sonarsynth.imaging.zone_kernel import zone_energies
+    from sonarsynth.imaging.delay_and_sum.lattice_kernel import lattice_energies
+    from sonarsynth.imaging.delay_and_sum.zone_kernel import zone_energies
 
     places, heights = fold(elements)
     heard = padded_bins(spectra, elements.count + 1, LANES)
