@@ -14,10 +14,19 @@ from sonarsynth.imaging.delay_and_sum.auto_beamformer import AutoBeamforming
 from sonarsynth.imaging.delay_and_sum.dense import DenseDelayAndSum
 from sonarsynth.imaging.delay_and_sum.focused import FocusedDelayAndSum
 from sonarsynth.imaging.steering import Steering
+from sonarsynth.imaging.sub_band import SubBand
 from sonarsynth.products import BeamSpectra, EnergyImage, Signals
 from sonarsynth.receiver import Elements, Sonar
 
-__all__ = ["AutoBeamforming", "Beamformer", "BeamformingMethod", "DenseDelayAndSum", "FocusedDelayAndSum", "Steering"]
+__all__ = [
+    "AutoBeamforming",
+    "Beamformer",
+    "BeamformingMethod",
+    "DenseDelayAndSum",
+    "FocusedDelayAndSum",
+    "Steering",
+    "SubBand",
+]
 
 
 class BeamformingMethod(Protocol):
@@ -42,4 +51,4 @@ class BeamformingMethod(Protocol):
         ...
 
 
-Beamformer = Annotated[FocusedDelayAndSum | DenseDelayAndSum | AutoBeamforming, BY_KIND]
+Beamformer = Annotated[FocusedDelayAndSum | DenseDelayAndSum | AutoBeamforming | SubBand, BY_KIND]
