@@ -13,6 +13,8 @@ from sonarsynth.description import BY_KIND
 from sonarsynth.imaging.delay_and_sum.auto_beamformer import AutoBeamforming
 from sonarsynth.imaging.delay_and_sum.dense import DenseDelayAndSum
 from sonarsynth.imaging.delay_and_sum.focused import FocusedDelayAndSum
+from sonarsynth.imaging.lp import LpMean
+from sonarsynth.imaging.order_statistic import OrderStatistic
 from sonarsynth.imaging.steering import Steering
 from sonarsynth.imaging.sub_band import SubBand
 from sonarsynth.products import BeamSpectra, EnergyImage, Signals
@@ -24,6 +26,8 @@ __all__ = [
     "BeamformingMethod",
     "DenseDelayAndSum",
     "FocusedDelayAndSum",
+    "LpMean",
+    "OrderStatistic",
     "Steering",
     "SubBand",
 ]
@@ -51,4 +55,5 @@ class BeamformingMethod(Protocol):
         ...
 
 
-Beamformer = Annotated[FocusedDelayAndSum | DenseDelayAndSum | AutoBeamforming | SubBand, BY_KIND]
+DelayAndSum = FocusedDelayAndSum | DenseDelayAndSum | AutoBeamforming
+Beamformer = Annotated[DelayAndSum | SubBand | LpMean | OrderStatistic, BY_KIND]
