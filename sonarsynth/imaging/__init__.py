@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Annotated, Protocol
 
 from sonarsynth.description import BY_KIND
+from sonarsynth.imaging.capon import Capon
 from sonarsynth.imaging.delay_and_sum.auto_beamformer import AutoBeamforming
 from sonarsynth.imaging.delay_and_sum.dense import DenseDelayAndSum
 from sonarsynth.imaging.delay_and_sum.focused import FocusedDelayAndSum
@@ -24,6 +25,7 @@ __all__ = [
     "AutoBeamforming",
     "Beamformer",
     "BeamformingMethod",
+    "Capon",
     "DenseDelayAndSum",
     "FocusedDelayAndSum",
     "LpMean",
@@ -56,4 +58,4 @@ class BeamformingMethod(Protocol):
 
 
 DelayAndSum = FocusedDelayAndSum | DenseDelayAndSum | AutoBeamforming
-Beamformer = Annotated[DelayAndSum | SubBand | LpMean | OrderStatistic, BY_KIND]
+Beamformer = Annotated[DelayAndSum | SubBand | LpMean | OrderStatistic | Capon, BY_KIND]

@@ -35,7 +35,7 @@ UNIONS = {
 }
 KINDS = (
     {
-        "scene.processing.beamforming": "capon",
+        "scene.processing.beamforming": "coherence_factor",
         "scene.processing.picking": "loudest",
         "scene.processing.placing": "monostatic",
     },
@@ -141,7 +141,7 @@ def of(said: dict[str, Any], kind: str) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("kind", "stage", "choice"),
     [
-        ("capon", "beamform", "beamforming"),
+        ("coherence_factor", "beamform", "beamforming"),
         ("loudest", "range", "picking"),
         ("monostatic", "range", "placing"),
         ("whole_samples", "synthesise", "synthesis"),
@@ -158,7 +158,7 @@ def test_it_runs_and_plan_and_store_say_so(said: dict[str, Any], kind: str, stag
     assert kind in mine["rows"][stage][0] and kind not in said["usual"]["rows"][stage][0]
     assert f"kind: {kind}" in mine["recipe"].replace("'", "")
     assert not choice or mine["choices"][choice]["kind"] == kind
-    assert ("not stated" in mine["rows"][stage][1]) == (kind == "capon")
+    assert ("not stated" in mine["rows"][stage][1]) == (kind == "coherence_factor")
 
 
 def direct_pulse(one: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
@@ -215,13 +215,13 @@ def test_the_data_are_those_of_the_method(said: dict[str, Any]) -> None:
     usual, sonar, sound = (said[name] for name in ("usual", *(" ".join(some.values()) for some in KINDS[:2])))
     assert sonar["pressure"] == usual["pressure"]
     plain, least = (np.array(one["energy"]) for one in (usual, sonar))
-    assert (least <= 1.1 * plain + 0.02 * plain.max()).all(), "no beam passes less than Capon's, by Cauchy and Schwarz"
+    assert (least <= 1.1 * plain + 0.02 * plain.max()).all(), "the factor is one at most, by Cauchy and Schwarz"
     assert np.median(least / plain) < 0.7
     assert np.abs(np.subtract(*(np.unravel_index(e.argmax(), e.shape) for e in (plain, least)))).max() <= 3  # a beam
     assert len(sonar["delay"]) == 1 and sonar["delay"] != usual["delay"], "on the axis of the loudest beam"
     straight = 0.5 * (1484.0 * sonar["delay"][0] + np.linalg.norm([0.6, -0.25, -0.15]))
     assert sonar["range"][0] == pytest.approx(straight, rel=0.01)
-    assert all(0.3 < r < 3.0 for r in sonar["range"]), "points of Capon's image lie in the tank"
+    assert all(0.3 < r < 3.0 for r in sonar["range"]), "points of the image lie in the tank"
     wrong = [abs(a - b) for a, b in zip(sound["pressure"], usual["pressure"], strict=True)]
     assert 0.0 < max(wrong) < max(map(abs, usual["pressure"]))
     assert np.abs(np.log10(np.max(sound["energy"]) / plain.max())) > 0.05

@@ -1,0 +1,128 @@
+"""Capon's beamformer: the least power that passes a wave from the steered direction whole."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+import numpy as np
+import numpy.typing as npt
+from annotated_types import Ge, Gt, Le
+
+from sonarsynth import conventions
+from sonarsynth.conventions import Floats, Number, PositiveMetres
+from sonarsynth.description import description
+from sonarsynth.equations.arrays.apertures import focus_delay, live_gain
+from sonarsynth.imaging.image_window import energy_image, window_spectra
+from sonarsynth.imaging.lattice_blocks import Complexes, subarrays
+from sonarsynth.imaging.steering import Steering
+from sonarsynth.products import EnergyImage, Signals
+from sonarsynth.receiver import Elements, Sonar
+
+AHEAD = np.array([[1.0, 0.0, 0.0]])
+
+
+@description
+class Capon(Steering):
+    """Minimum variance distortionless response: weights w = R^-1 a/(a^H R^-1 a), with a the phases of a wave from u.
+
+    On a lattice R is the covariance of its square blocks at a frequency (`lattice_blocks`), the array focused in every
+    direction as on the axis; in other arrays, and where too few sensors are live, that of all sensors over neighbouring
+    frequencies. R is loaded on its diagonal. The energy of a beam is w^H R w, R without its loading. With much loading
+    it tends to delay and sum: of the blocks, with their wider beam, on a lattice. Echoes are picked from beams that
+    weight each block by w and sum over the blocks in phase.
+
+    An echo 30 dB under a source that is 15 degrees off comes out within 0.15 dB (508 elements, blocks of 6 to 12).
+    Source: Capon (1969), Proc. IEEE 57, 1408, eq. 20.
+    """
+
+    kind: Literal["capon"] = "capon"
+    focus: PositiveMetres | None = 20.0
+    """Range at which the array is focused; left out (none), plane waves."""
+    subarray: Annotated[int, Ge(2), Le(16)] = 8
+    """Sensors along a side of a block of a lattice, at most; fewer where live blocks are few."""
+    bins: Annotated[int, Ge(2)] = 8
+    """Neighbouring frequencies that one covariance is the mean of, where there are no blocks."""
+    loading: Annotated[Number, Gt(0)] = 1e-3
+    """Of the mean power of a sensor (the trace over the number of sensors), added to the diagonal of the covariance."""
+
+    def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
+        """Image of the window from start to stop (s)."""
+        live_gain(elements.gain)
+        frequency, spectra, unit = window_spectra(signals, sonar, start, stop)
+        blocks, beams = subarrays(elements, self.subarray), sonar.beams
+        energy = np.zeros((beams.elevations, beams.azimuths))
+        if blocks is None:
+            u = conventions.direction(beams.azimuth, beams.elevation[:, None]).reshape(-1, 3)
+            heard = self.steer(spectra, frequency, u, elements, sonar)
+            energy = np.sum(np.abs(heard).astype(float) ** 2, axis=1).reshape(energy.shape)
+        else:
+            for k, spectrum in self._focused(spectra, frequency, elements, sonar):
+                covariance = blocks.covariance(spectrum)
+                inverse = self._inverse(covariance)
+                if inverse is not None:
+                    least = np.maximum(blocks.forms(inverse @ covariance @ inverse, k, beams), 0.0)
+                    energy += least / blocks.forms(inverse, k, beams) ** 2
+        return energy_image(unit * energy, sonar, start, stop)
+
+    def steer(
+        self,
+        spectra: npt.NDArray[np.complex64],
+        frequency: Floats,
+        direction: Floats,
+        elements: Elements,
+        sonar: Sonar,
+    ) -> npt.NDArray[np.complex64]:
+        """Spectra (beam, bin) in `direction` (beam, xyz), as `Steering.steer`."""
+        blocks = subarrays(elements, self.subarray)
+        if blocks is None:
+            return self._steered_over_bins(spectra, frequency, direction, elements, sonar)
+        beams = np.zeros((len(direction), len(frequency)), np.complex64)
+        for at, (k, spectrum) in enumerate(self._focused(spectra, frequency, elements, sonar)):
+            inverse = self._inverse(blocks.covariance(spectrum))
+            if inverse is not None:
+                weight = distortionless(inverse, np.exp(1j * k * (direction @ blocks.offset.T)))
+                beams[:, at] = np.sum(weight.conj() * blocks.snapshots(spectrum, k, direction), axis=1)
+        return beams
+
+    def _focused(
+        self, spectra: npt.NDArray[np.complex64], frequency: Floats, elements: Elements, sonar: Sonar
+    ) -> Iterator[tuple[float, Complexes]]:
+        """Wavenumber (rad/m) and spectrum (sensor,) of each bin, as of plane waves where they come from the focus."""
+        speed = sonar.assumed_sound_speed
+        late = focus_delay(elements.position, AHEAD, self.focus, speed)[0]
+        for f, heard in zip(frequency, spectra.T, strict=True):
+            yield 2.0 * np.pi * f / speed, heard * np.exp(2j * np.pi * f * late)
+
+    def _steered_over_bins(
+        self,
+        spectra: npt.NDArray[np.complex64],
+        frequency: Floats,
+        direction: Floats,
+        elements: Elements,
+        sonar: Sonar,
+    ) -> npt.NDArray[np.complex64]:
+        live = np.flatnonzero(elements.gain)
+        delay = focus_delay(elements.position[live], direction, self.focus, sonar.assumed_sound_speed)
+        beams = np.zeros((len(direction), len(frequency)), np.complex64)
+        for some in np.array_split(np.arange(len(frequency)), max(len(frequency) // self.bins, 1)):
+            heard, f = spectra[np.ix_(live, some)].astype(complex), frequency[some]
+            inverse = self._inverse(heard @ heard.conj().T / len(some))
+            if inverse is not None:
+                weight = distortionless(inverse, np.exp(-2j * np.pi * f.mean() * delay))
+                for at, one, x in zip(some, f, heard.T, strict=True):
+                    beams[:, at] = (weight.conj() * np.exp(2j * np.pi * (one - f.mean()) * delay)) @ x
+        return beams
+
+    def _inverse(self, covariance: Complexes) -> Complexes | None:
+        """Inverse of a covariance with its loading; None of silence."""
+        power = float(np.trace(covariance).real) / len(covariance)
+        if power == 0.0:
+            return None
+        return np.asarray(np.linalg.inv(covariance + self.loading * power * np.eye(len(covariance))))
+
+
+def distortionless(inverse: Complexes, phases: Complexes) -> Complexes:
+    """w = R^-1 a/(a^H R^-1 a): (beam, sensor), of R^-1 (sensor, sensor) and phases a (beam, sensor)."""
+    weight = phases @ inverse.T
+    return np.asarray(weight / np.sum(phases.conj() * weight, axis=1, keepdims=True))
