@@ -11,6 +11,7 @@ from typing import Annotated, Protocol
 
 from sonarsynth.description import BY_KIND
 from sonarsynth.imaging.capon import Capon
+from sonarsynth.imaging.clean import Clean
 from sonarsynth.imaging.delay_and_sum.auto_beamformer import AutoBeamforming
 from sonarsynth.imaging.delay_and_sum.dense import DenseDelayAndSum
 from sonarsynth.imaging.delay_and_sum.focused import FocusedDelayAndSum
@@ -26,6 +27,7 @@ __all__ = [
     "Beamformer",
     "BeamformingMethod",
     "Capon",
+    "Clean",
     "DenseDelayAndSum",
     "FocusedDelayAndSum",
     "LpMean",
@@ -58,4 +60,4 @@ class BeamformingMethod(Protocol):
 
 
 DelayAndSum = FocusedDelayAndSum | DenseDelayAndSum | AutoBeamforming
-Beamformer = Annotated[DelayAndSum | SubBand | LpMean | OrderStatistic | Capon, BY_KIND]
+Beamformer = Annotated[DelayAndSum | SubBand | LpMean | OrderStatistic | Capon | Clean, BY_KIND]

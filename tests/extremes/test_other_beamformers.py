@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonarsynth.imaging import Capon, LpMean, OrderStatistic, SubBand
+from sonarsynth.imaging import Capon, Clean, LpMean, OrderStatistic, SubBand
 from sonarsynth.products import Signals
 from sonarsynth.receiver import BeamGrid, PlanarLattice, PositionTable, Sonar, elements
 
@@ -17,7 +17,7 @@ ARRAYS = {
     "all dead but one": PlanarLattice(columns=5, rows=4, pitch=0.02, dead=tuple(i for i in range(20) if i != 7)),
     "no lattice": PositionTable(positions=((0.0, 0.0, 0.0), (0.0, 0.03, 0.01), (0.01, -0.02, 0.04))),
 }
-METHODS = [SubBand(), LpMean(), LpMean(p=0.0, window=1e-4), OrderStatistic(), Capon()]
+METHODS = [SubBand(), LpMean(), LpMean(p=0.0, window=1e-4), OrderStatistic(), Capon(), Clean()]
 WINDOW = 0.001, 0.003
 
 

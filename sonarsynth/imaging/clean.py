@@ -1,0 +1,105 @@
+"""CLEAN: an image taken apart into point echoes, by what the array makes of one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import Ge, Gt, Le
+
+from sonarsynth.conventions import Bools, Decibels, Floats, Number, PositiveMetres, direction
+from sonarsynth.description import description
+from sonarsynth.equations.arrays.apertures import focus_delay
+from sonarsynth.imaging.delay_and_sum.auto_beamformer import AutoBeamforming
+from sonarsynth.imaging.delay_and_sum.focused import AUTO_ERROR
+from sonarsynth.imaging.image_window import Shading, energy_image, weights, window_spectra
+from sonarsynth.imaging.steering import Steering
+from sonarsynth.products import EnergyImage, Signals
+from sonarsynth.receiver import Elements, Sonar
+
+MAIN_LOBE = 0.05
+"""Share of its peak above which a point's image is its main lobe, as far as that hangs together: side lobes of a full
+aperture are lower."""
+
+Image = Floats
+Place = tuple[int, int]
+
+
+@description
+class Clean(Steering):
+    """Deconvolution of the delay-and-sum image with the point-spread pattern of the array at the focus.
+
+    Again and again `gain` of the brightest beam, times the image of a point echo there of the mean spectrum of the
+    sensors, is taken away; it is put back without its side lobes and grating lobes, and what is left over is added.
+    Energies add up for echoes whose delays differ by more than the inverse of the band; echoes at one delay interfere,
+    which the image of a point knows nothing of, and leave some of their side lobes. The images of points are made as
+    the image is, once a direction: an extended target takes as long as so many images.
+
+    Echoes are picked from beams of delay and sum.
+    Source: Hogbom (1974), Astron. Astrophys. Suppl. 15, 417; in acoustics, CLEAN-PSF in Sijtsma (2007), Int. J.
+    Aeroacoustics 6, 357.
+    """
+
+    kind: Literal["clean"] = "clean"
+    focus: PositiveMetres | None = 20.0
+    """Range at which the array is focused; left out (none), plane waves."""
+    shading: Shading = "uniform"
+    """Weights over the aperture: all alike, or falling off towards the rim (lower side lobes, a wider beam)."""
+    gain: Annotated[Number, Gt(0), Le(1)] = 0.3
+    """Share of a peak that is taken away at once."""
+    depth: Annotated[Decibels, Gt(0)] = 25.0
+    """The work stops where nothing is left that is less than this under the brightest beam."""
+    steps: Annotated[int, Ge(1), Le(100_000)] = 500
+    """Times that something is taken away, at most."""
+
+    def row(self) -> str:
+        """Its kind, and how far down it goes."""
+        return f"{self.kind}, to {self.depth:g} dB"
+
+    def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
+        """Image of the window from start to stop (s)."""
+        frequencies, spectra, unit = window_spectra(signals, sonar, start, stop)
+        plain = AutoBeamforming(focus=self.focus, shading=self.shading).estimated(elements, sonar, AUTO_ERROR)
+        power = weights(elements, self.shading) @ np.abs(spectra).astype(float) ** 2
+        amplitude = np.sqrt(power / power.sum()) if power.any() else power
+
+        def point(place: Place) -> Image:
+            u = direction(sonar.beams.azimuth[place[1]], sonar.beams.elevation[place[0]])
+            delay = focus_delay(elements.position, u, self.focus, sonar.assumed_sound_speed)
+            wave = (amplitude * np.exp(-2j * np.pi * frequencies * delay[:, None])).astype(np.complex64)
+            return plain.energies(wave, frequencies, elements, sonar)
+
+        dirty = plain.energies(spectra, frequencies, elements, sonar)
+        return energy_image(unit * cleaned(dirty, point, self.gain, self.depth, self.steps), sonar, start, stop)
+
+
+def cleaned(dirty: Image, point: Callable[[Place], Image], gain: float, depth: float, steps: int) -> Image:
+    """The image (elevation, azimuth) of an energy image of point echoes without their side lobes, not below zero.
+
+    `point(place)` is the image of an echo of energy one there; gain, depth (dB) and steps as for `Clean`.
+    """
+    left, found = dirty.copy(), dict[Place, float]()
+    images = dict[Place, Image]()
+    least = dirty.max() * 10.0 ** (-depth / 10.0)
+    for _ in range(steps):
+        row, column = np.unravel_index(np.argmax(left), left.shape)
+        place = int(row), int(column)
+        if not left[place] > least:  # silence, and what is no number, too
+            break
+        if place not in images:
+            images[place] = point(place)
+        share = gain * left[place] / images[place][place]
+        left -= share * images[place]
+        found[place] = found.get(place, 0.0) + share
+    for place, energy in found.items():
+        left += energy * np.where(main_lobe(images[place], place), images[place], 0.0)
+    return np.maximum(left, 0.0)
+
+
+def main_lobe(image: Image, place: Place) -> Bools:
+    """The beams around `place` in which the image (elevation, azimuth) of a point there stays above `MAIN_LOBE`."""
+    from scipy.ndimage import label
+
+    lobes, _ = label(image >= MAIN_LOBE * image[place])
+    return np.asarray(lobes == lobes[place])
