@@ -190,3 +190,42 @@ def test_no_echo_is_picked_at_the_edge_of_the_view():
     narrow = sonar(span=10.0)
     assert len(points((spherical(20.0, np.radians(5.4), 0.0),), instrument=narrow)) == 0
     assert len(points((spherical(20.0, np.radians(4.0), 0.0),), instrument=narrow)) == 1
+
+
+def test_where_echoes_overlap_points_lie_among_them_within_their_errors():
+    """Six points closer than a beam and a pulse: further beyond them than three predicted errors, one in fifty."""
+    random, beyond, errors = np.random.default_rng(4), [], []
+    for _ in range(30):
+        middle = np.array([20.0, *random.uniform(-0.2, 0.2, 2)])
+        places = middle + random.uniform(-1.0, 1.0, (6, 3)) * [0.02, 0.012, 0.012]
+        targets = tuple(spherical(*place) for place in places)
+        cloud = points(targets, strengths=tuple(random.uniform(0.3, 1.0, 6)))
+        found = np.stack([cloud.range, cloud.azimuth, cloud.elevation], axis=1)
+        error = np.stack([cloud.range_error, cloud.azimuth_error, cloud.elevation_error], axis=1)
+        outside = np.maximum(places.min(axis=0) - found, found - places.max(axis=0))
+        beyond += (outside / error).max(axis=1).tolist()
+        errors += error[:, 1].tolist()
+    assert len(beyond) >= 30 and np.mean(np.array(beyond) > 3.0) <= 0.02
+    assert np.median(errors) < 0.012  # half of a beam: errors say something
+
+
+def test_extremes_give_points_where_targets_are_or_none():
+    """One row of beams, clipped signals, a target that fills the view, and silence."""
+    target = spherical(20.0, 0.05, 0.0)
+    row = replace(sonar(), beams=BeamGrid(azimuths=61, elevations=1, azimuth_span=0.5, elevation_span=0.1))
+    (line,) = [points((target,), instrument=row)]
+    assert len(line) == 1 and abs(line.azimuth[0] - 0.05) < 1e-3 and 0.005 < line.elevation_error[0] < 1.0
+    signals, first, last, known = heard((target,))
+    loud = np.abs(signals.pressure[:, -600:]).max()
+    clipped = replace(signals, pressure=np.clip(signals.pressure, -0.3 * loud, 0.3 * loud))
+    image = FocusedDelayAndSum().image(clipped, ARRAY, sonar(), first - MARGIN, last + MARGIN)
+    cloud = cloud_of(clipped, image, known, ARRAY, sonar(), POSE, WATER, direct=signals)
+    assert np.linalg.norm(cloud.position - target, axis=1).min() < 0.05
+    silent = replace(signals, pressure=np.zeros_like(signals.pressure))
+    nothing = FocusedDelayAndSum().image(silent, ARRAY, sonar(), first - MARGIN, last + MARGIN)
+    assert len(cloud_of(silent, nothing, known, ARRAY, sonar(), POSE, WATER, direct=signals)) == 0
+    random = np.random.default_rng(5)
+    full = points(tuple(spherical(random.uniform(19.5, 20.5), *random.uniform(-0.25, 0.25, 2)) for _ in range(60)))
+    assert len(full) > 10
+    for name in ("range", "range_error", "azimuth_error", "elevation_error", "snr", "energy"):
+        assert np.isfinite(getattr(full, name)).all(), name
