@@ -150,6 +150,7 @@ def connected(workers: int, scheduler: str | None = None, memory: int | None = N
 
     Each of these may take `memory` bytes (None: its share of the machine's). Raises NoScheduler.
     """
+    logging.getLogger("asyncio").addFilter(waited_for)
     if scheduler is not None:
         with _client_of(scheduler) as client:
             yield client
@@ -176,6 +177,13 @@ def connected(workers: int, scheduler: str | None = None, memory: int | None = N
                     client.close(timeout=patience)
                 with suppress(TimeoutError):
                     cluster.close(timeout=patience)
+
+
+def waited_for(record: logging.LogRecord) -> bool:
+    """Whether a log record is no task of distributed that failed when nobody waited for it any more, as where a build
+    is interrupted: Python prints a traceback of these when it collects them."""
+    kind = record.exc_info[0] if record.exc_info else None
+    return kind is None or kind.__module__.partition(".")[0] != "distributed"
 
 
 def _client_of(scheduler: str) -> Client:

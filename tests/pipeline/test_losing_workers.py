@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
+import gc
+import logging
 import signal
 import threading
 import time
@@ -9,9 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import psutil
+import pytest
+from distributed.client import AllExit
 
 from sonarsynth.planning import Plan
 from sonarsynth.schedule import build
+from sonarsynth.schedule.connecting import waited_for
 from sonarsynth.store.files.place import record
 from sonarsynth.store.marks import all_files, load_mark, marked
 from tests.waiting import HANGING, wait_until
@@ -61,3 +67,26 @@ def test_a_worker_that_dies_with_what_its_last_shards_gave_does_not_hold_the_bui
     }
     chunks = {name for name in all_files(whole) if not name.endswith("zarr.json")}
     assert {name: record(path, name) for name in chunks} == {name: record(whole, name) for name in chunks}
+
+
+@pytest.mark.parametrize(("error", "told"), [(AllExit(), 0), (ValueError("ours"), 1)])
+def test_a_task_of_dask_that_nobody_waits_for_any_more_is_no_traceback(
+    error: Exception, told: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def fail() -> None:
+        raise error
+
+    async def leave() -> None:
+        asyncio.ensure_future(fail())  # noqa: RUF006  collected, and logged, without being asked for
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        gc.collect()
+
+    log = logging.getLogger("asyncio")
+    log.addFilter(waited_for)
+    try:
+        asyncio.run(leave())
+        gc.collect()
+    finally:
+        log.removeFilter(waited_for)
+    assert len(caplog.records) == told
