@@ -78,7 +78,7 @@ def _origins(paths: Arrivals, beam: Floats, listening: Listening, band: Band) ->
     normal = _normal(elements, listening.sound_speed / centre)
     if normal is not None:
         found[(paths.direction @ normal) * (beam @ normal) < 0.0] = ORIGINS.index("mirror image")
-    found[paths.target < 0] = ORIGINS.index("snap itself")
+    found[paths.direct] = ORIGINS.index("snap itself")
     return found
 
 
