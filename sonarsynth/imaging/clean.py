@@ -22,8 +22,8 @@ MAIN_LOBE = 0.05
 """Share of its peak above which a point's image is its main lobe, as far as that hangs together: side lobes of a full
 aperture are lower."""
 
-Image = Floats
 Place = tuple[int, int]
+"""Row (elevation) and column (azimuth) of a beam."""
 
 
 @description
@@ -64,7 +64,7 @@ class Clean(Steering):
         power = weights(elements, self.shading) @ np.abs(spectra).astype(float) ** 2
         amplitude = np.sqrt(power / power.sum()) if power.any() else power
 
-        def point(place: Place) -> Image:
+        def point(place: Place) -> Floats:
             u = direction(sonar.beams.azimuth[place[1]], sonar.beams.elevation[place[0]])
             delay = focus_delay(elements.position, u, self.focus, sonar.assumed_sound_speed)
             wave = (amplitude * np.exp(-2j * np.pi * frequencies * delay[:, None])).astype(np.complex64)
@@ -74,13 +74,13 @@ class Clean(Steering):
         return energy_image(unit * cleaned(dirty, point, self.gain, self.depth, self.steps), sonar, start, stop)
 
 
-def cleaned(dirty: Image, point: Callable[[Place], Image], gain: float, depth: float, steps: int) -> Image:
+def cleaned(dirty: Floats, point: Callable[[Place], Floats], gain: float, depth: float, steps: int) -> Floats:
     """The image (elevation, azimuth) of an energy image of point echoes without their side lobes, not below zero.
 
     `point(place)` is the image of an echo of energy one there; gain, depth (dB) and steps as for `Clean`.
     """
     left, found = dirty.copy(), dict[Place, float]()
-    images = dict[Place, Image]()
+    images = dict[Place, Floats]()
     least = dirty.max() * 10.0 ** (-depth / 10.0)
     for _ in range(steps):
         row, column = np.unravel_index(np.argmax(left), left.shape)
@@ -97,7 +97,7 @@ def cleaned(dirty: Image, point: Callable[[Place], Image], gain: float, depth: f
     return np.maximum(left, 0.0)
 
 
-def main_lobe(image: Image, place: Place) -> Bools:
+def main_lobe(image: Floats, place: Place) -> Bools:
     """The beams around `place` in which the image (elevation, azimuth) of a point there stays above `MAIN_LOBE`."""
     from scipy.ndimage import label
 

@@ -19,7 +19,7 @@ from sonarsynth.state import WorldState
 
 FIRST_NULL = 1.9
 """rad of phase, root mean square over the aperture, at the first null of a beam: 1.915 of a disc, 1.81 of a line."""
-EXPLAINED = 0.01
+EXPLAINED = 0.05
 """Of the energy of a point that the paths of a frame must bring, or noise made it."""
 
 

@@ -32,21 +32,21 @@ LOBES = 8.0
 """Times what lobes bring of louder peaks that a peak must exceed: echoes are of more than their peaks."""
 NOISE_WIDTHS = 3.0
 """Beam widths on either side of a beam whose noise is taken for its own."""
-LOUDER = 2.0
+NOISE_ADDED = 2.0
 """Amplitude of noise, in units of its root mean square, that may be in a peak."""
 LOBE_BINS = 48
 """Frequencies that lobes are summed over."""
 RESOLVED = 1.0
 """An axis of the grid as long as this, in units of the roughness of noise along it, has peaks along it."""
 SIXTH = 1.0 / 6.0
-ABOUT = 1.4
+CENTRE_WINDOW = 1.4
 """Standard deviation, in widths of a peak, of the window about it in which the centre of power is looked for."""
-NOISE_PEAKS = 4.0
-"""Power below that, in units of the mean power of noise, is not counted there."""
-BESIDE_ERROR = 1.3
-"""Standard error of a peak for each part by which the centre of power is beside it."""
-EXTENDED = np.array([0.04, 0.04, 0.15])
-"""Standard error along elevation, azimuth and delay, in widths, of echoes of surfaces rather than points."""
+NOISE_CLEAR = 4.0
+"""Power below that, in units of the mean power of noise, does not count for the centre."""
+CENTRE_ERROR = 1.3
+"""Standard error of a peak over how far the centre of power about it is from it (fitted to five recipes)."""
+SURFACE_ERROR = np.array([0.04, 0.04, 0.15])
+"""Standard error along elevation, azimuth and delay, in widths, of echoes of surfaces, not points (fitted)."""
 UNKNOWN = 0.5
 """Standard error of a direction along an axis that is not resolved, in half widths of the beam."""
 
@@ -74,9 +74,11 @@ def peak_echoes(
     keep = (height >= least[b]) & (energy > residue(image, heard.loudest))
     keep[keep] = _own(heard, profiles, b[keep], t[keep], height[keep], noise[b[keep]])
     b, t, place, height, energy = b[keep], t[keep], place[keep], height[keep], energy[keep]
-    beside = power_centres(power, index, *beams, b, t, place, axes.step * axes.sharpness, ABOUT, NOISE_PEAKS * noise)
+    centre = power_centres(
+        power, index, *beams, b, t, place, axes.step * axes.sharpness, CENTRE_WINDOW, NOISE_CLEAR * noise
+    )
     snr = height / noise[b]
-    error = axes.errors(snr, beside)
+    error = axes.errors(snr, centre)
     offset = place * axes.step
     return PickedEchoes(
         elevation=image.elevation[profiles.row[b]] + offset[:, 0],
@@ -159,16 +161,16 @@ class Axes:
         lasting = max(profiles.power.shape[1] * profiles.step - 2 * pulse_times.PULSE_HALF, profiles.step)  # s
         return np.append(angle, lasting * 2 * np.pi * profiles.moments.noise_own_band)
 
-    def errors(self, snr: Floats, beside: Floats) -> Floats:
-        """Predicted standard errors (peak, 3) of peaks of signal-to-noise ratio `snr` (peak,).
+    def errors(self, snr: Floats, centre: Floats) -> Floats:
+        """Predicted standard errors (peak, 3) in rad, rad, s; snr (peak,): signal-to-noise ratio of powers.
 
         Noise moves the top of an amplitude that falls as 1 - (sharp x)^2/2 by its derivative over the bend, of standard
-        deviation rough/(sharp^2 (2 snr)^1/2). Where echoes overlap the centre of their power is beside their peak, by
-        `beside` (peak, 3) widths: the peak is taken to err by about as much (`BESIDE_ERROR`).
+        deviation rough/(sharp^2 (2 snr)^1/2). Where echoes overlap the `centre` of their power (peak, 3), in widths
+        from the peak, is beside it: the peak is taken to err by about as much (`CENTRE_ERROR`).
         """
         sharp = np.maximum(self.sharpness, [1e-3, 1e-3, 0.0])
         noise = self.roughness / (sharp**2 * np.sqrt(2.0 * snr[:, None]))
-        known = np.sqrt(noise**2 + (EXTENDED**2 + (BESIDE_ERROR * beside) ** 2) / sharp**2)
+        known = np.sqrt(noise**2 + (SURFACE_ERROR**2 + (CENTRE_ERROR * centre) ** 2) / sharp**2)
         unknown = UNKNOWN * np.maximum(1.0 / sharp, 0.5 * self.step)
         return np.asarray(np.minimum(np.where(self.resolved, known, unknown), [np.pi, np.pi, np.inf]))
 
@@ -244,6 +246,6 @@ def _own(heard: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: Fl
         2.0 * profiles.width / c,
     )
     own = np.empty(len(b), bool)
-    least = np.maximum(np.sqrt(height) - LOUDER * np.sqrt(noise), 0.0) ** 2  # without what noise may add
+    least = np.maximum(np.sqrt(height) - NOISE_ADDED * np.sqrt(noise), 0.0) ** 2  # without what noise may add
     own[loud] = least[loud] > LOBES * brought
     return own
