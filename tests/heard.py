@@ -6,6 +6,7 @@ import numpy as np
 
 from sonarsynth.equations.arrays.spherical_wave import envelope_peak
 from sonarsynth.imaging import FocusedDelayAndSum
+from sonarsynth.imaging.image_window import snapshots_of
 from sonarsynth.products import Signals
 from sonarsynth.ranging import IsovelocityPlacing, Peaks
 from sonarsynth.ranging.clouds import point_cloud
@@ -35,7 +36,9 @@ def cloud_of(
     """The points of the window of an image."""
     beams = None
     if np.isfinite(image.start):
-        beams = FocusedDelayAndSum(focus=focus).beams(signals, elements, sonar, image.start, image.stop)
+        beams = FocusedDelayAndSum(focus=focus).beams(
+            snapshots_of(signals, sonar, image.start, image.stop), elements, sonar
+        )
     loudest = float(np.abs(signals.pressure).max(initial=0.0))
     window = ReceivedWindow(elements, sonar, image, beams, loudest, direct or signals, estimates)
     return point_cloud(window, picking, placing, pose, profile)

@@ -19,7 +19,7 @@ from sonarsynth.imaging.lp import LpMean
 from sonarsynth.imaging.order_statistic import OrderStatistic
 from sonarsynth.imaging.steering import Steering
 from sonarsynth.imaging.sub_band import SubBand
-from sonarsynth.products import BeamSpectra, EnergyImage, Signals
+from sonarsynth.products import BeamSpectra, Snapshots
 from sonarsynth.receiver import Elements, Sonar
 
 __all__ = [
@@ -38,24 +38,19 @@ __all__ = [
 
 
 class BeamformingMethod(Protocol):
-    """One way to make an image from signals."""
+    """One way to make beams of the signals of a window."""
 
     @property
     def focus(self) -> float | None:
         """Range (m) at which the array is focused; none: plane waves."""
         ...
 
-    def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
-        """Image of the window from start to stop (s, clock of the signals) on the sonar's beam grid.
+    def beams(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> BeamSpectra:
+        """Beams of a window of the signals: their energies on the sonar's grid, and their spectra in any direction.
 
-        Raises ValueError when the window reaches outside the signals, when it is too short to resolve the sonar's band,
-        when no element is live, or when the method cannot take the array.
+        `Steering` makes them of a method's own `steer` or `energies`; of delay and sum, where it has none. The energies
+        raise ValueError when no element is live, or when the method cannot take the array.
         """
-        ...
-
-    def beams(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> BeamSpectra:
-        """Beams of the same window in any direction, that echoes are picked from: of `Steering`, delay and sum, where
-        a method has none of its own (`Steering.steer`)."""
         ...
 
 

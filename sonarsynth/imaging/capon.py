@@ -9,14 +9,12 @@ import numpy as np
 import numpy.typing as npt
 from annotated_types import Ge, Gt, Le
 
-from sonarsynth import conventions
 from sonarsynth.conventions import Floats, Number, PositiveMetres
 from sonarsynth.description import description
 from sonarsynth.equations.arrays.apertures import focus_delay, live_gain
-from sonarsynth.imaging.image_window import energy_image, window_spectra
 from sonarsynth.imaging.lattice_blocks import Complexes, subarrays
 from sonarsynth.imaging.steering import Steering
-from sonarsynth.products import EnergyImage, Signals
+from sonarsynth.products import Snapshots
 from sonarsynth.receiver import Elements, Sonar
 
 AHEAD = np.array([[1.0, 0.0, 0.0]])
@@ -46,62 +44,47 @@ class Capon(Steering):
     loading: Annotated[Number, Gt(0)] = 1e-3
     """Of the mean power of a sensor (the trace over the number of sensors), added to the diagonal of the covariance."""
 
-    def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
-        """Image of the window from start to stop (s)."""
+    def energies(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> Floats:
+        """As `Steering.energies`."""
         live_gain(elements.gain)
-        frequency, spectra, unit = window_spectra(signals, sonar, start, stop)
         blocks, beams = subarrays(elements, self.subarray), sonar.beams
-        energy = np.zeros((beams.elevations, beams.azimuths))
         if blocks is None:
-            u = conventions.direction(beams.azimuth, beams.elevation[:, None]).reshape(-1, 3)
-            heard = self.steer(spectra, frequency, u, elements, sonar)
-            energy = np.sum(np.abs(heard).astype(float) ** 2, axis=1).reshape(energy.shape)
-        else:
-            for k, spectrum in self._focused(spectra, frequency, elements, sonar):
-                covariance = blocks.covariance(spectrum)
-                inverse = self._inverse(covariance)
-                if inverse is not None:
-                    least = np.maximum(blocks.forms(inverse @ covariance @ inverse, k, beams), 0.0)
-                    energy += least / blocks.forms(inverse, k, beams) ** 2
-        return energy_image(unit * energy, sonar, start, stop)
+            return super().energies(snapshots, elements, sonar)
+        energy = np.zeros((beams.elevations, beams.azimuths))
+        for k, spectrum in self._focused(snapshots, elements, sonar):
+            covariance = blocks.covariance(spectrum)
+            inverse = self._inverse(covariance)
+            if inverse is not None:
+                least = np.maximum(blocks.forms(inverse @ covariance @ inverse, k, beams), 0.0)
+                energy += least / blocks.forms(inverse, k, beams) ** 2
+        return snapshots.unit * energy
 
     def steer(
-        self,
-        spectra: npt.NDArray[np.complex64],
-        frequency: Floats,
-        direction: Floats,
-        elements: Elements,
-        sonar: Sonar,
+        self, snapshots: Snapshots, elements: Elements, sonar: Sonar, direction: Floats
     ) -> npt.NDArray[np.complex64]:
-        """Spectra (beam, bin) in `direction` (beam, xyz), as `Steering.steer`."""
+        """As `Steering.steer`."""
         blocks = subarrays(elements, self.subarray)
         if blocks is None:
-            return self._steered_over_bins(spectra, frequency, direction, elements, sonar)
-        beams = np.zeros((len(direction), len(frequency)), np.complex64)
-        for at, (k, spectrum) in enumerate(self._focused(spectra, frequency, elements, sonar)):
+            return self._steered_over_bins(snapshots, elements, sonar, direction)
+        beams = np.zeros((len(direction), len(snapshots.frequency)), np.complex64)
+        for at, (k, spectrum) in enumerate(self._focused(snapshots, elements, sonar)):
             inverse = self._inverse(blocks.covariance(spectrum))
             if inverse is not None:
                 weight = distortionless(inverse, np.exp(1j * k * (direction @ blocks.offset.T)))
                 beams[:, at] = np.sum(weight.conj() * blocks.snapshots(spectrum, k, direction), axis=1)
         return beams
 
-    def _focused(
-        self, spectra: npt.NDArray[np.complex64], frequency: Floats, elements: Elements, sonar: Sonar
-    ) -> Iterator[tuple[float, Complexes]]:
+    def _focused(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> Iterator[tuple[float, Complexes]]:
         """Wavenumber (rad/m) and spectrum (sensor,) of each bin, as of plane waves where they come from the focus."""
         speed = sonar.assumed_sound_speed
         late = focus_delay(elements.position, AHEAD, self.focus, speed)[0]
-        for f, heard in zip(frequency, spectra.T, strict=True):
+        for f, heard in zip(snapshots.frequency, snapshots.spectra.T, strict=True):
             yield 2.0 * np.pi * f / speed, heard * np.exp(2j * np.pi * f * late)
 
     def _steered_over_bins(
-        self,
-        spectra: npt.NDArray[np.complex64],
-        frequency: Floats,
-        direction: Floats,
-        elements: Elements,
-        sonar: Sonar,
+        self, snapshots: Snapshots, elements: Elements, sonar: Sonar, direction: Floats
     ) -> npt.NDArray[np.complex64]:
+        spectra, frequency = snapshots.spectra, snapshots.frequency
         live = np.flatnonzero(elements.gain)
         delay = focus_delay(elements.position[live], direction, self.focus, sonar.assumed_sound_speed)
         beams = np.zeros((len(direction), len(frequency)), np.complex64)

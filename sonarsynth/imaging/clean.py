@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -13,9 +14,9 @@ from sonarsynth.description import description
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.imaging.delay_and_sum.auto_beamformer import AutoBeamforming
 from sonarsynth.imaging.delay_and_sum.focused import AUTO_ERROR
-from sonarsynth.imaging.image_window import Shading, energy_image, weights, window_spectra
+from sonarsynth.imaging.image_window import Shading, weights
 from sonarsynth.imaging.steering import Steering
-from sonarsynth.products import EnergyImage, Signals
+from sonarsynth.products import Snapshots
 from sonarsynth.receiver import Elements, Sonar
 
 MAIN_LOBE = 0.05
@@ -57,21 +58,20 @@ class Clean(Steering):
         """Its kind, and how far down it goes."""
         return f"{self.kind}, to {self.depth:g} dB"
 
-    def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
-        """Image of the window from start to stop (s)."""
-        frequencies, spectra, unit = window_spectra(signals, sonar, start, stop)
+    def energies(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> Floats:
+        """As `Steering.energies`."""
         plain = AutoBeamforming(focus=self.focus, shading=self.shading).estimated(elements, sonar, AUTO_ERROR)
-        power = weights(elements, self.shading) @ np.abs(spectra).astype(float) ** 2
+        power = snapshots.power(weights(elements, self.shading))
         amplitude = np.sqrt(power / power.sum()) if power.any() else power
 
         def point(place: Place) -> Floats:
             u = direction(sonar.beams.azimuth[place[1]], sonar.beams.elevation[place[0]])
             delay = focus_delay(elements.position, u, self.focus, sonar.assumed_sound_speed)
-            wave = (amplitude * np.exp(-2j * np.pi * frequencies * delay[:, None])).astype(np.complex64)
-            return plain.energies(wave, frequencies, elements, sonar)
+            wave = (amplitude * np.exp(-2j * np.pi * snapshots.frequency * delay[:, None])).astype(np.complex64)
+            return plain.energies(replace(snapshots, spectra=wave), elements, sonar)
 
-        dirty = plain.energies(spectra, frequencies, elements, sonar)
-        return energy_image(unit * cleaned(dirty, point, self.gain, self.depth, self.steps), sonar, start, stop)
+        dirty = plain.energies(snapshots, elements, sonar)
+        return cleaned(dirty, point, self.gain, self.depth, self.steps)
 
 
 def cleaned(dirty: Floats, point: Callable[[Place], Floats], gain: float, depth: float, steps: int) -> Floats:

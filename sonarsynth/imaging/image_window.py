@@ -1,31 +1,30 @@
-"""From signals to the spectra of a window, from sums over bins to an image: how every beamformer begins and ends."""
+"""From signals to the spectra of a window, from energies to an image: what comes before and after a beamformer."""
 
 from __future__ import annotations
 
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.apertures import hann_shading, live_gain
-from sonarsynth.equations.arrays.beams import spectrum_energy
 from sonarsynth.equations.arrays.gates import frequency_spacing, gate_samples, gated_spectra
-from sonarsynth.products import EnergyImage, Signals
+from sonarsynth.products import EnergyImage, Signals, Snapshots
 from sonarsynth.receiver import Elements, Sonar
 
 Shading = Literal["uniform", "hann"]
 """Weights over the aperture: all alike, or falling off towards the rim (lower side lobes, a wider beam)."""
 
 
-def window_spectra(
-    signals: Signals, sonar: Sonar, start: float, stop: float
-) -> tuple[Floats, npt.NDArray[np.complex64], float]:
-    """Frequencies (bin,) Hz in the sonar's band, spectra (sensor, bin) Pa of the window, Pa2 s of one |spectrum|^2."""
+def snapshots_of(signals: Signals, sonar: Sonar, start: float, stop: float) -> Snapshots:
+    """Spectra of the window from start to stop (s, clock of the signals) in the sonar's band.
+
+    Raises ValueError when the window reaches outside the signals, or is too short to resolve the band.
+    """
     rate = signals.sampling_frequency
     first, count = gate_samples(start, stop, signals.start, rate, signals.pressure.shape[1])
-    frequencies, spectra = gated_spectra(signals.pressure, rate, first, count, (sonar.band.low, sonar.band.high))
-    return frequencies, spectra, spectrum_energy(frequency_spacing(count, rate), rate)
+    frequency, spectra = gated_spectra(signals.pressure, rate, first, count, (sonar.band.low, sonar.band.high))
+    return Snapshots(frequency, frequency_spacing(count, rate), spectra, signals.start + first / rate, count, rate)
 
 
 def weights(elements: Elements, shading: Shading) -> Floats:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import Floats, direction
 from sonarsynth.description.method import Method
-from sonarsynth.equations.arrays.beams import beam_spectra, first_and_spacing, lattice_beam_spectra
-from sonarsynth.equations.arrays.gates import gate_samples
-from sonarsynth.imaging.image_window import Shading, weights, window_spectra
-from sonarsynth.products import BeamSpectra, Signals
+from sonarsynth.equations.arrays.beams import beam_spectra, lattice_beam_spectra
+from sonarsynth.imaging.image_window import Shading, energy_image, snapshots_of, weights
+from sonarsynth.products import BeamSpectra, EnergyImage, Signals, Snapshots
 from sonarsynth.receiver import Elements, Sonar
+
+BEAMS_AT_ONCE = 512
 
 
 class Steering(Method):
@@ -26,28 +28,29 @@ class Steering(Method):
     shading: Shading = "uniform"
     """Weights over the aperture."""
 
-    def beams(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> BeamSpectra:
-        """Beams of the window from start to stop (s), made when they are asked for. Raises ValueError as `image`."""
-        frequency, spectra, _ = window_spectra(signals, sonar, start, stop)
-        rate = signals.sampling_frequency
-        first, count = gate_samples(start, stop, signals.start, rate, signals.pressure.shape[1])
+    def beams(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> BeamSpectra:
+        """Beams of a window of the signals, made when they are asked for."""
+        energies = partial(self.energies, snapshots, elements, sonar)
+        return BeamSpectra(snapshots, energies, partial(self.steer, snapshots, elements, sonar))
 
-        def steered(direction: Floats) -> npt.NDArray[np.complex64]:
-            return self.steer(spectra, frequency, direction, elements, sonar)
+    def energies(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> Floats:
+        """Energy (elevation, azimuth) in Pa2 s of the beams of the sonar's grid: sum over bins of |B|^2.
 
-        _, spacing = first_and_spacing(frequency)
-        return BeamSpectra(frequency, spacing, signals.start + first / rate, count, rate, steered)
+        Raises ValueError when no element is live, or when the method cannot take the array.
+        """
+        grid = direction(sonar.beams.azimuth, sonar.beams.elevation[:, None])
+        u, energy = grid.reshape(-1, 3), np.empty(grid[..., 0].size)
+        for low in range(0, len(u), BEAMS_AT_ONCE):
+            some = slice(low, low + BEAMS_AT_ONCE)
+            beams = self.steer(snapshots, elements, sonar, u[some])
+            energy[some] = np.sum(np.abs(beams).astype(float) ** 2, axis=1)
+        return np.asarray(snapshots.unit * energy.reshape(grid.shape[:2]))
 
     def steer(
-        self,
-        spectra: npt.NDArray[np.complex64],
-        frequency: Floats,
-        direction: Floats,
-        elements: Elements,
-        sonar: Sonar,
+        self, snapshots: Snapshots, elements: Elements, sonar: Sonar, direction: Floats
     ) -> npt.NDArray[np.complex64]:
-        """Spectra (beam, bin) in `direction` (beam, xyz) of those of the sensors (sensor, bin) at evenly spaced
-        frequencies (bin,) Hz."""
+        """Spectra (beam, bin) in Pa of beams in `direction` (beam, xyz), sonar frame."""
+        spectra, frequency = snapshots.spectra, snapshots.frequency
         focus, c = self.focus, sonar.assumed_sound_speed
         gain = weights(elements, self.shading)
         if not (elements.on_lattice and self.separable):
@@ -64,3 +67,11 @@ class Steering(Method):
             sound_speed=c,
             focus=focus,
         )
+
+    def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
+        """Image of the window from start to stop (s, clock of the signals) on the sonar's beam grid.
+
+        Raises ValueError as `snapshots_of` and `energies`.
+        """
+        energy = self.energies(snapshots_of(signals, sonar, start, stop), elements, sonar)
+        return energy_image(energy, sonar, start, stop)

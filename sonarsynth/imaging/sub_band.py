@@ -5,16 +5,15 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
-import numpy.typing as npt
 from annotated_types import Ge, Le
 
 from sonarsynth.conventions import Floats, PositiveMetres
 from sonarsynth.description import description
 from sonarsynth.imaging.delay_and_sum.auto_beamformer import AutoBeamforming
 from sonarsynth.imaging.delay_and_sum.focused import AUTO_ERROR
-from sonarsynth.imaging.image_window import Shading, energy_image, weights, window_spectra
+from sonarsynth.imaging.image_window import Shading, weights
 from sonarsynth.imaging.steering import Steering
-from sonarsynth.products import EnergyImage, Signals
+from sonarsynth.products import Snapshots
 from sonarsynth.receiver import Elements, Sonar
 
 
@@ -46,20 +45,15 @@ class SubBand(Steering):
         """Its kind, and the number of sub-bands."""
         return f"{self.kind}, {self.bands} bands"
 
-    def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
-        """Image of the window from start to stop (s)."""
-        frequencies, spectra, unit = window_spectra(signals, sonar, start, stop)
+    def energies(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> Floats:
+        """As `Steering.energies`."""
         plain = AutoBeamforming(focus=self.focus, shading=self.shading).estimated(elements, sonar, AUTO_ERROR)
         gain = weights(elements, self.shading)
-        parts = np.array_split(np.arange(len(frequencies)), min(self.bands, len(frequencies)))
-        images = np.stack([plain.energies(spectra[:, part], frequencies[part], elements, sonar) for part in parts])
-        heard = np.array([mean_energy(spectra[:, part], gain) for part in parts])
-        return energy_image(unit * weighted_geometric_mean(images, heard), sonar, start, stop)
-
-
-def mean_energy(spectra: npt.NDArray[np.complexfloating], weight: Floats) -> float:
-    """Sum over bins of |spectra|^2 (sensor, bin), mean over sensors by weight (sensor,) of sum one."""
-    return float(weight @ np.sum(np.abs(spectra).astype(float) ** 2, axis=1))
+        bins = len(snapshots.frequency)
+        parts = [snapshots.select(some) for some in np.array_split(np.arange(bins), min(self.bands, bins))]
+        images = np.stack([plain.energies(part, elements, sonar) for part in parts])
+        heard = np.array([part.unit * part.power(gain).sum() for part in parts])
+        return weighted_geometric_mean(images, heard)
 
 
 def weighted_geometric_mean(energy: Floats, reference: Floats) -> Floats:

@@ -14,12 +14,10 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, PositiveMetres, PositiveSeconds, direction
 from sonarsynth.description import description
-from sonarsynth.imaging.image_window import Shading, energy_image
-from sonarsynth.imaging.steering import Steering
-from sonarsynth.products import BeamSpectra, EnergyImage, Signals
+from sonarsynth.imaging.image_window import Shading
+from sonarsynth.imaging.steering import BEAMS_AT_ONCE, Steering
+from sonarsynth.products import BeamSpectra, Snapshots
 from sonarsynth.receiver import Elements, Sonar
-
-BEAMS_AT_ONCE = 512
 
 
 @description
@@ -37,28 +35,29 @@ class TimeStatistic(Steering):
     def amplitude(self, magnitude: Floats) -> Floats:
         """The statistic (beam,) in Pa of magnitudes (beam, sample or window) in Pa."""
 
-    def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
-        """Image of the window from start to stop (s)."""
-        beams = self.beams(signals, elements, sonar, start, stop)
+    def energies(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> Floats:
+        """T a^2 (elevation, azimuth), in Pa2 s."""
+        beams = self.beams(snapshots, elements, sonar)
         grid = direction(sonar.beams.azimuth, sonar.beams.elevation[:, None])
-        u, rate = grid.reshape(-1, 3), beams.sampling_frequency
+        u, rate = grid.reshape(-1, 3), snapshots.sampling_frequency
         length = 1 if self.window is None else max(round(self.window * rate), 1)
         level = np.empty(len(u))
         for low in range(0, len(u), BEAMS_AT_ONCE):
             some = slice(low, low + BEAMS_AT_ONCE)
             level[some] = self.amplitude(root_mean_squares(beam_pressure(beams, u[some]), length))
-        return energy_image(beams.samples / rate * level.reshape(grid.shape[:2]) ** 2, sonar, start, stop)
+        return np.asarray(snapshots.duration * level.reshape(grid.shape[:2]) ** 2)
 
 
 def beam_pressure(beams: BeamSpectra, direction: Floats) -> Floats:
     """Pressure (beam, sample) in Pa of beams in `direction` (beam, xyz) over their window, in the band of the beams."""
     from scipy.fft import irfft
 
-    length, first = (round(f / beams.spacing) for f in (beams.sampling_frequency, beams.frequency[0]))
+    window = beams.snapshots
+    length, first = (round(f / window.spacing) for f in (window.sampling_frequency, window.frequency[0]))
     spectra = beams.spectra(direction)
     whole = np.zeros((len(spectra), length // 2 + 1), complex)
     whole[:, first : first + spectra.shape[1]] = spectra
-    return np.asarray(irfft(whole, length, axis=1)[:, : beams.samples])
+    return np.asarray(irfft(whole, length, axis=1)[:, : window.samples])
 
 
 def root_mean_squares(pressure: Floats, length: int) -> Floats:

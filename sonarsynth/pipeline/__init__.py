@@ -39,6 +39,7 @@ from sonarsynth.planning import Plan, check_unsampled_frame, context_of, plan, r
 from sonarsynth.planning.notes.source_notes import locator
 from sonarsynth.products import (
     Arrivals,
+    BeamSpectra,
     Echoes,
     EnergyImage,
     LinkBudget,
@@ -105,6 +106,7 @@ class BeamformedFrame:
     estimates: SourceEstimates | None
     image: EnergyImage | None
     imaged: Signals | None = None  # what the image was made of: without the snap's own reflections, where these go
+    beams: BeamSpectra | None = None  # of the echo window of these
     isolated: Floats | None = (
         None  # (snap, target + 1, family) dB: isolated paths of the link budget as signals have them;
     )
@@ -179,15 +181,15 @@ def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFr
     heard = float(estimates.time[0]) if snaps else np.nan
     start, stop = heard + plan.windows.echo_start, heard + plan.windows.echo_stop
     end = signals.start + plan.windows.samples / signals.sampling_frequency
-    imaged = signals
+    imaged, beams = signals, None
     if signals.start <= start and stop <= end:
         if processing.cancelling is not None:
             imaged = processing.cancelling.cancel(signals, estimates, receiver, survey, (start, stop))
-        imaged, image = image_of(plan, imaged, estimates, (start, stop))
+        imaged, beams, image = image_of(plan, imaged, estimates, (start, stop))
     else:  # no direct pulse was found, or an echo was taken for it: no clock, so no image, rather than an arbitrary one
         image = no_image(receiver.sonar, np.nan, np.nan)
     mark_stage("beamform")
-    return BeamformedFrame(signals, estimates, image, imaged)
+    return BeamformedFrame(signals, estimates, image, imaged, beams)
 
 
 def synthesise(plan: Plan, traced: TracedFrame) -> Signals:
@@ -243,11 +245,10 @@ def range_frame(plan: Plan, index: int, traced: TracedFrame, heard: BeamformedFr
 
 def cloud_of(plan: Plan, frame: Frame, heard: BeamformedFrame) -> PointCloud:
     """The points of a frame that has an image; `plan` is that of its sequence."""
-    image, signals, estimates = heard.image, heard.imaged, heard.estimates
-    if image is None or signals is None or estimates is None or not np.isfinite(image.start):
+    image, signals, estimates, beams = heard.image, heard.imaged, heard.estimates, heard.beams
+    if image is None or signals is None or estimates is None or beams is None:
         return no_points()
     elements, sonar, choices = plan.elements, plan.scene.sonar, plan.choices
-    beams = choices.beamforming.beams(signals, elements, sonar, image.start, image.stop)
     loudest = float(np.abs(signals.pressure).max(initial=0.0))
     window = ReceivedWindow(elements, sonar, image, beams, loudest, heard.signals, estimates)
     return point_cloud(window, choices.picking, choices.placing, frame.sonar_pose, plan.profile)

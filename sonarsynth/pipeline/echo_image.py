@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonarsynth.imaging.image_window import energy_image, snapshots_of
 from sonarsynth.planning import Plan
-from sonarsynth.products import EnergyImage, Signals, SourceEstimates
+from sonarsynth.products import BeamSpectra, EnergyImage, Signals, SourceEstimates
 from sonarsynth.ranging.cancelling.direct_pulse import remove, remove_others, trusted
 from sonarsynth.receiver import Sonar
 
 
 def image_of(
     plan: Plan, signals: Signals, estimates: SourceEstimates, window: tuple[float, float]
-) -> tuple[Signals, EnergyImage]:
-    """The image of an echo window (start, stop) in s, and the signals that it was made of.
+) -> tuple[Signals, BeamSpectra | None, EnergyImage]:
+    """The image of an echo window (start, stop) in s, the signals that it was made of, and their beams.
 
     The direct pulses of later snaps that are heard in the window are taken out; of the first one, where the plan says
     so. Where the plan takes the direct pulse out, what may be left of it is asked for in every beam.
@@ -22,17 +23,22 @@ def image_of(
     length = plan.windows.supports.clear
     if plan.scene.processing.direct_pulse != "keep":
         signals = remove_others(signals, estimates, elements, sonar, length, window)
-    if not plan.windows.direct_removed:
-        return signals, method.image(signals, elements, sonar, *window)
-    left = remove(signals, estimates, elements, sonar, length)
-    if left is None:  # what was located is no wave that could be taken out: no echo is told from it
-        return signals, no_image(sonar, *window, remainder=1.0)
+
+    def beams_of(some: Signals, start: float, stop: float) -> BeamSpectra:
+        return method.beams(snapshots_of(some, sonar, start, stop), elements, sonar)
 
     def imaging(some: Signals, start: float, stop: float) -> EnergyImage:
-        return method.image(some, elements, sonar, start, stop)
+        return energy_image(beams_of(some, start, stop).energies(), sonar, start, stop)
 
-    image = imaging(left, *window)
-    return left, trusted(image, signals, left, sonar, imaging, float(estimates.time[0]) - length)
+    if not plan.windows.direct_removed:
+        beams = beams_of(signals, *window)
+        return signals, beams, energy_image(beams.energies(), sonar, *window)
+    left = remove(signals, estimates, elements, sonar, length)
+    if left is None:  # what was located is no wave that could be taken out: no echo is told from it
+        return signals, None, no_image(sonar, *window, remainder=1.0)
+    beams = beams_of(left, *window)
+    image = energy_image(beams.energies(), sonar, *window)
+    return left, beams, trusted(image, signals, left, sonar, imaging, float(estimates.time[0]) - length)
 
 
 def no_image(sonar: Sonar, start: float, stop: float, remainder: float = np.nan) -> EnergyImage:

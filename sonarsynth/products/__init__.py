@@ -9,7 +9,7 @@ the instant of the frame; a snap at `Snap.time` is heard a travel time later).
 from sonarsynth.products.labels import LINK_BUDGET, ORIGINS, Echoes, LinkBudget, PointLabels, Truth
 from sonarsynth.products.paths import DIRECT, FAMILIES, Arrivals, Kind, Paths
 from sonarsynth.products.results import REASONS, EnergyImage, PointCloud, Signals, SourceEstimates, no_points
-from sonarsynth.products.steered_spectra import BeamSpectra
+from sonarsynth.products.steered_spectra import BeamSpectra, Snapshots
 
 __all__ = [
     "DIRECT",
@@ -27,6 +27,7 @@ __all__ = [
     "PointCloud",
     "PointLabels",
     "Signals",
+    "Snapshots",
     "SourceEstimates",
     "Truth",
     "no_points",

@@ -9,7 +9,7 @@ from sonarsynth.conventions import direction
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.imaging import Capon, DenseDelayAndSum
 from sonarsynth.imaging.delay_and_sum.dense import dense_energies
-from sonarsynth.imaging.image_window import window_spectra
+from sonarsynth.imaging.image_window import snapshots_of
 from sonarsynth.imaging.lattice_blocks import subarrays
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Band, BeamGrid, PlanarLattice, PositionTable, Romanis, Sonar, elements
@@ -48,10 +48,10 @@ def test_an_echo_30_db_under_a_source_15_degrees_off_keeps_its_level(side, floor
     level = 10.0 * np.log10(method.image(both, ROMANIS, SONAR, *WINDOW).energy / own)
     assert level[ROW, ECHO] == pytest.approx(0.0, abs=0.15)
     assert level[ROW, SOURCE] == pytest.approx(30.0, abs=0.15)
-    frequency, spectra, unit = window_spectra(both, SONAR, *WINDOW)
+    window = snapshots_of(both, SONAR, *WINDOW)
     blocks, spectrum = subarrays(ROMANIS, side), 0.0
-    for k, heard in method._focused(spectra, frequency, ROMANIS, SONAR):
-        spectrum = spectrum + unit / blocks.forms(method._inverse(blocks.covariance(heard)), k, SONAR.beams)
+    for k, heard in method._focused(window, ROMANIS, SONAR):
+        spectrum = spectrum + window.unit / blocks.forms(method._inverse(blocks.covariance(heard)), k, SONAR.beams)
     assert 10.0 * np.log10(spectrum[ROW, ECHO] / own) == pytest.approx(0.0, abs=0.15)
     assert away(10.0 * np.log10(spectrum / own)) == pytest.approx(floor, abs=0.3)
     assert away(level) < floor - 20.0
@@ -61,8 +61,8 @@ def test_beams_that_echoes_are_picked_from_pass_the_echo_and_not_the_source():
     echo, source = plane_wave(ECHO, 10.0**-1.5, 1.9e-3), plane_wave(SOURCE, 1.0, 1.5e-3)
     u = direction(SONAR.beams.azimuth[[ECHO]], SONAR.beams.elevation[ROW])
     method = Capon(focus=None)
-    beam = method.beams(signals(echo + source), ROMANIS, SONAR, *WINDOW).spectra(u)[0]
-    alone = method.beams(signals(echo), ROMANIS, SONAR, *WINDOW).spectra(u)[0]
+    beam = method.beams(snapshots_of(signals(echo + source), SONAR, *WINDOW), ROMANIS, SONAR).spectra(u)[0]
+    alone = method.beams(snapshots_of(signals(echo), SONAR, *WINDOW), ROMANIS, SONAR).spectra(u)[0]
     np.testing.assert_allclose(beam, alone, atol=0.03 * np.abs(alone).max())
 
 
@@ -71,7 +71,8 @@ def test_with_much_loading_it_is_delay_and_sum_of_the_blocks():
     parts, sonar = elements(array), Sonar(array=array, beams=BeamGrid(azimuths=7, elevations=4))
     heard = signals(np.random.default_rng(2).normal(size=(30, SAMPLES)))
     image = Capon(focus=None, subarray=3, loading=1e6).image(heard, parts, sonar, *WINDOW).energy
-    frequency, spectra, unit = window_spectra(heard, sonar, *WINDOW)
+    window = snapshots_of(heard, sonar, *WINDOW)
+    frequency, spectra, unit = window.frequency, window.spectra, window.unit
     u = direction(sonar.beams.azimuth, sonar.beams.elevation[:, None]).reshape(-1, 3)
     delay = focus_delay(parts.position, u, None, sonar.assumed_sound_speed)
     members = subarrays(parts, 3).members

@@ -14,6 +14,7 @@ from sonarsynth import pipeline, planning
 from sonarsynth.frontiers.image_knobs import apart
 from sonarsynth.frontiers.peers import acoular_image, likeness, thesis_image, thesis_pulse
 from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
+from sonarsynth.imaging.image_window import snapshots_of
 from sonarsynth.pipeline import BeamformedFrame, cloud_of
 from sonarsynth.products import Arrivals, EnergyImage, Signals
 from sonarsynth.recipe import reading
@@ -77,15 +78,16 @@ def bench(index: int = 32) -> dict[str, Any]:
         "error_of_peak_focus": relative(image.energy, dense.energy),  # separable against spherical focusing
     }
     if isinstance(beamformer, FocusedDelayAndSum):
-        one = replace(beamformer, zones=1)
-        axial, seconds = cpu(lambda: one.image(signals, plan.elements, sonar, start, stop))
+        axial, seconds = cpu(lambda: replace(beamformer, zones=1).image(signals, plan.elements, sonar, start, stop))
         stages["beamform"] |= {
             **likeness(image.energy, dense.energy),
             "one_zone": {"ms": 1e3 * seconds, **likeness(axial.energy, dense.energy)},
         }
 
+    beams = beamformer.beams(snapshots_of(signals, sonar, start, stop), plan.elements, sonar)
+
     def cloud(of: EnergyImage) -> Any:
-        return cloud_of(plan, traced.frame, BeamformedFrame(signals, located, of, signals))
+        return cloud_of(plan, traced.frame, BeamformedFrame(signals, located, of, signals, beams))
 
     points, seconds = cpu(lambda: cloud(image))
     difference, _, _ = apart(points, cloud(dense))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from sonarsynth.conventions import PositiveMetres
+from sonarsynth.conventions import Floats, PositiveMetres
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand
 from sonarsynth.imaging.delay_and_sum.dense import DenseDelayAndSum
@@ -12,7 +12,7 @@ from sonarsynth.imaging.delay_and_sum.focus_error import zones_needed
 from sonarsynth.imaging.delay_and_sum.focused import AUTO_ERROR, FocusedDelayAndSum
 from sonarsynth.imaging.image_window import Shading
 from sonarsynth.imaging.steering import Steering
-from sonarsynth.products import EnergyImage, Signals
+from sonarsynth.products import Snapshots
 from sonarsynth.receiver import Elements, Sonar
 
 
@@ -47,6 +47,6 @@ class AutoBeamforming(Steering):
                 return FocusedDelayAndSum(focus=self.focus, shading=self.shading, zones=zones)
         return DenseDelayAndSum(focus=self.focus, shading=self.shading)
 
-    def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
-        """Image of the window from start to stop (s), resolved for 0.1 dB."""
-        return self.estimated(elements, sonar, AUTO_ERROR).image(signals, elements, sonar, start, stop)
+    def energies(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> Floats:
+        """As `Steering.energies`, resolved for 0.1 dB."""
+        return self.estimated(elements, sonar, AUTO_ERROR).energies(snapshots, elements, sonar)

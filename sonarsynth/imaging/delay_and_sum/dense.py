@@ -12,9 +12,9 @@ from sonarsynth.description import description
 from sonarsynth.description.method import Demand
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.equations.arrays.beams import first_and_spacing
-from sonarsynth.imaging.image_window import Shading, energy_image, weights, window_spectra
+from sonarsynth.imaging.image_window import Shading, weights
 from sonarsynth.imaging.steering import Steering
-from sonarsynth.products import EnergyImage, Signals
+from sonarsynth.products import Snapshots
 from sonarsynth.receiver import Elements, Sonar
 
 BEAMS_AT_ONCE = 128
@@ -35,20 +35,13 @@ class DenseDelayAndSum(Steering):
         """Itself: exact."""
         return self, 0.0
 
-    def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
-        """Image of the window from start to stop (s)."""
-        frequencies, spectra, unit = window_spectra(signals, sonar, start, stop)
-        return energy_image(unit * self.energies(spectra, frequencies, elements, sonar), sonar, start, stop)
-
-    def energies(
-        self, spectra: npt.NDArray[np.complexfloating], frequencies: Floats, elements: Elements, sonar: Sonar
-    ) -> Floats:
-        """Sum over bins of |B|^2 of the beams of the grid: (elevation, azimuth), in the unit of spectra (sensor, bin)
-        squared; frequencies (bin,) Hz, evenly spaced. Raises ValueError when no element is live."""
+    def energies(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> Floats:
+        """As `Steering.energies`, in float64."""
         beams = direction(sonar.beams.azimuth, sonar.beams.elevation[:, None])
         delay = focus_delay(elements.position, beams.reshape(-1, 3), self.focus, sonar.assumed_sound_speed)
-        energy = dense_energies(spectra, delay, weights(elements, self.shading), frequencies)
-        return energy.reshape(beams.shape[:2])
+        weight = weights(elements, self.shading)
+        energy = dense_energies(snapshots.spectra, delay, weight, snapshots.frequency)
+        return snapshots.unit * energy.reshape(beams.shape[:2])
 
 
 def dense_energies(

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Annotated, Literal
 
-import numpy as np
-import numpy.typing as npt
 from annotated_types import Ge, Le
 
 from sonarsynth.conventions import Floats, PositiveMetres
@@ -20,9 +18,9 @@ from sonarsynth.imaging.delay_and_sum.lattice_image import (
     steered_zones,
     zoned_energies,
 )
-from sonarsynth.imaging.image_window import Shading, energy_image, weights, window_spectra
+from sonarsynth.imaging.image_window import Shading, weights
 from sonarsynth.imaging.steering import Steering
-from sonarsynth.products import EnergyImage, Signals
+from sonarsynth.products import Snapshots
 from sonarsynth.receiver import Elements, Sonar
 
 ZONES = (1, 2, 4, 8, 16, 32)
@@ -99,25 +97,17 @@ class FocusedDelayAndSum(Steering):
         """Only lattices are separable."""
         return "" if elements.on_lattice else "'focused' needs an array on a lattice; use 'dense' for other arrays"
 
-    def image(self, signals: Signals, elements: Elements, sonar: Sonar, start: float, stop: float) -> EnergyImage:
-        """Image of the window from start to stop (s). Raises ValueError for an array that is not a lattice."""
-        frequencies, spectra, unit = window_spectra(signals, sonar, start, stop)
-        return energy_image(unit * self.energies(spectra, frequencies, elements, sonar), sonar, start, stop)
-
-    def energies(
-        self, spectra: npt.NDArray[np.complexfloating], frequencies: Floats, elements: Elements, sonar: Sonar
-    ) -> Floats:
-        """Sum over bins of |B|^2 of the beams of the grid: (elevation, azimuth), in the unit of spectra (sensor, bin)
-        squared; frequencies (bin,) Hz, evenly spaced. Raises ValueError for an array that is not a lattice, or when no
-        element is live."""
+    def energies(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> Floats:
+        """As `Steering.energies`. Raises ValueError for an array that is not a lattice, or when no element is live."""
         check_lattice(elements)
+        spectra, frequency = snapshots.spectra, snapshots.frequency
         weight, grid, speed = weights(elements, self.shading), sonar.beams, sonar.assumed_sound_speed
         zones = self.zones if self.zones != "auto" else self._zones(elements, sonar)
         if zones == 1 or self.focus is None:
             axes = grid.azimuth, grid.elevation
-            return focused_energies(spectra, elements, weight, frequencies, *axes, speed, self.focus)
+            return snapshots.unit * focused_energies(spectra, elements, weight, frequency, *axes, speed, self.focus)
         cut = steered_zones(elements, self.shading, grid, self.focus, speed, sonar.band, zones)
-        return zoned_energies(spectra, elements, weight, frequencies, grid, speed, cut)
+        return snapshots.unit * zoned_energies(spectra, elements, weight, frequency, grid, speed, cut)
 
     def _zones(self, elements: Elements, sonar: Sonar) -> int:
         return zones_needed(elements, self.shading, sonar, self.focus, AUTO_ERROR) or MOST_ZONES

@@ -11,7 +11,7 @@ from sonarsynth.conventions import direction
 from sonarsynth.description.method import Demand
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.imaging.delay_and_sum.dense import dense_energies
-from sonarsynth.imaging.image_window import weights, window_spectra
+from sonarsynth.imaging.image_window import snapshots_of, weights
 from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.sampled_arrivals import arrivals_of
 from sonarsynth.planning.plans import Plan
@@ -51,10 +51,10 @@ def image_error(plan: Plan, method: Any, signals: Signals, start: float, stop: f
     row, column = np.nonzero(energy >= energy.max() * 10.0 ** (-WITHIN / 10.0))
     every = -(-len(row) // COMPARED)
     row, column = row[::every], column[::every]
-    frequencies, spectra, unit = window_spectra(signals, sonar, start, stop)
+    heard = snapshots_of(signals, sonar, start, stop)
     beams = direction(sonar.beams.azimuth[column], sonar.beams.elevation[row])
     delay = focus_delay(elements.position, beams, slow.focus, sonar.assumed_sound_speed)
-    exact = unit * dense_energies(spectra, delay, weights(elements, slow.shading), frequencies)
+    exact = heard.unit * dense_energies(heard.spectra, delay, weights(elements, slow.shading), heard.frequency)
     wrong = 10.0 * np.log10(energy[row, column] / exact)
     return float(np.sqrt(np.mean(wrong**2)))
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.imaging import FocusedDelayAndSum
+from sonarsynth.imaging.image_window import snapshots_of
 from sonarsynth.ranging import IsovelocityPlacing, Peaks, SensorDelays
 from sonarsynth.ranging.clouds import point_cloud
 from sonarsynth.ranging.location.locating import unlocatable
@@ -151,7 +152,7 @@ def _silence() -> Got:
     sonar = Sonar(array=PlanarLattice(columns=4, rows=4, pitch=0.1, face=0.0), beams=BeamGrid(azimuths=5, elevations=5))
     found = SensorDelays().locate(quiet, Receiver(POSE, FEW, sonar), Survey(100.0, PROFILE), 1)
     image = FocusedDelayAndSum().image(quiet, FEW, sonar, 1e-3, 6e-3)
-    beams = FocusedDelayAndSum().beams(quiet, FEW, sonar, 1e-3, 6e-3)
+    beams = FocusedDelayAndSum().beams(snapshots_of(quiet, sonar, 1e-3, 6e-3), FEW, sonar)
     window = ReceivedWindow(FEW, sonar, image, beams, 0.0, quiet, found)
     cloud = point_cloud(window, Peaks(), IsovelocityPlacing(), POSE, PROFILE)
     return together(
