@@ -21,6 +21,21 @@ class Demand:
     off_bottom: bool = False  # some source is not on the bottom
 
 
+@dataclass(frozen=True)
+class FrameSize:
+    """How much of everything there is in a frame: what the cost of methods grows with."""
+
+    emissions: int
+    sensors: int
+    samples: int  # of the signals of a sensor
+    bins: int  # frequencies of the echo window, in band
+    beams: int  # of the image
+    facets: int
+    paths: float  # by counts: each with the weight of its pulse, which some facets reshape
+    solid_angle: float = 0.0  # sr: of the largest target, as the array sees it
+    on_lattice: bool = True  # the sensors
+
+
 class Method:
     """How a method answers the planner. One that stands for several (`auto`) makes itself concrete in `resolve`."""
 
@@ -33,6 +48,13 @@ class Method:
     def exact(self) -> Any:
         """The exact, slow method that this one is to be judged by; itself where there is none."""
         return self
+
+    def cost(self, size: FrameSize) -> float:
+        """Seconds of one core that a frame takes, on the machine that costs are measured on (`planning.costs`).
+
+        Left at nothing, only the frames that are tried before a build tell (`schedule.predicting`).
+        """
+        return 0.0
 
     def variants(self) -> dict[str, Any]:
         """Other settings of it that `accuracy` walks, by what they are called: the knob, "at", the value."""

@@ -11,9 +11,10 @@ from annotated_types import Ge, Gt, Le
 
 from sonarsynth.conventions import Bools, Decibels, Floats, Number, PositiveMetres, direction
 from sonarsynth.description import description
+from sonarsynth.description.method import FrameSize
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.imaging.delay_and_sum.auto_beamformer import AutoBeamforming
-from sonarsynth.imaging.delay_and_sum.focused import AUTO_ERROR
+from sonarsynth.imaging.delay_and_sum.focused import AUTO_ERROR, FocusedDelayAndSum
 from sonarsynth.imaging.image_window import Shading, weights
 from sonarsynth.imaging.steering import Steering
 from sonarsynth.products import Snapshots
@@ -22,6 +23,9 @@ from sonarsynth.receiver import Elements, Sonar
 MAIN_LOBE = 0.05
 """Share of its peak above which a point's image is its main lobe, as far as that hangs together: side lobes of a full
 aperture are lower."""
+
+DIRECTIONS = 35
+"""In which a frame of the remus recipe, and one of the tank, has point echoes to 25 dB."""
 
 Place = tuple[int, int]
 """Row (elevation) and column (azimuth) of a beam."""
@@ -53,6 +57,10 @@ class Clean(Steering):
     """The work stops where nothing is left that is less than this under the brightest beam."""
     steps: Annotated[int, Ge(1), Le(100_000)] = 500
     """Times that something is taken away, at most."""
+
+    def cost(self, size: FrameSize) -> float:
+        """As `Method.cost`: an image for each direction that something is taken from."""
+        return DIRECTIONS * FocusedDelayAndSum(zones=4).cost(size)
 
     def row(self) -> str:
         """Its kind, and how far down it goes."""

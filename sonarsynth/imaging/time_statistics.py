@@ -14,6 +14,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, PositiveMetres, PositiveSeconds, direction
 from sonarsynth.description import description
+from sonarsynth.description.method import FrameSize
 from sonarsynth.imaging.image_window import Shading
 from sonarsynth.imaging.steering import BEAMS_AT_ONCE, Steering
 from sonarsynth.products import BeamSpectra, Snapshots
@@ -30,6 +31,10 @@ class TimeStatistic(Steering):
     """Weights over the aperture: all alike, or falling off towards the rim (lower side lobes, a wider beam)."""
     window: PositiveSeconds | None = None
     """The statistic is of root mean squares over windows so long, one after the other; left out, of samples."""
+
+    def cost(self, size: FrameSize) -> float:
+        """As `Method.cost`: beams steered one by one, and their transforms."""
+        return super().cost(size) + 1e-8 * size.beams * size.bins
 
     @abstractmethod
     def amplitude(self, magnitude: Floats) -> Floats:

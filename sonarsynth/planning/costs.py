@@ -1,8 +1,8 @@
 """What a plan costs: rows that `sonarsynth plan` prints.
 
-Costs are counts of work times seconds per unit of work, measured on one core of a 2-core AVX-512 machine (`tools/bench
-frame`), scaled by how fast this machine does a fixed set of transforms. Predictions are for one core, and quick: no
-frame is made. `schedule.predicting` makes some, and knows better.
+Each method says what it costs (`Method.cost`): counts of work times seconds per unit of work, measured on one core of a
+2-core AVX-512 machine (`tools/bench frame`), here scaled by how fast this machine does a fixed set of transforms. What
+no method owns is counted here. No frame is made: `schedule.predicting` makes some, and knows better.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from sonarsynth.description.method import FrameSize
 from sonarsynth.planning.plan_tables import Stage
 from sonarsynth.planning.plans import Plan
 
@@ -21,18 +22,11 @@ REFERENCE_TRANSFORM = 1.42e-3
 SECONDS = {
     "trace facet": 1.25e-6,  # straight rays, lit and seen, ray casting both ways, scattering law over the aperture
     "trace coherent facet": 2.2e-6,  # none of them is too faint
-    "trace refracted facet": 3e-6,  # eigenrays to the centre and to the probes of the aperture
     "label beam": 0.25e-6,
     "label facet": 0.28e-6,
-    "label refracted facet": 1.8e-6,
-    "synthesise path sensor": 1.0e-9,
-    "synthesise path sensor steradian": 3.6e-6,  # the wider a target, the more nodes and tiles
-    "synthesise sensor sample": 4.5e-9,
     "measure path": 1.3e-3,  # alone, at one hydrophone
     "remove sensor": 36e-6,
     "transform sensor sample": 1.6e-9,
-    "image beam bin": 1.2e-9,
-    "range beam": 70e-6,
     "write byte": 12e-9,
 }
 """Seconds per unit of work."""
@@ -40,8 +34,6 @@ ILLUMINATED_FRACTION, COHERENT = 0.22, 0.35
 """Share of the facets of a closed body that are paths: lit, seen and not too faint; and of coherent ones."""
 FILTERED_PULSE_COST = 1.9
 """Cost of synthesising a path whose pulse its facet reshapes, over that of one that repeats the snap."""
-RANGED_BEAMS = 60
-"""Beams over threshold round one glint."""
 
 
 @lru_cache(maxsize=1)
@@ -62,10 +54,6 @@ QUINTIC_COST = 1.6
 """Times what cubics over the array take, polynomials of the fifth degree take to trace."""
 
 
-def _facets(plan: Plan) -> int:
-    return sum(len(mesh.faces) for mesh in plan.scene.meshes)
-
-
 def _paths(plan: Plan) -> float:
     """Paths of one snap and family, each with the weight of its cost in the synthesis."""
     pairs = zip(plan.scene.laws, plan.scene.meshes, strict=True)
@@ -73,12 +61,11 @@ def _paths(plan: Plan) -> float:
     return sum(len(mesh.faces) * len(law.parts) * shares[law.coherent] for law, mesh in pairs)
 
 
-def _tracing(plan: Plan, kind: str) -> float:
+def _tracing(plan: Plan, size: FrameSize) -> float:
     """Seconds to trace every facet once."""
     pairs = zip(plan.scene.laws, plan.scene.meshes, strict=True)
-    extra = SECONDS["trace coherent facet"] - SECONDS["trace facet"]
-    each = SECONDS[f"trace {kind}facet"]
-    whole = sum(len(mesh.faces) * (each + extra * law.coherent) for law, mesh in pairs)
+    each = {law: SECONDS["trace coherent facet" if law else "trace facet"] for law in (False, True)}
+    whole = sum(len(mesh.faces) * each[law.coherent] for law, mesh in pairs) + plan.propagation.cost(size)
     return whole * (QUINTIC_COST if plan.choices.degree > 3 else 1.0)
 
 
@@ -99,17 +86,31 @@ def _solid_angle(plan: Plan) -> float:
     return max(angles)
 
 
-def _synthesis(plan: Plan) -> Row:
+def frame_size(plan: Plan) -> FrameSize:
+    """The sizes that the cost of methods grows with, of a frame of the plan's sequence."""
+    sizes, sonar = plan.sizes, plan.scene.sonar
+    gate = plan.windows.echo_stop - plan.windows.echo_start
+    return FrameSize(
+        emissions=sizes["emission"],
+        sensors=sizes["sensor"],
+        samples=sizes["sample"],
+        bins=max(round((sonar.band.high - sonar.band.low) * gate), 1) if np.isfinite(gate) else 1,
+        beams=sizes["azimuth"] * sizes["elevation"],
+        facets=sum(len(mesh.faces) for mesh in plan.scene.meshes),
+        paths=_paths(plan) * max(sizes["emission"], 1) * _ways(plan),
+        solid_angle=_solid_angle(plan),
+        on_lattice=plan.elements.on_lattice,
+    )
+
+
+def _synthesis(plan: Plan, size: FrameSize) -> Row:
     """The row of the synthesis, in seconds of the reference machine."""
-    scene, sizes = plan.scene, plan.sizes
-    sensor_samples = sizes["sensor"] * sizes["sample"]
-    paths = _paths(plan) * max(sizes["emission"], 1) * _ways(plan)
-    each = SECONDS["synthesise path sensor"] + _solid_angle(plan) * SECONDS["synthesise path sensor steradian"]
-    work = paths * sizes["sensor"] * each + sensor_samples * SECONDS["synthesise sensor sample"]
+    scene = plan.scene
+    work = plan.choices.synthesis.cost(size)
     noise = scene.world.environment.noise
     if noise is not None:
-        work += noise.seconds(sizes["sensor"], sizes["sample"])
-    stored = sensor_samples * (2 if scene.sonar.converter else 4) if "signals" in plan.products else 0
+        work += noise.cost(size)
+    stored = size.sensors * size.samples * (2 if scene.sonar.converter else 4) if "signals" in plan.products else 0
     error = f"{plan.errors.synthesis:.1g} of the peak" if plan.errors.synthesis else "rounding"
     error = NOT_STATED if np.isnan(plan.errors.synthesis) else error
     why = "requested" if "signals" in plan.products else f"needed by the {' and the '.join(sorted(plan.products))}"
@@ -160,62 +161,63 @@ Row = tuple[str, str, str, str, float, int]
 """A stage as `Stage` has it, in seconds of the reference machine."""
 
 
-def _trace_rows(plan: Plan) -> list[Row]:
+def _trace_rows(plan: Plan, size: FrameSize) -> list[Row]:
     """Paths, where any product needs them, and truth."""
-    sizes = plan.sizes
-    straight = not plan.propagation.bends
-    kind, rows = "" if straight else "refracted ", list[Row]()
+    rows = list[Row]()
     if plan.products:
         traced = 1 if plan.choices.subarrays == 1 else 1 + plan.choices.subarrays
-        why = "refraction is below the required accuracy" if straight else "the sound speed varies with depth"
-        seconds = _tracing(plan, kind) * max(sizes["emission"], 1) * _ways(plan) * traced
+        bent = plan.propagation.bends
+        why = "the sound speed varies with depth" if bent else "refraction is below the required accuracy"
+        seconds = _tracing(plan, size) * max(size.emissions, 1) * _ways(plan) * traced
         rows.append(("trace", _traced(plan), why, _expanded(plan), seconds, 0))
-    beams = sizes["azimuth"] * sizes["elevation"]
-    seconds = beams * SECONDS["label beam"] + _facets(plan) * SECONDS[f"label {kind}facet"]
-    return [*rows, ("label", "one ray per beam", "always", "none", seconds, beams * 10 + 4096)]
+    seconds = size.beams * SECONDS["label beam"] + size.facets * SECONDS["label facet"] + plan.propagation.cost(size)
+    return [*rows, ("label", "one ray per beam", "always", "none", seconds, size.beams * 10 + 4096)]
 
 
-def _signal_rows(plan: Plan) -> list[Row]:
+def _signal_rows(plan: Plan, size: FrameSize) -> list[Row]:
     """Signals, where any product needs them, and paths measured in signals of their own."""
-    rows = [_synthesis(plan)] if plan.products else []
+    rows = [_synthesis(plan, size)] if plan.products else []
     if "signals" in plan.products:
-        seconds = max(plan.sizes["emission"], 1) * (plan.sizes["target"] + 1) * SECONDS["measure path"]
+        seconds = max(size.emissions, 1) * (plan.sizes["target"] + 1) * SECONDS["measure path"]
         rows.append(("measure", "loudest path of each kind alone", "verify compares levels", "none", seconds, 0))
     return rows
 
 
-def _sonar_rows(plan: Plan) -> list[Row]:
+def _sonar_rows(plan: Plan, size: FrameSize) -> list[Row]:
     """What the sonar makes of signals."""
     if not plan.products & {"image", "cloud"}:
         return []
-    sonar, sizes = plan.scene.sonar, plan.sizes
-    beams, gate = sizes["azimuth"] * sizes["elevation"], plan.windows.echo_stop - plan.windows.echo_start
+    gate = plan.windows.echo_stop - plan.windows.echo_start
     locating, cancelling = plan.scene.processing.locating, plan.scene.processing.cancelling
-    seconds = locating.seconds(sizes["sensor"])
+    seconds = locating.cost(size)
     rows: list[Row] = [
         ("locate", locating.row(), "the echo window begins at the snap", "predicted, /source_estimates", seconds, 512)
     ]
-    image = sizes["sensor"] * gate * sonar.sampling_frequency * SECONDS["transform sensor sample"]
-    image += beams * (sonar.band.high - sonar.band.low) * gate * SECONDS["image beam bin"]
+    image = size.sensors * gate * plan.scene.sonar.sampling_frequency * SECONDS["transform sensor sample"]
+    image += plan.choices.beamforming.cost(size)
     if plan.windows.direct_removed:  # and what is left of it imaged
-        image = 2 * image + sizes["sensor"] * SECONDS["remove sensor"]
+        image = 2 * image + size.sensors * SECONDS["remove sensor"]
     if cancelling is not None:
-        image += cancelling.seconds(sizes["sensor"])
+        image += cancelling.cost(size)
     asked = "image" in plan.products
     why = "requested" if asked else "needed by the cloud"
     without = ", direct pulse removed" if plan.windows.direct_removed else ""
     without += "" if cancelling is None else f", {cancelling.row()} cancelling"
-    rows.append(("beamform", plan.choices.beamforming.row() + without, why, _steered(plan), image, 4 * beams * asked))
+    rows.append(
+        ("beamform", plan.choices.beamforming.row() + without, why, _steered(plan), image, 4 * size.beams * asked)
+    )
     if "cloud" in plan.products:
-        error, seconds = "predicted, /cloud/range_error" + _bent(plan), RANGED_BEAMS * SECONDS["range beam"]
+        error = "predicted, /cloud/range_error" + _bent(plan)
+        seconds = plan.choices.picking.cost(size) + plan.choices.placing.cost(size)
         method = f"{plan.choices.picking.row()}, {plan.choices.placing.row()}"
-        rows.append(("range", method, "requested", error, seconds, 66 * sizes["point"]))
+        rows.append(("range", method, "requested", error, seconds, 66 * plan.sizes["point"]))
     return rows
 
 
 def stages(plan: Plan) -> tuple[Stage, ...]:
     """What each stage will do, why, its error, and what it costs in one frame."""
-    rows, factor = [*_trace_rows(plan), *_signal_rows(plan), *_sonar_rows(plan)], machine_factor()
+    size, factor = frame_size(plan), machine_factor()
+    rows = [*_trace_rows(plan, size), *_signal_rows(plan, size), *_sonar_rows(plan, size)]
     total = sum(row[5] for row in rows)
     rows.append(("write", "zarr, blosc-zstd, crc32c", "always", "none", total * SECONDS["write byte"], 0))
     return tuple(Stage(a, b, c, d, seconds * factor, size) for a, b, c, d, seconds, size in rows)

@@ -8,6 +8,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, depth
 from sonarsynth.description import description
+from sonarsynth.description.method import FrameSize
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.rays.ray_solutions import COINCIDENT, GOOD, mean_slowness, water, within
 from sonarsynth.products import Paths
@@ -42,6 +43,10 @@ class Straight(PathModel):
     def exact(self) -> Refracted:
         """Bent rays."""
         return Refracted(bounces=self.bounces)
+
+    def cost(self, size: FrameSize) -> float:
+        """As `PathModel.cost`."""
+        return 0.0
 
     def connect(self, profile: Profile, environment_depth: float, start: Floats, end: Floats) -> Paths:
         """One path a pair and family, 1/r; arguments and errors as in `PathModel`. Coincident ends are flagged."""

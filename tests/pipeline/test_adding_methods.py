@@ -69,7 +69,7 @@ for which in json.loads(sys.argv[2]):
     count = int(cloud["count"])
     said[name] = {
         "recipe": tree.attrs["recipe"],
-        "rows": {row.stage: [row.method, row.error] for row in plan.stages},
+        "rows": {row.stage: [row.method, row.error, row.seconds] for row in plan.stages},
         "choices": {name: tree.attrs["choices"][name] for name in ("beamforming", "picking", "placing", "synthesis")},
         "energy": np.asarray(tree["image/energy"][0]).tolist(),
         "delay": cloud["delay"].values[:count].tolist(),
@@ -159,6 +159,13 @@ def test_it_runs_and_plan_and_store_say_so(said: dict[str, Any], kind: str, stag
     assert f"kind: {kind}" in mine["recipe"].replace("'", "")
     assert not choice or mine["choices"][choice]["kind"] == kind
     assert ("not stated" in mine["rows"][stage][1]) == (kind == "coherence_factor")
+
+
+@pytest.mark.parametrize(
+    ("kind", "stage", "ratio"), [("coherence_factor", "beamform", 1.2), ("whole_samples", "synthesise", 10.0)]
+)
+def test_what_it_costs_is_in_the_plan(said: dict[str, Any], kind: str, stage: str, ratio: float) -> None:
+    assert of(said, kind)["rows"][stage][2] > ratio * said["usual"]["rows"][stage][2]
 
 
 def direct_pulse(one: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:

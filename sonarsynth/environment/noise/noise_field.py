@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
-from sonarsynth.description.method import Method
+from sonarsynth.description.method import FrameSize, Method
 
 Complexes = npt.NDArray[np.complex128]
 
@@ -49,10 +49,10 @@ class NoiseField(Method):
         """Whether it is not independent between hydrophones."""
         return self.factors(np.array([1e4]), np.eye(2, 3)) is not None
 
-    def seconds(self, sensors: int, samples: int) -> float:
-        """Seconds that a frame of it takes on one core of the machine that costs are measured on."""
-        products = samples // 2 * sensors**3 / 3.0 if self.correlated else 0.0
-        return SECONDS * sensors * samples + PRODUCT_SECONDS * products
+    def cost(self, size: FrameSize) -> float:
+        """As `Method.cost`."""
+        products = size.samples // 2 * size.sensors**3 / 3.0 if self.correlated else 0.0
+        return SECONDS * size.sensors * size.samples + PRODUCT_SECONDS * products
 
     def validity(self, low: float, high: float) -> tuple[str, ...]:
         """Where its formulas do not hold in a band (Hz), one line each; `plan` says these, and the store has them."""

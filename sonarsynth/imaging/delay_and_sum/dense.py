@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from sonarsynth.conventions import Floats, PositiveMetres, direction
 from sonarsynth.description import description
-from sonarsynth.description.method import Demand
+from sonarsynth.description.method import Demand, FrameSize
 from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.equations.arrays.beams import first_and_spacing
 from sonarsynth.imaging.image_window import Shading, weights
@@ -34,6 +34,10 @@ class DenseDelayAndSum(Steering):
     def resolve(self, demand: Demand) -> tuple[DenseDelayAndSum, float]:
         """Itself: exact."""
         return self, 0.0
+
+    def cost(self, size: FrameSize) -> float:
+        """As `Method.cost`: every sensor in every beam."""
+        return 2.5e-9 * size.sensors * size.beams * size.bins
 
     def energies(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> Floats:
         """As `Steering.energies`, in float64."""

@@ -9,7 +9,7 @@ from annotated_types import Ge, Le
 
 from sonarsynth.conventions import Floats, PositiveMetres
 from sonarsynth.description import description
-from sonarsynth.description.method import Demand
+from sonarsynth.description.method import Demand, FrameSize
 from sonarsynth.imaging.delay_and_sum.dense import DenseDelayAndSum
 from sonarsynth.imaging.delay_and_sum.focus_error import MOST_ZONES, zones_needed
 from sonarsynth.imaging.delay_and_sum.lattice_image import (
@@ -88,6 +88,11 @@ class FocusedDelayAndSum(Steering):
     def exact(self) -> DenseDelayAndSum:
         """Every sensor in every beam, with the same focus and weights."""
         return DenseDelayAndSum(focus=self.focus, shading=self.shading)
+
+    def cost(self, size: FrameSize) -> float:
+        """As `Method.cost`; each zone is an image of its own, of part of the beams."""
+        zones = 1.0 if self.zones == "auto" else max(1.25 * self.zones, 1.0)
+        return 1.8e-9 * zones * size.beams * size.bins
 
     def row(self) -> str:
         """Its kind, and the zones where there are several."""

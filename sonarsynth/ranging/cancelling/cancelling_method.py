@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sonarsynth.description.method import Method
+from sonarsynth.description.method import FrameSize, Method
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.state import Receiver, Survey
 
@@ -25,6 +25,6 @@ class CancellingMethod(Method):
         """
         raise NotImplementedError(f"{type(self).__name__} cancels nothing")
 
-    def seconds(self, sensors: int) -> float:
-        """Seconds that a frame takes on one core of the machine that costs are measured on."""
-        return 18e-6 * sensors
+    def cost(self, size: FrameSize) -> float:
+        """As `Method.cost`."""
+        return 18e-6 * size.sensors

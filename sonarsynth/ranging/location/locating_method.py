@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonarsynth.description.method import Method
+from sonarsynth.description.method import FrameSize, Method
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.receiver import Elements
 from sonarsynth.state import Receiver, Snap, Survey, Trigger
@@ -32,6 +32,6 @@ class LocatingMethod(Method):
         """Distance (m) from the array centre within which it locates nothing."""
         return 0.0
 
-    def seconds(self, sensors: int) -> float:
-        """Seconds that a frame takes on one core of the machine that costs are measured on."""
-        return 8e-6 * sensors
+    def cost(self, size: FrameSize) -> float:
+        """As `Method.cost`."""
+        return 8e-6 * size.sensors

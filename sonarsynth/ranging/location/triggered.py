@@ -9,6 +9,7 @@ import numpy as np
 
 from sonarsynth.conventions import PositiveMetres, PositiveSeconds, depth
 from sonarsynth.description import description
+from sonarsynth.description.method import FrameSize
 from sonarsynth.environment.sound_speed import mean_gradient
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.location.locating_method import LocatingMethod
@@ -72,6 +73,6 @@ class Triggered(LocatingMethod):
         """As `Method.row`."""
         return f"trigger, to {1e6 * self.time_error:.3g} us and {self.position_error:.3g} m"
 
-    def seconds(self, sensors: int) -> float:
-        """As `LocatingMethod.seconds`: nothing is measured."""
+    def cost(self, size: FrameSize) -> float:
+        """As `Method.cost`: nothing is measured."""
         return 1e-4

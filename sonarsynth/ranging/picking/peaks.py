@@ -9,9 +9,12 @@ from annotated_types import Ge, Gt, Le
 
 from sonarsynth.conventions import Decibels, Number
 from sonarsynth.description import description
-from sonarsynth.description.method import Method
+from sonarsynth.description.method import FrameSize, Method
 from sonarsynth.ranging.picking.picked_echoes import PickedEchoes
 from sonarsynth.ranging.received_window import ReceivedWindow
+
+RANGED_BEAMS = 60
+"""Beams over threshold round one glint."""
 
 
 @description
@@ -43,6 +46,10 @@ class Peaks(Method):
         levels = {f"threshold at {x:g} dB": replace(self, threshold=x) for x in (3.0, 6.0, 12.0, 20.0)}
         levels |= {f"dynamic range at {x:g} dB": replace(self, dynamic_range=x) for x in (10.0, 15.0, 25.0, 35.0)}
         return levels | {f"false alarms at {x:g}": replace(self, false_alarms=x) for x in (1e-4, 1e-2, 1.0)}
+
+    def cost(self, size: FrameSize) -> float:
+        """As `Method.cost`: beams about one glint."""
+        return RANGED_BEAMS * 70e-6
 
     def picks(self, heard: ReceivedWindow) -> PickedEchoes:
         """See `PickingMethod`."""
