@@ -21,7 +21,7 @@ from sonarsynth.equations.scattering.facet_pulses import facet_response
 from sonarsynth.geometry import Pose
 from sonarsynth.labels import point_kernels as kernels
 from sonarsynth.labels.level_band import Band
-from sonarsynth.products import FAMILIES, Arrivals
+from sonarsynth.products import FAMILIES, Arrivals, Kind
 from sonarsynth.receiver import Elements
 
 GATE = 2.5
@@ -88,7 +88,7 @@ class Attribution:
 
     paths: Arrivals  # that may be heard, ascending in delay
     first: Ints  # (point,) the first path that may be heard then
-    target: Ints  # (group,) -1: the snap itself
+    target: Ints  # (group,) -1: the snap itself, or scatterers without a body
     snap: Ints  # (group,)
     family: Ints  # (group,) index into FAMILIES: on the way to the array
     lit_by: Ints  # (group,) index into FAMILIES: on the way to the target
@@ -139,7 +139,7 @@ def attribution(
         curvature,
         np.abs(paths.corner_delays).max(axis=1),
         group,
-        groups[0] < 0,
+        paths.direct[example],
         _spectra(paths, elements, fine),
         _matched(fine)[groups[1]],
         pulse,
@@ -156,7 +156,9 @@ def attribution(
 def _code(paths: Arrivals, snaps: int) -> Ints:
     """Number (path,) of the target, snap and ways to target and array of each."""
     ways = paths.lit_by * len(FAMILIES) + paths.arrives_by
-    return np.asarray(((paths.target + 1) * snaps + paths.snap) * len(FAMILIES) ** 2 + ways)
+    last = int(paths.target.max(initial=NO_TARGET)) + 1
+    owner = np.where(paths.kind == Kind.REVERBERATION, last, paths.target)
+    return np.asarray(((owner + 1) * snaps + paths.snap) * len(FAMILIES) ** 2 + ways)
 
 
 def _loud(arrivals: Arrivals, snaps: int) -> Bools:

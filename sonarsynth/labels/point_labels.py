@@ -12,7 +12,7 @@ from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels import point_kernels as kernels
 from sonarsynth.labels.attribution_of_points import MOST_BINS, Attribution, Listening, attribution
 from sonarsynth.labels.level_band import Band
-from sonarsynth.products import ORIGINS, Arrivals, PointCloud, PointLabels
+from sonarsynth.products import ORIGINS, Arrivals, Kind, PointCloud, PointLabels
 from sonarsynth.receiver import Elements
 from sonarsynth.receiver.mirror_images import mirror_normal
 from sonarsynth.state import WorldState
@@ -79,6 +79,7 @@ def _origins(paths: Arrivals, beam: Floats, listening: Listening, band: Band) ->
     if normal is not None:
         found[(paths.direction @ normal) * (beam @ normal) < 0.0] = ORIGINS.index("mirror image")
     found[paths.direct] = ORIGINS.index("snap itself")
+    found[paths.kind == Kind.REVERBERATION] = ORIGINS.index("reverberation")
     return found
 
 

@@ -143,7 +143,7 @@ def trace_at(plan: Plan, frame: Frame) -> TracedFrame:
     context = context_of(plan, frame)
     arrivals = trace(context, plan.propagation)
     mark_stage("trace")
-    seen = arrivals.seen_from_centre
+    seen = arrivals.seen_from_centre.without_reverberation
     levels = snap_levels(context.snaps)
     truth = label(context, plan.propagation, levels)
     band, targets = band_of(plan, context.snaps), len(context.bodies)

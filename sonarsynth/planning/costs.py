@@ -58,7 +58,12 @@ def _paths(plan: Plan) -> float:
     """Paths of one snap and family, each with the weight of its cost in the synthesis."""
     pairs = zip(plan.scene.laws, plan.scene.meshes, strict=True)
     shares = {True: COHERENT * FILTERED_PULSE_COST, False: ILLUMINATED_FRACTION}
-    return sum(len(mesh.faces) * len(law.parts) * shares[law.coherent] for law, mesh in pairs)
+    return _loose(plan) + sum(len(mesh.faces) * len(law.parts) * shares[law.coherent] for law, mesh in pairs)
+
+
+def _loose(plan: Plan) -> int:
+    """Scatterers that belong to no body."""
+    return sum(field.count for field in plan.scene.world.scatterers)
 
 
 def _tracing(plan: Plan, size: FrameSize) -> float:
@@ -66,6 +71,7 @@ def _tracing(plan: Plan, size: FrameSize) -> float:
     pairs = zip(plan.scene.laws, plan.scene.meshes, strict=True)
     each = {law: SECONDS["trace coherent facet" if law else "trace facet"] for law in (False, True)}
     whole = sum(len(mesh.faces) * each[law.coherent] for law, mesh in pairs) + plan.propagation.cost(size)
+    whole += _loose(plan) * each[False]
     return whole * (QUINTIC_COST if plan.choices.degree > 3 else 1.0)
 
 
@@ -96,7 +102,7 @@ def frame_size(plan: Plan) -> FrameSize:
         samples=sizes["sample"],
         bins=max(round((sonar.band.high - sonar.band.low) * gate), 1) if np.isfinite(gate) else 1,
         beams=sizes["azimuth"] * sizes["elevation"],
-        facets=sum(len(mesh.faces) for mesh in plan.scene.meshes),
+        facets=sum(len(mesh.faces) for mesh in plan.scene.meshes) + _loose(plan),
         paths=_paths(plan) * max(sizes["emission"], 1) * _ways(plan),
         solid_angle=_solid_angle(plan),
         on_lattice=plan.elements.on_lattice,
@@ -130,7 +136,8 @@ def _traced(plan: Plan) -> str:
     if plan.choices.occlusion == "sensors":
         to += ", occlusion from each hydrophone"
     sources = ", ".join(dict.fromkeys(source.row() for source in plan.scene.world.sources))
-    words = [f"{plan.propagation.row()} to {to}", f"{plan.propagation.bounces} bounces", laws, sources]
+    loose = ", ".join(field.row() for field in plan.scene.world.scatterers)
+    words = [f"{plan.propagation.row()} to {to}", f"{plan.propagation.bounces} bounces", laws, sources, loose]
     return ", ".join(word for word in words if word)
 
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.products.paths import Arrivals
 
-ORIGINS = ("main lobe", "side lobe", "grating lobe", "mirror image", "snap itself", "unexplained")
+ORIGINS = ("main lobe", "side lobe", "grating lobe", "mirror image", "snap itself", "unexplained", "reverberation")
 """How the array came to hear what made a point: in the beam, beside it, through a lobe that a lattice has in other
 directions, from behind a planar array, from no target but the snap (its direct pulse, or one that surface or bottom
 reflects), or from no path of the frame: noise, or what cancelling leaves."""

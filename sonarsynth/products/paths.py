@@ -170,6 +170,12 @@ class Arrivals:
         return replace(seen, occluded=seen.occluded[:, :0])
 
     @property
+    def without_reverberation(self) -> Arrivals:
+        """The paths of the source and of targets: those that levels and labels are about."""
+        apart = self.kind == Kind.REVERBERATION
+        return self.select(~apart) if apart.any() else self
+
+    @property
     def direct(self) -> Bools:
         """(path,) true for paths that met no target."""
         return np.asarray(self.kind == Kind.DIRECT)

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from annotated_types import Ge, Gt, Le
+from annotated_types import Ge, Gt, Le, MaxLen
 from pydantic import Field, ValidationInfo, field_validator
 
 from sonarsynth.conventions import Decibels, Floats, PositiveSeconds, Seconds
 from sonarsynth.description import description
+from sonarsynth.environment.scatterers import ScattererField
 from sonarsynth.environment.sea import Environment
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import Mesh
@@ -41,6 +42,8 @@ class World:
     """Bodies in the water."""
     sources: tuple[Source, ...] = ()
     """What makes the sound."""
+    scatterers: Annotated[tuple[ScattererField, ...], MaxLen(100)] = ()
+    """What scatters sound and belongs to no target: pieces of the bottom, stones."""
 
     @field_validator("targets")
     @classmethod
@@ -177,7 +180,9 @@ class Scene:
         snaps: list[Snap] = []
         for i, source in enumerate(self.world.sources):
             snaps += source.emissions(bottom, stream(seed, "snap", key, step, i), time)
-        return WorldState(time, bodies, tuple(snaps))
+        fields = enumerate(self.world.scatterers)
+        loose = tuple(some.scatterers(bottom, stream(seed, "scatterers", key, i)) for i, some in fields)
+        return WorldState(time, bodies, tuple(snaps), scatterers=loose)
 
     def frame(
         self,

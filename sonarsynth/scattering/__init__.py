@@ -12,6 +12,7 @@ from sonarsynth.scattering.kirchhoff import Kirchhoff
 from sonarsynth.scattering.kirchhoff_surface import PartlyReflecting
 from sonarsynth.scattering.law_validity import Scatterer
 from sonarsynth.scattering.mirror_lobe import MirrorLobe
+from sonarsynth.scattering.scatterers import PointScatterer, Scatterers
 
 Scattering = Annotated[MirrorLobe | Isotropic | Kirchhoff, BY_KIND]
 """Laws of scattering."""
@@ -23,6 +24,8 @@ __all__ = [
     "Kirchhoff",
     "MirrorLobe",
     "PartlyReflecting",
+    "PointScatterer",
     "Scatterer",
+    "Scatterers",
     "Scattering",
 ]

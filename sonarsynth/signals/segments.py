@@ -10,7 +10,7 @@ import numpy as np
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.equations.noise.filters import SUPPORT_TOLERANCE
 from sonarsynth.equations.scattering.facet_pulses import rough_factor
-from sonarsynth.products import Arrivals
+from sonarsynth.products import Arrivals, Kind
 from sonarsynth.receiver import Elements, Sonar, stop_frequency
 from sonarsynth.signals.array_paths import ArrayPaths, delay_and_gain, reach
 from sonarsynth.signals.filtered_pulse import PULSE_FEET, Reshaped, at_longest, silencing_blur, support_of
@@ -40,7 +40,7 @@ class Layout:
 
     stretches: tuple[Segment, ...]
     heard: Bools  # (path,) some of the pulse is in the window at some hydrophone
-    outside: int  # paths whose pulse is not wholly in the window at every hydrophone
+    outside: int  # paths but reverberation whose pulse is not wholly in the window at every hydrophone
     support: Floats  # (before or after, path) s: how far a pulse reaches from its arrival
 
 
@@ -81,7 +81,7 @@ def layout(
                 first = int(np.floor((early[chosen].min() - start) * fs)) - 1
                 last = int(np.ceil((late[chosen].max() - start) * fs)) + 1
                 stretches.append(Segment(chosen, waveform, coherent, first, fast_length(last - first + 1)))
-    return Layout(tuple(stretches), heard, int(cut.sum()), support)
+    return Layout(tuple(stretches), heard, int((cut & (arrivals.kind != Kind.REVERBERATION)).sum()), support)
 
 
 def _supports(

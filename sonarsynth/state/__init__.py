@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -14,7 +15,7 @@ from sonarsynth.geometry import Pose
 from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.receiver import Elements, Sonar
-from sonarsynth.scattering import FacetLaw
+from sonarsynth.scattering import FacetLaw, Scatterers
 from sonarsynth.sources.sound_source import Snap
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ class WorldState:
     time: float  # s since the start of the trajectory
     bodies: tuple[PlacedTarget, ...]
     snaps: tuple[Snap, ...]
+    scatterers: tuple[Scatterers, ...] = field(default=(), kw_only=True)  # that belong to no body, and hide nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +141,13 @@ class FrameContext(WorldState):
     receiver: Receiver
     laws: tuple[FacetLaw, ...] = ()  # how the facets of each body scatter
     tolerances: Tolerances = Tolerances()
+
+    @cached_property
+    def scattering(self) -> tuple[Scatterers, ...]:
+        """Everything that scatters: the facets of each body, then what belongs to none."""
+        laws = self.laws or (FacetLaw(),) * len(self.bodies)
+        of_bodies = (Scatterers.of_body(body, law) for body, law in zip(self.bodies, laws, strict=True))
+        return (*of_bodies, *self.scatterers)
 
 
 def meeting_times(tracks: Sequence[Track], snaps: tuple[Snap, ...], travel_time: TravelTime) -> Floats:

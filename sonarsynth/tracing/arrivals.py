@@ -48,7 +48,7 @@ def trace(context: FrameContext, propagation: Propagation) -> Arrivals:
     begun = set[int]()
     for some in occasions(context, moving):
         there = replace(receiver, pose=some.meeting.sonar.pose)
-        met = facet_paths(replace(context, bodies=some.bodies, receiver=there), propagation, some.targets)
+        met = facet_paths(replace(context, bodies=some.bodies, receiver=there), propagation, some.owners)
         array = replace(met, meeting=some.meeting)
         parts += [_direct(_hearing(array, snaps[index], moving), index) for index in set(some.snaps) - begun]
         parts += _echoes(array, some.snaps)
@@ -74,13 +74,14 @@ def arrivals(array: FacetPaths) -> Arrivals:
 
 def _echoes(array: FacetPaths, snaps: Iterable[int]) -> list[Arrivals]:
     """Echoes and shadow waves of some snaps."""
-    parts, through, laws = [], forward_paths(array), array.context.laws
+    parts, through, scattering = [], forward_paths(array), array.context.scattering
     for index in snaps:
         if not array.context.snaps[index].illuminates:
             continue
-        parts.append(echoes(array, index, tuple(law.parts for law in laws), Kind.ECHO))
+        parts.append(echoes(array, index, tuple(surface.law.parts for surface in scattering), Kind.ECHO))
         if through is not None:
-            parts.append(echoes(through, index, tuple(shadow_parts(law) for law in laws), Kind.FORWARD))
+            shadows = tuple(shadow_parts(surface.law) if surface.mesh is not None else () for surface in scattering)
+            parts.append(echoes(through, index, shadows, Kind.FORWARD))
     return parts
 
 

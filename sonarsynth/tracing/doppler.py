@@ -28,9 +28,9 @@ from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.motion import Track
-from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import Elements
+from sonarsynth.scattering import Scatterers
 from sonarsynth.state import Snap
 from sonarsynth.tracing.expansion.probe_paths import TERMS
 from sonarsynth.tracing.expansion.wavefront_polynomials import QUADRATIC_PROBES, SECOND_DEGREE, probes, sphere
@@ -91,13 +91,13 @@ class MetPaths:
         return np.asarray(back / np.sqrt(dot(back, back))[..., None])
 
 
-def velocities(bodies: tuple[PlacedTarget, ...], target: Ints, point: Floats) -> tuple[Floats, Floats]:
-    """Velocity (point, xyz) m/s of points of bodies (target of each), world, and the spin of their body rad/s."""
+def velocities(scattering: tuple[Scatterers, ...], owner: Ints, point: Floats) -> tuple[Floats, Floats]:
+    """Velocity (point, xyz) m/s of surface elements (owner of each), world, and the spin of their owner rad/s."""
     found, spins = np.zeros((2, len(point), 3))
-    for number, body in enumerate(bodies):
-        mine = target == number
-        spin = body.track.spin
-        found[mine] = body.velocity + np.cross(spin, point[mine] - body.pose.position) if spin.any() else body.velocity
+    for number, surface in enumerate(scattering):
+        mine, track = owner == number, surface.track
+        spin, velocity = track.spin, track.velocity
+        found[mine] = velocity + np.cross(spin, point[mine] - track.pose.position) if spin.any() else velocity
         spins[mine] = spin
     return found, spins
 

@@ -9,10 +9,9 @@ import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.equations.scattering.lobes import dot
-from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.scattering import Component
+from sonarsynth.scattering import Component, Scatterers
 from sonarsynth.scattering.components import CoherentKirchhoff, DiffuseKirchhoff, Lobe, Shadow
-from sonarsynth.scattering.facet_geometry import FacetGeometry, PulseResponse, patches
+from sonarsynth.scattering.facet_geometry import FacetGeometry, PulseResponse
 from sonarsynth.tracing.doppler import MetPaths
 from sonarsynth.tracing.transmit_paths import TransmitPaths
 
@@ -27,9 +26,9 @@ is alike on all facets, where these make up for each other (`Tolerances.facet_me
 
 @dataclass(frozen=True, eq=False)
 class EchoBatch:
-    """Echoes by one part of the law of one body, in the frame of the body."""
+    """Echoes by one part of the law of one owner, in its frame."""
 
-    body: PlacedTarget
+    surface: Scatterers
     part: Component
     row: Ints  # (echo,) which pair of a way and a leg
     patch: FacetGeometry  # (echo,)
@@ -49,7 +48,7 @@ class EchoBatch:
         """Amplitudes (echo, probe) in directions (echo, probe, xyz) of the world."""
         if (heights := self._heights) is not None:
             return np.asarray(self.amplitude[:, None] * self._elsewhere(heights, departure)[0])
-        away = self.body.pose.turn_to_body(departure)
+        away = self.surface.pose.turn_to_body(departure)
         return self.part.amplitude(self.incident[:, None, :], away, self.patch.over(), self.wavenumber[:, None])
 
     @property
@@ -59,7 +58,7 @@ class EchoBatch:
 
     def _elsewhere(self, heights: DiffuseKirchhoff, departure: Floats) -> tuple[Floats, Floats]:
         """As `DiffuseKirchhoff.elsewhere`, in directions (echo, probe, xyz) of the world."""
-        away, speed = self.body.pose.turn_to_body(departure), np.pi * sum(self.band) / self.wavenumber
+        away, speed = self.surface.pose.turn_to_body(departure), np.pi * sum(self.band) / self.wavenumber
         return heights.elsewhere(self.incident, self.scattered, away, self.patch, speed, self.band)
 
     @property
@@ -78,7 +77,7 @@ class EchoBatch:
         """Phase (echo, probe) in directions (echo, probe, xyz) of the world more than in that of the array centre."""
         if not (isinstance(self.part, CoherentKirchhoff) and self.part.turns):
             return np.zeros(departure.shape[:2])
-        away = self.body.pose.turn_to_body(departure)
+        away = self.surface.pose.turn_to_body(departure)
         seen_from_centre = self.part.phase(self.incident, self.scattered)[:, None]
         more = self.part.phase(self.incident[:, None, :], away) - seen_from_centre
         return np.asarray(more - 2.0 * np.pi * np.rint(more / (2.0 * np.pi)))
@@ -117,7 +116,7 @@ class EchoBatch:
             return self._elsewhere(heights, departure)[1]
         if not isinstance(self.part, CoherentKirchhoff | Shadow):
             return np.zeros(departure.shape[:2])
-        away, speed = self.body.pose.turn_to_body(departure), 2.0 * np.pi * centre / self.wavenumber
+        away, speed = self.surface.pose.turn_to_body(departure), 2.0 * np.pi * centre / self.wavenumber
         seen_from_centre = self.part.spread(self.incident, self.scattered, self.patch, speed)
         over = self.part.spread(self.incident[:, None, :], away, self.patch.over(), speed[:, None])
         return np.asarray(over - seen_from_centre[:, None])
@@ -127,7 +126,7 @@ class EchoBatch:
         """Where on its facet each echo comes from (echo, xyz) m, world, from the middle; 0 of means over facets."""
         if not isinstance(self.part, DiffuseKirchhoff):
             return np.zeros((len(self.row), 3))
-        return self.body.pose.turn_to_world(self.patch.spot)
+        return self.surface.pose.turn_to_world(self.patch.spot)
 
     def pulses(self, centre: float) -> PulseResponse:
         """What they make of the pulse; centre (Hz)."""
@@ -138,30 +137,32 @@ class EchoBatch:
 def echo_batches(
     array: FacetPaths, out: TransmitPaths, leg: Ints, parts: tuple[tuple[Component, ...], ...], carried: MetPaths | None
 ) -> list[EchoBatch]:
-    """Echoes of pairs of a way and a leg (pair,), by body and part; those that are nothing are left out; carried: by
+    """Echoes of pairs of a way and a leg (pair,), by owner and part; those that are nothing are left out; carried: by
     how much pairs differ from those that were traced, where anything moves."""
     facets, context, receiver, found = array.facets, array.context, array.context.receiver, []
     looked_for = context.tolerances.occlusion == "sensors" and receiver.elements.count > 1
-    target = facets.target[out.facet]
-    for number, (body, of_law) in enumerate(zip(context.bodies, parts, strict=True)):
-        row = np.flatnonzero(target == number)
+    owner = facets.owner[out.facet]
+    for number, (surface, of_law) in enumerate(zip(context.scattering, parts, strict=True)):
+        row = np.flatnonzero(owner == number)
         facet = facets.facet[out.facet[row]]
         arrival, departure = out.arrival[row], array.legs.departure[leg[row]]
         if carried is not None:
             mine = carried.select(row)
             arrival = mine.turned_back(arrival)
             departure = mine.turned_back(mine.departure(array.legs.length[leg[row]], departure))
-        incident, scattered = body.pose.turn_to_body(arrival), body.pose.turn_to_body(departure)
+        incident, scattered = surface.pose.turn_to_body(arrival), surface.pose.turn_to_body(departure)
         speed = context.medium.profile.at(depth(array.legs.point[leg[row]]))
         wavenumber = 2.0 * np.pi * receiver.centre / speed
         for part in (
             replace(p, beyond=True) if looked_for and isinstance(p, Lobe | CoherentKirchhoff | DiffuseKirchhoff) else p
             for p in of_law
         ):
-            patch = patches(body.mesh, not isinstance(part, Lobe)).select(facet)
+            patch = surface.geometry(not isinstance(part, Lobe)).select(facet)
             amplitude = part.amplitude(incident, scattered, patch, wavenumber)
-            sign = part.polarity(body.mesh)[facet]
-            group = EchoBatch(body, part, row, patch, incident, scattered, wavenumber, receiver.band, amplitude, sign)
+            sign = surface.polarity(part)[facet]
+            group = EchoBatch(
+                surface, part, row, patch, incident, scattered, wavenumber, receiver.band, amplitude, sign
+            )
             found.append(group.select(np.flatnonzero(amplitude)))
     return found
 

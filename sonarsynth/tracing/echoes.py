@@ -96,15 +96,15 @@ class _EchoBlock:
         """What decides which of them are kept."""
         row, amplitude = _columns(self.groups, "row", "amplitude")
         most = np.maximum(np.abs(self.few).max(axis=1, initial=0.0), np.abs(amplitude)) * self.factor[row]
-        target = self.array.facets.target[self.out.facet[row]]
+        owner = self.array.facets.owner[self.out.facet[row]]
         number = np.repeat(np.arange(len(self.groups)), [len(g.row) for g in self.groups])
         return EchoLevels(
-            most * in_band(self.pulses, self.array.context.receiver.band), self.pulses.coherent, target, number
+            most * in_band(self.pulses, self.array.context.receiver.band), self.pulses.coherent, owner, number
         )
 
 
 def echoes(array: FacetPaths, index: int, parts: tuple[tuple[Component, ...], ...], kind: Kind) -> Arrivals:
-    """Snap `index` to facet to array, over every facet of the legs that is lit; parts: of the law of each body.
+    """Snap `index` to facet to array, over every facet of the legs that is lit; parts: of the law of each owner.
 
     Facets are taken in blocks, so that little is held at a time; the echoes are those of one block, in its order.
     """
@@ -128,12 +128,12 @@ def echoes(array: FacetPaths, index: int, parts: tuple[tuple[Component, ...], ..
         view = partial(_away, array, legs, some.leg, some.carried)
         if meeting is not None and some.carried is not None:
             legs = received(legs, some.carried, meeting, profile)
-        target, facet = array.facets.target[out.facet], array.facets.facet[out.facet]
+        what, target, facet = array.met(out.facet, kind)
         amplitude, sign = _columns(some.groups, "amplitude", "sign")
         scattered, vary, loss = sign * amplitude, (variation, error), path_loss(array, snap, legs, out)
         one = assemble(
             legs, over, out, index, snap.time, loss,
-            kind=kind, target=target, facet=facet, scattering=scattered, variation=vary, pulses=some.pulses,
+            kind=what, target=target, facet=facet, scattering=scattered, variation=vary, pulses=some.pulses,
         )  # fmt: skip
         if meeting is not None and some.carried is not None:
             enough = array.context.tolerances.quadratic
@@ -193,9 +193,9 @@ def _carried(array: FacetPaths, snap: Snap, out: TransmitPaths, leg: Ints) -> tu
     """Ways (pair,) when and where the sound meets what moves, and the remainder of the motion."""
     meeting, facets = array.meeting, array.facets
     assert meeting is not None
-    target, point = facets.target[out.facet], facets.point[out.facet]
-    velocity, spin = velocities(array.context.bodies, target, point)
-    met = meeting.met[target]
+    owner, point = facets.owner[out.facet], facets.point[out.facet]
+    velocity, spin = velocities(array.context.scattering, owner, point)
+    met = meeting.met[owner]
     there, late = meets(out, met, velocity, snap.time, array.context.medium.profile.at(depth(point)))
     return there, met_paths(array.legs, leg, met, late, velocity, spin, meeting)
 
@@ -227,14 +227,14 @@ def _ways(array: FacetPaths, snap: Snap) -> TransmitPaths:
     start = np.broadcast_to(snap.position, (len(row), 3))
     paths = array.propagation.connect(medium.profile, medium.depth, start, facets.point[row])
     facet = row[paths.pair]
-    lit = usable(paths) & (np.einsum("ij,ij->i", facets.normal[facet], paths.arrival) < 0)
+    lit = usable(paths) & (np.einsum("ij,ij->i", facets.normal[facet], paths.arrival) <= 0)
     bounced = reflections(medium.environment, medium.profile, paths, array.context.receiver.centre)
     speed = float(medium.profile.at(depth(snap.position)))
     out = TransmitPaths.of(paths, bounced, facet, snap, speed)
     out = out.select(np.flatnonzero(lit & (out.spreading != 0.0)))
     out = out.select(~_hides(array, bodies, snap, out, facets.clear[out.facet]))
     for number, before in overlapping(bodies):
-        mine = np.flatnonzero(facets.target[out.facet] == number)
+        mine = np.flatnonzero(facets.owner[out.facet] == number)
         of = out.facet[mine]
         again = _hides(array, before, snap, out.select(mine), 2.0 * facets.point[of] - facets.clear[of])  # from under
         out = out.select(np.delete(np.arange(len(out.facet)), mine[again]))

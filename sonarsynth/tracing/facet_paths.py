@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import Ints
+from sonarsynth.conventions import NO_TARGET, Ints
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
+from sonarsynth.products import Kind
 from sonarsynth.state import FrameContext, Medium, Receiver
 from sonarsynth.tracing.doppler import Meeting
 from sonarsynth.tracing.expansion.array_expansion import ArrayExpansion, ExpansionSource, expansion_source
@@ -40,7 +41,7 @@ class FacetPaths:
     context: FrameContext  # bodies and array where they are when sound meets them
     propagation: Propagation
     first: int = 0  # of the legs, in the wavefronts
-    targets: tuple[int, ...] | None = None  # of the facets; None: all
+    owners: tuple[int, ...] | None = None  # of the facets; None: all
     meeting: Meeting | None = None  # when bodies and array are where they are here; None: nothing moves
 
     @property
@@ -73,6 +74,12 @@ class FacetPaths:
         """What bends the rays: the water, or for straight rays the speed at the array everywhere."""
         return bending(self.context.medium, self.propagation, self.context.receiver)
 
+    def met(self, row: Ints, kind: Kind) -> tuple[Ints, Ints, Ints]:
+        """What paths by facets (row) met: kind, target and facet of each (path,)."""
+        owner = self.facets.owner[row]
+        body = owner < len(self.context.bodies)
+        return np.where(body, kind, Kind.REVERBERATION), np.where(body, owner, NO_TARGET), self.facets.facet[row]
+
     def settled(self, leg: Ints) -> ReceivePaths:
         """Some legs (row,), with the hydrophones that bodies hide them from."""
         number, row = np.unique(leg[self.legs.open[leg]], return_inverse=True)
@@ -80,15 +87,14 @@ class FacetPaths:
         if not len(number):
             return legs
         some = self.legs.select(number)
-        side = self.facets.clear[some.row], self.facets.normal[some.row]
-        some = self.view(self.context.bodies).settled(some, *side)
+        some = self.view(self.context.bodies).settled(some, *self.facets.side(some.row, some.departure))
         occluded = legs.occluded.copy()
         occluded[legs.open] = some.occluded[row]
         return legs.seen(occluded, np.zeros(len(leg), bool))
 
 
-def facet_paths(context: FrameContext, propagation: Propagation, targets: tuple[int, ...] | None = None) -> FacetPaths:
-    """Facet to array, for every facet of every body, or of some targets, that leaves a ray for the array that no body
+def facet_paths(context: FrameContext, propagation: Propagation, owners: tuple[int, ...] | None = None) -> FacetPaths:
+    """Facet to array, for every surface element, or those of some owners, that leaves a ray for the array that no body
     hides.
 
     Raises ValueError for a body or an array that reaches out of the water.
@@ -100,22 +106,21 @@ def facet_paths(context: FrameContext, propagation: Propagation, targets: tuple[
     view = Occlusion(bodies, bent, receiver, propagation, tolerances)
     found: tuple[list[ReceivePaths], list[Facets]] = [], []
     seen = 0
-    for some in in_blocks(sum(len(body.mesh.faces) for body in bodies)):
-        every = facets_of(bodies, some)
-        if targets is not None and len(targets) < len(bodies):
-            every = every.select(np.isin(every.target, targets))
+    for some in in_blocks(sum(map(len, context.scattering))):
+        every = facets_of(context.scattering, some)
+        if owners is not None and len(owners) < len(context.scattering):
+            every = every.select(np.isin(every.owner, owners))
         if propagation.layered:
             every = every.select(may_face_receiver(every, receiver.pose.position, propagation.bounces, medium, slack))
         part = receive_paths(every, medium, receiver, propagation, slack)
-        side = every.clear[part.row], every.normal[part.row]
-        part = view.visible(part, *side)
+        part = view.visible(part, *every.side(part.row, part.departure))
         kept, row = np.unique(part.row, return_inverse=True)
         found[0].append(part.numbered(seen + row))
         found[1].append(every.select(kept))
         seen += len(kept)
     legs, facets = concatenate(found[0]), concatenate(found[1])
-    over = expansion_source(legs, facets.target[legs.row], bent, receiver, propagation, tolerances.degree)
-    return FacetPaths(legs, over, facets, context, propagation, targets=targets)
+    over = expansion_source(legs, facets.owner[legs.row], bent, receiver, propagation, tolerances.degree)
+    return FacetPaths(legs, over, facets, context, propagation, owners=owners)
 
 
 def bending(medium: Medium, propagation: Propagation, receiver: Receiver) -> Medium:

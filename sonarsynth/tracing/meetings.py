@@ -19,28 +19,28 @@ from sonarsynth.tracing.doppler import Meeting
 
 @dataclass(frozen=True, eq=False)
 class Occasion:
-    """What is traced together: some snaps, and the bodies whose echoes of them are heard at about one place."""
+    """What is traced together: some snaps, and what scatters whose echoes of them are heard at about one place."""
 
     snaps: tuple[int, ...]
-    targets: tuple[int, ...]
+    owners: tuple[int, ...]  # index into `FrameContext.scattering`
     bodies: tuple[PlacedTarget, ...]  # all of them, where the sound meets them
     meeting: Meeting
 
 
 @dataclass(frozen=True, eq=False)
 class _Times:
-    """When the sound of each snap meets the middle of bodies, and when the array hears that."""
+    """When the sound of each snap meets the middle of what scatters, and when the array hears that."""
 
     bodies: tuple[PlacedTarget, ...]
     sonar: Track
-    met: Floats  # (snap, body) s
-    heard: Floats  # (snap, body) s
+    met: Floats  # (snap, owner) s
+    heard: Floats  # (snap, owner) s
     shared: float
     wavenumber: float  # rad/m at the highest frequency
     aperture: float  # m
 
     def classes(self, snap: int) -> list[tuple[int, ...]]:
-        """Bodies, ascending, whose echoes of a snap the array hears at about one place."""
+        """Owners, ascending, whose echoes of a snap the array hears at about one place."""
         left, found = np.argsort(self.heard[snap], kind="stable").tolist(), []
         while left:
             first = float(self.heard[snap, left[0]])
@@ -52,10 +52,11 @@ class _Times:
 
     def serves(self, occasion: Occasion, snap: int) -> bool:
         """Whether what is traced on an occasion serves another snap as well."""
-        for body, late in zip(occasion.bodies, (self.met[snap] - occasion.meeting.met).tolist(), strict=True):
+        met = (self.met[snap] - occasion.meeting.met)[: len(occasion.bodies)]  # the others are at rest
+        for body, late in zip(occasion.bodies, met.tolist(), strict=True):
             if not self._near(body.track, late, body.mesh.radius, body.mesh.radius):
                 return False
-        late = self.heard[snap, list(occasion.targets)] - occasion.meeting.heard
+        late = self.heard[snap, list(occasion.owners)] - occasion.meeting.heard
         return all(self._array_near(occasion.meeting.sonar, seconds) for seconds in late.tolist())
 
     def _array_near(self, sonar: Track, seconds: float) -> bool:
@@ -80,22 +81,22 @@ def occasions(context: FrameContext, sonar: Track) -> list[Occasion]:
     array."""
     bodies, snaps, receiver = context.bodies, context.snaps, context.receiver
     speed = float(context.medium.profile.at(depth(sonar.pose.position)))
-    tracks = [body.track.part(0.5 * np.sum(body.mesh.box, axis=0)) for body in bodies]
+    tracks = [surface.track.part(surface.middle) for surface in context.scattering]
     met = meeting_times(tracks, snaps, lambda start, end: np.linalg.norm(end - start, axis=1) / speed)
     heard = hearing_times(positions(tracks, met), met, sonar, speed)
     wavenumber = 2.0 * np.pi * receiver.band[1] / speed
     times = _Times(bodies, sonar, met, heard, context.tolerances.shared, wavenumber, receiver.elements.aperture)
     found: list[Occasion] = []
     for snap in range(len(snaps)):
-        for targets in times.classes(snap):
+        for owners in times.classes(snap):
             for number, other in enumerate(found):
-                if other.targets == targets and times.serves(other, snap):
+                if other.owners == owners and times.serves(other, snap):
                     found[number] = replace(other, snaps=(*other.snaps, snap))
                     break
             else:
-                there = tuple(body.later(late) for body, late in zip(bodies, met[snap].tolist(), strict=True))
-                late = float(heard[snap, list(targets)].mean()) if targets else 0.0
-                found.append(Occasion((snap,), targets, there, Meeting(met[snap], late, sonar.later(late))))
+                there = tuple(body.later(late) for body, late in zip(bodies, met[snap].tolist(), strict=False))
+                late = float(heard[snap, list(owners)].mean()) if owners else 0.0
+                found.append(Occasion((snap,), owners, there, Meeting(met[snap], late, sonar.later(late))))
     return found
 
 

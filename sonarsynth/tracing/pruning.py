@@ -15,7 +15,7 @@ class EchoLevels(NamedTuple):
 
     strength: Floats  # (echo,) the largest amplitude that it has anywhere on the array
     coherent: Bools  # (echo,)
-    target: Ints  # (echo,)
+    owner: Ints  # (echo,) index into `FrameContext.scattering`
     group: Ints  # (echo,)
 
 
@@ -31,10 +31,10 @@ def loud_of_all(seen: list[EchoLevels], negligible: float) -> list[Bools]:
 
 def loud_ones(seen: EchoLevels, negligible: float) -> Bools:
     """Which (path,) are kept: all but the faintest of each target, by `arrivals.NEGLIGIBLE`."""
-    strength, coherent, target, _ = seen
+    strength, coherent, owner, _ = seen
     keep = np.ones(len(strength), bool)
-    for number, exponent in product(np.unique(target), (1, 2)):
-        some = np.flatnonzero((target == number) & (coherent == (exponent == 1)))
+    for number, exponent in product(np.unique(owner), (1, 2)):
+        some = np.flatnonzero((owner == number) & (coherent == (exponent == 1)))
         loudest = strength[some].max(initial=0.0)
         size = (strength[some] / (loudest or 1.0)) ** exponent  # amplitudes may be too small to be squared
         order = np.argsort(size, kind="stable")

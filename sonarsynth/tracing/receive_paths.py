@@ -15,6 +15,7 @@ from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Paths
 from sonarsynth.propagation.reflections import Reflections, reflections
+from sonarsynth.scattering import Scatterers
 from sonarsynth.state import Medium, Receiver
 from sonarsynth.tracing.occlusion.ray_cones import max_launch_deviation
 
@@ -81,14 +82,20 @@ class ReceivePaths:
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """Facets of the bodies, placed in the world."""
+    """All surface elements of a frame, placed in the world."""
 
-    target: Ints  # (facet,) index of the body
-    facet: Ints  # (facet,) index in its mesh
+    owner: Ints  # (facet,) index into `FrameContext.scattering`: of the body, where it has one
+    facet: Ints  # (facet,) index among those of its owner
     point: Floats  # (facet, xyz) m: centroid
     clear: Floats  # (facet, xyz) m: the centroid moved off its facet
     normal: Floats  # (facet, xyz)
     area: Floats  # (facet,) m2
+
+    def side(self, row: Ints, departure: Floats) -> tuple[Floats, Floats]:
+        """Where legs (leg, xyz) start clear of facets (row of each), and the normal of the side that they leave on:
+        where a facet has none, their departure (leg, xyz)."""
+        normal = self.normal[row]
+        return self.clear[row], np.where(normal.any(axis=1, keepdims=True), normal, departure)
 
     def select(self, keep: Bools | Ints | slice) -> Facets:
         """The facets picked by a mask, by indices, or by a slice, which copies nothing."""
@@ -153,23 +160,23 @@ def require_in_water(bodies: tuple[PlacedTarget, ...], bottom: float) -> None:
             raise ValueError(f"target '{body.name}' reaches {where} ({highest:g} to {deepest:g} m in {bottom:g} m)")
 
 
-def facets_of(bodies: tuple[PlacedTarget, ...], some: slice) -> Facets:
-    """Some of the facets of all bodies, one body after the other."""
-    last = np.cumsum([0, *(len(body.mesh.faces) for body in bodies)])
+def facets_of(scattering: tuple[Scatterers, ...], some: slice) -> Facets:
+    """Some of the surface elements of all, one owner after the other."""
+    last = np.cumsum([0, *map(len, scattering)])
     of = [slice(*np.clip([some.start - n, some.stop - n], 0, m - n)) for n, m in pairwise(last.tolist())]
-    target = np.repeat(np.arange(len(bodies)), [part.stop - part.start for part in of])
-    none, mine = np.empty((0, 3)), list(zip(bodies, of, strict=True))
-    point = np.concatenate([none, *(b.pose.to_world(b.mesh.centroid[part]) for b, part in mine)])
-    normal = np.concatenate([none, *(b.pose.turn_to_world(b.mesh.normal[part]) for b, part in mine)])
+    owner = np.repeat(np.arange(len(scattering)), [part.stop - part.start for part in of])
+    none, mine = np.empty((0, 3)), list(zip(scattering, of, strict=True))
+    point = np.concatenate([none, *(s.pose.to_world(s.position[part]) for s, part in mine)])
+    normal = np.concatenate([none, *(s.pose.turn_to_world(s.normal[part]) for s, part in mine)])
     rounding = 8.0 * np.finfo(float).eps * np.abs(point).max(axis=1, initial=0.0)  # of places in the world
-    offset = np.maximum(OFFSET * np.array([b.mesh.radius for b in bodies])[target], rounding)
+    offset = np.maximum(OFFSET * np.array([s.offset for s in scattering])[owner], rounding)
     return Facets(
-        target=target,
+        owner=owner,
         facet=np.concatenate([np.empty(0, np.int64), *(np.arange(part.start, part.stop) for part in of)]),
         point=point,
         clear=point + offset[:, None] * normal,
         normal=normal,
-        area=np.concatenate([np.empty(0), *(b.mesh.area[part] for b, part in mine)]),
+        area=np.concatenate([np.empty(0), *(s.area[part] for s, part in mine)]),
     )
 
 
@@ -184,7 +191,7 @@ def receive_paths(
     ahead = np.einsum("ij,ij->i", facets.normal[legs.row], legs.departure) * legs.length
     if slack and propagation.bends:
         ahead += legs.swerve(medium, receiver, slack) * (legs.length + slack)
-    return legs.select(np.flatnonzero(ahead > -slack))
+    return legs.select(np.flatnonzero(ahead >= -slack))
 
 
 def may_face_receiver(facets: Facets, position: Floats, bounces: int, medium: Medium, slack: float = 0.0) -> Bools:
@@ -195,7 +202,7 @@ def may_face_receiver(facets: Facets, position: Floats, bounces: int, medium: Me
     less, and by Snell's law its cosine is nowhere less than there times the ratio of the extreme sound speeds.
     """
     if not bounces and medium.profile.uniform:
-        return np.asarray(np.einsum("ij,ij->i", facets.normal, position - facets.point) > -slack)
+        return np.asarray(np.einsum("ij,ij->i", facets.normal, position - facets.point) >= -slack)
     level = position[:2] - facets.point[:, :2]
     distance = np.hypot(level[:, 0], level[:, 1])
     flattest = distance / np.hypot(distance, (bounces + 2) * medium.depth)

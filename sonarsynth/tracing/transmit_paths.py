@@ -91,7 +91,7 @@ def directed(snap: Snap, departure: Floats) -> tuple[Floats | float, Floats | fl
 
 def assemble(
     legs: ReceivePaths, over: ExpansionTerms, out: TransmitPaths, index: int, time: float, loss: Floats,
-    *, kind: Kind, target: Ints, facet: Ints, scattering: Floats, variation: tuple[Floats, float],
+    *, kind: Ints | Kind, target: Ints, facet: Ints, scattering: Floats, variation: tuple[Floats, float],
     pulses: PulseResponse,
 ) -> Arrivals:  # fmt: skip
     """Arrivals of snap `index` at `time` (s) from both halves of their paths; over: the wavefronts; loss: absorption of
@@ -100,7 +100,7 @@ def assemble(
     sign, phase = as_sign(out.phase + legs.phase + pulses.phase)
     boundary = sign * out.boundary * legs.boundary
     first, second = out.spreading, legs.spreading
-    if kind == Kind.DIRECT:
+    if np.ndim(kind) == 0 and kind == Kind.DIRECT:
         first, second = second, first
     return Arrivals(
         delay=time + (out.travel_time + legs.travel_time),
@@ -117,7 +117,7 @@ def assemble(
         boundary=boundary,
         absorption=loss,
         length=length,
-        kind=np.full(len(length), kind, np.int8),
+        kind=np.broadcast_to(np.asarray(kind, np.int8), length.shape),
         snap=np.full(len(length), index),
         target=target,
         facet=facet,

@@ -15,6 +15,7 @@ from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.propagation import Propagation, Refracted, Straight
 from sonarsynth.receiver import Elements, Romanis, elements
 from sonarsynth.receiver.subarrays import subarray
+from sonarsynth.scattering import FacetLaw, Scatterers
 from sonarsynth.state import Medium, Receiver, Tolerances
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Cylinder, LShape, Remus100, Shape, Sphere
@@ -64,7 +65,9 @@ def seen_alone(view: Occlusion, legs: ReceivePaths, start: Floats, normal: Float
 
 def shaded(bodies: tuple[PlacedTarget, ...], array: Elements, rays: Propagation, profile: Profile) -> Bools:
     """Hold every leg against each hydrophone by itself: (leg, sensor) which do not see it."""
-    facets = facets_of(bodies, slice(0, sum(len(b.mesh.faces) for b in bodies)))
+    facets = facets_of(
+        tuple(Scatterers.of_body(b, FacetLaw()) for b in bodies), slice(0, sum(len(b.mesh.faces) for b in bodies))
+    )
     water, receiver = Medium(WATER, profile), Receiver(SONAR, array)
     legs = receive_paths(facets, water, receiver, rays, array.aperture)
     view = Occlusion(bodies, bending(water, rays, receiver), receiver, rays, Tolerances(occlusion="sensors"))

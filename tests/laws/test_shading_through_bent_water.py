@@ -9,6 +9,7 @@ from sonarsynth.geometry import Pose
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.propagation import Propagation, Refracted
 from sonarsynth.receiver import Elements
+from sonarsynth.scattering import FacetLaw, Scatterers
 from sonarsynth.state import Medium, Receiver, Tolerances
 from sonarsynth.targets.shapes import Sphere
 from sonarsynth.tracing.occlusion.launch_deviation import launch_deviation, towards
@@ -61,7 +62,7 @@ def some_facets(seed: int) -> tuple[tuple[PlacedTarget, ...], Facets]:
     ball = body(Sphere(radius=0.5, edge=0.05), (12.0, 0.9, -14.5), 0.0)
     bodies = (*some_bodies(seed), ball)
     count = [len(b.mesh.faces) for b in bodies]
-    every = facets_of(bodies, slice(0, sum(count)))
+    every = facets_of(tuple(Scatterers.of_body(b, FacetLaw()) for b in bodies), slice(0, sum(count)))
     return bodies, every.select(np.unique(np.linspace(0, sum(count) - 1, 1500).astype(int)))
 
 

@@ -32,6 +32,7 @@ UNIONS = {
     "ranging/location": "Locator",
     "ranging/cancelling": "Cancelling",
     "sources": "Source",
+    "environment/scatterers": "ScattererField",
 }
 KINDS = (
     {
@@ -46,6 +47,7 @@ KINDS = (
         "scene.processing.cancelling": "time_gate, length: 10 ms",
     },
     {"scene.physics.tracing": "measured_current"},
+    {"scene.world.scatterers": "surface_patch, centre: [1.1, 0.0], side: 0.2, pieces: 50, strength: -10 dB"},
     {"scene.world.sources.0": "pinger, position: [0.6, -0.25, -0.3]"},
 )
 SCRIPT = """
@@ -60,7 +62,8 @@ base += ["scene.sonar.array={kind: planar_lattice, columns: 8, rows: 6, pitch: 3
 base += ["scene.world.targets.0.shape={kind: cylinder, radius: 6 cm, length: 30 cm, edge: 3 cm}"]  # exact sums are slow
 said = {}
 for which in json.loads(sys.argv[2]):
-    sets = [f"{path}={{kind: {kind}}}" for path, kind in which.items()]
+    sets = [f"{path}={{kind: {kind}}}" for path, kind in which.items() if not path.endswith("scatterers")]
+    sets += [f"{path}=[{{kind: {kind}}}]" for path, kind in which.items() if path.endswith("scatterers")]
     plan = ss.plan(ss.load(sys.argv[3], base + sets))
     name = " ".join(kind.partition(",")[0] for kind in which.values()) or "usual"
     assert schedule.build(plan, f"{name}.zarr", workers=0).ok
@@ -151,6 +154,7 @@ def of(said: dict[str, Any], kind: str) -> dict[str, Any]:
         ("surveyed_source", "locate", ""),
         ("time_gate", "beamform", ""),
         ("pinger", "trace", ""),
+        ("surface_patch", "trace", ""),
     ],
 )
 def test_it_runs_and_plan_and_store_say_so(said: dict[str, Any], kind: str, stage: str, choice: str) -> None:
@@ -211,6 +215,17 @@ def test_the_pinger_sweeps_at_its_level(said: dict[str, Any]) -> None:
         halves = np.abs(np.fft.rfft(ping[: ping.size // 2 * 2].reshape(2, -1), 256)) ** 2
         early, late = (float(np.average(np.fft.rfftfreq(256, 1.0 / rate), weights=half)) for half in halves)
         assert 40e3 < early < late - 4e3 < 66e3
+
+
+def test_the_surface_is_heard_when_sound_can_have_been_there(said: dict[str, Any]) -> None:
+    mine, usual = of(said, "surface_patch"), said["usual"]
+    more = np.abs(np.subtract(mine["sensors"], usual["sensors"])).max(axis=0)
+    source, array = np.array([0.6, -0.25, -0.3]), np.array([0.0, 0.0, -0.15])
+    corners = np.array([[x, y, 0.0] for x in (1.0, 1.2) for y in (-0.1, 0.1)])
+    way = np.linalg.norm(corners - source, axis=1) + np.linalg.norm(corners - array, axis=1)
+    heard = mine["start"] + np.flatnonzero(more > 0.3 * more.max()) / 196e3
+    assert way.min() / 1490.0 - 3e-5 < heard[0] and heard[-1] < way.max() / 1480.0 + 3e-5
+    assert more.max() > 1e-4 * np.abs(usual["sensors"]).max()
 
 
 def test_the_noise_is_as_loud_as_it_says(said: dict[str, Any]) -> None:

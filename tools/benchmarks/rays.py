@@ -118,7 +118,7 @@ def batch(plan: Plan, index: int, bounces: int) -> dict[str, Any]:
     found, seconds = median(search, 3)
     (time_on, gain_on), seconds_on = median(lambda: continued(water, made, position, distance))
     (delay, of_fronts), seconds_evaluate = median(lambda: expanded(plan, made))
-    group = made.facets.target[legs.row]
+    group = made.facets.owner[legs.row]
     _, seconds_fronts = median(lambda: array_expansion(legs, group, plan.medium, context.receiver, propagation))
     time_exact, gain_exact = of_legs(found, made, some, sensors, time_on)
     paths = len(legs.row) * sensors

@@ -41,7 +41,8 @@ def context_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> FrameC
         degree=choices.degree,
     )
     world = frame.moment
-    return FrameContext(world.time, world.bodies, world.snaps, plan.medium, receiver, plan.scene.laws, tolerances)
+    everything = world.time, world.bodies, world.snaps, plan.medium, receiver, plan.scene.laws, tolerances
+    return FrameContext(*everything, scatterers=world.scatterers)
 
 
 def receiver_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Receiver:

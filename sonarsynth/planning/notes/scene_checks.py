@@ -145,6 +145,9 @@ def check_frame(scene: Scene, frame: Frame) -> None:
         if inside(body, frame.sonar_pose.position):
             raise FieldError(path, f"target '{body.name}' contains the sonar at frame {frame.index}")
     _check_snaps(scene, frame)
+    for number, field in enumerate(frame.moment.scatterers):
+        where = ("scene", "world", "scatterers", number)
+        _check_depth(where, "a scatterer", field.position, scene.world.environment.depth, f"frame {frame.index}")
 
 
 def _check_met(scene: Scene, frame: Frame, number: int) -> None:

@@ -45,19 +45,20 @@ def blocking_bodies(context: FrameContext, source: Floats | None = None) -> tupl
 def forward_paths(array: FacetPaths) -> FacetPaths | None:
     """Facet to array, for every facet of the bodies that scatter forward, seen or not; None where there is none."""
     context, propagation = array.context, array.propagation
-    bodies, laws, receiver = context.bodies, context.laws, context.receiver
+    laws, receiver = context.laws, context.receiver
     solid = blocking_bodies(context)
-    if len(solid) == len(bodies):
+    if len(solid) == len(context.bodies):
         return None
-    every = facets_of(bodies, slice(0, sum(len(body.mesh.faces) for body in bodies)))
-    mine = range(len(laws)) if array.targets is None else array.targets
+    of_bodies = context.scattering[: len(laws)]
+    every = facets_of(of_bodies, slice(0, sum(map(len, of_bodies))))
+    mine = range(len(laws)) if array.owners is None else array.owners
     scatters = np.array([bool(shadow_parts(law)) and number in mine for number, law in enumerate(laws)])
-    every = every.select(scatters[every.target])
+    every = every.select(scatters[every.owner])
     legs = rays_to_centre(context.medium, every.point, receiver, propagation)
     view = array.view(solid)
     legs = view.visible(legs, every.clear[legs.row], None)
     legs = view.settled(legs, every.clear[legs.row], None)
     kept, row = np.unique(legs.row, return_inverse=True)
     legs, facets = legs.numbered(row), every.select(kept)
-    over = expansion_source(legs, facets.target[legs.row], array.bending, receiver, propagation)
+    over = expansion_source(legs, facets.owner[legs.row], array.bending, receiver, propagation)
     return replace(array, legs=legs, wavefronts=over, facets=facets)
