@@ -15,6 +15,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -91,14 +92,15 @@ def begun(source: Source | None = None) -> dict[str, Any]:
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
             "recipe_as_written": "" if source is None else source.text,
             "recipe_settings": [] if source is None else list(source.settings),
-            "versions": versions(),
+            "versions": dict(versions()),
             "machine": machine(),
             "git": git_state(),
         }
     }
 
 
-def versions() -> dict[str, str]:
+@cache  # reading the metadata of all libraries takes a quarter of the time in which a small store is laid out
+def versions() -> Mapping[str, str]:
     """Versions of Python, of the libraries that touch numbers, and of the BLAS."""
     found = {"python": f"{platform.python_implementation()} {platform.python_version()}"}
     for name in LIBRARIES:

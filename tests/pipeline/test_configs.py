@@ -47,7 +47,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
         sets: tuple[str, ...] = ()
         if name == "harbour.yaml":
             sets = harbour.written(folder)
-        made = _plan(name, sets)
+        made = _plan(name, *sets)
         report = schedule.build(made, folder / f"{name}.zarr", frames=FRAMES.get(name), workers=0)
         assert report.ok and report.written == len(FRAMES.get(name, range(made.sizes["frame"])))
         return folder / f"{name}.zarr"
@@ -87,15 +87,15 @@ def test_the_echo_of_the_tank_is_ranged_through_the_direct_pulse(built: Callable
 
 def test_the_tank_without_the_echo_says_so() -> None:
     """Kept, the direct pulse hides the echo: no point is made of its edge, and the plan names frame, target, share."""
-    made = _plan("tank.yaml", ("scene.processing.direct_pulse=keep",))
+    made = _plan("tank.yaml", "scene.processing.direct_pulse=keep")
     (note,) = (line for line in made.warnings if "lost" in line)
     assert note.startswith("cylinder: 100 % of its echo") and note.endswith("is lost to the echo window in frame 0")
     assert not np.isfinite(render(made, 0)["cloud/range"].values).any()
 
 
 @cache
-def _plan(name: str, sets: tuple[str, ...] = ()) -> Plan:
-    """A plan is made once: that of the thermocline takes as long as its frames."""
+def _plan(name: str, *sets: str) -> Plan:
+    """A plan is made once, by whatever test: that of the thermocline takes as long as its frames."""
     return planning.plan(reading.load(CONFIGS / name, sets))
 
 
@@ -152,7 +152,7 @@ def test_ghosts_by_surface_and_bottom_are_imaged_where_the_truth_says(built: Cal
 
 
 def test_points_lit_by_another_snap_say_so_and_are_warned_of(tmp_path: Path) -> None:
-    made = _plan("crowd.yaml", ("scene.processing.direct_pulse=keep",))
+    made = _plan("crowd.yaml", "scene.processing.direct_pulse=keep")
     assert schedule.build(made, tmp_path / "crowd.zarr", frames=(0,), workers=0).ok
     checks = _checks(tmp_path / "crowd.zarr")
     assert checks["predicted range errors"].ok
@@ -226,7 +226,7 @@ def test_rays_from_the_l_shape_go_on_to_the_shrimp() -> None:
 
 @needs_real_input
 def test_real_water_and_a_real_hull(tmp_path: Path) -> None:
-    made = _plan("harbour.yaml", harbour.settings(REAL / "castaway_ctd.csv", REAL / "rexrov.stl"))
+    made = _plan("harbour.yaml", *harbour.settings(REAL / "castaway_ctd.csv", REAL / "rexrov.stl"))
     report = schedule.build(made, tmp_path / "harbour.zarr", frames=range(0, 16, 5), workers=0)
     assert report.ok
     checks = _checks(tmp_path / "harbour.zarr")
