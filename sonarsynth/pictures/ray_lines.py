@@ -23,7 +23,7 @@ from sonarsynth.equations.rays.ray_solutions import (
     water,
 )
 from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.pictures.figures.ray_figure import FAN
+from sonarsynth.pictures.ray_figures.ray_styles import FAN
 from sonarsynth.planning import Plan
 from sonarsynth.products import FAMILIES
 from sonarsynth.propagation.polylines import Polylines, polylines

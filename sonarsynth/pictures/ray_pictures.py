@@ -9,15 +9,16 @@ import json
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
+from sonarsynth.conventions import counted
 from sonarsynth.equations.rays.ray_solutions import water
-from sonarsynth.pictures.figures.frame_figure import Hull
-from sonarsynth.pictures.figures.ray_figure import FAN, Look, section_figure, space_figure
-from sonarsynth.pictures.figures.ray_page import page
+from sonarsynth.pictures.ray_figures.ray_figure import section_figure, space_figure
+from sonarsynth.pictures.ray_figures.ray_page import page
+from sonarsynth.pictures.ray_figures.ray_styles import FAN, Look
+from sonarsynth.pictures.ray_figures.scene_geometry import SceneGeometry, scene_geometry
 from sonarsynth.pictures.ray_lines import HIDDEN, RayLine, eigenray_lines, fan_lines
 from sonarsynth.pipeline import follow_rays
 from sonarsynth.planning import Plan
@@ -25,9 +26,6 @@ from sonarsynth.planning import plan as plan_of
 from sonarsynth.propagation.ray_request import EigenrayRequest
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 LONGEST_TABLE = 100
 REFLECTED = {"surface": "surface", "bottom": "bottom", "facet": "target"}
@@ -60,19 +58,28 @@ def show_rays(plan: Plan, index: int, out: Path) -> tuple[list[Path], str]:
     """Write `section.png`, `space.png`, `rays.html` and `rays.json` of a frame's rays; their paths, and a table.
 
     The section is the vertical plane of the sonar's axis, or the one that the eigenrays spread along where they spread
-    little along that axis. Where rays of a fan are sent on to the shrimp, their colour in space is their coefficient,
-    and only those that met a target are drawn. Raises FieldError where there is nothing to draw.
+    little along that axis. Rays of a fan that are sent on to the shrimp are coloured by their coefficient, and
+    only those are drawn in space. Raises FieldError where there is nothing to draw.
     """
     plan = plan.at(index)
-    frame = plan.recipe.frame(index)[1]
+    scene, frame = plan.recipe.frame(index)
     lines = ray_lines(plan, frame, index)
-    hulls = [Hull(b.name, b.pose.to_world(b.mesh.vertices), b.mesh.faces.astype(int)) for b in frame.moment.bodies]
-    value = as_json(plan, frame, lines)
+    geometry = scene_geometry(scene, frame, _bearing(frame, lines))
+    value = as_json(plan, frame, lines, geometry)
+    looks = [Look(line.family, HIDDEN in line.flags, line.event, line.coefficient) for line in lines]
+    rays = [line.position for line in lines]
+    depth, speed = (np.array(value["profile"][name]) for name in ("depth", "speed"))
+    title = f"{plan.recipe.title or 'untitled'}, frame {index}"
+    every = counted(len(rays), "ray")
     out.mkdir(parents=True, exist_ok=True)
     files = [out / name for name in ("section.png", "space.png", "rays.html", "rays.json")]
-    _section(lines, hulls, value).savefig(files[0])
-    _space(lines, hulls, value).savefig(files[1])
-    files[2].write_text(page(value, hulls), encoding="ascii")
+    section_figure(f"{title}: {every}", rays, looks, depth, speed, geometry).savefig(files[0])
+    met = [i for i, look in enumerate(looks) if look.family != FAN or np.isfinite(look.coefficient)]
+    shown = met if any(look.family == FAN for look in (looks[i] for i in met)) else range(len(looks))
+    some = every if len(shown) == len(rays) else f"{len(shown)} of {every}, sent on from a target"
+    space = space_figure(f"{title}: {some}", [rays[i] for i in shown], [looks[i] for i in shown], geometry)
+    space.savefig(files[1], bbox_inches="tight", pad_inches=0.1)
+    files[2].write_text(page(value, looks, geometry), encoding="utf-8")
     files[3].write_text(json.dumps(value, allow_nan=False) + "\n", encoding="ascii")
     return files, table(lines)
 
@@ -87,8 +94,8 @@ def ray_lines(plan: Plan, frame: Frame, index: int) -> list[RayLine]:
     return lines
 
 
-def as_json(plan: Plan, frame: Frame, lines: Sequence[RayLine]) -> dict[str, Any]:
-    """The rays of a frame, and the water that they are in, for a program."""
+def as_json(plan: Plan, frame: Frame, lines: Sequence[RayLine], geometry: SceneGeometry) -> dict[str, Any]:
+    """The rays of a frame, the water that they are in, and what stands around them, for a program."""
     bottom = plan.scene.world.environment.depth
     layers = water(plan.profile.depth, plan.profile.speed, bottom)
     places = {"array": frame.sonar_pose.position} | {f"snap {n}": s.position for n, s in enumerate(frame.moment.snaps)}
@@ -100,7 +107,10 @@ def as_json(plan: Plan, frame: Frame, lines: Sequence[RayLine]) -> dict[str, Any
         "bottom": bottom,
         "profile": {"depth": layers.depth.tolist(), "speed": layers.speed.tolist()},
         "places": {name: place.tolist() for name, place in places.items()},
-        "bearing": _bearing(frame, lines),
+        "bearing": geometry.bearing,
+        "hydrophones": geometry.sensors.tolist(),
+        "tracks": {name: track.tolist() for name, track in geometry.tracks.items()},
+        "field_of_view": {name: line.tolist() for name, line in geometry.view.items()},
         "rays": [line.as_json() for line in lines],
     }
 
@@ -150,39 +160,3 @@ def _bearing(frame: Frame, lines: Sequence[RayLine]) -> float:
     widest = np.linalg.svd(flat, full_matrices=False)[2][0]  # the array is the origin
     away = widest if widest @ flat.mean(axis=0) >= 0 else -widest
     return float(np.arctan2(away[1], away[0]))
-
-
-def _section(lines: Sequence[RayLine], hulls: Sequence[Hull], value: dict[str, Any]) -> Figure:
-    profile = value["profile"]
-    return section_figure(
-        [line.position for line in lines],
-        hulls,
-        np.array(profile["depth"]),
-        np.array(profile["speed"]),
-        value["bottom"],
-        value["bearing"],
-        _looks(lines),
-        _places(value),
-    )
-
-
-def _space(lines: Sequence[RayLine], hulls: Sequence[Hull], value: dict[str, Any]) -> Figure:
-    sent = [line for line in lines if np.isfinite(line.coefficient)]
-    others = [line for line in lines if line.family != FAN]
-    drawn = [*others, *sent] if sent else list(lines)
-    strength = np.array([line.coefficient if np.isfinite(line.coefficient) else 1.0 for line in drawn])
-    rays = [line.position for line in drawn]
-    return space_figure(rays, strength, hulls, _places(value), _looks(drawn), value["bearing"])
-
-
-def _looks(lines: Sequence[RayLine]) -> list[Look]:
-    """How each ray is drawn; nothing where all are of the fan: then in turn, or by their coefficients."""
-    if all(line.family == FAN for line in lines):
-        return []
-    return [Look(line.family, HIDDEN in line.flags, line.event) for line in lines]
-
-
-def _places(value: dict[str, Any]) -> dict[str, Floats]:
-    """Points to name; of snaps at one place the first."""
-    first = {tuple(place): name for name, place in reversed(value["places"].items())}
-    return {name: np.array(place) for name, place in value["places"].items() if first[tuple(place)] == name}

@@ -11,6 +11,7 @@ HEAVY = (
     "numba",
     "trimesh",
     "matplotlib",
+    "plotly",
     "open3d",
     "xarray",
     "dask",

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from sonarsynth.pictures.figures.ray_figure import section_figure, space_figure
 
 from sonarsynth.equations.noise.filters import Fir
 from sonarsynth.pictures.figures.frame_figure import FramePicture, Hull, View, Window
 from sonarsynth.pictures.figures.outlines import CELLS, union_outline, view_outline
-from sonarsynth.pictures.figures.ray_figure import section_figure, space_figure
 from sonarsynth.pictures.figures.snap_figure import snap_figure
 from sonarsynth.sources.shrimp import LogarithmicBubble
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from sonarsynth.pictures.figures.ray_figure import Look, section_figure
 
 from sonarsynth.pictures.figures.frame_figure import Hull
-from sonarsynth.pictures.figures.ray_figure import Look, section_figure
 
 RAY = np.array([[0.0, 0.0, -5.0], [10.0, 0.0, 0.0], [20.0, 0.0, -4.0], [10.0, 0.0, -10.0], [0.0, 0.0, -5.0]])
 

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from sonarsynth.pictures.figures.ray_figure import RAYS
-from sonarsynth.pictures.figures.style import INK, PALE, figure, grid, label
+from sonarsynth.pictures.figures.style import INK, PALE, RAYS, figure, grid, label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

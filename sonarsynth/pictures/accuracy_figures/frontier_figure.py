@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from sonarsynth.pictures.figures.ray_figure import RAYS
-from sonarsynth.pictures.figures.style import INK, PALE, figure, grid, label
+from sonarsynth.pictures.figures.style import INK, PALE, RAYS, figure, grid, label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

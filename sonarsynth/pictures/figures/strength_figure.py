@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.pictures.figures.ray_figure import RAYS
-from sonarsynth.pictures.figures.style import DYNAMIC_RANGE, ENERGY_MAP, INK, figure, label
+from sonarsynth.pictures.figures.style import DYNAMIC_RANGE, ENERGY_MAP, INK, RAYS, figure, label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -24,8 +24,13 @@ OUTLINES = ("#56c8ff", "#ffffff", "#8ff0a4", "#f7a8d8")
 BACKDROP = "#12111c"
 """Background of clouds and rim of labels: the darkest colour of the energy map, a little lifted."""
 
-MARKS = ("#0072B2", "#D55E00", "#009E73")
-"""A hit, a far hit, a miss (Okabe and Ito 2008)."""
+RAYS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+"""Lines that are told apart by colour (Okabe and Ito 2008)."""
+
+MARKS = RAYS[:3]
+"""A hit, a far hit, a miss."""
+
+WINDS = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
 
 INK = "#222222"
 PALE = "#8a8a8a"
@@ -35,6 +40,12 @@ def decibels(energy: npt.ArrayLike, reference: float) -> Floats:
     """Energy (...) in dB re `reference` (the same unit); -inf for silence, NaN stays NaN."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return 10.0 * np.log10(np.asarray(energy, float) / reference)
+
+
+def compass(bearing: float) -> str:
+    """A horizontal direction (rad, from x to y: east to north) as people say it: "NE (045 deg)", from north by east."""
+    degrees = float(np.rad2deg(0.5 * np.pi - bearing)) % 360.0
+    return f"{WINDS[round(degrees / 22.5) % 16]} ({round(degrees) % 360:03d} deg)"
 
 
 def figure(width: float, height: float, **layout: Any) -> Figure:

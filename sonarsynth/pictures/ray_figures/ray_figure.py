@@ -1,0 +1,225 @@
+"""Rays in the water: a section with the sound speed beside it, and rays in space (figures 14 to 16 of the thesis)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.pictures.figures.outlines import union_outline
+from sonarsynth.pictures.figures.style import ERROR_MAP, INK, PALE, compass, figure, grid, label
+from sonarsynth.pictures.ray_figures.ray_styles import (
+    COLOURS,
+    MARKERS,
+    Look,
+    Style,
+    drawing_order,
+    highest_coefficient,
+    styles,
+)
+from sonarsynth.pictures.ray_figures.scene_geometry import SceneGeometry
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from mpl_toolkits.mplot3d import Axes3D
+
+SURFACE, BOTTOM, VIEW, TRACK = "#4a90c2", "#8c6d46", "#7b5ea7", "#444444"
+WIDTH = 8.0
+"""Inches of a section; its height is that of equal scales, within `HEIGHTS`."""
+HEIGHTS = (1.7, 5.5)
+AXES = ("east, x (m)", "north, y (m)", "up, z (m)")
+
+
+def section_figure(
+    title: str, rays: Sequence[Floats], looks: Sequence[Look], depth: Floats, speed: Floats, geometry: SceneGeometry
+) -> Figure:
+    """Rays (each (point, xyz) in m, world) seen on the plane of a section, beside the sound speed (m/s).
+
+    Both axes have one scale where that fits; else the title says how much larger heights are drawn.
+    """
+    flat = [geometry.on_plane(ray) for ray in rays]
+    ends = [*geometry.places.values(), *(hull.vertices for hull in geometry.hulls)]
+    across = np.concatenate([*flat, *(geometry.on_plane(np.atleast_2d(points)) for points in ends)])[:, 0]
+    margin = 0.04 * np.ptp(across) or 1.0
+    left, right = float(across.min()) - margin, float(across.max()) + margin
+    made = figure(WIDTH + 3.2, 4.0, dpi=110)
+    parts = made.add_gridspec(1, 2, width_ratios=[1.0, 4.0])
+    section = made.add_subplot(parts[1])
+    section.set(xlim=(left, right), ylim=(-1.06 * geometry.bottom, 0.06 * geometry.bottom))
+    _section(section, geometry)
+    drawn = styles(looks)
+    for i in drawing_order(looks):
+        _draw(section, flat[i], looks[i], drawn[i])
+    label(section, f"distance from the array towards {compass(geometry.bearing)} (m)", "")
+    _profile(made.add_subplot(parts[0], sharey=section), depth, speed, geometry.bottom)
+    _legend(made, looks, [("field of view", VIEW, "-.")])
+    _colour_bar(made, section, looks)
+    section.set_title(" ", fontsize=10, color=INK, loc="left")
+    factor = _equal_scales(made, section)
+    scales = "one scale" if 0.97 < factor < 1.03 else f"heights drawn {factor:.2g} times as large"
+    section.set_title(f"{title}; {scales}", fontsize=10, color=INK, loc="left")
+    return made
+
+
+def _equal_scales(made: Figure, axes: Axes) -> float:
+    """Give a figure the height at which the scales of axes are equal, within HEIGHTS; returns z over x that is left."""
+    for _ in range(2):
+        made.draw_without_rendering()  # the axes find their place
+        box, (left, right), (low, high) = axes.get_window_extent(), axes.get_xlim(), axes.get_ylim()
+        inches, wide = box.height / made.dpi, box.width / made.dpi
+        made.set_figheight(made.get_figheight() + np.clip(wide * (high - low) / (right - left), *HEIGHTS) - inches)
+    made.draw_without_rendering()
+    box = axes.get_window_extent()
+    return float(box.height / (high - low) / (box.width / (right - left)))
+
+
+def _section(axes: Axes, geometry: SceneGeometry) -> None:
+    """Surface, bottom, field of view, targets, hydrophones and named places on the plane of a section."""
+    for z, colour in ((0.0, SURFACE), (-geometry.bottom, BOTTOM)):
+        axes.axhline(z, color=colour, linewidth=1.5)
+    axes.plot(*geometry.on_plane(geometry.view["upright"]).T, color=VIEW, linewidth=0.8, linestyle="-.")
+    for hull in geometry.hulls:
+        body = geometry.on_plane(hull.vertices)
+        for line in union_outline(body, hull.faces):
+            axes.fill(*line.T, facecolor="#d9d9d9", edgecolor=INK, linewidth=0.8)
+        _name(axes, hull.name, np.array([0.5 * (body[:, 0].min() + body[:, 0].max()), body[:, 1].max()]), over=True)
+    axes.plot(*geometry.on_plane(geometry.sensors).T, "s", color=INK, markersize=2.0, zorder=5)
+    for name, point in geometry.places.items():
+        place = geometry.on_plane(point[None])[0]
+        axes.plot(*place, "o", color=INK, markersize=4, zorder=5)
+        _name(axes, name, place)
+
+
+def _draw(axes: Axes, points: Floats, look: Look, style: Style) -> None:
+    """A ray (point, 2 or 3) and its vertices."""
+    line = ":" if style.hidden else "-"
+    axes.plot(*points.T, color=style.colour, linewidth=style.width, linestyle=line)
+    for event, marker in MARKERS.items() if style.marked else ():
+        at = points[[e == event for e in look.event]]
+        if len(at):
+            axes.plot(*at.T, marker, color=style.colour, markersize=4)
+
+
+def _name(axes: Axes, name: str, place: Floats, over: bool = False) -> None:
+    """A name beside a point (2), or over it."""
+    from matplotlib.patheffects import withStroke
+
+    offset = {"xytext": (0, 5), "ha": "center"} if over else {"xytext": (6, -11)}
+    text = axes.annotate(name, place, textcoords="offset points", fontsize=9, color=INK, zorder=6, **offset)  # type: ignore[arg-type]
+    text.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
+
+
+def _legend(made: Figure, looks: Sequence[Look], lines: Sequence[tuple[str, str, str]]) -> None:
+    """One legend under the figure: rays by their labels, marks of vertices, other lines (name, colour, dashes)."""
+    from matplotlib.lines import Line2D
+
+    drawn = styles(looks)
+    first = [*COLOURS, *(s.label for s in drawn)]
+    rays = {s.label: s for s in sorted(drawn, key=lambda s: first.index(s.label))}
+    handles = [Line2D([], [], color=s.colour, label=name) for name, s in rays.items() if "sent on" not in name]
+    if any(s.hidden for s in drawn):
+        handles.append(Line2D([], [], color=INK, linestyle=":", label="hidden by a target"))
+    met = {event for look, s in zip(looks, drawn, strict=True) if s.marked for event in look.event}
+    marks = {marker: "target" if event == "facet" else event for event, marker in MARKERS.items() if event in met}
+    for marker, event in marks.items():
+        name = event if event == "turning point" else f"reflected by {event}"
+        handles.append(Line2D([], [], color=INK, marker=marker, linestyle="", markersize=4, label=name))
+    handles += [Line2D([], [], color=c, linestyle=dash, label=name) for name, c, dash in lines]  # type: ignore[arg-type]
+    made.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6), fontsize=8, frameon=False)
+
+
+def _colour_bar(made: Figure, axes: Axes, looks: Sequence[Look], pad: float = 0.02) -> None:
+    """The scale of the coefficients, where rays have one."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    if highest := highest_coefficient(looks):
+        bar = made.colorbar(ScalarMappable(Normalize(0.0, highest), ERROR_MAP), ax=axes, shrink=0.8, pad=pad)
+        bar.set_label("coefficient of scattering", fontsize=8, color=INK)
+        bar.ax.tick_params(labelsize=8)
+
+
+def _profile(axes: Axes, depth: Floats, speed: Floats, bottom_depth: float) -> None:
+    inside = (depth > 0.0) & (depth < bottom_depth)
+    ends = np.interp([0.0, bottom_depth], depth, speed)
+    grid(axes)
+    axes.plot([ends[0], *speed[inside], ends[1]], [0.0, *-depth[inside], -bottom_depth], color=INK, linewidth=1.2)
+    axes.ticklabel_format(axis="x", useOffset=False)
+    label(axes, "sound speed (m/s)", "up, z (m)", "profile")
+    middle = 0.5 * (speed.min() + speed.max())
+    half = max(0.6 * np.ptp(speed), 2.0)
+    axes.set_xlim(middle - half, middle + half)
+    axes.locator_params(axis="x", nbins=3)
+
+
+def space_figure(title: str, rays: Sequence[Floats], looks: Sequence[Look], geometry: SceneGeometry) -> Figure:
+    """Rays (each (point, xyz) in m, world) in space on one scale, with tracks and field of view, and the array."""
+    made = figure(11.0, 5.6, dpi=110)
+    parts = made.add_gridspec(2, 2, width_ratios=[3.4, 1.0])
+    axes: Axes3D = made.add_subplot(parts[:, 0], projection="3d")
+    _bodies(axes, geometry)
+    lines = [("field of view, at the array's elevation", VIEW, "-.")]
+    axes.plot(*geometry.view["across"].T, color=VIEW, linewidth=0.8, linestyle="-.")
+    for name, track in geometry.tracks.items():
+        axes.plot(*track.T, color=TRACK, linewidth=1.0, linestyle="--")
+        towards = np.arctan2(*(track[-1] - track[0])[[1, 0]])
+        lines.append((f"track of {name}, towards {compass(towards)}", TRACK, "--"))
+    drawn = styles(looks)
+    for i in drawing_order(looks):
+        _draw(axes, rays[i], looks[i], drawn[i])
+    axes.scatter(*geometry.sensors.T, s=0.6, color=INK, depthshade=False)
+    for name, place in geometry.places.items():
+        axes.scatter(*place, s=22, color=INK, depthshade=False)
+        axes.text(*place, f"  {name}", fontsize=9, color=INK)
+    every = [*rays, *(hull.vertices for hull in geometry.hulls), *geometry.tracks.values(), geometry.view["across"]]
+    _one_scale(axes, np.concatenate([*every, *(p[None] for p in geometry.places.values())]), geometry.bearing)
+    _face(made.add_subplot(parts[0, 1]), geometry)
+    _legend(made, looks, lines)
+    _colour_bar(made, axes, looks, pad=0.14)
+    made.suptitle(f"{title}; one scale", x=0.01, ha="left", fontsize=11, color=INK)
+    return made
+
+
+def _bodies(axes: Axes3D, geometry: SceneGeometry) -> None:
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    for hull in geometry.hulls:
+        body = Poly3DCollection(
+            hull.vertices[hull.faces], facecolors="#c8c8c8", edgecolors=PALE, alpha=0.5, linewidths=0.2
+        )
+        axes.add_collection3d(body, autolim=False)
+
+
+def _one_scale(axes: Axes3D, points: Floats, bearing: float) -> None:
+    """Limits that hold points (point, xyz) in boxes of their size, seen with `bearing` (rad) to the right."""
+    span = np.maximum(np.ptp(points, axis=0), 0.05 * np.ptp(points, axis=0).max())
+    middle = 0.5 * (points.max(axis=0) + points.min(axis=0))
+    axes.set(**{f"{axis}lim": (m - 0.5 * s, m + 0.5 * s) for axis, m, s in zip("xyz", middle, span, strict=True)})
+    axes.set_box_aspect(tuple(span), zoom=1.05)
+    axes.view_init(elev=30.0, azim=-60.0 + float(np.rad2deg(bearing)))
+    for axis, name, size in zip((axes.xaxis, axes.yaxis, axes.zaxis), AXES, span, strict=True):
+        axis.set_label_text(name, fontsize=8)
+        axis.labelpad = 10.0
+        axis.get_major_locator().set_params(nbins=max(2, round(7 * float(size / span.max()))))
+    axes.tick_params(labelsize=7)
+
+
+def _face(axes: Axes, geometry: SceneGeometry) -> None:
+    """The elements as one sees them who looks along the sonar's axis (figure 9 of the thesis): port on the left."""
+    from matplotlib.collections import PatchCollection
+    from matplotlib.patches import Rectangle
+
+    array = geometry.elements
+    side = 100.0 * (array.face or 0.3 * array.pitch or 0.05 * array.aperture)
+    places = 100.0 * array.position[:, 1:]
+    squares = [Rectangle((y - 0.5 * side, z - 0.5 * side), side, side) for y, z in places]
+    colours = np.where(array.gain > 0, INK, "none")
+    axes.add_collection(PatchCollection(squares, facecolors=list(colours), edgecolors=PALE, linewidths=0.3))
+    reach = 1.1 * (100.0 * array.aperture + side)
+    axes.set(xlim=(reach, -reach), ylim=(-reach, reach), aspect="equal")
+    dead = int(np.sum(array.gain == 0))
+    name = f"array of {array.count} hydrophones" + (f", {dead} dead" if dead else "")
+    label(axes, "port, y (cm)", "up, z (cm)", name)
