@@ -10,7 +10,7 @@ import json
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -48,6 +48,7 @@ Products = Annotated[
     typer.Option(metavar="LIST", help="Stored besides the ground truth: signals, image, cloud; 'truth': nothing else."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+Scale = Literal["common", "frame"]
 ALL_PRODUCTS = "signals,image,cloud"
 
 
@@ -219,18 +220,23 @@ def show(
         int | None, typer.Option(min=0, help="The frame of the sheet. Default: the frame with most points.")
     ] = None,
     film: Annotated[bool, typer.Option(help="Also write the film.")] = True,
+    scale: Annotated[
+        Scale, typer.Option(help="0 dB of the film: the brightest beam of all frames, or that of each frame.")
+    ] = "common",
 ) -> None:
     """Draw a store: a film of the energy image, a sheet with image, point cloud and signals; print a summary.
 
     With several stores: films side by side, each with its range error, levels and cost.
     """
+    from sonarsynth.cli.printing import progress
     from sonarsynth.pictures import show as draw
     from sonarsynth.pictures.compare import show_beside
 
-    if len(stores) == 1:
-        files = draw(stores[0], out, frame=frame, film=film, say=typer.echo)
-    else:
-        files = show_beside(stores, out, frame=frame, film=film, say=typer.echo)
+    with progress("reading") as drawn:
+        if len(stores) == 1:
+            files = draw(stores[0], out, frame=frame, film=film, scale=scale, say=typer.echo, progress=drawn)
+        else:
+            files = show_beside(stores, out, frame=frame, film=film, scale=scale, say=typer.echo, progress=drawn)
     for file in files:
         typer.echo(str(file))
 

@@ -32,14 +32,17 @@ def console(*, stderr: bool = False) -> Console:
 
 
 @contextmanager
-def progress() -> Iterator[Report]:
-    """A callback that shows progress on stderr: a bar on a terminal, else a line now and then."""
+def progress(waiting: str = "starting workers") -> Iterator[Report]:
+    """A callback that shows progress on stderr: a bar on a terminal, else a line now and then.
+
+    waiting: what is done before the first frame.
+    """
     if not sys.stderr.isatty():
         yield _Lines()
         return
     columns = (SpinnerColumn(), BarColumn(), MofNCompleteColumn(), TextColumn("frames  {task.fields[pace]}"))
     with Progress(*columns, console=console(stderr=True), transient=True) as bar:
-        task = bar.add_task("frames", total=None, pace="starting workers")
+        task = bar.add_task("frames", total=None, pace=waiting)
         began = time.monotonic()
 
         def update(done: int, total: int, failed: int) -> None:
@@ -71,7 +74,7 @@ def _pace(done: int, total: int, failed: int, began: float) -> str:
     """Frames per second, time left, frames that failed."""
     finished = done + failed
     if not finished:
-        return "starting workers"
+        return "none finished yet"
     rate = finished / max(time.monotonic() - began, 1e-9)
     text = f"{rate:.3g} frames/s, {duration((total - finished) / rate)} left"
     return text + (f", {failed} failed" if failed else "")

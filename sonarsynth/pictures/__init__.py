@@ -13,7 +13,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.pictures.figures.frame_figure import FramePicture, View, window
 from sonarsynth.pictures.figures.sheet import Errors, sheet
 from sonarsynth.pictures.figures.style import decibels
-from sonarsynth.pictures.film import thinned, write_film
+from sonarsynth.pictures.film import Progress, thinned, write_film
 from sonarsynth.pictures.steered_beams import beams
 from sonarsynth.pictures.store_reading import (
     NothingToDraw,
@@ -37,12 +37,15 @@ def show(
     *,
     frame: int | None = None,
     film: bool = True,
+    scale: str = "common",
     frames_per_second: float = 10.0,
     say: Callable[[str], None] = print,
+    progress: Progress | None = None,
 ) -> list[Path]:
     """Draw a store into the folder `out` (left out: `<store>.pictures`), say a summary, return the files written.
 
-    film.mp4 (film.gif without ffmpeg): every frame that was built, at `frames_per_second`. sheet.png: frame number
+    film.mp4 (film.gif without ffmpeg): every frame that was built, at `frames_per_second`, in dB re the brightest beam
+    of all (scale "common") or of each frame ("frame"); `progress` is told of each. sheet.png: frame number
     `frame` (left out: the one with most points on a target). What the store does not hold is left out of the pictures
     and said. Raises NothingToDraw, a ValueError, where there is no store, or not that frame.
     """
@@ -68,13 +71,14 @@ def show(
         if len(filmed) < len(frames):
             say(f"film: {len(filmed)} of {len(frames)} frames")
         in_order = [read[i] for i in filmed]
-        reference = _reference(in_order)
+        common = _reference(in_order) if scale == "common" else None
         each = zip(in_order, earlier_points(in_order), strict=True)
-        views = [replace(_view(tree, one, reference), earlier=before) for one, before in each]
+        views = [replace(_view(tree, one, common or _reference([one])), earlier=before) for one, before in each]
+        of = "all frames" if common else "each frame"
         picture = FramePicture(
-            *beam_grid(tree), window(views), "beams and points: energy re the brightest beam of all frames (dB)"
+            *beam_grid(tree), window(views), f"beams and points: energy re the brightest beam of {of} (dB)"
         )
-        files.append(write_film(picture, views, folder, frames_per_second))
+        files.append(write_film(picture, views, folder, frames_per_second, progress))
     return files
 
 
@@ -106,13 +110,16 @@ def _reference(frames: list[Stored]) -> float:
 def _view(tree: xr.DataTree, frame: Stored, reference: float) -> View:
     title = tree.attrs.get("title") or "untitled"
     clock = f"   t = {frame.time:.2f} s" if np.isfinite(frame.time) else ""
+    count = tree["truth"].sizes["frame"]
+    of = f" (0 to {count - 1})" if count > 1 else ""
     return View(
-        title=f"{title}   frame {frame.index} (0 to {tree['truth'].sizes['frame'] - 1}){clock}",
+        title=f"{title}   frame {frame.index}{of}{clock}",
         level=None if frame.energy is None else decibels(frame.energy, reference),
         points=frame.points,
         point_level=decibels(frame.point_energy, reference),
         hulls=frame.hulls,
         ghosts=frame.ghosts,
+        lobes=frame.lobes,
     )
 
 

@@ -12,10 +12,21 @@ import numpy as np
 
 from sonarsynth.pictures.figures.compared_images import BesidePicture, Column, Moment, Panel
 from sonarsynth.pictures.figures.style import decibels
-from sonarsynth.pictures.film import thinned, write_film
+from sonarsynth.pictures.film import Progress, thinned, write_film
 from sonarsynth.pictures.recipe_diff import names_of
 from sonarsynth.pictures.scores import LEVEL, EchoEnergies, as_table, heard, scores_of
-from sonarsynth.pictures.store_reading import NothingToDraw, beam_grid, built, hulls, needed, opened, pictures_of, read
+from sonarsynth.pictures.store_reading import (
+    NothingToDraw,
+    beam_grid,
+    built,
+    ghosts,
+    hulls,
+    lobes,
+    needed,
+    opened,
+    pictures_of,
+    read,
+)
 from sonarsynth.store import Folder, folder_of
 
 if TYPE_CHECKING:
@@ -32,7 +43,7 @@ EDGE = 8
 
 NOTE = (
     f"Echo: mean energy of the beams that point at a target; levels in {LEVEL}. "
-    "Colours: re the brightest beam of each film. CPU: median over frames, of one core."
+    "Rings: ghosts; dotted lines: grating lobes. CPU: median over frames, of one core."
 )
 
 
@@ -42,14 +53,17 @@ def show_beside(
     *,
     frame: int | None = None,
     film: bool = True,
+    scale: str = "common",
     frames_per_second: float = 10.0,
     say: Callable[[str], None] = print,
+    progress: Progress | None = None,
 ) -> list[Path]:
     """Draw two to four stores beside each other into the folder `out`, say their numbers; returns the files written.
 
     beside.png: an early, the best and a late frame, and the numbers of each store under it; the best is `frame`, left
     out the one with most points on target in all stores. film.mp4 (film.gif without ffmpeg): the frames that all
-    stores have. Each store is named by what differs in its recipe, and drawn re its own brightest beam. `out` left
+    stores have. Each store is named by what differs in its recipe, and drawn re its own brightest beam of
+    all frames (scale "common") or of each ("frame"). `out` left
     out: <names of the stores>.pictures beside the first.
 
     Raises NothingToDraw, a ValueError, where a store is none or has no image, where beam grids differ, where no frame
@@ -61,7 +75,7 @@ def show_beside(
     trees = [_fit(opened(path), path) for path in paths]
     frames = _common(trees, paths, frame, say)
     sounds = [heard(tree, frames) for tree in trees]
-    references = [sound.reference for sound in sounds]
+    references = [sound.reference if scale == "common" else None for sound in sounds]
     names = names_of([str(tree.attrs.get("recipe", "")) for tree in trees], _file_names(paths))
     numbers = [scores_of(t, path, frames, sound) for t, path, sound in zip(trees, paths, sounds, strict=True)]
     say(as_table(names, numbers))
@@ -71,15 +85,16 @@ def show_beside(
     folder.mkdir(parents=True, exist_ok=True)
     heading = _heading(trees, len(frames))
     chosen = _three(sounds, frames, frame)
-    sheet = BesidePicture(*beam_grid(trees[0]), columns, heading, NOTE, rows=len(chosen))
+    of = "each film" if scale == "common" else "each image"
+    sheet = BesidePicture(*beam_grid(trees[0]), columns, heading, NOTE, rows=len(chosen), of=of)
     sheet.show(*(moment(trees, references, *pick) for pick in chosen))
     files = [folder / "beside.png"]
     sheet.figure.savefig(files[0], dpi=120)
     if film and len(frames) > 1:
         if len(thinned(frames)) < len(frames):
             say(f"film: {len(thinned(frames))} of {len(frames)} frames")
-        moving = BesideFilm(BesidePicture(*beam_grid(trees[0]), columns, heading, NOTE), trees, references)
-        files.append(write_film(moving, thinned(frames), folder, frames_per_second))
+        moving = BesideFilm(BesidePicture(*beam_grid(trees[0]), columns, heading, NOTE, of=of), trees, references)
+        files.append(write_film(moving, thinned(frames), folder, frames_per_second, progress))
     return files
 
 
@@ -89,7 +104,7 @@ class BesideFilm:
 
     picture: BesidePicture
     trees: Sequence[xr.DataTree]
-    references: Sequence[float]  # Pa2 s
+    references: Sequence[float | None]  # Pa2 s; None: of the brightest beam of each frame
 
     @property
     def figure(self) -> Figure:
@@ -105,14 +120,16 @@ class BesideFilm:
         return self.picture.pixels()
 
 
-def moment(trees: Sequence[xr.DataTree], references: Sequence[float], frame: int, why: str = "") -> Moment:
-    """A frame of all stores, each in dB re its own reference (Pa2 s)."""
+def moment(trees: Sequence[xr.DataTree], references: Sequence[float | None], frame: int, why: str = "") -> Moment:
+    """A frame of all stores, each in dB re its own reference (Pa2 s); without one, re its brightest beam."""
     panels: list[Panel] = []
     for tree, reference in zip(trees, references, strict=True):
         energy = needed(tree, "image/energy", frame)
-        level = decibels(energy, reference) if np.isfinite(energy).any() else None
+        brightest = float(np.max(energy, initial=0.0, where=np.isfinite(energy))) or 1.0
+        level = decibels(energy, reference or brightest) if np.isfinite(energy).any() else None
         bodies = hulls(tree, frame)
-        panels.append(Panel(level, next((p.hulls for p in panels if _alike(p.hulls, bodies)), bodies)))
+        bodies = next((p.hulls for p in panels if _alike(p.hulls, bodies)), bodies)
+        panels.append(Panel(level, bodies, ghosts(tree, frame), lobes(tree, frame)))
     times = {None if (t := read(tree, "time", frame)) is None else round(float(t), 9) for tree in trees}
     clock = [f"{t:.2f} s" for t in times if t is not None and np.isfinite(t)] if len(times) == 1 else []
     return Moment("\n".join([f"frame {frame}", *clock, *([why] if why else [])]), tuple(panels))

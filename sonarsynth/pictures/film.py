@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -46,25 +46,42 @@ def thinned(frames: Sequence[Item]) -> list[Item]:
     return list(frames[:: -(-len(frames) // LONGEST) or 1])
 
 
+Progress: TypeAlias = Callable[[int, int, int], None]
+"""Is told how many frames are drawn, of how many, and how many failed (none does)."""
+
+
 def write_film(
-    picture: Picture[View_contra], views: Sequence[View_contra], folder: Path, frames_per_second: float
+    picture: Picture[View_contra],
+    views: Sequence[View_contra],
+    folder: Path,
+    frames_per_second: float,
+    progress: Progress | None = None,
 ) -> Path:
     """Draw views one after another into `folder`/film.mp4 or film.gif; returns its path."""
     if shutil.which("ffmpeg"):
         path = folder / "film.mp4"
-        if _mp4(picture, views, path, frames_per_second):
+        if _mp4(_drawn(picture, views, progress), path, frames_per_second):
             return path
         path.unlink(missing_ok=True)  # an ffmpeg without the codec
-    return _gif(picture, views, folder / "film.gif", frames_per_second)
+    return _gif(_drawn(picture, views, progress), folder / "film.gif", frames_per_second)
 
 
-def _mp4(picture: Picture[View_contra], views: Sequence[View_contra], path: Path, frames_per_second: float) -> bool:
+def _drawn(
+    picture: Picture[View_contra], views: Sequence[View_contra], progress: Progress | None
+) -> Iterator[np.ndarray]:
+    """Pixels (row, column, rgb) of one view after another."""
+    for n, view in enumerate(views, 1):
+        picture.show(view)
+        yield picture.pixels()
+        if progress is not None:
+            progress(n, len(views), 0)
+
+
+def _mp4(shots: Iterator[np.ndarray], path: Path, frames_per_second: float) -> bool:
     """Whether ffmpeg took all frames, as raw pixels."""
     maker: subprocess.Popen[bytes] | None = None
     try:
-        for view in views:
-            picture.show(view)
-            shot = picture.pixels()
+        for shot in shots:
             if maker is None:
                 size = f"{shot.shape[1]}x{shot.shape[0]}"
                 raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(frames_per_second), "-i", "-"]
@@ -82,14 +99,11 @@ def _mp4(picture: Picture[View_contra], views: Sequence[View_contra], path: Path
     return maker is not None and maker.returncode == 0
 
 
-def _gif(picture: Picture[View_contra], views: Sequence[View_contra], path: Path, frames_per_second: float) -> Path:
+def _gif(shots: Iterator[np.ndarray], path: Path, frames_per_second: float) -> Path:
     from PIL import Image
 
     colours = _palette()
-    frames = []
-    for view in views:
-        picture.show(view)
-        frames.append(Image.fromarray(picture.pixels()).quantize(palette=colours, dither=Image.Dither.NONE))
+    frames = [Image.fromarray(shot).quantize(palette=colours, dither=Image.Dither.NONE) for shot in shots]
     milliseconds = max(20, round(1000 / frames_per_second))
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=milliseconds, loop=0, optimize=False)
     return path

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, Ints, direction
+from sonarsynth.conventions import Floats, Ints, azimuth_elevation, direction
+from sonarsynth.equations.arrays.grating_lobes import grating_lobes
 from sonarsynth.evaluation.point_checks import has_labels, points
 from sonarsynth.geometry import Pose
 from sonarsynth.pictures.figures.frame_figure import Hull
@@ -19,8 +20,20 @@ from sonarsynth.store import Folder, Mismatch, Remote, folder_of, open_store
 if TYPE_CHECKING:
     import xarray as xr
 
-READ = ("", "truth", "targets", "image", "cloud", "source_estimates")
-"""Groups that frames are drawn from, with those in them."""
+LOBED = 20.0
+"""Grating lobes are drawn of direct echoes, and of ghosts that are less than this many dB under them."""
+LOBE_POINTS = 24
+"""Frequencies of the band at which a grating lobe is drawn."""
+POINTS = ("x", "y", "z", "azimuth", "elevation", "energy", "delay", "target")
+READ = (
+    *("time", "image/energy", "truth/sonar_position", "truth/sonar_orientation", "truth/emissions/position"),
+    *(f"truth/beams/{name}" for name in ("target", "range")),
+    *(f"truth/targets/{name}" for name in ("target", "position", "orientation", "mesh", "family")),
+    *(f"truth/targets/echo_{name}" for name in ("level", "azimuth", "elevation")),
+    *(f"cloud/{name}" for name in POINTS),
+    *("signals/position", "truth/beams/azimuth", "truth/beams/elevation"),
+)
+"""Variables that frames are drawn from, beside the meshes."""
 FAINTEST = 40.0
 """Ghosts this many dB under the direct echo of their target are not drawn."""
 
@@ -57,17 +70,51 @@ def bytes_of(store: Folder) -> int:
     return sum(path.stat().st_size for path in store.rglob("*") if path.is_file())
 
 
-def read(tree: xr.DataTree, name: str, frame: int | None = None) -> np.ndarray | None:
-    """A variable ("image/energy"), of one frame or whole; None where the store does not hold it."""
+@dataclass(frozen=True, eq=False)
+class Held:
+    """Variables of some frames of a store, read at once: each by itself takes xarray a millisecond."""
+
+    attrs: Mapping[Any, Any]
+    values: Mapping[str, np.ndarray]
+    by_frame: frozenset[str]  # those with an axis of frames, the first
+
+
+Source: TypeAlias = "xr.DataTree | Held"
+"""What frames are read from; frames of what is held are counted from 0."""
+
+
+def held(tree: xr.DataTree, frames: Sequence[int]) -> Held:
+    """What pictures need of some frames."""
+    values, by_frame = {}, []
+    meshes = [f"{g.path.strip('/')}/{n}" for g in tree.subtree if g.path[:9] == "/targets/" for n in g.dataset]
+    for name in (*READ, *meshes):
+        data = _variable(tree, name)
+        if data is not None:
+            values[name] = np.asarray((data.isel(frame=list(frames)) if "frame" in data.dims else data).values)
+            by_frame += [name] if "frame" in data.dims else []
+    return Held(tree.attrs, values, frozenset(by_frame))
+
+
+def _variable(tree: xr.DataTree, name: str) -> xr.DataArray | None:
     group, _, variable = name.rpartition("/")
     try:
-        data = (tree[group] if group else tree).dataset[variable]
+        return (tree[group] if group else tree).dataset[variable]
     except KeyError:
         return None
-    return np.asarray((data if frame is None else data.isel(frame=frame)).values)
 
 
-def needed(tree: xr.DataTree, name: str, frame: int | None = None) -> np.ndarray:
+def read(source: Source, name: str, frame: int | None = None) -> np.ndarray | None:
+    """A variable ("image/energy"), of one frame or whole; None where the store does not hold it."""
+    if isinstance(source, Held):
+        values = source.values.get(name)
+        return values[frame] if values is not None and frame is not None and name in source.by_frame else values
+    data = _variable(source, name)
+    if data is None:
+        return None
+    return np.asarray((data if frame is None or "frame" not in data.dims else data.isel(frame=frame)).values)
+
+
+def needed(tree: Source, name: str, frame: int | None = None) -> np.ndarray:
     """As `read`, for what pictures cannot do without. Raises NothingToDraw."""
     values = read(tree, name, frame)
     if values is None:
@@ -105,29 +152,33 @@ class Stored:
     poses: tuple[Pose, ...]  # of the targets in the world; NaN of one that is not there
     hulls: tuple[Hull, ...]
     ghosts: tuple[Ghost, ...]
+    lobes: tuple[Floats, ...]  # (frequency, azimuth and elevation) deg: grating lobes over the band
 
 
 def every_stored(tree: xr.DataTree, frames: Sequence[int]) -> list[Stored]:
-    """Some frames as stored, each group read at once: a store has many small variables."""
-    import xarray as xr
-
-    some = {}
-    for group in tree.subtree:
-        path = group.path.strip("/")
-        if path.partition("/")[0] in READ and (data := group.dataset).variables:
-            inherited = [name for name in data.coords if name not in group.to_dataset(inherit=False).coords]
-            here = data.drop_vars(inherited)
-            some[f"/{path}"] = (here.isel(frame=list(frames)) if "frame" in here.dims else here).load()
-    loaded = xr.DataTree.from_dict(some)
-    return [replace(stored(loaded, row), index=index) for row, index in enumerate(frames)]
+    """Some frames as stored. A frame that was not built comes back full of NaN."""
+    source = held(tree, frames)
+    found = points(tree, frames) if has_labels(tree) else None
+    made = []
+    for row, index in enumerate(frames):
+        cloud: dict[str, Floats] = dict.fromkeys((*POINTS, "range_error"), np.zeros(0))
+        if found is not None:
+            own = found.frame == index
+            cloud = {name: needed(source, f"cloud/{name}", row)[found.row[own]].astype(float) for name in POINTS}
+            cloud["range_error"] = np.where(found.judged[own], found.error[own], np.nan)
+        made.append(_stored(source, row, index, cloud))
+    return made
 
 
 def stored(tree: xr.DataTree, index: int) -> Stored:
-    """One frame as stored. A frame that was not built comes back full of NaN."""
-    cloud = _points(tree, index)
-    energy = read(tree, "image/energy", index)
-    pose = _sonar(tree, index)
-    time = read(tree, "time", index)
+    """One frame as stored."""
+    return every_stored(tree, [index])[0]
+
+
+def _stored(tree: Held, row: int, index: int, cloud: Mapping[str, Floats]) -> Stored:
+    energy = read(tree, "image/energy", row)
+    pose = _sonar(tree, row)
+    time = read(tree, "time", row)
     return Stored(
         index=index,
         time=float("nan") if time is None else float(time),
@@ -139,30 +190,21 @@ def stored(tree: xr.DataTree, index: int) -> Stored:
         point_direction=np.stack([cloud["azimuth"], cloud["elevation"]], axis=-1),
         point_delay=cloud["delay"],
         point_target=cloud["target"].astype(int),
-        target=needed(tree, "truth/beams/target", index),
-        true_range=needed(tree, "truth/beams/range", index).astype(float),
-        snap=pose.to_body(needed(tree, "truth/emissions/position", index)),
-        poses=_poses(tree, index),
-        hulls=hulls(tree, index),
-        ghosts=ghosts(tree, index),
+        target=needed(tree, "truth/beams/target", row),
+        true_range=needed(tree, "truth/beams/range", row).astype(float),
+        snap=pose.to_body(needed(tree, "truth/emissions/position", row)),
+        poses=_poses(tree, row),
+        hulls=hulls(tree, row),
+        ghosts=ghosts(tree, row),
+        lobes=lobes(tree, row),
     )
 
 
-def _points(tree: xr.DataTree, index: int) -> dict[str, Floats]:
-    """Columns (point,) of the points of a frame, none in a store without a cloud; range_error by their labels."""
-    names = ("x", "y", "z", "azimuth", "elevation", "energy", "delay", "target")
-    if not has_labels(tree):
-        return dict.fromkeys((*names, "range_error"), np.zeros(0))
-    found = points(tree, [index])
-    kept = {name: needed(tree, f"cloud/{name}", index)[found.row].astype(float) for name in names}
-    return kept | {"range_error": np.where(found.judged, found.error, np.nan)}
-
-
-def _sonar(tree: xr.DataTree, index: int) -> Pose:
+def _sonar(tree: Source, index: int) -> Pose:
     return Pose(needed(tree, "truth/sonar_position", index), needed(tree, "truth/sonar_orientation", index))
 
 
-def _poses(tree: xr.DataTree, index: int) -> tuple[Pose, ...]:
+def _poses(tree: Source, index: int) -> tuple[Pose, ...]:
     """The poses of the targets; none in a store without."""
     position, orientation = (read(tree, f"truth/targets/{name}", index) for name in ("position", "orientation"))
     if position is None or orientation is None:
@@ -170,7 +212,7 @@ def _poses(tree: xr.DataTree, index: int) -> tuple[Pose, ...]:
     return tuple(Pose(*pose) for pose in zip(position, orientation, strict=True))
 
 
-def echo_levels(tree: xr.DataTree, frame: int) -> tuple[Floats, list[str]] | None:
+def echo_levels(tree: Source, frame: int) -> tuple[Floats, list[str]] | None:
     """Levels (target, family) in dB re the direct echo of each target, and the families; None where none are stored.
 
     A target without a direct echo: re its strongest.
@@ -184,7 +226,7 @@ def echo_levels(tree: xr.DataTree, frame: int) -> tuple[Floats, list[str]] | Non
     return level - np.where(np.isfinite(direct), direct, strongest)[:, None], names
 
 
-def ghosts(tree: xr.DataTree, frame: int) -> tuple[Ghost, ...]:
+def ghosts(tree: Source, frame: int) -> tuple[Ghost, ...]:
     """Ghosts of all targets that are less than `FAINTEST` under the direct echo; none in a store without echoes."""
     found = echo_levels(tree, frame)
     azimuth, elevation = (read(tree, f"truth/targets/echo_{name}", frame) for name in ("azimuth", "elevation"))
@@ -199,6 +241,37 @@ def ghosts(tree: xr.DataTree, frame: int) -> tuple[Ghost, ...]:
             where = float(azimuth[target, family]), float(elevation[target, family])
             drawn.append(Ghost(f"{whose}{families[family]} ghost", int(target), *where, float(level[target, family])))
     return tuple(drawn)
+
+
+def lobes(tree: Source, frame: int) -> tuple[Floats, ...]:
+    """Lines (frequency, azimuth and elevation) in deg along which the image has grating lobes of the loudest echoes.
+
+    None in a store without echoes, or of an array that is no lattice.
+    """
+    found, position = echo_levels(tree, frame), read(tree, "signals/position")
+    azimuth, elevation = (read(tree, f"truth/targets/echo_{name}", frame) for name in ("azimuth", "elevation"))
+    pitch = 0.0 if position is None else lattice_pitch(position)
+    if found is None or azimuth is None or elevation is None or not pitch:
+        return ()
+    frequency = np.linspace(tree.attrs["band_low"], tree.attrs["band_high"], LOBE_POINTS)
+    grid = [needed(tree, f"truth/beams/{name}") for name in ("azimuth", "elevation")]
+    low, high = np.array([[axis.min(), axis.max()] for axis in grid]).T
+    drawn = []
+    for echo in np.argwhere((found[0] > -LOBED) & np.isfinite(azimuth + elevation)):
+        towards = direction(*np.deg2rad([azimuth[tuple(echo)], elevation[tuple(echo)]]))
+        beams = grating_lobes(towards, frequency, pitch, tree.attrs["assumed_sound_speed"])
+        lines = np.rad2deg(np.stack(azimuth_elevation(beams), axis=-1))
+        drawn += [line for line in lines if ((line >= low) & (line <= high)).all(axis=-1).any()]
+    return tuple(drawn)
+
+
+def lattice_pitch(position: Floats) -> float:
+    """Pitch (m) of the square lattice that sensors (sensor, xyz) are on, in the plane x = 0; 0 where they are not."""
+    across = np.concatenate([np.diff(np.unique(position[:, axis].round(6))) for axis in (1, 2)])
+    pitch = float(across.min(initial=np.inf))
+    steps = (position[:, 1:] - position[0, 1:]) / pitch
+    on = np.isfinite(pitch) and np.abs(steps - steps.round()).max() < 1e-2 and not np.ptp(position[:, 0]) > 1e-6
+    return pitch if on else 0.0
 
 
 def _blended(azimuth: Floats, elevation: Floats, families: list[str], family: int) -> bool:
@@ -217,7 +290,7 @@ def _blended(azimuth: Floats, elevation: Floats, families: list[str], family: in
     return bool((near[once] <= near[family]).any())
 
 
-def mesh_group(tree: xr.DataTree, name: str, target: int, index: int) -> str:
+def mesh_group(tree: Source, name: str, target: int, index: int) -> str:
     """Where the mesh is that a target has in a frame: its group, or one of those in it where its shape varies."""
     group = f"targets/{name}"
     if read(tree, f"{group}/0/faces") is None:
@@ -225,7 +298,7 @@ def mesh_group(tree: xr.DataTree, name: str, target: int, index: int) -> str:
     return f"{group}/{int(needed(tree, 'truth/targets/mesh', index)[target])}"
 
 
-def hulls(tree: xr.DataTree, index: int) -> tuple[Hull, ...]:
+def hulls(tree: Source, index: int) -> tuple[Hull, ...]:
     """The targets of a frame where they truly are; none of a frame that was not built."""
     sonar = _sonar(tree, index)
     names = read(tree, "truth/targets/target")

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from sonarsynth.pictures.figures.ray_figure import section_figure, space_figure
 
 from sonarsynth.equations.noise.filters import Fir
 from sonarsynth.pictures.figures.frame_figure import FramePicture, Hull, View, Window
 from sonarsynth.pictures.figures.outlines import CELLS, union_outline, view_outline
 from sonarsynth.pictures.figures.snap_figure import snap_figure
+from sonarsynth.pictures.ray_figures.ray_figure import section_figure, space_figure
+from sonarsynth.pictures.ray_figures.ray_styles import Look
+from sonarsynth.pictures.ray_figures.scene_geometry import SceneGeometry
+from sonarsynth.receiver import PlanarLattice, elements
 from sonarsynth.sources.shrimp import LogarithmicBubble
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -115,21 +118,30 @@ def test_the_filter_is_drawn_with_half_its_response_at_the_cutoff() -> None:
     assert np.allclose(both[1] - both[0], decibels, atol=1e-6)
 
 
+def around(bottom: float, *hulls: Hull) -> SceneGeometry:
+    """An array at (0, 0, -0.1) that looks along x; its field of view is 2 m across."""
+    array, place = elements(PlanarLattice(columns=2, rows=2, pitch=0.01)), np.array([0.0, 0.0, -0.1])
+    view = {n: place + [[0, 0, 0], [1, 1, 0], [1, -1, 0]] for n in ("across", "upright")}
+    return SceneGeometry(bottom, 0.0, place, array, array.position + place, {"array": place}, hulls, {}, view)
+
+
+def fan(coefficient: float = np.nan) -> Look:
+    return Look("fan", False, ("launch", "surface", "end"), coefficient)
+
+
 def test_the_section_shows_the_profile_as_it_is() -> None:
     ray = np.array([[0.0, 0.0, -0.1], [0.3, 0.0, 0.0], [0.6, 0.0, -0.3]])
     depth, speed = np.array([0.0, 0.1, 0.3]), np.array([1500.0, 1510.0, 1490.0])
-    made = section_figure([ray], [Hull("ball", *sphere([0.5, 0.0, -0.15], 0.05))], depth, speed, bottom_depth=0.3)
-    section, profile = made.axes
-    assert np.allclose(section.lines[2].get_xydata(), ray[:, [0, 2]])
+    ball = Hull("ball", *sphere([0.5, 0.0, -0.15], 0.05))
+    section, profile = section_figure("tank", [ray], [fan()], depth, speed, around(0.3, ball)).axes
+    assert any(np.array_equal(line.get_xydata(), ray[:, [0, 2]]) for line in section.lines)
     assert section.get_ylim()[0] < -0.3 < 0.0 < section.get_ylim()[1]
     assert np.interp(-0.1, *profile.lines[0].get_xydata()[::-1, ::-1].T) == pytest.approx(1510.0)
 
 
 def test_rays_in_space_keep_one_scale_on_all_axes() -> None:
-    rays = [np.array([[0.0, 0.0, 0.0], [6.0, 0.1 * i, -1.0], [1.0, 10.0, 10.0]]) for i in range(3)]
-    made = space_figure(
-        rays, np.array([1.0, 0.5, 0.1]), [], {"array": np.zeros(3), "shrimp": np.array([1.0, 10.0, 10.0])}
-    )
+    rays = [np.array([[0.0, 0.0, 0.0], [6.0, 0.1 * i, -1.0], [1.0, 10.0, -10.0]]) for i in range(3)]
+    made = space_figure("fan", rays, [fan(c) for c in (1.0, 0.5, 0.1)], around(10.0))
     axes = made.axes[0]
     spans = [np.ptp(limits) for limits in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())]
     assert spans / np.linalg.norm(spans) == pytest.approx(axes._box_aspect / np.linalg.norm(axes._box_aspect), rel=1e-6)

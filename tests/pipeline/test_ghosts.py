@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sonarsynth import schedule
+from sonarsynth.conventions import direction
+from sonarsynth.equations.arrays.grating_lobes import grating_lobes
 from sonarsynth.pictures import show
 from sonarsynth.pictures.figures.frame_figure import FramePicture, Hull, View, Window
 from sonarsynth.pictures.figures.ghost_rings import Ghost, place
-from sonarsynth.pictures.store_reading import FAINTEST, ghosts, opened, stored
+from sonarsynth.pictures.store_reading import FAINTEST, ghosts, lattice_pitch, opened, stored
 from sonarsynth.planning import plan
 from sonarsynth.recipe import reading
 
@@ -174,3 +177,38 @@ def test_stored_ghosts_lie_where_the_mirror_images_are(
     (line,) = [line for line in said[0].splitlines() if line.startswith("  ghosts")]
     assert f"box: surface {found['surface ghost'].level:+.1f} dB, bottom {found['bottom ghost'].level:+.1f} dB" in line
     assert line.endswith(f"dB re its {reference} echo")
+
+
+def test_grating_lobes_lie_where_the_lattice_cannot_tell() -> None:
+    """Sensors of a lattice hear a wave from a grating lobe in step with one from the direction itself: their phases
+    differ by whole turns."""
+    pitch, speed = 0.05, 1500.0
+    sensors = np.stack([np.zeros(35), *(g.ravel() for g in np.mgrid[0:5, 0:7] * pitch)], axis=1)
+    towards, frequency = direction(np.deg2rad(-6.0), np.deg2rad(25.0)), np.array([25e3, 60e3, 85e3])
+    found = grating_lobes(towards, frequency, pitch, speed)
+    assert len(found)
+    assert lattice_pitch(sensors) == pytest.approx(pitch)
+    assert lattice_pitch(sensors * [1.0, 1.0, 1.3]) == lattice_pitch(sensors[:1]) == 0.0
+    for n, f in enumerate(frequency):
+        there = found[np.isfinite(found[:, n, 0]), n]
+        np.testing.assert_allclose(np.linalg.norm(there, axis=1), 1.0, rtol=1e-12)
+        assert np.abs(there - towards).max(axis=1).min() > 0.3  # none is the direction itself
+        turns = f / speed * (there - towards) @ (sensors - sensors[0]).T
+        np.testing.assert_allclose(turns, turns.round(), atol=1e-9)
+        reach = int(2.0 * pitch * f / speed)
+        orders = np.mgrid[-reach : reach + 1, -reach : reach + 1].reshape(2, -1).T
+        every = towards[1:] + orders * speed / (f * pitch)
+        assert len(there) == sum(u @ u < 1.0 for u in every) - 1
+
+
+def test_grating_lobes_are_drawn_over_the_band_and_leave_the_axes_alone(picture: FramePicture) -> None:
+    lobe = np.stack([np.linspace(10.0, 80.0, 30), np.full(30, 12.0)], axis=1)
+    picture.show(view())
+    without, limits = picture.pixels().astype(int), picture.figure.axes[0].get_xlim()
+    picture.show(replace(view(), lobes=(lobe,)))
+    rows, columns = np.nonzero(np.abs(picture.pixels() - without).max(axis=2) > 40)
+    at = np.stack([columns + 0.5, len(without) - rows - 0.5], axis=1)
+    azimuth, elevation = picture.figure.axes[0].transData.inverted().transform(at).T
+    assert picture.figure.axes[0].get_xlim() == limits
+    assert np.abs(elevation - 12.0).max() < 1.0
+    assert azimuth.min() == pytest.approx(10.0, abs=1.0) and azimuth.max() == pytest.approx(25.5, abs=1.0)

@@ -11,6 +11,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.pictures.figures.frame_figure import Hull, clipped, edges, image_axes, outline_artist, set_outlines
+from sonarsynth.pictures.figures.ghost_rings import Ghost, GhostMarks
 from sonarsynth.pictures.figures.style import INK, PALE, figure
 
 if TYPE_CHECKING:
@@ -47,6 +48,8 @@ class Panel:
 
     level: Floats | None  # (elevation, azimuth) dB re the brightest beam of the store; None without an image
     hulls: tuple[Hull, ...]
+    ghosts: tuple[Ghost, ...] = ()
+    lobes: tuple[Floats, ...] = ()  # (point, azimuth and elevation) deg: grating lobes
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +64,18 @@ class BesidePicture:
     """A figure laid out once, a column a store and a row a moment; `show` draws moments in place of the last."""
 
     def __init__(
-        self, azimuth: Floats, elevation: Floats, columns: Sequence[Column], heading: str, note: str = "", rows: int = 1
+        self,
+        azimuth: Floats,
+        elevation: Floats,
+        columns: Sequence[Column],
+        heading: str,
+        note: str = "",
+        rows: int = 1,
+        of: str = "each film",
     ) -> None:
-        """Lay out for a beam grid (deg, ascending). `note` stands beneath the numbers."""
+        """Lay out for a beam grid (deg, ascending). `note` stands beneath the numbers; levels are re the brightest beam
+        of what `of` says.
+        """
         across, up = (np.ptp(edges(angle)) for angle in (azimuth, elevation))
         self._width = WIDTHS[len(columns)] * (SMALLER if rows > 1 else 1.0)
         self._height = float(np.clip(self._width * up / across, 0.25 * self._width, 1.6 * self._width))
@@ -80,6 +92,7 @@ class BesidePicture:
         self._text(0.15, self._size[1] - 0.3, heading, fontsize=12)
         places = [[self._axes(r, c, below, rows) for c in range(len(columns))] for r in range(rows)]
         self._images = [[image_axes(axes, azimuth, elevation) for axes in row] for row in places]
+        self._ghosts = [[GhostMarks(axes) for axes in row] for row in places]
         self._outlines = [[outline_artist(axes) for axes in row] for row in places]
         for row in places:
             for axes in row:
@@ -88,7 +101,7 @@ class BesidePicture:
         for c, title in enumerate(titles):
             self._text(self._left(c), top + 0.1, title, fontsize=10.5, fontweight="bold", linespacing=1.15)
         self._table(columns, table, note)
-        self._bar(top, below)
+        self._bar(top, below, of)
 
     def show(self, *moments: Moment) -> None:
         """Draw moments, a row each, in place of the last."""
@@ -99,7 +112,9 @@ class BesidePicture:
                 assert shape is not None
                 absent = panel.level is None
                 image.set_data(np.ma.masked_all(shape.shape) if absent else _drawn(panel.level))
-            _outline(self._outlines[row], [panel.hulls for panel in moment.panels])
+            lines = _outline(self._outlines[row], [panel.hulls for panel in moment.panels])
+            for marks, panel, around in zip(self._ghosts[row], moment.panels, lines, strict=True):
+                marks.show(panel.ghosts, panel.lobes, around)
 
     def pixels(self) -> np.ndarray:
         """The figure as drawn: (row, column, rgb) uint8."""
@@ -138,18 +153,18 @@ class BesidePicture:
             self.figure.add_artist(Line2D(ends, [(y - 0.06) / h] * 2, color="#e4e4e4", linewidth=0.6))
         self._text(0.15, BOTTOM, note, fontsize=8, color=PALE)
 
-    def _bar(self, top: float, below: float) -> None:
+    def _bar(self, top: float, below: float, of: str) -> None:
         """One scale of colours for all panels."""
         w, h = self._size
         place = self.figure.add_axes(((w - RIGHT) / w, below / h, 0.14 / w, (top - below) / h))
         bar = self.figure.colorbar(self._images[0][0], cax=place, extend="min")
-        long = "energy re the brightest beam of each film (dB)"
+        long = f"energy re the brightest beam of {of} (dB)"
         bar.set_label(long if top - below > 3.2 else "energy (dB)", fontsize=8.5, color=INK)
         bar.ax.tick_params(labelsize=8)
 
 
-def _outline(artists: Sequence[PolyCollection], hulls: Sequence[tuple[Hull, ...]]) -> None:
-    """Draw outlines in each panel; those of hulls that are one object are found once, for that takes its time."""
+def _outline(artists: Sequence[PolyCollection], hulls: Sequence[tuple[Hull, ...]]) -> list[list[Floats]]:
+    """Draw outlines in each panel, and return them; those of hulls that are one object are found once."""
     first: dict[int, int] = {}
     lines: list[list[Floats]] = []
     for i, (artist, some) in enumerate(zip(artists, hulls, strict=True)):
@@ -158,6 +173,7 @@ def _outline(artists: Sequence[PolyCollection], hulls: Sequence[tuple[Hull, ...]
         if like != i:
             artist.set_verts(lines[like])
             artist.set_edgecolor(artists[like].get_edgecolor())
+    return lines
 
 
 def _two_lines(text: str, letters: int) -> str:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
-from sonarsynth.pictures.figures.ghost_rings import Ghost, GhostMarks
+from sonarsynth.conventions import Floats, counted
+from sonarsynth.pictures.figures.ghost_rings import Ghost, GhostMarks, legend
 from sonarsynth.pictures.figures.outlines import union_outline, view_outline
-from sonarsynth.pictures.figures.style import BACKDROP, DYNAMIC_RANGE, ENERGY_MAP, INK, OUTLINES, figure, label
+from sonarsynth.pictures.figures.style import BACKDROP, DYNAMIC_RANGE, ENERGY_MAP, INK, OUTLINES, figure, label, settle
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -53,6 +53,7 @@ class View:
     point_level: Floats  # (point,) dB re the same
     hulls: tuple[Hull, ...]
     ghosts: tuple[Ghost, ...] = ()
+    lobes: tuple[Floats, ...] = ()  # (point, azimuth and elevation) deg: grating lobes
     earlier: Floats = field(default_factory=lambda: np.zeros((0, 3)))  # (point, xyz) m: points of frames before
 
 
@@ -97,9 +98,8 @@ class FramePicture:
         self._image: AxesImage = image_axes(sky, azimuth, elevation)
         self._outlines: PolyCollection = outline_artist(sky)
         self._ghosts = GhostMarks(sky)
-        bar = self.figure.colorbar(self._image, ax=sky, shrink=0.82, pad=0.02, extend="min")
-        bar.set_label(unit, fontsize=9, color=INK)
-        bar.ax.tick_params(labelsize=8)
+        legend(sky)
+        colour_bar(sky, self._image, unit)
         self._clouds = [
             CloudPanel(self.figure.add_subplot(parts[0, 1]), PLAN, "from above"),
             CloudPanel(self.figure.add_subplot(parts[1, 1]), SIDE, "from starboard"),
@@ -120,25 +120,32 @@ class FramePicture:
             panel.show(view, self.window)
         if self._behind is None:
             self._lay_out()
-        self._ghosts.show(view.ghosts, outlines)
+        self._ghosts.show(view.ghosts, view.lobes, outlines)
 
     def _lay_out(self) -> None:
         """Arrange once, for axes that move from frame to frame are hard to watch, and draw what stays."""
-        self.figure.canvas.draw()
-        self.figure.set_layout_engine("none")
+        settle(self.figure)
         changing = self._changing()
-        for artist in changing:
+        edges = [spine for axes in self.figure.axes for spine in axes.spines.values()]
+        for artist in (*changing, *edges):
             artist.set_visible(False)
         self.figure.canvas.draw()
-        self._behind = self._canvas().copy_from_bbox(self.figure.bbox)
+        canvas = self._canvas()
+        self._behind = canvas.copy_from_bbox(self.figure.bbox)
+        bare = np.asarray(canvas.buffer_rgba())[..., :3].copy()
+        for spine in edges:  # images lie on the edges of axes, which are put back as they were drawn
+            spine.set_visible(True)
+            self.figure.draw_artist(spine)
+        framed = np.asarray(canvas.buffer_rgba())[..., :3]
+        self._edges = np.nonzero((framed != bare).any(axis=2))
+        self._edge_colours = framed[self._edges]
         for artist in changing:
             artist.set_visible(True)
 
     def _changing(self) -> list[Artist]:
         """What is drawn anew in each frame, the rearmost first."""
         clouds = [artist for panel in self._clouds for artist in panel.changing]
-        edges = [spine for axes in self.figure.axes for spine in axes.spines.values()]  # images lie on them
-        return [self._title, self._image, self._outlines, *self._ghosts.drawn, *clouds, *edges]
+        return [self._title, self._image, self._outlines, *self._ghosts.drawn, *clouds]
 
     def _canvas(self) -> FigureCanvasAgg:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -152,7 +159,9 @@ class FramePicture:
         canvas.restore_region(self._behind)
         for artist in self._changing():
             self.figure.draw_artist(artist)
-        return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+        drawn = np.asarray(canvas.buffer_rgba())[..., :3].copy()
+        drawn[self._edges] = self._edge_colours
+        return drawn
 
 
 class CloudPanel:
@@ -195,7 +204,7 @@ class CloudPanel:
         self._points.set_array(clipped(view.point_level))
         outside = int((np.abs(at) > [reach, reach / 1.6]).any(axis=1).sum())
         before = f", grey: {len(view.earlier)} of earlier frames" if len(view.earlier) else ""
-        self._note.set_text(f"{len(at)} points" + (f", {outside} of them outside" if outside else "") + before)
+        self._note.set_text(counted(len(at), "point") + (f", {outside} of them outside" if outside else "") + before)
 
 
 def clipped(level: Floats) -> Floats:
@@ -219,13 +228,17 @@ def image_axes(axes: Axes, azimuth: Floats, elevation: Floats) -> AxesImage:
         vmax=0.0,
         interpolation="nearest",
     )
-    label(
-        axes,
-        "azimuth (deg), port on the left",
-        "elevation (deg), up positive",
-        "energy image, true outline of the target",
-    )
+    label(axes, "azimuth (deg), port on the left", "elevation (deg), up positive")
+    axes.set_autoscale_on(False)  # marks outside are not drawn
     return image
+
+
+def colour_bar(axes: Axes, image: AxesImage, unit: str) -> None:
+    """The scale of an image beside it, as high as the image."""
+    place = axes.inset_axes((1.02, 0.0, 0.035, 1.0))
+    bar = axes.figure.colorbar(image, cax=place, extend="min")
+    bar.set_label(unit, fontsize=9, color=INK)
+    bar.ax.tick_params(labelsize=8)
 
 
 def edges(centres: Floats) -> tuple[float, float]:

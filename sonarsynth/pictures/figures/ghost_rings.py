@@ -1,9 +1,9 @@
-"""Ghosts in an energy image: a ring and a label where the array sees a target mirrored in surface or bottom."""
+"""Ghosts and grating lobes in an energy image: rings at mirrored targets, lines where the lattice repeats an echo."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +22,9 @@ RING = 9.0
 GAP = 4.0
 """Free space (points) between a ring and its label."""
 
+LOBE: dict[str, Any] = {"color": "#c9f7ff", "linewidth": 1.0, "linestyle": (0, (1, 2))}
+"""How a grating lobe is drawn."""
+
 ARROWS = {(0, 1): "^", (0, -1): "v", (1, 0): ">", (-1, 0): "<"}
 """Markers for ghosts outside the picture, by (right, up)."""
 
@@ -38,31 +41,36 @@ class Ghost:
 
 
 class GhostMarks:
-    """Rings on the axes of an energy image; `show` draws those of one frame in place of the last."""
+    """Marks on the axes of an energy image; `show` draws those of one frame in place of the last."""
 
     def __init__(self, axes: Axes) -> None:
         self._axes = axes
         self.drawn: list[Artist] = []
         """What is drawn of this frame."""
 
-    def show(self, ghosts: tuple[Ghost, ...], outlines: list[Floats], clear: float = GAP) -> None:
-        """Draw ghosts, labels `clear` points off the outlines of targets: lines (point, azimuth and elevation) in deg.
+    def show(
+        self, ghosts: tuple[Ghost, ...], lobes: tuple[Floats, ...], outlines: list[Floats], clear: float = GAP
+    ) -> None:
+        """Draw ghosts, labels `clear` points off the outlines of targets, and grating lobes.
 
-        The axes must have their final place: labels are laid out on it. A ghost outside is an arrow at the edge.
+        lobes, outlines: lines (point, azimuth and elevation) in deg. The axes must have their final place: labels are
+        laid out on it. A ghost outside is an arrow at the edge.
         """
         for artist in self.drawn:
             artist.remove()
-        self.drawn = []
         axes = self._axes
+        self.drawn = []
+        for line in lobes:
+            self.drawn += axes.plot(*line.T, **LOBE)
         point = axes.figure.dpi / 72.0  # in pixels
         frame = np.asarray(axes.get_window_extent().extents)
         inside = frame + GAP * point * np.array([1.0, 1.0, -1.0, -1.0])
-        taken = [_box(axes.transData.transform(line), clear * point) for line in outlines]
+        taken = [box_of(axes.transData.transform(line), clear * point) for line in outlines]
         marks = []
         for ghost in ghosts:
             true = axes.transData.transform((ghost.azimuth, ghost.elevation))
             at = np.clip(true, frame[:2] + RING * point, frame[2:] - RING * point)
-            taken.append(_box(at[None], 0.6 * RING * point))
+            taken.append(box_of(at[None], 0.6 * RING * point))
             marks.append((ghost, at, _marker(true, frame)))
         for ghost, at, marker in marks:
             ring, text = self._mark(ghost, at, marker)
@@ -98,7 +106,33 @@ class GhostMarks:
         return ring, text
 
 
-def _box(points: Floats, margin: float) -> Floats:
+def legend(axes: Axes) -> None:
+    """What outline, rings and lines mean, over the axes of an image."""
+    from matplotlib.lines import Line2D
+
+    ring: dict[str, Any] = {
+        "linestyle": "",
+        "marker": "o",
+        "markersize": 6,
+        "markerfacecolor": "none",
+        "color": OUTLINES[0],
+    }
+    handles = [
+        Line2D([], [], color=OUTLINES[0], label="true outline"),
+        Line2D([], [], label="ghost by surface or bottom", **ring),
+        Line2D([], [], label="grating lobe", **LOBE),
+    ]
+    where: dict[str, Any] = {
+        "loc": "lower left",
+        "bbox_to_anchor": (0.0, 1.0),
+        "ncols": 3,
+        "borderaxespad": 0.9,
+        "columnspacing": 1.2,
+    }
+    axes.legend(handles=handles, fontsize=7.5, labelcolor="white", facecolor=BACKDROP, framealpha=1.0, **where)
+
+
+def box_of(points: Floats, margin: float) -> Floats:
     """(left, bottom, right, top) of points (point, 2), with a margin."""
     return np.concatenate([points.min(axis=0) - margin, points.max(axis=0) + margin])
 

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
-from sonarsynth.pictures.figures.frame_figure import View, Window, clipped, image_axes, outline_artist, set_outlines
-from sonarsynth.pictures.figures.ghost_rings import GhostMarks
-from sonarsynth.pictures.figures.style import ERROR_MAP, INK, MARKS, OUTLINES, PALE, figure, grid, label
+from sonarsynth.conventions import Floats, counted
+from sonarsynth.pictures.figures.frame_figure import (
+    View,
+    Window,
+    clipped,
+    colour_bar,
+    image_axes,
+    outline_artist,
+    set_outlines,
+)
+from sonarsynth.pictures.figures.ghost_rings import GhostMarks, box_of, legend, place
+from sonarsynth.pictures.figures.style import ERROR_MAP, INK, MARKS, OUTLINES, PALE, figure, grid, label, settle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,6 +26,9 @@ if TYPE_CHECKING:
 
 WORST_SHOWN = 10.0
 """Range errors (cm) are coloured up to this."""
+
+BADGE = 14.0
+"""Size (points) of the number of a beam."""
 
 BADGES = 22.0
 """Points around a target that the numbers of its beams take: labels of ghosts stay off."""
@@ -60,38 +71,34 @@ def sheet(
     if view.level is not None:
         image.set_data(np.ma.masked_invalid(clipped(view.level))[:, ::-1])
     outlines = set_outlines(outline_artist(sky), view.hulls)
-    bar = made.colorbar(image, ax=sky, shrink=0.82, pad=0.02, extend="min")
-    bar.set_label(unit, fontsize=9, color=INK)
-    bar.ax.tick_params(labelsize=8)
-    mark_beams(sky, beams)
+    legend(sky)
+    colour_bar(sky, image, unit)
     draw_cloud(made.add_subplot(top[2], projection="3d"), made, view, errors, space)
     if beams:
         below = rows[1].subgridspec(1, len(beams))
         draw_beams([made.add_subplot(below[i]) for i in range(len(beams))], beams)
-    made.draw_without_rendering()  # the axes find their place
-    GhostMarks(sky).show(view.ghosts, outlines, BADGES if beams else 0.0)
+    settle(made)
+    GhostMarks(sky).show(view.ghosts, view.lobes, outlines, BADGES if beams else 0.0)
+    mark_beams(sky, beams, outlines)
     return made
 
 
-def mark_beams(axes: Axes, beams: list[Beam]) -> None:
-    """Rings at the beams, with their numbers beside them so that the target stays in sight."""
-    beside = ((13, 13), (-13, 13), (-13, -13))
-    for beam, number, colour, offset in zip(beams, "123", MARKS, beside, strict=False):
+def mark_beams(axes: Axes, beams: list[Beam], outlines: list[Floats]) -> None:
+    """Rings at the beams, with their numbers beside them: inside the axes, off the targets and off each other."""
+    point = axes.figure.dpi / 72.0  # in pixels
+    to_pixels = axes.transData.transform
+    taken = [box_of(to_pixels(line), 0.0) for line in outlines]
+    taken += [box_of(to_pixels([(beam.azimuth, beam.elevation)]), 5.0 * point) for beam in beams]
+    for beam, number, colour in zip(beams, "123", MARKS, strict=False):
         at = (beam.azimuth, beam.elevation)
         axes.plot(*at, "o", ms=8, mfc="none", mec="white", mew=2.4)
         axes.plot(*at, "o", ms=8, mfc="none", mec=colour, mew=1.2)
-        badge = {"boxstyle": "circle,pad=0.25", "facecolor": colour, "edgecolor": "white", "linewidth": 0.8}
-        axes.annotate(
-            number,
-            at,
-            offset,
-            textcoords="offset points",
-            ha="center",
-            va="center",
-            color="white",
-            fontsize=8,
-            bbox=badge,
-        )
+        size, pixel = np.full(2, BADGE * point), to_pixels(at)
+        middle = place(pixel, size, 6.0 * point, np.asarray(axes.get_window_extent().extents), taken)
+        taken.append(box_of(middle[None], 0.5 * BADGE * point))
+        shape = {"boxstyle": "circle,pad=0.25", "facecolor": colour, "edgecolor": "white", "linewidth": 0.8}
+        middling: dict[str, Any] = {"ha": "center", "va": "center", "color": "white", "fontsize": 8, "bbox": shape}
+        axes.annotate(number, at, (middle - pixel) / point, textcoords="offset points", **middling)
 
 
 def draw_cloud(axes: Axes, onto: Figure, view: View, errors: Errors, space: Window) -> None:
@@ -119,7 +126,7 @@ def draw_cloud(axes: Axes, onto: Figure, view: View, errors: Errors, space: Wind
     bar.ax.tick_params(labelsize=8)
     low, high = centre - half, centre + half
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(tuple(half), zoom=1.15)
+    axes.set_box_aspect(tuple(half), zoom=1.05)
     axes.view_init(elev=24, azim=-160)  # from behind the sonar, a little to starboard: port is on the left
     axes.set_xlabel("forward, x (m)", fontsize=8)
     axes.set_ylabel("port, y (m)", fontsize=8)
@@ -127,10 +134,9 @@ def draw_cloud(axes: Axes, onto: Figure, view: View, errors: Errors, space: Wind
     axes.tick_params(labelsize=7)
     axes.locator_params(nbins=5)
     outside = int((~inside).sum())
-    counts = f"{int(on.sum())} points on a target, {int(off.sum())} off target" + (
-        f", {outside} outside" if outside else ""
-    )
-    axes.set_title(f"point cloud in the true hull: {counts}", fontsize=10, color=INK, loc="left", y=0.98)
+    counts = f"{counted(int(on.sum()), 'point')} on a target, {int(off.sum())} off target"
+    more = f", {outside} outside" if outside else ""
+    axes.set_title(f"point cloud in the true hull, one scale: {counts}{more}", fontsize=10, color=INK, y=1.0)
 
 
 def draw_beams(panels: list[Axes], beams: list[Beam]) -> None:
@@ -142,11 +148,11 @@ def draw_beams(panels: list[Axes], beams: list[Beam]) -> None:
         grid(axes)
         axes.plot(1e3 * beam.time, factor * beam.pressure, color=colour, linewidth=0.9)
         if np.isfinite(beam.expected):
-            axes.axvline(1e3 * beam.expected, color=INK, linewidth=0.9, linestyle="--", label="echo, true delay")
+            axes.axvline(
+                1e3 * beam.expected, color=INK, linewidth=0.9, linestyle="--", label="surface on the beam's axis"
+            )
         if np.isfinite(beam.measured):
-            axes.axvline(1e3 * beam.measured, color=PALE, linewidth=0.9, linestyle=":", label="echo, measured delay")
-        if np.isfinite([beam.expected, beam.measured]).any():
-            axes.legend(loc="upper left", fontsize=7, frameon=False)
+            axes.axvline(1e3 * beam.measured, color=PALE, linewidth=0.9, linestyle=":", label="point of the cloud")
         axes.set_xlim(1e3 * first, 1e3 * last)
         axes.set_ylim(-1.08 * factor * peak, 1.08 * factor * peak)
         where = f"azimuth {beam.azimuth:+.1f}, elevation {beam.elevation:+.1f} deg"
@@ -156,6 +162,14 @@ def draw_beams(panels: list[Axes], beams: list[Beam]) -> None:
             f"beam pressure ({unit})" if number == "1" else "",
             f"{number}  {beam.name}: {where}",
         )
+    _beam_legend(panels)
+
+
+def _beam_legend(panels: list[Axes]) -> None:
+    """One legend of the lines at delays, under the figure."""
+    named = {name: line for axes in panels for line, name in zip(*axes.get_legend_handles_labels(), strict=True)}
+    if named:
+        panels[0].figure.legend(named.values(), named, loc="outside lower center", ncols=2, fontsize=8, frameon=False)
 
 
 def _span(beams: list[Beam]) -> tuple[float, float]:

@@ -58,6 +58,14 @@ def figure(width: float, height: float, **layout: Any) -> Figure:
     return made
 
 
+def settle(made: Figure) -> None:
+    """Give the axes of a figure their place, once: later drawings need not look for it."""
+    engine = made.get_layout_engine()
+    if engine is not None:
+        engine.execute(made)
+        made.set_layout_engine("none")
+
+
 def label(axes: Axes, x: str, y: str, title: str = "") -> None:
     """Name the axes, thin the frame, put the title to the left."""
     axes.set_xlabel(x, fontsize=9, color=INK)

@@ -1,0 +1,26 @@
+"""Grating lobes of a lattice: other directions in which a plane wave is in step at all of its sensors."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+
+
+def grating_lobes(direction: Floats, frequency: Floats, pitch: float, sound_speed: float) -> Floats:
+    """Directions (lobe, frequency, xyz) of beams that hear a plane wave from `direction` (xyz) as loud as its own does.
+
+    Of a square lattice in the plane x = 0, ahead of it (x > 0): frequency (Hz), pitch (m), sound speed (m/s). NaN at
+    frequencies that have not this lobe; lobes of no frequency are left out. Components along the lattice differ by
+    whole multiples of c/(f pitch) (Van Trees 2002, Optimum Array Processing, section 2.5).
+    """
+    step = sound_speed / (np.asarray(frequency, float) * pitch)
+    most = int(np.floor(2.0 / step.min()))
+    orders = np.stack(np.meshgrid(*2 * [np.arange(-most, most + 1)]), axis=-1).reshape(-1, 2)
+    orders = orders[orders.any(axis=1)]
+    along = direction[1:] + orders[:, None, :] * step[:, None]
+    ahead = 1.0 - (along**2).sum(axis=-1)
+    there = ahead > 0.0
+    found = np.concatenate([np.sqrt(np.maximum(ahead, 0.0))[..., None], along], axis=-1)
+    found[~there] = np.nan
+    return np.asarray(found[there.any(axis=1)])
