@@ -47,8 +47,8 @@ Products = Annotated[
     str,
     typer.Option(metavar="LIST", help="Stored besides the ground truth: signals, image, cloud; 'truth': nothing else."),
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 Scale = Literal["common", "frame"]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 ALL_PRODUCTS = "signals,image,cloud"
 
 
@@ -211,32 +211,25 @@ def show(
         list[str], typer.Argument(metavar="STORE...", help="One store, or up to four to compare.", show_default=False)
     ],
     out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER", help="Where to write the pictures. Default: <store>.pictures, <a>-<b>.pictures."
-        ),
+        Path | None, typer.Option(metavar="FOLDER", help="Where to. Default: <store>.pictures, <a>-<b>.pictures.")
     ] = None,
     frame: Annotated[
         int | None, typer.Option(min=0, help="The frame of the sheet. Default: the frame with most points.")
     ] = None,
     film: Annotated[bool, typer.Option(help="Also write the film.")] = True,
-    scale: Annotated[
-        Scale, typer.Option(help="0 dB of the film: the brightest beam of all frames, or that of each frame.")
-    ] = "common",
+    scale: Annotated[Scale, typer.Option(help="0 dB: the brightest beam of all frames, or of each.")] = "common",
 ) -> None:
     """Draw a store: a film of the energy image, a sheet with image, point cloud and signals; print a summary.
 
     With several stores: films side by side, each with its range error, levels and cost.
     """
-    from sonarsynth.cli.printing import progress
+    from sonarsynth.cli import printing
     from sonarsynth.pictures import show as draw
     from sonarsynth.pictures.compare import show_beside
 
-    with progress("reading") as drawn:
-        if len(stores) == 1:
-            files = draw(stores[0], out, frame=frame, film=film, scale=scale, say=typer.echo, progress=drawn)
-        else:
-            files = show_beside(stores, out, frame=frame, film=film, scale=scale, say=typer.echo, progress=drawn)
+    with printing.progress("reading") as drawn:
+        more: Any = {"frame": frame, "film": film, "scale": scale, "say": typer.echo, "progress": drawn}
+        files = draw(stores[0], out, **more) if len(stores) == 1 else show_beside(stores, out, **more)
     for file in files:
         typer.echo(str(file))
 
@@ -257,10 +250,7 @@ def rays(
     frame: Annotated[int, typer.Option(min=0, help="The frame to trace.")] = 0,
     settings: Settings = [],  # noqa: B006
 ) -> None:
-    """Draw rays as a vertical section, in 3-D, and as an interactive HTML page.
-
-    Eigenrays by default; the recipe's `rays:` block if it has one.
-    """
+    """Draw eigenrays, or what the recipe's `rays:` asks for: a section, a 3-D view, and an interactive HTML page."""
     from sonarsynth import planning
     from sonarsynth.pictures.ray_pictures import show_rays
     from sonarsynth.recipe import reading
@@ -280,15 +270,20 @@ def rays(
 def snap(
     recipe: RecipeFile,
     out: Annotated[Path, typer.Option(metavar="FILE", help="Where to write the picture.")] = Path("snap.png"),
+    compare: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="A recording (WAV, CSV) of a snap to compare the model with.")
+    ] = None,
     settings: Settings = [],  # noqa: B006
 ) -> None:
-    """Draw the snap of a recipe: waveform and spectrum before and after the sonar's filter, and the filter."""
+    """Draw the snap of a recipe before and after the sonar's filter: waveform, spectrum, level, width and bandwidth."""
     from sonarsynth.pictures import snap_pictures
     from sonarsynth.recipe import reading
 
     source = reading.read(recipe, settings)
     with reading.locating(source):
-        file = snap_pictures.snap(reading.recipe_of(source), out)
+        file, found = snap_pictures.draw_snap(reading.recipe_of(source), out, compare)
+    if found is not None:
+        typer.echo(found.summary())
     typer.echo(str(file))
 
 

@@ -5,14 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sonarsynth.equations.bubble.pulses import filtered
 from sonarsynth.equations.noise.filters import Fir
 from sonarsynth.pictures.figures.frame_figure import FramePicture, Hull, View, Window
 from sonarsynth.pictures.figures.outlines import CELLS, union_outline, view_outline
-from sonarsynth.pictures.figures.snap_figure import snap_figure
+from sonarsynth.pictures.figures.snap_comparison import compare_snaps
+from sonarsynth.pictures.figures.snap_figure import bandwidth, half_width, snap_figure
 from sonarsynth.pictures.ray_figures.ray_figure import section_figure, space_figure
 from sonarsynth.pictures.ray_figures.ray_styles import Look
 from sonarsynth.pictures.ray_figures.scene_geometry import SceneGeometry
 from sonarsynth.receiver import PlanarLattice, elements
+from sonarsynth.sources.recordings import Recording
 from sonarsynth.sources.shrimp import LogarithmicBubble
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -114,8 +117,56 @@ def test_the_filter_is_drawn_with_half_its_response_at_the_cutoff() -> None:
     frequency, decibels = response.lines[0].get_data()
     assert np.interp(110.0, frequency, decibels) == pytest.approx(-6.02, abs=0.05)
     assert waveform.lines[0].get_ydata().max() == pytest.approx(1e-3 * 10 ** (190 / 20) * 1e-6, rel=0.02)
+    assert waveform.get_xlim()[0] >= -110.0 and waveform.get_xlim()[1] <= 110.0  # us
+    assert "snap: peak 190.0 dB" in waveform.get_legend().get_texts()[0].get_text()
     both = [line.get_ydata() for line in levels.lines]
     assert np.allclose(both[1] - both[0], decibels, atol=1e-6)
+
+
+def test_width_and_bandwidth_of_a_tone_in_a_gaussian_are_those_of_the_closed_form() -> None:
+    """exp(-t^2/2 s^2): 2 sqrt(2 ln 2) s wide at half its height, and in the spectrum sqrt(ln 10)/(2 pi s) either side
+    at -10 dB."""
+    s = 8e-6
+    time, frequency = np.linspace(-1e-4, 1e-4, 40_001), np.linspace(0.0, 2e5, 20_001)
+    assert half_width(time, -np.exp(-0.5 * (time / s) ** 2)) == pytest.approx(2 * np.sqrt(2 * np.log(2)) * s, rel=1e-6)
+    level = 20 * np.log10(np.exp(-0.5 * (2 * np.pi * s * (frequency - 9e4)) ** 2))
+    half = np.sqrt(np.log(10)) / (2 * np.pi * s)
+    assert bandwidth(frequency, level) == pytest.approx((9e4 - half, 9e4 + half), abs=10.0)
+
+
+def snap_recording(rate: float, noise: float = 0.0, sign: float = 1.0) -> Recording:
+    """A snap as a hydrophone of some sampling frequency has it, with noise (rms, over its peak), between samples."""
+    time = (np.arange(600) - 400.37) / rate
+    p = filtered(time, LogarithmicBubble().pulse(0.0, 1.2 * rate), Fir(0.0, 0.4 * rate, 0.1 * rate, 80.0))
+    p = sign * p / np.abs(p).max() + noise * np.random.default_rng(5).standard_normal(len(p))
+    return Recording(p * np.hanning(1200)[300:900], rate, float(np.argmax(np.abs(p))))
+
+
+def test_a_recording_of_the_model_itself_is_found_to_be_it() -> None:
+    bubble = LogarithmicBubble()
+    for sign in (1.0, -1.0):
+        window = snap_recording(1e6, sign=sign)
+        found = compare_snaps(lambda highest: bubble.pulse(0.0, highest), window, (25e3, 85e3))
+        assert found.misfit < 0.03 and found.level_misfit < 0.1
+        assert found.inverted == (sign < 0.0)
+
+
+def test_the_misfit_is_the_noise_of_the_recording() -> None:
+    """And the model fits best as it is placed: an rms misfit of sin(angle) between the two as vectors."""
+    bubble = LogarithmicBubble()
+    clean, noisy = (
+        compare_snaps(lambda highest: bubble.pulse(0.0, highest), snap_recording(1e6, noise), (25e3, 85e3))
+        for noise in (0.0, 0.05)
+    )
+    share = 0.05 * np.sqrt(0.85) / np.sqrt(np.mean(clean.measured**2))  # the low pass lets 0.85 of the noise through
+    assert noisy.misfit == pytest.approx(share, rel=0.2)
+    cosine = noisy.measured @ noisy.modelled / np.linalg.norm(noisy.measured) / np.linalg.norm(noisy.modelled)
+    assert noisy.misfit == pytest.approx(np.sqrt(1.0 - cosine**2), rel=1e-9)
+
+
+def test_a_recording_below_the_band_of_the_sonar_is_refused() -> None:
+    with pytest.raises(ValueError, match="sampled at 40000 Hz: it has nothing of the sonar's band"):
+        compare_snaps(lambda highest: LogarithmicBubble().pulse(0.0, highest), snap_recording(4e4), (25e3, 85e3))
 
 
 def around(bottom: float, *hulls: Hull) -> SceneGeometry:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,8 @@ from numpy.random import default_rng
 from ruamel.yaml import YAML
 
 from sonarsynth import schedule
+from sonarsynth.cli import app
+from sonarsynth.cli.running import run
 from sonarsynth.description import FieldError
 from sonarsynth.pictures.snap_pictures import snap as draw_snap
 from sonarsynth.pipeline import render
@@ -83,6 +86,39 @@ def test_the_snap_of_each_model_is_drawn(tmp_path: Path) -> None:
     for kind, snap in SNAPS.items():
         draw_snap(recipe_with(tmp_path, snap), tmp_path / f"{kind}.png")
         assert (tmp_path / f"{kind}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_snap_is_compared_with_a_recording_and_what_is_none_gives_one_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    from scipy.io import wavfile
+
+    recipe_with(tmp_path, SNAPS["gabor"])
+    rate, cut = 500_000, b"RIFF\x24\x00\x00\x00WAVEfmt "
+    time = (np.arange(500) - 250) / rate
+    width = 3 / 55e3 / (2 * np.sqrt(2 * np.log(2)))
+    tone = np.exp(-0.5 * (time / width) ** 2) * np.cos(2 * np.pi * 55e3 * time)
+    wavfile.write(tmp_path / "tone.wav", rate, (2**14 * tone).astype(np.int16))
+    wavfile.write(tmp_path / "slow.wav", 8000, (2**14 * tone).astype(np.int16))
+    wavfile.write(tmp_path / "silent.wav", rate, np.zeros(500, np.int16))
+    wavfile.write(tmp_path / "nan.wav", rate, np.full(500, np.nan, np.float32))
+    (tmp_path / "cut.wav").write_bytes(cut)
+    (tmp_path / "empty.wav").write_bytes(b"")
+    (tmp_path / "noise.wav").write_bytes(default_rng(0).bytes(3000))
+    out = str(tmp_path / "compared.png")
+
+    def compared(name: str) -> tuple[int, str]:
+        arguments = ["snap", str(tmp_path / "recipe.yaml"), "--compare", str(tmp_path / name), "--out", out]
+        status, texts = run(app, arguments), capfd.readouterr()
+        return status, texts.out if status == 0 else texts.err
+
+    status, said = compared("tone.wav")
+    assert status == 0 and Path(out).read_bytes().startswith(b"\x89PNG")
+    found = re.search(r"waveform (\S+) % .* spectrum (\S+) dB", said)
+    assert found is not None and float(found[1]) < 5.0 and float(found[2]) < 0.5
+    for name in ("slow.wav", "silent.wav", "nan.wav", "cut.wav", "empty.wav", "noise.wav", "absent.wav"):
+        status, said = compared(name)
+        assert status == 2 and said.count("\n") == 1 and name in said, said
 
 
 def test_a_recording_lies_beside_its_recipe_and_what_it_holds_counts(tmp_path: Path) -> None:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
-from sonarsynth.equations.bubble.pulses import Pulse, filtered, gain_for_level, reach, spectrum
+from sonarsynth.equations.bubble.pulses import Pulse, filtered, gain_for_level, levels, reach, spectrum
 from sonarsynth.equations.noise.filters import Fir, response
+from sonarsynth.pictures.figures.snap_comparison import SnapComparison, draw_comparison
 from sonarsynth.pictures.figures.style import INK, MARKS, figure, grid, label
 
 if TYPE_CHECKING:
@@ -18,10 +19,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 AS_MADE = Fir(0.0, 1e6, 0.2e6, 80.0)
-"""The snap itself is drawn below 1.1 MHz: there is no more in a picture of a millisecond."""
+"""The snap itself is drawn below 1.1 MHz."""
 
-AROUND = 0.1e-3
-"""s of silence that is drawn either side."""
+AROUND = 100e-6
+"""s that are drawn before and after the collapse."""
 
 LOWEST_RESPONSE = -120.0
 """The filter is drawn down to this (dB)."""
@@ -31,31 +32,53 @@ def snap_figure(
     pulse: Callable[[float], Pulse],
     fir: Fir,
     source_level: float | None = None,
-    *,
-    before: float | None = None,
-    after: float | None = None,
+    comparison: SnapComparison | None = None,
     highest: float = 200e3,
 ) -> Figure:
     """The snap at 1 m, scaled to `source_level` (dB re 1 uPa at 1 m peak; None: its own), before and after the filter.
 
-    pulse: gives it for waves up to a frequency (Hz). Drawn from `before` to `after` the collapse (s; None: all of it,
-    and 0.1 ms more), and up to `highest` (Hz).
+    pulse: gives it for waves up to a frequency (Hz). Drawn for 200 us about the collapse, up to `highest` (Hz), with
+    level, width and bandwidth; under it, where there is one, a comparison with a measured snap.
     """
     fine, heard = pulse(reach(AS_MADE)), pulse(max(reach(fir), highest))
     gain = gain_for_level(fine, source_level)
-    time = np.linspace(
-        fine.start - AROUND if before is None else -before, fine.end + AROUND if after is None else after, 4001
-    )
+    time = np.linspace(-AROUND, AROUND, 4001)
     frequency = np.linspace(highest / 800, highest, 800)
     passed = response(frequency, fir)
     density = gain * spectrum(frequency, heard)
-    made = figure(12.0, 3.8, dpi=110)
-    parts = made.add_gridspec(1, 3)
-    panels = [made.add_subplot(parts[i]) for i in range(3)]
-    _waveforms(panels[0], time, gain * filtered(time, fine, AS_MADE), gain * filtered(time, heard, fir))
-    _levels(panels[1], frequency, _energy_level(density), _energy_level(density * passed))
+    rows = 1 if comparison is None else 2
+    made = figure(12.0, 4.2 * rows, dpi=110)
+    parts = made.add_gridspec(rows, 3)
+    panels = [made.add_subplot(parts[0, i]) for i in range(3)]
+    snaps = {"snap": (fine, AS_MADE), "filtered": (heard, fir)}
+    waves = {name: gain * filtered(time, *one) for name, one in snaps.items()}
+    decibels = {name: 20.0 * np.log10(gain) + np.array(levels(*one)) for name, one in snaps.items()}
+    _waveforms(panels[0], time, waves, decibels)
+    _levels(panels[1], frequency, {"snap": _energy_level(density), "filtered": _energy_level(density * passed)})
     _response(panels[2], frequency, passed)
+    if comparison is not None:
+        draw_comparison((made.add_subplot(parts[1, 0]), made.add_subplot(parts[1, 1])), comparison, highest)
     return made
+
+
+def half_width(time: Floats, pressure: Floats) -> float:
+    """How long (s) a pulse stays above half its largest size about it: full width at half maximum."""
+    size = np.abs(pressure)
+    top = int(np.argmax(size))
+    low = np.flatnonzero(size < 0.5 * size[top])
+    before, after = low[low < top], low[low > top]
+    if not len(before) or not len(after):
+        return float("nan")
+    ends = [
+        np.interp(0.5 * size[top], size[[i, i + d]], time[[i, i + d]]) for i, d in ((before[-1], 1), (after[0], -1))
+    ]
+    return float(ends[1] - ends[0])
+
+
+def bandwidth(frequency: Floats, level: Floats, down: float = 10.0) -> tuple[float, float]:
+    """Lowest and highest frequency (Hz) at which levels (frequency,) are at most `down` dB under the highest."""
+    loud = frequency[level >= level.max() - down]
+    return float(loud[0]), float(loud[-1])
 
 
 def _energy_level(density: np.ndarray) -> Floats:
@@ -64,21 +87,27 @@ def _energy_level(density: np.ndarray) -> Floats:
         return np.asarray(10.0 * np.log10(2.0 * np.abs(density) ** 2 / REFERENCE_PRESSURE**2))
 
 
-def _waveforms(axes: Axes, time: Floats, snap: Floats, filtered: Floats) -> None:
+def _waveforms(axes: Axes, time: Floats, waves: dict[str, Floats], decibels: dict[str, Floats]) -> None:
     grid(axes)
-    axes.plot(1e3 * time, 1e-3 * snap, color=INK, linewidth=1.0, label="snap")
-    axes.plot(1e3 * time, 1e-3 * filtered, color=MARKS[0], linewidth=1.0, label="filtered")
-    axes.legend(fontsize=8, frameon=False, loc="upper left")
-    label(axes, "time after the collapse (ms)", "pressure at 1 m (kPa)", "waveform")
+    for (name, wave), colour in zip(waves.items(), (INK, MARKS[0]), strict=True):
+        (peak, both), width = decibels[name], half_width(time, wave)
+        said = f"{name}: peak {peak:.1f} dB, peak to peak {both:.1f} dB,\n{1e6 * width:.3g} us wide at half the peak"
+        axes.plot(1e6 * time, 1e-3 * wave, color=colour, linewidth=1.0, label=said)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.4 * (high - low))  # room for the legend
+    axes.legend(fontsize=7.5, frameon=False, loc="upper left")
+    label(axes, "time after the collapse (us)", "pressure at 1 m (kPa)", "waveform, dB re 1 uPa at 1 m")
 
 
-def _levels(axes: Axes, frequency: Floats, snap: Floats, filtered: Floats) -> None:
+def _levels(axes: Axes, frequency: Floats, densities: dict[str, Floats]) -> None:
     grid(axes)
-    axes.plot(1e-3 * frequency, snap, color=INK, linewidth=1.0, label="snap")
-    axes.plot(1e-3 * frequency, filtered, color=MARKS[0], linewidth=1.0, label="filtered")
-    top = float(snap.max())
-    axes.set_ylim(top - 70.0, top + 5.0)
-    axes.legend(fontsize=8, frameon=False, loc="lower left")
+    for (name, level), colour in zip(densities.items(), (INK, MARKS[0]), strict=True):
+        low, high = bandwidth(frequency, level)
+        said = f"{name}: {1e-3 * low:.3g} to {1e-3 * high:.3g} kHz within 10 dB"
+        axes.plot(1e-3 * frequency, level, color=colour, linewidth=1.0, label=said)
+    top = float(densities["snap"].max())
+    axes.set_ylim(top - 70.0, top + 18.0)
+    axes.legend(fontsize=7.5, frameon=False, loc="upper right")
     label(axes, "frequency (kHz)", "energy density at 1 m (dB re 1 uPa2 s/Hz)", "spectrum")
 
 
