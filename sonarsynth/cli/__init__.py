@@ -45,7 +45,9 @@ Settings = Annotated[
 ]
 Products = Annotated[
     str,
-    typer.Option(metavar="LIST", help="Stored besides the ground truth: signals, image, cloud; 'truth': nothing else."),
+    typer.Option(
+        metavar="LIST", help="Stored besides the ground truth: signals, image, cloud, beams; 'truth': nothing."
+    ),
 ]
 Scale = Literal["common", "frame"]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]

@@ -23,6 +23,7 @@ from sonarsynth.pipeline.requested_rays import follow_rays
 from sonarsynth.pipeline.stage_times import STAGES, mark_stage, stage_timer
 from sonarsynth.pipeline.stored_values import (
     Values,
+    beam_values,
     cloud_values,
     echo_values,
     image_values,
@@ -35,7 +36,7 @@ from sonarsynth.pipeline.stored_values import (
 )
 from sonarsynth.pipeline.synthesis import frame_signals
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, variables
-from sonarsynth.planning import Plan, check_unsampled_frame, context_of, plan, receiver_of, survey_of
+from sonarsynth.planning import OF_BEAMS, Plan, check_unsampled_frame, context_of, plan, receiver_of, survey_of
 from sonarsynth.planning.notes.source_notes import locator
 from sonarsynth.products import (
     Arrivals,
@@ -167,7 +168,7 @@ def beamform_frame(plan: Plan, index: int, traced: TracedFrame) -> BeamformedFra
     if "signals" in plan.products:
         isolated = measure_isolated(plan, traced)
         mark_stage("measure")
-    if not plan.products & {"image", "cloud"}:
+    if not plan.products & OF_BEAMS:
         return BeamformedFrame(signals, None, None, isolated=isolated)
     return replace(locate_and_image(plan, traced.frame, signals), isolated=isolated)
 
@@ -234,6 +235,9 @@ def range_frame(plan: Plan, index: int, traced: TracedFrame, heard: BeamformedFr
     if "image" in plan.products:
         values |= image_values(heard.image, plan.windows.direct_removed)
     mark_stage("collect")
+    if "beams" in plan.products:
+        values |= beam_values(plan, heard.beams, heard.image)
+        mark_stage("resolve")
     if "cloud" in plan.products:
         cloud = cloud_of(plan, frame, heard).loudest(plan.sizes["point"])
         mark_stage("range")
@@ -280,6 +284,7 @@ def render(recipe: Recipe | Plan, index: int) -> xr.DataTree:
         attrs = {"units": v.units, "long_name": v.long_name, **dict(v.attributes)}
         data = values[v.group, v.name]
         if "scale_factor" in attrs:
-            data = (data * attrs.pop("scale_factor")).astype(np.float32)
+            packed = data * attrs.pop("scale_factor")
+            data = np.where(data == v.fill, np.nan, packed).astype(np.float32)
         groups.setdefault(v.group, xr.Dataset())[v.name] = (v.dims[1:], data, attrs)
     return xr.DataTree.from_dict(groups)

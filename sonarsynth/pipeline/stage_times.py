@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Final
 
-STAGES: Final = ("trace", "label", "synthesise", "measure", "locate", "beamform", "range", "collect")
+STAGES: Final = ("trace", "label", "synthesise", "measure", "locate", "beamform", "resolve", "range", "collect")
 """Stages that are counted, in order: names of rows of a plan, and `collect`, values made ready to be stored."""
 
 

@@ -5,9 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from sonarsynth.conventions import NO_TARGET, Floats
+from sonarsynth.imaging.beam_envelopes import envelope_levels
+from sonarsynth.pipeline.variables.variable_groups import LEVEL_STEP, NO_LEVEL
+from sonarsynth.planning import Plan
 from sonarsynth.products import (
     LINK_BUDGET,
     Arrivals,
+    BeamSpectra,
     Echoes,
     EnergyImage,
     LinkBudget,
@@ -90,6 +94,17 @@ def image_values(image: EnergyImage, direct_removed: bool) -> Values:
     """The image and its window; what may be left in it of the direct pulse, where that is taken out."""
     values = table("/image", energy=image.energy, start=image.start, stop=image.stop)
     return values | table("/image", remainder=np.float32(image.remainder)) if direct_removed else values
+
+
+def beam_values(plan: Plan, beams: BeamSpectra | None, image: EnergyImage) -> Values:
+    """Levels of beams against delay, rounded to `LEVEL_STEP`; nothing of beams that the image has nothing of."""
+    shape = *image.energy.shape, len(plan.beam_delays)
+    stored = np.full(shape, NO_LEVEL, np.int16)
+    if beams is not None:
+        level = envelope_levels(beams, plan.scene.sonar, shape[2]) / LEVEL_STEP
+        known = np.isfinite(level) & np.isfinite(image.energy)[..., None]
+        stored[known] = np.rint(np.clip(level[known], NO_LEVEL + 1, -NO_LEVEL - 1))
+    return table("/beams", level=stored, start=np.nan if beams is None else beams.snapshots.start)
 
 
 def cloud_values(cloud: PointCloud, labels: PointLabels, size: int) -> Values:

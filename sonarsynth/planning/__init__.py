@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonarsynth.planning.choices import Choices, choices_from
+from sonarsynth.planning.choices import ALL_PRODUCTS, OF_BEAMS, PRODUCTS, Choices, choices_from
 from sonarsynth.planning.choosing import choose
 from sonarsynth.planning.costs import machine_factor, stages
 from sonarsynth.planning.listening_windows import check_windows, frame_start, listening_windows
@@ -18,12 +18,14 @@ from sonarsynth.planning.notes.omissions import left_out
 from sonarsynth.planning.notes.plan_notes import notes, stored_validity
 from sonarsynth.planning.notes.scene_checks import check_frame, check_located, check_methods, read_inputs
 from sonarsynth.planning.plan_tables import Omission, Stage
-from sonarsynth.planning.plans import PRODUCTS, Errors, Plan, Windows
+from sonarsynth.planning.plans import Errors, Plan, Windows
 from sonarsynth.receiver import elements
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
 
 __all__ = [
+    "ALL_PRODUCTS",
+    "OF_BEAMS",
     "PRODUCTS",
     "Choices",
     "Errors",
@@ -116,9 +118,9 @@ def _mean_stages(made: Plan, looks: Sequence[SampledScene]) -> tuple[Stage, ...]
 def chosen_products(names: Iterable[str]) -> frozenset[str]:
     """Products by name, one or several; none, or "truth", for truth alone. Raises ValueError for another name."""
     chosen = frozenset([names] if isinstance(names, str) else names) - {"truth"}
-    unknown = sorted(chosen - set(PRODUCTS))
+    unknown = sorted(chosen - set(ALL_PRODUCTS))
     if unknown:
-        raise ValueError(f"'{unknown[0]}' is not a product; known: {', '.join((*PRODUCTS, 'truth'))}")
+        raise ValueError(f"'{unknown[0]}' is not a product; known: {', '.join((*ALL_PRODUCTS, 'truth'))}")
     return chosen
 
 

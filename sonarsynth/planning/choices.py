@@ -14,6 +14,14 @@ from sonarsynth.ranging import IsovelocityPlacing, Peaks, Picking, Placing
 from sonarsynth.signals import GriddedSynthesis, Synthesis
 from sonarsynth.state import OcclusionPoint
 
+PRODUCTS = ("signals", "image", "cloud")
+"""What a build makes where nothing else is asked for. Truth is always written; with any product, levels of what is
+traced too."""
+ALL_PRODUCTS = (*PRODUCTS, "beams")
+"""What a build can be asked for."""
+OF_BEAMS = frozenset({"image", "cloud", "beams"})
+"""Products that the signals are steered for."""
+
 Degree = Literal[3, 5]
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.description.method import Demand
-from sonarsynth.planning.choices import Choices, Degree
+from sonarsynth.planning.choices import OF_BEAMS, Choices, Degree
 from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.focus_zones import beamformer
 from sonarsynth.planning.measured.ray_bending import ranging_error
@@ -72,7 +72,7 @@ def choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
     made = replace(plan, choices=choices)
     indices = [look.frames[0].index for look in some]
     cut = _subarrays(made, indices)
-    imaged = bool(plan.products & {"image", "cloud"})
+    imaged = bool(plan.products & OF_BEAMS)
     steering, blurred = beamformer(made, indices) if imaged else (choices.beamforming, 0.0)
     return replace(
         made,

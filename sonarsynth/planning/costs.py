@@ -13,6 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from sonarsynth.description.method import FrameSize
+from sonarsynth.planning.choices import OF_BEAMS
 from sonarsynth.planning.plan_tables import Stage
 from sonarsynth.planning.plans import Plan
 
@@ -27,6 +28,8 @@ SECONDS = {
     "measure path": 1.3e-3,  # alone, at one hydrophone
     "remove sensor": 36e-6,
     "transform sensor sample": 1.6e-9,
+    "steer beam bin": 4.5e-8,
+    "envelope delay": 2e-8,
     "write byte": 12e-9,
 }
 """Seconds per unit of work."""
@@ -192,7 +195,7 @@ def _signal_rows(plan: Plan, size: FrameSize) -> list[Row]:
 
 def _sonar_rows(plan: Plan, size: FrameSize) -> list[Row]:
     """What the sonar makes of signals."""
-    if not plan.products & {"image", "cloud"}:
+    if not plan.products & OF_BEAMS:
         return []
     gate = plan.windows.echo_stop - plan.windows.echo_start
     locating, cancelling = plan.scene.processing.locating, plan.scene.processing.cancelling
@@ -213,6 +216,11 @@ def _sonar_rows(plan: Plan, size: FrameSize) -> list[Row]:
     rows.append(
         ("beamform", plan.choices.beamforming.row() + without, why, _steered(plan), image, 4 * size.beams * asked)
     )
+    if "beams" in plan.products:
+        delays = len(plan.beam_delays)
+        what, count = f"envelopes of beams, {delays} delays", size.beams * delays
+        seconds = size.beams * size.bins * SECONDS["steer beam bin"] + count * SECONDS["envelope delay"]
+        rows.append(("resolve", what, "requested", "0.005 dB, rounding", seconds, 2 * count))
     if "cloud" in plan.products:
         error = "predicted, /cloud/range_error" + _bent(plan)
         seconds = plan.choices.picking.cost(size) + plan.choices.placing.cost(size)

@@ -12,6 +12,7 @@ from sonarsynth.conventions import Floats, counted
 from sonarsynth.description.memory import frame_bytes
 from sonarsynth.environment.absorption import DepthAbsorption
 from sonarsynth.environment.sea import Profile
+from sonarsynth.imaging.beam_envelopes import envelope_delays
 from sonarsynth.planning.choices import Choices
 from sonarsynth.planning.measured.absorption_error import Passed, mean_absorption, passed_by, shape_error
 from sonarsynth.planning.measured.ray_bending import propagation
@@ -22,9 +23,6 @@ from sonarsynth.receiver import Elements, elements
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.state import Medium
-
-PRODUCTS = ("signals", "image", "cloud")
-"""What a build can be asked for. Truth is always written; with any of these, levels of what is traced too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +106,11 @@ class Plan:
     def digest(self) -> str:
         """Identity of the numbers that this plan makes, whatever the products: the recipe's digest."""
         return self.recipe.digest
+
+    @property
+    def beam_delays(self) -> Floats:
+        """Delays (delay,) in s after the start of the echo window at which levels of beams are stored."""
+        return envelope_delays(self.windows.echo_stop - self.windows.echo_start, self.scene.sonar)
 
     def absorption(self, frequency: np.ndarray | float) -> Floats:
         """Absorption in dB/m at frequencies (Hz): the mean over the depths of the sequence's paths.

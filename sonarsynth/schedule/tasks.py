@@ -30,8 +30,8 @@ WARM_UP: Final = 300.0
 
 
 def tasks_of(products: Sequence[str]) -> tuple[str, ...]:
-    """Those of frames with such products: no beamform where only truth is wanted, no range without a cloud."""
-    return STAGES[: 1 if not products else 3 if "cloud" in products else 2]
+    """Those of frames with such products: truth alone is traced, and the last is for what takes single beams."""
+    return STAGES[: 1 if not products else 3 if {"cloud", "beams"} & set(products) else 2]
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def beamform(job: Job, traced: Sequence[Step]) -> list[Step]:
 
     def work(before: Step) -> Any:
         heard = pipeline.beamform_frame(plan_of(job), before.frame, before.made)
-        if "cloud" in job.products:
+        if len(tasks_of(job.products)) == 3:
             return before.made, heard
         return _values(job, before.frame, before.made, heard)
 

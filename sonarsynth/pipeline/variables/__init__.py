@@ -9,7 +9,7 @@ from sonarsynth.pipeline.variables.static_variables import coordinates
 from sonarsynth.pipeline.variables.truth_variables import HOW_LEVELS_ADD_UP
 from sonarsynth.pipeline.variables.variable import Variable
 from sonarsynth.pipeline.variables.variable_groups import VARIABLES
-from sonarsynth.planning import Plan
+from sonarsynth.planning import OF_BEAMS, Plan
 
 __all__ = ["FORMAT_VERSION", "HOW_LEVELS_ADD_UP", "VARIABLES", "Variable", "attributes", "coordinates", "variables"]
 
@@ -22,7 +22,7 @@ def variables(plan: Plan) -> tuple[Variable, ...]:
     wanted = {"truth", *plan.products}
     if plan.products:
         wanted.add("levels")
-    if plan.products & {"image", "cloud"}:
+    if plan.products & OF_BEAMS:
         wanted.add("source_estimates")
     chosen = [v for v in VARIABLES if v.product in wanted]
     if not plan.windows.direct_removed:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth.planning import Plan
+from sonarsynth.planning import OF_BEAMS, Plan
 from sonarsynth.products import DIRECT, FAMILIES
 from sonarsynth.recipe.varied_columns import columns
 
@@ -27,21 +27,27 @@ def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.n
 
     beams = scene.sonar.beams
     add("/", "frame", ("frame",), np.arange(sizes["frame"]), "1", "frame of the dataset")
-    on_grid = "/truth/beams" + (" /image" if "image" in plan.products else "")
+    on_grid = " ".join(["/truth/beams", *(f"/{name}" for name in ("image", "beams") if name in plan.products)])
     degrees = {"comment": "as the sonar looks"}
     add(on_grid, "azimuth", ("azimuth",), np.rad2deg(beams.azimuth), "degree", "azimuth, port positive", **degrees)
     add(
         on_grid, "elevation", ("elevation",), np.rad2deg(beams.elevation), "degree", "elevation, up positive", **degrees
     )
-    estimates = " /source_estimates" if plan.products & {"image", "cloud"} else ""
+    estimates = " /source_estimates" if plan.products & OF_BEAMS else ""
     add("/truth" + estimates, "xyz", ("xyz",), list("xyz"), "1", "axis")
     add("/truth", "wxyz", ("wxyz",), list("wxyz"), "1", "part of a unit quaternion, scalar first")
     add("/truth/targets", "target", ("target",), np.array(names, dtype=np.str_), "1", "name of the target")
     bounds = ["azimuth_min", "azimuth_max", "elevation_min", "elevation_max"]
     add("/truth/targets", "bound", ("bound",), bounds, "1", "which bound of the image box")
     if plan.products:
-        echoes = [*names, DIRECT]
-        add("/link_budget", "target", ("target",), echoes, "1", f"target of the echoes; {DIRECT}: snap to array")
+        add(
+            "/link_budget",
+            "target",
+            ("target",),
+            [*names, DIRECT],
+            "1",
+            f"target of the echoes; {DIRECT}: snap to array",
+        )
         add(
             "/link_budget",
             "family",
@@ -52,6 +58,15 @@ def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.n
         )
         touched = "boundaries touched on the way from the target to the array"
         add("/truth/targets", "family", ("family",), list(FAMILIES), "1", touched)
+    if "beams" in plan.products:
+        add(
+            "/beams",
+            "delay",
+            ("delay",),
+            plan.beam_delays,
+            "s",
+            "time after the start of the window, steps of 1/bandwidth",
+        )
     if "signals" in plan.products:
         _add_sensors(plan, add)
     for column in columns(plan.recipe.spanned):

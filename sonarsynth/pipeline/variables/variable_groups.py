@@ -45,6 +45,22 @@ _IMAGE = group_of(
         attributes=comment("the direct pulse is taken out; beams with more than a quarter of this are NaN"),
     ),
 )
+LEVEL_STEP, NO_LEVEL = 0.01, -(2**15)
+"""dB that levels of beams are rounded to; what stands for none."""
+_BEAMS = group_of(
+    "/beams",
+    "beams",
+    row(
+        "level",
+        (*BEAMS, "delay"),
+        "int16",
+        "dB",
+        "mean square pressure of the beam over a period of the carrier, re 1 uPa, by its envelope",
+        fill=NO_LEVEL,
+        attributes=(("scale_factor", LEVEL_STEP), *comment("missing: silence, or a beam that the image lacks")),
+    ),
+    row("start", ("frame",), "float64", "s", "time of delay 0 after the instant of the frame"),
+)
 WHOSE = comment(
     "of the paths that bring most energy in the beam of the point at its delay. A range is wrong where the emission is "
     "not that of the first source estimate. Targets are where the sound met them"
@@ -132,5 +148,5 @@ _ESTIMATES = group_of(
         attributes=NONE,
     ),
 )
-VARIABLES: tuple[Variable, ...] = (*_ROOT, *_SIGNALS, *_IMAGE, *_CLOUD, *_ESTIMATES, *TRUTH, *LEVELS)
+VARIABLES: tuple[Variable, ...] = (*_ROOT, *_SIGNALS, *_IMAGE, *_BEAMS, *_CLOUD, *_ESTIMATES, *TRUTH, *LEVELS)
 """Every variable that a frame may have."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.planning.choices import OF_BEAMS
 from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.sampled_arrivals import arrivals_of, receiver_of, survey_of
 from sonarsynth.planning.notes.source_notes import locator
@@ -37,7 +38,7 @@ class Losses:
 def lost_echoes(made: Plan) -> list[str]:
     """Notes on what echoes lose, where the direct pulse is taken out or the echo window cuts more than their feet."""
     windows, names = made.windows, [target.name for target in made.scene.world.targets]
-    if not (windows.direct_removed or windows.cut) or not made.products & {"image", "cloud"}:
+    if not (windows.direct_removed or windows.cut) or not made.products & OF_BEAMS:
         return []
     rows = [row for index in windows.tight if (row := losses(made.at(index), index)) is not None]
     found = []

@@ -9,9 +9,10 @@ import numpy as np
 from sonarsynth.environment.boundary_numbers import rms_height
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
+from sonarsynth.planning.choices import ALL_PRODUCTS
 from sonarsynth.planning.measured.ray_bending import bending_error
 from sonarsynth.planning.plan_tables import Omission
-from sonarsynth.planning.plans import PRODUCTS, Plan
+from sonarsynth.planning.plans import Plan
 from sonarsynth.propagation.bounces import MOST_BOUNCES
 from sonarsynth.receiver import stop_frequency
 from sonarsynth.recipe.scene import Frame
@@ -72,7 +73,7 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
 
 def _not_asked_for(plan: Plan) -> list[Omission]:
     """What the products of this build do not need."""
-    rows = [Omission(name, "not requested", "0") for name in PRODUCTS if name not in plan.products]
+    rows = [Omission(name, "not requested", "0") for name in ALL_PRODUCTS if name not in plan.products]
     if "signals" not in plan.products:
         why = "signals are not stored, so there is nothing to compare with it"
         rows.append(Omission("the loudest path of each kind by itself", why, "0"))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sonarsynth.environment.sea import Profile
+from sonarsynth.planning.choices import OF_BEAMS
 from sonarsynth.planning.measured.lost_echoes import lost_echoes
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.notes.formula_validity import validity
@@ -39,7 +40,7 @@ def notes(made: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
             f"{made.windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest snap"
         )
     cancelled = scene.processing.cancelling is not None
-    if made.propagation.bounces and not cancelled and made.products & {"image", "cloud"} and made.sizes["emission"]:
+    if made.propagation.bounces and not cancelled and made.products & OF_BEAMS and made.sizes["emission"]:
         found.append("reflections of the snap itself enter the image: processing.cancelling removes them")
     found += lost_echoes(made) + _accuracy(made, looks) + off_the_bottom(scene)
     for look in noted(looks):

@@ -15,6 +15,7 @@ from sonarsynth.equations.rays.ray_solutions import TOLERANCE
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.motion import pose
 from sonarsynth.geometry.placed_target import PlacedTarget
+from sonarsynth.planning.choices import OF_BEAMS
 from sonarsynth.receiver import Sonar, elements
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals.array_paths import MAX_DOPPLER
@@ -205,7 +206,7 @@ def check_located(scene: Scene, frame: Frame, products: frozenset[str]) -> None:
     owners = [i for i, source in enumerate(scene.world.sources) for _ in source.times]
     for owner, snap in zip(owners, frame.moment.snaps, strict=True):
         away = float(np.linalg.norm(snap.position - frame.sonar_pose.position))
-        if away < least and products & {"image", "cloud"}:
+        if away < least and products & OF_BEAMS:
             raise FieldError(
                 ("scene", "world", "sources", owner, "position"),
                 f"is {away:.3g} m from the centre of the array at frame {frame.index}, among its hydrophones, which "
@@ -216,7 +217,7 @@ def check_located(scene: Scene, frame: Frame, products: frozenset[str]) -> None:
 def check_methods(scene: Scene, products: frozenset[str]) -> None:
     """The beamformer must be able to use the array."""
     line = scene.processing.beamforming.refusal(elements(scene.sonar.array))
-    if line and products & {"image", "cloud"}:
+    if line and products & OF_BEAMS:
         raise FieldError(("scene", "processing", "beamforming", "kind"), line)
 
 
