@@ -11,11 +11,19 @@ from __future__ import annotations
 
 from typing import Any, TypeVar, cast, dataclass_transform
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Discriminator, Field
 from pydantic.dataclasses import dataclass
 
 BY_KIND: Any = Field(discriminator="kind")
 """Annotation of a union of descriptions: `kind` says which one."""
+
+
+def _one_or_several(value: object) -> str:
+    return "several" if isinstance(value, (list, tuple)) else "one"
+
+
+ONE_OR_SEVERAL: Any = Discriminator(_one_or_several)
+"""Annotation of a union of one (`Tag("one")`) and a tuple of such (`Tag("several")`)."""
 
 _CONFIG = ConfigDict(extra="forbid", allow_inf_nan=False, validate_default=True, use_attribute_docstrings=True)
 

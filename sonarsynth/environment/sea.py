@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from annotated_types import Ge, Le
-from pydantic import model_validator
+from pydantic import Tag, model_validator
 
 from sonarsynth.conventions import Number, PositiveMetres
-from sonarsynth.description import description
+from sonarsynth.description import ONE_OR_SEVERAL, description
 from sonarsynth.environment.boundaries import SeaBottom, SeaSurface
 from sonarsynth.environment.hydrography import WaterSalinity, WaterTemperature
 from sonarsynth.environment.noise import Noise
@@ -67,8 +67,18 @@ class Environment:
     surface: SeaSurface = SeaSurface()
     bottom: SeaBottom = SeaBottom()
     absorption: Absorption = Absorption()
-    noise: Noise | None = None
-    """Ambient noise at the hydrophones; none if left out."""
+    noise: (
+        Annotated[Annotated[Noise, Tag("one")] | Annotated[tuple[Noise, ...], Tag("several")], ONE_OR_SEVERAL] | None
+    ) = None
+    """Ambient noise at the hydrophones: one, or a list whose powers add up; none if left out. One that is appended to
+    the list changes nothing of those before it."""
+
+    @property
+    def noises(self) -> tuple[Noise, ...]:
+        """All of the ambient noise, as a list."""
+        if self.noise is None:
+            return ()
+        return self.noise if isinstance(self.noise, tuple) else (self.noise,)
 
     @model_validator(mode="after")
     def _water_all_the_way(self) -> Environment:

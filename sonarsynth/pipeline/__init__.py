@@ -34,7 +34,7 @@ from sonarsynth.pipeline.stored_values import (
     table,
     truth_values,
 )
-from sonarsynth.pipeline.synthesis import frame_signals
+from sonarsynth.pipeline.synthesis import digitise, frame_signals
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, variables
 from sonarsynth.planning import OF_BEAMS, Plan, check_unsampled_frame, context_of, plan, receiver_of, survey_of
 from sonarsynth.planning.notes.source_notes import locator
@@ -50,12 +50,10 @@ from sonarsynth.products import (
     Truth,
     no_points,
 )
-from sonarsynth.randomness import stream
 from sonarsynth.ranging.clouds import point_cloud
 from sonarsynth.ranging.received_window import ReceivedWindow
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
-from sonarsynth.signals import add_noise, convert
 from sonarsynth.signals.filtered_pulse import snap_levels
 from sonarsynth.signals.isolated_paths import measured_levels
 from sonarsynth.tracing.arrivals import trace
@@ -197,15 +195,6 @@ def synthesise(plan: Plan, traced: TracedFrame) -> Signals:
     """Pressure at each hydrophone: echoes and direct snap, ambient noise, converter."""
     plan = plan.at(traced.frame.index)
     return digitise(plan, traced.frame, frame_signals(plan, traced.frame, traced.arrivals))
-
-
-def digitise(plan: Plan, frame: Frame, signals: Signals) -> Signals:
-    """Signals as the sonar has them: with ambient noise, through the converter; `plan` is that of the sequence."""
-    sonar, noise = plan.scene.sonar, plan.scene.world.environment.noise
-    if noise is not None:
-        random = stream(frame.seed, "noise", frame.key, frame.step)
-        signals = add_noise(signals, noise, sonar, plan.elements, random, frame.sonar_pose)
-    return signals if sonar.converter is None else convert(signals, sonar.converter)
 
 
 def measure_isolated(plan: Plan, traced: TracedFrame) -> Floats:

@@ -1,13 +1,19 @@
-"""What the hydrophones hear of a frame: from one expansion of its paths over the array, or from one for each part."""
+"""What the hydrophones hear of a frame, from one expansion of its paths over the array or from one for each part; and
+what the sonar makes of that: noise, converter."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from sonarsynth.conventions import depth
+from sonarsynth.pipeline.stage_times import mark_stage
 from sonarsynth.planning import Plan, arrivals_of, frame_start
+from sonarsynth.planning.noise_rows import part_names
 from sonarsynth.products import Arrivals, Signals
+from sonarsynth.randomness import stream
 from sonarsynth.receiver.subarrays import Subarray, subarrays
 from sonarsynth.recipe.scene import Frame
+from sonarsynth.signals import add_noise, convert
 
 
 def frame_signals(plan: Plan, frame: Frame, arrivals: Arrivals) -> Signals:
@@ -32,3 +38,19 @@ def subarray_signals(plan: Plan, frame: Frame, part: Subarray) -> Signals:
     method, sonar, snaps = plan.choices.synthesis, plan.scene.sonar, frame.moment.snaps
     own, start = arrivals_of(plan, frame, part), frame_start(plan, frame)
     return method.signals(own, snaps, part.elements, sonar, plan.absorption, start, plan.windows.samples)
+
+
+def digitise(plan: Plan, frame: Frame, signals: Signals) -> Signals:
+    """Signals as the sonar has them: with ambient noise, through the converter; `plan` is that of the sequence.
+
+    Each part of the noise has a stream of its own.
+    """
+    mark_stage("synthesise")
+    sonar, pose = plan.scene.sonar, frame.sonar_pose
+    sound_speed = float(plan.profile.at(depth(pose.position)))
+    noises = plan.scene.world.environment.noises
+    for number, (name, noise) in enumerate(zip(part_names(noises), noises, strict=True)):
+        random = stream(frame.seed, "noise", frame.key, frame.step, *([number] if number else []))
+        signals = add_noise(signals, noise, sonar, plan.elements, random, pose, sound_speed)
+        mark_stage(name)
+    return signals if sonar.converter is None else convert(signals, sonar.converter)

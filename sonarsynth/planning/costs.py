@@ -14,6 +14,7 @@ import numpy as np
 
 from sonarsynth.description.method import FrameSize
 from sonarsynth.planning.choices import OF_BEAMS
+from sonarsynth.planning.noise_rows import noise_rows
 from sonarsynth.planning.plan_tables import Stage
 from sonarsynth.planning.plans import Plan
 
@@ -116,14 +117,11 @@ def _synthesis(plan: Plan, size: FrameSize) -> Row:
     """The row of the synthesis, in seconds of the reference machine."""
     scene = plan.scene
     work = plan.choices.synthesis.cost(size)
-    noise = scene.world.environment.noise
-    if noise is not None:
-        work += noise.cost(size)
     stored = size.sensors * size.samples * (2 if scene.sonar.converter else 4) if "signals" in plan.products else 0
     error = f"{plan.errors.synthesis:.1g} of the peak" if plan.errors.synthesis else "rounding"
     error = NOT_STATED if np.isnan(plan.errors.synthesis) else error
     why = "requested" if "signals" in plan.products else f"needed by the {' and the '.join(sorted(plan.products))}"
-    method = plan.choices.synthesis.row() + ("" if noise is None else f", {noise.row()} noise")
+    method = plan.choices.synthesis.row() + "".join(f", {noise.row()} noise" for noise in noises)
     return ("synthesise", method, why, error, work, stored)
 
 
@@ -186,7 +184,7 @@ def _trace_rows(plan: Plan, size: FrameSize) -> list[Row]:
 
 def _signal_rows(plan: Plan, size: FrameSize) -> list[Row]:
     """Signals, where any product needs them, and paths measured in signals of their own."""
-    rows = [_synthesis(plan, size)] if plan.products else []
+    rows = [_synthesis(plan, size), *noise_rows(plan, size)] if plan.products else []
     if "signals" in plan.products:
         seconds = max(size.emissions, 1) * (plan.sizes["target"] + 1) * SECONDS["measure path"]
         rows.append(("measure", "loudest path of each kind alone", "verify compares levels", "none", seconds, 0))

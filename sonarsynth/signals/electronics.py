@@ -16,6 +16,7 @@ from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Converter, Elements, Filter, Sonar
 from sonarsynth.signals.filtered_pulse import fir
+from sonarsynth.signals.noise.drawing import draw
 from sonarsynth.signals.segments import fast_length
 
 QUIETEST = 1e-7
@@ -54,9 +55,10 @@ def add_noise(
     elements: Elements,
     rng: np.random.Generator,
     pose: Pose | None = None,
+    sound_speed: float = 1500.0,
 ) -> Signals:
     """Signals with Gaussian noise through the anti-alias filter; a dead element stays silent. pose: of the array, which
-    noise that is correlated between hydrophones may depend on; none: that of the world's axes.
+    noise that hydrophones hear together depends on; none: that of the world's axes. sound_speed (m/s): at the array.
 
     Drawn in the frequency domain over a period longer than the window by the filter's length, so that the ends are not
     alike.
@@ -70,9 +72,13 @@ def add_noise(
     high = low + size.size
     spectrum = np.zeros((sensors, length // 2 + 1), np.complex64)
     fast = np.random.Generator(np.random.SFC64(rng.integers(0, 1 << 32, 4, np.uint32)))  # half the time of Philox
-    if noise.correlated:
+    frequency = _frequencies(low, high, fs, length)
+    if noise.directions is not None:
+        here = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])) if pose is None else pose
+        spectrum[:, low:high] = size * draw(noise.directions, elements, here, frequency, sound_speed, fast)
+    elif noise.correlated:
         position = elements.position if pose is None else pose.to_world(elements.position)
-        _draw_correlated(spectrum[:, low:high], noise, _frequencies(low, high, fs, length), gain, position, fast)
+        _draw_correlated(spectrum[:, low:high], noise, frequency, gain, position, fast)
     else:
         drawn = fast.standard_normal((sensors, 2 * (high - low)), dtype=np.float32).view(np.complex64)
         np.multiply(drawn, size, out=spectrum[:, low:high])

@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
 from sonarsynth.description.method import FrameSize, Method
+from sonarsynth.environment.noise.directions import Directions
 
 Complexes = npt.NDArray[np.complex128]
 
@@ -19,6 +20,10 @@ SECONDS, PRODUCT_SECONDS = 10e-9, 0.1e-9
 
 class NoiseField(Method):
     """Gaussian noise at the hydrophones, stationary in a frame; as it stands, independent between them."""
+
+    directions: Directions | None = None
+    """Where it comes from, at point hydrophones of the density; none: it is independent between hydrophones, or says
+    its cross spectral density itself."""
 
     def density(self, frequency: Floats) -> Floats:
         """One-sided power spectral density (Pa2/Hz) at each hydrophone, at frequencies (Hz, positive)."""
@@ -46,7 +51,7 @@ class NoiseField(Method):
 
     @property
     def correlated(self) -> bool:
-        """Whether it is not independent between hydrophones."""
+        """Whether it states a cross spectral density of its own."""
         return self.factors(np.array([1e4]), np.eye(2, 3)) is not None
 
     def cost(self, size: FrameSize) -> float:

@@ -23,8 +23,8 @@ def validity(scene: Scene, profile: Profile) -> tuple[str, ...]:
         ("absorption", note)
         for note in absorption_notes(environment.absorption, [[band.low], [band.high]], [0.0, environment.depth])
     ]
-    if environment.noise is not None:
-        found += [("noise", note) for note in environment.noise.validity(band.low, band.high)]
+    for noise in environment.noises:
+        found += [("noise", note) for note in noise.validity(band.low, band.high)]
     if scene.physics.tracing.bounces:
         for name, boundary in (("surface", environment.surface), ("bottom", environment.bottom)):
             found += [(f"{name}.{field}", note) for field, note in boundary_notes(boundary, band.low, band.high)]

@@ -66,7 +66,7 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
     elif moving:
         way = "bodies are posed when sound meets their centre; from there constant velocity and spin"
         rows.append(Omission("motion of targets beyond constant velocity and spin", way, _carried(plan, frame)))
-    if environment.noise is None:
+    if not environment.noises:
         rows.append(Omission("ambient noise", "none in the recipe", "signals are free of noise"))
     return tuple(rows + _not_asked_for(plan) + _not_traced(plan) + _not_heard(plan))
 

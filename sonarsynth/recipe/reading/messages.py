@@ -163,6 +163,8 @@ def _chosen(kind: Any, data: Any) -> Any:
     members = _members(kind)
     if len(members) == 1:
         return members[0]
+    if isinstance(data, list):
+        return next((m for m in members if get_origin(m) is tuple), None)
     tag = data.get("kind") if isinstance(data, dict) else None
     tagged = [m for m in members if _tag(m) is not None]
     if isinstance(data, dict) and tag is None and len(tagged) == 1:  # the kind of the only one may be left out

@@ -1,0 +1,52 @@
+"""Rows of a plan for each part of the noise: its level, what its coherence errs by, and what it costs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.conventions import REFERENCE_PRESSURE, depth
+from sonarsynth.description.method import FrameSize
+from sonarsynth.environment.noise import Noise
+from sonarsynth.signals.noise.drawing import coherence_error, seconds
+
+if TYPE_CHECKING:
+    from sonarsynth.planning.plans import Plan
+
+NoiseRow = tuple[str, str, str, str, float, int]
+"""As `costs.Row`."""
+
+
+def part_names(noises: tuple[Noise, ...]) -> tuple[str, ...]:
+    """What each part of the noise is called: by its kind, numbered where there are several."""
+    kinds = [noise.kind for noise in noises]
+    return tuple(
+        f"noise {kind}" + (f" {kinds[:n].count(kind) + 1}" if kinds.count(kind) > 1 else "")
+        for n, kind in enumerate(kinds)
+    )
+
+
+def noise_rows(plan: Plan, size: FrameSize) -> list[NoiseRow]:
+    """A row for each part of the noise."""
+    scene, elements = plan.scene, plan.elements
+    noises = scene.world.environment.noises
+    pose = plan.recipe.frame(0)[1].sonar_pose
+    sound_speed = float(plan.profile.at(depth(pose.position)))
+    band, centre, rows = scene.sonar.band, np.array([scene.sonar.band.centre]), list[NoiseRow]()
+    for name, noise in zip(part_names(noises), noises, strict=True):
+        level = 10.0 * np.log10(float(noise.density(centre)[0]) / REFERENCE_PRESSURE**2)
+        said = f"{level:.1f} dB re 1 uPa2/Hz at {centre[0] / 1e3:.3g} kHz"
+        way, error, work = (
+            "independent between hydrophones",
+            "none",
+            noise.cost(size),
+        )
+        if noise.directions is not None:
+            wrong, way = coherence_error(noise.directions, elements, pose, band.low, band.high, sound_speed)
+            way, error = f"{noise.directions.kind}: {way}", f"{wrong:.2g} of the coherence"
+            work = seconds(noise.directions, elements, plan.sizes["sample"])
+        elif noise.correlated:
+            way = "by its cross spectral density"
+        rows.append((name, f"{noise.row()}, {way}", said, error, work, 0))
+    return rows

@@ -1,0 +1,1 @@
+"""Noise that hydrophones hear together, drawn: on lattices, and at hydrophones anywhere."""

@@ -1,0 +1,52 @@
+"""Noise of given directions at hydrophones anywhere: in each bin a sum of plane waves from directions drawn afresh."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from sonarsynth.conventions import Floats
+from sonarsynth.environment.noise.directions import Directions, OneDirection
+from sonarsynth.equations.arrays.apertures import element_directivity
+from sonarsynth.equations.noise.wave_directions import drawn
+from sonarsynth.geometry import Pose
+from sonarsynth.receiver import Elements
+
+FEWEST, MOST = 256, 1024
+"""Plane waves of a bin: eight a hydrophone, so that several are heard in each beam, within these."""
+SECONDS = 15e-9
+"""Of one core for the phase of one wave at one hydrophone."""
+
+
+def waves(sensors: int) -> int:
+    """How many plane waves there are in a bin."""
+    return int(np.clip(8 * sensors, FEWEST, MOST))
+
+
+def draw(
+    directions: Directions,
+    elements: Elements,
+    pose: Pose,
+    frequency: Floats,
+    sound_speed: float,
+    random: np.random.Generator,
+) -> npt.NDArray[np.complex64]:
+    """Spectra (sensor, bin) at frequencies (bin,) Hz, as `lattice_noise.draw` gives them.
+
+    Waves come as often from each direction as the intensity is, all equally loud: on average over bins and frames the
+    cross spectral density is exact, and each point hydrophone's spectrum is Gaussian.
+    """
+    out = np.empty((elements.count, frequency.size), np.complex64)
+    one = isinstance(directions, OneDirection)
+    count = 1 if one else waves(elements.count)
+    for n, f in enumerate(frequency.tolist()):
+        if isinstance(directions, OneDirection):
+            world = directions.toward[None]
+        else:
+            world = drawn(directions.intensity, directions.edges, random.random((count, 2)))
+        toward = pose.turn_to_body(world)
+        normal = random.standard_normal((count, 2)) / np.sqrt(count)
+        heard = (normal[:, 0] + 1j * normal[:, 1]) * element_directivity(f, toward, elements.face, sound_speed)
+        turns = (2.0 * np.pi * f / sound_speed) * (elements.position @ toward.T)
+        out[:, n] = np.exp(1j * turns.astype(np.float32)) @ heard.astype(np.complex64)
+    return out
