@@ -33,7 +33,7 @@ def noise_rows(plan: Plan, size: FrameSize) -> list[NoiseRow]:
     noises = scene.world.environment.noises
     pose = plan.recipe.frame(0)[1].sonar_pose
     sound_speed = float(plan.profile.at(depth(pose.position)))
-    band, centre, rows = scene.sonar.band, np.array([scene.sonar.band.centre]), list[NoiseRow]()
+    centre, rows = np.array([scene.sonar.band.centre]), list[NoiseRow]()
     for name, noise in zip(part_names(noises), noises, strict=True):
         level = 10.0 * np.log10(float(noise.density(centre)[0]) / REFERENCE_PRESSURE**2)
         said = f"{level:.1f} dB re 1 uPa2/Hz at {centre[0] / 1e3:.3g} kHz"
@@ -43,7 +43,7 @@ def noise_rows(plan: Plan, size: FrameSize) -> list[NoiseRow]:
             noise.cost(size),
         )
         if noise.directions is not None:
-            wrong, way = coherence_error(noise.directions, elements, pose, band.low, band.high, sound_speed)
+            wrong, way = coherence_error(noise.directions, elements, pose, scene.sonar, sound_speed)
             way, error = f"{noise.directions.kind}: {way}", f"{wrong:.2g} of the coherence"
             work = seconds(noise.directions, elements, plan.sizes["sample"])
         elif noise.correlated:

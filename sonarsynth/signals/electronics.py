@@ -16,7 +16,6 @@ from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Converter, Elements, Filter, Sonar
 from sonarsynth.signals.filtered_pulse import fir
-from sonarsynth.signals.noise.drawing import draw
 from sonarsynth.signals.segments import fast_length
 
 QUIETEST = 1e-7
@@ -74,8 +73,10 @@ def add_noise(
     fast = np.random.Generator(np.random.SFC64(rng.integers(0, 1 << 32, 4, np.uint32)))  # half the time of Philox
     frequency = _frequencies(low, high, fs, length)
     if noise.directions is not None:
+        from sonarsynth.signals.noise.drawing import draw  # compiled, and seldom needed
+
         here = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])) if pose is None else pose
-        spectrum[:, low:high] = size * draw(noise.directions, elements, here, frequency, sound_speed, fast)
+        spectrum[:, low:high] = size * draw(noise.directions, elements, here, sonar, frequency, sound_speed, fast)
     elif noise.correlated:
         position = elements.position if pose is None else pose.to_world(elements.position)
         _draw_correlated(spectrum[:, low:high], noise, frequency, gain, position, fast)

@@ -119,7 +119,7 @@ def test_the_field_of_a_lattice_has_the_covariance_of_a_plain_sum(directions: No
 def covariance(noise: FlatNoise, array: Elements, pose: Pose, draws: int, f: Floats) -> Floats:
     """Covariance (sensor, sensor) of spectra at frequencies near each other, of 1 Pa2/Hz."""
     assert noise.directions is not None
-    x = [draw(noise.directions, array, pose, f, C, stream(3, "draw", n)) for n in range(draws)]
+    x = [draw(noise.directions, array, pose, Sonar(), f, C, stream(3, "draw", n)) for n in range(draws)]
     spectra = np.concatenate(x, axis=1)
     return np.asarray(spectra @ spectra.conj().T / (2.0 * spectra.shape[1]))
 
@@ -146,7 +146,7 @@ def test_noise_of_one_direction_gives_the_beam_pattern_of_the_array() -> None:
     array, pose = elements(PlanarLattice(columns=6, rows=4, pitch=0.02)), Pose(np.zeros(3), quaternion(0.5 * np.pi))
     wave = OneDirection(bearing=np.deg2rad(80.0), elevation=np.deg2rad(12.0))
     f = np.array([60e3])
-    x = draw(wave, array, pose, f, C, stream(1, "wave"))[:, 0]
+    x = draw(wave, array, pose, Sonar(), f, C, stream(1, "wave"))[:, 0]
     from_there, k = wave.toward, 2.0 * np.pi * 60e3 / C
     face = np.prod(np.sinc(0.5 * k * 0.02 * from_there[1:] / np.pi))
     for azimuth in (-0.3, 0.0, np.deg2rad(10.0)):

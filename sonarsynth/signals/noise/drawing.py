@@ -8,45 +8,50 @@ import numpy.typing as npt
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.noise.directions import Directions, OneDirection
 from sonarsynth.geometry import Pose
-from sonarsynth.receiver import Elements
+from sonarsynth.receiver import BandPass, Elements, Sonar, stop_frequency
 from sonarsynth.signals.noise import lattice_noise, random_waves
 from sonarsynth.signals.noise.lattice_noise import TORUS, PeriodicField, lattice_of, periodic_field
 
 WAVE_SECONDS = 40e-9
 """Of one core to draw one wave of the periodic field in one bin."""
+LOWEST = 0.02
+"""Of the highest frequency: below, the lattice is one point."""
 SMALL = 64
 """Hydrophones of a lattice for which plane waves cost less."""
 
 
 def field_on_lattice(
-    directions: Directions, elements: Elements, pose: Pose, low: float, high: float, sound_speed: float
+    directions: Directions, elements: Elements, pose: Pose, sonar: Sonar, sound_speed: float
 ) -> PeriodicField | None:
-    """The periodic field of a band (Hz) that is drawn; None where plane waves are."""
-    if isinstance(directions, OneDirection) or not elements.on_lattice or elements.count < SMALL or high <= low:
+    """The periodic field that is drawn, over all that passes the filter of the sonar; None where plane waves are."""
+    if isinstance(directions, OneDirection) or not elements.on_lattice or elements.count < SMALL:
         return None
+    high = stop_frequency(sonar.antialias)
+    passed = sonar.antialias
+    low = passed.low - 0.5 * passed.transition if isinstance(passed, BandPass) else 0.0
     up = pose.turn_to_body([0.0, 0.0, 1.0])
-    return periodic_field(directions, lattice_of(elements, up, sound_speed), low, high)
+    return periodic_field(directions, lattice_of(elements, up, sound_speed), max(low, LOWEST * high), high)
 
 
 def draw(
     directions: Directions,
     elements: Elements,
     pose: Pose,
+    sonar: Sonar,
     frequency: Floats,
     sound_speed: float,
     random: np.random.Generator,
 ) -> npt.NDArray[np.complex64]:
     """Spectra (sensor, bin) at frequencies (bin,) Hz: of noise of 1 Pa2/Hz at a point, the mean power of the real part,
     and of the imaginary part, is what a face hears of it: 1 at most."""
-    band = float(frequency[0]), float(frequency[-1])
-    field = field_on_lattice(directions, elements, pose, *band, sound_speed)
+    field = field_on_lattice(directions, elements, pose, sonar, sound_speed)
     if field is None:
         return random_waves.draw(directions, elements, pose, frequency, sound_speed, random)
     return lattice_noise.draw(field, elements, frequency, random)
 
 
 def coherence_error(
-    directions: Directions, elements: Elements, pose: Pose, low: float, high: float, sound_speed: float
+    directions: Directions, elements: Elements, pose: Pose, sonar: Sonar, sound_speed: float
 ) -> tuple[float, str]:
     """What the coherence of what is drawn errs by, at most, and how it is drawn in a few words.
 
@@ -54,7 +59,7 @@ def coherence_error(
     """
     if isinstance(directions, OneDirection):
         return 0.0, "one plane wave"
-    field = field_on_lattice(directions, elements, pose, low, high, sound_speed)
+    field = field_on_lattice(directions, elements, pose, sonar, sound_speed)
     if field is None:
         count = random_waves.waves(elements.count)
         return float(1.0 / np.sqrt(count)), f"{count} plane waves in each bin"
