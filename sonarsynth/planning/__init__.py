@@ -111,8 +111,10 @@ def _mean_stages(made: Plan, looks: Sequence[SampledScene]) -> tuple[Stage, ...]
     real = [look.frames[0].index for look in looks if look.real]
     chosen = real[:: -(-len(real) // COSTED)]
     rows = [stages(made.at(index)) for index in chosen]
-    means = (sum(row[i].seconds for row in rows) / len(rows) for i in range(len(rows[0])))
-    return tuple(replace(stage, seconds=mean) for stage, mean in zip(rows[0], means, strict=True))
+    spent = [(stage, stage.seconds / len(rows)) for row in rows for stage in row]
+    named = {stage.stage: stage for stage, _ in reversed(spent)}  # parts of the noise may vary
+    order = dict.fromkeys(stage.stage for stage, _ in spent)
+    return tuple(replace(named[name], seconds=sum(s for one, s in spent if one.stage == name)) for name in order)
 
 
 def chosen_products(names: Iterable[str]) -> frozenset[str]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from sonarsynth.environment.noise import TabulatedNoise, ThermalNoise, WenzNoise, WindNoise
 from sonarsynth.equations.bubble import snap_pressure
 from sonarsynth.equations.noise import ambient_noise, filters
 from sonarsynth.equations.noise.filters import Fir
@@ -111,6 +112,27 @@ def test_noise_levels_elsewhere() -> None:
     f = np.linspace(25e3, 85e3, 20001)
     band = np.trapezoid(ambient_noise.power_density(ambient_noise.wenz_level(f, 0.5, 5.0)), f)
     assert 10 * np.log10(band / 1e-12) == pytest.approx(81.31, abs=6e-3)
+
+
+def test_noise_by_sea_state_and_of_rain() -> None:
+    assert float(ambient_noise.knudsen_level(20e3, 2.0)) == pytest.approx(39.6, abs=0.1), "Knudsen's line of state 2"
+    slope = ambient_noise.knudsen_level(20e3, 3.0) - ambient_noise.knudsen_level(10e3, 3.0)
+    assert float(slope) == pytest.approx(-5.1, abs=0.05), "5 dB an octave"
+    assert float(ambient_noise.rain_level(5e3, 10.0)) == pytest.approx(57.8, abs=1e-9)
+    assert float(ambient_noise.rain_level(10e3, 10.0) - ambient_noise.rain_level(5e3, 10.0)) == pytest.approx(
+        -3.01, abs=0.01
+    )
+
+
+def test_parts_of_wenz_are_the_parts_that_can_be_asked_for() -> None:
+    f = np.geomspace(1e3, 2e5, 40)
+    both = WindNoise(wind_speed=8.0).density(f) + ThermalNoise().density(f)
+    components = ambient_noise.wenz_components(f, 0.5, 8.0)
+    rest = sum(ambient_noise.power_density(components[name]) for name in ("turbulence", "shipping"))
+    np.testing.assert_allclose(both + rest, WenzNoise(wind_speed=8.0).density(f), rtol=1e-12)
+    table = TabulatedNoise(frequencies=(1e3, 1e5), levels=(60.0, 20.0))
+    assert float(table.density(np.array([1e4]))[0]) == pytest.approx(1e-12 * 1e4, rel=1e-9), "40 dB half way"
+    assert table.validity(25e3, 85e3) == () and "1000 to 100000 Hz" in table.validity(25e3, 2e5)[0]
 
 
 def test_quantisation() -> None:

@@ -32,6 +32,22 @@ def wenz_level(frequency: npt.ArrayLike, shipping: float, wind_speed: float) -> 
     return np.asarray(10.0 * np.log10(sum(10.0 ** (part / 10.0) for part in parts)))
 
 
+def knudsen_level(frequency: npt.ArrayLike, sea_state: float) -> Floats:
+    """Spectral level (dB re 1 uPa2/Hz) of the sea at a sea state (0.5 or more), at frequencies (Hz, positive).
+
+    Source: Knudsen, Alford and Emling (1948), Journal of Marine Research 7, 410: lines of 5 dB an octave.
+    """
+    return np.asarray(56.0 + 19.0 * np.log10(sea_state) - 17.0 * np.log10(np.asarray(frequency, float) / 1e3))
+
+
+def rain_level(frequency: npt.ArrayLike, rate: float) -> Floats:
+    """Spectral level (dB re 1 uPa2/Hz) of rain of a rate (mm/h), at frequencies (Hz, positive).
+
+    Source: Ma, Nystuen and Lien (2005), JASA 117, 3555, at 5 kHz; 3 dB less each octave, good to 5 dB.
+    """
+    return np.asarray(42.4 + 15.4 * np.log10(rate) - 10.0 * np.log10(np.asarray(frequency, float) / 5e3))
+
+
 def power_density(level: npt.ArrayLike) -> Floats:
     """One-sided power spectral density (Pa2/Hz) of a spectral level (dB re 1 uPa2/Hz)."""
     return np.asarray(REFERENCE_PRESSURE**2 * 10.0 ** (np.asarray(level, float) / 10.0))

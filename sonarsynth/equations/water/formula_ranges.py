@@ -128,3 +128,5 @@ BUBBLE_LOSS: Final = Range("bubble loss of APL-UW TR 9407 (1994)", {"frequency":
 WENZ: Final = Range(
     "Wenz's noise as of Coates (1989)", {"frequency": (1.0, 100e3, "Hz"), "wind_speed": (0.0, 15.0, "m/s")}
 )
+KNUDSEN: Final = Range("Knudsen's noise", {"frequency": (500.0, 50e3, "Hz"), "sea_state": (0.5, 6.0, "")})
+RAIN: Final = Range("noise of rain of Ma et al. (2005)", {"frequency": (1e3, 50e3, "Hz"), "rate": (2.0, 200.0, "mm/h")})
