@@ -29,12 +29,13 @@ from sonarsynth.pipeline.stored_values import (
     image_values,
     link_budget_values,
     of_isolated,
+    sensor_values,
     signal_values,
     source_estimate_values,
     table,
     truth_values,
 )
-from sonarsynth.pipeline.synthesis import digitise, frame_signals
+from sonarsynth.pipeline.synthesis import digitise, errors_of, frame_signals, known_signals
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, variables
 from sonarsynth.planning import OF_BEAMS, Plan, check_unsampled_frame, context_of, plan, receiver_of, survey_of
 from sonarsynth.planning.notes.source_notes import locator
@@ -101,7 +102,7 @@ class TracedFrame:
 class BeamformedFrame:
     """What the beamform task gives; None where no product needs it."""
 
-    signals: Signals
+    signals: Signals  # as processing has them
     estimates: SourceEstimates | None
     image: EnergyImage | None
     imaged: Signals | None = None  # what the image was made of: without the snap's own reflections, where these go
@@ -110,6 +111,7 @@ class BeamformedFrame:
         None  # (snap, target + 1, family) dB: isolated paths of the link budget as signals have them;
     )
     # None where signals are not stored
+    recorded: Signals | None = None  # as the converter gave them, where the sonar corrected them since
 
 
 def truth_frame(plan: Plan, index: int) -> Values:
@@ -156,19 +158,22 @@ def trace_at(plan: Plan, frame: Frame) -> TracedFrame:
 def _of_frame(plan: Plan, frame: Frame) -> Values:
     """Which frame it is."""
     split = plan.recipe.split(frame.index)
-    return table("/", trajectory=frame.trajectory, step=frame.step, time=frame.time, split=split)
+    values = table("/", trajectory=frame.trajectory, step=frame.step, time=frame.time, split=split)
+    drawn = errors_of(plan, frame)
+    return values if drawn is None else values | sensor_values(drawn)
 
 
 def beamform_frame(plan: Plan, index: int, traced: TracedFrame) -> BeamformedFrame:
     """What the array hears: signals, where the snap is, and the energy image of the echo window."""
-    signals, isolated = synthesise(plan, traced), None
+    recorded, isolated = synthesise(plan, traced), None
     mark_stage("synthesise")
     if "signals" in plan.products:
         isolated = measure_isolated(plan, traced)
         mark_stage("measure")
     if not plan.products & OF_BEAMS:
-        return BeamformedFrame(signals, None, None, isolated=isolated)
-    return replace(locate_and_image(plan, traced.frame, signals), isolated=isolated)
+        return BeamformedFrame(recorded, None, None, isolated=isolated)
+    signals = known_signals(plan.at(traced.frame.index), traced.frame, recorded)
+    return replace(locate_and_image(plan, traced.frame, signals), isolated=isolated, recorded=recorded)
 
 
 def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFrame:
@@ -216,7 +221,7 @@ def range_frame(plan: Plan, index: int, traced: TracedFrame, heard: BeamformedFr
     values |= estimate_truth(direct, len(frame.moment.snaps))
     if "signals" in plan.products:
         counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
-        values |= signal_values(heard.signals, counts)
+        values |= signal_values(heard.recorded or heard.signals, counts)
     if heard.image is None or heard.estimates is None:
         mark_stage("collect")
         return values

@@ -21,6 +21,7 @@ from sonarsynth.products import (
     SourceEstimates,
     Truth,
 )
+from sonarsynth.receiver.sensor_errors import DrawnErrors
 
 Values = dict[tuple[str, str], np.ndarray]
 """(group, name) to the array of one frame, without the frame axis."""
@@ -74,6 +75,19 @@ def of_isolated(budget: LinkBudget, values: np.ndarray, fill: float = np.nan) ->
     rows = np.full(budget.isolated_level.shape, fill, values.dtype)
     rows[np.isfinite(budget.isolated_level)] = values
     return rows
+
+
+def sensor_values(drawn: DrawnErrors) -> Values:
+    """What is wrong with the sensors."""
+    return table(
+        "/truth/sensors",
+        gain=20.0 * np.log10(drawn.gain),
+        phase=np.rad2deg(drawn.phase),
+        delay=drawn.delay,
+        position_error=drawn.position,
+        state=drawn.state.astype(np.int8),
+        clock_rate=1e6 * drawn.clock_rate,
+    )
 
 
 def signal_values(signals: Signals, counts: bool) -> Values:

@@ -1,50 +1,75 @@
 """What the hydrophones hear of a frame, from one expansion of its paths over the array or from one for each part; and
-what the sonar makes of that: noise, converter."""
+what the sonar makes of that: noise, errors of sensors and channels, converter."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
 from sonarsynth.conventions import depth
 from sonarsynth.pipeline.stage_times import mark_stage
 from sonarsynth.planning import Plan, arrivals_of, frame_start
-from sonarsynth.planning.noise_rows import part_names
+from sonarsynth.planning.noise_rows import ELECTRONICS, SENSORS, part_names
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.randomness import stream
+from sonarsynth.receiver import Elements
+from sonarsynth.receiver.sensor_errors import DrawnErrors, SensorState, drawn_errors
 from sonarsynth.receiver.subarrays import Subarray, subarrays
 from sonarsynth.recipe.scene import Frame
-from sonarsynth.signals import add_noise, convert
+from sonarsynth.signals import add_noise, channel_errors, convert
+from sonarsynth.signals.electronics import ElectronicNoise
 
 
 def frame_signals(plan: Plan, frame: Frame, arrivals: Arrivals) -> Signals:
-    """Pressure at each hydrophone, without noise and converter; arrivals: those of the frame at the whole array.
+    """Pressure at each hydrophone where it is, without noise and converter; arrivals: those of the frame at the whole
+    array.
 
     Where the array is cut into parts, paths are traced again to each of them. `outside` is that of the part that loses
     most. Raises ValueError for anything outside the water.
     """
-    method, sonar, snaps = plan.choices.synthesis, plan.scene.sonar, frame.moment.snaps
-    start, samples = frame_start(plan, frame), plan.windows.samples
+    start, samples, sensors = frame_start(plan, frame), plan.windows.samples, true_elements(plan, frame)
     if plan.choices.subarrays == 1:
-        return method.signals(arrivals, snaps, plan.elements, sonar, plan.absorption, start, samples)
-    pressure, outside = np.zeros((plan.elements.count, samples), np.float32), 0
-    for part in subarrays(plan.elements, plan.choices.subarrays):
+        return _signals(plan, frame, arrivals, sensors)
+    pressure, outside = np.zeros((sensors.count, samples), np.float32), 0
+    for part in subarrays(sensors, plan.choices.subarrays):
         heard = subarray_signals(plan, frame, part)
         pressure[part.sensor], outside = heard.pressure, max(outside, heard.outside)
-    return Signals(pressure, start, sonar.sampling_frequency, 0.0, 0, outside)
+    return Signals(pressure, start, plan.scene.sonar.sampling_frequency, 0.0, 0, outside)
 
 
 def subarray_signals(plan: Plan, frame: Frame, part: Subarray) -> Signals:
     """What a part of the array hears, of paths that are traced to it."""
+    return _signals(plan, frame, arrivals_of(plan, frame, part), part.elements)
+
+
+def _signals(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements) -> Signals:
+    """What hydrophones hear of arrivals; what comes from behind, through the baffle."""
     method, sonar, snaps = plan.choices.synthesis, plan.scene.sonar, frame.moment.snaps
-    own, start = arrivals_of(plan, frame, part), frame_start(plan, frame)
-    return method.signals(own, snaps, part.elements, sonar, plan.absorption, start, plan.windows.samples)
+    if sonar.baffle:
+        left = np.where(arrivals.direction[:, 0] < 0.0, sonar.behind, 1.0)
+        arrivals = replace(arrivals, amplitude=arrivals.amplitude * left)
+    start = frame_start(plan, frame)
+    return method.signals(arrivals, snaps, sensors, sonar, plan.absorption, start, plan.windows.samples)
+
+
+def errors_of(plan: Plan, frame: Frame) -> DrawnErrors | None:
+    """What is wrong with the sensors in the sequence of a frame; None where nothing is described."""
+    errors = plan.scene.sonar.sensor_errors
+    return None if errors is None else drawn_errors(errors, plan.elements.count, frame.seed, frame.key)
+
+
+def true_elements(plan: Plan, frame: Frame) -> Elements:
+    """The elements where they are across the axis: along it, a wrong position is a delay of the channel."""
+    drawn = errors_of(plan, frame)
+    if drawn is None or not drawn.position.any():
+        return plan.elements
+    return replace(plan.elements, position=plan.elements.position + drawn.position * [0.0, 1.0, 1.0])
 
 
 def digitise(plan: Plan, frame: Frame, signals: Signals) -> Signals:
-    """Signals as the sonar has them: with ambient noise, through the converter; `plan` is that of the sequence.
-
-    Each part of the noise has a stream of its own.
-    """
+    """Signals as the sonar has them: ambient noise, errors of the channels, electronics, converter; `plan` is that of
+    the sequence. Each part has a stream of its own."""
     mark_stage("synthesise")
     sonar, pose = plan.scene.sonar, frame.sonar_pose
     sound_speed = float(plan.profile.at(depth(pose.position)))
@@ -53,4 +78,43 @@ def digitise(plan: Plan, frame: Frame, signals: Signals) -> Signals:
         random = stream(frame.seed, "noise", frame.key, frame.step, *([number] if number else []))
         signals = add_noise(signals, noise, sonar, plan.elements, random, pose, sound_speed)
         mark_stage(name)
+    signals = _through_channels(plan, frame, signals, sound_speed)
     return signals if sonar.converter is None else convert(signals, sonar.converter)
+
+
+def _through_channels(plan: Plan, frame: Frame, signals: Signals, sound_speed: float) -> Signals:
+    """Signals after what is wrong with the channels, and with the noise of the electronics."""
+    sonar, drawn = plan.scene.sonar, errors_of(plan, frame)
+    errors, louder = sonar.sensor_errors, np.ones(plan.elements.count)
+    if errors is not None and drawn is not None:
+        signals = channel_errors.respond(signals, drawn, sound_speed)
+        if errors.cross_talk is not None:
+            signals = channel_errors.talk(signals, plan.elements, errors.cross_talk)
+        louder[drawn.state == SensorState.NOISY] = 10.0 ** (errors.noisy_by / 20.0)
+        mark_stage(SENSORS)
+    if sonar.electronics is not None:
+        random = stream(frame.seed, "electronics", frame.key, frame.step)
+        own = replace(plan.elements, gain=np.where(plan.elements.gain == 0.0, 0.0, louder))
+        signals = add_noise(signals, ElectronicNoise(sonar.electronics), sonar, own, random)
+        mark_stage(ELECTRONICS)
+    if errors is not None and drawn is not None:
+        if errors.jitter or errors.clock_rate:
+            random = stream(frame.seed, "jitter", frame.key, frame.step)
+            signals = channel_errors.sampled(signals, errors.jitter, drawn.clock_rate, random)
+        if errors.overload is not None:
+            signals = channel_errors.overloaded(signals, errors.overload)
+        if errors.stuck and sonar.converter is not None:
+            stuck = (sonar.converter.full_scale * drawn.stuck_at)[:, None].astype(np.float32)
+            held = (drawn.state == SensorState.STUCK)[:, None]
+            signals = replace(signals, pressure=np.where(held, stuck, signals.pressure))
+        mark_stage(SENSORS)
+    return signals
+
+
+def known_signals(plan: Plan, frame: Frame, signals: Signals) -> Signals:
+    """Signals as processing has them: corrected of what it knows of the errors of the channels."""
+    errors, drawn = plan.scene.sonar.sensor_errors, errors_of(plan, frame)
+    if errors is None or drawn is None:
+        return signals
+    sound_speed = plan.scene.sonar.assumed_sound_speed
+    return channel_errors.corrected(signals, errors, drawn, sound_speed)

@@ -9,11 +9,17 @@ import numpy as np
 from sonarsynth.conventions import REFERENCE_PRESSURE, depth
 from sonarsynth.description.method import FrameSize
 from sonarsynth.environment.noise import Noise
+from sonarsynth.environment.noise.noise_field import SECONDS as DRAW_SECONDS
+from sonarsynth.receiver import SensorErrors
 from sonarsynth.signals.noise.drawing import coherence_error, seconds
 
 if TYPE_CHECKING:
     from sonarsynth.planning.plans import Plan
 
+ELECTRONICS, SENSORS = "electronics", "sensors"
+"""Stages beside the parts of the noise."""
+ERROR_SECONDS = 40e-9
+"""Of one core to filter a sample of one channel."""
 NoiseRow = tuple[str, str, str, str, float, int]
 """As `costs.Row`."""
 
@@ -49,4 +55,21 @@ def noise_rows(plan: Plan, size: FrameSize) -> list[NoiseRow]:
         elif noise.correlated:
             way = "by its cross spectral density"
         rows.append((name, f"{noise.row()}, {way}", said, error, work, 0))
+    return [*rows, *_channel_rows(plan)]
+
+
+def _channel_rows(plan: Plan) -> list[NoiseRow]:
+    """Rows of the errors of the channels and of their noise."""
+    sonar, rows, sizes = plan.scene.sonar, list[NoiseRow](), plan.sizes
+    each = sizes["sensor"] * sizes["sample"]
+    if (errors := sonar.sensor_errors) is not None:
+        usual = SensorErrors()
+        given = [name for name in vars(usual) if getattr(errors, name) != getattr(usual, name) and name != "known"]
+        method = f"{', '.join(given) or 'no errors'}; processing knows {errors.known}"
+        rows.append(
+            (SENSORS, method.replace("_", " "), "requested", "none", ERROR_SECONDS * each, 36 * sizes["sensor"])
+        )
+    if sonar.electronics is not None:
+        said = f"{sonar.electronics.level:.1f} dB re 1 uPa2/Hz"
+        rows.append((ELECTRONICS, "independent between channels", said, "none", DRAW_SECONDS * each, 0))
     return rows

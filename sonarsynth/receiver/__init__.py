@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Le, Lt
-from pydantic import ValidationInfo, field_validator
+from pydantic import ValidationInfo, field_validator, model_validator
 
 from sonarsynth.conventions import (
     Decibels,
@@ -23,6 +23,7 @@ from sonarsynth.conventions import (
 )
 from sonarsynth.description import BY_KIND, description
 from sonarsynth.receiver.hydrophones import Array, Elements, PlanarLattice, PositionTable, Romanis, elements
+from sonarsynth.receiver.sensor_errors import Electronics, Overload, SensorErrors
 
 __all__ = [
     "Array",
@@ -30,12 +31,15 @@ __all__ = [
     "BandPass",
     "BeamGrid",
     "Converter",
+    "Electronics",
     "Elements",
     "Filter",
     "LowPass",
+    "Overload",
     "PlanarLattice",
     "PositionTable",
     "Romanis",
+    "SensorErrors",
     "Sonar",
     "elements",
     "stop_frequency",
@@ -156,6 +160,12 @@ class Sonar:
     filter: Filter | None = None
     """Anti-alias filter before sampling; left out: a `BandPass` of the band."""
     sampling_frequency: Annotated[PositiveHertz, Le(100e6)] = 196e3
+    electronics: Electronics | None = None
+    """Noise of the preamplifiers; left out: none."""
+    sensor_errors: SensorErrors | None = None
+    """What is wrong with hydrophones and channels; left out: nothing."""
+    baffle: Annotated[Decibels, Ge(0), Le(200)] = 0.0
+    """How much weaker hydrophones hear what comes from behind the array."""
     converter: Converter | None = None
     """Left out: pressure is stored as float32."""
     beams: BeamGrid = BeamGrid()
@@ -181,6 +191,24 @@ class Sonar:
         if value < 2 * edge:
             raise ValueError(f"{value:g} Hz is under twice the filter's stop edge ({edge:g} Hz)")
         return value
+
+    @model_validator(mode="after")
+    def _check_errors(self) -> Sonar:
+        errors = self.sensor_errors
+        if errors is None:
+            return self
+        if errors.stuck and self.converter is None:
+            raise ValueError("stuck channels give a number of the converter: describe a converter")
+        if errors.noisy and self.electronics is None:
+            raise ValueError("noisy channels have louder electronics: describe electronics")
+        if errors.jitter * self.band.high > 1.0:
+            raise ValueError(f"jitter of {errors.jitter:g} s is over a period of the band's highest frequency")
+        return self
+
+    @property
+    def behind(self) -> float:
+        """What the baffle leaves of the pressure of a wave from behind, 1 at most."""
+        return float(10.0 ** (-self.baffle / 20.0))
 
     @property
     def antialias(self) -> Filter:

@@ -11,10 +11,11 @@ from scipy.fft import irfft
 
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.noise import NoiseField
+from sonarsynth.equations.noise.ambient_noise import power_density
 from sonarsynth.equations.noise.filters import duration, response
 from sonarsynth.geometry import Pose
 from sonarsynth.products import Signals
-from sonarsynth.receiver import Converter, Elements, Filter, Sonar
+from sonarsynth.receiver import Converter, Electronics, Elements, Filter, Sonar
 from sonarsynth.signals.filtered_pulse import fir
 from sonarsynth.signals.segments import fast_length
 
@@ -110,6 +111,26 @@ def _draw_correlated(
         drawn = rng.standard_normal((len(factors), factors.shape[2], 2), dtype=np.float32).astype(float)
         sound = np.einsum("fsk,fk->sf", factors, drawn[..., 0] + 1j * drawn[..., 1], optimize=True)
         out[:, some] = gain[some] * sound
+
+
+class ElectronicNoise(NoiseField):
+    """Noise of the preamplifiers, 1/f below a corner."""
+
+    kind = "electronics"
+
+    def __init__(self, electronics: Electronics) -> None:
+        self.electronics = electronics
+
+    def density(self, frequency: Floats) -> Floats:
+        """As `NoiseField.density`."""
+        own = self.electronics
+        return power_density(own.level + 10.0 * np.log10(1.0 + own.corner / frequency))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ElectronicNoise) and self.electronics == other.electronics
+
+    def __hash__(self) -> int:
+        return hash(self.electronics)
 
 
 def convert(signals: Signals, converter: Converter | None) -> Signals:

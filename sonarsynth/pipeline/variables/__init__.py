@@ -24,6 +24,8 @@ def variables(plan: Plan) -> tuple[Variable, ...]:
         wanted.add("levels")
     if plan.products & OF_BEAMS:
         wanted.add("source_estimates")
+    if plan.scene.sonar.sensor_errors is not None:
+        wanted.add("sensors")
     chosen = [v for v in VARIABLES if v.product in wanted]
     if not plan.windows.direct_removed:
         chosen = [v for v in chosen if (v.group, v.name) != ("/image", "remainder")]

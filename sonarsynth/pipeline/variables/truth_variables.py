@@ -3,7 +3,19 @@
 from __future__ import annotations
 
 from sonarsynth.labels.views import MEANINGS, View
-from sonarsynth.pipeline.variables.variable import BEAMS, CELL, ECHO, EMISSION, NONE, TARGET, comment, group_of, row
+from sonarsynth.pipeline.variables.variable import (
+    BEAMS,
+    CELL,
+    ECHO,
+    EMISSION,
+    NONE,
+    SENSOR,
+    TARGET,
+    comment,
+    group_of,
+    row,
+)
+from sonarsynth.receiver.sensor_errors import SensorState
 
 _INSTANT = comment("at the instant of the frame; what is heard is of when sound met the target: position_at_echo")
 _MEETING = comment(
@@ -148,6 +160,27 @@ _BEAMS = group_of(
     row("facet", BEAMS, "int32", "1", "facet that the beam points at", attributes=(*NONE, *_INSTANT)),
     row("range", BEAMS, "float32", "m", "distance to the first surface in the beam's direction", attributes=_INSTANT),
 )
+SENSORS = group_of(
+    "/truth/sensors",
+    "sensors",
+    row("gain", SENSOR, "float32", "dB", "sensitivity of the channel over its nominal one"),
+    row("phase", SENSOR, "float32", "degree", "phase of the channel at positive frequencies, alike at all of them"),
+    row("delay", SENSOR, "float32", "s", "how late the channel is sampled, positive: it shows what came earlier"),
+    row("position_error", (*SENSOR, "xyz"), "float32", "m", "where the hydrophone is, less where it should be"),
+    row(
+        "state",
+        SENSOR,
+        "int8",
+        "1",
+        "what the channel is",
+        attributes=(
+            ("flag_values", [int(v) for v in SensorState]),
+            ("flag_meanings", " ".join(v.name.lower() for v in SensorState)),
+        ),
+    ),
+    row("clock_rate", ("frame",), "float64", "1e-6", "how much faster time passes between samples than it should"),
+)
+"""What is wrong with the sensors, where a recipe describes that."""
 TRUTH = (*_SONAR, *_TARGETS, *_EMISSIONS, *_BEAMS)
 """True poses, emissions and beams."""
 HOW_LEVELS_ADD_UP = (

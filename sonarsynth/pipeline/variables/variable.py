@@ -24,6 +24,7 @@ class Variable:
 BEAMS = ("frame", "elevation", "azimuth")
 EMISSION = ("frame", "emission")
 ESTIMATE = ("frame", "estimate")
+SENSOR = ("frame", "sensor")
 POINT = ("frame", "point")
 TARGET = ("frame", "target")
 ECHO = (*TARGET, "family")

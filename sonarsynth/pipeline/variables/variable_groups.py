@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sonarsynth.pipeline.variables.truth_variables import LEVELS, TRUTH
+from sonarsynth.pipeline.variables.truth_variables import LEVELS, SENSORS, TRUTH
 from sonarsynth.pipeline.variables.variable import BEAMS, ESTIMATE, NONE, POINT, Variable, comment, flags, group_of, row
 from sonarsynth.products import FAMILIES, ORIGINS, REASONS
 from sonarsynth.recipe import SPLITS
@@ -148,5 +148,5 @@ _ESTIMATES = group_of(
         attributes=NONE,
     ),
 )
-VARIABLES: tuple[Variable, ...] = (*_ROOT, *_SIGNALS, *_IMAGE, *_BEAMS, *_CLOUD, *_ESTIMATES, *TRUTH, *LEVELS)
+VARIABLES: tuple[Variable, ...] = (*_ROOT, *_SIGNALS, *_IMAGE, *_BEAMS, *_CLOUD, *_ESTIMATES, *TRUTH, *SENSORS, *LEVELS)
 """Every variable that a frame may have."""

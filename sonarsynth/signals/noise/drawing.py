@@ -30,7 +30,9 @@ def field_on_lattice(
     passed = sonar.antialias
     low = passed.low - 0.5 * passed.transition if isinstance(passed, BandPass) else 0.0
     up = pose.turn_to_body([0.0, 0.0, 1.0])
-    return periodic_field(directions, lattice_of(elements, up, sound_speed), max(low, LOWEST * high), high)
+    return periodic_field(
+        directions, lattice_of(elements, up, sound_speed, sonar.behind), max(low, LOWEST * high), high
+    )
 
 
 def draw(
@@ -46,7 +48,7 @@ def draw(
     and of the imaginary part, is what a face hears of it: 1 at most."""
     field = field_on_lattice(directions, elements, pose, sonar, sound_speed)
     if field is None:
-        return random_waves.draw(directions, elements, pose, frequency, sound_speed, random)
+        return random_waves.draw(directions, elements, pose, sonar.behind, frequency, sound_speed, random)
     return lattice_noise.draw(field, elements, frequency, random)
 
 

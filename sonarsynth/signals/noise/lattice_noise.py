@@ -37,6 +37,7 @@ class Lattice:
     face: float  # m
     up: tuple[float, float, float]  # of the world, sonar frame
     sound_speed: float  # m/s
+    behind: float  # what is left of the pressure of waves from behind
 
     @cached_property
     def size(self) -> tuple[int, int]:
@@ -67,12 +68,12 @@ class PeriodicField:
     error: float
 
 
-def lattice_of(elements: Elements, up: Floats, sound_speed: float) -> Lattice:
+def lattice_of(elements: Elements, up: Floats, sound_speed: float, behind: float = 1.0) -> Lattice:
     """The lattice of elements that are on one; up (xyz): unit vector of the world's z, sonar frame."""
     y, z = elements.columns - 1 - elements.column, elements.rows - 1 - elements.row  # rise with y and z
     places = tuple(zip(y.tolist(), z.tolist(), strict=True))
     ux, uy, uz = np.round(up, 9).tolist()
-    return Lattice(places, elements.pitch, elements.face, (ux, uy, uz), sound_speed)
+    return Lattice(places, elements.pitch, elements.face, (ux, uy, uz), sound_speed, behind)
 
 
 @lru_cache(maxsize=4)
@@ -110,7 +111,10 @@ def _powers(
         k = 2.0 * np.pi * f / lattice.sound_speed
         toward, weight = _waves(directions, _rounded(k * (reach + lattice.face)), half)
         turn = k * lattice.pitch
-        covariance = lag_covariance(toward @ turned, weight, (turn, turn), k * lattice.face, lags)
+        toward = toward @ turned
+        back = 0.5 if half else toward[:, 0] < 0.0
+        weight = weight * (1.0 - back * (1.0 - lattice.behind**2))
+        covariance = lag_covariance(toward, weight, (turn, turn), k * lattice.face, lags)
         found, error = periodic_powers(np.where(away <= reach, covariance, 0.0), used, ROUNDS)
         powers[n], worst = found, max(worst, error)
     return powers, worst

@@ -27,11 +27,13 @@ def draw(
     directions: Directions,
     elements: Elements,
     pose: Pose,
+    behind: float,
     frequency: Floats,
     sound_speed: float,
     random: np.random.Generator,
 ) -> npt.NDArray[np.complex64]:
-    """Spectra (sensor, bin) at frequencies (bin,) Hz, as `lattice_noise.draw` gives them.
+    """Spectra (sensor, bin) at frequencies (bin,) Hz, as `lattice_noise.draw` gives them; behind: what is left of
+    the pressure of waves from behind.
 
     Waves come as often from each direction as the intensity is, all equally loud: on average over bins and frames the
     cross spectral density is exact, and each point hydrophone's spectrum is Gaussian.
@@ -47,6 +49,7 @@ def draw(
         toward = pose.turn_to_body(world)
         normal = random.standard_normal((count, 2)) / np.sqrt(count)
         heard = (normal[:, 0] + 1j * normal[:, 1]) * element_directivity(f, toward, elements.face, sound_speed)
+        heard *= np.where(toward[:, 0] < 0.0, behind, 1.0)
         turns = (2.0 * np.pi * f / sound_speed) * (elements.position @ toward.T)
         out[:, n] = np.exp(1j * turns.astype(np.float32)) @ heard.astype(np.complex64)
     return out

@@ -1,0 +1,97 @@
+"""Channels as they are: response, cross-talk, the clock that samples them, and overload; and what is corrected."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+from scipy.sparse import csr_array
+
+from sonarsynth.conventions import Floats
+from sonarsynth.equations.noise.filters import kaiser_bessel
+from sonarsynth.products import Signals
+from sonarsynth.receiver import Elements
+from sonarsynth.receiver.sensor_errors import DrawnErrors, Overload, SensorErrors, SensorState
+
+BLEND = 256
+"""Samples over which the end of a window goes over into its start, so that a filter finds no step there."""
+TAPS, SHAPE = 64, 10.0
+"""Of the interpolation from the samples of an even clock to those of a real one, and of its Kaiser window."""
+
+
+def respond(signals: Signals, drawn: DrawnErrors, sound_speed: float) -> Signals:
+    """Signals after gain, phase and delay of each channel; dead ones are silent. Windows are taken for periodic: the
+    ends are wrong for as long as the delay."""
+    heard = np.where(drawn.state == SensorState.DEAD, 0.0, 1.0)
+    f, spectrum, samples = _spectrum(signals)
+    return _filtered(signals, spectrum * drawn.response(f, sound_speed) * heard[:, None], samples)
+
+
+def corrected(signals: Signals, errors: SensorErrors, drawn: DrawnErrors, sound_speed: float) -> Signals:
+    """Signals as processing has them: without what it knows of the errors (`SensorErrors.known`)."""
+    if errors.known == "none":
+        return signals
+    works = (drawn.state == SensorState.WORKING) | (drawn.state == SensorState.NOISY)
+    f, spectrum, samples = _spectrum(signals)
+    response = drawn.response(f, sound_speed, errors.known == "all")
+    return _filtered(signals, spectrum / response * works[:, None], samples)
+
+
+def _spectrum(signals: Signals) -> tuple[Floats, np.ndarray, int]:
+    """Frequencies (bin,), spectra (sensor, bin) of the window, made periodic, and its samples so."""
+    p = signals.pressure
+    length = next_fast_len(p.shape[1] + BLEND, real=True)
+    down = np.linspace(1.0, 0.0, length - p.shape[1] + 2, dtype=np.float32)[1:-1]
+    whole = np.concatenate([p, p[:, -1:] * down + p[:, :1] * (1.0 - down)], axis=1)
+    return rfftfreq(length, 1.0 / signals.sampling_frequency), rfft(whole, axis=1), length
+
+
+def _filtered(signals: Signals, spectrum: np.ndarray, length: int) -> Signals:
+    pressure = irfft(spectrum, length, axis=1)[:, : signals.pressure.shape[1]]
+    return replace(signals, pressure=pressure.astype(np.float32))
+
+
+def talk(signals: Signals, elements: Elements, level: float) -> Signals:
+    """Signals with what each channel gets of its neighbours, at a level (dB, negative) below them: (I + K) x."""
+    return replace(signals, pressure=(signals.pressure + neighbours(elements, level) @ signals.pressure))
+
+
+def neighbours(elements: Elements, level: float) -> csr_array:
+    """K (sensor, sensor): the amplitude at neighbours, else 0."""
+    count = elements.count
+    place = np.stack([elements.column, elements.row], axis=1) if elements.on_lattice else np.arange(count)[:, None]
+    number = {tuple(one): n for n, one in enumerate(place.tolist())}
+    steps = np.concatenate([np.eye(place.shape[1], dtype=int), -np.eye(place.shape[1], dtype=int)])
+    pairs = [
+        (n, number[near]) for one, n in number.items() for near in map(tuple, (one + steps).tolist()) if near in number
+    ]
+    to, of = np.array(pairs, dtype=int).reshape(-1, 2).T
+    return csr_array((np.full(len(pairs), 10.0 ** (level / 20.0), np.float32), (to, of)), shape=(count, count))
+
+
+def sampled(signals: Signals, jitter: float, clock_rate: float, random: np.random.Generator) -> Signals:
+    """Signals at the times of a real clock: sample n, n/fs after the start, is taken at n/fs (1 + clock_rate) and
+    `jitter` (s, standard deviation) off; the same for all channels. Beyond the window is silence."""
+    samples, fs = signals.pressure.shape[1], signals.sampling_frequency
+    place = np.arange(samples) * (1.0 + clock_rate) + fs * jitter * random.standard_normal(samples)
+    tap = np.floor(place).astype(int)[:, None] + np.arange(1 - TAPS // 2, TAPS // 2 + 1)
+    away = place[:, None] - tap
+    weight = np.sinc(away) * kaiser_bessel(away, TAPS, SHAPE)
+    there = (tap >= 0) & (tap < samples)
+    at = np.broadcast_to(np.arange(samples)[:, None], tap.shape)
+    matrix = csr_array((weight[there].astype(np.float32), (at[there], tap[there])), shape=(samples, samples))
+    return replace(signals, pressure=np.ascontiguousarray((matrix @ signals.pressure.T).T))
+
+
+def overloaded(signals: Signals, overload: Overload) -> Signals:
+    """Signals cut at the level of overload; after that each channel's gain comes back as 1 - exp(-t/recovery)."""
+    p = signals.pressure
+    cut = np.abs(p) > overload.level
+    if not cut.any():
+        return signals
+    n = np.arange(p.shape[1])
+    last = np.maximum.accumulate(np.where(cut, n, -(1 << 40)), axis=1)
+    since = (n - last) / (signals.sampling_frequency * overload.recovery)
+    gain = np.where(cut, 1.0, -np.expm1(-since))
+    return replace(signals, pressure=(np.clip(p, -overload.level, overload.level) * gain).astype(np.float32))
