@@ -8,17 +8,23 @@ from dataclasses import replace
 import numpy as np
 
 from sonarsynth.conventions import depth
+from sonarsynth.geometry.motion import pose, velocity
 from sonarsynth.pipeline.stage_times import mark_stage
-from sonarsynth.planning import Plan, arrivals_of, frame_start
+from sonarsynth.planning import Plan, arrivals_of, context_of, frame_start
 from sonarsynth.planning.noise_rows import ELECTRONICS, SENSORS, part_names
 from sonarsynth.products import Arrivals, Signals
 from sonarsynth.randomness import stream
-from sonarsynth.receiver import Elements
+from sonarsynth.receiver import Elements, Sonar
 from sonarsynth.receiver.sensor_errors import DrawnErrors, SensorState, drawn_errors
 from sonarsynth.receiver.subarrays import Subarray, subarrays
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals import add_noise, channel_errors, convert
 from sonarsynth.signals.electronics import ElectronicNoise
+from sonarsynth.signals.noise.point_sources import add_noise_source
+from sonarsynth.sources.noise_source import NoiseSource
+from sonarsynth.sources.snap_models import Ricker
+from sonarsynth.sources.sound_source import Snap
+from sonarsynth.tracing.arrivals import trace
 
 
 def frame_signals(plan: Plan, frame: Frame, arrivals: Arrivals) -> Signals:
@@ -46,11 +52,8 @@ def subarray_signals(plan: Plan, frame: Frame, part: Subarray) -> Signals:
 def _signals(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements) -> Signals:
     """What hydrophones hear of arrivals; what comes from behind, through the baffle."""
     method, sonar, snaps = plan.choices.synthesis, plan.scene.sonar, frame.moment.snaps
-    if sonar.baffle:
-        left = np.where(arrivals.direction[:, 0] < 0.0, sonar.behind, 1.0)
-        arrivals = replace(arrivals, amplitude=arrivals.amplitude * left)
     start = frame_start(plan, frame)
-    return method.signals(arrivals, snaps, sensors, sonar, plan.absorption, start, plan.windows.samples)
+    return method.signals(_behind(arrivals, sonar), snaps, sensors, sonar, plan.absorption, start, plan.windows.samples)
 
 
 def errors_of(plan: Plan, frame: Frame) -> DrawnErrors | None:
@@ -71,15 +74,41 @@ def digitise(plan: Plan, frame: Frame, signals: Signals) -> Signals:
     """Signals as the sonar has them: ambient noise, errors of the channels, electronics, converter; `plan` is that of
     the sequence. Each part has a stream of its own."""
     mark_stage("synthesise")
-    sonar, pose = plan.scene.sonar, frame.sonar_pose
-    sound_speed = float(plan.profile.at(depth(pose.position)))
+    sonar, here = plan.scene.sonar, frame.sonar_pose
+    sound_speed = float(plan.profile.at(depth(here.position)))
     noises = plan.scene.world.environment.noises
     for number, (name, noise) in enumerate(zip(part_names(noises), noises, strict=True)):
         random = stream(frame.seed, "noise", frame.key, frame.step, *([number] if number else []))
-        signals = add_noise(signals, noise, sonar, plan.elements, random, pose, sound_speed)
+        signals = add_noise(signals, noise, sonar, plan.elements, random, here, sound_speed)
         mark_stage(name)
+    for number, source in enumerate(plan.scene.world.noise_sources):
+        signals = _with_noise_source(plan, frame, signals, source, number)
+        mark_stage(f"noise of {source.name}")
     signals = _through_channels(plan, frame, signals, sound_speed)
     return signals if sonar.converter is None else convert(signals, sonar.converter)
+
+
+def _with_noise_source(plan: Plan, frame: Frame, signals: Signals, source: NoiseSource, number: int) -> Signals:
+    """Signals with the sound of one source, by the paths that an emission of it would take."""
+    time, position = frame.time, pose(source.motion, frame.time).position
+    instant = Snap(position, 0.0, Ricker(frequency=plan.scene.sonar.band.centre), None, illuminates=False)
+    arrivals = trace(replace(context_of(plan, frame), snaps=(instant,)), plan.propagation)
+    apart = position - frame.sonar_pose.position
+    closing = (frame.sonar_velocity - velocity(source.motion, time)) @ apart / max(float(np.linalg.norm(apart)), 1e-9)
+    random = stream(frame.seed, "noise source", frame.key, frame.step, number)
+    sonar, sensors = plan.scene.sonar, true_elements(plan, frame)
+    arrivals = _behind(arrivals, sonar)
+    return add_noise_source(
+        signals, source, arrivals, instant, sensors, sonar, plan.absorption, time, float(closing), random
+    )
+
+
+def _behind(arrivals: Arrivals, sonar: Sonar) -> Arrivals:
+    """Arrivals, with what the baffle leaves of those from behind."""
+    if not sonar.baffle:
+        return arrivals
+    left = np.where(arrivals.direction[:, 0] < 0.0, sonar.behind, 1.0)
+    return replace(arrivals, amplitude=arrivals.amplitude * left)
 
 
 def _through_channels(plan: Plan, frame: Frame, signals: Signals, sound_speed: float) -> Signals:

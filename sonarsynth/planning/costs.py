@@ -121,7 +121,9 @@ def _synthesis(plan: Plan, size: FrameSize) -> Row:
     error = f"{plan.errors.synthesis:.1g} of the peak" if plan.errors.synthesis else "rounding"
     error = NOT_STATED if np.isnan(plan.errors.synthesis) else error
     why = "requested" if "signals" in plan.products else f"needed by the {' and the '.join(sorted(plan.products))}"
-    method = plan.choices.synthesis.row() + "".join(f", {noise.row()} noise" for noise in plan.scene.world.environment.noises)
+    method = plan.choices.synthesis.row() + "".join(
+        f", {noise.row()} noise" for noise in plan.scene.world.environment.noises
+    )
     return ("synthesise", method, why, error, work, stored)
 
 

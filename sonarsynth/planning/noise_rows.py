@@ -8,16 +8,21 @@ import numpy as np
 
 from sonarsynth.conventions import REFERENCE_PRESSURE, depth
 from sonarsynth.description.method import FrameSize
+from sonarsynth.description import FieldError
 from sonarsynth.environment.noise import Noise
 from sonarsynth.environment.noise.noise_field import SECONDS as DRAW_SECONDS
+from sonarsynth.geometry.motion import pose
 from sonarsynth.receiver import SensorErrors
 from sonarsynth.signals.noise.drawing import coherence_error, seconds
+from sonarsynth.sources.noise_source import NoiseRecording
 
 if TYPE_CHECKING:
     from sonarsynth.planning.plans import Plan
 
 ELECTRONICS, SENSORS = "electronics", "sensors"
 """Stages beside the parts of the noise."""
+PATH_SECONDS = 150e-9
+"""Of one core for a sample of one hydrophone of a source of noise."""
 ERROR_SECONDS = 40e-9
 """Of one core to filter a sample of one channel."""
 NoiseRow = tuple[str, str, str, str, float, int]
@@ -37,8 +42,8 @@ def noise_rows(plan: Plan, size: FrameSize) -> list[NoiseRow]:
     """A row for each part of the noise."""
     scene, elements = plan.scene, plan.elements
     noises = scene.world.environment.noises
-    pose = plan.recipe.frame(0)[1].sonar_pose
-    sound_speed = float(plan.profile.at(depth(pose.position)))
+    here = plan.recipe.frame(plan.sequence * plan.recipe.steps)[1].sonar_pose
+    sound_speed = float(plan.profile.at(depth(here.position)))
     centre, rows = np.array([scene.sonar.band.centre]), list[NoiseRow]()
     for name, noise in zip(part_names(noises), noises, strict=True):
         level = 10.0 * np.log10(float(noise.density(centre)[0]) / REFERENCE_PRESSURE**2)
@@ -49,13 +54,33 @@ def noise_rows(plan: Plan, size: FrameSize) -> list[NoiseRow]:
             noise.cost(size),
         )
         if noise.directions is not None:
-            wrong, way = coherence_error(noise.directions, elements, pose, scene.sonar, sound_speed)
+            wrong, way = coherence_error(noise.directions, elements, here, scene.sonar, sound_speed)
             way, error = f"{noise.directions.kind}: {way}", f"{wrong:.2g} of the coherence"
             work = seconds(noise.directions, elements, plan.sizes["sample"])
         elif noise.correlated:
             way = "by its cross spectral density"
         rows.append((name, f"{noise.row()}, {way}", said, error, work, 0))
-    return [*rows, *_channel_rows(plan)]
+    return [*rows, *_source_rows(plan), *_channel_rows(plan)]
+
+
+def _source_rows(plan: Plan) -> list[NoiseRow]:
+    """Rows of the sources of noise. Raises FieldError for one that is out of the water."""
+    rows, each, centre = list[NoiseRow](), plan.sizes["sensor"] * plan.sizes["sample"], plan.scene.sonar.band.centre
+    trajectory, bottom = plan.scene.trajectory, plan.scene.world.environment.depth
+    for number, source in enumerate(plan.scene.world.noise_sources):
+        for step in (0, trajectory.frames - 1):
+            height = float(pose(source.motion, trajectory.time(step)).position[2])
+            if not -bottom <= height < 0.0:
+                where = ("scene", "world", "noise_sources", number, "motion")
+                raise FieldError(where, f"is out of the water: z {height:g} m in frame {step} of {-bottom:g} to 0 m")
+        said = "as recorded"
+        if not isinstance(source.sound, NoiseRecording):
+            density = float(source.sound.density(np.array([centre]))[0])
+            level = 10.0 * np.log10(density / REFERENCE_PRESSURE**2)
+            said = f"{level:.1f} dB re 1 uPa2/Hz at 1 m and {centre / 1e3:.3g} kHz"
+        method = f"{source.sound.kind} from one place, each path at each hydrophone"
+        rows.append((f"noise of {source.name}", method, said, "none", PATH_SECONDS * each, 0))
+    return rows
 
 
 def _channel_rows(plan: Plan) -> list[NoiseRow]:

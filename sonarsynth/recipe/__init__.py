@@ -23,6 +23,7 @@ from sonarsynth.recipe.variation.grid import Axis, Zip, entry_tag
 from sonarsynth.recipe.variation.mesh_variants import Variants, target_meshes, variant_numbers
 from sonarsynth.recipe.variation.random_variations import Choice, Normal, Sobol, Uniform, Variation
 from sonarsynth.recipe.variation.values import Plain
+from sonarsynth.sources.noise_source import NoiseRecording
 from sonarsynth.sources.snap_models import RecordedSnap
 from sonarsynth.targets.shapes import MeshFile
 
@@ -43,7 +44,7 @@ __all__ = [
     "Zip",
 ]
 
-FILE_KINDS = frozenset({MeshFile.kind, Cast.kind, RecordedSnap.kind})
+FILE_KINDS = frozenset({MeshFile.kind, Cast.kind, RecordedSnap.kind, NoiseRecording.kind})
 """Descriptions whose `path` names a file."""
 
 Entry = Annotated[Annotated[Axis, Tag("axis")] | Annotated[Zip, Tag("zip")], Discriminator(entry_tag)]

@@ -1,0 +1,70 @@
+"""Noise of one place at hydrophones: its spectrum, or what it plays, through each path."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from scipy.fft import irfft, rfft, rfftfreq
+
+from sonarsynth.conventions import Floats
+from sonarsynth.equations.noise.filters import duration, response
+from sonarsynth.products import Arrivals, Signals
+from sonarsynth.receiver import Elements, Sonar
+from sonarsynth.signals.array_paths import array_paths
+from sonarsynth.signals.direct_sum import attenuation, exact_spectra, relative_absorption
+from sonarsynth.signals.filtered_pulse import fir
+from sonarsynth.signals.segments import fast_length
+from sonarsynth.sources.noise_source import NoiseRecording, NoiseSource
+from sonarsynth.state import Snap
+
+MARGIN = 64
+"""Samples at either end for what a resampled recording does there."""
+QUIETEST = 1e-7
+"""Bins that the filter passes less of are left empty."""
+
+
+def add_noise_source(
+    signals: Signals,
+    source: NoiseSource,
+    arrivals: Arrivals,
+    instant: Snap,
+    elements: Elements,
+    sonar: Sonar,
+    absorption: Callable[[Floats], Floats] | None,
+    time: float,
+    closing: float,
+    random: np.random.Generator,
+) -> Signals:
+    """Signals with the sound of a source.
+
+    arrivals: its paths, of an emission of 1 Pa at 1 m at the instant of the frame (`instant`); time: of the frame, in s
+    since the start of the motions; closing: speed in m/s at which source and array approach.
+    """
+    if not arrivals.delay.size:
+        return signals
+    fs, samples = signals.sampling_frequency, signals.pressure.shape[1]
+    front = array_paths(arrivals, (instant,), elements, attenuation(absorption, sonar.band.centre))
+    passed = fir(sonar.antialias)
+    early = float(arrivals.delay.min()) - 2.0 * elements.aperture / arrivals.sound_speed
+    spread = float(arrivals.delay.max()) + 2.0 * elements.aperture / arrivals.sound_speed - early
+    lead = int(np.ceil((spread + duration(passed)) * fs)) + MARGIN
+    length = fast_length(lead + samples + MARGIN)
+    frequency = rfftfreq(length, 1.0 / fs)
+    through = response(frequency, passed)
+    drawn = np.flatnonzero((through**2 > QUIETEST) & (frequency > 0.0))
+    f = frequency[drawn]
+    sent = np.zeros(frequency.size, complex)
+    if isinstance(source.sound, NoiseRecording):
+        faster = 1.0 + closing / arrivals.sound_speed
+        played = source.sound.segment(time + signals.start - lead / fs - early, length / fs * faster, length)
+        sent[drawn] = rfft(played)[drawn] * through[drawn]
+    else:
+        normal = random.standard_normal((2, drawn.size))
+        sent[drawn] = (normal[0] + 1j * normal[1]) * through[drawn] * np.sqrt(source.sound.density(f) * fs * length) / 2
+    relative = relative_absorption(absorption, f, sonar.band.centre)
+    spectrum = np.zeros((elements.count, frequency.size), complex)
+    spectrum[:, drawn] = exact_spectra(front, elements, f, relative, early) * sent[drawn]
+    sound = irfft(spectrum, length, axis=1)[:, lead : lead + samples]
+    return replace(signals, pressure=(signals.pressure + sound).astype(np.float32))

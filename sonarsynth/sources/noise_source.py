@@ -1,0 +1,95 @@
+"""Things that sound all the time from one place, at rest or moving: ships, whales, dolphins, an earthquake. They are
+heard, but light nothing."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from functools import lru_cache
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import Ge, Gt, MinLen
+from pydantic import model_validator
+
+from sonarsynth.conventions import Floats, Number, PositiveMetres, Seconds
+from sonarsynth.description import BY_KIND, description, named_files
+from sonarsynth.environment.noise import Noise
+from sonarsynth.geometry.motion import Motion
+from sonarsynth.sources.pulse_model import Stamp
+from sonarsynth.sources.recordings import RecordingError
+
+MOST_BYTES = 1 << 30
+
+
+@description
+class NoiseRecording:
+    """What a WAV file holds, again and again, brought to 1 m."""
+
+    kind: Literal["noise_recording"] = "noise_recording"
+    path: str
+    """Relative to the recipe."""
+    distance: PositiveMetres = 1.0
+    """From the source to the hydrophone that recorded it: the pressure is brought to 1 m as 1/r."""
+    pascals: Annotated[Number, Gt(0)] = 1.0
+    """Pressure (Pa) of the number 1 in the file; the full scale of a WAV of whole numbers is 1."""
+    channel: Annotated[int, Ge(0)] = 0
+    start: Seconds = 0.0
+    """Time of the recording that is played at time 0 of the motions."""
+
+    def segment(self, time: float, duration: float, samples: int) -> Floats:
+        """Pressure (sample,) in Pa at 1 m from a time (s) on, as the source plays it, brought to so many samples by
+        their Fourier series. Raises RecordingError where the file cannot be read."""
+        from scipy.signal import resample
+
+        rate, pressure = _read(self, named_files.stamp(self.path))
+        first = round((time + self.start) * rate)
+        wanted = (first + np.arange(max(round(duration * rate), 2))) % pressure.size
+        return np.asarray(resample(pressure[wanted], samples), float)
+
+
+@lru_cache(maxsize=4)
+def _read(recording: NoiseRecording, changed: Stamp) -> tuple[float, Floats]:
+    """Sampling frequency (Hz), and the pressure (sample,) at 1 m."""
+    from scipy.io import wavfile
+
+    path = recording.path
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            rate, data = wavfile.read(io.BytesIO(named_files.read(path, MOST_BYTES)))
+    except named_files.FileError as error:
+        raise RecordingError(f"{path}: {error}") from None
+    except Exception as error:  # whatever a damaged file may bring
+        raise RecordingError(f"{path}: cannot be read as WAV ({type(error).__name__})") from None
+    columns = data.reshape(len(data), -1)
+    if recording.channel >= columns.shape[1] or not rate > 0 or len(data) < 2:
+        raise RecordingError(f"{path}: has no channel {recording.channel} of sound")
+    values = columns[:, recording.channel].astype(float)
+    if data.dtype == np.uint8:
+        values = (values - 128.0) / 128.0
+    elif data.dtype.kind == "i":
+        values /= -float(np.iinfo(data.dtype).min)
+    if not np.isfinite(values).all():
+        raise RecordingError(f"{path}: holds numbers that are not finite")
+    return float(rate), values * (recording.pascals * recording.distance)
+
+
+@description
+class NoiseSource:
+    """A source of noise at one place. Its paths are those of the recipe, direct and reflected; hydrophones hear each as
+    one wave, curved as it is, bodies shade it, and it is alike in all directions."""
+
+    name: Annotated[str, MinLen(1)]
+    """For people."""
+    motion: Motion
+    """Where it is: at one place in each frame. Recordings are played faster as it approaches (Doppler)."""
+    sound: Annotated[Noise | NoiseRecording, BY_KIND]
+    """What it sounds like at 1 m: a spectrum, whose level is re 1 uPa2/Hz at 1 m, drawn anew in each frame; or a
+    recording."""
+
+    @model_validator(mode="after")
+    def _check(self) -> NoiseSource:
+        if not isinstance(self.sound, NoiseRecording) and self.sound.directions is not None:
+            raise ValueError("sound from one place has no directions: leave out directions")
+        return self
