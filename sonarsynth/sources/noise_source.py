@@ -15,11 +15,14 @@ from pydantic import model_validator
 from sonarsynth.conventions import Floats, Number, PositiveMetres, Seconds
 from sonarsynth.description import BY_KIND, description, named_files
 from sonarsynth.environment.noise import Noise
+from sonarsynth.equations.noise.filters import kaiser_bessel
 from sonarsynth.geometry.motion import Motion
 from sonarsynth.sources.pulse_model import Stamp
 from sonarsynth.sources.recordings import RecordingError
 
 MOST_BYTES = 1 << 30
+TAPS, SHAPE = 64, 10.0
+"""Of the interpolation between samples of a recording, and of its Kaiser window."""
 
 
 @description
@@ -37,15 +40,20 @@ class NoiseRecording:
     start: Seconds = 0.0
     """Time of the recording that is played at time 0 of the motions."""
 
-    def segment(self, time: float, duration: float, samples: int) -> Floats:
-        """Pressure (sample,) in Pa at 1 m from a time (s) on, as the source plays it, brought to so many samples by
-        their Fourier series. Raises RecordingError where the file cannot be read."""
-        from scipy.signal import resample
-
+    def segment(self, time: float, step: float, samples: int) -> Floats:
+        """Pressure (sample,) in Pa at 1 m at a time (s) and every `step` (s) after it, as the source plays it: a
+        windowed sinc, without what is above half the rate of the samples. Raises RecordingError where the file cannot
+        be read."""
         rate, pressure = _read(self, named_files.stamp(self.path))
-        first = round((time + self.start) * rate)
-        wanted = (first + np.arange(max(round(duration * rate), 2))) % pressure.size
-        return np.asarray(resample(pressure[wanted], samples), float)
+        place = (time + self.start + step * np.arange(samples)) * rate
+        cut = min(1.0, 1.0 / (step * rate))
+        reach = int(np.ceil(0.5 * TAPS / cut))
+        first = np.floor(place).astype(int)
+        found = np.zeros(samples)
+        for tap in range(1 - reach, reach + 1):
+            away = cut * (place - first - tap)
+            found += np.sinc(away) * kaiser_bessel(away, TAPS, SHAPE) * pressure[(first + tap) % pressure.size]
+        return cut * found
 
 
 @lru_cache(maxsize=4)

@@ -19,8 +19,8 @@ from sonarsynth.signals.segments import fast_length
 from sonarsynth.sources.noise_source import NoiseRecording, NoiseSource
 from sonarsynth.state import Snap
 
-MARGIN = 64
-"""Samples at either end for what a resampled recording does there."""
+MARGIN = 8
+"""Samples of the period beyond window, filter and delays."""
 QUIETEST = 1e-7
 """Bins that the filter passes less of are left empty."""
 
@@ -57,8 +57,8 @@ def add_noise_source(
     f = frequency[drawn]
     sent = np.zeros(frequency.size, complex)
     if isinstance(source.sound, NoiseRecording):
-        faster = 1.0 + closing / arrivals.sound_speed
-        played = source.sound.segment(time + signals.start - lead / fs - early, length / fs * faster, length)
+        step = (1.0 + closing / arrivals.sound_speed) / fs
+        played = source.sound.segment(time + signals.start - lead / fs - early, step, length)
         sent[drawn] = rfft(played)[drawn] * through[drawn]
     else:
         normal = random.standard_normal((2, drawn.size))

@@ -1,0 +1,100 @@
+"""Sources of noise at one place: a recording is heard when and as loud as it must be; a spectrum at its level."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import wavfile
+from scipy.signal.windows import hann
+
+import sonarsynth as ss
+from sonarsynth.pipeline.synthesis import digitise
+from sonarsynth.planning import frame_start
+from sonarsynth.products import Signals
+
+FS, C = 196e3, 1540.0
+RECIPE = """
+title: a source of noise
+scene:
+  world:
+    environment:
+      depth: 40 m
+      sound_speed: {kind: isovelocity, speed: 1540}
+      absorption: {formula: none}
+      noise: NOISE
+    noise_sources: [SOURCE]
+  sonar:
+    array: {kind: position_table, positions: [[0, 0, 0], [0, 0.4, 0.1], [0.2, -0.3, 0.5]]}
+    beams: {azimuths: 3, elevations: 3}
+  trajectory: {frames: 2, interval: 0.5 s, sonar: {kind: still, position: [0, 0, -20], heading: 90 deg}}
+"""
+STILL = "{kind: still, position: [12, 3, -17]}"
+
+
+def heard(folder: Path, source: str, noise: str = "null", frame: int = 0, samples: int = 4000) -> Signals:
+    """Signals of a frame in which nothing else sounds, in a window of so many samples."""
+    (folder / "recipe.yaml").write_text(RECIPE.replace("SOURCE", source).replace("NOISE", noise))
+    plan = ss.plan(ss.load(folder / "recipe.yaml"), products=["signals"])
+    instant = plan.recipe.frame(frame)[1]
+    quiet = Signals(np.zeros((3, samples), np.float32), frame_start(plan, instant), FS, 0.0, 0, 0)
+    return digitise(plan, instant, quiet)
+
+
+def tone(folder: Path, frequency: float, rate: int = 400_000) -> None:
+    """A WAV of half a second, which holds whole periods."""
+    wave = np.sin(2.0 * np.pi * frequency * np.arange(rate // 2) / rate)
+    wavfile.write(folder / "tone.wav", rate, wave.astype(np.float32))
+
+
+def test_a_recording_is_heard_after_its_travel_time_and_falls_as_the_distance(tmp_path: Path) -> None:
+    tone(tmp_path, 60e3)
+    sound = "{kind: noise_recording, path: tone.wav, pascals: 3, start: 1 us}"
+    got = heard(tmp_path, f"{{name: a, motion: {STILL}, sound: {sound}}}", frame=1)
+    positions = np.array([[0, 0, 0], [0, 0.4, 0.1], [0.2, -0.3, 0.5]]) + [0.0, 0.0, -20.0]  # it looks east
+    t = got.start + np.arange(got.pressure.shape[1]) / FS
+    for row, place in zip(got.pressure, positions, strict=True):
+        r = np.linalg.norm(place - [12.0, 3.0, -17.0])
+        exact = 3.0 / r * np.sin(2.0 * np.pi * 60e3 * (0.5 + t - r / C + 1e-6))
+        np.testing.assert_allclose(row[100:-100], exact[100:-100], atol=0.01 * 3.0 / r)
+
+
+@pytest.mark.parametrize("speed", [-15.0, 15.0])
+def test_a_recording_that_approaches_is_heard_higher(tmp_path: Path, speed: float) -> None:
+    tone(tmp_path, 60e3)
+    motion = f"{{kind: line, start: [100, 0, -20], stop: [{100 - speed}, 0, -20], duration: 1 s}}"
+    got = heard(
+        tmp_path, f"{{name: a, motion: {motion}, sound: {{kind: noise_recording, path: tone.wav}}}}", samples=16384
+    )
+    spectrum = np.abs(np.fft.rfft(got.pressure[0] * hann(16384), 1 << 18))
+    assert spectrum.argmax() * FS / (1 << 18) == pytest.approx(60e3 * (1.0 + speed / C), abs=4.0)
+
+
+def test_a_spectrum_is_heard_at_its_level_and_changes_no_draw_of_the_ambient_noise(tmp_path: Path) -> None:
+    source = f"{{name: ship, motion: {STILL}, sound: {{kind: flat, level: 120 dB}}}}"
+    got = heard(tmp_path, source, samples=30000).pressure
+    r = np.linalg.norm([12.0, 3.0, 3.0])
+    f = np.fft.rfftfreq(30000, 1.0 / FS)
+    inside = (f > 35e3) & (f < 75e3)
+    power = 2.0 * np.abs(np.fft.rfft(got[0] * hann(30000))[inside]) ** 2 / (FS * np.sum(hann(30000) ** 2))
+    assert 10.0 * np.log10(power.mean() * r**2) == pytest.approx(0.0, abs=0.3)
+    ambient = "{kind: flat, level: 60 dB}"
+    alone = heard(tmp_path, source, samples=2000).pressure
+    both = heard(tmp_path, source, ambient, samples=2000).pressure
+    without = heard(tmp_path, "", ambient, samples=2000).pressure
+    np.testing.assert_allclose(both, alone + without, atol=1e-6)
+    assert np.abs(np.corrcoef(alone[0], without[0])[0, 1]) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("{name: a, motion: {kind: still, position: [9, 0, 3]}, sound: {kind: flat, level: 1 dB}}", "out of the water"),
+        (f"{{name: a, motion: {STILL}, sound: {{kind: thermal, directions: {{kind: surface}}}}}}", "no directions"),
+        (f"{{name: a, motion: {STILL}, sound: {{kind: noise_recording, path: tone.wav}}}}", "no such file"),
+    ],
+)
+def test_what_cannot_be_is_refused(tmp_path: Path, source: str, message: str) -> None:
+    with pytest.raises((ss.RecipeError, ss.FieldError), match=message):
+        heard(tmp_path, source)
