@@ -30,7 +30,22 @@ if TYPE_CHECKING:
         SeaSurface,
         Sediment,
     )
-    from sonarsynth.environment.noise import FlatNoise, WenzNoise
+    from sonarsynth.environment.noise import (
+        FlatNoise,
+        KnudsenNoise,
+        RainNoise,
+        TabulatedNoise,
+        ThermalNoise,
+        WenzNoise,
+        WindNoise,
+    )
+    from sonarsynth.environment.noise.directions import (
+        BottomDirections,
+        IsotropicDirections,
+        OneDirection,
+        RingDirections,
+        SurfaceDirections,
+    )
     from sonarsynth.environment.sea import (
         Absorption,
         Cast,
@@ -70,10 +85,13 @@ if TYPE_CHECKING:
         BandPass,
         BeamGrid,
         Converter,
+        Electronics,
         LowPass,
+        Overload,
         PlanarLattice,
         PositionTable,
         Romanis,
+        SensorErrors,
         Sonar,
     )
     from sonarsynth.recipe import Accuracy, Axis, Choice, Normal, Recipe, Sobol, Splits, Uniform, Zip
@@ -83,6 +101,7 @@ if TYPE_CHECKING:
     from sonarsynth.schedule import BuildReport, build
     from sonarsynth.schedule.repairing import RepairReport, repair
     from sonarsynth.signals import AutoSynthesis, DirectSum, GriddedSynthesis
+    from sonarsynth.sources.noise_source import NoiseRecording, NoiseSource
     from sonarsynth.sources.shrimp import LogarithmicBubble, SnappingShrimp
     from sonarsynth.sources.snap_models import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
     from sonarsynth.store import open_store as open
@@ -103,6 +122,7 @@ __all__ = [
     "BandPass",
     "BeamAxis",
     "BeamGrid",
+    "BottomDirections",
     "Box",
     "BuildReport",
     "Cast",
@@ -116,6 +136,7 @@ __all__ = [
     "DirectSum",
     "EchoWindow",
     "EigenrayRequest",
+    "Electronics",
     "Environment",
     "FieldError",
     "FirstEcho",
@@ -125,10 +146,12 @@ __all__ = [
     "Gabor",
     "GriddedSynthesis",
     "Isotropic",
+    "IsotropicDirections",
     "Isovelocity",
     "IsovelocityPlacing",
     "KellerMiksis",
     "Kirchhoff",
+    "KnudsenNoise",
     "LShape",
     "Line",
     "Linear",
@@ -138,7 +161,11 @@ __all__ = [
     "MirrorLobe",
     "Munk",
     "Myring",
+    "NoiseRecording",
+    "NoiseSource",
     "Normal",
+    "OneDirection",
+    "Overload",
     "PartlyReflecting",
     "Peaks",
     "Physics",
@@ -147,6 +174,7 @@ __all__ = [
     "PositionTable",
     "PressureRelease",
     "Processing",
+    "RainNoise",
     "RayArrivals",
     "RayRequest",
     "Recipe",
@@ -159,12 +187,14 @@ __all__ = [
     "RepairReport",
     "Ricker",
     "Rigid",
+    "RingDirections",
     "Romanis",
     "Scene",
     "SeaBottom",
     "SeaSurface",
     "Sediment",
     "SensorDelays",
+    "SensorErrors",
     "SnapVariation",
     "SnappingShrimp",
     "Sobol",
@@ -173,9 +203,12 @@ __all__ = [
     "Splits",
     "Still",
     "Straight",
+    "SurfaceDirections",
     "Tabulated",
+    "TabulatedNoise",
     "Target",
     "TemperatureSalinity",
+    "ThermalNoise",
     "Thermocline",
     "Trajectory",
     "Uniform",
@@ -183,6 +216,7 @@ __all__ = [
     "Waypoint",
     "Waypoints",
     "WenzNoise",
+    "WindNoise",
     "World",
     "Zip",
     "accuracy",
@@ -210,7 +244,10 @@ _HOMES = {
     "export": "points",
     "description": "FieldError",
     "environment.boundaries": "FluidHalfSpace PressureRelease ReflectionTable Rigid SeaBottom SeaSurface Sediment",
-    "environment.noise": "FlatNoise WenzNoise",
+    "environment.noise": "FlatNoise KnudsenNoise RainNoise TabulatedNoise ThermalNoise WenzNoise WindNoise",
+    "environment.noise.directions": (
+        "BottomDirections IsotropicDirections OneDirection RingDirections SurfaceDirections"
+    ),
     "environment.sea": (
         "Absorption Cast Catenary Environment Isovelocity Linear Munk Tabulated TemperatureSalinity Thermocline"
     ),
@@ -227,7 +264,10 @@ _HOMES = {
     "ranging": (
         "AutoPlacing BeamAxis FirstEcho IsovelocityPlacing Peaks RefractedPlacing SensorDelays WavefrontCancelling"
     ),
-    "receiver": "Band BandPass BeamGrid Converter LowPass PlanarLattice PositionTable Romanis Sonar",
+    "receiver": (
+        "Band BandPass BeamGrid Converter Electronics LowPass Overload PlanarLattice PositionTable Romanis "
+        "SensorErrors Sonar"
+    ),
     "recipe": "Accuracy Axis Choice Normal Recipe Sobol Splits Zip Uniform",
     "recipe.reading": "RecipeError dump load loads schema",
     "recipe.scene": "EchoWindow Physics Processing Scene Trajectory World",
@@ -235,6 +275,7 @@ _HOMES = {
     "schedule": "BuildReport build",
     "schedule.repairing": "RepairReport repair",
     "signals": "AutoSynthesis DirectSum GriddedSynthesis",
+    "sources.noise_source": "NoiseRecording NoiseSource",
     "sources.shrimp": "LogarithmicBubble SnappingShrimp",
     "sources.snap_models": "Gabor KellerMiksis RecordedSnap Ricker SnapVariation",
     "store": "verify",

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import REFERENCE_PRESSURE, depth
-from sonarsynth.description.method import FrameSize
 from sonarsynth.description import FieldError
+from sonarsynth.description.method import FrameSize
 from sonarsynth.environment.noise import Noise
 from sonarsynth.environment.noise.noise_field import SECONDS as DRAW_SECONDS
 from sonarsynth.geometry.motion import pose

@@ -38,18 +38,20 @@ def draw(
     Waves come as often from each direction as the intensity is, all equally loud: on average over bins and frames the
     cross spectral density is exact, and each point hydrophone's spectrum is Gaussian.
     """
+    wave_number = 2.0 * np.pi * frequency / sound_speed
+    if isinstance(directions, OneDirection):
+        toward = pose.turn_to_body(directions.toward)
+        sent = random.standard_normal((2, frequency.size))
+        face = element_directivity(frequency, toward, elements.face, sound_speed) * (behind if toward[0] < 0.0 else 1.0)
+        turns = np.outer(elements.position @ toward, wave_number).astype(np.float32)
+        return np.asarray(np.exp(1j * turns) * ((sent[0] + 1j * sent[1]) * face), np.complex64)
     out = np.empty((elements.count, frequency.size), np.complex64)
-    one = isinstance(directions, OneDirection)
-    count = 1 if one else waves(elements.count)
+    count = waves(elements.count)
     for n, f in enumerate(frequency.tolist()):
-        if isinstance(directions, OneDirection):
-            world = directions.toward[None]
-        else:
-            world = drawn(directions.intensity, directions.edges, random.random((count, 2)))
-        toward = pose.turn_to_body(world)
+        toward = pose.turn_to_body(drawn(directions.intensity, directions.edges, random.random((count, 2))))
         normal = random.standard_normal((count, 2)) / np.sqrt(count)
         heard = (normal[:, 0] + 1j * normal[:, 1]) * element_directivity(f, toward, elements.face, sound_speed)
         heard *= np.where(toward[:, 0] < 0.0, behind, 1.0)
-        turns = (2.0 * np.pi * f / sound_speed) * (elements.position @ toward.T)
+        turns = wave_number[n] * (elements.position @ toward.T)
         out[:, n] = np.exp(1j * turns.astype(np.float32)) @ heard.astype(np.complex64)
     return out
