@@ -113,7 +113,10 @@ def _costs(file: Path, frames: frozenset[int]) -> dict[str, str]:
         return dict.fromkeys([*called, SPEED], UNKNOWN)
     spent = np.array([[cpu.get(stage, 0.0) for stage in STAGES] for cpu in rows.values()])
     medians = [*np.median(spent, axis=0), np.median(spent.sum(axis=1))]
-    said = {name: f"{1e3 * cost:.3g} ms" for name, cost in zip(called, medians, strict=True)}
+    said = {
+        name: f"{1e3 * cost:.3g} ms" if cost < 1.0 else f"{cost:.3g} s"
+        for name, cost in zip(called, medians, strict=True)
+    }
     return said | {SPEED: f"{1 / medians[-1]:.3g}" if medians[-1] > 0 else UNKNOWN}
 
 

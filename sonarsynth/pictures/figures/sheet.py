@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 WORST_SHOWN = 10.0
 """Range errors (cm) are coloured up to this."""
 
-BADGE = 14.0
+BADGE = 18.0
 """Size (points) of the number of a beam."""
 
 BADGES = 22.0

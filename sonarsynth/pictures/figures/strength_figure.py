@@ -53,11 +53,15 @@ def _rose(axes: PolarAxes, aspect: Floats, frequency: Floats, strength: Floats, 
     axes.tick_params(labelsize=8, colors=INK)
     axes.grid(color="#dddddd", linewidth=0.5)
     axes.set_rlabel_position(200.0)
-    axes.set_title("dB re 1 m2; bow up, port left", fontsize=8, color=INK)
+    for text in axes.get_yticklabels():
+        text.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8})
+    axes.set_xlabel("target strength (dB re 1 m2); bow up, port on the left", fontsize=8, color=INK)
     axes.legend(fontsize=7, loc="lower left", bbox_to_anchor=(-0.12, -0.1), frameon=False)
 
 
 def _map(made: Figure, axes: Axes, aspect: Floats, frequency: Floats, strength: Floats, top: float) -> None:
+    from matplotlib.ticker import AutoLocator, MultipleLocator
+
     low = top - DYNAMIC_RANGE
     shown = axes.pcolormesh(
         frequency / 1e3,
@@ -69,7 +73,8 @@ def _map(made: Figure, axes: Axes, aspect: Floats, frequency: Floats, strength: 
         shading="nearest",
         rasterized=True,
     )
-    label(axes, "frequency (kHz)", "aspect (deg, 0 ahead, port positive)")
+    label(axes, "frequency (kHz)", "aspect (deg, 0 bow, 90 port)")
+    axes.yaxis.set_major_locator(MultipleLocator(45.0) if np.ptp(aspect) > np.pi else AutoLocator())
     bar = made.colorbar(shown, ax=axes, fraction=0.05, pad=0.02)
-    bar.set_label("dB re 1 m2", fontsize=8)
+    bar.set_label("target strength (dB re 1 m2)", fontsize=8)
     bar.ax.tick_params(labelsize=8)

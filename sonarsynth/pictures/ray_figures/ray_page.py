@@ -145,8 +145,8 @@ def _section(rays: Mapping[str, Any], geometry: SceneGeometry) -> Iterator[Any]:
             shade = {"fill": "toself", "fillcolor": GREY, "mode": "lines", "line_color": INK, "line_width": 1}
             yield go.Scatter(x=line[:, 0], y=line[:, 1], name=escape(hull.name), **shade, **quiet)
     x, y = geometry.on_plane(np.array(list(geometry.places.values()))).T
-    words = {"text": list(geometry.places), "mode": "markers+text", "textposition": "top right"}
-    yield go.Scatter(x=x, y=y, marker_color=INK, name="", **words, **quiet)
+    words = {"text": list(geometry.places), "mode": "markers+text", "textposition": "top center"}
+    yield go.Scatter(x=x, y=y, marker_color=INK, name="", zorder=1, **words, **quiet)
 
 
 def _surroundings(geometry: SceneGeometry) -> Iterator[Any]:
