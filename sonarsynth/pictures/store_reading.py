@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from sonarsynth.conventions import Floats, Ints, azimuth_elevation, direction
-from sonarsynth.equations.arrays.grating_lobes import grating_lobes
+from sonarsynth.equations.arrays.grating_lobes import grating_lobes, lattice_pitch
 from sonarsynth.evaluation.point_checks import has_labels, points
 from sonarsynth.geometry import Pose
 from sonarsynth.pictures.figures.frame_figure import Hull
 from sonarsynth.pictures.figures.ghost_rings import Ghost
-from sonarsynth.store import Folder, Mismatch, Remote, folder_of, open_store
+from sonarsynth.store import Folder, Mismatch, folder_of, open_store
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,13 +61,6 @@ def pictures_of(store: str | Folder, name: str = "") -> Path:
     path = folder_of(store)
     found = f"{name or path.name}.pictures"
     return path.with_name(found) if isinstance(path, Path) else Path(found)
-
-
-def bytes_of(store: Folder) -> int:
-    """Bytes of the files of a store; 0 where nobody can list them."""
-    if isinstance(store, Remote):
-        return sum(store.sizes().values()) if store.listed else 0
-    return sum(path.stat().st_size for path in store.rglob("*") if path.is_file())
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,15 +256,6 @@ def lobes(tree: Source, frame: int) -> tuple[Floats, ...]:
         lines = np.rad2deg(np.stack(azimuth_elevation(beams), axis=-1))
         drawn += [line for line in lines if ((line >= low) & (line <= high)).all(axis=-1).any()]
     return tuple(drawn)
-
-
-def lattice_pitch(position: Floats) -> float:
-    """Pitch (m) of the square lattice that sensors (sensor, xyz) are on, in the plane x = 0; 0 where they are not."""
-    across = np.concatenate([np.diff(np.unique(position[:, axis].round(6))) for axis in (1, 2)])
-    pitch = float(across.min(initial=np.inf))
-    steps = (position[:, 1:] - position[0, 1:]) / pitch
-    on = np.isfinite(pitch) and np.abs(steps - steps.round()).max() < 1e-2 and not np.ptp(position[:, 0]) > 1e-6
-    return pitch if on else 0.0
 
 
 def _blended(azimuth: Floats, elevation: Floats, families: list[str], family: int) -> bool:

@@ -8,8 +8,8 @@ import numpy as np
 
 from sonarsynth.evaluation import bounds, brightest_beam_on_target, range_errors
 from sonarsynth.labels.views import View
-from sonarsynth.pictures.store_reading import built, bytes_of, echo_levels, mesh_group, needed, read
-from sonarsynth.store import Folder
+from sonarsynth.pictures.store_reading import built, echo_levels, mesh_group, needed, read
+from sonarsynth.store import Folder, Remote
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -94,3 +94,10 @@ def _agreement(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
     checks += bounds(tree, frames)
     warnings = [check.warning for check in checks if check.warning]
     return [*(f"  {check.name}: {check.got}" for check in checks), *(f"  warning: {warning}" for warning in warnings)]
+
+
+def bytes_of(store: Folder) -> int:
+    """Bytes of the files of a store; 0 where nobody can list them."""
+    if isinstance(store, Remote):
+        return sum(store.sizes().values()) if store.listed else 0
+    return sum(path.stat().st_size for path in store.rglob("*") if path.is_file())

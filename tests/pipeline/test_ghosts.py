@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 
 from sonarsynth import schedule
 from sonarsynth.conventions import direction
-from sonarsynth.equations.arrays.grating_lobes import grating_lobes
+from sonarsynth.equations.arrays.grating_lobes import grating_lobes, lattice_pitch
 from sonarsynth.pictures import show
 from sonarsynth.pictures.figures.frame_figure import FramePicture, Hull, View, Window
 from sonarsynth.pictures.figures.ghost_rings import Ghost, place
-from sonarsynth.pictures.store_reading import FAINTEST, ghosts, lattice_pitch, opened, stored
+from sonarsynth.pictures.store_reading import FAINTEST, ghosts, opened, stored
 from sonarsynth.planning import plan
 from sonarsynth.recipe import reading
 

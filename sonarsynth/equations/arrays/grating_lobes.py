@@ -24,3 +24,12 @@ def grating_lobes(direction: Floats, frequency: Floats, pitch: float, sound_spee
     found = np.concatenate([np.sqrt(np.maximum(ahead, 0.0))[..., None], along], axis=-1)
     found[~there] = np.nan
     return np.asarray(found[there.any(axis=1)])
+
+
+def lattice_pitch(position: Floats) -> float:
+    """Pitch (m) of the square lattice that sensors (sensor, xyz) are on, in the plane x = 0; 0 where they are not."""
+    across = np.concatenate([np.diff(np.unique(position[:, axis].round(6))) for axis in (1, 2)])
+    pitch = float(across.min(initial=np.inf))
+    steps = (position[:, 1:] - position[0, 1:]) / pitch
+    on = np.isfinite(pitch) and np.abs(steps - steps.round()).max() < 1e-2 and not np.ptp(position[:, 0]) > 1e-6
+    return pitch if on else 0.0
