@@ -45,9 +45,7 @@ Settings = Annotated[
 ]
 Products = Annotated[
     str,
-    typer.Option(
-        metavar="LIST", help="Stored besides the ground truth: signals, image, cloud, beams; 'truth': nothing."
-    ),
+    typer.Option(metavar="LIST", help="Stored besides the truth: signals, image, cloud, beams; 'truth': nothing else."),
 ]
 Scale = Literal["common", "frame"]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
