@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import fields, replace
 from functools import partial
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -14,11 +14,12 @@ from scipy.spatial import cKDTree
 from sonarsynth.conventions import Floats
 from sonarsynth.frontiers.exact_frame import exact_plan
 from sonarsynth.frontiers.rows import Point, timed
-from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
+from sonarsynth.imaging import Beamformer, DenseDelayAndSum, FocusedDelayAndSum
 from sonarsynth.pipeline import BeamformedFrame, cloud_of
 from sonarsynth.planning import Plan
 from sonarsynth.products import EnergyImage, PointCloud
 from sonarsynth.ranging import IsovelocityPlacing, Placing
+from sonarsynth.receiver import Elements
 from sonarsynth.recipe.scene import Frame
 
 BRIGHT = 20.0
@@ -54,6 +55,17 @@ def image_points(plan: Plan, heard: BeamformedFrame) -> Iterator[Point]:
         yield image_point(plan, made.energy, exact.energy, knob, setting, seconds, chosen=knob == "chosen")
     if chosen != slow:
         yield image_point(plan, exact.energy, exact.energy, "exact", "dense", slowest)
+    for method in other_images(slow, plan.elements):
+        made, seconds = timed(partial(image_of, plan, heard, method))
+        point = image_point(plan, made.energy, exact.energy, "another image", method.row(), seconds)
+        yield replace(point, role="peer")
+
+
+def other_images(slow: Any, elements: Elements) -> list[Any]:
+    """Beamformers that make another image than delay and sum, focused as `slow` is: what differs is no error."""
+    kinds = [kind for kind in get_args(get_args(Beamformer)[0]) if kind().exact().kind != slow.kind]
+    made = [kind(focus=slow.focus) if "focus" in kind.__dataclass_fields__ else kind() for kind in kinds]
+    return [method for method in made if not method.refusal(elements)]
 
 
 def named(method: Any) -> str:
