@@ -13,6 +13,7 @@ import xarray as xr
 from sonarsynth.conventions import azimuth_elevation, direction
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.pictures import show
+from sonarsynth.pictures.compare import moment
 from sonarsynth.pictures.steered_beams import beams, choose
 from sonarsynth.pictures.store_reading import built, opened, stored
 
@@ -327,3 +328,15 @@ def test_a_broken_ffmpeg_leaves_a_gif(store: Path, tmp_path: Path, monkeypatch: 
     fake.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
     assert show(store, tmp_path, say=lambda _: None)[1].name == "film.gif"
+
+
+def test_levels_are_relative_to_one_beam_of_all_frames_or_to_one_of_each(store: Path) -> None:
+    tree = opened(store)
+    brightest = max(float(stored(tree, i).energy.max()) for i in (0, 1))
+    common = [moment([tree], [brightest], i).panels[0].level for i in (0, 1)]
+    each = [moment([tree], [None], i).panels[0].level for i in (0, 1)]
+    assert max(level.max() for level in common) == pytest.approx(0.0, abs=1e-6)
+    assert min(level.max() for level in common) < -1e-3
+    for one, other in zip(common, each, strict=True):
+        assert other.max() == 0.0
+        np.testing.assert_allclose(one - other, one.max(), atol=1e-6)
