@@ -139,5 +139,5 @@ def _write_sheet(
     view = _view(tree, frame, _reference([frame]))
     made = sheet(*beam_grid(tree), view, errors, heard, window([view]), "energy re the brightest beam (dB)")
     path = folder / "sheet.png"
-    made.savefig(path)
+    made.savefig(path, bbox_inches="tight", pad_inches=0.1)
     return path
