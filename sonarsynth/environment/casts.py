@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from sonarsynth.conventions import FASTEST, SLOWEST, Floats
+from sonarsynth.conventions import Floats
 from sonarsynth.description import named_files
-from sonarsynth.environment.cast_files import CastError, Column, Table, read_table
-from sonarsynth.environment.hydrography import another_unit, sea_water_speed
+from sonarsynth.environment.down_cast import Selection, averaged, select
+from sonarsynth.environment.hydrography import SpeedFormula, sea_water_speed
 from sonarsynth.environment.profiles import nearest
+from sonarsynth.environment.readers import READ, CastError, CastTable, read_cast
 from sonarsynth.environment.sound_speed import (
     Cast,
     Catenary,
@@ -26,21 +28,15 @@ from sonarsynth.environment.sound_speed import (
     Thermocline,
 )
 from sonarsynth.equations.water.formula_ranges import noted
-from sonarsynth.equations.water.seawater import depth_of_pressure
+from sonarsynth.equations.water.seawater import depth_of_pressure, practical_salinity, pressure_of_depth
 
 __all__ = ["CastError", "profile_of", "smoothed"]
 
 LATITUDE = 45.0
 """Degrees, where nothing says."""
 
-PLAUSIBLE = {
-    "depth": (0.0, 12e3, "m"),
-    "pressure": (0.0, 12e3, "dbar"),
-    "temperature": (-5.0, 50.0, "degC"),
-    "salinity": (0.0, 50.0, "psu"),
-    "sound speed": (SLOWEST, FASTEST, "m/s"),
-}
-"""A value outside is a mark for "missing" (-9999), a wrong unit or a wrong sign; it is refused."""
+OWN_FORMULAS: Final[tuple[SpeedFormula, ...]] = ("chen_millero", "del_grosso", "mackenzie", "medwin")
+"""With which a file's own sound speed is compared."""
 
 MOST_LAYERS = 100_000
 
@@ -48,8 +44,8 @@ MOST_LAYERS = 100_000
 def profile_of(sound_speed: SoundSpeed) -> Profile:
     """The profile that rays are traced through: every node as it is, nothing thinned, nothing smoothed but on request.
 
-    A cast is read from its path (relative to the working directory) and kept until the file changes; a cast that was
-    taken on the way up is turned over. Formulas out of their range are in the profile's notes: nothing warns. Raises
+    A cast is read from its path (relative to the working directory) and kept until the file changes; what is left out
+    of it is in the notes (`down_cast`). Formulas out of their range are in the profile's notes: nothing warns. Raises
     `CastError` in one line that names file, line and column, ImportError where a formula needs what is not installed.
     """
     if isinstance(sound_speed, Cast):
@@ -73,7 +69,7 @@ def _profile_of(sound_speed: SoundSpeed, stamp: tuple[int, int] | None) -> Profi
         case Linear() | Thermocline() | Munk() | Catenary():
             return _profile(*sound_speed.nodes)
         case Cast():
-            return _cast_profile(sound_speed, read_table(Path(sound_speed.path)))
+            return _cast_profile(sound_speed)
 
 
 def _profile(depth: npt.ArrayLike, speed: npt.ArrayLike, notes: tuple[str, ...] = ()) -> Profile:
@@ -83,7 +79,7 @@ def _profile(depth: npt.ArrayLike, speed: npt.ArrayLike, notes: tuple[str, ...] 
     return Profile(*nodes, notes)
 
 
-def _place(where: TemperatureSalinity | Cast, table: Table | None = None) -> tuple[float, float | None]:
+def _place(where: TemperatureSalinity | Cast, table: CastTable | None = None) -> tuple[float, float | None]:
     """Latitude and longitude in degrees, as they are written, else as the file says, else 45 degrees and None."""
     latitude, longitude = (None, None) if table is None else (table.latitude, table.longitude)
     latitude = latitude if where.latitude is None else float(np.degrees(where.latitude))
@@ -91,22 +87,90 @@ def _place(where: TemperatureSalinity | Cast, table: Table | None = None) -> tup
     return LATITUDE if latitude is None else latitude, longitude
 
 
-def _cast_profile(cast: Cast, table: Table) -> Profile:
+def _cast_profile(cast: Cast) -> Profile:
+    """The profile of a file: read, chosen from, and said what of."""
+    given = [None if angle is None else float(np.degrees(angle)) for angle in (cast.latitude, cast.longitude)]
+    table = read_cast(Path(cast.path), cast.profile, *given)
     place = _place(cast, table)
-    with noted() as notes:
-        depth = _depth(table, place[0])
-    order = slice(None, None, -1) if depth[0] > depth[-1] else slice(None)
-    step = np.diff(depth[order])
-    if np.any(step < 0):
-        rows = range(len(depth))[order]
-        turn = rows[int(np.argmax(step < 0)) + 1]
-        raise CastError(
-            f"{table.path}, line {table.lines[turn]}: the depth {depth[turn]:g} m turns back; "
-            "a cast goes one way, down or up"
-        )
-    speed, more = _speed(cast, table, depth, place)
-    profile = _profile(depth[order], speed[order], (*notes, *more))
+    water = {name: column.values for name, column in table.columns.items()}
+    needed = _needed(cast, table)
+    with noted() as notes, np.errstate(invalid="ignore"):
+        depth = water["depth"] if "depth" in needed else depth_of_pressure(np.maximum(water["pressure"], 0.0), place[0])
+    if "pressure" in needed:
+        depth = np.where(water["pressure"] < 0.0, water["pressure"], depth)  # in the air
+    kept = select(table, {name: water[name] for name in needed if name in water}, depth)
+    water = {name: values[kept.rows] for name, values in water.items()}
+    z = depth[kept.rows]
+    if "salinity" in needed and "salinity" not in water:
+        water["salinity"] = _salinity(cast, water, z, place[0])
+    if "sound speed" in needed:
+        speed = water["sound speed"]
+        said = _unused(cast, table)
+    else:
+        speed, said = sea_water_speed(cast.formula, water["temperature"], water["salinity"], z, *place)
+    said = (*notes, *said, *table.notes, *_selection(table, kept), *_comparison(water, z, place))
+    profile = _profile(*averaged(z, speed), said)
     return profile if cast.smoothing is None else smoothed(profile, cast.smoothing)
+
+
+def _needed(cast: Cast, table: CastTable) -> tuple[str, ...]:
+    """The quantities that a row must have: depth or pressure, and sound speed or what makes it. Raises CastError."""
+    has = table.columns
+    level = next((name for name in ("depth", "pressure") if name in has), None)
+    if level is None:
+        raise CastError(f"{table.where()}: no column of depth or pressure among {table.shown_names}; read are {READ}")
+    usable = "sound speed" in has and np.isfinite(has["sound speed"].values).any()
+    if usable and cast.quantity != "temperature_salinity":
+        return level, "sound speed"
+    if cast.quantity == "sound_speed":
+        raise CastError(f"{table.where()}: no column of sound speed among {table.shown_names}")
+    if "temperature" in has and ("salinity" in has or cast.salinity is not None):
+        return level, "temperature", *(("salinity",) if cast.salinity is None else ())
+    if "temperature" in has and "conductivity" in has:
+        return level, "temperature", "conductivity", "salinity"
+    what = "" if cast.quantity == "temperature_salinity" else "sound speed, or of "
+    hint = "; give the `salinity`" if "temperature" in has else ""
+    raise CastError(f"{table.where()}: no columns of {what}temperature and salinity, among {table.shown_names}{hint}")
+
+
+def _salinity(cast: Cast, water: dict[str, Floats], depth: Floats, latitude: float) -> Floats:
+    """Practical salinity (row,) where the file has no column of it: as given, or by the conductivity."""
+    if cast.salinity is not None:
+        return np.full(len(depth), cast.salinity)
+    pressure = water["pressure"] if "pressure" in water else pressure_of_depth(depth, latitude)
+    return np.nan_to_num(practical_salinity(water["conductivity"], water["temperature"], pressure))
+
+
+def _unused(cast: Cast, table: CastTable) -> tuple[str, ...]:
+    """A note where a formula was asked for that the file does not need."""
+    own = table.columns["sound speed"].name
+    unused = f"formula {cast.formula} is not used: the file has a sound speed, '{own}', of its own"
+    return (unused,) if cast.formula != "mackenzie" else ()
+
+
+def _selection(table: CastTable, kept: Selection) -> tuple[str, ...]:
+    """One note of what was left out of a cast; none where nothing was."""
+    if not kept.left_out:
+        return ()
+    parts = ", ".join(f"{count} {reason}" for reason, count in kept.left_out.items())
+    way = ", taken on the way up" if kept.upward else ""
+    return (f"cast ({table.layout}): {len(kept.rows)} of {len(table.lines)} rows used{way}; left out: {parts}",)
+
+
+def _comparison(water: dict[str, Floats], depth: Floats, place: tuple[float, float | None]) -> tuple[str, ...]:
+    """A note of how far the file's own sound speed is from that of its temperature and salinity."""
+    if not {"sound speed", "temperature", "salinity"} <= set(water):
+        return ()
+    some = np.all([np.isfinite(water[name]) for name in ("sound speed", "temperature", "salinity")], axis=0)
+    some &= (water["temperature"] > -3.0) & (water["temperature"] < 45.0) & (water["salinity"] >= 0.0)
+    if not some.any() or not water["salinity"][some].any():
+        return ()
+    off = {}
+    for formula in OWN_FORMULAS:
+        ours = sea_water_speed(formula, water["temperature"][some], water["salinity"][some], depth[some], *place)[0]
+        off[formula] = float(np.abs(water["sound speed"][some] - ours).max())
+    best = min(off, key=lambda formula: off[formula])
+    return (f"the file's own sound speed is within {off[best]:.2g} m/s of {best} by its temperature and salinity",)
 
 
 def smoothed(profile: Profile, thickness: float) -> Profile:
@@ -123,46 +187,3 @@ def smoothed(profile: Profile, thickness: float) -> Profile:
         raise ValueError(f"smoothing: layers of {thickness:g} m over {extent:g} m are more than {MOST_LAYERS}")
     node = np.linspace(profile.depth[0], profile.depth[-1], int(np.ceil(extent / thickness * (1 - 1e-12))) + 1)
     return _profile(node, nearest(node, np.union1d(node, profile.depth), profile.at), profile.notes)
-
-
-def _depth(table: Table, latitude: float) -> Floats:
-    if (column := table.find("depth")) is not None:
-        return _values(table, column)
-    if (column := table.find("pressure")) is not None:
-        return depth_of_pressure(_values(table, column), latitude)
-    raise CastError(f"{table.path}, line {table.header}: no column of depth or pressure among {table.names}")
-
-
-def _speed(
-    cast: Cast, table: Table, depth: Floats, place: tuple[float, float | None]
-) -> tuple[Floats, tuple[str, ...]]:
-    own = table.find("sound speed")
-    temperature, salinity = table.find("temperature"), table.find("salinity")
-    if own is not None and cast.quantity != "temperature_salinity":
-        unused = f"formula {cast.formula} is not used: the file has a sound speed, '{own.name}', of its own"
-        return _values(table, own), (unused,) if cast.formula != "mackenzie" else ()
-    if cast.quantity == "sound_speed":
-        raise CastError(f"{table.path}, line {table.header}: no column of sound speed among {table.names}")
-    if temperature is None or salinity is None:
-        what = (
-            "temperature and salinity"
-            if cast.quantity == "temperature_salinity"
-            else "sound speed, or of temperature and salinity,"
-        )
-        raise CastError(f"{table.path}, line {table.header}: no columns of {what} among {table.names}")
-    return sea_water_speed(cast.formula, _values(table, temperature), _values(table, salinity), depth, *place)
-
-
-def _values(table: Table, column: Column) -> Floats:
-    """The values of a column in our units, each within what is plausible."""
-    values = table.values(column)
-    low, high, unit = PLAUSIBLE[column.quantity]
-    wrong = ~((values >= low) & (values <= high))
-    if np.any(wrong):
-        row = int(np.argmax(wrong))
-        raise CastError(
-            f"{table.path}, line {table.lines[row]}, column '{column.name}': "
-            f"{values[row]:g} {unit} is not a {column.quantity} between {low:g} and {high:g} {unit}"
-            + (another_unit(float(values[row])) if column.quantity == "temperature" else "")
-        )
-    return values

@@ -93,10 +93,10 @@ class TemperatureSalinity(SpeedModel):
 
 @description
 class Cast(SpeedModel):
-    """A CTD cast in a CSV file, as the instrument exported it (CastAway), or with named columns.
+    """A cast in a file, as the instrument or the archive has it: what is read is in the page on recipes.
 
-    Comment lines begin with '%' or '#'; then a line of column names. Depth (m or dbar) and either sound speed or
-    temperature and salinity are found by name.
+    Depth (m or dbar) and sound speed, or temperature and salinity (or conductivity), are found by name. The down-cast
+    is taken (the up-cast where there is none), without rows in the air, heave loops and missing values; a note says so.
     """
 
     kind: Literal["cast"] = "cast"
@@ -111,6 +111,10 @@ class Cast(SpeedModel):
     """Of the place ("1.3 deg"), for depth and pressure; left out: what the file says, else 45 degrees."""
     longitude: Longitude | None = None
     """Of the place, for what the salt there consists of (teos10); left out: what the file says, else standard."""
+    salinity: WaterSalinity | None = None
+    """Of the whole depth, where the file has none (an expendable thermograph); left out: such a file is refused."""
+    profile: Annotated[int, Ge(0)] | None = None
+    """Which of several profiles in the file, from 0; left out: the first, with a note."""
     smoothing: PositiveMetres | None = None
     """Left out: every node as it is, micro-layers kept. Else layers of this thickness (or a little less, to fit), with
     the speeds at their nodes that are nearest to the cast in the mean square over depth: straight parts, the mean and

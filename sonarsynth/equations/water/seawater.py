@@ -22,6 +22,7 @@ __all__ = [
     "francois_garrison",
     "mackenzie",
     "medwin",
+    "practical_salinity",
     "pressure_of_depth",
     "teos10",
 ]
@@ -148,6 +149,24 @@ def pressure_of_depth(depth: npt.ArrayLike, latitude: float = 45.0) -> Floats:
         p = p + (z - _standard_depth(p, latitude))
     formula_ranges.FOFONOFF_MILLARD.check(pressure=p)
     return np.asarray(p)
+
+
+def practical_salinity(conductivity: npt.ArrayLike, temperature: npt.ArrayLike, pressure: npt.ArrayLike) -> Floats:
+    """Practical salinity (psu) of a conductivity (mS/cm), a temperature (degC, scale of 1990) and a pressure (dbar).
+
+    The scale of 1978: Perkin and Lewis (1980), IEEE J. Oceanic Eng. 5, 9, as in Fofonoff and Millard (1983), UNESCO
+    technical papers in marine science 44. Holds for 2 to 42 psu, -2 to 35 degC; NaN without conductivity.
+    """
+    t90, p = np.asarray(temperature, float), np.asarray(pressure, float)
+    t = 1.00024 * t90
+    ratio = np.asarray(conductivity, float) / 42.914
+    depth = p * (2.070e-5 + p * (-6.370e-10 + 3.989e-15 * p))
+    of_pressure = 1.0 + depth / (1.0 + t * (3.426e-2 + 4.464e-4 * t) + (4.215e-1 - 3.107e-3 * t) * ratio)
+    of_temperature = 0.6766097 + t * (2.00564e-2 + t * (1.104259e-4 + t * (-6.9698e-7 + 1.0031e-9 * t)))
+    root = np.sqrt(np.where(ratio > 0, ratio / (of_pressure * of_temperature), np.nan))
+    standard = np.polynomial.polynomial.polyval(root, (0.0080, -0.1692, 25.3851, 14.0941, -7.0261, 2.7081))
+    warm = np.polynomial.polynomial.polyval(root, (0.0005, -0.0056, -0.0066, -0.0375, 0.0636, -0.0144))
+    return np.asarray(standard + (t - 15.0) / (1.0 + 0.0162 * (t - 15.0)) * warm)
 
 
 def _standard_depth(p: Floats, latitude: float) -> Floats:

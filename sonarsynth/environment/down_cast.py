@@ -1,0 +1,131 @@
+"""What of a cast a profile is made of: the down-cast, in the water, of rows that have what is needed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.environment.hydrography import another_unit
+from sonarsynth.environment.readers.cast_table import CastError, CastTable
+
+PLAUSIBLE: Final = {
+    "depth": (-20.0, 12e3, "m"),
+    "pressure": (-20.0, 12e3, "dbar"),
+    "temperature": (-5.0, 50.0, "degC"),
+    "salinity": (0.0, 50.0, "psu"),
+    "conductivity": (0.0, 120.0, "mS/cm"),
+    "sound speed": (1300.0, 1900.0, "m/s"),
+}
+"""A value of water; others are marks for "missing", a sensor in the air, a wrong unit or a wrong sign."""
+
+MOST_IMPLAUSIBLE: Final = 0.5
+"""Part of the rows that may have a value outside: of more, it is not the rows that are wrong."""
+IN_AIR: Final = 0.1
+"""A conductivity or salinity under this part of its median, near the surface, is of a sensor in the air."""
+SALT: Final = 2.0
+"""Median (psu, mS/cm) from which the water is salt enough to tell air from it."""
+SURFACE: Final = 2.0
+"""Depth (m) above which a sensor may be in the air."""
+
+
+@dataclass
+class Selection:
+    """Rows that are left, in the order of their depth, and what was left out."""
+
+    rows: Ints
+    left_out: dict[str, int] = field(default_factory=dict)
+    upward: bool = False
+
+    def keep(self, good: np.ndarray, reason: str) -> None:
+        """Leave out the rows that are not good."""
+        if not good.all():
+            self.left_out[reason] = self.left_out.get(reason, 0) + int(np.count_nonzero(~good))
+            self.rows = self.rows[good]
+
+
+def select(table: CastTable, needed: dict[str, Floats], depth: Floats) -> Selection:
+    """Rows that make a profile, from the surface down.
+
+    needed: (row,) columns without which a row is of no use; depth: (row,) m. Rows with a missing or an impossible value
+    are left out, those in the air, one of the two ways where a cast has both, and those no deeper than one before (heave
+    loops; Sea-Bird's "loop edit" with no least speed). Raises CastError where nothing is left, or most of a column is
+    impossible.
+    """
+    kept = Selection(np.arange(len(depth)))
+    there = np.all([np.isfinite(values) for values in needed.values()], axis=0)
+    kept.keep(there, "with a missing value")
+    _nonempty(table, kept)
+    _check(table, {name: values[kept.rows] for name, values in needed.items()}, kept.rows)
+    for name, values in needed.items():
+        low, high, _ = PLAUSIBLE[name]
+        some = values[kept.rows]
+        kept.keep((some >= low) & (some <= high), "with an impossible value")
+    _nonempty(table, kept)
+    kept.keep(~_in_air(needed, depth, kept.rows), "in the air")
+    _nonempty(table, kept)
+    _one_way(kept, depth)
+    z = depth[kept.rows]
+    deepest = np.maximum.accumulate(z)
+    kept.keep(np.append(True, z[1:] >= deepest[:-1]), "of heave loops")
+    return kept
+
+
+def averaged(depth: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Depths that differ, and the mean of the values of each."""
+    z, back, count = np.unique(depth, return_inverse=True, return_counts=True)
+    return (depth, values) if len(z) == len(depth) else (z, np.bincount(back, values) / count)
+
+
+def _nonempty(table: CastTable, kept: Selection) -> None:
+    if not len(kept.rows):
+        why = ", ".join(f"{count} {reason}" for reason, count in kept.left_out.items())
+        raise CastError(f"{table.path}: no row can be used ({why})")
+
+
+def _check(table: CastTable, needed: dict[str, Floats], rows: Ints) -> None:
+    """Refuses a column of which most is impossible, with the first such value."""
+    for name, values in needed.items():
+        low, high, unit = PLAUSIBLE[name]
+        wrong = ~((values >= low) & (values <= high))
+        if np.mean(wrong) > MOST_IMPLAUSIBLE or (name == "depth" and np.mean(values < 0) > MOST_IMPLAUSIBLE):
+            at = int(np.argmax(wrong)) if wrong.any() else int(np.argmax(values < 0))
+            low = max(low, 0.0) if name in ("depth", "pressure") else low
+            raise CastError(
+                f"{table.where(int(rows[at]))}, column '{table.columns[name].name}': "
+                f"{values[at]:g} {unit} is not a {name} between {low:g} and {high:g} {unit}"
+                + (another_unit(float(values[at])) if name == "temperature" else "")
+            )
+
+
+def _in_air(needed: dict[str, Floats], depth: Floats, rows: Ints) -> np.ndarray:
+    """Rows above the surface, or near it with next to no salt where the water has some."""
+    z = depth[rows]
+    air = z < 0.0
+    for name in ("salinity", "conductivity"):
+        if name in needed:
+            some = needed[name][rows]
+            median = float(np.median(some))
+            air |= (median > SALT) & (some < IN_AIR * median) & (z < SURFACE)
+    return np.asarray(air)
+
+
+def _one_way(kept: Selection, depth: Floats) -> None:
+    """The way down from the last time that it was highest before the deepest row; the way up where that is longer."""
+    z = depth[kept.rows]
+    deepest = int(np.argmax(z))
+    down, up = z[: deepest + 1], z[deepest:]
+    if np.ptp(up) > 2.0 * np.ptp(down):
+        kept.upward = True
+        end = deepest + int(np.argmin(up))
+        part = np.arange(end, deepest - 1, -1)
+        name = "of the way down"
+    else:
+        start = len(down) - 1 - int(np.argmin(down[::-1]))
+        part = np.arange(start, deepest + 1)
+        name = "of the way up"
+    if len(part) < len(z):
+        kept.left_out[name] = len(z) - len(part)
+    kept.rows = kept.rows[part]

@@ -1,0 +1,168 @@
+"""Casts in netCDF: Argo profiles, World Ocean Atlas and other grids, Turo and ERDDAP, by names and standard names.
+
+Classic netCDF (3) needs nothing more; netCDF 4 needs h5netcdf (`pip install 'sonarsynth[netcdf]'`).
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.environment.readers.cast_columns import UnitError, meaning
+from sonarsynth.environment.readers.cast_table import CastError, CastTable, Column, without_flags
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+GOOD_FLAGS: Final = b"1258"
+"""Quality flags of Argo that mean good, probably good, changed and estimated (Argo user's manual, table 2)."""
+PROFILES: Final = ("n_prof", "profile", "time", "casts", "obs_profile")
+LEVELS: Final = ("n_levels", "depth", "z", "level", "row", "obs", "pres", "pressure", "lev")
+PLACES: Final = ("latitude", "longitude", "lat", "lon")
+
+
+def read_netcdf(
+    path: Path, data: bytes, profile: int | None, latitude: float | None, longitude: float | None
+) -> CastTable:
+    """A cast; of several the `profile`-th (from 0; left out: the first), of a grid the nearest to a place (degrees).
+
+    Raises CastError.
+    """
+    import xarray as xr
+
+    engine = "scipy" if data[:3] == b"CDF" else "h5netcdf"
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            dataset = xr.open_dataset(io.BytesIO(data), engine=engine, decode_times=False)
+            found = _columns(path, dataset)
+            return _table(path, dataset, found, profile, latitude, longitude)
+    except CastError:
+        raise
+    except ImportError:
+        raise CastError(f"{path}: is netCDF 4, which needs h5netcdf: pip install 'sonarsynth[netcdf]'") from None
+    except Exception as error:  # whatever a damaged file may bring
+        if engine == "h5netcdf" and "h5netcdf" in str(error):
+            raise CastError(f"{path}: is netCDF 4, which needs h5netcdf: pip install 'sonarsynth[netcdf]'") from None
+        text = " ".join(str(error).split())[:120]
+        raise CastError(f"{path}: cannot be read as netCDF ({type(error).__name__}: {text})") from None
+
+
+def _columns(path: Path, dataset: xr.Dataset) -> dict[str, tuple[str, Any]]:
+    """Variable and meaning of each quantity; adjusted values before those in real time, where any is there."""
+    found: dict[str, tuple[str, Any]] = {}
+    names = sorted((str(name) for name in dataset.variables), key=lambda n: "adjusted" not in n.lower())
+    for name in names:
+        variable = dataset[name]
+        if not np.issubdtype(variable.dtype, np.number) or variable.size == 0 or not variable.dims:
+            continue
+        known = str(variable.attrs.get("standard_name", "")).lower()
+        unit = str(variable.attrs.get("units", "")) or None
+        for called in (name, known):
+            try:
+                held = meaning(called, unit) if called else None
+            except UnitError:
+                continue
+            if held is not None and held.quantity not in found and np.isfinite(variable.values).any():
+                found[held.quantity] = name, held
+    if not {"depth", "pressure"} & set(found) or not {"temperature", "sound speed"} & set(found):
+        shown = ", ".join(f"'{n}'" for n in list(dataset.variables)[:12])
+        raise CastError(f"{path}: no profile of depth or pressure, and temperature or sound speed, among {shown}")
+    return found
+
+
+def _table(
+    path: Path,
+    dataset: xr.Dataset,
+    found: dict[str, tuple[str, Any]],
+    profile: int | None,
+    latitude: float | None,
+    longitude: float | None,
+) -> CastTable:
+    notes: list[str] = []
+    lead = dataset[found["temperature" if "temperature" in found else "sound speed"][0]]
+    levels = next((d for d in reversed(lead.dims) if str(d).lower() in LEVELS), lead.dims[-1])
+    pick: dict[Any, int] = {}
+    for dim in lead.dims:
+        if dim == levels:
+            continue
+        if str(dim).lower() in PLACES:
+            pick[dim] = _nearest(path, dataset, dim, latitude if str(dim).lower().startswith("lat") else longitude)
+        else:
+            pick[dim] = _chosen(path, dataset, dim, profile, notes)
+    rows = _same_cast(dataset, levels, profile, path, notes) if not pick else slice(None)
+    columns = {}
+    for quantity, (name, held) in found.items():
+        variable = dataset[name]
+        if levels in variable.dims:
+            at = {dim: pick.get(dim, 0) for dim in variable.dims if dim != levels}
+            values = _good(dataset, name, variable.isel(at).values.astype(float), at)[rows]
+            columns[quantity] = Column(name, held.ours(without_flags(values)))
+    size = len(next(iter(columns.values())).values)
+    place = [_coordinate(dataset, name, pick, rows) for name in ("lat", "lon")]
+    names = tuple(str(n) for n in dataset.variables)
+    made = "Argo" if "argo" in str(dataset.attrs.get("title", "")).lower() else "netCDF"
+    return CastTable(path, made, columns, np.arange(1, size + 1), names, 0, *place, notes=tuple(notes))
+
+
+def _chosen(path: Path, dataset: xr.Dataset, dim: Any, profile: int | None, notes: list[str]) -> int:
+    """Which of several profiles: the one asked for, else the first."""
+    count = dataset.sizes[dim]
+    if profile is not None and profile >= count:
+        raise CastError(f"{path}: has no profile {profile}, only {count} (from 0)")
+    if count > 1:
+        notes.append(f"profile {profile or 0} of {count} along {dim}")
+    return profile or 0
+
+
+def _nearest(path: Path, dataset: xr.Dataset, dim: Any, place: float | None) -> int:
+    if dataset.sizes[dim] == 1:
+        return 0
+    if place is None:
+        raise CastError(f"{path}: is a grid of places: give the `latitude` and the `longitude` of the scene")
+    off = dataset[dim].values.astype(float) - place
+    return int(np.argmin(np.abs((off + 180.0) % 360.0 - 180.0)))
+
+
+def _same_cast(dataset: xr.Dataset, levels: Any, profile: int | None, path: Path, notes: list[str]) -> Any:
+    """Rows of one cast of a long table (ERDDAP): those of one float and cycle."""
+    keys = [n for n in ("platform_number", "cycle_number", "direction", "CYCLE_NUMBER") if n in dataset.variables]
+    keys = [n for n in keys if dataset[n].dims == (levels,)]
+    if not keys:
+        return slice(None)
+    code = np.array(["|".join(map(str, row)) for row in zip(*(dataset[n].values for n in keys), strict=True)])
+    first = np.sort(np.unique(code, return_index=True)[1])
+    if profile is not None and profile >= len(first):
+        raise CastError(f"{path}: has no profile {profile}, only {len(first)} (from 0)")
+    if len(first) > 1:
+        notes.append(f"profile {profile or 0} of {len(first)}")
+    return code == code[first[profile or 0]]
+
+
+def _good(dataset: xr.Dataset, name: str, values: Floats, at: dict[Any, int]) -> Floats:
+    """Values whose quality flag, where they have one, says that they can be used."""
+    flag = next((f for f in (f"{name}_QC", f"{name}_qc") if f in dataset.variables), None)
+    if flag is None:
+        return values
+    flags = dataset[flag].isel({d: i for d, i in at.items() if d in dataset[flag].dims}).values
+    if flags.shape != values.shape:
+        return values
+    text = np.array([str(f.decode() if isinstance(f, bytes) else f).strip()[:1] for f in flags])
+    return np.where(np.isin(text, list(GOOD_FLAGS.decode())), values, np.nan)
+
+
+def _coordinate(dataset: xr.Dataset, start: str, pick: dict[Any, int], rows: Any) -> float | None:
+    """Latitude or longitude (degrees) of the profile."""
+    most = 90.0 if start == "lat" else 360.0
+    for name in dataset.variables:
+        if str(name).lower() in (start, "latitude" if start == "lat" else "longitude"):
+            variable = dataset[name].isel({d: i for d, i in pick.items() if d in dataset[name].dims})
+            values = np.ravel(variable.values[rows] if variable.ndim and not pick else variable.values)
+            if values.size and np.issubdtype(values.dtype, np.number) and abs(float(values[0])) <= most:
+                return float(values[0])
+    return None
