@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
 from sonarsynth.description import named_files
-from sonarsynth.environment.down_cast import Selection, averaged, select
+from sonarsynth.environment.down_cast import Selection, averaged, left_out, select
 from sonarsynth.environment.hydrography import SpeedFormula, sea_water_speed
 from sonarsynth.environment.profiles import nearest
 from sonarsynth.environment.readers import READ, CastError, CastTable, read_cast
@@ -35,6 +35,8 @@ __all__ = ["CastError", "profile_of", "smoothed"]
 LATITUDE = 45.0
 """Degrees, where nothing says."""
 
+ALIKE: Final = 0.3
+"""m/s: formulas of sound speed differ by no more."""
 OWN_FORMULAS: Final[tuple[SpeedFormula, ...]] = ("chen_millero", "del_grosso", "mackenzie", "medwin")
 """With which a file's own sound speed is compared."""
 
@@ -93,6 +95,8 @@ def _cast_profile(cast: Cast) -> Profile:
     table = read_cast(Path(cast.path), cast.profile, *given)
     place = _place(cast, table)
     water = {name: column.values for name, column in table.columns.items()}
+    if "sound speed" in water:
+        water["sound speed"] = np.where(water["sound speed"] == 0.0, np.nan, water["sound speed"])  # out of the water
     needed = _needed(cast, table)
     with noted() as notes, np.errstate(invalid="ignore"):
         depth = water["depth"] if "depth" in needed else depth_of_pressure(np.maximum(water["pressure"], 0.0), place[0])
@@ -152,9 +156,10 @@ def _selection(table: CastTable, kept: Selection) -> tuple[str, ...]:
     """One note of what was left out of a cast; none where nothing was."""
     if not kept.left_out:
         return ()
-    parts = ", ".join(f"{count} {reason}" for reason, count in kept.left_out.items())
     way = ", taken on the way up" if kept.upward else ""
-    return (f"cast ({table.layout}): {len(kept.rows)} of {len(table.lines)} rows used{way}; left out: {parts}",)
+    return (
+        f"cast ({table.layout}): {len(kept.rows)} of {len(table.lines)} rows used{way}; left out: {left_out(kept)}",
+    )
 
 
 def _comparison(water: dict[str, Floats], depth: Floats, place: tuple[float, float | None]) -> tuple[str, ...]:
@@ -170,7 +175,11 @@ def _comparison(water: dict[str, Floats], depth: Floats, place: tuple[float, flo
         ours = sea_water_speed(formula, water["temperature"][some], water["salinity"][some], depth[some], *place)[0]
         off[formula] = float(np.abs(water["sound speed"][some] - ours).max())
     best = min(off, key=lambda formula: off[formula])
-    return (f"the file's own sound speed is within {off[best]:.2g} m/s of {best} by its temperature and salinity",)
+    how = "is within" if off[best] < ALIKE else "differs by up to"
+    by = "of" if off[best] < ALIKE else "from"
+    return (
+        f"the file's own sound speed {how} {off[best]:.2g} m/s {by} that of {best} by its temperature and salinity",
+    )
 
 
 def smoothed(profile: Profile, thickness: float) -> Profile:

@@ -27,6 +27,8 @@ IN_AIR: Final = 0.1
 """A conductivity or salinity under this part of its median, near the surface, is of a sensor in the air."""
 SALT: Final = 2.0
 """Median (psu, mS/cm) from which the water is salt enough to tell air from it."""
+FEW: Final = 3
+"""Rows under which a longer file is no cast, but a series at one depth."""
 SURFACE: Final = 2.0
 """Depth (m) above which a sensor may be in the air."""
 
@@ -49,10 +51,9 @@ class Selection:
 def select(table: CastTable, needed: dict[str, Floats], depth: Floats) -> Selection:
     """Rows that make a profile, from the surface down.
 
-    needed: (row,) columns without which a row is of no use; depth: (row,) m. Rows with a missing or an impossible value
-    are left out, those in the air, one of the two ways where a cast has both, and those no deeper than one before (heave
-    loops; Sea-Bird's "loop edit" with no least speed). Raises CastError where nothing is left, or most of a column is
-    impossible.
+    needed: (row,) columns without which a row is of no use; depth: (row,) m. Left out are rows with a missing or an
+    impossible value, those in the air, one of the two ways where a cast has both, and those less deep than one before
+    (heave loops). Raises CastError where nothing is left, or where most of a column is impossible.
     """
     kept = Selection(np.arange(len(depth)))
     there = np.all([np.isfinite(values) for values in needed.values()], axis=0)
@@ -70,7 +71,16 @@ def select(table: CastTable, needed: dict[str, Floats], depth: Floats) -> Select
     z = depth[kept.rows]
     deepest = np.maximum.accumulate(z)
     kept.keep(np.append(True, z[1:] >= deepest[:-1]), "of heave loops")
+    if len(kept.rows) < FEW < len(table.lines):
+        raise CastError(
+            f"{table.path}: is no cast: {len(kept.rows)} of {len(table.lines)} rows go down, {left_out(kept)}"
+        )
     return kept
+
+
+def left_out(kept: Selection) -> str:
+    """What was left out, for people."""
+    return ", ".join(f"{count} {reason}" for reason, count in kept.left_out.items())
 
 
 def averaged(depth: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -81,8 +91,7 @@ def averaged(depth: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 def _nonempty(table: CastTable, kept: Selection) -> None:
     if not len(kept.rows):
-        why = ", ".join(f"{count} {reason}" for reason, count in kept.left_out.items())
-        raise CastError(f"{table.path}: no row can be used ({why})")
+        raise CastError(f"{table.path}: no row can be used ({left_out(kept)})")
 
 
 def _check(table: CastTable, needed: dict[str, Floats], rows: Ints) -> None:
@@ -90,7 +99,8 @@ def _check(table: CastTable, needed: dict[str, Floats], rows: Ints) -> None:
     for name, values in needed.items():
         low, high, unit = PLAUSIBLE[name]
         wrong = ~((values >= low) & (values <= high))
-        if np.mean(wrong) > MOST_IMPLAUSIBLE or (name == "depth" and np.mean(values < 0) > MOST_IMPLAUSIBLE):
+        heights = name == "depth" and values.max() <= 0.0 and values.min() < 0.0
+        if np.mean(wrong) > MOST_IMPLAUSIBLE or heights:
             at = int(np.argmax(wrong)) if wrong.any() else int(np.argmax(values < 0))
             low = max(low, 0.0) if name in ("depth", "pressure") else low
             raise CastError(

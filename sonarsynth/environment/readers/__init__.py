@@ -9,7 +9,7 @@ import re
 import zipfile
 import zlib
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from sonarsynth.description import named_files
 from sonarsynth.environment.readers.cast_table import CastError, CastTable, Column
@@ -105,8 +105,8 @@ def _unpacked(data: bytes) -> bytes:
     return data
 
 
-def _bounded(file: io.BufferedIOBase | gzip.GzipFile | bz2.BZ2File | object) -> bytes:
-    data: bytes = file.read(MAX_BYTES + 1)  # type: ignore[attr-defined]
+def _bounded(file: Any) -> bytes:
+    data: bytes = file.read(MAX_BYTES + 1)
     if len(data) > MAX_BYTES:
         raise named_files.FileError(f"unpacks to more than {MAX_BYTES >> 20} MiB")
     return data

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.environment.readers.cast_columns import UnitError, meaning
+from sonarsynth.environment.readers.cast_columns import Meaning, UnitError, meaning
 from sonarsynth.environment.readers.cast_table import CastError, CastTable, Column, without_flags
 
 if TYPE_CHECKING:
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 GOOD_FLAGS: Final = b"1258"
 """Quality flags of Argo that mean good, probably good, changed and estimated (Argo user's manual, table 2)."""
-PROFILES: Final = ("n_prof", "profile", "time", "casts", "obs_profile")
 LEVELS: Final = ("n_levels", "depth", "z", "level", "row", "obs", "pres", "pressure", "lev")
 PLACES: Final = ("latitude", "longitude", "lat", "lon")
 
@@ -41,7 +40,7 @@ def read_netcdf(
             warnings.simplefilter("ignore")
             dataset = xr.open_dataset(io.BytesIO(data), engine=engine, decode_times=False)
             found = _columns(path, dataset)
-            return _table(path, dataset, found, profile, latitude, longitude)
+            return _table(path, dataset, found, profile, (latitude, longitude))
     except CastError:
         raise
     except ImportError:
@@ -53,23 +52,23 @@ def read_netcdf(
         raise CastError(f"{path}: cannot be read as netCDF ({type(error).__name__}: {text})") from None
 
 
-def _columns(path: Path, dataset: xr.Dataset) -> dict[str, tuple[str, Any]]:
-    """Variable and meaning of each quantity; adjusted values before those in real time, where any is there."""
-    found: dict[str, tuple[str, Any]] = {}
+def _columns(path: Path, dataset: xr.Dataset) -> dict[str, list[tuple[str, Meaning]]]:
+    """Variables and meanings of each quantity; adjusted values before those in real time. Raises CastError."""
+    found: dict[str, list[tuple[str, Meaning]]] = {}
     names = sorted((str(name) for name in dataset.variables), key=lambda n: "adjusted" not in n.lower())
     for name in names:
         variable = dataset[name]
         if not np.issubdtype(variable.dtype, np.number) or variable.size == 0 or not variable.dims:
             continue
-        known = str(variable.attrs.get("standard_name", "")).lower()
         unit = str(variable.attrs.get("units", "")) or None
-        for called in (name, known):
+        for called in (name, str(variable.attrs.get("standard_name", ""))):
             try:
                 held = meaning(called, unit) if called else None
             except UnitError:
                 continue
-            if held is not None and held.quantity not in found and np.isfinite(variable.values).any():
-                found[held.quantity] = name, held
+            if held is not None:
+                found.setdefault(held.quantity, []).append((name, held))
+                break
     if not {"depth", "pressure"} & set(found) or not {"temperature", "sound speed"} & set(found):
         shown = ", ".join(f"'{n}'" for n in list(dataset.variables)[:12])
         raise CastError(f"{path}: no profile of depth or pressure, and temperature or sound speed, among {shown}")
@@ -79,44 +78,66 @@ def _columns(path: Path, dataset: xr.Dataset) -> dict[str, tuple[str, Any]]:
 def _table(
     path: Path,
     dataset: xr.Dataset,
-    found: dict[str, tuple[str, Any]],
+    found: dict[str, list[tuple[str, Meaning]]],
     profile: int | None,
-    latitude: float | None,
-    longitude: float | None,
+    place: tuple[float | None, float | None],
 ) -> CastTable:
     notes: list[str] = []
-    lead = dataset[found["temperature" if "temperature" in found else "sound speed"][0]]
+    lead = dataset[found["temperature" if "temperature" in found else "sound speed"][0][0]]
     levels = next((d for d in reversed(lead.dims) if str(d).lower() in LEVELS), lead.dims[-1])
     pick: dict[Any, int] = {}
-    for dim in lead.dims:
-        if dim == levels:
-            continue
+    others = [dim for dim in lead.dims if dim != levels]
+    for dim in others:
         if str(dim).lower() in PLACES:
-            pick[dim] = _nearest(path, dataset, dim, latitude if str(dim).lower().startswith("lat") else longitude)
-        else:
-            pick[dim] = _chosen(path, dataset, dim, profile, notes)
-    rows = _same_cast(dataset, levels, profile, path, notes) if not pick else slice(None)
-    columns = {}
-    for quantity, (name, held) in found.items():
-        variable = dataset[name]
-        if levels in variable.dims:
-            at = {dim: pick.get(dim, 0) for dim in variable.dims if dim != levels}
-            values = _good(dataset, name, variable.isel(at).values.astype(float), at)[rows]
-            columns[quantity] = Column(name, held.ours(without_flags(values)))
+            pick[dim] = _nearest(path, dataset, dim, place[0 if str(dim).lower().startswith("lat") else 1])
+    rows = slice(None) if others else _same_cast(dataset, levels, profile, path, notes)
+    columns: dict[str, Column] = {}
+    for dim in others:
+        if dim not in pick:
+            pick[dim] = _chosen(path, dataset, dim, profile)
+            while profile is None and pick[dim] + 1 < dataset.sizes[dim] and not _usable(dataset, found, levels, pick):
+                pick[dim] += 1
+            if dataset.sizes[dim] > 1:
+                notes.append(f"profile {pick[dim]} of {dataset.sizes[dim]} along {dim}")
+    columns = _values(dataset, found, levels, pick, rows)
     size = len(next(iter(columns.values())).values)
-    place = [_coordinate(dataset, name, pick, rows) for name in ("lat", "lon")]
+    latitude, longitude = (_coordinate(dataset, name, pick, rows) for name in ("lat", "lon"))
     names = tuple(str(n) for n in dataset.variables)
     made = "Argo" if "argo" in str(dataset.attrs.get("title", "")).lower() else "netCDF"
-    return CastTable(path, made, columns, np.arange(1, size + 1), names, 0, *place, notes=tuple(notes))
+    return CastTable(path, made, columns, np.arange(1, size + 1), names, 0, latitude, longitude, tuple(notes))
 
 
-def _chosen(path: Path, dataset: xr.Dataset, dim: Any, profile: int | None, notes: list[str]) -> int:
+def _values(
+    dataset: xr.Dataset, found: dict[str, list[tuple[str, Meaning]]], levels: Any, pick: dict[Any, int], rows: Any
+) -> dict[str, Column]:
+    """Columns of the profile picked: of each quantity the first variable that has a good value in it."""
+    columns: dict[str, Column] = {}
+    for quantity, several in found.items():
+        for name, held in several:
+            variable = dataset[name]
+            if levels not in variable.dims:
+                continue
+            at = {dim: pick.get(dim, 0) for dim in variable.dims if dim != levels}
+            values = without_flags(_good(dataset, name, variable.isel(at).values.astype(float), at)[rows])
+            if quantity not in columns or not np.isfinite(columns[quantity].values).any():
+                columns[quantity] = Column(name, held.ours(values))
+    return columns
+
+
+def _usable(
+    dataset: xr.Dataset, found: dict[str, list[tuple[str, Meaning]]], levels: Any, pick: dict[Any, int]
+) -> bool:
+    """Whether a profile has rows with all that the file has of pressure or depth, temperature and salinity."""
+    columns = _values(dataset, found, levels, pick, slice(None))
+    wanted = [columns[name].values for name in ("pressure", "temperature", "salinity") if name in columns]
+    return bool(np.any(np.all(np.isfinite(wanted), axis=0)))
+
+
+def _chosen(path: Path, dataset: xr.Dataset, dim: Any, profile: int | None) -> int:
     """Which of several profiles: the one asked for, else the first."""
     count = dataset.sizes[dim]
     if profile is not None and profile >= count:
         raise CastError(f"{path}: has no profile {profile}, only {count} (from 0)")
-    if count > 1:
-        notes.append(f"profile {profile or 0} of {count} along {dim}")
     return profile or 0
 
 

@@ -35,6 +35,8 @@ class Layout:
     """Of the last line of the head; empty: it is the first."""
     head: int = 1
     """Lines of a head that has no `last`; 0: rows begin in the first line, where the pattern ends."""
+    row: str = ""
+    """How a row begins, where other lines of numbers stand among them."""
     several: bool = False
     """The last line of the head comes again before each further cast."""
 
@@ -96,15 +98,17 @@ LAYOUTS: Final = (
         "AML",
         r"\[cast header\]",
         ("", "", "sound speed", "pressure"),
-        ("SensorName=SV-.*SV\.X", *AML),
-        last=r"SyncScans|\s*$",
+        (r"SensorName=SV-.*SV\.X", *AML),
+        last=r"\s*$",
+        row=r"\d{4}-\d\d-\d\d,",
     ),
     Layout(
         "AML",
         r"\[cast header\]",
         ("", "", "conductivity", "temperature", "pressure", "", "salinity", "", "sound speed"),
-        ("SensorName=SV-.*CT\.X C", *AML),
+        (r"SensorName=SV-.*CT\.X C", *AML),
         last=r"\s*$",
+        row=r"\d{4}-\d\d-\d\d,",
     ),
 )
 
@@ -130,10 +134,10 @@ def read_fixed_columns(path: Path, text: str, profile: int) -> CastTable | None:
     rows, numbers = [], []
     for number, line in enumerate(lines[starts[profile] : stop], start=starts[profile] + 1):
         begun = re.match(layout.first, line, re.IGNORECASE) if number == 1 else None
-        line = line[begun.end() :] if begun else line
-        cells = [c.strip() for c in line.split(",")] if "," in line else line.split()
+        body = line[begun.end() :] if begun else line
+        cells = [c.strip() for c in body.split(",")] if "," in body else body.split()
         row = [_number(cells, i) for i, _ in wanted]
-        if np.count_nonzero(np.isfinite(row)) >= min(2, len(row)):
+        if re.match(layout.row, line) and np.count_nonzero(np.isfinite(row)) >= min(2, len(row)):
             rows.append(row)
             numbers.append(number)
     values = np.array(rows, float).reshape(-1, len(wanted))

@@ -25,6 +25,8 @@ PLACE: Final = r"^[%#*/\s]*(?:start[ _]+|cast start |nmea |seatex )?{}(?:\s*\([^
 LATITUDE: Final = re.compile(PLACE.format("lat(?:itude)?"), re.IGNORECASE)
 LONGITUDE: Final = re.compile(PLACE.format("lon(?:g|gitude)?"), re.IGNORECASE)
 NUMBERED_FIELD: Final = re.compile(r"Field(\d+)\s*:\s*(.*?)\s*$")
+MVP_ROWS: Final = 4
+"""Rows of statistics (least, most, mean, deviation) before those of the cast in an M1 of MVP."""
 MARKS: Final = re.compile(r"^\s*(?:[%#*;/!]+|columns\s*=)\s*", re.IGNORECASE)
 UNIT_MARKS: Final = re.compile(r"^\s*(?:[%#*;/!]+|units\s*=)", re.IGNORECASE)
 
@@ -39,6 +41,7 @@ SPLITTERS: Final[dict[str, Splitter]] = {
     ",": _by(","),
     ";": _by(";"),
     "\t": _by("\t"),
+    "dashes": lambda line: re.split(r"\s+-\s+", line.strip()),
     "columns": lambda line: re.split(r"\s{2,}", line.strip()),
     "words": lambda line: re.findall(r"[^\s(\[]+(?:\s?[(\[][^)\]]*[)\]])?", line),
 }
@@ -82,7 +85,7 @@ def read_named_columns(path: Path, text: str) -> CastTable:
     Raises CastError: no rows, no names, an unknown unit, a cell that is not a number.
     """
     lines = text.split("\n")
-    header = _sippican(lines) or _header(path, lines)
+    header = _sippican(path, lines) or _header(path, lines)
     columns = header.meanings(path)
     needed = max((i for i, _ in columns.values()), default=0) + 1
     cut = SPLITTERS.get(header.separator, str.split) if header.separator in ",;\t" else str.split
@@ -95,6 +98,8 @@ def read_named_columns(path: Path, text: str) -> CastTable:
             rows.append([*cells, *[""] * (needed - len(cells))])
             numbers.append(number)
     comma = header.separator in ";\t" and any("," in cell for row in rows[:3] for cell in row)
+    make = _make(lines[: header.first])
+    rows, numbers = (rows[MVP_ROWS:], numbers[MVP_ROWS:]) if make == "MVP" else (rows, numbers)
     own: dict[str, Column] = {}
     for quantity, (i, held) in columns.items():
         cells = [row[i].strip().replace(",", ".") if comma else row[i].strip() for row in rows]
@@ -102,7 +107,7 @@ def read_named_columns(path: Path, text: str) -> CastTable:
         own[quantity] = Column(name, held.ours(numbers_of(cells, path, numbers, name)))
     return CastTable(
         path,
-        _make(lines[: header.first]),
+        make,
         own,
         np.array(numbers, np.int64),
         tuple(name.strip() for name in header.names),
@@ -204,12 +209,15 @@ def _of(quantity: str, unit: str) -> bool:
     return any(unit in texts for texts in UNITS[quantity])
 
 
-def _sippican(lines: list[str]) -> _Header | None:
+def _sippican(path: Path, lines: list[str]) -> _Header | None:
     """Column names of an EDF of Sippican, one a line: 'Field3 : Depth (m)'."""
     fields = [(i, m[2]) for i, line in enumerate(lines[:HEAD_LINES]) if (m := NUMBERED_FIELD.match(line.strip()))]
     if not fields:
         return None
     last = fields[-1][0]
+    rows = [len(line.split()) for line in lines[last + 2 : last + 5]]
+    if rows and max(rows) < len(fields):
+        raise CastError(f"{path}, line {last + 3}: a row of {max(rows)} columns, where the head names {len(fields)}")
     return _Header(fields[0][0], [name for _, name in fields], [], "\t", last + 2)
 
 
@@ -248,7 +256,7 @@ def _repeated(header: _Header, columns: dict[str, tuple[int, Meaning]]) -> tuple
 
 MAKES: Final = {
     "castaway": "CastAway", "% device,cc": "CastAway", "mk21": "Sippican EDF", "turo": "Turo", "valeport": "Valeport",
-    "midas": "Valeport", "swift": "Valeport", "seacast": "AML", "aml_": "AML", "ctd-48": "Sea and Sun",
+    "ndecimate": "MVP", "midas": "Valeport", "swift": "Valeport", "seacast": "AML", "aml_": "AML",
     "sea & sun": "Sea and Sun", "idronaut": "Idronaut", "uctd": "Oceanscience", "ohsi": "Digibar",
 }  # fmt: skip
 
