@@ -8,20 +8,22 @@ from typing import Final
 
 import numpy as np
 
-from sonarsynth.conventions import UNITS
+from sonarsynth.conventions import UNITS, Floats, Ints
 from sonarsynth.description import named_files
 from sonarsynth.description.byte_bounded_cache import byte_bounded_cache
 from sonarsynth.geometry.mesh import Mesh, read_only
 from sonarsynth.geometry.surfaces import MeshError, Surface, halve_longest_edges, split_long_edges
 from sonarsynth.targets.generated.generation import generate
 from sonarsynth.targets.generated.smoothing import curved
-from sonarsynth.targets.mesh_readers.mesh_files import read_surface
-from sonarsynth.targets.mesh_readers.mesh_repair import check, repair
+from sonarsynth.targets.mesh_readers.mesh_files import IN_METRES, read_surface
+from sonarsynth.targets.mesh_readers.mesh_repair import check, repair, with_backs
 from sonarsynth.targets.shapes import Cylinder, MeshFile, Myring, Remus100, Shape
 
 __all__ = ["MeshError", "file_stamp", "mesh_of", "refined_mesh"]
 
 
+LARGEST_IN_METRES: Final = 300.0
+"""Size (m) over which a file without a unit is taken to be in millimetres."""
 SHARP: Final = MeshFile(path="").crease
 """The crease of shapes that leave it out."""
 
@@ -64,6 +66,9 @@ def refined_mesh(shape: Shape, edge: float = np.inf, sagitta: float = np.inf) ->
         (vertices, numbers), notes = generate(shape, edge, sagitta)
         if isinstance(shape, Remus100) and shape.coarse and edge < np.inf:
             vertices, numbers = halve_longest_edges((vertices, numbers), edge)
+    if isinstance(shape, MeshFile) and shape.sides == "both":
+        (vertices, numbers), sheets = with_backs((vertices, numbers))
+        notes = (*notes, f"{sheets} facets of sheets scatter from both sides") if sheets else notes
     faces = np.ascontiguousarray(numbers, np.int32)
     flat = None
     if isinstance(shape, (Cylinder, Myring, Remus100)):  # their ends
@@ -74,7 +79,7 @@ def refined_mesh(shape: Shape, edge: float = np.inf, sagitta: float = np.inf) ->
 
 
 def _read(shape: MeshFile, edge: float, sagitta: float) -> tuple[Surface, tuple[str, ...]]:
-    surface, notes = _repaired(replace(shape, edge=None, smooth=False, crease=SHARP), file_stamp(shape))
+    surface, notes = _repaired(replace(shape, edge=None, smooth=False, crease=SHARP, sides="front"), file_stamp(shape))
     longest = min(edge, np.inf if shape.edge is None else shape.edge)
     if np.isinf(longest) and not (shape.smooth and np.isfinite(sagitta)):
         return surface, notes
@@ -94,9 +99,23 @@ def _repaired(shape: MeshFile, stamp: tuple[int, int] | None) -> tuple[Surface, 
     path = Path(shape.path)
     vertices, faces = read_surface(path)
     turn = Rotation.from_euler("xyz", [shape.roll, shape.pitch, shape.heading]).as_matrix()
+    unit, guessed = _unit(shape, vertices, faces)
     with np.errstate(invalid="ignore", over="ignore"):
-        placed = (vertices * UNITS["m"][shape.unit]) @ turn.T + np.array(shape.offset)
+        placed = (vertices * UNITS["m"][unit]) @ turn.T + np.array(shape.offset)
     check((placed, faces), shape.path)
     (vertices, faces), notes = repair((placed, faces), shape.path, shares_vertices=path.suffix.lower() != ".stl")
     vertices.flags.writeable = faces.flags.writeable = False
-    return (vertices, faces), notes
+    return (vertices, faces), (*guessed, *notes)
+
+
+def _unit(shape: MeshFile, vertices: Floats, faces: Ints) -> tuple[str, tuple[str, ...]]:
+    """The unit of the numbers in a file, and a note where it is guessed from the size."""
+    if shape.unit != "auto" or Path(shape.path).suffix.lower().removeprefix(".") in IN_METRES:
+        return ("m" if shape.unit == "auto" else shape.unit), ()
+    with np.errstate(invalid="ignore", over="ignore"):
+        size = float(
+            np.ptp(vertices[np.unique(faces[(faces >= 0) & (faces < len(vertices))])], axis=0).max(initial=0.0)
+        )
+    if not LARGEST_IN_METRES < size <= 1e3 * LARGEST_IN_METRES:
+        return "m", ()
+    return "mm", (f"taken to be in mm, {1e-3 * size:.3g} m across: in m it would be {size:.3g}; give the `unit`",)

@@ -33,13 +33,16 @@ class BodyShape(Method):
 
 @description
 class MeshFile(BodyShape):
-    """A mesh in a file: STL, OBJ, PLY, OFF or GLB."""
+    """A mesh in a file: STL, OBJ, PLY, OFF, glTF, COLLADA, 3MF, or a text of three lines a facet."""
 
     kind: Literal["mesh_file"] = "mesh_file"
     path: str
     """Relative to the recipe."""
-    unit: Literal["m", "cm", "mm", "in", "ft"] = "m"
-    """Unit of the numbers in the file."""
+    unit: Literal["auto", "m", "cm", "mm", "in", "ft"] = "auto"
+    """Unit of the numbers in the file. `auto`: what the file says (COLLADA, glTF, 3MF); else metres, or millimetres
+    where it would be larger than 300 m, which a note says. Of a file that says it: of what it calls a metre."""
+    sides: Literal["front", "both"] = "front"
+    """Which sides of a sheet (a part that is not closed: a fin, a net, a scan) scatter."""
     offset: Position = (0.0, 0.0, 0.0)
     """Shift (m) of the file's origin in the body frame, after the turn."""
     heading: Radians = 0.0
@@ -65,7 +68,7 @@ class MeshFile(BodyShape):
     @property
     def read_as(self) -> str:
         """As `BodyShape.read_as`."""
-        return f"with numbers in {self.unit}"
+        return "" if self.unit == "auto" else f"with numbers in {self.unit}"
 
 
 @description

@@ -98,6 +98,17 @@ def orient(vertices: Floats, faces: Ints) -> tuple[Ints, list[str]]:
     return np.where(outward[part][:, None], faces, faces[:, ::-1]), notes
 
 
+def with_backs(surface: Surface) -> tuple[Surface, int]:
+    """The same with a second facet behind each of an open part, turned round, and how many there are."""
+    vertices, faces = surface
+    part = _winding(faces)[1]
+    sheet = ~_outward(vertices, faces, part)[0][part]
+    backs = faces[sheet][:, ::-1]
+    used, numbers = np.unique(backs, return_inverse=True)  # with corners of their own: a sheet keeps its border
+    added = numbers.reshape(-1, 3) + len(vertices)
+    return (np.concatenate([vertices, vertices[used]]), np.concatenate([faces, added])), int(np.count_nonzero(sheet))
+
+
 def _winding(faces: Ints) -> tuple[Bools, Ints, int]:
     """Facets to turn so that neighbours run along their shared edge in opposite directions; parts; one-sided parts.
 

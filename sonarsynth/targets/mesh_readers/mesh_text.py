@@ -212,3 +212,22 @@ def read_text_stl(data: bytes) -> Surface:
         raise MeshError(f"cannot be read as STL ({error})") from None
     vertices = np.array(places, float).reshape(-1, 3)
     return vertices, np.arange(len(vertices)).reshape(-1, 3)
+
+
+def read_corners(data: bytes) -> Surface:
+    """Vertices, three a facet, of a text of three lines a facet, each the x, y and z of a corner. Raises MeshError."""
+    rows = [
+        (i, words)
+        for i, line in enumerate(lines_of(data), start=1)
+        if (words := re.split(rb"[\s,]+", line.strip())) != [b""]
+    ]
+    if bad := next((i for i, words in rows if len(words) != 3), None):
+        raise MeshError(f"line {bad}: is not the x, y and z of a corner")
+    if len(rows) % 3:
+        raise MeshError(f"has {len(rows)} corners, not three for each facet")
+    try:
+        places = [numbers(words) for _, words in rows]
+    except ValueError as error:
+        raise MeshError(f"cannot be read as corners of facets ({str(error)[:60]})") from None
+    vertices = np.array(places, float).reshape(-1, 3)
+    return vertices, np.arange(len(vertices)).reshape(-1, 3)
