@@ -14,6 +14,7 @@ from sonarsynth.planning.listening_windows import check_windows, frame_start, li
 from sonarsynth.planning.measured.ray_bending import propagation
 from sonarsynth.planning.measured.sampled_arrivals import arrivals_of, context_of, receiver_of, survey_of
 from sonarsynth.planning.measured.sampled_frames import SampledScene, check_alike, sample_frames
+from sonarsynth.planning.measured.thinned_profile import thinned
 from sonarsynth.planning.notes.omissions import left_out
 from sonarsynth.planning.notes.plan_notes import notes, stored_validity
 from sonarsynth.planning.notes.scene_checks import check_frame, check_located, check_methods, read_inputs
@@ -87,10 +88,11 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS, choices: Choices | 
                     check_located(look.scene, frame, products)
     ends = (looks[0].frames[0], looks[0].frames[-1])
     paths = propagation(scene, profile, ends, recipe.accuracy.signal)
+    fewer, thinning = thinned(paths, recipe, 0, profile)
     windows = listening_windows(recipe, looks)
     check_windows(scene, windows)
     sizes = _sizes(recipe, windows)
-    made = Plan(recipe, products, profile, paths, windows, sizes=sizes)
+    made = Plan(recipe, products, fewer, paths, windows, sizes=sizes, thinning=thinning)
     made = choose(made, looks) if choices is None else replace(made, choices=choices)
     made = replace(made, stages=_mean_stages(made, looks))
     made = replace(made, shard_frames=_shard_frames(made), validity=stored_validity(looks))

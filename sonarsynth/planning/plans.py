@@ -16,6 +16,7 @@ from sonarsynth.imaging.beam_envelopes import envelope_delays
 from sonarsynth.planning.choices import Choices
 from sonarsynth.planning.measured.absorption_error import Passed, mean_absorption, passed_by, shape_error
 from sonarsynth.planning.measured.ray_bending import propagation
+from sonarsynth.planning.measured.thinned_profile import thinned
 from sonarsynth.planning.notes.scene_checks import check_shrimp, read_inputs
 from sonarsynth.planning.plan_tables import Omission, Stage, as_html, as_text
 from sonarsynth.propagation import Propagation
@@ -80,6 +81,7 @@ class Plan:
     validity: tuple[str, ...] = ()  # where formulas and laws hold and do not, as the store has it
     sizes: dict[str, int] = field(default_factory=dict)
     shard_frames: int = 1
+    thinning: float = 0.0  # error of signals, relative, of the layers that stand for a measured profile
     sequence: int = 0  # whose scene, profile and propagation these are
 
     @property
@@ -214,4 +216,5 @@ def _of_sequence(plan: Plan, sequence: int) -> Plan:
         first = sequence * plan.recipe.steps
         ends = (plan.recipe.frame(first)[1], plan.recipe.frame(first + plan.recipe.steps - 1)[1])
     paths = propagation(scene, profile, ends, plan.recipe.accuracy.signal)
-    return replace(plan, sequence=sequence, profile=profile, propagation=paths)
+    fewer, thinning = thinned(paths, plan.recipe, sequence, profile)
+    return replace(plan, sequence=sequence, profile=fewer, propagation=paths, thinning=thinning)

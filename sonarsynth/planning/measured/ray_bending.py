@@ -40,27 +40,34 @@ def bending_error(model: Propagation, scene: Scene, profile: Profile, frames: It
     """
     if profile.uniform:
         return 0.0
-    exact = model.exact()
+    return difference_of_paths((model, profile), (model.exact(), profile), scene, frames)
+
+
+def difference_of_paths(
+    one: tuple[Propagation, Profile], other: tuple[Propagation, Profile], scene: Scene, frames: Iterable[Frame]
+) -> float:
+    """Error of signals, relative, by which the paths of one model in one water differ from those of another, as in
+    `bending_error`; inf where they differ in number."""
     bottom, highest = scene.world.environment.depth, scene.sonar.band.high
     worst = 0.0
     for frame in frames:
         array = frame.sonar_pose.position
-        start, end = _ways(frame, bottom)
+        start, end = ways(frame, bottom)
         if not len(start):
             continue
-        one, other = (rays.connect(profile, bottom, start, end) for rays in (model, exact))
-        if not _alike(one, other):
+        mine, theirs = (model.connect(profile, bottom, start, end) for model, profile in (one, other))
+        if not _alike(mine, theirs):
             return np.inf
-        late = 2.0 * np.pi * highest * np.abs(one.travel_time - other.travel_time)
-        turned = np.linalg.norm(one.arrival - other.arrival, axis=1)
-        wave = 2.0 * np.pi * highest / float(profile.at(depth(array)))
+        late = 2.0 * np.pi * highest * np.abs(mine.travel_time - theirs.travel_time)
+        turned = np.linalg.norm(mine.arrival - theirs.arrival, axis=1)
+        wave = 2.0 * np.pi * highest / float(other[1].at(depth(array)))
         over = wave * elements(scene.sonar.array).aperture * turned
-        louder = np.abs(one.spreading / other.spreading - 1.0)
+        louder = np.abs(mine.spreading / theirs.spreading - 1.0)
         worst = max(worst, 2.0 * float(np.max(late + over + louder, initial=0.0)))
     return worst
 
 
-def _ways(frame: Frame, bottom: float) -> tuple[Floats, Floats]:
+def ways(frame: Frame, bottom: float) -> tuple[Floats, Floats]:
     """Starts and ends (pair, xyz) from each snap to `around` bodies, from there to the array, and straight in."""
     array, points = frame.sonar_pose.position, around(frame, bottom)
     snaps = np.array([snap.position for snap in frame.moment.snaps]).reshape(-1, 3)
@@ -72,7 +79,7 @@ def _ways(frame: Frame, bottom: float) -> tuple[Floats, Floats]:
 def unlike_straight(model: Propagation, frame: Frame, profile: Profile, bottom: float) -> float:
     """By how much (s) direct paths of a model are later or earlier than straight lines, with room: the most of those to
     `around` bodies and the array, and half as much more."""
-    start, end = _ways(frame, bottom)
+    start, end = ways(frame, bottom)
     paths, lines = (some.connect(profile, bottom, start, end) for some in (model.direct, Straight()))
     return 1.5 * float(np.max(np.abs(paths.travel_time - lines.travel_time[paths.pair]), initial=0.0))
 

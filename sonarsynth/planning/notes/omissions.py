@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from sonarsynth.environment.boundary_numbers import rms_height
+from sonarsynth.environment.casts import profile_of
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.planning.choices import ALL_PRODUCTS
@@ -68,7 +69,7 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
         rows.append(Omission("motion of targets beyond constant velocity and spin", way, _carried(plan, frame)))
     if not environment.noises:
         rows.append(Omission("ambient noise", "none in the recipe", "signals are free of noise"))
-    return tuple(rows + _not_asked_for(plan) + _not_traced(plan) + _not_heard(plan))
+    return tuple(rows + _thinned(plan) + _not_asked_for(plan) + _not_traced(plan) + _not_heard(plan))
 
 
 def _not_asked_for(plan: Plan) -> list[Omission]:
@@ -90,6 +91,15 @@ def _refraction_bound(plan: Plan, frame: Frame) -> str:
         return f"{bound:.1g} of the signals"
     varies = np.ptp(plan.profile.speed)
     return f"requested, but the sound speed varies by {varies:.3g} m/s: angles and delays are biased"
+
+
+def _thinned(plan: Plan) -> list[Omission]:
+    """Nodes of a measured profile that fewer layers stand for."""
+    read, kept = len(profile_of(plan.scene.world.environment.sound_speed).depth), len(plan.profile.depth)
+    if kept == read:
+        return []
+    bound = f"{plan.thinning:.1g} of the signals, measured" if plan.thinning else "0: the rest is below the bottom"
+    return [Omission(f"{read} nodes of the sound speed", f"{kept} stand for them", bound)]
 
 
 def _not_traced(plan: Plan) -> list[Omission]:
