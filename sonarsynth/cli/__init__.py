@@ -139,7 +139,7 @@ def build(
     chosen = product_names(products)
     source = reading.read(recipe, settings)
     made_from = reading.recipe_of(source)
-    with reading.locating(source):
+    with reading.locating(source), printing.planning():
         plan = planning.plan(made_from, chosen)
     wanted = chosen_frames(frames, sequences, made_from.sequences, made_from.steps)
     stores.try_writing(stores.folder_of(store))
@@ -175,7 +175,7 @@ def plan(recipe: RecipeFile, settings: Settings = [], products: Products = ALL_P
     chosen = product_names(products)
     source = reading.read(recipe, settings)
     made_from = reading.recipe_of(source)
-    with reading.locating(source):
+    with reading.locating(source), printing.planning():
         made = planning.plan(made_from, chosen)
     prediction = schedule.predict(made, prepared=time.process_time())
     made = replace(made, stages=prediction.rows(made))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from sonarsynth.conventions import counted, format_bytes
 from sonarsynth.planning.plan_tables import as_tables
@@ -49,6 +50,30 @@ def progress(waiting: str = "starting workers") -> Iterator[Report]:
             bar.update(task, completed=done + failed, total=total, pace=_pace(done, total, failed, began))
 
         yield update
+
+
+@contextmanager
+def planning() -> Iterator[None]:
+    """Shows that a plan is being made: a spinner on a terminal, else a line now and then."""
+    began, done = time.monotonic(), threading.Event()
+    if sys.stderr.isatty():
+        with Progress(SpinnerColumn(), TextColumn("planning"), TimeElapsedColumn(), transient=True) as bar:
+            bar.add_task("planning", total=None)
+            yield
+        return
+
+    def say() -> None:
+        while not done.wait(SECONDS_BETWEEN_LINES):
+            sys.stderr.write(f"planning, {time.monotonic() - began:.0f} s\n")
+            sys.stderr.flush()
+
+    thread = threading.Thread(target=say, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        thread.join()
 
 
 def announce(dashboard: str) -> None:

@@ -105,7 +105,7 @@ def _cast_profile(cast: Cast) -> Profile:
     kept = select(table, {name: water[name] for name in needed if name in water}, depth)
     water = {name: values[kept.rows] for name, values in water.items()}
     z = depth[kept.rows]
-    if "salinity" in needed and "salinity" not in water:
+    if "sound speed" not in needed and "salinity" not in water:
         water["salinity"] = _salinity(cast, water, z, place[0])
     if "sound speed" in needed:
         speed = water["sound speed"]
@@ -129,12 +129,15 @@ def _needed(cast: Cast, table: CastTable) -> tuple[str, ...]:
     if cast.quantity == "sound_speed":
         raise CastError(f"{table.where()}: no column of sound speed among {table.shown_names}")
     if "temperature" in has and ("salinity" in has or cast.salinity is not None):
-        return level, "temperature", *(("salinity",) if cast.salinity is None else ())
+        return level, "temperature", *(("salinity",) if "salinity" in has else ())
     if "temperature" in has and "conductivity" in has:
-        return level, "temperature", "conductivity", "salinity"
+        return level, "temperature", "conductivity"
     what = "" if cast.quantity == "temperature_salinity" else "sound speed, or of "
+    comma = "," if what else ""
     hint = "; give the `salinity`" if "temperature" in has else ""
-    raise CastError(f"{table.where()}: no columns of {what}temperature and salinity, among {table.shown_names}{hint}")
+    raise CastError(
+        f"{table.where()}: no columns of {what}temperature and salinity{comma} among {table.shown_names}{hint}"
+    )
 
 
 def _salinity(cast: Cast, water: dict[str, Floats], depth: Floats, latitude: float) -> Floats:

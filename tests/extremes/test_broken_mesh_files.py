@@ -41,7 +41,7 @@ BROKEN = {
     "inf.stl": (one((0, 0, 0), (1, 0, 0), (0, np.inf, 0)), "vertex 2 is not finite"),
     "flat.stl": (one((0, 0, 0), (1, 0, 0), (2, 0, 0)), "no facet has an area"),
     "point.stl": (one((1, 1, 1), (1, 1, 1), (1, 1, 1)), "is 0 m across, smaller than 1 mm; give the `unit`"),
-    "large.stl": (one((0, 0, 0), (2e4, 0, 0), (0, 1, 0)), "is 2e.04 m across, larger than 10 km; give the `unit`"),
+    "large.stl": (one((0, 0, 0), (2e6, 0, 0), (0, 1, 0)), "is 2e.06 m across, larger than 10 km; give the `unit`"),
     "small.stl": (one((0, 0, 0), (2e-4, 0, 0), (0, 1e-4, 0)), "is 0.0002 m across, smaller than 1 mm"),
     "vast.stl": (one((0, 0, 0), (3e38, 0, 0), (0, 3e38, 0)), "larger than 10 km"),
     "cut_text.stl": (b"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", "the text STL has no 'endsolid'"),
@@ -122,6 +122,9 @@ def test_a_unit_brings_an_absurd_size_back(tmp_path):
     path = tmp_path / "mm.stl"
     path.write_bytes(one((0, 0, 0), (2e4, 0, 0), (0, 1, 0)))
     assert mesh_of(MeshFile(path=str(path), unit="mm")).box[1, 0] == pytest.approx(20.0)
+    guessed = mesh_of(MeshFile(path=str(path)))
+    assert guessed.box[1, 0] == pytest.approx(20.0) and "taken to be in mm, 20 m across" in guessed.notes[0]
+    assert mesh_of(MeshFile(path=str(path), unit="cm")).box[1, 0] == pytest.approx(200.0)
 
 
 FORMATS = {

@@ -91,10 +91,12 @@ def read_named_columns(path: Path, text: str) -> CastTable:
     cut = SPLITTERS.get(header.separator, str.split) if header.separator in ",;\t" else str.split
     rows, numbers = [], []
     for number, line in enumerate(lines[header.first :], start=header.first + 1):
-        if not line.strip(" \t,;") or line.lstrip()[0] in "%#*/[":
+        if not _is_row(line):
             continue
         cells = _cells(path, number, line, cut)
-        if any(map(_numeric, (cells[i] for i, _ in columns.values() if i < len(cells)))) or not any(cells[1:]):
+        wanted = [cells[i] for i, _ in columns.values() if i < len(cells)]
+        whole = len(cells) >= needed or all(map(_numeric, wanted))  # a shorter line of words is no row
+        if not columns or (whole and any(map(_numeric, wanted))) or not any(cells[1:]):
             rows.append([*cells, *[""] * (needed - len(cells))])
             numbers.append(number)
     comma = header.separator in ";\t" and any("," in cell for row in rows[:3] for cell in row)
@@ -122,7 +124,7 @@ def _header(path: Path, lines: list[str]) -> _Header:
     for index, line in enumerate(lines[:HEAD_LINES]):
         if (found := _as_header(lines, index, line)) is not None:
             return found
-    written = [(i, line) for i, line in enumerate(lines) if line.strip(" \t,;") and line.lstrip()[0] not in "%#"]
+    written = [(i, line) for i, line in enumerate(lines) if _is_row(line)]
     if len(written) < 2:
         raise CastError(f"{path}: has no rows of numbers")
     index, line = written[0]
@@ -182,7 +184,7 @@ def _units(lines: list[str], index: int, count: int, cut: Splitter) -> tuple[lis
     if any("[" in cell for cell in cells):
         cells = re.findall(r"\[[^\]]*\]", text)
         cells = [""] * (count - len(cells)) + cells  # the last columns have one each
-    if not any(is_unit(cell) for cell in cells if cell) or any(is_number(cell) for cell in cells):
+    if not any(is_unit(cell) for cell in cells if cell) or any(_numeric(cell) for cell in cells):
         return [], after
     first = after + 1
     while first < len(lines) and re.match(r"\s*([\[.]|$)", lines[first]):  # '[MeasurementData]', '.profile 0'
@@ -219,6 +221,12 @@ def _sippican(path: Path, lines: list[str]) -> _Header | None:
     if rows and max(rows) < len(fields):
         raise CastError(f"{path}, line {last + 3}: a row of {max(rows)} columns, where the head names {len(fields)}")
     return _Header(fields[0][0], [name for _, name in fields], [], "\t", last + 2)
+
+
+def _is_row(line: str) -> bool:
+    """Whether a line may hold names or numbers: not empty, no comment, no title in brackets."""
+    text = line.strip()
+    return bool(text.strip(" \t,;")) and text[0] not in "%#*/["
 
 
 def _numeric(cell: str) -> bool:

@@ -143,18 +143,19 @@ def _resolved(source: Source, data: Any, where: Where, check: bool) -> Any:
         file = Path(path) if Path(path).is_absolute() else folder / path
         if check:
             _check_place(source, place, path)
-            _check_file(source, place, path, file)
+            _check_file(source, place, path, folder)
         return data | {"path": path if Path(path).is_absolute() else str(file)}
     return {key: _resolved(source, value, (*where, key), check) for key, value in data.items()}
 
 
-def _check_file(source: Source, where: Where, path: str, file: Path) -> None:
+def _check_file(source: Source, where: Where, path: str, folder: Path) -> None:
+    file = folder / path
     try:
         found, there = file.exists(), file.is_file()
     except (OSError, ValueError):  # too long, or a NUL byte
         raise source.error(where, "is not the path of a file") from None
     if not found:
-        raise source.error(where, f"no such file: {path or file}")
+        raise source.error(where, f"no such file: {path}" + ("" if Path(path).is_absolute() else f", in {folder}"))
     if not there:
         raise source.error(where, f"is not a file: {path or file}")
 
