@@ -29,8 +29,8 @@ def collada(nodes, unit=1.0, up="Z_UP", library="", kind="polylist"):
     return f"""<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
 <asset><unit name="x" meter="{unit}"/><up_axis>{up}</up_axis></asset>
 <library_geometries><geometry id="box"><mesh><source id="p"><float_array id="a" count="24">{numbers}</float_array>
-<technique_common><accessor source="#a" count="8" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
-<param name="Z" type="float"/></accessor></technique_common></source>
+<technique_common><accessor source="#a" count="8" stride="3"><param name="X" type="float"/>
+<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
 <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
 <{kind} count="{count}"><input semantic="VERTEX" source="#v" offset="0"/>{index}</{kind}></mesh></geometry>
 </library_geometries>{library}

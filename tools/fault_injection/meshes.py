@@ -45,7 +45,8 @@ ODD_LINES = (
     b"element x 1000000000", b"property list uint double vertex_indices", b"property float x",
     b"comment TextureFile /dev/zero", b"format binary_big_endian 1.0", b"end_header", b"endsolid", b"solid",
     b"facet normal 0 0 1", b"endfacet", b"1000000000 1000000000 0", b"3 0 1 2", b"3 0 0 0", b"9 0 1 2", b"4 0 1 2 3",
-    b"OFF", b"#", b"\0", b"\xff",
+    b'<!DOCTYPE x [<!ENTITY a "b">]>', b'<instance_node url="#node0"/>', b'<p>0 1 1000000000</p>', b"<ph>", b"0 0",
+    b'<instance_geometry url="file:///etc/passwd#x"/>', b"OFF", b"#", b"\0", b"\xff",
 )  # fmt: skip
 
 
@@ -71,12 +72,17 @@ def bases() -> list[Case]:
         ("parts.off", parts, "off", {}),
         ("ball.glb", ball, "glb", {}),
         ("sheet.obj", sheet, "obj", {}),
+        ("parts.dae", parts, "dae", {}),
     ):
         data = mesh.export(file_type=kind, **options)
         data = data.encode() if isinstance(data, str) else bytes(data)
         smooth = str(name.startswith("ball")).lower()
         found.append(Case(name, RECIPE.format(name=name, smooth=smooth).encode(), {name: data}))
-    return found
+    corners = "".join("{:g} {:g} {:g}\n".format(*corner) for corner in parts.triangles.reshape(-1, 3))
+    return [
+        *found,
+        Case("parts.txt", RECIPE.format(name="parts.txt", smooth="false").encode(), {"parts.txt": corners.encode()}),
+    ]
 
 
 def mutated(case: Case, random: np.random.Generator) -> Case:
@@ -90,7 +96,7 @@ def mutated(case: Case, random: np.random.Generator) -> Case:
 
 
 def _changed(data: bytes, name: str, random: np.random.Generator) -> bytes:
-    text = name in ("text.stl", "ball.obj", "sheet.obj", "text.ply", "parts.off")
+    text = name in ("text.stl", "ball.obj", "sheet.obj", "text.ply", "parts.off", "parts.dae", "parts.txt")
     ways = [numbers, numbers, _lines, _lines, damaged] if text else [_words, _words, _words, damaged, _lines]
     if name.endswith(".glb"):
         ways = [_tree, _tree, _tree, _words, damaged]
