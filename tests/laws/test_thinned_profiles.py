@@ -51,7 +51,7 @@ def test_layers_are_as_few_as_the_accuracy_allows(tmp_path):
         assert error <= 0.2 * signal
         assert np.abs(fewer.at(profile.depth) - profile.speed)[profile.depth < 60].max() < 0.2
         counts.append(len(fewer.depth))
-    assert len(profile.depth) == 1800 and counts == sorted(counts) and counts[0] < 120 < counts[2]
+    assert len(profile.depth) == 1800 and counts == sorted(counts) and counts[0] < 60 < counts[2] < 180
 
 
 def test_what_is_straight_needs_no_nodes_and_what_is_below_the_bottom_none(tmp_path):
