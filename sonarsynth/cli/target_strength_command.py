@@ -40,8 +40,8 @@ def target_strength(
     ] = "{kind: kirchhoff}",
     sound_speed: Annotated[float, typer.Option(help="Sound speed in m/s.", metavar="C")] = 1500.0,
     unit: Annotated[
-        str, typer.Option(metavar="UNIT", help="Unit of the mesh file's coordinates: m, cm, mm, in or ft.")
-    ] = "m",
+        str, typer.Option(metavar="UNIT", help="Unit of the mesh file's coordinates: m, cm, mm, in, ft, or auto.")
+    ] = "auto",
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to write the table and the picture.")] = Path(
         "target_strength"
     ),
@@ -84,10 +84,10 @@ def _shape(text: str, unit: str) -> Shape:
     """The shape that a text describes: a mapping in YAML, or the path of a mesh file. Raises BadOption, RecipeError."""
     from sonarsynth.targets.shapes import MeshFile, Shape
 
-    if unit not in ("m", "cm", "mm", "in", "ft"):
-        raise BadOption(f"--unit: {unit} is none of m, cm, mm, in, ft")
+    if unit not in ("auto", "m", "cm", "mm", "in", "ft"):
+        raise BadOption(f"--unit: {unit} is none of auto, m, cm, mm, in, ft")
     if text.lstrip().startswith("{"):
-        if unit != "m":
+        if unit != "auto":
             raise BadOption(f"--unit: is for a mesh file; write units in the shape, such as 'radius: 25 {unit}'")
         found: Shape = _described(text, "shape", Shape)
         return found
