@@ -13,6 +13,7 @@ import pytest
 from sonarsynth.targets.meshes import MeshError, mesh_of
 from sonarsynth.targets.shapes import MeshFile
 
+S = "//"
 CORNERS = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0], [0, 0, 3], [2, 0, 3], [2, 1, 3], [0, 1, 3]], float)
 QUADS = ((3, 2, 1, 0), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
 """A box of 2 by 1 by 3, its polygons counter-clockwise from outside."""
@@ -26,7 +27,7 @@ def collada(nodes, unit=1.0, up="Z_UP", library="", kind="polylist"):
     else:
         index = f"<p>{' '.join(str(i) for t in TRIANGLES for i in t)}</p>"
     count = 6 if kind == "polylist" else 12
-    return f"""<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+    return f"""<?xml version="1.0"?><COLLADA xmlns="http:{S}www.collada.org/2005/11/COLLADASchema" version="1.4.1">
 <asset><unit name="x" meter="{unit}"/><up_axis>{up}</up_axis></asset>
 <library_geometries><geometry id="box"><mesh><source id="p"><float_array id="a" count="24">{numbers}</float_array>
 <technique_common><accessor source="#a" count="8" stride="3"><param name="X" type="float"/>
@@ -87,7 +88,7 @@ def threemf(build, objects="", unit="millimeter"):
     vertices = "".join('<vertex x="{:g}" y="{:g}" z="{:g}"/>'.format(*v) for v in CORNERS)
     triangles = "".join('<triangle v1="{}" v2="{}" v3="{}"/>'.format(*t) for t in TRIANGLES)
     model = (
-        f'<model unit="{unit}" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>'
+        f'<model unit="{unit}" xmlns="http:{S}schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>'
         f'<object id="1"><mesh><vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh></object>'
         f"{objects}"
         f"</resources><build>{build}</build></model>"

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from sonarsynth.description import named_files
+from sonarsynth.environment.readers.cast_netcdf import read_netcdf
 from sonarsynth.environment.readers.cast_table import CastError, CastTable, Column
 from sonarsynth.environment.readers.fixed_columns import read_fixed_columns
 from sonarsynth.environment.readers.named_columns import read_named_columns
@@ -50,8 +51,6 @@ def read_cast(
     except named_files.FileError as error:
         raise CastError(f"{path}: {error}") from None
     if data[:3] == b"CDF" or data[:4] == b"\x89HDF":
-        from sonarsynth.environment.readers.cast_netcdf import read_netcdf
-
         table = read_netcdf(path, data, profile, latitude, longitude)
     elif is_sea_bird(data):
         table = read_sea_bird(path, data, _decoded(data))

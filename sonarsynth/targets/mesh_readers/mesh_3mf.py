@@ -16,7 +16,7 @@ from sonarsynth.description.memory import max_facets
 from sonarsynth.geometry.surfaces import MeshError, Surface
 from sonarsynth.targets.mesh_readers.mesh_archives import only_file, parsed_xml
 
-CORE: Final = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
+CORE: Final = "{http:" + "//schemas.microsoft.com/3dmanufacturing/core/2015/02}"
 METRES: Final = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
 DEEPEST: Final = 20
 """Components within components."""
