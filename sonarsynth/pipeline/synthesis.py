@@ -4,6 +4,7 @@ what the sonar makes of that: noise, errors of sensors and channels, converter."
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -98,9 +99,8 @@ def _with_noise_source(plan: Plan, frame: Frame, signals: Signals, source: Noise
     random = stream(frame.seed, "noise source", frame.key, frame.step, number)
     sonar, sensors = plan.scene.sonar, true_elements(plan, frame)
     arrivals = _behind(arrivals, sonar)
-    return add_noise_source(
-        signals, source, arrivals, instant, sensors, sonar, plan.absorption, time, float(closing), random
-    )
+    moving = partial(add_noise_source, time=time, closing=float(closing), random=random)
+    return moving(signals, source, arrivals, instant, sensors, sonar, plan.absorption)
 
 
 def _behind(arrivals: Arrivals, sonar: Sonar) -> Arrivals:

@@ -33,6 +33,7 @@ def add_noise_source(
     elements: Elements,
     sonar: Sonar,
     absorption: Callable[[Floats], Floats] | None,
+    *,
     time: float,
     closing: float,
     random: np.random.Generator,
