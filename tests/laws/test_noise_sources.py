@@ -98,3 +98,15 @@ def test_a_spectrum_is_heard_at_its_level_and_changes_no_draw_of_the_ambient_noi
 def test_what_cannot_be_is_refused(tmp_path: Path, source: str, message: str) -> None:
     with pytest.raises((ss.RecipeError, ss.FieldError), match=message):
         heard(tmp_path, source)
+
+
+def test_a_noise_that_is_appended_changes_nothing_of_those_before_it(tmp_path: Path) -> None:
+    first, second = "{kind: flat, level: 60 dB}", "{kind: wind, directions: {kind: surface}}"
+    alone = heard(tmp_path, "", first, samples=500).pressure
+    np.testing.assert_array_equal(heard(tmp_path, "", f"[{first}]", samples=500).pressure, alone)
+    more, most = (
+        heard(tmp_path, "", f"[{first}, {second}{rest}]", samples=500).pressure for rest in ("", ", {kind: thermal}")
+    )
+    added, last = more - alone, most - more
+    assert np.abs(np.corrcoef(added[0], alone[0])[0, 1]) < 0.2 and np.std(added) > 0.0
+    assert np.abs(np.corrcoef(last[0], added[0])[0, 1]) < 0.3 and np.std(last) > 0.0
