@@ -16,7 +16,8 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.labels import echo_levels, label, link_budget, path_powers
-from sonarsynth.pipeline.echo_image import image_of, no_image
+from sonarsynth.pipeline.echo_image import image_of, image_without_clock
+from sonarsynth.pipeline.frame_chorus import clear_values, frame_chorus, soundscape_values, with_chorus
 from sonarsynth.pipeline.labelled_estimates import emission_values, estimate_truth, heard_directly
 from sonarsynth.pipeline.labelling import band_of, expansion_error, point_labels
 from sonarsynth.pipeline.requested_rays import follow_rays
@@ -52,9 +53,11 @@ from sonarsynth.products import (
     no_points,
 )
 from sonarsynth.ranging.clouds import point_cloud
+from sonarsynth.ranging.location.association import in_record, light_first
 from sonarsynth.ranging.received_window import ReceivedWindow
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
+from sonarsynth.signals.chorus.chorus_arrivals import ChorusArrivals
 from sonarsynth.signals.filtered_pulse import snap_levels
 from sonarsynth.signals.isolated_paths import measured_levels
 from sonarsynth.tracing.arrivals import trace
@@ -96,6 +99,7 @@ class TracedFrame:
     truth: Truth
     budget: LinkBudget
     echoes: Echoes
+    chorus: ChorusArrivals | None = None  # None: the scene has none
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +127,7 @@ def truth_at(plan: Plan, frame: Frame) -> Values:
     """The same of a frame that is at hand; `plan` is that of its sequence."""
     truth = label(context_of(plan, frame), plan.propagation, snap_levels(frame.moment.snaps))
     mark_stage("label")
-    return _of_frame(plan, frame) | truth_values(truth)
+    return _of_frame(plan, frame) | truth_values(truth) | soundscape_values(plan, frame, frame_chorus(plan, frame))
 
 
 def trace_frame(plan: Plan, index: int) -> TracedFrame:
@@ -152,7 +156,7 @@ def trace_at(plan: Plan, frame: Frame) -> TracedFrame:
     budget = link_budget(seen, powers, band, targets, levels, expansion_error(plan, seen))
     heard = echo_levels(seen, powers, targets, levels)
     mark_stage("label")
-    return TracedFrame(frame, arrivals, truth, budget, heard)
+    return TracedFrame(frame, arrivals, truth, budget, heard, frame_chorus(plan, frame))
 
 
 def _of_frame(plan: Plan, frame: Frame) -> Values:
@@ -177,29 +181,34 @@ def beamform_frame(plan: Plan, index: int, traced: TracedFrame) -> BeamformedFra
 
 
 def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFrame:
-    """What the sonar makes of signals: where the snap is, and the energy image of the echo window."""
-    processing, receiver, snaps = plan.scene.processing, receiver_of(plan, frame), plan.sizes["emission"]
+    """What the sonar makes of signals: where the snap is, and the energy image of the echo window.
+
+    Without a snap whose echo window is in the record there is no clock: the image is of the last so long part of the
+    record, and no echo has a place.
+    """
+    processing, receiver, windows = plan.scene.processing, receiver_of(plan, frame), plan.windows
     survey = survey_of(plan, frame)
-    estimates = locator(plan.scene).locate(signals, receiver, survey, snaps)
+    estimates = locator(plan.scene).locate(signals, receiver, survey, plan.sizes["estimate"])
+    window = (windows.echo_start, windows.echo_stop)
+    estimates = light_first(estimates, signals, plan.elements, plan.scene.sonar, *window)
     mark_stage("locate")
-    heard = float(estimates.time[0]) if snaps else np.nan
-    start, stop = heard + plan.windows.echo_start, heard + plan.windows.echo_stop
-    end = signals.start + plan.windows.samples / signals.sampling_frequency
     imaged, beams = signals, None
-    if signals.start <= start and stop <= end:
+    if in_record(estimates, signals, *window)[:1].any():
+        start, stop = (float(estimates.time[0]) + late for late in window)
         if processing.cancelling is not None:
             imaged = processing.cancelling.cancel(signals, estimates, receiver, survey, (start, stop))
         imaged, beams, image = image_of(plan, imaged, estimates, (start, stop))
-    else:  # no direct pulse was found, or an echo was taken for it: no clock, so no image, rather than an arbitrary one
-        image = no_image(receiver.sonar, np.nan, np.nan)
+    else:  # no direct pulse was found, or an echo was taken for it
+        image = image_without_clock(plan, signals)
     mark_stage("beamform")
     return BeamformedFrame(signals, estimates, image, imaged, beams)
 
 
 def synthesise(plan: Plan, traced: TracedFrame) -> Signals:
-    """Pressure at each hydrophone: echoes and direct snap, ambient noise, converter."""
+    """Pressure at each hydrophone: echoes and direct snap, chorus, ambient noise, converter."""
     plan = plan.at(traced.frame.index)
-    return digitise(plan, traced.frame, frame_signals(plan, traced.frame, traced.arrivals))
+    signals = frame_signals(plan, traced.frame, traced.arrivals)
+    return digitise(plan, traced.frame, with_chorus(plan, signals, traced.chorus))
 
 
 def measure_isolated(plan: Plan, traced: TracedFrame) -> Floats:
@@ -216,8 +225,9 @@ def range_frame(plan: Plan, index: int, traced: TracedFrame, heard: BeamformedFr
     plan = plan.at(index)
     frame = traced.frame
     values = _of_frame(plan, frame) | truth_values(traced.truth) | echo_values(traced.echoes, traced.arrivals)
-    values |= link_budget_values(traced.budget, heard.isolated)
+    values |= link_budget_values(traced.budget, heard.isolated) | soundscape_values(plan, frame, traced.chorus)
     direct = heard_directly(plan, traced.arrivals, frame.moment.snaps)
+    values |= clear_values(plan, traced.chorus, traced.echoes, direct, frame.moment.snaps)
     values |= estimate_truth(direct, len(frame.moment.snaps))
     if "signals" in plan.products:
         counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
@@ -225,7 +235,8 @@ def range_frame(plan: Plan, index: int, traced: TracedFrame, heard: BeamformedFr
     if heard.image is None or heard.estimates is None:
         mark_stage("collect")
         return values
-    values |= source_estimate_values(heard.estimates) | emission_values(plan, direct, heard.estimates)
+    values |= source_estimate_values(heard.estimates)
+    values |= emission_values(plan, direct, heard.estimates, heard.signals, frame.moment.snaps)
     if "image" in plan.products:
         values |= image_values(heard.image, plan.windows.direct_removed)
     mark_stage("collect")
@@ -245,6 +256,8 @@ def cloud_of(plan: Plan, frame: Frame, heard: BeamformedFrame) -> PointCloud:
     """The points of a frame that has an image; `plan` is that of its sequence."""
     image, signals, estimates, beams = heard.image, heard.imaged, heard.estimates, heard.beams
     if image is None or signals is None or estimates is None or beams is None:
+        return no_points()
+    if not in_record(estimates, signals, plan.windows.echo_start, plan.windows.echo_stop)[:1].any():
         return no_points()
     elements, sonar, choices = plan.elements, plan.scene.sonar, plan.choices
     loudest = float(np.abs(signals.pressure).max(initial=0.0))

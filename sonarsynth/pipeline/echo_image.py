@@ -45,3 +45,11 @@ def no_image(sonar: Sonar, start: float, stop: float, remainder: float = np.nan)
     """An image of which nothing is known."""
     silent = np.full((sonar.beams.elevations, sonar.beams.azimuths), np.nan, np.float32)
     return EnergyImage(silent, sonar.beams.azimuth, sonar.beams.elevation, start, stop, remainder)
+
+
+def image_without_clock(plan: Plan, signals: Signals) -> EnergyImage:
+    """The image of the last part of the record that is as long as the echo window, where no snap says when echoes
+    come."""
+    stop = signals.start + (signals.pressure.shape[1] - 1) / signals.sampling_frequency
+    start = max(stop - (plan.windows.echo_stop - plan.windows.echo_start), signals.start)
+    return plan.choices.beamforming.image(signals, plan.elements, plan.scene.sonar, start, stop)

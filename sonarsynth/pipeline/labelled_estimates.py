@@ -8,7 +8,8 @@ from sonarsynth.conventions import Floats
 from sonarsynth.labels.estimate_labels import Direct, direct_paths, emissions, heard_first
 from sonarsynth.pipeline.stored_values import Values, table
 from sonarsynth.planning import Plan
-from sonarsynth.products import Arrivals, SourceEstimates
+from sonarsynth.products import Arrivals, Signals, SourceEstimates
+from sonarsynth.ranging.location.association import in_record
 from sonarsynth.signals.direct_sum import relative_absorption
 from sonarsynth.signals.filtered_pulse import envelope_delay
 from sonarsynth.state import Snap
@@ -33,10 +34,15 @@ def estimate_truth(direct: Direct, snaps: int) -> Values:
     return table("/truth/emissions", arrival=time, azimuth=np.rad2deg(azimuth), elevation=np.rad2deg(elevation))
 
 
-def emission_values(plan: Plan, direct: Direct, estimates: SourceEstimates) -> Values:
-    """Which snap each estimate came from."""
-    band = plan.scene.sonar.band
-    return table("/source_estimates", emission=emissions(estimates, direct, band.high - band.low, beam_width(plan)))
+def emission_values(
+    plan: Plan, direct: Direct, estimates: SourceEstimates, signals: Signals, snaps: tuple[Snap, ...]
+) -> Values:
+    """Which snap each estimate came from, and whether the first, which is the clock, is of one that lights."""
+    band, window = plan.scene.sonar.band, (plan.windows.echo_start, plan.windows.echo_stop)
+    found = emissions(estimates, direct, band.high - band.low, beam_width(plan))
+    clock = in_record(estimates, signals, *window)[:1].any() and found[0] >= 0
+    usable = np.int8(clock and snaps[int(found[0])].illuminates)
+    return table("/source_estimates", emission=found, usable=usable)
 
 
 def beam_width(plan: Plan) -> float:

@@ -55,6 +55,8 @@ SHARDS = 128
 """Shards of a dataset, at least, for there to be more than SHARD_FRAMES frames in one."""
 SHARD_SECONDS = 10.0
 """Seconds that such a shard takes at most, by counts of work: those of the machine that costs were measured on."""
+STRANGERS = 4
+"""Snaps that the sonar looks at besides those of the recipe, where there is a chorus."""
 COSTED = 5
 """Sequences over which the predicted cost is averaged."""
 
@@ -140,7 +142,7 @@ def _sizes(recipe: Recipe, windows: Windows) -> dict[str, int]:
         "azimuth": beams.azimuths,
         "target": len(scene.world.targets),
         "emission": snaps,
-        "estimate": snaps,
+        "estimate": snaps + (STRANGERS if scene.world.chorus is not None else 0),
         "point": min(scene.processing.max_points, beams.elevations * beams.azimuths),
     }
 

@@ -26,6 +26,8 @@ SECONDS = {
     "trace coherent facet": 2.2e-6,  # none of them is too faint
     "label beam": 0.25e-6,
     "label facet": 0.28e-6,
+    "chorus path sensor": 11e-9,  # a pulse of 40 samples
+    "chorus sensor sample": 10e-9,  # the filter behind all pulses
     "measure path": 1.3e-3,  # alone, at one hydrophone
     "remove sensor": 36e-6,
     "transform sensor sample": 1.6e-9,
@@ -117,6 +119,9 @@ def _synthesis(plan: Plan, size: FrameSize) -> Row:
     """The row of the synthesis, in seconds of the reference machine."""
     scene = plan.scene
     work = plan.choices.synthesis.cost(size)
+    if plan.chorus is not None:
+        work += _chorus_paths(plan) * size.sensors * SECONDS["chorus path sensor"]
+        work += size.sensors * size.samples * SECONDS["chorus sensor sample"]
     stored = size.sensors * size.samples * (2 if scene.sonar.converter else 4) if "signals" in plan.products else 0
     error = f"{plan.errors.synthesis:.1g} of the peak" if plan.errors.synthesis else "rounding"
     error = NOT_STATED if np.isnan(plan.errors.synthesis) else error
@@ -124,7 +129,19 @@ def _synthesis(plan: Plan, size: FrameSize) -> Row:
     method = plan.choices.synthesis.row() + "".join(
         f", {noise.row()} noise" for noise in plan.scene.world.environment.noises
     )
+    if plan.scene.world.chorus is not None:
+        method += f", chorus of {plan.scene.world.chorus.row()}"
     return ("synthesise", method, why, error, work, stored)
+
+
+def _chorus_paths(plan: Plan) -> float:
+    """Paths of the chorus that are heard in a record, about."""
+    chorus, reach = plan.scene.world.chorus, plan.chorus
+    if chorus is None or reach is None:
+        return 0.0
+    snaps = np.pi * np.diff(reach.edges**2) / reach.stands_for
+    record = plan.sizes["sample"] / plan.scene.sonar.sampling_frequency
+    return float(chorus.rate * record * snaps.sum() * (1 + reach.images))
 
 
 def _traced(plan: Plan) -> str:

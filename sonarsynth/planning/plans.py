@@ -12,9 +12,11 @@ from sonarsynth.conventions import Floats, counted
 from sonarsynth.description.memory import frame_bytes
 from sonarsynth.environment.absorption import DepthAbsorption
 from sonarsynth.environment.sea import Profile
+from sonarsynth.geometry.motion import pose
 from sonarsynth.imaging.beam_envelopes import envelope_delays
 from sonarsynth.planning.choices import Choices
 from sonarsynth.planning.measured.absorption_error import Passed, mean_absorption, passed_by, shape_error
+from sonarsynth.planning.measured.chorus_reach import band_frequencies, chorus_reach
 from sonarsynth.planning.measured.ray_bending import propagation
 from sonarsynth.planning.measured.thinned_profile import thinned
 from sonarsynth.planning.notes.scene_checks import check_shrimp, read_inputs
@@ -23,6 +25,7 @@ from sonarsynth.propagation import Propagation
 from sonarsynth.receiver import Elements, elements
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Scene
+from sonarsynth.signals.chorus.chorus_arrivals import ChorusReach
 from sonarsynth.state import Medium
 
 
@@ -131,6 +134,15 @@ class Plan:
         """Absorption at the centre of the band, which each path loses by the depths that it passes."""
         environment = self.scene.world.environment
         return DepthAbsorption.of(environment.absorption, self.scene.sonar.band.centre, environment.depth)
+
+    @cached_property
+    def chorus(self) -> ChorusReach | None:
+        """How far the chorus of the sequence is heard; none without one."""
+        if self.scene.world.chorus is None:
+            return None
+        sonar, first = self.scene.sonar, self.scene.trajectory.time(0)
+        where = pose(self.scene.trajectory.sonar, first).position
+        return chorus_reach(self.scene, self.profile, where, self.absorption(band_frequencies(sonar)))
 
     @cached_property
     def _passed(self) -> Passed:

@@ -26,6 +26,7 @@ from sonarsynth.receiver import Sonar
 from sonarsynth.scattering import MirrorLobe, Scattering
 from sonarsynth.signals import AutoSynthesis, Synthesis
 from sonarsynth.sources import Source
+from sonarsynth.sources.chorus import Chorus
 from sonarsynth.sources.noise_source import NoiseSource
 from sonarsynth.state import Snap, WorldState
 from sonarsynth.targets.target import Target, mesh_for
@@ -47,6 +48,8 @@ class World:
     """What scatters sound and belongs to no target: pieces of the bottom, stones."""
     noise_sources: tuple[NoiseSource, ...] = ()
     """What sounds all the time from one place, and lights nothing: ships, animals."""
+    chorus: Chorus | None = None
+    """All the other snaps of the sea, which are heard but light nothing; left out: there are none."""
 
     @field_validator("targets")
     @classmethod

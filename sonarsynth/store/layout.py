@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 SMALL_BYTES: Final = 4096
 """A frame of an array under this size gets no chunk of its own."""
 
-_FIXED: Final = {"xyz": 3, "xyz_other": 3, "wxyz": 4, "corner": 8}
+_FIXED: Final = {"xyz": 3, "xyz_other": 3, "wxyz": 4, "corner": 8, "loudest": 3}
 """Sizes of axes that no scene changes."""
 
 

@@ -26,6 +26,8 @@ def variables(plan: Plan) -> tuple[Variable, ...]:
         wanted.add("source_estimates")
     if plan.scene.sonar.sensor_errors is not None:
         wanted.add("sensors")
+    if plan.scene.world.chorus is not None:
+        wanted |= {"chorus"} | ({"chorus and levels"} if plan.products else set())
     chosen = [v for v in VARIABLES if v.product in wanted]
     if not plan.windows.direct_removed:
         chosen = [v for v in chosen if (v.group, v.name) != ("/image", "remainder")]

@@ -8,6 +8,7 @@ from sonarsynth.pipeline.variables.variable import (
     CELL,
     ECHO,
     EMISSION,
+    LOUDEST,
     NONE,
     SENSOR,
     TARGET,
@@ -181,6 +182,33 @@ SENSORS = group_of(
     row("clock_rate", ("frame",), "float64", "1e-6", "how much faster time passes between samples than it should"),
 )
 """What is wrong with the sensors, where a recipe describes that."""
+SOUNDSCAPE = group_of(
+    "/truth/soundscape",
+    "chorus",
+    row("snaps", ("frame",), "int32", "1", "snaps of the chorus that reach the array centre within the record"),
+    row("paths", ("frame",), "int32", "1", "their paths: direct, and by surface and bottom"),
+    row(
+        "level",
+        LOUDEST,
+        "float64",
+        "dB",
+        "peak level of the loudest paths at the array centre re 1 uPa, before the filter",
+        attributes=comment("absorbed as at the centre of the band; NaN where there are fewer"),
+    ),
+    row("arrival", LOUDEST, "float64", "s", "when they arrive, after the instant of the frame"),
+    row("azimuth", LOUDEST, "float64", "degree", "azimuth that they arrive from, port positive"),
+    row("elevation", LOUDEST, "float64", "degree", "elevation that they arrive from, up positive"),
+    row(
+        "clear",
+        ("frame",),
+        "int8",
+        "1",
+        "whether no snap of the chorus is louder than the echoes of the loudest target, in the echo window",
+        attributes=comment("1 clear, 0 not, -1 where nothing echoes; the true window after each snap that lights"),
+        product="chorus and levels",
+    ),
+)
+"""Of the chorus, where a scene has one."""
 TRUTH = (*_SONAR, *_TARGETS, *_EMISSIONS, *_BEAMS)
 """True poses, emissions and beams."""
 HOW_LEVELS_ADD_UP = (

@@ -21,6 +21,7 @@ class Variable:
     product: str = ""  # of a build; "truth": always there; "levels": of what is traced, there with any other product
 
 
+LOUDEST = ("frame", "loudest")
 BEAMS = ("frame", "elevation", "azimuth")
 EMISSION = ("frame", "emission")
 ESTIMATE = ("frame", "estimate")

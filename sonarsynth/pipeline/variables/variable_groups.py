@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sonarsynth.pipeline.variables.truth_variables import LEVELS, SENSORS, TRUTH
+from sonarsynth.pipeline.variables.truth_variables import LEVELS, SENSORS, SOUNDSCAPE, TRUTH
 from sonarsynth.pipeline.variables.variable import BEAMS, ESTIMATE, NONE, POINT, Variable, comment, flags, group_of, row
 from sonarsynth.products import FAMILIES, ORIGINS, REASONS
 from sonarsynth.recipe import SPLITS
@@ -147,6 +147,17 @@ _ESTIMATES = group_of(
         "index of the true emission that the estimate came from: a label",
         attributes=NONE,
     ),
+    row(
+        "usable",
+        ("frame",),
+        "int8",
+        "1",
+        "whether the first estimate, which is the clock, is of a snap that lights: a label",
+        attributes=comment("0: the image is by the clock of another snap, or of the end of the record, without points"),
+    ),
 )
-VARIABLES: tuple[Variable, ...] = (*_ROOT, *_SIGNALS, *_IMAGE, *_BEAMS, *_CLOUD, *_ESTIMATES, *TRUTH, *SENSORS, *LEVELS)
+VARIABLES: tuple[Variable, ...] = (
+    *(*_ROOT, *_SIGNALS, *_IMAGE, *_BEAMS, *_CLOUD, *_ESTIMATES),
+    *(*TRUTH, *SENSORS, *SOUNDSCAPE, *LEVELS),
+)
 """Every variable that a frame may have."""

@@ -18,6 +18,7 @@ from sonarsynth.propagation.bounces import MOST_BOUNCES
 from sonarsynth.receiver import stop_frequency
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.scattering import MirrorLobe
+from sonarsynth.signals.chorus.chorus_arrivals import FAINT
 from sonarsynth.state import FrameContext, Receiver
 from sonarsynth.targets.mesh_resolution import expected_error
 from sonarsynth.targets.meshes import mesh_of
@@ -67,9 +68,34 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
     elif moving:
         way = "bodies are posed when sound meets their centre; from there constant velocity and spin"
         rows.append(Omission("motion of targets beyond constant velocity and spin", way, _carried(plan, frame)))
+    rows += _chorus_left_out(plan)
     if not environment.noises:
         rows.append(Omission("ambient noise", "none in the recipe", "signals are free of noise"))
     return tuple(rows + _thinned(plan) + _not_asked_for(plan) + _not_traced(plan) + _not_heard(plan))
+
+
+def _chorus_left_out(plan: Plan) -> list[Omission]:
+    """What of the other snaps of the sea is not simulated."""
+    chorus, reach = plan.scene.world.chorus, plan.chorus
+    if chorus is None or reach is None:
+        return []
+    far = f"snaps beyond {reach.reach:.4g} m, and images by more than {reach.images} reflections"
+    rows = [
+        Omission(far, "the chorus is heard one snap at a time", f"{reach.beyond:.1f} dB re all of the chorus"),
+        Omission(
+            "echoes of the chorus off targets", "its snaps light nothing", "those of a snap of its level and place"
+        ),
+        Omission("refraction of the chorus", "straight rays at the mean slowness", "angles err by r g/(2 c)"),
+    ]
+    faint = f"paths of the chorus under {reach.level - FAINT:.0f} dB re 1 uPa"
+    rows.append(Omission(faint, "faint", f"each {-FAINT:g} dB re the rms pressure of all of it"))
+    many = np.flatnonzero(reach.stands_for > 1.0)
+    if many.size:
+        what = f"most snaps beyond {reach.edges[many[0]]:.4g} m"
+        most = int(reach.stands_for.max())
+        bound = f"excess kurtosis {reach.thinned:+.2g}, of {reach.kurtosis:.3g}; no power"
+        rows.append(Omission(what, f"one stands for up to {most} far off, where the sum is Gaussian", bound))
+    return rows
 
 
 def _not_asked_for(plan: Plan) -> list[Omission]:

@@ -39,6 +39,12 @@ def notes(made: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
         found.append(
             f"{made.windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest snap"
         )
+    if scene.world.chorus is not None and made.chorus is not None:
+        reach = made.chorus
+        found.append(
+            f"chorus: {scene.world.chorus.row()}: predicted {reach.level:.0f} dB re 1 uPa rms in the band, excess "
+            f"kurtosis {reach.kurtosis:.3g}"
+        )
     cancelled = scene.processing.cancelling is not None
     if made.propagation.bounces and not cancelled and made.products & OF_BEAMS and made.sizes["emission"]:
         found.append("reflections of the snap itself enter the image: processing.cancelling removes them")

@@ -20,6 +20,7 @@ from sonarsynth.receiver import Sonar, elements
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals.array_paths import MAX_DOPPLER
 from sonarsynth.signals.filtered_pulse import heard_part
+from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.sources.snap_pulses import waveform
 from sonarsynth.sources.sound_source import SoundSource
 from sonarsynth.state import meeting_times
@@ -128,6 +129,12 @@ def check_shrimp(scene: Scene) -> None:
             _check_pulse(source, bottom_depth, scene.sonar)
         except ValueError as error:
             raise FieldError(("scene", "world", "sources", i, source.pulse_field), str(error)) from None
+    if (chorus := scene.world.chorus) is not None:
+        try:
+            one = SnappingShrimp(position=(0.0, 0.0), snap=chorus.snap, source_level=chorus.level)
+            _check_pulse(one, bottom_depth, scene.sonar)
+        except ValueError as error:
+            raise FieldError(("scene", "world", "chorus", "snap"), str(error)) from None
 
 
 def check_frame(scene: Scene, frame: Frame) -> None:

@@ -1,0 +1,93 @@
+"""The chorus of a frame: its snaps as they reach the array, what the hydrophones hear of them, and their truth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sonarsynth.conventions import azimuth_elevation, depth
+from sonarsynth.labels.estimate_labels import Direct, heard_first
+from sonarsynth.pipeline.stored_values import Values, table
+from sonarsynth.planning import Plan, frame_start, receiver_of
+from sonarsynth.products import Echoes, Signals
+from sonarsynth.randomness import number
+from sonarsynth.recipe.scene import Frame
+from sonarsynth.signals.chorus.chorus_arrivals import (
+    ChorusArrivals,
+    chorus_arrivals,
+    image_heights,
+    listening,
+    no_chorus,
+)
+from sonarsynth.signals.chorus.chorus_synthesis import chorus_pressure, spare_time
+from sonarsynth.sources.chorus import draw_snaps
+from sonarsynth.state import Snap
+
+LOUDEST = 3
+"""Paths of a frame that are stored, the loudest."""
+
+
+def frame_chorus(plan: Plan, frame: Frame) -> ChorusArrivals | None:
+    """The snaps of the chorus that a frame hears; `plan` is that of its sequence. None where the scene has none."""
+    chorus, reach = plan.scene.world.chorus, plan.chorus
+    if chorus is None:
+        return None
+    if reach is None:
+        return no_chorus()
+    receiver, sonar = receiver_of(plan, frame), plan.scene.sonar
+    spare = spare_time(plan.elements, sonar, receiver.speed(plan.medium))
+    start = frame_start(plan, frame)
+    window = (start - spare, start + plan.windows.samples / sonar.sampling_frequency + spare)
+    heights = image_heights(plan.profile, plan.medium.depth, float(depth(frame.sonar_pose.position)), reach.images)
+    now = (frame.time + window[0], frame.time + window[1])
+    snaps = draw_snaps(chorus, number(frame.seed, "chorus", frame.key), listening(heights, receiver, now, reach.reach))
+    return chorus_arrivals(snaps, reach, plan.medium, receiver, frame.time, window)
+
+
+def with_chorus(plan: Plan, signals: Signals, arrivals: ChorusArrivals | None) -> Signals:
+    """Signals with the chorus; `plan` is that of the frame's sequence."""
+    chorus = plan.scene.world.chorus
+    if arrivals is None or chorus is None or not len(arrivals.delay):
+        return signals
+    model, samples = chorus.snap.at_depth(plan.medium.depth), signals.pressure.shape[1]
+    heard = chorus_pressure(
+        arrivals, model, chorus.widths, plan.elements, plan.scene.sonar, plan.absorption, signals.start, samples
+    )
+    return replace(signals, pressure=signals.pressure + heard)
+
+
+def soundscape_values(plan: Plan, frame: Frame, arrivals: ChorusArrivals | None) -> Values:
+    """Truth of the chorus in the record of a frame: how many snaps, and which are the loudest."""
+    if arrivals is None:
+        return {}
+    start = frame_start(plan, frame)
+    stop = start + plan.windows.samples / plan.scene.sonar.sampling_frequency
+    arrivals = arrivals.select((arrivals.delay >= start) & (arrivals.delay < stop))
+    level, time, azimuth, elevation = np.full((4, LOUDEST), np.nan)
+    loud = np.argsort(-arrivals.received, kind="stable")[:LOUDEST]
+    some = slice(0, len(loud))
+    level[some], time[some] = arrivals.received[loud], arrivals.delay[loud]
+    azimuth[some], elevation[some] = (np.rad2deg(x) for x in azimuth_elevation(arrivals.direction[loud]))
+    counts = {"snaps": np.int32(len(np.unique(arrivals.snap))), "paths": np.int32(len(arrivals.delay))}
+    return table("/truth/soundscape", **counts, level=level, arrival=time, azimuth=azimuth, elevation=elevation)
+
+
+def clear_values(
+    plan: Plan, arrivals: ChorusArrivals | None, echoes: Echoes, direct: Direct, snaps: tuple[Snap, ...]
+) -> Values:
+    """Whether no snap of the chorus in the echo window is louder than the loudest target's echoes; -1 without any.
+
+    The window is that after the direct pulse of each snap that lights: all of them must be clear.
+    """
+    if arrivals is None:
+        return {}
+    heard = heard_first(direct, len(snaps))[0]
+    time = [t for t, snap in zip(heard, snaps, strict=True) if snap.illuminates]
+    echo = np.max(echoes.level, initial=-np.inf, where=np.isfinite(echoes.level))
+    clear = -1
+    if np.isfinite(echo) and np.isfinite(time).any():
+        opens, closes = plan.windows.echo_start, plan.windows.echo_stop
+        inside = [(arrivals.delay >= t + opens) & (arrivals.delay <= t + closes) for t in time if np.isfinite(t)]
+        clear = int(not (np.any(inside, axis=0) & (arrivals.received > echo)).any())
+    return table("/truth/soundscape", clear=np.int8(clear))

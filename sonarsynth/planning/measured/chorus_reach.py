@@ -1,0 +1,159 @@
+"""How far, and by how many images, a chorus is heard one snap at a time, and where few snaps may stand for many."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, depth
+from sonarsynth.environment.sea import Environment, Profile
+from sonarsynth.equations.noise.chorus_moments import (
+    PulsePower,
+    Reflected,
+    RingMoments,
+    effective_duration,
+    excess_kurtosis,
+    level_moment,
+    power_spectrum,
+    ring_moments,
+)
+from sonarsynth.receiver import Sonar
+from sonarsynth.recipe.scene import Scene
+from sonarsynth.signals.chorus.chorus_arrivals import CAVITY, ChorusReach, image_heights, reflected
+from sonarsynth.signals.filtered_pulse import pulse_spectrum
+from sonarsynth.sources.chorus import Chorus
+from sonarsynth.sources.pulse_model import PulseModel
+from sonarsynth.sources.snap_pulses import waveform
+
+BEYOND, FEWER = 0.02, 0.01
+"""Shares of the power that snaps beyond an automatic reach, and images beyond an automatic number, may bring."""
+FARTHEST, MOST_IMAGES = 1000.0, 60
+"""m, and reflections: of what is chosen by itself."""
+HORIZON = 3e4
+"""m: beyond, nothing is heard."""
+NEAREST = 1.0
+"""m: the innermost ring, from the height of the array on outwards."""
+GAUSSIAN = 0.1
+"""Excess kurtosis that snaps which stand for many may add, all together: Gaussian noise has none."""
+BINS = 64
+"""Frequencies of the band that moments are taken at."""
+
+
+class _Water(NamedTuple):
+    environment: Environment
+    profile: Profile
+    sonar: Sonar
+    end: float  # m: depth of the array
+
+
+def chorus_reach(scene: Scene, profile: Profile, position: Floats, absorption: Floats) -> ChorusReach | None:
+    """What a scene's chorus needs, for an array at a position (xyz) in m; none without a chorus, or with no snaps.
+
+    absorption: (bin,) dB/m at `band_frequencies`. One snap stands for many in rings far off, of a factor of two in
+    distance each, where all of these together keep within `GAUSSIAN`; these all have the mean energy.
+    """
+    chorus = scene.world.chorus
+    if chorus is None or chorus.rate == 0.0:
+        return None
+    water = _Water(scene.world.environment, profile, scene.sonar, float(depth(position)))
+    return _reach(chorus, water, tuple(absorption.tolist()))
+
+
+def band_frequencies(sonar: Sonar) -> Floats:
+    """Frequencies (bin,) in Hz that moments are taken at."""
+    return np.linspace(sonar.band.low, sonar.band.high, BINS)
+
+
+def snap_power(model: PulseModel, sonar: Sonar, absorption: Floats) -> PulsePower:
+    """A snap of 1 Pa at 1 m in the band of the sonar."""
+    rate, samples, f = sonar.sampling_frequency, 1 << 14, band_frequencies(sonar)
+    frequency, spectrum = pulse_spectrum(waveform(model), sonar.antialias, rate, samples)
+    peak = model.pulse(0.0, 0.0).peak
+    lasts = effective_duration(np.fft.irfft(spectrum, samples), 1.0 / rate)
+    power = np.interp(f, frequency, np.abs(spectrum) ** 2) / peak**2
+    return PulsePower(f, power, absorption * np.log(10.0) / 10.0, lasts)
+
+
+def _images(water: _Water, bounces: int) -> tuple[Floats, Reflected]:
+    """Heights (image,) of images, and what their reflections leave."""
+    heights = image_heights(water.profile, water.environment.depth, water.end, bounces)
+
+    def share(rho: Floats, length: Floats) -> Floats:
+        grazing = np.arcsin(np.minimum(heights.climb[:, None] / length, 1.0)).T
+        centre = water.sonar.band.centre
+        found = reflected(water.environment, water.profile, heights, grazing, centre)
+        turn = 2.0 * np.pi * centre * found.delay_std  # rough: all of the energy, see `chorus_arrivals`
+        return np.asarray((found.modulus**2 * np.where(turn > 1.0, 1.0, np.exp(-(turn**2)))).T)
+
+    return heights.climb, share
+
+
+@lru_cache(maxsize=64)
+def _reach(chorus: Chorus, water: _Water, absorption: tuple[float, ...]) -> ChorusReach:
+    pulse = snap_power(chorus.snap.at_depth(water.environment.depth), water.sonar, np.array(absorption))
+    near = max(NEAREST, 0.0 if water.end < water.environment.depth else CAVITY)
+    edges = np.concatenate([[1e-2], near * 2.0 ** np.arange(np.ceil(np.log2(HORIZON / near)) + 1)])
+
+    def moments(bounces: int, inner: Floats = edges) -> list[RingMoments]:
+        climb, share = _images(water, bounces)
+        return [ring_moments(a, b, climb, share, pulse) for a, b in pairwise(inner)]
+
+    bounces = chorus.images
+    if bounces == "auto":
+        power = np.array([sum(m.square for m in moments(n)) for n in _ORDERS])
+        bounces = _ORDERS[int(np.argmax(power >= (1.0 - FEWER) * power[-1]))]
+    rings = moments(bounces)
+    square = np.array([m.square for m in rings])
+    outside = np.append(np.cumsum(square[::-1])[::-1], 0.0) / square.sum()
+    if chorus.reach == "auto":
+        reach = float(min(edges[int(np.argmax(outside <= BEYOND))], FARTHEST))
+    else:
+        reach = chorus.reach
+    inner = np.append(edges[edges < reach], reach)
+    rings = moments(bounces, inner)
+    square, fourth = np.array([m.square for m in rings]), np.array([m.fourth for m in rings])
+    each = np.array([excess_kurtosis(chorus.rate, chorus.deviation, square.sum(), x) for x in fourth])
+    spread = float(level_moment(0.0, chorus.deviation, 4) / level_moment(0.0, chorus.deviation, 2) ** 2)
+    stands_for = _thinning(each, np.pi * np.diff(inner**2), spread)
+    spectrum = power_spectrum(
+        chorus.rate,
+        level_moment(chorus.level, chorus.deviation, 2),
+        np.sum([m.spectrum for m in rings], axis=0),
+        pulse.power,
+    )
+    mean = float(np.trapezoid(spectrum, pulse.frequency))
+    more = float(np.interp(np.log(reach), np.log(edges), outside))
+    return ChorusReach(
+        reach=reach,
+        images=bounces,
+        edges=inner,
+        stands_for=stands_for,
+        mean_level=10.0 * np.log10(level_moment(chorus.level, chorus.deviation, 2)) + 120.0,
+        kurtosis=float(each.sum()),
+        thinned=float(each @ np.where(stands_for > 1.0, stands_for / spread - 1.0, 0.0)),
+        beyond=float(10.0 * np.log10(max(more, 1e-12))),
+        level=float(10.0 * np.log10(mean) + 120.0),
+    )
+
+
+_ORDERS = (0, 1, 2, 4, 6, 8, 12, 16, 20, 24, 32, 40, 48, MOST_IMAGES)
+"""Numbers of reflections to choose from."""
+
+
+def _thinning(kurtosis: Floats, area: Floats, spread: float) -> Floats:
+    """How many snaps one stands for (ring,): the fewest snaps in all whose added kurtosis keeps within `GAUSSIAN`.
+
+    kurtosis (ring,) is what each ring brings as it is: `spread` times less where all are equally loud, n times more
+    where one stands for n. area (ring,) m2: the sum of area/n is least, for a given sum of kurtosis n, where n goes as
+    sqrt(area/kurtosis).
+    """
+    best = np.sqrt(area / np.maximum(kurtosis, 1e-300))
+    scale = np.geomspace(1e-3, 1e6, 400) / best.max()
+    many = np.clip(np.floor(np.multiply.outer(scale, best)), 1.0, 1e6)
+    added = np.where(many > 1.0, np.maximum(many / spread - 1.0, 0.0), 0.0) @ kurtosis
+    alike = np.where(many > 1.0, kurtosis, 0.0).sum(axis=1)  # levels of these have no law of their own
+    within = np.flatnonzero((added <= GAUSSIAN) & (alike <= GAUSSIAN))
+    return np.asarray(many[within[-1]] if within.size else np.ones(len(area)))

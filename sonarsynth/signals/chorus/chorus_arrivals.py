@@ -1,0 +1,212 @@
+"""Snaps of a chorus as they reach the array: straight rays, directly and by the images of surface and bottom."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from sonarsynth.conventions import Bools, Floats, Ints, depth
+from sonarsynth.environment.sea import Environment, Profile
+from sonarsynth.equations.rays.ray_solutions import mean_slowness, water
+from sonarsynth.propagation.images import images
+from sonarsynth.propagation.reflections import Reflections, at_boundaries
+from sonarsynth.sources.chorus import ChorusSnaps, Listening
+from sonarsynth.state import Medium, Receiver
+
+CAVITY = 3.5e-3
+"""m: the radius of the bubble. Sound falls as 1/r from there on; nearer, it is what it is there."""
+
+FAINT = 40.0
+"""dB: a path so far below the root mean square pressure of the whole chorus is left out."""
+
+
+class ChorusReach(NamedTuple):
+    """How far, and by how many images, snaps are heard one by one; and where few stand for many."""
+
+    reach: float  # m, horizontally
+    images: int  # reflections, in all
+    edges: Floats  # (ring + 1,) m
+    stands_for: Floats  # (ring,) snaps that one stands for, with their energy: 1 of those near
+    mean_level: float  # dB re 1 uPa at 1 m: of the mean energy of snaps
+    kurtosis: float  # excess kurtosis of the chorus
+    thinned: float  # what this gains from one snap standing for many
+    beyond: float  # dB: power of what is beyond the reach, re all of it
+    level: float  # dB re 1 uPa: of the whole chorus in the band
+
+
+class ImageHeights(NamedTuple):
+    """Ways from the bottom to the array, unfolded."""
+
+    climb: Floats  # (image,) m that the ray climbs
+    slowness: Floats  # (image,) s/m: mean over the depths that it crosses
+    surface: Ints  # (image,) reflections
+    bottom: Ints  # (image,)
+    turns: Floats  # (image,) -1 where it arrives from above
+
+    def select(self, some: Ints) -> ImageHeights:
+        """Those of these indices."""
+        return ImageHeights(
+            self.climb[some], self.slowness[some], self.surface[some], self.bottom[some], self.turns[some]
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ChorusArrivals:
+    """Arrivals of a chorus at the array centre, sorted by snap, then image.
+
+    delay       (path,)       s     after the instant of the frame: time 0 of the pulse
+    direction   (path, xyz)   -     sonar frame, towards where it comes from
+    length      (path,)       m     of the path: radius of the wavefront
+    gain        (path,)       -     pressure over that of a snap of its level at 1 m, at the centre of the band; signed
+    phase       (path,)       rad   of lossy reflections
+    delay_std   (path,)       s     of roughness, a Gaussian in time
+    level       (path,)       dB    peak source level re 1 uPa at 1 m
+    width       (path,)       -     number of the width, of `Chorus.widths`
+    snap        (path,)       -     number of the snap, of those in the window
+    boundaries  (path,)       -     reflections
+    absorption  (path,)       dB    at the centre of the band; not in gain
+    """
+
+    delay: Floats
+    direction: Floats
+    length: Floats
+    gain: Floats
+    phase: Floats
+    delay_std: Floats
+    level: Floats
+    width: Ints
+    snap: Ints
+    boundaries: Ints
+    absorption: Floats
+    key: Ints  # (snap, 5) of `ChorusSnaps`
+    sound_speed: float  # m/s of the water at the array
+
+    @property
+    def received(self) -> Floats:
+        """Peak level (path,) at the array centre, dB re 1 uPa."""
+        return np.asarray(self.level + 20.0 * np.log10(np.abs(self.gain)) - self.absorption)
+
+    def select(self, keep: Bools | Ints) -> ChorusArrivals:
+        """Some of the arrivals."""
+        whole = ("key", "sound_speed")
+        return ChorusArrivals(**{n: v if n in whole else v[keep] for n, v in vars(self).items()})
+
+
+def no_chorus() -> ChorusArrivals:
+    """A chorus without a snap."""
+    none, whole = np.zeros(0), np.zeros(0, np.int64)
+    return ChorusArrivals(
+        none,
+        np.zeros((0, 3)),
+        none,
+        none,
+        none,
+        none,
+        none,
+        whole,
+        whole,
+        whole,
+        none,
+        np.zeros((0, 5), np.int64),
+        1500.0,
+    )
+
+
+def image_heights(profile: Profile, bottom_depth: float, end: float, bounces: int) -> ImageHeights:
+    """Of a source on the bottom, for an array at depth `end` (m), by at most so many reflections.
+
+    Its image in the bottom is in the source itself: the source level is of both.
+    """
+    layers, ends = water(profile.depth, profile.speed, bottom_depth), np.array([bottom_depth])
+    edges = np.array([0.0, min(max(end, 0.0), bottom_depth), bottom_depth])
+    above, below = (
+        float(mean_slowness(layers, np.array([a]), np.array([b]))[0]) if b > a else 1.0 / float(profile.at(a))
+        for a, b in pairwise(edges)
+    )
+    rows = []
+    for image in images(ends, edges[1:2], bottom_depth, bounces):
+        climb = float(image.climb[0])
+        if climb >= 0.0 and (image.bottom <= image.surface):
+            crossed = float(image.above[0]) * above + float(image.between[0] + image.below[0]) * below
+            slowness = crossed / climb if climb > 0.0 else below
+            rows.append((climb, slowness, image.surface, image.bottom, image.turns))
+    height, mean, surface, bottom, turns = (np.array(column) for column in zip(*rows, strict=True))
+    return ImageHeights(height, mean, surface, bottom, turns)
+
+
+def listening(heights: ImageHeights, receiver: Receiver, window: tuple[float, float], reach: float) -> Listening:
+    """What `draw_snaps` needs of an array and a window (s, since the start of the motions)."""
+    slow, fast = 1.0 / float(heights.slowness.max()), 1.0 / float(heights.slowness.min())
+    return Listening(receiver.pose.position[:2], *window, reach, float(heights.climb.max()), slow, fast)
+
+
+def reflected(
+    environment: Environment, profile: Profile, heights: ImageHeights, grazing: Floats, f: float
+) -> Reflections:
+    """What the reflections of images do at grazing angles (..., image) in rad; f (Hz): of the middle of the band."""
+    every = np.broadcast_to(np.arange(len(heights.climb)), grazing.shape).ravel()
+    surface, bottom, angle = heights.surface[every], heights.bottom[every], grazing.ravel()
+    found = at_boundaries(environment, profile, angle, surface, angle, bottom, f)
+    return Reflections(*(x.reshape(grazing.shape) for x in (found.modulus, found.phase, found.delay_std)))
+
+
+def chorus_arrivals(
+    snaps: ChorusSnaps,
+    reach: ChorusReach,
+    medium: Medium,
+    receiver: Receiver,
+    time: float,
+    window: tuple[float, float],
+) -> ChorusArrivals:
+    """Arrivals in a window (s, after the instant of the frame, which is `time` (s) after the start of the motions).
+
+    The array moves from snap to snap at its velocity; while it hears one it is at rest. A path so rough that the phase
+    of its reflections is lost (2 pi f sigma > 1 in the middle of the band) keeps its energy, with a random sign. Paths
+    that are `FAINT` are left out.
+    """
+    ring = np.clip(np.searchsorted(reach.edges, np.hypot(*(snaps.place - receiver.pose.position[:2]).T)), 1, None) - 1
+    stands_for = reach.stands_for[np.minimum(ring, len(reach.stands_for) - 1)]
+    some = np.flatnonzero(snaps.thinning * stands_for < 1.0)
+    snaps, louder = snaps.select(some), np.sqrt(stands_for[some])
+    levels = np.where(louder > 1.0, reach.mean_level, snaps.level)
+    heights = image_heights(medium.profile, medium.depth, float(depth(receiver.pose.position)), reach.images)
+    emitted, at = (snaps.time - time)[:, None], receiver.pose.position[:2]
+    level = np.broadcast_to((snaps.place - at)[:, None], (len(some), len(heights.climb), 2))
+    velocity = np.zeros(2) if receiver.track is None else receiver.track.velocity[:2]
+    delay = emitted + np.hypot(np.hypot(level[..., 0], level[..., 1]), heights.climb) * heights.slowness
+    if velocity.any():
+        level = level - delay[..., None] * velocity
+        delay = emitted + np.hypot(np.hypot(level[..., 0], level[..., 1]), heights.climb) * heights.slowness
+    snap, image = np.nonzero((delay > window[0]) & (delay < window[1]))
+    level, delay = level[snap, image], delay[snap, image]
+    climb = heights.climb[image]
+    length = np.maximum(np.hypot(np.hypot(level[:, 0], level[:, 1]), climb), 1e-6)
+    own = heights.select(image)
+    bounced = reflected(
+        medium.environment, medium.profile, own, np.arcsin(np.minimum(climb / length, 1.0)), receiver.centre
+    )
+    sign = np.where(np.floor(snaps.sign[snap] * 2.0 ** (4 + image % 40)) % 2.0, -1.0, 1.0)
+    lost = 2.0 * np.pi * receiver.centre * bounced.delay_std > 1.0
+    towards = np.column_stack([level, -climb * own.turns]) / length[:, None]
+    loss = medium.absorption
+    mean = loss if isinstance(loss, float) else float(np.trapezoid(loss.value, loss.depth) / medium.depth)
+    used, number = np.unique(snap, return_inverse=True)
+    found = ChorusArrivals(
+        delay=delay,
+        direction=towards @ receiver.pose.rotation,
+        length=length,
+        gain=np.where(lost, sign, 1.0) * louder[snap] * bounced.modulus / np.maximum(length, CAVITY),
+        phase=np.where(lost, 0.0, bounced.phase),
+        delay_std=np.where(lost, 0.0, bounced.delay_std),
+        level=levels[snap],
+        width=snaps.width[snap],
+        snap=number,
+        boundaries=own.surface + own.bottom,
+        absorption=mean * length,
+        key=snaps.key[used],
+        sound_speed=receiver.speed(medium),
+    )
+    return found.select(found.received >= reach.level - FAINT)

@@ -1,0 +1,58 @@
+"""Compiled loop of the chorus. One thread, fixed order: the same bits on any number of workers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from sonarsynth.equations.kernels.vectors import WIDTH, add_two
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy", forceinline=True)
+def _mix(modes: Any, weight: Any, size: int, table: Any) -> None:
+    """The sum (size,) of modes (mode * size,) times weight (mode,): an even number of them."""
+    table[:] = 0.0
+    for k in range(0, weight.size, 2):
+        for i in range(0, size, WIDTH):
+            add_two(table, i, modes, k * size + i, weight[k], (k + 1) * size + i, weight[k + 1])  # type: ignore[call-arg]
+
+
+@njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+def add_pulses(
+    modes: Any, taps: int, fractions: int, weight: Any, first: Any, last: Any, place: Any, length: Any, start: Any,
+    position: Any, rate: float, slowness: float, cavity: float, samples: int, pitch: int, out: Any,
+) -> None:  # fmt: skip
+    """Add the pulse of every row at the sensors first to last (row,) to out (sensor * pitch,), so many samples each.
+
+    The pulse is the sum of modes (mode * fraction * tap,) times weight (row, mode): at the fractions of a sample before
+    each tap, linear in between, one fraction more than `fractions`. place (row, xyz) m is where its wave seems to come
+    from, length (row,) m how far that is from the middle of the array, where the first tap is at start (row,) in
+    samples. position (xyz * sensor,) m; rate in samples/s, slowness in s/m; nearer than `cavity` (m) it is no louder.
+    """
+    sensors, size, number = position.size // 3, (fractions + 1) * taps, modes.dtype.type
+    table = np.zeros(size, modes.dtype)
+    begin, part = np.empty(sensors, np.int32), np.empty(sensors, np.int32)
+    v, w = np.empty(sensors, modes.dtype), np.empty(sensors, modes.dtype)
+    scale = rate * slowness
+    for row in range(start.size):
+        _mix(modes, weight[row], size, table)
+        px, py, pz, r = place[row, 0], place[row, 1], place[row, 2], length[row]
+        for s in range(first[row], last[row]):
+            qx, qy, qz = position[s], position[sensors + s], position[2 * sensors + s]
+            x, y, z = px - qx, py - qy, pz - qz
+            away = np.sqrt(x * x + y * y + z * z)
+            longer = (qx * (qx - 2.0 * px) + qy * (qy - 2.0 * py) + qz * (qz - 2.0 * pz)) / (away + r)
+            at, gain = start[row] + scale * longer, r / max(away, cavity)
+            after = np.floor(at) + 1.0
+            x = (after - at) * fractions
+            n = min(np.floor(x), fractions - 1.0)
+            begin[s], part[s] = np.int32(after), np.int32(n)
+            w[s] = number((x - n) * gain)
+            v[s] = number(gain) - w[s]
+        for s in range(first[row], last[row]):
+            if begin[s] >= 0 and begin[s] + taps <= samples:
+                line, value = s * pitch + begin[s], part[s] * taps
+                for j in range(0, taps, WIDTH):
+                    add_two(out, line + j, table, value + j, v[s], value + taps + j, w[s])  # type: ignore[call-arg]

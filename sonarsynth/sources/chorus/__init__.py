@@ -1,0 +1,8 @@
+"""The chorus: all the snaps of a sea that are heard, but light nothing."""
+
+from __future__ import annotations
+
+from sonarsynth.sources.chorus.shrimp_chorus import Chorus, Clusters, SnapDensity
+from sonarsynth.sources.chorus.snap_cells import ChorusSnaps, Listening, draw_snaps
+
+__all__ = ["Chorus", "ChorusSnaps", "Clusters", "Listening", "SnapDensity", "draw_snaps"]

@@ -1,0 +1,98 @@
+"""Frames with a chorus: what it adds, what it leaves alone, and which snap is taken for the light."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from sonarsynth.pipeline import render
+from sonarsynth.planning import plan
+from sonarsynth.recipe import reading
+
+REMUS = Path(__file__).resolve().parents[2] / "configs" / "remus.yaml"
+SMALL = (
+    "scene.sonar.array={kind: planar_lattice, columns: 6, rows: 6, pitch: 10 cm}",
+    "scene.world.targets.0.shape={kind: sphere, radius: 0.5 m}",
+    "scene.processing.beamforming={kind: dense}",
+    "scene.sonar.beams={azimuths: 21, elevations: 21}",
+    "scene.world.environment.noise={kind: flat, level: 30 dB}",
+)
+
+
+@cache
+def frame_of(*more: str, index: int = 1) -> xr.DataTree:
+    """A frame of a small scene."""
+    return render(reading.load(str(REMUS), [*SMALL, *more]), index)
+
+
+def test_no_density_changes_no_number() -> None:
+    without, empty = frame_of(), frame_of("scene.world.chorus={density: 0}")
+    for name in ("signals/pressure", "image/energy", "cloud/range", "link_budget/received_level"):
+        assert np.array_equal(without[name].values, empty[name].values, equal_nan=True), name
+    assert int(empty["truth/soundscape"].snaps) == 0 and int(empty["truth/soundscape"].clear) == 1
+
+
+def test_a_chorus_is_added_and_changes_no_other_draw() -> None:
+    chorus = "scene.world.chorus={density: 0.02, reach: 100 m, images: 2}"
+    off = "scene.sonar.converter=null"
+    silent, both, louder = (
+        frame_of(off, *more) for more in ((), (chorus,), (chorus, "scene.world.chorus.level=205 dB"))
+    )
+    added = [tree["signals"].pressure.values - silent["signals"].pressure.values for tree in (both, louder)]
+    assert np.abs(added[0]).max() > 0.0
+    assert np.abs(added[1] - 10.0 * added[0]).max() <= 1e-4 * np.abs(added[1]).max()
+    assert (silent["truth/emissions/level"].values == both["truth/emissions/level"].values).all()
+
+
+def test_overlapping_windows_hear_the_same_chorus() -> None:
+    """Two frames 2 ms apart hear the same sea: their records agree where they overlap."""
+    more = (
+        "scene.world.chorus={density: 0.05, reach: 60 m, images: 1}",
+        "scene.world.sources.0.source_level=0 dB",
+        "scene.world.environment.noise=null",
+        "scene.trajectory.interval=2 ms",
+        "scene.sonar.converter=null",
+        "scene.trajectory.frames=3",
+    )
+    one, other = (frame_of(*more, index=n)["signals"] for n in (1, 2))
+    rate = 196e3
+    late = round((2e-3 + float(other.start) - float(one.start)) * rate)
+    a, b = one.pressure.values[:, late:], other.pressure.values[:, : one.pressure.shape[1] - late]
+    assert np.abs(a - b).max() < 0.02 * np.abs(a).max()
+
+
+def test_the_loudest_is_not_the_light_where_its_echoes_would_be_hidden() -> None:
+    """A stranger 7 m off, much louder, whose echo window holds the direct pulse of the other."""
+    stranger = (
+        "scene.world.sources=[{kind: snapping_shrimp, position: [14, -5]}, {kind: snapping_shrimp, name: stranger, "
+        "position: [4.9, 0.5], source_level: 200 dB, snap_times: [-14 ms]}]",
+        "scene.sonar.array={kind: romanis}",  # a small array takes the one for an echo of the other
+    )
+    tree = frame_of(*stranger)
+    found, arrival = tree["source_estimates"], tree["truth/emissions"].arrival.values
+    assert int(found.emission[0]) == 0 and int(found.usable) == 1
+    assert arrival[1] < arrival[0]
+    assert float(tree["image"].start) > arrival[0]
+
+
+def test_a_frame_without_a_clock_has_an_image_of_its_record() -> None:
+    tree = frame_of("scene.world.sources.0.source_level=0 dB", "scene.world.chorus={density: 1e-9}")
+    start, stop = float(tree["image"].start), float(tree["image"].stop)
+    assert np.isfinite(tree["image"].energy.values).all() and stop > start
+    assert int(tree["source_estimates"].usable) == 0 and int(tree["cloud"]["count"]) == 0
+
+
+def test_plan_says_what_the_chorus_is_and_leaves_out() -> None:
+    text = " ".join(str(plan(reading.load(str(REMUS), [*SMALL, "scene.world.chorus={density: reef}"]))).split())
+    for words in ("an estimate", "excess kurtosis", "echoes of the chorus off targets", "re all of the chorus"):
+        assert words in text, words
+
+
+def test_a_chorus_whose_recording_is_absent_is_refused() -> None:
+    absent = "scene.world.chorus={snap: {kind: recorded_snap, path: absent.wav}}"
+    with pytest.raises(reading.RecipeError, match=r"chorus.snap.path: no such file"):
+        reading.load(str(REMUS), [*SMALL, absent])
