@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from sonarsynth.evaluation.checks import Check, SmallVariables, blocks, every, numbered, of_frame
+from sonarsynth.evaluation.checks import Check, SmallVariables, blocks, every, numbered, of_frame, other_sounds
 from sonarsynth.evaluation.level_checks import echoes_heard, snaps_heard
 
 
@@ -72,7 +72,8 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
     """The brightest beam of each frame lies on a target, or within one beam width of its outline; or on a ghost of one
     that the truth has, which the check counts and warns of.
 
-    Frames without a target in view, or whose echoes are inaudible, do not count.
+    Frames without a target in view, or whose echoes are inaudible, do not count. Where a chorus or anything else sounds
+    too, it may be brighter: a warning.
     """
     name, expected = "brightest beam on target", "every frame, or on a ghost by surface or bottom"
     azimuth, elevation = (np.deg2rad(every(tree, f"truth/beams/{axis}")) for axis in ("azimuth", "elevation"))
@@ -95,13 +96,17 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
             missed.append(i)
     if not seen:
         return Check(name, expected, "no target is in view and audible", None, {})
-    also = f", on a ghost in {ghosts}" if ghosts else ""
+    also, besides = f", on a ghost in {ghosts}" if ghosts else "", " and ".join(other_sounds(tree))
+    warning = f"in {ghosts} of {seen} frames the brightest beam is on a ghost by surface or bottom" if ghosts else ""
+    if missed and besides:
+        also += f", elsewhere in {len(missed)}"
+        warning = f"in {len(missed)} of {seen} frames the brightest beam is on no target; also heard: {besides}"
     return Check(
         name,
         expected,
         f"{hits} of {seen} frames{also}",
-        hits + ghosts == seen,
+        None if missed and besides else hits + ghosts == seen,
         {"hits": hits, "frames": seen, "ghosts": ghosts},
         numbered(missed),
-        warning=f"in {ghosts} of {seen} frames the brightest beam is on a ghost by surface or bottom" if ghosts else "",
+        warning=warning,
     )

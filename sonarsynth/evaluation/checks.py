@@ -26,6 +26,11 @@ class Check:
     warning: str = ""
 
 
+def other_sounds(tree: xr.DataTree) -> list[str]:
+    """What is heard in a store beside its sources and targets, by the names of recipes: it may be louder than these."""
+    return [str(name) for name in tree.attrs.get("other_sounds", ())]
+
+
 def every(tree: xr.DataTree, name: str) -> np.ndarray:
     """Values of a variable over all frames."""
     return np.asarray(tree[name].values)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from sonarsynth.evaluation.checks import Check, numbered
+from sonarsynth.evaluation.checks import Check, numbered, other_sounds
 from sonarsynth.products import FAMILIES, ORIGINS
 
 OUTLIERS = 0.01
@@ -16,6 +16,8 @@ OUTLIERS = 0.01
 
 MOST_ROWS = 2_000_000
 """Points, and room for points, that are read at once."""
+UNKNOWN, STRANGER = -1, -2
+"""Clocks that are no emission: nobody knows; a snap of the chorus, which the labels do not list."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,12 +34,12 @@ class Points:
     family: np.ndarray  # (point,)
     lit_by: np.ndarray  # (point,)
     origin: np.ndarray  # (point,)
-    clock: np.ndarray  # (point,) the emission that delays are counted from; -1: not known
+    clock: np.ndarray  # (point,) the emission that delays are counted from; UNKNOWN; STRANGER: a snap of the chorus
 
     @property
     def strange(self) -> np.ndarray:
         """(point,) lit by another snap than that of the clock."""
-        return np.asarray((self.clock >= 0) & (self.emission >= 0) & (self.emission != self.clock))
+        return np.asarray((self.clock != UNKNOWN) & (self.emission >= 0) & (self.emission != self.clock))
 
     @property
     def judged(self) -> np.ndarray:
@@ -76,11 +78,13 @@ def points(tree: xr.DataTree, frames: Sequence[int] | np.ndarray) -> Points:
 
 
 def _clocks(tree: xr.DataTree, frames: np.ndarray) -> np.ndarray:
-    """The emission (row,) of the first source estimate in frames (row,); -1 where that is not known."""
+    """The emission (row,) of the first source estimate in frames (row,)."""
     if "source_estimates" not in tree.children or "emission" not in tree["source_estimates"].dataset or not len(frames):
-        return np.full(len(frames), -1)
+        return np.full(len(frames), UNKNOWN)
     each, row = np.unique(frames, return_inverse=True)
-    return np.asarray(tree["source_estimates"].dataset["emission"].isel(frame=each, estimate=0).values)[row]
+    emission = np.asarray(tree["source_estimates"].dataset["emission"].isel(frame=each, estimate=0).values)
+    other = STRANGER if other_sounds(tree) else UNKNOWN
+    return np.where(emission < 0, other, emission.astype(int))[row]
 
 
 def range_errors(tree: xr.DataTree, frames: np.ndarray) -> list[Check]:

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from sonarsynth.evaluation.brightest_beams import beam_width
-from sonarsynth.evaluation.checks import Check, SmallVariables, blocks, numbered
+from sonarsynth.evaluation.checks import Check, SmallVariables, blocks, numbered, other_sounds
 from sonarsynth.evaluation.level_checks import snaps_heard
 from sonarsynth.geometry import Pose
 from sonarsynth.products import REASONS
@@ -34,10 +34,17 @@ class _Tally:
     misses: list[float] = field(default_factory=list)  # m
     useless: int = 0
     strays: int = 0  # accepted, and come from no snap
+    strangers: int = 0  # of the chorus, or of other sources of noise
     rows: int = 0
     unheard: int = 0  # snaps that reach the array, and were not found
     reasons: Counter[str] = field(default_factory=Counter)
     frames: set[int] = field(default_factory=set)
+
+    def add_stray(self, frame: int, strangers: bool) -> None:
+        """Count an estimate that comes from no snap; it may be right where others sound too."""
+        self.strangers += strangers
+        self.strays += not strangers
+        self.frames |= set() if strangers else {frame}
 
     def add(self, frame: int, within: dict[str, bool]) -> None:
         for name, good in within.items():
@@ -70,6 +77,8 @@ def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
     got = f"{sum(places)} of {len(places) + tally.strays}, median error {median:.3g} m"
     if not good and worst != "position":
         got += f"; {worst} in {100 * shares.get(worst, 0.0):.3g} %"
+    if tally.strangers:
+        got += f"; {tally.strangers} of other snaps"
     if tally.strays:
         got += f"; {tally.strays} match no snap"
     numbers |= {"good": sum(places), "found": tally.rows, "median_m": median, "strays": tally.strays}
@@ -77,7 +86,8 @@ def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
 
 
 def _frame(some: SmallVariables, i: int, tally: _Tally) -> None:
-    names = map(str, some.tree["source_estimates"].dataset.data_vars)
+    rows = some.tree["source_estimates"].dataset.data_vars.items()
+    names = [str(name) for name, variable in rows if "estimate" in variable.dims]
     column = {name: some.of(f"source_estimates/{name}", i) for name in names}
     found = np.flatnonzero(np.isfinite(column["time"]))
     reached = int(snaps_heard(some, i).sum())
@@ -94,8 +104,7 @@ def _frame(some: SmallVariables, i: int, tally: _Tally) -> None:
     for row in found:
         emission = int(column["emission"][row])
         if emission < 0:
-            tally.strays += 1
-            tally.frames.add(i)
+            tally.add_stray(i, bool(other_sounds(some.tree)))
             continue
         one = {name: values[row] for name, values in column.items()}
         turned = (one["azimuth"] - truth["azimuth"][emission] + 180.0) % 360.0 - 180.0
