@@ -17,7 +17,7 @@ from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.array_paths import array_paths, delay_and_gain, reach
 from sonarsynth.signals.filtered_pulse import pulse_spectrum, pulse_support
 from sonarsynth.signals.segments import fast_length
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 
 
 def installed(library: str) -> bool:
@@ -25,7 +25,7 @@ def installed(library: str) -> bool:
     return find_spec(library) is not None
 
 
-def thesis_pulse(snap: Snap, plan: Plan) -> Floats:
+def thesis_pulse(snap: Emission, plan: Plan) -> Floats:
     """The snap (sample,) as the thesis's loop places it: through the filter, at the sonar's rate."""
     sonar = plan.scene.sonar
     before, after = pulse_support(snap.waveform, sonar.antialias)

@@ -22,7 +22,7 @@ from sonarsynth.signals.chorus.chorus_arrivals import (
 )
 from sonarsynth.signals.chorus.chorus_synthesis import chorus_pressure, spare_time
 from sonarsynth.sources.chorus import draw_snaps
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 
 LOUDEST = 3
 """Paths of a frame that are stored, the loudest."""
@@ -74,7 +74,7 @@ def soundscape_values(plan: Plan, frame: Frame, arrivals: ChorusArrivals | None)
 
 
 def clear_values(
-    plan: Plan, arrivals: ChorusArrivals | None, echoes: Echoes, direct: Direct, snaps: tuple[Snap, ...]
+    plan: Plan, arrivals: ChorusArrivals | None, echoes: Echoes, direct: Direct, snaps: tuple[Emission, ...]
 ) -> Values:
     """Whether no snap of the chorus in the echo window is louder than the loudest target's echoes; -1 without any.
 

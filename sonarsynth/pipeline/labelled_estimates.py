@@ -12,10 +12,10 @@ from sonarsynth.products import Arrivals, Signals, SourceEstimates
 from sonarsynth.ranging.location.association import in_record
 from sonarsynth.signals.direct_sum import relative_absorption
 from sonarsynth.signals.filtered_pulse import envelope_delay
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 
 
-def heard_directly(plan: Plan, arrivals: Arrivals, snaps: tuple[Snap, ...]) -> Direct:
+def heard_directly(plan: Plan, arrivals: Arrivals, snaps: tuple[Emission, ...]) -> Direct:
     """The direct paths of a frame, with the time at which the envelope of each pulse peaks in the band."""
     sonar = plan.scene.sonar
 
@@ -35,7 +35,7 @@ def estimate_truth(direct: Direct, snaps: int) -> Values:
 
 
 def emission_values(
-    plan: Plan, direct: Direct, estimates: SourceEstimates, signals: Signals, snaps: tuple[Snap, ...]
+    plan: Plan, direct: Direct, estimates: SourceEstimates, signals: Signals, snaps: tuple[Emission, ...]
 ) -> Values:
     """Which snap each estimate came from, and whether the first, which is the clock, is of one that lights."""
     band, window = plan.scene.sonar.band, (plan.windows.echo_start, plan.windows.echo_stop)

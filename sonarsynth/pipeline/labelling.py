@@ -12,7 +12,7 @@ from sonarsynth.products import Arrivals, PointCloud, PointLabels, SourceEstimat
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.direct_sum import relative_absorption
 from sonarsynth.signals.isolated_paths import energy_in_slices
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 
 
 def expansion_error(plan: Plan, arrivals: Arrivals) -> float:
@@ -26,7 +26,7 @@ def expansion_error(plan: Plan, arrivals: Arrivals) -> float:
     return float(20 * np.log10((1.0 + arrivals.amplitude_error) / np.cos(phase)))
 
 
-def band_of(plan: Plan, snaps: tuple[Snap, ...]) -> Band:
+def band_of(plan: Plan, snaps: tuple[Emission, ...]) -> Band:
     """The band that levels are taken in."""
     sonar = plan.scene.sonar
     energy = np.array([energy_in_slices(snap.waveform, sonar, SLICES) for snap in snaps]).reshape(-1, SLICES)

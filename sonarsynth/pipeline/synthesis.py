@@ -24,7 +24,7 @@ from sonarsynth.signals.electronics import ElectronicNoise
 from sonarsynth.signals.noise.point_sources import add_noise_source
 from sonarsynth.sources.noise_source import NoiseSource
 from sonarsynth.sources.snap_models import Ricker
-from sonarsynth.sources.sound_source import Snap
+from sonarsynth.sources.sound_source import Emission
 from sonarsynth.tracing.arrivals import trace
 
 
@@ -92,7 +92,7 @@ def digitise(plan: Plan, frame: Frame, signals: Signals) -> Signals:
 def _with_noise_source(plan: Plan, frame: Frame, signals: Signals, source: NoiseSource, number: int) -> Signals:
     """Signals with the sound of one source, by the paths that an emission of it would take."""
     time, position = frame.time, pose(source.motion, frame.time).position
-    instant = Snap(position, 0.0, Ricker(frequency=plan.scene.sonar.band.centre), None, illuminates=False)
+    instant = Emission(position, 0.0, Ricker(frequency=plan.scene.sonar.band.centre), None, illuminates=False)
     arrivals = trace(replace(context_of(plan, frame), snaps=(instant,)), plan.propagation)
     apart = position - frame.sonar_pose.position
     closing = (frame.sonar_velocity - velocity(source.motion, time)) @ apart / max(float(np.linalg.norm(apart)), 1e-9)

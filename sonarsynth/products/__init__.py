@@ -3,7 +3,7 @@
 Axes: path (an arrival), sensor, sample, emission (a snap), estimate, target, elevation, azimuth, point, xyz, term
 (polynomial over the aperture).
 Unless said otherwise arrays are float64, positions in m in the sonar frame, times in s on the clock of the frame (0 is
-the instant of the frame; a snap at `Snap.time` is heard a travel time later).
+the instant of the frame; a snap at `Emission.time` is heard a travel time later).
 """
 
 from sonarsynth.products.labels import LINK_BUDGET, ORIGINS, Echoes, LinkBudget, PointLabels, Truth

@@ -28,7 +28,7 @@ from sonarsynth.signals import AutoSynthesis, Synthesis
 from sonarsynth.sources import Source
 from sonarsynth.sources.chorus import Chorus
 from sonarsynth.sources.noise_source import NoiseSource
-from sonarsynth.state import Snap, WorldState
+from sonarsynth.state import Emission, WorldState
 from sonarsynth.targets.target import Target, mesh_for
 
 MOST = 500
@@ -183,7 +183,7 @@ class Scene:
             for t, mesh in placed
         )
         bottom = self.world.environment.depth
-        snaps: list[Snap] = []
+        snaps: list[Emission] = []
         for i, source in enumerate(self.world.sources):
             snaps += source.emissions(bottom, stream(seed, "snap", key, step, i), time)
         fields = enumerate(self.world.scatterers)

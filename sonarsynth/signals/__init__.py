@@ -14,7 +14,7 @@ from sonarsynth.signals.direct_sum import DirectSum
 from sonarsynth.signals.electronics import add_noise, convert
 from sonarsynth.signals.filtered_pulse import pulse_support
 from sonarsynth.signals.gridded_synthesis import GriddedSynthesis
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 
 __all__ = [
     "AutoSynthesis",
@@ -34,7 +34,7 @@ class SignalSynthesis(Protocol):
     def signals(
         self,
         arrivals: Arrivals,
-        snaps: tuple[Snap, ...],
+        snaps: tuple[Emission, ...],
         elements: Elements,
         sonar: Sonar,
         absorption: Callable[[Floats], Floats] | None,

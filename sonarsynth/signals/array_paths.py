@@ -13,7 +13,7 @@ from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import Elements
 from sonarsynth.signals.filtered_pulse import snap_gains
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 
 MAX_DOPPLER = 0.1
 """Doppler of 0.1 is a closing speed of 75 m/s: more is an error."""
@@ -87,7 +87,7 @@ class ArrayPaths:
 
 
 def array_paths(
-    arrivals: Arrivals, snaps: tuple[Snap, ...], elements: Elements, attenuation: float = 0.0
+    arrivals: Arrivals, snaps: tuple[Emission, ...], elements: Elements, attenuation: float = 0.0
 ) -> ArrayPaths:
     """The wavefronts of arrivals, in water that absorbs `attenuation` (dB/m) at the band centre; raises ValueError
     where one cannot be synthesised."""

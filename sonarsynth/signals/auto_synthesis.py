@@ -14,7 +14,7 @@ from sonarsynth.products import Arrivals, Signals
 from sonarsynth.receiver import Elements, Sonar
 from sonarsynth.signals.direct_sum import DirectSum
 from sonarsynth.signals.gridded_synthesis import ROUNDING, SPENT, GriddedSynthesis, kernel_error
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 
 DEFAULT_ERROR = 3e-4
 """Error of the synthesis where no plan says what is allowed."""
@@ -51,7 +51,7 @@ class AutoSynthesis(Method):
     def signals(
         self,
         arrivals: Arrivals,
-        snaps: tuple[Snap, ...],
+        snaps: tuple[Emission, ...],
         elements: Elements,
         sonar: Sonar,
         absorption: Callable[[Floats], Floats] | None,

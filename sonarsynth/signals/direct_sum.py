@@ -18,7 +18,7 @@ from sonarsynth.signals.array_paths import ArrayPaths, array_paths, arrival_dire
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.signals.pulse_variation import bend, changed
 from sonarsynth.signals.segments import fast_length, layout
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 
 
 def relative_absorption(absorption: Callable[[Floats], Floats] | None, frequency: Floats, centre: float) -> Floats:
@@ -89,7 +89,7 @@ class DirectSum(Method):
     def signals(
         self,
         arrivals: Arrivals,
-        snaps: tuple[Snap, ...],
+        snaps: tuple[Emission, ...],
         elements: Elements,
         sonar: Sonar,
         absorption: Callable[[Floats], Floats] | None,
@@ -102,7 +102,7 @@ class DirectSum(Method):
     def pressure(
         self,
         arrivals: Arrivals,
-        snaps: tuple[Snap, ...],
+        snaps: tuple[Emission, ...],
         elements: Elements,
         sonar: Sonar,
         absorption: Callable[[Floats], Floats] | None,
@@ -116,7 +116,7 @@ class DirectSum(Method):
 
 def exact_signals(
     arrivals: Arrivals,
-    snaps: tuple[Snap, ...],
+    snaps: tuple[Emission, ...],
     elements: Elements,
     sonar: Sonar,
     absorption: Callable[[Floats], Floats] | None,

@@ -22,7 +22,7 @@ from sonarsynth.receiver import Filter, LowPass, Sonar, stop_frequency
 from sonarsynth.signals.gridded.nodes import analysis, chebyshev, rounded_up
 from sonarsynth.sources.pulse_model import PulseModel, Stamp
 from sonarsynth.sources.snap_pulses import Waveform
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 
 LONGEST_ENVELOPE = 1 << 18
 """Samples of the pulses whose envelopes are looked at, at most."""
@@ -267,7 +267,7 @@ def _peak(waveform: Waveform) -> float:
     return _made(waveform.model, waveform.stamp, 0.0).peak
 
 
-def snap_levels(heard: tuple[Snap, ...]) -> Floats:
+def snap_levels(heard: tuple[Emission, ...]) -> Floats:
     """(snap,) peak source level of each snap (dB re 1 uPa at 1 m), as its model's level is taken."""
     with np.errstate(divide="ignore"):
         own = [20.0 * np.log10(_peak(s.waveform) / REFERENCE_PRESSURE) for s in heard]
@@ -275,7 +275,7 @@ def snap_levels(heard: tuple[Snap, ...]) -> Floats:
     return np.array([v + 20.0 * np.log10(s.gain) for s, v in zip(heard, level, strict=True)])
 
 
-def snap_gains(heard: tuple[Snap, ...]) -> Floats:
+def snap_gains(heard: tuple[Emission, ...]) -> Floats:
     """(snap,) factor on the pulse of each snap's waveform."""
     return np.array(
         [s.gain * pulses.gain_for_level(_made(s.model, s.waveform.stamp, 0.0), s.source_level) for s in heard]

@@ -20,7 +20,7 @@ from sonarsynth.signals.direct_sum import attenuation
 from sonarsynth.signals.gridded.bins import bins_of
 from sonarsynth.signals.gridded.deposit import add_segment
 from sonarsynth.signals.segments import Segment, layout
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 
 ROUNDING: Final[dict[str, float]] = {"float32": 3e-6, "float64": 1e-9}
 """What the precision of the grid and its table of the kernel leave."""
@@ -107,7 +107,7 @@ class GriddedSynthesis(Method):
     def signals(
         self,
         arrivals: Arrivals,
-        snaps: tuple[Snap, ...],
+        snaps: tuple[Emission, ...],
         elements: Elements,
         sonar: Sonar,
         absorption: Callable[[Floats], Floats] | None,
@@ -121,7 +121,7 @@ class GriddedSynthesis(Method):
     def pressure(
         self,
         arrivals: Arrivals,
-        snaps: tuple[Snap, ...],
+        snaps: tuple[Emission, ...],
         elements: Elements,
         sonar: Sonar,
         absorption: Callable[[Floats], Floats] | None,

@@ -26,7 +26,7 @@ from sonarsynth.signals.gridded.nodes import rounded_up
 from sonarsynth.signals.pulse_shapes import stretched
 from sonarsynth.signals.segments import fast_length, layout
 from sonarsynth.sources.snap_pulses import Waveform
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 
 if TYPE_CHECKING:
     from sonarsynth.signals import SignalSynthesis
@@ -59,7 +59,7 @@ def energy_in_slices(waveform: Waveform, sonar: Sonar, count: int) -> Floats:
 def measured_levels(
     method: SignalSynthesis,
     paths: Arrivals,
-    snaps: tuple[Snap, ...],
+    snaps: tuple[Emission, ...],
     sonar: Sonar,
     absorption: Callable[[Floats], Floats] | None,
 ) -> Floats:

@@ -16,7 +16,7 @@ from sonarsynth.signals.array_paths import ArrayPaths, delay_and_gain, reach
 from sonarsynth.signals.filtered_pulse import PULSE_FEET, Reshaped, at_longest, silencing_blur, support_of
 from sonarsynth.signals.pulse_variation import widest_spread
 from sonarsynth.sources.snap_pulses import Waveform
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 
 FAST = (16, 18, 20, 24, 27, 30)
 """Lengths of stretches are these times powers of two: fast to transform, and few, so that spectra of pulses are
@@ -55,7 +55,7 @@ def fast_length(samples: int) -> int:
 def layout(
     arrivals: Arrivals,
     front: ArrayPaths,
-    snaps: tuple[Snap, ...],
+    snaps: tuple[Emission, ...],
     elements: Elements,
     sonar: Sonar,
     start: float,
@@ -85,7 +85,7 @@ def layout(
 
 
 def _supports(
-    arrivals: Arrivals, front: ArrayPaths, snaps: tuple[Snap, ...], sonar: Sonar
+    arrivals: Arrivals, front: ArrayPaths, snaps: tuple[Emission, ...], sonar: Sonar
 ) -> tuple[Floats, Floats, Bools]:
     """Support (before or after, path) of each pulse in s: in its plain shape or its slope's, and in its own; and which
     (path,) are silent, blurred or from a facet that is not rough."""

@@ -15,7 +15,7 @@ from sonarsynth.equations.bubble.snap_pressure import Bubble, onset
 from sonarsynth.sources.pulse_model import PulseModel
 from sonarsynth.sources.snap_models import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
 from sonarsynth.sources.snap_pulses import largest_scales, scales
-from sonarsynth.sources.sound_source import Snap, SoundSource
+from sonarsynth.sources.sound_source import Emission, SoundSource
 
 
 @description
@@ -107,7 +107,7 @@ class SnappingShrimp(SoundSource):
         """As `SoundSource.largest_scales`."""
         return largest_scales(self.variation)
 
-    def emissions(self, bottom: float, random: np.random.Generator, start: float) -> tuple[Snap, ...]:
+    def emissions(self, bottom: float, random: np.random.Generator, start: float) -> tuple[Emission, ...]:
         """As `SoundSource.emissions`: each snap as loud and as long as is drawn for it."""
         drawn = scales(self.variation, random, len(self.times))
         each = zip(self.times, drawn.gain.tolist(), drawn.width.tolist(), strict=True)

@@ -19,7 +19,7 @@ level is of. Negative where the phase is turned by pi. One pattern for all of th
 
 
 @dataclass(frozen=True, eq=False)
-class Snap:
+class Emission:
     """One emission of one source: gain p(t/width) of its model."""
 
     position: Floats  # (xyz) m, world
@@ -83,13 +83,13 @@ class SoundSource(Method):
         """Bounds on the gain and the width of what it emits, over its model's; the smallest are their inverses."""
         return 1.0, 1.0
 
-    def emissions(self, bottom: float, random: np.random.Generator, start: float) -> tuple[Snap, ...]:
+    def emissions(self, bottom: float, random: np.random.Generator, start: float) -> tuple[Emission, ...]:
         """What it emits in a frame, one a time; random: a stream of its own in each frame; start: time (s) of the
         frame since the start of the motions."""
         return tuple(self.emission(bottom, start, time) for time in self.times)
 
-    def emission(self, bottom: float, start: float, time: float, gain: float = 1.0, width: float = 1.0) -> Snap:
+    def emission(self, bottom: float, start: float, time: float, gain: float = 1.0, width: float = 1.0) -> Emission:
         """What it emits `time` (s) after the instant of a frame, gain times as loud and width times as long."""
         now, model = start + time, self.model(bottom)
         motion = self.velocity(now), self.directivity(now)
-        return Snap(self.place(bottom, now), time, model, self.level, gain, width, *motion, self.illuminates)
+        return Emission(self.place(bottom, now), time, model, self.level, gain, width, *motion, self.illuminates)

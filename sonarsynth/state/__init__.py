@@ -16,17 +16,17 @@ from sonarsynth.geometry.motion import Track
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.receiver import Elements, Sonar
 from sonarsynth.scattering import FacetLaw, Scatterers
-from sonarsynth.sources.sound_source import Snap
+from sonarsynth.sources.sound_source import Emission
 
 if TYPE_CHECKING:
     from sonarsynth.environment.absorption import DepthAbsorption
 
 __all__ = [
+    "Emission",
     "FrameContext",
     "Medium",
     "OcclusionPoint",
     "Receiver",
-    "Snap",
     "Survey",
     "Tolerances",
     "TravelTime",
@@ -52,7 +52,7 @@ class WorldState:
 
     time: float  # s since the start of the trajectory
     bodies: tuple[PlacedTarget, ...]
-    snaps: tuple[Snap, ...]
+    snaps: tuple[Emission, ...]
     scatterers: tuple[Scatterers, ...] = field(default=(), kw_only=True)  # that belong to no body, and hide nothing
 
 
@@ -150,7 +150,7 @@ class FrameContext(WorldState):
         return (*of_bodies, *self.scatterers)
 
 
-def meeting_times(tracks: Sequence[Track], snaps: tuple[Snap, ...], travel_time: TravelTime) -> Floats:
+def meeting_times(tracks: Sequence[Track], snaps: tuple[Emission, ...], travel_time: TravelTime) -> Floats:
     """When the sound of each snap meets what is on each track (snap, track), s on the clock of the frame.
 
     tracks: from the instant of the frame on; travel_time: of direct paths. Solves t = t_snap + T(x(t)), x the track, by

@@ -13,7 +13,7 @@ from sonarsynth.conventions import NO_TARGET, depth
 from sonarsynth.geometry.motion import Track
 from sonarsynth.products import Arrivals, Kind
 from sonarsynth.scattering.facet_geometry import PulseResponse
-from sonarsynth.state import FrameContext, Snap
+from sonarsynth.state import Emission, FrameContext
 from sonarsynth.tracing.doppler import Meeting, MetPaths, apply_doppler, received
 from sonarsynth.tracing.echoes import echoes
 from sonarsynth.tracing.expansion.amplitude_polynomials import fitted
@@ -56,7 +56,7 @@ def trace(context: FrameContext, propagation: Propagation) -> Arrivals:
     return join(parts, receiver.speed(context.medium), receiver.centre)
 
 
-def _hearing(array: FacetPaths, snap: Snap, sonar: Track) -> FacetPaths:
+def _hearing(array: FacetPaths, snap: Emission, sonar: Track) -> FacetPaths:
     """The array where it hears a snap itself."""
     speed = float(array.context.medium.profile.at(depth(sonar.pose.position)))
     heard = float(hearing_times(snap.position, np.asarray(snap.time), sonar, speed))
@@ -86,7 +86,7 @@ def _echoes(array: FacetPaths, snaps: Iterable[int]) -> list[Arrivals]:
 
 
 def _direct(array: FacetPaths, index: int) -> Arrivals:
-    """Snap `index` to array, where no body stands in between that sound does not pass."""
+    """Emission `index` to array, where no body stands in between that sound does not pass."""
     context, meeting = array.context, array.meeting
     medium, receiver, snap = context.medium, context.receiver, context.snaps[index]
     legs = rays_to_centre(medium, snap.position[None, :], receiver, array.propagation)

@@ -31,7 +31,7 @@ from sonarsynth.geometry.motion import Track
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import Elements
 from sonarsynth.scattering import Scatterers
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 from sonarsynth.tracing.expansion.probe_paths import TERMS
 from sonarsynth.tracing.expansion.wavefront_polynomials import QUADRATIC_PROBES, SECOND_DEGREE, probes, sphere
 from sonarsynth.tracing.receive_paths import ReceivePaths
@@ -69,7 +69,7 @@ class MetPaths:
         return MetPaths(**{name: value[rows] for name, value in vars(self).items()})
 
     @staticmethod
-    def direct(count: int, snap: Snap) -> MetPaths:
+    def direct(count: int, snap: Emission) -> MetPaths:
         """Paths from a snap itself, which is where it is when it sounds."""
         zero, none = np.zeros(count), np.zeros((count, 3))
         return MetPaths(zero + snap.time, zero, none + snap.velocity, none, none)

@@ -15,7 +15,7 @@ from sonarsynth.products import Arrivals, Kind
 from sonarsynth.propagation.reflections import reflections
 from sonarsynth.scattering import Component
 from sonarsynth.scattering.facet_geometry import PulseResponse
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 from sonarsynth.tracing.doppler import MetPaths, apply_doppler, meets, met_paths, received, velocities
 from sonarsynth.tracing.echo_batches import EchoBatch, echo_batches, in_band
 from sonarsynth.tracing.expansion.amplitude_polynomials import variations
@@ -29,7 +29,6 @@ from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, no_arriva
 
 if TYPE_CHECKING:
     from sonarsynth.tracing.facet_paths import FacetPaths
-
 
 PRUNE_MARGIN = 1e-3
 """Of what is negligible: fainter echoes are not held while other facets are looked at."""
@@ -104,7 +103,7 @@ class _EchoBlock:
 
 
 def echoes(array: FacetPaths, index: int, parts: tuple[tuple[Component, ...], ...], kind: Kind) -> Arrivals:
-    """Snap `index` to facet to array, over every facet of the legs that is lit; parts: of the law of each owner.
+    """Emission `index` to facet to array, over every facet of the legs that is lit; parts: of the law of each owner.
 
     Facets are taken in blocks, so that little is held at a time; the echoes are those of one block, in its order.
     """
@@ -145,7 +144,7 @@ def echoes(array: FacetPaths, index: int, parts: tuple[tuple[Component, ...], ..
     return ordered(made, group)
 
 
-def _loudest(array: FacetPaths, snap: Snap, parts: tuple[tuple[Component, ...], ...]) -> list[_EchoBlock]:
+def _loudest(array: FacetPaths, snap: Emission, parts: tuple[tuple[Component, ...], ...]) -> list[_EchoBlock]:
     """Echoes from each block of facets that are not too faint.
 
     What is much fainter than will do, by the blocks so far, is not held; should it be wanted after all, its block is
@@ -171,7 +170,7 @@ def _loudest(array: FacetPaths, snap: Snap, parts: tuple[tuple[Component, ...], 
     return held
 
 
-def _found(array: FacetPaths, snap: Snap, parts: tuple[tuple[Component, ...], ...]) -> _EchoBlock:
+def _found(array: FacetPaths, snap: Emission, parts: tuple[tuple[Component, ...], ...]) -> _EchoBlock:
     """All echoes of a snap from the facets of the legs."""
     out, fronts = _ways(array, snap), array.fronts
     way, leg = path_pairs(out.facet, array.legs.row, len(array.facets.facet))
@@ -189,7 +188,7 @@ def _found(array: FacetPaths, snap: Snap, parts: tuple[tuple[Component, ...], ..
     return _EchoBlock(array, groups, out, leg, factor, few, gain, over, pulses, carried)
 
 
-def _carried(array: FacetPaths, snap: Snap, out: TransmitPaths, leg: Ints) -> tuple[TransmitPaths, MetPaths]:
+def _carried(array: FacetPaths, snap: Emission, out: TransmitPaths, leg: Ints) -> tuple[TransmitPaths, MetPaths]:
     """Ways (pair,) when and where the sound meets what moves, and the remainder of the motion."""
     meeting, facets = array.meeting, array.facets
     assert meeting is not None
@@ -220,7 +219,7 @@ def _columns(groups: list[EchoBatch], *names: str) -> list[np.ndarray]:
     return [np.concatenate([getattr(g, name) for g in groups]) for name in names]
 
 
-def _ways(array: FacetPaths, snap: Snap) -> TransmitPaths:
+def _ways(array: FacetPaths, snap: Emission) -> TransmitPaths:
     """Ways from a snap to the lit side of facets that no body hides; of facets in one place, the first body's."""
     medium, bodies, facets = array.context.medium, array.context.bodies, array.facets
     row = np.flatnonzero(may_face_receiver(facets, snap.position, array.propagation.bounces, medium))
@@ -241,7 +240,9 @@ def _ways(array: FacetPaths, snap: Snap) -> TransmitPaths:
     return out.merged()
 
 
-def _hides(array: FacetPaths, bodies: tuple[PlacedTarget, ...], snap: Snap, out: TransmitPaths, start: Floats) -> Bools:
+def _hides(
+    array: FacetPaths, bodies: tuple[PlacedTarget, ...], snap: Emission, out: TransmitPaths, start: Floats
+) -> Bools:
     """Whether any of some bodies stands in ways (way,) from a snap to points near facets, start (way, xyz)."""
     end = np.broadcast_to(snap.position, start.shape)
     stand_in = partial(hidden, bounces=out.bounces, turning=out.turning)  # backwards: bodies are where a ray begins

@@ -8,7 +8,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, depth
 from sonarsynth.environment.absorption import DepthAbsorption
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 from sonarsynth.tracing.receive_paths import ReceivePaths
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sonarsynth.tracing.transmit_paths import TransmitPaths
 
 
-def path_loss(array: FacetPaths, snap: Snap, legs: ReceivePaths, out: TransmitPaths | None = None) -> Floats:
+def path_loss(array: FacetPaths, snap: Emission, legs: ReceivePaths, out: TransmitPaths | None = None) -> Floats:
     """Absorption (path,) in dB along legs to the array and, of echoes, along the ways out to where they start."""
     absorption = array.context.medium.absorption
     if not isinstance(absorption, DepthAbsorption):

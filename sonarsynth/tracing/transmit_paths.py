@@ -11,7 +11,7 @@ from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.products import Arrivals, Kind, Paths
 from sonarsynth.propagation.reflections import Reflections, as_sign
 from sonarsynth.scattering.facet_geometry import PulseResponse
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 from sonarsynth.tracing.expansion.wavefront_polynomials import ExpansionTerms
 from sonarsynth.tracing.receive_paths import ReceivePaths
 
@@ -38,7 +38,7 @@ class TransmitPaths:
     approach: Floats  # (way,) speed of the source along the way, over that of sound: pulses are shorter by it
 
     @staticmethod
-    def of(paths: Paths, bounced: Reflections, facet: Ints, snap: Snap, speed: float) -> TransmitPaths:
+    def of(paths: Paths, bounced: Reflections, facet: Ints, snap: Emission, speed: float) -> TransmitPaths:
         """Of paths to facets (path,) from a snap where sound has this speed (m/s)."""
         loud, turned = directed(snap, paths.departure)
         return TransmitPaths(
@@ -81,7 +81,7 @@ class TransmitPaths:
         return np.asarray(self.surface + self.bottom)
 
 
-def directed(snap: Snap, departure: Floats) -> tuple[Floats | float, Floats | float]:
+def directed(snap: Emission, departure: Floats) -> tuple[Floats | float, Floats | float]:
     """What a snap sends in directions (path, xyz), world: modulus and phase (rad) over that of its level."""
     if snap.directivity is None:
         return 1.0, 0.0

@@ -22,7 +22,7 @@ from sonarsynth.recipe.scene import Scene, World
 from sonarsynth.scattering import Isotropic, Kirchhoff, MirrorLobe
 from sonarsynth.scattering.law_notes import concave_note, facing_share
 from sonarsynth.sources.shrimp import LogarithmicBubble, SnappingShrimp
-from sonarsynth.state import FrameContext, Medium, Receiver, Snap
+from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Cylinder, LShape, Remus100, Sphere
 from sonarsynth.targets.target import Target
@@ -55,7 +55,7 @@ def heard(
     """Every path; all of them finite."""
     speed = np.array([C + 8.0, C - 7.0]) if bent else np.array([C])
     water = Medium(WATER, Profile(np.array([0.0, BOTTOM_DEPTH])[: len(speed)], speed))
-    snaps = (Snap(np.asarray(source), 0.0, LogarithmicBubble(), None),)
+    snaps = (Emission(np.asarray(source), 0.0, LogarithmicBubble(), None),)
     context = FrameContext(0.0, bodies, snaps, water, Receiver(Pose(ARRAY, EAST), ROMANIS), laws)
     found = trace(context, AutoTracing(bounces=bounces))
     for name, value in vars(found).items():
@@ -250,7 +250,7 @@ def test_a_body_that_touches_a_boundary_within_rounding_is_in_the_water(depth: f
             made = plan(scene(Target(name="body", shape=shape, motion=still), depth), {"cloud"})
             body = made.recipe.frame(0)[1].moment.bodies[0]
             surface = Environment(depth=depth, sound_speed=Isovelocity(speed=C))
-            snap = Snap(np.array([14.0, -4.0, -5.0]), 0.0, LogarithmicBubble(), None)
+            snap = Emission(np.array([14.0, -4.0, -5.0]), 0.0, LogarithmicBubble(), None)
             water, receiver = Medium(surface, made.profile), Receiver(Pose(np.array([0.0, 0.0, -5.0]), EAST), ROMANIS)
             found = trace(FrameContext(0.0, (body,), (snap,), water, receiver, (Kirchhoff(),)), AutoTracing(bounces=1))
             assert np.isfinite(found.amplitude).all() and (found.target == 0).any()

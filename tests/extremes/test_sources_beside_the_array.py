@@ -13,7 +13,7 @@ from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.ranging.location.triggered import Triggered
 from sonarsynth.receiver import Romanis, elements
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Receiver, Snap, Survey
+from sonarsynth.state import Emission, Receiver, Survey
 from tests.heard import silence
 
 TANK = Path(__file__).resolve().parents[2] / "configs" / "tank.yaml"
@@ -79,7 +79,7 @@ def test_among_the_hydrophones_its_trigger_tells_when_and_where() -> None:
 def test_a_trigger_errs_as_it_says() -> None:
     method, random = Triggered(time_error=3e-6, position_error=0.02), np.random.default_rng(3)
     receiver = Receiver(Pose(np.array([0.0, 0.0, -5.0]), quaternion(0.5 * np.pi)), elements(Romanis()))
-    snap = Snap(np.array([1.0, 0.5, -4.0]), 0.25, LogarithmicBubble(), None)
+    snap = Emission(np.array([1.0, 0.5, -4.0]), 0.25, LogarithmicBubble(), None)
     told = [method.told((snap,), receiver, random)[0] for _ in range(400)]
     off = np.array([(t.position - snap.position) / 0.02 for t in told])
     late = np.array([t.time for t in told]) - 0.25

@@ -15,10 +15,10 @@ from sonarsynth.signals import DirectSum, GriddedSynthesis, pulse_support
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.sources.snap_pulses import waveform
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 
 MODEL = LogarithmicBubble()
-SNAPS = (Snap(np.zeros(3), 0.0, MODEL, None),)
+SNAPS = (Emission(np.zeros(3), 0.0, MODEL, None),)
 SONAR = Sonar()
 C = 1540.0
 GRID = np.linspace(-0.6, 0.6, 4)

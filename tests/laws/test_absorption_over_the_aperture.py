@@ -12,11 +12,11 @@ from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, element
 from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 
 C = 1540.0
 SONAR = Sonar()
-SNAPS = (Snap(np.zeros(3), 0.0, LogarithmicBubble(), None),)
+SNAPS = (Emission(np.zeros(3), 0.0, LogarithmicBubble(), None),)
 ROMANIS = elements(Romanis())
 FAR = np.argsort(np.linalg.norm(ROMANIS.position, axis=1))[[-1, -2, -200]]
 

@@ -19,7 +19,7 @@ from sonarsynth.propagation import AutoTracing, Refracted, Straight
 from sonarsynth.receiver import BeamGrid, Romanis, Sonar, elements
 from sonarsynth.scattering import Kirchhoff, MirrorLobe, PartlyReflecting, Scattering
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import FrameContext, Medium, Receiver, Snap
+from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.tracing import echoes
 from sonarsynth.tracing.arrivals import trace
 
@@ -40,7 +40,7 @@ BODIES = tuple(
     for name, n, place in (("large", 5, (20.0, 1.0, -11.0)), ("small", 3, (15.0, 0.5, -11.5)))
 )
 SNAPS = tuple(
-    Snap(np.array(at), 1e-3 * at[0], LogarithmicBubble(), None) for at in ((3.0, 6.0, -30.0), (9.0, -6.0, -30))
+    Emission(np.array(at), 1e-3 * at[0], LogarithmicBubble(), None) for at in ((3.0, 6.0, -30.0), (9.0, -6.0, -30))
 )
 CASES: dict[str, tuple[Profile, int, Scattering]] = {
     "straight": (UNIFORM, 0, MirrorLobe(width=0.3)),

@@ -19,7 +19,7 @@ from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import Romanis, elements
 from sonarsynth.scattering import Isotropic, Kirchhoff, MirrorLobe, PartlyReflecting
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import FrameContext, Medium, Receiver, Snap
+from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.tracing.arrivals import trace
@@ -42,7 +42,7 @@ def body(mesh: Mesh, place: Floats, name: str = "body", turned: float = 0.5 * np
 def echo(
     bodies: tuple[PlacedTarget, ...], source: Floats, laws: tuple[object, ...], bounces: int = 0, array: Floats = ARRAY
 ) -> Arrivals:
-    snaps = (Snap(np.array(source, float), 0.0, LogarithmicBubble(), None),)
+    snaps = (Emission(np.array(source, float), 0.0, LogarithmicBubble(), None),)
     receiver = Receiver(Pose(array, EAST), ROMANIS)
     found = trace(
         FrameContext(0.0, bodies, snaps, Medium(WATER, PROFILE), receiver, laws), AutoTracing(bounces=bounces)

@@ -23,13 +23,13 @@ from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.array_paths import array_paths, delay_and_gain
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import FrameContext, Medium, Receiver, Snap, Tolerances
+from sonarsynth.state import Emission, FrameContext, Medium, Receiver, Tolerances
 from sonarsynth.tracing.arrivals import trace
 from sonarsynth.tracing.expansion.wavefront_polynomials import terms_of
 
 POSE = Pose(np.array([0.0, 0.0, -5.0]), quaternion(0.5 * np.pi))
 ROMANIS = elements(Romanis())
-SNAP = Snap(np.array([5.0, -2.0, -9.0]), 0.0, LogarithmicBubble(), None)
+SNAP = Emission(np.array([5.0, -2.0, -9.0]), 0.0, LogarithmicBubble(), None)
 SONAR = Sonar()
 PROFILE = Profile(np.array([0.0, 10.0]), np.array([1500.0, 1700.0]))
 WATER = Environment(depth=10.0, sound_speed=Isovelocity(speed=1500.0), absorption=Absorption(formula="none"))

@@ -24,7 +24,7 @@ from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.array_paths import array_paths, delay_and_gain
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import FrameContext, Medium, Receiver, Snap, Tolerances
+from sonarsynth.state import Emission, FrameContext, Medium, Receiver, Tolerances
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box
 from sonarsynth.tracing.arrivals import trace
@@ -33,7 +33,7 @@ C = 1500.0
 PROFILE = Profile(np.array([0.0]), np.array([C]))
 POSE = Pose(np.array([0.0, 0.0, -5.0]), quaternion(0.5 * np.pi))
 ROMANIS = elements(Romanis())
-SNAP = Snap(np.array([14.0, -5.0, -9.5]), 0.0, LogarithmicBubble(), None)
+SNAP = Emission(np.array([14.0, -5.0, -9.5]), 0.0, LogarithmicBubble(), None)
 SONAR = Sonar()
 PANEL = mesh_of(Box(size=(0.006, 0.3, 0.2), edge=0.05))
 FRONT = np.flatnonzero(PANEL.normal[:, 0] < -0.9)

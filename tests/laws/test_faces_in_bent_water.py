@@ -19,13 +19,13 @@ from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.signals.array_paths import array_paths, arrival_directions, towards
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import FrameContext, Medium, Receiver, Snap
+from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.tracing.arrivals import trace
 
 C = 1500.0
 POSE = Pose(np.array([0.0, 0.0, -5.0]), quaternion(0.5 * np.pi))
 ROMANIS = elements(Romanis())
-SNAPS = tuple(Snap(np.array([14.0, y, z]), 0.0, LogarithmicBubble(), None) for y, z in ((-5.0, -9.5), (-4.0, -9.0)))
+SNAPS = tuple(Emission(np.array([14.0, y, z]), 0.0, LogarithmicBubble(), None) for y, z in ((-5.0, -9.5), (-4.0, -9.0)))
 SONAR = Sonar()
 FAR = np.array([int(np.argmax(np.linalg.norm(ROMANIS.position, axis=1))), int(np.argmin(ROMANIS.position[:, 2])), 300])
 START, SAMPLES = 0.008, 1000

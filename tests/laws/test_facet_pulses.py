@@ -19,11 +19,11 @@ from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.sources.snap_pulses import waveform
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 from tests.laws.test_synthesis import C, absorption, arrivals, error, some_of, target_at
 
 MODEL = LogarithmicBubble()
-SNAPS = (Snap(np.zeros(3), 0.0, MODEL, None),)
+SNAPS = (Emission(np.zeros(3), 0.0, MODEL, None),)
 SHARP = Sonar(filter=BandPass(low=35e3, high=75e3, transition=15e3, attenuation=160))  # nothing beyond 98 kHz
 CENTRE = SHARP.band.centre
 ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))

@@ -20,7 +20,7 @@ from sonarsynth.scattering import Kirchhoff
 from sonarsynth.signals import GriddedSynthesis
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import FrameContext, Medium, Receiver, Snap, Tolerances
+from sonarsynth.state import Emission, FrameContext, Medium, Receiver, Tolerances
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box
 from sonarsynth.tracing.arrivals import trace
@@ -30,7 +30,7 @@ PROFILE = Profile(np.array([0.0]), np.array([C]))
 WATER = Environment(depth=200.0, sound_speed=Isovelocity(speed=C), absorption=Absorption(formula="none"))
 PLACE, EAST = np.array([0.0, 0.0, -100.0]), quaternion(0.5 * np.pi)
 ROMANIS = elements(Romanis())
-SNAP = Snap(PLACE + [0.5, 2.0, 1.0], 0.0, LogarithmicBubble(), None)
+SNAP = Emission(PLACE + [0.5, 2.0, 1.0], 0.0, LogarithmicBubble(), None)
 SONAR = Sonar()
 EDGES = np.array([SONAR.band.low, SONAR.band.centre, SONAR.band.high])
 PANEL = mesh_of(Box(size=(0.006, 0.06, 0.06), edge=0.006))

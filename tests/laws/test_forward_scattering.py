@@ -21,7 +21,7 @@ from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import Romanis, elements
 from sonarsynth.scattering import Kirchhoff, MirrorLobe, PartlyReflecting
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import FrameContext, Medium, Receiver, Snap
+from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.tracing.arrivals import trace
@@ -53,7 +53,7 @@ def heard(
     moving: Track | None = None,
     water: Environment = WATER,
 ) -> Arrivals:
-    snaps = (Snap(np.array(source, float), 0.0, LogarithmicBubble(), None),)
+    snaps = (Emission(np.array(source, float), 0.0, LogarithmicBubble(), None),)
     receiver = Receiver(Pose(np.array(array, float), EAST), ROMANIS, track=moving)
     return trace(FrameContext(0.0, bodies, snaps, Medium(water, profile), receiver, laws), AutoTracing(bounces=bounces))
 

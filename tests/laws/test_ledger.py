@@ -19,11 +19,11 @@ from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.signals.isolated_paths import energy_in_slices, ideal_hydrophone, measured_levels
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.sources.snap_pulses import waveform
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 from tests.laws.test_synthesis import absorption, arrivals
 
 MODEL = LogarithmicBubble()
-SNAPS = (Snap(np.zeros(3), 0.0, MODEL, None), Snap(np.ones(3), 0.0, MODEL, None, gain=0.3))
+SNAPS = (Emission(np.zeros(3), 0.0, MODEL, None), Emission(np.ones(3), 0.0, MODEL, None, gain=0.3))
 SONAR = Sonar(filter=BandPass(low=25e3, high=85e3), band=SonarBand(low=25e3, high=85e3))
 LEVEL = np.array([190.0, 180.0])
 LOSSES = ("transmission_loss_out", "transmission_loss_in", "absorption_loss", "boundary_loss")

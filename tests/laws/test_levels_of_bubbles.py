@@ -12,7 +12,7 @@ from sonarsynth.equations.noise import filters
 from sonarsynth.equations.noise.filters import Fir
 from sonarsynth.signals.filtered_pulse import snap_gains, snap_levels
 from sonarsynth.sources.snap_models import KellerMiksis
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 
 GASES = (300.0, 1000.0, 3000.0)
 EAR = Fir(0.0, 200e3, 20e3, 60.0)
@@ -25,7 +25,7 @@ def collapsed(gas: float, depth: float = 5.0) -> Collapse:
 
 def heard(model: KellerMiksis, source_level: float) -> float:
     """Peak level (dB) of a snap with an imposed level, at 1 m, behind the hydrophone."""
-    snap = Snap(np.zeros(3), 0.0, model, source_level, 1.0, 1.0)
+    snap = Emission(np.zeros(3), 0.0, model, source_level, 1.0, 1.0)
     made = pulses.scaled(model.pulse(0.0, pulses.reach(EAR)), float(snap_gains((snap,))[0]), 1.0)
     return pulses.levels(made, EAR).peak
 
@@ -60,7 +60,9 @@ def test_an_imposed_level_is_heard_whatever_the_gas() -> None:
 
 def test_the_level_that_is_stored_is_of_the_same_peak() -> None:
     model = KellerMiksis(depth=5.0)
-    raw, own = (Snap(np.zeros(3), 0.0, m, None, 1.0, 1.0) for m in (KellerMiksis(depth=5.0, level_below=None), model))
+    raw, own = (
+        Emission(np.zeros(3), 0.0, m, None, 1.0, 1.0) for m in (KellerMiksis(depth=5.0, level_below=None), model)
+    )
     found = collapsed(2000.0)
     expected = float(level(bubble_pulse.peak(found)[1])), float(level(bubble_pulse.peak_below(found, 200e3)))
     assert snap_levels((raw, own)) == pytest.approx(expected, abs=1e-9)

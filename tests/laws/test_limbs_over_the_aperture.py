@@ -20,7 +20,7 @@ from sonarsynth.scattering.components import CoherentKirchhoff
 from sonarsynth.scattering.facet_geometry import patches
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import FrameContext, Medium, OcclusionPoint, Receiver, Snap, Tolerances
+from sonarsynth.state import Emission, FrameContext, Medium, OcclusionPoint, Receiver, Tolerances
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Sphere
 from sonarsynth.tracing.arrivals import trace
@@ -31,7 +31,7 @@ WATER = Environment(depth=200.0, sound_speed=Isovelocity(speed=C), absorption=Ab
 PLACE, EAST = np.array([0.0, 0.0, -100.0]), quaternion(0.5 * np.pi)
 SONAR, FACE = Sonar(), Romanis().face
 BALL = mesh_of(Sphere(radius=0.08, edge=0.008))
-SNAP = Snap(PLACE + [4.0, 6.0, 1.0], 0.0, LogarithmicBubble(), None)
+SNAP = Emission(PLACE + [4.0, 6.0, 1.0], 0.0, LogarithmicBubble(), None)
 ARRAY = elements(PositionTable(positions=tuple(map(tuple, elements(Romanis()).position[::6].tolist())), face=FACE))
 FAR = np.argsort(np.linalg.norm(ARRAY.position, axis=1))[[-1, -2, 30]]
 SINGLE = elements(PositionTable(positions=((0.0, 0.0, 0.0),), face=FACE))

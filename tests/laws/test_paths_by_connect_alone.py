@@ -23,7 +23,7 @@ from sonarsynth.propagation.path_model import KnownRays
 from sonarsynth.receiver import Romanis, elements
 from sonarsynth.scattering import Isotropic
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import FrameContext, Medium, Receiver, Snap, Tolerances
+from sonarsynth.state import Emission, FrameContext, Medium, Receiver, Tolerances
 from sonarsynth.tracing.arrivals import trace
 
 DEPTH = 12.0
@@ -53,7 +53,7 @@ def traced(model: PathModel, profile: Profile) -> Arrivals:
     shape = trimesh.creation.icosphere(subdivisions=2, radius=0.3)
     mesh = Mesh(np.asarray(shape.vertices), np.asarray(shape.faces, np.int32))
     ball = PlacedTarget("ball", mesh, Pose(np.array([15.0, 1.0, -6.0]), quaternion(0.0)), np.zeros(3))
-    snap = Snap(np.array([6.0, 5.0, -9.0]), 0.0, LogarithmicBubble(), None)
+    snap = Emission(np.array([6.0, 5.0, -9.0]), 0.0, LogarithmicBubble(), None)
     law, all_of_it = (Isotropic(strength=1.0),), Tolerances(negligible=0.0)
     water, receiver = Medium(WATER, profile), Receiver(SONAR, ARRAY)
     return trace(FrameContext(0.0, (ball,), (snap,), water, receiver, law, all_of_it), model)

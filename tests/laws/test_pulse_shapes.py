@@ -26,11 +26,11 @@ from sonarsynth.signals.filtered_pulse import (
 from sonarsynth.signals.pulse_shapes import shape_modes
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.sources.snap_pulses import waveform
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 from tests.laws.test_synthesis import absorption, arrivals, error, some_of, target_at
 
 MODEL = LogarithmicBubble()
-SNAPS = (Snap(np.zeros(3), 0.0, MODEL, None),)
+SNAPS = (Emission(np.zeros(3), 0.0, MODEL, None),)
 SONAR = Sonar()
 SHARP = Sonar(filter=BandPass(low=35e3, high=75e3, transition=15e3, attenuation=160))  # nothing beyond 98 kHz
 LOW = Sonar(filter=LowPass(cutoff=60e3, attenuation=140), sampling_frequency=250e3)
@@ -127,7 +127,7 @@ def test_a_turned_pulse_is_over_after_its_support(sonar: Sonar) -> None:
 )
 def test_kernel_deposit_is_the_exact_sum(method: GriddedSynthesis, bound: float) -> None:
     """All at once: phase, blur and stretch of any size, refracted fronts, several snaps of different kinds."""
-    snaps = (*SNAPS, Snap(np.zeros(3), 0.0, LogarithmicBubble(q=-2.5e5), 190.0))
+    snaps = (*SNAPS, Emission(np.zeros(3), 0.0, LogarithmicBubble(q=-2.5e5), 190.0))
     array = some_of(FACES, 60)
     of = shaped(target_at(8.0, 9, 2, refracted=True, direct=False), 3)
     of = replace(of, snap=np.random.default_rng(4).integers(0, 2, of.delay.size))

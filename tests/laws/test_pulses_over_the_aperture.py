@@ -20,7 +20,7 @@ from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, element
 from sonarsynth.scattering import FacetLaw, Kirchhoff, MirrorLobe, PartlyReflecting
 from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import FrameContext, Medium, Receiver, Snap
+from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box
 from sonarsynth.tracing.arrivals import trace
@@ -34,7 +34,7 @@ FACE = 49.53e-3
 SAND = SeaBottom(reflection=Sediment(name="medium sand"))
 HARD = SeaBottom(reflection=Rigid())
 ROUGH = SeaSurface(rms_height=0.006)
-SNAP = Snap(np.array([14.0, -5.0, -9.5]), 0.0, LogarithmicBubble(), None)
+SNAP = Emission(np.array([14.0, -5.0, -9.5]), 0.0, LogarithmicBubble(), None)
 SONAR = Sonar()
 BAND = SONAR.band
 EDGES = np.array([BAND.low, BAND.centre, BAND.high])

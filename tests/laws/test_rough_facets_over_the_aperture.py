@@ -20,7 +20,7 @@ from sonarsynth.scattering import Kirchhoff
 from sonarsynth.signals import GriddedSynthesis
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import FrameContext, Medium, Receiver, Snap, Tolerances
+from sonarsynth.state import Emission, FrameContext, Medium, Receiver, Tolerances
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box
 from sonarsynth.tracing.arrivals import trace
@@ -67,7 +67,7 @@ def traced(
 ) -> Arrivals:
     """What the front of the panel echoes without phase in common."""
     panel = PlacedTarget("panel", PANEL, Pose(PLACE + view.place, quaternion(view.heading)), np.zeros(3))
-    snap = Snap(PLACE + view.snap, 0.0, LogarithmicBubble(), None)
+    snap = Emission(PLACE + view.snap, 0.0, LogarithmicBubble(), None)
     receiver = Receiver(Pose(place, EAST), array, SONAR)
     none = Tolerances(negligible=0.0, quadratic=0.0, facet_mean=0.0)
     context = FrameContext(0.0, (panel,), (snap,), Medium(WATER, profile), receiver, (law,), none)
@@ -77,7 +77,7 @@ def traced(
 
 
 def heard(found: Arrivals, array: Elements, start: float) -> Floats:
-    snap = Snap(PLACE, 0.0, LogarithmicBubble(), None)
+    snap = Emission(PLACE, 0.0, LogarithmicBubble(), None)
     return exact_signals(found, (snap,), array, SONAR, None, start, 512)[0]
 
 
@@ -175,7 +175,7 @@ def test_echoes_come_from_their_points(profile: Profile, bounces: int) -> None:
 def test_the_fast_synthesis_follows_rough_facets_over_the_array() -> None:
     found, array = traced(ROUGH, GRAZING, PLACE, array_of(1.0)), array_of(1.0)
     assert found.delay_variance_terms.any()
-    start, snap = found.delay.min() - 2e-4, Snap(PLACE, 0.0, LogarithmicBubble(), None)
+    start, snap = found.delay.min() - 2e-4, Emission(PLACE, 0.0, LogarithmicBubble(), None)
     exact = heard(found, array, start)
     for tolerance, most in ((1.5e-4, 2e-4), (1e-6, 3e-6)):
         method = GriddedSynthesis(width=10, precision="float64", tolerance=tolerance)

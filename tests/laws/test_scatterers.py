@@ -22,7 +22,7 @@ from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import PositionTable, Sonar, elements
 from sonarsynth.scattering import Isotropic
 from sonarsynth.sources.snap_models import Gabor
-from sonarsynth.state import FrameContext, Medium, Receiver, Snap, Tolerances
+from sonarsynth.state import Emission, FrameContext, Medium, Receiver, Tolerances
 from sonarsynth.tracing.arrivals import trace
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -34,7 +34,7 @@ WATER = Medium(
 ARRAY = elements(PositionTable(positions=((0.0, -0.1, 0.0), (0.0, 0.1, 0.1), (0.0, 0.0, -0.1))))
 POSE = Pose(np.array([0.0, 0.0, -5.0]), quaternion(0.5 * np.pi))
 SOURCE = np.array([6.0, -4.0, -7.0])
-SNAP = Snap(SOURCE, 0.0, Gabor(frequency=50e3, cycles=8.0), None)
+SNAP = Emission(SOURCE, 0.0, Gabor(frequency=50e3, cycles=8.0), None)
 
 
 def ball(place: list[float], radius: float = 0.3) -> PlacedTarget:

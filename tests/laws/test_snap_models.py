@@ -27,7 +27,7 @@ from sonarsynth.signals.filtered_pulse import (
 from sonarsynth.sources.shrimp import LogarithmicBubble, SnapModel, SnappingShrimp
 from sonarsynth.sources.snap_models import Gabor, KellerMiksis, RecordedSnap, Ricker, SnapVariation
 from sonarsynth.sources.snap_pulses import largest_scales, waveform
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 from tests.laws.test_synthesis import absorption, arrivals, error, some_of, target_at
 from tests.scenes import remus
 
@@ -51,8 +51,8 @@ def recorded(folder: Path, wave: Floats) -> RecordedSnap:
     return RecordedSnap(path=str(path), time=0.0)
 
 
-def snap(model: SnapModel, level: float | None = None, gain: float = 1.0, width: float = 1.0) -> Snap:
-    return Snap(np.zeros(3), 0.0, model, level, gain, width)
+def snap(model: SnapModel, level: float | None = None, gain: float = 1.0, width: float = 1.0) -> Emission:
+    return Emission(np.zeros(3), 0.0, model, level, gain, width)
 
 
 def with_shrimp(frames: int = 2, **of_shrimp: object) -> Recipe:

@@ -20,7 +20,7 @@ from sonarsynth.receiver import LowPass, PositionTable, Sonar, elements
 from sonarsynth.scattering import Isotropic
 from sonarsynth.signals import DirectSum
 from sonarsynth.sources.snap_models import Gabor
-from sonarsynth.state import FrameContext, Medium, Receiver, Snap, Tolerances
+from sonarsynth.state import Emission, FrameContext, Medium, Receiver, Tolerances
 from sonarsynth.tracing.arrivals import trace
 
 C, RATE, STILL = 1500.0, 400e3, np.zeros(3)
@@ -41,13 +41,13 @@ def ball() -> PlacedTarget:
     return PlacedTarget("ball", mesh, Pose(PLACE, quaternion(0.0)), STILL)
 
 
-def traced(snap: Snap, sonar: Floats = STILL) -> Arrivals:
+def traced(snap: Emission, sonar: Floats = STILL) -> Arrivals:
     receiver = Receiver(POSE, ARRAY, SONAR, Track(POSE, sonar))
     laws, none = (Isotropic(strength=1.0),), Tolerances(negligible=0.0, quadratic=0.0)
     return trace(FrameContext(0.0, (ball(),), (snap,), WATER, receiver, laws, none), AutoTracing(bounces=0))
 
 
-def heard(found: Arrivals, snap: Snap, start: float, samples: int) -> Floats:
+def heard(found: Arrivals, snap: Emission, start: float, samples: int) -> Floats:
     return np.asarray(DirectSum().signals(found, (snap,), ARRAY, SONAR, None, start, samples).pressure, float)
 
 
@@ -57,7 +57,7 @@ def tone(time: Floats) -> Floats:
     return np.asarray(np.cos(2.0 * np.pi * TONE.frequency * time) * np.exp(-0.5 * (time / deviation) ** 2))
 
 
-def emitted(snap: Snap, end: Floats, time: Floats) -> tuple[Floats, Floats]:
+def emitted(snap: Emission, end: Floats, time: Floats) -> tuple[Floats, Floats]:
     """When what is at `end` (xyz) at times (sample,) was emitted, and how far away the source was then, by the root of
     t' + |end - x(t')|/c = t."""
     sent = time.copy()
@@ -69,7 +69,7 @@ def emitted(snap: Snap, end: Floats, time: Floats) -> tuple[Floats, Floats]:
 
 @pytest.mark.parametrize("velocity", [(25.0, 0.0, 0.0), (-8.0, -20.0, 5.0)])
 def test_a_source_that_moves_is_heard_as_its_retarded_time_says(velocity: tuple[float, float, float]) -> None:
-    snap = Snap(SOURCE, 0.0, TONE, None, velocity=np.array(velocity))
+    snap = Emission(SOURCE, 0.0, TONE, None, velocity=np.array(velocity))
     found = traced(snap)
     for some, by_target in ((found.select(found.direct), False), (found.select(~found.direct), True)):
         start, samples = float(some.delay.min()) - 1.5e-3, 1200
@@ -102,7 +102,7 @@ class Dipole:
 
 
 def test_the_directivity_is_that_of_the_direction_in_which_each_path_leaves() -> None:
-    plain = Snap(SOURCE, 0.0, TONE, None)
+    plain = Emission(SOURCE, 0.0, TONE, None)
     dipole = replace(plain, directivity=Dipole((-0.8, 0.6, 0.0)))
     every, some = traced(plain), traced(dipole)
     start, samples = float(every.delay.min()) - 1e-3, 1024
@@ -122,7 +122,7 @@ def test_the_directivity_is_that_of_the_direction_in_which_each_path_leaves() ->
 
 
 def test_a_source_that_does_not_illuminate_is_heard_directly_alone() -> None:
-    plain = Snap(SOURCE, 0.0, TONE, None)
+    plain = Emission(SOURCE, 0.0, TONE, None)
     every, alone = traced(plain), traced(replace(plain, illuminates=False))
     assert not every.direct.all() and alone.direct.all()
     for name, value in vars(every.select(every.direct)).items():
@@ -133,6 +133,6 @@ def test_a_source_that_does_not_illuminate_is_heard_directly_alone() -> None:
 def test_a_source_that_moves_with_the_array_is_at_rest_for_it() -> None:
     """The direct pulse of what the array tows comes at another time, but is not stretched."""
     velocity = np.array([12.0, 9.0, 0.0])
-    found = traced(Snap(SOURCE, 0.0, TONE, None, velocity=velocity), velocity)
+    found = traced(Emission(SOURCE, 0.0, TONE, None, velocity=velocity), velocity)
     assert found.doppler[found.direct] == pytest.approx(0.0, abs=1e-12)
     assert np.abs(found.doppler[~found.direct]).min() > 1e-3

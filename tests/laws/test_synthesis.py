@@ -19,10 +19,10 @@ from sonarsynth.signals.filtered_pulse import fir
 from sonarsynth.signals.gridded.nodes import chebyshev, interpolation, nodes_for
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.sources.snap_pulses import waveform
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 
 MODEL = LogarithmicBubble()
-SNAPS = (Snap(np.zeros(3), 0.0, MODEL, None),)
+SNAPS = (Emission(np.zeros(3), 0.0, MODEL, None),)
 SONAR = Sonar()
 SHARP = Sonar(filter=BandPass(low=35e3, high=75e3, transition=15e3, attenuation=160))  # nothing beyond 98 kHz
 FACES = elements(Romanis())
@@ -299,7 +299,7 @@ def test_hydrophones_anywhere_and_plane_waves() -> None:
 def test_several_snaps_of_different_kinds_and_levels() -> None:
     rng = np.random.default_rng(6)
     other = LogarithmicBubble(q=-2.5e5)
-    snaps = (*SNAPS, Snap(np.zeros(3), 0.0, MODEL, 180.0), Snap(np.zeros(3), 0.0, other, 190.0))
+    snaps = (*SNAPS, Emission(np.zeros(3), 0.0, MODEL, 180.0), Emission(np.zeros(3), 0.0, other, 190.0))
     of = target_at(15.0, 30, 7, direct=False)
     of = arrivals(of.delay, of.direction, of.radius, of.amplitude, snap=rng.integers(0, 3, 30))
     array = some_of(FACES, 60)

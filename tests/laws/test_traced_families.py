@@ -18,7 +18,7 @@ from sonarsynth.propagation import AutoTracing, Refracted, Straight
 from sonarsynth.receiver import PositionTable, Romanis, elements
 from sonarsynth.scattering import Isotropic, MirrorLobe
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import FrameContext, Medium, Receiver, Snap
+from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.tracing.arrivals import trace
 
 BOTTOM_DEPTH, C = 12.0, 1530.0
@@ -37,15 +37,15 @@ def ball(place=(15.0, 1.0, -6.0), radius: float = 0.3, subdivisions: int = 2) ->
     return PlacedTarget("ball", mesh, Pose(np.array(place), quaternion(0.0)), np.zeros(3))
 
 
-def snap(time: float = 0.0) -> Snap:
-    return Snap(SOURCE, time, LogarithmicBubble(), None)
+def snap(time: float = 0.0) -> Emission:
+    return Emission(SOURCE, time, LogarithmicBubble(), None)
 
 
 def run(
     bodies=None, profile=UNIFORM, environment=RIGID, bounces=2, law=None, array=ONE, tracing=None, source=SOURCE,
     sonar=SONAR,
 ) -> Arrivals:  # fmt: skip
-    snaps = (Snap(source, 0.0, LogarithmicBubble(), None),)
+    snaps = (Emission(source, 0.0, LogarithmicBubble(), None),)
     bodies = (ball(),) if bodies is None else bodies
     tracing = tracing or AutoTracing(bounces=bounces)
     laws = (law or Isotropic(strength=1.0),) * len(bodies)

@@ -19,7 +19,7 @@ from sonarsynth.propagation import AutoTracing, Refracted, Straight
 from sonarsynth.receiver import Elements, PositionTable, Romanis, elements
 from sonarsynth.scattering import Isotropic, MirrorLobe
 from sonarsynth.sources.shrimp import LogarithmicBubble
-from sonarsynth.state import FrameContext, Medium, Receiver, Snap
+from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.tracing.arrivals import arrivals, trace
 from sonarsynth.tracing.expansion.wavefront_polynomials import probes
 from sonarsynth.tracing.facet_paths import facet_paths
@@ -45,13 +45,13 @@ def body(
     return PlacedTarget(name, mesh, Pose(np.array(position), quaternion(heading, 0.1, 0.2)), np.zeros(3))
 
 
-def snap(position: tuple[float, float, float], time: float = 0.0) -> Snap:
-    return Snap(np.array(position), time, LogarithmicBubble(), None)
+def snap(position: tuple[float, float, float], time: float = 0.0) -> Emission:
+    return Emission(np.array(position), time, LogarithmicBubble(), None)
 
 
 def run(
     bodies: tuple[PlacedTarget, ...] = (body((20.0, 1.0, -11.0)),),
-    snaps: tuple[Snap, ...] = (snap((3.0, 6.0, -30.0)),),
+    snaps: tuple[Emission, ...] = (snap((3.0, 6.0, -30.0)),),
     profile: Profile = UNIFORM,
     law: MirrorLobe | Isotropic | None = None,
     sonar: Pose = SONAR,

@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from sonarsynth.evaluation import check
 from sonarsynth.pipeline import render
 from sonarsynth.planning import plan
 from sonarsynth.recipe import reading
+from sonarsynth.schedule import build
+from sonarsynth.store import open_store
 
 REMUS = Path(__file__).resolve().parents[2] / "configs" / "remus.yaml"
 SMALL = (
@@ -96,3 +99,12 @@ def test_a_chorus_whose_recording_is_absent_is_refused() -> None:
     absent = "scene.world.chorus={snap: {kind: recorded_snap, path: absent.wav}}"
     with pytest.raises(reading.RecipeError, match=r"chorus.snap.path: no such file"):
         reading.load(str(REMUS), [*SMALL, absent])
+
+
+def test_a_chorus_that_is_brighter_than_the_echoes_is_no_fault_of_the_store(tmp_path: Path) -> None:
+    chorus = "scene.world.chorus={density: 0.02, reach: 100 m, images: 2}"
+    made = plan(reading.load(str(REMUS), [*SMALL, chorus, "scene.trajectory.frames=2"]))
+    assert build(made, tmp_path / "chorus.zarr", workers=0).ok
+    checks = check(open_store(tmp_path / "chorus.zarr"))
+    assert not [one for one in checks if one.ok is False]
+    assert any("also heard: chorus" in one.warning for one in checks)

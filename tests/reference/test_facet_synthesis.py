@@ -21,11 +21,11 @@ from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.signals.pulse_shapes import MOST_PHASE, shape_modes
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.sources.snap_pulses import waveform
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 from tests.laws.test_synthesis import C, absorption, arrivals, error, some_of, target_at
 
 MODEL = LogarithmicBubble()
-SNAPS = (Snap(np.zeros(3), 0.0, MODEL, None),)
+SNAPS = (Emission(np.zeros(3), 0.0, MODEL, None),)
 SONAR = Sonar()
 SHARP = Sonar(filter=BandPass(low=35e3, high=75e3, transition=15e3, attenuation=160))  # nothing beyond 98 kHz
 LOW = Sonar(filter=LowPass(cutoff=60e3, attenuation=140), sampling_frequency=250e3)

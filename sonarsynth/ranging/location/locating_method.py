@@ -7,7 +7,7 @@ import numpy as np
 from sonarsynth.description.method import FrameSize, Method
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.receiver import Elements
-from sonarsynth.state import Receiver, Snap, Survey, Trigger
+from sonarsynth.state import Emission, Receiver, Survey, Trigger
 
 
 class LocatingMethod(Method):
@@ -17,7 +17,7 @@ class LocatingMethod(Method):
         """The `snaps` loudest direct pulses, loudest first, one row each; NaN rows for those that were not found."""
         raise NotImplementedError(f"{type(self).__name__} locates nothing")
 
-    def told(self, snaps: tuple[Snap, ...], receiver: Receiver, random: np.random.Generator) -> tuple[Trigger, ...]:
+    def told(self, snaps: tuple[Emission, ...], receiver: Receiver, random: np.random.Generator) -> tuple[Trigger, ...]:
         """What a trigger tells the sonar of the emissions of a frame, loudest first; nothing, unless it has one.
 
         random: a stream of its own in each frame.

@@ -13,7 +13,7 @@ from sonarsynth.description.method import FrameSize
 from sonarsynth.environment.sound_speed import mean_gradient
 from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging.location.locating_method import LocatingMethod
-from sonarsynth.state import Receiver, Snap, Survey, Trigger
+from sonarsynth.state import Emission, Receiver, Survey, Trigger
 
 
 @description
@@ -28,7 +28,7 @@ class Triggered(LocatingMethod):
     position_error: PositiveMetres = 0.01
     """Standard error of each coordinate of the place that it is told."""
 
-    def told(self, snaps: tuple[Snap, ...], receiver: Receiver, random: np.random.Generator) -> tuple[Trigger, ...]:
+    def told(self, snaps: tuple[Emission, ...], receiver: Receiver, random: np.random.Generator) -> tuple[Trigger, ...]:
         """As `LocatingMethod.told`: with errors that are drawn."""
         from sonarsynth.signals.filtered_pulse import envelope_delay, snap_levels
 

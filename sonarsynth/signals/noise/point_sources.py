@@ -17,7 +17,7 @@ from sonarsynth.signals.direct_sum import attenuation, exact_spectra, relative_a
 from sonarsynth.signals.filtered_pulse import fir
 from sonarsynth.signals.segments import fast_length
 from sonarsynth.sources.noise_source import NoiseRecording, NoiseSource
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 
 MARGIN = 8
 """Samples of the period beyond window, filter and delays."""
@@ -29,7 +29,7 @@ def add_noise_source(
     signals: Signals,
     source: NoiseSource,
     arrivals: Arrivals,
-    instant: Snap,
+    instant: Emission,
     elements: Elements,
     sonar: Sonar,
     absorption: Callable[[Floats], Floats] | None,

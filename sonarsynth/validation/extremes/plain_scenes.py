@@ -18,7 +18,7 @@ from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import Band, Elements, LowPass, Sonar
 from sonarsynth.sources.shrimp import SnapModel
 from sonarsynth.sources.snap_models import Ricker
-from sonarsynth.state import FrameContext, Medium, Receiver, Snap
+from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.tracing.arrivals import trace
 
 if TYPE_CHECKING:
@@ -36,9 +36,9 @@ WATER = Environment(depth=BOTTOM_DEPTH, sound_speed=Isovelocity(speed=C), absorp
 PROFILE = Profile(np.array([0.0]), np.array([C]))
 
 
-def snap(place: Sequence[float] | Floats, time: float = 0.0, model: SnapModel = PULSE, gain: float = 1.0) -> Snap:
+def snap(place: Sequence[float] | Floats, time: float = 0.0, model: SnapModel = PULSE, gain: float = 1.0) -> Emission:
     """A test pulse at a place (xyz) in the sonar frame."""
-    return Snap(ARRAY + np.asarray(place, float), time, model, None, gain)
+    return Emission(ARRAY + np.asarray(place, float), time, model, None, gain)
 
 
 def body(mesh: Mesh, place: Sequence[float] | Floats, turned: float = 0.5 * np.pi) -> PlacedTarget:
@@ -47,7 +47,7 @@ def body(mesh: Mesh, place: Sequence[float] | Floats, turned: float = 0.5 * np.p
 
 
 def traced(
-    snaps: Sequence[Snap],
+    snaps: Sequence[Emission],
     elements: Elements,
     bodies: Sequence[PlacedTarget] = (),
     laws: Sequence[FacetLaw] = (),
@@ -66,7 +66,7 @@ def traced(
 def heard(
     method: SignalSynthesis,
     found: Arrivals,
-    snaps: Sequence[Snap],
+    snaps: Sequence[Emission],
     elements: Elements,
     start: float,
     samples: int,

@@ -26,7 +26,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.environment.sea import Profile
 from sonarsynth.receiver.hydrophones import elements
 from sonarsynth.recipe.scene import Frame, Scene
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 from sonarsynth.validation.references.frames.facet_laws import amplitudes, known, signs
 from sonarsynth.validation.references.frames.line_of_sight import Surface
 from sonarsynth.validation.references.frames.moving_points import Mover
@@ -125,7 +125,7 @@ class FramePressure:
         """Most reflections of a path."""
         return self.scene.physics.tracing.bounces
 
-    def _lit(self, snap: Snap, body: Body) -> list[_Lit]:
+    def _lit(self, snap: Emission, body: Body) -> list[_Lit]:
         """The facets of a body that a snap lights, by each family."""
         found = []
         for family in families(self.bounces):
@@ -185,7 +185,7 @@ class FramePressure:
         size = size * body.sign[one.row] * one.back.spreading * way.spreading
         return [self._arriving(place, late, size, (1.0 - away) / (1.0 - out), (one.back, one.family), (way, family))]
 
-    def _direct(self, snap: Snap, place: Floats) -> list[Contributions]:
+    def _direct(self, snap: Emission, place: Floats) -> list[Contributions]:
         """What one hydrophone hears without a target."""
         found, sent = [], np.array([snap.time])
         for family in families(self.bounces):
@@ -215,7 +215,7 @@ class FramePressure:
             face=elements(self.scene.sonar.array).face * face,
         )
 
-    def _signal(self, snap: Snap, found: list[Contributions], start: float, samples: int) -> Floats:
+    def _signal(self, snap: Emission, found: list[Contributions], start: float, samples: int) -> Floats:
         """Pressure (sample,) of what arrives."""
         rate, chosen = self.scene.sonar.sampling_frequency, self.scene.sonar.antialias
         pad = int(np.ceil(1.2 * duration(snap, chosen) * rate))

@@ -9,13 +9,13 @@ import numpy as np
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.sea import Absorption
 from sonarsynth.receiver import Filter, LowPass
-from sonarsynth.state import Snap
+from sonarsynth.state import Emission
 from sonarsynth.validation.references.frames.path_sum import point_spectrum
 
 MICROPASCAL = 1e-6
 
 
-def spectrum(snap: Snap, step: float, bins: int, longer: float = 0.0) -> np.ndarray:
+def spectrum(snap: Emission, step: float, bins: int, longer: float = 0.0) -> np.ndarray:
     """Spectrum (bin,) in Pa s, at frequencies bin * step (Hz), of a snap at 1 m that lasts 1 + longer times as long:
     of gain p(t/width), its collapse at 0."""
     made = snap.model.pulse(0.0, step * bins * snap.width * (1.0 + max(longer, 0.1)))
@@ -40,7 +40,7 @@ def _passed(chosen: Filter) -> tuple[Floats, Floats, float, float]:
     return f[::2][: len(whole)], whole, low, high
 
 
-def duration(snap: Snap, chosen: Filter) -> float:
+def duration(snap: Emission, chosen: Filter) -> float:
     """How long (s) either side of its collapse a filtered snap lasts at most."""
     made = snap.model.pulse(0.0, 0.0 if isinstance(chosen, LowPass) else chosen.high)
     ringing = (chosen.attenuation - 7.95) / (2.285 * 4.0 * np.pi * chosen.transition)
