@@ -57,7 +57,8 @@ def planning() -> Iterator[None]:
     """Shows that a plan is being made: a spinner on a terminal, else a line now and then."""
     began, done = time.monotonic(), threading.Event()
     if sys.stderr.isatty():
-        with Progress(SpinnerColumn(), TextColumn("planning"), TimeElapsedColumn(), transient=True) as bar:
+        columns = SpinnerColumn(), TextColumn("planning"), TimeElapsedColumn()
+        with Progress(*columns, console=console(stderr=True), transient=True) as bar:
             bar.add_task("planning", total=None)
             yield
         return

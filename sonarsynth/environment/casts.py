@@ -144,8 +144,12 @@ def _salinity(cast: Cast, water: dict[str, Floats], depth: Floats, latitude: flo
     """Practical salinity (row,) where the file has no column of it: as given, or by the conductivity."""
     if cast.salinity is not None:
         return np.full(len(depth), cast.salinity)
-    pressure = water["pressure"] if "pressure" in water else pressure_of_depth(depth, latitude)
-    return np.nan_to_num(practical_salinity(water["conductivity"], water["temperature"], pressure))
+    standard = pressure_of_depth(depth, latitude)
+    pressure = water.get("pressure", standard)
+    found = practical_salinity(
+        water["conductivity"], water["temperature"], np.where(np.isfinite(pressure), pressure, standard)
+    )
+    return np.where(water["conductivity"] > 0.0, found, 0.0)
 
 
 def _unused(cast: Cast, table: CastTable) -> tuple[str, ...]:

@@ -82,7 +82,8 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
         energy, truth = of_frame(tree, "image/energy", i), of_frame(tree, "truth/beams/target", i)
         if not ((truth >= 0).any() and echoes_heard(some, i)):
             continue
-        if not np.isfinite(energy).any():  # no clock, no image: a miss, unless no snap could be heard or made out
+        lost = some.has("source_estimates/usable") and not some.of("source_estimates/usable", i)
+        if lost or not np.isfinite(energy).any():  # no clock: a miss, unless no snap could be heard or made out
             hit = ghost = False
             counts = bool(snaps_heard(some, i).any()) and not refused(some, i)
         else:

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from sonarsynth.evaluation.checks import Check, numbered, other_sounds
+from sonarsynth.evaluation.source_estimates import STRANGERS
 from sonarsynth.products import FAMILIES, ORIGINS
 
 OUTLIERS = 0.01
@@ -83,7 +84,7 @@ def _clocks(tree: xr.DataTree, frames: np.ndarray) -> np.ndarray:
         return np.full(len(frames), UNKNOWN)
     each, row = np.unique(frames, return_inverse=True)
     emission = np.asarray(tree["source_estimates"].dataset["emission"].isel(frame=each, estimate=0).values)
-    other = STRANGER if other_sounds(tree) else UNKNOWN
+    other = STRANGER if STRANGERS & set(other_sounds(tree)) else UNKNOWN
     return np.where(emission < 0, other, emission.astype(int))[row]
 
 

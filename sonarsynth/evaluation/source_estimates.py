@@ -23,6 +23,8 @@ QUANTITIES = ("position", "azimuth", "elevation", "time")
 USELESS_RANGE = 0.5
 """A place whose predicted error is more of its range than this is of no use; a bearing, of more than a beam width; a
 time, of more than the inverse of the bandwidth."""
+STRANGERS = frozenset({"chorus", "noise_sources"})
+"""Other sounds that may be located as snaps."""
 ACCEPTED, PLACELESS = REASONS.index("accepted"), REASONS.index("range_unknown")
 
 
@@ -69,6 +71,9 @@ def snap_located(tree: xr.DataTree, frames: np.ndarray) -> Check:
     if not tally.rows:
         got = f"none of {tally.unheard} found" if tally.unheard else "no snap reaches the array"
         return Check(NAME, EXPECTED, got, None, {"found": 0}, numbered(sorted(tally.frames)), _warning(tally))
+    if not (tally.strays or any(tally.within.values())):
+        got = f"none of {tally.unheard} found, {tally.strangers} of other snaps"
+        return Check(NAME, EXPECTED, got, None, {"found": tally.rows}, (), _warning(tally))
     shares = {name: float(np.mean(good + [False] * tally.strays)) for name, good in tally.within.items() if good}
     worst = min(shares, key=lambda name: shares[name]) if shares else "position"
     good = bool(shares) and shares[worst] >= SHARE
@@ -104,7 +109,7 @@ def _frame(some: SmallVariables, i: int, tally: _Tally) -> None:
     for row in found:
         emission = int(column["emission"][row])
         if emission < 0:
-            tally.add_stray(i, bool(other_sounds(some.tree)))
+            tally.add_stray(i, bool(STRANGERS & set(other_sounds(some.tree))))
             continue
         one = {name: values[row] for name, values in column.items()}
         turned = (one["azimuth"] - truth["azimuth"][emission] + 180.0) % 360.0 - 180.0

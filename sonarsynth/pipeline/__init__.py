@@ -36,7 +36,7 @@ from sonarsynth.pipeline.stored_values import (
     table,
     truth_values,
 )
-from sonarsynth.pipeline.synthesis import digitise, errors_of, frame_signals, known_signals
+from sonarsynth.pipeline.synthesis import digitise, errors_of, frame_signals, known_elements, known_signals
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, variables
 from sonarsynth.planning import OF_BEAMS, Plan, check_unsampled_frame, context_of, plan, receiver_of, survey_of
 from sonarsynth.planning.notes.source_notes import locator
@@ -186,20 +186,21 @@ def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFr
     Without a snap whose echo window is in the record there is no clock: the image is of the last so long part of the
     record, and no echo has a place.
     """
-    processing, receiver, windows = plan.scene.processing, receiver_of(plan, frame), plan.windows
+    processing, windows, elements = plan.scene.processing, plan.windows, known_elements(plan, frame)
+    receiver = replace(receiver_of(plan, frame), elements=elements)
     survey = survey_of(plan, frame)
     estimates = locator(plan.scene).locate(signals, receiver, survey, plan.sizes["estimate"])
     window = (windows.echo_start, windows.echo_stop)
-    estimates = light_first(estimates, signals, plan.elements, plan.scene.sonar, *window)
+    estimates = light_first(estimates, signals, elements, plan.scene.sonar, *window)
     mark_stage("locate")
     imaged, beams = signals, None
     if in_record(estimates, signals, *window)[:1].any():
         start, stop = (float(estimates.time[0]) + late for late in window)
         if processing.cancelling is not None:
             imaged = processing.cancelling.cancel(signals, estimates, receiver, survey, (start, stop))
-        imaged, beams, image = image_of(plan, imaged, estimates, (start, stop))
+        imaged, beams, image = image_of(plan, elements, imaged, estimates, (start, stop))
     else:  # no direct pulse was found, or an echo was taken for it
-        image = image_without_clock(plan, signals)
+        image = image_without_clock(plan, elements, signals)
     mark_stage("beamform")
     return BeamformedFrame(signals, estimates, image, imaged, beams)
 
@@ -208,7 +209,7 @@ def synthesise(plan: Plan, traced: TracedFrame) -> Signals:
     """Pressure at each hydrophone: echoes and direct snap, chorus, ambient noise, converter."""
     plan = plan.at(traced.frame.index)
     signals = frame_signals(plan, traced.frame, traced.arrivals)
-    return digitise(plan, traced.frame, with_chorus(plan, signals, traced.chorus))
+    return digitise(plan, traced.frame, with_chorus(plan, traced.frame, signals, traced.chorus))
 
 
 def measure_isolated(plan: Plan, traced: TracedFrame) -> Floats:
@@ -259,7 +260,7 @@ def cloud_of(plan: Plan, frame: Frame, heard: BeamformedFrame) -> PointCloud:
         return no_points()
     if not in_record(estimates, signals, plan.windows.echo_start, plan.windows.echo_stop)[:1].any():
         return no_points()
-    elements, sonar, choices = plan.elements, plan.scene.sonar, plan.choices
+    elements, sonar, choices = known_elements(plan, frame), plan.scene.sonar, plan.choices
     loudest = float(np.abs(signals.pressure).max(initial=0.0))
     window = ReceivedWindow(elements, sonar, image, beams, loudest, heard.signals, estimates)
     return point_cloud(window, choices.picking, choices.placing, frame.sonar_pose, plan.profile)

@@ -8,18 +8,18 @@ from sonarsynth.imaging.image_window import energy_image, snapshots_of
 from sonarsynth.planning import Plan
 from sonarsynth.products import BeamSpectra, EnergyImage, Signals, SourceEstimates
 from sonarsynth.ranging.cancelling.direct_pulse import remove, remove_others, trusted
-from sonarsynth.receiver import Sonar
+from sonarsynth.receiver import Elements, Sonar
 
 
 def image_of(
-    plan: Plan, signals: Signals, estimates: SourceEstimates, window: tuple[float, float]
+    plan: Plan, elements: Elements, signals: Signals, estimates: SourceEstimates, window: tuple[float, float]
 ) -> tuple[Signals, BeamSpectra | None, EnergyImage]:
     """The image of an echo window (start, stop) in s, the signals that it was made of, and their beams.
 
     The direct pulses of later snaps that are heard in the window are taken out; of the first one, where the plan says
     so. Where the plan takes the direct pulse out, what may be left of it is asked for in every beam.
     """
-    method, elements, sonar = plan.choices.beamforming, plan.elements, plan.scene.sonar
+    method, sonar = plan.choices.beamforming, plan.scene.sonar
     length = plan.windows.supports.clear
     if plan.scene.processing.direct_pulse != "keep":
         signals = remove_others(signals, estimates, elements, sonar, length, window)
@@ -47,9 +47,9 @@ def no_image(sonar: Sonar, start: float, stop: float, remainder: float = np.nan)
     return EnergyImage(silent, sonar.beams.azimuth, sonar.beams.elevation, start, stop, remainder)
 
 
-def image_without_clock(plan: Plan, signals: Signals) -> EnergyImage:
+def image_without_clock(plan: Plan, elements: Elements, signals: Signals) -> EnergyImage:
     """The image of the last part of the record that is as long as the echo window, where no snap says when echoes
     come."""
     stop = signals.start + (signals.pressure.shape[1] - 1) / signals.sampling_frequency
     start = max(stop - (plan.windows.echo_stop - plan.windows.echo_start), signals.start)
-    return plan.choices.beamforming.image(signals, plan.elements, plan.scene.sonar, start, stop)
+    return plan.choices.beamforming.image(signals, elements, plan.scene.sonar, start, stop)

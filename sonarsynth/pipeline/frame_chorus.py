@@ -9,6 +9,7 @@ import numpy as np
 from sonarsynth.conventions import azimuth_elevation, depth
 from sonarsynth.labels.estimate_labels import Direct, heard_first
 from sonarsynth.pipeline.stored_values import Values, table
+from sonarsynth.pipeline.synthesis import true_elements
 from sonarsynth.planning import Plan, frame_start, receiver_of
 from sonarsynth.products import Echoes, Signals
 from sonarsynth.randomness import number
@@ -45,14 +46,21 @@ def frame_chorus(plan: Plan, frame: Frame) -> ChorusArrivals | None:
     return chorus_arrivals(snaps, reach, plan.medium, receiver, frame.time, window)
 
 
-def with_chorus(plan: Plan, signals: Signals, arrivals: ChorusArrivals | None) -> Signals:
+def with_chorus(plan: Plan, frame: Frame, signals: Signals, arrivals: ChorusArrivals | None) -> Signals:
     """Signals with the chorus; `plan` is that of the frame's sequence."""
     chorus = plan.scene.world.chorus
     if arrivals is None or chorus is None or not len(arrivals.delay):
         return signals
     model, samples = chorus.snap.at_depth(plan.medium.depth), signals.pressure.shape[1]
     heard = chorus_pressure(
-        arrivals, model, chorus.widths, plan.elements, plan.scene.sonar, plan.absorption, signals.start, samples
+        arrivals,
+        model,
+        chorus.widths,
+        true_elements(plan, frame),
+        plan.scene.sonar,
+        plan.absorption,
+        signals.start,
+        samples,
     )
     return replace(signals, pressure=signals.pressure + heard)
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from sonarsynth.labels import SLICES, Band, Listening, label_points
+from sonarsynth.pipeline.synthesis import known_elements
 from sonarsynth.planning import Plan
 from sonarsynth.products import Arrivals, PointCloud, PointLabels, SourceEstimates
 from sonarsynth.recipe.scene import Frame
@@ -42,7 +43,7 @@ def point_labels(
     moves = plan.scene.physics.doppler
     moment = frame.moment if moves else replace(frame.moment, bodies=tuple(body.frozen for body in frame.moment.bodies))
     listening = Listening(
-        plan.elements,
+        known_elements(plan, frame),
         sonar.assumed_sound_speed,
         plan.choices.beamforming.focus,
         float(estimates.time[0]) if len(estimates.time) else np.nan,

@@ -90,16 +90,21 @@ def digitise(plan: Plan, frame: Frame, signals: Signals) -> Signals:
 
 
 def _with_noise_source(plan: Plan, frame: Frame, signals: Signals, source: NoiseSource, number: int) -> Signals:
-    """Signals with the sound of one source, by the paths that an emission of it would take."""
-    time, position = frame.time, pose(source.motion, frame.time).position
-    instant = Emission(position, 0.0, Ricker(frequency=plan.scene.sonar.band.centre), None, illuminates=False)
+    """Signals with the sound of one source, by the paths of an emission that is heard at the instant of the frame."""
+    own = frame.sonar_pose.position
+    away = np.linalg.norm(pose(source.motion, frame.time).position - own)
+    late = float(away) / float(plan.profile.at(depth(own)))
+    time, position = frame.time - late, pose(source.motion, frame.time - late).position
+    pulse = Ricker(frequency=plan.scene.sonar.band.centre)
+    instant = Emission(position, -late, pulse, None, illuminates=False)
     arrivals = trace(replace(context_of(plan, frame), snaps=(instant,)), plan.propagation)
+    arrivals = replace(arrivals, delay=arrivals.delay + late)
     apart = position - frame.sonar_pose.position
     closing = (frame.sonar_velocity - velocity(source.motion, time)) @ apart / max(float(np.linalg.norm(apart)), 1e-9)
     random = stream(frame.seed, "noise source", frame.key, frame.step, number)
     sonar, sensors = plan.scene.sonar, true_elements(plan, frame)
     arrivals = _behind(arrivals, sonar)
-    moving = partial(add_noise_source, time=time, closing=float(closing), random=random)
+    moving = partial(add_noise_source, time=frame.time, closing=float(closing), random=random)
     return moving(signals, source, arrivals, instant, sensors, sonar, plan.absorption)
 
 
@@ -138,6 +143,15 @@ def _through_channels(plan: Plan, frame: Frame, signals: Signals, sound_speed: f
             signals = replace(signals, pressure=np.where(held, stuck, signals.pressure))
         mark_stage(SENSORS)
     return signals
+
+
+def known_elements(plan: Plan, frame: Frame) -> Elements:
+    """The elements as processing has them: without those that it knows to be dead or stuck."""
+    errors, drawn = plan.scene.sonar.sensor_errors, errors_of(plan, frame)
+    if errors is None or drawn is None or errors.known == "none":
+        return plan.elements
+    works = (drawn.state != SensorState.DEAD) & (drawn.state != SensorState.STUCK)
+    return plan.elements if works.all() else replace(plan.elements, gain=plan.elements.gain * works)
 
 
 def known_signals(plan: Plan, frame: Frame, signals: Signals) -> Signals:

@@ -68,7 +68,7 @@ def _source_rows(plan: Plan) -> list[NoiseRow]:
     rows, each, centre = list[NoiseRow](), plan.sizes["sensor"] * plan.sizes["sample"], plan.scene.sonar.band.centre
     trajectory, bottom = plan.scene.trajectory, plan.scene.world.environment.depth
     for number, source in enumerate(plan.scene.world.noise_sources):
-        for step in (0, trajectory.frames - 1):
+        for step in range(trajectory.frames):
             height = float(pose(source.motion, trajectory.time(step)).position[2])
             if not -bottom <= height < 0.0:
                 where = ("scene", "world", "noise_sources", number, "motion")

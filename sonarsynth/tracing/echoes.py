@@ -226,7 +226,7 @@ def _ways(array: FacetPaths, snap: Emission) -> TransmitPaths:
     start = np.broadcast_to(snap.position, (len(row), 3))
     paths = array.propagation.connect(medium.profile, medium.depth, start, facets.point[row])
     facet = row[paths.pair]
-    lit = usable(paths) & (np.einsum("ij,ij->i", facets.normal[facet], paths.arrival) <= 0)
+    lit = usable(paths) & facets.lit(facet, paths.arrival)
     bounced = reflections(medium.environment, medium.profile, paths, array.context.receiver.centre)
     speed = float(medium.profile.at(depth(snap.position)))
     out = TransmitPaths.of(paths, bounced, facet, snap, speed)

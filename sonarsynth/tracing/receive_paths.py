@@ -97,6 +97,15 @@ class Facets:
         normal = self.normal[row]
         return self.clear[row], np.where(normal.any(axis=1, keepdims=True), normal, departure)
 
+    def lit(self, row: Ints, arrival: Floats) -> Bools:
+        """Whether paths that arrive along (path, xyz) light facets (row of each): from their side, if they have one."""
+        return np.asarray((np.einsum("ij,ij->i", self.normal[row], arrival) < 0) | self.sideless[row])
+
+    @property
+    def sideless(self) -> Bools:
+        """(facet,) which scatter all round: they have no normal."""
+        return np.asarray(~self.normal.any(axis=1))
+
     def select(self, keep: Bools | Ints | slice) -> Facets:
         """The facets picked by a mask, by indices, or by a slice, which copies nothing."""
         return Facets(**{name: value[keep] for name, value in vars(self).items()})
@@ -191,7 +200,7 @@ def receive_paths(
     ahead = np.einsum("ij,ij->i", facets.normal[legs.row], legs.departure) * legs.length
     if slack and propagation.bends:
         ahead += legs.swerve(medium, receiver, slack) * (legs.length + slack)
-    return legs.select(np.flatnonzero(ahead >= -slack))
+    return legs.select(np.flatnonzero((ahead > -slack) | facets.sideless[legs.row]))
 
 
 def may_face_receiver(facets: Facets, position: Floats, bounces: int, medium: Medium, slack: float = 0.0) -> Bools:
@@ -202,7 +211,7 @@ def may_face_receiver(facets: Facets, position: Floats, bounces: int, medium: Me
     less, and by Snell's law its cosine is nowhere less than there times the ratio of the extreme sound speeds.
     """
     if not bounces and medium.profile.uniform:
-        return np.asarray(np.einsum("ij,ij->i", facets.normal, position - facets.point) >= -slack)
+        return np.asarray((np.einsum("ij,ij->i", facets.normal, position - facets.point) > -slack) | facets.sideless)
     level = position[:2] - facets.point[:, :2]
     distance = np.hypot(level[:, 0], level[:, 1])
     flattest = distance / np.hypot(distance, (bounces + 2) * medium.depth)

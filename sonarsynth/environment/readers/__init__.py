@@ -5,6 +5,7 @@ from __future__ import annotations
 import bz2
 import gzip
 import io
+import lzma
 import re
 import zipfile
 import zlib
@@ -13,7 +14,7 @@ from typing import Any, Final
 
 from sonarsynth.description import named_files
 from sonarsynth.environment.readers.cast_netcdf import read_netcdf
-from sonarsynth.environment.readers.cast_table import CastError, CastTable, Column
+from sonarsynth.environment.readers.cast_table import MAX_ROWS, CastError, CastTable, Column
 from sonarsynth.environment.readers.fixed_columns import read_fixed_columns
 from sonarsynth.environment.readers.named_columns import read_named_columns
 from sonarsynth.environment.readers.sea_bird import is_sea_bird, read_sea_bird
@@ -28,7 +29,6 @@ READ: Final = (
 """What is read, for refusals."""
 
 MAX_BYTES: Final = 1 << 26
-MAX_ROWS: Final = 500_000
 
 
 def read_cast(
@@ -85,6 +85,13 @@ def _decoded(data: bytes) -> str:
     return re.sub("\r+\n?", "\n", text)
 
 
+UNPACKING: Final = (
+    OSError, EOFError, zlib.error, lzma.LZMAError, zipfile.BadZipFile, NotImplementedError, RuntimeError,
+    UnicodeDecodeError,
+)  # fmt: skip
+"""What a damaged archive may bring."""
+
+
 def _unpacked(data: bytes) -> bytes:
     """What a packed file of one file holds, of MAX_BYTES at most. Raises FileError."""
     try:
@@ -99,7 +106,7 @@ def _unpacked(data: bytes) -> bytes:
                     raise named_files.FileError(f"is an archive of {len(files)} files, not of one cast")
                 with archive.open(files[0]) as member:
                     return _bounded(member)
-    except (OSError, EOFError, zlib.error, zipfile.BadZipFile, NotImplementedError, RuntimeError) as error:
+    except UNPACKING as error:
         raise named_files.FileError(f"cannot be unpacked ({' '.join(str(error).split())[:80]})") from None
     return data
 

@@ -62,7 +62,8 @@ UNITS: Final[dict[str, dict[tuple[str, ...], tuple[float, float]]]] = {
         ("bar",): (10.0, 0.0),
         ("kpa",): (0.1, 0.0),
         ("mpa",): (100.0, 0.0),
-        ("psi", "psia"): (0.6894757, 0.0),
+        ("psi",): (0.6894757, 0.0),
+        ("psia",): (0.6894757, -10.1325),  # that of the air with it
     },
     "temperature": {
         ("c", "degc", "deg c", "degrees c", "°c", "º c", "ºc", "?c", "celsius", "degree celsius", "degrees celsius",
@@ -90,6 +91,8 @@ UNITS: Final[dict[str, dict[tuple[str, ...], tuple[float, float]]]] = {
 }  # fmt: skip
 """Units in lower case, with the factor and the offset that bring them to m, dbar, degC, psu, mS/cm and m/s."""
 
+SCALES: Final = ("its-90", "its-68", "ipts-68", "its68", "ipts68", "salt water", "fresh water")
+"""What a unit is of, where it stands beside it."""
 NO_UNITS: Final = ("", "calculated", "calc", "float", "measured")
 
 
@@ -159,14 +162,16 @@ def _plain(name: str) -> str:
 
 
 def _clean_unit(text: str) -> str | None:
-    """A unit as it is in the table; of several words between commas ('ITS-68, deg C') the first that is one."""
+    """A unit as it is in the table; of several words between commas that which is no scale ('ITS-90, deg F')."""
     whole = re.sub(r"\s+", " ", text.replace("_", " ").strip(" ()[]").lower())
     if whole in NO_UNITS:
         return None
     parts = [part.strip() for part in re.split(r"[,;]", whole)]
     scale = next((part for part in parts if "68" in part), None)
     known = [part for part in parts if any(_known(quantity, part) for quantity in UNITS)]
-    return scale if scale and _known("temperature", scale) else known[0] if known else whole
+    unit = next((part for part in reversed(known) if part not in SCALES), known[-1] if known else whole)
+    celsius = next(iter(UNITS["temperature"]))
+    return scale if scale and _known("temperature", scale) and unit in (scale, *celsius) else unit
 
 
 def _known(quantity: str, unit: str | None) -> bool:
@@ -174,6 +179,8 @@ def _known(quantity: str, unit: str | None) -> bool:
 
 
 def _conversion(quantity: str, unit: str | None, column: str) -> tuple[float, float]:
+    if quantity == "conductivity" and unit is None:  # S/m and mS/cm are both usual
+        raise UnitError(f"column '{column}': has no unit; write it as in 'conductivity (mS/cm)'")
     for texts, numbers in UNITS[quantity].items():
         if unit is None or unit in texts:  # no unit: ours, which comes first
             return numbers

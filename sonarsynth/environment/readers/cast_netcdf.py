@@ -14,7 +14,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.environment.readers.cast_columns import Meaning, UnitError, meaning
-from sonarsynth.environment.readers.cast_table import CastError, CastTable, Column, without_flags
+from sonarsynth.environment.readers.cast_table import MAX_ROWS, CastError, CastTable, Column, without_flags
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,6 +38,8 @@ def read_netcdf(
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
+            if engine == "h5netcdf":
+                _refuse_other_files(path, data)
             dataset = xr.open_dataset(io.BytesIO(data), engine=engine, decode_times=False)
             found = _columns(path, dataset)
             return _table(path, dataset, found, profile, (latitude, longitude))
@@ -50,6 +52,21 @@ def read_netcdf(
             raise CastError(f"{path}: is netCDF 4, which needs h5netcdf: pip install 'sonarsynth[netcdf]'") from None
         text = " ".join(str(error).split())[:120]
         raise CastError(f"{path}: cannot be read as netCDF ({type(error).__name__}: {text})") from None
+
+
+def _refuse_other_files(path: Path, data: bytes) -> None:
+    """Refuses an HDF5 file some of whose numbers lie in other files. Raises CastError, ImportError."""
+    import h5py
+
+    def check(name: str, item: object) -> None:
+        if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
+            raise CastError(f"{path}: '{name}' lies in another file, which is not read")
+
+    with h5py.File(io.BytesIO(data), "r") as file:
+        file.visititems(check)  # follows no link to another file
+        for name in file:
+            if isinstance(file.get(name, getlink=True), h5py.ExternalLink):
+                raise CastError(f"{path}: '{name}' lies in another file, which is not read")
 
 
 def _columns(path: Path, dataset: xr.Dataset) -> dict[str, list[tuple[str, Meaning]]]:
@@ -85,6 +102,8 @@ def _table(
     notes: list[str] = []
     lead = dataset[found["temperature" if "temperature" in found else "sound speed"][0][0]]
     levels = next((d for d in reversed(lead.dims) if str(d).lower() in LEVELS), lead.dims[-1])
+    if dataset.sizes[levels] > MAX_ROWS:
+        raise CastError(f"{path}: has more than {MAX_ROWS} rows")
     pick: dict[Any, int] = {}
     others = [dim for dim in lead.dims if dim != levels]
     for dim in others:

@@ -11,6 +11,8 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
 
+MAX_ROWS: Final = 500_000
+"""Of a cast, or of one profile of a file."""
 MISSING_MARKS: Final = ("", "nan", "na", "n/a", "null", "none", "-", "--")
 FLAGS: Final = (-9.99e-29, -99.0, -99.99, -99.999, -999.0, -999.9, -999.99, -9990.0, -9999.0, -99999.0, 9999.0, 99999.0)
 """Numbers that stand for a missing value: of Sea-Bird, and those that people write."""
@@ -85,7 +87,8 @@ def degrees(text: str) -> float | None:
     """
     import re
 
-    letters = re.findall(r"[NSEWnsew]\b", re.sub(r"[°'\":;]|deg", " ", text))
+    words = re.sub(r"[°'\":;]|deg(?:rees?)?", " ", text)
+    letters = re.findall(r"([NSEWnsew])(?:orth|outh|ast|est)?\b", words)
     numbers = [float(n) for n in re.findall(r"[-+]?\d+(?:\.\d*)?", text.strip())]
     if not 1 <= len(numbers) <= 3 or any(n < 0 or n >= 60 for n in numbers[1:]):
         return None

@@ -93,7 +93,13 @@ LAYOUTS: Final = (
         last=VALEPORT[1],
     ),
     Layout("Valeport", "Now:", ("pressure", "sound speed"), ("RapidSV", *VALEPORT), last=VALEPORT[1]),
-    Layout("Valeport", "Now:", ("pressure", "temperature", "conductivity"), ("MiniCTD", *VALEPORT), last=VALEPORT[1]),
+    Layout(
+        "Valeport",
+        "Now:",
+        ("pressure", "temperature", "conductivity (mS/cm)"),
+        ("MiniCTD", *VALEPORT),
+        last=VALEPORT[1],
+    ),
     Layout(
         "AML",
         r"\[cast header\]",
@@ -105,7 +111,7 @@ LAYOUTS: Final = (
     Layout(
         "AML",
         r"\[cast header\]",
-        ("", "", "conductivity", "temperature", "pressure", "", "salinity", "", "sound speed"),
+        ("", "", "conductivity (mS/cm)", "temperature", "pressure", "", "salinity", "", "sound speed"),
         (r"SensorName=SV-.*CT\.X C", *AML),
         last=r"\s*$",
         row=r"\d{4}-\d\d-\d\d,",

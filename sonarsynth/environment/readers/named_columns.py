@@ -43,7 +43,7 @@ SPLITTERS: Final[dict[str, Splitter]] = {
     "\t": _by("\t"),
     "dashes": lambda line: re.split(r"\s+-\s+", line.strip()),
     "columns": lambda line: re.split(r"\s{2,}", line.strip()),
-    "words": lambda line: re.findall(r"[^\s(\[]+(?:\s?[(\[][^)\]]*[)\]])?", line),
+    "words": lambda line: re.findall(r"[^\s(\[]+(?:\s?[(\[][^)\]]{0,60}[)\]])?", line),
 }
 """How a line is cut into cells; rows under names in columns or words are cut at any white space."""
 
@@ -74,8 +74,11 @@ class _Header:
                 held = meaning(split(name)[0] if self.shifted else name, unit)
             except UnitError as error:
                 raise CastError(f"{path}, line {self.index + 1}, {error}") from None
-            if held is not None:
-                found.setdefault(held.quantity, (i, held))
+            if held is None:
+                continue
+            of_sea = held.quantity == "pressure" and split(name)[0].startswith("sea ")  # not that of the air with it
+            if held.quantity not in found or of_sea:
+                found[held.quantity] = (i, held)
         return found
 
 
@@ -89,7 +92,7 @@ def read_named_columns(path: Path, text: str) -> CastTable:
     columns = header.meanings(path)
     needed = max((i for i, _ in columns.values()), default=0) + 1
     cut = SPLITTERS.get(header.separator, str.split) if header.separator in ",;\t" else str.split
-    rows, numbers = [], []
+    rows, numbers, widths = [], [], list[int]()
     for number, line in enumerate(lines[header.first :], start=header.first + 1):
         if not _is_row(line):
             continue
@@ -99,7 +102,9 @@ def read_named_columns(path: Path, text: str) -> CastTable:
         if not columns or (whole and any(map(_numeric, wanted))) or not any(cells[1:]):
             rows.append([*cells, *[""] * (needed - len(cells))])
             numbers.append(number)
-    comma = header.separator in ";\t" and any("," in cell for row in rows[:3] for cell in row)
+            widths.append(len(cells))
+    _check_widths(path, header, widths)
+    comma = header.separator in ";\t" and any("," in row[i] for row in rows for i, _ in columns.values())
     make = _make(lines[: header.first])
     rows, numbers = (rows[MVP_ROWS:], numbers[MVP_ROWS:]) if make == "MVP" else (rows, numbers)
     own: dict[str, Column] = {}
@@ -117,6 +122,14 @@ def read_named_columns(path: Path, text: str) -> CastTable:
         *_place(lines),
         notes=_repeated(header, columns),
     )
+
+
+def _check_widths(path: Path, header: _Header, widths: list[int]) -> None:
+    """Refuses rows with fewer numbers than there are names, where a name of two words ('Sound Speed') may be two."""
+    few = [width for width in widths if width < len(header.names)]
+    if header.separator in ("words", "columns", "dashes") and 2 * len(few) > len(widths):
+        line = f"{path}, line {header.index + 1}"
+        raise CastError(f"{line}: {len(header.names)} column names, but rows of {few[0]} numbers")
 
 
 def _header(path: Path, lines: list[str]) -> _Header:
@@ -168,7 +181,10 @@ def _quantity(name: str) -> str | None:
 
 def _nominal(name: str) -> str | None:
     """The quantity of a column whose unit is not known, or another's."""
-    held = meaning(split(name)[0])
+    try:
+        held = meaning(split(name)[0])
+    except UnitError:
+        return "conductivity"
     return None if held is None else held.quantity
 
 

@@ -45,7 +45,8 @@ def variables(plan: Plan) -> tuple[Variable, ...]:
 def attributes(plan: Plan) -> dict[str, Any]:
     """Root attributes of a store that any builder of this plan writes the same."""
     recipe, world = plan.recipe, plan.scene.world
-    besides = {"chorus": world.chorus, "noise_sources": world.noise_sources, "scatterers": world.scatterers}
+    chorus = world.chorus is not None and world.chorus.rate > 0.0
+    besides = {"chorus": chorus, "noise_sources": world.noise_sources, "scatterers": world.scatterers}
     others = [name for name, value in besides.items() if value]
     also: dict[str, Any] = {"other_sounds": others} if others else {}
     return also | {

@@ -68,8 +68,11 @@ def difference_of_paths(
 
 
 def ways(frame: Frame, bottom: float) -> tuple[Floats, Floats]:
-    """Starts and ends (pair, xyz) from each snap to `around` bodies, from there to the array, and straight in."""
+    """Starts and ends (pair, xyz) from each snap to `around` bodies and scatterers, from there to the array, and
+    straight in."""
     array, points = frame.sonar_pose.position, around(frame, bottom)
+    loose = [s.position[np.r_[s.position.argmin(axis=0), s.position.argmax(axis=0)]] for s in frame.moment.scatterers]
+    points = np.concatenate([points, *loose])
     snaps = np.array([snap.position for snap in frame.moment.snaps]).reshape(-1, 3)
     start = np.concatenate([np.repeat(snaps, len(points), axis=0), points, snaps])
     end = np.concatenate([np.tile(points, (len(snaps), 1)), np.broadcast_to(array, (len(points) + len(snaps), 3))])

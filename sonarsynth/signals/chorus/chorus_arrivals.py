@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -209,4 +209,5 @@ def chorus_arrivals(
         key=snaps.key[used],
         sound_speed=receiver.speed(medium),
     )
+    found = replace(found, gain=found.gain * np.where(found.direction[:, 0] < 0.0, receiver.sonar.behind, 1.0))
     return found.select(found.received >= reach.level - FAINT)

@@ -44,7 +44,7 @@ def add_pulses(
             x, y, z = px - qx, py - qy, pz - qz
             away = np.sqrt(x * x + y * y + z * z)
             longer = (qx * (qx - 2.0 * px) + qy * (qy - 2.0 * py) + qz * (qz - 2.0 * pz)) / (away + r)
-            at, gain = start[row] + scale * longer, r / max(away, cavity)
+            at, gain = start[row] + scale * longer, max(r, cavity) / max(away, cavity)
             after = np.floor(at) + 1.0
             x = (after - at) * fractions
             n = min(np.floor(x), fractions - 1.0)

@@ -203,6 +203,7 @@ def chorus_pressure(
         if not len(some.delay):
             continue
         modes = pulse_modes(model, width, sonar, elements.face, sound_speed, lost)
+        _check_length(modes, spare - elements.aperture / sound_speed, rate * times)
         _add(
             flat,
             length,
@@ -221,6 +222,13 @@ def chorus_pressure(
     pressure = np.empty((elements.count, samples), np.float32)
     pressure[order] = heard
     return pressure * elements.gain[:, None].astype(np.float32)
+
+
+def _check_length(modes: PulseModes, longest: float, rate: float) -> None:
+    """Refuses pulses of more than `longest` (s): those at the ends of the record would not be heard whole."""
+    length = modes.table.shape[1] // (FRACTIONS + 1) / rate
+    if length > longest:
+        raise ValueError(f"a snap of the chorus lasts {1e3 * length:.3g} ms; {1e3 * longest:.3g} ms is the most")
 
 
 def spare_time(elements: Elements, sonar: Sonar, sound_speed: float) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Final, Literal, get_args
 
 import numpy as np
-from annotated_types import Ge, Gt, Le
+from annotated_types import Ge, Le
 
 from sonarsynth.conventions import Decibels, Floats, Number, PositiveMetres, PositiveSeconds
 from sonarsynth.description import description
@@ -30,7 +30,7 @@ WIDTHS = 8
 class Clusters:
     """Snaps that come together: a Neyman-Scott process. Source: Neyman and Scott (1958), J. R. Stat. Soc. B 20, 1."""
 
-    snaps: Annotated[Number, Gt(0), Le(100)] = 3.0
+    snaps: Annotated[Number, Ge(0.1), Le(100)] = 3.0
     """Of a cluster: the mean of a Poisson law, so that counts over long times have a Fano factor of 1 + snaps."""
     radius: Annotated[PositiveMetres, Le(20)] = 2.0
     """Of a cluster on the bottom, evenly filled."""

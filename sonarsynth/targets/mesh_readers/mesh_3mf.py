@@ -36,6 +36,7 @@ def read_3mf(data: bytes) -> Surface:
     placed: list[str] = []
     try:
         for item in root.iter(f"{CORE}item"):
+            _refuse_other_parts(item)
             _place(objects, item.get("objectid", ""), _matrix(item), vertices, faces, placed)
     except (ValueError, TypeError, KeyError) as error:
         if isinstance(error, MeshError):
@@ -65,6 +66,7 @@ def _place(
     if depth == 0 or len(placed) > MOST_PLACED:
         raise MeshError("has components within components without end")
     for component in found.iter(f"{CORE}component"):
+        _refuse_other_parts(component)
         inner = _matrix(component)
         _place(objects, component.get("objectid", ""), inner @ matrix, vertices, faces, placed, depth - 1)
     mesh = found.find(f"{CORE}mesh")
@@ -78,8 +80,16 @@ def _place(
         raise MeshError(f"object '{name[:20]}' has an index out of range: there are {len(places)} vertices")
     if sum(map(len, faces)) + len(corners) > max_facets():
         raise MeshError(f"places more than {max_facets()} facets")
-    vertices.append(places @ matrix[:3, :3] + matrix[3, :3])
-    faces.append(corners)
+    used, corners = np.unique(corners, return_inverse=True)  # so that facets bound vertices
+    corners = corners.reshape(-1, 3)
+    vertices.append(places[used] @ matrix[:3, :3] + matrix[3, :3])
+    faces.append(corners if np.linalg.det(matrix[:3, :3]) > 0.0 else corners[:, ::-1])
+
+
+def _refuse_other_parts(element: Element) -> None:
+    """Objects of the production extension lie in other files of the archive."""
+    if any(key.rpartition("}")[2] == "path" for key in element.attrib):
+        raise MeshError("has parts in other files of the archive, which are not read")
 
 
 def _matrix(element: Element) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import lzma
 import re
 import zipfile
 import zlib
@@ -11,8 +12,14 @@ from xml.etree import ElementTree
 
 from sonarsynth.geometry.surfaces import MeshError
 
-MAX_BYTES: Final = 1 << 29
+MAX_BYTES: Final = 1 << 28
 """What one file of an archive may unpack to."""
+
+
+DAMAGED: Final = (
+    OSError, EOFError, zlib.error, lzma.LZMAError, zipfile.BadZipFile, NotImplementedError, RuntimeError, ValueError,
+)  # fmt: skip
+"""What a damaged archive may bring."""
 
 
 def only_file(data: bytes, ending: str) -> bytes:
@@ -24,7 +31,7 @@ def only_file(data: bytes, ending: str) -> bytes:
                 raise MeshError(f"is an archive without a {ending}")
             with archive.open(names[0]) as file:
                 found = file.read(MAX_BYTES + 1)
-    except (OSError, EOFError, zlib.error, zipfile.BadZipFile, NotImplementedError, RuntimeError, ValueError) as error:
+    except DAMAGED as error:
         if isinstance(error, MeshError):
             raise
         raise MeshError(f"is an archive that cannot be unpacked ({' '.join(str(error).split())[:80]})") from None
@@ -37,6 +44,8 @@ def plain_xml(data: bytes) -> bytes:
     """The same XML, which declares no entities: they can swell without end, or name other files. Raises MeshError."""
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         data = re.sub(rb"encoding=[\"'][^\"']*[\"']", b"", data.decode("utf-16", "replace").encode(), count=1)
+    if b"\0" in data:
+        raise MeshError("is not XML in UTF-8, or in UTF-16 with its mark")
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
         raise MeshError("declares a document type or entities, which are not read")
     return data

@@ -110,7 +110,9 @@ def _parts(document: Any) -> list[Surface]:
                 vertices = np.asarray(primitive.vertex, float)
                 if index.size and (index.min() < 0 or index.max() >= len(vertices)):
                     raise MeshError(f"has an index out of range: there are {len(vertices)} vertices")
-                parts.append((vertices, polygons(vertices, counts, index)))
+                faces = polygons(vertices, counts, index)
+                mirrored = np.linalg.det(np.asarray(getattr(bound, "matrix", np.eye(4)), float)[:3, :3]) < 0.0
+                parts.append((vertices, faces[:, ::-1] if mirrored else faces))
     return parts
 
 
