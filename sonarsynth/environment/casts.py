@@ -32,6 +32,8 @@ from sonarsynth.equations.water.seawater import depth_of_pressure, practical_sal
 
 __all__ = ["CastError", "profile_of", "smoothed"]
 
+AMBIGUOUS = 10.0
+"""mS/cm: below, a conductivity may be one in S/m; no water has 10 S/m."""
 LATITUDE = 45.0
 """Degrees, where nothing says."""
 
@@ -131,6 +133,7 @@ def _needed(cast: Cast, table: CastTable) -> tuple[str, ...]:
     if "temperature" in has and ("salinity" in has or cast.salinity is not None):
         return level, "temperature", *(("salinity",) if "salinity" in has else ())
     if "temperature" in has and "conductivity" in has:
+        _check_unit(table)
         return level, "temperature", "conductivity"
     what = "" if cast.quantity == "temperature_salinity" else "sound speed, or of "
     comma = "," if what else ""
@@ -138,6 +141,14 @@ def _needed(cast: Cast, table: CastTable) -> tuple[str, ...]:
     raise CastError(
         f"{table.where()}: no columns of {what}temperature and salinity{comma} among {table.shown_names}{hint}"
     )
+
+
+def _check_unit(table: CastTable) -> None:
+    """Refuses a conductivity without a unit that may be in S/m: no sea water has so little in mS/cm, none so much."""
+    column = table.columns["conductivity"]
+    if not column.unit_stated and np.nanmax(column.values, initial=0.0) < AMBIGUOUS:
+        line = f"{table.where()}, column '{column.name}': has no unit, and could be in S/m"
+        raise CastError(f"{line}; write it as in 'conductivity (mS/cm)'")
 
 
 def _salinity(cast: Cast, water: dict[str, Floats], depth: Floats, latitude: float) -> Floats:

@@ -209,3 +209,32 @@ def test_what_is_no_cast_is_said_with_what_is_read(tmp_path):
         with pytest.raises(CastError) as refused:
             profile(tmp_path, content)
         assert message in str(refused.value) and "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("head", "rows"),
+    [
+        ("Temperature (ITS-90, deg F);Depth (salt water, m);Salinity (psu)", "50;0;35 50;20;35"),
+        ("Depth [salt water, ft];Temperature (deg C, ITS-90);Salinity (psu)", "0;10;35 65.6168;10;35"),
+        ("Depth (m);Temperature (C);Conductivity", "0;10;38.1 20;10;38.1"),
+    ],
+)
+def test_units_beside_scales_are_those_of_the_column(tmp_path, head, rows):
+    """At 10 m, 10 degC and 35 psu (38.1 mS/cm) sound travels at 1490.0 m/s. Source: Mackenzie (1981)."""
+    file = tmp_path / "cast.csv"
+    file.write_text("\n".join([head, *rows.split()]) + "\n")
+    assert profile_of(Cast(path=str(file))).at(10.0) == pytest.approx(1490.0, abs=0.5)
+
+
+def test_a_conductivity_that_may_be_in_siemens_a_metre_is_refused(tmp_path):
+    file = tmp_path / "cast.csv"
+    file.write_text("Depth (m),Temperature (C),Conductivity\n0,10,3.8\n10,10,3.8\n")
+    with pytest.raises(ValueError, match="'Conductivity': has no unit, and could be in S/m"):
+        profile_of(Cast(path=str(file)))
+
+
+def test_names_of_two_words_in_columns_cut_at_spaces_are_refused_where_rows_are_shorter(tmp_path):
+    file = tmp_path / "cast.txt"
+    file.write_text("Sound Speed Depth Temp Sal\n1500 0 13 35\n1501 5 14 35\n1502 35 15 35\n")
+    with pytest.raises(ValueError, match="5 column names, but rows of 4 numbers"):
+        profile_of(Cast(path=str(file)))

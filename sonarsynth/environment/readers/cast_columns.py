@@ -107,6 +107,7 @@ class Meaning:
     quantity: str
     factor: float
     offset: float
+    stated: bool = True  # its unit, rather than taken for ours
 
     def ours(self, values: Floats) -> Floats:
         """Values in m, dbar, degC (scale of 1990), psu, mS/cm or m/s."""
@@ -130,7 +131,7 @@ def meaning(column: str, unit: str | None = None) -> Meaning | None:
     if fitting:
         return Meaning(fitting[0], *_conversion(fitting[0], str(given), column))
     quantity = found[-1]  # 'c' without a unit is the sound speed
-    return Meaning(quantity, *_conversion(quantity, given, column))
+    return Meaning(quantity, *_conversion(quantity, given, column), stated=given is not None)
 
 
 def is_unit(text: str) -> bool:
@@ -179,8 +180,6 @@ def _known(quantity: str, unit: str | None) -> bool:
 
 
 def _conversion(quantity: str, unit: str | None, column: str) -> tuple[float, float]:
-    if quantity == "conductivity" and unit is None:  # S/m and mS/cm are both usual
-        raise UnitError(f"column '{column}': has no unit; write it as in 'conductivity (mS/cm)'")
     for texts, numbers in UNITS[quantity].items():
         if unit is None or unit in texts:  # no unit: ours, which comes first
             return numbers

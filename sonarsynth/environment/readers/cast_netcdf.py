@@ -139,7 +139,7 @@ def _values(
             at = {dim: pick.get(dim, 0) for dim in variable.dims if dim != levels}
             values = without_flags(_good(dataset, name, variable.isel(at).values.astype(float), at)[rows])
             if quantity not in columns or not np.isfinite(columns[quantity].values).any():
-                columns[quantity] = Column(name, held.ours(values))
+                columns[quantity] = Column(name, held.ours(values), held.stated)
     return columns
 
 

@@ -28,6 +28,7 @@ class Column:
 
     name: str  # as in the file
     values: Floats  # (row,) m, dbar, degC (scale of 1990), psu, m/s or mS/cm; NaN where it is missing
+    unit_stated: bool = True  # rather than taken for ours
 
 
 @dataclass(frozen=True, eq=False)

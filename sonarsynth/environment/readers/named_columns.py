@@ -111,7 +111,7 @@ def read_named_columns(path: Path, text: str) -> CastTable:
     for quantity, (i, held) in columns.items():
         cells = [row[i].strip().replace(",", ".") if comma else row[i].strip() for row in rows]
         name = header.names[i].strip()
-        own[quantity] = Column(name, held.ours(numbers_of(cells, path, numbers, name)))
+        own[quantity] = Column(name, held.ours(numbers_of(cells, path, numbers, name)), held.stated)
     return CastTable(
         path,
         make,
@@ -181,10 +181,7 @@ def _quantity(name: str) -> str | None:
 
 def _nominal(name: str) -> str | None:
     """The quantity of a column whose unit is not known, or another's."""
-    try:
-        held = meaning(split(name)[0])
-    except UnitError:
-        return "conductivity"
+    held = meaning(split(name)[0])
     return None if held is None else held.quantity
 
 
