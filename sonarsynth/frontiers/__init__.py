@@ -109,7 +109,7 @@ def _frame(made: Plan, index: int, hydrophones: int | None, say: Say, *, peers: 
     signals = frame_signals(plan, frame, arrivals)
     whole = Whole.of(exact, signals)
     say(f"frame {index}: image and range")
-    points += image_points(plan, whole.heard)
+    points += image_points(plan, whole.heard, peers)
     points += range_points(plan, frame, whole.heard)
     points += picking_points(plan, frame, arrivals, whole.heard)
     if peers:

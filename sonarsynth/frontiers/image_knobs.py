@@ -29,8 +29,8 @@ BESIDE = 0.02
 """rad of direction, and m of path: points of two clouds that are further apart are not one."""
 
 
-def image_points(plan: Plan, heard: BeamformedFrame) -> Iterator[Point]:
-    """Walk the beamformers on the signals of a frame; nothing where it has no image."""
+def image_points(plan: Plan, heard: BeamformedFrame, peers: bool = True) -> Iterator[Point]:
+    """Walk the beamformers on the signals of a frame, other images too (`peers`); nothing where it has no image."""
     chosen: Any = plan.choices.beamforming
     slow = exact_plan(plan).choices.beamforming
     if not imaged(heard):
@@ -55,7 +55,7 @@ def image_points(plan: Plan, heard: BeamformedFrame) -> Iterator[Point]:
         yield image_point(plan, made.energy, exact.energy, knob, setting, seconds, chosen=knob == "chosen")
     if chosen != slow:
         yield image_point(plan, exact.energy, exact.energy, "exact", "dense", slowest)
-    for method in other_images(slow, plan.elements):
+    for method in other_images(slow, plan.elements) if peers else ():
         made, seconds = timed(partial(image_of, plan, heard, method))
         point = image_point(plan, made.energy, exact.energy, "another image", method.row(), seconds)
         yield replace(point, role="peer")

@@ -106,7 +106,7 @@ def test_a_task_is_of_one_frame_where_they_are_long(small_plan: Plan) -> None:
         return job_of(Path("s"), replace(plan, stages=stages, shard_frames=64), "").block
 
     assert block(20.0) == block(2.0) == 1
-    assert block(1.0) == 3
+    assert block(0.99) == 3
     assert block(1e-9) == 64
     large = replace(small_plan, sizes=small_plan.sizes | {"sensor": 4096, "sample": 1000})
     assert block(1e-9, large) == 1  # 33 MB of signals a frame

@@ -102,7 +102,7 @@ def test_a_chorus_whose_recording_is_absent_is_refused() -> None:
 
 
 def test_a_chorus_that_is_brighter_than_the_echoes_is_no_fault_of_the_store(tmp_path: Path) -> None:
-    chorus = "scene.world.chorus={density: 0.02, reach: 100 m, images: 2}"
+    chorus = "scene.world.chorus={density: 0.2, reach: 100 m, images: 2}"
     made = plan(reading.load(str(REMUS), [*SMALL, chorus, "scene.trajectory.frames=2"]))
     assert build(made, tmp_path / "chorus.zarr", workers=0).ok
     checks = check(open_store(tmp_path / "chorus.zarr"))

@@ -27,11 +27,12 @@ TASKS = {
     "signals": ["trace", "beamform"],
     "truth": ["trace"],
 }
+NOISE = "noise flat"
 PARTS = {
-    "signals,image,cloud": {"trace", "label", "synthesise", "measure", "locate", "beamform", "collect", "range"},
-    "image": {"trace", "label", "synthesise", "locate", "beamform", "collect"},
-    "cloud": {"trace", "label", "synthesise", "locate", "beamform", "collect", "range"},
-    "signals": {"trace", "label", "synthesise", "measure", "collect"},
+    "signals,image,cloud": {"trace", "label", "synthesise", NOISE, "measure", "locate", "beamform", "collect", "range"},
+    "image": {"trace", "label", "synthesise", NOISE, "locate", "beamform", "collect"},
+    "cloud": {"trace", "label", "synthesise", NOISE, "locate", "beamform", "collect", "range"},
+    "signals": {"trace", "label", "synthesise", NOISE, "measure", "collect"},
     "truth": {"label"},
 }
 
@@ -52,7 +53,7 @@ def test_only_what_was_asked_for_runs(small: Recipe, tmp_path: Path, products: s
     (row,) = map(json.loads, (tmp_path / "s.times.jsonl").read_text().splitlines())
     assert list(row["seconds"]) == list(row["cpu"]) == list(report.stage_cpu) == TASKS[products]
     assert row["parts"].keys() == PARTS[products]
-    assert row["parts"].keys() <= set(pipeline.STAGES)
+    assert row["parts"].keys() <= {*pipeline.STAGES, NOISE}
     planned = {stage.stage for stage in plan(small, split(products)).stages}
     assert planned - {"write"} == PARTS[products] - {"collect"}
     assert math.fsum(row["parts"].values()) == pytest.approx(math.fsum(row["cpu"].values()), abs=0.01)

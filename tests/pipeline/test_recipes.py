@@ -36,7 +36,7 @@ WRONG = [
     ("azimuths: 11", "azimuths: 'no'", "15: scene.sonar.beams.azimuths: must be a valid integer, not 'no'"),
     ("azimuths: 11", "azimuths: ", "15: scene.sonar.beams.azimuths: must be a valid integer, not nothing"),
     ("kind: box,", "kind: bux,", "8: scene.world.targets.0.shape.kind: 'bux' is not a kind here; did you mean 'box'?"),
-    ("kind: flat,", "", "5: scene.world.environment.noise: needs a kind: one of flat, wenz"),
+    ("kind: flat,", "", "5: scene.world.environment.noise: needs a kind: one of flat, knudsen, rain"),
     ("[1, 1, 1]", "[1, .nan, 1]", "8: scene.world.targets.0.shape.size.1: must be a finite number, not .nan"),
     ("[1, 1, 1]", "[1, -.inf, 1]", "8: scene.world.targets.0.shape.size.1: must be a finite number, not -.inf"),
     ("[1, 1, 1]", "[1, 1e400, 1]", "8: scene.world.targets.0.shape.size.1: must be a finite number, not 1e400"),

@@ -62,7 +62,7 @@ def test_a_bare_number_is_si_or_refused_with_both_readings(name: str) -> None:
     """In all fields of the schema: with and without the unit the same, or only with."""
     for _, kind, unit in (leaf for leaf in FIELDS if leaf[0] == name):
         recipe = TypeAdapter(kind)
-        for number in (0.5, 1.0, 7.5, 30, 2000.0, 60e3, 1e-4, -1e-4):
+        for number in (0.5, 1.0, 7.5, 30, 2000.0, 60e3, 1e-4, -1e-4, -20.0):
             try:
                 said = recipe.validate_json(json.dumps(f"{number} {unit.symbol}"), strict=True)
             except ValidationError:  # out of the bounds of the field

@@ -140,16 +140,15 @@ def _beside_view() -> Got:
 
 
 def _behind() -> Got:
-    """The body stands before the snap: nothing direct is heard, so no bearing, no image and no cloud."""
+    """The body stands before the snap: nothing direct is heard, so no bearing, an empty image and no cloud."""
     tree = frame(recipe(((Sphere(radius=0.6, edge=0.1), (7.0, 0.0, 0.0)),), (14.0, 0.0, -5.0)))
     silent = not tree["signals"].pressure.values.any()
-    none = all(
-        np.isnan(np.asarray(tree[name])).all() for name in ("source_estimates/position", "image/energy", "cloud/range")
-    )
+    none = all(np.isnan(np.asarray(tree[name])).all() for name in ("source_estimates/position", "cloud/range"))
+    none &= not np.asarray(tree["image/energy"]).any()
     direct = tree["link_budget"].paths.values[0, -1].sum()
     return together(
         holds(direct == 0 and silent, "no direct path, silence"),
-        holds(none, "no bearing, image, cloud"),
+        holds(none, "no bearing, energy, cloud"),
         reasoned(tree),
     )
 
@@ -216,7 +215,8 @@ def _arrays() -> Got:
     for positions in (((0.0, 0.0, 0.0),), ((0.0, 0.1, 0.0),) * 2):
         dense = Processing(beamforming=DenseDelayAndSum())
         tree = frame(recipe(array=PositionTable(positions=positions), processing=dense))
-        parts.append(holds(bool(np.isnan(tree["image"].energy.values).all()), "no image"))
+        located = np.isfinite(tree["source_estimates"].time.values).any()
+        parts.append(holds(not located and int(tree["cloud"]["count"]) == 0, "no clock, no point"))
         parts.append(reasoned(tree))
     return together(*parts)
 
@@ -231,5 +231,9 @@ CASES = (
     Case(
         "the link budget of loud, faint and hidden targets", "levels add up; NaN where there is no path", _link_budget
     ),
-    Case("frames of one sensor and of two at one place", "no bearing, so no image; NaN with its reason", _arrays),
+    Case(
+        "frames of one sensor and of two at one place",
+        "no bearing, so no clock and no point; NaN with its reason",
+        _arrays,
+    ),
 )
