@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -250,3 +251,14 @@ def test_the_electronics_rise_below_their_corner() -> None:
     noise = ElectronicNoise(Electronics(level=30.0, corner=1e3))
     levels = 10.0 * np.log10(noise.density(np.array([10.0, 1e3, 1e6])) / 1e-12)
     np.testing.assert_allclose(levels, [50.04, 33.01, 30.0], atol=0.01)
+
+
+def test_processing_goes_without_hydrophones_that_it_knows_to_be_dead() -> None:
+    """With a fifth of 128 dead, the snap is located and beams are as loud as with none; untold, they are fainter."""
+    tank = Path(__file__).resolve().parents[2] / "configs" / "tank.yaml"
+    errors = [[], *([f"scene.sonar.sensor_errors={{dead: 0.2, known: {known}}}"] for known in ("gain", "none"))]
+    trees = [ss.render(ss.plan(ss.load(tank, one), ["image"]), 0) for one in errors]
+    whole, told, untold = (float(np.nanmax(tree["image/energy"].values, initial=0.0)) for tree in trees)
+    assert [int(tree["source_estimates/usable"]) for tree in trees[:2]] == [1, 1]
+    assert 10.0 * np.log10(told / whole) == pytest.approx(0.0, abs=0.7)
+    assert untold < 0.8 * told
