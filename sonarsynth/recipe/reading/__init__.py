@@ -17,13 +17,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
 from pydantic import TypeAdapter, ValidationError
-from pydantic.json_schema import GenerateJsonSchema
 from ruamel.yaml import YAML
 
 from sonarsynth.description import FieldError
 from sonarsynth.recipe import FILE_KINDS, Recipe
+from sonarsynth.recipe.reading.json_schema import schema
 from sonarsynth.recipe.reading.messages import explain
 from sonarsynth.recipe.reading.old_keys import new_setting, with_new_keys
 from sonarsynth.recipe.reading.yaml_source import SET, RecipeError, Source, Where, override, read_file, read_text
@@ -100,34 +99,6 @@ def dump(recipe: Recipe) -> str:
     yaml.allow_unicode = True
     yaml.dump(_ADAPTER.dump_python(recipe, mode="json"), text)
     return text.getvalue()
-
-
-def schema() -> dict[str, Any]:
-    """JSON schema of a recipe, for editors: titles, descriptions, kinds, and the unit of each number (`x-unit`)."""
-    found = _ADAPTER.json_schema(schema_generator=_Schema)
-    _write_defaults(found)
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **found}
-
-
-def _write_defaults(part: Any) -> str | None:
-    """Give defaults that are angles their unit, as people write it. Returns the unit of a number, None for others."""
-    if isinstance(part, list):
-        return next((unit for unit in [_write_defaults(one) for one in part] if unit), None)
-    if not isinstance(part, dict):
-        return None
-    inner = {name: _write_defaults(value) for name, value in part.items()}
-    unit = part.get("x-unit") or inner.get("anyOf")
-    value = part.get("default")
-    if unit in ("rad", "rad/s") and isinstance(value, float) and value != 0:
-        part["default"] = f"{round(float(np.rad2deg(value)), 10):.12g} {unit.replace('rad', 'deg')}"
-    return unit
-
-
-class _Schema(GenerateJsonSchema):
-    """Takes NumPy numbers as defaults."""
-
-    def encode_default(self, dft: Any) -> Any:
-        return super().encode_default(dft.item() if isinstance(dft, np.generic) else dft)
 
 
 def _resolved(source: Source, data: Any, where: Where, check: bool) -> Any:
