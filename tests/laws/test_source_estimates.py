@@ -11,12 +11,15 @@ from scipy.stats import chi2
 
 from sonarsynth.conventions import azimuth_elevation, direction
 from sonarsynth.environment.sea import Profile
+from sonarsynth.equations.arrays.spherical_wave import Wavefront, wavefront_delays
 from sonarsynth.evaluation import snap_located
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.labels.estimate_labels import Direct, emissions
 from sonarsynth.planning.notes.source_notes import off_the_bottom, standing_off
 from sonarsynth.products import REASONS, Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
+from sonarsynth.ranging.location.locating import fit_wave
+from sonarsynth.ranging.location.pulse_times import Pulse, lag_variance
 from sonarsynth.receiver import Band, PlanarLattice, Sonar, elements
 from sonarsynth.state import Receiver, Survey
 from tests.heard import RATE, add_noise, envelope_late, hear, hear_direct, silence
@@ -157,6 +160,29 @@ def test_pulls_of_estimates_have_unit_variance() -> None:
         low, high = (count * known.mean() / chi2.ppf(p, count) for p in (0.975, 0.025))
         assert low <= 1.44 and high >= 0.64
     assert np.mean(single < 16.0) >= 0.99
+
+
+@pytest.mark.parametrize(("alike", "most"), [(0.0, 1.1), (0.5, 1.15)])
+def test_the_more_alike_neighbours_err_the_larger_errors_are_predicted(alike: float, most: float) -> None:
+    """Delays of a sphere with errors that correlate by `alike` from row to row and from column to column."""
+    q = elements(WIDE).position
+    apart = np.abs(np.arange(12)[:, None] - np.arange(12))
+    root = np.linalg.cholesky(alike**apart) if alike else np.eye(12)
+    true = Wavefront(direction(0.2, -0.3), 0.1, 0.0, np.zeros((2, 3)), np.zeros((4, 4)), np.zeros(4), np.zeros(144))
+    delay = wavefront_delays(q, true.direction, true.curvature, C)
+    pulse = Pulse(np.zeros(1), np.zeros(1), 0.0, np.zeros(144), np.ones(144), 0.0, np.ones(1), 0.0)
+    fits, predicted = [], []
+    random = np.random.default_rng(12)
+    for _ in range(300):
+        error = 1e-8 * (root @ random.standard_normal((12, 12)) @ root.T).ravel()
+        wave = fit_wave(delay + error, q, C, pulse.weight, true)
+        assert wave is not None
+        fits.append([*wave.direction, wave.curvature])
+        variance = lag_variance(wave, pulse, elements(WIDE), 0.0)
+        spread = wave.tangents.T @ wave.covariance[:2, :2] @ wave.tangents
+        predicted.append(variance * np.append(np.diag(spread), wave.covariance[2, 2]))
+    ratio = np.sqrt(np.var(fits, axis=0) / np.mean(predicted, axis=0))
+    assert (ratio > 1 / most).all() and (ratio < most).all(), ratio
 
 
 def estimate(time: float, azimuth: float, elevation: float = -0.2) -> SourceEstimates:

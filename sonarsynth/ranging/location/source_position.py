@@ -11,12 +11,9 @@ from sonarsynth.conventions import Floats, azimuth_elevation
 from sonarsynth.equations.arrays.spherical_wave import Wavefront, envelope_peak
 from sonarsynth.geometry import Pose
 from sonarsynth.products import REASONS, SourceEstimates
-from sonarsynth.ranging.location.pulse_times import DEAF, Pulse
+from sonarsynth.ranging.location.pulse_times import DEAF, Pulse, lag_variance
 from sonarsynth.receiver import Elements, Sonar
 
-FLOOR = 1e-9
-"""Standard error (s) of a lag without any noise: what cutting the pulse's tail off does. Biases of 0.01 to 0.2 ns of
-curvature at the rim have been seen, which is what independent errors six times as large would leave."""
 TIME_FLOOR = 0.002
 """Standard error of the time without any noise, in units of 1/bandwidth: absorption, and what is cut, skew a pulse."""
 AGREES = 9.0
@@ -81,17 +78,6 @@ class Fix:
     used: bool  # whether the bottom was
 
 
-def _variance(wave: Wavefront, pulse: Pulse, rounding: float) -> float:
-    """Variance of a lag of weight one: the larger of what the lags show and of the Cramer-Rao bound for the noise seen.
-
-    The noise is not taken below that of rounding, nor lags below `FLOOR`.
-    """
-    count = int(np.sum(pulse.weight > 0))
-    least = FLOOR**2 * float(np.sum(pulse.weight)) / max(count, 1)
-    shown = float(pulse.weight @ wave.residual**2) / max(count - 4, 1)
-    return float(np.max([shown, least, 0.5 * pulse.noise, 0.5 * rounding]))
-
-
 def bending_covariance(
     by_angle: Floats, slope: float, distance: float, gradient: float, sound_speed: float, aperture: float
 ) -> Floats:
@@ -118,7 +104,7 @@ def place(wave: Wavefront, pulse: Pulse, known: SonarKnowledge, heard: Wavefront
     """
     elements, sonar, pose = known.elements, known.sonar, known.pose
     heard = heard or wave
-    timing = _variance(wave, pulse, known.rounding) * wave.covariance
+    timing = lag_variance(wave, pulse, elements, known.rounding) * wave.covariance
     full = timing + np.outer(wave.by_sound_speed, wave.by_sound_speed) * sonar.sound_speed_error**2
     if not np.isfinite(full[2, 2]):  # too few sensors to tell the curvature: anything outside the array
         full[2, 2] = 1 / elements.aperture**2
