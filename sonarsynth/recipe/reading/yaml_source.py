@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -147,6 +148,7 @@ def _replaced(source: Source, data: Any, where: Where, depth: int, value: Any) -
     raise RecipeError(source.name, SET, dotted(where), f"'{dotted(where[:depth])}' has no fields")
 
 
+@lru_cache(maxsize=16)
 def _compose(text: str, name: str, place: str = "", field: str = "") -> Node | None:
     yaml = YAML(typ="safe", pure=True)
     yaml.Composer = _Composer
