@@ -66,11 +66,11 @@ def accuracy(
 
     _check(recipe, reference, extremes, settings or [o for o in (frames, hydrophones, seed) if o is not None])
     if recipe is not None:
-        from sonarsynth.cli.frontier_table import recipe_table
+        from sonarsynth.cli.accuracy_tables.frontier_table import recipe_table
 
         return recipe_table(recipe, settings, frames, hydrophones, seed, out, peers=peers, as_json=as_json)
     if extremes:
-        from sonarsynth.cli.extremes_table import extremes_table
+        from sonarsynth.cli.accuracy_tables.extremes_table import extremes_table
 
         return extremes_table(out, as_json=as_json)
     reference = reference or "rays"

@@ -3,8 +3,6 @@ heard, but light nothing."""
 
 from __future__ import annotations
 
-import io
-import warnings
 from functools import lru_cache
 from typing import Annotated, Literal
 
@@ -13,14 +11,13 @@ from annotated_types import Ge, Gt, MinLen
 from pydantic import model_validator
 
 from sonarsynth.conventions import Floats, Number, PositiveMetres, Seconds
-from sonarsynth.description import BY_KIND, description, named_files
+from sonarsynth.description import BY_KIND, description, named_files, wav_files
 from sonarsynth.environment.noise import Noise
 from sonarsynth.equations.noise.filters import kaiser_bessel
 from sonarsynth.geometry.motion import Motion
 from sonarsynth.sources.pulse_model import Stamp
 from sonarsynth.sources.recordings import RecordingError
 
-MOST_BYTES = 1 << 30
 TAPS, SHAPE = 64, 10.0
 """Of the interpolation between samples of a recording, and of its Kaiser window."""
 
@@ -59,28 +56,14 @@ class NoiseRecording:
 @lru_cache(maxsize=4)
 def _read(recording: NoiseRecording, changed: Stamp) -> tuple[float, Floats]:
     """Sampling frequency (Hz), and the pressure (sample,) at 1 m."""
-    from scipy.io import wavfile
-
     path = recording.path
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            rate, data = wavfile.read(io.BytesIO(named_files.read(path, MOST_BYTES)))
+        rate, values = wav_files.read_wav(path, recording.channel)
     except named_files.FileError as error:
         raise RecordingError(f"{path}: {error}") from None
-    except Exception as error:  # whatever a damaged file may bring
-        raise RecordingError(f"{path}: cannot be read as WAV ({type(error).__name__})") from None
-    columns = data.reshape(len(data), -1)
-    if recording.channel >= columns.shape[1] or not rate > 0 or len(data) < 2:
-        raise RecordingError(f"{path}: has no channel {recording.channel} of sound")
-    values = columns[:, recording.channel].astype(float)
-    if data.dtype == np.uint8:
-        values = (values - 128.0) / 128.0
-    elif data.dtype.kind == "i":
-        values /= -float(np.iinfo(data.dtype).min)
-    if not np.isfinite(values).all():
-        raise RecordingError(f"{path}: holds numbers that are not finite")
-    return float(rate), values * (recording.pascals * recording.distance)
+    if values.size < 2:
+        raise RecordingError(f"{path}: holds one sample")
+    return rate, values * (recording.pascals * recording.distance)
 
 
 @description

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
 import re
-import warnings
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -14,7 +12,7 @@ import numpy as np
 from annotated_types import Ge, Gt, Le
 
 from sonarsynth.conventions import UNITS, Floats, Number, PositiveHertz, PositiveMetres, Seconds
-from sonarsynth.description import description, named_files
+from sonarsynth.description import description, named_files, wav_files
 from sonarsynth.equations.bubble import waveforms
 from sonarsynth.equations.bubble.pulses import Pulse
 from sonarsynth.sources.pulse_model import PulseModel, Stamp
@@ -122,31 +120,13 @@ def _gate(size: int, part: float) -> Floats:
 
 
 def _wav(path: Path, snap: RecordedSnap) -> tuple[float, float, Floats]:
-    from scipy.io import wavfile
-
     if snap.sampling_frequency is not None:
         raise RecordingError(f"{path}: a WAV has its own sampling frequency: leave out sampling_frequency")
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            warnings.filterwarnings("ignore", "Chunk .* not understood")
-            rate, data = wavfile.read(io.BytesIO(_bytes(path)))
-    except RecordingError:
-        raise
-    except Exception as error:  # whatever a damaged file may bring
-        text = " ".join(str(error).split())[:120]
-        raise RecordingError(f"{path}: cannot be read as WAV ({type(error).__name__}: {text})") from None
-    columns = data.reshape(len(data), -1)
-    if snap.channel >= columns.shape[1]:
-        raise RecordingError(f"{path}: has no channel {snap.channel}, only {columns.shape[1]} (from 0)")
-    values = columns[:, snap.channel].astype(float)
-    if data.dtype == np.uint8:
-        values = (values - 128.0) / 128.0
-    elif data.dtype.kind == "i":
-        values = values / -float(np.iinfo(data.dtype).min)
-    if not rate > 0:
-        raise RecordingError(f"{path}: has a sampling frequency of {rate} Hz")
-    return 0.0, float(rate), values
+        rate, values = wav_files.read_wav(path, snap.channel, MOST_BYTES)
+    except named_files.FileError as error:
+        raise RecordingError(f"{path}: {error}") from None
+    return 0.0, rate, values
 
 
 def _text(path: Path, snap: RecordedSnap) -> tuple[float, float, Floats]:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from sonarsynth.cli import app
-from sonarsynth.cli.frontier_table import show
+from sonarsynth.cli.accuracy_tables.frontier_table import show
 from sonarsynth.cli.running import run
 from sonarsynth.environment.boundaries import SeaBottom, Sediment
 from sonarsynth.frontiers import Measured, Point, exact_frame, measure, usual_frames
@@ -253,7 +253,7 @@ def test_the_command(
         return replace(measured, verdicts=tuple(replace(v, ok=True) for v in measured.verdicts))
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sonarsynth.cli.frontier_table.measure", measures)
+        patch.setattr("sonarsynth.cli.accuracy_tables.frontier_table.measure", measures)
         options = ["--set", "accuracy.signal=0.003", "--frames", "1", "--hydrophones", "7", "--seed", "5", "--no-peers"]
         assert run(app, ["accuracy", str(file), *options, "--out", str(tmp_path)]) == 0
     assert asked == [0.003, (1,), 7, 5, False]
@@ -261,11 +261,11 @@ def test_the_command(
     assert "verdicts" in said and "dynamic" in said and "not installed" in said
     assert str(tmp_path / "scene.json") in said and (tmp_path / "scene.png").exists()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sonarsynth.cli.frontier_table.measure", lambda *a, **k: replace(measured, verdicts=()))
+        patch.setattr("sonarsynth.cli.accuracy_tables.frontier_table.measure", lambda *a, **k: replace(measured, verdicts=()))
         assert run(app, ["accuracy", str(file), "--json", "--out", str(tmp_path)]) == 0
         assert len(json.loads(capsys.readouterr().out)) == len(measured.points)
         wrong = (replace(measured.verdicts[0], ok=False),)
-        patch.setattr("sonarsynth.cli.frontier_table.measure", lambda *a, **k: replace(measured, verdicts=wrong))
+        patch.setattr("sonarsynth.cli.accuracy_tables.frontier_table.measure", lambda *a, **k: replace(measured, verdicts=wrong))
         assert run(app, ["accuracy", str(file), "--out", str(tmp_path)]) == 1
         assert "FAILED" in capsys.readouterr().out
 
