@@ -22,7 +22,7 @@ from sonarsynth.equations.noise.chorus_moments import (
 )
 from sonarsynth.receiver import Sonar
 from sonarsynth.recipe.scene import Scene
-from sonarsynth.signals.chorus.chorus_arrivals import CAVITY, ChorusReach, image_heights, reflected
+from sonarsynth.signals.chorus.chorus_arrivals import CAVITY, ChorusReach, ImageHeights, image_heights, reflected
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
 from sonarsynth.sources.chorus import Chorus
 from sonarsynth.sources.pulse_model import PulseModel
@@ -42,7 +42,9 @@ BINS = 64
 """Frequencies of the band that moments are taken at."""
 
 
-class _Water(NamedTuple):
+class ChorusWater(NamedTuple):
+    """The water that a chorus is heard through, and who hears it."""
+
     environment: Environment
     profile: Profile
     sonar: Sonar
@@ -58,7 +60,7 @@ def chorus_reach(scene: Scene, profile: Profile, position: Floats, absorption: F
     chorus = scene.world.chorus
     if chorus is None or chorus.rate == 0.0:
         return None
-    water = _Water(scene.world.environment, profile, scene.sonar, float(depth(position)))
+    water = ChorusWater(scene.world.environment, profile, scene.sonar, float(depth(position)))
     return _reach(chorus, water, tuple(absorption.tolist()))
 
 
@@ -77,8 +79,8 @@ def snap_power(model: PulseModel, sonar: Sonar, absorption: Floats) -> PulsePowe
     return PulsePower(f, power, absorption * np.log(10.0) / 10.0, lasts)
 
 
-def _images(water: _Water, bounces: int) -> tuple[Floats, Reflected]:
-    """Heights (image,) of images, and what their reflections leave."""
+def image_shares(water: ChorusWater, bounces: int) -> tuple[ImageHeights, Reflected]:
+    """Images by at most so many reflections, and the share of the energy that these leave."""
     heights = image_heights(water.profile, water.environment.depth, water.end, bounces)
 
     def share(rho: Floats, length: Floats) -> Floats:
@@ -88,18 +90,18 @@ def _images(water: _Water, bounces: int) -> tuple[Floats, Reflected]:
         turn = 2.0 * np.pi * centre * found.delay_std  # rough: all of the energy, see `chorus_arrivals`
         return np.asarray((found.modulus**2 * np.where(turn > 1.0, 1.0, np.exp(-(turn**2)))).T)
 
-    return heights.climb, share
+    return heights, share
 
 
 @lru_cache(maxsize=64)
-def _reach(chorus: Chorus, water: _Water, absorption: tuple[float, ...]) -> ChorusReach:
+def _reach(chorus: Chorus, water: ChorusWater, absorption: tuple[float, ...]) -> ChorusReach:
     pulse = snap_power(chorus.snap.at_depth(water.environment.depth), water.sonar, np.array(absorption))
     near = max(NEAREST, 0.0 if water.end < water.environment.depth else CAVITY)
     edges = np.concatenate([[1e-2], near * 2.0 ** np.arange(np.ceil(np.log2(HORIZON / near)) + 1)])
 
     def moments(bounces: int, inner: Floats = edges) -> list[RingMoments]:
-        climb, share = _images(water, bounces)
-        return [ring_moments(a, b, climb, share, pulse) for a, b in pairwise(inner)]
+        heights, share = image_shares(water, bounces)
+        return [ring_moments(a, b, heights.climb, share, pulse) for a, b in pairwise(inner)]
 
     bounces = chorus.images
     if bounces == "auto":

@@ -1,0 +1,200 @@
+"""What theory says of a chorus at a hydrophone: spectrum, directions, and how often it is loud."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, partial
+from itertools import pairwise
+
+import numpy as np
+from scipy.interpolate import RegularGridInterpolator
+from scipy.special import ndtr
+
+from sonarsynth.conventions import Floats, depth
+from sonarsynth.equations.arrays.apertures import element_directivity
+from sonarsynth.equations.noise import filters
+from sonarsynth.equations.noise.arrival_counts import CountMoments, path_counts
+from sonarsynth.equations.noise.chorus_moments import Reflected, level_moment
+from sonarsynth.planning import Plan, receiver_of
+from sonarsynth.planning.measured.chorus_reach import ChorusWater, image_shares
+from sonarsynth.recipe.scene import Frame
+from sonarsynth.signals.chorus.chorus_arrivals import CAVITY, ChorusReach, ImageHeights
+from sonarsynth.signals.filtered_pulse import fir, pulse_spectrum
+from sonarsynth.sources.chorus import Chorus
+from sonarsynth.sources.snap_pulses import waveform
+from sonarsynth.state import Receiver
+
+DISTANCES, AZIMUTHS = 6, 90
+"""Of snaps: distances in each ring, and directions, that rates are summed over."""
+TURNS, LENGTHS, FINER = 24, 20, 4
+"""Of the table of peaks behind the filter: directions along y and along z, path lengths, samples of one."""
+PANELS = 24
+"""Nodes between edges of the elevation."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChorusModel:
+    """A chorus as an array at rest hears it; all paths are heard through the face of a hydrophone."""
+
+    chorus: Chorus
+    reach: ChorusReach
+    heights: ImageHeights
+    share: Reflected  # of the energy that reflections leave
+    plan: Plan
+    receiver: Receiver
+
+    @property
+    def energy(self) -> float:
+        """Mean square pressure of snaps at 1 m (Pa2) times their number a m2 and s."""
+        return self.chorus.rate * level_moment(self.chorus.level, self.chorus.deviation, 2)
+
+    @cached_property
+    def climb(self) -> Floats:
+        """(image,) m that rays climb."""
+        return np.maximum(self.heights.climb, CAVITY)
+
+    @cached_property
+    def edges(self) -> tuple[float, ...]:
+        """Sines of the elevation, rising, between which the intensity is smooth."""
+        lowest = self.climb / np.hypot(self.reach.reach, self.climb)
+        least = float(lowest.min())
+        steps = np.geomspace(least, 1.0, 2 + int(np.ceil(-np.log2(least))))
+        above = np.unique(np.append(steps, lowest).round(12))
+        above = above[np.append(True, np.diff(above) > 1e-9)]
+        return tuple(np.concatenate([-above[::-1], above]).tolist())
+
+    def intensity(self, sine: Floats, absorption: float) -> Floats:
+        """Energy per unit of sine (node,), over that of a snap at 1 m and times the snaps a m2: sum of 2 pi V^2
+        exp(-a r)/|sine| over the images whose rays come from there; absorption: dB/m."""
+        flat, away = np.asarray(sine, float).ravel(), np.maximum(np.abs(np.asarray(sine, float)).ravel(), 1e-12)
+        length = self.climb[:, None] / away
+        far = length * np.sqrt(1.0 - np.minimum(away, 1.0) ** 2)
+        there = (far <= self.reach.reach * (1.0 + 1e-9)) & (np.sign(flat) == -self.heights.turns[:, None])
+        left = self.share(far[0], length) * 10.0 ** (-absorption * length / 10.0)
+        return np.asarray(2.0 * np.pi * np.where(there, left, 0.0).sum(axis=0) / away).reshape(np.shape(sine))
+
+    def power(self, absorption: float, low: float = -1.0, high: float = 1.0) -> float:
+        """The integral of the intensity over sines from low to high, without faces."""
+        node, weight = np.polynomial.legendre.leggauss(PANELS)
+        inner = [low, *(edge for edge in self.edges if low < edge < high), high]
+        return sum(
+            0.5 * (b - a) * float(weight @ self.intensity(0.5 * (a + b) + 0.5 * (b - a) * node, absorption))
+            for a, b in pairwise(inner)
+        )
+
+    def pulse_energy(self, frequency: Floats) -> Floats:
+        """|S|^2 (bin,) in s^2 of snaps of 1 Pa behind the filter, the mean over their widths."""
+        sonar, model = self.receiver.sonar, self.model
+        samples = self.samples
+        found = []
+        for width in self.chorus.widths.tolist():
+            f, spectrum = pulse_spectrum(waveform(model, width), sonar.antialias, sonar.sampling_frequency, samples)
+            found.append(np.abs(spectrum) ** 2)
+        peak = model.pulse(0.0, 0.0).peak
+        return np.asarray(np.interp(frequency, f, np.mean(found, axis=0)) / peak**2)
+
+    @cached_property
+    def model(self):  # type: ignore[no-untyped-def]
+        """Of a snap, on the bottom."""
+        return self.chorus.snap.at_depth(self.plan.medium.depth)
+
+    @cached_property
+    def samples(self) -> int:
+        """That hold a filtered snap."""
+        sonar = self.receiver.sonar
+        lasts = 4.0 * filters.duration(fir(sonar.antialias)) + 2e-3
+        return 1 << int(np.ceil(np.log2(lasts * sonar.sampling_frequency)))
+
+    @cached_property
+    def _peaks(self) -> RegularGridInterpolator:
+        """dB of the largest sample of snaps behind the filter, re their peak before any, over the path length and
+        the sizes of the direction along y and z."""
+        sonar, elements = self.receiver.sonar, self.receiver.elements
+        reach, step = np.hypot(self.reach.reach, self.climb.max()), np.linspace(0.0, 1.0, TURNS)
+        lengths = np.linspace(0.0, reach, LENGTHS)  # decibels fall almost as the length grows
+        f, spectrum = pulse_spectrum(waveform(self.model), sonar.antialias, sonar.sampling_frequency, self.samples)
+        used = np.flatnonzero(np.abs(spectrum) > 1e-6 * np.abs(spectrum).max())
+        lost = self.plan.absorption(f[used])
+        y, z = np.meshgrid(step, step, indexing="ij")
+        towards = np.stack([np.zeros_like(y), y, z], axis=-1)[:, :, None, :]
+        face = element_directivity(f[used], towards, elements.face, self.receiver.speed(self.plan.medium))
+        table = np.empty((LENGTHS, TURNS, TURNS))
+        for number, length in enumerate(lengths.tolist()):
+            heard = np.zeros((TURNS, TURNS, FINER * self.samples // 2 + 1), complex)
+            heard[..., used] = spectrum[used] * face * 10.0 ** (-lost * length / 20.0)
+            wave = np.abs(np.fft.irfft(heard, axis=-1)) * FINER * sonar.sampling_frequency
+            largest = wave.reshape(TURNS, TURNS, -1, FINER).max(axis=2)
+            table[number] = (20.0 * np.log10(np.maximum(largest, 1e-300))).mean(axis=-1)
+        table -= 20.0 * np.log10(self.model.pulse(0.0, 0.0).peak)
+        return RegularGridInterpolator((lengths, step, step), table, bounds_error=False, fill_value=None)
+
+    @cached_property
+    def _places(self) -> tuple[Floats, Floats, Floats]:
+        """Horizontal distances (node,) in m; snaps/s (node,) there; gain (node, image) in dB of pressure, without
+        absorption."""
+        x, w = np.polynomial.legendre.leggauss(DISTANCES)
+        rho, area = [], []
+        for low, high in pairwise(self.reach.edges.tolist()):
+            some = np.exp(0.5 * np.log(low * high) + 0.5 * np.log(high / low) * x)
+            rho.append(some)
+            area.append(np.pi * np.log(high / low) * w * some**2)
+        away = np.concatenate(rho)
+        length = np.maximum(np.hypot(away, self.climb[:, None]), CAVITY)
+        share = self.share(away, length)
+        gain = 10.0 * np.log10(np.maximum(share, 1e-30)) - 20.0 * np.log10(length)
+        return away, self.chorus.rate * np.concatenate(area), gain.T
+
+    @cached_property
+    def _heard(self) -> tuple[Floats, Floats, Floats]:
+        """Of snaps in all directions: gain (place, path) in dB from the source level to the largest sample at a
+        hydrophone, delay (place, path) in s, and snaps/s (place,)."""
+        away, rate, gain = self._places
+        length = np.hypot(away[:, None], self.climb)
+        around = 2.0 * np.pi * (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS
+        flat = (away[:, None] / length)[:, None, :]
+        shape = (len(away), AZIMUTHS, len(self.climb))
+        up = np.broadcast_to((-self.climb * self.heights.turns / length)[:, None, :], shape)
+        towards = np.stack([flat * np.cos(around)[:, None], flat * np.sin(around)[:, None], up], axis=-1)
+        towards = self.receiver.pose.turn_to_body(towards)
+        long = np.broadcast_to(length[:, None, :], up.shape)
+        sizes = np.abs(towards[..., 1:])
+        heard = gain[:, None, :] + self._peaks(np.stack([long, sizes[..., 0], sizes[..., 1]], axis=-1))
+        behind = 20.0 * np.log10(max(self.receiver.sonar.behind, 1e-15))
+        heard = heard + np.where(towards[..., 0] < 0.0, behind, 0.0)
+        delay = np.broadcast_to((length * self.heights.slowness)[:, None, :], heard.shape)
+        paths = len(self.climb)
+        return heard.reshape(-1, paths), delay.reshape(-1, paths), np.repeat(rate / AZIMUTHS, AZIMUTHS)
+
+    def loud(self, levels: Floats) -> list[CountMoments]:
+        """Arrivals whose largest sample is above each level (level,) in dB re 1 uPa. Snaps of a cluster are taken as
+        one by one."""
+        gain, delay, rate = self._heard
+        wide = float(np.hypot(self.chorus.deviation, 20.0 / np.log(10.0) * self.chorus.width))
+        return path_counts(gain, delay, rate, (self.chorus.level, wide), levels)
+
+    def energies(self, edges: Floats, seconds: float) -> Floats:
+        """Energy (bin,) of paths by the sine of the elevation, over that of a snap at 1 m, between edges (bin + 1,)."""
+        absorption = float(self.plan.absorption(self.receiver.centre))
+        each = partial(self.power, absorption)
+        return np.array([seconds * self.chorus.rate * each(a, b) for a, b in pairwise(edges.tolist())])
+
+    def counts(self, edges: Floats, seconds: float, level: float) -> Floats:
+        """Number (bin,) of paths whose peak at the centre, before any filter, is above a level (dB re 1 uPa)."""
+        away, rate, gain = self._places
+        length = np.hypot(away[:, None], self.climb)
+        needed = level - gain + float(self.plan.absorption(self.receiver.centre)) * length
+        often = rate[:, None] * ndtr((self.chorus.level - needed) / max(self.chorus.deviation, 1e-9))
+        sine = -self.climb * self.heights.turns / length
+        return seconds * np.histogram(sine.ravel(), edges, weights=often.ravel())[0]
+
+
+def chorus_model(plan: Plan, first: Frame) -> ChorusModel | None:
+    """The model of the chorus of a plan, at the array of a frame; None where it has none that sounds."""
+    chorus, reach = plan.scene.world.chorus, plan.chorus
+    if chorus is None or reach is None:
+        return None
+    receiver = receiver_of(plan, first)
+    end = float(depth(first.sonar_pose.position))
+    water = ChorusWater(plan.scene.world.environment, plan.profile, plan.scene.sonar, end)
+    heights, share = image_shares(water, reach.images)
+    return ChorusModel(chorus, reach, heights, share, plan, receiver)

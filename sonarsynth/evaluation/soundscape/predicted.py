@@ -1,0 +1,174 @@
+"""Figures of the model of a sound, at what the measured ones are of; and both as numbers for programs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.equations.noise.stable_laws import ESTIMATORS
+from sonarsynth.evaluation.soundscape.measured import PERCENT, Measured
+from sonarsynth.evaluation.soundscape.model import SoundModel
+from sonarsynth.evaluation.soundscape.octaves import band_means
+
+PASCAL = 120.0
+"""dB re 1 uPa of 1 Pa."""
+BINS = 18
+"""Of the elevation, from -90 to 90 deg."""
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """What the model of a recipe says, at the grids of `Measured`."""
+
+    parts: dict[str, Floats]  # (bin,) Pa2/Hz
+    octaves: Floats  # (band,) dB re 1 Pa2/Hz
+    coherence: Floats  # (frequency, pair)
+    rates: Floats | None  # (level,) 1/s; none without a chorus
+    fano: float
+    kurtosis: float  # excess, at most; NaN without a chorus
+    root: float  # dB re 1 Pa: root mean square in the band
+    elevation: Floats | None  # (bin,) of `Elevations`; none where nothing is known of arrivals
+
+    @property
+    def density(self) -> Floats:
+        """(bin,) Pa2/Hz of all parts."""
+        return np.asarray(sum(self.parts.values()))
+
+
+def elevation_edges() -> Floats:
+    """Sines (bin + 1,) of the edges of bins of the elevation."""
+    return np.sin(np.linspace(-0.5 * np.pi, 0.5 * np.pi, BINS + 1))
+
+
+def predict(model: SoundModel, measured: Measured) -> Predicted:
+    """The model's figures of a measured sound."""
+    parts, sound, chorus = model.parts(measured.frequency), measured.sound, model.chorus
+    density = np.asarray(sum(parts.values()))
+    offset = sound.position[measured.pairs] - sound.position[0]
+    square = float(np.trapezoid(density, measured.frequency))
+    rates, fano, kurtosis, elevation = None, float("nan"), float("nan"), None
+    if chorus is not None:
+        counts = chorus.loud(measured.levels + PASCAL)
+        rates = np.array([count.rate for count in counts])
+        if chorus.chorus.clusters is None and not np.isnan(measured.loud):
+            fano = counts[int(np.argmin(np.abs(measured.levels - measured.loud)))].fano
+        share = float(np.trapezoid(parts["chorus"], measured.frequency)) / square
+        kurtosis = chorus.reach.kurtosis * share**2
+        if (known := sound.arrivals) is not None:
+            edges = elevation_edges()
+            above = known.above
+            elevation = (
+                chorus.energies(edges, known.seconds)
+                if above is None
+                else chorus.counts(edges, known.seconds, above)
+            )
+    return Predicted(
+        parts=parts,
+        octaves=10.0 * np.log10(band_means(measured.frequency, density, measured.edges)),
+        coherence=np.stack([model.coherence(f, offset) for f in measured.at.tolist()]),
+        rates=rates,
+        fano=fano,
+        kurtosis=kurtosis,
+        root=10.0 * float(np.log10(square)),
+        elevation=elevation,
+    )
+
+
+def as_json(measured: Measured, predicted: Predicted | None = None) -> dict[str, Any]:
+    """Numbers for programs; null where there is none. Levels in dB re 1 uPa, or re full scale without calibration."""
+    sound, got, spread = measured.sound, measured.figures, measured.spread
+    zero = PASCAL if sound.calibrated else 0.0
+    model = predicted or Predicted({}, np.zeros(0), np.zeros((0, 0)), None, np.nan, np.nan, np.nan, None)
+    found: dict[str, Any] = {
+        "seconds": sound.seconds,
+        "hydrophones": len(sound.position),
+        "levels": sound.unit,
+        "notes": list(sound.notes),
+        "spectrum": {
+            "frequency_hz": measured.frequency,
+            "level_db": _level(got.density) + zero,
+            "spread_db": 10.0 / np.log(10.0) * spread.density / np.maximum(got.density, 1e-300),
+            "model_db": _level(model.density) + zero if model.parts else None,
+            "parts_db": {name: _level(part) + zero for name, part in model.parts.items()},
+        },
+        "third_octaves": {
+            "centre_hz": measured.centres,
+            "level_db": got.octaves + zero,
+            "spread_db": spread.octaves,
+            "model_db": model.octaves + zero if predicted else None,
+        },
+        "peak_rates": {
+            "level_db": measured.levels + zero,
+            "per_second": got.rates,
+            "spread": spread.rates,
+            "model": model.rates,
+        },
+        "amplitude": {
+            "level_db": measured.tail + zero,
+            "exceedance": got.exceedance,
+            "spread": spread.exceedance,
+            "rms_db": got.moments[0] + zero,
+            "rms_spread_db": spread.moments[0],
+            "rms_model_db": model.root + zero,
+            "excess_kurtosis": got.moments[1],
+            "excess_kurtosis_spread": spread.moments[1],
+            "excess_kurtosis_model_at_most": model.kurtosis,
+            "stable_fits": {
+                name: {
+                    "alpha": got.alpha[n],
+                    "alpha_spread": spread.alpha[n],
+                    "scale_db": got.scale[n] + zero,
+                    "scale_spread_db": spread.scale[n],
+                }
+                for n, name in enumerate(ESTIMATORS)
+            },
+        },
+        "millisecond_levels": {
+            "percent": list(PERCENT),
+            "level_db": got.percentiles + zero,
+            "spread_db": spread.percentiles,
+        },
+        "coherence": {
+            "frequency_hz": measured.at,
+            "offset_m": sound.position[measured.pairs] - sound.position[0],
+            "value": got.coherence,
+            "spread": spread.coherence,
+            "model": model.coherence if predicted else None,
+        },
+        "loud_arrivals": {
+            "above_db": measured.loud + zero,
+            "gaps_s": np.sort(measured.gaps),
+            "fano_factor": got.fano[0],
+            "fano_spread": spread.fano[0],
+            "fano_model": model.fano,
+        },
+    }
+    if (known := sound.arrivals) is not None:
+        edges = elevation_edges()
+        found["elevation"] = {
+            "edges_deg": np.rad2deg(np.arcsin(edges)),
+            "of": "energy" if known.above is None else f"paths over {known.above:.1f} dB re 1 uPa",
+            "value": np.histogram(known.sine, edges, weights=known.weight)[0],
+            "spread": np.sqrt(np.histogram(known.sine, edges, weights=known.weight**2)[0]),
+            "model": model.elevation,
+        }
+    plain: dict[str, Any] = _plain(found)
+    return plain
+
+
+def _level(power: Floats) -> Floats:
+    with np.errstate(divide="ignore"):
+        return np.asarray(10.0 * np.log10(power))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _plain(inner) for name, inner in value.items()}
+    if isinstance(value, np.ndarray | list):
+        return [_plain(inner) for inner in (value.tolist() if isinstance(value, np.ndarray) else value)]
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else None
+    return value

@@ -1,0 +1,60 @@
+"""A recording of the sea, cut into blocks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+
+from sonarsynth.conventions import Floats
+from sonarsynth.description.named_files import FileError
+from sonarsynth.description.wav_files import read_wav
+from sonarsynth.equations.noise.filters import response
+from sonarsynth.evaluation.soundscape.sound import SHORTEST, Sound
+from sonarsynth.receiver import Sonar
+from sonarsynth.signals.filtered_pulse import fir
+from sonarsynth.sources.recordings import RecordingError
+
+BLOCK, FEWEST_BLOCKS = 0.1, 10
+"""s: of a block, or less, so that there are so many at least."""
+MOST_SAMPLES = 1 << 25
+"""Of a recording: the rest is not looked at."""
+
+
+def recorded_sound(path: Path | str, sonar: Sonar, pascals: float | None, channel: int = 0) -> Sound:
+    """A channel of a WAV file behind the filter of a sonar, as far as it goes; pascals: pressure (Pa) of the number 1
+    in the file, the full scale of one of whole numbers, None where nobody knows. Raises RecordingError."""
+    try:
+        rate, values = read_wav(path, channel)
+    except FileError as error:
+        raise RecordingError(f"{path}: {error}") from None
+    notes = [] if pascals is not None else ["levels of the recording are relative: its sensitivity is not given"]
+    if len(values) > MOST_SAMPLES:
+        values = values[:MOST_SAMPLES]
+        notes.append(f"of the recording the first {len(values) / rate:.3g} s are measured")
+    size = min(int(BLOCK * rate), len(values) // FEWEST_BLOCKS)
+    if size < SHORTEST:
+        raise RecordingError(
+            f"{path}: has {len(values)} samples, too few for {FEWEST_BLOCKS} blocks of {SHORTEST} or more"
+        )
+    if not np.ptp(values) > 0.0:
+        raise RecordingError(f"{path}: is silent")
+    if 0.5 * rate <= sonar.band.low:
+        raise RecordingError(f"{path}: is sampled at {rate:g} Hz: it holds nothing of the band of the sonar")
+    if 0.5 * rate < sonar.band.high:
+        notes.append(f"the recording ends at {0.5e-3 * rate:g} kHz, within the band of the sonar: its levels are lower")
+    heard = _filtered(values * (pascals or 1.0), rate, sonar)
+    if not np.abs(heard).max() > 1e-12 * np.abs(values).max() * (pascals or 1.0):
+        raise RecordingError(f"{path}: is silent in the band of the sonar")
+    blocks = heard[: len(heard) // size * size].reshape(-1, 1, size).astype(np.float32)
+    band = (sonar.band.low, min(sonar.band.high, 0.5 * rate))
+    return Sound(blocks, rate, np.zeros((1, 3)), True, band, calibrated=pascals is not None, notes=tuple(notes))
+
+
+def _filtered(values: Floats, rate: float, sonar: Sonar) -> Floats:
+    """Samples (sample,) behind the filter of the sonar."""
+    length = next_fast_len(len(values) + int(0.01 * rate), real=True)
+    known = np.linspace(0.0, 0.5 * rate, 8193)
+    gain = np.interp(rfftfreq(length, 1.0 / rate), known, response(known, fir(sonar.antialias)))
+    return np.asarray(irfft(rfft(values - values.mean(), length) * gain, length)[: len(values)])
