@@ -8,7 +8,6 @@
     if __name__ == "__main__":                       # worker processes import the script again
         ss.build(recipe, "remus.zarr", frames=range(8))
         tree = ss.open("remus.zarr")
-        print(ss.verify("remus.zarr").ok)
 
 Recipes are written in YAML or with the classes below. Names are looked up when they are first used, so importing the
 package is light.
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
         FlatNoise,
         KnudsenNoise,
         RainNoise,
+        RecordedNoise,
         TabulatedNoise,
         ThermalNoise,
         WenzNoise,
@@ -65,6 +65,7 @@ if TYPE_CHECKING:
     from sonarsynth.pictures import show
     from sonarsynth.pictures.ray_pictures import rays
     from sonarsynth.pictures.snap_pictures import snap
+    from sonarsynth.pictures.soundscape_figures.soundscape_pictures import soundscape
     from sonarsynth.pipeline import render
     from sonarsynth.planning import Plan, plan
     from sonarsynth.propagation import AutoTracing, Refracted, Straight
@@ -179,6 +180,7 @@ __all__ = [
     "RayRequest",
     "Recipe",
     "RecipeError",
+    "RecordedNoise",
     "RecordedSnap",
     "ReflectionTable",
     "Refracted",
@@ -236,6 +238,7 @@ __all__ = [
     "schema",
     "show",
     "snap",
+    "soundscape",
     "target_strength",
     "verify",
 ]
@@ -244,7 +247,7 @@ _HOMES = {
     "export": "points",
     "description": "FieldError",
     "environment.boundaries": "FluidHalfSpace PressureRelease ReflectionTable Rigid SeaBottom SeaSurface Sediment",
-    "environment.noise": "FlatNoise KnudsenNoise RainNoise TabulatedNoise ThermalNoise WenzNoise WindNoise",
+    "environment.noise": "FlatNoise KnudsenNoise RainNoise RecordedNoise TabulatedNoise ThermalNoise WenzNoise WindNoise",
     "environment.noise.directions": (
         "BottomDirections IsotropicDirections OneDirection RingDirections SurfaceDirections"
     ),
@@ -256,6 +259,7 @@ _HOMES = {
     "pictures": "show",
     "pictures.ray_pictures": "rays",
     "pictures.snap_pictures": "snap",
+    "pictures.soundscape_figures.soundscape_pictures": "soundscape",
     "pipeline": "render",
     "planning": "Plan plan",
     "propagation": "AutoTracing Refracted Straight",
@@ -291,9 +295,7 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'sonarsynth' has no attribute '{name}'")
     home, attribute = _HOME[name]
-    value = getattr(importlib.import_module(f"sonarsynth.{home}"), attribute)
-    globals()[name] = value
-    return value
+    return globals().setdefault(name, getattr(importlib.import_module(f"sonarsynth.{home}"), attribute))
 
 
 def __dir__() -> list[str]:

@@ -20,6 +20,7 @@ from sonarsynth.cli.export_command import export
 from sonarsynth.cli.repair_command import repair
 from sonarsynth.cli.running import BadOption, run
 from sonarsynth.cli.selecting import chosen_frames, product_names
+from sonarsynth.cli.soundscape_command import soundscape
 from sonarsynth.cli.target_strength_command import target_strength
 from sonarsynth.cli.worker_options import worker_bounds
 
@@ -234,10 +235,8 @@ def show(
         typer.echo(str(file))
 
 
-app.command()(accuracy)
-app.command()(card)
-app.command()(export)
-app.command()(repair)
+for command in (accuracy, card, export, repair, soundscape):
+    app.command()(command)
 app.command("target-strength")(target_strength)
 
 

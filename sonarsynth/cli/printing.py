@@ -53,19 +53,19 @@ def progress(waiting: str = "starting workers") -> Iterator[Report]:
 
 
 @contextmanager
-def planning() -> Iterator[None]:
-    """Shows that a plan is being made: a spinner on a terminal, else a line now and then."""
+def planning(what: str = "planning") -> Iterator[None]:
+    """Shows that something is being made: a spinner on a terminal, else a line now and then."""
     began, done = time.monotonic(), threading.Event()
     if sys.stderr.isatty():
-        columns = SpinnerColumn(), TextColumn("planning"), TimeElapsedColumn()
+        columns = SpinnerColumn(), TextColumn(what), TimeElapsedColumn()
         with Progress(*columns, console=console(stderr=True), transient=True) as bar:
-            bar.add_task("planning", total=None)
+            bar.add_task(what, total=None)
             yield
         return
 
     def say() -> None:
         while not done.wait(SECONDS_BETWEEN_LINES):
-            sys.stderr.write(f"planning, {time.monotonic() - began:.0f} s\n")
+            sys.stderr.write(f"{what}, {time.monotonic() - began:.0f} s\n")
             sys.stderr.flush()
 
     thread = threading.Thread(target=say, daemon=True)

@@ -12,6 +12,7 @@ from pydantic import Discriminator, Tag, TypeAdapter
 
 from sonarsynth.conventions import Ints
 from sonarsynth.description import description, named_files
+from sonarsynth.environment.noise import RecordedNoise
 from sonarsynth.environment.sound_speed import Cast
 from sonarsynth.propagation.ray_request import RayRequest
 from sonarsynth.recipe.citation import Attribution, Creator
@@ -44,7 +45,7 @@ __all__ = [
     "Zip",
 ]
 
-FILE_KINDS = frozenset({MeshFile.kind, Cast.kind, RecordedSnap.kind, NoiseRecording.kind})
+FILE_KINDS = frozenset({MeshFile.kind, Cast.kind, RecordedSnap.kind, NoiseRecording.kind, RecordedNoise.kind})
 """Descriptions whose `path` names a file."""
 
 Entry = Annotated[Annotated[Axis, Tag("axis")] | Annotated[Zip, Tag("zip")], Discriminator(entry_tag)]

@@ -90,6 +90,7 @@ SURFACE = [
     "RayRequest",
     "Recipe",
     "RecipeError",
+    "RecordedNoise",
     "RecordedSnap",
     "ReflectionTable",
     "Refracted",
@@ -147,6 +148,7 @@ SURFACE = [
     "schema",
     "show",
     "snap",
+    "soundscape",
     "target_strength",
     "verify",
 ]

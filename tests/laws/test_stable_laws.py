@@ -39,7 +39,7 @@ def test_two_is_gauss_and_one_is_cauchy() -> None:
 @pytest.mark.parametrize("alpha", [0.6, 0.9, 1.2, 1.6, 1.95])
 def test_tails_are_the_transform_of_the_characteristic_function(alpha: float) -> None:
     for x in (0.2, 1.0, 5.0):
-        whole = quad(lambda t: np.sinc(x * t / np.pi) * x * np.exp(-(t**alpha)), 0.0, 200.0, limit=2000)[0]
+        whole = quad(lambda t, x=x: np.sinc(x * t / np.pi) * x * np.exp(-(t**alpha)), 0.0, 200.0, limit=2000)[0]
         assert float(stable_laws.exceedance(np.array(x), alpha)) == pytest.approx(1.0 - 2.0 / np.pi * whole, abs=2e-5)
     far = np.array([1e4])  # P(|x| > y) -> 2 Gamma(alpha) sin(pi alpha/2)/(pi y^alpha)
     law = 2.0 / np.pi * gamma(alpha) * np.sin(0.5 * np.pi * alpha) * far**-alpha

@@ -261,11 +261,15 @@ def test_the_command(
     assert "verdicts" in said and "dynamic" in said and "not installed" in said
     assert str(tmp_path / "scene.json") in said and (tmp_path / "scene.png").exists()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sonarsynth.cli.accuracy_tables.frontier_table.measure", lambda *a, **k: replace(measured, verdicts=()))
+        patch.setattr(
+            "sonarsynth.cli.accuracy_tables.frontier_table.measure", lambda *a, **k: replace(measured, verdicts=())
+        )
         assert run(app, ["accuracy", str(file), "--json", "--out", str(tmp_path)]) == 0
         assert len(json.loads(capsys.readouterr().out)) == len(measured.points)
         wrong = (replace(measured.verdicts[0], ok=False),)
-        patch.setattr("sonarsynth.cli.accuracy_tables.frontier_table.measure", lambda *a, **k: replace(measured, verdicts=wrong))
+        patch.setattr(
+            "sonarsynth.cli.accuracy_tables.frontier_table.measure", lambda *a, **k: replace(measured, verdicts=wrong)
+        )
         assert run(app, ["accuracy", str(file), "--out", str(tmp_path)]) == 1
         assert "FAILED" in capsys.readouterr().out
 

@@ -9,12 +9,16 @@ from sonarsynth.environment.noise.flat_noise import FlatNoise
 from sonarsynth.environment.noise.knudsen_noise import KnudsenNoise
 from sonarsynth.environment.noise.noise_field import NoiseField
 from sonarsynth.environment.noise.rain_noise import RainNoise
+from sonarsynth.environment.noise.recorded_noise import RecordedNoise
 from sonarsynth.environment.noise.tabulated_noise import TabulatedNoise
 from sonarsynth.environment.noise.thermal_noise import ThermalNoise
 from sonarsynth.environment.noise.wenz_noise import WenzNoise
 from sonarsynth.environment.noise.wind_noise import WindNoise
 
-Noise = Annotated[FlatNoise | KnudsenNoise | RainNoise | TabulatedNoise | ThermalNoise | WenzNoise | WindNoise, BY_KIND]
+Noise = Annotated[
+    FlatNoise | KnudsenNoise | RainNoise | RecordedNoise | TabulatedNoise | ThermalNoise | WenzNoise | WindNoise,
+    BY_KIND,
+]
 """Models of ambient noise, by `kind`."""
 
 __all__ = [
@@ -23,6 +27,7 @@ __all__ = [
     "Noise",
     "NoiseField",
     "RainNoise",
+    "RecordedNoise",
     "TabulatedNoise",
     "ThermalNoise",
     "WenzNoise",

@@ -13,7 +13,7 @@ from sonarsynth.pipeline.synthesis import digitise
 from sonarsynth.planning import Plan, Windows
 from sonarsynth.planning.measured.ray_bending import propagation
 from sonarsynth.planning.notes.scene_checks import check_shrimp, read_inputs
-from sonarsynth.planning.pulse_durations import PulseDurations
+from sonarsynth.planning.plans import PulseDurations
 from sonarsynth.products import Signals
 from sonarsynth.receiver import PositionTable, elements
 from sonarsynth.recipe import Recipe

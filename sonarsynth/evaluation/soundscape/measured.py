@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy.signal import csd, welch
 
-from sonarsynth.conventions import Floats, Ints
+from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.equations.noise.arrival_counts import APART, fano_factor, loud_arrivals
 from sonarsynth.equations.noise.stable_laws import ESTIMATORS
 from sonarsynth.evaluation.soundscape.octaves import band_means, octave_bands
@@ -22,7 +22,7 @@ STEP, LOUDER = 5.0, 10.0
 """dB: between levels whose rates are counted, and that these are above the root mean square at least."""
 TAIL = 48
 """Levels that exceedance is measured at."""
-FITTED = 1 << 15
+FITTED = 1 << 13
 """Samples that stable laws are fitted to, at most."""
 AGAIN = 60
 """Resamplings of blocks."""
@@ -100,9 +100,7 @@ def measure(sound: Sound) -> Measured:
     random, count = np.random.default_rng(0), len(blocks)
     again = [_figures(made, [blocks[n] for n in random.integers(0, count, count)]) for _ in range(AGAIN)]
     spread = {f.name: _deviation([getattr(one, f.name) for one in again]) for f in fields(Figures)}
-    return Measured(
-        *(getattr(made, f.name) for f in fields(Measured)[:-2]), figures=_figures(made, blocks), spread=Figures(**spread)
-    )
+    return replace(made, figures=_figures(made, blocks), spread=Figures(**spread))
 
 
 def _deviation(values: list[Floats]) -> Floats:
@@ -123,7 +121,8 @@ def _grids(sound: Sound) -> tuple[Floats, Floats, Ints]:
     low, high = sound.band
     at = frequency[[int(np.argmin(np.abs(frequency - f))) for f in (low, 0.5 * (low + high), high)]]
     away = np.linalg.norm(sound.position - sound.position[0], axis=1)
-    return frequency, at, np.flatnonzero((away > 0.0) & (away * rate / 1500.0 < LATE * size))
+    near = np.flatnonzero((away > 0.0) & (away * rate / 1500.0 < LATE * size))
+    return np.asarray(frequency, float), np.asarray(at, float), near
 
 
 def _loud(sound: Sound, levels: Floats) -> tuple[float, Floats]:
@@ -138,7 +137,7 @@ def _loud(sound: Sound, levels: Floats) -> tuple[float, Floats]:
     return float("nan"), np.zeros(0)
 
 
-def _block(made: Measured, pressure: Floats, bins: Floats) -> _Block:
+def _block(made: Measured, pressure: Floats, bins: Bools) -> _Block:
     sound, rate = made.sound, made.sound.sampling_frequency
     size = _segment(sound)
     density = welch(pressure, rate, nperseg=size, axis=-1)[1]

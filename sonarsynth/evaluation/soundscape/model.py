@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -77,12 +78,11 @@ class SoundModel:
         face = self.receiver.elements.face
         return heard_share(toward, frequency, face, self._speed, self.receiver.sonar.behind)
 
-    def _over_band(self, frequency: Floats, value: object) -> Floats:
+    def _over_band(self, frequency: Floats, value: Callable[[float], float]) -> Floats:
         """A function of the frequency (Hz) at frequencies (bin,), interpolated between knots where there are many."""
-        assert callable(value)
         low, high = max(float(frequency.min()), 1.0), float(frequency.max())
         knots = frequency if len(frequency) < KNOTS else np.linspace(low, high, KNOTS)
-        return np.interp(frequency, knots, [value(max(f, 1.0)) for f in knots.tolist()])
+        return np.asarray(np.interp(frequency, knots, [value(max(f, 1.0)) for f in knots.tolist()]))
 
     def _face(self, noise: NoiseField, frequency: float) -> float:
         """Share of the power of a noise that a hydrophone hears."""

@@ -61,9 +61,7 @@ def predict(model: SoundModel, measured: Measured) -> Predicted:
             edges = elevation_edges()
             above = known.above
             elevation = (
-                chorus.energies(edges, known.seconds)
-                if above is None
-                else chorus.counts(edges, known.seconds, above)
+                chorus.energies(edges, known.seconds) if above is None else chorus.counts(edges, known.seconds, above)
             )
     return Predicted(
         parts=parts,

@@ -48,7 +48,7 @@ class Sound:
     @property
     def seconds(self) -> float:
         """Of all blocks together."""
-        return self.pressure.shape[0] * self.pressure.shape[2] / self.sampling_frequency
+        return float(self.pressure.shape[0] * self.pressure.shape[2] / self.sampling_frequency)
 
     @property
     def unit(self) -> str:
@@ -72,7 +72,7 @@ def listeners(elements: Elements, works: npt.NDArray[np.bool_]) -> Ints:
     if len(chosen) < HYDROPHONES:
         others = np.setdiff1d(np.flatnonzero(away > 0.0), chosen)
         chosen += _spaced(others, away)[: HYDROPHONES - len(chosen)]
-    return alive[np.array(chosen)]
+    return np.asarray(alive[np.array(chosen)])
 
 
 def _spaced(some: Ints, away: Floats) -> list[int]:

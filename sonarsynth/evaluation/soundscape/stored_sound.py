@@ -30,7 +30,9 @@ MOST_FRAMES = 2048
 def recipe_of_store(tree: xr.DataTree, path: Folder, files: Path | str | None) -> Recipe:
     """The recipe that a store holds; files: folder of those that it names. Raises Mismatch."""
     try:
-        return recipe_with(str(tree.attrs["recipe"]), str(path), files_of(path, tree.attrs, files))
+        return recipe_with(
+            str(tree.attrs["recipe"]), str(path), files_of(path, {str(k): v for k, v in tree.attrs.items()}, files)
+        )
     except KeyError:
         raise Mismatch(f"{path}: holds no recipe, which the model is of") from None
     except (RecipeError, FieldError, OSError) as error:

@@ -1,0 +1,69 @@
+"""Noise of the spectrum of a recording."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import Ge, Gt
+
+from sonarsynth.conventions import Floats, Number
+from sonarsynth.description import description, named_files, wav_files
+from sonarsynth.environment.noise.directions import Directions
+from sonarsynth.environment.noise.noise_field import NoiseField
+
+SEGMENT, FEWEST = 4096, 4
+"""Samples of a segment of the spectrum at most, and segments at least."""
+SHORTEST = 256
+"""Samples of a recording."""
+
+
+@description
+class RecordedNoise(NoiseField):
+    """Gaussian noise that has the power spectral density of a recording of the sea (WAV), by Welch's method. Of the
+    recording its mean spectrum alone is kept: neither its samples nor its snaps, which a chorus makes, are played.
+    Beyond half its sampling frequency there is nothing."""
+
+    kind: Literal["recording"] = "recording"
+    path: str
+    """Relative to the recipe."""
+    pascals: Annotated[Number, Gt(0)] = 1.0
+    """Pressure (Pa) of the number 1 in the file; the full scale of a WAV of whole numbers is 1."""
+    channel: Annotated[int, Ge(0)] = 0
+    directions: Directions | None = None
+    """As of `flat`: one hydrophone does not tell where its sound came from."""
+
+    def density(self, frequency: Floats) -> Floats:
+        """As `NoiseField.density`: straight lines between the bins of the spectrum. Raises ValueError for a file that
+        cannot be read, is silent or too short."""
+        known, density = self._spectrum()
+        return np.asarray(np.interp(frequency, known, density, right=0.0))
+
+    def validity(self, low: float, high: float) -> tuple[str, ...]:
+        """As `NoiseField.validity`."""
+        last = float(self._spectrum()[0][-1])
+        if high <= last:
+            return ()
+        return (f"the recording {self.path} is of 0 to {last:.6g} Hz, the band of {low:.6g} to {high:.6g} Hz",)
+
+    def _spectrum(self) -> tuple[Floats, Floats]:
+        try:
+            return _spectrum_of(self, named_files.stamp(self.path))
+        except named_files.FileError as error:
+            raise ValueError(f"{self.path}: {error}") from None
+
+
+@lru_cache(maxsize=8)
+def _spectrum_of(noise: RecordedNoise, changed: tuple[int, int]) -> tuple[Floats, Floats]:
+    """Frequencies (bin,) in Hz, and the power spectral density (bin,) there in Pa2/Hz. Raises FileError."""
+    from scipy.signal import welch
+
+    rate, values = wav_files.read_wav(noise.path, noise.channel)
+    if values.size < SHORTEST:
+        raise named_files.FileError(f"has {values.size} samples; the spectrum of noise needs {SHORTEST}")
+    size = min(SEGMENT, values.size // FEWEST)
+    frequency, density = welch(values * noise.pascals, rate, nperseg=size)
+    if not 0.0 < float(density[1:].max()) < np.inf:
+        raise named_files.FileError("is silent, or louder than numbers can say")
+    return frequency, density

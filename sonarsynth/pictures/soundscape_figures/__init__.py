@@ -1,0 +1,1 @@
+"""Figures of the sound that hydrophones hear, beside its models and a recording."""

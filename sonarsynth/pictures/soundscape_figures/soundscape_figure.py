@@ -1,0 +1,190 @@
+"""One sheet of the figures of a soundscape: each measured, with its spread, over its model."""
+
+from __future__ import annotations
+
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import erfc
+
+from sonarsynth.conventions import Floats
+from sonarsynth.equations.noise.stable_laws import ESTIMATORS, exceedance
+from sonarsynth.evaluation.soundscape.measured import PERCENT, Measured
+from sonarsynth.evaluation.soundscape.predicted import PASCAL, Predicted, elevation_edges
+from sonarsynth.pictures.figures.style import INK, MARKS, PALE, RAYS, figure, grid, label
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MODEL, HEARD, RECORDED = MARKS[1], INK, RAYS[0]
+PARTS = (RAYS[2], RAYS[3], RAYS[4], RAYS[5], PALE)
+SHOWN = 45.0
+"""dB: parts of a spectrum so far below the loudest are out of the picture."""
+
+
+def soundscape_figure(title: str, made: Measured, model: Predicted, recording: Measured | None = None) -> Figure:
+    """The sheet: spectrum, rates of loud arrivals, amplitudes, elevations, coherence, gaps."""
+    sheet = figure(15.0, 8.6)
+    panels = sheet.subplots(2, 3).ravel()
+    for axes in panels:
+        grid(axes)
+    both = [(made, HEARD, "sound"), *([(recording, RECORDED, "recording")] if recording else [])]
+    _spectrum(panels[0], both, model)
+    _rates(panels[1], both, model)
+    _amplitudes(panels[2], both)
+    _elevations(panels[3], made, model)
+    _coherence(panels[4], made, model)
+    _gaps(panels[5], both, model)
+    for axes in panels:
+        if axes.get_legend_handles_labels()[0]:
+            axes.legend(fontsize=7, frameon=False)
+    sheet.suptitle(title, fontsize=11, color=INK, x=0.01, ha="left")
+    notes = [*made.sound.notes, *(recording.sound.notes if recording else ())]
+    levels = [f"{name}: {_percentiles(one)}" for one, _, name in both]
+    sheet.supxlabel(fill("; ".join([*levels, *notes]), 230), fontsize=8, color=INK, x=0.01, ha="left")
+    return sheet
+
+
+def _zero(one: Measured) -> float:
+    return PASCAL if one.sound.calibrated else 0.0
+
+
+def _percentiles(one: Measured) -> str:
+    found = " / ".join(f"{level + _zero(one):.1f}" for level in one.figures.percentiles)
+    return f"{'/'.join(f'{p:g}' for p in PERCENT)} % of 1 ms levels {found} {one.sound.unit}"
+
+
+def _spectrum(axes: Axes, both: list[tuple[Measured, str, str]], model: Predicted) -> None:
+    made = both[0][0]
+    for one, colour, name in both:
+        level = _decibels(one.figures.density) + _zero(one)
+        wide = 10.0 / np.log(10.0) * one.spread.density / np.maximum(one.figures.density, 1e-300)
+        axes.fill_between(1e-3 * one.frequency, level - wide, level + wide, color=colour, alpha=0.2, linewidth=0)
+        axes.plot(1e-3 * one.frequency, level, color=colour, linewidth=0.9, label=f"{name} ({one.sound.seconds:.3g} s)")
+        centre = 1e-3 * one.centres
+        axes.errorbar(
+            centre, one.figures.octaves + _zero(one), one.spread.octaves, fmt="s", color=colour, markersize=4, capsize=2
+        )
+    total = _decibels(model.density) + PASCAL
+    for (name, part), colour in zip(model.parts.items(), PARTS * len(model.parts), strict=False):
+        if len(model.parts) > 1 and (part_level := _decibels(part) + PASCAL).max() > total.max() - SHOWN:
+            axes.plot(1e-3 * made.frequency, part_level, color=colour, linewidth=0.8, label=name)
+    axes.plot(1e-3 * made.frequency, total, "--", color=MODEL, linewidth=1.4, label="model")
+    axes.set_ylim(total.max() - SHOWN, None)
+    off = float(np.mean(made.figures.octaves - model.octaves)) if len(model.octaves) else float("nan")
+    said = f": {off:+.1f} dB re model" if np.isfinite(off) else ""
+    label(axes, "frequency (kHz)", "spectral level (dB re 1 uPa2/Hz)", f"spectrum, 1/3 octaves (squares){said}")
+
+
+def _rates(axes: Axes, both: list[tuple[Measured, str, str]], model: Predicted) -> None:
+    made = both[0][0]
+    for one, colour, name in both:
+        some = one.figures.rates > 0.0
+        x = one.levels[some] + _zero(one)
+        axes.errorbar(x, one.figures.rates[some], one.spread.rates[some], fmt="o", color=colour, capsize=2, label=name)
+    if model.rates is not None:
+        some = model.rates > 0.01 / made.sound.seconds
+        axes.plot(made.levels[some] + PASCAL, model.rates[some], "--", color=MODEL, label="model")
+    if axes.get_legend_handles_labels()[0]:
+        axes.set_yscale("log")
+        axes.set_ylim(0.1 / made.sound.seconds, None)
+    else:
+        _nothing(axes, "nothing is 10 dB over the mean")
+    label(axes, f"peak level ({made.sound.unit})", "arrivals above it (1/s)", "loud arrivals at a hydrophone")
+
+
+def _amplitudes(axes: Axes, both: list[tuple[Measured, str, str]]) -> None:
+    titles = []
+    for one, colour, name in both:
+        x, known = 10.0 ** (one.tail / 20.0), one.figures
+        some = known.exceedance > 0.0
+        axes.plot(one.tail[some] + _zero(one), known.exceedance[some], color=colour, linewidth=1.4, label=name)
+        gauss = erfc(x / 10.0 ** (known.moments[0] / 20.0) / np.sqrt(2.0))
+        axes.plot(one.tail + _zero(one), gauss, ":", color=colour, label="Gaussian of its power")
+        alpha, scale = known.alpha[1], known.scale[1]
+        if np.isfinite(alpha):
+            law = exceedance(x / 10.0 ** (scale / 20.0), float(alpha))
+            axes.plot(one.tail + _zero(one), law, "--", color=colour, linewidth=0.9, label=f"stable, alpha {alpha:.2f}")
+        each = ", ".join(f"{a:.2f}" if np.isfinite(a) else "none" for a in known.alpha)
+        titles.append(f"{name}: alpha {each}; kurtosis {known.moments[1]:.3g} over 3")
+    axes.set_yscale("log")
+    least = min(float(one.figures.exceedance[one.figures.exceedance > 0.0].min()) for one, _, _ in both)
+    axes.set_ylim(0.5 * least, 1.5)
+    short = "/".join(name.split()[0] for name in ESTIMATORS)
+    label(axes, f"magnitude ({both[0][0].sound.unit})", "share above", f"amplitudes ({short})\n" + "\n".join(titles))
+
+
+def _elevations(axes: Axes, made: Measured, model: Predicted) -> None:
+    known, edges = made.sound.arrivals, elevation_edges()
+    if known is None or model.elevation is None:
+        _nothing(axes, "no arrivals are known")
+        label(axes, "elevation (deg)", "", "arrivals by elevation")
+        return
+    degrees = np.rad2deg(np.arcsin(edges))
+    value = np.histogram(known.sine, edges, weights=known.weight)[0]
+    wide = np.sqrt(np.histogram(known.sine, edges, weights=known.weight**2)[0])
+    middle = 0.5 * (degrees[1:] + degrees[:-1])
+    axes.errorbar(middle[value > 0], value[value > 0], wide[value > 0], fmt="o", color=HEARD, capsize=2, label="sound")
+    axes.stairs(model.elevation, degrees, color=MODEL, linestyle="--", label="model")
+    if known.above is None:
+        law = np.array([_inverse_sine(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)])
+        axes.stairs(law * model.elevation.sum() / law.sum(), degrees, color=PALE, label="1/|sin|, same sum")
+        of = "energy re a snap at 1 m"
+    else:
+        of = f"paths over {known.above:.0f} dB"
+    top = max(float(model.elevation.max()), float(value.max()))
+    axes.set(yscale="log", ylim=(1e-4 * top, 3.0 * top))
+    label(axes, "elevation (deg, up positive)", f"{of} in 10 deg", f"arrivals by elevation ({len(known.sine)} paths)")
+
+
+def _inverse_sine(low: float, high: float, least: float = 0.005) -> float:
+    """Integral of 1/|v| over sines, those that are smaller than `least` left out."""
+    a, b = sorted((abs(low), abs(high)))
+    return float(np.log(max(b, least) / max(a, least)))
+
+
+def _coherence(axes: Axes, made: Measured, model: Predicted) -> None:
+    offset = made.sound.position[made.pairs] - made.sound.position[0]
+    away = np.linalg.norm(offset, axis=1)
+    level = np.abs(offset[:, 2]) < 0.5 * away
+    for n, (f, colour) in enumerate(zip(made.at.tolist(), RAYS, strict=False)):
+        for some, mark, line, way in ((level, "o", "--", "across"), (~level, "^", ":", "up")):
+            if not some.any():
+                continue
+            order = np.flatnonzero(some)[np.argsort(away[some])]
+            got, wide = made.figures.coherence[n, order], made.spread.coherence[n, order]
+            said = f"{1e-3 * f:.3g} kHz {way}"
+            axes.errorbar(away[order], got, wide, fmt=mark, color=colour, markersize=4, capsize=2, label=said)
+            axes.plot(away[order], model.coherence[n, order], mark + line, color=colour, mfc="none", linewidth=0.8)
+    if not len(away):
+        _nothing(axes, "no hydrophones near enough to each other")
+    label(axes, "distance of hydrophones (m)", "coherence, real part", "coherence (open marks, lines: model)")
+
+
+def _gaps(axes: Axes, both: list[tuple[Measured, str, str]], model: Predicted) -> None:
+    titles = []
+    for one, colour, name in both:
+        gaps = np.sort(one.gaps)
+        if not gaps.size:
+            titles.append(f"{name}: too few that stand apart" if one.sound.running else f"{name}: frames are too short")
+            continue
+        share = 1.0 - np.arange(len(gaps)) / len(gaps)
+        axes.step(1e3 * gaps, share, where="post", color=colour, label=f"{name}, over {one.loud + _zero(one):.0f} dB")
+        axes.plot(1e3 * gaps, np.exp(-gaps / gaps.mean()), ":", color=colour, label="Poisson of its rate")
+        predicted = f" (model {model.fano:.1f})" if name == "sound" and np.isfinite(model.fano) else ""
+        titles.append(f"{name}: Fano factor {one.figures.fano[0]:.2g} +- {one.spread.fano[0]:.1g}{predicted}")
+    if axes.get_legend_handles_labels()[0]:
+        axes.set(xscale="log", yscale="log")
+    else:
+        _nothing(axes, "no gaps")
+    label(axes, "gap (ms)", "share of longer gaps", "gaps between loud arrivals\n" + "\n".join(titles))
+
+
+def _nothing(axes: Axes, why: str) -> None:
+    axes.text(0.5, 0.5, why, transform=axes.transAxes, ha="center", color=PALE)
+
+
+def _decibels(power: Floats) -> Floats:
+    return np.asarray(10.0 * np.log10(np.maximum(power, 1e-300)))
