@@ -1,16 +1,13 @@
 """sonarsynth: labelled synthetic sonar datasets: pressure, images, point clouds, and the exact truth of each.
 
     import sonarsynth as ss
-
     recipe = ss.load("configs/remus.yaml")
     print(ss.plan(recipe))                           # stages, errors, time and size, before anything is built
     frame = ss.render(recipe, 0)                     # one frame as an xarray.DataTree, without a store
     if __name__ == "__main__":                       # worker processes import the script again
         ss.build(recipe, "remus.zarr", frames=range(8))
-        tree = ss.open("remus.zarr")
 
-Recipes are written in YAML or with the classes below. Names are looked up when they are first used, so importing the
-package is light.
+Recipes are written in YAML or with the classes below; these are looked up when they are first used.
 """
 
 from __future__ import annotations
@@ -247,7 +244,8 @@ _HOMES = {
     "export": "points",
     "description": "FieldError",
     "environment.boundaries": "FluidHalfSpace PressureRelease ReflectionTable Rigid SeaBottom SeaSurface Sediment",
-    "environment.noise": "FlatNoise KnudsenNoise RainNoise RecordedNoise TabulatedNoise ThermalNoise WenzNoise WindNoise",
+    "environment.noise": "FlatNoise KnudsenNoise RainNoise TabulatedNoise ThermalNoise WenzNoise WindNoise",
+    "environment.noise.recorded_noise": "RecordedNoise",
     "environment.noise.directions": (
         "BottomDirections IsotropicDirections OneDirection RingDirections SurfaceDirections"
     ),

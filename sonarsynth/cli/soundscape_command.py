@@ -10,7 +10,7 @@ import typer
 
 from sonarsynth.cli.running import BadOption
 
-LONGEST = 120.0
+SHORTEST, LONGEST = 0.05, 120.0
 """s."""
 
 
@@ -18,6 +18,7 @@ def soundscape(
     source: Annotated[
         str, typer.Argument(metavar="RECIPE|STORE", help="A recipe (YAML), or a store.", show_default=False)
     ],
+    *,
     out: Annotated[Path, typer.Option(metavar="FILE", help="Where to write the picture.")] = Path("soundscape.png"),
     seconds: Annotated[float, typer.Option(metavar="S", help="Of a recipe's sound that is made.")] = 2.0,
     compare: Annotated[
@@ -44,8 +45,8 @@ def soundscape(
     from sonarsynth.pictures.soundscape_figures import soundscape_pictures as pictures
     from sonarsynth.recipe import reading
 
-    if not 0.0 < seconds <= LONGEST:
-        raise BadOption(f"--seconds: must be above 0 and at most {LONGEST:g}")
+    if not SHORTEST <= seconds <= LONGEST:
+        raise BadOption(f"--seconds: must be from {SHORTEST:g} to {LONGEST:g}")
     beside = None if compare is None else pictures.Compared(compare, _pascals(full_scale, sensitivity), channel)
     if beside is None and (full_scale is not None or sensitivity is not None):
         raise BadOption("--full-scale and --sensitivity are those of a recording: name one with --compare")

@@ -19,15 +19,14 @@ from sonarsynth.receiver import PositionTable, elements
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
 
-BLOCK = 0.1
-"""s: of a block, or"""
+BLOCK, FEWEST_BLOCKS = 0.1, 8
+"""s: of a block, or less, so that there are so many at least."""
 MOST_SAMPLES = 1 << 18
-"""samples at most."""
-FEWEST_BLOCKS = 8
+"""Of a block."""
 
 
-def listening_plan(recipe: Recipe) -> Plan:
-    """The plan of the first sequence of a recipe for a few point-like places of its array, and no errors of sensors.
+def listening_plan(recipe: Recipe, seconds: float = 1.0) -> Plan:
+    """The plan of so much sound of the first sequence of a recipe, at a few hydrophones, without errors of sensors.
 
     Raises FieldError as `planning.plan` does, NothingHeard where the recipe has neither chorus nor noise.
     """
@@ -46,7 +45,7 @@ def listening_plan(recipe: Recipe) -> Plan:
     profile = read_inputs(scene)
     check_shrimp(scene)
     rate = sonar.sampling_frequency
-    samples = int(min(BLOCK * rate, MOST_SAMPLES))
+    samples = int(min(min(BLOCK, seconds / FEWEST_BLOCKS) * rate, MOST_SAMPLES))
     none = PulseDurations(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     windows = Windows(np.zeros(scene.trajectory.frames), samples, 0.0, samples / rate, none, 0)
     paths = propagation(scene, profile, (recipe.frame(0)[1],), recipe.accuracy.signal)
@@ -57,7 +56,7 @@ def made_sound(plan: Plan, first: Frame, seconds: float) -> Sound:
     """So much of the sound that a sonar at rest hears from a frame on; `plan` is that of `listening_plan`."""
     sonar, samples = plan.scene.sonar, plan.windows.samples
     long = samples / sonar.sampling_frequency
-    count = max(int(np.ceil(seconds / long - 1e-9)), FEWEST_BLOCKS)
+    count = max(round(seconds / long), 2)
     blocks, sines, energies = [], [], []
     for number in range(count):
         moment = replace(first.moment, time=first.time + number * long)

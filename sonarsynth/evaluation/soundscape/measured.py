@@ -18,7 +18,7 @@ SEGMENT = 1024
 """Samples of a segment of spectra, at most."""
 LATE = 0.15
 """Of a segment: as long as sound may take from one hydrophone to another for their coherence to be measured."""
-STEP, LOUDER = 5.0, 10.0
+STEP, LOUDER = 5.0, 14.0
 """dB: between levels whose rates are counted, and that these are above the root mean square at least."""
 TAIL = 48
 """Levels that exceedance is measured at."""

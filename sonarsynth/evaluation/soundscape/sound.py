@@ -64,6 +64,8 @@ def listeners(elements: Elements, works: npt.NDArray[np.bool_]) -> Ints:
         raise NothingHeard("every hydrophone is dead: there is no sound to measure")
     place = elements.position[alive]
     first = int(np.argmin(np.linalg.norm(place, axis=1)))
+    if alive.size <= HYDROPHONES:
+        return np.asarray(np.append(alive[first], np.delete(alive, first)))
     apart = place - place[first]
     away = np.linalg.norm(apart, axis=1)
     chosen = [first]

@@ -75,8 +75,8 @@ def stored_sound(tree: xr.DataTree, recipe: Recipe) -> Sound:
         band=(scene.sonar.band.low, scene.sonar.band.high),
         arrivals=_arrivals(tree, frames, signals.sizes["sample"] / rate),
         notes=(
-            f"of {used.size} frames the {1e3 * size / rate:.3g} ms before the listed snaps are heard: the rest is their "
-            "sound and its echoes",
+            f"of {used.size} frames the {1e3 * size / rate:.3g} ms before the listed snaps are heard: the rest is "
+            "their sound and its echoes",
             "frames are too short for gaps between loud arrivals",
         ),
     )

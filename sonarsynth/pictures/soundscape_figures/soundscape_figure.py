@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from textwrap import fill
 from typing import TYPE_CHECKING
 
@@ -91,7 +92,7 @@ def _rates(axes: Axes, both: list[tuple[Measured, str, str]], model: Predicted) 
         axes.set_yscale("log")
         axes.set_ylim(0.1 / made.sound.seconds, None)
     else:
-        _nothing(axes, "nothing is 10 dB over the mean")
+        _nothing(axes, "nothing is 14 dB over the mean")
     label(axes, f"peak level ({made.sound.unit})", "arrivals above it (1/s)", "loud arrivals at a hydrophone")
 
 
@@ -129,7 +130,7 @@ def _elevations(axes: Axes, made: Measured, model: Predicted) -> None:
     axes.errorbar(middle[value > 0], value[value > 0], wide[value > 0], fmt="o", color=HEARD, capsize=2, label="sound")
     axes.stairs(model.elevation, degrees, color=MODEL, linestyle="--", label="model")
     if known.above is None:
-        law = np.array([_inverse_sine(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)])
+        law = np.array([_inverse_sine(a, b) for a, b in pairwise(edges.tolist())])
         axes.stairs(law * model.elevation.sum() / law.sum(), degrees, color=PALE, label="1/|sin|, same sum")
         of = "energy re a snap at 1 m"
     else:

@@ -77,7 +77,7 @@ def soundscape_of_recipe(recipe: Recipe, seconds: float = SECONDS, compare: Comp
     """Make a stretch of the sound of a recipe, of its first sequence, without its targets and listed snaps, and measure
     it. Raises FieldError, NothingToDraw where there is no sound, RecordingError."""
     try:
-        plan = listening_plan(recipe)
+        plan = listening_plan(recipe, seconds)
         recording = _recording(recipe, compare)
         first = recipe.frame(0)[1]
         measured = measure(made_sound(plan, first, seconds))
@@ -128,9 +128,10 @@ def soundscape(
     """Measure what hydrophones hear of the sea of a recipe, or of a store (a folder or a URL), beside its model, and
     draw it into the file `out`.
 
-    seconds: of a recipe's sound to make; compare: a recording (WAV) whose figures are put beside them; pascals: pressure
-    (Pa) of the number 1 in it, the full scale of one of whole numbers; files: folder of the files that a store's recipe
-    names. Raises FieldError, NothingToDraw (a ValueError) where there is no sound, RecordingError, Mismatch.
+    seconds: of a recipe's sound to make; compare: a recording (WAV) whose figures are put beside them; pascals:
+    pressure (Pa) of the number 1 in it, the full scale of one of whole numbers; files: folder of the files that a
+    store's recipe names. Raises FieldError, NothingToDraw (a ValueError) where there is no sound, RecordingError,
+    Mismatch.
     """
     beside = None if compare is None else Compared(compare, pascals)
     if isinstance(source, Recipe):

@@ -1,0 +1,116 @@
+"""The command `soundscape`: of recipes, stores and recordings, and what cannot be measured."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import wavfile
+
+from sonarsynth.cli import app
+from sonarsynth.cli.running import run
+from sonarsynth.planning import plan
+from sonarsynth.recipe import reading
+from sonarsynth.schedule import build
+
+TEXT = """
+scene:
+  world:
+    environment:
+      depth: 10 m
+      sound_speed: {kind: isovelocity, speed: 1540}
+      noise: {kind: flat, level: 60 dB}
+    targets:
+      - {name: ball, shape: {kind: sphere, radius: 0.3, edge: 0.2}, motion: {kind: still, position: [18, 0, -5]}}
+    sources: [{kind: snapping_shrimp, position: [14, -5]}]
+    chorus: {density: 0.01, reach: 50 m, images: 1, width: 0, snap: SNAP}
+  sonar:
+    array: {kind: planar_lattice, columns: 3, rows: 3, pitch: 5 cm, DEAD}
+    beams: {azimuths: 5, elevations: 5}
+    converter: {bits: 16, full_scale: 200 Pa}
+  trajectory: {frames: 3, interval: 0.1}
+"""
+
+
+def recipe_in(folder: Path, dead: str = "dead: [4]") -> Path:
+    (folder / "sea.yaml").write_text(
+        TEXT.replace("DEAD", dead).replace("SNAP", "{kind: ricker, frequency: 50 kHz, peak: 3 kPa}")
+    )
+    return folder / "sea.yaml"
+
+
+def said(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    status = run(app, ["soundscape", *map(str, arguments)])
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+def test_a_recipe_and_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    sea, wav, picture = recipe_in(tmp_path), tmp_path / "sea.wav", tmp_path / "out" / "sea.png"
+    wavfile.write(wav, 96_000, (3000 * np.random.default_rng(1).standard_normal(40_000)).astype(np.int16))
+    given = (sea, "--seconds", 0.1, "--out", picture, "--compare", wav, "--sensitivity", -180, "--json")
+    status, out, _ = said(capsys, *given)
+    found = json.loads(out)
+    assert status == 0 and picture.stat().st_size > 20_000
+    assert "NaN" not in out and found["hydrophones"] == 8  # one is dead
+    assert set(found["spectrum"]["parts_db"]) == {"noise flat", "chorus", "rounding"}
+    recorded = found["recording"]
+    assert any("48 kHz" in note for note in recorded["notes"])
+    passed = 10.0 * np.log10((48.0 - 25.0) / 48.0)  # of white noise
+    exact = 20.0 * np.log10(3000 / 32768) + 180.0 + passed
+    assert recorded["amplitude"]["rms_db"] == pytest.approx(exact, abs=0.3)
+
+
+def test_a_store(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert build(plan(reading.load(recipe_in(tmp_path)), ["signals"]), tmp_path / "s.zarr", workers=0).ok
+    status, out, _ = said(capsys, tmp_path / "s.zarr", "--out", tmp_path / "s.png", "--json")
+    found = json.loads(out)
+    assert status == 0 and any("before the listed snaps" in note for note in found["notes"])
+    assert found["loud_arrivals"]["fano_factor"] is None and found["elevation"]["of"].startswith("paths over")
+    assert found["seconds"] < 0.01  # the direct pulse, which is 30 dB louder, and its echoes are left out
+    assert found["amplitude"]["rms_db"] < 130.0
+
+
+@pytest.mark.parametrize(
+    ("settings", "line"),
+    [
+        (["scene.world.chorus=null", "scene.world.environment.noise=null"], "neither scene.world.chorus nor"),
+        (["scene.sonar.array.dead=[0, 1, 2, 3, 4, 5, 6, 7, 8]"], "every hydrophone is dead"),
+    ],
+)
+def test_a_recipe_without_sound_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], settings: list[str], line: str
+) -> None:
+    status, _, err = said(capsys, recipe_in(tmp_path), *(part for one in settings for part in ("--set", one)))
+    assert status == 2 and line in err and err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("values", "line"),
+    [
+        (np.zeros(40_000, np.int16), "is silent"),
+        (np.zeros(0, np.int16), "holds no samples"),
+        (np.ones(100, np.int16), "has 100 samples, too few"),
+        (np.full(40_000, np.nan, np.float32), "not finite"),
+    ],
+)
+def test_a_recording_without_sound_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], values: np.ndarray, line: str
+) -> None:
+    wavfile.write(tmp_path / "sea.wav", 196_000, values)
+    status, _, err = said(capsys, recipe_in(tmp_path), "--compare", tmp_path / "sea.wav")
+    assert status == 2 and line in err and err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "options",
+    [("--full-scale", "1"), ("--compare", "sea.wav", "--full-scale", "1", "--sensitivity", "2"), ("--seconds", "0")],
+)
+def test_options_that_do_not_go_together(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: tuple[str, ...]
+) -> None:
+    status, _, err = said(capsys, recipe_in(tmp_path), *options)
+    assert status == 2 and err.count("\n") == 1
+    assert said(capsys, tmp_path / "none.yaml")[0] == 2 and said(capsys, tmp_path / "none.zarr")[0] == 2
