@@ -129,7 +129,7 @@ def test_a_chorus_is_heard_as_its_model_says() -> None:
     got, model = measure(sound), sound_model(plan, first)
     said = predict(model, got)
     assert plan.chorus is not None and abs(said.root + 120.0 - plan.chorus.level) < 0.3  # by another integration
-    assert abs(got.figures.moments[0] - said.root) < 0.3 + 4.0 * got.spread.moments[0]
+    assert abs(got.figures.moments[0] - said.root) < 0.3 + 4.0 * said.scatter
     assert said.rates is not None
     near = np.flatnonzero((said.rates * sound.seconds > 5.0) & (said.rates * APART < 0.1))
     expected = said.rates[near] * sound.seconds

@@ -14,7 +14,7 @@ from sonarsynth.conventions import Floats, depth
 from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.equations.noise import filters
 from sonarsynth.equations.noise.arrival_counts import CountMoments, path_counts
-from sonarsynth.equations.noise.chorus_moments import Reflected, level_moment
+from sonarsynth.equations.noise.chorus_moments import Reflected, effective_duration, level_moment
 from sonarsynth.planning import Plan, receiver_of
 from sonarsynth.planning.measured.chorus_reach import ChorusWater, image_shares
 from sonarsynth.recipe.scene import Frame
@@ -92,6 +92,13 @@ class ChorusModel:
             found.append(np.abs(spectrum) ** 2)
         peak = model.pulse(0.0, 0.0).peak
         return np.asarray(np.interp(frequency, f, np.mean(found, axis=0)) / peak**2)
+
+    @property
+    def pulse_duration(self) -> float:
+        """(int s^2)^2 / int s^4 in s of a snap behind the filter."""
+        sonar = self.receiver.sonar
+        _, spectrum = pulse_spectrum(waveform(self.model), sonar.antialias, sonar.sampling_frequency, self.samples)
+        return effective_duration(np.fft.irfft(spectrum), 1.0 / sonar.sampling_frequency)
 
     @cached_property
     def model(self):  # type: ignore[no-untyped-def]

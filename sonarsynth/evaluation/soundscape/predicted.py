@@ -30,6 +30,7 @@ class Predicted:
     fano: float
     kurtosis: float  # excess, at most; NaN without a chorus
     root: float  # dB re 1 Pa: root mean square in the band
+    scatter: float  # dB: of that, from one stretch as long as the sound to another, as snaps are few
     elevation: Floats | None  # (bin,) of `Elevations`; none where nothing is known of arrivals
 
     @property
@@ -49,7 +50,7 @@ def predict(model: SoundModel, measured: Measured) -> Predicted:
     density = np.asarray(sum(parts.values()))
     offset = sound.position[measured.pairs] - sound.position[0]
     square = float(np.trapezoid(density, measured.frequency))
-    rates, fano, kurtosis, elevation = None, float("nan"), float("nan"), None
+    rates, fano, kurtosis, scatter, elevation = None, float("nan"), float("nan"), 0.0, None
     if chorus is not None:
         counts = chorus.loud(measured.levels + PASCAL)
         rates = np.array([count.rate for count in counts])
@@ -57,6 +58,7 @@ def predict(model: SoundModel, measured: Measured) -> Predicted:
             fano = counts[int(np.argmin(np.abs(measured.levels - measured.loud)))].fano
         share = float(np.trapezoid(parts["chorus"], measured.frequency)) / square
         kurtosis = chorus.reach.kurtosis * share**2
+        scatter = 10.0 / np.log(10.0) * float(np.sqrt(kurtosis * chorus.pulse_duration / sound.seconds))
         if (known := sound.arrivals) is not None:
             edges = elevation_edges()
             above = known.above
@@ -71,6 +73,7 @@ def predict(model: SoundModel, measured: Measured) -> Predicted:
         fano=fano,
         kurtosis=kurtosis,
         root=10.0 * float(np.log10(square)),
+        scatter=scatter,
         elevation=elevation,
     )
 
@@ -79,7 +82,7 @@ def as_json(measured: Measured, predicted: Predicted | None = None) -> dict[str,
     """Numbers for programs; null where there is none. Levels in dB re 1 uPa, or re full scale without calibration."""
     sound, got, spread = measured.sound, measured.figures, measured.spread
     zero = PASCAL if sound.calibrated else 0.0
-    model = predicted or Predicted({}, np.zeros(0), np.zeros((0, 0)), None, np.nan, np.nan, np.nan, None)
+    model = predicted or Predicted({}, np.zeros(0), np.zeros((0, 0)), None, np.nan, np.nan, np.nan, np.nan, None)
     found: dict[str, Any] = {
         "seconds": sound.seconds,
         "hydrophones": len(sound.position),
@@ -111,6 +114,7 @@ def as_json(measured: Measured, predicted: Predicted | None = None) -> dict[str,
             "rms_db": got.moments[0] + zero,
             "rms_spread_db": spread.moments[0],
             "rms_model_db": model.root + zero,
+            "rms_model_scatter_db": model.scatter,
             "excess_kurtosis": got.moments[1],
             "excess_kurtosis_spread": spread.moments[1],
             "excess_kurtosis_model_at_most": model.kurtosis,

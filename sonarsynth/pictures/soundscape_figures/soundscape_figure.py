@@ -75,7 +75,7 @@ def _spectrum(axes: Axes, both: list[tuple[Measured, str, str]], model: Predicte
     axes.plot(1e-3 * made.frequency, total, "--", color=MODEL, linewidth=1.4, label="model")
     axes.set_ylim(total.max() - SHOWN, None)
     off = float(np.mean(made.figures.octaves - model.octaves)) if len(model.octaves) else float("nan")
-    said = f": {off:+.1f} dB re model" if np.isfinite(off) else ""
+    said = f": {off:+.1f} dB re model (+- {model.scatter:.1f} by chance)" if np.isfinite(off) else ""
     label(axes, "frequency (kHz)", "spectral level (dB re 1 uPa2/Hz)", f"spectrum, 1/3 octaves (squares){said}")
 
 

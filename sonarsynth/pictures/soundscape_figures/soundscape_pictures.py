@@ -52,7 +52,7 @@ class Soundscape:
         got, wide, model = self.measured.figures, self.measured.spread, self.predicted
         lines = [
             f"level in the band: {got.moments[0] + PASCAL:.1f} +- {wide.moments[0]:.1f} dB re 1 uPa rms "
-            f"(model {model.root + PASCAL:.1f})"
+            f"(model {model.root + PASCAL:.1f}, +- {model.scatter:.1f} in so short a time)"
         ]
         off = got.octaves - model.octaves
         if off.size:
