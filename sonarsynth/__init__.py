@@ -6,6 +6,7 @@
     frame = ss.render(recipe, 0)                     # one frame as an xarray.DataTree, without a store
     if __name__ == "__main__":                       # worker processes import the script again
         ss.build(recipe, "remus.zarr", frames=range(8))
+        print(ss.open("remus.zarr"), ss.verify("remus.zarr").ok)
 
 Recipes are written in YAML or with the classes below; these are looked up when they are first used.
 """
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
     from sonarsynth.export import points
     from sonarsynth.frontiers import measure as accuracy
     from sonarsynth.geometry.motion import Circle, ConstantVelocity, Line, Still, Waypoint, Waypoints
+    from sonarsynth.geometry.recorded_track import RecordedTrack
     from sonarsynth.imaging import DenseDelayAndSum, FocusedDelayAndSum
     from sonarsynth.pictures import show
     from sonarsynth.pictures.ray_pictures import rays
@@ -179,6 +181,7 @@ __all__ = [
     "RecipeError",
     "RecordedNoise",
     "RecordedSnap",
+    "RecordedTrack",
     "ReflectionTable",
     "Refracted",
     "RefractedPlacing",
@@ -253,6 +256,7 @@ _HOMES = {
         "Absorption Cast Catenary Environment Isovelocity Linear Munk Tabulated TemperatureSalinity Thermocline"
     ),
     "geometry.motion": "Circle ConstantVelocity Line Still Waypoint Waypoints",
+    "geometry.recorded_track": "RecordedTrack",
     "imaging": "DenseDelayAndSum FocusedDelayAndSum",
     "pictures": "show",
     "pictures.ray_pictures": "rays",

@@ -17,6 +17,7 @@ import typer
 from sonarsynth.cli.accuracy_command import accuracy
 from sonarsynth.cli.card_command import card
 from sonarsynth.cli.export_command import export
+from sonarsynth.cli.rays_command import rays
 from sonarsynth.cli.repair_command import repair
 from sonarsynth.cli.running import BadOption, run
 from sonarsynth.cli.selecting import chosen_frames, product_names
@@ -235,34 +236,9 @@ def show(
         typer.echo(str(file))
 
 
-for command in (accuracy, card, export, repair, soundscape):
+for command in (accuracy, card, export, rays, repair, soundscape):
     app.command()(command)
 app.command("target-strength")(target_strength)
-
-
-@app.command()
-def rays(
-    recipe: RecipeFile,
-    out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Where to write the pictures. Default: <recipe>.rays.")
-    ] = None,
-    frame: Annotated[int, typer.Option(min=0, help="The frame to trace.")] = 0,
-    settings: Settings = [],  # noqa: B006
-) -> None:
-    """Draw eigenrays, or what the recipe's `rays:` asks for: a section, a 3-D view, and an interactive HTML page."""
-    from sonarsynth import planning
-    from sonarsynth.pictures.ray_pictures import show_rays
-    from sonarsynth.recipe import reading
-
-    source = reading.read(recipe, settings)
-    made_from = reading.recipe_of(source)
-    if frame >= made_from.frames:
-        raise BadOption(f"--frame {frame} is outside 0..{made_from.frames - 1}")
-    with reading.locating(source):
-        files, table = show_rays(planning.plan(made_from), frame, out or Path(f"{recipe.stem}.rays"))
-    typer.echo(table)
-    for file in files:
-        typer.echo(str(file))
 
 
 @app.command()

@@ -1,4 +1,4 @@
-"""`sonarsynth export STORE`."""
+"""`sonarsynth export STORE`, and `export RECIPE --to bellhop`."""
 
 from __future__ import annotations
 
@@ -10,24 +10,56 @@ import typer
 from sonarsynth.cli.running import BadOption
 from sonarsynth.cli.selecting import frame_numbers
 
+BELLHOP = "bellhop"
+
 
 def export(
-    store: Annotated[str, typer.Argument(help="The store, a Zarr folder or its URL.", show_default=False)],
-    to: Annotated[str, typer.Option(metavar="FORMAT", help="ply or pcd: point clouds.")] = "ply",
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Where to write. Default: beside the store.")] = None,
+    source: Annotated[
+        str, typer.Argument(metavar="STORE", help="The store, or for bellhop the recipe.", show_default=False)
+    ],
+    to: Annotated[
+        str,
+        typer.Option(
+            metavar="FORMAT",
+            help="ply or pcd: point clouds of a store. bellhop: environments (.env) of a recipe's water.",
+        ),
+    ] = "ply",
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Where to write; for bellhop a folder. Default: beside the store."),
+    ] = None,
     frames: Annotated[
-        str | None, typer.Option(metavar="LIST", help="Only these frames, such as 0:8 or 0:8,12 (end excluded).")
+        str | None,
+        typer.Option(
+            metavar="LIST", help="Only these frames, such as 0:8 or 0:8,12 (end excluded). Default: all; bellhop: 0."
+        ),
     ] = None,
     relative_to: Annotated[
         str, typer.Option(metavar="AXES", help="sonar, world, or the name of a target: its points fall together.")
     ] = "sonar",
+    settings: Annotated[
+        list[str],
+        typer.Option("--set", metavar="PATH=VALUE", help="Override a field of the recipe (bellhop). Repeatable."),
+    ] = [],  # noqa: B006 - typer copies it
 ) -> None:
-    """Write the points of a store as one cloud for other programs, with colours, normals and labels."""
-    from sonarsynth.export import FORMATS, points, write_points
+    """Write what other programs read: the points of a store as one cloud, or the water of a recipe for Bellhop.
+
+    A cloud has colours, normals and labels. For Bellhop each snap of a frame has an environment, from it to the array.
+    """
+    from sonarsynth.export import FORMATS
+
+    if to == BELLHOP:
+        _bellhop(Path(source), out, frames, settings)
+    elif to not in FORMATS:
+        raise BadOption(f"--to must be one of {', '.join((*FORMATS, BELLHOP))}, not {to}")
+    else:
+        _points(source, to, out, frames, relative_to)
+
+
+def _points(store: str, to: str, out: Path | None, frames: str | None, relative_to: str) -> None:
+    from sonarsynth.export import points, write_points
     from sonarsynth.store import open_store
 
-    if to not in FORMATS:
-        raise BadOption(f"--to must be one of {', '.join(FORMATS)}, not {to}")
     tree = open_store(store)
     some = frame_numbers(frames, tree.sizes["frame"])
     beside = Path(Path(store).name) if "://" in store else Path(store)
@@ -38,3 +70,23 @@ def export(
     except (ValueError, ImportError) as error:
         raise BadOption(str(error)) from None
     typer.echo(f"{written}: {cloud.sizes['point']} points")
+
+
+def _bellhop(recipe: Path, out: Path | None, frames: str | None, settings: list[str]) -> None:
+    from sonarsynth import planning
+    from sonarsynth.export import write_bellhop
+    from sonarsynth.recipe import reading
+
+    source = reading.read(recipe, settings)
+    made_from = reading.recipe_of(source)
+    some = frame_numbers(frames or "0:1", made_from.frames) or ()
+    folder, notes = out or Path(f"{recipe.stem}.bellhop"), dict[str, None]()
+    with reading.locating(source):
+        plan = planning.plan(made_from)
+        for index in some:
+            files, unsaid = write_bellhop(plan, index, folder, recipe.stem)
+            notes |= dict.fromkeys(unsaid)
+            for file in files:
+                typer.echo(str(file))
+    for note in notes:
+        typer.echo(f"note: {note}")

@@ -13,6 +13,7 @@ from pydantic import field_validator
 from sonarsynth.conventions import Floats, MetresPerSecond, Position, PositiveMetres, PositiveSeconds, Radians, Seconds
 from sonarsynth.description import BY_KIND, description
 from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.geometry.recorded_track import RecordedTrack, track_pose, track_spin, track_velocity
 
 
 @description
@@ -104,12 +105,14 @@ class ConstantVelocity:
     roll: Radians = 0.0
 
 
-Motion = Annotated[Still | Line | Waypoints | Circle | ConstantVelocity, BY_KIND]
+Motion = Annotated[Still | Line | Waypoints | Circle | ConstantVelocity | RecordedTrack, BY_KIND]
 
 
 def pose(motion: Motion, time: float) -> Pose:
-    """Where a body is at a time (s)."""
+    """Where a body is at a time (s). Raises TrackError where the file of a track cannot be used."""
     match motion:
+        case RecordedTrack():
+            return track_pose(motion, time)
         case Still():
             return Pose(np.array(motion.position), quaternion(motion.heading, motion.pitch, motion.roll))
         case Line():
@@ -130,6 +133,8 @@ def pose(motion: Motion, time: float) -> Pose:
 def velocity(motion: Motion, time: float) -> Floats:
     """Velocity (3,) in the world at a time (m/s); at a waypoint, that of the leg that begins."""
     match motion:
+        case RecordedTrack():
+            return track_velocity(motion, time)
         case Still():
             return np.zeros(3)
         case Line():
@@ -148,9 +153,11 @@ def velocity(motion: Motion, time: float) -> Floats:
 
 
 def spin(motion: Motion, time: float) -> Floats:
-    """Angular velocity (3,) in the world at a time (rad/s): headings alone change; at a waypoint, of the leg that
-    begins."""
+    """Angular velocity (3,) in the world at a time (rad/s): headings alone change, but on a track; at a waypoint, of
+    the leg that begins."""
     match motion:
+        case RecordedTrack():
+            return track_spin(motion, time)
         case Circle():
             return np.array([0.0, 0.0, motion.speed / motion.radius])
         case Waypoints():

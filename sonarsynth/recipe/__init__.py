@@ -14,6 +14,7 @@ from sonarsynth.conventions import Ints
 from sonarsynth.description import description, named_files
 from sonarsynth.environment.noise import RecordedNoise
 from sonarsynth.environment.sound_speed import Cast
+from sonarsynth.geometry.recorded_track import RecordedTrack
 from sonarsynth.propagation.ray_request import RayRequest
 from sonarsynth.recipe.citation import Attribution, Creator
 from sonarsynth.recipe.scene import Frame, Scene
@@ -45,7 +46,9 @@ __all__ = [
     "Zip",
 ]
 
-FILE_KINDS = frozenset({MeshFile.kind, Cast.kind, RecordedSnap.kind, NoiseRecording.kind, RecordedNoise.kind})
+FILE_KINDS = frozenset(
+    {each.kind for each in (MeshFile, Cast, RecordedSnap, NoiseRecording, RecordedNoise, RecordedTrack)}
+)
 """Descriptions whose `path` names a file."""
 
 Entry = Annotated[Annotated[Axis, Tag("axis")] | Annotated[Zip, Tag("zip")], Discriminator(entry_tag)]

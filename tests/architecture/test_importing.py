@@ -92,6 +92,7 @@ SURFACE = [
     "RecipeError",
     "RecordedNoise",
     "RecordedSnap",
+    "RecordedTrack",
     "ReflectionTable",
     "Refracted",
     "RefractedPlacing",

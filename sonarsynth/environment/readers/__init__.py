@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from sonarsynth.description import named_files
+from sonarsynth.environment.readers.bellhop_env import is_bellhop, is_range_dependent, read_bellhop
 from sonarsynth.environment.readers.cast_netcdf import read_netcdf
 from sonarsynth.environment.readers.cast_table import MAX_ROWS, CastError, CastTable, Column
 from sonarsynth.environment.readers.fixed_columns import read_fixed_columns
@@ -24,7 +25,7 @@ __all__ = ["READ", "CastError", "CastTable", "Column", "read_cast"]
 READ: Final = (
     "Sea-Bird CNV, ROS and BTL; CastAway, Valeport, AML, RBR, Sippican EDF, MVP, SAIV, Idronaut, Sea and Sun, "
     "Oceanscience and other tables with column names and units; Kongsberg ASVP and S, Hypack, Caris, ISS, Sonardyne, "
-    "TSK, UNB; netCDF of Argo, WOA and Turo; any of them in .gz, .bz2 or .zip"
+    "TSK, UNB; .env of Bellhop; netCDF of Argo, WOA and Turo; any of them in .gz, .bz2 or .zip"
 )
 """What is read, for refusals."""
 
@@ -65,10 +66,12 @@ def _read_text(path: Path, data: bytes, profile: int | None) -> CastTable:
     text = _decoded(data)
     if "\0" in text[:4096]:
         raise CastError(f"{path}: is not a text file, nor netCDF; read are {READ}")
-    table = read_fixed_columns(path, text, profile or 0)
+    if is_range_dependent(text):
+        raise CastError(f"{path}: is a .ssp of Bellhop, profiles over range without depths, which is not supported")
+    table = read_bellhop(path, text) if is_bellhop(text) else read_fixed_columns(path, text, profile or 0)
     if table is None:
         table = read_named_columns(path, text)
-    if profile and len(table.notes) == 0:
+    if profile and (len(table.notes) == 0 or table.layout == "Bellhop"):
         raise CastError(f"{path}: has no profile {profile}: it holds one cast")
     return table
 

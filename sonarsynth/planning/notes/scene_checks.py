@@ -16,6 +16,7 @@ from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.motion import pose
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.planning.choices import OF_BEAMS
+from sonarsynth.planning.notes.track_checks import check_tracks
 from sonarsynth.receiver import Sonar, elements
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals.array_paths import MAX_DOPPLER
@@ -45,7 +46,7 @@ STEEPEST = 1e6
 
 
 def read_inputs(scene: Scene) -> Profile:
-    """Read the cast and the meshes, so that a missing or broken file is known before anything is computed."""
+    """Read cast, tracks and meshes, so that a missing or broken file is known before anything is computed."""
     world = ("scene", "world")
     try:
         profile = profile_of(scene.world.environment.sound_speed)
@@ -53,6 +54,7 @@ def read_inputs(scene: Scene) -> Profile:
         raise FieldError((*world, "environment", "sound_speed"), str(error)) from None
     _check_profile(scene, profile)
     _check_noise(scene)
+    check_tracks(scene)
     for i, (target, law) in enumerate(zip(scene.world.targets, scene.laws, strict=True)):
         try:
             _check_plain(scene, i)

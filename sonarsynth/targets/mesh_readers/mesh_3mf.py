@@ -13,8 +13,9 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.description.memory import max_facets
+from sonarsynth.description.plain_xml import parsed_xml
 from sonarsynth.geometry.surfaces import MeshError, Surface
-from sonarsynth.targets.mesh_readers.mesh_archives import only_file, parsed_xml
+from sonarsynth.targets.mesh_readers.mesh_archives import only_file
 
 CORE: Final = "{http:" + "//schemas.microsoft.com/3dmanufacturing/core/2015/02}"
 METRES: Final = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
@@ -25,7 +26,7 @@ MOST_PLACED: Final = 100_000
 
 
 def read_3mf(data: bytes) -> Surface:
-    """Vertices (m) and triangles of all items of the build. Raises MeshError."""
+    """Vertices (m) and triangles of all items of the build. Raises MeshError, FileError."""
     root = parsed_xml(only_file(data, ".model"))
     scale = METRES.get(root.get("unit", "millimeter"))
     if scale is None:

@@ -1,14 +1,12 @@
-"""Archives and XML that a mesh comes in: of bounded size, without links, entities and documents elsewhere."""
+"""Archives that a mesh comes in: of bounded size, without links."""
 
 from __future__ import annotations
 
 import io
 import lzma
-import re
 import zipfile
 import zlib
 from typing import Final
-from xml.etree import ElementTree
 
 from sonarsynth.geometry.surfaces import MeshError
 
@@ -38,22 +36,3 @@ def only_file(data: bytes, ending: str) -> bytes:
     if len(found) > MAX_BYTES:
         raise MeshError(f"unpacks to more than {MAX_BYTES >> 20} MiB")
     return found
-
-
-def plain_xml(data: bytes) -> bytes:
-    """The same XML, which declares no entities: they can swell without end, or name other files. Raises MeshError."""
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        data = re.sub(rb"encoding=[\"'][^\"']*[\"']", b"", data.decode("utf-16", "replace").encode(), count=1)
-    if b"\0" in data:
-        raise MeshError("is not XML in UTF-8, or in UTF-16 with its mark")
-    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-        raise MeshError("declares a document type or entities, which are not read")
-    return data
-
-
-def parsed_xml(data: bytes) -> ElementTree.Element:
-    """The root of an XML document. Raises MeshError."""
-    try:
-        return ElementTree.fromstring(plain_xml(data))
-    except (ElementTree.ParseError, ValueError, LookupError, RecursionError) as error:
-        raise MeshError(f"is not XML ({' '.join(str(error).split())[:80]})") from None

@@ -15,8 +15,9 @@ import numpy as np
 
 from sonarsynth.conventions import Ints
 from sonarsynth.description.memory import max_facets
+from sonarsynth.description.plain_xml import parsed_xml, plain_xml
 from sonarsynth.geometry.surfaces import MeshError, Surface, join
-from sonarsynth.targets.mesh_readers.mesh_archives import only_file, parsed_xml, plain_xml
+from sonarsynth.targets.mesh_readers.mesh_archives import only_file
 from sonarsynth.targets.mesh_readers.mesh_text import polygons
 
 UP: Final = {
@@ -33,7 +34,7 @@ MOST_PLACED: Final = 100_000
 
 
 def read_collada(data: bytes) -> Surface:
-    """Vertices (m, z up) and triangles of all instances in the scene. Raises MeshError."""
+    """Vertices (m, z up) and triangles of all instances in the scene. Raises MeshError, FileError."""
     text = plain_xml(only_file(data, ".dae") if data[:4] == b"PK\x03\x04" else data)
     if b"<COLLADA" not in text:
         raise MeshError("is no COLLADA file")

@@ -49,7 +49,7 @@ def read_surface(path: Path) -> Surface:
         raise MeshError(f"{path}: is empty")
     try:
         vertices, faces = READERS[kind](data, path.parent)
-    except MeshError as error:
+    except (MeshError, named_files.FileError) as error:
         raise MeshError(f"{path}: {error}") from None
     if vertices.ndim != 2 or vertices.shape[1:] != (3,):
         raise MeshError(f"{path}: has vertices without three coordinates")

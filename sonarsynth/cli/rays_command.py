@@ -1,0 +1,53 @@
+"""`sonarsynth rays RECIPE`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sonarsynth.cli.running import BadOption
+
+
+def rays(
+    recipe: Annotated[Path, typer.Argument(help="The recipe, a YAML file.", show_default=False)],
+    out: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Where to write the pictures. Default: <recipe>.rays.")
+    ] = None,
+    frame: Annotated[int, typer.Option(min=0, help="The frame to trace.")] = 0,
+    compare: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Arrivals (.arr) that Bellhop made of what `export --to bellhop` wrote."),
+    ] = None,
+    settings: Annotated[
+        list[str],
+        typer.Option(
+            "--set",
+            metavar="PATH=VALUE",
+            help="Override a field of the recipe, such as scene.trajectory.frames=8. Repeatable.",
+        ),
+    ] = [],  # noqa: B006 - typer copies it
+) -> None:
+    """Draw eigenrays, or what the recipe's `rays:` asks for: a section, a 3-D view, and an interactive HTML page."""
+    from sonarsynth import planning
+    from sonarsynth.pictures.ray_pictures import show_rays
+    from sonarsynth.recipe import reading
+
+    source = reading.read(recipe, settings)
+    made_from = reading.recipe_of(source)
+    if frame >= made_from.frames:
+        raise BadOption(f"--frame {frame} is outside 0..{made_from.frames - 1}")
+    with reading.locating(source):
+        plan = planning.plan(made_from)
+        files, table = show_rays(plan, frame, out or Path(f"{recipe.stem}.rays"))
+    typer.echo(table)
+    for file in files:
+        typer.echo(str(file))
+    if compare is not None:
+        from sonarsynth.validation.bellhop import ArrivalsError, compare_arrivals, comparison_table
+
+        try:
+            typer.echo(comparison_table(compare_arrivals(plan, frame, compare), compare))
+        except ArrivalsError as error:
+            raise BadOption(f"--compare: {error}") from None

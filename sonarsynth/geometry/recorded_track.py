@@ -1,0 +1,168 @@
+"""Motion along a track in a file: a ship by GPS, a vehicle by its navigation."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import Ge, Le
+
+from sonarsynth.conventions import Floats, NonNegativeMetres, Position, Radians, Seconds
+from sonarsynth.description import description, named_files
+from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.geometry.local_plane import FARTHEST, east_north
+from sonarsynth.geometry.track_files import TrackError, TrackTable, read_track
+
+STANDS = 1e-3
+"""m/s: slower than this a body has no course, and keeps the one that it had."""
+
+Latitude = Annotated[Radians, Ge(-0.5 * np.pi), Le(0.5 * np.pi)]
+Longitude = Annotated[Radians, Ge(-2 * np.pi), Le(2 * np.pi)]
+
+
+@description
+class RecordedTrack:
+    """Along the points of a file, CSV or GPX: a curve through them of continuous velocity (Akima's, modified).
+
+    Columns: time, and x and y (with z or depth) or latitude and longitude (with depth). Heading, pitch and roll as the
+    file has them; a heading that it lacks is along the velocity.
+    """
+
+    kind: Literal["track"] = "track"
+    path: str
+    """Relative to the recipe."""
+    start: Literal["first"] | Seconds = "first"
+    """Time of the file that is time 0 of the motions; `first`: that of its first point. Dates are s since 1970."""
+    origin: tuple[Latitude, Longitude] | None = None
+    """Latitude and longitude ("1.3 deg") of x = y = 0; left out: of the first point."""
+    offset: Position = (0.0, 0.0, 0.0)
+    """Added to every place: where in the world the file's own origin is."""
+    depth: NonNegativeMetres | None = None
+    """Of the whole track, in place of what the file says; a file without depths needs it."""
+    heading: Radians | None = None
+    """Of the whole track, in place of what the file says."""
+    pitch: Radians = 0.0
+    """Where the file has none."""
+    roll: Radians = 0.0
+    """Where the file has none."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Curve:
+    """A track between its points: x, y, z (m), heading, pitch and roll (rad), cubics of the time."""
+
+    times: list[float]  # (point,) s of the motions
+    cubic: Floats  # (4, point - 1, column): coefficients, highest power first, of the time after the point
+
+    def at(self, time: float) -> Floats:
+        """x, y, z, heading, pitch, roll; beyond the ends straight on, without turning."""
+        inside, (a, b, c, d), late = self._piece(time)
+        values = ((a * late + b) * late + c) * late + d
+        if inside != time:
+            values[:3] += (time - inside) * self.rates(inside)[:3]
+        return np.asarray(values)
+
+    def rates(self, time: float) -> Floats:
+        """Their derivatives."""
+        inside, (a, b, c, _), late = self._piece(time)
+        values = (3.0 * a * late + 2.0 * b) * late + c
+        if inside != time:
+            values[3:] = 0.0
+        return np.asarray(values)
+
+    def _piece(self, time: float) -> tuple[float, Floats, float]:
+        """The time, no farther than an end; the cubic there, and the time after its beginning."""
+        inside = min(max(time, self.times[0]), self.times[-1])
+        piece = min(bisect_right(self.times, inside), len(self.times) - 1) - 1
+        return inside, self.cubic[:, piece], inside - self.times[piece]
+
+
+def track_pose(track: RecordedTrack, time: float) -> Pose:
+    """Where a body on a track is at a time (s) of the motions. Raises TrackError where the file cannot be used."""
+    values = _of(track).at(time)
+    return Pose(values[:3], quaternion(*values[3:].tolist()))
+
+
+def track_velocity(track: RecordedTrack, time: float) -> Floats:
+    """Velocity (xyz) in m/s. Raises TrackError."""
+    return _of(track).rates(time)[:3]
+
+
+def track_spin(track: RecordedTrack, time: float) -> Floats:
+    """Angular velocity (xyz) in the world, rad/s: of heading, pitch and roll together. Raises TrackError."""
+    curve = _of(track)
+    (heading, pitch, _), (turning, pitching, rolling) = curve.at(time)[3:], curve.rates(time)[3:]
+    ahead = np.array([np.cos(pitch) * np.sin(heading), np.cos(pitch) * np.cos(heading), np.sin(pitch)])
+    starboard = np.array([np.cos(heading), -np.sin(heading), 0.0])
+    return np.asarray(rolling * ahead + pitching * starboard - turning * np.array([0.0, 0.0, 1.0]))
+
+
+def track_span(track: RecordedTrack) -> tuple[float, float]:
+    """Times (s) of the motions of the first and the last point. Raises TrackError where the file cannot be used."""
+    curve = _of(track)
+    return curve.times[0], curve.times[-1]
+
+
+def _of(track: RecordedTrack) -> _Curve:
+    try:
+        return _curve(track, named_files.stamp(track.path))
+    except named_files.FileError as error:
+        raise TrackError(f"{track.path}: {error}") from None
+
+
+@lru_cache(maxsize=16)
+def _curve(track: RecordedTrack, changed: tuple[int, int]) -> _Curve:
+    from scipy.interpolate import Akima1DInterpolator
+
+    table = read_track(Path(track.path))
+    clock = table.columns["time"]
+    time = clock - (clock[0] if track.start == "first" else track.start)
+    place = _places(track, table)
+    angles = [np.full(len(time), angle) for angle in (track.pitch, track.roll)]
+    angles = [np.unwrap(table.columns.get(name, a)) for name, a in zip(("pitch", "roll"), angles, strict=True)]
+    velocity = Akima1DInterpolator(time, place, method="makima").derivative()(time)
+    if track.heading is not None:
+        heading = np.full(len(time), track.heading)
+    else:
+        heading = np.unwrap(table.columns["heading"]) if "heading" in table.columns else _courses(velocity)
+    values = np.column_stack([place, heading, *angles])
+    curve = Akima1DInterpolator(time, values, method="makima")
+    return _Curve(time.tolist(), np.asarray(curve.c, float))
+
+
+def _places(track: RecordedTrack, table: TrackTable) -> Floats:
+    """Places (point, xyz) m in the world. Raises TrackError."""
+    columns = table.columns
+    if track.depth is not None:
+        up = np.full(len(columns["time"]), -track.depth)
+    elif "depth" in columns or "z" in columns:
+        up = -columns["depth"] if "depth" in columns else columns["z"]
+    else:
+        raise TrackError(f"{table.path}: has no column of depth or z: give the `depth`")
+    if "x" in columns and "y" in columns:
+        if track.origin is not None:
+            raise TrackError(f"{table.path}: has x and y, which no `origin` in latitude and longitude places")
+        flat = np.column_stack([columns["x"], columns["y"]])
+    else:
+        latitude, longitude = columns["latitude"], columns["longitude"]
+        origin = (float(latitude[0]), float(longitude[0])) if track.origin is None else track.origin
+        flat = east_north(latitude, longitude, origin)
+        if (far := float(np.hypot(*flat.T).max())) > FARTHEST:
+            raise TrackError(
+                f"{table.path}: goes {1e-3 * far:.0f} km from its origin, where the plane of east and north ends "
+                f"({1e-3 * FARTHEST:g} km)"
+            )
+    return np.asarray(np.column_stack([flat, up]) + np.array(track.offset))
+
+
+def _courses(velocity: Floats) -> Floats:
+    """Headings (point,) along velocities (point, xyz), rad without jumps; where it stands, that of the point before."""
+    moving = np.flatnonzero(np.hypot(velocity[:, 0], velocity[:, 1]) > STANDS)
+    if not len(moving):
+        return np.zeros(len(velocity))
+    held = moving[np.maximum(np.searchsorted(moving, np.arange(len(velocity)), side="right") - 1, 0)]
+    return np.unwrap(np.arctan2(velocity[held, 0], velocity[held, 1]))

@@ -1,0 +1,155 @@
+"""Eigenrays of ours beside Bellhop's arrivals: delay, angles, loss and bounces, and by how much they differ."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from sonarsynth.conventions import depth as depth_of
+from sonarsynth.pictures.ray_lines import RayLine, eigenray_lines
+from sonarsynth.planning import Plan
+from sonarsynth.propagation.ray_request import EigenrayRequest
+from sonarsynth.recipe.scene import Frame
+from sonarsynth.validation.bellhop.arrivals_file import ArrivalsError, BellhopArrivals, read_arrivals
+
+OFF: Final = 0.01
+"""Part of the distance by which ends may be elsewhere, and the least of it (m)."""
+SAME_RAY: Final = np.deg2rad(1.0)
+"""Launch angles of two arrivals of one ray: beams on either side of it."""
+SAME_TIME: Final = 1e-3
+"""Part of their delay, likewise."""
+HEADINGS: Final = (
+    "family", "bounces (S, B)", "time (ms)", "- Bellhop (us)", "launch (deg)", "- Bellhop", "arrival (deg)",
+    "- Bellhop", "TL (dB)", "- Bellhop",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ComparedRay:
+    """A ray of ours and Bellhop's: NaN where there is none."""
+
+    family: str
+    surface: int
+    bottom: int
+    delay: tuple[float, float]  # s: ours, Bellhop's
+    launch: tuple[float, float]  # rad, up positive
+    arrival: tuple[float, float]  # rad, up positive
+    loss: tuple[float, float]  # dB
+
+
+def compare_arrivals(plan: Plan, index: int, file: Path) -> list[ComparedRay]:
+    """The rays of frame `index` from a snap to the array, as `rays:` asks for, beside the arrivals of a file.
+
+    Of several snaps the one is taken that the file's ends are of. Rays are paired within the same number of bounces at
+    the surface and at the bottom, by the nearest launch angle; arrivals of one ray (Bellhop has one from the beams on
+    either side of it) are added up. Raises ArrivalsError where the file cannot be read, or is of other ends.
+    """
+    plan = plan.at(index)
+    frame = plan.recipe.frame(index)[1]
+    snap, found = _nearest(frame, file)
+    wanted = None if plan.recipe.rays is None else plan.recipe.rays.eigenrays
+    request = replace(EigenrayRequest() if wanted is None else wanted, targets="none")
+    return paired(
+        [line for line in eigenray_lines(plan, frame, request) if line.name == f"snap {snap} to array"], found
+    )
+
+
+def paired(ours: Sequence[RayLine], found: BellhopArrivals) -> list[ComparedRay]:
+    """Rays of both, in the order of their delays."""
+    theirs = _merged(found)
+    left = list(range(len(theirs)))
+    compared = []
+    for line in ours:
+        bounces = (line.event.count("surface"), line.event.count("bottom"))
+        row = np.array([line.time[-1], line.elevation[0], line.elevation[-1], line.transmission_loss])
+        alike = [i for i in left if theirs[i][0] == bounces]
+        best = min(alike, key=lambda i: abs(theirs[i][1][1] - row[1]), default=None)
+        other = np.full(4, np.nan) if best is None else theirs[best][1]
+        left = [i for i in left if i != best]
+        compared.append(_row(line.family, bounces, row, other))
+    compared += [_row("Bellhop alone", theirs[i][0], np.full(4, np.nan), theirs[i][1]) for i in left]
+    return sorted(compared, key=lambda ray: float(np.nanmin(ray.delay)))
+
+
+def comparison_table(rays: Sequence[ComparedRay], file: Path) -> str:
+    """The comparison, a line a ray; arrivals of more reflections than any ray of ours has are only counted."""
+    most = max((ray.surface + ray.bottom for ray in rays if np.isfinite(ray.delay[0])), default=0)
+    shown = [ray for ray in rays if ray.surface + ray.bottom <= most]
+    rows: list[tuple[str, ...]] = [HEADINGS]
+    for ray in shown:
+        cells = [f"{1e3 * _either(ray.delay):.4f}", f"{1e6 * (ray.delay[0] - ray.delay[1]):.3f}"]
+        for angle in (ray.launch, ray.arrival):
+            cells += [f"{np.rad2deg(_either(angle)):.3f}", f"{np.rad2deg(angle[0] - angle[1]):.3f}"]
+        cells += [f"{_either(ray.loss):.2f}", f"{ray.loss[0] - ray.loss[1]:.2f}"]
+        rows.append((ray.family, f"{ray.surface}, {ray.bottom}", *(c.replace("nan", "-") for c in cells)))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = [" ".join(_aligned(row, widths)).rstrip() for row in rows]
+    return "\n".join([f"{file.name}, ours less Bellhop's:", *lines, _summary(rays, len(shown))])
+
+
+def _aligned(row: Sequence[str], widths: Sequence[int]) -> list[str]:
+    return [c.rjust(w + 1) if n else c.ljust(w) for n, (c, w) in enumerate(zip(row, widths, strict=True))]
+
+
+def _summary(rays: Sequence[ComparedRay], shown: int) -> str:
+    both = [ray for ray in rays if np.isfinite(ray.delay).all()]
+    words = f"{len(both)} rays of both, {shown - len(both)} of one alone"
+    if both:
+        late = max(abs(ray.delay[0] - ray.delay[1]) for ray in both)
+        loud = max(abs(ray.loss[0] - ray.loss[1]) for ray in both)
+        words += f"; delays differ by {1e6 * late:.3g} us at most, levels by {loud:.2g} dB"
+    left = len(rays) - shown
+    return words + (f"; {left} arrivals of more reflections not looked for" if left else "")
+
+
+def _either(pair: tuple[float, float]) -> float:
+    """What of a pair is there, ours first."""
+    return pair[1] if np.isnan(pair[0]) else pair[0]
+
+
+def _nearest(frame: Frame, file: Path) -> tuple[int, BellhopArrivals]:
+    """The snap that a file is of, and its arrivals. Raises ArrivalsError."""
+    array = frame.sonar_pose.position
+    best: tuple[float, int, BellhopArrivals] | None = None
+    for number, snap in enumerate(frame.moment.snaps):
+        ends = (float(depth_of(snap.position)), float(depth_of(array)), float(np.hypot(*(array - snap.position)[:2])))
+        found = read_arrivals(file, *ends)
+        there = (found.source_depth, found.receiver_depth, found.distance)
+        off = float(np.abs(np.subtract(ends, there)).max())
+        if off <= OFF * max(1.0, ends[2]) and (best is None or off < best[0]):
+            best = (off, number, found)
+    if best is None:
+        raise ArrivalsError(f"{file}: has no source and receiver where a snap and the array are in frame {frame.index}")
+    return best[1], best[2]
+
+
+def _merged(found: BellhopArrivals) -> list[tuple[tuple[int, int], np.ndarray]]:
+    """Bounces, and delay, angles and loss of each ray: what is of the same ray added up, weighted by amplitude."""
+    amplitude = 10.0 ** (-found.loss / 20.0)
+    rows = np.column_stack([found.delay, found.launch, found.arrival, amplitude])
+    groups: list[tuple[tuple[int, int], list[np.ndarray]]] = []
+    for i in np.lexsort((found.launch, found.bottom, found.surface)):
+        bounces, row = (int(found.surface[i]), int(found.bottom[i])), rows[i]
+        if groups and groups[-1][0] == bounces:
+            last = groups[-1][1][-1]
+            if row[1] - last[1] < SAME_RAY and abs(row[0] - last[0]) < SAME_TIME * last[0]:
+                groups[-1][1].append(row)
+                continue
+        groups.append((bounces, [row]))
+    merged = []
+    for bounces, some in groups:
+        table = np.array(some)
+        whole = table[:, 3].sum()
+        mean = table[:, :3].T @ table[:, 3] / whole if whole > 0.0 else table[0, :3]
+        with np.errstate(divide="ignore"):
+            merged.append((bounces, np.append(mean, -20.0 * np.log10(whole))))
+    return merged
+
+
+def _row(family: str, bounces: tuple[int, int], ours: np.ndarray, theirs: np.ndarray) -> ComparedRay:
+    delay, launch, arrival, loss = ((float(a), float(b)) for a, b in zip(ours, theirs, strict=True))
+    return ComparedRay(family, *bounces, delay, launch, arrival, loss)

@@ -1,0 +1,117 @@
+"""Arrivals as Bellhop writes them (`.arr` of a run 'A'): delays, angles and amplitudes of eigenrays.
+
+Porter (2011), "The BELLHOP manual and user's guide", arrivals files; the form with `'2D'` in its first line, and the
+one before it, whose first line has the numbers of depths and ranges.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.description import named_files
+
+MAX_BYTES: Final = 1 << 26
+COLUMNS: Final = 8
+"""Amplitude, phase, delay (real, imaginary), angles at source and receiver, bounces at top and bottom."""
+
+
+class ArrivalsError(ValueError):
+    """A file of arrivals that cannot be read: one line that names it."""
+
+
+@dataclass(frozen=True, eq=False)
+class BellhopArrivals:
+    """The arrivals at one receiver, from one source.
+
+    source_depth, receiver_depth and distance in m, frequency in Hz.
+    """
+
+    frequency: float
+    source_depth: float
+    receiver_depth: float
+    distance: float  # m, horizontal
+    delay: Floats  # (arrival,) s
+    loss: Floats  # (arrival,) dB: transmission loss, absorption within
+    phase: Floats  # (arrival,) rad
+    launch: Floats  # (arrival,) rad, up positive
+    arrival: Floats  # (arrival,) rad, direction of travel, up positive
+    surface: Ints  # (arrival,) reflections
+    bottom: Ints  # (arrival,)
+
+
+def read_arrivals(path: Path, source_depth: float, receiver_depth: float, distance: float) -> BellhopArrivals:
+    """The arrivals of the source and the receiver in a file that are nearest to these (m).
+
+    Raises ArrivalsError in one line where the file cannot be read, or is cut off.
+    """
+    try:
+        data = named_files.read(path, MAX_BYTES)
+    except named_files.FileError as error:
+        raise ArrivalsError(f"{path}: {error}") from None
+    try:
+        text = data.decode("ascii")
+    except UnicodeDecodeError:
+        raise ArrivalsError(f"{path}: is not a text file: arrivals in binary (run 'a') are not read") from None
+    head, _, rest = text.lstrip().partition("\n")
+    if re.match(r"['\"]3D", head):
+        raise ArrivalsError(f"{path}: is of BELLHOP3D, which is not read")
+    plane = re.match(r"['\"]2D", head) is not None
+    try:
+        numbers = np.array((rest if plane else text).split(), float)
+    except ValueError as error:
+        raise ArrivalsError(f"{path}: is no file of arrivals ({str(error)[:60]})") from None
+    return _Numbers(path, numbers).arrivals(plane, (source_depth, receiver_depth, distance))
+
+
+@dataclass
+class _Numbers:
+    """All numbers of a file, taken one after the other."""
+
+    path: Path
+    values: Floats
+    at: int = 0
+
+    def take(self, count: float) -> Floats:
+        """The next so many. Raises ArrivalsError where there are not as many."""
+        if not (count >= 0 and count == np.floor(count) and self.at + count <= len(self.values)):
+            raise ArrivalsError(f"{self.path}: is cut off, or is no file of arrivals of Bellhop")
+        self.at += int(count)
+        return self.values[self.at - int(count) : self.at]
+
+    def arrivals(self, plane: bool, wanted: tuple[float, float, float]) -> BellhopArrivals:
+        """Those of the nearest source and receiver."""
+        frequency = float(self.take(1)[0])
+        if plane:
+            axes = [self.take(self.take(1)[0]) for _ in range(3)]
+        else:
+            axes = [self.take(count) for count in self.take(3).tolist()]
+        if not all(len(axis) and np.isfinite(axis).all() for axis in axes) or not frequency > 0:
+            raise ArrivalsError(f"{self.path}: has no frequency, source, receiver or range")
+        nearest = [int(np.argmin(np.abs(axis - value))) for axis, value in zip(axes, wanted, strict=True)]
+        found = self._block([len(axis) for axis in axes], nearest)
+        source, receiver, distance = (float(axis[i]) for axis, i in zip(axes, nearest, strict=True))
+        amplitude, phase, delay, lost, launch, arrival, surface, bottom = found.T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            loss = -20.0 * np.log10(np.abs(amplitude)) - 20.0 / np.log(10.0) * 2.0 * np.pi * frequency * lost
+        ends = (-np.deg2rad(launch), -np.deg2rad(arrival))  # Bellhop's are down positive
+        counts = (surface.astype(np.int64), bottom.astype(np.int64))
+        return BellhopArrivals(frequency, source, receiver, distance, delay, loss, np.deg2rad(phase), *ends, *counts)
+
+    def _block(self, sizes: list[int], nearest: list[int]) -> Floats:
+        """Rows (arrival, column) of a source, a receiver depth and a range."""
+        for source in range(sizes[0]):
+            self.take(1)  # the most that any receiver has
+            for depth in range(sizes[1]):
+                for distance in range(sizes[2]):
+                    rows = self.take(COLUMNS * self.take(1)[0]).reshape(-1, COLUMNS)
+                    if [source, depth, distance] == nearest:
+                        if not np.isfinite(rows).all():
+                            raise ArrivalsError(f"{self.path}: holds numbers that are not finite")
+                        return rows
+        raise AssertionError("the nearest are among them")

@@ -1,0 +1,182 @@
+"""Bellhop as a neighbour: what it reads is written, what it writes is read, and its eigenrays are ours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sonarsynth import planning
+from sonarsynth.cli import app
+from sonarsynth.cli.running import run
+from sonarsynth.environment.casts import CastError, profile_of
+from sonarsynth.environment.sound_speed import Cast
+from sonarsynth.equations.water.boundary_reflection import rayleigh
+from sonarsynth.export import write_bellhop
+from sonarsynth.recipe.reading import load
+from sonarsynth.validation.bellhop import ArrivalsError, compare_arrivals, read_arrivals
+
+HERE = Path(__file__).parent / "bellhop"
+
+
+def plan_of(name, *sets):
+    return planning.plan(load(HERE / f"{name}.yaml", sets), (), planning.Choices())
+
+
+@pytest.mark.parametrize("name", ["uniform", "layers"])
+def test_an_environment_is_written_as_it_was_for_the_recorded_run(tmp_path, name):
+    files, _ = write_bellhop(plan_of(name), 0, tmp_path, name)
+    assert [file.read_text() for file in files] == [(HERE / f"{name}.env").read_text()]
+
+
+def test_an_environment_is_read_back_to_the_last_digit(tmp_path):
+    written = plan_of("layers")
+    (file,), _ = write_bellhop(written, 0, tmp_path, "layers")
+    back, there = profile_of(Cast(path=str(file))), written.profile
+    inside = there.depth < 30.0
+    assert np.array_equal(back.depth[:-1], there.depth[inside]) and np.array_equal(back.speed[:-1], there.speed[inside])
+    assert (back.depth[-1], back.speed[-1]) == (30.0, there.at(30.0))
+    assert back.notes == (
+        "the environment's depth is 30 m in the file, the reflection of its bottom {kind: fluid, density_ratio: 1.451, "
+        "speed_ratio: 1.1073, loss_tangent: 0.01602}",
+    )
+
+
+def test_recorded_arrivals_are_those_of_images():
+    """Uniform water: every delay, angle and level by images, with Rayleigh's coefficient."""
+    found = read_arrivals(HERE / "uniform.arr", 16.0, 6.0, 30.0)
+    assert (found.frequency, found.source_depth, found.receiver_depth, found.distance) == (55e3, 16.0, 6.0, 30.0)
+    assert len(found.delay) == 21 and (found.surface <= 5).all()
+    up, odd = found.launch > 0, (found.surface + found.bottom) % 2 == 1
+    end = np.where(odd, -6.0, 6.0)  # of the receiver, or of its image
+    unfolded = np.where(up, 16.0 + 40.0 * found.bottom - end, 40.0 * found.bottom - 16.0 + end)
+    length = np.hypot(30.0, unfolded)
+    np.testing.assert_allclose(found.delay, length / 1500.0, atol=2e-6)  # the steepest are beams beside the ray
+    np.testing.assert_allclose(np.abs(found.launch), np.arctan2(np.abs(unfolded), 30.0), atol=2e-3)
+    once = np.abs(rayleigh(np.arctan2(np.abs(unfolded), 30.0), 1.8, 1.1, 0.01))
+    whole = 20.0 * np.log10(length) - 20.0 * found.bottom * np.log10(once)
+    strong = found.bottom <= 2
+    absorbed = (found.loss - whole)[strong] / length[strong]
+    assert np.ptp(absorbed) < 3e-3 and 0.005 < absorbed.mean() < 0.04  # dB/m at 55 kHz
+
+
+@pytest.mark.parametrize(("name", "late"), [("uniform", 5e-8), ("layers", 4e-7)])
+def test_eigenrays_are_those_of_a_recorded_run(name, late):
+    """The snap of `layers` is on the bottom, and 1 mm above it in Bellhop's run: 0.67 us at most."""
+    rays = compare_arrivals(plan_of(name), 0, HERE / f"{name}.arr")
+    ours = [ray for ray in rays if np.isfinite(ray.delay[0])]
+    assert len(ours) == {"uniform": 13, "layers": 11}[name]
+    for ray in ours:
+        assert abs(ray.delay[0] - ray.delay[1]) < late
+        assert abs(ray.launch[0] - ray.launch[1]) < 1e-4
+        assert abs(ray.arrival[0] - ray.arrival[1]) < 1e-4
+        assert abs(ray.loss[0] - ray.loss[1]) < 0.06
+    most = max(ray.surface + ray.bottom for ray in ours)
+    alone = [ray for ray in rays if np.isnan(ray.delay[0]) and ray.surface + ray.bottom < most]
+    assert alone == []
+
+
+ENV = """'A title, with: an apostrophe''s comma'
+100.0 /
+1 ! media
+'SVF' /
+51  0.0  60.0
+  0.0  1.5200D3 0.0 1.0 0 0
+ 20.0, 1510.0 /
+ 40.0 /
+ 60.0 1505.0 /
+'A~' 0.0
+ 60.0 1600.0 200.0 1.8 0.5 0.0 /
+"""
+
+
+def test_an_environment_is_read_by_the_rules_of_fortran(tmp_path):
+    file = tmp_path / "a.env"
+    file.write_text(ENV)
+    found = profile_of(Cast(path=str(file)))
+    assert found.depth.tolist() == [0.0, 20.0, 40.0, 60.0]
+    assert found.speed.tolist() == [1520.0, 1510.0, 1510.0, 1505.0]  # what a `/` leaves out is as before
+    loss = 0.5e-3 * 100.0 / (20 / np.log(10)) * 1600.0 / (2 * np.pi * 100.0)  # 0.5 dB/(m kHz)
+    assert "by a spline" in found.notes[0]
+    assert found.notes[1] == (
+        f"the environment's depth is 60 m in the file, the reflection of its bottom {{kind: fluid, density_ratio: 1.8, "
+        f"speed_ratio: {1600 / 1505:.6g}, loss_tangent: {loss:.4g}}}, without its shear waves of 200 m/s; its bathymetry"
+        " file is not read: the bottom is flat"
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "said"),
+    [
+        ("'SVF'", "'QVF'", 4, "a sound speed that varies with range (option 'Q' and its .ssp) is not supported"),
+        ("'SVF'", "'HVF'", 4, "a sound speed that varies in three dimensions"),
+        ("'SVF'", "'AVF'", 4, "an analytic sound speed (option 'A') is not supported"),
+        ("'SVF'", "'SVF ~'", 4, "an altimetry file (option '~') is not supported"),
+        ("'SVF'", "'XVF'", 4, "option 'X' is no way of Bellhop's to interpolate"),
+        ("1 ! media", "3", 3, "3 media: layers under the water are not supported"),
+        (" 20.0, 1510.0", " x 1510.0", 7, "'x' is not a number"),
+        (" 40.0 /", " 10.0 /", 8, "the node at 10 m is not below the one before"),
+        (" 60.0 1505.0", " 70.0 1505.0", 9, "the node at 70 m is below the bottom, 60 m"),
+        ("51  0.0  60.0", "51 /", 5, "has 1 values where a Bellhop environment has 3 or more"),
+    ],
+)
+def test_what_is_not_supported_is_named_in_one_line(tmp_path, old, new, line, said):
+    file = tmp_path / "a.env"
+    file.write_text(ENV.replace(old, new, 1))
+    with pytest.raises(CastError) as refused:
+        profile_of(Cast(path=str(file)))
+    assert str(refused.value).startswith(f"{file}, line {line}: ") and said in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_cut_environment_and_profiles_over_range_are_refused(tmp_path):
+    file = tmp_path / "a.env"
+    file.write_text(ENV.partition(" 40.0")[0])
+    with pytest.raises(CastError, match=r"ends where more of a Bellhop environment must follow"):
+        profile_of(Cast(path=str(file)))
+    file.write_text("2\n0.0 10.0\n1500 1501\n1510 1511\n")
+    with pytest.raises(CastError, match=r"is a \.ssp of Bellhop"):
+        profile_of(Cast(path=str(file)))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda text: text[: len(text) // 2], "is cut off"),
+        (lambda text: text.replace("'2D'", "'3D'"), "is of BELLHOP3D"),
+        (lambda text: text.replace("          21\n", "  1e9\n"), "is cut off"),
+        (lambda text: text.replace("0.122970447", "nan"), "not finite"),
+        (lambda text: text.replace("0.122970447", "x"), "is no file of arrivals"),
+        (lambda text: "", "is cut off"),
+        (lambda text: text.replace("16.0000000", "12.0"), "has no source and receiver where a snap and the array are"),
+    ],
+)
+def test_broken_arrivals_are_refused_in_one_line(tmp_path, change, said):
+    file = tmp_path / "a.arr"
+    file.write_text(change((HERE / "uniform.arr").read_text()))
+    with pytest.raises(ArrivalsError) as refused:
+        compare_arrivals(plan_of("uniform"), 0, file)
+    assert said in str(refused.value) and str(file) in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_older_arrivals_are_read_too(tmp_path):
+    """Before `'2D'`: the numbers of depths and ranges in the first line, then the depths and ranges."""
+    text = (HERE / "uniform.arr").read_text().split("\n")
+    file = tmp_path / "a.arr"
+    file.write_text("\n".join(["55000.0 1 1 1", "16.0", "6.0", "30.0", *text[5:]]))
+    old, new = (read_arrivals(path, 16.0, 6.0, 30.0) for path in (file, HERE / "uniform.arr"))
+    assert np.array_equal(old.delay, new.delay) and np.array_equal(old.bottom, new.bottom)
+
+
+def test_the_command_writes_environments_and_tables_of_reflection(tmp_path, capsys):
+    table = "{kind: table, grazing: [0 deg, 30 deg, 90 deg], loss: [0, 3, 20], phase: [180 deg, 90 deg, 0]}"
+    sets = [f"scene.world.environment.bottom={{reflection: {table}, rms_height: 2 cm}}"]
+    given = ["export", str(HERE / "uniform.yaml"), "--to", "bellhop", "--out", str(tmp_path), "--set", sets[0]]
+    assert run(app, given) == 0
+    printed = capsys.readouterr().out
+    assert "uniform_frame0_snap0.brc" in printed and "a roughness of 0.02 m rms takes nothing" in printed
+    angle, modulus, phase = np.loadtxt(tmp_path / "uniform_frame0_snap0.brc", skiprows=1).T
+    np.testing.assert_allclose(-20 * np.log10(modulus), np.interp(angle, [0, 30, 90], [0, 3, 20]), atol=1e-6)
+    np.testing.assert_allclose(phase, np.interp(angle, [0, 30, 90], [180, 90, 0]), atol=1e-6)
+    assert "'F' 0.0" in (tmp_path / "uniform_frame0_snap0.env").read_text()
