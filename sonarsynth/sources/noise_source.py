@@ -10,8 +10,8 @@ import numpy as np
 from annotated_types import Ge, Gt, MinLen
 from pydantic import model_validator
 
-from sonarsynth.conventions import Floats, Number, PositiveMetres, Seconds
-from sonarsynth.description import BY_KIND, description, named_files, wav_files
+from sonarsynth.conventions import Floats, Number, PositiveHertz, PositiveMetres, Seconds
+from sonarsynth.description import BY_KIND, description, named_files, waveform_files
 from sonarsynth.environment.noise import Noise
 from sonarsynth.equations.noise.filters import kaiser_bessel
 from sonarsynth.geometry.motion import Motion
@@ -24,7 +24,7 @@ TAPS, SHAPE = 64, 10.0
 
 @description
 class NoiseRecording:
-    """What a WAV file holds, again and again, brought to 1 m."""
+    """What a WAV or HDF5 file holds, again and again, brought to 1 m."""
 
     kind: Literal["noise_recording"] = "noise_recording"
     path: str
@@ -33,6 +33,10 @@ class NoiseRecording:
     """From the source to the hydrophone that recorded it: the pressure is brought to 1 m as 1/r."""
     pascals: Annotated[Number, Gt(0)] = 1.0
     """Pressure (Pa) of the number 1 in the file; the full scale of a WAV of whole numbers is 1."""
+    sampling_frequency: PositiveHertz | None = None
+    """For an HDF5 without an attribute of that name."""
+    dataset: str | None = None
+    """Of an HDF5 ("/group/dataset"); left out: the only one that there is."""
     channel: Annotated[int, Ge(0)] = 0
     start: Seconds = 0.0
     """Time of the recording that is played at time 0 of the motions."""
@@ -56,13 +60,15 @@ class NoiseRecording:
 @lru_cache(maxsize=4)
 def _read(recording: NoiseRecording, changed: Stamp) -> tuple[float, Floats]:
     """Sampling frequency (Hz), and the pressure (sample,) at 1 m."""
-    path = recording.path
     try:
-        rate, values = wav_files.read_wav(path, recording.channel)
+        data = named_files.read(recording.path, waveform_files.MOST_BYTES)
+        rate, values = waveform_files.waveform(
+            data, recording.channel, sampling_frequency=recording.sampling_frequency, dataset=recording.dataset
+        )
     except named_files.FileError as error:
-        raise RecordingError(f"{path}: {error}") from None
+        raise RecordingError(f"{recording.path}: {error}") from None
     if values.size < 2:
-        raise RecordingError(f"{path}: holds one sample")
+        raise RecordingError(f"{recording.path}: holds one sample")
     return rate, values * (recording.pascals * recording.distance)
 
 

@@ -1,4 +1,4 @@
-"""Recorded waveforms: read from CSV, text and WAV files, checked, brought to 1 m."""
+"""Recorded waveforms: read from CSV, text, WAV and HDF5 files, checked, brought to 1 m."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ import numpy as np
 from annotated_types import Ge, Gt, Le
 
 from sonarsynth.conventions import UNITS, Floats, Number, PositiveHertz, PositiveMetres, Seconds
-from sonarsynth.description import description, named_files, wav_files
+from sonarsynth.description import description, named_files, waveform_files
 from sonarsynth.equations.bubble import waveforms
 from sonarsynth.equations.bubble.pulses import Pulse
 from sonarsynth.sources.pulse_model import PulseModel, Stamp
 
 MOST_SAMPLES = 1 << 18
 """A longer file is a recording of the sea, not of a snap."""
+
+MOST_NUMBERS = 1 << 23
+"""Of all channels together."""
 
 MOST_BYTES = 1 << 26
 
@@ -41,7 +44,7 @@ class Recording:
 
 @description
 class RecordedSnap(PulseModel):
-    """A recorded waveform: CSV or text (time and pressure, or pressure alone), or WAV."""
+    """A recorded waveform: CSV or text (time and pressure, or pressure alone), WAV or HDF5."""
 
     kind: Literal["recorded_snap"] = "recorded_snap"
     path: str
@@ -51,11 +54,13 @@ class RecordedSnap(PulseModel):
     pascals: Annotated[Number, Gt(0)] = 1.0
     """Pressure (Pa) of the number 1 in the file; the full scale of a WAV of whole numbers is 1."""
     sampling_frequency: PositiveHertz | None = None
-    """For a file without times; others have their own."""
+    """For a file without times, or an HDF5 without an attribute of that name; others have their own."""
+    dataset: str | None = None
+    """Of an HDF5 ("/group/dataset"); left out: the only one that there is."""
     channel: Annotated[int, Ge(0)] = 0
-    """Of a WAV, or the column of pressure after the time, from 0."""
+    """Of a WAV or an HDF5, or the column of pressure after the time, from 0."""
     time: Seconds | None = None
-    """Time of the collapse, on the file's own clock (a WAV's begins at 0); left out: of the largest pressure."""
+    """Time of the collapse, on the file's own clock (of WAV and HDF5 from 0); left out: of the largest pressure."""
     fade: Annotated[Number, Ge(0), Le(0.5)] = 0.0
     """Part of the recording that fades in, and that fades out: for one that is not quiet at its ends."""
 
@@ -89,7 +94,9 @@ def stamp(snap: RecordedSnap) -> Stamp:
 @lru_cache(maxsize=32)
 def _recording(snap: RecordedSnap, changed: Stamp) -> Recording:
     path = Path(snap.path)
-    start, rate, values = (_wav if path.suffix.lower() in {".wav", ".wave"} else _text)(path, snap)
+    data = _bytes(path)
+    instrument = waveform_files.is_hdf5(data) or path.suffix.lower() in {".wav", ".wave"}
+    start, rate, values = (_instrument if instrument else _text)(path, data, snap)
     if not 4 <= values.size <= MOST_SAMPLES:
         raise RecordingError(f"{path}: has {values.size} samples; a snap has 4 to {MOST_SAMPLES}")
     with np.errstate(over="ignore", invalid="ignore"):
@@ -119,18 +126,17 @@ def _gate(size: int, part: float) -> Floats:
     return np.asarray(rise * rise[::-1], float)
 
 
-def _wav(path: Path, snap: RecordedSnap) -> tuple[float, float, Floats]:
-    if snap.sampling_frequency is not None:
-        raise RecordingError(f"{path}: a WAV has its own sampling frequency: leave out sampling_frequency")
+def _instrument(path: Path, data: bytes, snap: RecordedSnap) -> tuple[float, float, Floats]:
+    """Start (s), sampling frequency (Hz) and numbers (sample,) of a WAV or an HDF5."""
+    given = {"sampling_frequency": snap.sampling_frequency, "dataset": snap.dataset}
     try:
-        rate, values = wav_files.read_wav(path, snap.channel, MOST_BYTES)
+        return 0.0, *waveform_files.waveform(data, snap.channel, **given, most=MOST_NUMBERS)
     except named_files.FileError as error:
         raise RecordingError(f"{path}: {error}") from None
-    return 0.0, rate, values
 
 
-def _text(path: Path, snap: RecordedSnap) -> tuple[float, float, Floats]:
-    rows, lines, names = _rows(path)
+def _text(path: Path, data: bytes, snap: RecordedSnap) -> tuple[float, float, Floats]:
+    rows, lines, names = _rows(path, data)
     timed = snap.sampling_frequency is None
     column = snap.channel + timed
     if rows.shape[1] <= column:
@@ -148,10 +154,10 @@ def _text(path: Path, snap: RecordedSnap) -> tuple[float, float, Floats]:
     return float(time[0]), float(1.0 / step), values
 
 
-def _rows(path: Path) -> tuple[Floats, list[int], list[str]]:
+def _rows(path: Path, data: bytes) -> tuple[Floats, list[int], list[str]]:
     """Numbers (row, column), the number of each one's line, and the names of the columns where the file has them."""
     try:
-        text = _bytes(path).decode("utf-8-sig")
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise RecordingError(f"{path}: is not a text file") from None
     written = [(i, s) for i, s in enumerate(text.splitlines(), start=1) if s.strip() and s.lstrip()[0] not in "#%"]

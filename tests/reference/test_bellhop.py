@@ -101,8 +101,8 @@ def test_an_environment_is_read_by_the_rules_of_fortran(tmp_path):
     assert "by a spline" in found.notes[0]
     assert found.notes[1] == (
         f"the environment's depth is 60 m in the file, the reflection of its bottom {{kind: fluid, density_ratio: 1.8, "
-        f"speed_ratio: {1600 / 1505:.6g}, loss_tangent: {loss:.4g}}}, without its shear waves of 200 m/s; its bathymetry"
-        " file is not read: the bottom is flat"
+        f"speed_ratio: {1600 / 1505:.6g}, loss_tangent: {loss:.4g}}}, without its shear waves of 200 m/s; its "
+        "bathymetry file is not read: the bottom is flat"
     )
 
 

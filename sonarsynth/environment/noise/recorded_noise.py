@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 import numpy as np
 from annotated_types import Ge, Gt
 
-from sonarsynth.conventions import Floats, Number
-from sonarsynth.description import description, named_files, wav_files
+from sonarsynth.conventions import Floats, Number, PositiveHertz
+from sonarsynth.description import description, named_files, waveform_files
 from sonarsynth.environment.noise.directions import Directions
 from sonarsynth.environment.noise.noise_field import NoiseField
 
@@ -21,7 +21,7 @@ SHORTEST = 256
 
 @description
 class RecordedNoise(NoiseField):
-    """Gaussian noise that has the power spectral density of a recording of the sea (WAV), by Welch's method. Of the
+    """Gaussian noise that has the power spectral density of a recording of the sea (WAV or HDF5), by Welch's method. Of the
     recording its mean spectrum alone is kept: neither its samples nor its snaps, which a chorus makes, are played.
     Beyond half its sampling frequency there is nothing."""
 
@@ -30,6 +30,10 @@ class RecordedNoise(NoiseField):
     """Relative to the recipe."""
     pascals: Annotated[Number, Gt(0)] = 1.0
     """Pressure (Pa) of the number 1 in the file; the full scale of a WAV of whole numbers is 1."""
+    sampling_frequency: PositiveHertz | None = None
+    """For an HDF5 without an attribute of that name."""
+    dataset: str | None = None
+    """Of an HDF5 ("/group/dataset"); left out: the only one that there is."""
     channel: Annotated[int, Ge(0)] = 0
     directions: Directions | None = None
     """As of `flat`: one hydrophone does not tell where its sound came from."""
@@ -59,7 +63,12 @@ def _spectrum_of(noise: RecordedNoise, changed: tuple[int, int]) -> tuple[Floats
     """Frequencies (bin,) in Hz, and the power spectral density (bin,) there in Pa2/Hz. Raises FileError."""
     from scipy.signal import welch
 
-    rate, values = wav_files.read_wav(noise.path, noise.channel)
+    rate, values = waveform_files.waveform(
+        named_files.read(noise.path, waveform_files.MOST_BYTES),
+        noise.channel,
+        sampling_frequency=noise.sampling_frequency,
+        dataset=noise.dataset,
+    )
     if values.size < SHORTEST:
         raise named_files.FileError(f"has {values.size} samples; the spectrum of noise needs {SHORTEST}")
     size = min(SEGMENT, values.size // FEWEST)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.description import hdf5_files, named_files
 from sonarsynth.environment.readers.cast_columns import Meaning, UnitError, meaning
 from sonarsynth.environment.readers.cast_table import MAX_ROWS, CastError, CastTable, Column, without_flags
 
@@ -39,12 +40,14 @@ def read_netcdf(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             if engine == "h5netcdf":
-                _refuse_other_files(path, data)
+                hdf5_files.refuse_other_files(data)
             dataset = xr.open_dataset(io.BytesIO(data), engine=engine, decode_times=False)
             found = _columns(path, dataset)
             return _table(path, dataset, found, profile, (latitude, longitude))
     except CastError:
         raise
+    except named_files.FileError as error:
+        raise CastError(f"{path}: {error}") from None
     except ImportError:
         raise CastError(f"{path}: is netCDF 4, which needs h5netcdf: pip install 'sonarsynth[netcdf]'") from None
     except Exception as error:  # whatever a damaged file may bring
@@ -52,21 +55,6 @@ def read_netcdf(
             raise CastError(f"{path}: is netCDF 4, which needs h5netcdf: pip install 'sonarsynth[netcdf]'") from None
         text = " ".join(str(error).split())[:120]
         raise CastError(f"{path}: cannot be read as netCDF ({type(error).__name__}: {text})") from None
-
-
-def _refuse_other_files(path: Path, data: bytes) -> None:
-    """Refuses an HDF5 file some of whose numbers lie in other files. Raises CastError, ImportError."""
-    import h5py
-
-    def check(name: str, item: object) -> None:
-        if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
-            raise CastError(f"{path}: '{name}' lies in another file, which is not read")
-
-    with h5py.File(io.BytesIO(data), "r") as file:
-        file.visititems(check)  # follows no link to another file
-        for name in file:
-            if isinstance(file.get(name, getlink=True), h5py.ExternalLink):
-                raise CastError(f"{path}: '{name}' lies in another file, which is not read")
 
 
 def _columns(path: Path, dataset: xr.Dataset) -> dict[str, list[tuple[str, Meaning]]]:

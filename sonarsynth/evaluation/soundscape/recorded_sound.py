@@ -8,8 +8,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from sonarsynth.conventions import Floats
-from sonarsynth.description.named_files import FileError
-from sonarsynth.description.wav_files import read_wav
+from sonarsynth.description import named_files, waveform_files
 from sonarsynth.equations.noise.filters import response
 from sonarsynth.evaluation.soundscape.sound import SHORTEST, Sound
 from sonarsynth.receiver import Sonar
@@ -26,8 +25,8 @@ def recorded_sound(path: Path | str, sonar: Sonar, pascals: float | None, channe
     """A channel of a WAV file behind the filter of a sonar, as far as it goes; pascals: pressure (Pa) of the number 1
     in the file, the full scale of one of whole numbers, None where nobody knows. Raises RecordingError."""
     try:
-        rate, values = read_wav(path, channel)
-    except FileError as error:
+        rate, values = waveform_files.waveform(named_files.read(path, waveform_files.MOST_BYTES), channel)
+    except named_files.FileError as error:
         raise RecordingError(f"{path}: {error}") from None
     notes = [] if pascals is not None else ["levels of the recording are relative: its sensitivity is not given"]
     if len(values) > MOST_SAMPLES:
