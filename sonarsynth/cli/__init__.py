@@ -246,7 +246,8 @@ def snap(
     recipe: RecipeFile,
     out: Annotated[Path, typer.Option(metavar="FILE", help="Where to write the picture.")] = Path("snap.png"),
     compare: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="A recording (WAV, CSV) of a snap to compare the model with.")
+        Path | None,
+        typer.Option(metavar="FILE", help="A recording (WAV, CSV, HDF5) of a snap to compare the model with."),
     ] = None,
     settings: Settings = [],  # noqa: B006
 ) -> None:

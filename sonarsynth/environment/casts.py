@@ -114,7 +114,7 @@ def _cast_profile(cast: Cast) -> Profile:
         said = _unused(cast, table)
     else:
         speed, said = sea_water_speed(cast.formula, water["temperature"], water["salinity"], z, *place)
-    said = (*notes, *said, *table.notes, *_selection(table, kept), *_comparison(water, z, place))
+    said = (*notes, *said, *table.notes, *_selection(table, kept, z), *_comparison(water, z, place))
     profile = _profile(*averaged(z, speed), said)
     return profile if cast.smoothing is None else smoothed(profile, cast.smoothing)
 
@@ -170,14 +170,15 @@ def _unused(cast: Cast, table: CastTable) -> tuple[str, ...]:
     return (unused,) if cast.formula != "mackenzie" else ()
 
 
-def _selection(table: CastTable, kept: Selection) -> tuple[str, ...]:
-    """One note of what was left out of a cast; none where nothing was."""
-    if not kept.left_out:
+def _selection(table: CastTable, kept: Selection, depth: Floats) -> tuple[str, ...]:
+    """One note of what was left out of a cast, and of rows at one depth (m); none where all is used as it is."""
+    alike = len(depth) - len(np.unique(depth))
+    if not kept.left_out and not alike:
         return ()
     way = ", taken on the way up" if kept.upward else ""
-    return (
-        f"cast ({table.layout}): {len(kept.rows)} of {len(table.lines)} rows used{way}; left out: {left_out(kept)}",
-    )
+    less = f"; left out: {left_out(kept)}" if kept.left_out else ""
+    mean = f"; {alike} at the depth of another are averaged with it" if alike else ""
+    return (f"cast ({table.layout}): {len(kept.rows)} of {len(table.lines)} rows used{way}{less}{mean}",)
 
 
 def _comparison(water: dict[str, Floats], depth: Floats, place: tuple[float, float | None]) -> tuple[str, ...]:

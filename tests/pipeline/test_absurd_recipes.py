@@ -161,8 +161,8 @@ def test_what_cannot_be_printed_is_shown_by_number(small_file: Path, capfd: pyte
 
 
 def test_a_few_random_changes(tmp_path: Path) -> None:
-    """The command that makes a thousand of them, of recipes and of meshes (tools/faults); here it makes a few."""
-    command = [sys.executable, "-m", "fault_injection", "--fuzz", "6", "--meshes", "6", "--seed", "5"]
+    """The command that makes a thousand of them, of recipes, meshes and other files (tools/faults); here a few."""
+    command = [sys.executable, "-m", "fault_injection", "--fuzz", "6", "--meshes", "6", "--casts", "4", "--seed", "5"]
     environment = {
         **os.environ,
         "TMPDIR": str(tmp_path),
@@ -171,6 +171,7 @@ def test_a_few_random_changes(tmp_path: Path) -> None:
     done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=HANGING, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     found = json.loads(done.stdout)
+    assert (found["casts"]["cases"], found["casts"]["failures"]) == (4, [])
     for kind, count in (("fuzz", 6), ("meshes", 6)):
         assert (found[kind]["cases"], found[kind]["failures"]) == (count, [])
         assert found[kind]["accepted"] + found[kind]["refused_in_one_line"] == count

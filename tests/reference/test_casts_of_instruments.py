@@ -238,3 +238,11 @@ def test_names_of_two_words_in_columns_cut_at_spaces_are_refused_where_rows_are_
     file.write_text("Sound Speed Depth Temp Sal\n1500 0 13 35\n1501 5 14 35\n1502 35 15 35\n")
     with pytest.raises(ValueError, match="5 column names, but rows of 4 numbers"):
         profile_of(Cast(path=str(file)))
+
+
+def test_rows_at_one_depth_are_averaged_and_that_is_said(tmp_path):
+    z, c = [1.0, 2.0, 2.0, 2.0, 3.0], [1500.0, 1501.0, 1502.0, 1506.0, 1504.0]
+    made = profile(tmp_path, "Depth (m),Sound speed (m/s)\n" + rows(z, c))
+    np.testing.assert_array_equal(made.depth, [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(made.speed, [1500.0, 1503.0, 1504.0])
+    assert made.notes == ("cast (table): 5 of 5 rows used; 2 at the depth of another are averaged with it",)

@@ -10,6 +10,7 @@ import zipfile
 import numpy as np
 import pytest
 
+from sonarsynth.targets.mesh_readers import mesh_gltf
 from sonarsynth.targets.meshes import MeshError, mesh_of
 from sonarsynth.targets.shapes import MeshFile
 
@@ -133,6 +134,20 @@ def test_gltf_with_a_buffer_in_its_folder_and_in_its_text(tmp_path):
     made = mesh(tmp_path, "box.gltf", text)
     np.testing.assert_allclose(made.box, [[0, 0, 8], [4, 2, 14]])
     assert volume(made) == pytest.approx(48.0)
+
+
+def test_the_buffers_of_a_gltf_are_bounded_together(tmp_path, monkeypatch):
+    """Each may be small, and there may be many: here the first leaves no room for the second."""
+    text, places = gltf("box.bin")
+    (tmp_path / "box.bin").write_bytes(places)
+    monkeypatch.setattr(mesh_gltf, "MAX_BYTES", 144 + len(places) - 1)
+    with pytest.raises(MeshError, match=r"names the buffer 'box.bin', which is larger than 0 MiB \(of 0 MiB for all"):
+        mesh(tmp_path, "box.gltf", text)
+    monkeypatch.setattr(mesh_gltf, "MAX_BYTES", 100)
+    with pytest.raises(MeshError, match="has buffers of more than 0 MiB together"):
+        mesh(tmp_path, "box.gltf", text)
+    monkeypatch.setattr(mesh_gltf, "MAX_BYTES", 144 + len(places) + 3)
+    assert volume(mesh(tmp_path, "box.gltf", text)) == pytest.approx(48.0)
 
 
 def test_three_lines_a_facet(tmp_path):

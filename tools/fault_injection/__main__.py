@@ -12,6 +12,7 @@ KINDS = {
     "corrupt": "damage files of a store, verify, repair, compare",
     "fuzz": "change recipes and their files, plan them",
     "meshes": "change mesh files, plan with them",
+    "casts": "change casts, tracks and recordings, plan with them",
     "links": "put links into a store, beside it and in front of it",
     "hostile": "forge stores, digests and all, and run every command on them",
     "renames": "move stores while they are built",

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import json
 import struct
+import zipfile
+import zlib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +16,7 @@ import numpy as np
 import trimesh
 
 from fault_injection.fuzz import judged
-from fault_injection.recipes import Case, by_file, by_structure, damaged, numbers, pick, places
+from fault_injection.recipes import Case, by_file, by_structure, damaged, lines_changed, numbers, pick, places
 
 RECIPE = """\
 title: a mesh
@@ -50,6 +54,9 @@ ODD_LINES = (
 )  # fmt: skip
 
 
+odd_lines = lines_changed(ODD_LINES)
+
+
 def run(count: int, seed: int, folder: Path | None = None) -> dict[str, Any]:
     """Judge so many changed mesh files. Returns what came of them."""
     return judged(bases(), mutated, count, seed, folder)
@@ -73,8 +80,11 @@ def bases() -> list[Case]:
         ("ball.glb", ball, "glb", {}),
         ("sheet.obj", sheet, "obj", {}),
         ("parts.dae", parts, "dae", {}),
+        ("ball.gltf", ball, "glb", {}),
+        ("parts.3mf", parts, "obj", {}),
     ):
         data = mesh.export(file_type=kind, **options)
+        data = _gltf(data) if name.endswith("gltf") else _packed(_model(mesh)) if name.endswith("3mf") else data
         data = data.encode() if isinstance(data, str) else bytes(data)
         smooth = str(name.startswith("ball")).lower()
         found.append(Case(name, RECIPE.format(name=name, smooth=smooth).encode(), {name: data}))
@@ -83,6 +93,53 @@ def bases() -> list[Case]:
         *found,
         Case("parts.txt", RECIPE.format(name="parts.txt", smooth="false").encode(), {"parts.txt": corners.encode()}),
     ]
+
+
+def _gltf(data: bytes) -> bytes:
+    """A GLB as a text that holds its buffer."""
+    size = struct.unpack("<I", data[12:16])[0]
+    tree = json.loads(data[20 : 20 + size])
+    tree["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64.b64encode(data[28 + size :]).decode()
+    return json.dumps(tree, indent=1).encode()
+
+
+def _model(mesh: trimesh.Trimesh) -> bytes:
+    """The XML of a 3MF, its numbers in metres."""
+    space = "http" + "://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+    vertices = "".join('<vertex x="{:g}" y="{:g}" z="{:g}"/>\n'.format(*v) for v in mesh.vertices)
+    faces = "".join('<triangle v1="{}" v2="{}" v3="{}"/>\n'.format(*f) for f in mesh.faces)
+    return (
+        f'<model unit="meter" xmlns="{space}"><resources>\n<object id="1"><mesh><vertices>\n{vertices}</vertices>\n'
+        f'<triangles>\n{faces}</triangles></mesh></object>\n<object id="2"><components>\n<component objectid="1" '
+        'transform="1 0 0 0 1 0 0 0 1 0 0 0"/>\n</components></object></resources>\n<build>\n<item objectid="2"/>\n'
+        "</build></model>\n"
+    ).encode()
+
+
+def _packed(model: bytes) -> bytes:
+    box = io.BytesIO()
+    with zipfile.ZipFile(box, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("3D/3dmodel.model", model)
+    return box.getvalue()
+
+
+def _inside(data: bytes, random: np.random.Generator) -> bytes:
+    """What a 3MF packs changed, and packed again."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            model = archive.read(archive.namelist()[0])
+    except (
+        zipfile.BadZipFile,
+        zlib.error,
+        OSError,
+        RuntimeError,
+        NotImplementedError,
+        IndexError,
+        EOFError,
+        ValueError,
+    ):
+        return damaged(data, random)
+    return _packed(pick((numbers, numbers, odd_lines, damaged), random)(model, random))
 
 
 def mutated(case: Case, random: np.random.Generator) -> Case:
@@ -97,25 +154,12 @@ def mutated(case: Case, random: np.random.Generator) -> Case:
 
 def _changed(data: bytes, name: str, random: np.random.Generator) -> bytes:
     text = name in ("text.stl", "ball.obj", "sheet.obj", "text.ply", "parts.off", "parts.dae", "parts.txt")
-    ways = [numbers, numbers, _lines, _lines, damaged] if text else [_words, _words, _words, damaged, _lines]
-    if name.endswith(".glb"):
+    ways = [numbers, numbers, odd_lines, odd_lines, damaged] if text else [_words, _words, _words, damaged, odd_lines]
+    if name.endswith((".glb", ".gltf")):
         ways = [_tree, _tree, _tree, _words, damaged]
+    elif name.endswith(".3mf"):
+        ways = [_inside, _inside, _inside, damaged]
     return pick(ways, random)(data, random)
-
-
-def _lines(data: bytes, random: np.random.Generator) -> bytes:
-    """A line added, dropped, repeated, or put elsewhere."""
-    lines = data.split(b"\n")
-    n, how = int(random.integers(len(lines))), int(random.integers(4))
-    if how == 0:
-        lines[n:n] = [pick(ODD_LINES, random)] * int(pick((1, 1, 100), random))
-    elif how == 1:
-        del lines[n : n + int(pick((1, 5, 1000), random))]
-    elif how == 2:
-        lines[n:n] = [lines[n]] * int(pick((1, 1000), random))
-    else:
-        lines.insert(int(random.integers(len(lines))), lines.pop(n))
-    return b"\n".join(lines)
 
 
 def _words(data: bytes, random: np.random.Generator) -> bytes:
@@ -133,10 +177,11 @@ ODD_VALUES = (
 
 
 def _tree(data: bytes, random: np.random.Generator) -> bytes:
-    """The description in a GLB file changed: counts, offsets, types, links; the lengths in the file stay right."""
+    """The description in a GLB or glTF changed: counts, offsets, types, links; the lengths in the file stay right."""
     try:
         size = struct.unpack("<I", data[12:16])[0]
-        tree = json.loads(data[20 : 20 + size])
+        bare = data[:4] != b"glTF"
+        tree = json.loads(data if bare else data[20 : 20 + size])
         where = list(places(tree))
         holder, key = pick(where, random)
     except (ValueError, struct.error, IndexError):
@@ -152,6 +197,8 @@ def _tree(data: bytes, random: np.random.Generator) -> bytes:
     else:
         holder[key] = pick(ODD_VALUES, random)
     text = json.dumps(tree).encode()
+    if bare:
+        return text
     text += b" " * (-len(text) % 4)
     rest = data[20 + size :]
     return b"glTF" + struct.pack("<IIII", 2, 20 + len(text) + len(rest), len(text), 0x4E4F534A) + text + rest

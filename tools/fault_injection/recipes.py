@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -277,6 +278,25 @@ def numbers(data: bytes, random: np.random.Generator) -> bytes:
     for one in sorted((found[n] for n in chosen), key=lambda match: -match.start()):  # from the end
         data = data[: one.start()] + pick(ODD_NUMBERS, random) + data[one.end() :]
     return data
+
+
+def lines_changed(odd: tuple[bytes, ...]) -> Callable[[bytes, np.random.Generator], bytes]:
+    """A change of a text: a line added (of some odd ones), dropped, repeated, or put elsewhere."""
+
+    def change(data: bytes, random: np.random.Generator) -> bytes:
+        lines = data.split(b"\n")
+        n, how = int(random.integers(len(lines))), int(random.integers(4))
+        if how == 0:
+            lines[n:n] = [pick(odd, random)] * int(pick((1, 1, 100), random))
+        elif how == 1:
+            del lines[n : n + int(pick((1, 5, 1000), random))]
+        elif how == 2:
+            lines[n:n] = [lines[n]] * int(pick((1, 1000), random))
+        else:
+            lines.insert(int(random.integers(len(lines))), lines.pop(n))
+        return b"\n".join(lines)
+
+    return change
 
 
 ODD_NUMBERS = (

@@ -21,9 +21,11 @@ SHORTEST = 256
 
 @description
 class RecordedNoise(NoiseField):
-    """Gaussian noise that has the power spectral density of a recording of the sea (WAV or HDF5), by Welch's method. Of the
-    recording its mean spectrum alone is kept: neither its samples nor its snaps, which a chorus makes, are played.
-    Beyond half its sampling frequency there is nothing."""
+    """Gaussian noise that has the power spectral density of a recording of the sea (WAV or HDF5), by Welch's method.
+
+    Of the recording its mean spectrum alone is kept: neither its samples nor its snaps, which a chorus makes, are
+    played. Beyond half its sampling frequency there is nothing.
+    """
 
     kind: Literal["recording"] = "recording"
     path: str

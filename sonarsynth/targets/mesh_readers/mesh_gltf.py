@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import binascii
 import json
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import unquote
@@ -82,8 +83,12 @@ def read_gltf(data: bytes, folder: Path) -> Surface:
         for mesh in tree.get("meshes", []):
             for primitive in mesh["primitives"]:
                 primitive.pop("material", None)
-        buffers = [_buffer(buffer, folder) for buffer in tree.get("buffers", [])]
-        starts = [sum(len(b) for b in buffers[:i]) for i in range(len(buffers))]
+        buffers: list[bytes] = []
+        room = MAX_BYTES
+        for buffer in tree.get("buffers", []):
+            buffers.append(_buffer(buffer, folder, room))
+            room -= len(buffers[-1])
+        starts = [0, *accumulate(map(len, buffers))]
         for view in tree.get("bufferViews", []):
             view["byteOffset"] = view.get("byteOffset", 0) + starts[view["buffer"]]
             view["buffer"] = 0
@@ -104,8 +109,8 @@ def _chunk(kind: int, data: bytes) -> bytes:
     return len(data).to_bytes(4, "little") + kind.to_bytes(4, "little") + data
 
 
-def _buffer(buffer: dict[str, Any], folder: Path) -> bytes:
-    """The bytes of a buffer, padded to a whole number of words. Raises MeshError."""
+def _buffer(buffer: dict[str, Any], folder: Path, most: int) -> bytes:
+    """The bytes of a buffer, padded to a whole number of words, of `most` at most. Raises MeshError."""
     name = str(buffer.get("uri", ""))
     if name.startswith("data:"):
         try:
@@ -117,10 +122,13 @@ def _buffer(buffer: dict[str, Any], folder: Path) -> bytes:
         inside = not Path(unquote(name)).is_absolute() and file.resolve().is_relative_to(folder.resolve())
         if not name or ":" in name or not inside:
             raise MeshError(f"names a buffer outside its folder: '{name[:60]}'")
+        rest = "" if most == MAX_BYTES else f" (of {MAX_BYTES >> 20} MiB for all buffers)"
         try:
-            found = named_files.read(file, MAX_BYTES)
+            found = named_files.read(file, most)
         except named_files.FileError as error:
-            raise MeshError(f"names the buffer '{name[:60]}', which {error}") from None
+            raise MeshError(f"names the buffer '{name[:60]}', which {error}{rest}") from None
+    if len(found) + 3 > most:
+        raise MeshError(f"has buffers of more than {MAX_BYTES >> 20} MiB together")
     if len(found) < int(buffer["byteLength"]):
         raise MeshError(f"has a buffer of {len(found)} bytes where it says {buffer['byteLength']}")
     return found + bytes(-len(found) % 4)

@@ -1,0 +1,125 @@
+"""Random changes of the other files that recipes name: casts, Bellhop's environments, tracks, recordings."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from fault_injection.fuzz import judged
+from fault_injection.recipes import (
+    Case,
+    by_file,
+    by_structure,
+    cast_file,
+    damaged,
+    lines_changed,
+    numbers,
+    pick,
+    snap_files,
+)
+
+RECIPE = """\
+title: files
+seed: 3
+scene:
+  world:
+    environment: {{depth: 12 m, sound_speed: {speed}, noise: {{kind: flat, level: 40 dB}}}}
+    targets:
+      - name: body
+        shape: {{kind: sphere, radius: 0.3 m}}
+        motion: {motion}
+    sources:
+      - position: [12, 8]
+        kind: snapping_shrimp
+        {snap}
+  sonar:
+    array: {{kind: planar_lattice, columns: 5, rows: 4, pitch: 5 cm}}
+    beams: {{azimuths: 11, elevations: 9, azimuth_span: 30 deg, elevation_span: 30 deg}}
+  trajectory: {{frames: 2, interval: 0.5}}
+  processing: {{beamforming: {{kind: focused, focus: 10 m}}}}
+"""
+USUAL = {
+    "speed": "{kind: isovelocity, speed: 1540}",
+    "motion": "{kind: line, start: [10, 0, -5], stop: [10, 1, -5], duration: 1}",
+    "snap": "source_level: 190 dB",
+}
+ENVIRONMENT = """\
+'A shelf'
+50000.0
+1
+'CVWF'
+27 35 8.1 5
+3 0.0 12.0
+0.0 1540.0 /
+6.0 1541.0 /
+12.0 1530.0 /
+'A' 0.0
+12.0 1800.0 0.0 1.8 0.5 0.0 /
+"""
+ODD_LINES = (
+    b"'", b'"', b"/", b"1e9 /", b"1 1e300 /", b"0 0 0", b"'QVW'", b"'CVWB'", b"1000000000", b"nan,nan,nan,nan", b",,,,",
+    b"2024-05-01T10:00:00Z,1,2,3", b"time,lat,lon", b"t,x,y,z", b"Depth (m),Sound speed (m/s)", b"*END*", b"# name 0 =",
+    b'<!DOCTYPE x [<!ENTITY a "b">]>', b"<trkpt>", b"</trkseg>", b'<trkpt lat="99" lon="1e9"/>', b"<a>" * 3000, b"\0",
+    b"\xff", b"5*1.0", b"1.5D400", b"0.0 10.0", b"2",
+)  # fmt: skip
+
+
+def run(count: int, seed: int, folder: Path | None = None) -> dict[str, Any]:
+    """Judge so many changed files. Returns what came of them."""
+    return judged(bases(), mutated, count, seed, folder)
+
+
+def bases() -> list[Case]:
+    """A recipe with one file of each kind."""
+    rows = "".join(f"{t},{10 + 0.2 * t},{0.3 * t},{5 + 0.1 * t},{80 + t}\n" for t in range(6))
+    point = '<trkpt lat="{}" lon="{}"><ele>-4</ele><time>2024-05-01T10:00:0{}Z</time></trkpt>\n'
+    points = "".join(point.format(1.2 + 1e-6 * t, 103.8 + 2e-6 * t, t) for t in range(6))
+    found = [
+        ("cast.csv", "speed", "{{kind: cast, path: {}}}", cast_file()),
+        ("shelf.env", "speed", "{{kind: cast, path: {}}}", ENVIRONMENT.encode()),
+        ("way.csv", "motion", "{{kind: track, path: {}}}", f"time (s),x,y,depth (m),heading\n{rows}".encode()),
+        (
+            "way.gpx",
+            "motion",
+            "{{kind: track, path: {}, offset: [10, 0, 0]}}",
+            f'<?xml version="1.0"?>\n<gpx><trk><trkseg>\n{points}</trkseg></trk></gpx>\n'.encode(),
+        ),
+        ("snap.h5", "snap", "snap: {{kind: recorded_snap, path: {}, fade: 0.1}}", _hdf5()),
+        *(
+            (name, "snap", "snap: {{kind: recorded_snap, path: {}, fade: 0.1}}", data)
+            for name, data in snap_files().items()
+        ),
+    ]
+    return [
+        Case(name, RECIPE.format(**USUAL | {field: text.format(name)}).encode(), {name: data})
+        for name, field, text, data in found
+    ]
+
+
+def _hdf5() -> bytes:
+    t = (np.arange(400) - 120) * 2e-6
+    file = io.BytesIO()
+    with h5py.File(file, "w") as made:
+        made["snap"] = 2e3 * (1 - (t / 8e-6) ** 2) * np.exp(-0.5 * (t / 8e-6) ** 2)
+        made["snap"].attrs["sampling_frequency"] = 5e5
+    return file.getvalue()
+
+
+odd_lines = lines_changed(ODD_LINES)
+
+
+def mutated(case: Case, random: np.random.Generator) -> Case:
+    """The case with its file changed once to three times; now and then its recipe too, or the path to it."""
+    (name,) = case.files
+    ways = [damaged] if name.endswith((".h5", ".wav")) else [numbers, numbers, odd_lines, odd_lines, damaged]
+    for _ in range(pick((1, 1, 2, 3), random)):
+        changed = pick(ways, random)(case.files[name], random)
+        case = replace(case, files={name: changed}, done=(*case.done, "file"))
+    if random.random() < 0.1:
+        case = by_structure(case, random)
+    return by_file(case, random) if random.random() < 0.1 else case
