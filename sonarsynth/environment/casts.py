@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
 from sonarsynth.description import named_files
-from sonarsynth.environment.down_cast import Selection, averaged, left_out, select
+from sonarsynth.environment.down_cast import PLAUSIBLE, Selection, averaged, left_out, select
 from sonarsynth.environment.hydrography import SpeedFormula, sea_water_speed
 from sonarsynth.environment.profiles import nearest
 from sonarsynth.environment.readers import READ, CastError, CastTable, read_cast
@@ -186,7 +186,9 @@ def _comparison(water: dict[str, Floats], depth: Floats, place: tuple[float, flo
     if not {"sound speed", "temperature", "salinity"} <= set(water):
         return ()
     some = np.all([np.isfinite(water[name]) for name in ("sound speed", "temperature", "salinity")], axis=0)
-    some &= (water["temperature"] > -3.0) & (water["temperature"] < 45.0) & (water["salinity"] >= 0.0)
+    with np.errstate(invalid="ignore"):
+        some &= (water["temperature"] > -3.0) & (water["temperature"] < 45.0)
+        some &= (water["salinity"] >= 0.0) & (water["salinity"] <= PLAUSIBLE["salinity"][1])
     if not some.any() or not water["salinity"][some].any():
         return ()
     off = {}

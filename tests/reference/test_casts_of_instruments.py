@@ -81,6 +81,14 @@ def test_the_water_that_was_written_is_read(tmp_path, make):
     np.testing.assert_allclose(made.speed, C, atol=2e-4)
 
 
+def test_an_absurd_salinity_beside_a_sound_speed_is_not_compared(tmp_path):
+    wrong = np.array([33.0, 1e30, 1e300, 33.6, 33.9])
+    head = "Depth (m),Temperature (degC),Salinity (psu),Sound speed (m/s)\n"
+    made = profile(tmp_path, head + rows(Z, T, wrong, C))
+    np.testing.assert_allclose(made.speed, C, atol=1e-4)
+    assert "is within" in made.notes[-1] and "chen_millero" in made.notes[-1]
+
+
 @pytest.mark.parametrize(("formula", "name"), [(chen_millero, "svCM"), (del_grosso, "svDM")])
 def test_the_files_own_sound_speed_is_compared(tmp_path, formula, name):
     speed = formula(T * (1.00024 if formula is chen_millero else 1.0), S, P)
