@@ -128,9 +128,10 @@ def _gate(size: int, part: float) -> Floats:
 
 def _instrument(path: Path, data: bytes, snap: RecordedSnap) -> tuple[float, float, Floats]:
     """Start (s), sampling frequency (Hz) and numbers (sample,) of a WAV or an HDF5."""
-    given = {"sampling_frequency": snap.sampling_frequency, "dataset": snap.dataset}
+    rate, name = snap.sampling_frequency, snap.dataset
     try:
-        return 0.0, *waveform_files.waveform(data, snap.channel, **given, most=MOST_NUMBERS)
+        found = waveform_files.waveform(data, snap.channel, sampling_frequency=rate, dataset=name, most=MOST_NUMBERS)
+        return 0.0, *found
     except named_files.FileError as error:
         raise RecordingError(f"{path}: {error}") from None
 
