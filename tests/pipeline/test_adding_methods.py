@@ -106,8 +106,8 @@ def extended(folder: Path) -> Path:
         (copy / name).write_text(text)
         described = re.findall(r"^@description\nclass (\w+)", text, re.MULTILINE)[-1]
         registry = (PACKAGE / family / "__init__.py").read_text()
-        union = re.search(rf"^{UNIONS[family]} = Annotated\[(.+), BY_KIND\]$", registry, re.MULTILINE)
-        assert union is not None, "the union is one line"
+        union = re.search(rf"^{UNIONS[family]} = Annotated\[\s*([^\]]+),\s*BY_KIND,?\s*\]$", registry, re.MULTILINE)
+        assert union is not None, f"no union {UNIONS[family]}"
         line = union[0].replace(union[1], f"{union[1]} | {described}")
         module = f"from sonarsynth.{family.replace('/', '.')}.{file.removesuffix('.py')} import {described}\n"
         (copy / family / "__init__.py").write_text(registry.replace(union[0], f"{module}{line}"))
