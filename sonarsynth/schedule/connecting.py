@@ -17,7 +17,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from multiprocessing import resource_tracker
+from multiprocessing import forkserver, resource_tracker
 from typing import Any, Final
 from urllib.parse import urlsplit
 
@@ -37,6 +37,7 @@ KEEP_MEMORY: Final = {"MALLOC_TRIM_THRESHOLD_": str(2**28), "MALLOC_MMAP_THRESHO
 back (from 64 kB up), and the kernel clear it anew: half of the CPU time of a frame."""
 
 _SETTINGS: Final = {
+    "distributed.worker.multiprocessing-method": "forkserver",  # see `_start_forkserver`
     "distributed.nanny.pre-spawn-environ": ONE_THREAD | KEEP_MEMORY,
     "distributed.scheduler.work-stealing": False,  # a shard stays where it is
     "distributed.scheduler.allowed-failures": 1,  # workers that a task may take with it, less one
@@ -53,7 +54,6 @@ _SETTINGS: Final = {
     "distributed.worker.profile.enabled": False,  # its samples of stacks: 8 MB a worker in each 1000 frames of 13 ms
 }
 
-
 CLOSING: Final = 60.0
 """Seconds for a cluster to close."""
 
@@ -62,7 +62,6 @@ CLOSING_IN_HASTE: Final = 4.0
 
 HEAP: Final = 0.9
 """Part of a worker's memory that its arrays may take: beyond it a frame gets a MemoryError, and the worker lives on."""
-
 
 NO_PAGES: Final[dict[str, Any]] = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
 """Settings of a cluster without a dashboard."""
@@ -203,6 +202,7 @@ def _client_of(scheduler: str) -> Client:
 def _local_cluster(workers: int, memory: int, dashboard: bool) -> LocalCluster:
     limit = MemoryLimit(int(HEAP * memory))
     _require_loopback()
+    _start_forkserver()
     try:
         cluster = LocalCluster(
             n_workers=workers,
@@ -216,14 +216,15 @@ def _local_cluster(workers: int, memory: int, dashboard: bool) -> LocalCluster:
             memory_limit=memory,
             plugins=(limit,) if dashboard else (limit, NoPages()),
             silence_logs=logging.CRITICAL,
-            env=ONE_THREAD,
+            env=dict(os.environ) | ONE_THREAD,
         )
     except RuntimeError as error:  # workers import the script that builds, which must not build again
         raise RuntimeError(
             'no worker process could start: in a script, build under `if __name__ == "__main__":`, or with workers=0'
         ) from error
     if not dashboard:
-        _close_pages(cluster)
+        started: Any = cluster
+        started.loop.add_callback(started.scheduler.http_server.stop)  # every scheduler starts a web server
     return cluster
 
 
@@ -237,11 +238,6 @@ def _require_loopback() -> None:
             f"worker processes need a loopback interface, and 127.0.0.1 is not there ({error.strerror}): bring it up "
             "('ip link set lo up'), or build with --workers 0"
         ) from None
-
-
-def _close_pages(cluster: Any) -> None:
-    """Close the web server that every scheduler starts."""
-    cluster.loop.add_callback(cluster.scheduler.http_server.stop)
 
 
 @contextmanager
@@ -269,17 +265,35 @@ def _interrupts_put_off() -> Iterator[list[int]]:
                 signal.signal(number, handler)
 
 
+def _start_forkserver() -> None:
+    """Start the process that workers are forked from, once: it has imported what they need, which each would take
+    seconds for. It ends with this process. What allocates memory reads its settings when a process starts.
+    """
+    forkserver.set_forkserver_preload(["distributed", "sonarsynth.schedule.tasks"])
+    with _environment(ONE_THREAD | KEEP_MEMORY):
+        forkserver.ensure_running()
+
+
 def _start_tracker() -> None:
     """Start the resource tracker of multiprocessing: its start, in whichever thread, unblocks SIGINT.
 
     What workers that were ended in haste leave, it removes, and should not warn of after our last line.
     """
-    before = os.environ.get("PYTHONWARNINGS")
-    os.environ["PYTHONWARNINGS"] = ",".join(filter(None, [before, "ignore:resource_tracker"]))
-    try:
+    warnings = ",".join(filter(None, [os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker"]))
+    with _environment({"PYTHONWARNINGS": warnings}):
         resource_tracker.ensure_running()
+
+
+@contextmanager
+def _environment(changed: dict[str, str]) -> Iterator[None]:
+    """Variables that processes started meanwhile have."""
+    before = {name: os.environ.get(name) for name in changed}
+    os.environ.update(changed)
+    try:
+        yield
     finally:
-        if before is None:
-            del os.environ["PYTHONWARNINGS"]
-        else:
-            os.environ["PYTHONWARNINGS"] = before
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

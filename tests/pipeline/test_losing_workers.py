@@ -21,12 +21,7 @@ from sonarsynth.schedule.connecting import waited_for
 from sonarsynth.store.files.place import record
 from sonarsynth.store.marks import all_files, load_mark, marked
 from tests.waiting import HANGING, wait_until
-
-
-def workers() -> list[psutil.Process]:
-    """Worker processes that this one started."""
-    children = psutil.Process().children(recursive=True)
-    return [child for child in children if any("spawn_main" in word for word in child.cmdline())]
+from tools.fault_injection.processes import workers_of
 
 
 class Striking:
@@ -40,7 +35,7 @@ class Striking:
             return
         wait_until(lambda: len(marked(self.path)) >= self.shards)
         time.sleep(0.5)  # the scheduler hears that they are done
-        (worker,) = workers()
+        (worker,) = workers_of(psutil.Process())
         worker.send_signal(signal.SIGSTOP)
         threading.Timer(2.0, worker.kill).start()
         self.struck = worker.pid

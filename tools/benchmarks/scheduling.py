@@ -22,6 +22,7 @@ import dask
 import psutil
 from fault_injection.cluster import Cluster
 from fault_injection.kills import RECIPE
+from fault_injection.processes import workers_of
 
 from sonarsynth import planning, schedule
 from sonarsynth.planning import SHARD_FRAMES, Plan
@@ -72,15 +73,10 @@ class Watch:
         return 1e3 * (self.cpu[name][last] - self.cpu[name][first]) / (last - first)
 
 
-def spawned(process: psutil.Process) -> list[psutil.Process]:
-    """Worker processes below a process."""
-    return [p for p in process.children(recursive=True) if any("spawn_main" in word for word in p.cmdline())]
-
-
 def here() -> dict[str, psutil.Process]:
     """The processes of a build on workers of its own."""
     me = psutil.Process()
-    workers = {f"worker {n}": p for n, p in enumerate(sorted(spawned(me), key=lambda p: p.pid))}
+    workers = {f"worker {n}": p for n, p in enumerate(sorted(workers_of(me), key=lambda p: p.pid))}
     return {"client with scheduler": me, **workers}
 
 
@@ -124,7 +120,11 @@ def apart(made: Plan) -> dict[str, Any]:
 
         def processes() -> dict[str, psutil.Process]:
             scheduler, nanny = (psutil.Process(p.pid) for p in cluster.processes)
-            return {"client": psutil.Process(), "scheduler": scheduler, "worker": spawned(nanny)[0]}
+            return {
+                "client": psutil.Process(),
+                "scheduler": scheduler,
+                "worker": next(p for p in nanny.children(recursive=True) if "spawn_main" in " ".join(p.cmdline())),
+            }
 
         return built(made, folder / "s.zarr", Watch(processes), scheduler=address)
 

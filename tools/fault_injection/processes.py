@@ -71,7 +71,7 @@ def kill_worker(child: int, dice: random.Random) -> bool:
     while time.monotonic() < until:
         try:
             process = psutil.Process(child)
-            found = [one for one in process.children(recursive=True) if any("spawn_main" in w for w in one.cmdline())]
+            found = workers_of(process)
             if not found and process.status() == psutil.STATUS_ZOMBIE:
                 return False
         except psutil.Error:
@@ -81,6 +81,12 @@ def kill_worker(child: int, dice: random.Random) -> bool:
             return True
         time.sleep(0.01)
     return False
+
+
+def workers_of(process: psutil.Process) -> list[psutil.Process]:
+    """Worker processes of a build: they are forked from one that the building process starts."""
+    servers = [one for one in process.children() if any("multiprocessing.forkserver" in word for word in one.cmdline())]
+    return [worker for server in servers for worker in server.children()]
 
 
 def strike(kill: Callable[[], object]) -> None:
