@@ -6,7 +6,8 @@
     frame = ss.render(recipe, 0)                     # one frame as an xarray.DataTree, without a store
     if __name__ == "__main__":                       # worker processes import the script again
         ss.build(recipe, "remus.zarr", frames=range(8))
-        print(ss.open("remus.zarr"), ss.verify("remus.zarr").ok)
+        tree = ss.open("remus.zarr")
+        print(ss.verify("remus.zarr").ok)
 
 Recipes are written in YAML or with the classes below; these are looked up when they are first used.
 """

@@ -101,6 +101,7 @@ def test_an_expansion_absorbs_what_the_way_to_each_hydrophone_does(distance: flo
         assert np.abs(row - alone[0]).max() < 1e-9 * np.abs(alone).max()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", [1, 300])
 @pytest.mark.parametrize("face", [0.0, 49.53e-3])
 def test_the_fast_synthesis_absorbs_as_the_exact_sum(count: int, face: float) -> None:

@@ -140,6 +140,7 @@ def flat(found: Arrivals) -> Arrivals:
     return replace(found, doppler_terms=np.zeros((len(found.delay), 0)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("amplify", [1.0, 20.0])
 def test_kernel_deposit_adds_what_the_direct_sum_adds(amplify: float) -> None:
     """To the first power: the second is left out."""

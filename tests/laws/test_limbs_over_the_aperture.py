@@ -58,6 +58,7 @@ def alone(law: Kirchhoff, sensor: int) -> Arrivals:
     return traced(law, Pose(PLACE, EAST).to_world(ARRAY.position[sensor][None])[0], SINGLE)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("law", "better"), LAWS)
 def test_one_expansion_hears_what_each_hydrophone_sees(law: Kirchhoff, better: float) -> None:
     found, centre = (traced(law, PLACE, ARRAY, occlusion) for occlusion in ("sensors", "centre"))

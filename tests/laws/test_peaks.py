@@ -88,6 +88,7 @@ def test_two_echoes_in_one_direction_are_two_points_and_closer_than_the_pulse_on
     assert len(cloud) == 1 and 19.99 < cloud.range[0] < 20.012
 
 
+@pytest.mark.long
 def test_errors_are_as_predicted():
     """Pulls of azimuth, elevation and range, of 400 echoes and more, 13 to 24 dB over the noise: of points, where
     errors are those of noise."""

@@ -151,6 +151,7 @@ def test_shade_of_another_array_is_refused() -> None:
         GriddedSynthesis().signals(of, SNAPS, array, SONAR, absorption, start, samples)
 
 
+@pytest.mark.long
 def test_errors_are_measured_where_each_hydrophone_sees_for_itself() -> None:
     """Every knob of `accuracy RECIPE`: subarrays and views of the targets, syntheses, images."""
     recipe = screened(0.02)

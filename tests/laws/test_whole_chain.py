@@ -181,6 +181,7 @@ def _brightest(edge: float, phases: str) -> float:
     return float(np.mean([10 * np.log10(image.energy.max()) for image in images]))
 
 
+@pytest.mark.long
 def test_levels_do_not_depend_on_the_number_of_facets() -> None:
     """Powers of facets with random signs add; with all signs alike half the edge, four times the facets, gives 6 dB."""
     assert abs(_brightest(0.02, "random") - _brightest(0.04, "random")) < 3.0

@@ -160,6 +160,7 @@ def test_what_cannot_be_printed_is_shown_by_number(small_file: Path, capfd: pyte
     assert err.rstrip("\n").isprintable() and "s\\x1b[31m\\x202e" in err
 
 
+@pytest.mark.long
 def test_a_few_random_changes(tmp_path: Path) -> None:
     """The command that makes a thousand of them, of recipes, meshes and other files (tools/faults); here a few."""
     command = [sys.executable, "-m", "fault_injection", "--fuzz", "6", "--meshes", "6", "--casts", "4", "--seed", "5"]

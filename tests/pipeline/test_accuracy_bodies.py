@@ -41,6 +41,7 @@ def rows() -> dict[str, list[Row]]:
     return {name: REFERENCES[name](True) for name in BODIES}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", BODIES)
 def test_echoes_of_facets_are_within_every_bound(rows: dict[str, list[Row]], name: str) -> None:
     of = rows[name]

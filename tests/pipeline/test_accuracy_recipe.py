@@ -213,6 +213,7 @@ def test_frames_that_no_plan_measures_in() -> None:
     assert usual_frames(1) == (0,)
 
 
+@pytest.mark.long
 def test_another_seed_keeps_the_choices(alone: pytest.MonkeyPatch) -> None:
     made = measure(small(), [0], hydrophones=2, seed=77, peers=False)
     assert made.choices == plan(small()).choices.as_json()
@@ -241,6 +242,7 @@ def test_finufft_and_ours_agree(bounces: int, monkeypatch: pytest.MonkeyPatch) -
     assert found[-1].knob == "ours, on the same" and found[-1].meets
 
 
+@pytest.mark.long
 def test_the_command(
     alone: pytest.MonkeyPatch, measured: Measured, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -154,6 +154,7 @@ def test_calls_that_cannot_be(small: Recipe, tmp_path: Path) -> None:
     assert sonarsynth.plan(small, "image").products == {"image"}
 
 
+@pytest.mark.long
 def test_a_script_without_a_main_guard_is_told_so(small_file: Path, tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(

@@ -35,6 +35,11 @@ FRAMES = {
     "crowd.yaml": (9,),
 }
 """Frames of a recipe that are built; of others all."""
+LONG = {"thermocline.yaml", "harbour.yaml"}
+EVERY = [
+    pytest.param(file.name, marks=[pytest.mark.long] if file.name in LONG else [])
+    for file in sorted(CONFIGS.glob("*.yaml"))
+]
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +60,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     return build
 
 
-@pytest.mark.parametrize("name", sorted(file.name for file in CONFIGS.glob("*.yaml")))
+@pytest.mark.parametrize("name", EVERY)
 def test_every_shipped_recipe_builds_and_verifies(name: str, built: Callable[[str], Path]) -> None:
     store = built(name)
     assert run(app, ["verify", str(store)]) == 0
@@ -123,6 +128,7 @@ def test_the_thesis_scene_is_imaged_ranged_and_located(built: Callable[[str], Pa
     assert (distance < beam).all() and np.median(distance) < 0.3 * beam.mean()
 
 
+@pytest.mark.long
 def test_ghosts_by_surface_and_bottom_are_imaged_where_the_truth_says(built: Callable[[str], Path]) -> None:
     """Some frames of the crossing over a thermocline, with every path of up to two bounces."""
     made = _plan("thermocline.yaml")
@@ -151,6 +157,7 @@ def test_ghosts_by_surface_and_bottom_are_imaged_where_the_truth_says(built: Cal
     assert checks["range of points on target"].numbers["largest_m"] < 0.5
 
 
+@pytest.mark.long
 def test_of_two_snaps_the_clock_is_the_one_whose_echoes_stand_clear(tmp_path: Path) -> None:
     """The direct pulse of the far snap lies in the echo window of the near one, and not the other way."""
     made = _plan("crowd.yaml", "scene.processing.direct_pulse=keep")

@@ -23,6 +23,7 @@ def crossing(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_points_are_the_same_in_every_frame_of_reference(crossing: Path) -> None:
     tree = ss.open(crossing)
     sonar, world, hull = (ss.points(tree, relative_to=to) for to in ("sonar", "world", "remus"))

@@ -23,6 +23,7 @@ def faults(*arguments: str) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
+@pytest.mark.long
 def test_killed_builds_come_out_identical() -> None:
     """The client is killed; workers that are have laws in test_surviving and test_losing_workers."""
     done = faults("--kills", os.environ.get("SONARSYNTH_KILLS", "1"), "--seed", "3")

@@ -41,6 +41,7 @@ class Striking:
         self.struck = worker.pid
 
 
+@pytest.mark.long
 def test_a_worker_that_dies_with_what_its_last_shards_gave_does_not_hold_the_build_up(
     tmp_path: Path, small_plan: Plan
 ) -> None:

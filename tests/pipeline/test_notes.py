@@ -23,6 +23,7 @@ def warnings(distance: float, law: ss.Kirchhoff | ss.MirrorLobe) -> str:
     return "\n".join(ss.plan(ss.Recipe(scene=ss.Scene(world=world), accuracy=quick)).warnings)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("distance", "said"), [(2.0, True), (6.0, False)])
 def test_a_coherent_target_close_by_is_noted(distance: float, said: bool) -> None:
     assert ("ball: nearer than 2.5 m" in warnings(distance, ss.Kirchhoff())) == said

@@ -102,6 +102,7 @@ def test_what_workers_build_is_what_a_folder_would_hold(bucket: str, images: Pla
     assert b"someone" not in kept + state
 
 
+@pytest.mark.long
 def test_damage_in_a_bucket_is_found_and_mended(bucket: str, whole: Path) -> None:
     place = Remote(f"{bucket}/damaged/s.zarr")
     place.write_each(contents(whole))
@@ -116,6 +117,7 @@ def test_damage_in_a_bucket_is_found_and_mended(bucket: str, whole: Path) -> Non
     assert contents(place) == contents(whole)
 
 
+@pytest.mark.long
 def test_a_killed_build_is_resumed_to_the_same(bucket: str, small_file: Path, images: Plan, whole: Path) -> None:
     """Killed while a shard is written; of those that are not laid out whole, test_remote has a law."""
     place = Remote(f"{bucket}/killed/s.zarr")

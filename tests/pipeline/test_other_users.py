@@ -97,6 +97,7 @@ def test_nothing_answers_without_a_certificate(client: Client) -> None:
     assert attacked() == ""
 
 
+@pytest.mark.long
 def test_another_user_reaches_neither_scheduler_workers_nor_keys(client: Client) -> None:
     if os.geteuid() != 0:
         pytest.skip("only root can become another user")

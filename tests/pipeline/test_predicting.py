@@ -180,6 +180,7 @@ def test_work_shared_costs_no_less() -> None:
     assert 1.0 <= predicting.sharing(2) <= 2.0
 
 
+@pytest.mark.long
 def test_the_commands_predict_and_compare(small_file: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     from sonarsynth.cli import app
     from sonarsynth.cli.running import run

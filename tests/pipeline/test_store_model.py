@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 import xarray as xr
 from hypothesis import settings
 from hypothesis import strategies as st
@@ -122,4 +123,5 @@ class Store(RuleBasedStateMachine):
 
 
 TestStore = Store.TestCase
+TestStore.pytestmark = [pytest.mark.long]
 TestStore.settings = settings(max_examples=4, stateful_step_count=10, deadline=None)

@@ -76,6 +76,7 @@ def listening() -> set[str]:
     return {connection.laddr.ip for connection in found if connection.status == psutil.CONN_LISTEN}
 
 
+@pytest.mark.long
 def test_frames_that_end_their_worker_are_named_with_why_and_the_rest_goes_on(
     tmp_path: Path, small_plan: Plan, reference: Path
 ) -> None:

@@ -73,11 +73,11 @@ def _error(made: Plan, index: int, sensors: np.ndarray) -> float:
     [
         ("remus.yaml", 1e-2),
         ("remus.yaml", 1e-5),
-        ("tank.yaml", 1e-5),
+        pytest.param("tank.yaml", 1e-5, marks=pytest.mark.long),
         ("deep.yaml", 1e-3),
         ("deep.yaml", 1e-5),
-        ("thermocline.yaml", 1e-2),
-        ("thermocline.yaml", 1e-5),
+        pytest.param("thermocline.yaml", 1e-2, marks=pytest.mark.long),
+        pytest.param("thermocline.yaml", 1e-5, marks=pytest.mark.long),
         ("crowd.yaml", 1e-3),
     ],
 )

@@ -78,6 +78,7 @@ def test_the_last_of_an_empty_cavity_is_rayleighs() -> None:
     assert bubbles_conserved.left(np.array(1e-8)) == pytest.approx(bubbles_conserved.LAW * 1e-8**0.4, rel=1e-6)
 
 
+@pytest.mark.long
 def test_the_table_holds_and_says_what_is_solved_and_what_refused() -> None:
     rows = bubble_accuracy(quick=True)
     assert [row for row in rows if not row.ok] == []
