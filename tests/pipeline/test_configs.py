@@ -192,6 +192,28 @@ def test_a_grid_of_ranges_headings_and_hulls(built: Callable[[str], Path]) -> No
         assert np.isfinite(there).all() and np.array_equal(there[::2, 2], tree.to_dataset().depth.values[frames[::2]])
 
 
+def test_each_image_of_the_boat_shows_what_it_is_for() -> None:
+    """dB re the brightest beam: what is short beside what lasts, and what the grating lobes are worth."""
+
+    def levels(kind: str) -> tuple[float, float]:
+        """Of the ball, and of the brightest beam that is neither on it nor on the boat."""
+        sets = (f"scene.processing.beamforming={{kind: {kind}}}", "scene.world.chorus.density=0")
+        energy = render(_plan("boat.yaml", *sets), 1)["image/energy"]
+        decibels = 10.0 * np.log10(np.maximum(energy / energy.max(), 1e-9))
+        ball, boat = (
+            (abs(energy.azimuth - azimuth) < 5.0) & (abs(energy.elevation - elevation) < 5.0)
+            for azimuth, elevation in ((8.1, 0.0), (-6.3, 9.4))
+        )
+        assert float(decibels.where(boat).max()) == 0.0 or kind == "capon"
+        return float(decibels.where(ball).max()), float(decibels.where(~(ball | boat)).max())
+
+    echo, ghost = levels("focused")
+    assert -15.0 < echo < -5.0 and -15.0 < ghost < -10.0
+    assert levels("sub_band")[1] < ghost - 10.0
+    assert levels("clean")[1] < ghost - 6.0
+    assert levels("order_statistic")[0] < echo - 15.0
+
+
 def test_the_target_crosses_20_m_ahead_9_m_to_the_right() -> None:
     made = _plan("remus.yaml")
     places = [

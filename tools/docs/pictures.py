@@ -1,6 +1,6 @@
 """Draws pictures of README and of the pages again: python tools/docs/pictures.py [NAME ...].
 
-Names: cloud, thumbnails, ghosts, laws, accuracy; left out: all of them, which takes minutes.
+Names: cloud, thumbnails, ghosts, images, laws, accuracy; left out: all of them, which takes minutes.
 """
 
 from __future__ import annotations
@@ -21,10 +21,22 @@ from sonarsynth.pictures.figures.frame_figure import FramePicture, window
 from sonarsynth.pictures.store_reading import beam_grid, opened, stored
 
 ROOT = Path(__file__).resolve().parents[2]
-FRAMES = {"remus": 40, "thermocline": 40, "crowd": 0, "deep": 8, "tank": 0, "l_shape": 0, "grid": 3, "harbour": 8}
+FRAMES = {
+    "boat": 1,
+    "remus": 40,
+    "thermocline": 40,
+    "crowd": 0,
+    "deep": 8,
+    "tank": 0,
+    "l_shape": 0,
+    "grid": 3,
+    "harbour": 8,
+}
 """The frame of each shipped recipe that is drawn."""
 GHOSTS = 46
 """The frame of thermocline.yaml whose ghosts are drawn."""
+IMAGES = ("focused", "sub_band", "clean", "capon", "lp", "order_statistic")
+"""Beamformers whose images of a frame of boat.yaml are drawn."""
 LAWS = {
     "lobe": "{kind: mirror_lobe, width: 30 deg}",
     "smooth": "{kind: kirchhoff}",
@@ -69,6 +81,23 @@ def ghosts(folder: Path) -> None:
     picture.figure.savefig(ROOT / ".github" / "ghosts.png", dpi=100, metadata={"Software": None})
 
 
+def images(folder: Path) -> None:
+    """One frame of boat.yaml by every beamformer, 35 dB deep."""
+    figure, panels = plt.subplots(2, 3, figsize=(8.4, 5.6), dpi=100, sharex=True, sharey=True, layout="compressed")
+    for kind, panel in zip(IMAGES, panels.flat, strict=True):
+        recipe = ss.load(ROOT / "configs" / "boat.yaml", [f"scene.processing.beamforming={{kind: {kind}}}"])
+        energy = ss.render(recipe, FRAMES["boat"])["image/energy"]
+        decibels = 10 * np.log10(np.maximum(energy / energy.max(), 1e-9))
+        drawn = panel.pcolormesh(energy.azimuth, energy.elevation, decibels, vmin=-35, vmax=0, cmap="inferno")
+        panel.set(title=kind, aspect="equal")
+    panels[0, 0].invert_xaxis()
+    figure.supxlabel("azimuth (deg), port on the left")
+    figure.supylabel("elevation (deg)")
+    figure.colorbar(drawn, ax=panels, label="dB re the brightest beam")
+    figure.savefig(ROOT / ".github" / "images.png", metadata={"Software": None})
+    plt.close(figure)
+
+
 def laws(folder: Path) -> None:
     """The pass of remus.yaml by three laws of scattering, side by side."""
     stores = [folder / f"{name}.zarr" for name in LAWS]
@@ -109,7 +138,14 @@ def cloud(folder: Path) -> None:
     plt.close(figure)
 
 
-DRAWN = {"cloud": cloud, "thumbnails": thumbnails, "ghosts": ghosts, "laws": laws, "accuracy": accuracy}
+DRAWN = {
+    "cloud": cloud,
+    "thumbnails": thumbnails,
+    "ghosts": ghosts,
+    "images": images,
+    "laws": laws,
+    "accuracy": accuracy,
+}
 
 
 def main() -> None:
