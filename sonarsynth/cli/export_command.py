@@ -35,8 +35,11 @@ def export(
         ),
     ] = None,
     relative_to: Annotated[
-        str, typer.Option(metavar="AXES", help="sonar, world, or the name of a target: its points fall together.")
-    ] = "sonar",
+        str | None,
+        typer.Option(
+            metavar="AXES", help="sonar, world, or the name of a target: its points fall together. Default: sonar."
+        ),
+    ] = None,
     settings: Annotated[
         list[str],
         typer.Option("--set", metavar="PATH=VALUE", help="Override a field of the recipe (bellhop). Repeatable."),
@@ -49,11 +52,15 @@ def export(
     from sonarsynth.export import FORMATS
 
     if to == BELLHOP:
+        if relative_to is not None:
+            raise BadOption("--relative-to is for point clouds: Bellhop has no such axes")
         _bellhop(Path(source), out, frames, settings)
     elif to not in FORMATS:
         raise BadOption(f"--to must be one of {', '.join((*FORMATS, BELLHOP))}, not {to}")
+    elif settings:
+        raise BadOption("--set is for recipes: a store is what it is")
     else:
-        _points(source, to, out, frames, relative_to)
+        _points(source, to, out, frames, relative_to or "sonar")
 
 
 def _points(store: str, to: str, out: Path | None, frames: str | None, relative_to: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,8 @@ from sonarsynth.environment.sound_speed import Cast
 from sonarsynth.equations.water.boundary_reflection import rayleigh
 from sonarsynth.export import write_bellhop
 from sonarsynth.recipe.reading import load
-from sonarsynth.validation.bellhop import ArrivalsError, compare_arrivals, read_arrivals
+from sonarsynth.validation.bellhop import ArrivalsError, BellhopArrivals, compare_arrivals, read_arrivals
+from sonarsynth.validation.bellhop.arrivals_compared import paired
 
 HERE = Path(__file__).parent / "bellhop"
 
@@ -45,7 +47,7 @@ def test_an_environment_is_read_back_to_the_last_digit(tmp_path):
 
 def test_recorded_arrivals_are_those_of_images():
     """Uniform water: every delay, angle and level by images, with Rayleigh's coefficient."""
-    found = read_arrivals(HERE / "uniform.arr", 16.0, 6.0, 30.0)
+    found = read_arrivals(HERE / "uniform.arr").at(16.0, 6.0, 30.0)
     assert (found.frequency, found.source_depth, found.receiver_depth, found.distance) == (55e3, 16.0, 6.0, 30.0)
     assert len(found.delay) == 21 and (found.surface <= 5).all()
     up, odd = found.launch > 0, (found.surface + found.bottom) % 2 == 1
@@ -77,6 +79,22 @@ def test_eigenrays_are_those_of_a_recorded_run(name, late):
     assert alone == []
 
 
+def test_only_rays_that_are_alike_are_pairs_and_the_nearest_first():
+    def ours(launch):
+        return SimpleNamespace(family="direct", event=[], time=[0.02], elevation=[launch, 0.0], transmission_loss=30.0)
+
+    def theirs(delay, launch):
+        none, one = np.zeros(1, int), np.ones(1)
+        return BellhopArrivals(
+            55e3, 16.0, 6.0, 30.0, delay * one, 30.0 * one, 0 * one, launch * one, 0 * one, none, none
+        )
+
+    rays = paired([ours(0.0), ours(0.02)], theirs(0.02, 0.021))
+    assert [ray.launch[1] for ray in rays if ray.launch[0] == 0.02] == [0.021] and len(rays) == 2
+    for other in (theirs(0.021, 0.0), theirs(0.02, 0.1)):
+        assert sorted(ray.family for ray in paired([ours(0.0)], other)) == ["Bellhop alone", "direct"]
+
+
 ENV = """'A title, with: an apostrophe''s comma'
 100.0 /
 1 ! media
@@ -106,6 +124,13 @@ def test_an_environment_is_read_by_the_rules_of_fortran(tmp_path):
     )
 
 
+def test_a_loss_in_a_unit_that_is_not_known_is_not_said(tmp_path):
+    file = tmp_path / "a.env"
+    file.write_text(ENV.replace("'SVF'", "'SVm'"))
+    note = profile_of(Cast(path=str(file))).notes[1]
+    assert "its loss (unit 'm') is not read" in note and "loss_tangent" not in note
+
+
 @pytest.mark.parametrize(
     ("old", "new", "line", "said"),
     [
@@ -116,6 +141,9 @@ def test_an_environment_is_read_by_the_rules_of_fortran(tmp_path):
         ("'SVF'", "'XVF'", 4, "option 'X' is no way of Bellhop's to interpolate"),
         ("1 ! media", "3", 3, "3 media: layers under the water are not supported"),
         (" 20.0, 1510.0", " x 1510.0", 7, "'x' is not a number"),
+        (" 20.0, 1510.0", " 20.0, nan", 7, "'nan' is not a finite number"),
+        ("1 ! media", "1d999", 3, "'1d999' is not a finite number"),
+        (" 40.0 /", " 10.0" + 5000 * " " + "'", 9, "the node at 10 m is not below the one before"),  # over at once
         (" 40.0 /", " 10.0 /", 8, "the node at 10 m is not below the one before"),
         (" 60.0 1505.0", " 70.0 1505.0", 9, "the node at 70 m is below the bottom, 60 m"),
         ("51  0.0  60.0", "51 /", 5, "has 1 values where a Bellhop environment has 3 or more"),
@@ -150,6 +178,7 @@ def test_a_cut_environment_and_profiles_over_range_are_refused(tmp_path):
         (lambda text: text.replace("0.122970447", "x"), "is no file of arrivals"),
         (lambda text: "", "is cut off"),
         (lambda text: text.replace("16.0000000", "12.0"), "has no source and receiver where a snap and the array are"),
+        (lambda text: text.replace("16.0000000", "16.2"), "has no source and receiver where a snap and the array are"),
     ],
 )
 def test_broken_arrivals_are_refused_in_one_line(tmp_path, change, said):
@@ -165,7 +194,7 @@ def test_older_arrivals_are_read_too(tmp_path):
     text = (HERE / "uniform.arr").read_text().split("\n")
     file = tmp_path / "a.arr"
     file.write_text("\n".join(["55000.0 1 1 1", "16.0", "6.0", "30.0", *text[5:]]))
-    old, new = (read_arrivals(path, 16.0, 6.0, 30.0) for path in (file, HERE / "uniform.arr"))
+    old, new = (read_arrivals(path).at(16.0, 6.0, 30.0) for path in (file, HERE / "uniform.arr"))
     assert np.array_equal(old.delay, new.delay) and np.array_equal(old.bottom, new.bottom)
 
 
@@ -180,3 +209,11 @@ def test_the_command_writes_environments_and_tables_of_reflection(tmp_path, caps
     np.testing.assert_allclose(-20 * np.log10(modulus), np.interp(angle, [0, 30, 90], [0, 3, 20]), atol=1e-6)
     np.testing.assert_allclose(phase, np.interp(angle, [0, 30, 90], [180, 90, 0]), atol=1e-6)
     assert "'F' 0.0" in (tmp_path / "uniform_frame0_snap0.env").read_text()
+
+
+@pytest.mark.parametrize(
+    "given", [("uniform.yaml", "--to", "bellhop", "--relative-to", "sonar"), ("a.zarr", "--set", "seed=2")]
+)
+def test_options_of_the_other_export_are_refused(tmp_path, capsys, given):
+    assert run(app, ["export", str(HERE / given[0]), *given[1:], "--out", str(tmp_path / "x")]) == 2
+    assert "is for" in capsys.readouterr().err and not list(tmp_path.iterdir())

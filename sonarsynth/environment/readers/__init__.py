@@ -66,12 +66,15 @@ def _read_text(path: Path, data: bytes, profile: int | None) -> CastTable:
     text = _decoded(data)
     if "\0" in text[:4096]:
         raise CastError(f"{path}: is not a text file, nor netCDF; read are {READ}")
-    if is_range_dependent(text):
-        raise CastError(f"{path}: is a .ssp of Bellhop, profiles over range without depths, which is not supported")
     table = read_bellhop(path, text) if is_bellhop(text) else read_fixed_columns(path, text, profile or 0)
-    if table is None:
-        table = read_named_columns(path, text)
-    if profile and (len(table.notes) == 0 or table.layout == "Bellhop"):
+    try:
+        table = table or read_named_columns(path, text)
+    except CastError:
+        if is_range_dependent(text):
+            line = "is a .ssp of Bellhop, profiles over range without depths, which is not supported"
+            raise CastError(f"{path}: {line}") from None
+        raise
+    if profile and not table.several:
         raise CastError(f"{path}: has no profile {profile}: it holds one cast")
     return table
 

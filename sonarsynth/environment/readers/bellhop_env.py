@@ -15,7 +15,7 @@ import numpy as np
 
 from sonarsynth.environment.readers.cast_table import MAX_ROWS, CastError, CastTable, Column, is_number
 
-WORD: Final = re.compile(r"\s*,?\s*('(?:[^']|'')*'|\"[^\"]*\"|/|[^\s,/'\"]+)")
+WORD: Final = re.compile(r"('(?:[^']|'')*'|\"[^\"]*\"|/|[^\s,/'\"]+)")
 INTERPOLATION: Final = {"N": "of 1/c2", "S": "by a spline", "P": "by a monotone cubic"}
 """How Bellhop goes from node to node, where that is not in straight lines."""
 REFUSED: Final = {
@@ -85,9 +85,12 @@ class _Records:
         if isinstance(held, str):
             return word[1:-1] if word[0] in "'\"" else word
         try:
-            return float(re.sub("[dD]", "e", word))
+            number = float(re.sub("[dD]", "e", word))
         except ValueError:
             raise self.error(f"{word[:40]!r} is not a number") from None
+        if not np.isfinite(number):
+            raise self.error(f"{word[:40]!r} is not a finite number")
+        return number
 
     def error(self, what: str) -> CastError:
         """An error in the record that was read last."""
@@ -163,14 +166,16 @@ def _bottom(records: _Records, unit: str, frequency: float, depth: float, speed:
         if cp > 0.0 and density > 0.0 and speed > 0.0:
             loss = _loss_tangent(attenuation, unit, frequency, cp)
             made = f"{{kind: fluid, density_ratio: {density:.6g}, speed_ratio: {cp / speed:.6g}"
-            made += f", loss_tangent: {loss:.4g}}}" + (f", without its shear waves of {cs:g} m/s" if cs else "")
+            made += "}" if loss is None else f", loss_tangent: {loss:.4g}}}"
+            made += f", its loss (unit '{unit}') is not read" if loss is None else ""
+            made += f", without its shear waves of {cs:g} m/s" if cs else ""
     if made is None:
         return f"{depth_note}; its bottom (option '{kind}') is not read{shape}"
     return f"{depth_note}, the reflection of its bottom {made}{shape}"
 
 
-def _loss_tangent(attenuation: float, unit: str, frequency: float, speed: float) -> float:
-    """Imaginary over real part of the wavenumber, from an attenuation in one of Bellhop's units."""
+def _loss_tangent(attenuation: float, unit: str, frequency: float, speed: float) -> float | None:
+    """Imaginary over real part of the wavenumber, from an attenuation in one of Bellhop's units; None for others."""
     omega = 2.0 * np.pi * frequency
     with np.errstate(divide="ignore", invalid="ignore"):
         nepers = {  # a metre, times speed over omega
@@ -181,4 +186,4 @@ def _loss_tangent(attenuation: float, unit: str, frequency: float, speed: float)
             "Q": 0.5 / attenuation if attenuation else 0.0,
             "L": attenuation,
         }
-    return float(np.nan_to_num(nepers.get(unit, 0.0)))
+    return float(np.nan_to_num(nepers[unit])) if unit in nepers else None

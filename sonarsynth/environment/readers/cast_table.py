@@ -48,6 +48,7 @@ class CastTable:
     latitude: float | None = None  # degrees, where the file gives it
     longitude: float | None = None  # likewise
     notes: tuple[str, ...] = field(default=())
+    several: bool = False  # whether the file holds more casts than this one
 
     def __post_init__(self) -> None:
         if not len(self.lines):

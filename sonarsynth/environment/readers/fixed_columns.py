@@ -148,10 +148,11 @@ def read_fixed_columns(path: Path, text: str, profile: int) -> CastTable | None:
             numbers.append(number)
     values = np.array(rows, float).reshape(-1, len(wanted))
     columns = {held.quantity: Column(held.quantity, held.ours(values[:, k])) for k, (_, held) in enumerate(wanted)}
-    several = (f"profile {profile} of {len(starts)}",) if len(starts) > 1 else ()
+    several = len(starts) > 1
+    notes = (f"profile {profile} of {len(starts)}",) if several else ()
     names = tuple(held.quantity for _, held in wanted)
     where = placed(place.get("lat"), place.get("lon"))
-    return CastTable(path, layout.make, columns, np.array(numbers, np.int64), names, 0, *where, notes=several)
+    return CastTable(path, layout.make, columns, np.array(numbers, np.int64), names, 0, *where, notes, several)
 
 
 def _heads(layout: Layout, lines: list[str], head: str) -> tuple[dict[str, str], list[int]] | None:

@@ -17,7 +17,10 @@ from sonarsynth.recipe.scene import Frame
 from sonarsynth.validation.bellhop.arrivals_file import ArrivalsError, BellhopArrivals, read_arrivals
 
 OFF: Final = 0.01
-"""Part of the distance by which ends may be elsewhere, and the least of it (m)."""
+"""Part of the distance, and of the larger depth, by which ends may be elsewhere; of one metre at least. A snap on the
+bottom is a little above it in Bellhop's run (`bellhop_files.LIFT`), which is less."""
+SAME_LAUNCH, SAME_DELAY = np.deg2rad(2.0), 0.01
+"""Launch angles, and part of the delay, by which our ray and an arrival may differ and be a pair."""
 SAME_RAY: Final = np.deg2rad(1.0)
 """Launch angles of two arrivals of one ray: beams on either side of it."""
 SAME_TIME: Final = 1e-3
@@ -29,7 +32,7 @@ HEADINGS: Final = (
 
 
 @dataclass(frozen=True)
-class ComparedRay:
+class RayComparison:
     """A ray of ours and Bellhop's: NaN where there is none."""
 
     family: str
@@ -41,12 +44,13 @@ class ComparedRay:
     loss: tuple[float, float]  # dB
 
 
-def compare_arrivals(plan: Plan, index: int, file: Path) -> list[ComparedRay]:
+def compare_arrivals(plan: Plan, index: int, file: Path) -> list[RayComparison]:
     """The rays of frame `index` from a snap to the array, as `rays:` asks for, beside the arrivals of a file.
 
     Of several snaps the one is taken that the file's ends are of. Rays are paired within the same number of bounces at
-    the surface and at the bottom, by the nearest launch angle; arrivals of one ray (Bellhop has one from the beams on
-    either side of it) are added up. Raises ArrivalsError where the file cannot be read, or is of other ends.
+    the surface and at the bottom, the nearest launch angles first, where these and the delays are about the same;
+    arrivals of one ray (Bellhop has one from the beams on either side of it) are added up. Raises ArrivalsError where
+    the file cannot be read, or is of other ends.
     """
     plan = plan.at(index)
     frame = plan.recipe.frame(index)[1]
@@ -58,24 +62,35 @@ def compare_arrivals(plan: Plan, index: int, file: Path) -> list[ComparedRay]:
     )
 
 
-def paired(ours: Sequence[RayLine], found: BellhopArrivals) -> list[ComparedRay]:
+def paired(ours: Sequence[RayLine], found: BellhopArrivals) -> list[RayComparison]:
     """Rays of both, in the order of their delays."""
-    theirs = _merged(found)
-    left = list(range(len(theirs)))
-    compared = []
-    for line in ours:
-        bounces = (line.event.count("surface"), line.event.count("bottom"))
-        row = np.array([line.time[-1], line.elevation[0], line.elevation[-1], line.transmission_loss])
-        alike = [i for i in left if theirs[i][0] == bounces]
-        best = min(alike, key=lambda i: abs(theirs[i][1][1] - row[1]), default=None)
-        other = np.full(4, np.nan) if best is None else theirs[best][1]
-        left = [i for i in left if i != best]
-        compared.append(_row(line.family, bounces, row, other))
-    compared += [_row("Bellhop alone", theirs[i][0], np.full(4, np.nan), theirs[i][1]) for i in left]
+    theirs, none = _merged(found), np.full(4, np.nan)
+    rows = [
+        (
+            (line.event.count("surface"), line.event.count("bottom")),
+            np.array([line.time[-1], line.elevation[0], line.elevation[-1], line.transmission_loss]),
+        )
+        for line in ours
+    ]
+    near = [
+        (abs(their[1] - own[1]), i, j)
+        for i, (own_bounces, own) in enumerate(rows)
+        for j, (bounces, their) in enumerate(theirs)
+        if bounces == own_bounces
+        and abs(their[1] - own[1]) < SAME_LAUNCH
+        and abs(their[0] - own[0]) < SAME_DELAY * own[0]
+    ]
+    pair: dict[int, int] = {}
+    for _, i, j in sorted(near):
+        if i not in pair and j not in pair.values():
+            pair[i] = j
+    compared = [_row(line.family, *rows[i], theirs[pair[i]][1] if i in pair else none) for i, line in enumerate(ours)]
+    alone = [their for j, their in enumerate(theirs) if j not in pair.values()]
+    compared += [_row("Bellhop alone", bounces, none, their) for bounces, their in alone]
     return sorted(compared, key=lambda ray: float(np.nanmin(ray.delay)))
 
 
-def comparison_table(rays: Sequence[ComparedRay], file: Path) -> str:
+def comparison_table(rays: Sequence[RayComparison], file: Path) -> str:
     """The comparison, a line a ray; arrivals of more reflections than any ray of ours has are only counted."""
     most = max((ray.surface + ray.bottom for ray in rays if np.isfinite(ray.delay[0])), default=0)
     shown = [ray for ray in rays if ray.surface + ray.bottom <= most]
@@ -95,7 +110,7 @@ def _aligned(row: Sequence[str], widths: Sequence[int]) -> list[str]:
     return [c.rjust(w + 1) if n else c.ljust(w) for n, (c, w) in enumerate(zip(row, widths, strict=True))]
 
 
-def _summary(rays: Sequence[ComparedRay], shown: int) -> str:
+def _summary(rays: Sequence[RayComparison], shown: int) -> str:
     both = [ray for ray in rays if np.isfinite(ray.delay).all()]
     words = f"{len(both)} rays of both, {shown - len(both)} of one alone"
     if both:
@@ -113,18 +128,17 @@ def _either(pair: tuple[float, float]) -> float:
 
 def _nearest(frame: Frame, file: Path) -> tuple[int, BellhopArrivals]:
     """The snap that a file is of, and its arrivals. Raises ArrivalsError."""
-    array = frame.sonar_pose.position
-    best: tuple[float, int, BellhopArrivals] | None = None
+    array, found = frame.sonar_pose.position, read_arrivals(file)
+    best: tuple[float, int, tuple[float, float, float]] | None = None
     for number, snap in enumerate(frame.moment.snaps):
         ends = (float(depth_of(snap.position)), float(depth_of(array)), float(np.hypot(*(array - snap.position)[:2])))
-        found = read_arrivals(file, *ends)
-        there = (found.source_depth, found.receiver_depth, found.distance)
-        off = float(np.abs(np.subtract(ends, there)).max())
-        if off <= OFF * max(1.0, ends[2]) and (best is None or off < best[0]):
-            best = (off, number, found)
+        off = np.abs(np.subtract(ends, found.nearest(*ends)))
+        within = OFF * np.maximum(1.0, [max(ends[:2]), max(ends[:2]), ends[2]])
+        if (off <= within).all() and (best is None or off.max() < best[0]):
+            best = (float(off.max()), number, ends)
     if best is None:
         raise ArrivalsError(f"{file}: has no source and receiver where a snap and the array are in frame {frame.index}")
-    return best[1], best[2]
+    return best[1], found.at(*best[2])
 
 
 def _merged(found: BellhopArrivals) -> list[tuple[tuple[int, int], np.ndarray]]:
@@ -150,6 +164,6 @@ def _merged(found: BellhopArrivals) -> list[tuple[tuple[int, int], np.ndarray]]:
     return merged
 
 
-def _row(family: str, bounces: tuple[int, int], ours: np.ndarray, theirs: np.ndarray) -> ComparedRay:
+def _row(family: str, bounces: tuple[int, int], ours: np.ndarray, theirs: np.ndarray) -> RayComparison:
     delay, launch, arrival, loss = ((float(a), float(b)) for a, b in zip(ours, theirs, strict=True))
-    return ComparedRay(family, *bounces, delay, launch, arrival, loss)
+    return RayComparison(family, *bounces, delay, launch, arrival, loss)

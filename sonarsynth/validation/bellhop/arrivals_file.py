@@ -45,11 +45,8 @@ class BellhopArrivals:
     bottom: Ints  # (arrival,)
 
 
-def read_arrivals(path: Path, source_depth: float, receiver_depth: float, distance: float) -> BellhopArrivals:
-    """The arrivals of the source and the receiver in a file that are nearest to these (m).
-
-    Raises ArrivalsError in one line where the file cannot be read, or is cut off.
-    """
+def read_arrivals(path: Path) -> ArrivalsFile:
+    """A file of arrivals. Raises ArrivalsError in one line where it cannot be read, or is cut off."""
     try:
         data = named_files.read(path, MAX_BYTES)
     except named_files.FileError as error:
@@ -63,15 +60,63 @@ def read_arrivals(path: Path, source_depth: float, receiver_depth: float, distan
         raise ArrivalsError(f"{path}: is of BELLHOP3D, which is not read")
     plane = re.match(r"['\"]2D", head) is not None
     try:
-        numbers = np.array((rest if plane else text).split(), float)
+        numbers = _Numbers(path, np.array((rest if plane else text).split(), float))
     except ValueError as error:
         raise ArrivalsError(f"{path}: is no file of arrivals ({str(error)[:60]})") from None
-    return _Numbers(path, numbers).arrivals(plane, (source_depth, receiver_depth, distance))
+    frequency = float(numbers.take(1)[0])
+    if plane:
+        axes = [numbers.take(numbers.take(1)[0]) for _ in range(3)]
+    else:
+        axes = [numbers.take(count) for count in numbers.take(3).tolist()]
+    if not all(len(axis) and np.isfinite(axis).all() for axis in axes) or not frequency > 0:
+        raise ArrivalsError(f"{path}: has no frequency, source, receiver or range")
+    return ArrivalsFile(path, frequency, axes, numbers.values[numbers.at :])
+
+
+@dataclass(frozen=True, eq=False)
+class ArrivalsFile:
+    """A file of arrivals: from each source to each receiver depth and range."""
+
+    path: Path
+    frequency: float  # Hz
+    axes: list[Floats]  # m: depths of sources, depths of receivers, ranges
+    rest: Floats  # the numbers after these
+
+    def nearest(self, *wanted: float) -> tuple[float, float, float]:
+        """The depth of a source, depth of a receiver and range in the file that are nearest to these (m)."""
+        source, receiver, distance = (float(axis[i]) for axis, i in zip(self.axes, self._indices(wanted), strict=True))
+        return source, receiver, distance
+
+    def at(self, *wanted: float) -> BellhopArrivals:
+        """The arrivals of the source and the receiver that are nearest to these (m). Raises ArrivalsError."""
+        amplitude, phase, delay, lost, launch, arrival, surface, bottom = self._rows(self._indices(wanted)).T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            loss = -20.0 * np.log10(np.abs(amplitude)) - 20.0 / np.log(10.0) * 2.0 * np.pi * self.frequency * lost
+        ends = (-np.deg2rad(launch), -np.deg2rad(arrival))  # Bellhop's are down positive
+        counts = (surface.astype(np.int64), bottom.astype(np.int64))
+        return BellhopArrivals(self.frequency, *self.nearest(*wanted), delay, loss, np.deg2rad(phase), *ends, *counts)
+
+    def _indices(self, wanted: tuple[float, ...]) -> list[int]:
+        return [int(np.argmin(np.abs(axis - value))) for axis, value in zip(self.axes, wanted, strict=True)]
+
+    def _rows(self, wanted: list[int]) -> Floats:
+        """Rows (arrival, column) of a source, a receiver depth and a range."""
+        numbers, sizes = _Numbers(self.path, self.rest), [len(axis) for axis in self.axes]
+        for source in range(sizes[0]):
+            numbers.take(1)  # the most that any receiver has
+            for depth in range(sizes[1]):
+                for distance in range(sizes[2]):
+                    rows = numbers.take(COLUMNS * numbers.take(1)[0]).reshape(-1, COLUMNS)
+                    if [source, depth, distance] == wanted:
+                        if not np.isfinite(rows).all():
+                            raise ArrivalsError(f"{self.path}: holds numbers that are not finite")
+                        return rows
+        raise AssertionError("the nearest are among them")
 
 
 @dataclass
 class _Numbers:
-    """All numbers of a file, taken one after the other."""
+    """Numbers of a file, taken one after the other."""
 
     path: Path
     values: Floats
@@ -83,35 +128,3 @@ class _Numbers:
             raise ArrivalsError(f"{self.path}: is cut off, or is no file of arrivals of Bellhop")
         self.at += int(count)
         return self.values[self.at - int(count) : self.at]
-
-    def arrivals(self, plane: bool, wanted: tuple[float, float, float]) -> BellhopArrivals:
-        """Those of the nearest source and receiver."""
-        frequency = float(self.take(1)[0])
-        if plane:
-            axes = [self.take(self.take(1)[0]) for _ in range(3)]
-        else:
-            axes = [self.take(count) for count in self.take(3).tolist()]
-        if not all(len(axis) and np.isfinite(axis).all() for axis in axes) or not frequency > 0:
-            raise ArrivalsError(f"{self.path}: has no frequency, source, receiver or range")
-        nearest = [int(np.argmin(np.abs(axis - value))) for axis, value in zip(axes, wanted, strict=True)]
-        found = self._block([len(axis) for axis in axes], nearest)
-        source, receiver, distance = (float(axis[i]) for axis, i in zip(axes, nearest, strict=True))
-        amplitude, phase, delay, lost, launch, arrival, surface, bottom = found.T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            loss = -20.0 * np.log10(np.abs(amplitude)) - 20.0 / np.log(10.0) * 2.0 * np.pi * frequency * lost
-        ends = (-np.deg2rad(launch), -np.deg2rad(arrival))  # Bellhop's are down positive
-        counts = (surface.astype(np.int64), bottom.astype(np.int64))
-        return BellhopArrivals(frequency, source, receiver, distance, delay, loss, np.deg2rad(phase), *ends, *counts)
-
-    def _block(self, sizes: list[int], nearest: list[int]) -> Floats:
-        """Rows (arrival, column) of a source, a receiver depth and a range."""
-        for source in range(sizes[0]):
-            self.take(1)  # the most that any receiver has
-            for depth in range(sizes[1]):
-                for distance in range(sizes[2]):
-                    rows = self.take(COLUMNS * self.take(1)[0]).reshape(-1, COLUMNS)
-                    if [source, depth, distance] == nearest:
-                        if not np.isfinite(rows).all():
-                            raise ArrivalsError(f"{self.path}: holds numbers that are not finite")
-                        return rows
-        raise AssertionError("the nearest are among them")
