@@ -75,9 +75,9 @@ def _explain(error: Exception, shown: bool) -> int:
     match type(error).__name__:
         case "Locked" | "Ended" | "Damage":
             return _say(str(error), STORE)
-        case (
-            "RecipeError" | "Mismatch" | "NothingToDraw" | "TooLarge" | "Unreachable" | "NoScheduler" | "RecordingError"
-        ):
+        case "RecipeError" | "Mismatch" | "NothingToDraw" | "TooLarge" | "Unreachable" | "NoScheduler":
+            return _say(str(error), INPUT)
+        case "RecordingError" | "TrackError":
             return _say(str(error), INPUT)
     if isinstance(error, (BadOption, FieldError)):
         return _say(str(error), INPUT)

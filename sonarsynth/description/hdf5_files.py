@@ -11,7 +11,7 @@ from sonarsynth.description.named_files import FileError
 
 SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
 MOST_ITEMS: Final = 100_000
-"""Groups and datasets of a file."""
+"""Of a file: names of groups and datasets, of which one may have many."""
 MISSING: Final = "is HDF5, which needs h5py: pip install 'sonarsynth[netcdf]'"
 
 
@@ -21,17 +21,17 @@ def refuse_other_files(data: bytes) -> None:
     count = 0
 
     def check(name: str, item: object) -> None:
-        nonlocal count
-        count += 1
-        if count > MOST_ITEMS:
-            raise FileError(f"has more than {MOST_ITEMS} groups and datasets")
         if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
             raise FileError(f"'{name}' lies in another file, which is not read")
         if isinstance(item, h5py.Group):
             links(item)
 
     def links(group: Any) -> None:
+        nonlocal count
         for name in group:
+            count += 1
+            if count > MOST_ITEMS:
+                raise FileError(f"has more than {MOST_ITEMS} groups and datasets")
             if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
                 raise FileError(f"'{name}' lies in another file, which is not read")
 

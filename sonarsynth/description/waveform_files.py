@@ -31,22 +31,25 @@ def waveform(
     sampling_frequency: float | None = None,
     dataset: str | None = None,
     most: int = MOST_NUMBERS,
+    long: bool = False,
+    longest: int | None = None,
 ) -> tuple[float, Floats]:
     """Sampling frequency (Hz) and numbers (sample,) of a channel, from 0, of a file in HDF5 or else in WAV.
 
     The full scale of whole numbers in a WAV is 1. Numbers of an HDF5 are as they stand, times the attribute
     `scale_factor` and plus `add_offset` where there are such; of a table the longer side is time. sampling_frequency:
-    for an HDF5 that does not say it; dataset: of an HDF5 of several, of at most `most` numbers. Raises FileError, whose
-    text does not name the file.
+    for an HDF5 that does not say it; dataset: of an HDF5 of several, of at most `most` numbers; long: a recording of
+    the sea, of which a WAV that ends before its header says (of a recorder that was switched off) is taken as far as it
+    goes; longest: samples that are taken, at most. Raises FileError, whose text does not name the file.
     """
     if is_hdf5(data):
-        rate, values = _hdf5(data, channel, sampling_frequency, dataset, most)
+        rate, values = _hdf5(data, channel, sampling_frequency, dataset, most, longest)
     elif sampling_frequency is not None:
         raise FileError("a WAV has its own sampling frequency: leave out sampling_frequency")
     elif dataset is not None:
         raise FileError("is no HDF5: leave out dataset")
     else:
-        rate, values = _wav(data, channel)
+        rate, values = _wav(data, channel, long, longest)
     if not 0 < rate < np.inf:
         raise FileError(f"has a sampling frequency of {rate} Hz")
     if not np.isfinite(values).all():
@@ -54,20 +57,22 @@ def waveform(
     return rate, values
 
 
-def _wav(data: bytes, channel: int) -> tuple[float, Floats]:
+def _wav(data: bytes, channel: int, long: bool, longest: int | None) -> tuple[float, Floats]:
     from scipy.io import wavfile
 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             warnings.filterwarnings("ignore", "Chunk .* not understood")
+            if long:
+                warnings.filterwarnings("ignore", "Reached EOF prematurely")
             rate, found = wavfile.read(io.BytesIO(data))
     except Exception as error:  # whatever a damaged file may bring
         text = " ".join(str(error).split())[:120]
         raise FileError(f"cannot be read as WAV ({type(error).__name__}: {text})") from None
     if not found.size:
         raise FileError("holds no samples")
-    values = _column(found.reshape(len(found), -1), channel)
+    values = _column(found.reshape(len(found), -1), channel, longest)
     if found.dtype == np.uint8:
         values = (values - 128.0) / 128.0
     elif found.dtype.kind == "i":
@@ -76,13 +81,18 @@ def _wav(data: bytes, channel: int) -> tuple[float, Floats]:
 
 
 def _hdf5(
-    data: bytes, channel: int, sampling_frequency: float | None, dataset: str | None, most: int
+    data: bytes,
+    channel: int,
+    sampling_frequency: float | None,
+    dataset: str | None,
+    most: int,
+    longest: int | None,
 ) -> tuple[float, Floats]:
     found, attributes = hdf5_files.read_dataset(data, dataset, most)
     if found.ndim not in (1, 2) or not found.size:
         raise FileError(f"its dataset has the shape {found.shape}, and is no waveform")
     table = found.reshape(len(found), -1)
-    values = _column(table if len(table) >= table.shape[1] else table.T, channel)
+    values = _column(table if len(table) >= table.shape[1] else table.T, channel, longest)
     own = next((attributes[name] for name in RATES if name in attributes), None)
     if own is None and sampling_frequency is None:
         raise FileError(f"has no attribute {RATES[0]}: give the sampling_frequency")
@@ -92,7 +102,7 @@ def _hdf5(
     return rate, values * attributes.get("scale_factor", 1.0) + attributes.get("add_offset", 0.0)
 
 
-def _column(columns: np.ndarray, channel: int) -> Floats:
+def _column(columns: np.ndarray, channel: int, longest: int | None) -> Floats:
     if channel >= columns.shape[1]:
         raise FileError(f"has no channel {channel}, only {columns.shape[1]} (from 0)")
-    return columns[:, channel].astype(float)
+    return columns[:longest, channel].astype(float)

@@ -63,7 +63,11 @@ def _read(recording: NoiseRecording, changed: Stamp) -> tuple[float, Floats]:
     try:
         data = named_files.read(recording.path, waveform_files.MOST_BYTES)
         rate, values = waveform_files.waveform(
-            data, recording.channel, sampling_frequency=recording.sampling_frequency, dataset=recording.dataset
+            data,
+            recording.channel,
+            sampling_frequency=recording.sampling_frequency,
+            dataset=recording.dataset,
+            long=True,
         )
     except named_files.FileError as error:
         raise RecordingError(f"{recording.path}: {error}") from None

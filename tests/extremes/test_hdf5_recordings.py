@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
+from sonarsynth.description import hdf5_files
 from sonarsynth.sources.noise_source import NoiseRecording
 from sonarsynth.sources.recordings import RecordingError, read_recording
 from sonarsynth.sources.snap_models import RecordedSnap
@@ -131,6 +132,26 @@ def test_hostile_files_are_refused_in_one_line(tmp_path, forge, said):
     with h5py.File(path, "w") as made:
         forge(made, tmp_path)
     refused(path, said)
+
+
+def test_many_names_of_one_dataset_are_counted(file, monkeypatch):
+    monkeypatch.setattr(hdf5_files, "MOST_ITEMS", 20)
+    with h5py.File(file, "a") as made:
+        for number in range(20):
+            made[f"again{number}"] = made["deployment/pressure"]
+    refused(file, "has more than 20 groups and datasets")
+
+
+def test_a_long_recording_whose_header_was_never_finished_is_taken_as_far_as_it_goes(tmp_path):
+    path = tmp_path / "a.wav"
+    wavfile.write(path, RATE, PULSE)
+    whole, data = NoiseRecording(path=str(path)).segment(0.0, 1.0 / RATE, 300), bytearray(path.read_bytes())
+    at = data.index(b"data") + 4
+    size = (4 * len(PULSE) + 4000).to_bytes(4, "little")
+    data[at : at + 4], data[4:8] = size, (len(data) + 4000).to_bytes(4, "little")
+    path.write_bytes(data)
+    assert np.array_equal(NoiseRecording(path=str(path)).segment(0.0, 1.0 / RATE, 300), whole)
+    refused(path, "cannot be read as WAV")
 
 
 def test_damaged_files_are_refused_or_read(file, tmp_path):

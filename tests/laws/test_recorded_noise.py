@@ -10,6 +10,7 @@ from scipy.io import wavfile
 from scipy.signal import welch
 
 import sonarsynth as ss
+from sonarsynth.environment.noise import recorded_noise
 from sonarsynth.equations.noise.filters import response
 from sonarsynth.pipeline.synthesis import digitise
 from sonarsynth.products import Signals
@@ -78,3 +79,34 @@ def test_recordings_that_cannot_be_are_refused(tmp_path: Path, rate: int, sample
     (tmp_path / "sea.wav").write_bytes(b"RIFF no sound")
     with pytest.raises(ss.FieldError, match="cannot be read as WAV"):
         ss.plan(recipe(tmp_path))
+
+
+def test_a_long_recording_is_of_its_beginning_and_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recorded_noise, "LONGEST", 20_000)
+    values = np.random.default_rng(1).standard_normal(60_000).astype(np.float32)
+    values[20_000:] *= 100.0
+    wavfile.write(tmp_path / "sea.wav", 250_000, values)
+    noise = ss.plan(recipe(tmp_path)).scene.world.environment.noises[0]
+    assert noise.validity(25e3, 85e3) == (f"of the recording {noise.path} the spectrum of the first 0.08 s is used",)
+    mean = noise.density(np.linspace(25e3, 85e3, 200)).mean()
+    assert mean == pytest.approx(2.0 * 4.0**2 / 250e3, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("kind", "file", "said"),
+    [
+        ("recording", "low.wav", "holds nothing of the middle of the band"),
+        ("recording", "broken.wav", "cannot be read as WAV"),
+        ("noise_recording", "broken.wav", "cannot be read as WAV"),
+    ],
+)
+def test_recordings_of_sources_of_noise_are_refused_too(tmp_path: Path, kind: str, file: str, said: str) -> None:
+    wavfile.write(tmp_path / "low.wav", 96_000, np.arange(9000, dtype=np.int16))
+    (tmp_path / "broken.wav").write_bytes(b"RIFF no sound")
+    one = f"{{name: a, motion: {{kind: still, position: [9, 0, -9]}}, sound: {{kind: {kind}, path: {file}}}}}"
+    text = RECIPE.replace("noise: {kind: recording, path: sea.wav, pascals: 4MORE}", "noise: null")
+    (tmp_path / "recipe.yaml").write_text(
+        text.replace("  sonar: {array", f"    noise_sources: [{one}]\n  sonar: {{array")
+    )
+    with pytest.raises(ss.FieldError, match=rf"scene.world.noise_sources.0.sound: .*{said}"):
+        ss.plan(ss.load(tmp_path / "recipe.yaml"))

@@ -15,8 +15,8 @@ from sonarsynth.environment.noise.noise_field import NoiseField
 
 SEGMENT, FEWEST = 4096, 4
 """Samples of a segment of the spectrum at most, and segments at least."""
-SHORTEST = 256
-"""Samples of a recording."""
+SHORTEST, LONGEST = 256, 1 << 25
+"""Samples of a recording at least, and those of its beginning that the spectrum is of, at most."""
 
 
 @description
@@ -24,7 +24,8 @@ class RecordedNoise(NoiseField):
     """Gaussian noise that has the power spectral density of a recording of the sea (WAV or HDF5), by Welch's method.
 
     Of the recording its mean spectrum alone is kept: neither its samples nor its snaps, which a chorus makes, are
-    played. Beyond half its sampling frequency there is nothing.
+    played. Beyond half its sampling frequency there is nothing. Of a recording of more than 2^25 samples, as many of
+    its beginning are used.
     """
 
     kind: Literal["recording"] = "recording"
@@ -43,17 +44,21 @@ class RecordedNoise(NoiseField):
     def density(self, frequency: Floats) -> Floats:
         """As `NoiseField.density`: straight lines between the bins of the spectrum. Raises ValueError for a file that
         cannot be read, is silent or too short."""
-        known, density = self._spectrum()
+        known, density, _ = self._spectrum()
         return np.asarray(np.interp(frequency, known, density, right=0.0))
 
     def validity(self, low: float, high: float) -> tuple[str, ...]:
         """As `NoiseField.validity`."""
-        last = float(self._spectrum()[0][-1])
-        if high <= last:
-            return ()
-        return (f"the recording {self.path} is of 0 to {last:.6g} Hz, the band of {low:.6g} to {high:.6g} Hz",)
+        frequency, _, used = self._spectrum()
+        last = float(frequency[-1])
+        lines = []
+        if high > last:
+            lines.append(f"the recording {self.path} is of 0 to {last:.6g} Hz, the band of {low:.6g} to {high:.6g} Hz")
+        if used is not None:
+            lines.append(f"of the recording {self.path} the spectrum of the first {used:.4g} s is used")
+        return tuple(lines)
 
-    def _spectrum(self) -> tuple[Floats, Floats]:
+    def _spectrum(self) -> tuple[Floats, Floats, float | None]:
         try:
             return _spectrum_of(self, named_files.stamp(self.path))
         except named_files.FileError as error:
@@ -61,8 +66,9 @@ class RecordedNoise(NoiseField):
 
 
 @lru_cache(maxsize=8)
-def _spectrum_of(noise: RecordedNoise, changed: tuple[int, int]) -> tuple[Floats, Floats]:
-    """Frequencies (bin,) in Hz, and the power spectral density (bin,) there in Pa2/Hz. Raises FileError."""
+def _spectrum_of(noise: RecordedNoise, changed: tuple[int, int]) -> tuple[Floats, Floats, float | None]:
+    """Frequencies (bin,) in Hz, the power spectral density (bin,) there in Pa2/Hz, and of how much of the recording it
+    is (s), where it is not of all. Raises FileError."""
     from scipy.signal import welch
 
     rate, values = waveform_files.waveform(
@@ -70,11 +76,15 @@ def _spectrum_of(noise: RecordedNoise, changed: tuple[int, int]) -> tuple[Floats
         noise.channel,
         sampling_frequency=noise.sampling_frequency,
         dataset=noise.dataset,
+        long=True,
+        longest=LONGEST + 1,
     )
+    used = LONGEST / rate if values.size > LONGEST else None
+    values = values[:LONGEST]
     if values.size < SHORTEST:
         raise named_files.FileError(f"has {values.size} samples; the spectrum of noise needs {SHORTEST}")
     size = min(SEGMENT, values.size // FEWEST)
     frequency, density = welch(values * noise.pascals, rate, nperseg=size)
     if not 0.0 < float(density[1:].max()) < np.inf:
         raise named_files.FileError("is silent, or louder than numbers can say")
-    return frequency, density
+    return frequency, density, used

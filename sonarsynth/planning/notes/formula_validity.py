@@ -9,6 +9,7 @@ from sonarsynth.description import FieldError
 from sonarsynth.environment.absorption import absorption_notes
 from sonarsynth.environment.boundary_numbers import boundary_notes
 from sonarsynth.environment.sea import Profile
+from sonarsynth.planning.notes.noise_checks import noise_notes
 from sonarsynth.recipe.scene import Scene
 
 
@@ -23,13 +24,11 @@ def validity(scene: Scene, profile: Profile) -> tuple[str, ...]:
         ("absorption", note)
         for note in absorption_notes(environment.absorption, [[band.low], [band.high]], [0.0, environment.depth])
     ]
-    for noise in environment.noises:
-        found += [("noise", note) for note in noise.validity(band.low, band.high)]
     if scene.physics.tracing.bounces:
         for name, boundary in (("surface", environment.surface), ("bottom", environment.bottom)):
             found += [(f"{name}.{field}", note) for field, note in boundary_notes(boundary, band.low, band.high)]
     lines = [f"scene.world.environment.{field}: {note}" for field, note in found]
-    return (*lines, *(f"{'.'.join(BELIEVED)}: {note}" for note in _believed(scene)))
+    return (*lines, *noise_notes(scene), *(f"{'.'.join(BELIEVED)}: {note}" for note in _believed(scene)))
 
 
 BELIEVED = ("scene", "processing", "placing", "profile")

@@ -16,6 +16,7 @@ from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.motion import pose
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.planning.choices import OF_BEAMS
+from sonarsynth.planning.notes.noise_checks import check_noises
 from sonarsynth.planning.notes.track_checks import check_tracks
 from sonarsynth.receiver import Sonar, elements
 from sonarsynth.recipe.scene import Frame, Scene
@@ -53,7 +54,7 @@ def read_inputs(scene: Scene) -> Profile:
     except (ValueError, OSError, ImportError) as error:
         raise FieldError((*world, "environment", "sound_speed"), str(error)) from None
     _check_profile(scene, profile)
-    _check_noise(scene)
+    check_noises(scene)
     check_tracks(scene)
     for i, (target, law) in enumerate(zip(scene.world.targets, scene.laws, strict=True)):
         try:
@@ -68,18 +69,6 @@ def read_inputs(scene: Scene) -> Profile:
     except ValueError as error:
         raise FieldError(("scene", "sonar", "array"), str(error)) from None
     return profile
-
-
-def _check_noise(scene: Scene) -> None:
-    """Each noise must have a density in the middle of the band: its file may be broken, or of other frequencies."""
-    environment, centre = scene.world.environment, scene.sonar.band.centre
-    for number, noise in enumerate(environment.noises):
-        several = (number,) if isinstance(environment.noise, tuple) else ()
-        try:
-            if not noise.correlated and not noise.density(np.array([centre]))[0] > 0.0:
-                raise ValueError(f"holds nothing of the middle of the band, {centre:g} Hz")
-        except ValueError as error:
-            raise FieldError(("scene", "world", "environment", "noise", *several), str(error)) from None
 
 
 def _check_profile(scene: Scene, profile: Profile) -> None:

@@ -1,0 +1,49 @@
+"""Can the noises of a scene be read, are they of its band, and where do their formulas not hold?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from sonarsynth.description import FieldError
+from sonarsynth.environment.noise import Noise
+from sonarsynth.recipe.scene import Scene
+from sonarsynth.sources.noise_source import NoiseRecording
+
+INSTANT = 1e-9
+"""s: between samples of a recording, to read it alone."""
+
+
+def check_noises(scene: Scene) -> None:
+    """Each noise must have a density in the middle of the band: its file may be broken, or of other frequencies.
+
+    Raises FieldError.
+    """
+    centre = scene.sonar.band.centre
+    for where, noise in _noises(scene):
+        try:
+            if isinstance(noise, NoiseRecording):
+                noise.segment(0.0, INSTANT, 1)
+            elif not noise.correlated and not noise.density(np.array([centre]))[0] > 0.0:
+                raise ValueError(f"holds nothing of the middle of the band, {centre:g} Hz")
+        except ValueError as error:
+            raise FieldError(where, str(error)) from None
+
+
+def noise_notes(scene: Scene) -> Iterator[str]:
+    """Where the formulas of noises do not hold in the band, one line each with its field."""
+    band = scene.sonar.band
+    for where, noise in _noises(scene):
+        if not isinstance(noise, NoiseRecording):
+            yield from (f"{'.'.join(map(str, where))}: {note}" for note in noise.validity(band.low, band.high))
+
+
+def _noises(scene: Scene) -> Iterator[tuple[tuple[str | int, ...], Noise | NoiseRecording]]:
+    """Each noise of a scene, and where it is in the recipe."""
+    environment = scene.world.environment
+    for i, noise in enumerate(environment.noises):
+        several = (i,) if isinstance(environment.noise, tuple) else ()
+        yield ("scene", "world", "environment", "noise", *several), noise
+    for i, source in enumerate(scene.world.noise_sources):
+        yield ("scene", "world", "noise_sources", i, "sound"), source.sound
