@@ -237,7 +237,7 @@ def fewer(wave: Wavefront, pulse: Pulse, elements: Elements) -> float:
     """
     error = np.sqrt(pulse.weight) * wave.residual
     total = float(error @ error)
-    if not total > 0:
+    if not total > 0 or np.count_nonzero(elements.gain) < 3:
         return 1.0
     here, beside = neighbours(elements)
     alike = float(np.mean(error[here][:, None] * error[beside])) * len(here) / total
