@@ -22,7 +22,7 @@ def soundscape(
     out: Annotated[Path, typer.Option(metavar="FILE", help="Where to write the picture.")] = Path("soundscape.png"),
     seconds: Annotated[float, typer.Option(metavar="S", help="Of a recipe's sound that is made.")] = 2.0,
     compare: Annotated[
-        Path | None, typer.Option(metavar="WAV", help="A recording of the sea to put beside it.")
+        Path | None, typer.Option(metavar="FILE", help="A recording of the sea (WAV, HDF5) to put beside it.")
     ] = None,
     full_scale: Annotated[
         float | None, typer.Option(metavar="PA", help="Pressure (Pa) of the recording's full scale.")
@@ -31,6 +31,12 @@ def soundscape(
         float | None, typer.Option(metavar="DB", help="The same in dB re full scale per uPa, such as -176.")
     ] = None,
     channel: Annotated[int, typer.Option(min=0, help="Channel of the recording, from 0.")] = 0,
+    dataset: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Of an HDF5 that has several: the one of the recording.")
+    ] = None,
+    sampling_frequency: Annotated[
+        float | None, typer.Option(metavar="HZ", help="Of an HDF5 that does not say it.")
+    ] = None,
     files: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Where the files are that a store's recipe names.")
     ] = None,
@@ -42,14 +48,22 @@ def soundscape(
     """Draw what the hydrophones hear of the sea, beside its models: spectrum, loud arrivals, amplitudes, directions,
     coherence, gaps. A recording can be put beside it."""
     from sonarsynth.cli import printing
+    from sonarsynth.evaluation.soundscape.recorded_sound import SeaRecording
     from sonarsynth.pictures.soundscape_figures import soundscape_pictures as pictures
     from sonarsynth.recipe import reading
 
     if not SHORTEST <= seconds <= LONGEST:
         raise BadOption(f"--seconds: must be from {SHORTEST:g} to {LONGEST:g}")
-    beside = None if compare is None else pictures.Compared(compare, _pascals(full_scale, sensitivity), channel)
-    if beside is None and (full_scale is not None or sensitivity is not None):
-        raise BadOption("--full-scale and --sensitivity are those of a recording: name one with --compare")
+    of_recording = (full_scale, sensitivity, dataset, sampling_frequency)
+    if compare is None and (channel or any(given is not None for given in of_recording)):
+        raise BadOption(
+            "--full-scale, --sensitivity, --channel, --dataset and --sampling-frequency are those of a recording: name "
+            "one with --compare"
+        )
+    beside = None
+    if compare is not None:
+        pascals = _pascals(full_scale, sensitivity)
+        beside = SeaRecording(compare, pascals, channel, dataset, sampling_frequency)
     if Path(source).is_file():
         read = reading.read(Path(source), settings)
         with reading.locating(read), printing.planning("making sound"):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import reduce
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +15,14 @@ from sonarsynth.equations.noise.arrival_counts import APART, fano_factor, loud_a
 from sonarsynth.equations.noise.plane_wave_spectra import cross_power
 from sonarsynth.equations.noise.wave_directions import quadrature
 from sonarsynth.evaluation.soundscape.made_sound import listening_plan, made_sound
-from sonarsynth.evaluation.soundscape.measured import Measured, measure
+from sonarsynth.evaluation.soundscape.measured import MeasuredFigures, measure
 from sonarsynth.evaluation.soundscape.model import sound_model
 from sonarsynth.evaluation.soundscape.predicted import predict
-from sonarsynth.evaluation.soundscape.recorded_sound import recorded_sound
+from sonarsynth.evaluation.soundscape.recorded_sound import SeaRecording, recorded_sound
 from sonarsynth.evaluation.soundscape.sound import NothingHeard, Sound
+from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.pictures.soundscape_figures.soundscape_figure import _of_recording
+from sonarsynth.pipeline.frame_chorus import frame_chorus
 from sonarsynth.receiver import Sonar
 
 RATE = 200_000
@@ -31,14 +36,16 @@ scene:
     chorus: CHORUS
   sonar:
     array: {kind: position_table, positions: [[0, 0, 0], [0, 2 cm, 0], [0, 0, 3 cm]], face: FACE}
+    baffle: BAFFLE
     beams: {azimuths: 3, elevations: 3}
     electronics: {level: 20 dB}
   trajectory: {frames: 1, interval: 0.5 s, sonar: {kind: still, position: [0, 0, -10], heading: 90 deg}}
 """
 
 
-def recipe(noise: str = "null", chorus: str = "null", face: str = "0") -> ss.Recipe:
-    return ss.loads(RECIPE.replace("NOISE", noise).replace("CHORUS", chorus).replace("FACE", face))
+def recipe(noise: str = "null", chorus: str = "null", face: str = "0", baffle: str = "0 dB") -> ss.Recipe:
+    given = {"NOISE": noise, "CHORUS": chorus, "FACE": face, "BAFFLE": baffle}
+    return ss.loads(reduce(lambda text, name: text.replace(name, given[name]), given, RECIPE))
 
 
 def test_loud_arrivals_of_a_poisson_process_are_poisson() -> None:
@@ -77,9 +84,9 @@ def test_coherence_of_plane_waves_is_that_of_the_closed_forms() -> None:
     np.testing.assert_allclose(cross_power(toward, weight, offset, k), [-0.131810, -0.425515 - 0.205777j], atol=2e-6)
 
 
-def recording(folder: Path, values: np.ndarray, pascals: float | None = 5.0) -> Measured:
+def recording(folder: Path, values: np.ndarray, pascals: float | None = 5.0) -> MeasuredFigures:
     wavfile.write(folder / "sea.wav", RATE, values.astype(np.float32))
-    return measure(recorded_sound(folder / "sea.wav", Sonar(), pascals))
+    return measure(recorded_sound(SeaRecording(folder / "sea.wav", pascals), Sonar()))
 
 
 def test_a_recording_of_gaussian_noise_has_its_figures(tmp_path: Path) -> None:
@@ -94,6 +101,9 @@ def test_a_recording_of_gaussian_noise_has_its_figures(tmp_path: Path) -> None:
     relative = recording(tmp_path, 0.1 * np.random.default_rng(3).standard_normal(200_000), None)
     np.testing.assert_allclose(got.figures.octaves - relative.figures.octaves, 20.0 * np.log10(5.0), atol=1e-4)
     assert any("relative" in note for note in relative.sound.notes)
+    drawn = _of_recording(relative, got)  # in a picture: at the level of the sound
+    assert drawn.zero + relative.figures.octaves.mean() == pytest.approx(120.0 + got.figures.octaves.mean())
+    assert "shifted" in drawn.legend and _of_recording(got, got).zero == 120.0
 
 
 def test_a_recording_of_poisson_clicks_has_their_rate(tmp_path: Path) -> None:
@@ -144,7 +154,36 @@ def test_a_chorus_is_heard_as_its_model_says() -> None:
     assert abs(paths - every) < 5.0 * np.sqrt(2.0 * every)
 
 
+def test_a_baffle_weakens_what_comes_from_behind_in_the_model_as_in_the_sea() -> None:
+    one = recipe(chorus="{density: 0.02, deviation: 1 dB, reach: 80 m, images: 1}", baffle="12 dB")
+    plan, first = listening_plan(one, 0.8), one.frame(0)[1]
+    tilted = replace(first, sonar_pose=Pose(first.sonar_pose.position, quaternion(0.7, np.deg2rad(30.0))))
+    paths, blocks = [], 20
+    for number in range(blocks):
+        frame = replace(tilted, step=number, moment=replace(first.moment, time=0.1 * number))
+        arrivals = frame_chorus(plan, frame)
+        assert arrivals is not None
+        paths.append(arrivals.select((arrivals.delay >= 0.0) & (arrivals.delay < 0.1)))
+    model = sound_model(plan, tilted).chorus
+    assert model is not None
+    energy = sum(float((some.gain**2 * 10.0 ** (-some.absorption / 10.0)).sum()) for some in paths)
+    edges = np.array([-1.0, 1.0])
+    assert energy == pytest.approx(float(model.energies(edges, 0.1 * blocks)[0]), rel=0.2)
+    level = float(np.median(np.concatenate([some.received for some in paths])))
+    often = float(model.counts(edges, 0.1 * blocks, level)[0])
+    count = sum(np.count_nonzero(some.received > level) for some in paths)
+    assert abs(count - often) < 5.0 * np.sqrt(2.0 * often)
+    sine, around = np.linspace(-0.99, 0.99, 30)[:, None], np.linspace(0.0, 2.0 * np.pi, 2001)[:-1]
+    flat = np.sqrt(1.0 - sine**2)
+    toward = np.stack(np.broadcast_arrays(flat * np.cos(around), flat * np.sin(around), sine), axis=-1)
+    exact = (tilted.sonar_pose.turn_to_body(toward)[..., 0] >= 0.0).mean(axis=1)
+    np.testing.assert_allclose(model.in_front(sine[:, 0]), exact, atol=2e-3)
+    assert 0.0 < exact[5] < exact[20] < 1.0
+
+
 def test_no_sound_is_refused() -> None:
+    with pytest.raises(NothingHeard, match="samples, more than"):
+        listening_plan(recipe("{kind: flat, level: 60 dB}"), 1e4)
     with pytest.raises(NothingHeard, match="neither"):
         listening_plan(recipe())
     silent = Sound(np.zeros((10, 1, 100), np.float32), 196e3, np.zeros((1, 3)), True, (25e3, 85e3))

@@ -5,15 +5,20 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from scipy.io import wavfile
 
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
+from sonarsynth.evaluation.soundscape.sound import NothingHeard
+from sonarsynth.evaluation.soundscape.stored_sound import stored_sound
+from sonarsynth.pictures.soundscape_figures import soundscape_pictures
 from sonarsynth.planning import plan
 from sonarsynth.recipe import reading
 from sonarsynth.schedule import build
+from sonarsynth.store import open_store
 
 TEXT = """
 scene:
@@ -27,11 +32,14 @@ scene:
     sources: [{kind: snapping_shrimp, position: [14, -5]}]
     chorus: {density: 0.01, reach: 50 m, images: 1, width: 0, snap: SNAP}
   sonar:
-    array: {kind: planar_lattice, columns: 3, rows: 3, pitch: 5 cm, DEAD}
+    array: {kind: planar_lattice, columns: 3, rows: 3, pitch: 5 cm, face: 0, DEAD}
     beams: {azimuths: 5, elevations: 5}
     converter: {bits: 16, full_scale: 200 Pa}
-  trajectory: {frames: 3, interval: 0.1}
+  trajectory: {frames: 2, interval: 0.1}
 """
+
+
+SHIP = "scene.world.noise_sources=[{name: ship, motion: {kind: still, position: [9, 0, -3]}, sound: {kind: thermal}}]"
 
 
 def recipe_in(folder: Path, dead: str = "dead: [4]") -> Path:
@@ -48,10 +56,12 @@ def said(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, s
 
 
 def test_a_recipe_and_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    sea, wav, picture = recipe_in(tmp_path), tmp_path / "sea.wav", tmp_path / "out" / "sea.png"
-    wavfile.write(wav, 96_000, (3000 * np.random.default_rng(1).standard_normal(40_000)).astype(np.int16))
-    given = (sea, "--seconds", 0.1, "--out", picture, "--compare", wav, "--sensitivity", -180, "--json")
-    status, out, _ = said(capsys, *given)
+    sea, file, picture = recipe_in(tmp_path), tmp_path / "sea.h5", tmp_path / "out" / "sea.png"
+    with h5py.File(file, "w") as made:
+        made["other"] = np.zeros(9)
+        made["pressure"] = np.random.default_rng(1).standard_normal(40_000) * 3000 / 32768
+    of = ("--dataset", "pressure", "--sampling-frequency", 96_000, "--sensitivity", -180)
+    status, out, _ = said(capsys, sea, "--seconds", 0.1, "--out", picture, "--compare", file, *of, "--json")
     found = json.loads(out)
     assert status == 0 and picture.stat().st_size > 20_000
     assert "NaN" not in out and found["hydrophones"] == 8  # one is dead
@@ -63,20 +73,28 @@ def test_a_recipe_and_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert recorded["amplitude"]["rms_db"] == pytest.approx(exact, abs=0.3)
 
 
-def test_a_store(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert build(plan(reading.load(recipe_in(tmp_path)), ["signals"]), tmp_path / "s.zarr", workers=0).ok
+def test_a_store(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    recipe = reading.load(recipe_in(tmp_path))
+    assert build(plan(recipe, ["signals"]), tmp_path / "s.zarr", workers=0).ok
+    monkeypatch.setattr(soundscape_pictures, "draw_soundscape", lambda found, out: out)  # one picture is drawn above
     status, out, _ = said(capsys, tmp_path / "s.zarr", "--out", tmp_path / "s.png", "--json")
     found = json.loads(out)
     assert status == 0 and any("before the listed snaps" in note for note in found["notes"])
     assert found["loud_arrivals"]["fano_factor"] is None and found["elevation"]["of"].startswith("paths over")
-    assert found["seconds"] < 0.01  # the direct pulse, which is 30 dB louder, and its echoes are left out
-    assert found["amplitude"]["rms_db"] < 130.0
+    assert found["seconds"] < 0.01
+    tree = open_store(tmp_path / "s.zarr").copy()
+    peak = 120.0 + 20.0 * np.log10(float(np.abs(tree["signals/pressure"]).max()))
+    assert found["amplitude"]["level_db"][-1] < peak - 6.0  # the direct pulse and its echoes are left out
+    tree["signals/pressure"] = tree["signals/pressure"].astype(float).where(tree["signals/pressure"].frame < 1)
+    with pytest.raises(NothingHeard, match="not finite"):
+        stored_sound(tree, recipe)
 
 
 @pytest.mark.parametrize(
     ("settings", "line"),
     [
         (["scene.world.chorus=null", "scene.world.environment.noise=null"], "neither scene.world.chorus nor"),
+        (["scene.world.chorus=null", "scene.world.environment.noise=null", SHIP], "neither scene.world.chorus nor"),
         (["scene.sonar.array.dead=[0, 1, 2, 3, 4, 5, 6, 7, 8]"], "every hydrophone is dead"),
     ],
 )
@@ -106,7 +124,12 @@ def test_a_recording_without_sound_is_one_line(
 
 @pytest.mark.parametrize(
     "options",
-    [("--full-scale", "1"), ("--compare", "sea.wav", "--full-scale", "1", "--sensitivity", "2"), ("--seconds", "0")],
+    [
+        ("--full-scale", "1"),
+        ("--dataset", "a"),
+        ("--compare", "sea.wav", "--full-scale", "1", "--sensitivity", "2"),
+        ("--seconds", "0"),
+    ],
 )
 def test_options_that_do_not_go_together(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], options: tuple[str, ...]

@@ -73,13 +73,24 @@ class ChorusModel:
         left = self.share(far[0], length) * 10.0 ** (-absorption * length / 10.0)
         return np.asarray(2.0 * np.pi * np.where(there, left, 0.0).sum(axis=0) / away).reshape(np.shape(sine))
 
-    def power(self, absorption: float, low: float = -1.0, high: float = 1.0) -> float:
-        """The integral of the intensity over sines from low to high, without faces."""
+    def in_front(self, sine: Floats) -> Floats:
+        """Share (...) of the azimuths, at sines (...) of the elevation, from which sound comes before the array."""
+        ahead = self.receiver.pose.turn_to_world(np.array([1.0, 0.0, 0.0]))
+        flat = np.sqrt(np.maximum(1.0 - sine**2, 0.0)) * np.hypot(ahead[0], ahead[1])
+        return np.asarray(np.arccos(np.clip(-sine * ahead[2] / np.maximum(flat, 1e-15), -1.0, 1.0)) / np.pi)
+
+    def power(self, absorption: float, low: float = -1.0, high: float = 1.0, behind: float = 1.0) -> float:
+        """The integral of the intensity over sines from low to high, without faces; behind: what the baffle leaves of
+        the energy of sound from behind the array."""
+
+        def heard(sine: Floats) -> Floats:
+            front = self.in_front(sine)
+            return self.intensity(sine, absorption) * (front + (1.0 - front) * behind)
+
         node, weight = np.polynomial.legendre.leggauss(PANELS)
         inner = [low, *(edge for edge in self.edges if low < edge < high), high]
         return sum(
-            0.5 * (b - a) * float(weight @ self.intensity(0.5 * (a + b) + 0.5 * (b - a) * node, absorption))
-            for a, b in pairwise(inner)
+            0.5 * (b - a) * float(weight @ heard(0.5 * (a + b) + 0.5 * (b - a) * node)) for a, b in pairwise(inner)
         )
 
     def pulse_energy(self, frequency: Floats) -> Floats:
@@ -117,7 +128,8 @@ class ChorusModel:
         """dB of the largest sample of snaps behind the filter, re their peak before any, over the path length and
         the sizes of the direction along y and z."""
         sonar, elements = self.receiver.sonar, self.receiver.elements
-        reach, step = np.hypot(self.reach.reach, self.climb.max()), np.linspace(0.0, 1.0, TURNS)
+        turns = TURNS if elements.face else 2  # a point hears all directions alike
+        reach, step = np.hypot(self.reach.reach, self.climb.max()), np.linspace(0.0, 1.0, turns)
         lengths = np.linspace(0.0, reach, LENGTHS)  # decibels fall almost as the length grows
         f, spectrum = pulse_spectrum(waveform(self.model), sonar.antialias, sonar.sampling_frequency, self.samples)
         used = np.flatnonzero(np.abs(spectrum) > 1e-6 * np.abs(spectrum).max())
@@ -125,12 +137,12 @@ class ChorusModel:
         y, z = np.meshgrid(step, step, indexing="ij")
         towards = np.stack([np.zeros_like(y), y, z], axis=-1)[:, :, None, :]
         face = element_directivity(f[used], towards, elements.face, self.receiver.speed(self.plan.medium))
-        table = np.empty((LENGTHS, TURNS, TURNS))
+        table = np.empty((LENGTHS, turns, turns))
         for number, length in enumerate(lengths.tolist()):
-            heard = np.zeros((TURNS, TURNS, FINER * self.samples // 2 + 1), complex)
+            heard = np.zeros((turns, turns, FINER * self.samples // 2 + 1), complex)
             heard[..., used] = spectrum[used] * face * 10.0 ** (-lost * length / 20.0)
             wave = np.abs(np.fft.irfft(heard, axis=-1)) * FINER * sonar.sampling_frequency
-            largest = wave.reshape(TURNS, TURNS, -1, FINER).max(axis=2)
+            largest = wave.reshape(turns, turns, -1, FINER).max(axis=2)
             table[number] = (20.0 * np.log10(np.maximum(largest, 1e-300))).mean(axis=-1)
         table -= 20.0 * np.log10(self.model.pulse(0.0, 0.0).peak)
         return RegularGridInterpolator((lengths, step, step), table, bounds_error=False, fill_value=None)
@@ -151,6 +163,11 @@ class ChorusModel:
         gain = 10.0 * np.log10(np.maximum(share, 1e-30)) - 20.0 * np.log10(length)
         return away, self.chorus.rate * np.concatenate(area), gain.T
 
+    @property
+    def _behind(self) -> float:
+        """dB: of sound from behind the array, which the baffle weakens."""
+        return float(20.0 * np.log10(max(self.receiver.sonar.behind, 1e-15)))
+
     @cached_property
     def _heard(self) -> tuple[Floats, Floats, Floats]:
         """Of snaps in all directions: gain (place, path) in dB from the source level to the largest sample at a
@@ -166,8 +183,7 @@ class ChorusModel:
         long = np.broadcast_to(length[:, None, :], up.shape)
         sizes = np.abs(towards[..., 1:])
         heard = gain[:, None, :] + self._peaks(np.stack([long, sizes[..., 0], sizes[..., 1]], axis=-1))
-        behind = 20.0 * np.log10(max(self.receiver.sonar.behind, 1e-15))
-        heard = heard + np.where(towards[..., 0] < 0.0, behind, 0.0)
+        heard = heard + np.where(towards[..., 0] < 0.0, self._behind, 0.0)
         delay = np.broadcast_to((length * self.heights.slowness)[:, None, :], heard.shape)
         paths = len(self.climb)
         return heard.reshape(-1, paths), delay.reshape(-1, paths), np.repeat(rate / AZIMUTHS, AZIMUTHS)
@@ -180,18 +196,23 @@ class ChorusModel:
         return path_counts(gain, delay, rate, (self.chorus.level, wide), levels)
 
     def energies(self, edges: Floats, seconds: float) -> Floats:
-        """Energy (bin,) of paths by the sine of the elevation, over that of a snap at 1 m, between edges (bin + 1,)."""
+        """Energy (bin,) of paths by the sine of the elevation, over that of a snap at 1 m, between edges (bin + 1,),
+        behind the baffle."""
         absorption = float(self.plan.absorption(self.receiver.centre))
-        each = partial(self.power, absorption)
+        each = partial(self.power, absorption, behind=self.receiver.sonar.behind**2)
         return np.array([seconds * self.chorus.rate * each(a, b) for a, b in pairwise(edges.tolist())])
 
     def counts(self, edges: Floats, seconds: float, level: float) -> Floats:
-        """Number (bin,) of paths whose peak at the centre, before any filter, is above a level (dB re 1 uPa)."""
+        """Number (bin,) of paths whose peak at the centre, behind the baffle and before any filter, is above a level
+        (dB re 1 uPa)."""
         away, rate, gain = self._places
         length = np.hypot(away[:, None], self.climb)
         needed = level - gain + float(self.plan.absorption(self.receiver.centre)) * length
-        often = rate[:, None] * ndtr((self.chorus.level - needed) / max(self.chorus.deviation, 1e-9))
         sine = -self.climb * self.heights.turns / length
+        front, behind = self.in_front(sine), self._behind
+        over, deviation = self.chorus.level - needed, max(self.chorus.deviation, 1e-9)
+        share = front * ndtr(over / deviation) + (1.0 - front) * ndtr((over + behind) / deviation)
+        often = rate[:, None] * share
         return seconds * np.histogram(sine.ravel(), edges, weights=often.ravel())[0]
 
 

@@ -62,7 +62,7 @@ class _Block:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredFigures:
     """Figures of a sound, what they are of, and their spread."""
 
     sound: Sound
@@ -79,12 +79,12 @@ class Measured:
     spread: Figures
 
 
-def measure(sound: Sound) -> Measured:
+def measure(sound: Sound) -> MeasuredFigures:
     """The figures of a sound. Raises NothingHeard where it is silent."""
-    square = float(np.mean(sound.pressure.astype(float) ** 2))
+    square = float(np.mean([np.mean(block.astype(float) ** 2) for block in sound.pressure]))
     if not square > 0.0:
         raise NothingHeard("the sound is silent: there is nothing to measure")
-    root, peak = 10.0 * np.log10(square), 20.0 * np.log10(float(np.abs(sound.pressure).max()))
+    root, peak = 10.0 * np.log10(square), 20.0 * np.log10(max(float(np.abs(block).max()) for block in sound.pressure))
     levels = np.arange(np.ceil((root + LOUDER) / STEP), np.ceil(peak / STEP) + 1.0) * STEP
     frequency, at, pairs = _grids(sound)
     bins = (frequency >= sound.band[0]) & (frequency <= sound.band[1])
@@ -93,7 +93,7 @@ def measure(sound: Sound) -> Measured:
     loud, gaps = _loud(sound, levels)
     grid = np.linspace(root - 30.0, peak, TAIL)
     nothing = Figures(*(np.zeros(0) for _ in fields(Figures)))
-    made = Measured(
+    made = MeasuredFigures(
         sound, frequency[bins], centres[there], edges[there], levels, grid, at, pairs, loud, gaps, nothing, nothing
     )
     blocks = [_block(made, pressure, bins) for pressure in sound.pressure]
@@ -137,7 +137,7 @@ def _loud(sound: Sound, levels: Floats) -> tuple[float, Floats]:
     return float("nan"), np.zeros(0)
 
 
-def _block(made: Measured, pressure: Floats, bins: Bools) -> _Block:
+def _block(made: MeasuredFigures, pressure: Floats, bins: Bools) -> _Block:
     sound, rate = made.sound, made.sound.sampling_frequency
     size = _segment(sound)
     density = welch(pressure, rate, nperseg=size, axis=-1)[1]
@@ -164,7 +164,7 @@ def _block(made: Measured, pressure: Floats, bins: Bools) -> _Block:
     )
 
 
-def _figures(made: Measured, blocks: list[_Block]) -> Figures:
+def _figures(made: MeasuredFigures, blocks: list[_Block]) -> Figures:
     """The figures of some blocks."""
     density = np.mean([b.density for b in blocks], axis=0)
     square, fourth = np.mean([b.sums for b in blocks], axis=0)

@@ -1,10 +1,16 @@
-"""Spectra in 1/3 octaves."""
+"""Spectra in decibels and in 1/3 octaves."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from sonarsynth.conventions import Floats
+
+
+def decibels(power: Floats) -> Floats:
+    """10 log10 of powers (...); minus infinity of 0."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(10.0 * np.log10(power))
 
 
 def octave_bands(low: float, high: float) -> tuple[Floats, Floats]:

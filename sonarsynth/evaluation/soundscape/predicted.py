@@ -9,9 +9,9 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.noise.stable_laws import ESTIMATORS
-from sonarsynth.evaluation.soundscape.measured import PERCENT, Measured
+from sonarsynth.evaluation.soundscape.measured import PERCENT, MeasuredFigures
 from sonarsynth.evaluation.soundscape.model import SoundModel
-from sonarsynth.evaluation.soundscape.octaves import band_means
+from sonarsynth.evaluation.soundscape.octaves import band_means, decibels
 
 PASCAL = 120.0
 """dB re 1 uPa of 1 Pa."""
@@ -20,8 +20,8 @@ BINS = 18
 
 
 @dataclass(frozen=True, eq=False)
-class Predicted:
-    """What the model of a recipe says, at the grids of `Measured`."""
+class PredictedFigures:
+    """What the model of a recipe says, at the grids of `MeasuredFigures`."""
 
     parts: dict[str, Floats]  # (bin,) Pa2/Hz
     octaves: Floats  # (band,) dB re 1 Pa2/Hz
@@ -31,7 +31,7 @@ class Predicted:
     kurtosis: float  # excess, at most; NaN without a chorus
     root: float  # dB re 1 Pa: root mean square in the band
     scatter: float  # dB: of that, from one stretch as long as the sound to another, as snaps are few
-    elevation: Floats | None  # (bin,) of `Elevations`; none where nothing is known of arrivals
+    elevation: Floats | None  # (bin,) as `Arrivals.by_elevation`; none where nothing is known of arrivals
 
     @property
     def density(self) -> Floats:
@@ -44,7 +44,7 @@ def elevation_edges() -> Floats:
     return np.sin(np.linspace(-0.5 * np.pi, 0.5 * np.pi, BINS + 1))
 
 
-def predict(model: SoundModel, measured: Measured) -> Predicted:
+def predict(model: SoundModel, measured: MeasuredFigures) -> PredictedFigures:
     """The model's figures of a measured sound."""
     parts, sound, chorus = model.parts(measured.frequency), measured.sound, model.chorus
     density = np.asarray(sum(parts.values()))
@@ -65,7 +65,7 @@ def predict(model: SoundModel, measured: Measured) -> Predicted:
             elevation = (
                 chorus.energies(edges, known.seconds) if above is None else chorus.counts(edges, known.seconds, above)
             )
-    return Predicted(
+    return PredictedFigures(
         parts=parts,
         octaves=10.0 * np.log10(band_means(measured.frequency, density, measured.edges)),
         coherence=np.stack([model.coherence(f, offset) for f in measured.at.tolist()]),
@@ -78,11 +78,11 @@ def predict(model: SoundModel, measured: Measured) -> Predicted:
     )
 
 
-def as_json(measured: Measured, predicted: Predicted | None = None) -> dict[str, Any]:
+def as_json(measured: MeasuredFigures, predicted: PredictedFigures | None = None) -> dict[str, Any]:
     """Numbers for programs; null where there is none. Levels in dB re 1 uPa, or re full scale without calibration."""
     sound, got, spread = measured.sound, measured.figures, measured.spread
     zero = PASCAL if sound.calibrated else 0.0
-    model = predicted or Predicted({}, np.zeros(0), np.zeros((0, 0)), None, np.nan, np.nan, np.nan, np.nan, None)
+    model = predicted or PredictedFigures({}, np.zeros(0), np.zeros((0, 0)), None, np.nan, np.nan, np.nan, np.nan, None)
     found: dict[str, Any] = {
         "seconds": sound.seconds,
         "hydrophones": len(sound.position),
@@ -90,10 +90,10 @@ def as_json(measured: Measured, predicted: Predicted | None = None) -> dict[str,
         "notes": list(sound.notes),
         "spectrum": {
             "frequency_hz": measured.frequency,
-            "level_db": _level(got.density) + zero,
+            "level_db": decibels(got.density) + zero,
             "spread_db": 10.0 / np.log(10.0) * spread.density / np.maximum(got.density, 1e-300),
-            "model_db": _level(model.density) + zero if model.parts else None,
-            "parts_db": {name: _level(part) + zero for name, part in model.parts.items()},
+            "model_db": decibels(model.density) + zero if model.parts else None,
+            "parts_db": {name: decibels(part) + zero for name, part in model.parts.items()},
         },
         "third_octaves": {
             "centre_hz": measured.centres,
@@ -150,20 +150,16 @@ def as_json(measured: Measured, predicted: Predicted | None = None) -> dict[str,
     }
     if (known := sound.arrivals) is not None:
         edges = elevation_edges()
+        value, chance = known.by_elevation(edges)
         found["elevation"] = {
             "edges_deg": np.rad2deg(np.arcsin(edges)),
             "of": "energy" if known.above is None else f"paths over {known.above:.1f} dB re 1 uPa",
-            "value": np.histogram(known.sine, edges, weights=known.weight)[0],
-            "spread": np.sqrt(np.histogram(known.sine, edges, weights=known.weight**2)[0]),
+            "value": value,
+            "spread": chance,
             "model": model.elevation,
         }
     plain: dict[str, Any] = _plain(found)
     return plain
-
-
-def _level(power: Floats) -> Floats:
-    with np.errstate(divide="ignore"):
-        return np.asarray(10.0 * np.log10(power))
 
 
 def _plain(value: Any) -> Any:

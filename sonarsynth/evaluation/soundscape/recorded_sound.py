@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,22 +11,38 @@ from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from sonarsynth.conventions import Floats
 from sonarsynth.description import named_files, waveform_files
 from sonarsynth.equations.noise.filters import response
-from sonarsynth.evaluation.soundscape.sound import SHORTEST, Sound
+from sonarsynth.evaluation.soundscape.sound import BLOCK, FEWEST_BLOCKS, SHORTEST, Sound
 from sonarsynth.receiver import Sonar
 from sonarsynth.signals.filtered_pulse import fir
 from sonarsynth.sources.recordings import RecordingError
 
-BLOCK, FEWEST_BLOCKS = 0.1, 10
-"""s: of a block, or less, so that there are so many at least."""
 MOST_SAMPLES = 1 << 25
 """Of a recording: the rest is not looked at."""
 
 
-def recorded_sound(path: Path | str, sonar: Sonar, pascals: float | None, channel: int = 0) -> Sound:
-    """A channel of a WAV file behind the filter of a sonar, as far as it goes; pascals: pressure (Pa) of the number 1
-    in the file, the full scale of one of whole numbers, None where nobody knows. Raises RecordingError."""
+@dataclass(frozen=True)
+class SeaRecording:
+    """A recording of the sea in a file (WAV or HDF5), and what the file does not say."""
+
+    path: Path | str
+    pascals: float | None = None  # of the number 1 in the file, the full scale of a WAV of whole numbers; None: unknown
+    channel: int = 0
+    dataset: str | None = None  # of an HDF5 of several
+    sampling_frequency: float | None = None  # Hz, of an HDF5 that does not say it
+
+
+def recorded_sound(recording: SeaRecording, sonar: Sonar) -> Sound:
+    """A channel of a recording behind the filter of a sonar, as far as it goes. Raises RecordingError."""
+    path, pascals = recording.path, recording.pascals
     try:
-        rate, values = waveform_files.waveform(named_files.read(path, waveform_files.MOST_BYTES), channel)
+        rate, values = waveform_files.waveform(
+            named_files.read(path, waveform_files.MOST_BYTES),
+            recording.channel,
+            sampling_frequency=recording.sampling_frequency,
+            dataset=recording.dataset,
+            long=True,
+            longest=MOST_SAMPLES + 1,
+        )
     except named_files.FileError as error:
         raise RecordingError(f"{path}: {error}") from None
     notes = [] if pascals is not None else ["levels of the recording are relative: its sensitivity is not given"]

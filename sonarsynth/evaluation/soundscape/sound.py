@@ -9,17 +9,22 @@ import numpy.typing as npt
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.receiver import Elements
+from sonarsynth.recipe.scene import Scene
 
 HYDROPHONES = 9
 """Of an array that are listened to, at most."""
 SHORTEST = 64
 """Samples of a block, at least."""
+BLOCK, FEWEST_BLOCKS = 0.1, 8
+"""s: of a block of running sound, or less, so that there are so many at least."""
+MOST_SAMPLES = 1 << 28
+"""Of all hydrophones together: 1 GiB."""
 ALONG = 0.97
 """Cosine of the angle to an axis within which a hydrophone lies along it from another."""
 
 
 class NothingHeard(ValueError):
-    """There is no sound to measure; str() is one line."""
+    """There is no sound that can be measured; str() is one line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +35,11 @@ class Arrivals:
     weight: Floats  # (path,) 1/m2: energy over that of a snap at 1 m; or 1 each, of paths above a level
     above: float | None  # dB re 1 uPa: the level; None: weights are energies
     seconds: float  # in which they were heard
+
+    def by_elevation(self, edges: Floats) -> tuple[Floats, Floats]:
+        """Sums (bin,) of the weights between sines (bin + 1,), and the standard deviation of each by chance."""
+        value = np.histogram(self.sine, edges, weights=self.weight)[0]
+        return value, np.sqrt(np.histogram(self.sine, edges, weights=self.weight**2)[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +64,18 @@ class Sound:
     def unit(self) -> str:
         """Of levels."""
         return "dB re 1 uPa" if self.calibrated else "dB re full scale"
+
+
+def model_notes(scene: Scene) -> tuple[str, ...]:
+    """What is heard of a scene and is not in its model."""
+    notes = []
+    if scene.world.noise_sources:
+        notes.append("sources of noise at one place are heard, and are not in the model")
+    if scene.sonar.sensor_errors is not None:
+        notes.append("errors of sensors are heard, and are not in the model")
+    if scene.world.chorus is None:
+        notes.append("no arrivals by elevation: the recipe has no chorus")
+    return tuple(notes)
 
 
 def listeners(elements: Elements, works: npt.NDArray[np.bool_]) -> Ints:

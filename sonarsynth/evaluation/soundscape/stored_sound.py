@@ -10,7 +10,15 @@ import numpy.typing as npt
 
 from sonarsynth.conventions import Floats, direction
 from sonarsynth.description import FieldError
-from sonarsynth.evaluation.soundscape.sound import SHORTEST, Arrivals, NothingHeard, Sound, listeners
+from sonarsynth.evaluation.soundscape.sound import (
+    MOST_SAMPLES,
+    SHORTEST,
+    Arrivals,
+    NothingHeard,
+    Sound,
+    listeners,
+    model_notes,
+)
 from sonarsynth.geometry import rotation_matrix
 from sonarsynth.receiver import Elements
 from sonarsynth.receiver.sensor_errors import SensorState
@@ -42,7 +50,8 @@ def recipe_of_store(tree: xr.DataTree, path: Folder, files: Path | str | None) -
 def stored_sound(tree: xr.DataTree, recipe: Recipe) -> Sound:
     """Frames before the first listed snap is heard at any hydrophone; of a frame without one, all of it.
 
-    Raises NothingHeard where the store has no signals, no frame, no working hydrophone, or no such part.
+    Raises NothingHeard where the store has no signals, no frame, no working hydrophone, or no such part, or where that
+    holds numbers that are not finite.
     """
     scene = recipe.scene_of(0)
     signals = tree["signals"].dataset if "signals" in tree.children else None
@@ -64,11 +73,14 @@ def stored_sound(tree: xr.DataTree, recipe: Recipe) -> Sound:
             f"frames hold {max(1e3 * float(np.median(quiet)), 0.0):.2g} ms before the listed snaps are heard, and what "
             "follows is their sound and its echoes: too little to measure; draw the recipe instead"
         )
+    used = used[: max(MOST_SAMPLES // (some.size * size), 2)]
     pressure = signals["pressure"].isel(frame=used, sensor=some, sample=slice(0, size)).values
+    if not np.isfinite(pressure).all():
+        raise NothingHeard("the signals of the store hold numbers that are not finite")
     if not np.abs(pressure).max() > 0.0:
         raise NothingHeard("the store is silent before the listed snaps are heard")
     return Sound(
-        pressure=np.nan_to_num(np.asarray(pressure, np.float32)),
+        pressure=np.asarray(pressure, np.float32),
         sampling_frequency=rate,
         position=array.position[some],
         running=False,
@@ -78,6 +90,7 @@ def stored_sound(tree: xr.DataTree, recipe: Recipe) -> Sound:
             f"of {used.size} frames the {1e3 * size / rate:.3g} ms before the listed snaps are heard: the rest is "
             "their sound and its echoes",
             "frames are too short for gaps between loud arrivals",
+            *model_notes(scene),
         ),
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from textwrap import fill
 from typing import TYPE_CHECKING
@@ -9,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import erfc
 
-from sonarsynth.conventions import Floats
 from sonarsynth.equations.noise.stable_laws import ESTIMATORS, exceedance
-from sonarsynth.evaluation.soundscape.measured import PERCENT, Measured
-from sonarsynth.evaluation.soundscape.predicted import PASCAL, Predicted, elevation_edges
+from sonarsynth.evaluation.soundscape.measured import PERCENT, MeasuredFigures
+from sonarsynth.evaluation.soundscape.octaves import decibels
+from sonarsynth.evaluation.soundscape.predicted import PASCAL, PredictedFigures, elevation_edges
 from sonarsynth.pictures.figures.style import INK, MARKS, PALE, RAYS, figure, grid, label
 
 if TYPE_CHECKING:
@@ -25,13 +26,26 @@ SHOWN = 45.0
 """dB: parts of a spectrum so far below the loudest are out of the picture."""
 
 
-def soundscape_figure(title: str, made: Measured, model: Predicted, recording: Measured | None = None) -> Figure:
+@dataclass(frozen=True, eq=False)
+class _Curve:
+    """A sound in the panels."""
+
+    figures: MeasuredFigures
+    colour: str
+    name: str
+    zero: float  # dB re 1 uPa of the level 0 of its figures
+    legend: str
+
+
+def soundscape_figure(
+    title: str, made: MeasuredFigures, model: PredictedFigures, recording: MeasuredFigures | None = None
+) -> Figure:
     """The sheet: spectrum, rates of loud arrivals, amplitudes, elevations, coherence, gaps."""
     sheet = figure(15.0, 8.6)
     panels = sheet.subplots(2, 3).ravel()
     for axes in panels:
         grid(axes)
-    both = [(made, HEARD, "sound"), *([(recording, RECORDED, "recording")] if recording else [])]
+    both = [_Curve(made, HEARD, "sound", PASCAL, "sound"), *([_of_recording(recording, made)] if recording else [])]
     _spectrum(panels[0], both, model)
     _rates(panels[1], both, model)
     _amplitudes(panels[2], both)
@@ -43,34 +57,50 @@ def soundscape_figure(title: str, made: Measured, model: Predicted, recording: M
             axes.legend(fontsize=7, frameon=False)
     sheet.suptitle(title, fontsize=11, color=INK, x=0.01, ha="left")
     notes = [*made.sound.notes, *(recording.sound.notes if recording else ())]
-    levels = [f"{name}: {_percentiles(one)}" for one, _, name in both]
+    levels = [f"{one.name}: {_percentiles(one.figures)}" for one in both]
     sheet.supxlabel(fill("; ".join([*levels, *notes]), 230), fontsize=8, color=INK, x=0.01, ha="left")
     return sheet
 
 
-def _zero(one: Measured) -> float:
-    return PASCAL if one.sound.calibrated else 0.0
+def _of_recording(recording: MeasuredFigures, made: MeasuredFigures) -> _Curve:
+    """The curve of a recording; without calibration its mean level in 1/3 octaves is put at that of the sound."""
+    if recording.sound.calibrated:
+        return _Curve(recording, RECORDED, "recording", PASCAL, "recording")
+    _, ours, theirs = np.intersect1d(made.centres.round(3), recording.centres.round(3), return_indices=True)
+    levels, others = made.figures.octaves[ours], recording.figures.octaves[theirs]
+    if not len(levels):
+        levels, others = made.figures.moments[:1], recording.figures.moments[:1]
+    shift = float(np.mean(levels) - np.mean(others))
+    return _Curve(recording, RECORDED, "recording", PASCAL + shift, "recording, shifted to the sound")
 
 
-def _percentiles(one: Measured) -> str:
-    found = " / ".join(f"{level + _zero(one):.1f}" for level in one.figures.percentiles)
+def _percentiles(one: MeasuredFigures) -> str:
+    zero = PASCAL if one.sound.calibrated else 0.0
+    found = " / ".join(f"{level + zero:.1f}" for level in one.figures.percentiles)
     return f"{'/'.join(f'{p:g}' for p in PERCENT)} % of 1 ms levels {found} {one.sound.unit}"
 
 
-def _spectrum(axes: Axes, both: list[tuple[Measured, str, str]], model: Predicted) -> None:
-    made = both[0][0]
-    for one, colour, name in both:
-        level = _decibels(one.figures.density) + _zero(one)
+def _spectrum(axes: Axes, both: list[_Curve], model: PredictedFigures) -> None:
+    made = both[0].figures
+    for curve in both:
+        one, colour, zero = curve.figures, curve.colour, curve.zero
+        level = decibels(one.figures.density) + zero
         wide = 10.0 / np.log(10.0) * one.spread.density / np.maximum(one.figures.density, 1e-300)
         axes.fill_between(1e-3 * one.frequency, level - wide, level + wide, color=colour, alpha=0.2, linewidth=0)
-        axes.plot(1e-3 * one.frequency, level, color=colour, linewidth=0.9, label=f"{name} ({one.sound.seconds:.3g} s)")
+        axes.plot(
+            1e-3 * one.frequency,
+            level,
+            color=colour,
+            linewidth=0.9,
+            label=f"{curve.legend} ({one.sound.seconds:.3g} s)",
+        )
         centre = 1e-3 * one.centres
         axes.errorbar(
-            centre, one.figures.octaves + _zero(one), one.spread.octaves, fmt="s", color=colour, markersize=4, capsize=2
+            centre, one.figures.octaves + zero, one.spread.octaves, fmt="s", color=colour, markersize=4, capsize=2
         )
-    total = _decibels(model.density) + PASCAL
+    total = decibels(model.density) + PASCAL
     for (name, part), colour in zip(model.parts.items(), PARTS * len(model.parts), strict=False):
-        if len(model.parts) > 1 and (part_level := _decibels(part) + PASCAL).max() > total.max() - SHOWN:
+        if len(model.parts) > 1 and (part_level := decibels(part) + PASCAL).max() > total.max() - SHOWN:
             axes.plot(1e-3 * made.frequency, part_level, color=colour, linewidth=0.8, label=name)
     axes.plot(1e-3 * made.frequency, total, "--", color=MODEL, linewidth=1.4, label="model")
     axes.set_ylim(total.max() - SHOWN, None)
@@ -79,12 +109,15 @@ def _spectrum(axes: Axes, both: list[tuple[Measured, str, str]], model: Predicte
     label(axes, "frequency (kHz)", "spectral level (dB re 1 uPa2/Hz)", f"spectrum, 1/3 octaves (squares){said}")
 
 
-def _rates(axes: Axes, both: list[tuple[Measured, str, str]], model: Predicted) -> None:
-    made = both[0][0]
-    for one, colour, name in both:
+def _rates(axes: Axes, both: list[_Curve], model: PredictedFigures) -> None:
+    made = both[0].figures
+    for curve in both:
+        one, colour, zero = curve.figures, curve.colour, curve.zero
         some = one.figures.rates > 0.0
-        x = one.levels[some] + _zero(one)
-        axes.errorbar(x, one.figures.rates[some], one.spread.rates[some], fmt="o", color=colour, capsize=2, label=name)
+        x = one.levels[some] + zero
+        axes.errorbar(
+            x, one.figures.rates[some], one.spread.rates[some], fmt="o", color=colour, capsize=2, label=curve.legend
+        )
     if model.rates is not None:
         some = model.rates > 0.01 / made.sound.seconds
         axes.plot(made.levels[some] + PASCAL, model.rates[some], "--", color=MODEL, label="model")
@@ -96,36 +129,40 @@ def _rates(axes: Axes, both: list[tuple[Measured, str, str]], model: Predicted) 
     label(axes, f"peak level ({made.sound.unit})", "arrivals above it (1/s)", "loud arrivals at a hydrophone")
 
 
-def _amplitudes(axes: Axes, both: list[tuple[Measured, str, str]]) -> None:
+def _amplitudes(axes: Axes, both: list[_Curve]) -> None:
     titles = []
-    for one, colour, name in both:
+    for curve in both:
+        one, colour, name, zero = curve.figures, curve.colour, curve.name, curve.zero
         x, known = 10.0 ** (one.tail / 20.0), one.figures
         some = known.exceedance > 0.0
-        axes.plot(one.tail[some] + _zero(one), known.exceedance[some], color=colour, linewidth=1.4, label=name)
+        axes.plot(one.tail[some] + zero, known.exceedance[some], color=colour, linewidth=1.4, label=curve.legend)
         gauss = erfc(x / 10.0 ** (known.moments[0] / 20.0) / np.sqrt(2.0))
-        axes.plot(one.tail + _zero(one), gauss, ":", color=colour, label="Gaussian of its power")
+        axes.plot(one.tail + zero, gauss, ":", color=colour, label="Gaussian of its power")
         alpha, scale = known.alpha[1], known.scale[1]
         if np.isfinite(alpha):
             law = exceedance(x / 10.0 ** (scale / 20.0), float(alpha))
-            axes.plot(one.tail + _zero(one), law, "--", color=colour, linewidth=0.9, label=f"stable, alpha {alpha:.2f}")
+            axes.plot(one.tail + zero, law, "--", color=colour, linewidth=0.9, label=f"stable, alpha {alpha:.2f}")
         each = ", ".join(f"{a:.2f}" if np.isfinite(a) else "none" for a in known.alpha)
         titles.append(f"{name}: alpha {each}; kurtosis {known.moments[1]:.3g} over 3")
     axes.set_yscale("log")
-    least = min(float(one.figures.exceedance[one.figures.exceedance > 0.0].min()) for one, _, _ in both)
+    least = min(
+        float(one.figures.exceedance[one.figures.exceedance > 0.0].min()) for one in (curve.figures for curve in both)
+    )
     axes.set_ylim(0.5 * least, 1.5)
     short = "/".join(name.split()[0] for name in ESTIMATORS)
-    label(axes, f"magnitude ({both[0][0].sound.unit})", "share above", f"amplitudes ({short})\n" + "\n".join(titles))
+    label(
+        axes, f"magnitude ({both[0].figures.sound.unit})", "share above", f"amplitudes ({short})\n" + "\n".join(titles)
+    )
 
 
-def _elevations(axes: Axes, made: Measured, model: Predicted) -> None:
+def _elevations(axes: Axes, made: MeasuredFigures, model: PredictedFigures) -> None:
     known, edges = made.sound.arrivals, elevation_edges()
     if known is None or model.elevation is None:
         _nothing(axes, "no arrivals are known")
         label(axes, "elevation (deg)", "", "arrivals by elevation")
         return
     degrees = np.rad2deg(np.arcsin(edges))
-    value = np.histogram(known.sine, edges, weights=known.weight)[0]
-    wide = np.sqrt(np.histogram(known.sine, edges, weights=known.weight**2)[0])
+    value, wide = known.by_elevation(edges)
     middle = 0.5 * (degrees[1:] + degrees[:-1])
     axes.errorbar(middle[value > 0], value[value > 0], wide[value > 0], fmt="o", color=HEARD, capsize=2, label="sound")
     axes.stairs(model.elevation, degrees, color=MODEL, linestyle="--", label="model")
@@ -146,7 +183,7 @@ def _inverse_sine(low: float, high: float, least: float = 0.005) -> float:
     return float(np.log(max(b, least) / max(a, least)))
 
 
-def _coherence(axes: Axes, made: Measured, model: Predicted) -> None:
+def _coherence(axes: Axes, made: MeasuredFigures, model: PredictedFigures) -> None:
     offset = made.sound.position[made.pairs] - made.sound.position[0]
     away = np.linalg.norm(offset, axis=1)
     level = np.abs(offset[:, 2]) < 0.5 * away
@@ -164,15 +201,16 @@ def _coherence(axes: Axes, made: Measured, model: Predicted) -> None:
     label(axes, "distance of hydrophones (m)", "coherence, real part", "coherence (open marks, lines: model)")
 
 
-def _gaps(axes: Axes, both: list[tuple[Measured, str, str]], model: Predicted) -> None:
+def _gaps(axes: Axes, both: list[_Curve], model: PredictedFigures) -> None:
     titles = []
-    for one, colour, name in both:
+    for curve in both:
+        one, colour, name, zero = curve.figures, curve.colour, curve.name, curve.zero
         gaps = np.sort(one.gaps)
         if not gaps.size:
             titles.append(f"{name}: too few that stand apart" if one.sound.running else f"{name}: frames are too short")
             continue
         share = 1.0 - np.arange(len(gaps)) / len(gaps)
-        axes.step(1e3 * gaps, share, where="post", color=colour, label=f"{name}, over {one.loud + _zero(one):.0f} dB")
+        axes.step(1e3 * gaps, share, where="post", color=colour, label=f"{curve.legend}, over {one.loud + zero:.0f} dB")
         axes.plot(1e3 * gaps, np.exp(-gaps / gaps.mean()), ":", color=colour, label="Poisson of its rate")
         predicted = f" (model {model.fano:.1f})" if name == "sound" and np.isfinite(model.fano) else ""
         titles.append(f"{name}: Fano factor {one.figures.fano[0]:.2g} +- {one.spread.fano[0]:.1g}{predicted}")
@@ -185,7 +223,3 @@ def _gaps(axes: Axes, both: list[tuple[Measured, str, str]], model: Predicted) -
 
 def _nothing(axes: Axes, why: str) -> None:
     axes.text(0.5, 0.5, why, transform=axes.transAxes, ha="center", color=PALE)
-
-
-def _decibels(power: Floats) -> Floats:
-    return np.asarray(10.0 * np.log10(np.maximum(power, 1e-300)))

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.evaluation.soundscape.made_sound import listening_plan, made_sound
-from sonarsynth.evaluation.soundscape.measured import Measured, measure
+from sonarsynth.evaluation.soundscape.measured import MeasuredFigures, measure
 from sonarsynth.evaluation.soundscape.model import sound_model
-from sonarsynth.evaluation.soundscape.predicted import PASCAL, Predicted, as_json, predict
-from sonarsynth.evaluation.soundscape.recorded_sound import recorded_sound
+from sonarsynth.evaluation.soundscape.predicted import PASCAL, PredictedFigures, as_json, predict
+from sonarsynth.evaluation.soundscape.recorded_sound import SeaRecording, recorded_sound
 from sonarsynth.evaluation.soundscape.sound import NothingHeard
 from sonarsynth.evaluation.soundscape.stored_sound import recipe_of_store, stored_sound
 from sonarsynth.pictures.soundscape_figures.soundscape_figure import soundscape_figure
@@ -24,23 +24,14 @@ SECONDS = 2.0
 """Of a recipe's sound that is made."""
 
 
-@dataclass(frozen=True)
-class Compared:
-    """A recording to compare with."""
-
-    path: Path | str
-    pascals: float | None = None  # of the number 1 in the file; None where nobody knows
-    channel: int = 0
-
-
 @dataclass(frozen=True, eq=False)
 class Soundscape:
     """Figures of a sound, of its model, and of a recording."""
 
     title: str
-    measured: Measured
-    predicted: Predicted
-    recording: Measured | None = None
+    measured: MeasuredFigures
+    predicted: PredictedFigures
+    recording: MeasuredFigures | None = None
 
     def as_json(self) -> dict[str, Any]:
         """All numbers, for programs; null where there is none."""
@@ -73,7 +64,7 @@ class Soundscape:
         return [*lines, *(f"note: {note}" for note in self.measured.sound.notes)]
 
 
-def soundscape_of_recipe(recipe: Recipe, seconds: float = SECONDS, compare: Compared | None = None) -> Soundscape:
+def soundscape_of_recipe(recipe: Recipe, seconds: float = SECONDS, compare: SeaRecording | None = None) -> Soundscape:
     """Make a stretch of the sound of a recipe, of its first sequence, without its targets and listed snaps, and measure
     it. Raises FieldError, NothingToDraw where there is no sound, RecordingError."""
     try:
@@ -87,7 +78,7 @@ def soundscape_of_recipe(recipe: Recipe, seconds: float = SECONDS, compare: Comp
 
 
 def soundscape_of_store(
-    store: str | Folder, files: Path | str | None = None, compare: Compared | None = None
+    store: str | Folder, files: Path | str | None = None, compare: SeaRecording | None = None
 ) -> Soundscape:
     """Measure what the frames of a store hold of the sea alone, beside the model of its recipe, whose files are looked
     for in a folder `files`. Raises NothingToDraw where it holds none of that, Mismatch, RecordingError."""
@@ -103,10 +94,10 @@ def soundscape_of_store(
     return Soundscape(recipe.title, measured, predict(sound_model(plan, recipe.frame(0)[1]), measured), recording)
 
 
-def _recording(recipe: Recipe, compare: Compared | None) -> Measured | None:
+def _recording(recipe: Recipe, compare: SeaRecording | None) -> MeasuredFigures | None:
     if compare is None:
         return None
-    return measure(recorded_sound(compare.path, recipe.scene_of(0).sonar, compare.pascals, compare.channel))
+    return measure(recorded_sound(compare, recipe.scene_of(0).sonar))
 
 
 def draw_soundscape(found: Soundscape, out: Path) -> Path:
@@ -123,17 +114,21 @@ def soundscape(
     seconds: float = SECONDS,
     compare: Path | str | None = None,
     pascals: float | None = None,
+    channel: int = 0,
+    dataset: str | None = None,
+    sampling_frequency: float | None = None,
     files: Path | str | None = None,
 ) -> Soundscape:
     """Measure what hydrophones hear of the sea of a recipe, or of a store (a folder or a URL), beside its model, and
     draw it into the file `out`.
 
-    seconds: of a recipe's sound to make; compare: a recording (WAV) whose figures are put beside them; pascals:
-    pressure (Pa) of the number 1 in it, the full scale of one of whole numbers; files: folder of the files that a
-    store's recipe names. Raises FieldError, NothingToDraw (a ValueError) where there is no sound, RecordingError,
-    Mismatch.
+    seconds: of a recipe's sound to make; compare: a recording (WAV or HDF5) whose figures are put beside them; pascals:
+    pressure (Pa) of the number 1 in it, the full scale of a WAV of whole numbers; channel: of it, from 0; dataset,
+    sampling_frequency (Hz): of an HDF5 of several datasets, and of one that does not say it; files: folder of the files
+    that a store's recipe names. Raises FieldError, NothingToDraw (a ValueError) where there is no sound,
+    RecordingError, Mismatch.
     """
-    beside = None if compare is None else Compared(compare, pascals)
+    beside = None if compare is None else SeaRecording(compare, pascals, channel, dataset, sampling_frequency)
     if isinstance(source, Recipe):
         found = soundscape_of_recipe(source, seconds, beside)
     else:
