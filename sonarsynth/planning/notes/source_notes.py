@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from sonarsynth.description.method import Demand
+from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.ranging import LocatingMethod
 from sonarsynth.recipe.scene import Scene
 
 OFF = 3.0
-"""A source this many standard errors of the bottom's depth above the bottom stands off it."""
+"""A source this many standard errors of the bottom's depth above the bottom stands off it; and a speed of sound that is
+assumed is another than the water's."""
 
 
 def standing_off(scene: Scene) -> tuple[str, ...]:
@@ -28,3 +32,18 @@ def off_the_bottom(scene: Scene) -> list[str]:
     """Which sources the sonar does not find where it may look for them."""
     names, note = standing_off(scene), scene.processing.locating.off_bottom_note()
     return [f"{', '.join(names)}: not on the bottom; {note}"] if names and note else []
+
+
+def other_water(looks: Sequence[SampledScene]) -> list[str]:
+    """Where the sonar takes the water about it for other water than it knows that it may be, in the worst sequence."""
+    worst, found = OFF, []
+    for look in looks:
+        sonar, depth = look.scene.sonar, -float(look.frames[0].sonar_pose.position[2])
+        assumed, error, speed = sonar.assumed_sound_speed, sonar.sound_speed_error, float(look.profile.at(depth))
+        if abs(speed - assumed) > worst * error:
+            worst = abs(speed - assumed) / max(error, 1e-9)
+            found = [
+                f"the sonar assumes sound at {assumed:g} m/s, good to {error:g} m/s, and the water about it has "
+                f"{speed:.4g} m/s: places are further off than predicted (scene.sonar.assumed_sound_speed)"
+            ]
+    return found
