@@ -17,7 +17,7 @@ from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.local_plane import FARTHEST, east_north
 from sonarsynth.geometry.track_files import TrackError, TrackTable, read_track
 
-STANDS = 1e-3
+AT_REST = 1e-3
 """m/s: slower than this a body has no course, and keeps the one that it had."""
 
 Latitude = Annotated[Radians, Ge(-0.5 * np.pi), Le(0.5 * np.pi)]
@@ -161,7 +161,7 @@ def _places(track: RecordedTrack, table: TrackTable) -> Floats:
 
 def _courses(velocity: Floats) -> Floats:
     """Headings (point,) along velocities (point, xyz), rad without jumps; where it stands, that of the point before."""
-    moving = np.flatnonzero(np.hypot(velocity[:, 0], velocity[:, 1]) > STANDS)
+    moving = np.flatnonzero(np.hypot(velocity[:, 0], velocity[:, 1]) > AT_REST)
     if not len(moving):
         return np.zeros(len(velocity))
     held = moving[np.maximum(np.searchsorted(moving, np.arange(len(velocity)), side="right") - 1, 0)]

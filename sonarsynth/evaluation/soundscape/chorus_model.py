@@ -21,6 +21,7 @@ from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.chorus.chorus_arrivals import CAVITY, ChorusReach, ImageHeights
 from sonarsynth.signals.filtered_pulse import fir, pulse_spectrum
 from sonarsynth.sources.chorus import Chorus
+from sonarsynth.sources.pulse_model import PulseModel
 from sonarsynth.sources.snap_pulses import waveform
 from sonarsynth.state import Receiver
 
@@ -112,7 +113,7 @@ class ChorusModel:
         return effective_duration(np.fft.irfft(spectrum), 1.0 / sonar.sampling_frequency)
 
     @cached_property
-    def model(self):  # type: ignore[no-untyped-def]
+    def model(self) -> PulseModel:
         """Of a snap, on the bottom."""
         return self.chorus.snap.at_depth(self.plan.medium.depth)
 

@@ -11,7 +11,7 @@ from sonarsynth.evaluation.soundscape.sound import (
     BLOCK,
     FEWEST_BLOCKS,
     MOST_SAMPLES,
-    Arrivals,
+    ArrivalElevations,
     NothingHeard,
     Sound,
     listeners,
@@ -83,7 +83,7 @@ def made_sound(plan: Plan, first: Frame, seconds: float) -> Sound:
             inside = arrivals.select((arrivals.delay >= 0.0) & (arrivals.delay < long))
             sines.append(first.sonar_pose.turn_to_world(inside.direction)[:, 2])
             energies.append(inside.gain**2 * 10.0 ** (-inside.absorption / 10.0))
-    known = Arrivals(np.concatenate(sines), np.concatenate(energies), None, count * long) if sines else None
+    known = ArrivalElevations(np.concatenate(sines), np.concatenate(energies), None, count * long) if sines else None
     return Sound(
         pressure=pressure,
         sampling_frequency=sonar.sampling_frequency,

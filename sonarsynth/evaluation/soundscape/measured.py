@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.signal import csd, welch
 
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.equations.noise.arrival_counts import APART, fano_factor, loud_arrivals
-from sonarsynth.equations.noise.stable_laws import ESTIMATORS
+from sonarsynth.equations.noise.stable_laws import ESTIMATORS, StableFit
 from sonarsynth.evaluation.soundscape.octaves import band_means, octave_bands
 from sonarsynth.evaluation.soundscape.sound import NothingHeard, Sound
 
@@ -24,7 +25,7 @@ TAIL = 48
 """Levels that exceedance is measured at."""
 FITTED = 1 << 13
 """Samples that stable laws are fitted to, at most."""
-AGAIN = 60
+RESAMPLINGS = 60
 """Resamplings of blocks."""
 CROWDED, FEWEST = 0.03, 10
 """Loud arrivals, of which gaps are measured: their rate times `APART` at most, and how many there are at least."""
@@ -98,7 +99,7 @@ def measure(sound: Sound) -> MeasuredFigures:
     )
     blocks = [_block(made, pressure, bins) for pressure in sound.pressure]
     random, count = np.random.default_rng(0), len(blocks)
-    again = [_figures(made, [blocks[n] for n in random.integers(0, count, count)]) for _ in range(AGAIN)]
+    again = [_figures(made, [blocks[n] for n in random.integers(0, count, count)]) for _ in range(RESAMPLINGS)]
     spread = {f.name: _deviation([getattr(one, f.name) for one in again]) for f in fields(Figures)}
     return replace(made, figures=_figures(made, blocks), spread=Figures(**spread))
 
@@ -186,9 +187,8 @@ def _figures(made: MeasuredFigures, blocks: list[_Block]) -> Figures:
         )
 
 
-def _fit(fit: object, samples: Floats) -> tuple[float, float]:
+def _fit(fit: Callable[[Floats], StableFit], samples: Floats) -> tuple[float, float]:
     """alpha and scale; NaN where no law fits."""
-    assert callable(fit)
     try:
         alpha, scale = fit(samples)
     except ValueError:

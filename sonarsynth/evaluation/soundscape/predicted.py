@@ -31,7 +31,7 @@ class PredictedFigures:
     kurtosis: float  # excess, at most; NaN without a chorus
     root: float  # dB re 1 Pa: root mean square in the band
     scatter: float  # dB: of that, from one stretch as long as the sound to another, as snaps are few
-    elevation: Floats | None  # (bin,) as `Arrivals.by_elevation`; none where nothing is known of arrivals
+    elevation: Floats | None  # (bin,) as `ArrivalElevations.by_elevation`; none where nothing is known of arrivals
 
     @property
     def density(self) -> Floats:

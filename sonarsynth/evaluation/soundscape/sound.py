@@ -28,7 +28,7 @@ class NothingHeard(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Arrivals:
+class ArrivalElevations:
     """What is known of the snaps that are heard, by the elevation that they come from (world)."""
 
     sine: Floats  # (path,) of the elevation, up positive
@@ -52,7 +52,7 @@ class Sound:
     running: bool  # each block goes on where the one before ended
     band: tuple[float, float]  # Hz
     calibrated: bool = True
-    arrivals: Arrivals | None = None
+    arrivals: ArrivalElevations | None = None
     notes: tuple[str, ...] = ()  # what the figures leave out, and why
 
     @property

@@ -13,7 +13,7 @@ from sonarsynth.description import FieldError
 from sonarsynth.evaluation.soundscape.sound import (
     MOST_SAMPLES,
     SHORTEST,
-    Arrivals,
+    ArrivalElevations,
     NothingHeard,
     Sound,
     listeners,
@@ -117,7 +117,7 @@ def _quiet_seconds(tree: xr.DataTree, frames: npt.NDArray[np.int64], start: Floa
     return np.asarray(np.minimum(first - start, long))
 
 
-def _arrivals(tree: xr.DataTree, frames: npt.NDArray[np.int64], long: float) -> Arrivals | None:
+def _arrivals(tree: xr.DataTree, frames: npt.NDArray[np.int64], long: float) -> ArrivalElevations | None:
     """Paths of the chorus above a level at which the loudest of each frame, which the store lists, are all."""
     if "soundscape" not in tree["truth"].children:
         return None
@@ -132,4 +132,4 @@ def _arrivals(tree: xr.DataTree, frames: npt.NDArray[np.int64], long: float) -> 
     if not np.isfinite(above):
         above = float(np.nanmin(level)) if np.isfinite(level).any() else 0.0
     some = level > above
-    return Arrivals(up[some], np.ones(int(some.sum())), above, len(frames) * long)
+    return ArrivalElevations(up[some], np.ones(int(some.sum())), above, len(frames) * long)

@@ -11,7 +11,7 @@ from sonarsynth.planning.choices import OF_BEAMS
 from sonarsynth.planning.measured.lost_echoes import lost_echoes
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.notes.formula_validity import validity
-from sonarsynth.planning.notes.source_notes import off_the_bottom, other_water
+from sonarsynth.planning.notes.source_notes import assumed_speed_notes, off_the_bottom
 from sonarsynth.planning.notes.target_notes import held, law_notes, mirror_notes, overlap_notes
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.pulse_durations import SUPPORT, extreme_waveforms
@@ -50,7 +50,7 @@ def notes(made: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
         found.append("reflections of the snap itself enter the image: processing.cancelling removes them")
     found += lost_echoes(made) + _accuracy(made, looks) + off_the_bottom(scene)
     if made.sizes["emission"] and made.products & OF_BEAMS:
-        found += other_water(noted(looks))
+        found += assumed_speed_notes(noted(looks))
     for look in noted(looks):
         found += mirror_notes(look) + overlap_notes(look)
         found += _extent(look.scene, look.profile)

@@ -34,7 +34,7 @@ def off_the_bottom(scene: Scene) -> list[str]:
     return [f"{', '.join(names)}: not on the bottom; {note}"] if names and note else []
 
 
-def other_water(looks: Sequence[SampledScene]) -> list[str]:
+def assumed_speed_notes(looks: Sequence[SampledScene]) -> list[str]:
     """Where the sonar takes the water about it for other water than it knows that it may be, in the worst sequence."""
     worst, found = OFF, []
     for look in looks:

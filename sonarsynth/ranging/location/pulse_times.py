@@ -216,24 +216,24 @@ def measure(
 def lag_variance(wave: Wavefront, pulse: Pulse, elements: Elements, rounding: float) -> float:
     """Variance of a lag of weight one: the larger of what the lags show and of the Cramer-Rao bound for the noise seen.
 
-    What they show over `FLOOR`, which allows for that, counts the more, the more alike neighbours err (`fewer`). The
-    noise is not taken below that of `rounding`, (Pa s)^2 in a bin.
+    What lags show over `FLOOR`, which allows for that, is taken times `correlation_factor`. The noise is not taken
+    below that of `rounding`, (Pa s)^2 in a bin.
     """
     count = int(np.sum(pulse.weight > 0))
     least = FLOOR**2 * float(np.sum(pulse.weight)) / max(count, 1)
     shown = float(pulse.weight @ wave.residual**2) / max(count - 4, 1)
     if shown > least:
-        shown += (shown - least) * (fewer(wave, pulse, elements) - 1)
+        shown += (shown - least) * (correlation_factor(wave, pulse, elements) - 1)
     return float(np.max([shown, least, 0.5 * pulse.noise, 0.5 * rounding]))
 
 
-def fewer(wave: Wavefront, pulse: Pulse, elements: Elements) -> float:
-    """How many times fewer independent lags there are than sensors, at least 1.
+def correlation_factor(wave: Wavefront, pulse: Pulse, elements: Elements) -> float:
+    """Factor on the variance of a fit, at least 1, where the errors of neighbouring sensors are correlated.
 
     Another wave in the window shifts the lags in waves across the array: neighbours err alike, and the fit takes more
-    of it for direction and curvature than of independent errors. Errors whose neighbours on a lattice correlate by r,
-    falling off by r from one to the next, make means as uncertain as ((1 - r)/(1 + r))^2 of them would (Bartlett 1946,
-    in both directions).
+    of it for direction and curvature than of independent errors. Errors that correlate by r between neighbours on a
+    lattice, and by r^n between the n-th along a row or a column, give means ((1 + r)/(1 - r))^2 times the variance of
+    independent ones (Bartlett 1946, J. R. Stat. Soc. Suppl. 8, 27, in both directions).
     """
     error = np.sqrt(pulse.weight) * wave.residual
     total = float(error @ error)
