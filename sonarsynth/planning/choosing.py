@@ -7,6 +7,7 @@ a few frames at a few hydrophones that are traced by themselves.
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -48,8 +49,24 @@ DEGREE_TOLERANCE = 0.03
 """Error of the synthesis that measures, over what is allowed."""
 
 
+_CHOSEN: OrderedDict[object, tuple[Choices, Errors]] = OrderedDict()
+KEPT = 16
+"""Plans whose choices this process remembers: a recipe that is read again, frame by frame, is not measured again."""
+
+
 def choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
     """A plan whose windows are laid, with its choices made. Nothing in them depends on how fast this machine is."""
+    key = plan.digest, plan.products, tuple(frame.index for look in looks for frame in look.frames)
+    found = _CHOSEN.get(key)
+    if found is None:
+        made = _choose(plan, looks)
+        found = _CHOSEN[key] = made.choices, made.errors
+        while len(_CHOSEN) > KEPT:
+            _CHOSEN.popitem(last=False)
+    return replace(plan, choices=found[0], errors=found[1])
+
+
+def _choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
     scene, accuracy = plan.scene, plan.recipe.accuracy
     if not plan.products:  # nothing is traced
         return plan

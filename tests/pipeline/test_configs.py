@@ -252,6 +252,7 @@ def test_rays_from_the_l_shape_go_on_to_the_shrimp() -> None:
     assert coefficient.min() >= 0 and coefficient.max() <= 1 and np.ptp(coefficient) > 0.3
 
 
+@pytest.mark.long
 @needs_real_input
 def test_real_water_and_a_real_hull(tmp_path: Path) -> None:
     made = _plan("harbour.yaml", *harbour.settings(REAL / "castaway_ctd.csv", REAL / "rexrov.stl"))

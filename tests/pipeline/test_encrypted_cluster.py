@@ -85,6 +85,7 @@ def ended(process: subprocess.Popen[bytes]) -> None:
             child.kill()
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("trusted")
 def test_a_cluster_that_speaks_tls_makes_the_same_arrays(
     tmp_path: Path, small_file: Path, small_plan: Plan, address: str, capfd: pytest.CaptureFixture[str]

@@ -90,6 +90,7 @@ def status(*arguments: str) -> object:
     return end.value.code
 
 
+@pytest.mark.long
 def test_what_workers_build_is_what_a_folder_would_hold(bucket: str, images: Plan, whole: Path) -> None:
     place = Remote(f"{bucket}/built/s.zarr")
     report = schedule.build(images, place, frames=range(10), workers=1)

@@ -58,6 +58,7 @@ def test_another_order(tmp_path: Path, small_plan: Plan, reference: dict[str, by
     assert contents(tmp_path / "s.zarr") == reference
 
 
+@pytest.mark.long
 def test_another_locale_time_zone_hash_seed_and_folder(
     tmp_path: Path, small_file: Path, reference: dict[str, bytes]
 ) -> None:

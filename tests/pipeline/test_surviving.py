@@ -153,6 +153,7 @@ def elsewhere(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
         yield processes[0], json.loads(file.read_text())["address"]
 
 
+@pytest.mark.long
 def test_a_scheduler_that_dies_ends_the_build_in_one_line_and_it_goes_on(
     tmp_path: Path, small_plan: Plan, reference: Path, elsewhere: tuple[subprocess.Popen[bytes], str]
 ) -> None:
@@ -248,6 +249,7 @@ def in_namespace(script: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(["unshare", "-rm", "sh", "-euc", script], capture_output=True, text=True, check=False)
 
 
+@pytest.mark.long
 def test_a_disk_that_takes_no_more_is_one_line_and_the_build_goes_on(
     tmp_path: Path, small_file: Path, reference: Path
 ) -> None:

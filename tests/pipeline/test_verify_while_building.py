@@ -59,6 +59,7 @@ def test_damage_to_what_is_complete_is_found_all_the_same(copy: Path, name: str,
     assert report.building and not report.ok and report.complete == ()
 
 
+@pytest.mark.long
 def test_no_frame_is_ever_called_bad_while_shards_are_written_and_written_again(
     tmp_path: Path, small_plan: Plan
 ) -> None:
