@@ -7,6 +7,7 @@ import xarray as xr
 
 from sonarsynth.evaluation.checks import Check, SmallVariables, blocks, every, numbered, of_frame, other_sounds
 from sonarsynth.evaluation.level_checks import echoes_heard, snaps_heard
+from sonarsynth.labels.views import View
 
 
 def beam_width(tree: xr.DataTree) -> float:
@@ -68,11 +69,21 @@ def on_ghost(some: SmallVariables, frame: int, azimuth: float, elevation: float)
     return bool(((off <= reach).all(axis=0) & loud).any())  # NaN where no echo comes that way
 
 
+def louder_outside(some: SmallVariables, frame: int) -> bool:
+    """Whether the loudest direct echo is of a target out of the view of the beams, which lobes may show."""
+    if not some.has("truth/targets/echo_level"):
+        return False
+    level = np.nan_to_num(some.of("truth/targets/echo_level", frame)[:, 0], nan=-np.inf)
+    within = np.isin(some.of("truth/targets/view", frame), (View.IN_VIEW, View.PARTLY_IN_VIEW))
+    return bool(level[~within].max(initial=-np.inf) > level[within].max(initial=-np.inf))
+
+
 def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
     """The brightest beam of each frame lies on a target, or within one beam width of its outline; or on a ghost of one
     that the truth has, which the check counts and warns of.
 
-    Frames without a target in view, or whose echoes are inaudible, do not count. Where a chorus or anything else sounds
+    Frames without a target in view, or whose echoes are inaudible, or fainter than those of one out of view, do not
+    count. Where a chorus or anything else sounds
     too, it may be brighter: a warning.
     """
     name, expected = "brightest beam on target", "every frame, or on a ghost by surface or bottom"
@@ -80,7 +91,7 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
     hits, ghosts, seen, missed = 0, 0, 0, []
     for some, i in ((block, i) for block in blocks(tree, frames) for i in block.frames):
         energy, truth = of_frame(tree, "image/energy", i), of_frame(tree, "truth/beams/target", i)
-        if not ((truth >= 0).any() and echoes_heard(some, i)):
+        if not ((truth >= 0).any() and echoes_heard(some, i)) or louder_outside(some, i):
             continue
         lost = some.has("source_estimates/usable") and not some.of("source_estimates/usable", i)
         if lost or not np.isfinite(energy).any():  # no clock: a miss, unless no snap could be heard or made out

@@ -115,11 +115,12 @@ class _Turn:
 def _normals(tree: xr.DataTree, bodies: xr.Dataset, target: Ints, facet: Ints, names: list[str]) -> Floats:
     """Outward normals (point, xyz), world, of the facets that brought the echoes; NaN where none did."""
     found = np.full((len(target), 3), np.nan)
-    for number, name in enumerate(names):
+    for number in range(len(names)):
         some = np.flatnonzero((target == number) & (facet >= 0))
-        if not len(some) or "targets" not in tree.children or name not in tree["targets"].children:
+        if not len(some):
             continue
-        mesh = tree["targets"].children[name].dataset
+        group = tree["targets"][str(bodies["group"].values[number])]
+        mesh = (group[str(int(bodies["mesh"].values[number]))] if group.children else group).dataset
         a, b, c = np.moveaxis(mesh["vertices"].values.astype(float)[mesh["faces"].values[facet[some]]], 1, 0)
         across = np.cross(b - a, c - a)
         own = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,25 +16,24 @@ def quaternion(heading: float, pitch: float = 0.0, roll: float = 0.0) -> Floats:
 
     Then pitched nose up and rolled starboard down (rad): body to world = Rz(pi/2 - heading) Ry(-pitch) Rx(roll).
     """
-    yaw = 0.5 * np.pi - heading
-    about_z = np.array([np.cos(0.5 * yaw), 0.0, 0.0, np.sin(0.5 * yaw)])
-    about_y = np.array([np.cos(0.5 * pitch), 0.0, -np.sin(0.5 * pitch), 0.0])
-    about_x = np.array([np.cos(0.5 * roll), np.sin(0.5 * roll), 0.0, 0.0])
-    return quaternion_product(quaternion_product(about_z, about_y), about_x)
+    half = 0.5 * (0.5 * np.pi - heading), 0.5 * pitch, 0.5 * roll
+    (cz, cy, cx), (sz, sy, sx) = ([float(f(angle)) for angle in half] for f in (np.cos, np.sin))
+    return np.array(_product(_product((cz, 0.0, 0.0, sz), (cy, 0.0, -sy, 0.0)), (cx, sx, 0.0, 0.0)))
 
 
 def quaternion_product(p: npt.ArrayLike, q: npt.ArrayLike) -> Floats:
     """Hamilton product p q of quaternions (..., 4): rotate by q first, then by p."""
-    pw, px, py, pz = np.moveaxis(np.asarray(p, float), -1, 0)
-    qw, qx, qy, qz = np.moveaxis(np.asarray(q, float), -1, 0)
-    return np.stack(
-        [
-            pw * qw - px * qx - py * qy - pz * qz,
-            pw * qx + px * qw + py * qz - pz * qy,
-            pw * qy - px * qz + py * qw + pz * qx,
-            pw * qz + px * qy - py * qx + pz * qw,
-        ],
-        axis=-1,
+    return np.stack(_product(*(np.moveaxis(np.asarray(a, float), -1, 0) for a in (p, q))), axis=-1)
+
+
+def _product(p: Any, q: Any) -> tuple[Any, Any, Any, Any]:
+    """The same of four numbers each, or of four arrays."""
+    (pw, px, py, pz), (qw, qx, qy, qz) = p, q
+    return (
+        pw * qw - px * qx - py * qy - pz * qz,
+        pw * qx + px * qw + py * qz - pz * qy,
+        pw * qy - px * qz + py * qw + pz * qx,
+        pw * qz + px * qy - py * qx + pz * qw,
     )
 
 

@@ -75,6 +75,10 @@ class Mesh:
         """Largest distance of a vertex from the body's origin (m)."""
         return float(np.linalg.norm(self.vertices, axis=1).max())
 
+    def scaled(self, factor: float) -> Mesh:
+        """The same body so many times as large, about its origin."""
+        return self if factor == 1.0 else Mesh(read_only(self.vertices * factor), self.faces, self.notes, self.flat)
+
     @cached_property
     def digest(self) -> str:
         """SHA-256 of vertices and faces: the mesh's identity in caches and in the store."""

@@ -13,6 +13,7 @@ from pydantic import field_validator
 from sonarsynth.conventions import Floats, MetresPerSecond, Position, PositiveMetres, PositiveSeconds, Radians, Seconds
 from sonarsynth.description import BY_KIND, description
 from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.geometry.hovering import Hover, hover_pose, hover_spin, hover_velocity
 from sonarsynth.geometry.recorded_track import RecordedTrack, track_pose, track_spin, track_velocity
 
 
@@ -105,7 +106,7 @@ class ConstantVelocity:
     roll: Radians = 0.0
 
 
-Motion = Annotated[Still | Line | Waypoints | Circle | ConstantVelocity | RecordedTrack, BY_KIND]
+Motion = Annotated[Still | Line | Waypoints | Circle | ConstantVelocity | Hover | RecordedTrack, BY_KIND]
 
 
 def pose(motion: Motion, time: float) -> Pose:
@@ -113,6 +114,8 @@ def pose(motion: Motion, time: float) -> Pose:
     match motion:
         case RecordedTrack():
             return track_pose(motion, time)
+        case Hover():
+            return hover_pose(motion, time)
         case Still():
             return Pose(np.array(motion.position), quaternion(motion.heading, motion.pitch, motion.roll))
         case Line():
@@ -135,6 +138,8 @@ def velocity(motion: Motion, time: float) -> Floats:
     match motion:
         case RecordedTrack():
             return track_velocity(motion, time)
+        case Hover():
+            return hover_velocity(motion, time)
         case Still():
             return np.zeros(3)
         case Line():
@@ -158,6 +163,8 @@ def spin(motion: Motion, time: float) -> Floats:
     match motion:
         case RecordedTrack():
             return track_spin(motion, time)
+        case Hover():
+            return hover_spin(motion, time)
         case Circle():
             return np.array([0.0, 0.0, motion.speed / motion.radius])
         case Waypoints():

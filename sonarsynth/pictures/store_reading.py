@@ -28,7 +28,7 @@ POINTS = ("x", "y", "z", "azimuth", "elevation", "energy", "delay", "target")
 READ = (
     *("time", "image/energy", "truth/sonar_position", "truth/sonar_orientation", "truth/emissions/position"),
     *(f"truth/beams/{name}" for name in ("target", "range")),
-    *(f"truth/targets/{name}" for name in ("target", "position", "orientation", "mesh", "family")),
+    *(f"truth/targets/{name}" for name in ("target", "group", "position", "orientation", "scale", "mesh", "family")),
     *(f"truth/targets/echo_{name}" for name in ("level", "azimuth", "elevation")),
     *(f"cloud/{name}" for name in POINTS),
     *("signals/position", "truth/beams/azimuth", "truth/beams/elevation"),
@@ -274,9 +274,9 @@ def _blended(azimuth: Floats, elevation: Floats, families: list[str], family: in
     return bool((near[once] <= near[family]).any())
 
 
-def mesh_group(tree: Source, name: str, target: int, index: int) -> str:
-    """Where the mesh is that a target has in a frame: its group, or one of those in it where its shape varies."""
-    group = f"targets/{name}"
+def mesh_group(tree: Source, target: int, index: int) -> str:
+    """Where the mesh is that a target has in a frame: its group, or one of those in it where there are several."""
+    group = f"targets/{needed(tree, 'truth/targets/group')[target]}"
     if read(tree, f"{group}/0/faces") is None:
         return group
     return f"{group}/{int(needed(tree, 'truth/targets/mesh', index)[target])}"
@@ -290,11 +290,14 @@ def hulls(tree: Source, index: int) -> tuple[Hull, ...]:
         return ()
     position = needed(tree, "truth/targets/position", index)
     orientation = needed(tree, "truth/targets/orientation", index)
+    scale = needed(tree, "truth/targets/scale", index)
     made = []
     for i, name in enumerate(map(str, names)):
-        group = mesh_group(tree, name, i, index)
+        if not np.isfinite(position[i]).all():  # not in this sequence
+            continue
+        group = mesh_group(tree, i, index)
         vertices, faces = read(tree, f"{group}/vertices"), read(tree, f"{group}/faces")
-        if vertices is not None and faces is not None and np.isfinite(position[i]).all():
-            there = sonar.to_body(Pose(position[i], orientation[i]).to_world(vertices))
+        if vertices is not None and faces is not None:
+            there = sonar.to_body(Pose(position[i], orientation[i]).to_world(scale[i] * vertices))
             made.append(Hull(name, there, faces.astype(np.int64)))
     return tuple(made)

@@ -58,9 +58,10 @@ def _targets(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
     inside = None if view is None else np.isin(view[frames], (View.IN_VIEW, View.PARTLY_IN_VIEW)).sum(axis=0)
     lines = []
     for i, name in enumerate(map(str, names)):
-        faces = read(tree, f"{mesh_group(tree, name, i, int(frames[0]))}/faces")
+        faces = read(tree, f"{mesh_group(tree, i, int(frames[0]))}/faces")
         facets = f"{len(faces)} facets, " if faces is not None else ""
-        reach = f"{away[:, i].min():.2f} to {away[:, i].max():.2f} m away"
+        there = away[np.isfinite(away[:, i]), i]
+        reach = f"{there.min():.2f} to {there.max():.2f} m away" if len(there) else "in none of these frames"
         within = "" if inside is None or inside[i] == seen[i] else f" ({inside[i]} within the beams)"
         lines.append(f"  target     {name}: {facets}{reach}, in sight in {seen[i]} frames{within}")
     return [*lines, *_ghosts(tree, frames, list(map(str, names)))]

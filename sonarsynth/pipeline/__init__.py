@@ -37,6 +37,7 @@ from sonarsynth.pipeline.stored_values import (
     truth_values,
 )
 from sonarsynth.pipeline.synthesis import digitise, errors_of, frame_signals, known_elements, known_signals
+from sonarsynth.pipeline.target_slots import in_slots, which_values
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, variables
 from sonarsynth.planning import OF_BEAMS, Plan, check_unsampled_frame, context_of, plan, receiver_of, survey_of
 from sonarsynth.planning.notes.source_notes import locator
@@ -127,7 +128,8 @@ def truth_at(plan: Plan, frame: Frame) -> Values:
     """The same of a frame that is at hand; `plan` is that of its sequence."""
     truth = label(context_of(plan, frame), plan.propagation, snap_levels(frame.moment.snaps))
     mark_stage("label")
-    return _of_frame(plan, frame) | truth_values(truth) | soundscape_values(plan, frame, frame_chorus(plan, frame))
+    values = _of_frame(plan, frame) | truth_values(truth) | which_values(plan)
+    return in_slots(plan, values | soundscape_values(plan, frame, frame_chorus(plan, frame)), VARIABLES)
 
 
 def trace_frame(plan: Plan, index: int) -> TracedFrame:
@@ -224,6 +226,13 @@ def measure_isolated(plan: Plan, traced: TracedFrame) -> Floats:
 def range_frame(plan: Plan, index: int, traced: TracedFrame, heard: BeamformedFrame) -> Values:
     """The point cloud, and every stored value of the frame."""
     plan = plan.at(index)
+    values = in_slots(plan, _heard_values(plan, traced, heard) | which_values(plan), VARIABLES)
+    mark_stage("label")
+    return values
+
+
+def _heard_values(plan: Plan, traced: TracedFrame, heard: BeamformedFrame) -> Values:
+    """Every stored value of a frame, of the bodies that are there; `plan` is that of its sequence."""
     frame = traced.frame
     values = _of_frame(plan, frame) | truth_values(traced.truth) | echo_values(traced.echoes, traced.arrivals)
     values |= link_budget_values(traced.budget, heard.isolated) | soundscape_values(plan, frame, traced.chorus)
@@ -249,7 +258,6 @@ def range_frame(plan: Plan, index: int, traced: TracedFrame, heard: BeamformedFr
         mark_stage("range")
         labels = point_labels(plan, frame, traced.arrivals, heard.estimates, cloud)
         values |= cloud_values(cloud, labels, plan.sizes["point"])
-        mark_stage("label")
     return values
 
 

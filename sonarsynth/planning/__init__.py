@@ -97,7 +97,7 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS, choices: Choices | 
     made = Plan(recipe, products, fewer, paths, windows, sizes=sizes, thinning=thinning)
     made = choose(made, looks) if choices is None else replace(made, choices=choices)
     made = replace(made, stages=_mean_stages(made, looks))
-    made = replace(made, shard_frames=_shard_frames(made), validity=stored_validity(looks))
+    made = replace(made, shard_frames=_shard_frames(made), validity=stored_validity(recipe, looks))
     return replace(made, left_out=left_out(made), warnings=notes(made, looks))
 
 
@@ -140,7 +140,7 @@ def _sizes(recipe: Recipe, windows: Windows) -> dict[str, int]:
         "sample": windows.samples,
         "elevation": beams.elevations,
         "azimuth": beams.azimuths,
-        "target": len(scene.world.targets),
+        "target": len(recipe.target_names),
         "emission": snaps,
         "estimate": snaps + (STRANGERS if scene.world.chorus is not None else 0),
         "point": min(scene.processing.max_points, beams.elevations * beams.azimuths),
@@ -154,7 +154,7 @@ def check_unsampled_frame(plan: Plan, frame: Frame) -> None:
     """
     if not np.isfinite(plan.windows.start[frame.index]):
         with plan.recipe.spanned.naming(plan.sequence):
-            check_alike(plan.recipe.scene_of(0), plan.scene)
+            check_alike(plan.recipe.described, plan.scene)
             check_frame(plan.scene, frame)
             check_located(plan.scene, frame, plan.products)
             frame_start(plan, frame)

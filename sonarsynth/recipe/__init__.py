@@ -10,10 +10,10 @@ from typing import Annotated, Any
 from annotated_types import Ge, Le
 from pydantic import Discriminator, Tag, TypeAdapter
 
-from sonarsynth.conventions import Ints
 from sonarsynth.description import description, named_files
 from sonarsynth.environment.noise import RecordedNoise
 from sonarsynth.environment.sound_speed import Cast
+from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.recorded_track import RecordedTrack
 from sonarsynth.propagation.ray_request import RayRequest
 from sonarsynth.recipe.citation import Attribution, Creator
@@ -22,7 +22,7 @@ from sonarsynth.recipe.sequences import MOST_SEQUENCES, Sequences
 from sonarsynth.recipe.splits import SPLITS, Splits
 from sonarsynth.recipe.tolerance import Accuracy
 from sonarsynth.recipe.variation.grid import Axis, Zip, entry_tag
-from sonarsynth.recipe.variation.mesh_variants import Variants, target_meshes, variant_numbers
+from sonarsynth.recipe.variation.mesh_variants import mesh_number, target_meshes
 from sonarsynth.recipe.variation.random_variations import Choice, Normal, Sobol, Uniform, Variation
 from sonarsynth.recipe.variation.values import Plain
 from sonarsynth.sources.noise_source import NoiseRecording
@@ -104,14 +104,40 @@ class Recipe:
         """Scene of a sequence. Raises IndexError outside 0..sequences-1, FieldError where it cannot be."""
         return self.spanned.scene(sequence)
 
+    @cached_property
+    def described(self) -> Scene:
+        """The scene of the first sequence before its populations are drawn: what all sequences are like."""
+        return self.spanned.described(0)
+
     @property
-    def meshes(self) -> Variants:
-        """The different meshes of each target, and the first sequence that has each. Raises FieldError."""
+    def target_names(self) -> tuple[str, ...]:
+        """Names of all targets that sequences may have: those of the recipe, then those of populations."""
+        return self.described.world.target_names
+
+    @property
+    def meshes(self) -> dict[str, tuple[Mesh, ...]]:
+        """The different meshes of each target of the recipe, and of each population, by its name. Raises FieldError."""
         return target_meshes(self.spanned)
 
-    def mesh_numbers(self) -> Ints:
-        """Which of its meshes each target has (sequence, target)."""
-        return variant_numbers(self.spanned)
+    @property
+    def mesh_groups(self) -> tuple[str, ...]:
+        """Under which name of `meshes` those of each target are (target,)."""
+        world = self.described.world
+        drawn = (population.name for population in world.populations for _ in population.slots)
+        return (*(target.name for target in world.targets), *drawn)
+
+    def mesh_number(self, scene: Scene, target: int) -> int:
+        """Which of its meshes a target of the scene of a sequence has."""
+        return mesh_number(self.spanned, scene, target)
+
+    @cached_property
+    def categories(self) -> tuple[str, ...]:
+        """What targets are called, in the order of the recipe."""
+        world = self.described.world
+        said = [target.category for target in world.targets]
+        said += [str(v) for _, entry in self.spanned.entries for v in _listed(entry) if _sets(entry, "category")]
+        said += [p.category(n) for p in world.populations for n in range(len(p.models))]
+        return tuple(dict.fromkeys(said))
 
     def frame(self, index: int) -> tuple[Scene, Frame]:
         """Scene and frame number `index`; raises IndexError outside 0..frames-1, FieldError where it cannot be."""
@@ -138,12 +164,20 @@ class Recipe:
         Where the files lie does not matter.
         """
         deciding = {name: value for name, value in self.as_json().items() if name not in ("rays", "dataset")}
-        meshes = {
-            t.name: [mesh.digest for _, mesh in some]
-            for t, some in zip(self.scene.world.targets, self.meshes, strict=True)
-        }
+        meshes = {name: [mesh.digest for mesh in some] for name, some in self.meshes.items()}
         text = json.dumps([_by_content(deciding), meshes], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _sets(entry: Axis | Variation, field: str) -> bool:
+    """Whether what varies sets a field of this name."""
+    return any(path.endswith(f".{field}") for path in entry.path)
+
+
+def _listed(entry: Axis | Variation) -> list[Any]:
+    """The values of what varies, where they are listed."""
+    some = entry.taken if isinstance(entry, Axis) else entry.values if isinstance(entry, Choice) else ()
+    return [plain.value for plain in some]
 
 
 def _by_content(value: Any) -> Any:

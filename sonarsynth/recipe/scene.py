@@ -23,13 +23,14 @@ from sonarsynth.propagation import AutoTracing, Tracing
 from sonarsynth.randomness import stream
 from sonarsynth.ranging import AutoPlacing, Cancelling, Locator, Peaks, Picking, Placing, SensorDelays
 from sonarsynth.receiver import Sonar
+from sonarsynth.recipe.populations.population import Population
 from sonarsynth.scattering import MirrorLobe, Scattering
 from sonarsynth.signals import AutoSynthesis, Synthesis
 from sonarsynth.sources import Source
 from sonarsynth.sources.chorus import Chorus
 from sonarsynth.sources.noise_source import NoiseSource
 from sonarsynth.state import Emission, WorldState
-from sonarsynth.targets.target import Target, mesh_for
+from sonarsynth.targets.target import Target
 
 MOST = 500
 """Targets of a scene; snaps of a frame."""
@@ -48,6 +49,8 @@ class World:
     """What scatters sound and belongs to no target: pieces of the bottom, stones."""
     noise_sources: tuple[NoiseSource, ...] = ()
     """What sounds all the time from one place, and lights nothing: ships, animals."""
+    populations: Annotated[tuple[Population, ...], MaxLen(100)] = ()
+    """Targets that are drawn anew for each sequence."""
     chorus: Chorus | None = None
     """All the other snaps of the sea, which are heard but light nothing; left out: there are none."""
 
@@ -62,6 +65,25 @@ class World:
                 raise ValueError(f"two targets are called '{target.name}'")
             names.add(target.name)
         return targets
+
+    @field_validator("populations")
+    @classmethod
+    def _check_population_names(cls, some: tuple[Population, ...], info: ValidationInfo) -> tuple[Population, ...]:
+        taken = {target.name: target.name for target in info.data.get("targets", ())} | {DIRECT: DIRECT}
+        for population in some:
+            for name in (population.name, *population.slots):
+                if name in taken:
+                    raise ValueError(f"'{name}' of population '{population.name}' is the name of '{taken[name]}' too")
+                taken[name] = population.name
+        if len(info.data.get("targets", ())) + sum(population.most for population in some) > MOST:
+            raise ValueError(f"more than {MOST} targets with those of the recipe")
+        return some
+
+    @property
+    def target_names(self) -> tuple[str, ...]:
+        """Names of all targets that may be there: those of the recipe, then those of populations."""
+        drawn = (name for population in self.populations for name in population.slots)
+        return (*(target.name for target in self.targets), *drawn)
 
     @field_validator("targets", "sources")
     @classmethod
@@ -173,7 +195,7 @@ class Scene:
 
     def mesh_of(self, target: int) -> Mesh:
         """What a target is traced with. Raises ValueError, or OSError, where it has no mesh."""
-        return mesh_for(self.world.targets[target].shape, self.laws[target], self.sonar.shortest_wavelength)
+        return self.world.targets[target].mesh(self.laws[target], self.sonar.shortest_wavelength)
 
     def moment(self, time: float, *, key: int | str = 0, step: int = 0, seed: int = 0) -> WorldState:
         """The world at a time (s), with the snaps that a frame of the sequence of this key, step and seed draws."""

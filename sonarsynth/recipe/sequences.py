@@ -20,6 +20,7 @@ import numpy as np
 from sonarsynth.conventions import Ints
 from sonarsynth.description import FieldError
 from sonarsynth.randomness import number
+from sonarsynth.recipe.populations.drawing import populated
 from sonarsynth.recipe.renamed_keys import as_drawn
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.recipe.splits import SPLITS, Splits, assign
@@ -125,7 +126,7 @@ class Sequences:
                 old = settings[before + i]
                 changed[before + i] = Setting(old.source, old.name, old.paths, variation.at(part))
                 try:
-                    yield with_settings(self.base, self._plain, changed)
+                    yield populated(with_settings(self.base, self._plain, changed), self.seed, self.key(sequence))
                 except FieldError:
                     continue
 
@@ -135,7 +136,13 @@ class Sequences:
 
     def scene(self, sequence: int) -> Scene:
         """Scene of a sequence. Raises FieldError that names the entry and its value where there is none."""
-        return _scene(self, sequence) if self.varied else self.base
+        return _scene(self, sequence) if self.varied or self.base.world.populations else self.base
+
+    def described(self, sequence: int) -> Scene:
+        """The same before its populations are drawn."""
+        if not self.varied:
+            return self.base
+        return with_settings(self.base, self._plain, self.settings(sequence))
 
     def check(self) -> None:
         """Raises FieldError for entries that cannot go together; the scenes are not looked at."""
@@ -239,7 +246,7 @@ def _meet(a: Where, b: Where) -> bool:
 
 @lru_cache(maxsize=128)
 def _scene(sequences: Sequences, sequence: int) -> Scene:
-    return with_settings(sequences.base, sequences._plain, sequences.settings(sequence))
+    return populated(sequences.described(sequence), sequences.seed, sequences.key(sequence))
 
 
 @lru_cache(maxsize=4096)

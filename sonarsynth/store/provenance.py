@@ -77,10 +77,7 @@ def planned(plan: Plan) -> dict[str, Any]:
 def inputs(plan: Plan) -> dict[str, Any]:
     """SHA-256 of the meshes of each target as used, and of the files that the recipe names (their names, not paths)."""
     recipe = plan.recipe
-    meshes = {
-        target.name: [mesh.digest for _, mesh in some]
-        for target, some in zip(recipe.scene.world.targets, recipe.meshes, strict=True)
-    }
+    meshes = {name: [mesh.digest for mesh in some] for name, some in recipe.meshes.items()}
     files = {(Path(path).name, digest(path)) for path in paths(recipe.as_json())}
     return {"meshes": meshes, "files": [{"name": name, "sha256": found} for name, found in sorted(files)]}
 

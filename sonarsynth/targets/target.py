@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from annotated_types import Ge, Le
 from pydantic import StringConstraints
 
+from sonarsynth.conventions import Number
 from sonarsynth.description import description
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.motion import Motion
@@ -16,6 +18,8 @@ from sonarsynth.targets.shapes import Shape
 
 NAME = r"^[A-Za-z][A-Za-z0-9_-]{0,63}$"
 Name = Annotated[str, StringConstraints(pattern=NAME)]
+Category = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_.+-]{0,63}$")]
+Scale = Annotated[Number, Ge(1e-3), Le(1e3)]
 
 
 @description
@@ -30,9 +34,25 @@ class Target:
     """Where it is, at any time."""
     scattering: Scattering | None = None
     """How its facets scatter, by what it is made of; left out: as `scene.physics.scattering` says."""
+    category: Category = "target"
+    """What a detector is to call it: a word."""
+    clutter: bool = False
+    """Whether it is there to be taken for a target, and is none."""
+    scale: Scale = 1.0
+    """So many times as large as the shape, about its origin."""
+    mesh_scale: Scale | None = None
+    """Scale that its mesh is fine enough for, where bodies of several scales share one; left out: its own."""
+
+    def mesh(self, law: Scattering, wavelength: float) -> Mesh:
+        """What it is traced with by a law, at the shortest wavelength (m). Raises MeshError as `mesh_of`."""
+        return self.base_mesh(law, wavelength).scaled(self.scale)
+
+    def base_mesh(self, law: Scattering, wavelength: float) -> Mesh:
+        """The same before it is scaled."""
+        return base_mesh(self.shape, law, wavelength / (self.mesh_scale or self.scale))
 
 
-def mesh_for(shape: Shape, law: Scattering, wavelength: float) -> Mesh:
+def base_mesh(shape: Shape, law: Scattering, wavelength: float) -> Mesh:
     """The mesh that a shape is traced with: as described, or fine enough for a law that sums phases, at the shortest
     wavelength (m) of the band. Raises MeshError as `mesh_of`."""
     error = law.mesh_tolerance

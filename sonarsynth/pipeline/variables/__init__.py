@@ -7,7 +7,7 @@ from typing import Any
 
 from sonarsynth.pipeline.variables.static_variables import coordinates
 from sonarsynth.pipeline.variables.truth_variables import HOW_LEVELS_ADD_UP
-from sonarsynth.pipeline.variables.variable import Variable
+from sonarsynth.pipeline.variables.variable import Variable, flags
 from sonarsynth.pipeline.variables.variable_groups import VARIABLES
 from sonarsynth.planning import OF_BEAMS, Plan
 
@@ -31,6 +31,8 @@ def variables(plan: Plan) -> tuple[Variable, ...]:
     chosen = [v for v in VARIABLES if v.product in wanted]
     if not plan.windows.direct_removed:
         chosen = [v for v in chosen if (v.group, v.name) != ("/image", "remainder")]
+    categories = flags(plan.recipe.categories)
+    chosen = [replace(v, attributes=categories) if v.name == "category" else v for v in chosen]
     converter = plan.scene.sonar.converter
     if converter is not None and converter.bits <= 16:
         counts: dict[str, Any] = {

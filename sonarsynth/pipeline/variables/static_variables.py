@@ -10,13 +10,11 @@ from sonarsynth.planning import OF_BEAMS, Plan
 from sonarsynth.products import DIRECT, FAMILIES
 from sonarsynth.recipe.varied_columns import columns
 
-WHICH_MESH = "which mesh the target has: its group under /targets/<name>"
-
 
 def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
     """Static variables of a store: {(group, name): (dims, values, attributes)}."""
     scene, sizes = plan.scene, plan.sizes
-    names = [t.name for t in scene.world.targets]
+    names = list(plan.recipe.target_names)
     static: dict[tuple[str, str], tuple[tuple[str, ...], np.ndarray, dict[str, Any]]] = {}
 
     def add(
@@ -76,23 +74,14 @@ def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.n
 
 
 def _add_meshes(plan: Plan, add: Any) -> None:
-    """The mesh of each target in its group; where its shape varies, its meshes in groups 0, 1, ... of that."""
-    meshes = plan.recipe.meshes
-    for target, some in zip(plan.scene.world.targets, meshes, strict=True):
-        for n, (_, mesh) in enumerate(some):
-            group = f"/targets/{target.name}" + (f"/{n}" if len(some) > 1 else "")
-            add(group, "vertices", ("vertex", "xyz"), mesh.vertices, "m", "vertices in the target's frame")
+    """The mesh of each target in its group; where there are several, in groups 0, 1, ... of that."""
+    groups = np.array(plan.recipe.mesh_groups, dtype=np.str_)
+    add("/truth/targets", "group", ("target",), groups, "1", "group of the target's meshes, under /targets")
+    for name, meshes in plan.recipe.meshes.items():
+        for n, mesh in enumerate(meshes):
+            group = f"/targets/{name}" + (f"/{n}" if len(meshes) > 1 else "")
+            add(group, "vertices", ("vertex", "xyz"), mesh.vertices, "m", "vertices in the target's frame, at scale 1")
             add(group, "faces", ("face", "corner"), mesh.faces, "1", "vertex indices of each facet, outward")
-    if any(len(some) > 1 for some in meshes):
-        numbers = np.repeat(plan.recipe.mesh_numbers().astype(np.int32), plan.recipe.steps, axis=0)
-        add(
-            "/truth/targets",
-            "mesh",
-            ("frame", "target"),
-            numbers,
-            "1",
-            "which mesh the target has: its group under /targets/<name>",
-        )
 
 
 def _add_sensors(plan: Plan, add: Any) -> None:

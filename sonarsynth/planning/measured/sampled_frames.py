@@ -38,12 +38,11 @@ def sample_frames(recipe: Recipe) -> tuple[SampledScene, ...]:
     Raises FieldError that names the field, the frame and the values of the sequence.
     """
     steps = sampled_frames(recipe)
-    first = next(iter(steps))
     looks = []
     for sequence, some in steps.items():
         with recipe.spanned.naming(sequence):
             scene = recipe.scene_of(sequence)
-            check_alike(recipe.scene_of(first), scene)
+            check_alike(recipe.described, scene)
             profile = read_inputs(scene)
             check_shrimp(scene)
             frames = tuple(recipe.frame(sequence * recipe.steps + step)[1] for step in some)
@@ -85,15 +84,20 @@ def _ends(recipe: Recipe) -> Iterator[SampledScene]:
 
 
 def check_alike(first: Scene, other: Scene) -> None:
-    """Raises FieldError unless two scenes have targets and snaps of the same number and name: the store's axes."""
+    """Raises FieldError unless two scenes have targets and snaps of the same number and name: the store's axes.
+
+    Of the second, bodies of populations have been drawn: these come and go.
+    """
     world, others = ("scene", "world"), other.world
+    drawn = {name for population in first.world.populations for name in population.slots}
+    described = tuple(target for target in others.targets if target.name not in drawn)
     for what, one, more in (
-        ("targets", first.world.targets, others.targets),
+        ("targets", first.world.targets, described),
         ("sources", first.world.sources, others.sources),
     ):
         if len(one) != len(more):
             raise FieldError((*world, what), f"all sequences must have equally many: {len(one)} and {len(more)}")
-    for i, (a, b) in enumerate(zip(first.world.targets, others.targets, strict=True)):
+    for i, (a, b) in enumerate(zip(first.world.targets, described, strict=True)):
         if a.name != b.name:
             raise FieldError(
                 (*world, "targets", i, "name"), f"must be the same in all sequences: '{a.name}' and '{b.name}'"

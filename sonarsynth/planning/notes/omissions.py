@@ -241,7 +241,7 @@ def _rough_bodies(plan: Plan, frame: Frame) -> tuple[PlacedTarget, ...]:
     """The bodies of a frame with few facets."""
     bodies = []
     for target, body in zip(plan.scene.world.targets, frame.moment.bodies, strict=True):
-        mesh = mesh_of(target.shape)
+        mesh = mesh_of(target.shape).scaled(target.scale)
         every = -(-len(mesh.faces) // ENOUGH)
         bodies.append(replace(body, mesh=mesh if every == 1 else _every(mesh, every)))
     return tuple(bodies)

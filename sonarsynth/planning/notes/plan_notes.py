@@ -11,6 +11,7 @@ from sonarsynth.planning.choices import OF_BEAMS
 from sonarsynth.planning.measured.lost_echoes import lost_echoes
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.notes.formula_validity import validity
+from sonarsynth.planning.notes.population_notes import once, population_notes
 from sonarsynth.planning.notes.source_notes import assumed_speed_notes, off_the_bottom
 from sonarsynth.planning.notes.target_notes import held, law_notes, mirror_notes, overlap_notes
 from sonarsynth.planning.plans import Plan
@@ -34,7 +35,7 @@ def notes(made: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
             f"the windows are based on {made.looked_at} of {recipe.frames} frames and the ends of the variations; "
             "every other frame is checked when it is rendered, and fails if it does not fit"
         )
-    found += _shared(recipe, looks)
+    found += population_notes(recipe) + _shared(recipe, looks)
     if made.windows.disturbed:
         found.append(
             f"{made.windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest snap"
@@ -57,7 +58,7 @@ def notes(made: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
         found += _cut(look.scene, look.profile.uniform)
         found += validity(look.scene, look.profile)
         found += law_notes(look)
-    return tuple(dict.fromkeys(found))
+    return once(found, recipe)
 
 
 def noted(looks: Sequence[SampledScene]) -> list[SampledScene]:
@@ -66,12 +67,12 @@ def noted(looks: Sequence[SampledScene]) -> list[SampledScene]:
     return real[:: -(-len(real) // NOTED)]
 
 
-def stored_validity(looks: Sequence[SampledScene]) -> tuple[str, ...]:
+def stored_validity(recipe: Recipe, looks: Sequence[SampledScene]) -> tuple[str, ...]:
     """Where formulas and laws of the scenes hold and do not, one line each: as the store has them."""
     found: list[str] = []
     for look in noted(looks):
         found += [*held(look), *validity(look.scene, look.profile)]
-    return tuple(dict.fromkeys(found))
+    return once(found, recipe)
 
 
 def _extent(scene: Scene, profile: Profile) -> list[str]:

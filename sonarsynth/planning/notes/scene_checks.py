@@ -27,7 +27,6 @@ from sonarsynth.sources.snap_pulses import waveform
 from sonarsynth.sources.sound_source import SoundSource
 from sonarsynth.state import meeting_times
 from sonarsynth.targets.meshes import mesh_of
-from sonarsynth.targets.target import mesh_for
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 FARTHEST = 1e6
@@ -59,7 +58,7 @@ def read_inputs(scene: Scene) -> Profile:
     for i, (target, law) in enumerate(zip(scene.world.targets, scene.laws, strict=True)):
         try:
             _check_plain(scene, i)
-            mesh_for(target.shape, law, scene.sonar.shortest_wavelength)
+            target.mesh(law, scene.sonar.shortest_wavelength)
         except FieldError:
             raise
         except (ValueError, OSError) as error:
@@ -104,7 +103,7 @@ def _check_plain(scene: Scene, number: int) -> None:
     target, bottom_depth = scene.world.targets[number], scene.world.environment.depth
     if target.shape.plain is None:
         return
-    plain = mesh_of(target.shape.plain)
+    plain = mesh_of(target.shape.plain).scaled(target.scale)
     body = PlacedTarget(target.name, plain, pose(target.motion, scene.trajectory.time(0)), np.zeros(3))
     if not _box_in_water(body, bottom_depth):
         size = float(np.ptp(plain.box, axis=0).max())

@@ -24,6 +24,7 @@ from sonarsynth.description import FieldError
 from sonarsynth.recipe import FILE_KINDS, Recipe
 from sonarsynth.recipe.reading.json_schema import schema
 from sonarsynth.recipe.reading.messages import explain
+from sonarsynth.recipe.reading.model_tables import with_models
 from sonarsynth.recipe.reading.old_keys import new_setting, with_new_keys
 from sonarsynth.recipe.reading.yaml_source import SET, RecipeError, Source, Where, override, read_file, read_text
 
@@ -71,6 +72,7 @@ def recipe_of(source: Source, *, check_files: bool = True, resolved: bool = Fals
     """
     for note in source.notes:
         warnings.warn(f"{source.name}: {note}", RenamedKey, stacklevel=2)
+    source = with_models(source)
     data = _resolved(source, source.data, (), check_files)
     try:
         return _ADAPTER.validate_json(json.dumps(data), strict=True, context={"resolved": resolved})

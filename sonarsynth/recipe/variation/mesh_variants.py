@@ -4,76 +4,97 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-import numpy as np
-
-from sonarsynth.conventions import Ints
 from sonarsynth.description import FieldError
 from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.recipe.scene import Scene
 from sonarsynth.recipe.sequences import Sequences
 from sonarsynth.recipe.variation.values import Where, where
+from sonarsynth.targets.target import base_mesh
 
 MOST_VARIANTS = 1000
 """Different meshes of a target that a dataset may have."""
 
-Variants = tuple[tuple[tuple[int, Mesh], ...], ...]
-"""Of each target: the first sequence that has a mesh, and the mesh."""
 
+def target_meshes(sequences: Sequences) -> dict[str, tuple[Mesh, ...]]:
+    """The meshes of each target of the recipe, and of the models of each population, by its name.
 
-def target_meshes(sequences: Sequences) -> Variants:
-    """The meshes of each target. Raises FieldError for more than MOST_VARIANTS, or a scene that cannot be."""
+    Raises FieldError for more than MOST_VARIANTS, or a scene that cannot be.
+    """
     return _found(sequences)[0]
 
 
-def variant_numbers(sequences: Sequences) -> Ints:
-    """Which of its meshes each target has (sequence, target)."""
-    return _found(sequences)[1]
+def mesh_number(sequences: Sequences, scene: Scene, target: int) -> int:
+    """Which of its meshes a target of the scene of a sequence has."""
+    numbers, name = _found(sequences)[1], scene.world.targets[target].name
+    digest = _base_mesh(scene, target).digest
+    group = next((p.name for p in sequences.base.world.populations if name in p.slots), name)
+    return numbers[group][digest]
 
 
 @lru_cache(maxsize=8)
-def _found(sequences: Sequences) -> tuple[Variants, Ints]:
-    scene = sequences.scene(0)
-    targets = len(scene.world.targets)
-    numbers = np.zeros((sequences.count, targets), np.int64)
-    kept: list[tuple[tuple[int, Mesh], ...]] = []
-    for target in range(targets):
-        shaping = _shaping(sequences, target)
-        if not shaping:
-            kept.append(((0, scene.meshes[target]),))
+def _found(sequences: Sequences) -> tuple[dict[str, tuple[Mesh, ...]], dict[str, dict[str, int]]]:
+    """Meshes of each group, and their numbers by their digests."""
+    scene = sequences.described(0)
+    kept = {target.name: _of_target(sequences, n) for n, target in enumerate(scene.world.targets)}
+    for place, population in enumerate(scene.world.populations):
+        kept[population.name] = tuple(_of_model(scene, place, n) for n in range(len(population.models)))
+    alone = {name: tuple({mesh.digest: mesh for mesh in some}.values()) for name, some in kept.items()}
+    return alone, {name: {mesh.digest: n for n, mesh in enumerate(some)} for name, some in alone.items()}
+
+
+def _of_target(sequences: Sequences, target: int) -> tuple[Mesh, ...]:
+    """The meshes of a target of the recipe, in the order of the sequences."""
+    shaping = _shaping(sequences, target)
+    if not shaping:
+        return (_mesh(sequences, 0, target),)
+    found: dict[str, Mesh] = {}
+    known = set[tuple[str, ...]]()
+    gridded = max(shaping) < len(sequences.grid_settings(0))  # nothing that is drawn matters
+    for sequence in range(sequences.count):
+        settings = sequences.grid_settings(sequence) if gridded else sequences.settings(sequence)
+        signature = tuple(settings[i].value.text for i in shaping)
+        if signature in known:
             continue
-        found: dict[str, int] = {}
-        known: dict[tuple[str, ...], int] = {}
-        meshes: list[tuple[int, Mesh]] = []
-        gridded = max(shaping) < len(sequences.grid_settings(0))  # nothing that is drawn matters
-        for sequence in range(sequences.count):
-            settings = sequences.grid_settings(sequence) if gridded else sequences.settings(sequence)
-            signature = tuple(settings[i].value.text for i in shaping)
-            if signature not in known:
-                mesh = _mesh(sequences, sequence, target)
-                known[signature] = found.setdefault(mesh.digest, len(found))
-                if len(found) > len(meshes):
-                    meshes.append((sequence, mesh))
-                if len(found) > MOST_VARIANTS:
-                    place = sequences.entries[shaping[-1]][0]
-                    raise FieldError(place, f"makes more than {MOST_VARIANTS} different meshes: choose among fewer")
-            numbers[sequence, target] = known[signature]
-        kept.append(tuple(meshes))
-    return tuple(kept), numbers
+        known.add(signature)
+        mesh = _mesh(sequences, sequence, target)
+        found.setdefault(mesh.digest, mesh)
+        if len(found) > MOST_VARIANTS:
+            place = sequences.entries[shaping[-1]][0]
+            raise FieldError(place, f"makes more than {MOST_VARIANTS} different meshes: choose among fewer")
+    return tuple(found.values())
+
+
+def _of_model(scene: Scene, place: int, number: int) -> Mesh:
+    population = scene.world.populations[place]
+    model = population.models[number]
+    law = model.scattering or scene.physics.scattering
+    try:
+        return base_mesh(model.shape, law, scene.sonar.shortest_wavelength / model.scale[1])
+    except (ValueError, OSError) as error:
+        where = ("scene", "world", "populations", place, "models", number, "shape")
+        raise FieldError(where, str(error)) from None
+
+
+def _base_mesh(scene: Scene, target: int) -> Mesh:
+    return scene.world.targets[target].base_mesh(scene.laws[target], scene.sonar.shortest_wavelength)
 
 
 def _mesh(sequences: Sequences, sequence: int, target: int) -> Mesh:
     with sequences.naming(sequence):
-        scene = sequences.scene(sequence)
+        scene = sequences.described(sequence)
         if target >= len(scene.world.targets):
             raise FieldError(("scene", "world", "targets"), "the number of targets must be the same in all sequences")
         try:
-            return scene.mesh_of(target)
+            return _base_mesh(scene, target)
         except (ValueError, OSError) as error:
             raise FieldError(("scene", "world", "targets", target, "shape"), str(error)) from None
 
 
 def _shaping(sequences: Sequences, target: int) -> list[int]:
     """Numbers of the entries that may change the mesh of a target."""
-    places: tuple[Where, ...] = tuple(("scene", "world", "targets", target, field) for field in ("shape", "scattering"))
+    places: tuple[Where, ...] = tuple(
+        ("scene", "world", "targets", target, field) for field in ("shape", "scattering", "mesh_scale")
+    )
     meets = [
         any(all(a == b for a, b in zip(where(path), place, strict=False)) for path in entry.path for place in places)
         for _, entry in sequences.entries

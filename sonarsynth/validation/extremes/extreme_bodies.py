@@ -19,7 +19,7 @@ from sonarsynth.scattering.law_validity import OFF
 from sonarsynth.state import FrameContext, Medium, Receiver
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
-from sonarsynth.targets.target import mesh_for
+from sonarsynth.targets.target import base_mesh
 from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, together
 from sonarsynth.validation.extremes.plain_scenes import POSE, PROFILE, WATER, C, body, snap, traced, transfer
 
@@ -58,7 +58,7 @@ def _law(law: MirrorLobe | Kirchhoff) -> Got:
     for radius, low in SPHERES:
         frequency = np.geomspace(low, 3.4 * low, 9)
         shape = Sphere(radius=radius, edge=radius / 8.0)
-        mesh = mesh_for(shape, law, C / frequency[-1])
+        mesh = base_mesh(shape, law, C / frequency[-1])
         exact = sphere_amplitude(frequency, np.pi, radius=radius, sound_speed=C, boundary=boundary)
         error = echo(law, mesh, radius, frequency) - 20.0 * np.log10(np.abs(exact))
         note = law.too_small(Scatterer(mesh, C / frequency[-1], C / frequency[0]))

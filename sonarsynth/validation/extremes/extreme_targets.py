@@ -16,7 +16,7 @@ from sonarsynth.scattering.mirror_lobe import MirrorLobe
 from sonarsynth.targets.mesh_readers.mesh_repair import repair
 from sonarsynth.targets.meshes import mesh_of, refined_mesh
 from sonarsynth.targets.shapes import Box, Shape, Sphere
-from sonarsynth.targets.target import mesh_for
+from sonarsynth.targets.target import base_mesh
 from sonarsynth.targets.target_strength import target_strength
 from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, together
 from sonarsynth.validation.extremes.plain_scenes import C, body, snap, traced, transfer
@@ -29,7 +29,7 @@ BESIDE = np.array([0.0, 1e-6, 0.0])
 def echo(shape: Shape, far: float, band: tuple[float, float]) -> Floats:
     """The coherent echo (frequency,) at the ends of a band of a body whose middle is so far ahead (m)."""
     law = Kirchhoff()
-    mesh = mesh_for(shape, law, C / band[1])
+    mesh = base_mesh(shape, law, C / band[1])
     found = traced([snap(BESIDE)], ONE, [body(mesh, (far, 0.0, 0.0))], [law], band)
     return transfer(found.select(~found.direct), np.array(band))
 

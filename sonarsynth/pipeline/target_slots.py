@@ -1,0 +1,56 @@
+"""Bodies of a frame in their places along the target axis of the store: what is not there reads as missing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonarsynth.pipeline.stored_values import Values, table
+from sonarsynth.pipeline.variables.variable import Variable
+from sonarsynth.planning import Plan
+
+INDICES = (("/truth/beams", "target"), ("/cloud", "target"))
+"""Variables that are numbers of targets."""
+
+
+def which_values(plan: Plan) -> Values:
+    """What the bodies of a frame are, each along its own axis; `plan` is that of its sequence."""
+    scene, recipe = plan.scene, plan.recipe
+    targets, categories = scene.world.targets, recipe.categories
+    return table(
+        "/truth/targets",
+        present=np.ones(len(targets), np.int8),
+        category=np.array([categories.index(target.category) for target in targets], np.int16),
+        clutter=np.array([target.clutter for target in targets], np.int8),
+        scale=np.array([target.scale for target in targets], float),
+        mesh=np.array([recipe.mesh_number(scene, n) for n in range(len(targets))], np.int32),
+    )
+
+
+def in_slots(plan: Plan, values: Values, variables: tuple[Variable, ...]) -> Values:
+    """The values of a frame with every axis of targets as long as the store's; `plan` is that of its sequence."""
+    slots = {name: n for n, name in enumerate(plan.recipe.target_names)}
+    here = np.array([slots[target.name] for target in plan.scene.world.targets], np.int64)
+    if len(here) == len(slots):
+        return values
+    found = dict(values)
+    for v in variables:
+        if "target" in v.dims and (v.group, v.name) in values:
+            found[v.group, v.name] = _spread(values[v.group, v.name], v, here, len(slots))
+    found["/truth/targets", "present"] = np.isin(np.arange(len(slots)), here).astype(np.int8)
+    for key in INDICES:
+        if key in values:
+            numbers = values[key]
+            known = np.append(here, -1)[np.where(numbers < 0, len(here), numbers)]
+            found[key] = known.astype(numbers.dtype)
+    return found
+
+
+def _spread(values: np.ndarray, variable: Variable, here: np.ndarray, slots: int) -> np.ndarray:
+    """Values along the axis of targets, in their slots; the direct path of the link budget stays the last."""
+    axis = variable.dims.index("target") - 1  # without frames
+    also = values.shape[axis] - len(here)
+    shape = (*values.shape[:axis], slots + also, *values.shape[axis + 1 :])
+    spread = np.full(shape, variable.fill, values.dtype)
+    places = np.concatenate([here, slots + np.arange(also)])
+    np.moveaxis(spread, axis, 0)[places] = np.moveaxis(values, axis, 0)
+    return spread

@@ -1,0 +1,199 @@
+"""Drawing the bodies of populations: each where it fits, keyed so that nothing that comes after it changes it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.description import FieldError
+from sonarsynth.geometry import Pose
+from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.geometry.motion import pose
+from sonarsynth.randomness import number, share, stream, uniforms
+from sonarsynth.receiver import elements
+from sonarsynth.recipe.populations.drawn_tracks import DRAWS, Span
+from sonarsynth.recipe.populations.population import Population
+from sonarsynth.recipe.populations.regions import SonarView
+from sonarsynth.targets.target import Target
+
+if TYPE_CHECKING:
+    from sonarsynth.recipe.scene import Scene
+
+TRIES = 1000
+"""Places that are tried for a body before there is said to be no room."""
+TIMES = 9
+"""Frames of a sequence that a place must do for, at most; first and last among them."""
+ABOVE_BOTTOM = 1e-3
+"""m between the bottom and the lowest point of what lies on it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """The bodies of a sequence."""
+
+    targets: tuple[Target, ...]
+    tried: int  # places
+
+
+@dataclass(frozen=True, eq=False)
+class _Ball:
+    """A sphere that moves."""
+
+    centre: Floats  # (time, xyz) m
+    radius: float  # m
+
+    def gap(self, other: _Ball) -> float:
+        """Least distance (m) between the two at any time; negative where they meet."""
+        apart = np.linalg.norm(self.centre - other.centre, axis=1).min(initial=np.inf)
+        return float(apart) - self.radius - other.radius
+
+
+@dataclass(frozen=True, eq=False)
+class _MovingBox:
+    """The box round a target of the recipe."""
+
+    poses: tuple[Pose, ...]  # (time,)
+    box: Floats  # (2, xyz) m, own frame
+
+    def gap(self, other: _Ball) -> float:
+        """Least distance (m) to a sphere at any time."""
+        apart = np.inf
+        for there, centre in zip(self.poses, other.centre, strict=True):
+            local = there.to_body(centre)
+            outside = np.maximum(np.maximum(self.box[0] - local, local - self.box[1]), 0.0)
+            apart = min(apart, float(np.linalg.norm(outside)))
+        return apart - other.radius
+
+
+def populated(scene: Scene, seed: int, key: int | str) -> Scene:
+    """The scene of the sequence of a key, with the bodies of its populations among its targets.
+
+    Raises FieldError where a population has no room.
+    """
+    if not scene.world.populations:
+        return scene
+    targets = (*scene.world.targets, *draw(scene, seed, key).targets)
+    return replace(scene, world=replace(scene.world, targets=targets, populations=()))
+
+
+def draw(scene: Scene, seed: int, key: int | str) -> Drawn:
+    """The bodies of the populations of a scene. Raises FieldError as `populated`."""
+    sea = _Sea.of(scene, seed, key)
+    found: list[Target] = []
+    tried = 0
+    for place, population in enumerate(scene.world.populations):
+        base = number(seed, "population", key, population.name)
+        count = _count(population, share(seed, "population", key, population.name, "count"))
+        for slot in range(count):
+            for attempt in range(TRIES):
+                tried += 1
+                target = sea.tried(population, slot, uniforms(base, slot, attempt, np.arange(6 + DRAWS + 2)))
+                if target is not None:
+                    found.append(target)
+                    break
+            else:
+                raise FieldError(
+                    ("scene", "world", "populations", place),
+                    f"no room for body {slot + 1} of {count} in {TRIES} tries: it needs a larger region, or fewer or "
+                    "smaller bodies",
+                )
+    return Drawn(tuple(found), tried)
+
+
+def _count(population: Population, part: float) -> int:
+    weights = population.weights or np.ones(population.most - population.least + 1)
+    bounds = np.cumsum(weights)
+    return population.least + int(np.searchsorted(bounds, part * bounds[-1], side="right"))
+
+
+class _Sea:
+    """What is in the water already, at some times of a sequence."""
+
+    def __init__(self, scene: Scene, times: Floats, others: list[_Ball | _MovingBox]) -> None:
+        self.scene, self.times, self.others = scene, times, others
+        self.span = Span(float(times[0]), float(times[-1]))
+        beams = scene.sonar.beams
+        middle = pose(scene.trajectory.sonar, self.span.middle)
+        self.view = SonarView(middle, beams.azimuth_span, beams.elevation_span)
+
+    @classmethod
+    def of(cls, scene: Scene, seed: int, key: int | str) -> _Sea:
+        """The targets of the recipe, the array, and the snaps."""
+        trajectory, bottom = scene.trajectory, scene.world.environment.depth
+        steps = sorted({int(n) for n in np.linspace(0, trajectory.frames - 1, min(trajectory.frames, TIMES)).round()})
+        times = np.array([trajectory.time(step) for step in steps])
+        sonar = np.array([pose(trajectory.sonar, t).position for t in times])
+        others: list[_Ball | _MovingBox] = [_Ball(sonar, 0.5 * elements(scene.sonar.array).aperture)]
+        for i, source in enumerate(scene.world.sources):
+            snaps = [
+                source.emissions(bottom, stream(seed, "snap", key, step, i), t)
+                for step, t in zip(steps, times.tolist(), strict=True)
+            ]
+            for each in zip(*snaps, strict=False):
+                others.append(_Ball(np.array([snap.position for snap in each]), 0.0))
+        for target, mesh in zip(scene.world.targets, scene.meshes, strict=True):
+            others.append(_MovingBox(tuple(pose(target.motion, t) for t in times), mesh.box))
+        return cls(scene, times, others)
+
+    def tried(self, population: Population, slot: int, draws: Floats) -> Target | None:
+        """The body that draws make, and it is in the water from now on; None where it does not fit."""
+        where = population.region.place(draws[:3], self.view)
+        if where is None:
+            return None
+        weights = np.cumsum([model.weight for model in population.models])
+        model = population.models[int(np.searchsorted(weights, draws[-1] * weights[-1], side="right"))]
+        smallest, largest = model.scale
+        attitude = population.orientation.attitude(draws[3:6])
+        made = population.track.motion(where, attitude, self.span, draws[6 : 6 + DRAWS])
+        target = Target(
+            name=population.slots[slot],
+            shape=model.shape,
+            motion=made,
+            scattering=model.scattering,
+            category=model.category or population.name,
+            clutter=population.clutter,
+            scale=float(smallest * (largest / smallest) ** draws[-2]),
+            mesh_scale=largest,
+        )
+        law = model.scattering or self.scene.physics.scattering
+        mesh = target.base_mesh(law, self.scene.sonar.shortest_wavelength)
+        hull = target.scale * hull_of(mesh)
+        if population.on_bottom:
+            lowest = float(pose(made, self.span.middle).to_world(hull)[:, 2].min())
+            where = where - [0.0, 0.0, lowest + self.scene.world.environment.depth - ABOVE_BOTTOM]
+            made = population.track.motion(where, attitude, self.span, draws[6 : 6 + DRAWS])
+            target = replace(target, motion=made)
+        poses = [pose(made, t) for t in self.times.tolist()]
+        ball = _round(mesh, target.scale, poses)
+        apart = population.apart
+        if not self._in_water(hull, poses) or any(other.gap(ball) < apart for other in self.others):
+            return None
+        self.others.append(ball)
+        return target
+
+    def _in_water(self, hull: Floats, poses: list[Pose]) -> bool:
+        bottom = -self.scene.world.environment.depth
+        heights = [there.to_world(hull)[:, 2] for there in poses]
+        return all(float(z.min()) > bottom and float(z.max()) < 0.0 for z in heights)
+
+
+def _round(mesh: Mesh, scale: float, poses: list[Pose]) -> _Ball:
+    """The sphere round the box of a body at some times."""
+    low, high = scale * mesh.box
+    centre = np.array([there.to_world(0.5 * (low + high)) for there in poses])
+    return _Ball(centre, 0.5 * float(np.linalg.norm(high - low)))
+
+
+@lru_cache(maxsize=256)
+def hull_of(mesh: Mesh) -> Floats:
+    """Vertices (vertex, xyz) of a mesh that can be its highest or lowest: those of its convex hull."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return np.asarray(mesh.vertices[ConvexHull(mesh.vertices).vertices])
+    except QhullError:  # flat
+        return mesh.vertices
