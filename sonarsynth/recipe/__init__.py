@@ -23,7 +23,16 @@ from sonarsynth.recipe.splits import SPLITS, Splits
 from sonarsynth.recipe.tolerance import Accuracy
 from sonarsynth.recipe.variation.grid import Axis, Zip, entry_tag
 from sonarsynth.recipe.variation.mesh_variants import mesh_number, target_meshes
-from sonarsynth.recipe.variation.random_variations import Choice, Normal, Sobol, Uniform, Variation
+from sonarsynth.recipe.variation.named_paths import numbered, numbered_variations
+from sonarsynth.recipe.variation.random_variations import (
+    Choice,
+    Integers,
+    LogUniform,
+    Normal,
+    Sobol,
+    Uniform,
+    Variation,
+)
 from sonarsynth.recipe.variation.values import Plain
 from sonarsynth.sources.noise_source import NoiseRecording
 from sonarsynth.sources.snap_models import RecordedSnap
@@ -37,6 +46,8 @@ __all__ = [
     "Axis",
     "Choice",
     "Creator",
+    "Integers",
+    "LogUniform",
     "Normal",
     "Plain",
     "Recipe",
@@ -83,7 +94,9 @@ class Recipe:
     @cached_property
     def spanned(self) -> Sequences:
         """The sequences."""
-        return Sequences(self.scene, self.seed, self.grid, self.variations, self.repeats, self.splits)
+        world = self.scene.world
+        grid, variations = numbered(world, self.grid), numbered_variations(world, self.variations)
+        return Sequences(self.scene, self.seed, grid, variations, self.repeats, self.splits)
 
     @property
     def sequences(self) -> int:

@@ -20,17 +20,19 @@ import numpy as np
 from sonarsynth.conventions import Ints
 from sonarsynth.description import FieldError
 from sonarsynth.randomness import number
-from sonarsynth.recipe.populations.drawing import populated
+from sonarsynth.recipe.populations.drawn_bodies import populated
 from sonarsynth.recipe.renamed_keys import as_drawn
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.recipe.splits import SPLITS, Splits, assign
 from sonarsynth.recipe.variation.grid import Axis, Zip, axes
-from sonarsynth.recipe.variation.random_variations import Choice, Sobol, Variation
+from sonarsynth.recipe.variation.random_variations import Choice, Ranged, Sobol, Variation
 from sonarsynth.recipe.variation.setting import Setting, plain_scene, with_settings
 from sonarsynth.recipe.variation.values import Plain, Where, default_name, where
 
 MOST_FRAMES = 10_000_000
 MOST_SEQUENCES = 1_000_000
+NOTHING = Plain.of(None)
+"""Value of an entry whose field stays as it is."""
 RESERVED = ("frame", "trajectory", "step", "time", "split", "repeat")
 """Names of the store that no entry can have."""
 
@@ -101,14 +103,22 @@ class Sequences:
         point = self.point(sequence)
         of_point, dimension, found = _point(self, point[:-1])[1], 0, []
         key = f"{of_point} {point[-1]}"
+        paths = {name_of(variation): variation.path[0] for variation in self.variations}
+        held = {setting.name: setting.value for setting in self.grid_settings(sequence)}
         for i, variation in enumerate(self.variations):
             path = as_drawn(variation.path[0])
             if isinstance(variation, Sobol):
                 value = variation.draw(self.seed, of_point, path, dimension, point[-1])
                 dimension += 1
-            else:
+            elif isinstance(variation, Choice):
                 value = variation.draw(self.seed, key, path)
-            found.append(Setting(("variations", i), name_of(variation), variation.path, value))
+            else:
+                other = None if variation.like is None else paths[variation.like]
+                value = variation.at(variation.share(self.seed, key, other))
+            applies = variation.when is None or _has(held[variation.when.entry], variation.when.value)
+            held[name_of(variation)] = value if applies else NOTHING
+            set_at = variation.path if applies else ()
+            found.append(Setting(("variations", i), name_of(variation), set_at, held[name_of(variation)]))
         return tuple(found)
 
     def settings(self, sequence: int) -> tuple[Setting, ...]:
@@ -161,10 +171,29 @@ class Sequences:
                 if path in paths:
                     raise FieldError((*place, "path"), f"'{path}' is set by '{paths[path]}' as well")
                 paths[path] = name
+        self._check_dependent()
         if self.splits is not None:
             stratify = [] if self.splits.stratify is None else [(("splits", "stratify"), self.splits.stratify)]
             for at, name in [*stratify, *((("splits", "undivided"), n) for n in self.splits.undivided)]:
                 self._check_name(at, name)
+
+    def _check_dependent(self) -> None:
+        """What goes with another, or only where another has some value: that must be there, and come before."""
+        ranged = {name_of(v): v for v in self.variations if isinstance(v, Ranged)}
+        listed = {name_of(entry) for some in self._axes for _, entry, _ in some}
+        for i, variation in enumerate(self.variations):
+            if variation.when is not None and variation.when.entry not in listed:
+                known = ", ".join(sorted(listed)) or "there are none"
+                raise FieldError(
+                    ("variations", i, "when", "entry"),
+                    f"'{variation.when.entry}' is no entry of the grid, nor a choice that comes before; known: {known}",
+                )
+            if isinstance(variation, Choice):
+                listed.add(name_of(variation))
+            like = variation.like if isinstance(variation, Ranged) else None
+            if like is not None and (like not in ranged or ranged[like].like is not None or like == name_of(variation)):
+                free = ", ".join(name for name, v in ranged.items() if v.like is None and v is not variation) or "none"
+                raise FieldError(("variations", i, "like"), f"'{like}' is no other variation to go with: {free}")
 
     def _check_name(self, at: Where, name: str) -> None:
         """A name must be that of an entry with values that several sequences can have."""
@@ -237,6 +266,12 @@ def name_of(entry: Axis | Variation) -> str:
 def _closeness(setting: Setting) -> tuple[int, bool]:
     """How much a setting is to blame, of several that meet a field: the one that leads deepest, a drawn one first."""
     return max(len(where(path)) for path in setting.paths), setting.source[0] == "variations"
+
+
+def _has(value: Plain, wanted: Plain) -> bool:
+    """Whether an entry has a value, or one of that kind."""
+    held = value.value
+    return value == wanted or (isinstance(held, dict) and held.get("kind") == wanted.value)
 
 
 def _meet(a: Where, b: Where) -> bool:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.conventions import Unit
-from sonarsynth.recipe.sequences import Sequences, name_of
+from sonarsynth.recipe.sequences import NOTHING, Sequences, name_of
 from sonarsynth.recipe.variation.grid import Axis
 from sonarsynth.recipe.variation.random_variations import Choice, Variation
 from sonarsynth.recipe.variation.setting import unit_at, value_at
@@ -47,27 +47,30 @@ def columns(sequences: Sequences) -> tuple[Column, ...]:
 
 def _column(sequences: Sequences, entry: Axis | Variation, values: Sequence[Plain]) -> Column:
     path = entry.path[0]
-    first = sequences.scene(0)
     listed = entry.taken if isinstance(entry, Axis) else entry.values if isinstance(entry, Choice) else ()
-    unit = unit_at(first, path)
-    found = value_at(first, path)
+    there = next((n for n, value in enumerate(values) if value != NOTHING), None)
+    unit: Unit | None = None
+    found: Any = 0.0
+    if there is not None:
+        scene = sequences.described(there)
+        unit, found = unit_at(scene, path), value_at(scene, path)
     numeric = isinstance(found, (int, float)) and not isinstance(found, bool)
-    parsed = {v: _number(v, unit) for v in set(values) | set(listed)} if numeric else {}
+    parsed = {v: _number(v, unit) for v in set(values) | set(listed) if v != NOTHING} if numeric else {}
     long_name = ", ".join(entry.path)
     if numeric and None not in parsed.values():
-        array = np.array([parsed[v] for v in values], np.float64)
+        array = np.array([parsed.get(v, np.nan) for v in values], np.float64)
         symbol = unit.symbol if unit else "1"
         if symbol.startswith("rad"):
             array = np.rad2deg(array)
         return Column(name_of(entry), array, {"units": UDUNITS.get(symbol, symbol), "long_name": long_name})
-    order = {value: n for n, value in enumerate(listed or dict.fromkeys(values))}
+    order = {value: n for n, value in enumerate(listed or (v for v in dict.fromkeys(values) if v != NOTHING))}
     attributes = {
         "units": "1",
         "long_name": long_name,
         "flag_values": list(range(len(order))),
         "flag_meanings": " ".join(meanings(list(order))),
     }
-    return Column(name_of(entry), np.array([order[v] for v in values], np.int32), attributes)
+    return Column(name_of(entry), np.array([order.get(v, -1) for v in values], np.int32), attributes)
 
 
 def _number(value: Plain, unit: Unit | None) -> float | None:

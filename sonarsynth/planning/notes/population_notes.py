@@ -9,7 +9,7 @@ import numpy as np
 
 from sonarsynth.conventions import counted
 from sonarsynth.recipe import Recipe
-from sonarsynth.recipe.populations.drawing import draw
+from sonarsynth.recipe.populations.drawn_bodies import draw
 
 LOOKED_AT = 1000
 """Sequences whose bodies are drawn to say how many there are."""

@@ -72,7 +72,7 @@ def recipe_of(source: Source, *, check_files: bool = True, resolved: bool = Fals
     """
     for note in source.notes:
         warnings.warn(f"{source.name}: {note}", RenamedKey, stacklevel=2)
-    source = with_models(source)
+    source = source if resolved else with_models(source)
     data = _resolved(source, source.data, (), check_files)
     try:
         return _ADAPTER.validate_json(json.dumps(data), strict=True, context={"resolved": resolved})

@@ -29,9 +29,10 @@ def with_models(source: Source) -> Source:
     made, scene = [], source.data["scene"]
     for number, population in enumerate(populations):
         models = population.get("models") if isinstance(population, dict) else None
-        listed = isinstance(models, dict) and isinstance(models.get("table"), str)
-        named = {"models": _listed(source, (*where, number, "models"), models)} if listed else {}
-        made.append(population | named if named else population)
+        if isinstance(models, dict) and isinstance(models.get("table"), str):
+            made.append(population | {"models": _listed(source, (*where, number, "models"), models)})
+        else:
+            made.append(population)
     world = scene["world"] | {"populations": made}
     return replace(source, data=source.data | {"scene": scene | {"world": world}})
 

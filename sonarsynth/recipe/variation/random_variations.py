@@ -6,12 +6,13 @@ from functools import lru_cache
 from typing import Annotated, Literal
 
 import numpy as np
-from annotated_types import MinLen
+from annotated_types import Ge, Le, MinLen
 from pydantic import model_validator
 
 from sonarsynth.conventions import Ints, Number
 from sonarsynth.description import BY_KIND, description
 from sonarsynth.randomness import share
+from sonarsynth.recipe.renamed_keys import as_drawn
 from sonarsynth.recipe.variation.values import (
     Name,
     Paths,
@@ -32,14 +33,58 @@ FAR = 4.0
 
 
 @description
-class Uniform:
+class Condition:
+    """That another entry has a value."""
+
+    entry: Name
+    """An entry of the grid, or a choice that comes before."""
+    value: PlainValue
+    """What it must have; or its kind."""
+
+
+@description
+class Drawn:
+    """What every variation says."""
+
+    path: Paths
+    """Field of the scene; a list of fields gets the same value. Targets, sources and populations go by name or number:
+    `targets.drum.motion.speed`."""
+    name: Name | None = None
+    """Name of the coordinate in the store; left out: made from the path."""
+    when: Condition | None = None
+    """Where alone it is drawn; elsewhere the field stays as it is."""
+
+
+@description
+class Ranged(Drawn):
+    """What every variation says that is a number."""
+
+    like: Name | None = None
+    """Name of another such variation, itself like none, that this one goes with."""
+    correlation: Annotated[Number, Ge(-1), Le(1)] = 1.0
+    """With that: of the normal scores of both (a Gaussian copula), so that each keeps its distribution."""
+
+    def at(self, part: float) -> Plain:
+        """The value that this part (0 to 1) of all draws stays under."""
+        raise NotImplementedError
+
+    def share(self, seed: int, key: int | str, other: str | None) -> float:
+        """The part that is drawn for a sequence; `other`: the path of what it is like."""
+        own = share(seed, "variation", key, as_drawn(self.path[0]))
+        if other is None:
+            return own
+        from scipy.special import ndtr, ndtri
+
+        theirs = share(seed, "variation", key, as_drawn(other))
+        scores = ndtri(np.array([theirs, own]) + 2.0**-54)
+        return float(ndtr(self.correlation * scores[0] + np.sqrt(1.0 - self.correlation**2) * scores[1]))
+
+
+@description
+class Uniform(Ranged):
     """Evenly between two bounds."""
 
     kind: Literal["uniform"] = "uniform"
-    path: Paths
-    """Field of the scene; a list of fields gets the same value."""
-    name: Name | None = None
-    """Name of the coordinate in the store; left out: made from the path."""
     low: Quantity
     high: Quantity
 
@@ -52,20 +97,52 @@ class Uniform:
         """The value that this part (0 to 1) of all draws stays under."""
         return _between(self.low, self.high, part)
 
-    def draw(self, seed: int, key: int | str, path: str) -> Plain:
-        """The value of a sequence."""
-        return self.at(share(seed, "variation", key, path))
+
+@description
+class LogUniform(Ranged):
+    """Between two bounds, evenly in the logarithm."""
+
+    kind: Literal["log_uniform"] = "log_uniform"
+    low: Quantity
+    high: Quantity
+
+    @model_validator(mode="after")
+    def _check(self) -> LogUniform:
+        _check_bounds(self.low, self.high)
+        if not number_and_unit(self.low)[0] > 0.0:
+            raise ValueError(f"low must be greater than 0, not {self.low}")
+        return self
+
+    def at(self, part: float) -> Plain:
+        """As `Ranged.at`."""
+        (low, unit), (high, _) = number_and_unit(self.low), number_and_unit(self.high)
+        return with_unit(min(max(low * (high / low) ** part, low), high), unit)
 
 
 @description
-class Normal:
+class Integers(Ranged):
+    """Whole numbers, each equally often, both bounds included."""
+
+    kind: Literal["integers"] = "integers"
+    low: Annotated[int, Ge(-(10**9)), Le(10**9)]
+    high: Annotated[int, Ge(-(10**9)), Le(10**9)]
+
+    @model_validator(mode="after")
+    def _check(self) -> Integers:
+        if not self.low < self.high:
+            raise ValueError(f"low must be less than high: {self.low} to {self.high}")
+        return self
+
+    def at(self, part: float) -> Plain:
+        """As `Ranged.at`."""
+        return Plain.of(min(self.low + int(part * (self.high - self.low + 1)), self.high))
+
+
+@description
+class Normal(Ranged):
     """A normal distribution, cut off at bounds where these are given (truncated: no draw lies outside)."""
 
     kind: Literal["normal"] = "normal"
-    path: Paths
-    """Field of the scene; a list of fields gets the same value."""
-    name: Name | None = None
-    """Name of the coordinate in the store; left out: made from the path."""
     mean: Quantity
     """Mean before it is cut."""
     deviation: Quantity
@@ -115,20 +192,16 @@ class Normal:
         value = value if low is None else max(low, value)
         return with_unit(value if high is None else min(high, value), unit)
 
-    def draw(self, seed: int, key: int | str, path: str) -> Plain:
-        """The value of a sequence."""
-        return self.at(share(seed, "variation", key, path) + 2.0**-54)
+    def share(self, seed: int, key: int | str, other: str | None) -> float:
+        """As `Ranged.share`; never 0, which has no score."""
+        return super().share(seed, key, other) + (2.0**-54 if other is None else 0.0)
 
 
 @description
-class Choice:
+class Choice(Drawn):
     """One of several values."""
 
     kind: Literal["choice"] = "choice"
-    path: Paths
-    """Field of the scene; a list of fields gets the same value."""
-    name: Name | None = None
-    """Name of the coordinate in the store; left out: made from the path."""
     values: Annotated[tuple[PlainValue, ...], MinLen(1)]
     weights: tuple[Number, ...] | None = None
     """How often each is taken, relative to the others; left out: equally often."""
@@ -156,17 +229,13 @@ class Choice:
 
 
 @description
-class Sobol:
+class Sobol(Drawn):
     """Evenly between two bounds, and more evenly than by chance: the repeats of a grid point share one Sobol sequence
     (Sobol 1967, directions of Joe and Kuo 2008), with a dimension for each variation of this kind, shifted at random
     (digital shift) for each grid point.
     """
 
     kind: Literal["sobol"] = "sobol"
-    path: Paths
-    """Field of the scene; a list of fields gets the same value."""
-    name: Name | None = None
-    """Name of the coordinate in the store; left out: made from the path."""
     low: Quantity
     high: Quantity
 
@@ -185,7 +254,7 @@ class Sobol:
         return self.at((_sobol(dimension, repeat) ^ shift) / (1 << SOBOL_BITS))
 
 
-Variation = Annotated[Uniform | Normal | Choice | Sobol, BY_KIND]
+Variation = Annotated[Uniform | LogUniform | Integers | Normal | Choice | Sobol, BY_KIND]
 
 
 def _sobol(dimension: int, number: int) -> int:

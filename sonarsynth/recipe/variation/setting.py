@@ -14,11 +14,16 @@ from pydantic_core import ErrorDetails
 
 from sonarsynth.conventions import Unit
 from sonarsynth.description import FieldError
+from sonarsynth.receiver import Sonar
 from sonarsynth.recipe.scene import Scene, Trajectory, World
 from sonarsynth.recipe.variation.values import Plain, Where, where
 
 _SCENE: TypeAdapter[Scene] = TypeAdapter(Scene)
-_PARTS: dict[str, TypeAdapter[Any]] = {"world": TypeAdapter(World), "trajectory": TypeAdapter(Trajectory)}
+_PARTS: dict[str, TypeAdapter[Any]] = {
+    "world": TypeAdapter(World),
+    "trajectory": TypeAdapter(Trajectory),
+    "sonar": TypeAdapter(Sonar),
+}
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,11 @@ from sonarsynth.conventions import bounded
 Where = tuple[str | int, ...]
 """A path into a recipe: field names and indices from the top."""
 
+WORLD = ("environment", "targets", "sources", "populations", "noise_sources", "scatterers", "chorus")
+SHORT = dict.fromkeys(WORLD, "scene.world.") | {"trajectory": "scene.", "sonar": "scene."}
+"""What may be left out before a path that begins so."""
+VARYING = ("scene.world.", "scene.trajectory.", "scene.sonar.sensor_errors.", "scene.sonar.electronics.")
+"""What can vary."""
 FIXED = ("scene.trajectory.frames",)
 """Fields that cannot vary though their neighbours can: they decide the shape of the dataset."""
 
@@ -105,17 +110,22 @@ def _paths(value: Any) -> tuple[str, ...]:
     texts = (value,) if isinstance(value, str) else value
     if not isinstance(texts, (list, tuple)) or not texts or not all(isinstance(t, str) for t in texts):
         raise ValueError("must be a path such as scene.world.targets.0.motion.heading, or a list of them")
+    texts = [f"{SHORT[text.split('.')[0]]}{text}" if text.split(".")[0] in SHORT else text for text in texts]
     for text in texts:
-        if not text.startswith(("scene.world.", "scene.trajectory.")) or text in FIXED:
+        if not text.startswith(VARYING) or text in FIXED:
             raise ValueError(
-                f"'{text}' cannot vary: scene.world and scene.trajectory do; the instrument, the methods and the "
-                "number of frames are the same for all sequences"
+                f"'{text}' cannot vary: scene.world, scene.trajectory and what is wrong with the sensors do; the "
+                "instrument, the methods and the number of frames are the same for all sequences"
+            )
+        if re.fullmatch(r"scene\.world\.populations\.[\w-]+(\.(most|name|models(\..*)?))?", text):
+            raise ValueError(
+                f"'{text}' cannot vary: the store has room and meshes for what a population may be at most"
             )
         if text.endswith(".path"):
             raise ValueError(f"'{text}' is the name of a file: vary what holds it, with its kind and path")
         if text.endswith(".kind"):
             raise ValueError(f"'{text}' cannot vary by itself: vary what holds it, with its kind and all its fields")
-        if not all(re.fullmatch(r"\w+", part) for part in text.split(".")):
+        if not all(re.fullmatch(r"[\w-]+", part) for part in text.split(".")):
             raise ValueError(f"'{text}' is not a path such as scene.world.targets.0.motion.heading")
     return tuple(texts)
 

@@ -1,0 +1,47 @@
+"""Paths by name: `targets.drum.motion.speed` for `scene.world.targets.0.motion.speed` of a target that is so called."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TypeVar
+
+from sonarsynth.description import FieldError
+from sonarsynth.recipe.scene import World
+from sonarsynth.recipe.variation.grid import Axis, Zip
+from sonarsynth.recipe.variation.random_variations import Variation
+from sonarsynth.recipe.variation.values import Where
+
+Entry = TypeVar("Entry", bound=Axis | Variation)
+LISTS = ("targets", "sources", "noise_sources", "populations")
+"""Of the world, whose members have names."""
+
+
+def numbered(world: World, grid: tuple[Axis | Zip, ...]) -> tuple[Axis | Zip, ...]:
+    """The entries of a grid with numbers in their paths for names. Raises FieldError for a name that nothing has."""
+    return tuple(
+        replace(entry, zip=tuple(_numbered(world, axis, ("grid", i, "zip", j)) for j, axis in enumerate(entry.zip)))
+        if isinstance(entry, Zip)
+        else _numbered(world, entry, ("grid", i))
+        for i, entry in enumerate(grid)
+    )
+
+
+def numbered_variations(world: World, variations: tuple[Variation, ...]) -> tuple[Variation, ...]:
+    """The same of variations."""
+    return tuple(_numbered(world, variation, ("variations", i)) for i, variation in enumerate(variations))
+
+
+def _numbered(world: World, entry: Entry, where: Where) -> Entry:
+    paths = tuple(_by_number(world, path, (*where, "path")) for path in entry.path)
+    return entry if paths == entry.path else replace(entry, path=paths)
+
+
+def _by_number(world: World, path: str, where: Where) -> str:
+    parts = path.split(".")
+    if len(parts) < 4 or parts[1] != "world" or parts[2] not in LISTS or parts[3].isdecimal():
+        return path
+    names = [one.name for one in getattr(world, parts[2])]
+    if parts[3] not in names:
+        known = ", ".join(names) or "there are none"
+        raise FieldError(where, f"'{path}': none of scene.world.{parts[2]} is called '{parts[3]}'; known: {known}")
+    return ".".join([*parts[:3], str(names.index(parts[3])), *parts[4:]])
