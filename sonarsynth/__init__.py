@@ -32,6 +32,7 @@ _HOMES = {
     "geometry.motion": "Circle ConstantVelocity Line RecordedTrack Still Waypoint Waypoints",
     "imaging": "DenseDelayAndSum FocusedDelayAndSum",
     "pictures": "show",
+    "pictures.preview_figures.preview_pictures": "preview",
     "pictures.ray_pictures": "rays",
     "pictures.snap_pictures": "snap",
     "pictures.soundscape_figures.soundscape_pictures": "soundscape",

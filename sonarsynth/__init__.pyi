@@ -52,6 +52,7 @@ from sonarsynth.geometry.motion import (
 from sonarsynth.geometry.recorded_track import RecordedTrack as RecordedTrack
 from sonarsynth.imaging import DenseDelayAndSum as DenseDelayAndSum, FocusedDelayAndSum as FocusedDelayAndSum
 from sonarsynth.pictures import show as show
+from sonarsynth.pictures.preview_figures.preview_pictures import preview as preview
 from sonarsynth.pictures.ray_pictures import rays as rays
 from sonarsynth.pictures.snap_pictures import snap as snap
 from sonarsynth.pictures.soundscape_figures.soundscape_pictures import soundscape as soundscape

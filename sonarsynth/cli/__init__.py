@@ -15,6 +15,8 @@ from typing import Annotated, Any, Literal
 import typer
 
 from sonarsynth.cli.accuracy_command import accuracy
+from sonarsynth.cli.authoring.init_command import init
+from sonarsynth.cli.authoring.preview_command import preview
 from sonarsynth.cli.card_command import card
 from sonarsynth.cli.export_command import export
 from sonarsynth.cli.rays_command import rays
@@ -236,7 +238,7 @@ def show(
         typer.echo(str(file))
 
 
-for command in (accuracy, card, export, rays, repair, soundscape):
+for command in (accuracy, card, export, init, preview, rays, repair, soundscape):
     app.command()(command)
 app.command("target-strength")(target_strength)
 

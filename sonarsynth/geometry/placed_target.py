@@ -11,6 +11,8 @@ from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.motion import Motion, Track
 
+_CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+
 
 @dataclass(frozen=True, eq=False)
 class PlacedTarget:
@@ -27,6 +29,12 @@ class PlacedTarget:
     def track(self) -> Track:
         """Of its origin."""
         return Track(self.pose, self.velocity, self.motion, self.time)
+
+    @property
+    def box(self) -> Floats:
+        """(8, xyz) m, world: corners of the oriented bounding box, z changing fastest, x slowest."""
+        low, high = self.mesh.box
+        return self.pose.to_world(low + _CORNERS * (high - low))
 
     def later(self, seconds: float) -> PlacedTarget:
         """The body where it will be, or was, so many seconds (s) after."""

@@ -21,8 +21,6 @@ from sonarsynth.state import FrameContext, meeting_times, positions
 Connect = Callable[[Floats, Floats], Paths]
 """Rays from (pair, xyz) to (pair, xyz) in the world: a propagation model bound to its water."""
 
-_CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-
 
 def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -> Truth:
     """Truth of a frame, on the grid of beams of its sonar; snap_level: (snap,) dB re 1 uPa at 1 m.
@@ -53,7 +51,7 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
         target_velocity=_rows([b.velocity for b in bodies], 3),
         meeting_time=met,
         position_at_echo=positions(tracks, met),
-        box=np.array([_box(b, sonar_pose) for b in bodies]).reshape(-1, 8, 3),
+        box=np.array([sonar_pose.to_body(b.box) for b in bodies]).reshape(-1, 8, 3),
         image_box=_rows([box.bounds for box in boxes], 4),
         view=np.array([box.view for box in boxes], np.int8),
         visible_fraction=np.array([fraction for _, fraction in visible]),
@@ -77,12 +75,6 @@ def _direct_times(connect: Connect, start: Floats, end: Floats) -> Floats:
 
 def _rows(rows: list[Floats], width: int) -> Floats:
     return np.array(rows, float).reshape(-1, width)
-
-
-def _box(body: PlacedTarget, sonar_pose: Pose) -> Floats:
-    """(8, xyz) corners of the oriented bounding box in the sonar frame."""
-    low, high = body.mesh.box
-    return sonar_pose.to_body(body.pose.to_world(low + _CORNERS * (high - low)))
 
 
 def _as_seen(body: PlacedTarget, sonar_pose: Pose, connect: Connect, straight: bool) -> Floats:

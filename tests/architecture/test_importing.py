@@ -143,6 +143,7 @@ SURFACE = [
     "open",
     "plan",
     "points",
+    "preview",
     "rays",
     "render",
     "repair",

@@ -9,7 +9,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.pictures.figures.outlines import union_outline
-from sonarsynth.pictures.figures.style import ERROR_MAP, INK, PALE, compass, figure, grid, label
+from sonarsynth.pictures.figures.style import ERROR_MAP, INK, PALE, compass, figure, label
 from sonarsynth.pictures.ray_figures.ray_styles import (
     COLOURS,
     MARKERS,
@@ -19,6 +19,17 @@ from sonarsynth.pictures.ray_figures.ray_styles import (
     highest_coefficient,
     styles,
 )
+from sonarsynth.pictures.ray_figures.scene_drawing import (
+    TRACK,
+    VIEW,
+    bodies_in_space,
+    name_beside,
+    one_scale,
+    profile_axes,
+    scale_words,
+    surface_and_bottom,
+    vertical_scale,
+)
 from sonarsynth.pictures.ray_figures.scene_geometry import SceneGeometry
 
 if TYPE_CHECKING:
@@ -26,11 +37,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from mpl_toolkits.mplot3d import Axes3D
 
-SURFACE, BOTTOM, VIEW, TRACK = "#4a90c2", "#8c6d46", "#7b5ea7", "#444444"
 WIDTH = 8.0
 """Inches of a section; its height is that of equal scales, within `HEIGHTS`."""
 HEIGHTS = (1.7, 5.5)
-AXES = ("east, x (m)", "north, y (m)", "up, z (m)")
 
 
 def section_figure(
@@ -54,13 +63,12 @@ def section_figure(
     for i in drawing_order(looks):
         _draw(section, flat[i], looks[i], drawn[i])
     label(section, f"distance from the array towards {compass(geometry.bearing)} (m)", "")
-    _profile(made.add_subplot(parts[0], sharey=section), depth, speed, geometry.bottom)
+    profile_axes(made.add_subplot(parts[0], sharey=section), depth, speed, geometry.bottom)
     _legend(made, looks, [("field of view", VIEW, "-.")])
     _colour_bar(made, section, looks)
     section.set_title(" ", fontsize=10, color=INK, loc="left")
     factor = _equal_scales(made, section)
-    scales = "one scale" if 0.97 < factor < 1.03 else f"heights drawn {factor:.2g} times as large"
-    section.set_title(f"{title}; {scales}", fontsize=10, color=INK, loc="left")
+    section.set_title(f"{title}; {scale_words(factor)}", fontsize=10, color=INK, loc="left")
     return made
 
 
@@ -72,25 +80,25 @@ def _equal_scales(made: Figure, axes: Axes) -> float:
         inches, wide = box.height / made.dpi, box.width / made.dpi
         made.set_figheight(made.get_figheight() + np.clip(wide * (high - low) / (right - left), *HEIGHTS) - inches)
     made.draw_without_rendering()
-    box = axes.get_window_extent()
-    return float(box.height / (high - low) / (box.width / (right - left)))
+    return vertical_scale(axes)
 
 
 def _section(axes: Axes, geometry: SceneGeometry) -> None:
     """Surface, bottom, field of view, targets, hydrophones and named places on the plane of a section."""
-    for z, colour in ((0.0, SURFACE), (-geometry.bottom, BOTTOM)):
-        axes.axhline(z, color=colour, linewidth=1.5)
+    surface_and_bottom(axes, geometry.bottom)
     axes.plot(*geometry.on_plane(geometry.view["upright"]).T, color=VIEW, linewidth=0.8, linestyle="-.")
     for hull in geometry.hulls:
         body = geometry.on_plane(hull.vertices)
         for line in union_outline(body, hull.faces):
             axes.fill(*line.T, facecolor="#d9d9d9", edgecolor=INK, linewidth=0.8)
-        _name(axes, hull.name, np.array([0.5 * (body[:, 0].min() + body[:, 0].max()), body[:, 1].max()]), over=True)
+        name_beside(
+            axes, hull.name, np.array([0.5 * (body[:, 0].min() + body[:, 0].max()), body[:, 1].max()]), over=True
+        )
     axes.plot(*geometry.on_plane(geometry.sensors).T, "s", color=INK, markersize=2.0, zorder=5)
     for name, point in geometry.places.items():
         place = geometry.on_plane(point[None])[0]
         axes.plot(*place, "o", color=INK, markersize=4, zorder=5)
-        _name(axes, name, place)
+        name_beside(axes, name, place)
 
 
 def _draw(axes: Axes, points: Floats, look: Look, style: Style) -> None:
@@ -101,15 +109,6 @@ def _draw(axes: Axes, points: Floats, look: Look, style: Style) -> None:
         at = points[[e == event for e in look.event]]
         if len(at):
             axes.plot(*at.T, marker, color=style.colour, markersize=4)
-
-
-def _name(axes: Axes, name: str, place: Floats, over: bool = False) -> None:
-    """A name beside a point (2), or over it."""
-    from matplotlib.patheffects import withStroke
-
-    offset = {"xytext": (0, 5), "ha": "center"} if over else {"xytext": (6, -11)}
-    text = axes.annotate(name, place, textcoords="offset points", fontsize=9, color=INK, zorder=6, **offset)  # type: ignore[arg-type]
-    text.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
 
 
 def _legend(made: Figure, looks: Sequence[Look], lines: Sequence[tuple[str, str, str]]) -> None:
@@ -142,25 +141,12 @@ def _colour_bar(made: Figure, axes: Axes, looks: Sequence[Look], pad: float = 0.
         bar.ax.tick_params(labelsize=8)
 
 
-def _profile(axes: Axes, depth: Floats, speed: Floats, bottom_depth: float) -> None:
-    inside = (depth > 0.0) & (depth < bottom_depth)
-    ends = np.interp([0.0, bottom_depth], depth, speed)
-    grid(axes)
-    axes.plot([ends[0], *speed[inside], ends[1]], [0.0, *-depth[inside], -bottom_depth], color=INK, linewidth=1.2)
-    axes.ticklabel_format(axis="x", useOffset=False)
-    label(axes, "sound speed (m/s)", "up, z (m)", "profile")
-    middle = 0.5 * (speed.min() + speed.max())
-    half = max(0.6 * np.ptp(speed), 2.0)
-    axes.set_xlim(middle - half, middle + half)
-    axes.locator_params(axis="x", nbins=3)
-
-
 def space_figure(title: str, rays: Sequence[Floats], looks: Sequence[Look], geometry: SceneGeometry) -> Figure:
     """Rays (each (point, xyz) in m, world) in space on one scale, with tracks and field of view, and the array."""
     made = figure(11.0, 5.6, dpi=110)
     parts = made.add_gridspec(2, 2, width_ratios=[3.4, 1.0])
     axes: Axes3D = made.add_subplot(parts[:, 0], projection="3d")
-    _bodies(axes, geometry)
+    bodies_in_space(axes, geometry.hulls)
     lines = [("field of view, at the array's elevation", VIEW, "-.")]
     axes.plot(*geometry.view["across"].T, color=VIEW, linewidth=0.8, linestyle="-.")
     for name, track in geometry.tracks.items():
@@ -175,36 +161,12 @@ def space_figure(title: str, rays: Sequence[Floats], looks: Sequence[Look], geom
         axes.scatter(*place, s=22, color=INK, depthshade=False)
         axes.text(*place, f"  {name}", fontsize=9, color=INK)
     every = [*rays, *(hull.vertices for hull in geometry.hulls), *geometry.tracks.values(), geometry.view["across"]]
-    _one_scale(axes, np.concatenate([*every, *(p[None] for p in geometry.places.values())]), geometry.bearing)
+    one_scale(axes, np.concatenate([*every, *(p[None] for p in geometry.places.values())]), geometry.bearing)
     _face(made.add_subplot(parts[0, 1]), geometry)
     _legend(made, looks, lines)
     _colour_bar(made, axes, looks, pad=0.14)
     made.suptitle(f"{title}; one scale", x=0.01, ha="left", fontsize=11, color=INK)
     return made
-
-
-def _bodies(axes: Axes3D, geometry: SceneGeometry) -> None:
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-    for hull in geometry.hulls:
-        body = Poly3DCollection(
-            hull.vertices[hull.faces], facecolors="#c8c8c8", edgecolors=PALE, alpha=0.5, linewidths=0.2
-        )
-        axes.add_collection3d(body, autolim=False)
-
-
-def _one_scale(axes: Axes3D, points: Floats, bearing: float) -> None:
-    """Limits that hold points (point, xyz) in boxes of their size, seen with `bearing` (rad) to the right."""
-    span = np.maximum(np.ptp(points, axis=0), 0.05 * np.ptp(points, axis=0).max())
-    middle = 0.5 * (points.max(axis=0) + points.min(axis=0))
-    axes.set(**{f"{axis}lim": (m - 0.5 * s, m + 0.5 * s) for axis, m, s in zip("xyz", middle, span, strict=True)})
-    axes.set_box_aspect(tuple(span), zoom=1.05)
-    axes.view_init(elev=30.0, azim=-60.0 + float(np.rad2deg(bearing)))
-    for axis, name, size in zip((axes.xaxis, axes.yaxis, axes.zaxis), AXES, span, strict=True):
-        axis.set_label_text(name, fontsize=8)
-        axis.labelpad = 10.0
-        axis.get_major_locator().set_params(nbins=max(2, round(7 * float(size / span.max()))))
-    axes.tick_params(labelsize=7)
 
 
 def _face(axes: Axes, geometry: SceneGeometry) -> None:

@@ -12,8 +12,8 @@ from sonarsynth.conventions import Floats
 from sonarsynth.pictures.figures.frame_figure import Hull
 from sonarsynth.pictures.figures.outlines import union_outline
 from sonarsynth.pictures.figures.style import ERROR_MAP, INK, compass
-from sonarsynth.pictures.ray_figures.ray_figure import AXES, BOTTOM, SURFACE, TRACK, VIEW
 from sonarsynth.pictures.ray_figures.ray_styles import FAN, Look, Style, drawing_order, highest_coefficient, styles
+from sonarsynth.pictures.ray_figures.scene_drawing import AXES, BOTTOM, SURFACE, TRACK, VIEW
 from sonarsynth.pictures.ray_figures.scene_geometry import SceneGeometry
 
 if TYPE_CHECKING:

@@ -1,0 +1,61 @@
+"""The recipes that come with sonarsynth, wherever it is installed, and copies of them that work elsewhere."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import sonarsynth
+from sonarsynth.cli.running import BadOption
+
+PACKAGE = Path(sonarsynth.__file__).parent
+
+
+def shipped() -> dict[str, Path]:
+    """The shipped recipes by name: of the clone that runs, else those installed with the package."""
+    found = (sorted(folder.glob("*.yaml")) for folder in (PACKAGE.parent / "configs", PACKAGE / "configs"))
+    return {file.stem: file for file in next((files for files in found if files), [])}
+
+
+def text_of(name: str, file: Path) -> tuple[str, list[Path], list[str]]:
+    """A shipped recipe as the text of a new file, the files that go with it, and the names of those that do not come.
+
+    Commands in its comments name the new file. Raises BadOption where there is no such recipe.
+    """
+    from sonarsynth.recipe import reading
+
+    known = shipped()
+    name = Path(name).stem
+    if name not in known:
+        raise BadOption(f"--from: '{name}' is none of {', '.join(known) or 'the shipped recipes, which are not there'}")
+    text = re.sub(rf"configs/{name}\.yaml", lambda _: str(file), known[name].read_text(encoding="utf-8"))
+    text = re.sub(rf"\b{name}\.zarr", f"{file.stem}.zarr", text)
+    beside = [known[name].parent / path for path in _paths(reading.read(known[name]).data)]
+    there = [path for path in beside if path.is_file()]
+    return text, there, [path.name for path in beside if path not in there]
+
+
+def _paths(data: Any) -> Iterator[str]:
+    """Every file that a recipe names."""
+    from sonarsynth.recipe import FILE_KINDS
+
+    if isinstance(data, dict):
+        if data.get("kind") in FILE_KINDS and isinstance(data.get("path"), str):
+            yield data["path"]
+        for value in data.values():
+            yield from _paths(value)
+    elif isinstance(data, list):
+        for value in data:
+            yield from _paths(value)
+
+
+def copy_beside(files: list[Path], folder: Path) -> None:
+    """Copy files that a recipe names into its folder. Raises BadOption before any is copied where one is there."""
+    for file in files:
+        if (folder / file.name).exists():
+            raise BadOption(f"{folder / file.name} exists already: nothing was written")
+    for file in files:
+        shutil.copyfile(file, folder / file.name)

@@ -1,0 +1,1 @@
+"""What a recipe would make, drawn before it is built."""
