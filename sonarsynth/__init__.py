@@ -64,7 +64,7 @@ _HOMES = {
     "targets.target_strength": "target_strength",
 }
 _HOME = {name: (home, name) for home, names in _HOMES.items() for name in names.split()}
-_HOME |= {"accuracy": ("frontiers", "measure"), "card": ("store.cards", "write"), "open": ("store", "open_store")}
+_HOME |= {"accuracy": ("frontiers", "measure"), "card": ("store.cards", "write"), "open": ("loading", "open")}
 
 __all__ = sorted(_HOME)  # noqa: PLE0605  the stub beside this file has the names for type checkers
 

@@ -51,6 +51,7 @@ from sonarsynth.geometry.motion import (
 )
 from sonarsynth.geometry.recorded_track import RecordedTrack as RecordedTrack
 from sonarsynth.imaging import DenseDelayAndSum as DenseDelayAndSum, FocusedDelayAndSum as FocusedDelayAndSum
+from sonarsynth.loading import open as open
 from sonarsynth.pictures import show as show
 from sonarsynth.pictures.preview_figures.preview_pictures import preview as preview
 from sonarsynth.pictures.ray_pictures import rays as rays
@@ -137,7 +138,7 @@ from sonarsynth.sources.snap_models import (
     Ricker as Ricker,
     SnapVariation as SnapVariation,
 )
-from sonarsynth.store import open_store as open, verify as verify
+from sonarsynth.store import verify as verify
 from sonarsynth.store.cards import write as card
 from sonarsynth.targets.shapes import (
     Box as Box,

@@ -107,6 +107,11 @@ def _reference(frames: list[Stored]) -> float:
     return max([p for p in peaks if p > 0], default=1.0)
 
 
+def frame_view(tree: xr.DataTree, frame: Stored) -> View:
+    """What is drawn of a frame by itself, in dB re its brightest beam."""
+    return _view(tree, frame, _reference([frame]))
+
+
 def _view(tree: xr.DataTree, frame: Stored, reference: float) -> View:
     title = tree.attrs.get("title") or "untitled"
     clock = f"   t = {frame.time:.2f} s" if np.isfinite(frame.time) else ""
@@ -136,7 +141,7 @@ def _write_sheet(
     elif not heard:
         say("sheet: without beam signals, for no beam of the frame points at a target")
     errors = Errors(points=frame.points, error=frame.range_error)
-    view = _view(tree, frame, _reference([frame]))
+    view = frame_view(tree, frame)
     made = sheet(*beam_grid(tree), view, errors, heard, window([view]), "energy re the brightest beam (dB)")
     path = folder / "sheet.png"
     made.savefig(path, bbox_inches="tight", pad_inches=0.1)

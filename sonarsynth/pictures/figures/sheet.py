@@ -67,12 +67,7 @@ def sheet(
     rows = made.add_gridspec(2 if beams else 1, 1, height_ratios=[1.75, 1.0] if beams else [1.0])
     top = rows[0].subgridspec(1, 3, width_ratios=[1.12, 0.12, 1.0])
     sky = made.add_subplot(top[0])
-    image = image_axes(sky, azimuth, elevation)
-    if view.level is not None:
-        image.set_data(np.ma.masked_invalid(clipped(view.level))[:, ::-1])
-    outlines = set_outlines(outline_artist(sky), view.hulls)
-    legend(sky)
-    colour_bar(sky, image, unit)
+    outlines = draw_image(sky, azimuth, elevation, view, unit)
     draw_cloud(made.add_subplot(top[2], projection="3d"), made, view, errors, space)
     if beams:
         below = rows[1].subgridspec(1, len(beams))
@@ -81,6 +76,17 @@ def sheet(
     GhostMarks(sky).show(view.ghosts, view.lobes, outlines, BADGES if beams else 0.0)
     mark_beams(sky, beams, outlines)
     return made
+
+
+def draw_image(axes: Axes, azimuth: Floats, elevation: Floats, view: View, unit: str) -> list[Floats]:
+    """The energy image over the beam grid (deg), with its scale and the outlines of targets, which are returned."""
+    image = image_axes(axes, azimuth, elevation)
+    if view.level is not None:
+        image.set_data(np.ma.masked_invalid(clipped(view.level))[:, ::-1])
+    outlines = set_outlines(outline_artist(axes), view.hulls)
+    legend(axes)
+    colour_bar(axes, image, unit)
+    return outlines
 
 
 def mark_beams(axes: Axes, beams: list[Beam], outlines: list[Floats]) -> None:

@@ -1,0 +1,66 @@
+"""`.sonar` of the tree of a store: its points and groups as tables, a frame as a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import xarray as xr
+
+from sonarsynth.loading.tables import as_table, built_frames, points_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+@xr.register_datatree_accessor("sonar")  # type: ignore[no-untyped-call]
+class SonarAccessor:
+    """Tables and pictures of a store. The tree stays what it is: all else is plain xarray."""
+
+    def __init__(self, tree: xr.DataTree) -> None:
+        self._tree = tree
+
+    @property
+    def frames(self) -> list[int]:
+        """Numbers of the frames that were built: the others read as NaN and -1."""
+        return built_frames(self._tree)
+
+    def points(self, frames: int | Iterable[int] | None = None) -> pd.DataFrame:
+        """The points of some frames (left out: all) as a table, a row each, without padding; index: frame and point.
+
+        Columns are the variables of /cloud, in their units; labels with names (target, family, origin, lit_by) are
+        categories, missing where there is none. Raises ValueError where the store has no cloud, IndexError for a
+        frame that it has not.
+        """
+        return points_table(self._tree, frames)
+
+    def table(
+        self, group: str, rows: Iterable[str] | None = None, frames: int | Iterable[int] | None = None
+    ) -> pd.DataFrame:
+        """A group as a table, with a row for each combination of `rows`, of the frames that were built.
+
+        group: such as "truth/targets" or "link_budget". rows: axes, such as ["frame", "target", "family"]; left out,
+        those that most of the variables have. Axes of components (xyz, wxyz, bound, corner) become columns:
+        `position_x`. Variables that have further axes are left out and named in `.attrs["left_out"]`; those with fewer
+        are repeated. Flags are categories by name; other numbers that are -1 mean none.
+
+        Raises KeyError for a group that is not there, ValueError for an axis that it has not, or a table of more than 20 million rows.
+        """
+        return as_table(self._tree, group, rows, frames)
+
+    def image(self, frame: int) -> Figure:
+        """The energy image of a frame with the outlines of targets and the rings of ghosts, in dB re its brightest
+        beam. Raises NothingToDraw, a ValueError, where there is none.
+        """
+        from sonarsynth.pictures.single_frames.frame_pictures import image_picture
+
+        return image_picture(self._tree, frame)
+
+    def cloud(self, frame: int) -> Figure:
+        """The point cloud of a frame in the true hulls, in 3-D, coloured by range error. Raises NothingToDraw, a
+        ValueError, where the frame was not built.
+        """
+        from sonarsynth.pictures.single_frames.frame_pictures import cloud_picture
+
+        return cloud_picture(self._tree, frame)

@@ -1,0 +1,122 @@
+"""Groups of a store as tables of pandas."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from math import prod
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+COMPONENTS = ("xyz", "xyz_other", "wxyz", "bound", "corner")
+"""Axes that become columns: components of one quantity, not several quantities."""
+MOST_ROWS = 20_000_000
+
+
+def built_frames(tree: xr.DataTree) -> list[int]:
+    """Numbers of the frames that were built."""
+    place = np.asarray(tree["truth/sonar_position"].values)
+    return [int(frame) for frame in np.flatnonzero(np.isfinite(place[:, 0]))]
+
+
+def points_table(tree: xr.DataTree, frames: int | Iterable[int] | None) -> pd.DataFrame:
+    """The points of some frames, a row each; see `SonarAccessor.points`."""
+    if "cloud" not in tree.children:
+        raise ValueError("the store has no cloud: it was built without that product")
+    cloud = _of_frames(tree, tree.children["cloud"].to_dataset(inherit=True), frames)
+    own = [name for name, values in cloud.data_vars.items() if values.dims == ("frame", "point")]
+    held = cloud["count"].values
+    cloud = cloud[own].isel(point=slice(0, int(held.max(initial=0)))).load()
+    there = np.arange(cloud.sizes["point"]) < held[:, None]
+    table = cloud.assign_coords(point=np.arange(cloud.sizes["point"])).to_dataframe(dim_order=["frame", "point"])
+    table = _with_words(table[there.ravel()], cloud)
+    names = [str(name) for name in tree["truth/targets"].coords["target"].values]
+    return table.assign(target=_named(table["target"], range(len(names)), names))
+
+
+def as_table(
+    tree: xr.DataTree, group: str, rows: Iterable[str] | None, frames: int | Iterable[int] | None
+) -> pd.DataFrame:
+    """A group as a table; see `SonarAccessor.table`."""
+    node = tree[group]
+    if not isinstance(node, xr.DataTree):
+        raise KeyError(f"{group} is a variable: name its group")
+    dataset = node.to_dataset(inherit=True)
+    if "frame" in node.to_dataset(inherit=False).dims:
+        dataset = _of_frames(tree, dataset, frames)
+    axes = {name: _axes(values) for name, values in dataset.data_vars.items()}
+    wanted = Counter(axes.values()).most_common(1)[0][0] if rows is None and axes else tuple(rows or ())
+    if unknown := [name for name in wanted if name not in dataset.dims]:
+        raise ValueError(f"{group} has no axis {unknown[0]}: {', '.join(map(str, dataset.dims))}")
+    if not wanted:
+        raise ValueError(f"{group} has no axis: there is nothing to make a row of")
+    count = prod(dataset.sizes[name] for name in wanted)
+    if count > MOST_ROWS:
+        raise ValueError(f"{group}: {count} rows are more than {MOST_ROWS}; choose frames, or use xarray")
+    kept = [name for name, own in axes.items() if set(own) <= set(wanted)]
+    columns: dict[str, xr.DataArray] = {}
+    for name in kept:
+        columns |= _columns(str(name), dataset[name])
+    chosen = xr.Dataset(columns, attrs=dataset.attrs).drop_vars(COMPONENTS, errors="ignore")
+    chosen = chosen.expand_dims({name: dataset[name] for name in wanted if name not in chosen.dims})
+    chosen = chosen.assign_coords({name: _labels(dataset[name]) for name in wanted})
+    table = _with_words(chosen.to_dataframe(dim_order=list(wanted)), chosen)
+    table.attrs["left_out"] = sorted(str(name) for name in axes if name not in kept)
+    return table
+
+
+def _labels(values: xr.DataArray) -> np.ndarray:
+    """A coordinate as pandas has it: texts as Python's."""
+    labels = np.asarray(values.values)
+    return labels.astype(object) if labels.dtype.kind in "TU" else labels
+
+
+def _axes(values: xr.DataArray) -> tuple[str, ...]:
+    return tuple(str(name) for name in values.dims if name not in COMPONENTS)
+
+
+def _columns(name: str, values: xr.DataArray) -> dict[str, xr.DataArray]:
+    """A variable as columns, one for each of its components."""
+    axis = next((str(axis) for axis in values.dims if axis in COMPONENTS), None)
+    if axis is None:
+        return {name: values.reset_coords(drop=True)}
+    found: dict[str, xr.DataArray] = {}
+    for i, word in enumerate(values[axis].values):
+        found |= _columns(f"{name}_{word}", values.isel({axis: i}, drop=True))
+    return found
+
+
+def _of_frames(tree: xr.DataTree, dataset: xr.Dataset, frames: int | Iterable[int] | None) -> xr.Dataset:
+    """Some frames of a dataset; left out: those that were built."""
+    if frames is None:
+        chosen = built_frames(tree)
+    else:
+        chosen = [frames] if isinstance(frames, int | np.integer) else [int(frame) for frame in frames]
+    count = dataset.sizes["frame"]
+    if wrong := [frame for frame in chosen if not 0 <= frame < count]:
+        raise IndexError(f"frame {wrong[0]} is outside 0..{count - 1}")
+    return dataset.isel(frame=chosen)
+
+
+def _with_words(table: pd.DataFrame, dataset: xr.Dataset) -> pd.DataFrame:
+    """Flags by their names."""
+    words = {}
+    for name, values in dataset.data_vars.items():
+        flags, meanings = np.atleast_1d(values.attrs.get("flag_values", ())), values.attrs.get("flag_meanings", "")
+        if len(flags) > 1:  # a single one says which number is none
+            words[str(name)] = _named(table[name], flags.tolist(), str(meanings).split())
+    return table.assign(**words)
+
+
+def _named(numbers: pd.Series, values: Iterable[int], names: list[str]) -> Any:
+    """Numbers as categories by name; missing where they have none."""
+    import pandas as pd
+
+    place = {value: i for i, value in enumerate(values)}
+    codes = [place.get(int(n), -1) if np.isfinite(n) else -1 for n in numbers]
+    return pd.Categorical.from_codes(codes, pd.Index(names))

@@ -1,0 +1,1 @@
+"""One frame of a store as one picture."""

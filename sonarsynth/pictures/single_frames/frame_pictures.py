@@ -1,0 +1,47 @@
+"""The energy image of a frame, or its point cloud, as a figure: the panels of the sheet, each by itself."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sonarsynth.pictures import frame_view
+from sonarsynth.pictures.figures.frame_figure import View, window
+from sonarsynth.pictures.figures.ghost_rings import GhostMarks
+from sonarsynth.pictures.figures.sheet import Errors, draw_cloud, draw_image
+from sonarsynth.pictures.figures.style import INK, figure, settle
+from sonarsynth.pictures.store_reading import NothingToDraw, Stored, beam_grid, built, stored
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+def image_picture(tree: xr.DataTree, frame: int) -> Figure:
+    """The energy image with outlines and ghosts, in dB re its brightest beam. Raises NothingToDraw."""
+    _, view = _read(tree, frame)
+    if view.level is None:
+        raise NothingToDraw(f"frame {frame} has no image")
+    made = figure(7.6, 6.0, dpi=110)
+    made.suptitle(view.title, x=0.01, ha="left", fontsize=11, color=INK)
+    axes = made.add_subplot()
+    outlines = draw_image(axes, *beam_grid(tree), view, "energy re the brightest beam (dB)")
+    settle(made)
+    GhostMarks(axes).show(view.ghosts, view.lobes, outlines)
+    return made
+
+
+def cloud_picture(tree: xr.DataTree, frame: int) -> Figure:
+    """The points in the true hulls, in 3-D, coloured by range error. Raises NothingToDraw."""
+    found, view = _read(tree, frame)
+    made = figure(7.6, 6.0, dpi=110)
+    made.suptitle(view.title, x=0.01, ha="left", fontsize=11, color=INK)
+    axes = made.add_subplot(projection="3d")
+    draw_cloud(axes, made, view, Errors(found.points, found.range_error), window([view]))
+    return made
+
+
+def _read(tree: xr.DataTree, frame: int) -> tuple[Stored, View]:
+    if frame not in built(tree):
+        raise NothingToDraw(f"frame {frame} has not been built")
+    found = stored(tree, frame)
+    return found, frame_view(tree, found)

@@ -1,0 +1,105 @@
+"""`.sonar` of an opened store: its tables hold what xarray reads, its pictures what the frame holds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import sonarsynth as ss
+from sonarsynth import planning, schedule
+from sonarsynth.recipe import Recipe
+
+BUILT = [2, 3]
+
+
+@pytest.fixture(scope="module")
+def tree(small: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Iterator[xr.DataTree]:
+    """Two frames of twenty."""
+    path = tmp_path_factory.mktemp("opened") / "s.zarr"
+    assert schedule.build(planning.plan(small), path, frames=BUILT, workers=0).ok
+    with ss.open(path) as found:
+        yield found
+
+
+def test_points_are_those_of_the_cloud_without_padding(tree: xr.DataTree) -> None:
+    table, cloud = tree.sonar.points(), tree["cloud"].to_dataset()
+    counts = cloud["count"].values[BUILT]
+    assert counts.sum() > 0
+    assert [len(table.loc[frame]) if frame in table.index else 0 for frame in BUILT] == counts.tolist()
+    for (frame, point), row in table.iterrows():
+        for name in ("x", "y", "z", "range", "energy", "delay", "emission", "facet"):
+            assert row[name] == cloud[name].values[frame, point]
+        target = int(cloud["target"].values[frame, point])
+        assert row["target"] == "box" if target == 0 else row["target"] != row["target"]
+        meanings = cloud["family"].attrs["flag_meanings"].split()
+        assert row["family"] == meanings[int(cloud["family"].values[frame, point])]
+
+
+def test_points_of_a_frame_and_of_frames_that_are_not_there(tree: xr.DataTree) -> None:
+    every = tree.sonar.points()
+    assert tree.sonar.points(BUILT[0]).equals(every.loc[[BUILT[0]]] if BUILT[0] in every.index else every.iloc[:0])
+    assert len(tree.sonar.points([0])) == 0  # not built
+    with pytest.raises(IndexError, match=r"frame 20 is outside 0\.\.19"):
+        tree.sonar.points(20)
+
+
+def test_a_group_is_a_row_a_target_with_components_as_columns(tree: xr.DataTree) -> None:
+    table, group = tree.sonar.table("truth/targets"), tree["truth/targets"]
+    assert table.index.names == ["frame", "target"] and table.index.tolist() == [(n, "box") for n in BUILT]
+    for i, axis in enumerate("xyz"):
+        assert table[f"position_{axis}"].tolist() == group["position"].values[BUILT, 0, i].tolist()
+    assert table["box_7_z"].tolist() == group["box"].values[BUILT, 0, 7, 2].tolist()
+    assert table["image_box_elevation_max"].tolist() == group["image_box"].values[BUILT, 0, 3].tolist()
+    assert set(table["view"]) <= set(group["view"].attrs["flag_meanings"].split())
+    assert "echo_level" in table.attrs["left_out"]
+
+
+def test_rows_may_be_chosen(tree: xr.DataTree) -> None:
+    table = tree.sonar.table("truth/targets", ["frame", "target", "family"], frames=3)
+    level = tree["truth/targets"]["echo_level"].sel(frame=3, target="box")
+    assert table["echo_level"].to_numpy() == pytest.approx(level.values, nan_ok=True)
+    assert table.loc[(3, "box")].index.tolist() == [str(name) for name in level["family"].values]
+    assert table["position_x"].nunique() == 1
+    with pytest.raises(ValueError, match="truth/targets has no axis points"):
+        tree.sonar.table("truth/targets", ["points"])
+    with pytest.raises(KeyError):
+        tree.sonar.table("nothing")
+
+
+@pytest.mark.parametrize(
+    ("group", "rows"),
+    [
+        ("/", ["frame"]),
+        ("truth", ["frame"]),
+        ("truth/emissions", ["frame", "emission"]),
+        ("source_estimates", ["frame", "estimate"]),
+        ("link_budget", ["frame", "emission", "target", "family"]),
+        ("truth/beams", ["frame", "elevation", "azimuth"]),
+        ("cloud", ["frame", "point"]),
+        ("image", ["frame"]),
+        ("signals", ["frame"]),
+        ("targets/box", ["face"]),
+    ],
+)
+def test_no_table_has_more_rows_than_its_axes(tree: xr.DataTree, group: str, rows: list[str]) -> None:
+    table, sizes = tree.sonar.table(group), tree[group].to_dataset(inherit=True).sizes
+    assert table.index.names == rows
+    assert len(table) == np.prod([len(BUILT) if name == "frame" else sizes[name] for name in rows])
+    assert len(table.columns) > 0
+
+
+def test_a_target_is_chosen_by_name_and_a_frame_is_a_picture(tree: xr.DataTree) -> None:
+    assert tree["truth/targets"].sel(target="box")["position"].dims == ("frame", "xyz")
+    image = tree.sonar.image(3)
+    drawn = next(axes for axes in image.axes if axes.images).images[0].get_array()
+    energy = tree["image/energy"].isel(frame=3).values
+    assert drawn is not None and drawn[:, ::-1].filled() == pytest.approx(10 * np.log10(energy / energy.max()))
+    shown = tree.sonar.cloud(3).axes[0].get_title()
+    assert "points on a target" in shown or "point on a target" in shown
+    for picture in (tree.sonar.image, tree.sonar.cloud):
+        with pytest.raises(ValueError, match="frame 0 has not been built"):
+            picture(0)
