@@ -21,7 +21,7 @@ from sonarsynth.receiver import BeamGrid
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.recipe.splits import SPLITS
-from sonarsynth.targets.target import Target
+from sonarsynth.targets.target import NO_CATEGORY, Target
 
 SEQUENCES = 1000
 """Sequences that are looked at, if there are more."""
@@ -43,8 +43,8 @@ Progress = Callable[[int, int, int], None]
 
 
 def group_of(target: Target) -> str:
-    """The group that a target is counted in."""
-    return target.name
+    """The group that a target is counted in: its category, or its name where it is given none."""
+    return target.name if target.category == NO_CATEGORY else target.category
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +124,9 @@ def sample_geometry(
     chosen = spread(recipe.sequences, max(sequences, 1))
     count = min(recipe.steps, max(most_frames // len(chosen), 2))
     steps = np.unique(np.linspace(0, recipe.steps - 1, count).astype(int))
-    groups = list(dict.fromkeys(group_of(target) for target in recipe.scene.world.targets))
+    world = recipe.described.world
+    drawn = [p.category(n) for p in world.populations for n in range(len(p.models))]
+    groups = list(dict.fromkeys([*(group_of(target) for target in world.targets), *drawn]))
     rows: list[tuple[float, ...]] = []
     frames = [(int(n), int(step)) for n in chosen for step in steps]
     for number, place in enumerate(frames):

@@ -16,6 +16,8 @@ from sonarsynth.targets.mesh_resolution import frame_mesh
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Shape
 
+NO_CATEGORY = "target"
+"""What targets are called that are called nothing else."""
 NAME = r"^[A-Za-z][A-Za-z0-9_-]{0,63}$"
 Name = Annotated[str, StringConstraints(pattern=NAME)]
 Category = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_.+-]{0,63}$")]
@@ -34,7 +36,7 @@ class Target:
     """Where it is, at any time."""
     scattering: Scattering | None = None
     """How its facets scatter, by what it is made of; left out: as `scene.physics.scattering` says."""
-    category: Category = "target"
+    category: Category = NO_CATEGORY
     """What a detector is to call it: a word."""
     clutter: bool = False
     """Whether it is there to be taken for a target, and is none."""

@@ -80,7 +80,7 @@ def test_a_store_holds_every_value_and_every_mesh(spanning: Path, tmp_path: Path
         for name in ("signals/pressure", "cloud/range", "truth/beams/target", "link_budget/received_level"):
             assert np.array_equal(tree[name].values[13], other[name].values[13], equal_nan=True)
     one = render(recipe, 13)
-    assert float(one.coords["away"]) == 11.0 and int(one["truth/targets"].coords["mesh"][0]) == 1
+    assert float(one.coords["away"]) == 11.0 and int(one["truth/targets/mesh"][0]) == 1
 
 
 def test_a_sequence_more_changes_no_number_of_the_others(spanning: Path, tmp_path: Path) -> None:

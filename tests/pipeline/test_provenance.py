@@ -89,7 +89,7 @@ def test_the_plan_meshes_and_files_are_there(tmp_path: Path, small_text: str) ->
     made = planning.plan(recipe)
     found = store.creating.described(made)
     assert found["inputs"]["files"] == [{"name": "cast.csv", "sha256": hashlib.sha256(cast.read_bytes()).hexdigest()}]
-    meshes = [mesh.digest for _, mesh in recipe.meshes[0]]
+    meshes = [mesh.digest for mesh in recipe.meshes["box"]]
     assert found["inputs"]["meshes"] == {"box": meshes}
     assert {row["stage"] for row in found["plan"]["stages"]} >= {"trace", "synthesise", "beamform", "range"}
     assert found["plan"]["left_out"]

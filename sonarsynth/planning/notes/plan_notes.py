@@ -97,8 +97,9 @@ def _shared(recipe: Recipe, looks: Sequence[SampledScene]) -> list[str]:
             trajectory = look.scene.trajectory
             poses = tuple((t.motion, trajectory.start, trajectory.interval) for t in world.targets)
             snaps = tuple(tuple(s.place(world.environment.depth).tolist()) for s in world.sources)
-            held["target poses"].setdefault(poses, set()).add(split)
-            held["snap positions"].setdefault(snaps, set()).add(split)
+            for what, some in (("target poses", poses), ("snap positions", snaps)):
+                if some:  # scenes without any have nothing in common
+                    held[what].setdefault(some, set()).add(split)
     for what, splits in held.items():
         count = sum(len(some) > 1 for some in splits.values())
         if count:
