@@ -45,7 +45,8 @@ class SonarAccessor:
         `position_x`. Variables that have further axes are left out and named in `.attrs["left_out"]`; those with fewer
         are repeated. Flags are categories by name; other numbers that are -1 mean none.
 
-        Raises KeyError for a group that is not there, ValueError for an axis that it has not, or a table of more than 20 million rows.
+        Raises KeyError for a group that is not there, ValueError for an axis that it has not, or more than 20 million
+        rows.
         """
         return as_table(self._tree, group, rows, frames)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,16 +10,23 @@ import xarray as xr
 
 import sonarsynth as ss
 from sonarsynth import planning, schedule
-from sonarsynth.recipe import Recipe
+from sonarsynth.recipe import reading
 
 BUILT = [2, 3]
+TWO = """  - name: two
+        shape: {kind: sphere, radius: 0.4, edge: 0.1}
+        motion: {kind: still, position: [10, -2, -6]}
+    sources:"""
 
 
 @pytest.fixture(scope="module")
-def tree(small: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Iterator[xr.DataTree]:
-    """Two frames of twenty."""
+def tree(small_text: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[xr.DataTree]:
+    """Two frames of twenty, of two spheres before 96 hydrophones."""
+    text = small_text.replace("columns: 5, rows: 4", "columns: 12, rows: 8").replace("sources:", TWO, 1)
+    text = text.replace("{kind: box, size: [1, 1, 1], edge: 0.25}", "{kind: sphere, radius: 0.4, edge: 0.1}")
+    made = reading.loads(text.replace("azimuths: 11, elevations: 9", "azimuths: 21, elevations: 21"))
     path = tmp_path_factory.mktemp("opened") / "s.zarr"
-    assert schedule.build(planning.plan(small), path, frames=BUILT, workers=0).ok
+    assert schedule.build(planning.plan(made), path, frames=BUILT, workers=0).ok
     with ss.open(path) as found:
         yield found
 
@@ -34,7 +40,7 @@ def test_points_are_those_of_the_cloud_without_padding(tree: xr.DataTree) -> Non
         for name in ("x", "y", "z", "range", "energy", "delay", "emission", "facet"):
             assert row[name] == cloud[name].values[frame, point]
         target = int(cloud["target"].values[frame, point])
-        assert row["target"] == "box" if target == 0 else row["target"] != row["target"]
+        assert row["target"] == ["box", "two"][target] if target >= 0 else row.isna()["target"]
         meanings = cloud["family"].attrs["flag_meanings"].split()
         assert row["family"] == meanings[int(cloud["family"].values[frame, point])]
 
@@ -49,21 +55,23 @@ def test_points_of_a_frame_and_of_frames_that_are_not_there(tree: xr.DataTree) -
 
 def test_a_group_is_a_row_a_target_with_components_as_columns(tree: xr.DataTree) -> None:
     table, group = tree.sonar.table("truth/targets"), tree["truth/targets"]
-    assert table.index.names == ["frame", "target"] and table.index.tolist() == [(n, "box") for n in BUILT]
+    assert table.index.names == ["frame", "target"] and table.index.tolist() == [
+        (n, name) for n in BUILT for name in ("box", "two")
+    ]
     for i, axis in enumerate("xyz"):
-        assert table[f"position_{axis}"].tolist() == group["position"].values[BUILT, 0, i].tolist()
-    assert table["box_7_z"].tolist() == group["box"].values[BUILT, 0, 7, 2].tolist()
-    assert table["image_box_elevation_max"].tolist() == group["image_box"].values[BUILT, 0, 3].tolist()
+        assert table[f"position_{axis}"].tolist() == group["position"].values[BUILT, :, i].ravel().tolist()
+    assert table["box_7_z"].tolist() == group["box"].values[BUILT, :, 7, 2].ravel().tolist()
+    assert table["image_box_elevation_max"].tolist() == group["image_box"].values[BUILT, :, 3].ravel().tolist()
     assert set(table["view"]) <= set(group["view"].attrs["flag_meanings"].split())
     assert "echo_level" in table.attrs["left_out"]
 
 
 def test_rows_may_be_chosen(tree: xr.DataTree) -> None:
     table = tree.sonar.table("truth/targets", ["frame", "target", "family"], frames=3)
-    level = tree["truth/targets"]["echo_level"].sel(frame=3, target="box")
-    assert table["echo_level"].to_numpy() == pytest.approx(level.values, nan_ok=True)
-    assert table.loc[(3, "box")].index.tolist() == [str(name) for name in level["family"].values]
-    assert table["position_x"].nunique() == 1
+    level = tree["truth/targets"]["echo_level"].sel(frame=3, target="two")
+    assert table.loc[(3, "two"), "echo_level"].to_numpy() == pytest.approx(level.values, nan_ok=True)
+    assert table.loc[(3, "two")].index.tolist() == [str(name) for name in level["family"].values]
+    assert table.loc[(3, "two"), "position_x"].nunique() == 1
     with pytest.raises(ValueError, match="truth/targets has no axis points"):
         tree.sonar.table("truth/targets", ["points"])
     with pytest.raises(KeyError):
