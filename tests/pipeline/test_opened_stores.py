@@ -42,7 +42,8 @@ def test_points_are_those_of_the_cloud_without_padding(tree: xr.DataTree) -> Non
         target = int(cloud["target"].values[frame, point])
         assert row["target"] == ["box", "two"][target] if target >= 0 else row.isna()["target"]
         meanings = cloud["family"].attrs["flag_meanings"].split()
-        assert row["family"] == meanings[int(cloud["family"].values[frame, point])]
+        family = int(cloud["family"].values[frame, point])
+        assert row["family"] == meanings[family] if family >= 0 else row.isna()["family"]
 
 
 def test_points_of_a_frame_and_of_frames_that_are_not_there(tree: xr.DataTree) -> None:
