@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from sonarsynth.casting.ray_casting import OFFSET, first_hit, occluded
-from sonarsynth.conventions import NO_TARGET, Bools, Floats, Ints, direction
+from sonarsynth.casting.ray_casting import first_hit
+from sonarsynth.conventions import NO_TARGET, Floats, direction
 from sonarsynth.geometry import Pose
-from sonarsynth.geometry.mesh import Mesh, in_blocks
+from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.labels.views import box_in_view
-from sonarsynth.products import Paths, Truth
+from sonarsynth.labels.oriented_box import oriented_box
+from sonarsynth.labels.views.appearance import Appearance, Connect, appearance, finite, lit_fraction
+from sonarsynth.labels.views.box_in_view import View, box_in_view, pixel_box, truncation, whole_box
+from sonarsynth.labels.views.coverage import coverage
+from sonarsynth.products import Truth
 from sonarsynth.propagation import Propagation
 from sonarsynth.receiver import BeamGrid
 from sonarsynth.state import FrameContext, meeting_times, positions
-
-Connect = Callable[[Floats, Floats], Paths]
-"""Rays from (pair, xyz) to (pair, xyz) in the world: a propagation model bound to its water."""
 
 
 def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -> Truth:
@@ -32,17 +32,17 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
     that is nothing, and `view` says why (`views.View`).
     """
     bodies, sonar_pose, beams = context.bodies, context.receiver.pose, context.receiver.sonar.beams
-    straight, medium = not propagation.bends, context.medium
+    medium = context.medium
     connect = partial(propagation.direct.connect, medium.profile, medium.depth)
-    seen = [_as_seen(body, sonar_pose, connect, straight) for body in bodies]
-    target, facet, distance = _label_beams(bodies, seen, beams, sonar_pose, straight)
-    visible = [_visible(body, corners, bodies, sonar_pose) for body, corners in zip(bodies, seen, strict=True)]
-    boxes = [
-        box_in_view(corners, body.mesh.faces[facets], beams)
-        for body, corners, (facets, _) in zip(bodies, seen, visible, strict=True)
-    ]
+    bent = connect if propagation.bends else None
+    seen = [appearance(body, bodies, sonar_pose, bent) for body in bodies]
+    target, facet, distance = _label_beams(bodies, [one.corners for one in seen], beams, sonar_pose, bent is None)
     tracks = [body.track if context.receiver.track else body.frozen.track for body in bodies]
     met = meeting_times(tracks, context.snaps, partial(_direct_times, connect))
+    lit = [
+        [lit_fraction(body, one.visible, bodies, snap, medium, bent) for body, one in zip(bodies, seen, strict=True)]
+        for snap in context.snaps
+    ]
     return Truth(
         sonar_position=sonar_pose.position,
         sonar_orientation=sonar_pose.orientation,
@@ -51,17 +51,59 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
         target_velocity=_rows([b.velocity for b in bodies], 3),
         meeting_time=met,
         position_at_echo=positions(tracks, met),
-        box=np.array([sonar_pose.to_body(b.box) for b in bodies]).reshape(-1, 8, 3),
-        image_box=_rows([box.bounds for box in boxes], 4),
-        view=np.array([box.view for box in boxes], np.int8),
-        visible_fraction=np.array([fraction for _, fraction in visible]),
+        **_oriented(bodies, sonar_pose),
+        **_boxes(bodies, seen, sonar_pose, beams),
+        visible_fraction=np.array([one.fraction for one in seen]),
+        lit_fraction=np.array(lit, float).reshape(len(context.snaps), len(bodies)),
         snap_position=_rows([s.position for s in context.snaps], 3),
         snap_time=np.array([s.time for s in context.snaps]),
         snap_level=np.asarray(snap_level, float),
         beam_target=target,
         beam_facet=facet,
         beam_range=distance,
+        beam_coverage=coverage(
+            [(one.corners, b.mesh.faces, one.boxes) for b, one in zip(bodies, seen, strict=True)], beams
+        ),
     )
+
+
+def _oriented(bodies: tuple[PlacedTarget, ...], sonar_pose: Pose) -> dict[str, Any]:
+    """Columns of `Truth` of the boxes along the axes of bodies."""
+    boxes = [oriented_box(body, sonar_pose) for body in bodies]
+    return {
+        "box": np.array([box.corners for box in boxes]).reshape(-1, 8, 3),
+        "box_centre": _rows([box.centre for box in boxes], 3),
+        "box_size": _rows([box.size for box in boxes], 3),
+        "box_orientation": _rows([box.orientation for box in boxes], 4),
+        "yaw": np.array([box.yaw for box in boxes], float),
+    }
+
+
+def _boxes(
+    bodies: tuple[PlacedTarget, ...], seen: list[Appearance], sonar_pose: Pose, beams: BeamGrid
+) -> dict[str, Any]:
+    """Columns of `Truth` of boxes in azimuth and elevation, of what is in view of bodies as they are seen."""
+    views, straight, truncated, there = [], [], [], []
+    for body, one in zip(bodies, seen, strict=True):
+        faces = body.mesh.faces[one.visible]
+        found = box_in_view(one.corners, faces, beams, one.boxes[one.visible])
+        views.append(found)
+        truncated.append(truncation(one.corners, faces, found.view, beams))
+        true = sonar_pose.to_body(body.pose.to_world(body.mesh.vertices)) if one.bent else one.corners
+        straight.append(box_in_view(true, faces, beams).bounds if one.bent else found.bounds)
+        within = found.view <= View.PARTLY_IN_VIEW
+        if not within:  # what no ray or another body hides may be there all the same
+            within = box_in_view(one.corners, body.mesh.faces, beams, one.boxes).view <= View.PARTLY_IN_VIEW
+        there.append(within)
+    return {
+        "image_box": _rows([found.bounds for found in views], 4),
+        "true_image_box": _rows(straight, 4),
+        "full_box": _rows([whole_box(one.boxes) for one in seen], 4),
+        "pixel_box": _rows([pixel_box(found.bounds, beams) for found in views], 4),
+        "view": np.array([found.view for found in views], np.int8),
+        "in_view": np.array(there, np.int8),
+        "truncation": np.array(truncated, float),
+    }
 
 
 def _direct_times(connect: Connect, start: Floats, end: Floats) -> Floats:
@@ -77,21 +119,6 @@ def _rows(rows: list[Floats], width: int) -> Floats:
     return np.array(rows, float).reshape(-1, width)
 
 
-def _as_seen(body: PlacedTarget, sonar_pose: Pose, connect: Connect, straight: bool) -> Floats:
-    """(vertex, xyz) in the sonar frame: vertices where the array sees them; NaN where no ray arrives (a shadow)."""
-    world = body.pose.to_world(body.mesh.vertices)
-    true = sonar_pose.to_body(world)
-    if straight:
-        return true
-    apparent = np.full_like(true, np.nan)
-    for some in in_blocks(len(world)):
-        paths = connect(world[some], np.broadcast_to(sonar_pose.position, world[some].shape))
-        pairs, first = np.unique(paths.pair, return_index=True)  # the earliest: paths are sorted by time
-        towards = -sonar_pose.turn_to_body(paths.arrival[first])
-        apparent[some][pairs] = towards * np.linalg.norm(true[some][pairs], axis=1)[:, None]
-    return apparent
-
-
 def _label_beams(
     bodies: tuple[PlacedTarget, ...], seen: list[Floats], beams: BeamGrid, sonar_pose: Pose, straight: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -102,7 +129,7 @@ def _label_beams(
     facet = np.full(shape, NO_TARGET, np.int32)
     nearest = np.full(shape, np.inf)
     for index, (body, vertices) in enumerate(zip(bodies, seen, strict=True)):
-        kept = np.flatnonzero(_finite(vertices, body.mesh.faces))
+        kept = np.flatnonzero(finite(vertices, body.mesh.faces))
         if not len(kept):
             continue
         faces = body.mesh.faces if len(kept) == len(body.mesh.faces) else body.mesh.faces[kept]
@@ -134,31 +161,3 @@ def _beams_near(points: Floats, rays: Floats) -> tuple[np.ndarray, np.ndarray]:
     widest = np.arccos(np.clip(towards @ axis, -1, 1)).max()
     rows, columns = np.nonzero(np.arccos(np.clip(rays @ axis, -1, 1)) <= widest + 1e-3)
     return rows, columns
-
-
-def _visible(
-    body: PlacedTarget, seen: Floats, bodies: tuple[PlacedTarget, ...], sonar_pose: Pose
-) -> tuple[Ints, float]:
-    """The visible facets, in the view of the beams or not, and their share of the area that faces the array."""
-    mesh = body.mesh
-    facing, farthest = np.zeros(len(mesh.faces), bool), 0.0
-    for some in in_blocks(len(mesh.faces)):
-        centroid, normal = body.pose.to_world(mesh.centroid[some]), body.pose.turn_to_world(mesh.normal[some])
-        facing[some] = np.einsum("ij,ij->i", sonar_pose.position - centroid, normal) > 0
-        farthest = max(farthest, float(np.abs(centroid).max()))
-    rounding = 8.0 * np.finfo(float).eps * farthest  # of places in the world
-    offset = max(OFFSET * mesh.radius, rounding)
-    visible = np.zeros(len(mesh.faces), bool)
-    for some in in_blocks(len(mesh.faces)):
-        rows = np.flatnonzero(facing[some]) + some.start
-        start = body.pose.to_world(mesh.centroid[rows]) + offset * body.pose.turn_to_world(mesh.normal[rows])
-        clear = ~occluded(bodies, start, np.broadcast_to(sonar_pose.position, start.shape))
-        visible[rows] = clear & _finite(seen, mesh.faces[rows])
-    fraction = float(mesh.area[visible].sum() / mesh.area[facing].sum()) if visible.any() else 0.0
-    return np.flatnonzero(visible), fraction
-
-
-def _finite(points: Floats, faces: np.ndarray) -> Bools:
-    """Facets (facet,) whose corners are all finite points (point, xyz)."""
-    finite = np.asarray(np.isfinite(points).all(axis=1))
-    return np.ones(len(faces), bool) if finite.all() else np.asarray(finite[faces].all(axis=1))

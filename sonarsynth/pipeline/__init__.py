@@ -257,7 +257,7 @@ def _heard_values(plan: Plan, traced: TracedFrame, heard: BeamformedFrame) -> Va
         cloud = cloud_of(plan, frame, heard).loudest(plan.sizes["point"])
         mark_stage("range")
         labels = point_labels(plan, frame, traced.arrivals, heard.estimates, cloud)
-        values |= cloud_values(cloud, labels, plan.sizes["point"])
+        values |= cloud_values(cloud, labels, plan.sizes["point"], len(frame.moment.bodies))
     return values
 
 

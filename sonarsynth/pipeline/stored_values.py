@@ -40,8 +40,8 @@ def truth_values(truth: Truth) -> Values:
         prefix = next((start for start in groups if name.startswith(start)), "target_")
         short = name if prefix == "sonar_" else name.removeprefix(prefix)
         values[groups.get(prefix, "/truth/targets"), short] = np.asarray(value)
-    values["/truth/targets", "image_box"] = np.rad2deg(truth.image_box)
-    return values
+    angles = {name: np.rad2deg(getattr(truth, name)) for name in ("image_box", "true_image_box", "full_box", "yaw")}
+    return values | table("/truth/targets", **angles)
 
 
 def echo_values(echoes: Echoes, arrivals: Arrivals) -> Values:
@@ -121,15 +121,18 @@ def beam_values(plan: Plan, beams: BeamSpectra | None, image: EnergyImage) -> Va
     return table("/beams", level=stored, start=np.nan if beams is None else beams.snapshots.start)
 
 
-def cloud_values(cloud: PointCloud, labels: PointLabels, size: int) -> Values:
-    """The cloud, each coordinate apart, and whose echo each point is, padded to `size` points."""
+def cloud_values(cloud: PointCloud, labels: PointLabels, size: int, targets: int) -> Values:
+    """The cloud, each coordinate apart, and whose echo each point is, padded to `size` points; how many points each of
+    so many targets has."""
     x, y, z = cloud.position.T
     columns = {name: value for name, value in vars(cloud).items() if name not in ("position", "overflow")}
     angles = ("azimuth", "azimuth_error", "elevation", "elevation_error")
     columns |= {name: np.rad2deg(columns[name]).astype(np.float32) for name in angles}
     columns |= {"x": x, "y": y, "z": z, **vars(labels)}
     padded = {name: _padded(values, size) for name, values in columns.items()}
-    return table("/cloud", count=np.int32(len(cloud)), overflow=np.int32(cloud.overflow), **padded)
+    of_targets = np.bincount(labels.target[labels.target >= 0], minlength=targets).astype(np.int32)
+    values = table("/cloud", count=np.int32(len(cloud)), overflow=np.int32(cloud.overflow), **padded)
+    return values | table("/truth/targets", points=of_targets)
 
 
 def _padded(values: np.ndarray, size: int) -> np.ndarray:

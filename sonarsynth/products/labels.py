@@ -50,15 +50,26 @@ class Truth:
     meeting_time: Floats  # (snap, target) s: when the sound of each snap, by the direct path, meets the target's origin
     position_at_echo: Floats  # (snap, target, xyz) m, world: the origin then; NaN where no direct path leads to it
     box: Floats  # (target, corner 8, xyz) m: oriented bounding box, sonar frame
+    box_centre: Floats  # (target, xyz) m, sonar frame
+    box_size: Floats  # (target, xyz) m: of the box, along the target's axes
+    box_orientation: Floats  # (target, wxyz) from the target's frame to the sonar's
+    yaw: Floats  # (target,) rad: azimuth of the target's x axis, sonar frame, port positive; NaN where it is vertical
     image_box: Floats  # (target, 4): azimuth min, max, elevation min, max (rad) of what is seen and in view; or NaN
+    true_image_box: Floats  # (target, 4) rad: the same by straight lines to where it is, not where it appears
+    full_box: Floats  # (target, 4) rad: of all of it that is ahead, as it appears: hidden, and out of view, too; or NaN
+    pixel_box: Floats  # (target, 4) x0, y0, x1, y1: image_box on the grid of beams, which are at whole numbers + 0.5
     view: npt.NDArray[np.int8]  # (target,) how much of it is in the view of the beams: `views.View`
+    in_view: npt.NDArray[np.int8]  # (target,) 1: some of it is in the view of the beams, hidden or not
+    truncation: Floats  # (target,) share of the solid angle of what is seen that is out of view; NaN: nothing is seen
     visible_fraction: Floats  # (target,) share of the area facing the array that the array sees, in view or not
+    lit_fraction: Floats  # (snap, target) share of the area that is seen that the snap lights directly; NaN: none is
     snap_position: Floats  # (snap, xyz) m, world
     snap_time: Floats  # (snap,) s
     snap_level: Floats  # (snap,) dB re 1 uPa at 1 m
     beam_target: npt.NDArray[np.int16]  # (elevation, azimuth) -1 for none
     beam_facet: npt.NDArray[np.int32]  # (elevation, azimuth) -1 for none
     beam_range: npt.NDArray[np.float32]  # (elevation, azimuth) m to the first surface in the beam's direction
+    beam_coverage: npt.NDArray[np.float32]  # (elevation, azimuth) share of the cell of the beam that bodies cover
 
 
 @dataclass(frozen=True, eq=False)

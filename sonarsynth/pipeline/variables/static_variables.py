@@ -10,6 +10,11 @@ from sonarsynth.planning import OF_BEAMS, Plan
 from sonarsynth.products import DIRECT, FAMILIES
 from sonarsynth.recipe.varied_columns import columns
 
+_BOUNDS = (
+    ("bound", ["azimuth_min", "azimuth_max", "elevation_min", "elevation_max"], "which bound of a box in angles"),
+    ("side", ["x0", "y0", "x1", "y1"], "which side of a box in pixels: x along azimuth, y along elevation"),
+)
+
 
 def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
     """Static variables of a store: {(group, name): (dims, values, attributes)}."""
@@ -35,8 +40,8 @@ def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.n
     add("/truth" + estimates, "xyz", ("xyz",), list("xyz"), "1", "axis")
     add("/truth", "wxyz", ("wxyz",), list("wxyz"), "1", "part of a unit quaternion, scalar first")
     add("/truth/targets", "target", ("target",), np.array(names, dtype=np.str_), "1", "name of the target")
-    bounds = ["azimuth_min", "azimuth_max", "elevation_min", "elevation_max"]
-    add("/truth/targets", "bound", ("bound",), bounds, "1", "which bound of the image box")
+    for name, values, what in _BOUNDS:
+        add("/truth/targets", name, (name,), values, "1", what)
     if plan.products:
         add(
             "/link_budget",

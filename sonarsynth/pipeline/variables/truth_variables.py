@@ -2,150 +2,25 @@
 
 from __future__ import annotations
 
-from sonarsynth.labels.views import MEANINGS, View
+from sonarsynth.pipeline.variables.target_variables import INSTANT, TARGETS
 from sonarsynth.pipeline.variables.variable import (
     BEAMS,
     CELL,
-    ECHO,
     EMISSION,
     LOUDEST,
     NONE,
     SENSOR,
-    TARGET,
     comment,
     group_of,
     row,
 )
 from sonarsynth.receiver.sensor_errors import SensorState
 
-_INSTANT = comment("at the instant of the frame; what is heard is of when sound met the target: position_at_echo")
-_MEETING = comment(
-    "what echoes, images and points show is where the sound met the target; poses, boxes and beams of the truth are "
-    "those of the instant of the frame. Sound by surface or bottom meets it later. NaN where no direct path leads to it"
-)
 _SONAR = group_of(
     "/truth",
     "truth",
     row("sonar_position", ("frame", "xyz"), "float64", "m", "position of the array centre in the world"),
     row("sonar_orientation", ("frame", "wxyz"), "float64", "1", "unit quaternion from the sonar frame to the world"),
-)
-_TARGETS = group_of(
-    "/truth/targets",
-    "truth",
-    row(
-        "present",
-        TARGET,
-        "int8",
-        "1",
-        "whether the target is in the sequence",
-        attributes=(("flag_values", [0, 1]), ("flag_meanings", "no yes")),
-    ),
-    row("category", TARGET, "int16", "1", "what a detector is to call the target"),
-    row(
-        "clutter",
-        TARGET,
-        "int8",
-        "1",
-        "whether the target is there to be taken for one, and is none",
-        attributes=(("flag_values", [0, 1]), ("flag_meanings", "no yes")),
-    ),
-    row("scale", TARGET, "float64", "1", "size of the target over that of its mesh"),
-    row(
-        "mesh",
-        TARGET,
-        "int32",
-        "1",
-        "which mesh the target has: of those in /targets/<group>, where there are several",
-    ),
-    row(
-        "position",
-        (*TARGET, "xyz"),
-        "float64",
-        "m",
-        "position of the target's origin in the world at the instant of the frame",
-        attributes=_INSTANT,
-    ),
-    row(
-        "position_at_echo",
-        (*EMISSION, "target", "xyz"),
-        "float64",
-        "m",
-        "position of the target's origin in the world when the sound of the snap, by the direct path, met it",
-        attributes=_MEETING,
-    ),
-    row(
-        "meeting_time",
-        (*EMISSION, "target"),
-        "float64",
-        "s",
-        "time after the instant of the frame when the sound of the snap, by the direct path, met the target's origin",
-        attributes=_MEETING,
-    ),
-    row(
-        "orientation",
-        (*TARGET, "wxyz"),
-        "float64",
-        "1",
-        "unit quaternion from the target's frame to the world",
-        attributes=_INSTANT,
-    ),
-    row("velocity", (*TARGET, "xyz"), "float64", "m s-1", "velocity of the target in the world"),
-    row(
-        "box",
-        (*TARGET, "corner", "xyz"),
-        "float64",
-        "m",
-        "corners of the oriented bounding box, sonar frame",
-        attributes=_INSTANT,
-    ),
-    row(
-        "image_box",
-        (*TARGET, "bound"),
-        "float64",
-        "degree",
-        "bounds in azimuth and elevation of the visible part in view, at the instant of the frame",
-        attributes=comment("cut at the first and last beam each way; NaN where nothing is in view, see view"),
-    ),
-    row(
-        "view",
-        TARGET,
-        "int8",
-        "1",
-        "how much of the visible part is in the view of the beams",
-        attributes=(("flag_values", [int(v) for v in View]), ("flag_meanings", MEANINGS)),
-    ),
-    row(
-        "visible_fraction",
-        TARGET,
-        "float64",
-        "1",
-        "share of the area facing the array that the array sees",
-        attributes=comment("whether it is in the view of the beams or not"),
-    ),
-    row(
-        "echo_azimuth",
-        ECHO,
-        "float64",
-        "degree",
-        "azimuth that the target's echoes come from, weighted by power",
-        product="levels",
-    ),
-    row(
-        "echo_elevation",
-        ECHO,
-        "float64",
-        "degree",
-        "elevation that they come from: ghosts by surface and bottom",
-        product="levels",
-    ),
-    row(
-        "echo_level",
-        ECHO,
-        "float64",
-        "dB",
-        "level of the target's echoes re 1 uPa, of their energy in the band",
-        product="levels",
-    ),
 )
 _EMISSIONS = group_of(
     "/truth/emissions",
@@ -182,9 +57,17 @@ _EMISSIONS = group_of(
 _BEAMS = group_of(
     "/truth/beams",
     "truth",
-    row("target", BEAMS, "int16", "1", "target that the beam points at", attributes=(*NONE, *_INSTANT)),
-    row("facet", BEAMS, "int32", "1", "facet that the beam points at", attributes=(*NONE, *_INSTANT)),
-    row("range", BEAMS, "float32", "m", "distance to the first surface in the beam's direction", attributes=_INSTANT),
+    row("target", BEAMS, "int16", "1", "target that the beam points at", attributes=(*NONE, *INSTANT)),
+    row("facet", BEAMS, "int32", "1", "facet that the beam points at", attributes=(*NONE, *INSTANT)),
+    row("range", BEAMS, "float32", "m", "distance to the first surface in the beam's direction", attributes=INSTANT),
+    row(
+        "coverage",
+        BEAMS,
+        "float32",
+        "1",
+        "share of the solid angle of the beam's cell, which ends half way to the next beams, that targets cover",
+        attributes=comment("within 0.01; target, facet and range are of the middle of the cell alone"),
+    ),
 )
 SENSORS = group_of(
     "/truth/sensors",
@@ -234,7 +117,7 @@ SOUNDSCAPE = group_of(
     ),
 )
 """Of the chorus, where a scene has one."""
-TRUTH = (*_SONAR, *_TARGETS, *_EMISSIONS, *_BEAMS)
+TRUTH = (*_SONAR, *TARGETS, *_EMISSIONS, *_BEAMS)
 """True poses, emissions and beams."""
 HOW_LEVELS_ADD_UP = (
     "received = source - transmission_loss_out + scattering - transmission_loss_in - absorption - boundary. Ratios of "

@@ -59,7 +59,12 @@ def frame(of: Recipe, products: tuple[str, ...] = ("signals", "image", "cloud"))
 
 REASONS: dict[str, tuple[str, Callable[[Any], Any]]] = {
     "/truth/beams/range": ("target", lambda target: target < 0),
-    "/truth/targets/image_box": ("view", lambda view: view > View.PARTLY_IN_VIEW),
+    **{
+        f"/truth/targets/{box}": ("view", lambda view: view > View.PARTLY_IN_VIEW)
+        for box in ("image_box", "true_image_box", "full_box", "pixel_box")
+    },
+    "/truth/targets/truncation": ("view", lambda view: view == View.HIDDEN),
+    "/truth/targets/lit_fraction": ("view", lambda view: (view == View.HIDDEN)[None]),
     "/link_budget/error_bound": ("paths", lambda paths: paths == 0),
     "/link_budget/measured_level": ("paths", lambda paths: paths == 0),
     "/link_budget/isolated_level": ("paths", lambda paths: paths == 0),

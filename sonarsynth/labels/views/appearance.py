@@ -1,0 +1,125 @@
+"""Bodies as the array sees them: where their corners appear, which facets are visible, and which of those are lit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from sonarsynth.casting.ray_casting import OFFSET, occluded
+from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.geometry import Pose
+from sonarsynth.geometry.mesh import in_blocks
+from sonarsynth.geometry.placed_target import PlacedTarget
+from sonarsynth.labels.views.box_in_view import facet_boxes
+from sonarsynth.products import Paths
+from sonarsynth.state import Emission, Medium
+from sonarsynth.tracing.occlusion.ray_cones import hidden
+from sonarsynth.tracing.receive_paths import usable
+
+Connect = Callable[[Floats, Floats], Paths]
+"""Rays from (pair, xyz) to (pair, xyz) in the world: a propagation model bound to its water."""
+
+
+class Appearance(NamedTuple):
+    """A body as the array sees it."""
+
+    corners: Floats  # (vertex, xyz) m, sonar frame: where they appear; NaN where no ray arrives (a shadow)
+    boxes: Floats  # (facet, 4) rad: `facet_boxes` of all facets
+    visible: Ints  # facets that the array sees, in the view of the beams or not
+    fraction: float  # their share of the area that faces the array
+    bent: bool  # whether rays bend, so that corners are not where they appear
+
+
+def appearance(
+    body: PlacedTarget, bodies: tuple[PlacedTarget, ...], sonar_pose: Pose, connect: Connect | None
+) -> Appearance:
+    """A body among all bodies; connect: None where rays are straight."""
+    corners = _apparent(body, sonar_pose, connect)
+    boxes, visible = facet_boxes(corners, body.mesh.faces), _visible(body, corners, bodies, sonar_pose)
+    return Appearance(corners, boxes, *visible, bent=connect is not None)
+
+
+def _apparent(body: PlacedTarget, sonar_pose: Pose, connect: Connect | None) -> Floats:
+    """(vertex, xyz) in the sonar frame: vertices where the array sees them; NaN where no ray arrives."""
+    world = body.pose.to_world(body.mesh.vertices)
+    true = sonar_pose.to_body(world)
+    if connect is None:
+        return true
+    apparent = np.full_like(true, np.nan)
+    for some in in_blocks(len(world)):
+        paths = connect(world[some], np.broadcast_to(sonar_pose.position, world[some].shape))
+        pairs, first = np.unique(paths.pair, return_index=True)  # the earliest: paths are sorted by time
+        towards = -sonar_pose.turn_to_body(paths.arrival[first])
+        apparent[some][pairs] = towards * np.linalg.norm(true[some][pairs], axis=1)[:, None]
+    return apparent
+
+
+def _visible(
+    body: PlacedTarget, seen: Floats, bodies: tuple[PlacedTarget, ...], sonar_pose: Pose
+) -> tuple[Ints, float]:
+    """The visible facets, in the view of the beams or not, and their share of the area that faces the array."""
+    mesh = body.mesh
+    facing, farthest = np.zeros(len(mesh.faces), bool), 0.0
+    for some in in_blocks(len(mesh.faces)):
+        centroid, normal = body.pose.to_world(mesh.centroid[some]), body.pose.turn_to_world(mesh.normal[some])
+        facing[some] = np.einsum("ij,ij->i", sonar_pose.position - centroid, normal) > 0
+        farthest = max(farthest, float(np.abs(centroid).max()))
+    visible = np.zeros(len(mesh.faces), bool)
+    for some in in_blocks(len(mesh.faces)):
+        rows = np.flatnonzero(facing[some]) + some.start
+        start = _clear(body, rows, farthest)
+        clear = ~occluded(bodies, start, np.broadcast_to(sonar_pose.position, start.shape))
+        visible[rows] = clear & finite(seen, mesh.faces[rows])
+    fraction = float(mesh.area[visible].sum() / mesh.area[facing].sum()) if visible.any() else 0.0
+    return np.flatnonzero(visible), fraction
+
+
+def _clear(body: PlacedTarget, rows: Ints, farthest: float) -> Floats:
+    """(row, xyz) world: middles of facets (row,), moved off them; farthest: largest coordinate (m) of the body."""
+    rounding = 8.0 * np.finfo(float).eps * farthest  # of places in the world
+    offset = max(OFFSET * body.mesh.radius, rounding)
+    return body.pose.to_world(body.mesh.centroid[rows] + offset * body.mesh.normal[rows])
+
+
+def lit_fraction(
+    body: PlacedTarget,
+    visible: Ints,
+    bodies: tuple[PlacedTarget, ...],
+    snap: Emission,
+    medium: Medium,
+    connect: Connect | None,
+) -> float:
+    """Share of the area of the visible facets of a body that direct paths of an emission reach: on the outer side, and
+    past all bodies. NaN where none is visible; connect: None where rays are straight."""
+    if not len(visible):
+        return float("nan")
+    if not snap.illuminates:
+        return 0.0
+    lit = np.zeros(len(visible), bool)
+    for some in in_blocks(len(visible)):
+        rows = visible[some]
+        place, normal = body.pose.to_world(body.mesh.centroid[rows]), body.pose.turn_to_world(body.mesh.normal[rows])
+        farthest = float(np.abs(place).max())
+        if connect is None:
+            faced = np.flatnonzero(np.einsum("ij,ij->i", snap.position - place, normal) > 0.0)
+            start = _clear(body, rows[faced], farthest)
+            blocked = occluded(bodies, start, np.broadcast_to(snap.position, start.shape))
+        else:
+            paths = connect(np.broadcast_to(snap.position, place.shape), place)
+            towards = -paths.arrival
+            some_paths = np.flatnonzero(usable(paths) & (np.einsum("ij,ij->i", towards, normal[paths.pair]) > 0.0))
+            faced = paths.pair[some_paths]
+            start = _clear(body, rows[faced], farthest)
+            end = np.broadcast_to(snap.position, start.shape)
+            blocked = hidden(bodies, medium, start, end, towards[some_paths], paths.length[some_paths])
+        lit[faced[~blocked] + some.start] = True
+    area = body.mesh.area[visible]
+    return float(area[lit].sum() / area.sum())
+
+
+def finite(points: Floats, faces: np.ndarray) -> Bools:
+    """Facets (facet,) whose corners are all finite points (point, xyz)."""
+    known = np.asarray(np.isfinite(points).all(axis=1))
+    return np.ones(len(faces), bool) if known.all() else np.asarray(known[faces].all(axis=1))

@@ -1,0 +1,98 @@
+"""What of a body is in the view of the beam grid: its box in azimuth and elevation, or why there is none."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.labels.views import view_kernels
+from sonarsynth.receiver import BeamGrid
+
+
+class View(IntEnum):
+    """How much of what the array sees of a body lies between the first and the last beam, each way."""
+
+    IN_VIEW = 0
+    PARTLY_IN_VIEW = 1
+    OUTSIDE_VIEW = 2
+    BEHIND = 3
+    HIDDEN = 4
+
+
+MEANINGS = " ".join(view.name.lower() for view in View)
+"""Words of the flags, in the order of their values."""
+
+
+class BoxInView(NamedTuple):
+    """The part in view."""
+
+    bounds: Floats  # (4,) rad: azimuth min, max, elevation min, max; NaN where nothing is in view
+    view: View
+
+
+def facet_boxes(seen: Floats, faces: np.ndarray) -> Floats:
+    """Bounds (facet, 4) in rad of what of each facet (facet, 3) of corners seen (vertex, xyz), sonar frame, is ahead of
+    the sonar, x > 0: azimuth min, max, elevation min, max; NaN where nothing is, or a corner is NaN."""
+    boxes = np.empty((len(faces), 4))
+    view_kernels.boxes_ahead(np.ascontiguousarray(seen, float), faces, boxes)
+    return boxes
+
+
+def whole_box(boxes: Floats) -> Floats:
+    """Bounds (4,) of facets with boxes (facet, 4); NaN without any."""
+    found = np.empty(4)
+    view_kernels.bounds_of_whole(boxes, np.inf, np.inf, np.empty(len(boxes), bool), found)
+    return found
+
+
+def box_in_view(seen: Floats, faces: np.ndarray, beams: BeamGrid, boxes: Floats | None = None) -> BoxInView:
+    """Bounds of the facets (facet, 3) of corners seen (vertex, xyz), sonar frame, within the spans of a beam grid.
+
+    Exact for flat facets, however large: they are cut along the edges of the view. `faces` are those that the array
+    sees; without any, the body is hidden. It is behind where all of these are at x < 0. boxes: `facet_boxes` of them,
+    where these are known.
+    """
+    if not len(faces):
+        return BoxInView(np.full(4, np.nan), View.HIDDEN)
+    spans = 0.5 * beams.azimuth_span, 0.5 * beams.elevation_span
+    boxes = facet_boxes(seen, faces) if boxes is None else boxes
+    inner, parts = np.empty(len(boxes), bool), np.empty((2, 4))
+    view_kernels.bounds_of_whole(boxes, *spans, inner, parts[0])
+    if inner.all():
+        return BoxInView(parts[0], View.IN_VIEW)
+    inside, outside = view_kernels.bounds(np.ascontiguousarray(seen, float), faces[~inner], *spans, parts[1])
+    if inside or inner.any():
+        view = View.PARTLY_IN_VIEW if outside else View.IN_VIEW
+        return BoxInView(whole_box(parts if inside else parts[:1]), view)
+    named = np.zeros(len(seen), bool)
+    named[faces] = True
+    behind = bool((seen[named, 0] < 0.0).all())
+    return BoxInView(np.full(4, np.nan), View.BEHIND if behind else View.OUTSIDE_VIEW)
+
+
+def truncation(seen: Floats, faces: np.ndarray, view: View, beams: BeamGrid) -> float:
+    """Share of the solid angle of facets (facet, 3) of corners seen (vertex, xyz) that is out of the spans of a beam
+    grid; NaN where the body is hidden. Faces and view: as of `box_in_view`."""
+    if view != View.PARTLY_IN_VIEW:
+        return {View.IN_VIEW: 0.0, View.HIDDEN: float("nan")}.get(view, 1.0)
+    spans = 0.5 * beams.azimuth_span, 0.5 * beams.elevation_span
+    inside, every = view_kernels.solid_angles(np.ascontiguousarray(seen, float), faces, *spans)
+    return float(np.clip(1.0 - inside / every, 0.0, 1.0)) if every > 0.0 else 0.0
+
+
+def pixel_box(bounds: Floats, beams: BeamGrid) -> Floats:
+    """Bounds (4,) in rad as x0, y0, x1, y1 (4,) on a beam grid: beam (row i, column j) is at y = i + 0.5, x = j + 0.5.
+
+    A grid of one column, or row, has a beam as wide as its span.
+    """
+    azimuth, elevation = (
+        0.5 * count + angles * (max(count - 1, 1) / span)
+        for count, span, angles in (
+            (beams.azimuths, beams.azimuth_span, bounds[:2]),
+            (beams.elevations, beams.elevation_span, bounds[2:]),
+        )
+    )
+    return np.array([azimuth[0], elevation[0], azimuth[1], elevation[1]])

@@ -1,0 +1,233 @@
+"""Triangles cut along the edges of a view in azimuth and elevation.
+
+The azimuths within +-a, a < 90 degrees, are between two planes through the z axis: s = x sin a -+ y cos a >= 0. The
+elevations within +-e are outside two cones: s = hypot(x, y) sin e -+ z cos e >= 0. Along an edge s is linear for a
+plane and convex for a cone, so that an edge with both ends out of view has no part in it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from sonarsynth.conventions import Bools, Floats, Ints
+
+SIDES = 4
+MOST = 3 + 2 * SIDES
+"""Corners of a triangle cut four times, and room to spare."""
+HALVINGS = 60
+
+
+@njit(cache=True, nogil=True)
+def depth_in_view(p: Floats, side: int, half: Floats) -> float:
+    """How far (m) a point (xyz) is on the inner side of one of the four edges of a view; half: sines and cosines."""
+    if side < 2:
+        return float(p[0] * half[0] + (1 - 2 * side) * p[1] * half[1])
+    return float(math.sqrt(p[0] * p[0] + p[1] * p[1]) * half[2] + (5 - 2 * side) * p[2] * half[3])
+
+
+@njit(cache=True, nogil=True)
+def cross(a: Floats, b: Floats, side: int, half: Floats, out: Floats) -> None:
+    """Where the edge from a, in view, to b, out of it, leaves."""
+    low, high = 0.0, 1.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        for i in range(3):
+            out[i] = a[i] + middle * (b[i] - a[i])
+        if depth_in_view(out, side, half) >= 0.0:
+            low = middle
+        else:
+            high = middle
+
+
+@njit(cache=True, nogil=True)
+def cut(corner: Floats, count: int, side: int, half: Floats, other: Floats) -> int:
+    """The part (corner, xyz) of a polygon on the inner side of one edge of the view: how many corners."""
+    kept = 0
+    for i in range(count):
+        a, b = corner[i], corner[(i + 1) % count]
+        a_in = depth_in_view(a, side, half) >= 0.0
+        if a_in:
+            other[kept] = a
+            kept += 1
+        if a_in != (depth_in_view(b, side, half) >= 0.0):
+            if a_in:
+                cross(a, b, side, half, other[kept])
+            else:
+                cross(b, a, side, half, other[kept])
+            kept += 1
+    return kept
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def widen(p: Floats, slopes: Floats) -> None:
+    """Widen bounds (4,) on the tangents of azimuth and elevation by a point at x >= 0, but for rounding."""
+    across, up = p[1] / abs(p[0]), p[2] / math.sqrt(p[0] * p[0] + p[1] * p[1])
+    slopes[0], slopes[1] = min(slopes[0], across), max(slopes[1], across)
+    slopes[2], slopes[3] = min(slopes[2], up), max(slopes[3], up)
+
+
+@njit(cache=True, nogil=True)
+def steepest(a: Floats, b: Floats, out: Floats) -> bool:
+    """The point between two ends where the elevation of an edge is extreme, if there is one."""
+    d0, d1, d2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    square, along, across = a[0] * a[0] + a[1] * a[1], a[0] * d0 + a[1] * d1, d0 * d0 + d1 * d1
+    rate = d2 * along - a[2] * across
+    t = (a[2] * along - d2 * square) / rate if rate != 0.0 else -1.0
+    out[0], out[1], out[2] = a[0] + t * d0, a[1] + t * d1, a[2] + t * d2
+    return 0.0 < t < 1.0
+
+
+@njit(cache=True, nogil=True)
+def whole(corner: Floats, count: int, side: int, half: Floats) -> bool:
+    """Whether all corners of a polygon are on the inner side of an edge of the view."""
+    inner = True
+    for i in range(count):
+        inner &= depth_in_view(corner[i], side, half) >= 0.0
+    return inner
+
+
+@njit(cache=True, nogil=True)
+def bounds(seen: Floats, faces: Ints, azimuth: float, elevation: float, found: Floats) -> tuple[bool, bool]:
+    """Bounds (4,) in azimuth and elevation (rad) of triangles (facet, 3) of points (vertex, xyz) within +-azimuth and
+    +-elevation, in `found`; whether any part is in that view, and whether any is out of it."""
+    half = np.array([np.sin(azimuth), np.cos(azimuth), np.sin(elevation), np.cos(elevation)])
+    one, other, extreme = np.empty((MOST, 3)), np.empty((MOST, 3)), np.empty(3)
+    slopes = np.array([np.inf, -np.inf, np.inf, -np.inf])
+    inside, outside = False, False
+    for f in range(len(faces)):
+        for i in range(3):
+            one[i] = seen[faces[f, i]]
+        count = 3
+        for side in range(SIDES):
+            if whole(one, count, side, half):
+                continue
+            outside = True
+            count = cut(one, count, side, half, other)
+            one, other = other, one
+        for i in range(count):
+            inside = True
+            widen(one[i], slopes)
+            if steepest(one[i], one[(i + 1) % count], extreme):
+                widen(extreme, slopes)
+                outside |= depth_in_view(extreme, 2, half) < 0.0 or depth_in_view(extreme, 3, half) < 0.0
+    for i in range(4):
+        edge = azimuth if i < 2 else elevation
+        found[i] = min(max(math.atan(slopes[i]), -edge), edge)
+    return inside, outside
+
+
+@njit(cache=True, nogil=True)
+def boxes_ahead(seen: Floats, faces: Ints, boxes: Floats) -> None:
+    """Write bounds (facet, 4) in azimuth and elevation (rad) of the part of each triangle (facet, 3) of points (vertex,
+    xyz) that is ahead, x > 0; NaN where none is, or a corner is NaN."""
+    half = np.array([1.0, 0.0])
+    one, other, extreme, slopes = np.empty((MOST, 3)), np.empty((MOST, 3)), np.empty(3), np.empty(4)
+    for f in range(len(faces)):
+        known = True
+        for i in range(3):
+            p = seen[faces[f, i]]
+            one[i, 0], one[i, 1], one[i, 2] = p[0], p[1], p[2]
+            known &= math.isfinite(p[0] + p[1] + p[2])
+        count = 3 if known else 0
+        if known and not (one[0, 0] > 0.0 and one[1, 0] > 0.0 and one[2, 0] > 0.0):
+            count = cut(one, 3, 0, half, other)
+            one, other = other, one
+        slopes[0], slopes[1], slopes[2], slopes[3] = np.inf, -np.inf, np.inf, -np.inf
+        furthest = 0.0
+        for i in range(count):
+            furthest = max(furthest, one[i, 0])
+            widen(one[i], slopes)
+            if steepest(one[i], one[(i + 1) % count], extreme):
+                widen(extreme, slopes)
+        for i in range(4):
+            boxes[f, i] = math.atan(slopes[i]) if furthest > 0.0 else np.nan
+
+
+@njit(cache=True, nogil=True)
+def bounds_of_whole(boxes: Floats, azimuth: float, elevation: float, whole: Bools, found: Floats) -> None:
+    """Bounds (4,) of those of boxes (facet, 4) that are wholly within +-azimuth and +-elevation, in `found`: NaN of
+    none; and write which."""
+    low, high, lowest, highest = np.inf, -np.inf, np.inf, -np.inf
+    for f in range(len(boxes)):
+        a, b, c, d = boxes[f, 0], boxes[f, 1], boxes[f, 2], boxes[f, 3]
+        whole[f] = a >= -azimuth and b <= azimuth and c >= -elevation and d <= elevation  # none is where they are NaN
+        if whole[f]:
+            low, high, lowest, highest = min(low, a), max(high, b), min(lowest, c), max(highest, d)
+    found[0], found[1], found[2], found[3] = low, high, lowest, highest
+    if not low <= high:
+        found[:] = np.nan
+
+
+@njit(cache=True, nogil=True)
+def under_arc(a: Floats, b: Floats) -> float:
+    """Signed solid angle between the horizon and the arc of directions from a to b (xyz): the integral of the sine of
+    elevation over azimuth."""
+    level_a, level_b = math.hypot(a[0], a[1]), math.hypot(b[0], b[1])
+    turn = math.atan2(a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1])
+    if turn == 0.0:
+        return 0.0
+    low = a[2] / (level_a + math.hypot(level_a, a[2]))  # tangent of half the elevation
+    high = b[2] / (level_b + math.hypot(level_b, b[2]))
+    return float(2.0 * math.atan(math.tan(0.5 * turn) * (low + high) / (1.0 + low * high)))
+
+
+@njit(cache=True, nogil=True)
+def under_edge(a: Floats, b: Floats, half: Floats, ends: Floats) -> float:
+    """As `under_arc`, of the part of an edge from a to b whose elevation is in view, and of the view's edge where that
+    of a to b is beyond; half: as of `depth_in_view`."""
+    square_sine, square_cosine = half[2] * half[2], half[3] * half[3]
+    dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    # where the line meets the two cones: p t^2 + 2 q t + r = 0
+    p = square_cosine * dz * dz - square_sine * (dx * dx + dy * dy)
+    q = square_cosine * a[2] * dz - square_sine * (a[0] * dx + a[1] * dy)
+    r = square_cosine * a[2] * a[2] - square_sine * (a[0] * a[0] + a[1] * a[1])
+    one, two, root = 1.0, 1.0, q * q - p * r
+    if root > 0.0:
+        large = -(q + math.copysign(math.sqrt(root), q))
+        one = large / p if p != 0.0 else 1.0
+        two = r / large if large != 0.0 else 1.0
+    first, second = min(max(min(one, two), 0.0), 1.0), min(max(one, two, 0.0), 1.0)
+    total, start = 0.0, 0.0
+    for stop in (first, second, 1.0):
+        if stop > start:
+            for i in range(3):
+                ends[0, i], ends[1, i] = a[i] + start * (b[i] - a[i]), a[i] + stop * (b[i] - a[i])
+                ends[2, i] = 0.5 * (ends[0, i] + ends[1, i])
+            if depth_in_view(ends[2], 2, half) >= 0.0 and depth_in_view(ends[2], 3, half) >= 0.0:
+                total += under_arc(ends[0], ends[1])
+            else:
+                turn = math.atan2(
+                    ends[0, 0] * ends[1, 1] - ends[0, 1] * ends[1, 0], ends[0, 0] * ends[1, 0] + ends[0, 1] * ends[1, 1]
+                )
+                total += math.copysign(half[2], ends[2, 2]) * turn
+            start = stop
+    return total
+
+
+@njit(cache=True, nogil=True)
+def solid_angles(seen: Floats, faces: Ints, azimuth: float, elevation: float) -> tuple[float, float]:
+    """Sums of the solid angles (sr) of triangles (facet, 3) of points (vertex, xyz) within +-azimuth and +-elevation,
+    and of them whole. Source of the latter: Van Oosterom & Strackee (1983), IEEE Trans. Biomed. Eng. 30, 125, eq. 8."""
+    half = np.array([np.sin(azimuth), np.cos(azimuth), np.sin(elevation), np.cos(elevation)])
+    one, other, ends = np.empty((MOST, 3)), np.empty((MOST, 3)), np.empty((3, 3))
+    inside, every = 0.0, 0.0
+    for f in range(len(faces)):
+        for i in range(3):
+            one[i] = seen[faces[f, i]] / np.linalg.norm(seen[faces[f, i]])
+        a, b, c = one[0], one[1], one[2]
+        normal = np.array([b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]])
+        triple, cosines = abs(a @ normal), 1.0 + a @ b + b @ c + c @ a
+        every += 2.0 * math.atan2(triple, cosines)
+        count = 3
+        for side in range(2):
+            if not whole(one, count, side, half):
+                count = cut(one, count, side, half, other)
+                one, other = other, one
+        part = 0.0
+        for i in range(count):
+            part += under_edge(one[i], one[(i + 1) % count], half, ends)
+        inside += abs(part)
+    return inside, every
