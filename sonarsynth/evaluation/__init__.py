@@ -16,6 +16,7 @@ from sonarsynth.evaluation.level_checks import (
 )
 from sonarsynth.evaluation.point_checks import kinds, points, range_errors
 from sonarsynth.evaluation.source_estimates import snap_located
+from sonarsynth.evaluation.target_checks import labels_of_targets
 
 __all__ = [
     "EXPANSION_AMPLITUDE",
@@ -29,6 +30,7 @@ __all__ = [
     "check",
     "expansions_hold",
     "kinds",
+    "labels_of_targets",
     "link_budget_adds_up",
     "link_budget_measured",
     "near_target",
@@ -59,6 +61,7 @@ def check(tree: xr.DataTree) -> list[Check]:
         checks.append(brightest_beam_on_target(tree, built))
     if "cloud" in tree.children:
         checks.extend(range_errors(tree, built))
+    checks.append(labels_of_targets(tree, built))
     return checks + bounds(tree, built)
 
 

@@ -1,0 +1,73 @@
+"""Labels of targets against each other, and against the labels of points."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from sonarsynth.evaluation.checks import Check, blocks, numbered
+from sonarsynth.geometry import Pose
+
+ROUNDING = 1e-9
+"""m of corners, degrees of boxes, and pixels."""
+_SIDES = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+
+
+def labels_of_targets(tree: xr.DataTree, frames: np.ndarray) -> Check:
+    """Whether labels of targets that say the same in two ways agree: corners of the box and its centre, size and
+    orientation; what is in view in angles and in pixels, and by its flags; points of each target, counted."""
+    name, expected = "labels of targets", "boxes, flags and numbers of points agree"
+    if "box_centre" not in tree["truth/targets"].dataset:
+        return Check(name, expected, "the targets of this store have no such labels", None, {})
+    wrong: dict[str, list[int]] = {"oriented boxes": [], "boxes in view": [], "numbers of points": []}
+    counted = "points" in tree["truth/targets"].dataset
+    azimuth, elevation = (np.asarray(tree[f"truth/beams/{axis}"].values) for axis in ("azimuth", "elevation"))
+    for some in blocks(tree, frames):
+        for i in some.frames:
+            of = {str(v): some.of(f"truth/targets/{v}", i) for v in _READ}
+            there = of["view"] >= 0
+            if not _boxes_agree({v: values[there] for v, values in of.items()}):
+                wrong["oriented boxes"].append(i)
+            if not _views_agree({v: values[there] for v, values in of.items()}, azimuth, elevation):
+                wrong["boxes in view"].append(i)
+            if counted:
+                points, whose = some.of("truth/targets/points", i), some.of("cloud/target", i)
+                each = [int((whose == target).sum()) for target in range(len(points))]
+                if (whose >= len(points)).any() or (each != np.maximum(points, 0)).any():
+                    wrong["numbers of points"].append(i)
+    bad = {what: len(which) for what, which in wrong.items() if which}
+    got = "all agree" if not bad else ", ".join(f"{what} in {n} frames do not" for what, n in bad.items())
+    missed = np.unique(np.concatenate([np.zeros(0, int), *map(np.asarray, wrong.values())]).astype(int))
+    return Check(name, expected, got, not bad, {what: len(which) for what, which in wrong.items()}, numbered(missed))
+
+
+_READ = (
+    "box", "box_centre", "box_size", "box_orientation", "image_box", "full_box", "pixel_box", "view", "in_view",
+    "truncation",
+)  # fmt: skip
+
+
+def _boxes_agree(of: dict[str, np.ndarray]) -> bool:
+    for box, centre, size, turned in zip(*(of[v] for v in _READ[:4]), strict=True):
+        rebuilt = Pose(centre, turned).to_world(_SIDES * size)
+        if not (np.abs(rebuilt - box) <= ROUNDING * (1.0 + np.abs(box))).all():
+            return False
+    return True
+
+
+def _views_agree(of: dict[str, np.ndarray], azimuth: np.ndarray, elevation: np.ndarray) -> bool:
+    box, pixels, view, cut = of["image_box"], of["pixel_box"], of["view"], of["truncation"]
+    seen = view <= 1  # in view, or partly
+    if not ((np.isnan(box).any(axis=1) == ~seen).all() and (of["in_view"][seen] == 1).all()):
+        return False
+    if not ((cut[view == 0] == 0.0).all() and (cut[(view == 2) | (view == 3)] == 1.0).all()):
+        return False
+    whole, outward = of["full_box"][seen], np.array([-1.0, 1.0, -1.0, 1.0])
+    if not (outward * (whole - box[seen]) >= -ROUNDING).all():
+        return False
+    for angles, columns, sides in ((azimuth, [0, 1], [0, 2]), (elevation, [2, 3], [1, 3])):
+        if len(angles) > 1:
+            at = np.interp(box[seen][:, columns], angles, np.arange(len(angles)) + 0.5)
+            if not (np.abs(at - pixels[seen][:, sides]) <= 1e-6).all():
+                return False
+    return True
