@@ -1,6 +1,6 @@
 """Draws pictures of README and of the pages again: python tools/docs/pictures.py [NAME ...].
 
-Names: cloud, thumbnails, ghosts, images, laws, accuracy; left out: all of them, which takes minutes.
+Names: cloud, thumbnails, ghosts, images, labels, laws, accuracy; left out: all of them, which takes minutes.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from label_pictures import labels
 from matplotlib.collections import PolyCollection
 
 import sonarsynth as ss
@@ -143,6 +144,7 @@ DRAWN = {
     "thumbnails": thumbnails,
     "ghosts": ghosts,
     "images": images,
+    "labels": labels,
     "laws": laws,
     "accuracy": accuracy,
 }
