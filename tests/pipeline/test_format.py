@@ -11,6 +11,7 @@ import sonarsynth as ss
 from sonarsynth import schedule, store
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
+from sonarsynth.evaluation import labels_of_targets
 from sonarsynth.pipeline import VARIABLES
 from sonarsynth.products import PointCloud
 from sonarsynth.recipe.reading import loads
@@ -53,6 +54,31 @@ def test_the_cloud_is_a_list_whose_first_rows_are_its_points(built: Path) -> Non
         np.testing.assert_allclose(place, u * cloud["range"].values[there][:, None], rtol=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("points", 7, "numbers of points"),
+        ("box_size", 3.0, "oriented boxes"),
+        ("pixel_box", 1.0, "boxes in view"),
+        ("truncation", 0.5, "boxes in view"),
+        ("in_view", 0, "boxes in view"),
+        ("full_box", 0.0, "boxes in view"),
+    ],
+)
+def test_labels_of_targets_that_disagree_are_seen(built: Path, name: str, value: float, said: str) -> None:
+    tree = xr.open_datatree(built, engine="zarr").load()
+    targets = tree["truth/targets"].dataset
+    frames = np.flatnonzero(targets["view"].values[:, 0] >= 0)
+    assert labels_of_targets(tree, frames).ok is True
+    counts = [(tree["cloud/target"].values[frame] == 0).sum() for frame in frames]
+    assert targets["points"].values[frames, 0].tolist() == counts
+    wrong = targets.copy(deep=True)
+    wrong[name].values[frames[0]] = value
+    tree["truth/targets"] = wrong
+    found = labels_of_targets(tree, frames)
+    assert not found.ok and said in found.got and found.frames == (frames[0],)
+
+
 def test_the_loudest_points_are_kept_in_their_order_and_the_rest_are_counted() -> None:
     energy = np.array([3.0, 9.0, 1.0, 9.0, 5.0], np.float32)
     n = np.arange(5.0, dtype=np.float32)
@@ -63,15 +89,16 @@ def test_the_loudest_points_are_kept_in_their_order_and_the_rest_are_counted() -
 
 
 def test_a_store_without_room_for_its_points_says_how_many_it_left_out() -> None:
-    tree, few = (
-        ss.render(ss.load("configs/tank.yaml", [f"scene.processing.max_points={n}", AXIS]), 0)["cloud"]
-        for n in (4096, 5)
-    )
+    trees = [ss.render(ss.load("configs/tank.yaml", [f"scene.processing.max_points={n}", AXIS]), 0) for n in (4096, 5)]
+    tree, few = (one["cloud"] for one in trees)
     count = int(tree["count"])
     assert count > 5 and int(tree["overflow"]) == 0
     assert int(few["count"]) == 5 and int(few["overflow"]) == count - 5
     louder = np.sort(tree["energy"].values[:count])[-5:]
     assert np.array_equal(np.sort(few["energy"].values), louder)
+    for one in trees:  # the target has those that are left, and whose echo they are
+        own = int((one["cloud/target"].values == 0).sum())
+        assert one["truth/targets/points"].values.tolist() == [own] and own > 0
 
 
 def test_pressure_reads_as_float32_and_is_what_plain_xarray_reads(built: Path) -> None:

@@ -13,9 +13,10 @@ from numba import njit
 from sonarsynth.conventions import Floats
 from sonarsynth.receiver import BeamGrid
 
-DIRECTIONS, STEP = 233, 144
-"""Of a cell: a Fibonacci lattice, whose shares of the parts that straight edges cut off err by under 1 %. Source:
-Niederreiter (1992), Random Number Generation and Quasi-Monte Carlo Methods, section 5.1."""
+DIRECTIONS, STEP = 610, 377
+"""Of a cell: a Fibonacci lattice. The share that one straight edge cuts off errs by 0.002 rms, in 99 of 100 by under
+0.01, at most by 0.02, where the edge is along a row of it. Source: Niederreiter (1992), Random Number Generation and
+Quasi-Monte Carlo Methods, section 5.1."""
 
 Words = npt.NDArray[np.uint64]
 """Bits of the directions of a cell, 64 a word."""
@@ -117,7 +118,7 @@ def _cover(
 
 
 def coverage(bodies: list[tuple[Floats, np.ndarray, Floats]], beams: BeamGrid) -> npt.NDArray[np.float32]:
-    """Share (elevation, azimuth) of the solid angle of the cell of each beam that bodies cover: within 0.01.
+    """Share (elevation, azimuth) of the solid angle of the cell of each beam that bodies cover: 0.002 rms at one edge.
 
     bodies: corners seen (vertex, xyz), sonar frame, facets (facet, 3) of them, and their `facet_boxes`.
     """
