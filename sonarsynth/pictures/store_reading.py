@@ -276,10 +276,8 @@ def _blended(azimuth: Floats, elevation: Floats, families: list[str], family: in
 
 def mesh_group(tree: Source, target: int, index: int) -> str:
     """Where the mesh is that a target has in a frame: its group, or one of those in it where there are several."""
-    group = f"targets/{needed(tree, 'truth/targets/group')[target]}"
-    if read(tree, f"{group}/0/faces") is None:
-        return group
-    return f"{group}/{int(needed(tree, 'truth/targets/mesh', index)[target])}"
+    group, number = f"targets/{needed(tree, 'truth/targets/group')[target]}", needed(tree, "truth/targets/mesh", index)
+    return group if read(tree, f"{group}/0/faces") is None else f"{group}/{int(number[target])}"
 
 
 def hulls(tree: Source, index: int) -> tuple[Hull, ...]:
@@ -288,9 +286,9 @@ def hulls(tree: Source, index: int) -> tuple[Hull, ...]:
     names = read(tree, "truth/targets/target")
     if names is None or not np.isfinite(sonar.position).all():
         return ()
-    position = needed(tree, "truth/targets/position", index)
-    orientation = needed(tree, "truth/targets/orientation", index)
-    scale = needed(tree, "truth/targets/scale", index)
+    position, orientation, scale = (
+        needed(tree, f"truth/targets/{name}", index) for name in ("position", "orientation", "scale")
+    )
     made = []
     for i, name in enumerate(map(str, names)):
         if not np.isfinite(position[i]).all():  # not in this sequence

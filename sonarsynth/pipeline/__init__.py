@@ -112,10 +112,7 @@ class BeamformedFrame:
     image: EnergyImage | None
     imaged: Signals | None = None  # what the image was made of: without the snap's own reflections, where these go
     beams: BeamSpectra | None = None  # of the echo window of these
-    isolated: Floats | None = (
-        None  # (snap, target + 1, family) dB: isolated paths of the link budget as signals have them;
-    )
-    # None where signals are not stored
+    isolated: Floats | None = None  # (snap, target + 1, family) dB: isolated paths of the link budget, in signals
     recorded: Signals | None = None  # as the converter gave them, where the sonar corrected them since
 
 
@@ -232,7 +229,7 @@ def range_frame(plan: Plan, index: int, traced: TracedFrame, heard: BeamformedFr
 
 
 def _heard_values(plan: Plan, traced: TracedFrame, heard: BeamformedFrame) -> Values:
-    """Every stored value of a frame, of the bodies that are there; `plan` is that of its sequence."""
+    """The same of the bodies that are there; `plan` is that of the frame's sequence."""
     frame = traced.frame
     values = _of_frame(plan, frame) | truth_values(traced.truth) | echo_values(traced.echoes, traced.arrivals)
     values |= link_budget_values(traced.budget, heard.isolated) | soundscape_values(plan, frame, traced.chorus)
@@ -243,7 +240,6 @@ def _heard_values(plan: Plan, traced: TracedFrame, heard: BeamformedFrame) -> Va
         counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
         values |= signal_values(heard.recorded or heard.signals, counts)
     if heard.image is None or heard.estimates is None:
-        mark_stage("collect")
         return values
     values |= source_estimate_values(heard.estimates)
     values |= emission_values(plan, direct, heard.estimates, heard.signals, frame.moment.snaps)
