@@ -52,6 +52,10 @@ GLINT = 10.0
 thermocline.yaml), so a ghost may be brightest though its echoes are together fainter by this."""
 
 
+STANDS_OUT = 2.0
+"""Energy of the brightest beam over the median of all, under which it is that of noise."""
+
+
 def on_ghost(some: SmallVariables, frame: int, azimuth: float, elevation: float) -> bool:
     """Whether a direction (rad) is where the truth has a ghost of a target, by surface or bottom, no fainter than the
     target's own echoes by more than `GLINT`.
@@ -70,20 +74,28 @@ def on_ghost(some: SmallVariables, frame: int, azimuth: float, elevation: float)
 
 
 def louder_outside(some: SmallVariables, frame: int) -> bool:
-    """Whether the loudest direct echo is of a target out of the view of the beams, which lobes may show."""
+    """Whether a target out of the view of the beams, which lobes show, echoes as loud as any in view, by `GLINT`."""
     if not some.has("truth/targets/echo_level"):
         return False
     level = np.nan_to_num(some.of("truth/targets/echo_level", frame)[:, 0], nan=-np.inf)
     within = np.isin(some.of("truth/targets/view", frame), (View.IN_VIEW, View.PARTLY_IN_VIEW))
-    return bool(level[~within].max(initial=-np.inf) > level[within].max(initial=-np.inf))
+    return bool(level[~within].max(initial=-np.inf) > level[within].max(initial=-np.inf) - GLINT)
+
+
+def in_box(some: SmallVariables, frame: int, azimuth: float, elevation: float) -> bool:
+    """Whether a direction (rad) is in the image box of a target, or within a beam width of it: no beam may point at
+    what little of a target is in view."""
+    box = np.deg2rad(some.of("truth/targets/image_box", frame))
+    width, at = beam_width(some.tree), np.array([azimuth, azimuth, elevation, elevation])
+    return bool(((at[[0, 2]] >= box[:, [0, 2]] - width) & (at[[1, 3]] <= box[:, [1, 3]] + width)).all(axis=1).any())
 
 
 def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
     """The brightest beam of each frame lies on a target, or within one beam width of its outline; or on a ghost of one
     that the truth has, which the check counts and warns of.
 
-    Frames without a target in view, or whose echoes are inaudible, or fainter than those of one out of view, do not
-    count. Where a chorus or anything else sounds
+    Frames without a target in view, or whose echoes are inaudible, under the noise, or no louder than those of one out
+    of view, do not count. Where a chorus or anything else sounds
     too, it may be brighter: a warning.
     """
     name, expected = "brightest beam on target", "every frame, or on a ghost by surface or bottom"
@@ -99,7 +111,8 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
             counts = bool(snaps_heard(some, i).any()) and not refused(some, i)
         else:
             row, column = np.unravel_index(np.nanargmax(energy), energy.shape)
-            hit, counts = bool(near_target(tree, truth)[row, column]), True
+            hit = bool(near_target(tree, truth)[row, column]) or in_box(some, i, azimuth[column], elevation[row])
+            counts = hit or bool(energy[row, column] > STANDS_OUT * np.nanmedian(energy))
             ghost = not hit and on_ghost(some, i, azimuth[column], elevation[row])
         seen += counts
         hits += hit
