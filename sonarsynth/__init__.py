@@ -29,6 +29,7 @@ _HOMES = {
     "environment.sea": (
         "Absorption Cast Catenary Environment Isovelocity Linear Munk Tabulated TemperatureSalinity Thermocline"
     ),
+    "geometry.hovering": "Hover",
     "geometry.motion": "Circle ConstantVelocity Line RecordedTrack Still Waypoint Waypoints",
     "imaging": "DenseDelayAndSum FocusedDelayAndSum",
     "pictures": "show",
@@ -48,7 +49,11 @@ _HOMES = {
         "Band BandPass BeamGrid Converter Electronics LowPass Overload PlanarLattice PositionTable Romanis "
         "SensorErrors Sonar"
     ),
-    "recipe": "Accuracy Axis Choice Normal Recipe Sobol Splits Zip Uniform",
+    "recipe": "Accuracy Axis Choice Integers LogUniform Normal Recipe Sobol Splits Zip Uniform",
+    "recipe.populations.drawn_tracks": "AnyWay AtRest Hovering StraightAhead Upright Wandering",
+    "recipe.populations.population": "BodyModel Population",
+    "recipe.populations.regions": "Annulus BoxRegion FieldOfView PolygonRegion",
+    "recipe.variation.random_variations": "Condition",
     "recipe.reading": "RecipeError dump load loads schema",
     "recipe.scene": "EchoWindow Physics Processing Scene Trajectory World",
     "scattering": "Isotropic Kirchhoff MirrorLobe PartlyReflecting",

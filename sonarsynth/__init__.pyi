@@ -41,6 +41,7 @@ from sonarsynth.environment.sea import (
 )
 from sonarsynth.export import points as points
 from sonarsynth.frontiers import measure as accuracy
+from sonarsynth.geometry.hovering import Hover as Hover
 from sonarsynth.geometry.motion import (
     Circle as Circle,
     ConstantVelocity as ConstantVelocity,
@@ -94,12 +95,29 @@ from sonarsynth.recipe import (
     Accuracy as Accuracy,
     Axis as Axis,
     Choice as Choice,
+    Integers as Integers,
+    LogUniform as LogUniform,
     Normal as Normal,
     Recipe as Recipe,
     Sobol as Sobol,
     Splits as Splits,
     Uniform as Uniform,
     Zip as Zip,
+)
+from sonarsynth.recipe.populations.drawn_tracks import (
+    AnyWay as AnyWay,
+    AtRest as AtRest,
+    Hovering as Hovering,
+    StraightAhead as StraightAhead,
+    Upright as Upright,
+    Wandering as Wandering,
+)
+from sonarsynth.recipe.populations.population import BodyModel as BodyModel, Population as Population
+from sonarsynth.recipe.populations.regions import (
+    Annulus as Annulus,
+    BoxRegion as BoxRegion,
+    FieldOfView as FieldOfView,
+    PolygonRegion as PolygonRegion,
 )
 from sonarsynth.recipe.reading import (
     RecipeError as RecipeError,
@@ -116,6 +134,7 @@ from sonarsynth.recipe.scene import (
     Trajectory as Trajectory,
     World as World,
 )
+from sonarsynth.recipe.variation.random_variations import Condition as Condition
 from sonarsynth.scattering import (
     Isotropic as Isotropic,
     Kirchhoff as Kirchhoff,

@@ -9,13 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.stats import kstest, norm
+from scipy.stats import chisquare, kstest, norm, spearmanr
 from scipy.stats.qmc import discrepancy
 
+from sonarsynth.description import FieldError
 from sonarsynth.environment.sea import Environment, Isovelocity
 from sonarsynth.geometry.motion import ConstantVelocity, Line, pose, velocity
-from sonarsynth.recipe import Axis, Choice, Normal, Recipe, Sobol, Uniform, Zip, reading
+from sonarsynth.recipe import Axis, Choice, Integers, LogUniform, Normal, Recipe, Sobol, Uniform, Zip, reading
 from sonarsynth.recipe.scene import Scene, Trajectory, World
+from sonarsynth.recipe.variation.random_variations import Condition
+from sonarsynth.recipe.varied_columns import columns
 from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.targets.target import Target
@@ -154,6 +157,80 @@ def test_draws_have_their_distributions() -> None:
     assert kstest(values, lambda x: (cut.cdf(x) - low) / (high - low)).pvalue > 0.01
     assert kstest(drawn(Normal(path=f"{SHRIMP}.0", mean="3 m", deviation="2 m")), norm(3, 2).cdf).pvalue > 0.01
     assert np.mean(drawn(DRAWN[2]) == 1.0) == pytest.approx(0.75, abs=4 * np.sqrt(0.75 * 0.25 / 4000))
+
+
+def test_logarithms_and_whole_numbers_are_drawn_evenly() -> None:
+    values = drawn(LogUniform(path=f"{SHRIMP}.0", low="0.01 m", high="10 m"))
+    assert kstest(np.log10(values), "uniform", (-2, 3)).pvalue > 0.01
+    whole = drawn(Integers(path="scene.world.populations.0.least", low=-2, high=3))
+    counts = [np.sum(whole == n) for n in range(-2, 4)]
+    assert sum(counts) == len(whole) and chisquare(counts).pvalue > 0.01
+
+
+def test_one_variation_goes_with_another_and_keeps_its_distribution() -> None:
+    """Rank correlation of a Gaussian copula: Spearman's is (6/pi) arcsin(rho/2) (Kruskal, 1958)."""
+    one = Uniform(path=f"{SHRIMP}.0", name="one", low=18, high=25)
+    for rho in (-1.0, -0.5, 0.8, 1.0):
+        other = LogUniform(path=f"{MOTION}.speed", low=0.1, high=10, like="one", correlation=rho)
+        made = recipe(variations=(one, other), repeats=2000).spanned
+        rows = np.array([[float(s.value.value) for s in made.drawn(n)] for n in range(2000)])
+        assert spearmanr(*rows.T).statistic == pytest.approx(6 / np.pi * np.arcsin(rho / 2), abs=0.05)
+        assert kstest(np.log10(rows[:, 1]), "uniform", (-1, 2)).pvalue > 0.01
+        alone = recipe(variations=(one,), repeats=2000).spanned
+        assert [made.drawn(n)[0].value for n in range(50)] == [alone.drawn(n)[0].value for n in range(50)]
+
+
+def test_a_condition_is_kept_and_where_it_does_not_hold_the_field_stays() -> None:
+    """A radius of what is drawn to be a ball; of boxes there is none, and the column says so."""
+    ball, box = {"kind": "sphere", "radius": "0.5 m"}, {"kind": "box", "size": [1, 1, 1]}
+    made = recipe(
+        variations=(
+            Choice(path="targets.body.shape", name="shape", values=(box, ball)),
+            Uniform(
+                path="targets.body.shape.radius",
+                name="radius",
+                low="0.1 m",
+                high="0.4 m",
+                when=Condition(entry="shape", value="sphere"),
+            ),
+        ),
+        repeats=40,
+    )
+    made.spanned.check()
+    radius = next(column for column in columns(made.spanned) if column.name == "radius")
+    for n in range(40):
+        shape = made.scene_of(n).world.targets[0].shape
+        if isinstance(shape, Sphere):
+            assert shape.radius == radius.values[n] and 0.1 <= shape.radius <= 0.4
+        else:
+            assert np.isnan(radius.values[n])
+    assert 5 < np.isnan(radius.values).sum() < 35 and radius.attributes["units"] == "m"
+
+
+def test_paths_go_by_name_and_draw_what_they_draw_by_number() -> None:
+    numbered, named = (
+        recipe(variations=(Uniform(path=path, name="x", low=18, high=25),), repeats=3)
+        for path in (f"{MOTION}.start.0", "targets.body.motion.start.0")
+    )
+    assert [numbered.scene_of(n) for n in range(3)] == [named.scene_of(n) for n in range(3)]
+    with pytest.raises(FieldError, match="is called 'bodi'; known: body"):
+        _ = recipe(variations=(Uniform(path="targets.bodi.motion.speed", low=1, high=2),)).spanned
+
+
+@pytest.mark.parametrize(
+    ("variations", "message"),
+    [
+        ((Uniform(path=f"{SHRIMP}.0", low=1, high=2, like="x"),), "'x' is no other variation to go with: none"),
+        (
+            (Uniform(path=f"{SHRIMP}.0", low=1, high=2, when=Condition(entry="x", value=1)),),
+            "'x' is no entry of the grid, nor a choice that comes before; known: there are none",
+        ),
+    ],
+    ids=["like nothing", "when nothing"],
+)
+def test_what_others_depend_on_must_be_there(variations: tuple[Uniform, ...], message: str) -> None:
+    with pytest.raises(FieldError, match=message):
+        recipe(variations=variations, repeats=2).spanned.check()
 
 
 def test_a_far_tail_is_drawn_from_without_loss() -> None:

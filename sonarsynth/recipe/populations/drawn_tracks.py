@@ -102,8 +102,8 @@ class AtRest:
 
 
 @description
-class Straight(_Ranges):
-    """Straight ahead at constant speed."""
+class StraightAhead(_Ranges):
+    """StraightAhead ahead at constant speed."""
 
     kind: Literal["straight"] = "straight"
     speed: tuple[MetresPerSecond, MetresPerSecond]
@@ -175,7 +175,7 @@ class Wandering(_Ranges):
         return Waypoints(points=made, pitch=attitude.pitch, roll=attitude.roll)
 
 
-DrawnTrack = Annotated[AtRest | Straight | Hovering | Wandering, BY_KIND]
+DrawnTrack = Annotated[AtRest | StraightAhead | Hovering | Wandering, BY_KIND]
 
 
 def _position(place: Floats) -> tuple[float, float, float]:
