@@ -202,8 +202,9 @@ def enclosing(body: PlacedTarget) -> tuple[Floats, float]:
 
 def inside(body: PlacedTarget, point: Floats) -> bool:
     """Whether a point (xyz) of the world is inside a closed body: the facet above it shows its inner side."""
-    centre, radius = enclosing(body)
-    if not len(body.mesh.faces) or np.linalg.norm(point - centre) > radius:
+    own, box = body.pose.to_body(point), body.mesh.box
+    margin = 1e-5 * (1.0 + np.ptp(box, axis=0))  # rounding of places
+    if not len(body.mesh.faces) or (own < box[0] - margin).any() or (own > box[1] + margin).any():
         return False
     up = np.array([[1e-3, 2e-3, 1.0]])  # off the edges of boxes
     facet, _ = first_hit(body.mesh, body.pose.to_body(point[None]), body.pose.turn_to_body(up))

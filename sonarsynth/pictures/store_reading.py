@@ -276,8 +276,8 @@ def _blended(azimuth: Floats, elevation: Floats, families: list[str], family: in
 
 def mesh_group(tree: Source, target: int, index: int) -> str:
     """Where the mesh is that a target has in a frame: its group, or one of those in it where there are several."""
-    group, number = f"targets/{needed(tree, 'truth/targets/group')[target]}", needed(tree, "truth/targets/mesh", index)
-    return group if read(tree, f"{group}/0/faces") is None else f"{group}/{int(number[target])}"
+    group, which = (needed(tree, f"truth/targets/{n}", i)[target] for n, i in (("group", None), ("mesh", index)))
+    return f"targets/{group}" if read(tree, f"targets/{group}/0/faces") is None else f"targets/{group}/{int(which)}"
 
 
 def hulls(tree: Source, index: int) -> tuple[Hull, ...]:
@@ -286,9 +286,8 @@ def hulls(tree: Source, index: int) -> tuple[Hull, ...]:
     names = read(tree, "truth/targets/target")
     if names is None or not np.isfinite(sonar.position).all():
         return ()
-    position, orientation, scale = (
-        needed(tree, f"truth/targets/{name}", index) for name in ("position", "orientation", "scale")
-    )
+    placed = (needed(tree, f"truth/targets/{name}", index) for name in ("position", "orientation", "scale"))
+    position, orientation, scale = placed
     made = []
     for i, name in enumerate(map(str, names)):
         if not np.isfinite(position[i]).all():  # not in this sequence

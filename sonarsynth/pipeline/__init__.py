@@ -125,8 +125,8 @@ def truth_at(plan: Plan, frame: Frame) -> Values:
     """The same of a frame that is at hand; `plan` is that of its sequence."""
     truth = label(context_of(plan, frame), plan.propagation, snap_levels(frame.moment.snaps))
     mark_stage("label")
-    values = _of_frame(plan, frame) | truth_values(truth) | which_values(plan)
-    return in_slots(plan, values | soundscape_values(plan, frame, frame_chorus(plan, frame)), VARIABLES)
+    sound = soundscape_values(plan, frame, frame_chorus(plan, frame))
+    return in_slots(plan, _of_frame(plan, frame) | truth_values(truth) | which_values(plan) | sound, VARIABLES)
 
 
 def trace_frame(plan: Plan, index: int) -> TracedFrame:
@@ -147,8 +147,7 @@ def trace_at(plan: Plan, frame: Frame) -> TracedFrame:
     context = context_of(plan, frame)
     arrivals = trace(context, plan.propagation)
     mark_stage("trace")
-    seen = arrivals.seen_from_centre.without_reverberation
-    levels = snap_levels(context.snaps)
+    seen, levels = arrivals.seen_from_centre.without_reverberation, snap_levels(context.snaps)
     truth = label(context, plan.propagation, levels)
     band, targets = band_of(plan, context.snaps), len(context.bodies)
     powers = path_powers(seen, band)
@@ -168,11 +167,10 @@ def _of_frame(plan: Plan, frame: Frame) -> Values:
 
 def beamform_frame(plan: Plan, index: int, traced: TracedFrame) -> BeamformedFrame:
     """What the array hears: signals, where the snap is, and the energy image of the echo window."""
-    recorded, isolated = synthesise(plan, traced), None
+    recorded = synthesise(plan, traced)
     mark_stage("synthesise")
-    if "signals" in plan.products:
-        isolated = measure_isolated(plan, traced)
-        mark_stage("measure")
+    isolated = measure_isolated(plan, traced) if "signals" in plan.products else None
+    mark_stage("measure")
     if not plan.products & OF_BEAMS:
         return BeamformedFrame(recorded, None, None, isolated=isolated)
     signals = known_signals(plan.at(traced.frame.index), traced.frame, recorded)
