@@ -31,7 +31,7 @@ FRAMES = {
     "tank": 0,
     "l_shape": 0,
     "grid": 3,
-    "survey": 0,
+    "survey": 32,
     "harbour": 8,
 }
 """The frame of each shipped recipe that is drawn."""
