@@ -19,7 +19,7 @@ from sonarsynth.labels import echo_levels, label, link_budget, path_powers
 from sonarsynth.pipeline.echo_image import image_of, image_without_clock
 from sonarsynth.pipeline.frame_chorus import clear_values, frame_chorus, soundscape_values, with_chorus
 from sonarsynth.pipeline.labelled_estimates import emission_values, estimate_truth, heard_directly
-from sonarsynth.pipeline.labelling import band_of, expansion_error, point_labels
+from sonarsynth.pipeline.labelling import band_of, expansion_error, frame_values, point_labels
 from sonarsynth.pipeline.requested_rays import follow_rays
 from sonarsynth.pipeline.stage_times import STAGES, mark_stage, stage_timer
 from sonarsynth.pipeline.stored_values import (
@@ -30,13 +30,11 @@ from sonarsynth.pipeline.stored_values import (
     image_values,
     link_budget_values,
     of_isolated,
-    sensor_values,
     signal_values,
     source_estimate_values,
-    table,
     truth_values,
 )
-from sonarsynth.pipeline.synthesis import digitise, errors_of, frame_signals, known_elements, known_signals
+from sonarsynth.pipeline.synthesis import digitise, frame_signals, known_elements, known_signals
 from sonarsynth.pipeline.target_slots import in_slots, which_values
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, variables
 from sonarsynth.planning import OF_BEAMS, Plan, check_unsampled_frame, context_of, plan, receiver_of, survey_of
@@ -126,7 +124,7 @@ def truth_at(plan: Plan, frame: Frame) -> Values:
     truth = label(context_of(plan, frame), plan.propagation, snap_levels(frame.moment.snaps))
     mark_stage("label")
     sound = soundscape_values(plan, frame, frame_chorus(plan, frame))
-    return in_slots(plan, _of_frame(plan, frame) | truth_values(truth) | which_values(plan) | sound, VARIABLES)
+    return in_slots(plan, frame_values(plan, frame) | truth_values(truth) | which_values(plan) | sound, VARIABLES)
 
 
 def trace_frame(plan: Plan, index: int) -> TracedFrame:
@@ -157,20 +155,14 @@ def trace_at(plan: Plan, frame: Frame) -> TracedFrame:
     return TracedFrame(frame, arrivals, truth, budget, heard, frame_chorus(plan, frame))
 
 
-def _of_frame(plan: Plan, frame: Frame) -> Values:
-    """Which frame it is."""
-    split = plan.recipe.split(frame.index)
-    values = table("/", trajectory=frame.trajectory, step=frame.step, time=frame.time, split=split)
-    drawn = errors_of(plan, frame)
-    return values if drawn is None else values | sensor_values(drawn)
-
-
 def beamform_frame(plan: Plan, index: int, traced: TracedFrame) -> BeamformedFrame:
     """What the array hears: signals, where the snap is, and the energy image of the echo window."""
     recorded = synthesise(plan, traced)
     mark_stage("synthesise")
-    isolated = measure_isolated(plan, traced) if "signals" in plan.products else None
-    mark_stage("measure")
+    isolated = None
+    if "signals" in plan.products:
+        isolated = measure_isolated(plan, traced)
+        mark_stage("measure")
     if not plan.products & OF_BEAMS:
         return BeamformedFrame(recorded, None, None, isolated=isolated)
     signals = known_signals(plan.at(traced.frame.index), traced.frame, recorded)
@@ -229,7 +221,7 @@ def range_frame(plan: Plan, index: int, traced: TracedFrame, heard: BeamformedFr
 def _heard_values(plan: Plan, traced: TracedFrame, heard: BeamformedFrame) -> Values:
     """The same of the bodies that are there; `plan` is that of the frame's sequence."""
     frame = traced.frame
-    values = _of_frame(plan, frame) | truth_values(traced.truth) | echo_values(traced.echoes, traced.arrivals)
+    values = frame_values(plan, frame) | truth_values(traced.truth) | echo_values(traced.echoes, traced.arrivals)
     values |= link_budget_values(traced.budget, heard.isolated) | soundscape_values(plan, frame, traced.chorus)
     direct = heard_directly(plan, traced.arrivals, frame.moment.snaps)
     values |= clear_values(plan, traced.chorus, traced.echoes, direct, frame.moment.snaps)
@@ -238,6 +230,7 @@ def _heard_values(plan: Plan, traced: TracedFrame, heard: BeamformedFrame) -> Va
         counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
         values |= signal_values(heard.recorded or heard.signals, counts)
     if heard.image is None or heard.estimates is None:
+        mark_stage("collect")
         return values
     values |= source_estimate_values(heard.estimates)
     values |= emission_values(plan, direct, heard.estimates, heard.signals, frame.moment.snaps)

@@ -1,4 +1,4 @@
-"""What labels need of a plan: the band that levels are taken in, and whose echo each point is."""
+"""What labels need of a plan: which frame it is, the band that levels are taken in, and whose echo each point is."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from sonarsynth.labels import SLICES, Band, Listening, label_points
-from sonarsynth.pipeline.synthesis import known_elements
+from sonarsynth.pipeline.stored_values import Values, sensor_values, table
+from sonarsynth.pipeline.synthesis import errors_of, known_elements
 from sonarsynth.planning import Plan
 from sonarsynth.products import Arrivals, PointCloud, PointLabels, SourceEstimates
 from sonarsynth.recipe.scene import Frame
@@ -52,3 +53,11 @@ def point_labels(
     )
     band = band_of(plan, frame.moment.snaps)
     return label_points(cloud, arrivals, band, moment, listening)
+
+
+def frame_values(plan: Plan, frame: Frame) -> Values:
+    """Which frame it is."""
+    split = plan.recipe.split(frame.index)
+    values = table("/", trajectory=frame.trajectory, step=frame.step, time=frame.time, split=split)
+    drawn = errors_of(plan, frame)
+    return values if drawn is None else values | sensor_values(drawn)

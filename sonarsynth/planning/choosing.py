@@ -56,7 +56,10 @@ KEPT = 16
 
 def choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
     """A plan whose windows are laid, with its choices made. Nothing in them depends on how fast this machine is."""
-    key = plan.digest, plan.products, tuple(frame.index for look in looks for frame in look.frames)
+    try:
+        key = plan.digest, plan.products, tuple(frame.index for look in looks for frame in look.frames)
+    except (OSError, ValueError):  # a file that is not there, which what reads it says better
+        return _choose(plan, looks)
     found = _CHOSEN.get(key)
     if found is None:
         made = _choose(plan, looks)

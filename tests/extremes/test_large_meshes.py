@@ -20,6 +20,7 @@ from sonarsynth.planning.notes import scene_checks
 from sonarsynth.recipe import reading
 from sonarsynth.scattering.facet_geometry import patches
 from sonarsynth.scattering.random_signs import random_polarity
+from sonarsynth.targets import target
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Sphere
 
@@ -32,7 +33,7 @@ def test_a_file_in_millimetres_is_refused_before_it_is_meshed(tmp_path: Path, mo
     def meshed(*_: object) -> Mesh:
         raise AssertionError("meshed")
 
-    monkeypatch.setattr(scene_checks, "mesh_for", meshed)
+    monkeypatch.setattr(target, "base_mesh", meshed)
     shape = f"{{kind: mesh_file, path: {tmp_path / 'hull.stl'}}}"
     sets = (f"scene.world.targets.0.shape={shape}", "scene.physics.scattering={kind: kirchhoff}")
     scene = reading.load(REMUS, (sets[0].replace("}", ", unit: m}"), sets[1])).scene_of(0)

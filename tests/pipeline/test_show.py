@@ -127,6 +127,8 @@ def _frame(size, sonar, snap, vertices, faces, sensors, grid, step) -> dict[str,
         "truth/sonar_orientation": sonar.orientation,
         "truth/targets/position": target.position[None],
         "truth/targets/orientation": target.orientation[None],
+        "truth/targets/scale": np.array([1.0]),
+        "truth/targets/mesh": np.array([0], np.int32),
         "truth/targets/visible_fraction": np.array([1.0]),
         "truth/targets/box": np.stack(np.meshgrid(*np.stack([there.min(0), there.max(0)], 1)), -1).reshape(1, 8, 3),
         "truth/emissions/position": sonar.to_world(snap),
@@ -182,7 +184,7 @@ def _tree(frames, groups, size, angle, sensors, vertices, faces) -> xr.DataTree:
         "truth/sonar_orientation": ("frame", "wxyz"),
         "truth/targets/position": ("frame", "target", "xyz"),
         "truth/targets/orientation": ("frame", "target", "wxyz"),
-        "truth/targets/visible_fraction": ("frame", "target"),
+        **{f"truth/targets/{name}": ("frame", "target") for name in ("visible_fraction", "scale", "mesh")},
         "truth/targets/box": ("frame", "target", "corner", "xyz"),
         "truth/emissions/position": ("frame", "emission", "xyz"),
         "truth/emissions/time": ("frame", "emission"),
@@ -197,7 +199,7 @@ def _tree(frames, groups, size, angle, sensors, vertices, faces) -> xr.DataTree:
         sets.setdefault(group or "/", xr.Dataset())[variable] = (axes, values)
     for name in {"truth/beams", "image"} & set(sets):
         sets[name] = sets[name].assign_coords(azimuth=angle, elevation=angle)
-    sets["truth/targets"] = sets["truth/targets"].assign_coords(target=["hull"])
+    sets["truth/targets"] = sets["truth/targets"].assign_coords(target=["hull"], group=("target", ["hull"]))
     if "signals" in sets:
         sets["signals"]["position"] = (("sensor", "xyz"), sensors)
         sets["signals"]["gain"] = ("sensor", np.ones(len(sensors)))

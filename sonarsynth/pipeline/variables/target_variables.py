@@ -19,7 +19,7 @@ TARGETS = group_of(
     row("category", TARGET, "int16", "1", "what a detector is to call the target"),
     row("clutter", TARGET, "int8", "1", "whether it is there to be taken for a target, and is none", attributes=_YES),
     row("scale", TARGET, "float64", "1", "size of the target over that of its mesh"),
-    row("mesh", TARGET, "int32", "1", "which of the meshes in /targets/<group> it has, where there are several"),
+    row("mesh", TARGET, "int32", "1", "which mesh of its group it has, where there are several"),
     row(
         "position",
         (*TARGET, "xyz"),
