@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sonarsynth.conventions import Floats
 from sonarsynth.planning.choices import OF_BEAMS
 from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.sampled_arrivals import arrivals_of, receiver_of, survey_of
@@ -30,14 +29,14 @@ class Losses:
     """Of one frame, by the light of its loudest snap."""
 
     frame: int
-    lost: Floats  # (target,) share of the energy of its echo that the image is without; NaN where there is no echo
+    lost: dict[str, float]  # share of the energy of each target's echo that the image is without; NaN: no echo
     fall: float  # dB by which the energy of the direct pulse falls
     below: float  # dB: of the echoes over what is left of the direct pulse, in the echo window
 
 
 def lost_echoes(made: Plan) -> list[str]:
     """Notes on what echoes lose, where the direct pulse is taken out or the echo window cuts more than their feet."""
-    windows, names = made.windows, [target.name for target in made.scene.world.targets]
+    windows = made.windows
     if not (windows.direct_removed or windows.cut) or not made.products & OF_BEAMS:
         return []
     rows = [row for index in windows.tight if (row := losses(made.at(index), index)) is not None]
@@ -52,8 +51,9 @@ def lost_echoes(made: Plan) -> list[str]:
             f"in their window (measured, frame {frames})"
         )
     loss = "the removal of the direct pulse" if windows.direct_removed else "the echo window"
-    for target, name in enumerate(names):
-        share, frame = max(((row.lost[target], row.frame) for row in rows if row.lost[target] >= 0), default=(0.0, 0))
+    for name in made.recipe.target_names:
+        some = ((row.lost[name], row.frame) for row in rows if row.lost.get(name, np.nan) >= 0)
+        share, frame = max(some, default=(0.0, 0))
         if share > NOTED:
             level = f"{-10 * np.log10(1 - share):.2g} dB" if share < 1 else "all of it"
             part = f"{100 * share:.1f}" if share < 0.995 else f"{100 * share:.4g}"
@@ -99,7 +99,8 @@ def losses(plan: Plan, index: int) -> Losses | None:
     with np.errstate(divide="ignore", invalid="ignore"):
         fall = 10 * float(np.log10(_energy(direct.pressure) / _energy(alone)))
         below = 10 * float(np.log10(kept.sum() / _energy(alone[:, window])))
-    return Losses(index, np.clip(lost, 0.0, 1.0), fall, below)
+    names = [body.name for body in frame.moment.bodies]
+    return Losses(index, dict(zip(names, np.clip(lost, 0.0, 1.0).tolist(), strict=True)), fall, below)
 
 
 def _without(plan: Plan, signals: Signals, estimates: SourceEstimates) -> np.ndarray:

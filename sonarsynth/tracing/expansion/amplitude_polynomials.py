@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from sonarsynth.tracing.facet_paths import FacetPaths
 
 
+SILENT = 1e-20
+"""Amplitude under which an echo is none: of the loudest snap, 100 dB under 1 uPa. Errors are not relative to less."""
+
+
 class Varying(Protocol):
     """Echoes of a block of facets."""
 
@@ -61,7 +65,7 @@ def _fitted(blocks: Sequence[Varying], few: int | None) -> tuple[list[Floats], f
         fitted = _fit(block.array, _gain(law, block.amplitude, block.tapered, gain), strength, few)
         terms.append(fitted[0])
         worst, loudest = max(worst, fitted[1]), max(loudest, fitted[2])
-    return terms, worst / max(loudest, 1e-300)
+    return terms, worst / max(loudest, SILENT)
 
 
 def _gain(over_aperture: Floats, amplitude: Floats, tapered: Bools, probe_gain: Floats) -> Floats:
@@ -79,7 +83,7 @@ def fitted(array: FacetPaths, gain: Floats, strength: Floats) -> tuple[Floats, f
     And their largest error at the probes, for paths of that strength (path,), relative to the strongest.
     """
     terms, worst, loudest = _fit(array, gain, strength, None)
-    return terms, worst / max(loudest, 1e-300)
+    return terms, worst / max(loudest, SILENT)
 
 
 def _fit(array: FacetPaths, gain: Floats, strength: Floats, few: int | None) -> tuple[Floats, float, float]:
