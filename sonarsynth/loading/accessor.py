@@ -41,7 +41,7 @@ class SonarAccessor:
         """A group as a table, with a row for each combination of `rows`, of the frames that were built.
 
         group: such as "truth/targets" or "link_budget". rows: axes, such as ["frame", "target", "family"]; left out,
-        those that most of the variables have. Axes of components (xyz, wxyz, bound, corner) become columns:
+        those that most of the variables have. Axes of components (xyz, wxyz, bound, side, corner) become columns:
         `position_x`. Variables that have further axes are left out and named in `.attrs["left_out"]`; those with fewer
         are repeated. Flags are categories by name; other numbers that are -1 mean none.
 

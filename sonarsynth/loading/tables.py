@@ -13,7 +13,7 @@ import xarray as xr
 if TYPE_CHECKING:
     import pandas as pd
 
-COMPONENTS = ("xyz", "xyz_other", "wxyz", "bound", "corner")
+COMPONENTS = ("xyz", "xyz_other", "wxyz", "bound", "side", "corner")
 """Axes that become columns: components of one quantity, not several quantities."""
 MOST_ROWS = 20_000_000
 
