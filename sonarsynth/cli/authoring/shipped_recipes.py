@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import sonarsynth
 from sonarsynth.cli.running import BadOption
@@ -26,6 +24,7 @@ def text_of(name: str, file: Path) -> tuple[str, list[Path], list[str]]:
     Commands in its comments name the new file. Raises BadOption where there is no such recipe.
     """
     from sonarsynth.recipe import reading
+    from sonarsynth.store.provenance import paths
 
     known = shipped()
     name = Path(name).stem
@@ -33,23 +32,9 @@ def text_of(name: str, file: Path) -> tuple[str, list[Path], list[str]]:
         raise BadOption(f"--from: '{name}' is none of {', '.join(known) or 'the shipped recipes, which are not there'}")
     text = re.sub(rf"configs/{name}\.yaml", lambda _: str(file), known[name].read_text(encoding="utf-8"))
     text = re.sub(rf"\b{name}\.zarr", f"{file.stem}.zarr", text)
-    beside = [known[name].parent / path for path in _paths(reading.read(known[name]).data)]
+    beside = [known[name].parent / path for path in paths(reading.read(known[name]).data)]
     there = [path for path in beside if path.is_file()]
     return text, there, [path.name for path in beside if path not in there]
-
-
-def _paths(data: Any) -> Iterator[str]:
-    """Every file that a recipe names."""
-    from sonarsynth.recipe import FILE_KINDS
-
-    if isinstance(data, dict):
-        if data.get("kind") in FILE_KINDS and isinstance(data.get("path"), str):
-            yield data["path"]
-        for value in data.values():
-            yield from _paths(value)
-    elif isinstance(data, list):
-        for value in data:
-            yield from _paths(value)
 
 
 def copy_beside(files: list[Path], folder: Path) -> None:

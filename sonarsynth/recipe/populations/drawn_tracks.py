@@ -103,7 +103,7 @@ class AtRest:
 
 @description
 class StraightAhead(_Ranges):
-    """StraightAhead ahead at constant speed."""
+    """Straight ahead at constant speed."""
 
     kind: Literal["straight"] = "straight"
     speed: tuple[MetresPerSecond, MetresPerSecond]
