@@ -18,7 +18,15 @@ from sonarsynth.validation.extremes.outcomes import Got, holds, off, refused, re
 QUICK = [(group, case) for group, cases in groups().items() for case in cases if not case.slow]
 
 
-@pytest.mark.parametrize(("group", "case"), QUICK, ids=[f"{group}: {case.name}" for group, case in QUICK])
+SECONDS = ("a body at every bearing", "targets of 1 um, 1 mm and 1 km", "a target on the source-array baseline")
+"""Cases that take several."""
+ASKED = [
+    pytest.param(group, case, id=f"{group}: {case.name}", marks=[pytest.mark.long] if case.name in SECONDS else [])
+    for group, case in QUICK
+]
+
+
+@pytest.mark.parametrize(("group", "case"), ASKED)
 def test_what_must_come_out_does(group: str, case: Case) -> None:
     row = outcome(group, case)
     assert row.ok, row.got

@@ -208,7 +208,7 @@ def test_less_is_computed_for_less() -> None:
         assert set(render(plan(scene(), products), 0).children) == groups | more
 
 
-BUILT = ("one beam", "no targets", "500 m", "no shrimp", "one hydrophone", "the direct path is blocked")
+BUILT = ("one beam", "no targets", "500 m", "one hydrophone", "the direct path is blocked")
 
 
 @pytest.mark.parametrize("which", BUILT)

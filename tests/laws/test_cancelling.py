@@ -85,7 +85,7 @@ def reasons(result):
     return {(o.expected.surface, o.expected.bottom): o.reason for o in result.outcomes}
 
 
-@pytest.mark.parametrize(("late", "most"), [(-0.8e-3, -45.0), (0.1e-3, -40.0)])
+@pytest.mark.parametrize(("late", "most"), [pytest.param(-0.8e-3, -45.0, marks=pytest.mark.long), (0.1e-3, -40.0)])
 def test_the_arrival_goes_and_the_echo_stays(late, most):
     """The echo, 11 dB fainter at the sensors, keeps its energy and its delay, even at the same time."""
     clean = with_echo(direct(), late)

@@ -90,7 +90,7 @@ def heard(method: GriddedSynthesis | DirectSum, found: Arrivals, part: Elements)
     return np.asarray(make(found, (SNAP,), part, SONAR, None, 0.002, 800)[0])
 
 
-@pytest.mark.parametrize(("signal", "degree"), [(1e-3, 3), (1e-5, 5)])
+@pytest.mark.parametrize(("signal", "degree"), [(1e-3, 3), pytest.param(1e-5, 5, marks=pytest.mark.long)])
 def test_a_planner_takes_the_fifth_degree_before_it_cuts_the_array(signal: float, degree: int) -> None:
     made = planning.plan(reading.recipe_of(reading.read(TANK, [f"accuracy.signal={signal}"])))
     assert made.choices.subarrays == 1 and made.choices.degree == degree

@@ -55,6 +55,7 @@ def test_echoes_of_facets_are_within_every_bound(rows: dict[str, list[Row]], nam
         assert facets == sorted(facets)
 
 
+@pytest.mark.long
 def test_facets_get_better_as_they_get_smaller(rows: dict[str, list[Row]]) -> None:
     for name, body in (("sphere", "rigid sphere, 0.25 m"), ("cylinder", "rigid cylinder, 0.1 by 0.8 m, broadside")):
         errors = [row.got for row in rows[name] if row.knob == body]

@@ -126,7 +126,7 @@ def test_a_part_and_then_the_whole_is_the_whole_at_once(tmp_path: Path, small_pl
     assert_same(path, reference)
 
 
-@pytest.mark.parametrize("shards", [0, 2])
+@pytest.mark.parametrize("shards", [0, pytest.param(2, marks=pytest.mark.long)])
 def test_an_interrupted_build_goes_on(tmp_path: Path, small_plan: Plan, reference: Path, shards: int) -> None:
     def interrupt(done: int, total: int, failed: int) -> None:
         if done >= 8 * shards:
@@ -168,7 +168,12 @@ def test_disk_trouble_on_a_worker_ends_the_build(
 
 
 @pytest.mark.parametrize(
-    ("stage", "distributed"), [("trace_frame", False), ("range_frame", False), ("beamform_frame", True)]
+    ("stage", "distributed"),
+    [
+        ("trace_frame", False),
+        pytest.param("range_frame", False, marks=pytest.mark.long),
+        pytest.param("beamform_frame", True, marks=pytest.mark.long),
+    ],
 )
 def test_frames_that_raise_fail_and_the_rest_goes_on(
     tmp_path: Path,

@@ -200,7 +200,8 @@ def test_frames_and_products_are_read() -> None:
             frame_numbers(text, 9)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.long
 def test_signals_end_a_build_and_its_workers_in_10_s_and_it_goes_on(
     small_file: Path, tmp_path: Path, number: signal.Signals
 ) -> None:

@@ -71,44 +71,46 @@ def test_a_flipped_bit_is_found_wherever_it_is(copy: Path) -> None:
     assert not found(copy)
 
 
-@pytest.mark.parametrize(
-    ("damage", "where", "what"),
+DAMAGES: list[list[tuple[Callable[[Path], object], str, str]]] = [
     [
         (lambda p: (p / "image/energy/c.0.0.0").unlink(), "image/energy/c.0.0.0", "missing"),
-        (lambda p: (p / "image/energy/c.0.0.0").write_bytes(b""), "image/energy/c.0.0.0", "has 0 bytes"),
-        (
-            lambda p: (p / "image/energy/c.0.0.0").chmod(0o644) or flip(p / "image/energy/c.0.0.0", 99),
-            "image/energy/c.0.0.0",
-            "changed",
-        ),
-        (lambda p: (p / "image/energy/zarr.json").unlink(), "image/energy/zarr.json", "missing"),
+        (lambda p: (p / "image/start/c.0").write_bytes(b""), "image/start/c.0", "has 0 bytes"),
+        (lambda p: flip(p / "image/stop/c.0", 99), "image/stop/c.0", "changed"),
+        (lambda p: (p / "image/azimuth/zarr.json").unlink(), "image/azimuth/zarr.json", "missing"),
         (lambda p: (p / "targets/box/faces/c.0.0").unlink(), "targets/box/faces/c.0.0", "missing"),
         (lambda p: (p / ".marks/1.json").unlink(), "shard 1", "without a completion mark"),
-        (lambda p: (p / ".marks/layout.json").unlink(), ".marks/layout.json", "missing"),
-        (lambda p: (p / ".marks/0.json").write_text("{}"), ".marks/0.json", "damaged"),
         (lambda p: shutil.copy(p / ".marks/0.json", p / ".marks/2.json"), ".marks/2.json", "damaged"),
-        (lambda p: (p / "notes.txt").write_text("hello"), "notes.txt", "does not belong"),
+        (lambda p: (p / ".marks/layout.copy.json").unlink(), ".marks/layout.copy.json", "missing"),
         (lambda p: (p / ".marks/x").write_text("hello"), ".marks/x", "does not belong"),
         (lambda p: (p / ".marks/00.json").write_text("hello"), ".marks/00.json", "does not belong"),
-        (lambda p: (p / ".marks/layout.copy.json").unlink(), ".marks/layout.copy.json", "missing"),
-        (
-            lambda p: (p / ".marks/0.json").write_bytes((p / ".marks/0.json").read_bytes() + b"\n"),
-            ".marks/0.json",
-            "damaged",
-        ),
-        (lambda p: ((p / "zarr.json").unlink(), os.mkfifo(p / "zarr.json")), "zarr.json", "no plain file"),
+        (lambda p: (p / "notes.txt").write_text("hello"), "notes.txt", "does not belong"),
         (lambda p: (p / "image/x").symlink_to("/"), "image/x", "does not belong"),
         (lambda p: (p / "two\nlines").write_text("hello"), "two\\nlines", "does not belong"),
-        (
-            lambda p: shutil.copy(p / "image/energy/c.0.0.0", p / "image/energy/c.7.0.0"),
-            "shard 7",
-            "without a completion mark",
-        ),
+        (lambda p: shutil.copy(p / "cloud/x/c.0.0", p / "cloud/x/c.7.0"), "shard 7", "without a completion mark"),
     ],
-)
-def test_damage_is_named(copy: Path, damage: Callable[[Path], object], where: str, what: str) -> None:
-    damage(copy)
-    assert what in found(copy).get(where, f"not among {found(copy)}")
+    [
+        (lambda p: (p / ".marks/layout.json").unlink(), ".marks/layout.json", "missing"),
+        (lambda p: (p / ".marks/0.json").write_text("{}"), ".marks/0.json", "damaged"),
+    ],
+    [
+        (lambda p: ((p / "zarr.json").unlink(), os.mkfifo(p / "zarr.json")), "zarr.json", "no plain file"),
+        (lambda p: append(p / ".marks/0.json", b"\n"), ".marks/0.json", "damaged"),
+    ],
+]
+"""What is done to a store at once, where that is said, and as what."""
+
+
+def append(file: Path, more: bytes) -> None:
+    file.write_bytes(file.read_bytes() + more)
+
+
+@pytest.mark.parametrize("damages", DAMAGES)
+def test_each_damage_is_named(copy: Path, damages: list[tuple[Callable[[Path], object], str, str]]) -> None:
+    for damage, _, _ in damages:
+        damage(copy)
+    named = found(copy)
+    for _, where, what in damages:
+        assert what in named.get(where, f"{where} is not among {named}")
 
 
 def test_a_truncated_file_is_found(copy: Path) -> None:

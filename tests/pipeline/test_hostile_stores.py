@@ -60,13 +60,11 @@ def state(folder: Path) -> dict[str, tuple[int, bytes]]:
 
 
 LINKED = (
-    "image/energy",
     "image/energy/c.1.0.0",
-    "image",
     ".marks",
-    ".marks/1.json",
-    ".marks/layout.json",
     "zarr.json",
+    *(pytest.param(name, marks=pytest.mark.long) for name in ("image/energy", "image", ".marks/1.json")),
+    pytest.param(".marks/layout.json", marks=pytest.mark.long),
 )
 
 
@@ -317,9 +315,15 @@ def test_worker_processes_open_no_file_that_only_the_store_names(
 
 
 VALUES = ("text", 5, None, {"creators": [3]}, {"names": [[]]})
+FORGED = [
+    "plan",
+    "inputs",
+    *(pytest.param(name, marks=pytest.mark.long) for name in ("dataset", "provenance", "products", "choices")),
+    pytest.param("shard_frames", marks=pytest.mark.long),
+]
 
 
-@pytest.mark.parametrize("name", ["dataset", "plan", "provenance", "inputs", "products", "choices", "shard_frames"])
+@pytest.mark.parametrize("name", FORGED)
 def test_forged_attributes_are_one_line(path: Path, made: Plan, name: str) -> None:
     for value in VALUES:
         forge(path, lambda attributes, value=value: attributes.update({name: value}))

@@ -10,7 +10,9 @@ from sonarsynth.recipe import reading
 REMUS = Path(__file__).resolve().parents[2] / "configs" / "remus.yaml"
 
 
-@pytest.mark.parametrize("law", ["{kind: kirchhoff}", "{kind: kirchhoff, roughness: 2 mm, slope: 0.2}"])
+@pytest.mark.parametrize(
+    "law", ["{kind: kirchhoff, roughness: 2 mm, slope: 0.2}", pytest.param("{kind: kirchhoff}", marks=pytest.mark.long)]
+)
 def test_a_thousandth_takes_one_expansion(law: str) -> None:
     sets = ("accuracy.signal=1e-3", f"scene.physics.scattering={law}", "scene.trajectory.frames=2")
     made = planning.plan(reading.load(REMUS, sets), {"signals"})

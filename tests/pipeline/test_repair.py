@@ -123,10 +123,32 @@ DAMAGES: dict[str, Callable[[Path], object]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", DAMAGES)
-def test_a_repaired_store_is_the_one_that_was_built(copy: Path, whole: Path, name: str) -> None:
-    DAMAGES[name](copy)
-    assert store.verify(copy, quick=True).ok is (name == "an empty folder")
+AT_ONCE = (
+    "an empty folder",
+    "root metadata; a group; a folder where a file was; a shard past the end; marks of shards that are not there",
+    "root metadata and a copy of the manifest; a group is a file; the mark of a shard, and its steps; a link",
+    "metadata of a group and of an array; an array; the short last shard; the mark of another shard; an empty folder",
+    "both copies of the manifest; a broken link",
+    "both copies, and a static array",
+    "all marks",
+    "the marks and a group are files",
+    "the marks are a file; a shard that was not built",
+    "the mark of a shard; a blank after a mark; a pipe; a folder where the manifest was; a name that no line holds",
+    "a folder where metadata was; a folder where a mark was; a linked folder that nobody made",
+    "everything of frames",
+)
+"""Each damage once, with others that are elsewhere in the store."""
+
+
+def test_each_damage_is_repaired_once() -> None:
+    assert sorted({name for names in AT_ONCE for name in names.split("; ")}) == sorted(DAMAGES)
+
+
+@pytest.mark.parametrize("names", AT_ONCE)
+def test_a_repaired_store_is_the_one_that_was_built(copy: Path, whole: Path, names: str) -> None:
+    for name in names.split("; "):
+        DAMAGES[name](copy)
+    assert store.verify(copy, quick=True).ok is (names == "an empty folder")
     report = repair(copy, workers=0)
     assert report.ok, report
     assert_identical(copy, whole)

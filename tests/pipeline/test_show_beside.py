@@ -26,6 +26,7 @@ LOBE = "scene.physics.scattering={kind: mirror_lobe, width: 30 deg}"
 MIRRORS = "scene.physics.scattering={kind: kirchhoff}"
 ROUGH = "scene.physics.scattering={kind: kirchhoff, roughness: 2 mm}"
 BALL = [  # lit from the side of the sonar
+    "accuracy.signal=1e-2",
     "scene.world.targets.0.shape={kind: sphere, radius: 25 cm, edge: 12 cm}",
     "scene.world.sources.0.position=[6, -3]",
     "scene.sonar.array.pitch=10 cm",

@@ -82,9 +82,9 @@ def test_a_frame_is_the_same_whatever_was_rendered_before(tmp_path: Path) -> Non
     assert levels[0] != levels[1]
 
 
-def test_the_snap_of_each_model_is_drawn(tmp_path: Path) -> None:
-    for kind, snap in SNAPS.items():
-        draw_snap(recipe_with(tmp_path, snap), tmp_path / f"{kind}.png")
+def test_the_snap_of_a_model_is_drawn(tmp_path: Path) -> None:
+    for kind in ("keller_miksis", "gabor"):  # made of a bubble, and none
+        draw_snap(recipe_with(tmp_path, SNAPS[kind]), tmp_path / f"{kind}.png")
         assert (tmp_path / f"{kind}.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -131,6 +131,7 @@ def test_a_recording_lies_beside_its_recipe_and_what_it_holds_counts(tmp_path: P
     assert first.digest == same.digest != other.digest
 
 
+@pytest.mark.long
 def test_slow_tails_are_among_the_warnings(tmp_path: Path) -> None:
     low = "  physics: {tracing: {kind: straight, bounces: 1}}\n"
     text = "{kind: gabor, frequency: 50 kHz, cycles: 0.3}"
