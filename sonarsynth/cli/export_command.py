@@ -86,9 +86,9 @@ def _bellhop(recipe: Path, out: Path | None, frames: str | None, settings: list[
 
     source = reading.read(recipe, settings)
     made_from = reading.recipe_of(source)
-    some = frame_numbers(frames or "0:1", made_from.frames) or ()
     folder, notes = out or Path(f"{recipe.stem}.bellhop"), dict[str, None]()
     with reading.locating(source):
+        some = frame_numbers(frames or "0:1", made_from.frames) or ()
         plan = planning.plan(made_from)
         for index in some:
             files, unsaid = write_bellhop(plan, index, folder, recipe.stem)

@@ -190,7 +190,8 @@ def _spanned(plan: dict[str, Any]) -> Iterator[str]:
     grid = [f"{' with '.join(entry['names'])} ({entry['values']})" for entry in plan["grid"]]
     grid += [f"{plan['repeats']} repeats"] if plan["repeats"] > 1 else []
     spans = f": {' x '.join(grid)}" if grid else ""
-    yield f"{plan['sequences']} sequences of {plan['frames_of_a_sequence']} frames{spans}"
+    least, most = plan["frames_of_a_sequence"]
+    yield f"{plan['sequences']} sequences of {least if least == most else f'{least} to {most}'} frames{spans}"
     if plan["variations"]:
         yield "drawn for each: " + ", ".join(f"{v['name']} ({v['kind']})" for v in plan["variations"])
     yield "splits: " + ", ".join(f"{name} {count}" for name, count in plan["splits"].items()) + " sequences"

@@ -36,9 +36,9 @@ def rays(
 
     source = reading.read(recipe, settings)
     made_from = reading.recipe_of(source)
-    if frame >= made_from.frames:
-        raise BadOption(f"--frame {frame} is outside 0..{made_from.frames - 1}")
     with reading.locating(source):
+        if frame >= made_from.frames:
+            raise BadOption(f"--frame {frame} is outside 0..{made_from.frames - 1}")
         plan = planning.plan(made_from)
         files, table = show_rays(plan, frame, out or Path(f"{recipe.stem}.rays"))
     typer.echo(table)

@@ -20,6 +20,7 @@ from sonarsynth.pipeline.echo_image import image_of, image_without_clock
 from sonarsynth.pipeline.frame_chorus import clear_values, frame_chorus, soundscape_values, with_chorus
 from sonarsynth.pipeline.labelled_estimates import emission_values, estimate_truth, heard_directly
 from sonarsynth.pipeline.labelling import band_of, expansion_error, frame_values, point_labels
+from sonarsynth.pipeline.padded_axes import in_slots, which_values
 from sonarsynth.pipeline.requested_rays import follow_rays
 from sonarsynth.pipeline.stage_times import STAGES, mark_stage, stage_timer
 from sonarsynth.pipeline.stored_values import (
@@ -35,7 +36,6 @@ from sonarsynth.pipeline.stored_values import (
     truth_values,
 )
 from sonarsynth.pipeline.synthesis import digitise, frame_signals, known_elements, known_signals
-from sonarsynth.pipeline.target_slots import in_slots, which_values
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, variables
 from sonarsynth.planning import OF_BEAMS, Plan, check_unsampled_frame, context_of, plan, receiver_of, survey_of
 from sonarsynth.planning.notes.source_notes import locator

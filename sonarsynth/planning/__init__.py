@@ -22,7 +22,9 @@ from sonarsynth.planning.plan_tables import Omission, Stage
 from sonarsynth.planning.plans import Errors, Plan, Windows
 from sonarsynth.receiver import elements
 from sonarsynth.recipe import Recipe
+from sonarsynth.recipe.emission_slots import most_emissions
 from sonarsynth.recipe.scene import Frame
+from sonarsynth.recipe.sequence_checks import check_spanned
 
 __all__ = [
     "ALL_PRODUCTS",
@@ -77,7 +79,7 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS, choices: Choices | 
     if not isinstance(recipe, Recipe):
         raise TypeError(f"a recipe is planned, not a {type(recipe).__name__}: sonarsynth.load reads one from a file")
     products = chosen_products(products)
-    recipe.spanned.check()
+    check_spanned(recipe.spanned)
     with recipe.spanned.naming(0):
         scene = recipe.scene_of(0)
         profile = read_inputs(scene)
@@ -85,7 +87,7 @@ def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS, choices: Choices | 
     looks = sample_frames(recipe)
     for look in looks:
         if look.real:
-            with recipe.spanned.naming(look.frames[0].index // recipe.steps):
+            with recipe.spanned.naming(recipe.sequence(look.frames[0].index)):
                 for frame in look.frames:
                     check_located(look.scene, frame, products)
     ends = (looks[0].frames[0], looks[0].frames[-1])
@@ -133,7 +135,7 @@ def chosen_products(names: Iterable[str]) -> frozenset[str]:
 def _sizes(recipe: Recipe, windows: Windows) -> dict[str, int]:
     scene = recipe.scene_of(0)
     beams = scene.sonar.beams
-    snaps = sum(len(s.times) for s in scene.world.sources)
+    snaps = most_emissions(recipe.spanned)
     return {
         "frame": recipe.frames,
         "sensor": elements(scene.sonar.array).count,

@@ -42,7 +42,7 @@ def noise_rows(plan: Plan, size: FrameSize) -> list[NoiseRow]:
     """A row for each part of the noise."""
     scene, elements = plan.scene, plan.elements
     noises = scene.world.environment.noises
-    here = plan.recipe.frame(plan.sequence * plan.recipe.steps)[1].sonar_pose
+    here = plan.recipe.frame(plan.recipe.first_frame(plan.sequence))[1].sonar_pose
     sound_speed = float(plan.profile.at(depth(here.position)))
     centre, rows = np.array([scene.sonar.band.centre]), list[NoiseRow]()
     for name, noise in zip(part_names(noises), noises, strict=True):

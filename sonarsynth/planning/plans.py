@@ -94,7 +94,7 @@ class Plan:
 
     def at(self, index: int) -> Plan:
         """The plan for a frame: with the scene, the water and the propagation of its sequence. Raises FieldError."""
-        sequence = index // self.recipe.steps
+        sequence = self.recipe.sequence(index)
         return self if sequence == self.sequence else _of_sequence(self, sequence)
 
     @property
@@ -147,8 +147,8 @@ class Plan:
     @cached_property
     def _passed(self) -> Passed:
         """The depths of the paths of the sequence, in its first, middle and last frame."""
-        first = self.sequence * self.recipe.steps
-        steps = sorted({0, self.recipe.steps // 2, self.recipe.steps - 1})
+        first, count = self.recipe.first_frame(self.sequence), self.recipe.steps(self.sequence)
+        steps = sorted({0, count // 2, count - 1})
         return passed_by([self.recipe.frame(first + step)[1] for step in steps])
 
     @cached_property
@@ -225,8 +225,8 @@ def _of_sequence(plan: Plan, sequence: int) -> Plan:
         scene = plan.recipe.scene_of(sequence)
         profile = read_inputs(scene)
         check_shrimp(scene)
-        first = sequence * plan.recipe.steps
-        ends = (plan.recipe.frame(first)[1], plan.recipe.frame(first + plan.recipe.steps - 1)[1])
+        first, last = plan.recipe.first_frame(sequence), plan.recipe.first_frame(sequence + 1) - 1
+        ends = (plan.recipe.frame(first)[1], plan.recipe.frame(last)[1])
     paths = propagation(scene, profile, ends, plan.recipe.accuracy.signal)
     fewer, thinning = thinned(paths, plan.recipe, sequence, profile)
     return replace(plan, sequence=sequence, profile=fewer, propagation=paths, thinning=thinning)

@@ -7,6 +7,7 @@ import json
 from functools import cached_property
 from typing import Annotated, Any
 
+import numpy as np
 from annotated_types import Ge, Le
 from pydantic import Discriminator, Tag, TypeAdapter
 
@@ -104,14 +105,21 @@ class Recipe:
         return self.spanned.count
 
     @property
-    def steps(self) -> int:
-        """Number of frames of a sequence."""
-        return self.scene.trajectory.frames
-
-    @property
     def frames(self) -> int:
         """Number of frames of the whole dataset."""
-        return self.sequences * self.steps
+        return int(self.spanned.first_frames[-1])
+
+    def first_frame(self, sequence: int) -> int:
+        """Number of the first frame of a sequence."""
+        return int(self.spanned.first_frames[sequence])
+
+    def steps(self, sequence: int) -> int:
+        """Number of frames of a sequence."""
+        return int(self.spanned.steps[sequence])
+
+    def sequence(self, index: int) -> int:
+        """Which sequence a frame is of."""
+        return int(np.searchsorted(self.spanned.first_frames, index, side="right")) - 1
 
     def scene_of(self, sequence: int) -> Scene:
         """Scene of a sequence. Raises IndexError outside 0..sequences-1, FieldError where it cannot be."""
@@ -156,14 +164,14 @@ class Recipe:
         """Scene and frame number `index`; raises IndexError outside 0..frames-1, FieldError where it cannot be."""
         if not 0 <= index < self.frames:
             raise IndexError(f"frame {index} is outside 0..{self.frames - 1}")
-        sequence, step = divmod(index, self.steps)
+        sequence = self.sequence(index)
         scene = self.scene_of(sequence)
-        key = self.spanned.key(sequence)
+        key, step = self.spanned.key(sequence), index - self.first_frame(sequence)
         return scene, scene.frame(step, index=index, trajectory=sequence, seed=self.seed, key=key)
 
     def split(self, index: int) -> int:
         """Index into SPLITS of a frame; a sequence is never divided."""
-        return int(self.spanned.split[index // self.steps])
+        return int(self.spanned.split[self.sequence(index)])
 
     def as_json(self) -> dict[str, Any]:
         """The resolved recipe as plain JSON values."""

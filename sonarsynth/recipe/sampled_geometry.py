@@ -73,7 +73,8 @@ class SampledGeometry:
     def how(self) -> str:
         """What was looked at, in a sentence."""
         recipe, sequences = self.recipe, len(np.unique(self.sequence))
-        of = [(sequences, recipe.sequences, "sequence"), (len(self.sequence) // sequences, recipe.steps, "step")]
+        longest, most = np.bincount(self.sequence).max(), int(recipe.spanned.steps.max())
+        of = [(sequences, recipe.sequences, "sequence"), (int(longest), most, "step")]
         texts = [f"{n} of {counted(every, what)}" if n < every else counted(n, what) for n, every, what in of]
         spread = ", evenly sampled" if len(self.sequence) < recipe.frames else ""
         return f"{' x '.join(texts)}{spread}"
@@ -118,17 +119,16 @@ def sample_geometry(
 ) -> SampledGeometry:
     """Look at the targets of up to so many sequences of a recipe, and at up to `most_frames` frames of them.
 
-    Of more sequences, one is drawn from each of as many equal parts, so that no entry of a grid is passed over; the
-    steps of all are the same, and even. Raises FieldError for a scene that cannot be.
+    Of more sequences, one is drawn from each of as many equal parts, so that no entry of a grid is passed over; their
+    steps are even. Raises FieldError for a scene that cannot be.
     """
     chosen = spread(recipe.sequences, max(sequences, 1))
-    count = min(recipe.steps, max(most_frames // len(chosen), 2))
-    steps = np.unique(np.linspace(0, recipe.steps - 1, count).astype(int))
+    count = max(most_frames // len(chosen), 2)
     world = recipe.described.world
     drawn = [p.category(n) for p in world.populations for n in range(len(p.models))]
     groups = list(dict.fromkeys([*(group_of(target) for target in world.targets), *drawn]))
     rows: list[tuple[float, ...]] = []
-    frames = [(int(n), int(step)) for n in chosen for step in steps]
+    frames = [(int(n), step) for n in chosen for step in _even(recipe.steps(n), count)]
     for number, place in enumerate(frames):
         scene = recipe.scene_of(place[0])
         for name, values in _targets_of(scene, frame_of(recipe, scene, *place)):
@@ -148,6 +148,11 @@ def sample_geometry(
     )
 
 
+def _even(count: int, most: int) -> list[int]:
+    """At most so many of 0 to count - 1, evenly, both ends among them."""
+    return [int(n) for n in np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))]
+
+
 def spread(count: int, most: int) -> Ints:
     """At most so many of `count` numbers: all, or one at random from each of `most` equal parts."""
     if count <= most:
@@ -160,7 +165,9 @@ def frame_of(recipe: Recipe, scene: Scene, sequence: int, step: int) -> Frame:
     """A frame of a scene of a recipe. Raises FieldError where a target has no mesh."""
     try:
         key = recipe.spanned.key(sequence)
-        return scene.frame(step, index=sequence * recipe.steps + step, trajectory=sequence, seed=recipe.seed, key=key)
+        return scene.frame(
+            step, index=recipe.first_frame(sequence) + step, trajectory=sequence, seed=recipe.seed, key=key
+        )
     except FieldError:
         raise
     except (ValueError, OSError) as error:

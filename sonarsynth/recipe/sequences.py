@@ -25,16 +25,13 @@ from sonarsynth.recipe.renamed_keys import as_drawn
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.recipe.splits import SPLITS, Splits, assign
 from sonarsynth.recipe.variation.grid import Axis, Zip, axes
-from sonarsynth.recipe.variation.random_variations import Choice, Ranged, Sobol, Variation
+from sonarsynth.recipe.variation.random_variations import Choice, Sobol, Variation
 from sonarsynth.recipe.variation.setting import Setting, plain_scene, with_settings
-from sonarsynth.recipe.variation.values import Plain, Where, default_name, where
+from sonarsynth.recipe.variation.values import FRAMES, Plain, Where, default_name, where
 
-MOST_FRAMES = 10_000_000
 MOST_SEQUENCES = 1_000_000
 NOTHING = Plain.of(None)
 """Value of an entry whose field stays as it is."""
-RESERVED = ("frame", "trajectory", "step", "time", "split", "repeat")
-"""Names of the store that no entry can have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +73,25 @@ class Sequences:
         """Everything that varies, and where it stands in the recipe."""
         grid: list[tuple[Where, Axis | Variation]] = [(place, axis) for some in self._axes for place, axis, _ in some]
         return grid + [(("variations", i), variation) for i, variation in enumerate(self.variations)]
+
+    @cached_property
+    def steps(self) -> Ints:
+        """Number of frames of each sequence (sequence,). Raises FieldError where that is no whole number from 1."""
+        frames = np.full(self.count, self.base.trajectory.frames)
+        varying = next((n for n, (_, entry) in enumerate(self.entries) if FRAMES in entry.path), None)
+        if varying is not None:
+            for sequence in range(self.count):
+                setting = self.settings(sequence)[varying]
+                value = setting.value.value
+                if setting.paths and (type(value) is not int or value < 1):
+                    raise FieldError(setting.source, f"{FRAMES} must be a whole number from 1, not {value}")
+                frames[sequence] = value if setting.paths else frames[sequence]
+        return frames
+
+    @cached_property
+    def first_frames(self) -> Ints:
+        """Number of the first frame of each sequence, and that of all frames (sequence + 1,)."""
+        return np.concatenate([[0], np.cumsum(self.steps)])
 
     def point(self, sequence: int) -> tuple[int, ...]:
         """Number of the value of each entry of the grid, and of the repeat. Raises IndexError."""
@@ -154,55 +170,6 @@ class Sequences:
             return self.base
         return with_settings(self.base, self._plain, self.settings(sequence))
 
-    def check(self) -> None:
-        """Raises FieldError for entries that cannot go together; the scenes are not looked at."""
-        if self.count > MOST_SEQUENCES:
-            raise FieldError(("grid",), f"spans {self.count:.8g} sequences, more than {MOST_SEQUENCES}")
-        if self.count * self.base.trajectory.frames > MOST_FRAMES:
-            raise FieldError(("grid",), f"spans {self.count} sequences: more than {MOST_FRAMES} frames")
-        names: dict[str, str] = {}
-        paths: dict[str, str] = {}
-        for place, entry in self.entries:
-            name = name_of(entry)
-            if name in RESERVED or name in names:
-                raise FieldError((*place, "name"), f"'{name}' is the name of another coordinate: give another name")
-            names[name] = name
-            for path in entry.path:
-                if path in paths:
-                    raise FieldError((*place, "path"), f"'{path}' is set by '{paths[path]}' as well")
-                paths[path] = name
-        self._check_dependent()
-        if self.splits is not None:
-            stratify = [] if self.splits.stratify is None else [(("splits", "stratify"), self.splits.stratify)]
-            for at, name in [*stratify, *((("splits", "undivided"), n) for n in self.splits.undivided)]:
-                self._check_name(at, name)
-
-    def _check_dependent(self) -> None:
-        """What goes with another, or only where another has some value: that must be there, and come before."""
-        ranged = {name_of(v): v for v in self.variations if isinstance(v, Ranged)}
-        listed = {name_of(entry) for some in self._axes for _, entry, _ in some}
-        for i, variation in enumerate(self.variations):
-            if variation.when is not None and variation.when.entry not in listed:
-                known = ", ".join(sorted(listed)) or "there are none"
-                raise FieldError(
-                    ("variations", i, "when", "entry"),
-                    f"'{variation.when.entry}' is no entry of the grid, nor a choice that comes before; known: {known}",
-                )
-            if isinstance(variation, Choice):
-                listed.add(name_of(variation))
-            like = variation.like if isinstance(variation, Ranged) else None
-            if like is not None and (like not in ranged or ranged[like].like is not None or like == name_of(variation)):
-                free = ", ".join(name for name, v in ranged.items() if v.like is None and v is not variation) or "none"
-                raise FieldError(("variations", i, "like"), f"'{like}' is no other variation to go with: {free}")
-
-    def _check_name(self, at: Where, name: str) -> None:
-        """A name must be that of an entry with values that several sequences can have."""
-        known = {name_of(e): isinstance(e, (Axis, Choice)) for _, e in self.entries}
-        if name not in known:
-            raise FieldError(at, f"'{name}' names nothing that varies; known: {', '.join(known) or 'nothing varies'}")
-        if not known[name]:
-            raise FieldError(at, f"'{name}' has another value in each sequence: name an entry of the grid or a choice")
-
     @cached_property
     def split(self) -> Ints:
         """Split (sequence,) of each sequence: an index into SPLITS; all in the first where the recipe has no splits."""
@@ -230,9 +197,10 @@ class Sequences:
     def as_json(self) -> dict[str, Any]:
         """What is spanned, for a program."""
         counts = np.bincount(self.split, minlength=len(SPLITS))
+        frames = np.bincount(self.split, self.steps, minlength=len(SPLITS))
         return {
             "sequences": self.count,
-            "frames_of_a_sequence": self.base.trajectory.frames,
+            "frames_of_a_sequence": [int(self.steps.min()), int(self.steps.max())],
             "grid": [
                 {"names": [name_of(axis) for _, axis, _ in some], "values": size}
                 for some, size in zip(self._axes, self.sizes, strict=False)
@@ -240,6 +208,7 @@ class Sequences:
             "repeats": self.repeats,
             "variations": [{"name": name_of(v), "kind": v.kind} for v in self.variations],
             "splits": {name: int(n) for name, n in zip(SPLITS, counts, strict=True)},
+            "frames_of_splits": {name: int(n) for name, n in zip(SPLITS, frames, strict=True)},
         }
 
     @contextmanager

@@ -56,7 +56,7 @@ class Prediction:
     raw_bytes_a_frame: int  # before compression
     loading: float  # s of one core, before the first frame of a process is at the pace of the others
     fresh: tuple[float, ...]  # s of one core that tried frames took longer for the first time
-    steps: int  # frames of a sequence, where there is more than one sequence; else 0
+    steps: float  # frames of a sequence, on average, where there is more than one sequence; else 0
     prepared: float  # s of one core until a process has the plan
     waiting: float  # wall-clock time over processor time here and now, of one process
     others: float  # processes that ran or waited for a core then, besides this one
@@ -214,7 +214,7 @@ def predict(
         raw_bytes_a_frame=raw,
         loading=0.0,
         fresh=(),
-        steps=plan.recipe.steps if plan.recipe.sequences > 1 else 0,
+        steps=plan.recipe.frames / plan.recipe.sequences if plan.recipe.sequences > 1 else 0,
         prepared=usual if prepared is None else min(prepared, 1.25 * usual),
         waiting=1.0,
         others=0.0,

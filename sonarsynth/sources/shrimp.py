@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from annotated_types import Ge, Gt, Le, Lt, MinLen
+from annotated_types import Ge, Gt, Le, Lt
 
 from sonarsynth.conventions import Decibels, Floats, Metres, NonNegativeMetres, Number, Position, Seconds
 from sonarsynth.description import BY_KIND, description
@@ -77,8 +77,8 @@ class SnappingShrimp(SoundSource):
     scale the snap to; left out: the snap's own level."""
     variation: SnapVariation = SnapVariation()
     """How its snaps differ; left out: they do not."""
-    snap_times: Annotated[tuple[Seconds, ...], MinLen(1)] = (0.0,)
-    """Times of collapse (s) after the instant of each frame."""
+    snap_times: tuple[Seconds, ...] = (0.0,)
+    """Times of collapse (s) after the instant of each frame; none: it is silent, as it may be in some sequences."""
 
     times_field: ClassVar[str] = "snap_times"
     pulse_field: ClassVar[str] = "snap"

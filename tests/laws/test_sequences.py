@@ -17,6 +17,7 @@ from sonarsynth.environment.sea import Environment, Isovelocity
 from sonarsynth.geometry.motion import ConstantVelocity, Line, pose, velocity
 from sonarsynth.recipe import Axis, Choice, Integers, LogUniform, Normal, Recipe, Sobol, Uniform, Zip, reading
 from sonarsynth.recipe.scene import Scene, Trajectory, World
+from sonarsynth.recipe.sequence_checks import check_spanned
 from sonarsynth.recipe.variation.random_variations import Condition
 from sonarsynth.recipe.varied_columns import columns
 from sonarsynth.sources.shrimp import SnappingShrimp
@@ -54,7 +55,7 @@ def by_content(of: Recipe) -> dict[str, str]:
     spanned, made = of.spanned, {}
     for n in range(of.sequences):
         point = sorted((s.paths, s.value.text) for s in spanned.grid_settings(n))
-        frame = of.frame(n * of.steps + 1)[1]
+        frame = of.frame(of.first_frame(n) + 1)[1]
         made[str((point, spanned.point(n)[-1]))] = f"{of.scene_of(n)} {frame.key} {frame.moment.snaps}"
     return made
 
@@ -196,7 +197,7 @@ def test_a_condition_is_kept_and_where_it_does_not_hold_the_field_stays() -> Non
         ),
         repeats=40,
     )
-    made.spanned.check()
+    check_spanned(made.spanned)
     radius = next(column for column in columns(made.spanned) if column.name == "radius")
     for n in range(40):
         shape = made.scene_of(n).world.targets[0].shape
@@ -230,7 +231,7 @@ def test_paths_go_by_name_and_draw_what_they_draw_by_number() -> None:
 )
 def test_what_others_depend_on_must_be_there(variations: tuple[Uniform, ...], message: str) -> None:
     with pytest.raises(FieldError, match=message):
-        recipe(variations=variations, repeats=2).spanned.check()
+        check_spanned(recipe(variations=variations, repeats=2).spanned)
 
 
 def test_a_far_tail_is_drawn_from_without_loss() -> None:

@@ -29,7 +29,7 @@ VARIED = (
 
 
 def splits(of: Recipe) -> np.ndarray:
-    return np.array([of.split(n * of.steps) for n in range(of.sequences)])
+    return np.array([of.split(of.first_frame(n)) for n in range(of.sequences)])
 
 
 @settings(max_examples=60)
@@ -58,7 +58,7 @@ def test_a_recipe_is_split_in_its_shares(count: int) -> None:
     made = recipe(variations=VARIED, repeats=count, splits=Splits(train=0.8, validation=0.1, test=0.1))
     found = np.bincount(splits(made), minlength=3)
     assert np.all(np.abs(found - np.array([0.8, 0.1, 0.1]) * count) < 1.0)
-    assert [made.split(f) for f in range(12)] == [int(s) for s in np.repeat(splits(made)[:4], made.steps)]
+    assert [made.split(f) for f in range(12)] == [int(s) for s in np.repeat(splits(made)[:4], made.steps(0))]
 
 
 def test_each_value_of_the_stratifying_name_is_split_in_the_shares() -> None:

@@ -179,7 +179,7 @@ def test_a_grid_of_ranges_headings_and_hulls(built: Callable[[str], Path]) -> No
     """Of its 24 sequences the first, the last and one between."""
     made = _plan("grid.yaml")
     assert (made.recipe.sequences, made.sizes["frame"]) == (24, 144) and made.looked_at == 144
-    steps = made.recipe.steps
+    steps = made.recipe.steps(0)
     frames = [frame for n in (0, 12, 23) for frame in (n * steps, (n + 1) * steps - 1)]
     assert frames == list(FRAMES["grid.yaml"])
     checks = _checks(built("grid.yaml"))

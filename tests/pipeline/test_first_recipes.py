@@ -96,7 +96,7 @@ def test_without_a_terminal_a_small_recipe_is_written(empty: Path) -> None:
 @pytest.mark.parametrize("depth", [0.5, 10.0, 4000.0])
 def test_answers_make_a_recipe_whose_target_is_in_the_water(shape: str, depth: float) -> None:
     made = ss.loads(recipe_text(Answers(depth=depth, target=shape, array=None), Path("a.yaml")))
-    for step in (0, made.steps - 1):
+    for step in (0, made.steps(0) - 1):
         (body,) = made.scene.frame(step).moment.bodies
         assert body.box[:, 2].min() > -depth and body.box[:, 2].max() < 0.0
 

@@ -140,7 +140,7 @@ def test_plan_says_what_is_spanned(spanning: Path, capfd: pytest.CaptureFixture[
     assert "splits: train 4, validation 0, test 4 sequences\n" in out
     _, out, _ = said(capfd, "plan", spanning, "--json")
     made = json.loads(out)
-    assert (made["sequences"], made["frames_of_a_sequence"], made["frames_looked_at"]) == (8, 2, 16)
+    assert (made["sequences"], made["frames_of_a_sequence"], made["frames_looked_at"]) == (8, [2, 2], 16)
     assert made["splits"] == {"train": 4, "validation": 0, "test": 4}
 
 
@@ -166,7 +166,11 @@ WRONG = [
     ("motion.start.0", "motion.hedding", "18: grid.0.values.0: scene.world.targets.0.motion.hedding: 'hedding' is not"),
     ("motion.start.0", "motion.speed.0", "18: grid.0.path: scene.world.targets.0.motion.speed.0: 'scene.world.targets"),
     ("scene.world.targets.0.motion.start.0", "scene.sonar.beams.azimuths", "18: grid.0.path: 'scene.sonar.beams.az"),
-    ("scene.world.targets.0.motion.start.0", "scene.trajectory.frames", "18: grid.0.path: 'scene.trajectory.frames' c"),
+    (
+        "scene.world.targets.0.motion.start.0",
+        "scene.physics.subarrays",
+        "18: grid.0.path: 'scene.physics.subarrays' can",
+    ),
     ("scene.world.targets.0.motion.start.0", f"{SHAPE}.path", f"18: grid.0.path: '{SHAPE}.path' is the name of a fil"),
     ("name: away", "name: time", "18: grid.0.name: 'time' is the name of another coordinate"),
     ("name: away", "name: heading", "20: grid.1.zip.0.name: 'heading' is the name of another coordinate"),
@@ -200,8 +204,8 @@ WRONG = [
     ),
     (
         f"path: {START}.0, values: [9 m, 1100 cm]",
-        "path: scene.world.sources.0.snap_times, values: [[0], [0, 0.01]]",
-        "18: grid.0.values.1: scene.world.sources.0.snap_times: all sequences must have equally many: 1 and 2 (seq",
+        "path: trajectory.frames, values: [2, 0]",
+        "18: grid.0.values.1: scene.trajectory.frames must be a whole number from 1, not 0",
     ),
 ]
 

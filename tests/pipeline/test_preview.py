@@ -97,7 +97,7 @@ def test_a_grid_is_counted_by_sequence_and_split() -> None:
     assert (value["sampled_sequences"], value["sampled_frames"]) == (24, 144)
     assert value["sequences_by_split"] == {"train": 12, "validation": 6, "test": 6}
     assert sum(part["count"] for part in value["range"]["by_split"].values()) == value["range"]["all"]["count"]
-    first = [made.frame(n * made.steps)[1].moment.bodies[0].pose.position for n in range(24)]
+    first = [made.frame(made.first_frame(n))[1].moment.bodies[0].pose.position for n in range(24)]
     found = sample_geometry(made, most_frames=1)
     assert found.step.tolist() == [0, 5] * 24  # two of each at least
     apart = np.linalg.norm(np.array(first) - [0.0, 0.0, -8.0], axis=1)

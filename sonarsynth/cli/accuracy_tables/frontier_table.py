@@ -53,8 +53,8 @@ def recipe_table(
     count = _hydrophones(hydrophones)
     source = reading.read(recipe, settings)
     made_from = reading.recipe_of(source)
-    chosen = frame_numbers(frames, made_from.frames)
     with reading.locating(source):
+        chosen = frame_numbers(frames, made_from.frames)
         measured = measure(made_from, chosen, hydrophones=count, seed=seed, peers=peers, say=_say)
     _say("")
     files = write(measured, out, recipe.stem)

@@ -58,7 +58,7 @@ def stored_sound(tree: xr.DataTree, recipe: Recipe) -> Sound:
     if signals is None or "pressure" not in signals:
         raise NothingHeard("the store holds no signals: build it with --products signals")
     start = np.asarray(signals["start"].values, float)
-    frames = np.flatnonzero(np.isfinite(start[: recipe.steps]))[:MOST_FRAMES]
+    frames = np.flatnonzero(np.isfinite(start[: recipe.steps(0)]))[:MOST_FRAMES]
     if not frames.size:
         raise NothingHeard("no frame of the first sequence of the store has been built yet")
     array = _elements(signals)

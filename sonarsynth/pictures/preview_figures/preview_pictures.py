@@ -64,21 +64,22 @@ def _save(made: Any, file: Path) -> None:
 def overview(recipe: Recipe, sequence: int) -> Overview:
     """The scene of a sequence over its frames; the one in the middle is drawn whole. Raises FieldError."""
     scene = recipe.scene_of(sequence)
-    middle = (recipe.steps - 1) // 2
-    some = np.unique(np.linspace(0, recipe.steps - 1, SNAP_STEPS).astype(int)).tolist()
+    last = recipe.steps(sequence) - 1
+    middle = last // 2
+    some = np.unique(np.linspace(0, last, SNAP_STEPS).astype(int)).tolist()
     frames = {step: frame_of(recipe, scene, sequence, step) for step in {*some, middle}}
     drawn = frames[middle]
     ahead = drawn.sonar_pose.turn_to_world([1.0, 0.0, 0.0])
     profile = profile_of(scene.world.environment.sound_speed)
     layers = water(profile.depth, profile.speed, scene.world.environment.depth)
     split = f", for {SPLITS[recipe.spanned.split[sequence]]}" if recipe.splits is not None else ""
-    steps = f" (0 to {recipe.steps - 1})" if recipe.steps > 1 else ""
+    steps = f" (0 to {last})" if last else ""
     of = f"sequence {sequence} of {recipe.sequences}{split}, " if recipe.sequences > 1 else ""
     return Overview(
         title=f"{recipe.title or 'untitled'}: {of}frame {middle}{steps}",
         frame=middle,
         geometry=scene_geometry(scene, drawn, float(np.arctan2(ahead[1], ahead[0]))),
-        boxes=_boxes([frames[step] for step in sorted({0, middle, recipe.steps - 1})]),
+        boxes=_boxes([frames[step] for step in sorted({0, middle, last})]),
         snaps=np.array([snap.position for frame in frames.values() for snap in frame.moment.snaps]).reshape(-1, 3),
         depth=layers.depth,
         speed=layers.speed,

@@ -73,7 +73,7 @@ def coordinates(plan: Plan) -> dict[tuple[str, str], tuple[tuple[str, ...], np.n
     if "signals" in plan.products:
         _add_sensors(plan, add)
     for column in columns(plan.recipe.spanned):
-        static["/", column.name] = (("frame",), np.repeat(column.values, plan.recipe.steps), column.attributes)
+        static["/", column.name] = (("frame",), np.repeat(column.values, plan.recipe.spanned.steps), column.attributes)
     _add_meshes(plan, add)
     return static
 

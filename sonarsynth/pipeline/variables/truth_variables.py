@@ -25,6 +25,14 @@ _SONAR = group_of(
 _EMISSIONS = group_of(
     "/truth/emissions",
     "truth",
+    row(
+        "source",
+        EMISSION,
+        "int16",
+        "1",
+        "number of the source in the recipe",
+        attributes=NONE,
+    ),
     row("position", (*EMISSION, "xyz"), "float64", "m", "position of the snap in the world"),
     row("time", EMISSION, "float64", "s", "time of the snap after the instant of the frame"),
     row("level", EMISSION, "float64", "dB", "peak source level of the snap re 1 uPa at 1 m"),

@@ -45,7 +45,7 @@ def sample_frames(recipe: Recipe) -> tuple[SampledScene, ...]:
             check_alike(recipe.described, scene)
             profile = read_inputs(scene)
             check_shrimp(scene)
-            frames = tuple(recipe.frame(sequence * recipe.steps + step)[1] for step in some)
+            frames = tuple(recipe.frame(recipe.first_frame(sequence) + step)[1] for step in some)
             for frame in frames:
                 check_frame(scene, frame)
         looks.append(SampledScene(scene, profile, frames))
@@ -56,12 +56,12 @@ def sample_frames(recipe: Recipe) -> tuple[SampledScene, ...]:
 
 def sampled_frames(recipe: Recipe) -> dict[int, list[int]]:
     """Steps to look at of each sequence."""
-    count, steps = recipe.sequences, recipe.steps
-    if count * steps <= MAX_SAMPLED_FRAMES:
-        return {sequence: list(range(steps)) for sequence in range(count)}
-    each = min(max(MAX_SAMPLED_FRAMES // count, 2), steps)
-    chosen = _spread(steps, each)
-    return dict.fromkeys(_spread(count, MAX_SAMPLED_FRAMES // each), chosen)
+    count = recipe.sequences
+    if recipe.frames <= MAX_SAMPLED_FRAMES:
+        return {sequence: list(range(recipe.steps(sequence))) for sequence in range(count)}
+    each = min(max(MAX_SAMPLED_FRAMES // count, 2), int(recipe.spanned.steps.max()))
+    some = _spread(count, MAX_SAMPLED_FRAMES // each)
+    return {sequence: _spread(recipe.steps(sequence), each) for sequence in some}
 
 
 def _spread(count: int, most: int) -> list[int]:
@@ -75,7 +75,7 @@ def _ends(recipe: Recipe) -> Iterator[SampledScene]:
         for scene in recipe.spanned.extremes(sequence):
             try:
                 profile = read_inputs(scene)
-                frames = tuple(scene.frame(step) for step in _spread(recipe.steps, 3))
+                frames = tuple(scene.frame(step) for step in _spread(scene.trajectory.frames, 3))
                 for frame in frames:
                     check_frame(scene, frame)
             except FieldError:
@@ -84,7 +84,7 @@ def _ends(recipe: Recipe) -> Iterator[SampledScene]:
 
 
 def check_alike(first: Scene, other: Scene) -> None:
-    """Raises FieldError unless two scenes have targets and snaps of the same number and name: the store's axes.
+    """Raises FieldError unless two scenes have targets of the same names, and as many sources: the store's axes.
 
     Of the second, bodies of populations have been drawn: these come and go.
     """
@@ -102,11 +102,3 @@ def check_alike(first: Scene, other: Scene) -> None:
             raise FieldError(
                 (*world, "targets", i, "name"), f"must be the same in all sequences: '{a.name}' and '{b.name}'"
             )
-    for i, (s, t) in enumerate(zip(first.world.sources, others.sources, strict=True)):
-        if len(s.times) != len(t.times):
-            raise FieldError(
-                (*world, "sources", i, s.times_field),
-                f"all sequences must have equally many: {len(s.times)} and {len(t.times)}",
-            )
-    if first.trajectory.frames != other.trajectory.frames:
-        raise FieldError(("scene", "trajectory", "frames"), "all sequences must have equally many frames")

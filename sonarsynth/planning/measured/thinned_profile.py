@@ -65,8 +65,8 @@ def thinned(model: Propagation, recipe: Recipe, sequence: int, profile: Profile)
 
 def sampled(recipe: Recipe, sequence: int) -> list[Frame]:
     """Frames along a sequence, its first and last among them."""
-    steps = np.unique(np.linspace(0, recipe.steps - 1, SAMPLED).round().astype(int))
-    return [recipe.frame(sequence * recipe.steps + int(step))[1] for step in steps]
+    steps = np.unique(np.linspace(0, recipe.steps(sequence) - 1, SAMPLED).round().astype(int))
+    return [recipe.frame(recipe.first_frame(sequence) + int(step))[1] for step in steps]
 
 
 def _passed(frames: tuple[Frame, ...], bottom: float) -> tuple[float, float]:

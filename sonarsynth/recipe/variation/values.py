@@ -20,8 +20,8 @@ SHORT = dict.fromkeys(WORLD, "scene.world.") | {"trajectory": "scene.", "sonar":
 """What may be left out before a path that begins so."""
 VARYING = ("scene.world.", "scene.trajectory.", "scene.sonar.sensor_errors.", "scene.sonar.electronics.")
 """What can vary."""
-FIXED = ("scene.trajectory.frames",)
-"""Fields that cannot vary though their neighbours can: they decide the shape of the dataset."""
+FRAMES = "scene.trajectory.frames"
+"""How long a sequence is: what varies it lists whole numbers, or draws them."""
 
 
 @dataclass(frozen=True)
@@ -112,10 +112,10 @@ def _paths(value: Any) -> tuple[str, ...]:
         raise ValueError("must be a path such as scene.world.targets.0.motion.heading, or a list of them")
     texts = [f"{SHORT[text.split('.')[0]]}{text}" if text.split(".")[0] in SHORT else text for text in texts]
     for text in texts:
-        if not text.startswith(VARYING) or text in FIXED:
+        if not text.startswith(VARYING):
             raise ValueError(
                 f"'{text}' cannot vary: scene.world, scene.trajectory and what is wrong with the sensors do; the "
-                "instrument, the methods and the number of frames are the same for all sequences"
+                "instrument and the methods are the same for all sequences"
             )
         if re.fullmatch(r"scene\.world\.populations\.[\w-]+(\.(most|name|models(\..*)?))?", text):
             raise ValueError(

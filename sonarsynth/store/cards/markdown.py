@@ -103,10 +103,10 @@ def _variables(facts: Facts) -> str:
 
 
 def _splits(facts: Facts) -> str:
-    splits, steps = facts.plan.get("splits"), facts.plan.get("frames_of_a_sequence")
-    if not isinstance(splits, Mapping) or not isinstance(steps, int):
+    splits, frames = facts.plan.get("splits"), facts.plan.get("frames_of_splits")
+    if not isinstance(splits, Mapping) or not isinstance(frames, Mapping):
         return ""
-    rows = [(name, str(count), str(count * steps)) for name, count in splits.items()]
+    rows = [(name, str(count), str(frames.get(name))) for name, count in splits.items()]
     said = "By whole sequences: `split` of each frame is the number of a row, from 0."
     return f"{said}\n\n" + _table(("split", "sequences", "frames"), rows)
 

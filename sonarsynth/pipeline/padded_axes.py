@@ -1,4 +1,5 @@
-"""Bodies of a frame in their places along the target axis of the store: what is not there reads as missing."""
+"""Bodies of a frame in their places along the target axis of the store, and its emissions first along theirs: what is
+not there reads as missing."""
 
 from __future__ import annotations
 
@@ -13,10 +14,12 @@ INDICES = (("/truth/beams", "target"), ("/cloud", "target"))
 
 
 def which_values(plan: Plan) -> Values:
-    """What the bodies of a frame are, each along its own axis; `plan` is that of its sequence."""
+    """What the bodies and emissions of a frame are, each along its own axis; `plan` is that of its sequence."""
     scene, recipe = plan.scene, plan.recipe
     targets, categories = scene.world.targets, recipe.categories
-    return table(
+    sources = scene.world.sources
+    whose = np.repeat(np.arange(len(sources)), [len(source.times) for source in sources])
+    return table("/truth/emissions", source=whose.astype(np.int16)) | table(
         "/truth/targets",
         present=np.ones(len(targets), np.int8),
         category=np.array([categories.index(target.category) for target in targets], np.int16),
@@ -27,7 +30,8 @@ def which_values(plan: Plan) -> Values:
 
 
 def in_slots(plan: Plan, values: Values, variables: tuple[Variable, ...]) -> Values:
-    """The values of a frame with every axis of targets as long as the store's; `plan` is that of its sequence."""
+    """The values of a frame, its axes of targets and emissions as long as the store's; `plan` is that of its sequence."""
+    values = _with_room(values, plan.sizes["emission"], variables)
     slots = {name: n for n, name in enumerate(plan.recipe.target_names)}
     here = np.array([slots[target.name] for target in plan.scene.world.targets], np.int64)
     if len(here) == len(slots):
@@ -42,6 +46,19 @@ def in_slots(plan: Plan, values: Values, variables: tuple[Variable, ...]) -> Val
             numbers = values[key]
             known = np.append(here, -1)[np.where(numbers < 0, len(here), numbers)]
             found[key] = known.astype(numbers.dtype)
+    return found
+
+
+def _with_room(values: Values, emissions: int, variables: tuple[Variable, ...]) -> Values:
+    """The values with room for so many emissions: those that a frame does not have are the last."""
+    missing = emissions - len(values["/truth/emissions", "source"])
+    if not missing:
+        return values
+    found = dict(values)
+    for v in variables:
+        if "emission" in v.dims and (v.group, v.name) in values:
+            widths = [(0, missing if dim == "emission" else 0) for dim in v.dims[1:]]
+            found[v.group, v.name] = np.pad(values[v.group, v.name], widths, constant_values=v.fill)
     return found
 
 

@@ -1,0 +1,65 @@
+"""What is refused of what a recipe spans, before any scene is looked at."""
+
+from __future__ import annotations
+
+from sonarsynth.description import FieldError
+from sonarsynth.recipe.sequences import MOST_SEQUENCES, Sequences, name_of
+from sonarsynth.recipe.variation.grid import Axis
+from sonarsynth.recipe.variation.random_variations import Choice, Ranged
+from sonarsynth.recipe.variation.values import Where
+
+MOST_FRAMES = 10_000_000
+RESERVED = ("frame", "trajectory", "step", "time", "split", "repeat")
+"""Names of the store that no entry can have."""
+
+
+def check_spanned(spanned: Sequences) -> None:
+    """Raises FieldError for entries that cannot go together; the scenes are not looked at."""
+    if spanned.count > MOST_SEQUENCES:
+        raise FieldError(("grid",), f"spans {spanned.count:.8g} sequences, more than {MOST_SEQUENCES}")
+    names: dict[str, str] = {}
+    paths: dict[str, str] = {}
+    for place, entry in spanned.entries:
+        name = name_of(entry)
+        if name in RESERVED or name in names:
+            raise FieldError((*place, "name"), f"'{name}' is the name of another coordinate: give another name")
+        names[name] = name
+        for path in entry.path:
+            if path in paths:
+                raise FieldError((*place, "path"), f"'{path}' is set by '{paths[path]}' as well")
+            paths[path] = name
+    _check_dependent(spanned)
+    if spanned.first_frames[-1] > MOST_FRAMES:
+        raise FieldError(("grid",), f"spans {spanned.count} sequences: more than {MOST_FRAMES} frames")
+    if spanned.splits is not None:
+        stratify = [] if spanned.splits.stratify is None else [(("splits", "stratify"), spanned.splits.stratify)]
+        for at, name in [*stratify, *((("splits", "undivided"), n) for n in spanned.splits.undivided)]:
+            _check_name(spanned, at, name)
+
+
+def _check_dependent(spanned: Sequences) -> None:
+    """What goes with another, or only where another has some value: that must be there, and come before."""
+    ranged = {name_of(v): v for v in spanned.variations if isinstance(v, Ranged)}
+    listed = {name_of(entry) for place, entry in spanned.entries if place[0] == "grid"}
+    for i, variation in enumerate(spanned.variations):
+        if variation.when is not None and variation.when.entry not in listed:
+            known = ", ".join(sorted(listed)) or "there are none"
+            raise FieldError(
+                ("variations", i, "when", "entry"),
+                f"'{variation.when.entry}' is no entry of the grid, nor a choice that comes before; known: {known}",
+            )
+        if isinstance(variation, Choice):
+            listed.add(name_of(variation))
+        like = variation.like if isinstance(variation, Ranged) else None
+        if like is not None and (like not in ranged or ranged[like].like is not None or like == name_of(variation)):
+            free = ", ".join(name for name, v in ranged.items() if v.like is None and v is not variation) or "none"
+            raise FieldError(("variations", i, "like"), f"'{like}' is no other variation to go with: {free}")
+
+
+def _check_name(spanned: Sequences, at: Where, name: str) -> None:
+    """A name must be that of an entry with values that several sequences can have."""
+    known = {name_of(e): isinstance(e, (Axis, Choice)) for _, e in spanned.entries}
+    if name not in known:
+        raise FieldError(at, f"'{name}' names nothing that varies; known: {', '.join(known) or 'nothing varies'}")
+    if not known[name]:
+        raise FieldError(at, f"'{name}' has another value in each sequence: name an entry of the grid or a choice")
