@@ -30,7 +30,7 @@ def which_values(plan: Plan) -> Values:
 
 
 def in_slots(plan: Plan, values: Values, variables: tuple[Variable, ...]) -> Values:
-    """The values of a frame, its axes of targets and emissions as long as the store's; `plan` is that of its sequence."""
+    """The values of a frame, axes of targets and emissions as long as in the store; `plan` is that of its sequence."""
     values = _with_room(values, plan.sizes["emission"], variables)
     slots = {name: n for n, name in enumerate(plan.recipe.target_names)}
     here = np.array([slots[target.name] for target in plan.scene.world.targets], np.int64)
