@@ -5,7 +5,8 @@ from __future__ import annotations
 from sonarsynth.description import FieldError
 from sonarsynth.recipe.sequences import MOST_SEQUENCES, Sequences, name_of
 from sonarsynth.recipe.variation.grid import Axis
-from sonarsynth.recipe.variation.random_variations import Choice, Ranged
+from sonarsynth.recipe.variation.random_variations import Choice, Ranged, Sobol
+from sonarsynth.recipe.variation.sobol_points import OF_VARIATIONS
 from sonarsynth.recipe.variation.values import Where
 
 MOST_FRAMES = 10_000_000
@@ -29,6 +30,8 @@ def check_spanned(spanned: Sequences) -> None:
                 raise FieldError((*place, "path"), f"'{path}' is set by '{paths[path]}' as well")
             paths[path] = name
     _check_dependent(spanned)
+    if sum(isinstance(v, Sobol) for v in spanned.variations) > OF_VARIATIONS:
+        raise FieldError(("variations",), f"has more than {OF_VARIATIONS} of kind sobol")
     if spanned.first_frames[-1] > MOST_FRAMES:
         raise FieldError(("grid",), f"spans {spanned.count} sequences: more than {MOST_FRAMES} frames")
     if spanned.splits is not None:

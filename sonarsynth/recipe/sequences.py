@@ -111,20 +111,18 @@ class Sequences:
         """What everything random of a sequence is keyed by; 0 for a recipe that spans one scene."""
         if not self.varied:
             return 0
-        point = self.point(sequence)
-        return f"{_point(self, point[:-1])[1]} {point[-1]}"
+        return "{} {}".format(*self.repeat(sequence))
 
     def drawn(self, sequence: int) -> tuple[Setting, ...]:
         """The values of the variations of a sequence."""
-        point = self.point(sequence)
-        of_point, dimension, found = _point(self, point[:-1])[1], 0, []
-        key = f"{of_point} {point[-1]}"
+        (of_point, repeat), dimension, found = self.repeat(sequence), 0, []
+        key = f"{of_point} {repeat}"
         paths = {name_of(variation): variation.path[0] for variation in self.variations}
         held = {setting.name: setting.value for setting in self.grid_settings(sequence)}
         for i, variation in enumerate(self.variations):
             path = as_drawn(variation.path[0])
             if isinstance(variation, Sobol):
-                value = variation.draw(self.seed, of_point, path, dimension, point[-1])
+                value = variation.draw(self.seed, of_point, path, dimension, repeat)
                 dimension += 1
             elif isinstance(variation, Choice):
                 value = variation.draw(self.seed, key, path)
@@ -152,7 +150,7 @@ class Sequences:
                 old = settings[before + i]
                 changed[before + i] = Setting(old.source, old.name, old.paths, variation.at(part))
                 try:
-                    yield populated(with_settings(self.base, self._plain, changed), self.seed, self.key(sequence))
+                    yield self._populated(with_settings(self.base, self._plain, changed), sequence)
                 except FieldError:
                     continue
 
@@ -163,6 +161,14 @@ class Sequences:
     def scene(self, sequence: int) -> Scene:
         """Scene of a sequence. Raises FieldError that names the entry and its value where there is none."""
         return _scene(self, sequence) if self.varied or self.base.world.populations else self.base
+
+    def repeat(self, sequence: int) -> tuple[str, int]:
+        """The grid point of a sequence, as written, and which repeat of that it is."""
+        point = self.point(sequence)
+        return _point(self, point[:-1])[1], point[-1]
+
+    def _populated(self, scene: Scene, sequence: int) -> Scene:
+        return populated(scene, self.seed, self.key(sequence), self.repeat(sequence))
 
     def described(self, sequence: int) -> Scene:
         """The same before its populations are drawn."""
@@ -250,7 +256,7 @@ def _meet(a: Where, b: Where) -> bool:
 
 @lru_cache(maxsize=128)
 def _scene(sequences: Sequences, sequence: int) -> Scene:
-    return populated(sequences.described(sequence), sequences.seed, sequences.key(sequence))
+    return sequences._populated(sequences.described(sequence), sequence)
 
 
 @lru_cache(maxsize=4096)

@@ -96,6 +96,21 @@ def test_places_fill_a_region_evenly(region: Any) -> None:
         assert kstest(at[:, axis], thrown[:, axis]).pvalue > 1e-3
 
 
+def test_sobol_places_are_one_in_each_part_of_the_region_and_what_comes_after_changes_none() -> None:
+    """Of 64 repeats, in each of x, y, z and the number of bodies; and a second population has others."""
+    tank = BoxRegion(low=(5.0, -8.0, -15.0), high=(25.0, 8.0, -5.0))  # a body anywhere in it is clear of all else
+    ball = BodyModel(shape=Sphere(radius=0.01, edge=0.01))
+    even = some(models=(ball,), least=1, most=4, region=tank, apart=0.0, sobol=True)
+    alone, both = drawn(recipe(even, repeats=64)), recipe(even, replace(even, name="more"), repeats=64)
+    assert np.bincount([len(bodies) for bodies in alone]).tolist() == [0, 16, 16, 16, 16]
+    place = np.array([bodies[0].motion.position for bodies in alone])
+    part = (place - np.array(tank.low)) / (np.array(tank.high) - np.array(tank.low))
+    assert all(sorted(np.floor(64 * column)) == list(range(64)) for column in part.T)
+    assert drawn(both) == alone
+    other = np.array([bodies[0].motion.position for bodies in drawn(both, "more")])
+    assert abs(np.corrcoef(place.T, other.T)[:3, 3:]).max() < 0.3
+
+
 def test_a_field_of_view_is_the_sonars() -> None:
     made = recipe(some(region=FieldOfView(near=4.0, far=12.0), least=1, most=1, models=(BALL,)))
     view, beams = pose(made.scene.trajectory.sonar, 1.5), made.scene.sonar.beams

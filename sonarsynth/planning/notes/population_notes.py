@@ -26,7 +26,8 @@ def population_notes(recipe: Recipe) -> list[str]:
     numbers, tried = [], 0
     for sequence in some.tolist():
         with recipe.spanned.naming(sequence):
-            drawn = draw(recipe.spanned.described(sequence), recipe.seed, recipe.spanned.key(sequence))
+            spanned = recipe.spanned
+            drawn = draw(spanned.described(sequence), recipe.seed, spanned.key(sequence), spanned.repeat(sequence))
         numbers.append(len(drawn.targets))
         tried += drawn.tried
     refused = 100.0 * (1.0 - sum(numbers) / tried) if tried else 0.0

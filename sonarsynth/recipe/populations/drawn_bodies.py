@@ -18,6 +18,7 @@ from sonarsynth.receiver import elements
 from sonarsynth.recipe.populations.drawn_tracks import DRAWS, Span
 from sonarsynth.recipe.populations.population import Population
 from sonarsynth.recipe.populations.regions import SonarView
+from sonarsynth.recipe.variation.sobol_points import OF_VARIATIONS, sobol_shares
 from sonarsynth.targets.target import Target
 
 if TYPE_CHECKING:
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 
 TRIES = 1000
 """Places that are tried for a body before there is said to be no room."""
+OF_BODY = 6 + DRAWS + 2
+"""Random numbers of a body: place, attitude, track, scale and model."""
 TIMES = 9
 """Frames of a sequence that a place must do for, at most; first and last among them."""
 ABOVE_BOTTOM = 1e-3
@@ -69,29 +72,34 @@ class _MovingBox:
         return apart - other.radius
 
 
-def populated(scene: Scene, seed: int, key: int | str) -> Scene:
+def populated(scene: Scene, seed: int, key: int | str, repeat: tuple[str, int]) -> Scene:
     """The scene of the sequence of a key, with the bodies of its populations among its targets.
 
-    Raises FieldError where a population has no room.
+    repeat: its grid point, and which repeat of that it is. Raises FieldError where a population has no room.
     """
     if not scene.world.populations:
         return scene
-    targets = (*scene.world.targets, *draw(scene, seed, key).targets)
+    targets = (*scene.world.targets, *draw(scene, seed, key, repeat).targets)
     return replace(scene, world=replace(scene.world, targets=targets, populations=()))
 
 
-def draw(scene: Scene, seed: int, key: int | str) -> Drawn:
+def draw(scene: Scene, seed: int, key: int | str, repeat: tuple[str, int]) -> Drawn:
     """The bodies of the populations of a scene. Raises FieldError as `populated`."""
     sea = _Sea.of(scene, seed, key)
     found: list[Target] = []
     tried = 0
     for place, population in enumerate(scene.world.populations):
         base = number(seed, "population", key, population.name)
-        count = _count(population, share(seed, "population", key, population.name, "count"))
+        even = _Even.of(scene, place, seed, repeat) if population.sobol else None
+        part = even.count if even is not None else share(seed, "population", key, population.name, "count")
+        count = _count(population, part)
         for slot in range(count):
             for attempt in range(TRIES):
                 tried += 1
-                target = sea.tried(population, slot, uniforms(base, slot, attempt, np.arange(6 + DRAWS + 2)))
+                draws = uniforms(base, slot, attempt, np.arange(OF_BODY))
+                if even is not None and attempt == 0:
+                    draws = even.of_body(slot)
+                target = sea.tried(population, slot, draws)
                 if target is not None:
                     found.append(target)
                     break
@@ -102,6 +110,35 @@ def draw(scene: Scene, seed: int, key: int | str) -> Drawn:
                     "smaller bodies",
                 )
     return Drawn(tuple(found), tried)
+
+
+@dataclass(frozen=True)
+class _Even:
+    """What a population of a scene draws by a Sobol sequence."""
+
+    seed: int
+    repeat: tuple[str, int]  # grid point, and which of its repeats
+    name: str
+    first: int  # dimension
+
+    @classmethod
+    def of(cls, scene: Scene, place: int, seed: int, repeat: tuple[str, int]) -> _Even:
+        """Of population number `place`: one that is added after it changes nothing."""
+        before = sum(1 + OF_BODY * other.most for other in scene.world.populations[:place] if other.sobol)
+        return cls(seed, repeat, scene.world.populations[place].name, OF_VARIATIONS + before)
+
+    @property
+    def count(self) -> float:
+        """The draw of the number of bodies."""
+        return float(self._shares([f"{self.name} count"], self.first)[0])
+
+    def of_body(self, slot: int) -> Floats:
+        """The draws (`OF_BODY`,) of the first place that is tried for a body."""
+        return self._shares([f"{self.name} {slot} {n}" for n in range(OF_BODY)], self.first + 1 + OF_BODY * slot)
+
+    def _shares(self, names: list[str], first: int) -> Floats:
+        point, repeat = self.repeat
+        return sobol_shares(self.seed, f"{point} populations", names, first, repeat)
 
 
 def _count(population: Population, part: float) -> int:

@@ -68,6 +68,9 @@ class Population:
     """How they move. They are where they were drawn in the middle of the sequence."""
     apart: NonNegativeMetres = 0.0
     """Least gap between the spheres round two bodies, and to the array, at any frame."""
+    sobol: bool = False
+    """Whether their number and the first places that are tried are spread over the repeats of a grid point more evenly
+    than by chance (as `kind: sobol` of variations)."""
     clutter: bool = False
     """Whether they are there to be taken for targets, and are none."""
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Le, MinLen
 from pydantic import model_validator
 
-from sonarsynth.conventions import Ints, Number
+from sonarsynth.conventions import Number
 from sonarsynth.description import BY_KIND, description
 from sonarsynth.randomness import share
 from sonarsynth.recipe.renamed_keys import as_drawn
+from sonarsynth.recipe.variation.sobol_points import sobol_shares
 from sonarsynth.recipe.variation.values import (
     Name,
     Paths,
@@ -24,8 +24,6 @@ from sonarsynth.recipe.variation.values import (
     with_unit,
 )
 
-SOBOL_BITS = 30
-SOBOL_BLOCK = 1024
 LEAST_SHARE = 1e-12
 """A normal distribution must have so much of itself between its bounds."""
 FAR = 4.0
@@ -248,29 +246,12 @@ class Sobol(Drawn):
         """The value at this part (0 to 1) of the way from low to high."""
         return _between(self.low, self.high, part)
 
-    def draw(self, seed: int, key: int | str, path: str, dimension: int, repeat: int) -> Plain:
+    def draw(self, seed: int, key: str, path: str, dimension: int, repeat: int) -> Plain:
         """The value of a repeat of the grid point `key`, in this dimension of the sequence."""
-        shift = int(share(seed, "sobol", key, path) * (1 << SOBOL_BITS))
-        return self.at((_sobol(dimension, repeat) ^ shift) / (1 << SOBOL_BITS))
+        return self.at(float(sobol_shares(seed, key, [path], dimension, repeat)[0]))
 
 
 Variation = Annotated[Uniform | LogUniform | Integers | Normal | Choice | Sobol, BY_KIND]
-
-
-def _sobol(dimension: int, number: int) -> int:
-    """Point `number` of the unshifted sequence in one dimension, in units of 2^-SOBOL_BITS."""
-    block, row = divmod(number, SOBOL_BLOCK)
-    return int(_sobol_block(dimension, block)[row])
-
-
-@lru_cache(maxsize=64)
-def _sobol_block(dimension: int, block: int) -> Ints:
-    from scipy.stats.qmc import Sobol as Sequence
-
-    sequence = Sequence(dimension + 1, scramble=False, bits=SOBOL_BITS)
-    if block:
-        sequence.fast_forward(block * SOBOL_BLOCK)
-    return np.asarray(sequence.random(SOBOL_BLOCK)[:, dimension] * (1 << SOBOL_BITS)).astype(np.int64)
 
 
 def _check_bounds(low: float | str, high: float | str) -> None:
