@@ -40,7 +40,7 @@ def main() -> int:
                 place = Path(base) / f"{label}-{name}"
                 place.mkdir()
                 stores[label] = _build(tree, name, place, options.frames)
-            same &= _compare(name, stores["old"], stores["new"], renamed)
+            same &= _compare(name, options.frames, stores["old"], stores["new"], renamed)
     return 0 if same else 1
 
 
@@ -77,9 +77,10 @@ def _build(tree: Path, name: str, place: Path, frames: int) -> Path:
     raise SystemExit(f"{name} by {tree}: status {done.returncode}\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
 
 
-def _compare(name: str, old: Path, new: Path, renamed: Mapping[str, str]) -> bool:
-    """Print what differs between two stores, and what a frame costs in both. True where nothing does."""
-    stored, after = _arrays(old), _arrays(new)
+def _compare(name: str, frames: int, old: Path, new: Path, renamed: Mapping[str, str]) -> bool:
+    """Print what differs between the first frames of two stores, and what a frame costs in both. True where nothing
+    does."""
+    stored, after = _arrays(old, frames), _arrays(new, frames)
     if _format(old) == "2" and _format(new) == "3":
         stored = as_format_3(stored, after["cloud/range"].shape[1] if "cloud/range" in after else 0)
     before = {_renamed(path, renamed): array for path, array in stored.items()}
@@ -105,10 +106,16 @@ def _renamed(path: str, renamed: Mapping[str, str]) -> str:
     return path
 
 
-def _arrays(store: Path) -> dict[str, np.ndarray]:
-    """Every array of a store by its path, as stored."""
-    root = zarr.open_group(store, mode="r")
-    return {path: np.asarray(node[...]) for path, node in root.members(max_depth=None) if isinstance(node, zarr.Array)}
+def _arrays(store: Path, frames: int) -> dict[str, np.ndarray]:
+    """Every array of a store by its path, as stored; so many frames of those that have them."""
+    members = zarr.open_group(store, mode="r").members(max_depth=None)
+    arrays = {path: node for path, node in members if isinstance(node, zarr.Array)}
+    return {path: np.asarray(a[:frames] if _of_frames(a) else a[...]) for path, a in arrays.items()}
+
+
+def _of_frames(array: zarr.Array) -> bool:
+    names = getattr(array.metadata, "dimension_names", None)
+    return bool(names) and names[0] == "frame"
 
 
 def _format(store: Path) -> str:
