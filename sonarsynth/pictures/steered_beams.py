@@ -12,6 +12,7 @@ from sonarsynth.equations.arrays.gates import gated_spectra
 from sonarsynth.evaluation import beam_width
 from sonarsynth.pictures.figures.sheet import Beam
 from sonarsynth.pictures.store_reading import Stored, beam_grid, needed, read
+from sonarsynth.recipe.variation.values import ASSUMED_SPEED
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -94,7 +95,15 @@ def direct_arrival(tree: xr.DataTree, frame: Stored) -> float:
     if heard is not None and np.isfinite(heard).any():
         return float(heard[np.isfinite(heard)][0])
     snap_time = needed(tree, "truth/emissions/time", frame.index)
-    return float(snap_time[0] + np.linalg.norm(frame.snap[0]) / tree.attrs["assumed_sound_speed"])
+    return float(snap_time[0] + np.linalg.norm(frame.snap[0]) / assumed_speed(tree, frame.index))
+
+
+def assumed_speed(tree: xr.DataTree, frame: int) -> float:
+    """Speed of sound (m/s) that the sonar assumes in a frame: a coordinate where that varies."""
+    varied = [
+        c for c in tree.to_dataset().coords.values() if ASSUMED_SPEED in str(c.attrs.get("long_name")).split(", ")
+    ]
+    return float(varied[0][frame]) if varied else float(tree.attrs["assumed_sound_speed"])
 
 
 def _measured(frame: Stored, azimuth: float, elevation: float, step: float) -> float:
@@ -110,7 +119,7 @@ def _expected(tree: xr.DataTree, frame: Stored, point: Floats) -> float:
         return float("nan")
     snap = frame.snap[0]
     path = np.linalg.norm(snap - point) + np.linalg.norm(point) - np.linalg.norm(snap)
-    return float(path / tree.attrs["assumed_sound_speed"])
+    return float(path / assumed_speed(tree, frame.index))
 
 
 def steer(tree: xr.DataTree, frame: Stored, pressure: Floats, start: float, along: Floats) -> tuple[Floats, Floats]:
@@ -124,7 +133,7 @@ def steer(tree: xr.DataTree, frame: Stored, pressure: Floats, start: float, alon
     frequency, spectra = gated_spectra(pressure, rate, first, count, band)
     gain, position = needed(tree, "signals/gain"), needed(tree, "signals/position")
     focus = float(np.median(frame.true_range[frame.target >= 0]))
-    speed = float(tree.attrs["assumed_sound_speed"])
+    speed = assumed_speed(tree, frame.index)
     heard = beam_spectra(spectra, frequency, position, gain, along, speed, focus)
     samples = round(rate / float(frequency[1] - frequency[0]))
     every = np.zeros((len(along), samples // 2 + 1), complex)

@@ -157,6 +157,7 @@ def trace_at(plan: Plan, frame: Frame) -> TracedFrame:
 
 def beamform_frame(plan: Plan, index: int, traced: TracedFrame) -> BeamformedFrame:
     """What the array hears: signals, where the snap is, and the energy image of the echo window."""
+    plan = plan.at(index)
     recorded = synthesise(plan, traced)
     mark_stage("synthesise")
     isolated = None
@@ -165,12 +166,13 @@ def beamform_frame(plan: Plan, index: int, traced: TracedFrame) -> BeamformedFra
         mark_stage("measure")
     if not plan.products & OF_BEAMS:
         return BeamformedFrame(recorded, None, None, isolated=isolated)
-    signals = known_signals(plan.at(traced.frame.index), traced.frame, recorded)
+    signals = known_signals(plan, traced.frame, recorded)
     return replace(locate_and_image(plan, traced.frame, signals), isolated=isolated, recorded=recorded)
 
 
 def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFrame:
-    """What the sonar makes of signals: where the snap is, and the energy image of the echo window.
+    """What the sonar makes of signals: where the snap is, and the energy image of the echo window; `plan` is that of
+    the frame's sequence.
 
     Without a snap whose echo window is in the record there is no clock: the image is of the last so long part of the
     record, and no echo has a place.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ import xarray as xr
 from sonarsynth import cli, evaluation, planning, schedule, store
 from sonarsynth.cli.running import run
 from sonarsynth.pipeline import render
-from sonarsynth.recipe import reading
+from sonarsynth.recipe import Axis, reading
 from sonarsynth.recipe.reading import RecipeError
 
 SPAN = """\
@@ -31,6 +32,20 @@ variations:
     values: [{kind: linear, surface_speed: 1500, gradient: 0.1}, {kind: isovelocity, speed: 1520}]
 repeats: 2
 splits: {train: 0.5, test: 0.5, stratify: hull}
+"""
+
+
+WATCHING = """\
+scene:
+  world:
+    environment: {depth: 20 m, sound_speed: {kind: isovelocity, speed: 1510 m/s}}
+    targets: [{name: ball, shape: {kind: sphere, radius: 0.5, edge: 0.3}, motion: {kind: still, position: [14, 0, -5]}}]
+    sources: [{kind: snapping_shrimp, position: [6, 5]}]
+  sonar:
+    array: {kind: planar_lattice, columns: 24, rows: 24, pitch: 4 cm}
+    beams: {azimuth_span: 40 deg, azimuths: 21, elevation_span: 30 deg, elevations: 11}
+  trajectory: {sonar: {kind: still, position: [0, 0, -5], heading: 90 deg}}
+  processing: {echo_window: {start: 5 ms, stop: 14 ms}}
 """
 
 
@@ -108,6 +123,25 @@ def test_the_sound_speed_of_a_sequence_is_the_one_its_rays_go_through(spanning: 
         speed = made.recipe.scene_of(frame // 2).world.environment.sound_speed
         view = made.at(frame)
         assert view.at(frame + 1) is view and view.profile.uniform == (speed.kind == "isovelocity")
+
+
+def test_each_sequence_is_located_and_imaged_by_what_its_own_sonar_knows() -> None:
+    """A bottom at another depth, and another speed that is assumed: each frame is that of a recipe of its own."""
+    grid = (
+        Axis(path="environment.depth", values=("10 m", "20 m")),
+        Axis(path="sonar.assumed_sound_speed", values=("1500 m/s", "1520 m/s")),
+    )
+    recipe = replace(reading.loads(WATCHING), grid=grid)
+    spanned, ranges = planning.plan(recipe), []
+    for n in range(4):
+        alone = planning.plan(replace(recipe, scene=recipe.scene_of(n), grid=()), choices=spanned.choices)
+        frame, own = render(spanned, n), render(alone, 0)
+        place = frame["source_estimates/position"].values[0]
+        assert np.isfinite(place).all() and np.allclose(place, own["source_estimates/position"].values[0], atol=1e-3)
+        ranges.append(float(frame["cloud/range"][0]))
+        assert ranges[-1] == pytest.approx(float(own["cloud/range"][0]), abs=1e-3)
+        assert float(frame.coords["sonar_assumed_sound_speed"]) == (1500.0, 1520.0)[n % 2]
+    assert abs(ranges[0] - ranges[1]) > 0.05, "the speed that is assumed moves points"
 
 
 def test_sequences_and_frames_are_selected(spanning: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -18,7 +18,8 @@ Where = tuple[str | int, ...]
 WORLD = ("environment", "targets", "sources", "populations", "noise_sources", "scatterers", "chorus")
 SHORT = dict.fromkeys(WORLD, "scene.world.") | {"trajectory": "scene.", "sonar": "scene."}
 """What may be left out before a path that begins so."""
-VARYING = ("scene.world.", "scene.trajectory.", "scene.sonar.sensor_errors.", "scene.sonar.electronics.")
+ASSUMED_SPEED = "scene.sonar.assumed_sound_speed"
+VARYING = ("scene.world.", "scene.trajectory.", "scene.sonar.sensor_errors.", "scene.sonar.electronics.", ASSUMED_SPEED)
 """What can vary."""
 FRAMES = "scene.trajectory.frames"
 """How long a sequence is: what varies it lists whole numbers, or draws them."""
