@@ -145,7 +145,7 @@ def build(
     made_from = reading.recipe_of(source)
     with reading.locating(source), printing.planning():
         plan = planning.plan(made_from, chosen)
-    wanted = chosen_frames(frames, sequences, made_from.spanned.first_frames)
+    wanted = chosen_frames(frames, sequences, made_from.spanned.first_frames.tolist())
     stores.try_writing(stores.folder_of(store))
     prediction = None
     if predicting and scheduler is None and (restart or stores.missing(store, plan, wanted)):

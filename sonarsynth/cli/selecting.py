@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 from sonarsynth.cli.running import BadOption
-from sonarsynth.conventions import Ints
 
 
 def frame_numbers(text: str | None, count: int) -> tuple[int, ...] | None:
@@ -13,18 +13,18 @@ def frame_numbers(text: str | None, count: int) -> tuple[int, ...] | None:
     return _numbers("--frames", "frame", text, count)
 
 
-def chosen_frames(frames: str | None, sequences: str | None, first: Ints) -> tuple[int, ...] | None:
+def chosen_frames(frames: str | None, sequences: str | None, first: Sequence[int]) -> tuple[int, ...] | None:
     """Frames, of sequences with these first ones (sequence + 1,), that both texts name; None for all.
 
     Raises BadOption.
     """
-    some = frame_numbers(frames, int(first[-1]))
+    some = frame_numbers(frames, first[-1])
     of = _numbers("--sequences", "sequence", sequences, len(first) - 1)
     if of is None:
         return some
     if some is None:
-        return tuple(frame for n in of for frame in range(int(first[n]), int(first[n + 1])))
-    wanted = {frame for n in of for frame in range(int(first[n]), int(first[n + 1]))}
+        return tuple(frame for n in of for frame in range(first[n], first[n + 1]))
+    wanted = {frame for n in of for frame in range(first[n], first[n + 1])}
     both = tuple(frame for frame in some if frame in wanted)
     if not both:
         raise BadOption("--frames and --sequences have no frame in common")

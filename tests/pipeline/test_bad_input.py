@@ -83,8 +83,8 @@ WRONG = [
     ),
     (
         "position: [12, 8]",
-        "position: [12, 8]\n        snap_times: []",
-        "12: scene.world.sources.0.snap_times: must have at least",
+        "position: [12, 8]\n        snap_times: [[]]",
+        "12: scene.world.sources.0.snap_times",
     ),
     (
         "position: [12, 8]",
