@@ -14,6 +14,8 @@ from typing import Any, TypeVar, cast, dataclass_transform
 from pydantic import ConfigDict, Discriminator, Field
 from pydantic.dataclasses import dataclass
 
+from sonarsynth.description.schemas import HelpText
+
 BY_KIND: Any = Field(discriminator="kind")
 """Annotation of a union of descriptions: `kind` says which one."""
 
@@ -46,6 +48,11 @@ class FieldError(ValueError):
 def description(cls: type[T]) -> type[T]:
     """Make a class a description: keyword arguments only, frozen, hashable, unknown fields refused, no NaN or infinity.
 
-    Sequences are tuples. Raises `pydantic.ValidationError` (a ValueError) when a field is wrong.
+    Sequences are tuples; `help` lists the fields. Raises `pydantic.ValidationError` (a ValueError) when a field is
+    wrong.
     """
-    return cast(type[T], dataclass(frozen=True, kw_only=True, config=_CONFIG)(cls))
+    written = cls.__doc__
+    made = cast(type[T], dataclass(frozen=True, kw_only=True, config=_CONFIG)(cls))
+    if written:
+        made.__doc__ = HelpText(written)  # type: ignore[assignment]  # Python asks it for the text
+    return made

@@ -84,6 +84,7 @@ class Sediment:
 
     kind: Literal["sediment"] = "sediment"
     name: SedimentName
+    """As the table calls it, such as `medium sand`."""
 
     @field_validator("name", mode="before")
     @classmethod
@@ -149,6 +150,7 @@ class SeaSurface:
     """
 
     reflection: Reflection = PressureRelease()
+    """Of a plane wave, where the surface is smooth."""
     rms_height: RmsHeight = 0.0
     """Root-mean-square height of the waves; or give wind_speed."""
     wind_speed: Annotated[MetresPerSecond, Ge(0), Le(60)] | None = None
@@ -177,5 +179,6 @@ class SeaBottom:
     """The bottom: medium sand and smooth unless said otherwise."""
 
     reflection: Reflection = Sediment(name="medium sand")
+    """Of a plane wave, where the bottom is smooth."""
     rms_height: RmsHeight = 0.0
     """Root-mean-square height of the roughness."""

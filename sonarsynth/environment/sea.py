@@ -51,8 +51,11 @@ class Absorption:
     """
 
     formula: Literal["francois_garrison", "ainslie_mccolm", "none"] = "francois_garrison"
+    """`ainslie_mccolm` is simpler, within 10 % of the other; `none`: no absorption."""
     temperature: WaterTemperature = 27.0
+    """Of the water, alike at all depths."""
     salinity: WaterSalinity = 35.0
+    """Of the water, alike at all depths."""
     ph: Annotated[Number, Ge(0), Le(14)] = 8.1
     """pH of the water; it matters under some 10 kHz, where boric acid absorbs."""
 
@@ -64,9 +67,13 @@ class Environment:
     depth: Annotated[PositiveMetres, Le(12e3)]
     """Depth of the bottom below the mean surface."""
     sound_speed: SoundSpeed
+    """Against depth: a formula, or a measured cast."""
     surface: SeaSurface = SeaSurface()
+    """What a reflection at the surface does to sound."""
     bottom: SeaBottom = SeaBottom()
+    """What a reflection at the bottom does to sound."""
     absorption: Absorption = Absorption()
+    """What is lost on the way."""
     noise: (
         Annotated[Annotated[Noise, Tag("one")] | Annotated[tuple[Noise, ...], Tag("several")], ONE_OR_SEVERAL] | None
     ) = None

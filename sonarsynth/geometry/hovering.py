@@ -25,7 +25,9 @@ class Hover:
     heading: Radians = 0.0
     """That it swings about."""
     pitch: Radians = 0.0
+    """Nose up. About this it swings."""
     roll: Radians = 0.0
+    """Starboard down."""
     surge: NonNegativeMetres = 0.0
     """Amplitude forward."""
     sway: NonNegativeMetres = 0.0
@@ -35,6 +37,7 @@ class Hover:
     yaw: Annotated[Radians, Ge(0), Le(np.pi)] = 0.0
     """Amplitude of the heading."""
     period: PositiveSeconds = 10.0
+    """Of the swing, the same for all of its parts."""
     phase: Radians = 0.0
     """Of the heave at time 0; surge, sway and yaw are a quarter, a half and three quarters of a period later."""
 

@@ -23,9 +23,13 @@ class Still:
 
     kind: Literal["still"] = "still"
     position: Position
+    """(x, y, z)."""
     heading: Radians = 0.0
+    """Clockwise from north."""
     pitch: Radians = 0.0
+    """Nose up."""
     roll: Radians = 0.0
+    """Starboard down."""
 
 
 @description
@@ -38,10 +42,13 @@ class Line:
     stop: Position
     """Where it is after `duration`."""
     duration: PositiveSeconds
+    """Time from start to stop."""
     heading: Radians | None = None
     """Left out: along the track."""
     pitch: Radians = 0.0
+    """Nose up."""
     roll: Radians = 0.0
+    """Starboard down."""
 
 
 @description
@@ -49,7 +56,9 @@ class Waypoint:
     """A place to be at a time, with a heading."""
 
     time: Seconds
+    """Since the start of the motions."""
     position: Position
+    """(x, y, z)."""
     heading: Radians | None = None
     """Left out: towards the next waypoint (the last: as before)."""
 
@@ -62,7 +71,9 @@ class Waypoints:
     points: Annotated[tuple[Waypoint, ...], MinLen(2)]
     """Waypoints in the order of their times."""
     pitch: Radians = 0.0
+    """Nose up."""
     roll: Radians = 0.0
+    """Starboard down."""
 
     @field_validator("points")
     @classmethod
@@ -81,12 +92,15 @@ class Circle:
     centre: Position
     """Centre of the circle, at the depth of the body."""
     radius: PositiveMetres
+    """Of the track."""
     speed: MetresPerSecond
     """Positive is counter-clockwise seen from above."""
     bearing: Radians = 0.0
     """Compass bearing from the centre to the body at time 0."""
     pitch: Radians = 0.0
+    """Nose up."""
     roll: Radians = 0.0
+    """Starboard down."""
 
 
 @description
@@ -103,7 +117,9 @@ class ConstantVelocity:
     climb: MetresPerSecond = 0.0
     """How fast it rises; it stays level."""
     pitch: Radians = 0.0
+    """Nose up."""
     roll: Radians = 0.0
+    """Starboard down."""
 
 
 Motion = Annotated[Still | Line | Waypoints | Circle | ConstantVelocity | Hover | RecordedTrack, BY_KIND]

@@ -35,9 +35,11 @@ class RayRequest:
     directions: Annotated[tuple[tuple[Radians, Radians], ...], MinLen(1)] | None = None
     """(azimuth, elevation) of each ray in the sonar frame; left out: the grid."""
     azimuth_span: Annotated[Radians, Ge(0), Le(2 * np.pi)] = np.deg2rad(50.0)
+    """Of the grid, about the axis of the sonar."""
     azimuths: Annotated[int, Ge(1), Le(100)] = 11
     """Rays in a row of the grid."""
     elevation_span: Annotated[Radians, Ge(0), Le(np.pi)] = np.deg2rad(50.0)
+    """Of the grid, about the axis of the sonar."""
     elevations: Annotated[int, Ge(1), Le(100)] = 11
     """Rows of the grid."""
     duration: PositiveSeconds = 0.05

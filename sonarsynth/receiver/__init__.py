@@ -51,7 +51,9 @@ class Band:
     """The band that the sonar works in: the bins that are beamformed, located and ranged."""
 
     low: PositiveHertz
+    """Lowest frequency."""
     high: PositiveHertz
+    """Highest frequency."""
 
     @field_validator("high")
     @classmethod
@@ -76,7 +78,9 @@ class LowPass:
     cutoff: PositiveHertz
     """Where the response is one half (-6 dB)."""
     transition: Transition = 10e3
+    """From where it passes everything to where it stops everything."""
     attenuation: Annotated[Decibels, Ge(21), Le(160)] = 80.0
+    """Of what is stopped, at least."""
 
 
 @description
@@ -85,9 +89,13 @@ class BandPass:
 
     kind: Literal["band_pass"] = "band_pass"
     low: PositiveHertz
+    """Lower edge of what passes."""
     high: PositiveHertz
+    """Upper edge of what passes."""
     transition: Transition = 5e3
+    """From where it passes everything to where it stops everything."""
     attenuation: Annotated[Decibels, Ge(21), Le(160)] = 80.0
+    """Of what is stopped, at least."""
 
     @field_validator("high")
     @classmethod
@@ -156,10 +164,13 @@ class Sonar:
     """A passive sonar."""
 
     array: Array = Romanis()
+    """Where the hydrophones are."""
     band: Band = Band(low=25e3, high=85e3)
+    """What it works in."""
     filter: Filter | None = None
     """Anti-alias filter before sampling; left out: a `BandPass` of the band."""
     sampling_frequency: Annotated[PositiveHertz, Le(100e6)] = 196e3
+    """Of every channel."""
     electronics: Electronics | None = None
     """Noise of the preamplifiers; left out: none."""
     sensor_errors: SensorErrors | None = None
@@ -169,6 +180,7 @@ class Sonar:
     converter: Converter | None = None
     """Left out: pressure is stored as float32."""
     beams: BeamGrid = BeamGrid()
+    """Directions of the images."""
     assumed_sound_speed: WaterSoundSpeed = 1540.0
     """The sound speed that the sonar uses to steer and to range."""
     sound_speed_error: Annotated[MetresPerSecond, Ge(0)] = 1.0

@@ -44,6 +44,7 @@ class Overload:
     """A channel that was too loud: it is cut at a level, and its gain comes back exponentially after that."""
 
     level: Annotated[Pascals, Gt(0)]
+    """Peak pressure at which it is cut."""
     recovery: PositiveSeconds = 50e-6
     """Time constant of the recovery."""
 
@@ -75,6 +76,7 @@ class SensorErrors:
     clock_rate: Annotated[Number, Ge(0), Le(1000)] = 0.0
     """Standard deviation of the rate of the clock, in parts per million: time runs from the start of the window."""
     overload: Overload | None = None
+    """What a sound does that is too loud; left out: nothing."""
     known: Literal["none", "gain", "all"] = "none"
     """What processing may correct: nothing; gains, and it leaves out dead and stuck ones; or phases and delays as well.
     Positions across the axis, cross-talk, clock and overload stay as they are. Stored signals are never corrected."""

@@ -18,9 +18,11 @@ class Creator:
     """Who made a dataset: a person, or an organisation."""
 
     name: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=500, pattern=r"^[^\n\r]*$")]
+    """As it is to be cited."""
     organisation: bool = False
     """True for an organisation, false for a person."""
     affiliation: Line = ""
+    """Where that person works."""
     url: Address = ""
     """Home page, or ORCID (https://orcid.org/...)."""
 
@@ -32,6 +34,7 @@ class Attribution:
     description: Text = ""
     """What the dataset is for, in the words of its makers; left out: what the recipe spans."""
     creators: tuple[Creator, ...] = ()
+    """In the order of a citation."""
     citation: Text = ""
     """How to cite it, plain or BibTeX; left out: made of creators, year, title, version and address."""
     url: Address = ""
@@ -39,3 +42,4 @@ class Attribution:
     version: Annotated[str, StringConstraints(pattern=r"^\d+\.\d+\.\d+$")] = "1.0.0"
     """Version of the dataset, MAJOR.MINOR.PATCH."""
     keywords: tuple[Line, ...] = ()
+    """By which the dataset is to be found."""

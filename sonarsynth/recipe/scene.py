@@ -41,6 +41,7 @@ class World:
     """What there is."""
 
     environment: Environment
+    """The water, its surface and its bottom."""
     targets: tuple[Target, ...] = ()
     """Bodies in the water."""
     sources: tuple[Source, ...] = ()
@@ -155,6 +156,7 @@ class Processing:
     """What the sonar does with what it hears."""
 
     echo_window: EchoWindow = Field(default_factory=EchoWindow)
+    """When the sonar listens for echoes."""
     locating: Locator = Field(default_factory=SensorDelays)
     """How the snap is located."""
     cancelling: Cancelling | None = None
@@ -178,10 +180,15 @@ class Scene:
     """World, sonar, trajectory, physics and processing."""
 
     world: World
+    """What there is."""
     sonar: Sonar = Field(default_factory=Sonar)
+    """What listens."""
     trajectory: Trajectory = Field(default_factory=Trajectory)
+    """When frames are taken, and how the sonar moves."""
     physics: Physics = Field(default_factory=Physics)
+    """How the scene is simulated."""
     processing: Processing = Field(default_factory=Processing)
+    """What the sonar does with what it hears."""
 
     @property
     def laws(self) -> tuple[Scattering, ...]:

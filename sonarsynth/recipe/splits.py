@@ -26,8 +26,11 @@ class Splits:
     """
 
     train: _Share = 0.0
+    """Share of the sequences."""
     validation: _Share = 0.0
+    """Share of the sequences."""
     test: _Share = 0.0
+    """Share of the sequences; the three add up to 1."""
     stratify: Name | None = None
     """Name of an entry of the grid, or of a choice: each of its values is divided in these shares."""
     undivided: tuple[Name, ...] = ()

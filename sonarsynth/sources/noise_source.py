@@ -38,6 +38,7 @@ class NoiseRecording:
     dataset: str | None = None
     """Of an HDF5 ("/group/dataset"); left out: the only one that there is."""
     channel: Annotated[int, Ge(0)] = 0
+    """Of the file, from 0."""
     start: Seconds = 0.0
     """Time of the recording that is played at time 0 of the motions."""
 

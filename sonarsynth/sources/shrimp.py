@@ -27,6 +27,7 @@ class LogarithmicBubble(PulseModel):
 
     kind: Literal["logarithmic_bubble"] = "logarithmic_bubble"
     a: Annotated[Metres, Gt(0)] = 4.758856979338349e-04
+    """Scale of the radius (m)."""
     k: Annotated[Number, Gt(0)] = 3.782988768729427e03
     """Growth rate (1/s)."""
     m: Annotated[Seconds, Lt(0)] = -6.172539122042230e-04

@@ -46,11 +46,13 @@ class KellerMiksis(PulseModel):
     surface_pressure: Annotated[Pascals, Ge(0)] = 101325.0
     """Of the air."""
     vapour_pressure: Annotated[Pascals, Ge(0)] = 2339.0
+    """Within the bubble, constant."""
     surface_tension: Annotated[Number, Ge(0)] = 0.0725
     """In N/m."""
     viscosity: Annotated[Number, Ge(0)] = 1e-3
     """In Pa s."""
     density: Annotated[KilogramsPerCubicMetre, Gt(0)] = 998.0
+    """Of the water."""
     sound_speed: WaterSoundSpeed = 1482.0
     """In the water about the bubble: sets what it radiates, not how that travels."""
     exponent: Annotated[Number, Ge(1), Le(3)] = 1.4
@@ -138,6 +140,7 @@ class Gabor(PulseModel):
 
     kind: Literal["gabor"] = "gabor"
     frequency: PositiveHertz
+    """Of the tone."""
     cycles: Annotated[Number, Gt(0), Le(1000)] = 5.0
     """Of the tone in the Gaussian's width at half its height."""
     peak: Annotated[Pascals, Gt(0)] = 1.0

@@ -77,6 +77,7 @@ class Sphere(BodyShape):
 
     kind: Literal["sphere"] = "sphere"
     radius: Size
+    """From its centre, which is the origin."""
     edge: Size | None = None
     """Longest edge of a facet; left out: an eighth of the radius."""
 
@@ -87,7 +88,9 @@ class Cylinder(BodyShape):
 
     kind: Literal["cylinder"] = "cylinder"
     radius: Size
+    """Of the circle."""
     length: Size
+    """Along x."""
     edge: Size | None = None
     """Longest edge of a facet; left out: an eighth of the radius."""
 
@@ -151,9 +154,13 @@ class Myring(BodyShape):
 
     kind: Literal["myring"] = "myring"
     nose: Size
+    """Length of the nose."""
     middle: NonNegativeMetres
+    """Length of the straight part."""
     tail: Size
+    """Length of the tail."""
     diameter: Size
+    """Of the straight part."""
     exponent: Annotated[Number, Ge(0.5), Le(10)] = 2.0
     """Of the nose: 2 is an ellipse, more is blunter."""
     tail_angle: Annotated[Radians, Ge(0), Le(1.5)] = np.float64(0.436)

@@ -95,7 +95,9 @@ class RingDirections:
 
     kind: Literal["ring"] = "ring"
     low: Elevation = np.deg2rad(-10.0)
+    """Lower end of the elevations, up positive."""
     high: Elevation = np.deg2rad(-1.0)
+    """Upper end of the elevations."""
 
     @model_validator(mode="after")
     def _check(self) -> RingDirections:

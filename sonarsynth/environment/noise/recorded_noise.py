@@ -38,6 +38,7 @@ class RecordedNoise(NoiseField):
     dataset: str | None = None
     """Of an HDF5 ("/group/dataset"); left out: the only one that there is."""
     channel: Annotated[int, Ge(0)] = 0
+    """Of the file, from 0."""
     directions: Directions | None = None
     """As of `flat`: one hydrophone does not tell where its sound came from."""
 

@@ -21,6 +21,7 @@ class WindNoise(NoiseField):
 
     kind: Literal["wind"] = "wind"
     wind_speed: Annotated[PositiveSpeed, Le(60)] = 5.0
+    """Of the wind over the sea."""
     directions: Directions | None = None
     """As of `flat`; wind's are those of the surface."""
 

@@ -66,8 +66,11 @@ class Upright(_Ranges):
 
     kind: Literal["upright"] = "upright"
     heading: tuple[Radians, Radians] = (0.0, 2 * np.pi)
+    """Clockwise from north."""
     pitch: tuple[Radians, Radians] = (0.0, 0.0)
+    """Nose up."""
     roll: tuple[Radians, Radians] = (0.0, 0.0)
+    """Starboard down."""
 
     def attitude(self, draws: Floats) -> Attitude:
         """By three draws (0 to 1)."""
@@ -107,6 +110,7 @@ class StraightAhead(_Ranges):
 
     kind: Literal["straight"] = "straight"
     speed: tuple[MetresPerSecond, MetresPerSecond]
+    """Along the heading."""
     climb: tuple[MetresPerSecond, MetresPerSecond] = (0.0, 0.0)
     """How fast they rise; they stay level."""
 
@@ -131,6 +135,7 @@ class Hovering(_Ranges):
     yaw: tuple[Radians, Radians] = (0.0, 0.0)
     """Amplitude of the heading."""
     period: tuple[PositiveSeconds, PositiveSeconds] = (5.0, 10.0)
+    """Of the swing, the same for all of a body's."""
 
     def motion(self, place: Floats, attitude: Attitude, span: Span, draws: Floats) -> Motion:
         """As `AtRest.motion`, about the place."""
@@ -154,6 +159,7 @@ class Wandering(_Ranges):
 
     kind: Literal["wandering"] = "wandering"
     speed: tuple[MetresPerSecond, MetresPerSecond]
+    """Along each leg."""
     leg: PositiveSeconds
     """How long a leg takes."""
     turn: Annotated[Radians, Ge(0), Le(np.pi)]

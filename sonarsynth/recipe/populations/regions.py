@@ -84,8 +84,11 @@ class Annulus:
     centre: tuple[Metres, Metres]
     """x and y."""
     inner: NonNegativeMetres = 0.0
+    """Radius of the inner circle."""
     outer: PositiveMetres
+    """Radius of the outer circle."""
     heights: Heights
+    """Lowest and highest z."""
 
     @model_validator(mode="after")
     def _check(self) -> Annulus:
@@ -109,6 +112,7 @@ class PolygonRegion:
     corners: Annotated[tuple[tuple[Metres, Metres], ...], MinLen(3), MaxLen(1000)]
     """x and y of each, in order."""
     heights: Heights
+    """Lowest and highest z."""
 
     @model_validator(mode="after")
     def _check(self) -> PolygonRegion:

@@ -84,7 +84,9 @@ class Uniform(Ranged):
 
     kind: Literal["uniform"] = "uniform"
     low: Quantity
+    """Least value."""
     high: Quantity
+    """Largest value."""
 
     @model_validator(mode="after")
     def _check(self) -> Uniform:
@@ -102,7 +104,9 @@ class LogUniform(Ranged):
 
     kind: Literal["log_uniform"] = "log_uniform"
     low: Quantity
+    """Least value, over 0."""
     high: Quantity
+    """Largest value."""
 
     @model_validator(mode="after")
     def _check(self) -> LogUniform:
@@ -123,7 +127,9 @@ class Integers(Ranged):
 
     kind: Literal["integers"] = "integers"
     low: Annotated[int, Ge(-(10**9)), Le(10**9)]
+    """Least value."""
     high: Annotated[int, Ge(-(10**9)), Le(10**9)]
+    """Largest value."""
 
     @model_validator(mode="after")
     def _check(self) -> Integers:
@@ -146,7 +152,9 @@ class Normal(Ranged):
     deviation: Quantity
     """Standard deviation before it is cut."""
     low: Quantity | None = None
+    """Least value; left out: none is too small."""
     high: Quantity | None = None
+    """Largest value; left out: none is too large."""
 
     @model_validator(mode="after")
     def _check(self) -> Normal:
@@ -201,6 +209,7 @@ class Choice(Drawn):
 
     kind: Literal["choice"] = "choice"
     values: Annotated[tuple[PlainValue, ...], MinLen(1)]
+    """What the field may be."""
     weights: tuple[Number, ...] | None = None
     """How often each is taken, relative to the others; left out: equally often."""
 
@@ -235,7 +244,9 @@ class Sobol(Drawn):
 
     kind: Literal["sobol"] = "sobol"
     low: Quantity
+    """Least value."""
     high: Quantity
+    """Largest value."""
 
     @model_validator(mode="after")
     def _check(self) -> Sobol:

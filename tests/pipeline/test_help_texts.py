@@ -1,0 +1,47 @@
+"""Every field that a recipe may have is explained, in the schema that editors read and in `help`."""
+
+from __future__ import annotations
+
+import inspect
+
+import pytest
+
+import sonarsynth as ss
+from sonarsynth.description.schemas import kind_of, shown
+from sonarsynth.recipe import reading
+
+DESCRIBED = reading.schema()["$defs"]
+
+
+@pytest.mark.parametrize("name", sorted(DESCRIBED))
+def test_no_field_is_without_a_text(name: str) -> None:
+    fields = DESCRIBED[name].get("properties", {})
+    bare = [field for field, part in fields.items() if field != "kind" and not part.get("description")]
+    assert not bare and (DESCRIBED[name].get("description") or "enum" in DESCRIBED[name])
+
+
+def test_help_gives_parameters_with_bounds_units_and_defaults() -> None:
+    text = inspect.getdoc(ss.Thermocline)
+    assert text is not None
+    assert "mixed_depth : number from 0 in m, default 5\n    Depth of the top" in text
+    assert "surface_speed : number from 100 to 10000 in m/s, default 1541" in text
+    assert "kind :" not in text
+    assert "Parameters\n----------" not in DESCRIBED["Thermocline"]["description"]
+
+
+def test_the_stricter_of_two_bounds_is_shown() -> None:
+    for part, words in (
+        ({"minimum": 100, "exclusiveMinimum": 0}, "from 100"),
+        ({"minimum": 0, "exclusiveMinimum": 0, "maximum": 5}, "over 0 to 5"),
+        ({"maximum": 9, "exclusiveMaximum": 3}, "under 3"),
+    ):
+        assert kind_of({"type": "number", **part}) == f"number {words}"
+
+
+def test_defaults_are_short() -> None:
+    assert [shown(one) for one in (None, 5.0, {"kind": "wenz", "level": 3}, {"level": 3})] == [
+        "none",
+        "5",
+        "wenz",
+        "its own defaults",
+    ]
