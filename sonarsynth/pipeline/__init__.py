@@ -18,6 +18,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.labels import echo_levels, label, link_budget, path_powers
 from sonarsynth.pipeline.echo_image import image_of, image_without_clock
 from sonarsynth.pipeline.frame_chorus import clear_values, frame_chorus, soundscape_values, with_chorus
+from sonarsynth.pipeline.frame_reverberation import frame_reverberation, with_reverberation
 from sonarsynth.pipeline.labelled_estimates import emission_values, estimate_truth, heard_directly
 from sonarsynth.pipeline.labelling import band_of, expansion_error, frame_values, point_labels
 from sonarsynth.pipeline.padded_axes import in_slots, which_values
@@ -60,6 +61,7 @@ from sonarsynth.signals.chorus.chorus_arrivals import ChorusArrivals
 from sonarsynth.signals.filtered_pulse import snap_levels
 from sonarsynth.signals.isolated_paths import measured_levels
 from sonarsynth.tracing.arrivals import trace
+from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -99,6 +101,7 @@ class TracedFrame:
     budget: LinkBudget
     echoes: Echoes
     chorus: ChorusArrivals | None = None  # None: the scene has none
+    reverberation: ReverberationArrivals | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +155,9 @@ def trace_at(plan: Plan, frame: Frame) -> TracedFrame:
     budget = link_budget(seen, powers, band, targets, levels, expansion_error(plan, seen))
     heard = echo_levels(seen, powers, targets, levels)
     mark_stage("label")
-    return TracedFrame(frame, arrivals, truth, budget, heard, frame_chorus(plan, frame))
+    chorus, scattered = frame_chorus(plan, frame), frame_reverberation(plan, frame)
+    mark_stage("trace")
+    return TracedFrame(frame, arrivals, truth, budget, heard, chorus, scattered)
 
 
 def beamform_frame(plan: Plan, index: int, traced: TracedFrame) -> BeamformedFrame:
@@ -197,9 +202,10 @@ def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFr
 
 
 def synthesise(plan: Plan, traced: TracedFrame) -> Signals:
-    """Pressure at each hydrophone: echoes and direct snap, chorus, ambient noise, converter."""
+    """Pressure at each hydrophone: echoes and direct snap, reverberation, chorus, ambient noise, converter."""
     plan = plan.at(traced.frame.index)
     signals = frame_signals(plan, traced.frame, traced.arrivals)
+    signals = with_reverberation(plan, traced.frame, signals, traced.reverberation)
     return digitise(plan, traced.frame, with_chorus(plan, traced.frame, signals, traced.chorus))
 
 

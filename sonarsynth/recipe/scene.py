@@ -11,6 +11,7 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from sonarsynth.conventions import Decibels, Floats, PositiveSeconds, Seconds
 from sonarsynth.description import description
+from sonarsynth.environment.reverberation import Reverberation
 from sonarsynth.environment.scatterers import ScattererField
 from sonarsynth.environment.sea import Environment
 from sonarsynth.geometry import Pose
@@ -54,6 +55,8 @@ class World:
     """Targets that are drawn anew for each sequence."""
     chorus: Chorus | None = None
     """All the other snaps of the sea, which are heard but light nothing; left out: there are none."""
+    reverberation: Reverberation | None = None
+    """What bottom, surface and water scatter of the sound of the sources; left out: nothing but `scatterers` does."""
 
     @field_validator("targets")
     @classmethod

@@ -25,6 +25,9 @@ class Accuracy:
     """Error of ranges by the method that turns delays into places, in m."""
     image_db: Annotated[Number, Gt(0), Le(10)] = 0.1
     """Error of the energy in a beam, in dB: root mean square over those within 20 dB of the brightest."""
+    speckle: Annotated[Number, Ge(1e-4), Le(10)] = 0.1
+    """Error of the contrast of reverberation at a hydrophone, <I^2>/<I>^2, by few scatterers in place of many: it
+    decides how many there are. Their energy has no error from that."""
     exact: bool = False
     """Whether everything is computed the slow, exact way, but for what the scene chooses otherwise."""
 

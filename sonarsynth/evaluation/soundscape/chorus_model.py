@@ -18,8 +18,9 @@ from sonarsynth.equations.noise.chorus_moments import Reflected, effective_durat
 from sonarsynth.planning import Plan, receiver_of
 from sonarsynth.planning.measured.chorus_reach import ChorusWater, image_shares
 from sonarsynth.recipe.scene import Frame
-from sonarsynth.signals.chorus.chorus_arrivals import CAVITY, ChorusReach, ImageHeights
+from sonarsynth.signals.chorus.chorus_arrivals import ChorusReach, ImageHeights
 from sonarsynth.signals.filtered_pulse import fir, pulse_spectrum
+from sonarsynth.signals.pulse_sums.adding_pulses import CAVITY
 from sonarsynth.sources.chorus import Chorus
 from sonarsynth.sources.pulse_model import PulseModel
 from sonarsynth.sources.snap_pulses import waveform

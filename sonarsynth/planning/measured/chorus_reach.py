@@ -22,8 +22,9 @@ from sonarsynth.equations.noise.chorus_moments import (
 )
 from sonarsynth.receiver import Sonar
 from sonarsynth.recipe.scene import Scene
-from sonarsynth.signals.chorus.chorus_arrivals import CAVITY, ChorusReach, ImageHeights, image_heights, reflected
+from sonarsynth.signals.chorus.chorus_arrivals import ChorusReach, ImageHeights, image_heights, reflected
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
+from sonarsynth.signals.pulse_sums.adding_pulses import CAVITY
 from sonarsynth.sources.chorus import Chorus
 from sonarsynth.sources.pulse_model import PulseModel
 from sonarsynth.sources.snap_pulses import waveform

@@ -8,16 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats, Ints, depth
+from sonarsynth.conventions import Floats, Ints, depth
 from sonarsynth.environment.sea import Environment, Profile
 from sonarsynth.equations.rays.ray_solutions import mean_slowness, water
+from sonarsynth.products.pulse_arrivals import PulseArrivals
 from sonarsynth.propagation.images import images
 from sonarsynth.propagation.reflections import Reflections, at_boundaries
+from sonarsynth.signals.pulse_sums.adding_pulses import CAVITY
 from sonarsynth.sources.chorus import ChorusSnaps, Listening
 from sonarsynth.state import Medium, Receiver
-
-CAVITY = 3.5e-3
-"""m: the radius of the bubble. Sound falls as 1/r from there on; nearer, it is what it is there."""
 
 FAINT = 40.0
 """dB: a path so far below the root mean square pressure of the whole chorus is left out."""
@@ -54,64 +53,52 @@ class ImageHeights(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class ChorusArrivals:
-    """Arrivals of a chorus at the array centre, sorted by snap, then image.
+class ChorusArrivals(PulseArrivals):
+    """Arrivals of a chorus at the array centre, sorted by snap, then image: as `PulseArrivals`, gains at the centre of
+    the band, with
 
-    delay       (path,)       s     after the instant of the frame: time 0 of the pulse
-    direction   (path, xyz)   -     sonar frame, towards where it comes from
-    length      (path,)       m     of the path: radius of the wavefront
-    gain        (path,)       -     pressure over that of a snap of its level at 1 m, at the centre of the band; signed
-    phase       (path,)       rad   of lossy reflections
-    delay_std   (path,)       s     of roughness, a Gaussian in time
     level       (path,)       dB    peak source level re 1 uPa at 1 m
     width       (path,)       -     number of the width, of `Chorus.widths`
     snap        (path,)       -     number of the snap, of those in the window
     boundaries  (path,)       -     reflections
     absorption  (path,)       dB    at the centre of the band; not in gain
+    key         (snap, 5)     -     of `ChorusSnaps`
     """
 
-    delay: Floats
-    direction: Floats
-    length: Floats
-    gain: Floats
-    phase: Floats
-    delay_std: Floats
     level: Floats
     width: Ints
     snap: Ints
     boundaries: Ints
     absorption: Floats
-    key: Ints  # (snap, 5) of `ChorusSnaps`
-    sound_speed: float  # m/s of the water at the array
+    key: Ints
 
     @property
     def received(self) -> Floats:
         """Peak level (path,) at the array centre, dB re 1 uPa."""
         return np.asarray(self.level + 20.0 * np.log10(np.abs(self.gain)) - self.absorption)
 
-    def select(self, keep: Bools | Ints) -> ChorusArrivals:
-        """Some of the arrivals."""
-        whole = ("key", "sound_speed")
-        return ChorusArrivals(**{n: v if n in whole else v[keep] for n, v in vars(self).items()})
+    @staticmethod
+    def _whole() -> tuple[str, ...]:
+        return ("key", "sound_speed")
 
 
 def no_chorus() -> ChorusArrivals:
     """A chorus without a snap."""
     none, whole = np.zeros(0), np.zeros(0, np.int64)
     return ChorusArrivals(
-        none,
-        np.zeros((0, 3)),
-        none,
-        none,
-        none,
-        none,
-        none,
-        whole,
-        whole,
-        whole,
-        none,
-        np.zeros((0, 5), np.int64),
-        1500.0,
+        delay=none,
+        direction=np.zeros((0, 3)),
+        length=none,
+        gain=none,
+        phase=none,
+        delay_std=none,
+        level=none,
+        width=whole,
+        snap=whole,
+        boundaries=whole,
+        absorption=none,
+        key=np.zeros((0, 5), np.int64),
+        sound_speed=1500.0,
     )
 
 

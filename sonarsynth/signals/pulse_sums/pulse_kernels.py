@@ -1,4 +1,4 @@
-"""Compiled loop of the chorus. One thread, fixed order: the same bits on any number of workers."""
+"""Compiled loop of sums of pulses. One thread, fixed order: the same bits on any number of workers."""
 
 from __future__ import annotations
 

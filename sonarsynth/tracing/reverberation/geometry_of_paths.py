@@ -1,0 +1,103 @@
+"""From a source to scatterers to the array: how long, how loud and from where, before any of them scatters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, depth
+from sonarsynth.environment.boundary_numbers import coefficient
+from sonarsynth.equations.reverberation.bottom_strength import Angles
+from sonarsynth.sources.sound_source import Emission
+from sonarsynth.state import Medium, Receiver
+from sonarsynth.tracing.reverberation.ways import Way, ways
+
+NEAREST = 0.1
+"""m: scatterers nearer than this to source or array are as loud as there."""
+
+
+@dataclass(frozen=True, eq=False)
+class ScatteredPaths:
+    """Paths by scatterers (point,), of one emission, one way out and one way back.
+
+    delay       (point,)       s     at the array centre, after the instant of the frame
+    towards     (point, xyz)   -     world, where they come from
+    out, back   (point,)       m     lengths
+    spreading   (point,)       1/m2  energy flux of a source of 1 at a scatterer of 1 m2: directivity, reflections,
+                                     baffle and absorption at the centre of the band, over out^2 back^2 m2
+    angles                           in and out of a boundary
+    """
+
+    delay: Floats
+    towards: Floats
+    out: Floats
+    back: Floats
+    amplitude: Floats  # (point,) signed, without absorption and strength: 1/(out back) and what else changes it
+    absorbed: Floats  # (point,) energy left by absorption
+    angles: Angles
+
+    @property
+    def flux(self) -> Floats:
+        """Energy (point,) over that of the pulse at 1 m, for a cross-section of 1 m2/sr."""
+        return np.asarray(self.amplitude**2 * self.absorbed)
+
+
+def out_ways(medium: Medium, emission: Emission, end: Floats, bounces: int, owner: str) -> list[Way]:
+    """From an emission to depths end (point,)."""
+    return ways(medium.profile, medium.depth, float(depth(emission.position)), end, bounces, owner)
+
+
+def back_ways(medium: Medium, receiver: Receiver, end: Floats, bounces: int, owner: str) -> list[Way]:
+    """From the array to the same."""
+    return ways(medium.profile, medium.depth, float(depth(receiver.pose.position)), end, bounces, owner)
+
+
+def scattered_paths(
+    place: Floats, emission: Emission, medium: Medium, receiver: Receiver, out: Way, back: Way
+) -> ScatteredPaths:
+    """Paths by places (point, xyz) m. The array is where it is when they arrive."""
+    velocity = np.zeros(3) if receiver.track is None else receiver.track.velocity
+    begin, away = emission.position, place - emission.position
+    over = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
+    r1 = np.hypot(over, out.climb)
+    delay = emission.time + r1 * out.slowness
+    level = place[:, :2] - receiver.pose.position[:2]
+    late = delay + np.hypot(np.hypot(*level.T), back.climb) * back.slowness
+    if velocity.any():
+        level = level - late[:, None] * velocity[:2]
+    beside = np.maximum(np.hypot(*level.T), 1e-9)
+    r2 = np.hypot(beside, back.climb)
+    towards = np.column_stack([level, np.broadcast_to(back.climb, r2.shape)]) / r2[:, None]
+    sine_in, sine_out = np.abs(out.climb) / r1, np.abs(back.climb) / r2
+    forward = -(away[:, 0] * level[:, 0] + away[:, 1] * level[:, 1]) / (over * beside)
+    left = np.ones(len(place))
+    if emission.directivity is not None:
+        leaving = np.column_stack([place[:, :2] - begin[:2], np.broadcast_to(out.climb, r1.shape)]) / r1[:, None]
+        left = left * emission.directivity(leaving)
+    if receiver.sonar.baffle:
+        left = left * np.where((towards @ receiver.pose.rotation)[:, 0] < 0.0, receiver.sonar.behind, 1.0)
+    left = (
+        left * _reflected(medium, out, sine_in, receiver.centre) * _reflected(medium, back, sine_out, receiver.centre)
+    )
+    loss = medium.absorption
+    mean = loss if isinstance(loss, float) else float(np.trapezoid(loss.value, loss.depth) / medium.depth)
+    return ScatteredPaths(
+        delay=delay + r2 * back.slowness,
+        towards=towards,
+        out=r1,
+        back=r2,
+        amplitude=left / (np.maximum(r1, NEAREST) * np.maximum(r2, NEAREST)),
+        absorbed=10.0 ** (-0.1 * mean * (r1 + r2)),
+        angles=Angles(sine_in, sine_out, np.clip(forward, -1.0, 1.0)),
+    )
+
+
+def _reflected(medium: Medium, way: Way, sine: Floats, frequency: float) -> Floats | float:
+    """Modulus (point,) of the mirror reflections on a way: what roughness takes from them still comes, from about the
+    mirror point."""
+    if not way.bounces:
+        return 1.0
+    grazing, environment = np.arcsin(np.minimum(sine, 1.0)), medium.environment
+    top = np.abs(coefficient(environment.surface, grazing, frequency)) ** way.surface if way.surface else 1.0
+    return top * (np.abs(coefficient(environment.bottom, grazing, frequency)) ** way.bottom if way.bottom else 1.0)
