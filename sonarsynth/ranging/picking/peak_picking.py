@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +14,7 @@ from sonarsynth.equations.arrays.apertures import live_gain
 from sonarsynth.equations.arrays.noise_peaks import peak_level
 from sonarsynth.products import EnergyImage
 from sonarsynth.ranging.location import pulse_times
-from sonarsynth.ranging.picking.peak_kernels import lobe_power, local_maxima, power_centres
+from sonarsynth.ranging.picking.peak_kernels import farthest, local_maxima, over_lobes, power_centres
 from sonarsynth.ranging.picking.picked_echoes import PickedEchoes, no_echoes
 from sonarsynth.ranging.range_profiles import (
     OVERSAMPLING,
@@ -36,6 +37,8 @@ NOISE_ADDED = 2.0
 """Amplitude of noise, in units of its root mean square, that may be in a peak."""
 LOBE_BINS = 48
 """Frequencies that lobes are summed over."""
+LOBE_STEPS, LOBE_ERROR = 128, 4e-4
+"""Steps a period at the highest frequency that lobes are tabulated at; and what such a table errs by."""
 RESOLVED = 1.0
 """An axis of the grid as long as this, in units of the roughness of noise along it, has peaks along it."""
 SIXTH = 1.0 / 6.0
@@ -235,17 +238,31 @@ def _own(heard: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: Fl
     band, live = heard.sonar.band, np.flatnonzero(heard.elements.gain)
     taper = np.sin(np.pi * (np.arange(LOBE_BINS) + 0.5) / LOBE_BINS) ** 2
     c = heard.sonar.assumed_sound_speed
-    brought = lobe_power(
+    position, rate = heard.elements.position[live], LOBE_STEPS * band.high
+    steps = int(np.ceil((4.0 * farthest(position) / c + 2.0 / (band.high - band.low)) * rate)) + 2
+    least = np.maximum(np.sqrt(height) - NOISE_ADDED * np.sqrt(noise), 0.0) ** 2  # without what noise may add
+    own = np.empty(len(b), bool)
+    own[loud] = over_lobes(
         profiles.direction[b[loud]] / c,
         profiles.step * t[loud],
         height[loud],
-        heard.elements.position[live],
+        position,
         live_gain(heard.elements.gain)[live],
         np.linspace(band.low, band.high, LOBE_BINS),
         taper,
         2.0 * profiles.width / c,
+        least[loud] / LOBES,
+        _lobe_table(band.low, band.high, rate, steps),
+        rate,
+        LOBE_ERROR,
     )
-    own = np.empty(len(b), bool)
-    least = np.maximum(np.sqrt(height) - NOISE_ADDED * np.sqrt(noise), 0.0) ** 2  # without what noise may add
-    own[loud] = least[loud] > LOBES * brought
     return own
+
+
+@lru_cache(maxsize=8)
+def _lobe_table(low: float, high: float, rate: float, steps: int) -> Floats:
+    """Sum (2, delay) over the band low to high (Hz), tapered, at delays in steps of 1/rate (Hz), `steps` either way."""
+    taper = np.sin(np.pi * (np.arange(LOBE_BINS) + 0.5) / LOBE_BINS) ** 2
+    turns = np.arange(-steps, steps + 1) / rate
+    heard = np.exp(2j * np.pi * np.outer(np.linspace(low, high, LOBE_BINS), turns)).T @ (taper / taper.sum())
+    return np.ascontiguousarray([heard.real, heard.imag])
