@@ -104,6 +104,19 @@ def farthest(position: Any) -> Any:
     return reach
 
 
+@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy", forceinline=True)
+def _lobe(x: float, y: float, z: float, at: float, across: Any, weight: Any, real: Any, imaginary: Any) -> Any:
+    """Modulus of the sum over sensors of what a table (delay,) has at `at` and what positions (xyz, sensor) add."""
+    a = b = 0.0
+    for q in range(weight.size):
+        place = across[0, q] * x + across[1, q] * y + across[2, q] * z + at
+        n = np.int32(place)
+        part = place - n
+        a += weight[q] * (real[n] + part * (real[n + 1] - real[n]))
+        b += weight[q] * (imaginary[n] + part * (imaginary[n + 1] - imaginary[n]))
+    return np.sqrt(a * a + b * b)
+
+
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def over_lobes(
     direction: Any, delay: Any, power: Any, position: Any, weight: Any, frequency: Any, taper: Any, near: Any,
@@ -115,9 +128,11 @@ def over_lobes(
     middle at 0, linear in between to within `error`. That bounds what each louder peak may bring: what is left in doubt
     is computed as by `lobe_power`.
     """
-    peaks, sensors = len(power), len(weight)
+    peaks = len(power)
     own, reach = np.zeros(peaks, np.bool_), farthest(position)
-    lasting, last = 2.0 / (frequency[-1] - frequency[0]), table.shape[1] - 2
+    lasting = 2.0 / (frequency[-1] - frequency[0])
+    across = np.ascontiguousarray(position.T)
+    real, imaginary = np.ascontiguousarray(table[0]), np.ascontiguousarray(table[1])
     middle = 0.5 * (table.shape[1] - 1)
     for i in range(peaks):
         low = high = 0.0
@@ -127,15 +142,8 @@ def over_lobes(
             late = delay[i] - delay[j]
             if far <= near or abs(late) > reach * far + lasting:
                 continue
-            real = imaginary = 0.0
-            for q in range(sensors):
-                x = position[q, 0] * apart[0] + position[q, 1] * apart[1] + position[q, 2] * apart[2] + late
-                at = x * rate + middle
-                n = min(max(int(at), 0), last)
-                part = at - n
-                real += weight[q] * (table[0, n] + part * (table[0, n + 1] - table[0, n]))
-                imaginary += weight[q] * (table[1, n] + part * (table[1, n + 1] - table[1, n]))
-            size = np.sqrt(real**2 + imaginary**2)
+            x, y, z = apart[0] * rate, apart[1] * rate, apart[2] * rate
+            size = _lobe(x, y, z, late * rate + middle, across, weight, real, imaginary)
             low += power[j] * max(size - error, 0.0) ** 2
             high += power[j] * (size + error) ** 2
             if low >= least[i]:

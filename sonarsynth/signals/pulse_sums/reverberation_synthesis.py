@@ -28,7 +28,9 @@ from sonarsynth.state import Emission
 
 FACES_TURN = 0.4
 """rad: as `adding_pulses.TURN`; each path errs by 3 % rms, at random."""
-ATTENUATION = 50.0
+FEWER = 12
+"""Frequencies that modes are made at."""
+ATTENUATION = 40.0
 """dB: of the gentle filter."""
 GUARD = 0.2e-3
 """s: either side of a window, beside aperture and pulse: an impulse behind the gentle filter is over."""
@@ -43,9 +45,9 @@ def _passing(sonar: Sonar) -> Fir:
 
 @lru_cache(maxsize=16)
 def impulse_modes(sonar: Sonar, face: float, speed: float, absorption: tuple[float, ...]) -> PulseModes:
-    """The modes of an impulse of 1 Pa s; absorption: dB/m at `node_frequencies`."""
+    """The modes of an impulse of 1 Pa s; absorption: dB/m at as many frequencies."""
     rate = sonar.sampling_frequency * grid_factor(sonar)
-    passing, fine, nodes = _passing(sonar), rate * FRACTIONS, node_frequencies(sonar)
+    passing, fine, nodes = _passing(sonar), rate * FRACTIONS, node_frequencies(sonar, FEWER)
     made = shapes_of(nodes, sonar.band.centre, face, speed, np.array(absorption))
     samples = int(next_fast_len(int(4.0 * (filters.duration(passing) + GUARD) * fine), real=True))
     frequency = np.arange(int((passing.high + 0.5 * passing.transition) * samples / fine) + 1) * (fine / samples)
@@ -82,7 +84,7 @@ def reverberation_pressure(
     early = int(np.ceil(before * rate))
     count = fast_length(samples + early + int(np.ceil(after * rate)))
     order, _ = sensor_blocks(elements)
-    lost = tuple(absorption(node_frequencies(sonar)).tolist())
+    lost = tuple(absorption(node_frequencies(sonar, FEWER)).tolist())
     modes = impulse_modes(sonar, elements.face, arrivals.sound_speed, lost)
     heard = np.zeros((elements.count, count // 2 + 1), np.complex64)
     for number in np.unique(emission):

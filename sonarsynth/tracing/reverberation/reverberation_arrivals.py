@@ -93,8 +93,8 @@ def reverberation_arrivals(
 ) -> ReverberationArrivals:
     """What reaches the array of the sound of snaps that light; seed and key: of the sequence.
 
-    Scatterers are as many as make the contrast of what a hydrophone hears err by `speckle`, at all times: each sends
-    about the same part of what is heard when it is heard. Their expected energy is that of the strengths, exactly,
+    Scatterers are as many as make the contrast of what a hydrophone hears err by `speckle`, at all times. Their
+    expected energy is that of the strengths, exactly,
     whatever their number.
     """
     families = list(_families(described, snaps, medium, receiver, listening))
@@ -116,9 +116,7 @@ def reverberation_arrivals(
             heard += some
         elif own.any():
             left_out.append((name, float(10.0 * np.log10(own.sum() / whole.sum()))))
-    whole = rate(heard) + listening.noise
-    many = scatterers_per_pulse(listening.speckle) * listening.bandwidth
-    expected = [many * f.energy / np.maximum(whole[_bin(f.paths.delay, listening, bins)], 1e-300) for f in heard]
+    expected = _expected(heard, listening, bins)
     total = sum(float(x.sum()) for x in expected)
     if total > MOST:
         raise ValueError(
@@ -127,6 +125,22 @@ def reverberation_arrivals(
     parts = [_drawn(described, f, x, snaps, medium, receiver, listening, number(seed, f.owner, key))
              for f, x in zip(heard, expected, strict=True)]  # fmt: skip
     return _joined(parts, heard, names, tuple(left_out), receiver.pose.rotation, receiver.speed(medium))
+
+
+def _expected(heard: list[_Family], listening: Listening, bins: int) -> list[Floats]:
+    """How many scatterers each cell of each family has, on average.
+
+    As the root of what it sends, so that those of quiet directions are quiet too. Of so many (i) with energies e the
+    spread of intensities is sum e^1.5 sum e^0.5/(sum e)^2: those that arrive together are as many as that takes.
+    """
+    many = scatterers_per_pulse(listening.speckle) * listening.bandwidth * STEP
+    which = [_bin(f.paths.delay, listening, bins) for f in heard]
+    whole, steep = np.zeros(bins), np.zeros(bins)
+    for f, b in zip(heard, which, strict=True):
+        np.add.at(whole, b, f.energy)
+        np.add.at(steep, b, f.energy**1.5)
+    each = many * np.divide(steep, whole**2, out=np.zeros(bins), where=whole > 0.0)
+    return [each[b] * np.sqrt(f.energy) for f, b in zip(heard, which, strict=True)]
 
 
 def _bin(delay: Floats, listening: Listening, bins: int) -> Ints:
