@@ -4,7 +4,7 @@ what the sonar makes of that: noise, errors of sensors and channels, converter."
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -68,7 +68,12 @@ def true_elements(plan: Plan, frame: Frame) -> Elements:
     drawn = errors_of(plan, frame)
     if drawn is None or not drawn.position.any():
         return plan.elements
-    return replace(plan.elements, position=plan.elements.position + drawn.position * [0.0, 1.0, 1.0])
+    return _moved(plan.elements, drawn)
+
+
+@lru_cache(maxsize=8)
+def _moved(elements: Elements, drawn: DrawnErrors) -> Elements:
+    return replace(elements, position=elements.position + drawn.position * [0.0, 1.0, 1.0])
 
 
 def digitise(plan: Plan, frame: Frame, signals: Signals) -> Signals:
@@ -150,8 +155,13 @@ def known_elements(plan: Plan, frame: Frame) -> Elements:
     errors, drawn = plan.scene.sonar.sensor_errors, errors_of(plan, frame)
     if errors is None or drawn is None or errors.known == "none":
         return plan.elements
+    return _working(plan.elements, drawn)
+
+
+@lru_cache(maxsize=8)
+def _working(elements: Elements, drawn: DrawnErrors) -> Elements:
     works = (drawn.state != SensorState.DEAD) & (drawn.state != SensorState.STUCK)
-    return plan.elements if works.all() else replace(plan.elements, gain=plan.elements.gain * works)
+    return elements if works.all() else replace(elements, gain=elements.gain * works)
 
 
 def known_signals(plan: Plan, frame: Frame, signals: Signals) -> Signals:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import lru_cache
 from typing import Annotated, Literal
 
 import numpy as np
@@ -121,6 +122,7 @@ class DrawnErrors:
         return np.asarray(self.gain[:, None] * np.exp(1j * late))
 
 
+@lru_cache(maxsize=16)
 def drawn_errors(errors: SensorErrors, sensors: int, seed: int, key: int | str) -> DrawnErrors:
     """The errors of a sequence of this seed and key. Each kind has a stream of its own: one changes no other."""
 

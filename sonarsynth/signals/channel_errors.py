@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from scipy.sparse import csr_array
 
-from sonarsynth.conventions import Floats
 from sonarsynth.equations.noise.filters import kaiser_bessel
 from sonarsynth.products import Signals
 from sonarsynth.receiver import Elements
@@ -24,8 +24,9 @@ def respond(signals: Signals, drawn: DrawnErrors, sound_speed: float) -> Signals
     """Signals after gain, phase and delay of each channel; dead ones are silent. Windows are taken for periodic: the
     ends are wrong for as long as the delay."""
     heard = np.where(drawn.state == SensorState.DEAD, 0.0, 1.0)
-    f, spectrum, samples = _spectrum(signals)
-    return _filtered(signals, spectrum * drawn.response(f, sound_speed) * heard[:, None], samples)
+    spectrum, samples = _spectrum(signals)
+    response = _response(drawn, samples, signals.sampling_frequency, sound_speed)
+    return _filtered(signals, spectrum * response * heard[:, None], samples)
 
 
 def corrected(signals: Signals, errors: SensorErrors, drawn: DrawnErrors, sound_speed: float) -> Signals:
@@ -33,18 +34,24 @@ def corrected(signals: Signals, errors: SensorErrors, drawn: DrawnErrors, sound_
     if errors.known == "none":
         return signals
     works = (drawn.state == SensorState.WORKING) | (drawn.state == SensorState.NOISY)
-    f, spectrum, samples = _spectrum(signals)
-    response = drawn.response(f, sound_speed, errors.known == "all")
+    spectrum, samples = _spectrum(signals)
+    response = _response(drawn, samples, signals.sampling_frequency, sound_speed, errors.known == "all")
     return _filtered(signals, spectrum / response * works[:, None], samples)
 
 
-def _spectrum(signals: Signals) -> tuple[Floats, np.ndarray, int]:
-    """Frequencies (bin,), spectra (sensor, bin) of the window, made periodic, and its samples so."""
+@lru_cache(maxsize=4)
+def _response(drawn: DrawnErrors, samples: int, rate: float, sound_speed: float, phases: bool = True) -> np.ndarray:
+    """As `DrawnErrors.response`, at the frequencies of so many samples: the same in all frames of a sequence."""
+    return drawn.response(rfftfreq(samples, 1.0 / rate), sound_speed, phases)
+
+
+def _spectrum(signals: Signals) -> tuple[np.ndarray, int]:
+    """Spectra (sensor, bin) of the window, made periodic, and its samples so."""
     p = signals.pressure
     length = next_fast_len(p.shape[1] + BLEND, real=True)
     down = np.linspace(1.0, 0.0, length - p.shape[1] + 2, dtype=np.float32)[1:-1]
     whole = np.concatenate([p, p[:, -1:] * down + p[:, :1] * (1.0 - down)], axis=1)
-    return rfftfreq(length, 1.0 / signals.sampling_frequency), rfft(whole, axis=1), length
+    return rfft(whole, axis=1), length
 
 
 def _filtered(signals: Signals, spectrum: np.ndarray, length: int) -> Signals:

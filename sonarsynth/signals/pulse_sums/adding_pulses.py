@@ -20,22 +20,28 @@ TURN = 0.1
 paths go as this, and so does what they cost: 1 % of their peaks."""
 
 
-@lru_cache(maxsize=16)
 def sensor_blocks(elements: Elements) -> tuple[Ints, tuple[tuple[Ints, Floats, float], ...]]:
     """Sensors in an order, (sensor,), in which each half, quarter, ... is a block; and, of each level of blocks, where
     they begin (block + 1,), their middles (block, xyz) in m and the largest radius (m)."""
-    order, bounds = np.arange(elements.count), [0, elements.count]
+    return _blocks(elements.position.tobytes())
+
+
+@lru_cache(maxsize=16)
+def _blocks(places: bytes) -> tuple[Ints, tuple[tuple[Ints, Floats, float], ...]]:
+    """The same of positions (sensor, xyz): of those that err, frame after frame."""
+    position = np.frombuffer(places).reshape(-1, 3)
+    order, bounds = np.arange(len(position)), [0, len(position)]
     levels = []
     while True:
-        blocks = [elements.position[order[a:b]] for a, b in pairwise(bounds)]
+        blocks = [position[order[a:b]] for a, b in pairwise(bounds)]
         middle = np.array([block.mean(axis=0) for block in blocks])
         radius = max(float(np.linalg.norm(b - m, axis=1).max()) for b, m in zip(blocks, middle, strict=True))
         levels.append((np.array(bounds), middle, radius))
-        if len(blocks) == elements.count:
+        if len(blocks) == len(position):
             return order, tuple(levels)
         finer = [0]
         for a, b in pairwise(bounds):
-            some = elements.position[order[a:b]]
+            some = position[order[a:b]]
             axis = int(np.argmax(np.ptp(some, axis=0)))
             order[a:b] = order[a:b][np.argsort(some[:, axis], kind="stable")]
             finer += [(a + b) // 2, b] if b - a > 1 else [b]
