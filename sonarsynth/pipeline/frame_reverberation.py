@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from sonarsynth.pipeline.stage_times import mark_stage
 from sonarsynth.pipeline.synthesis import true_elements
 from sonarsynth.planning import Plan, frame_start
 from sonarsynth.planning.measured.reverberation_levels import frame_scatterers
+from sonarsynth.planning.reverberation_rows import REVERBERATION
 from sonarsynth.products import Signals
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.pulse_sums.reverberation_synthesis import reverberation_pressure
@@ -26,6 +28,7 @@ def with_reverberation(plan: Plan, frame: Frame, signals: Signals, arrivals: Rev
     """Signals with the reverberation; `plan` is that of the frame's sequence."""
     if arrivals is None or not len(arrivals.delay):
         return signals
+    mark_stage("synthesise")
     heard = reverberation_pressure(
         arrivals,
         arrivals.emission,
@@ -36,4 +39,5 @@ def with_reverberation(plan: Plan, frame: Frame, signals: Signals, arrivals: Rev
         signals.start,
         signals.pressure.shape[1],
     )
+    mark_stage(REVERBERATION)
     return replace(signals, pressure=np.asarray(signals.pressure + heard))

@@ -17,6 +17,7 @@ from sonarsynth.planning.choices import OF_BEAMS
 from sonarsynth.planning.noise_rows import noise_rows
 from sonarsynth.planning.plan_tables import Stage
 from sonarsynth.planning.plans import Plan
+from sonarsynth.planning.reverberation_rows import reverberation_rows
 
 REFERENCE_TRANSFORM = 1.42e-3
 """Seconds of the transforms in `machine_factor` on the machine where the constants below were measured."""
@@ -203,7 +204,7 @@ def _trace_rows(plan: Plan, size: FrameSize) -> list[Row]:
 
 def _signal_rows(plan: Plan, size: FrameSize) -> list[Row]:
     """Signals, where any product needs them, and paths measured in signals of their own."""
-    rows = [_synthesis(plan, size), *noise_rows(plan, size)] if plan.products else []
+    rows = [_synthesis(plan, size), *reverberation_rows(plan), *noise_rows(plan, size)] if plan.products else []
     if "signals" in plan.products:
         seconds = max(size.emissions, 1) * (plan.sizes["target"] + 1) * SECONDS["measure path"]
         rows.append(("measure", "loudest path of each kind alone", "verify compares levels", "none", seconds, 0))

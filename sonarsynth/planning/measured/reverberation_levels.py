@@ -2,25 +2,81 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
+from sonarsynth.description import FieldError
+from sonarsynth.equations.reverberation.bottom_strength import Angles
+from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.sampled_arrivals import receiver_of
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.signals.filtered_pulse import snap_gains
 from sonarsynth.signals.isolated_paths import energy_in_slices
 from sonarsynth.signals.pulse_sums.reverberation_synthesis import spare_times
 from sonarsynth.state import Emission
-from sonarsynth.tracing.reverberation.reverberation_arrivals import (
-    Listening,
-    ReverberationArrivals,
-    reverberation_arrivals,
-)
+from sonarsynth.tracing.reverberation.families import Listening, site_of
+from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals, reverberation_arrivals
 
 if TYPE_CHECKING:
     from sonarsynth.planning.plans import Plan
+
+
+GRAZING = np.sin(np.deg2rad(np.arange(5.0, 86.0, 5.0)))
+"""Sines of the grazing angles at which strengths are compared."""
+
+
+@dataclass(frozen=True)
+class ReverberationLevels:
+    """What a frame has of reverberation."""
+
+    families: tuple[tuple[str, int, float], ...]  # name, scatterers, dB re 1 uPa rms in the echo window
+    left_out: tuple[tuple[str, float], ...]  # name, dB re all of it
+    noise: float  # dB re 1 uPa: of a beam in the band
+    edges: float  # dB: most that a strength changes from the centre of the band to its edges
+    scatterers: int
+
+
+@lru_cache(maxsize=4)
+def reverberation_levels(plan: Plan) -> ReverberationLevels | None:
+    """Of the first frame of the sequence of a plan; none where nothing scatters."""
+    scene = plan.scene
+    if scene.world.reverberation is None:
+        return None
+    frame = plan.recipe.frame(plan.recipe.first_frame(plan.sequence))[1]
+    start = frame_start(plan, frame)
+    try:
+        found = frame_scatterers(plan, frame, start)
+    except ValueError as error:
+        raise FieldError(("scene", "world", "reverberation"), str(error)) from None
+    stop = start + plan.windows.samples / scene.sonar.sampling_frequency
+    opens = max(stop - (plan.windows.echo_stop - plan.windows.echo_start), start)
+    inside = (found.delay >= opens) & (found.delay < stop)
+    power = np.bincount(found.family[inside], found.energy[inside], len(found.families)) / (stop - opens)
+    count = np.bincount(found.family, minlength=len(found.families))
+    with np.errstate(divide="ignore"):
+        level = 10.0 * np.log10(np.append(power, noise_power(scene) / plan.elements.count)) + 120.0
+    heard = zip(found.families, count.tolist(), level[:-1].tolist(), strict=True)
+    some = tuple(one for one in heard if one[1])
+    edges = _changes_within_band(plan)
+    return ReverberationLevels(some, found.left_out, float(level[-1]), edges, len(found.delay))
+
+
+def _changes_within_band(plan: Plan) -> float:
+    """Most (dB) that backscattering strengths of boundaries change from the centre of the band to its edges."""
+    described, band = plan.scene.world.reverberation, plan.scene.sonar.band
+    back = Angles(GRAZING, GRAZING, np.full(len(GRAZING), -1.0))
+    worst = 0.0
+    for owner, law in (("bottom", described.bottom), ("surface", described.surface)) if described else ():
+        if law is None:
+            continue
+        own = [law.strength(back, site_of(owner, plan.medium, f)) for f in (band.low, band.centre, band.high)]
+        if own[1].min() > 0.0:
+            worst = max(worst, *(float(np.abs(10.0 * np.log10(x / own[1])).max()) for x in (own[0], own[2])))
+    return worst
 
 
 def sent_energy(snaps: tuple[Emission, ...], scene: Scene) -> Floats:

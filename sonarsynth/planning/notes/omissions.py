@@ -14,6 +14,7 @@ from sonarsynth.planning.choices import ALL_PRODUCTS
 from sonarsynth.planning.measured.ray_bending import bending_error
 from sonarsynth.planning.plan_tables import Omission
 from sonarsynth.planning.plans import Plan
+from sonarsynth.planning.reverberation_rows import reverberation_left_out
 from sonarsynth.propagation.bounces import MOST_BOUNCES
 from sonarsynth.receiver import stop_frequency
 from sonarsynth.recipe.scene import Frame
@@ -43,7 +44,7 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
     )
     rows.append(Omission("more reflections", f"requested: {kept}", reflected_bound(plan)))
     rough = [b for b in (environment.surface, environment.bottom) if rms_height(b) > 0.0]
-    if bounces and rough:
+    if bounces and rough and scene.world.reverberation is None:
         rows.append(
             Omission(
                 "scattering by rough boundaries",
@@ -68,7 +69,7 @@ def left_out(plan: Plan) -> tuple[Omission, ...]:
     elif moving:
         way = "bodies are posed when sound meets their centre; from there constant velocity and spin"
         rows.append(Omission("motion of targets beyond constant velocity and spin", way, _carried(plan, frame)))
-    rows += _chorus_left_out(plan)
+    rows += _chorus_left_out(plan) + reverberation_left_out(plan)
     if not environment.noises:
         rows.append(Omission("ambient noise", "none in the recipe", "signals are free of noise"))
     return tuple(rows + _thinned(plan) + _not_asked_for(plan) + _not_traced(plan) + _not_heard(plan))

@@ -30,7 +30,9 @@ class WindySurface(BoundaryLaw):
         """As `BoundaryLaw.strength`."""
         wind = site.wind_speed if self.wind_speed is None else self.wind_speed
         if wind is None:
-            raise ValueError("needs a wind_speed, here or of the environment's surface")
+            if site.rms_height > 0.0:
+                raise ValueError("needs the wind_speed of a rough surface")
+            return np.zeros(np.broadcast(*angles).shape)
         own = self.wind_speed is not None and self.wind_speed != site.wind_speed
         height = float(wind_wave_height(wind)) if own else site.rms_height
         both = site.mirrored(_angle(angles.sine_in)) * site.mirrored(_angle(angles.sine_out))

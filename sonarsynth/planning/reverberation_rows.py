@@ -1,0 +1,69 @@
+"""The row of a plan for reverberation: its families, their levels, what its speckle errs by, and what it costs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonarsynth.equations.reverberation.speckle import SINC, scatterers_per_pulse
+from sonarsynth.planning.measured.reverberation_levels import reverberation_levels
+from sonarsynth.planning.noise_rows import NoiseRow
+from sonarsynth.planning.plan_tables import Omission
+
+if TYPE_CHECKING:
+    from sonarsynth.planning.plans import Plan
+
+REVERBERATION = "reverberation"
+"""The stage."""
+PATH_SECONDS, SAMPLE_SECONDS, CELL_SECONDS = 25e-9, 12e-9, 8e-3
+"""Of one core: a scatterer at a sensor, a sample of a sensor, the cells of a frame."""
+
+
+def reverberation_rows(plan: Plan) -> list[NoiseRow]:
+    """One row, where anything scatters. Raises FieldError where a boundary has no strength."""
+    described, levels = plan.scene.world.reverberation, reverberation_levels(plan)
+    if described is None or levels is None:
+        return []
+    heard = ", ".join(f"{name} {level:.0f} dB" for name, _, level in levels.families if np.isfinite(level))
+    method = f"{described.row()}; {levels.scatterers} scatterers in the first frame"
+    why = f"{heard or 'nothing'} re 1 uPa in the echo window; noise of a beam {levels.noise:.0f} dB"
+    error = plan.recipe.accuracy.speckle
+    per_pulse = scatterers_per_pulse(error, shape=SINC)
+    said = f"{error:.2g} of the contrast at a hydrophone: {per_pulse:.2g} scatterers in 1/bandwidth; 3 % of each path"
+    sizes = plan.sizes
+    seconds = levels.scatterers * sizes["sensor"] * PATH_SECONDS + CELL_SECONDS
+    seconds += sizes["sensor"] * sizes["sample"] * SAMPLE_SECONDS
+    return [(REVERBERATION, method, why, said, seconds, 0)]
+
+
+def reverberation_left_out(plan: Plan) -> list[Omission]:
+    """What of reverberation is not simulated, and by how much."""
+    described, levels = plan.scene.world.reverberation, reverberation_levels(plan)
+    if described is None or levels is None:
+        return []
+    rows = [
+        Omission(
+            f"reverberation of the {name}", "far under the rest, or under the noise of a beam", f"{level:.0f} dB re all"
+        )
+        for name, level in levels.left_out
+    ]
+    return [
+        *rows,
+        Omission(
+            f"reverberation by more than {described.bounces} reflections beside",
+            "reverberation.bounces",
+            "each more loses what boundaries and spreading take",
+        ),
+        Omission(
+            "change of scattering strengths within the band", "as at its centre", f"{levels.edges:.1f} dB at its edges"
+        ),
+        Omission(
+            "shadows of targets in the reverberation", "scatterers are heard through targets", "that of what they hide"
+        ),
+        Omission("Doppler within the pulses of reverberation", "delays follow the sonar", "v/c of a pulse's length"),
+        Omission(
+            "speckle of single beams", "few scatterers fall into one", "contrast over 2; raise it by accuracy.speckle"
+        ),
+        Omission("reverberation of the chorus", "its snaps light nothing", "that of a snap of its level and place"),
+    ]

@@ -1,0 +1,165 @@
+"""Reverberation of frames: its energy is that of the sonar equation, whatever the number of scatterers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.fft import irfft
+
+from sonarsynth.environment.reverberation import Reverberation
+from sonarsynth.environment.sea import Absorption, Environment, Isovelocity
+from sonarsynth.equations.arrays.apertures import element_directivity
+from sonarsynth.equations.reverberation.speckle import contrast, lambert_rate
+from sonarsynth.geometry.motion import Still
+from sonarsynth.pipeline import synthesise, trace_at
+from sonarsynth.planning import Plan, frame_start, plan
+from sonarsynth.planning.measured.reverberation_levels import frame_scatterers, sent_energy
+from sonarsynth.receiver import Band, BandPass, PlanarLattice, Sonar
+from sonarsynth.recipe import Recipe
+from sonarsynth.recipe.scene import EchoWindow, Processing, Scene, Trajectory, World
+from sonarsynth.recipe.tolerance import Accuracy
+from sonarsynth.scattering.boundaries import Lambert
+from sonarsynth.signals.filtered_pulse import pulse_spectrum, snap_gains
+from sonarsynth.sources.shrimp import SnappingShrimp
+from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals
+
+SPEED, DEPTH, HEIGHT, MU = 1500.0, 60.0, 8.0, -15.0
+BACK = Still(position=(0.0, 0.0, -52.0))
+SNAP = (-0.1, 0.0)
+LAMBERT = Reverberation(bottom=Lambert(mu=MU), surface=None, bounces=0)
+
+
+def recipe(
+    described: Reverberation = LAMBERT,
+    seed: int = 1,
+    speckle: float = 0.1,
+    snap: tuple[float, float] = SNAP,
+    **more: Any,
+) -> Recipe:
+    """A few hydrophones 8 m over a wide bottom, that hear a snap beside them come back; no target, no noise."""
+    environment = Environment(depth=DEPTH, sound_speed=Isovelocity(speed=SPEED), absorption=Absorption(formula="none"))
+    sonar = Sonar(
+        array=PlanarLattice(columns=3, rows=2, pitch=0.02, face=more.pop("face", 0.02)),
+        band=Band(low=25e3, high=85e3),
+        filter=BandPass(low=25e3, high=85e3),
+        assumed_sound_speed=SPEED,
+    )
+    source = SnappingShrimp(position=snap, height=more.pop("source_height", HEIGHT))
+    return Recipe(
+        seed=seed,
+        accuracy=Accuracy(speckle=speckle),
+        scene=Scene(
+            world=World(environment=environment, sources=(source,), reverberation=described),
+            sonar=sonar,
+            trajectory=Trajectory(frames=1, sonar=more.pop("sonar", BACK)),
+            processing=Processing(echo_window=EchoWindow(start=0.0, stop=30e-3)),
+        ),
+    )
+
+
+def heard(made: Plan, index: int = 0) -> ReverberationArrivals:
+    """What comes back in a frame."""
+    frame = made.recipe.frame(index)[1]
+    return frame_scatterers(made, frame, frame_start(made, frame))
+
+
+def sent(made: Plan) -> float:
+    """Energy of the snap (Pa2 s) in the band at 1 m."""
+    return float(sent_energy(made.recipe.frame(0)[1].moment.snaps, made.scene)[0])
+
+
+def test_energy_is_that_of_the_sonar_equation_and_not_of_the_number_of_scatterers() -> None:
+    """Own snap over a Lambert bottom: mu (h/r)^2 2 pi r (c/2)/r^4 per second, integrated over steps of 3 ms."""
+    edges = np.arange(12e-3, 30e-3, 3e-3)
+    fine = np.linspace(edges[0], edges[-1], 60_001)
+    rate = lambert_rate(fine, HEIGHT, 10.0 ** (MU / 10.0), SPEED)
+    known = np.histogram(fine, edges, weights=rate * (fine[1] - fine[0]))[0]
+    counts = []
+    for speckle in (1.0, 0.1, 0.02):
+        drawn = [plan(recipe(seed=seed, speckle=speckle)) for seed in (1, 2, 3)]
+        found = [(heard(made), sent(made)) for made in drawn]
+        counts.append(np.mean([len(a.delay) for a, _ in found]))
+        got = np.mean([np.histogram(a.delay, edges, weights=a.energy)[0] / s for a, s in found], axis=0)
+        assert np.abs(10.0 * np.log10(got / known)).max() < (0.6 if speckle == 1.0 else 0.3), speckle
+        assert 10.0 * np.log10(got.sum() / known.sum()) == pytest.approx(0.0, abs=0.15), speckle
+    assert counts[2] > 4.0 * counts[1] > 30.0 * counts[0]
+
+
+def test_nothing_comes_before_the_first_possible_echo() -> None:
+    found = heard(plan(recipe()))
+    assert found.delay.min() > 2.0 * HEIGHT / SPEED - 1e-6
+    assert (found.length + found.lit_from > 2.0 * HEIGHT - 1e-3).all()
+
+
+def test_pressure_is_the_sum_of_the_pulses_of_all_scatterers() -> None:
+    """Brute force: each pulse at each hydrophone from where its scatterer is, each frequency, in float64."""
+    made = plan(recipe(speckle=1.0))
+    traced = trace_at(made, made.recipe.frame(0)[1])
+    arrivals = traced.reverberation
+    assert arrivals is not None and len(arrivals.delay) > 300
+    silent = synthesise(made, replace(traced, reverberation=None))
+    found = synthesise(made, traced).pressure.astype(float) - silent.pressure
+    sonar, snap, padded = made.scene.sonar, traced.frame.moment.snaps[0], 16384
+    rate = sonar.sampling_frequency
+    f, pulse = pulse_spectrum(snap.waveform, sonar.antialias, rate, padded)
+    known = np.zeros_like(found)
+    for s, q in enumerate(made.elements.position):
+        towards = arrivals.direction * arrivals.length[:, None] - q
+        r = np.linalg.norm(towards, axis=1)
+        spectrum = np.zeros(len(f), complex)
+        for n in range(len(r)):
+            late = arrivals.delay[n] + (r[n] - arrivals.length[n]) / SPEED - silent.start
+            face = element_directivity(f, towards[n] / r[n], made.elements.face, SPEED)
+            spectrum += arrivals.gain[n] * arrivals.length[n] / r[n] * face * np.exp(-2j * np.pi * f * late)
+        known[s] = irfft(spectrum * pulse * rate, padded)[: found.shape[1]]
+    known *= float(snap_gains((snap,))[0])
+    quiet = slice(100, -100)
+    assert np.linalg.norm((found - known)[:, quiet]) < 0.03 * np.linalg.norm(known[:, quiet])
+
+
+def test_the_energy_of_its_paths_is_heard() -> None:
+    """By hydrophones that hear alike from everywhere."""
+    made = plan(recipe(face=1e-3))
+    traced = trace_at(made, made.recipe.frame(0)[1])
+    arrivals = traced.reverberation
+    assert arrivals is not None
+    silent = synthesise(made, replace(traced, reverberation=None))
+    pressure = synthesise(made, traced).pressure.astype(float) - silent.pressure
+    rate = made.scene.sonar.sampling_frequency
+    time = silent.start + np.arange(pressure.shape[1]) / rate
+    heard_energy = (pressure[:, (time > 14e-3) & (time < 28e-3)] ** 2).mean(axis=0).sum() / rate
+    sent_paths = arrivals.energy[(arrivals.delay > 14e-3) & (arrivals.delay < 28e-3)].sum()
+    assert 10.0 * np.log10(heard_energy / sent_paths) == pytest.approx(0.0, abs=0.4)
+
+
+def test_snap_and_hydrophone_may_be_swapped() -> None:
+    edges = np.arange(14e-3, 29e-3, 5e-3)
+
+    def mean_rate(**places: Any) -> np.ndarray:
+        found = []
+        for seed in (1, 2, 3):
+            made = plan(recipe(seed=seed, **places))
+            arrivals = heard(made)
+            found.append(np.histogram(arrivals.delay, edges, weights=arrivals.energy)[0] / sent(made))
+        return np.mean(found, axis=0)
+
+    there = mean_rate(snap=(6.0, 3.0), source_height=5.0)
+    back = mean_rate(snap=(0.0, 0.0), sonar=Still(position=(6.0, 3.0, 5.0 - DEPTH)))
+    assert np.abs(10.0 * np.log10(there / back)).max() < 0.3
+
+
+def test_many_scatterers_make_gaussian_noise_and_few_the_law() -> None:
+    """<I^2>/<I>^2 of the complex envelope of a brute-force sum of signs behind a flat band of a tenth of the rate."""
+    draw, samples, band = np.random.default_rng(3), 1_000_000, 0.1
+    frequency = np.fft.fftfreq(samples)
+    for per_pulse in (1.0, 3.0, 10.0):
+        series = np.zeros(samples)
+        place = draw.integers(0, samples, int(per_pulse * band * samples))
+        np.add.at(series, place, draw.choice([-1.0, 1.0], len(place)))
+        spectrum = np.fft.fft(series)
+        spectrum[(frequency < 0.2) | (frequency >= 0.2 + band)] = 0.0
+        power = np.abs(np.fft.ifft(spectrum)) ** 2
+        assert (power**2).mean() / power.mean() ** 2 == pytest.approx(float(contrast(per_pulse)), rel=0.02)

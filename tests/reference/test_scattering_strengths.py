@@ -1,0 +1,110 @@
+"""Scattering strengths of bottom and surface against the published ones, and what no law may break."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sonarsynth.equations.reverberation.bottom_strength import GRAIN_SIZE, Angles, albedo, lambert, sediment
+from sonarsynth.equations.reverberation.surface_strength import facets
+from sonarsynth.scattering.boundaries import BoundarySite, WindySurface
+
+WAVENUMBER = 2.0 * np.pi * 50e3 / 1528.0
+GRAZING = np.deg2rad([5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 90.0])
+PUBLISHED = {  # dB at 50 kHz, of the closed forms of APL-UW TR 9407 computed by another program from the text alone
+    "sandy gravel": (-38.4, -28.3, -21.0, -18.1, -16.5, -14.2, -9.7),
+    "coarse sand": (-41.8, -31.6, -24.2, -21.1, -20.2, -17.6, -6.7),
+    "medium sand": (-45.7, -35.2, -27.1, -23.6, -22.5, -20.4, -5.7),
+    "fine sand": (-48.8, -37.9, -28.8, -24.9, -23.9, -22.7, -6.3),
+    "very fine sand": (-46.0, -35.4, -26.9, -25.7, -24.5, -23.6, -6.4),
+    "coarse silt": (-40.4, -32.0, -27.8, -26.4, -25.0, -24.1, -5.1),
+    "medium silt": (-41.3, -35.6, -31.7, -29.9, -28.3, -27.4, -6.1),
+}
+
+
+def back(grazing: np.ndarray) -> Angles:
+    """Towards where it came from."""
+    return Angles(np.sin(grazing), np.sin(grazing), np.full(np.shape(grazing), -1.0))
+
+
+def any_angles(count: int = 200) -> Angles:
+    """Pairs of directions, at random."""
+    draw = np.random.default_rng(5)
+    return Angles(*(draw.uniform(0.0, 1.0, count) for _ in range(2)), np.cos(draw.uniform(0.0, np.pi, count)))
+
+
+def hemisphere(zeniths: int = 400, azimuths: int = 480) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sines of grazing angles, cosines of azimuths and weights (sr) of directions of equal solid angle."""
+    sine = (np.arange(zeniths) + 0.5) / zeniths
+    forward = np.cos((np.arange(azimuths) + 0.5) * 2.0 * np.pi / azimuths)
+    s, f = (a.ravel() for a in np.meshgrid(sine, forward))
+    return s, f, np.full(s.size, 2.0 * np.pi / s.size)
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_backscattering_of_sediments_is_the_published_one(name: str) -> None:
+    found = 10.0 * np.log10(sediment(back(GRAZING), WAVENUMBER, name))
+    assert np.abs(found - PUBLISHED[name]).max() < 0.6
+
+
+def test_sediment_between_two_directions_is_the_published_one() -> None:
+    sine = np.full(5, np.sin(np.deg2rad(20.0)))
+    angles = Angles(sine, sine, np.cos(np.deg2rad([0.0, 45.0, 90.0, 135.0, 180.0])))
+    found = 10.0 * np.log10(sediment(angles, WAVENUMBER, "medium sand"))
+    assert np.abs(found - (7.92, -24.72, -26.94, -27.13, -27.12)).max() < 0.3
+
+
+@pytest.mark.parametrize(
+    ("wind", "published"),
+    [
+        (3.0, (-47.5, -47.5, -47.4, -46.6, -34.3, -1.8)),
+        (5.0, (-38.3, -38.2, -38.1, -38.0, -31.3, -0.4)),
+        (10.0, (-33.0, -29.7, -24.9, -22.2, -18.9, 0.5)),
+    ],
+)
+def test_backscattering_of_the_surface_is_the_published_one(wind: float, published: tuple[float, ...]) -> None:
+    site = BoundarySite(50e3, WAVENUMBER, np.ones_like, wind, rms_height=1.0)  # all of the facets' power is incoherent
+    found = 10.0 * np.log10(WindySurface().strength(back(np.deg2rad([5.0, 10.0, 20.0, 30.0, 60.0, 80.0])), site))
+    assert np.abs(found - published).max() < 0.3
+
+
+@pytest.mark.parametrize("name", GRAIN_SIZE)
+def test_a_sediment_is_reciprocal_and_gives_back_less_than_arrives(name: str) -> None:
+    angles = any_angles()
+    there, and_back = (sediment(one, WAVENUMBER, name) for one in (angles, angles.swapped))
+    assert np.allclose(there, and_back, rtol=1e-12) and (there >= 0.0).all() and np.isfinite(there).all()
+    sine, forward, weight = hemisphere()
+    for grazing in np.deg2rad([3.0, 10.0, 30.0, 60.0]):
+        out = sediment(Angles(np.full(sine.size, np.sin(grazing)), sine, forward), WAVENUMBER, name)
+        assert 0.0 < albedo(out, sine, weight, float(np.sin(grazing))) < 1.0
+
+
+def test_lambert_gives_back_pi_mu() -> None:
+    sine, forward, weight = hemisphere()
+    out = lambert(Angles(np.full(sine.size, 0.3), sine, forward), 0.1)
+    assert albedo(out, sine, weight, 0.3) == pytest.approx(0.1 * np.pi, rel=1e-6)
+
+
+@pytest.mark.parametrize("wind", [0.0, 0.5, 3.0, 10.0])
+def test_facets_give_back_what_the_coherent_reflection_lost(wind: float) -> None:
+    """Of waves that are far higher than the wavelength all that arrives from steeply above, of a smooth sea nothing."""
+    sine, forward, weight = hemisphere()
+    angles = Angles(np.full(sine.size, np.sin(np.deg2rad(70.0))), sine, forward)
+    whole = albedo(facets(angles, WAVENUMBER, wind, 1.0), sine, weight, float(np.sin(np.deg2rad(70.0))))
+    assert whole == pytest.approx(1.0, abs=0.06)
+    height = 0.3 / (2.0 * WAVENUMBER * np.sin(np.deg2rad(70.0)))
+    some = albedo(facets(angles, WAVENUMBER, wind, height), sine, weight, float(np.sin(np.deg2rad(70.0))))
+    assert some == pytest.approx(1.0 - np.exp(-0.09), rel=0.08)
+    assert not facets(angles, WAVENUMBER, wind, 0.0).any()
+
+
+def test_no_angle_and_no_wind_makes_a_missing_number() -> None:
+    edges = np.array([0.0, 1e-12, 1e-6, 0.5, 1.0 - 1e-12, 1.0])
+    angles = Angles(*(a.ravel() for a in np.meshgrid(edges, edges, [-1.0, 0.0, 1.0])))
+    for wind in (0.0, 0.3, 0.7, 1.0, 11.0, 60.0):
+        out = WindySurface().strength(angles, BoundarySite(50e3, WAVENUMBER, np.ones_like, wind, rms_height=0.1))
+        assert np.isfinite(out).all() and (out >= 0.0).all()
+    for name in GRAIN_SIZE:
+        out = sediment(angles, WAVENUMBER, name)
+        assert np.isfinite(out).all() and (out >= 0.0).all()
+        assert (out[(angles.sine_in == 0.0) & (angles.forward < 0.0)] < 1e-4).all()
