@@ -155,9 +155,9 @@ def trace_at(plan: Plan, frame: Frame) -> TracedFrame:
     budget = link_budget(seen, powers, band, targets, levels, expansion_error(plan, seen))
     heard = echo_levels(seen, powers, targets, levels)
     mark_stage("label")
-    chorus, scattered = frame_chorus(plan, frame), frame_reverberation(plan, frame)
+    others = frame_chorus(plan, frame), frame_reverberation(plan, frame)
     mark_stage("trace")
-    return TracedFrame(frame, arrivals, truth, budget, heard, chorus, scattered)
+    return TracedFrame(frame, arrivals, truth, budget, heard, *others)
 
 
 def beamform_frame(plan: Plan, index: int, traced: TracedFrame) -> BeamformedFrame:
@@ -204,8 +204,8 @@ def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFr
 def synthesise(plan: Plan, traced: TracedFrame) -> Signals:
     """Pressure at each hydrophone: echoes and direct snap, reverberation, chorus, ambient noise, converter."""
     plan = plan.at(traced.frame.index)
-    signals = frame_signals(plan, traced.frame, traced.arrivals)
-    signals = with_reverberation(plan, traced.frame, signals, traced.reverberation)
+    echoes = frame_signals(plan, traced.frame, traced.arrivals)
+    signals = with_reverberation(plan, traced.frame, echoes, traced.reverberation)
     return digitise(plan, traced.frame, with_chorus(plan, traced.frame, signals, traced.chorus))
 
 
@@ -286,8 +286,7 @@ def render(recipe: Recipe | Plan, index: int) -> xr.DataTree:
     import xarray as xr
 
     made = plan(recipe) if isinstance(recipe, Recipe) else recipe
-    values = _values(made, index)
-    groups: dict[str, xr.Dataset] = {"/": xr.Dataset(attrs=attributes(made))}
+    values, groups = _values(made, index), {"/": xr.Dataset(attrs=attributes(made))}
     for (group, name), (dims, array, attrs) in coordinates(made).items():
         one = (dims[1:], array[index], attrs) if "frame" in dims else (dims, array, attrs)
         groups.setdefault(group, xr.Dataset()).coords[name] = one

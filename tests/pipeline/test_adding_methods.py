@@ -33,6 +33,7 @@ UNIONS = {
     "ranging/cancelling": "Cancelling",
     "sources": "Source",
     "environment/scatterers": "ScattererField",
+    "scattering/boundaries": "BoundaryScattering",
 }
 KINDS = (
     {
@@ -48,6 +49,7 @@ KINDS = (
     },
     {"scene.physics.tracing": "measured_current"},
     {"scene.world.scatterers": "surface_patch, centre: [1.1, 0.0], side: 0.2, pieces: 50, strength: -10 dB"},
+    {"scene.world.reverberation.bottom": "lommel_seeliger"},
     {"scene.world.sources.0": "pinger, position: [0.6, -0.25, -0.3]"},
 )
 SCRIPT = """
@@ -155,11 +157,12 @@ def of(said: dict[str, Any], kind: str) -> dict[str, Any]:
         ("time_gate", "beamform", ""),
         ("pinger", "trace", ""),
         ("surface_patch", "trace", ""),
+        ("lommel_seeliger", "reverberation", ""),
     ],
 )
 def test_it_runs_and_plan_and_store_say_so(said: dict[str, Any], kind: str, stage: str, choice: str) -> None:
     mine = of(said, kind)
-    assert kind in mine["rows"][stage][0] and kind not in said["usual"]["rows"][stage][0]
+    assert kind in mine["rows"][stage][0] and kind not in said["usual"]["rows"].get(stage, [""])[0]
     assert f"kind: {kind}" in mine["recipe"].replace("'", "")
     assert not choice or mine["choices"][choice]["kind"] == kind
     assert ("not stated" in mine["rows"][stage][1]) == (kind == "coherence_factor")
@@ -226,6 +229,16 @@ def test_the_surface_is_heard_when_sound_can_have_been_there(said: dict[str, Any
     heard = mine["start"] + np.flatnonzero(more > 0.3 * more.max()) / 196e3
     assert way.min() / 1490.0 - 3e-5 < heard[0] and heard[-1] < way.max() / 1480.0 + 3e-5
     assert more.max() > 1e-4 * np.abs(usual["sensors"]).max()
+
+
+def test_the_bottom_is_heard_after_it_is_lit(said: dict[str, Any]) -> None:
+    """By the surface: sound along the bottom, where the shrimp sits, lights nothing."""
+    mine, usual = of(said, "lommel_seeliger"), said["usual"]
+    more = np.abs(np.subtract(mine["sensors"], usual["sensors"])).max(axis=0)
+    by_mirrors = np.linalg.norm([0.6, -0.25, 0.3 + 0.45]) / 1490.0  # image over the surface to array under the bottom
+    heard = mine["start"] + np.flatnonzero(more > 0.3 * more.max()) / 196e3
+    assert more.max() > 1e-3 * np.abs(usual["sensors"]).max()
+    assert heard[0] > by_mirrors - 1e-4, "but for the rise of the snap before its peak"
 
 
 def test_the_noise_is_as_loud_as_it_says(said: dict[str, Any]) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from sonarsynth.equations.reverberation.bottom_strength import GRAIN_SIZE, Angles, albedo, lambert, sediment
 from sonarsynth.equations.reverberation.surface_strength import facets
-from sonarsynth.scattering.boundaries import BoundarySite, WindySurface
+from sonarsynth.scattering.boundaries import BoundarySite, RoughSediment, WindySurface
 
 WAVENUMBER = 2.0 * np.pi * 50e3 / 1528.0
 GRAZING = np.deg2rad([5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 90.0])
@@ -108,3 +108,8 @@ def test_no_angle_and_no_wind_makes_a_missing_number() -> None:
         out = sediment(angles, WAVENUMBER, name)
         assert np.isfinite(out).all() and (out >= 0.0).all()
         assert (out[(angles.sine_in == 0.0) & (angles.forward < 0.0)] < 1e-4).all()
+
+
+def test_rock_is_refused() -> None:
+    with pytest.raises(ValueError, match="'rock' has no law; known"):
+        RoughSediment(name="rock")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.equations.reverberation.bottom_strength import GRAIN_SIZE, Angles, sediment
 from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.imaging.image_window import snapshots_of
 from sonarsynth.ranging import IsovelocityPlacing, Peaks, SensorDelays
@@ -14,6 +15,7 @@ from sonarsynth.ranging.clouds import point_cloud
 from sonarsynth.ranging.location.locating import unlocatable
 from sonarsynth.ranging.received_window import ReceivedWindow
 from sonarsynth.receiver import Band, BeamGrid, LowPass, PlanarLattice, PositionTable, Sonar, elements
+from sonarsynth.scattering.boundaries import BoundarySite, WindySurface
 from sonarsynth.scattering.isotropic import Isotropic
 from sonarsynth.signals import DirectSum, GriddedSynthesis
 from sonarsynth.sources.snap_models import Gabor, Ricker
@@ -206,6 +208,21 @@ def _ten_thousand() -> Got:
     )
 
 
+def _strengths() -> Got:
+    """Of every sediment, and of surfaces from calm to 60 m/s, along the boundary, straight up, and between."""
+    edges = np.array([0.0, 1e-12, 1e-6, 0.5, 1.0 - 1e-12, 1.0])
+    angles = Angles(*(a.ravel() for a in np.meshgrid(edges, edges, [-1.0, 0.0, 1.0])))
+    k = 2.0 * np.pi * 50e3 / C
+    sites = [BoundarySite(50e3, k, np.ones_like, wind, rms_height=0.1) for wind in (0.0, 0.69, 1.0, 11.0, 60.0)]
+    found = [sediment(angles, k, name) for name in GRAIN_SIZE]
+    found += [WindySurface().strength(angles, site) for site in sites]
+    along = np.array([x[(angles.sine_in == 0.0) & (angles.sine_out == 0.0) & (angles.forward < 0.0)] for x in found])
+    return together(
+        holds(all(np.isfinite(x).all() and (x >= 0.0).all() for x in found), "finite and not negative"),
+        holds(float(along.max()) < 1e-5, f"at most {along.max():.1g} along the boundary"),
+    )
+
+
 EXACT = "the pulse over r at its time, to 1e-4"
 CASES = (
     Case("delays of 1 us to 100 s", EXACT, _delays),
@@ -214,6 +231,7 @@ CASES = (
     Case("bands of 50 Hz to 10 MHz", EXACT, _bands),
     Case("a narrow band: 1000 cycles", "the tone in its Gaussian, to 1e-4", _narrow),
     Case("one loud and one faint target, 100 dB apart", "the faint one as it is alone, to 1e-3", _loud_and_faint),
+    Case("scattering at grazing 0 and 90 degrees, wind of 0 to 60 m/s", "finite, none along the boundary", _strengths),
     Case("silence", "no pressure, no energy; NaN for what is not there", _silence),
     Case("one sensor, two at one place", f"{EXACT}; no bearing, with the reason", _few_sensors),
     Case("10 000 sensors", f"{EXACT}; the energy of the focused beam by Parseval", _ten_thousand, slow=True),
