@@ -20,6 +20,7 @@ from typing import Any
 _HOMES = {
     "export": "points",
     "description": "FieldError",
+    "detection": "CellAveraging Detections ImagePeaks detect",
     "environment.boundaries": "FluidHalfSpace PressureRelease ReflectionTable Rigid SeaBottom SeaSurface Sediment",
     "environment.noise": "FlatNoise KnudsenNoise RainNoise TabulatedNoise ThermalNoise WenzNoise WindNoise",
     "environment.noise.recorded_noise": "RecordedNoise",
@@ -29,6 +30,7 @@ _HOMES = {
     "environment.sea": (
         "Absorption Cast Catenary Environment Isovelocity Linear Munk Tabulated TemperatureSalinity Thermocline"
     ),
+    "evaluation": "DetectorReport evaluate",
     "geometry.hovering": "Hover",
     "geometry.motion": "Circle ConstantVelocity Line RecordedTrack Still Waypoint Waypoints",
     "imaging": "DenseDelayAndSum FocusedDelayAndSum",

@@ -1,6 +1,12 @@
 """What `sonarsynth` exports, for type checkers: at run time each name is looked up when it is first used."""
 
 from sonarsynth.description import FieldError as FieldError
+from sonarsynth.detection import (
+    CellAveraging as CellAveraging,
+    Detections as Detections,
+    ImagePeaks as ImagePeaks,
+    detect as detect,
+)
 from sonarsynth.environment.boundaries import (
     FluidHalfSpace as FluidHalfSpace,
     PressureRelease as PressureRelease,
@@ -41,6 +47,7 @@ from sonarsynth.environment.sea import (
 )
 from sonarsynth.export import points as points
 from sonarsynth.frontiers import measure as accuracy
+from sonarsynth.evaluation import DetectorReport as DetectorReport, evaluate as evaluate
 from sonarsynth.geometry.hovering import Hover as Hover
 from sonarsynth.geometry.motion import (
     Circle as Circle,

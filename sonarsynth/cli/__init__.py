@@ -18,6 +18,8 @@ from sonarsynth.cli.accuracy_command import accuracy
 from sonarsynth.cli.authoring.init_command import init
 from sonarsynth.cli.authoring.preview_command import preview
 from sonarsynth.cli.card_command import card
+from sonarsynth.cli.detectors.detect_command import detect
+from sonarsynth.cli.detectors.evaluate_command import evaluate
 from sonarsynth.cli.export_command import export
 from sonarsynth.cli.rays_command import rays
 from sonarsynth.cli.repair_command import repair
@@ -238,7 +240,7 @@ def show(
         typer.echo(str(file))
 
 
-for command in (accuracy, card, export, init, preview, rays, repair, soundscape):
+for command in (accuracy, card, detect, evaluate, export, init, preview, rays, repair, soundscape):
     app.command()(command)
 app.command("target-strength")(target_strength)
 

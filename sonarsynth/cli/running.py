@@ -77,7 +77,7 @@ def _explain(error: Exception, shown: bool) -> int:
             return _say(str(error), STORE)
         case "RecipeError" | "Mismatch" | "NothingToDraw" | "TooLarge" | "Unreachable" | "NoScheduler":
             return _say(str(error), INPUT)
-        case "RecordingError" | "TrackError":
+        case "RecordingError" | "TrackError" | "DetectionsError":
             return _say(str(error), INPUT)
     if isinstance(error, (BadOption, FieldError)):
         return _say(str(error), INPUT)

@@ -1,9 +1,12 @@
-"""Texts of the command line that select frames and products."""
+"""Texts of the command line that select frames and products, and those that describe a thing."""
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 from sonarsynth.cli.running import BadOption
 
@@ -57,3 +60,19 @@ def product_names(text: str) -> frozenset[str]:
         return chosen_products(part.strip() for part in text.split(",") if part.strip())
     except ValueError as error:
         raise BadOption(f"--products: {error}") from None
+
+
+def described(text: str, name: str, kind: Any) -> Any:
+    """The description of a YAML text; kind: its class or union. Raises BadOption, RecipeError."""
+    from pydantic import TypeAdapter, ValidationError
+
+    from sonarsynth.recipe.reading.messages import explain
+    from sonarsynth.recipe.reading.yaml_source import read_text
+
+    if not text.lstrip().startswith("{"):
+        raise BadOption(f"{name}: must be a mapping such as '{{kind: kirchhoff}}', not '{text}'")
+    source = read_text(text, name, Path.cwd())
+    try:
+        return TypeAdapter(kind).validate_json(json.dumps(source.data), strict=True)
+    except ValidationError as error:
+        raise explain(error, kind, source) from None

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
 from sonarsynth.cli.running import BadOption
+from sonarsynth.cli.selecting import described
 
 if TYPE_CHECKING:
     from sonarsynth.conventions import Floats
@@ -54,7 +55,7 @@ def target_strength(
     from sonarsynth.pictures.strength_pictures import strength_table, write_strength
     from sonarsynth.scattering import Scattering
 
-    law = _described(scattering, "--scattering", Scattering)
+    law = described(scattering, "--scattering", Scattering)
     shape = _shape(body, unit)
     f, degrees = _values(frequency, "--frequency"), _values(aspect, "--aspect")
     if not f.min() > 0:
@@ -89,27 +90,11 @@ def _shape(text: str, unit: str) -> Shape:
     if text.lstrip().startswith("{"):
         if unit != "auto":
             raise BadOption(f"--unit: is for a mesh file; write units in the shape, such as 'radius: 25 {unit}'")
-        found: Shape = _described(text, "shape", Shape)
+        found: Shape = described(text, "shape", Shape)
         return found
     if not Path(text).is_file():
         raise BadOption(f"{text}: no such file, and no shape such as '{{kind: sphere, radius: 0.25 m}}'")
     return MeshFile(path=text, unit=unit)  # type: ignore[arg-type]
-
-
-def _described(text: str, name: str, kind: Any) -> Any:
-    """The description of a YAML text. Raises RecipeError."""
-    from pydantic import TypeAdapter, ValidationError
-
-    from sonarsynth.recipe.reading.messages import explain
-    from sonarsynth.recipe.reading.yaml_source import read_text
-
-    if not text.lstrip().startswith("{"):
-        raise BadOption(f"{name}: must be a mapping such as '{{kind: kirchhoff}}', not '{text}'")
-    source = read_text(text, name, Path.cwd())
-    try:
-        return TypeAdapter(kind).validate_json(json.dumps(source.data), strict=True)
-    except ValidationError as error:
-        raise explain(error, kind, source) from None
 
 
 def _values(text: str, option: str) -> Floats:

@@ -1,12 +1,15 @@
-"""Truth against data: what a store says it sees, checked against what was there. Reads plain xarray."""
+"""Truth against data: what a store says it sees, checked against what was there, and what detectors find. Reads plain
+xarray."""
 
 from __future__ import annotations
 
 import numpy as np
 import xarray as xr
 
-from sonarsynth.evaluation.brightest_beams import beam_width, brightest_beam_on_target, near_target
+from sonarsynth.detection import beam_width
+from sonarsynth.evaluation.brightest_beams import brightest_beam_on_target, near_target
 from sonarsynth.evaluation.checks import Check, every, numbered
+from sonarsynth.evaluation.detectors import TRUTH, DetectorReport, evaluate
 from sonarsynth.evaluation.error_bounds import bounds, warnings
 from sonarsynth.evaluation.level_checks import (
     INAUDIBLE,
@@ -23,11 +26,14 @@ __all__ = [
     "EXPANSION_PHASE",
     "INAUDIBLE",
     "LINK_BUDGET_TOLERANCE",
+    "TRUTH",
     "Check",
+    "DetectorReport",
     "beam_width",
     "bounds",
     "brightest_beam_on_target",
     "check",
+    "evaluate",
     "expansions_hold",
     "kinds",
     "labels_of_targets",

@@ -5,20 +5,10 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from sonarsynth.detection import beam_width
 from sonarsynth.evaluation.checks import Check, SmallVariables, blocks, every, numbered, of_frame, other_sounds
 from sonarsynth.evaluation.level_checks import echoes_heard, snaps_heard
 from sonarsynth.labels.views import View
-
-
-def beam_width(tree: xr.DataTree) -> float:
-    """Half-power beam width (rad) of the array at the centre of its band, from the attributes of the store.
-
-    Disc: 1.03 lambda / D (first-order; Van Trees 2002, table 4.1).
-    """
-    low, high = tree.attrs["band_low"], tree.attrs["band_high"]
-    extent = 2.0 * np.float64(tree.attrs["aperture_radius"])
-    with np.errstate(divide="ignore"):  # one place has no beam: every direction is the same
-        return float(1.03 * tree.attrs["assumed_sound_speed"] / (0.5 * (low + high)) / extent)
 
 
 def _grid_step(tree: xr.DataTree) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from sonarsynth.evaluation.brightest_beams import beam_width
+from sonarsynth.detection import beam_width
 from sonarsynth.evaluation.checks import Check, every, numbered
 from sonarsynth.evaluation.point_checks import has_labels, points, range_errors
 from sonarsynth.evaluation.source_estimates import snap_located

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import xarray as xr
 
-from sonarsynth.evaluation.brightest_beams import beam_width
+from sonarsynth.detection import beam_width
 from sonarsynth.evaluation.checks import Check, SmallVariables, blocks, numbered, other_sounds
 from sonarsynth.evaluation.level_checks import snaps_heard
 from sonarsynth.geometry import Pose

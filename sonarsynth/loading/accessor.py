@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
-from sonarsynth.loading.tables import as_table, built_frames, points_table
+from sonarsynth.loading.tables import as_table, points_table
+from sonarsynth.store import built_frames
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,7 +25,7 @@ class SonarAccessor:
     @property
     def frames(self) -> list[int]:
         """Numbers of the frames that were built: the others read as NaN and -1."""
-        return built_frames(self._tree)
+        return [int(frame) for frame in built_frames(self._tree)]
 
     def points(self, frames: int | Iterable[int] | None = None) -> pd.DataFrame:
         """The points of some frames (left out: all) as a table, a row each, without padding; index: frame and point.

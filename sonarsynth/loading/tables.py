@@ -10,18 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from sonarsynth.store import built_frames
+
 if TYPE_CHECKING:
     import pandas as pd
 
 COMPONENTS = ("xyz", "xyz_other", "wxyz", "bound", "side", "corner")
 """Axes that become columns: components of one quantity, not several quantities."""
 MOST_ROWS = 20_000_000
-
-
-def built_frames(tree: xr.DataTree) -> list[int]:
-    """Numbers of the frames that were built."""
-    place = np.asarray(tree["truth/sonar_position"].values)
-    return [int(frame) for frame in np.flatnonzero(np.isfinite(place[:, 0]))]
 
 
 def points_table(tree: xr.DataTree, frames: int | Iterable[int] | None) -> pd.DataFrame:
@@ -94,7 +90,7 @@ def _columns(name: str, values: xr.DataArray) -> dict[str, xr.DataArray]:
 def _of_frames(tree: xr.DataTree, dataset: xr.Dataset, frames: int | Iterable[int] | None) -> xr.Dataset:
     """Some frames of a dataset; left out: those that were built."""
     if frames is None:
-        chosen = built_frames(tree)
+        chosen = built_frames(tree).tolist()
     else:
         chosen = [frames] if isinstance(frames, int | np.integer) else [int(frame) for frame in frames]
     count = dataset.sizes["frame"]

@@ -14,7 +14,7 @@ from sonarsynth.store.files.remote import Remote, Unreachable
 from sonarsynth.store.files.within import Mismatch
 from sonarsynth.store.layout import Layout, layout_of
 from sonarsynth.store.marks import Damage, Mark
-from sonarsynth.store.opening import open_store
+from sonarsynth.store.opening import built_frames, chosen_frames, open_store
 from sonarsynth.store.writing import frames_there, missing, write_shard
 
 __all__ = [
@@ -32,6 +32,8 @@ __all__ = [
     "Unreachable",
     "absolute",
     "beside",
+    "built_frames",
+    "chosen_frames",
     "create",
     "examine",
     "folder_of",

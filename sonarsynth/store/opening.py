@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sonarsynth.description import FieldError
 from sonarsynth.pipeline.variables import FORMAT_VERSION
 from sonarsynth.store.files.place import Folder, absolute, opens
 from sonarsynth.store.files.within import Mismatch
@@ -46,6 +47,27 @@ def open_store(path: Folder | str) -> xr.DataTree:
         raise Mismatch(f"{folder}: not a store that xarray can open ({first})") from None
     tree.set_close(stored.close)
     return tree
+
+
+def built_frames(tree: xr.DataTree) -> np.ndarray:
+    """Numbers (frame,) of the frames of a tree that were built: the others read as NaN and -1."""
+    return np.flatnonzero(np.isfinite(np.asarray(tree["truth/sonar_position"].values)[:, 0]))
+
+
+def chosen_frames(tree: xr.DataTree, split: str | None = None) -> np.ndarray:
+    """Numbers (frame,) of the frames of a tree that were built, of one split alone where it is named.
+
+    Raises FieldError for a split that the store has not.
+    """
+    built = built_frames(tree)
+    if split is None:
+        return built
+    known = str(tree["split"].attrs["flag_meanings"]).split() if "split" in tree.dataset else []
+    if split not in known:
+        raise FieldError(
+            ("split",), f"must be one of {', '.join(known) or 'none: the store has no splits'}, not {split}"
+        )
+    return np.asarray(built[np.asarray(tree["split"].values)[built] == known.index(split)])
 
 
 def _decoded(dataset: xr.Dataset) -> xr.Dataset:

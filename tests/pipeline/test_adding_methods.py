@@ -34,6 +34,7 @@ UNIONS = {
     "sources": "Source",
     "environment/scatterers": "ScattererField",
     "scattering/boundaries": "BoundaryScattering",
+    "detection": "Detector",
 }
 KINDS = (
     {
@@ -88,6 +89,8 @@ for which in json.loads(sys.argv[2]):
         "start": float(tree["signals/start"][0]),
         "meeting": float(tree["truth/targets/meeting_time"][0, 0, 0]),
     }
+found = ss.detect("usual.zarr", "brightest_beam")
+said["usual"]["found"] = [found.box[0].tolist(), float(found.score[0]), len(found)]
 print(json.dumps(said))
 """
 
@@ -173,6 +176,14 @@ def test_it_runs_and_plan_and_store_say_so(said: dict[str, Any], kind: str, stag
 )
 def test_what_it_costs_is_in_the_plan(said: dict[str, Any], kind: str, stage: str, ratio: float) -> None:
     assert of(said, kind)["rows"][stage][2] > ratio * said["usual"]["rows"][stage][2]
+
+
+def test_the_detector_finds_the_brightest_beam(said: dict[str, Any]) -> None:
+    (x0, y0, x1, y1), score, count = said["usual"]["found"]
+    energy = np.array(said["usual"]["energy"])
+    row, column = np.unravel_index(energy.argmax(), energy.shape)
+    assert [x0, y0, x1, y1] == [column, row, column + 1, row + 1] and count == 1
+    assert score == pytest.approx(energy.max())
 
 
 def direct_pulse(one: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:

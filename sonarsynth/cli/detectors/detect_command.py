@@ -1,0 +1,40 @@
+"""The command `detect`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sonarsynth.cli.selecting import described
+
+
+def detect(
+    store: Annotated[str, typer.Argument(help="The store, a Zarr folder or its URL.", show_default=False)],
+    method: Annotated[
+        str,
+        typer.Option(metavar="METHOD", help="peaks, cfar, or one with settings: '{kind: peaks, threshold: 6 dB}'."),
+    ] = "peaks",
+    split: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Only these frames: train, validation or test.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Where to write. Default: <store>.<method>.json.", show_default=False),
+    ] = None,
+) -> None:
+    """Run a baseline detector on the images of a store: boxes, scores, ranges as JSON, the results format of COCO."""
+    from sonarsynth import detection
+    from sonarsynth.cli import printing
+
+    chosen: detection.DetectionMethod = (
+        described(method, "--method", detection.Detector)
+        if method.lstrip().startswith("{")
+        else detection.by_kind(method)
+    )
+    with printing.progress("reading") as progress:
+        found = detection.detect(store, chosen, split=split, progress=progress)
+    beside = Path(Path(store).name) if "://" in store else Path(store)
+    file = found.write(out or beside.with_name(f"{beside.name}.{chosen.kind}.json"))
+    typer.echo(f"{file}: {len(found)} detections")

@@ -1,0 +1,86 @@
+"""Detection: baseline detectors on the images of a store, as a family of methods, and the form of what any finds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import TypeAdapter
+
+from sonarsynth.description import BY_KIND, FieldError
+from sonarsynth.detection.cell_averaging import CellAveraging
+from sonarsynth.detection.detection_method import DetectionMethod, Region, detections_of
+from sonarsynth.detection.detections import Detections, DetectionsError, from_rows, read
+from sonarsynth.detection.image_peaks import ImagePeaks
+from sonarsynth.detection.sonar_view import SonarView, beam_width, views
+from sonarsynth.store import chosen_frames, open_store
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "CellAveraging",
+    "DetectionMethod",
+    "Detections",
+    "DetectionsError",
+    "Detector",
+    "ImagePeaks",
+    "Region",
+    "SonarView",
+    "beam_width",
+    "detect",
+    "from_rows",
+    "read",
+    "views",
+]
+
+Detector = Annotated[ImagePeaks | CellAveraging, BY_KIND]
+
+
+def detect(
+    store: str | Path | xr.DataTree,
+    method: DetectionMethod | str = "peaks",
+    *,
+    split: str | None = None,
+    progress: Callable[[int, int, int], None] | None = None,
+) -> Detections:
+    """Detections in the images of a store, without a look at its truth.
+
+    Parameters
+    ----------
+    store: path, URL or opened tree.
+    method: a description of the family, such as `ImagePeaks(threshold=6.0)`, or its kind: "peaks", "cfar".
+    split: of a store with splits, only these frames: train, validation or test.
+    progress: called with the frames done, those wanted, and 0.
+
+    Returns
+    -------
+    A row for each object: box, score, direction, and range where the cloud has a point in the box. `write` makes a file
+    of them, `evaluate` judges them.
+
+    Raises
+    ------
+    FieldError for a store without images, an unknown method or a split that the store has not.
+    """
+    tree = open_store(store) if isinstance(store, str | Path) else store
+    if "image" not in tree.children:
+        raise FieldError(("image",), "the store has no images: it was built without that product")
+    chosen = by_kind(method) if isinstance(method, str) else method
+    frames = chosen_frames(tree, split)
+    rows = []
+    for done, (frame, view) in enumerate(views(tree, frames), 1):
+        rows += [{"frame": frame, **found} for found in detections_of(view, chosen.regions(view))]
+        if progress is not None:
+            progress(done, len(frames), 0)
+    return from_rows(rows)
+
+
+def by_kind(kind: str) -> DetectionMethod:
+    """The method of a kind with its defaults. Raises FieldError."""
+    adapter: TypeAdapter[ImagePeaks | CellAveraging] = TypeAdapter(Detector)
+    try:
+        return adapter.validate_python({"kind": kind})
+    except ValueError:
+        kinds = ", ".join(adapter.json_schema()["discriminator"]["mapping"])
+        raise FieldError(("method",), f"must be one of {kinds}, not {kind!r}") from None

@@ -1,0 +1,109 @@
+"""What a detector is to find in a store: targets that are in view and no clutter, and what they are like there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.detection import Detections, from_rows
+from sonarsynth.geometry import Pose
+from sonarsynth.labels.views import View
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+BLOCK: Final = 1000
+"""Frames that are read at once."""
+_OF_TARGETS: Final = (
+    "present", "clutter", "view", "category", "pixel_box", "box_centre", "box_orientation", "visible_fraction",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class TrueObjects:
+    """Objects of the frames of a store, a row each.
+
+    | column | shape | unit | |
+    |---|---|---|---|
+    | `frame`, `category` | (row,) | 1 | numbers of the store |
+    | `box` | (row, 4) | beams | `pixel_box` |
+    | `azimuth`, `elevation` | (row,) | degree | of `box_centre`, sonar frame |
+    | `range` | (row,) | m | of `box_centre` from the array centre |
+    | `aspect` | (row,) | degree | from the bow to the direction of the sonar: 0 bow, 90 beam, 180 stern |
+    | `visible` | (row,) | 1 | `visible_fraction` |
+    | `snr` | (row,) | dB | the brightest beam in the box over the median beam of the image; NaN without image |
+    """
+
+    frame: Ints
+    category: Ints
+    box: Floats
+    azimuth: Floats
+    elevation: Floats
+    range: Floats
+    aspect: Floats
+    visible: Floats
+    snr: Floats
+
+    def __len__(self) -> int:
+        return len(self.frame)
+
+
+def category_names(tree: xr.DataTree) -> list[str]:
+    """What objects of a store are called, by their numbers."""
+    return str(tree["truth/targets/category"].attrs.get("flag_meanings", "target")).split()
+
+
+def true_objects(tree: xr.DataTree, frames: np.ndarray) -> TrueObjects:
+    """The objects of some frames."""
+    parts = [_some(tree, frames[start : start + BLOCK]) for start in range(0, max(len(frames), 1), BLOCK)]
+    names = [field.name for field in fields(TrueObjects)]
+    return TrueObjects(**{name: np.concatenate([part[name] for part in parts]) for name in names})
+
+
+def _some(tree: xr.DataTree, frames: np.ndarray) -> dict[str, np.ndarray]:
+    targets = tree["truth/targets"].dataset.isel(frame=frames)
+    of = {name: np.asarray(targets[name].values) for name in _OF_TARGETS}
+    there = (of["present"] == 1) & (of["clutter"] == 0)
+    there &= np.isin(of["view"], (View.IN_VIEW, View.PARTLY_IN_VIEW)) & np.isfinite(of["pixel_box"]).all(axis=-1)
+    row, slot = np.nonzero(there)
+    of = {name: values[row, slot] for name, values in of.items()}
+    centre, away = of["box_centre"], np.linalg.norm(of["box_centre"], axis=1)
+    ahead = np.array([[1.0, 0.0, 0.0]])
+    bow = [Pose(np.zeros(3), turned).turn_to_world(ahead)[0] for turned in of["box_orientation"]]
+    to_sonar = -(centre * np.reshape(bow, (-1, 3))).sum(axis=1) / away
+    return {
+        "frame": frames[row].astype(int),
+        "category": of["category"].astype(int),
+        "box": of["pixel_box"],
+        "azimuth": np.rad2deg(np.arctan2(centre[:, 1], centre[:, 0])),
+        "elevation": np.rad2deg(np.arcsin(np.clip(centre[:, 2] / away, -1.0, 1.0))),
+        "range": away,
+        "aspect": np.rad2deg(np.arccos(np.clip(to_sonar, -1.0, 1.0))),
+        "visible": of["visible_fraction"],
+        "snr": _snr(tree, frames, row, of["pixel_box"]),
+    }
+
+
+def _snr(tree: xr.DataTree, frames: np.ndarray, row: Ints, box: Floats) -> Floats:
+    """dB of the brightest beam in each box over the median of its image."""
+    found = np.full(len(row), np.nan)
+    if "image" not in tree.children or not len(row):
+        return found
+    energy = np.asarray(tree["image"].dataset["energy"].isel(frame=frames).values)
+    first = np.floor(box[:, :2]).astype(int)
+    stop = np.maximum(np.ceil(box[:, 2:]).astype(int), first + 1)
+    for n, (at, (x0, y0), (x1, y1)) in enumerate(zip(row, first, stop, strict=True)):
+        own, middle = energy[at, y0:y1, x0:x1], np.nanmedian(np.append(energy[at].ravel(), np.inf))
+        if own.size and np.isfinite(own).any() and 0.0 < middle < np.inf:
+            found[n] = 10.0 * np.log10(np.nanmax(own) / middle)
+    return found
+
+
+def as_detections(objects: TrueObjects) -> Detections:
+    """The truth as a detector without errors would report it."""
+    names = ("frame", "category", "box", "azimuth", "elevation", "range")
+    columns = [getattr(objects, name).tolist() for name in names]
+    return from_rows(dict(zip(names, row, strict=True)) | {"score": 1.0} for row in zip(*columns, strict=True))
