@@ -10,7 +10,7 @@ import typer
 from sonarsynth.cli.running import BadOption
 from sonarsynth.cli.selecting import frame_numbers
 
-BELLHOP = "bellhop"
+COCO, SONAR_NETCDF, BELLHOP = "coco", "sonar-netcdf", "bellhop"
 
 
 def export(
@@ -21,12 +21,15 @@ def export(
         str,
         typer.Option(
             metavar="FORMAT",
-            help="ply or pcd: point clouds of a store. bellhop: environments (.env) of a recipe's water.",
+            help="Of a store ply or pcd (points), coco (images, boxes, masks), sonar-netcdf (signals, beams). "
+            "Of a recipe bellhop (its water).",
         ),
     ] = "ply",
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Where to write; for bellhop a folder. Default: beside the store."),
+        typer.Option(
+            metavar="FILE", help="Where to write: a file of points, else a folder. Default: beside the store."
+        ),
     ] = None,
     frames: Annotated[
         str | None,
@@ -45,7 +48,8 @@ def export(
         typer.Option("--set", metavar="PATH=VALUE", help="Override a field of the recipe (bellhop). Repeatable."),
     ] = [],  # noqa: B006 - typer copies it
 ) -> None:
-    """Write what other programs read: the points of a store as one cloud, or the water of a recipe for Bellhop.
+    """Write what other programs read: of a store its points as one cloud, images and boxes for COCO, or signals and
+    beams in the convention SONAR-netCDF4; of a recipe the water for Bellhop. Says what is lost.
 
     A cloud has colours, normals and labels. For Bellhop each snap of a frame has an environment, from it to the array.
     """
@@ -55,10 +59,14 @@ def export(
         if relative_to is not None:
             raise BadOption("--relative-to is for point clouds: Bellhop has no such axes")
         _bellhop(Path(source), out, frames, settings)
-    elif to not in FORMATS:
-        raise BadOption(f"--to must be one of {', '.join((*FORMATS, BELLHOP))}, not {to}")
+    elif to not in (*FORMATS, COCO, SONAR_NETCDF):
+        raise BadOption(f"--to must be one of {', '.join((*FORMATS, COCO, SONAR_NETCDF, BELLHOP))}, not {to}")
     elif settings:
         raise BadOption("--set is for recipes: a store is what it is")
+    elif to in (COCO, SONAR_NETCDF):
+        if relative_to is not None:
+            raise BadOption("--relative-to is for point clouds")
+        _folder(source, to, out, frames)
     else:
         _points(source, to, out, frames, relative_to or "sonar")
 
@@ -69,14 +77,44 @@ def _points(store: str, to: str, out: Path | None, frames: str | None, relative_
 
     tree = open_store(store)
     some = frame_numbers(frames, tree.sizes["frame"])
-    beside = Path(Path(store).name) if "://" in store else Path(store)
-    file = out or beside.with_suffix(f".{to}")
+    file = out or _beside(store).with_suffix(f".{to}")
     try:
         cloud = points(tree, some, relative_to=relative_to)
         written = write_points(cloud, file if file.suffix else file.with_suffix(f".{to}"))
     except (ValueError, ImportError) as error:
         raise BadOption(str(error)) from None
     typer.echo(f"{written}: {cloud.sizes['point']} points")
+
+
+def _folder(store: str, to: str, out: Path | None, frames: str | None) -> None:
+    """A folder of files: images and annotations, or signals and beams."""
+    from sonarsynth.cli import printing
+    from sonarsynth.export import coco_files, sonar_netcdf
+    from sonarsynth.store import built_frames, open_store
+
+    tree = open_store(store)
+    some = frame_numbers(frames, tree.sizes["frame"])
+    chosen = built_frames(tree)
+    chosen = chosen if some is None else chosen[[frame in some for frame in chosen.tolist()]]
+    if not len(chosen):
+        raise BadOption("--frames: none of these frames has been built" if some else f"{store} has no frames yet")
+    folder = out or _beside(store).with_name(f"{_beside(store).name}.{to}")
+    write, lost = (
+        (coco_files.write_coco, coco_files.LOST) if to == COCO else (sonar_netcdf.write_sonar_netcdf, sonar_netcdf.LOST)
+    )
+    try:
+        with printing.progress("reading") as progress:
+            files = write(tree, folder, chosen, progress)
+    except ImportError as error:
+        raise BadOption(f"{error}: pip install 'sonarsynth[netcdf]'") from None
+    for file in files:
+        typer.echo(str(file))
+    for note in lost:
+        typer.echo(f"note: {note}")
+
+
+def _beside(store: str) -> Path:
+    return Path(Path(store).name) if "://" in store else Path(store)
 
 
 def _bellhop(recipe: Path, out: Path | None, frames: str | None, settings: list[str]) -> None:

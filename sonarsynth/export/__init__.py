@@ -1,7 +1,10 @@
-"""Points of many frames as one cloud, and files for other programs: of points, and of the water for Bellhop."""
+"""Points of many frames as one cloud, and files for other programs: of points, of images and boxes (COCO), of signals
+and beams (SONAR-netCDF4), and of the water for Bellhop."""
 
 from sonarsynth.export.bellhop_files import write_bellhop
+from sonarsynth.export.coco_files import write_coco
 from sonarsynth.export.fused_points import points
 from sonarsynth.export.point_files import FORMATS, write_points
+from sonarsynth.export.sonar_netcdf import write_sonar_netcdf
 
-__all__ = ["FORMATS", "points", "write_bellhop", "write_points"]
+__all__ = ["FORMATS", "points", "write_bellhop", "write_coco", "write_points", "write_sonar_netcdf"]

@@ -23,6 +23,7 @@ def objects(frame: Any, box: Any, category: Any = 0, **more: Any) -> TrueObjects
     return TrueObjects(
         frame=np.array(frame),
         category=np.broadcast_to(np.array(category), count).copy(),
+        target=np.zeros(count, int),
         box=np.array(box, float).reshape(-1, 4),
         **(columns | {"range": np.full(count, 10.0)} | more),
     )

@@ -70,7 +70,7 @@ def test_files_hold_the_points_with_colours_normals_and_labels(crossing: Path, t
     ("options", "said"),
     [
         (["--relative-to", "whale"], "must be sonar, world or a target (remus), not 'whale'"),
-        (["--to", "las"], "--to must be one of ply, pcd, bellhop, not las"),
+        (["--to", "las"], "--to must be one of ply, pcd, coco, sonar-netcdf, bellhop, not las"),
         (["--frames", "5:70"], "ends past the last frame, 63"),
         (["--frames", "1:3"], "there is no point to write"),
     ],

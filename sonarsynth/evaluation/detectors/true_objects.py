@@ -28,7 +28,7 @@ class TrueObjects:
 
     | column | shape | unit | |
     |---|---|---|---|
-    | `frame`, `category` | (row,) | 1 | numbers of the store |
+    | `frame`, `category`, `target` | (row,) | 1 | numbers of the store: the target is a slot, the same in all frames |
     | `box` | (row, 4) | beams | `pixel_box` |
     | `azimuth`, `elevation` | (row,) | degree | of `box_centre`, sonar frame |
     | `range` | (row,) | m | of `box_centre` from the array centre |
@@ -39,6 +39,7 @@ class TrueObjects:
 
     frame: Ints
     category: Ints
+    target: Ints
     box: Floats
     azimuth: Floats
     elevation: Floats
@@ -77,6 +78,7 @@ def _some(tree: xr.DataTree, frames: np.ndarray) -> dict[str, np.ndarray]:
     return {
         "frame": frames[row].astype(int),
         "category": of["category"].astype(int),
+        "target": slot,
         "box": of["pixel_box"],
         "azimuth": np.rad2deg(np.arctan2(centre[:, 1], centre[:, 0])),
         "elevation": np.rad2deg(np.arcsin(np.clip(centre[:, 2] / away, -1.0, 1.0))),

@@ -1,0 +1,118 @@
+"""Images and boxes in the format of COCO: what most image detectors are trained with."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from sonarsynth.description import FieldError
+from sonarsynth.evaluation.detectors import true_objects
+from sonarsynth.evaluation.detectors.true_objects import TrueObjects, category_names
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+DECIBELS: Final = 40.0
+"""Range of the grey values, below the brightest beam of each image: 255 is that beam, 0 all that is fainter."""
+LOST: Final = (
+    f"images are grey values of a byte, {DECIBELS:g} dB below the brightest beam of each: how bright that is, is lost",
+    "row 0 is the lowest elevation and column 0 the beam farthest to starboard, as pixel_box has them",
+    "signals, beams against delay, points, source estimates, meshes, poses and the link budget are left out",
+    "clutter has no annotation: what a detector finds there is a false alarm",
+)
+"""What an export lacks, a line each."""
+
+
+def write_coco(
+    tree: xr.DataTree,
+    folder: Path,
+    frames: np.ndarray,
+    progress: Callable[[int, int, int], None] | None = None,
+) -> tuple[Path, ...]:
+    """Write images and annotations of some frames of a store: `images/<frame>.png` and, of each split, `<split>.json`
+    (train.json of a recipe without splits).
+
+    An annotation is an object as `evaluate` has it: its `bbox` is `pixel_box`, its mask the beams that point at it (the
+    box, where none does), and beside what COCO asks for it has `track_id` (the slot of the target), `range`, `azimuth`,
+    `elevation`, `aspect`, `visibility` and `snr`. Images and categories have the numbers of detections (see
+    `sonarsynth.detection.read`). Returns the JSON files. Raises FieldError for a store without images, OSError.
+    """
+    if "image" not in tree.children:
+        raise FieldError(("image",), "the store has no images: it was built without that product")
+    (folder / "images").mkdir(parents=True, exist_ok=True)
+    objects, split = true_objects(tree, frames), tree["split"]
+    names = str(split.attrs["flag_meanings"]).split()
+    of_split = np.asarray(split.values)[frames]
+    entries: dict[str, dict[str, Any]] = {}
+    for done, frame in enumerate(frames.tolist(), 1):
+        entry = entries.setdefault(names[of_split[done - 1]], _head(tree))
+        entry["images"].append(_write_image(tree, folder, frame))
+        whose = np.asarray(tree["truth/beams/target"].isel(frame=frame).values)
+        for row in np.flatnonzero(objects.frame == frame):
+            entry["annotations"].append(_annotation(objects, int(row), whose))
+        if progress is not None:
+            progress(done, len(frames), 0)
+    files = []
+    for part, entry in entries.items():
+        files.append(folder / f"{part}.json")
+        files[-1].write_text(json.dumps(entry), encoding="utf-8")
+    return tuple(files)
+
+
+def _head(tree: xr.DataTree) -> dict[str, Any]:
+    names = enumerate(category_names(tree), 1)
+    return {
+        "info": {"description": str(tree.attrs.get("title", "")), "version": "1.0", "left_out": list(LOST)},
+        "licenses": [{"id": 1, "name": str(tree.attrs.get("licence", "")), "url": ""}],
+        "categories": [{"id": number, "name": name, "supercategory": "target"} for number, name in names],
+        "images": [],
+        "annotations": [],
+    }
+
+
+def _write_image(tree: xr.DataTree, folder: Path, frame: int) -> dict[str, Any]:
+    """Write an image; its entry."""
+    from PIL import Image
+
+    energy = np.nan_to_num(np.asarray(tree["image/energy"].isel(frame=frame).values))
+    file = folder / "images" / f"{frame:06d}.png"
+    Image.fromarray(grey(energy)).save(file)
+    height, width = energy.shape
+    return {"id": frame, "file_name": f"images/{file.name}", "width": width, "height": height, "license": 1}
+
+
+def grey(energy: np.ndarray) -> np.ndarray:
+    """Grey values (uint8) of energies, in dB re the brightest."""
+    level = 10.0 * np.log10(np.maximum(energy, np.finfo(float).tiny) / max(float(energy.max()), np.finfo(float).tiny))
+    return np.asarray(np.rint(255.0 * np.clip(1.0 + level / DECIBELS, 0.0, 1.0)), np.uint8)
+
+
+def _annotation(objects: TrueObjects, row: int, whose: np.ndarray) -> dict[str, Any]:
+    mask = whose == objects.target[row]
+    x0, y0, x1, y1 = map(float, objects.box[row])
+    corners: list[list[float]] = [[x0, y0, x1, y0, x1, y1, x0, y1]]
+    more = {"visibility": "visible", "snr": "snr", "range": "range", "aspect": "aspect"}
+    more |= {"azimuth": "azimuth", "elevation": "elevation"}
+    found = {name: float(getattr(objects, column)[row]) for name, column in more.items()}
+    return {
+        "id": row + 1,
+        "image_id": int(objects.frame[row]),
+        "category_id": int(objects.category[row]) + 1,
+        "bbox": [x0, y0, x1 - x0, y1 - y0],
+        "area": float(mask.sum()) or (x1 - x0) * (y1 - y0),
+        "segmentation": {"counts": _run_lengths(mask), "size": list(mask.shape)} if mask.any() else corners,
+        "iscrowd": 0,
+        "track_id": int(objects.target[row]),
+        **{name: value for name, value in found.items() if np.isfinite(value)},
+    }
+
+
+def _run_lengths(mask: np.ndarray) -> Sequence[int]:
+    """Lengths of runs of 0 and 1 down the columns, 0 first, as COCO counts a mask."""
+    values = np.concatenate([[0], mask.ravel(order="F").astype(int)])
+    changes = np.flatnonzero(np.diff(values)) if mask.any() else np.zeros(0, int)
+    return [int(n) for n in np.diff(np.concatenate([[0], changes, [mask.size]]))]

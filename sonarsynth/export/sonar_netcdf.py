@@ -1,0 +1,262 @@
+"""Signals and beams in the convention SONAR-netCDF4 of ICES, version 2.0.
+
+Source: Macaulay and Pena (2018), The SONAR-netCDF4 convention for sonar data, ICES Cooperative Research Report 341, and
+its version 2.0 (github.com/ices-publications/SONAR-netCDF4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from sonarsynth.conventions import Floats
+from sonarsynth.description import FieldError
+from sonarsynth.detection import beam_width
+from sonarsynth.export.platform_angles import beam_rotation, heading_pitch_roll
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+METRES_A_DEGREE: Final = 111_195.0
+"""Of latitude, and of longitude at the equator, where there is the origin of the world."""
+LOST: Final = (
+    "the light is that of snaps: what the convention asks of a transmitter is NaN, and no equation converts to target "
+    "strength",
+    "positions are metres east and north of 0 N 0 E; times are counted from the start of the sequence, as 1970-01-01",
+    "the truth, points, source estimates, meshes and the link budget are left out",
+)
+"""What an export lacks, a line each."""
+_TIME: Final = {
+    "axis": "T",
+    "calendar": "gregorian",
+    "long_name": "Time-stamp of each ping",
+    "standard_name": "time",
+    "units": "nanoseconds since 1970-01-01 00:00:00Z",
+}
+_ENUMS: Final = {
+    "beam_stabilisation_t": {"not_stabilised": 0, "stabilised": 1},
+    "beam_t": {"single": 0, "split_aperture_angles": 1, "split_aperture_4_subbeams": 2},
+    "conversion_equation_t": {f"type_{n}": n for n in range(1, 7)},
+    "transmit_t": {"CW": 0, "LFM": 1, "HFM": 2},
+}
+
+
+class _Beams(NamedTuple):
+    """A group of beams: hydrophones, which hear all directions, or steered beams."""
+
+    names: list[str]
+    azimuth: Floats  # (beam,) rad
+    elevation: Floats  # (beam,) rad
+    width: float  # degree
+    interval: float  # s
+    units: str
+    long_name: str
+    samples: Callable[[int], tuple[np.ndarray, float]]  # of a frame: (beam, sample), and the time of the first (s)
+
+
+def write_sonar_netcdf(
+    tree: xr.DataTree,
+    folder: Path,
+    frames: np.ndarray,
+    progress: Callable[[int, int, int], None] | None = None,
+) -> tuple[Path, ...]:
+    """Write some frames of a store, `sequence_<number>.nc` for each sequence of frames.
+
+    `/Sonar/Beam_group1` has the pressure (Pa) at each hydrophone, a beam without direction each; where they are is in
+    `/Platform`. The next group has the level (dB) of each steered beam against delay, where the store has the product
+    beams, else the energy (Pa2 s) of each as one sample. Returns the files. Raises FieldError for a store with neither
+    signals nor beams nor images, ImportError without h5netcdf, OSError.
+    """
+    groups = list(_groups(tree))
+    if not groups:
+        raise FieldError(("signals",), "the store has neither signals nor beams nor images")
+    folder.mkdir(parents=True, exist_ok=True)
+    sequence = np.asarray(tree["trajectory"].values)[frames]
+    files = []
+    for number in np.unique(sequence).tolist():
+        files.append(folder / f"sequence_{number}.nc")
+        _write(tree, files[-1], frames[sequence == number], groups)
+        if progress is not None:
+            progress(int((sequence <= number).sum()), len(frames), 0)
+    return tuple(files)
+
+
+def _groups(tree: xr.DataTree) -> Iterator[_Beams]:
+    if "signals" in tree.children:
+        signals = tree["signals"].dataset
+        place = np.zeros(signals.sizes["sensor"])
+        names = [f"hydrophone {n}" for n in range(len(place))]
+        interval = 1.0 / float(signals["sampling_frequency"])
+
+        def pressure(frame: int) -> tuple[np.ndarray, float]:
+            one = signals.isel(frame=frame)
+            return np.asarray(one["pressure"].values, np.float32), float(one["start"])
+
+        yield _Beams(names, place, place, 360.0, interval, "Pa", "Sound pressure", pressure)
+    if not {"beams", "image"} & set(tree.children):
+        return
+    steered = tree["beams" if "beams" in tree.children else "image"].dataset
+    azimuth, elevation = np.meshgrid(steered["azimuth"].values, steered["elevation"].values)
+    names = [f"azimuth {a:.6g} elevation {e:.6g}" for a, e in zip(azimuth.ravel(), elevation.ravel(), strict=True)]
+    interval, units, meaning = float("nan"), "Pa2 s", "Energy in the echo window"
+    if "delay" in steered.dims:
+        interval, units, meaning = float(np.diff(steered["delay"].values[:2])[0]), "dB", "Level of the beam re 1 uPa"
+
+    def values(frame: int) -> tuple[np.ndarray, float]:
+        one = steered.isel(frame=frame)
+        data = np.asarray(one["level" if "delay" in steered.dims else "energy"].values, np.float32)
+        return data.reshape(len(names), -1), float(one["start"])
+
+    yield _Beams(
+        names,
+        np.deg2rad(azimuth.ravel()),
+        np.deg2rad(elevation.ravel()),
+        float(np.rad2deg(beam_width(tree))),
+        interval,
+        units,
+        meaning,
+        values,
+    )
+
+
+def _write(tree: xr.DataTree, path: Path, frames: np.ndarray, groups: list[_Beams]) -> None:
+    import h5netcdf
+
+    with h5netcdf.File(path, "w") as file:
+        now = datetime.now(UTC).replace(microsecond=0).isoformat().replace("+00:00", "Z")
+        file.attrs.update(
+            {
+                "Conventions": "CF-1.7, SONAR-netCDF4-2.0, ACDD-1.3",
+                "date_created": now,
+                "keywords": "passive sonar, simulation",
+                "license": str(tree.attrs.get("licence", "None")),
+                "sonar_convention_authority": "ICES",
+                "sonar_convention_name": "SONAR-netCDF4",
+                "sonar_convention_version": "2.0",
+                "summary": " ".join(LOST),
+                "title": str(tree.attrs.get("title", "")),
+            }
+        )
+        _environment(tree, file)
+        _platform(tree, file)
+        made = {"conversion_software_name": "sonarsynth", "conversion_time": now}
+        made["conversion_software_version"] = str(tree.attrs.get("sonarsynth_version", ""))
+        file.create_group("Provenance").attrs.update(made)
+        sonar = file.create_group("Sonar")
+        sonar.attrs.update({"sonar_manufacturer": "none", "sonar_model": "sonarsynth", "sonar_type": "omni-sonar"})
+        kinds = {name: sonar.create_enumtype(np.int8, name, words) for name, words in _ENUMS.items()}
+        for number, group in enumerate(groups, 1):
+            _beam_group(tree, sonar.create_group(f"Beam_group{number}"), frames, group, kinds)
+
+
+def _environment(tree: xr.DataTree, file: Any) -> None:
+    group = file.create_group("Environment")
+    group.dimensions = {"frequency": 1}
+    middle = 0.5 * (tree.attrs["band_low"] + tree.attrs["band_high"])
+    _put(group, "frequency", ("frequency",), np.array([middle], np.float32), "Hz", "Acoustic frequency")
+    none = np.array([np.nan], np.float32)
+    _put(group, "absorption_indicative", ("frequency",), none, "dB/m", "Indicative acoustic absorption")
+    speed = np.float32(tree.attrs["assumed_sound_speed"])
+    _put(group, "sound_speed_indicative", (), speed, "m/s", "Indicative sound speed")
+
+
+def _platform(tree: xr.DataTree, file: Any) -> None:
+    """The hydrophones: transducers that receive alone."""
+    group = file.create_group("Platform")
+    place = np.asarray(tree["signals/position"].values) if "signals" in tree.children else np.zeros((1, 3))
+    group.dimensions = {"transducer": len(place), "position": 1, "MRU": 1, "gyro": 1}
+    kind = group.create_enumtype(np.int8, "transducer_type_t", {"Receive_only": 0, "Transmit_only": 1, "Monostatic": 3})
+    function = group.create_variable("transducer_function", ("transducer",), kind, fillvalue=np.int8(3))
+    function[:] = np.zeros(len(place), np.int8)
+    for n, (axis, sign) in enumerate((("x", 1.0), ("y", -1.0), ("z", -1.0))):  # ours are port and up
+        values = (sign * place[:, n]).astype(np.float32)
+        _put(group, f"transducer_offset_{axis}", ("transducer",), values, "m", f"{axis}-offset of the transducer")
+    for name in ("Position", "Attitude", "Gyro"):
+        group.create_group(name)
+
+
+def _beam_group(tree: xr.DataTree, group: Any, frames: np.ndarray, beams: _Beams, kinds: dict[str, Any]) -> None:
+    import h5py
+
+    count, rows = len(beams.names), len(frames)
+    group.attrs.update({"beam_mode": "inspection", "conversion_equation_type": np.int8(2)})
+    group.dimensions = {"ping_time": rows, "beam": count, "subbeam": 1, "tx_beam": 1}
+    names = group.create_variable("beam", ("beam",), h5py.string_dtype())
+    names.attrs["long_name"] = "Beam name"
+    names[:] = np.array(beams.names, object)
+    time = np.rint(1e9 * np.asarray(tree["time"].values)[frames]).astype(np.uint64)
+    group.create_variable("ping_time", ("ping_time",), np.uint64, data=time).attrs.update(_TIME)
+    ragged = group.create_vltype(np.float32, "sample_t")
+    samples = group.create_variable("backscatter_r", ("ping_time", "beam", "subbeam"), ragged)
+    samples.attrs.update({"long_name": beams.long_name, "units": beams.units})
+    start = np.zeros((rows, 1), np.float32)
+    for row, frame in enumerate(frames.tolist()):
+        values, start[row] = beams.samples(frame)
+        cells = np.empty((count, 1), object)
+        cells[:, 0] = list(values)
+        samples[row] = cells
+    enums: tuple[tuple[str, str, tuple[str, ...]], ...] = (
+        ("beam_stabilisation", "beam_stabilisation_t", ("ping_time",)),
+        ("beam_type", "beam_t", ()),
+        ("transmit_type", "transmit_t", ("ping_time", "tx_beam")),
+    )
+    for name, kind, dims in enums:
+        shape = tuple(group.dimensions[dim].size for dim in dims)
+        group.create_variable(name, dims, kinds[kind], fillvalue=np.int8(max(_ENUMS[kind].values())))[...] = np.zeros(
+            shape, np.int8
+        )
+    processing = group.create_variable(
+        "non_quantitative_processing", ("ping_time",), np.int16, data=np.zeros(rows, np.int16)
+    )
+    processing.attrs.update({"flag_meanings": "no_non_quantitative_processing", "flag_values": np.array([0], np.int16)})
+    if beams.units == "Pa":
+        index = np.arange(count, dtype=np.int32)
+        group.create_variable("receive_transducer_index", ("beam",), np.int32, data=index)
+    for name, (dims, values, units) in _numbers(tree, frames, beams, start).items():
+        shape = tuple(group.dimensions[dim].size for dim in dims)
+        data = np.broadcast_to(np.asarray(values), shape)
+        precise = np.float64 if name in ("platform_latitude", "platform_longitude") else np.float32
+        _put(group, name, dims, data.astype(precise), units, name.replace("_", " "))
+
+
+def _numbers(
+    tree: xr.DataTree, frames: np.ndarray, beams: _Beams, start: np.ndarray
+) -> dict[str, tuple[tuple[str, ...], Any, str]]:
+    """Numeric variables of a group of beams: dimensions, values, units."""
+    truth = tree["truth"].dataset.isel(frame=frames)
+    place = np.asarray(truth["sonar_position"].values)
+    heading, pitch, roll = heading_pitch_roll(np.asarray(truth["sonar_orientation"].values))
+    phi, theta = beam_rotation(beams.azimuth, beams.elevation)
+    ping, each, sent = ("ping_time",), ("ping_time", "beam"), ("ping_time", "tx_beam")
+    solid = 4.0 * np.pi if beams.width >= 360.0 else 0.25 * np.pi * np.deg2rad(beams.width) ** 2
+    return {
+        "beamwidth_receive_major": (each, beams.width, "arc_degree"),
+        "beamwidth_receive_minor": (each, beams.width, "arc_degree"),
+        "blanking_interval": (each, 0.0, "s"),
+        "equivalent_beam_angle": (each, solid, "sr"),
+        "platform_heading": (ping, heading, "degrees_north"),
+        "platform_latitude": (ping, place[:, 1] / METRES_A_DEGREE, "degrees_north"),
+        "platform_longitude": (ping, place[:, 0] / METRES_A_DEGREE, "degrees_east"),
+        "platform_pitch": (ping, pitch, "arc_degree"),
+        "platform_roll": (ping, roll, "arc_degree"),
+        "platform_vertical_offset": (ping, -place[:, 2], "m"),
+        "rx_beam_rotation_phi": (each, phi, "arc_degree"),
+        "rx_beam_rotation_theta": (each, theta, "arc_degree"),
+        "rx_beam_rotation_psi": (each, 0.0, "arc_degree"),
+        "sample_interval": (ping, beams.interval, "s"),
+        "sample_time_offset": (sent, -start, "s"),  # subtracted from the time of each sample
+        "transmit_duration_nominal": (sent, np.nan, "s"),
+        "transmit_frequency_start": (sent, tree.attrs["band_low"], "Hz"),
+        "transmit_frequency_stop": (sent, tree.attrs["band_high"], "Hz"),
+        **{f"tx_beam_rotation_{name}": (sent, np.nan, "arc_degree") for name in ("phi", "theta", "psi")},
+    }
+
+
+def _put(group: Any, name: str, dims: tuple[str, ...], values: Any, units: str, long_name: str) -> None:
+    """A variable with its attributes."""
+    variable = group.create_variable(name, dims, values.dtype, data=values)
+    variable.attrs.update({"units": units, "long_name": long_name})

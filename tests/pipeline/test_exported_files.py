@@ -1,0 +1,180 @@
+"""Images, boxes, signals and beams of a store, read back by the libraries of those formats."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import sonarsynth as ss
+from sonarsynth import schedule
+from sonarsynth.cli import app
+from sonarsynth.cli.running import run
+from sonarsynth.export.coco_files import DECIBELS, grey
+from sonarsynth.export.platform_angles import beam_rotation, heading_pitch_roll
+from sonarsynth.recipe import reading
+
+BUILT = [2, 3, 4]
+MANDATORY = {
+    "beam",
+    "ping_time",
+    "backscatter_r",
+    "beam_stabilisation",
+    "beam_type",
+    "beamwidth_receive_major",
+    "beamwidth_receive_minor",
+    "blanking_interval",
+    "equivalent_beam_angle",
+    "non_quantitative_processing",
+    "platform_heading",
+    "platform_latitude",
+    "platform_longitude",
+    "platform_pitch",
+    "platform_roll",
+    "platform_vertical_offset",
+    "rx_beam_rotation_phi",
+    "rx_beam_rotation_psi",
+    "rx_beam_rotation_theta",
+    "sample_interval",
+    "sample_time_offset",
+    "transmit_duration_nominal",
+    "transmit_frequency_start",
+    "transmit_frequency_stop",
+    "transmit_type",
+    "tx_beam_rotation_phi",
+    "tx_beam_rotation_psi",
+    "tx_beam_rotation_theta",
+}
+"""Of a group of beams, by the tables of SONAR-netCDF4 2.0."""
+
+
+@pytest.fixture(scope="module")
+def store(small_text: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three frames of twenty, of a box before 20 hydrophones."""
+    path = tmp_path_factory.mktemp("exported") / "s.zarr"
+    assert schedule.build(reading.loads(small_text), path, frames=BUILT, workers=0).ok
+    return path
+
+
+@pytest.fixture(scope="module")
+def coco(store: Path) -> Path:
+    assert run(app, ["export", str(store), "--to", "coco"]) == 0
+    return store.with_name("s.zarr.coco")
+
+
+def test_coco_reads_boxes_and_masks(store: Path, coco: Path) -> None:
+    from faster_coco_eval import COCO
+
+    tree = ss.open(store)
+    with contextlib.redirect_stdout(io.StringIO()):
+        read = COCO(str(coco / "train.json"))
+    assert sorted(read.imgs) == BUILT and [c["name"] for c in read.cats.values()] == ["target"]
+    for annotation in read.anns.values():
+        frame = annotation["image_id"]
+        x, y, width, height = annotation["bbox"]
+        box = tree["truth/targets/pixel_box"].values[frame, 0]
+        assert [x, y, x + width, y + height] == pytest.approx(box.tolist(), abs=1e-12)
+        mask = read.annToMask(annotation).astype(bool)
+        np.testing.assert_array_equal(mask, tree["truth/beams/target"].values[frame] == 0)
+        assert annotation["area"] == mask.sum() > 0
+        centre = tree["truth/targets/box_centre"].values[frame, 0]
+        assert annotation["range"] == pytest.approx(np.linalg.norm(centre))
+    assert len(read.anns) == len(BUILT)
+
+
+def test_images_are_levels_to_half_a_grey_value(store: Path, coco: Path) -> None:
+    from PIL import Image
+
+    for frame in BUILT:
+        energy = ss.open(store)["image/energy"].values[frame]
+        level = 10 * np.log10(energy / energy.max())
+        read = np.asarray(Image.open(coco / "images" / f"{frame:06d}.png")).astype(float)
+        seen = level > -DECIBELS
+        back = DECIBELS * (read / 255.0 - 1.0)
+        np.testing.assert_allclose(back[seen], level[seen], atol=0.5 * DECIBELS / 255.0 + 1e-6)
+    assert grey(np.array([[1.0, 1e-4, 1e-9, 0.0]])).tolist() == [[255, 0, 0, 0]]
+
+
+def test_what_coco_scores_evaluate_scores(store: Path, coco: Path, tmp_path: Path) -> None:
+    """Annotations as results: a detector that was trained on the export writes such a file."""
+    results = [
+        annotation | {"score": 0.5} for annotation in json.loads((coco / "train.json").read_text())["annotations"]
+    ]
+    (tmp_path / "results.json").write_text(json.dumps(results))
+    figures = ss.evaluate(store, tmp_path / "results.json").as_json()
+    assert figures["ap"] == figures["ap_distance"] == 1.0 and figures["classifies"]
+
+
+def test_netcdf_reads_what_the_convention_asks_and_the_same_numbers(store: Path) -> None:
+    import netCDF4
+
+    assert run(app, ["export", str(store), "--to", "sonar-netcdf"]) == 0
+    tree = ss.open(store)
+    with netCDF4.Dataset(store.with_name("s.zarr.sonar-netcdf") / "sequence_0.nc") as file:
+        assert file.sonar_convention_name == "SONAR-netCDF4" and file.sonar_convention_version == "2.0"
+        assert {"Environment", "Platform", "Provenance", "Sonar"} <= set(file.groups)
+        heard, steered = file["Sonar/Beam_group1"], file["Sonar/Beam_group2"]
+        for group in (heard, steered):
+            assert set(group.variables) >= MANDATORY
+        pressure = tree["signals/pressure"].values
+        for row, frame in enumerate(BUILT):
+            read = np.stack(list(heard["backscatter_r"][row, :, 0]))
+            np.testing.assert_array_equal(read, pressure[frame])
+            energy = np.concatenate(list(steered["backscatter_r"][row, :, 0]))
+            np.testing.assert_array_equal(energy, tree["image/energy"].values[frame].ravel())
+        rate = float(tree["signals/sampling_frequency"])
+        np.testing.assert_allclose(heard["sample_interval"][:], 1.0 / rate, rtol=1e-6)
+        np.testing.assert_allclose(-heard["sample_time_offset"][:, 0], tree["signals/start"].values[BUILT], rtol=1e-6)
+        seconds = heard["ping_time"][:].astype(float) / 1e9
+        np.testing.assert_allclose(seconds, tree["time"].values[BUILT], atol=1e-9)
+        place = tree["signals/position"].values
+        np.testing.assert_allclose(file["Platform/transducer_offset_y"][:], -place[:, 1], atol=1e-7)
+        depth = -tree["truth/sonar_position"].values[BUILT, 2]
+        np.testing.assert_allclose(heard["platform_vertical_offset"][:], depth, rtol=1e-6)
+        down = np.array([0.0, 0.0, 1.0])
+        turns = np.column_stack([steered[f"rx_beam_rotation_{a}"][0] for a in ("psi", "theta", "phi")])
+        axes = Rotation.from_euler("ZYX", turns, degrees=True).apply(down)
+        azimuth, elevation = np.meshgrid(np.deg2rad(tree["image/azimuth"]), np.deg2rad(tree["image/elevation"]))
+        ours = [np.cos(elevation) * np.cos(azimuth), -np.cos(elevation) * np.sin(azimuth), -np.sin(elevation)]
+        np.testing.assert_allclose(axes, np.stack(ours, axis=-1).reshape(-1, 3), atol=1e-6)
+        assert str(steered["beam"][0]).startswith("azimuth -15")
+
+
+def test_turns_of_ships_are_those_of_the_attitude() -> None:
+    """Against rotation matrices: axes north, east, down of the world, forward, starboard, down of the ship."""
+    random = np.random.default_rng(3)
+    angles = np.column_stack([random.uniform(0, 360, 50), random.uniform(-80, 80, 50), random.uniform(-170, 170, 50)])
+    ship = Rotation.from_euler("ZYX", angles, degrees=True).as_matrix()
+    flip = np.diag([1.0, -1.0, -1.0])
+    swap = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    ours = Rotation.from_matrix(swap @ ship @ flip).as_quat(scalar_first=True)
+    np.testing.assert_allclose(np.column_stack(heading_pitch_roll(ours)), angles, atol=1e-9)
+
+
+def test_every_beam_has_turns_within_their_limits() -> None:
+    azimuth, elevation = np.meshgrid(np.deg2rad(np.linspace(-179, 179, 30)), np.deg2rad(np.linspace(-89, 89, 31)))
+    phi, theta = beam_rotation(azimuth, elevation)
+    assert np.abs(phi).max() <= 180.0 and np.abs(theta).max() <= 90.0
+    turns = np.column_stack([theta.ravel(), phi.ravel()])
+    axes = Rotation.from_euler("YX", turns, degrees=True).apply([0.0, 0.0, 1.0])
+    expected = [np.cos(elevation) * np.cos(azimuth), -np.cos(elevation) * np.sin(azimuth), -np.sin(elevation)]
+    np.testing.assert_allclose(axes, np.stack(expected, axis=-1).reshape(-1, 3), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--to", "coco", "--frames", "5:8"], "none of these frames has been built"),
+        (["--to", "coco", "--relative-to", "world"], "--relative-to is for point clouds"),
+        (["--to", "sonar-netcdf", "--set", "seed=1"], "--set is for recipes"),
+    ],
+)
+def test_bad_words_get_one_line(store: Path, capsys: pytest.CaptureFixture[str], options: list[str], said: str) -> None:
+    assert run(app, ["export", str(store), *options]) == 2
+    error = capsys.readouterr().err
+    assert said in error and error.count("\n") == 1
