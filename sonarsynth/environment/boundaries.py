@@ -2,9 +2,10 @@
 is not flat, a slope or a reef, is a target with a mesh.
 
 Roughness takes from the mirror echo what it scatters elsewhere (Eckart 1953), frequency by frequency. That energy is
-not lost in the sea: it comes as many small echoes from around the mirror point. These are not simulated, so a rough
-boundary has hardly any echo here where a real one has an incoherent echo of about the energy of the flat one's: at 10
-degrees of grazing, wind of 2.6 m/s already takes 7.5 dB at 25 kHz, and 30 dB at 50 kHz.
+not lost in the sea: it comes as many small echoes from around the mirror point. These are simulated for a recipe that
+has a `reverberation` alone; without it a rough boundary has hardly any echo where a real one has an incoherent echo of
+about the energy of the flat one's: at 10 degrees of grazing, wind of 2.6 m/s already takes 7.5 dB at 25 kHz, and 30 dB
+at 50 kHz.
 """
 
 from __future__ import annotations
