@@ -1,4 +1,4 @@
-"""Opening a store to work with it: the tree of xarray, and tables and pictures of it under `.sonar`."""
+"""Opening a store to work with it: the tree of xarray, tables and pictures under `.sonar`, frames for training."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sonarsynth.loading.accessor import SonarAccessor
+from sonarsynth.loading.frames import Frames, RenderedFrames
 from sonarsynth.store import Folder, open_store
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["SonarAccessor", "open"]
+__all__ = ["Frames", "RenderedFrames", "SonarAccessor", "open"]
 
 
 def open(path: Folder | Path | str) -> xr.DataTree:

@@ -1,0 +1,207 @@
+"""Frames for training: what they hold is what xarray reads, bit for bit, and what the recipe renders."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import pickle
+import shutil
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sonarsynth as ss
+from sonarsynth import planning, schedule
+from sonarsynth.evaluation.detectors import true_objects
+from sonarsynth.loading import Frames, RenderedFrames
+from sonarsynth.loading.training_samples import FLOOR
+from sonarsynth.recipe import Recipe, reading
+from sonarsynth.store import Damage, Mismatch
+from sonarsynth.store.frame_reading import FrameReader
+
+BUILT = range(2, 18)
+EVERY = ("boxes", "mask", "points", "range")
+ROCK = """- name: rock
+        clutter: true
+        shape: {kind: sphere, radius: 0.4, edge: 0.1}
+        motion: {kind: still, position: [10, -2, -6]}
+    sources:"""
+
+
+@pytest.fixture(scope="module")
+def recipe(small_text: str) -> Recipe:
+    """Ten sequences of two frames, of a box and of clutter, with splits."""
+    text = small_text.replace("    sources:", f"      {ROCK}", 1).replace("frames: 20", "frames: 2")
+    text = text.replace("  trajectory:", "    converter: {bits: 16, full_scale: 20 Pa}\n  trajectory:")
+    noise = "{name: noise, path: environment.noise.level, kind: uniform, low: 30 dB, high: 50 dB}"
+    splits = "repeats: 10\nsplits: {train: 0.6, validation: 0.2, test: 0.2}\n"
+    return reading.loads(f"{text}variations: [{noise}]\n{splits}")
+
+
+@pytest.fixture(scope="module")
+def store(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Sixteen of its twenty frames, in shards of which one is there in part."""
+    path = tmp_path_factory.mktemp("training") / "s.zarr"
+    products = {"signals", "image", "cloud", "beams"}
+    assert schedule.build(planning.plan(recipe, products), path, frames=BUILT, workers=0).ok
+    return path
+
+
+def same(one: dict[str, Any], other: dict[str, Any]) -> bool:
+    return one.keys() == other.keys() and all(np.array_equal(one[k], other[k], equal_nan=True) for k in one)
+
+
+def test_every_array_is_what_xarray_reads(store: Path) -> None:
+    tree, reader = ss.open(store), FrameReader(store)
+    names = [
+        f"{node.path}/{name}".strip("/")
+        for node in tree.subtree
+        for name, values in node.to_dataset(inherit=False).variables.items()
+        if values.dims[:1] == ("frame",) and len(values.dims) and str(name) != "frame"
+    ]
+    assert len(names) > 60 and {"signals/pressure", "beams/level", "truth/targets/view"} <= set(names)
+    for name in names:
+        expected = np.asarray(tree[name].values)
+        if expected.dtype.kind not in "iuf" or 0 in expected.shape:
+            continue
+        array = reader.array(name)
+        assert array.shape == expected.shape
+        whole = array.every()
+        assert whole.dtype == expected.dtype, name
+        np.testing.assert_array_equal(whole, expected, err_msg=name)
+        for frame in (0, 2, 17, 19, 7):
+            np.testing.assert_array_equal(array[frame], expected[frame], err_msg=name)
+
+
+@pytest.mark.parametrize("split", [None, "train", "test"])
+def test_samples_are_of_the_built_frames_of_a_split(store: Path, split: str | None) -> None:
+    tree = ss.open(store)
+    data = Frames(store, split=split, image="energy", targets=EVERY, signals=True)
+    built = np.array(BUILT)
+    number = None if split is None else ["train", "validation", "test"].index(split)
+    expected = built if number is None else built[tree["split"].values[built] == number]
+    assert data.frames.tolist() == expected.tolist() and len(data) > 0
+    objects = true_objects(tree, data.frames)
+    for row, frame in enumerate(data.frames.tolist()):
+        sample = data[row]
+        assert sample["frame"] == frame
+        np.testing.assert_array_equal(sample["image"], tree["image/energy"].values[frame])
+        np.testing.assert_array_equal(sample["pressure"], tree["signals/pressure"].values[frame])
+        np.testing.assert_array_equal(sample["range"], tree["truth/beams/range"].values[frame])
+        own = objects.frame == frame
+        np.testing.assert_array_equal(sample["boxes"], objects.box[own].astype(np.float32))
+        assert sample["categories"].tolist() == objects.category[own].tolist()
+        whose = tree["truth/beams/target"].values[frame]
+        names = np.array([*tree["truth/targets/category"].values[frame], -1])
+        np.testing.assert_array_equal(sample["mask"], names[whose])
+        count = int(tree["cloud/count"].values[frame])
+        np.testing.assert_array_equal(sample["points"][:, 1], tree["cloud/y"].values[frame, :count])
+        floats = [value for value in sample.values() if np.asarray(value).dtype.kind == "f"]
+        assert {value.dtype for value in floats} == {np.dtype(np.float32)}
+
+
+def test_levels_are_re_the_brightest_beam(store: Path) -> None:
+    levels, energy = Frames(store), Frames(store, image="energy")
+    for row in range(len(levels)):
+        level, plain = levels[row]["image"], energy[row]["image"]
+        assert level.dtype == np.float32 and level.max() == 0.0 and np.isfinite(level).all()
+        expected = np.maximum(10.0 * np.log10(plain / plain.max()), FLOOR)
+        np.testing.assert_allclose(level, expected, atol=1e-4)
+
+
+def test_batches_are_the_samples_in_the_order_asked(store: Path) -> None:
+    data = Frames(store, targets=("boxes", "mask"))
+    rows = [7, 0, 11, 0, 3]
+    samples = data.__getitems__(rows)
+    assert all(same(sample, data[row]) for sample, row in zip(samples, rows, strict=True))
+    batch = data.collate(samples)
+    assert batch["image"].shape == (5, 9, 11) and batch["frame"].tolist() == data.frames[rows].tolist()
+    assert [box.shape[1] for box in batch["boxes"]] == [4] * 5
+    samples[0]["image"][:] = 7.0
+    assert not (data[7]["image"] == 7.0).any(), "a sample is the caller's own"
+    with pytest.raises(IndexError):
+        data[16]
+
+
+def take(data: Frames, row: int) -> dict[str, Any]:
+    return data[row]
+
+
+def test_it_is_pickled_and_read_by_processes_that_are_forked(store: Path) -> None:
+    data = Frames(store, targets=EVERY)
+    expected = [data[row] for row in range(4)]  # files are open now
+    again = pickle.loads(pickle.dumps(data))
+    assert all(same(again[row], sample) for row, sample in enumerate(expected))
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("fork")) as pool:
+        found = list(pool.map(take, [data] * 4, range(4)))
+    assert all(same(one, sample) for one, sample in zip(found, expected, strict=True))
+
+
+def test_rendered_frames_are_those_of_the_store(recipe: Recipe, store: Path) -> None:
+    stored = Frames(store, split="train", targets=("boxes", "mask"))
+    rendered = RenderedFrames(recipe, split="train", targets=("boxes", "mask"), seed=3)
+    found = {}
+    for _, sample in zip(range(4), rendered, strict=False):
+        found[sample["frame"]] = sample
+    where = {int(frame): row for row, frame in enumerate(stored.frames)}
+    both = found.keys() & where.keys()
+    assert both and all(same(found[frame], stored[where[frame]]) for frame in both)
+    assert rendered.categories == stored.categories == ("target",)
+    parts = [RenderedFrames(recipe, split="train", seed=3, part=(k, 3)).frames for k in range(3)]
+    assert sorted(np.concatenate(parts).tolist()) == sorted(rendered.frames.tolist())
+    assert rendered.frames.tolist() != sorted(rendered.frames.tolist())
+
+
+def test_a_damaged_file_is_no_data(store: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "s.zarr"
+    shutil.copytree(store, copy)
+    (file, *_) = sorted((copy / "signals" / "pressure").glob("c.*"))
+    content = bytearray(file.read_bytes())
+    for at in (20, len(content) - 30, len(content) - 2):  # a chunk, the index, the checksum of the index
+        file.write_bytes(bytes(content[:at]) + bytes([content[at] ^ 16]) + bytes(content[at + 1 :]))
+        with pytest.raises(Damage, match="checksum is wrong"):
+            _ = [FrameReader(copy).array("signals/pressure")[frame] for frame in range(20)]
+    file.write_bytes(bytes(content[:10]))
+    with pytest.raises(Damage):
+        _ = [FrameReader(copy).array("signals/pressure")[frame] for frame in range(20)]
+    file.unlink()
+    file.symlink_to(store / "zarr.json")
+    with pytest.raises(OSError, match="link"):
+        _ = [FrameReader(copy).array("signals/pressure")[frame] for frame in range(20)]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"shape": [20, 10**6, 10**6]}, "does not lie as sonarsynth writes it"),
+        ({"codecs": [{"name": "gzip"}]}, "does not lie as"),
+        ({"data_type": "object"}, "does not lie as|cannot be read"),
+        ({"chunk_grid": {}}, "metadata cannot be read"),
+        ({"shape": [20, 9, 12]}, "not of the size that the array has"),
+    ],
+)
+def test_metadata_are_not_believed(store: Path, tmp_path: Path, change: dict[str, Any], said: str) -> None:
+    copy = tmp_path / "s.zarr"
+    shutil.copytree(store, copy)
+    document = json.loads((copy / "zarr.json").read_text())
+    document["consolidated_metadata"]["metadata"]["image/energy"] |= change
+    (copy / "zarr.json").write_text(json.dumps(document))
+    with pytest.raises((Mismatch, Damage), match=said):
+        _ = FrameReader(copy).array("image/energy")[2]
+
+
+def test_what_is_not_there_is_said(store: Path, tmp_path: Path) -> None:
+    for options, said in (
+        ({"image": "picture"}, "image: must be one of db, energy, none, not 'picture'"),
+        ({"targets": "box"}, "targets: must be of boxes, mask, range, points, not 'box'"),
+        ({"split": "exam"}, "split: must be one of train, validation, test, not 'exam'"),
+    ):
+        with pytest.raises(ss.FieldError, match=said):
+            Frames(store, **options)  # type: ignore[arg-type]
+    with pytest.raises(Mismatch, match="is no store of sonarsynth"):
+        Frames(tmp_path)
+    with pytest.raises(Mismatch, match="copy the store"):
+        Frames("s3://bucket/s.zarr")
