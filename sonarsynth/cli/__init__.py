@@ -20,6 +20,7 @@ from sonarsynth.cli.authoring.preview_command import preview
 from sonarsynth.cli.card_command import card
 from sonarsynth.cli.detectors.detect_command import detect
 from sonarsynth.cli.detectors.evaluate_command import evaluate
+from sonarsynth.cli.detectors.report_command import report
 from sonarsynth.cli.export_command import export
 from sonarsynth.cli.rays_command import rays
 from sonarsynth.cli.repair_command import repair
@@ -240,7 +241,7 @@ def show(
         typer.echo(str(file))
 
 
-for command in (accuracy, card, detect, evaluate, export, init, preview, rays, repair, soundscape):
+for command in (accuracy, card, detect, evaluate, export, init, preview, rays, repair, report, soundscape):
     app.command()(command)
 app.command("target-strength")(target_strength)
 

@@ -1,0 +1,25 @@
+"""The command `report`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def report(
+    store: Annotated[str, typer.Argument(help="The store, a Zarr folder or its URL.", show_default=False)],
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Where to write. Default: <store>.report.html.")
+    ] = None,
+) -> None:
+    """Write a page about a store: film, contents by split, leaks between splits, errors, baselines, hardest frames."""
+    from sonarsynth.cli import printing
+    from sonarsynth.pictures.report_figures import report as write
+
+    with printing.progress("reading") as progress:
+        file, numbers = write(store, out, progress=progress)
+    for warning in numbers["warnings"]:
+        typer.echo(f"warning: {warning}")
+    typer.echo(str(file))

@@ -1,0 +1,164 @@
+"""The numbers of a report: all that its page draws, as plain values."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from sonarsynth.conventions import Floats, Ints
+from sonarsynth.detection import Detections, ImagePeaks, by_kind, detections_of, from_rows, views
+from sonarsynth.evaluation import points
+from sonarsynth.evaluation.detectors import DetectorReport, TrueObjects, true_objects
+from sonarsynth.evaluation.detectors.detector_scores import NEAR
+from sonarsynth.evaluation.detectors.true_objects import category_names
+from sonarsynth.evaluation.point_checks import has_labels
+from sonarsynth.store import built_frames
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Progress = Callable[[int, int, int], None]
+BASELINES: Final = ("peaks", "cfar")
+MOST_JUDGED: Final = 2000
+"""Frames that baselines are run on; of more, even steps."""
+HARDEST: Final = 10
+TRIVIAL: Final = 0.95
+"""Average precision at 2 m of a threshold, over which there is nothing to learn."""
+BINS: Final = 20
+QUANTITIES: Final = {"range": "m", "aspect": "deg", "snr": "dB", "visible": "share"}
+
+
+def numbers_of(tree: xr.DataTree, warnings: Sequence[str] = (), progress: Progress | None = None) -> dict[str, Any]:
+    """What a report says of a tree some of whose frames are built; warnings: those that are known of it already."""
+    built = built_frames(tree)
+    split = _splits(tree, built)
+    objects = true_objects(tree, built)
+    of_frame = dict(zip(built.tolist(), split, strict=True))
+    whose = [of_frame[frame] for frame in objects.frame.tolist()]
+    found: dict[str, Any] = {
+        "title": str(tree.attrs.get("title", "")),
+        "frames": len(built),
+        "frames_of_the_recipe": int(tree.sizes["frame"]),
+        "sequences": len(np.unique(np.asarray(tree["trajectory"].values)[built])),
+        "splits": dict(Counter(split)),
+        "objects": len(objects),
+        "categories": _by_category(tree, objects, whose),
+        "histograms": {name: _histogram(getattr(objects, name), whose) for name in QUANTITIES},
+        "leakage": leakage(tree, built, split),
+        "range_errors": _range_errors(tree, built),
+        "baselines": {},
+        "hardest": [],
+        "warnings": list(warnings),
+    }
+    if "image" in tree.children and len(built):
+        _judge(found, tree, built, progress)
+    return found
+
+
+def _splits(tree: xr.DataTree, frames: Ints) -> list[str]:
+    names = str(tree["split"].attrs["flag_meanings"]).split()
+    return [names[number] for number in np.asarray(tree["split"].values)[frames]]
+
+
+def _by_category(tree: xr.DataTree, objects: TrueObjects, split: list[str]) -> dict[str, dict[str, int]]:
+    names = category_names(tree)
+    counts = Counter(zip(objects.category.tolist(), split, strict=True))
+    found: dict[str, dict[str, int]] = {}
+    for (number, part), count in sorted(counts.items()):
+        found.setdefault(names[number], {})[part] = count
+    return found
+
+
+def _histogram(values: Floats, split: list[str]) -> dict[str, Any]:
+    """Edges, and numbers of objects by split."""
+    finite = np.isfinite(values)
+    if not finite.any():
+        return {"edges": [], "counts": {}}
+    edges = np.histogram_bin_edges(values[finite], BINS)
+    of = np.array(split)
+    return {
+        "edges": edges.tolist(),
+        "counts": {
+            name: np.histogram(values[finite & (of == name)], edges)[0].tolist() for name in dict.fromkeys(split)
+        },
+    }
+
+
+def leakage(tree: xr.DataTree, frames: Ints, split: list[str]) -> dict[str, int]:
+    """Whether a detector may have seen in training what it is judged by.
+
+    `sequences`: those that are in more than one split. `equal_frames`: frames in which bodies, snaps and sonar are
+    where they are in a frame of another split, to a millimetre.
+    """
+    sequence = np.asarray(tree["trajectory"].values)[frames].tolist()
+    in_splits: dict[int, set[str]] = {}
+    for number, part in zip(sequence, split, strict=True):
+        in_splits.setdefault(number, set()).add(part)
+    names = ("truth/targets/position", "truth/emissions/position", "truth/sonar_position")
+    places = [np.asarray(tree[name].values)[frames].reshape(len(frames), -1) for name in names]
+    rounded = np.rint(1e3 * np.nan_to_num(np.concatenate(places, axis=1))).astype(np.int64)
+    seen: dict[bytes, set[str]] = {}
+    keys = [row.tobytes() for row in rounded]
+    for key, part in zip(keys, split, strict=True):
+        seen.setdefault(key, set()).add(part)
+    return {
+        "sequences": sum(len(parts) > 1 for parts in in_splits.values()),
+        "equal_frames": sum(len(seen[key]) > 1 for key in keys),
+    }
+
+
+def _range_errors(tree: xr.DataTree, frames: Ints) -> dict[str, Any]:
+    """Errors of the ranges of points that are direct echoes, in tenths of the points by predicted error."""
+    if not has_labels(tree):
+        return {"points": 0, "predicted": [], "rms": []}
+    found = points(tree, frames)
+    good = found.judged & np.isfinite(found.error) & (found.range_error > 0.0)
+    order = np.argsort(found.range_error[good], kind="stable")
+    parts = [part for part in np.array_split(order, 10) if len(part)]
+    error, predicted = found.error[good], found.range_error[good]
+    return {
+        "points": int(good.sum()),
+        "predicted": [float(np.sqrt(np.mean(predicted[part] ** 2))) for part in parts],
+        "rms": [float(np.sqrt(np.mean(error[part] ** 2))) for part in parts],
+    }
+
+
+def _judge(found: dict[str, Any], tree: xr.DataTree, built: Ints, progress: Progress | None) -> None:
+    """Baselines on some frames, and the frames that the first of them is worst in."""
+    some = built if len(built) <= MOST_JUDGED else built[np.linspace(0, len(built) - 1, MOST_JUDGED).astype(int)]
+    methods = {kind: by_kind(kind) for kind in BASELINES}
+    rows: dict[str, list[dict[str, Any]]] = {kind: [] for kind in methods}
+    for done, (frame, view) in enumerate(views(tree, some), 1):
+        for kind, method in methods.items():
+            rows[kind] += [{"frame": frame, **one} for one in detections_of(view, method.regions(view))]
+        if progress is not None:
+            progress(done, len(some), 0)
+    objects = true_objects(tree, some)
+    reports = {kind: _report(tree, len(some), from_rows(mine), objects) for kind, mine in rows.items()}
+    found["judged_frames"] = len(some)
+    found["baselines"] = {kind: report.as_json() for kind, report in reports.items()}
+    found["hardest"] = _hardest(reports[ImagePeaks().kind])
+    if len(objects) and found["baselines"]["peaks"]["ap_2m"] > TRIVIAL:
+        reached = found["baselines"]["peaks"]["ap_2m"]
+        found["warnings"].append(f"a threshold reaches an average precision of {reached:.2f}: there is little to learn")
+
+
+def _report(tree: xr.DataTree, frames: int, detections: Detections, objects: TrueObjects) -> DetectorReport:
+    return DetectorReport(frames, tuple(category_names(tree)), detections, objects)
+
+
+def _hardest(report: DetectorReport) -> list[dict[str, Any]]:
+    """Frames with most objects missed and most false alarms."""
+    matched = report.by_distance[NEAR]
+    objects = Counter(report.objects.frame.tolist())
+    hits = Counter(report.detections.frame[matched >= 0].tolist())
+    false = Counter(report.detections.frame[matched < 0].tolist())
+    frames = sorted(objects.keys() | false.keys(), key=lambda f: (hits[f] - objects[f] - false[f], f))
+    return [
+        {"frame": f, "objects": objects[f], "missed": objects[f] - hits[f], "false_alarms": false[f]}
+        for f in frames[:HARDEST]
+        if objects[f] > hits[f] or false[f]
+    ]

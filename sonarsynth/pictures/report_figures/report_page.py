@@ -1,0 +1,144 @@
+"""The page of a report: one HTML file that any browser opens without a network."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from sonarsynth.evaluation import warnings as warnings_of
+from sonarsynth.pictures.report_figures.report_numbers import numbers_of
+from sonarsynth.pictures.store_reading import NothingToDraw
+from sonarsynth.store import Folder, Remote, built_frames, folder_of, open_store
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+CONFIG: Final = {"displaylogo": False, "responsive": True, "showSendToCloud": False, "plotlyServerURL": ""}
+"""Nothing leads out of the page."""
+PAGE: Final = """<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><title>{title}</title>
+<style>
+body {{ font: 15px/1.5 sans-serif; color: #222; max-width: 1100px; margin: 0 auto; padding: 0 16px 48px }}
+table {{ border-collapse: collapse; margin: 12px 0 }}
+td, th {{ border-bottom: 1px solid #ddd; padding: 3px 14px 3px 0; text-align: left }}
+.warning {{ background: #fff3d6; padding: 6px 12px; margin: 6px 0 }}
+</style></head>
+<body>
+{body}
+<script type="application/json" id="numbers">{numbers}</script>
+</body></html>
+"""
+
+
+def report(
+    store: str | Folder,
+    out: str | Path | None = None,
+    *,
+    progress: Callable[[int, int, int], None] | None = None,
+) -> tuple[Path, dict[str, Any]]:
+    """Write a page about a store: film, what is in it by split, whether splits are apart, errors against predicted
+    errors, baseline detectors, the hardest frames.
+
+    out: the file, `<store>.report.html` where it is left out. The page holds plotly.js (5 MB) and its own numbers as
+    JSON (the element `numbers`). Returns the file and the numbers. Raises NothingToDraw where no frame is built.
+    """
+    place = folder_of(store)
+    tree = open_store(place)
+    if not len(built_frames(tree)):
+        raise NothingToDraw(f"{place}: no frame has been built")
+    numbers = numbers_of(tree, warnings_of(place), progress)
+    beside = Path(place.name) if isinstance(place, Remote) else place
+    file = Path(out) if out is not None else beside.with_name(f"{beside.name}.report.html")
+    from sonarsynth.pictures.report_figures import report_plots as plots
+
+    figures = [
+        ("Film", plots.film(tree, built_frames(tree))),
+        ("What is in it", plots.histograms(numbers)),
+        ("Errors of ranges against predicted errors", plots.range_errors(numbers)),
+        ("Baseline detectors", plots.baselines(numbers)),
+    ]
+    title = escape(f"{numbers['title']}: {place.name}")
+    parts = [f"<h1>{title}</h1>", *_head(numbers)]
+    script = True
+    for heading, figure in figures:
+        if figure is not None:
+            parts.append(f"<h2>{escape(heading)}</h2>{_drawn(figure, script)}")
+            script = False
+    parts += _scores(numbers)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(PAGE.format(title=title, body="\n".join(parts), numbers=_as_json(numbers)), encoding="utf-8")
+    return file, numbers
+
+
+def _drawn(figure: Figure, script: bool) -> str:
+    return str(figure.to_html(full_html=False, include_plotlyjs=script, config=CONFIG))
+
+
+def _as_json(numbers: dict[str, Any]) -> str:
+    """JSON that ends no element of the page; null where there is no number."""
+    return json.dumps(_plain(numbers)).replace("<", "\\u003c")
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(name): _plain(part) for name, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _head(numbers: dict[str, Any]) -> list[str]:
+    splits = ", ".join(f"{count} {name}" for name, count in numbers["splits"].items())
+    apart = numbers["leakage"]
+    leaks = (
+        "no sequence is in two splits, and no frame is equal to one of another split"
+        if not any(apart.values())
+        else f"<b>{apart['sequences']} sequences are in two splits, {apart['equal_frames']} frames are equal to one of "
+        "another split</b>"
+    )
+    rows = [
+        ("frames", f"{numbers['frames']} of {numbers['frames_of_the_recipe']} built, {numbers['sequences']} sequences"),
+        ("splits", splits),
+        ("apart", leaks),
+        ("objects", f"{numbers['objects']} in view"),
+        *((escape(name), ", ".join(f"{n} {s}" for s, n in of.items())) for name, of in numbers["categories"].items()),
+    ]
+    warned = [f'<p class="warning">{escape(text)}</p>' for text in numbers["warnings"]]
+    return [_table(("", ""), rows), *warned]
+
+
+def _scores(numbers: dict[str, Any]) -> list[str]:
+    if not numbers["baselines"]:
+        return []
+    rows = [
+        (kind, *(_figure(of[name]) for name in ("ap", "ap50", "ap_distance", "ap_2m")), _share(of["detection"][-2]))
+        for kind, of in numbers["baselines"].items()
+    ]
+    head = ("", "AP by boxes", "AP50", "AP by distance", "AP 2 m", "found at 1 false alarm a frame")
+    hardest = [tuple(map(str, row.values())) for row in numbers["hardest"]]
+    named = ("frame", "objects", "missed", "false alarms")
+    return [
+        f"<p>Of {numbers['judged_frames']} frames; bands of 95 %.</p>{_table(head, rows)}",
+        f"<h2>Hardest frames</h2><p>Those that <code>peaks</code> errs in most.</p>{_table(named, hardest)}",
+    ]
+
+
+def _figure(value: float) -> str:
+    return "-" if math.isnan(value) else f"{value:.3f}"
+
+
+def _share(row: dict[str, float]) -> str:
+    if math.isnan(row["detected"]):
+        return "-"
+    return f"{100 * row['detected']:.1f} % ({100 * row['low']:.1f} to {100 * row['high']:.1f})"
+
+
+def _table(head: tuple[str, ...], rows: list[Any]) -> str:
+    """Cells are HTML already."""
+    lines = ["".join(f"<th>{cell}</th>" for cell in head)] if any(head) else []
+    lines += ["".join(f"<td>{cell}</td>" for cell in row) for row in rows]
+    return "<table>" + "".join(f"<tr>{line}</tr>" for line in lines) + "</table>"
