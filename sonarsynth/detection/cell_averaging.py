@@ -26,11 +26,11 @@ class CellAveraging:
     """
 
     kind: Literal["cfar"] = "cfar"
-    false_alarm_rate: Annotated[Number, Gt(0), Lt(1)] = 0.03
+    false_alarm_rate: Annotated[Number, Gt(0), Lt(1)] = 0.3
     """P."""
-    guard: Annotated[Number, Ge(0)] = 1.0
+    guard: Annotated[Number, Ge(0)] = 0.7
     """Beam widths about a beam that are not averaged: its own echo is there."""
-    training: Annotated[Number, Gt(0)] = 2.0
+    training: Annotated[Number, Gt(0)] = 1.0
     """Beam widths beyond these that are."""
 
     def regions(self, view: SonarView) -> list[Region]:

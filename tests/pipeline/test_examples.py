@@ -25,7 +25,11 @@ from sonarsynth.cli.running import run
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "tools" / "docs").glob("*.md"))]
-NOTEBOOKS = sorted((ROOT / "tools" / "notebooks").glob("*.py"))
+LONG = {"training_a_detector"}
+NOTEBOOKS = [
+    pytest.param(file, marks=[pytest.mark.long] if file.stem in LONG else [], id=file.stem)
+    for file in sorted((ROOT / "tools" / "notebooks").glob("*.py"))
+]
 QUICK = {"build": ("--frames=0:2", "--workers=0", "--no-predict"), "show": ("--no-film",)}
 """What is added where an example does not say it: every way of building has tests of its own."""
 PATHS = r"(?<![\w/~])(?:tools|configs|tests|sonarsynth|\.github|\.ci)/[\w./-]*\w"
@@ -149,13 +153,14 @@ def test_the_first_docstring_runs(
     assert (folder / "remus.zarr").is_dir()
 
 
-@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda notebook: notebook.stem)
+@pytest.mark.parametrize("notebook", NOTEBOOKS)
 def test_every_notebook_runs_and_draws(notebook: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from matplotlib import pyplot
 
     drawn: list[int] = []
     monkeypatch.setattr(pyplot, "show", lambda: drawn.append(len(pyplot.gcf().axes)))
     monkeypatch.setattr("tempfile.tempdir", str(folder))
+    monkeypatch.setenv("SEQUENCES", "10")
     runpy.run_path(str(notebook), run_name="__main__")
     pyplot.close("all")
     assert drawn and min(drawn) > 1
