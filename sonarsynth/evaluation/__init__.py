@@ -9,6 +9,7 @@ import xarray as xr
 from sonarsynth.detection import beam_width
 from sonarsynth.evaluation.brightest_beams import brightest_beam_on_target, near_target
 from sonarsynth.evaluation.checks import Check, every, numbered
+from sonarsynth.evaluation.cloud_scores import cloud_scores
 from sonarsynth.evaluation.detectors import TRUTH, DetectorReport, evaluate
 from sonarsynth.evaluation.error_bounds import bounds, warnings
 from sonarsynth.evaluation.level_checks import (
@@ -33,6 +34,7 @@ __all__ = [
     "bounds",
     "brightest_beam_on_target",
     "check",
+    "cloud_scores",
     "evaluate",
     "expansions_hold",
     "kinds",

@@ -16,6 +16,7 @@ import sonarsynth as ss
 from sonarsynth import planning, schedule
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
+from sonarsynth.evaluation import cloud_scores
 from sonarsynth.pictures.report_figures import numbers_of
 from sonarsynth.pictures.report_figures.report_numbers import leakage
 from sonarsynth.recipe import reading
@@ -26,6 +27,8 @@ def store(small_text: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Ten frames of five sequences in three splits, whose title would be a script."""
     noise = "{name: noise, path: environment.noise.level, kind: uniform, low: 30 dB, high: 50 dB}"
     text = small_text.replace("frames: 20", "frames: 2").replace("title: small", "title: '<script>alert(1)</script>'")
+    text = text.replace("columns: 5, rows: 4", "columns: 12, rows: 8")  # which has points
+    text = text.replace("{kind: box, size: [1, 1, 1], edge: 0.25}", "{kind: sphere, radius: 0.4, edge: 0.1}")
     text += f"variations: [{noise}]\nrepeats: 6\nsplits: {{train: 0.6, validation: 0.2, test: 0.2}}\n"
     path = tmp_path_factory.mktemp("report") / "s.zarr"
     plan = planning.plan(reading.loads(text), products={"image", "cloud"})
@@ -86,6 +89,8 @@ def test_the_numbers_of_the_page_are_those_of_the_store(store: Path, page: Page)
         assert mine["by_snr"] == json.loads(json.dumps(figures["by_snr"]))
         (row,) = (row for row in page.rows if row and row[0] == kind)
         assert row[4] == f"{figures['ap_2m']:.3f}"
+    clouds = cloud_scores(tree, np.arange(10))
+    assert found["clouds"] == clouds and clouds["points"] == int(tree["cloud/count"].values[:10].sum()) > 0
     assert ["frames", "10 of 12 built, 5 sequences"] in page.rows
 
 

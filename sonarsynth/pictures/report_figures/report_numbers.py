@@ -10,7 +10,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.detection import Detections, ImagePeaks, by_kind, detections_of, from_rows, views
-from sonarsynth.evaluation import points
+from sonarsynth.evaluation import cloud_scores, points
 from sonarsynth.evaluation.detectors import DetectorReport, TrueObjects, true_objects
 from sonarsynth.evaluation.detectors.detector_scores import NEAR
 from sonarsynth.evaluation.detectors.true_objects import category_names
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Progress = Callable[[int, int, int], None]
 BASELINES: Final = ("peaks", "cfar")
 MOST_JUDGED: Final = 2000
-"""Frames that baselines are run on; of more, even steps."""
+"""Frames that clouds and baselines are judged in; of more, even steps."""
 HARDEST: Final = 10
 TRIVIAL: Final = 0.95
 """Average precision at 2 m of a threshold, over which there is nothing to learn."""
@@ -49,6 +49,7 @@ def numbers_of(tree: xr.DataTree, warnings: Sequence[str] = (), progress: Progre
         "histograms": {name: _histogram(getattr(objects, name), whose) for name in QUANTITIES},
         "leakage": leakage(tree, built, split),
         "range_errors": _range_errors(tree, built),
+        "clouds": cloud_scores(tree, _some(built)) if "cloud" in tree.children else {},
         "baselines": {},
         "hardest": [],
         "warnings": list(warnings),
@@ -126,9 +127,14 @@ def _range_errors(tree: xr.DataTree, frames: Ints) -> dict[str, Any]:
     }
 
 
+def _some(frames: Ints) -> Ints:
+    """Those that are judged."""
+    return frames if len(frames) <= MOST_JUDGED else frames[np.linspace(0, len(frames) - 1, MOST_JUDGED).astype(int)]
+
+
 def _judge(found: dict[str, Any], tree: xr.DataTree, built: Ints, progress: Progress | None) -> None:
     """Baselines on some frames, and the frames that the first of them is worst in."""
-    some = built if len(built) <= MOST_JUDGED else built[np.linspace(0, len(built) - 1, MOST_JUDGED).astype(int)]
+    some = _some(built)
     methods = {kind: by_kind(kind) for kind in BASELINES}
     rows: dict[str, list[dict[str, Any]]] = {kind: [] for kind in methods}
     for done, (frame, view) in enumerate(views(tree, some), 1):

@@ -68,7 +68,7 @@ def report(
         if figure is not None:
             parts.append(f"<h2>{escape(heading)}</h2>{_drawn(figure, script)}")
             script = False
-    parts += _scores(numbers)
+    parts += [*_clouds(numbers), *_scores(numbers)]
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(PAGE.format(title=title, body="\n".join(parts), numbers=_as_json(numbers)), encoding="utf-8")
     return file, numbers
@@ -109,6 +109,16 @@ def _head(numbers: dict[str, Any]) -> list[str]:
     ]
     warned = [f'<p class="warning">{escape(text)}</p>' for text in numbers["warnings"]]
     return [_table(("", ""), rows), *warned]
+
+
+def _clouds(numbers: dict[str, Any]) -> list[str]:
+    by = numbers["clouds"].get("by_tolerance")
+    if not by:
+        return []
+    rows = [(limit, *(f"{row[name]:.3f}" for name in ("precision", "recall", "f_score"))) for limit, row in by.items()]
+    said = f"Chamfer distance {numbers['clouds']['chamfer']:.3g} m, of {numbers['clouds']['points']} points."
+    table = _table(("within", "points on the surface", "surface found", "F-score"), rows)
+    return [f"<h2>Clouds against the surfaces that the array sees</h2><p>{said}</p>{table}"]
 
 
 def _scores(numbers: dict[str, Any]) -> list[str]:
