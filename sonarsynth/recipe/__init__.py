@@ -118,7 +118,9 @@ class Recipe:
         return int(self.spanned.steps[sequence])
 
     def sequence(self, index: int) -> int:
-        """Which sequence a frame is of."""
+        """Which sequence a frame is of. Raises IndexError for a frame that is not there."""
+        if not 0 <= index < self.frames:
+            raise IndexError(f"frame {index} is outside 0..{self.frames - 1}")
         return int(np.searchsorted(self.spanned.first_frames, index, side="right")) - 1
 
     def scene_of(self, sequence: int) -> Scene:
@@ -162,8 +164,6 @@ class Recipe:
 
     def frame(self, index: int) -> tuple[Scene, Frame]:
         """Scene and frame number `index`; raises IndexError outside 0..frames-1, FieldError where it cannot be."""
-        if not 0 <= index < self.frames:
-            raise IndexError(f"frame {index} is outside 0..{self.frames - 1}")
         sequence = self.sequence(index)
         scene = self.scene_of(sequence)
         key, step = self.spanned.key(sequence), index - self.first_frame(sequence)

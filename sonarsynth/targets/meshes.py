@@ -24,6 +24,9 @@ __all__ = ["MeshError", "file_stamp", "mesh_of", "refined_mesh"]
 
 LARGEST_IN_METRES: Final = 300.0
 """Size (m) over which a file without a unit is taken to be in millimetres."""
+NANOMETRES: Final = 9
+"""Decimals of a vertex (m). Processors differ in the last bit of sines and powers: unrounded, a shape would have
+another digest on each, and with it other random signs of its facets, another speckle."""
 SHARP: Final = MeshFile(path="").crease
 """The crease of shapes that leave it out."""
 
@@ -69,6 +72,7 @@ def refined_mesh(shape: Shape, edge: float = np.inf, sagitta: float = np.inf) ->
     if isinstance(shape, MeshFile) and shape.sides == "both":
         (vertices, numbers), sheets = with_backs((vertices, numbers))
         notes = (*notes, f"{sheets} facets of sheets scatter from both sides") if sheets else notes
+    vertices = np.round(vertices, NANOMETRES) + 0.0  # no -0.0, which has other bits
     faces = np.ascontiguousarray(numbers, np.int32)
     flat = None
     if isinstance(shape, (Cylinder, Myring, Remus100)):  # their ends

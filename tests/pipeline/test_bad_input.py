@@ -151,6 +151,9 @@ def test_calls_that_cannot_be(small: Recipe, tmp_path: Path) -> None:
         sonarsynth.build(small, tmp_path / "s.zarr", workers=-1)
     with pytest.raises(IndexError, match=r"frame 20 is outside 0\.\.19"):
         sonarsynth.build(small, tmp_path / "s.zarr", workers=0, frames=[20])
+    for frame in (20, -1):
+        with pytest.raises(IndexError, match=rf"frame {frame} is outside 0\.\.19"):
+            sonarsynth.render(small, frame)
     assert sonarsynth.plan(small, "image").products == {"image"}
 
 
