@@ -45,6 +45,8 @@ def image_points(plan: Plan, heard: BeamformedFrame, peers: bool = True) -> Iter
             settings += [("focus", "focused", fast)]
         if slow.focus is not None:
             settings += [("focus", "plane waves", replace(fast, focus=None))]
+    if getattr(chosen, "bins", "") == "few":
+        settings.append(("bins", "all bins", replace(chosen, bins="all")))
     for knob, setting, method in [("chosen", named(chosen), chosen), *settings]:
         if knob != "chosen" and method == chosen:
             continue

@@ -5,12 +5,16 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.arrays.apertures import hann_shading, live_gain
 from sonarsynth.equations.arrays.gates import frequency_spacing, gate_samples, gated_spectra
 from sonarsynth.products import EnergyImage, Signals, Snapshots
 from sonarsynth.receiver import Elements, Sonar
+
+QUIET = 1e-7
+"""Of the energy in a window, that may be left out at each end of it."""
 
 Shading = Literal["uniform", "hann"]
 """Weights over the aperture: all alike, or falling off towards the rim (lower side lobes, a wider beam)."""
@@ -24,7 +28,18 @@ def snapshots_of(signals: Signals, sonar: Sonar, start: float, stop: float) -> S
     rate = signals.sampling_frequency
     first, count = gate_samples(start, stop, signals.start, rate, signals.pressure.shape[1])
     frequency, spectra = gated_spectra(signals.pressure, rate, first, count, (sonar.band.low, sonar.band.high))
-    return Snapshots(frequency, frequency_spacing(count, rate), spectra, signals.start + first / rate, count, rate)
+    lasting = _lasting(signals.pressure[:, first : first + count]) / rate
+    spacing, begin = frequency_spacing(count, rate), signals.start + first / rate
+    return Snapshots(frequency, spacing, spectra, begin, count, rate, lasting)
+
+
+def _lasting(pressure: npt.NDArray[np.floating]) -> int:
+    """Samples from where pressures (sensor, sample) have `QUIET` of their energy behind them to where they have so much
+    before them."""
+    power = np.einsum("st,st->t", pressure, pressure, dtype=float)
+    silence = QUIET * power.sum()
+    before, after = np.cumsum(power), np.cumsum(power[::-1])
+    return max(len(power) - int(np.searchsorted(before, silence)) - int(np.searchsorted(after, silence)), 0)
 
 
 def weights(elements: Elements, shading: Shading) -> Floats:

@@ -21,6 +21,7 @@ class Snapshots:
     start: float  # s: the sample that phases refer to
     samples: int  # of the window
     sampling_frequency: float  # Hz
+    lasting: float  # s: of the part of the window that all of its energy is in, but for 1e-7 before and after
 
     @property
     def duration(self) -> float:
@@ -37,8 +38,8 @@ class Snapshots:
         return np.asarray(weight @ np.abs(self.spectra).astype(float) ** 2)
 
     def select(self, bins: npt.NDArray[np.integer]) -> Snapshots:
-        """Some bins, next to each other."""
-        return replace(self, frequency=self.frequency[bins], spectra=self.spectra[:, bins])
+        """Some bins, next to each other: of part of a band, sound may last as long as the window."""
+        return replace(self, frequency=self.frequency[bins], spectra=self.spectra[:, bins], lasting=self.duration)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from sonarsynth.conventions import Floats, PositiveMetres
 from sonarsynth.description import description
 from sonarsynth.description.method import Demand, FrameSize
 from sonarsynth.imaging.delay_and_sum.dense import DenseDelayAndSum
+from sonarsynth.imaging.delay_and_sum.fewer_bins import fewer_bins
 from sonarsynth.imaging.delay_and_sum.focus_error import MOST_ZONES, zones_needed
 from sonarsynth.imaging.delay_and_sum.lattice_image import (
     check_lattice,
@@ -70,16 +71,20 @@ class FocusedDelayAndSum(Steering):
     zones: Annotated[int, Ge(1), Le(32)] | Literal["auto"] = "auto"
     """Zones across the upper and lower edge of the picture, each focused on its own centre; elsewhere as few as are as
     good. Auto: as many as `focus_error` puts at 0.1 dB, or 32 where none do."""
+    bins: Literal["few", "all", "auto"] = "auto"
+    """Frequencies of the window that energies are summed over: as few as its sound needs, which is shorter (0.01 dB),
+    or all. Auto: few in a plan, by the error that it measures; else all."""
 
     def resolve(self, demand: Demand) -> tuple[FocusedDelayAndSum | DenseDelayAndSum, float]:
         """As many zones as the recipe says; left to the plan, the fewest that err by no more than is allowed (dB)."""
         if demand.exact:
             return self.exact(), 0.0
+        few = replace(self, bins="few") if self.bins == "auto" else self
         if self.zones != "auto":
-            return self, demand.error(self)
-        method, error = replace(self, zones=1), float("inf")
+            return few, demand.error(few)
+        method, error = replace(few, zones=1), float("inf")
         for zones in ZONES if self.focus is not None else (1,):
-            method = replace(self, zones=zones)
+            method = replace(few, zones=zones)
             error = demand.error(method)
             if error <= demand.allowed:
                 break
@@ -90,7 +95,7 @@ class FocusedDelayAndSum(Steering):
         return DenseDelayAndSum(focus=self.focus, shading=self.shading)
 
     def cost(self, size: FrameSize) -> float:
-        """As `Method.cost`; each zone is an image of its own, of part of the beams."""
+        """As `Method.cost`, of all bins; each zone is an image of its own, of part of the beams."""
         zones = 1.0 if self.zones == "auto" else max(1.25 * self.zones, 1.0)
         return 1.8e-9 * zones * size.beams * size.bins
 
@@ -105,8 +110,9 @@ class FocusedDelayAndSum(Steering):
     def energies(self, snapshots: Snapshots, elements: Elements, sonar: Sonar) -> Floats:
         """As `Steering.energies`. Raises ValueError for an array that is not a lattice, or when no element is live."""
         check_lattice(elements)
-        spectra, frequency = snapshots.spectra, snapshots.frequency
         weight, grid, speed = weights(elements, self.shading), sonar.beams, sonar.assumed_sound_speed
+        snapshots = fewer_bins(snapshots, elements.aperture / speed) if self.bins == "few" else snapshots
+        spectra, frequency = snapshots.spectra, snapshots.frequency
         zones = self.zones if self.zones != "auto" else self._zones(elements, sonar)
         if zones == 1 or self.focus is None:
             axes = grid.azimuth, grid.elevation
