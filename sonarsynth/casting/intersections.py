@@ -12,6 +12,7 @@ from sonarsynth.conventions import Bools, Floats, Ints
 
 Int32s = npt.NDArray[np.int32]
 EDGE = 1e-14  # of the square of the body's size: rays this close to an edge hit either facet, never neither
+SPHERE = 1.0 + 1e-5  # square of the radius of a sphere a little over the unit sphere
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -112,17 +113,46 @@ def round_vertices(faces: Int32s, vertices: int) -> tuple[Int32s, Int32s]:
     return first, around
 
 
-@njit(cache=True, nogil=True)
-def pass_near(start: Floats, end: Floats, centre: Floats, radius: float, near: Bools) -> None:
-    """Write whether each segment (segment, xyz) comes within radius (m) of a point (xyz)."""
+@njit(cache=True, nogil=True, error_model="numpy")
+def into_mesh(
+    start: Floats, end: Floats, skip: Bools, rotation: Floats, position: Floats, centre: Floats, size: float,
+    origin: Floats, heading: Floats, far: Floats, segment: Ints,
+) -> int:  # fmt: skip
+    """Write the parts of segments (segment, xyz), world, that are within a sphere about a mesh, in its frame and unit:
+    where they begin, unit directions, and lengths; and which segment each is of. Returns how many: others miss it, or
+    are to be skipped.
+
+    rotation (xyz, xyz), position (xyz) m: the pose of the mesh; centre (xyz) and size (m): of its sphere.
+    """
+    count = 0
     for i in range(len(start)):
-        sx, sy, sz = end[i, 0] - start[i, 0], end[i, 1] - start[i, 1], end[i, 2] - start[i, 2]
-        cx, cy, cz = centre[0] - start[i, 0], centre[1] - start[i, 1], centre[2] - start[i, 2]
-        square = sx * sx + sy * sy + sz * sz
-        part = (cx * sx + cy * sy + cz * sz) / square if square > 0.0 else 0.0
-        part = min(max(part, 0.0), 1.0)
-        dx, dy, dz = cx - part * sx, cy - part * sy, cz - part * sz
-        near[i] = dx * dx + dy * dy + dz * dz <= radius * radius
+        if skip[i]:
+            continue
+        for x in range(3):
+            o = d = 0.0
+            for y in range(3):
+                o += rotation[y, x] * (start[i, y] - position[y])
+                d += rotation[y, x] * (end[i, y] - start[i, y])
+            origin[count, x], heading[count, x] = (o - centre[x]) / size, d / size
+        (ox, oy, oz), (dx, dy, dz) = origin[count], heading[count]
+        length = math.sqrt(dx * dx + dy * dy + dz * dz)
+        if not length > 0.0:
+            continue
+        dx, dy, dz = dx / length, dy / length, dz / length
+        nearest = -(ox * dx + oy * dy + oz * dz)
+        fx, fy, fz = ox + nearest * dx, oy + nearest * dy, oz + nearest * dz
+        half = SPHERE - (fx * fx + fy * fy + fz * fz)
+        if half <= 0.0:
+            continue
+        half = math.sqrt(half)
+        enter, leave = max(nearest - half, 0.0), min(nearest + half, length)
+        if not enter < leave:
+            continue
+        origin[count, 0], origin[count, 1], origin[count, 2] = ox + enter * dx, oy + enter * dy, oz + enter * dz
+        heading[count, 0], heading[count, 1], heading[count, 2] = dx, dy, dz
+        far[count], segment[count] = length - enter, i
+        count += 1
+    return count
 
 
 @njit(cache=True, nogil=True)

@@ -106,14 +106,20 @@ class CastingMesh:
 
     def cast(self, origin: Floats, direction: Floats, far: Floats) -> tuple[Ints, Floats]:
         """Facet (ray,) and distance of the nearest hit for rays in this mesh's frame and unit; -1 and NaN for none."""
-        from sonarsynth.casting import intersections
-
         facet, distance = np.full(len(origin), NO_TARGET), np.full(len(origin), np.nan)
         entry, leave = _through_unit_sphere(origin, direction, far)
         open_rays = np.flatnonzero(entry < leave)
         start = origin[open_rays] + entry[open_rays, None] * direction[open_rays]
-        heading, limit = direction[open_rays], (far - entry)[open_rays]
-        passed = np.zeros(len(open_rays))
+        facet[open_rays], where = self.within(start, direction[open_rays], (far - entry)[open_rays])
+        distance[open_rays] = where + entry[open_rays]
+        return facet, distance
+
+    def within(self, start: Floats, heading: Floats, limit: Floats) -> tuple[Ints, Floats]:
+        """The same of rays that start at the bounding sphere or within it, and end within `limit`."""
+        from sonarsynth.casting import intersections
+
+        facet, distance = np.full(len(start), NO_TARGET), np.full(len(start), np.nan)
+        left, passed = np.arange(len(start)), np.zeros(len(start))
         for _ in range(ROUNDS):
             proposed, at = self.caster.nearest(start + passed[:, None] * heading, heading, limit - passed)
             proposed = np.where((proposed >= 0) & (proposed < len(self.faces)), proposed, -1)
@@ -132,17 +138,15 @@ class CastingMesh:
                 found,
                 where,
             )
-            hit = found >= 0
-            facet[open_rays[hit]], distance[open_rays[hit]] = found[hit], where[hit] + entry[open_rays[hit]]
-            left = ~hit & (proposed >= 0)
-            if not left.any():
+            facet[left], distance[left] = found, where
+            again = (found < 0) & (proposed >= 0)
+            if not again.any():
                 return facet, distance
-            passed = (passed + at + 2 * OFFSET)[left]
-            open_rays, start, heading, limit = open_rays[left], start[left], heading[left], limit[left]
+            passed = (passed + at + 2 * OFFSET)[again]
+            left, start, heading, limit = left[again], start[again], heading[again], limit[again]
         found, where = np.empty(len(start), np.int64), np.empty(len(start))
         intersections.search(start, heading, np.zeros(len(start)), limit, self.vertices, self.faces, 1.0, found, where)
-        hit = found >= 0
-        facet[open_rays[hit]], distance[open_rays[hit]] = found[hit], where[hit] + entry[open_rays[hit]]
+        facet[left], distance[left] = found, where
         return facet, distance
 
 
@@ -242,19 +246,18 @@ def occluded(bodies: tuple[PlacedTarget, ...], start: Floats, end: Floats, backe
         raise ValueError("segments need finite ends")
     from sonarsynth.casting import intersections
 
-    hidden, near = np.zeros(len(a), bool), np.empty(len(a), bool)
+    hidden = np.zeros(len(a), bool)
+    origin, heading = np.empty((2, *a.shape))
+    far, segment = np.empty(len(a)), np.empty(len(a), np.int64)
     for body in bodies:
         if not len(body.mesh.faces):
             continue
-        ready = casting_mesh(body.mesh, backend)
-        intersections.pass_near(a, b, *enclosing(body), near)
-        free = np.flatnonzero(near & ~hidden)
-        if not len(free):
+        ready, pose = casting_mesh(body.mesh, backend), body.pose
+        count = intersections.into_mesh(
+            a, b, hidden, pose.rotation, pose.position, ready.centre, ready.size, origin, heading, far, segment
+        )
+        if not count:
             continue
-        o = (body.pose.to_body(a[free]) - ready.centre) / ready.size
-        span = (body.pose.to_body(b[free]) - ready.centre) / ready.size - o
-        length = np.linalg.norm(span, axis=1)
-        going = length > 0
-        facet, _ = ready.cast(o[going], span[going] / length[going, None], length[going])
-        hidden[free[going]] = facet >= 0
+        facet, _ = ready.within(origin[:count], heading[:count], far[:count])
+        hidden[segment[:count]] = facet >= 0
     return hidden
