@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -119,11 +119,17 @@ def _rows(rows: list[Floats], width: int) -> Floats:
     return np.array(rows, float).reshape(-1, width)
 
 
+@lru_cache(maxsize=4)
+def _rays_of(beams: BeamGrid) -> Floats:
+    """Directions (elevation, azimuth, xyz) of the beams."""
+    return direction(beams.azimuth[None, :], beams.elevation[:, None])
+
+
 def _label_beams(
     bodies: tuple[PlacedTarget, ...], seen: list[Floats], beams: BeamGrid, sonar_pose: Pose, straight: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Target, facet and range (elevation, azimuth) of each beam."""
-    rays = direction(beams.azimuth[None, :], beams.elevation[:, None])
+    rays = _rays_of(beams)
     shape = rays.shape[:2]
     target = np.full(shape, NO_TARGET, np.int16)
     facet = np.full(shape, NO_TARGET, np.int32)
@@ -158,6 +164,6 @@ def _beams_near(points: Floats, rays: Floats) -> tuple[np.ndarray, np.ndarray]:
         every = np.indices(rays.shape[:2]).reshape(2, -1)
         return every[0], every[1]
     axis /= np.linalg.norm(axis)
-    widest = np.arccos(np.clip(towards @ axis, -1, 1)).max()
-    rows, columns = np.nonzero(np.arccos(np.clip(rays @ axis, -1, 1)) <= widest + 1e-3)
+    widest = np.arccos(np.clip((towards @ axis).min(), -1.0, 1.0)) + 1e-3
+    rows, columns = np.nonzero(rays @ axis >= np.cos(min(widest, np.pi)))
     return rows, columns

@@ -60,26 +60,28 @@ def _visible(
     body: PlacedTarget, seen: Floats, bodies: tuple[PlacedTarget, ...], sonar_pose: Pose
 ) -> tuple[Ints, float]:
     """The visible facets, in the view of the beams or not, and their share of the area that faces the array."""
-    mesh = body.mesh
-    facing, farthest = np.zeros(len(mesh.faces), bool), 0.0
-    for some in in_blocks(len(mesh.faces)):
-        centroid, normal = body.pose.to_world(mesh.centroid[some]), body.pose.turn_to_world(mesh.normal[some])
-        facing[some] = np.einsum("ij,ij->i", sonar_pose.position - centroid, normal) > 0
-        farthest = max(farthest, float(np.abs(centroid).max()))
+    mesh, here = body.mesh, body.pose.to_body(sonar_pose.position)
+    facing = _facing(body, slice(None), here)
     visible = np.zeros(len(mesh.faces), bool)
     for some in in_blocks(len(mesh.faces)):
         rows = np.flatnonzero(facing[some]) + some.start
-        start = _clear(body, rows, farthest)
+        start = _clear(body, rows)
         clear = ~occluded(bodies, start, np.broadcast_to(sonar_pose.position, start.shape))
         visible[rows] = clear & finite(seen, mesh.faces[rows])
     fraction = float(mesh.area[visible].sum() / mesh.area[facing].sum()) if visible.any() else 0.0
     return np.flatnonzero(visible), fraction
 
 
-def _clear(body: PlacedTarget, rows: Ints, farthest: float) -> Floats:
-    """(row, xyz) world: middles of facets (row,), moved off them; farthest: largest coordinate (m) of the body."""
-    rounding = 8.0 * np.finfo(float).eps * farthest  # of places in the world
-    offset = max(OFFSET * body.mesh.radius, rounding)
+def _facing(body: PlacedTarget, rows: Ints | slice, place: Floats) -> Bools:
+    """Whether a place (xyz), in the frame of a body, is on the outer side of facets (row,)."""
+    ahead = place - body.mesh.centroid[rows]
+    return np.asarray(np.einsum("ij,ij->i", ahead, body.mesh.normal[rows]) > 0.0)
+
+
+def _clear(body: PlacedTarget, rows: Ints) -> Floats:
+    """(row, xyz) world: middles of facets (row,), moved off them."""
+    farthest = float(np.abs(body.pose.position).max()) + body.mesh.radius
+    offset = max(OFFSET * body.mesh.radius, 8.0 * np.finfo(float).eps * farthest)  # rounding of places in the world
     return body.pose.to_world(body.mesh.centroid[rows] + offset * body.mesh.normal[rows])
 
 
@@ -100,18 +102,20 @@ def lit_fraction(
     lit = np.zeros(len(visible), bool)
     for some in in_blocks(len(visible)):
         rows = visible[some]
-        place, normal = body.pose.to_world(body.mesh.centroid[rows]), body.pose.turn_to_world(body.mesh.normal[rows])
-        farthest = float(np.abs(place).max())
         if connect is None:
-            faced = np.flatnonzero(np.einsum("ij,ij->i", snap.position - place, normal) > 0.0)
-            start = _clear(body, rows[faced], farthest)
+            faced = np.flatnonzero(_facing(body, rows, body.pose.to_body(snap.position)))
+            start = _clear(body, rows[faced])
             blocked = occluded(bodies, start, np.broadcast_to(snap.position, start.shape))
         else:
+            place, normal = (
+                body.pose.to_world(body.mesh.centroid[rows]),
+                body.pose.turn_to_world(body.mesh.normal[rows]),
+            )
             paths = connect(np.broadcast_to(snap.position, place.shape), place)
             towards = -paths.arrival
             some_paths = np.flatnonzero(usable(paths) & (np.einsum("ij,ij->i", towards, normal[paths.pair]) > 0.0))
             faced = paths.pair[some_paths]
-            start = _clear(body, rows[faced], farthest)
+            start = _clear(body, rows[faced])
             end = np.broadcast_to(snap.position, start.shape)
             blocked = hidden(bodies, medium, start, end, towards[some_paths], paths.length[some_paths])
         lit[faced[~blocked] + some.start] = True
