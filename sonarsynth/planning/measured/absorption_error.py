@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -48,10 +49,19 @@ def _leg(start: Floats, middle: Floats, end: Floats) -> tuple[Floats, Floats]:
 
 def mean_absorption(absorption: Absorption, passed: Passed, frequency: np.ndarray | float) -> Floats:
     """Mean (...) in dB/m at frequencies (...) (Hz) over all that the paths pass, by their lengths."""
-    where, at = np.unique(np.round(passed.depth, 3), return_inverse=True)
-    weight = np.bincount(at.ravel(), passed.length.ravel()) / passed.length.sum()
     f = np.asarray(frequency, float)
-    return np.asarray(absorption_db_per_m(absorption, f[..., None], where) @ weight)
+    return _mean(absorption, passed.depth.tobytes(), passed.length.tobytes(), f.tobytes()).reshape(f.shape)
+
+
+@lru_cache(maxsize=256)
+def _mean(absorption: Absorption, depths: bytes, lengths: bytes, frequencies: bytes) -> Floats:
+    """The same, kept: all frames ask for the same few frequencies."""
+    f, passed, length = (np.frombuffer(numbers) for numbers in (frequencies, depths, lengths))
+    where, at = np.unique(np.round(passed, 3), return_inverse=True)
+    weight = np.bincount(at, length) / length.sum()
+    found = np.asarray(absorption_db_per_m(absorption, f[:, None], where) @ weight)
+    found.setflags(write=False)
+    return found
 
 
 def shape_error(
