@@ -19,7 +19,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "sonarsynth"
-PAGE = (ROOT / "tools" / "docs" / "extending.md").read_text()
+PAGE = (ROOT / "tools" / "docs" / "how-to" / "extending.md").read_text()
 FILES = dict(re.findall(r"^```python file=(\S+)\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE))
 UNIONS = {
     "imaging": "Beamformer",

@@ -24,7 +24,11 @@ from sonarsynth.cli import app
 from sonarsynth.cli.running import run
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "tools" / "docs").glob("*.md"))]
+PAGES = [
+    ROOT / "README.md",
+    *sorted((ROOT / ".github").glob("*.md")),
+    *sorted((ROOT / "tools" / "docs").rglob("*.md")),
+]
 LONG = {"training_a_detector"}
 NOTEBOOKS = [
     pytest.param(file, marks=[pytest.mark.long] if file.stem in LONG else [], id=file.stem)

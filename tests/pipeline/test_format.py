@@ -137,7 +137,7 @@ def test_a_store_of_an_older_format_is_refused_in_one_line(
 
 
 def test_every_group_of_the_schema_is_on_the_page_of_the_store() -> None:
-    page = Path("tools/docs/the-store.md").read_text()
+    page = Path("tools/docs/reference/the-store.md").read_text()
     assert all(f"`{group}`" in page for group in {v.group for v in VARIABLES} - {"/"})
 
 

@@ -1,4 +1,4 @@
-"""Pictures of tools/docs/labels.md: boxes of targets, and what beams and sound meet of them."""
+"""Pictures of tools/docs/reference/labels.md: boxes of targets, and what beams and sound meet of them."""
 
 from __future__ import annotations
 
