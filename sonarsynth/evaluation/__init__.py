@@ -19,6 +19,7 @@ from sonarsynth.evaluation.level_checks import (
     link_budget_measured,
 )
 from sonarsynth.evaluation.point_checks import kinds, points, range_errors
+from sonarsynth.evaluation.snr_checks import signal_to_noise
 from sonarsynth.evaluation.source_estimates import snap_located
 from sonarsynth.evaluation.target_checks import labels_of_targets
 
@@ -45,6 +46,7 @@ __all__ = [
     "nothing_outside",
     "points",
     "range_errors",
+    "signal_to_noise",
     "snap_located",
     "warnings",
 ]
@@ -67,6 +69,8 @@ def check(tree: xr.DataTree) -> list[Check]:
         checks.append(nothing_outside(tree, built))
     if "image" in tree.children:
         checks.append(brightest_beam_on_target(tree, built))
+    if "snr" in tree["truth/targets"].dataset:
+        checks.append(signal_to_noise(tree, built))
     if "cloud" in tree.children:
         checks.extend(range_errors(tree, built))
     checks.append(labels_of_targets(tree, built))

@@ -21,8 +21,10 @@ from sonarsynth.pictures.store_reading import (
     beam_grid,
     built,
     every_stored,
+    needed,
     opened,
     pictures_of,
+    read,
 )
 from sonarsynth.pictures.summary import summary
 from sonarsynth.store import Folder, folder_of
@@ -118,7 +120,7 @@ def _view(tree: xr.DataTree, frame: Stored, reference: float) -> View:
     count = tree["truth"].sizes["frame"]
     of = f" (0 to {count - 1})" if count > 1 else ""
     return View(
-        title=f"{title}   frame {frame.index}{of}{clock}",
+        title=f"{title}   frame {frame.index}{of}{clock}{_snr(tree, frame)}",
         level=None if frame.energy is None else decibels(frame.energy, reference),
         points=frame.points,
         point_level=decibels(frame.point_energy, reference),
@@ -126,6 +128,16 @@ def _view(tree: xr.DataTree, frame: Stored, reference: float) -> View:
         ghosts=frame.ghosts,
         lobes=frame.lobes,
     )
+
+
+def _snr(tree: xr.DataTree, frame: Stored) -> str:
+    """The signal-to-noise ratios of the targets of a frame, for its title: of the loudest three."""
+    found = read(tree, "truth/targets/snr")
+    if found is None:
+        return ""
+    snr, names = found[frame.index], needed(tree, "truth/targets/target")
+    loud = [n for n in np.argsort(-np.nan_to_num(snr, nan=-np.inf))[:3] if np.isfinite(snr[n])]
+    return "   snr " + ", ".join(f"{names[n]} {snr[n]:.0f} dB" for n in loud) if loud else ""
 
 
 def _write_sheet(

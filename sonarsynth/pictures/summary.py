@@ -56,15 +56,22 @@ def _targets(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
     seen = (needed(tree, "truth/targets/visible_fraction")[frames] > 0).sum(axis=0)
     view = read(tree, "truth/targets/view")
     inside = None if view is None else np.isin(view[frames], (View.IN_VIEW, View.PARTLY_IN_VIEW)).sum(axis=0)
-    lines = []
+    snr, lines = read(tree, "truth/targets/snr"), []
     for i, name in enumerate(map(str, names)):
         faces = read(tree, f"{mesh_group(tree, i, int(frames[0]))}/faces")
         facets = f"{len(faces)} facets, " if faces is not None else ""
         there = away[np.isfinite(away[:, i]), i]
         reach = f"{there.min():.2f} to {there.max():.2f} m away" if len(there) else "in none of these frames"
+        ratio = "" if snr is None or not np.isfinite(snr[frames, i]).any() else _ratios(snr[frames, i])
         within = "" if inside is None or inside[i] == seen[i] else f" ({inside[i]} within the beams)"
-        lines.append(f"  target     {name}: {facets}{reach}, in sight in {seen[i]} frames{within}")
+        lines.append(f"  target     {name}: {facets}{reach}, in sight in {seen[i]} frames{within}{ratio}")
     return [*lines, *_ghosts(tree, frames, list(map(str, names)))]
+
+
+def _ratios(snr: np.ndarray) -> str:
+    """Signal-to-noise ratios (frame,) in dB in a few words."""
+    some = snr[np.isfinite(snr)]
+    return f", snr {some.min():.0f} to {some.max():.0f} dB (median {np.median(some):.0f})"
 
 
 def _ghosts(tree: xr.DataTree, frames: np.ndarray, names: list[str]) -> list[str]:

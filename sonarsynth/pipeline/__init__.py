@@ -9,7 +9,7 @@ The three are the tasks that the scheduler runs; what nobody asked for is not co
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,9 +20,10 @@ from sonarsynth.pipeline.echo_image import image_of, image_without_clock
 from sonarsynth.pipeline.frame_chorus import clear_values, frame_chorus, soundscape_values, with_chorus
 from sonarsynth.pipeline.frame_reverberation import frame_reverberation, with_reverberation
 from sonarsynth.pipeline.labelled_estimates import emission_values, estimate_truth, heard_directly
-from sonarsynth.pipeline.labelling import band_of, expansion_error, frame_values, point_labels
+from sonarsynth.pipeline.labelling import band_of, expansion_error, frame_values, isolated_levels, point_labels
 from sonarsynth.pipeline.padded_axes import in_slots, which_values
 from sonarsynth.pipeline.requested_rays import follow_rays
+from sonarsynth.pipeline.signal_to_noise import SoundParts, snr_values
 from sonarsynth.pipeline.stage_times import STAGES, mark_stage, stage_timer
 from sonarsynth.pipeline.stored_values import (
     Values,
@@ -31,12 +32,11 @@ from sonarsynth.pipeline.stored_values import (
     echo_values,
     image_values,
     link_budget_values,
-    of_isolated,
     signal_values,
     source_estimate_values,
     truth_values,
 )
-from sonarsynth.pipeline.synthesis import digitise, frame_signals, known_elements, known_signals
+from sonarsynth.pipeline.synthesis import Hearing, digitise, frame_signals, known_elements, known_signals, told_nothing
 from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, variables
 from sonarsynth.planning import OF_BEAMS, Plan, check_unsampled_frame, context_of, plan, receiver_of, survey_of
 from sonarsynth.planning.notes.source_notes import locator
@@ -59,7 +59,6 @@ from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.chorus.chorus_arrivals import ChorusArrivals
 from sonarsynth.signals.filtered_pulse import snap_levels
-from sonarsynth.signals.isolated_paths import measured_levels
 from sonarsynth.tracing.arrivals import trace
 from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals
 
@@ -115,6 +114,7 @@ class BeamformedFrame:
     beams: BeamSpectra | None = None  # of the echo window of these
     isolated: Floats | None = None  # (snap, target + 1, family) dB: isolated paths of the link budget, in signals
     recorded: Signals | None = None  # as the converter gave them, where the sonar corrected them since
+    snr: Values = field(default_factory=dict)
 
 
 def truth_frame(plan: Plan, index: int) -> Values:
@@ -163,16 +163,18 @@ def trace_at(plan: Plan, frame: Frame) -> TracedFrame:
 def beamform_frame(plan: Plan, index: int, traced: TracedFrame) -> BeamformedFrame:
     """What the array hears: signals, where the snap is, and the energy image of the echo window."""
     plan = plan.at(index)
-    recorded = synthesise(plan, traced)
+    parts = SoundParts(plan)
+    recorded = synthesise(plan, traced, parts)
     mark_stage("synthesise")
     isolated = None
     if "signals" in plan.products:
-        isolated = measure_isolated(plan, traced)
+        isolated = isolated_levels(plan, traced.frame, traced.budget, traced.truth.snap_level)
         mark_stage("measure")
-    if not plan.products & OF_BEAMS:
-        return BeamformedFrame(recorded, None, None, isolated=isolated)
-    signals = known_signals(plan, traced.frame, recorded)
-    return replace(locate_and_image(plan, traced.frame, signals), isolated=isolated, recorded=recorded)
+    heard = BeamformedFrame(recorded, None, None)
+    if plan.products & OF_BEAMS:
+        heard = locate_and_image(plan, traced.frame, known_signals(plan, traced.frame, recorded))
+    snr = snr_values(plan, traced.frame, traced.arrivals, traced.truth, parts, heard.image)
+    return replace(heard, isolated=isolated, recorded=recorded, snr=snr)
 
 
 def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFrame:
@@ -201,21 +203,16 @@ def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFr
     return BeamformedFrame(signals, estimates, image, imaged, beams)
 
 
-def synthesise(plan: Plan, traced: TracedFrame) -> Signals:
+def synthesise(plan: Plan, traced: TracedFrame, hearing: Hearing = told_nothing) -> Signals:
     """Pressure at each hydrophone: echoes and direct snap, reverberation, chorus, ambient noise, converter."""
     plan = plan.at(traced.frame.index)
-    echoes = frame_signals(plan, traced.frame, traced.arrivals)
-    signals = with_reverberation(plan, traced.frame, echoes, traced.reverberation)
-    return digitise(plan, traced.frame, with_chorus(plan, traced.frame, signals, traced.chorus))
-
-
-def measure_isolated(plan: Plan, traced: TracedFrame) -> Floats:
-    """Levels (snap, target + 1, family) in dB of the isolated paths of the link budget, measured in signals of each."""
-    plan = plan.at(traced.frame.index)
-    scene, budget = plan.scene, traced.budget
-    method, snaps = plan.choices.synthesis, traced.frame.moment.snaps
-    measured = measured_levels(method, budget.isolated, snaps, scene.sonar, plan.absorption)
-    return of_isolated(budget, traced.truth.snap_level[budget.isolated.snap] + measured)
+    signals = frame_signals(plan, traced.frame, traced.arrivals)
+    hearing("paths", signals)
+    signals = with_reverberation(plan, traced.frame, signals, traced.reverberation)
+    hearing("reverberation", signals)
+    signals = with_chorus(plan, traced.frame, signals, traced.chorus)
+    hearing("chorus", signals)
+    return digitise(plan, traced.frame, signals, hearing)
 
 
 def range_frame(plan: Plan, index: int, traced: TracedFrame, heard: BeamformedFrame) -> Values:
@@ -233,7 +230,7 @@ def _heard_values(plan: Plan, traced: TracedFrame, heard: BeamformedFrame) -> Va
     values |= link_budget_values(traced.budget, heard.isolated) | soundscape_values(plan, frame, traced.chorus)
     direct = heard_directly(plan, traced.arrivals, frame.moment.snaps)
     values |= clear_values(plan, traced.chorus, traced.echoes, direct, frame.moment.snaps)
-    values |= estimate_truth(direct, len(frame.moment.snaps))
+    values |= estimate_truth(direct, len(frame.moment.snaps)) | heard.snr
     if "signals" in plan.products:
         counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
         values |= signal_values(heard.recorded or heard.signals, counts)

@@ -6,14 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from sonarsynth.conventions import Floats
 from sonarsynth.labels import SLICES, Band, Listening, label_points
-from sonarsynth.pipeline.stored_values import Values, sensor_values, table
+from sonarsynth.pipeline.stored_values import Values, of_isolated, sensor_values, table
 from sonarsynth.pipeline.synthesis import errors_of, known_elements
 from sonarsynth.planning import Plan
-from sonarsynth.products import Arrivals, PointCloud, PointLabels, SourceEstimates
+from sonarsynth.products import Arrivals, LinkBudget, PointCloud, PointLabels, SourceEstimates
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.direct_sum import relative_absorption
-from sonarsynth.signals.isolated_paths import energy_in_slices
+from sonarsynth.signals.isolated_paths import energy_in_slices, measured_levels
 from sonarsynth.state import Emission
 
 
@@ -34,6 +35,13 @@ def band_of(plan: Plan, snaps: tuple[Emission, ...]) -> Band:
     energy = np.array([energy_in_slices(snap.waveform, sonar, SLICES) for snap in snaps]).reshape(-1, SLICES)
     band = Band(sonar.band.low, sonar.band.high, energy, np.zeros(SLICES))
     return replace(band, relative=relative_absorption(plan.absorption, band.frequency, sonar.band.centre))
+
+
+def isolated_levels(plan: Plan, frame: Frame, budget: LinkBudget, snap_level: Floats) -> Floats:
+    """Levels (snap, target + 1, family) in dB of the isolated paths of the link budget, measured in signals of each."""
+    method, sonar = plan.choices.synthesis, plan.scene.sonar
+    measured = measured_levels(method, budget.isolated, frame.moment.snaps, sonar, plan.absorption)
+    return of_isolated(budget, snap_level[budget.isolated.snap] + measured)
 
 
 def point_labels(

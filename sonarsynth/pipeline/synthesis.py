@@ -3,6 +3,7 @@ what the sonar makes of that: noise, errors of sensors and channels, converter."
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache, partial
 
@@ -37,7 +38,7 @@ def frame_signals(plan: Plan, frame: Frame, arrivals: Arrivals) -> Signals:
     """
     start, samples, sensors = frame_start(plan, frame), plan.windows.samples, true_elements(plan, frame)
     if plan.choices.subarrays == 1:
-        return _signals(plan, frame, arrivals, sensors)
+        return array_signals(plan, frame, arrivals, sensors)
     pressure, outside = np.zeros((sensors.count, samples), np.float32), 0
     for part in subarrays(sensors, plan.choices.subarrays):
         heard = subarray_signals(plan, frame, part)
@@ -47,11 +48,11 @@ def frame_signals(plan: Plan, frame: Frame, arrivals: Arrivals) -> Signals:
 
 def subarray_signals(plan: Plan, frame: Frame, part: Subarray) -> Signals:
     """What a part of the array hears, of paths that are traced to it."""
-    return _signals(plan, frame, arrivals_of(plan, frame, part), part.elements)
+    return array_signals(plan, frame, arrivals_of(plan, frame, part), part.elements)
 
 
-def _signals(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements) -> Signals:
-    """What hydrophones hear of arrivals; what comes from behind, through the baffle."""
+def array_signals(plan: Plan, frame: Frame, arrivals: Arrivals, sensors: Elements) -> Signals:
+    """What hydrophones hear of arrivals, expanded over all of them; what comes from behind, through the baffle."""
     method, sonar, snaps = plan.choices.synthesis, plan.scene.sonar, frame.moment.snaps
     start = frame_start(plan, frame)
     return method.signals(_behind(arrivals, sonar), snaps, sensors, sonar, plan.absorption, start, plan.windows.samples)
@@ -76,7 +77,15 @@ def _moved(elements: Elements, drawn: DrawnErrors) -> Elements:
     return replace(elements, position=elements.position + drawn.position * [0.0, 1.0, 1.0])
 
 
-def digitise(plan: Plan, frame: Frame, signals: Signals) -> Signals:
+Hearing = Callable[[str, Signals], object]
+"""Is told what there is of the sound of a frame after each part of it, by name."""
+
+
+def told_nothing(part: str, signals: Signals) -> None:
+    """A `Hearing` that keeps nothing."""
+
+
+def digitise(plan: Plan, frame: Frame, signals: Signals, hearing: Hearing = told_nothing) -> Signals:
     """Signals as the sonar has them: ambient noise, errors of the channels, electronics, converter; `plan` is that of
     the sequence. Each part has a stream of its own."""
     mark_stage("synthesise")
@@ -90,7 +99,8 @@ def digitise(plan: Plan, frame: Frame, signals: Signals) -> Signals:
     for number, source in enumerate(plan.scene.world.noise_sources):
         signals = _with_noise_source(plan, frame, signals, source, number)
         mark_stage(f"noise of {source.name}")
-    signals = _through_channels(plan, frame, signals, sound_speed)
+    hearing("noise", signals)
+    signals = _through_channels(plan, frame, signals, sound_speed, hearing)
     return signals if sonar.converter is None else convert(signals, sonar.converter)
 
 
@@ -121,7 +131,7 @@ def _behind(arrivals: Arrivals, sonar: Sonar) -> Arrivals:
     return replace(arrivals, amplitude=arrivals.amplitude * left)
 
 
-def _through_channels(plan: Plan, frame: Frame, signals: Signals, sound_speed: float) -> Signals:
+def _through_channels(plan: Plan, frame: Frame, signals: Signals, sound_speed: float, hearing: Hearing) -> Signals:
     """Signals after what is wrong with the channels, and with the noise of the electronics."""
     sonar, drawn = plan.scene.sonar, errors_of(plan, frame)
     errors, louder = sonar.sensor_errors, np.ones(plan.elements.count)
@@ -131,10 +141,12 @@ def _through_channels(plan: Plan, frame: Frame, signals: Signals, sound_speed: f
             signals = channel_errors.talk(signals, plan.elements, errors.cross_talk)
         louder[drawn.state == SensorState.NOISY] = 10.0 ** (errors.noisy_by / 20.0)
         mark_stage(SENSORS)
+    hearing("channels", signals)
     if sonar.electronics is not None:
         random = stream(frame.seed, "electronics", frame.key, frame.step)
         own = replace(plan.elements, gain=np.where(plan.elements.gain == 0.0, 0.0, louder))
         signals = add_noise(signals, ElectronicNoise(sonar.electronics), sonar, own, random)
+        hearing("electronics", signals)
         mark_stage(ELECTRONICS)
     if errors is not None and drawn is not None:
         if errors.jitter or errors.clock_rate:

@@ -14,7 +14,7 @@ import numpy as np
 
 from sonarsynth.description.method import FrameSize
 from sonarsynth.planning.choices import OF_BEAMS
-from sonarsynth.planning.noise_rows import noise_rows
+from sonarsynth.planning.noise_rows import SIGNAL_TO_NOISE, noise_rows, sound_parts
 from sonarsynth.planning.plan_tables import Stage
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.reverberation_rows import reverberation_rows
@@ -205,10 +205,21 @@ def _trace_rows(plan: Plan, size: FrameSize) -> list[Row]:
 def _signal_rows(plan: Plan, size: FrameSize) -> list[Row]:
     """Signals, where any product needs them, and paths measured in signals of their own."""
     rows = [_synthesis(plan, size), *reverberation_rows(plan), *noise_rows(plan, size)] if plan.products else []
+    if plan.products and (parts := sound_parts(plan.scene)):
+        rows.append(_signal_to_noise(plan, size, len(parts)))
     if "signals" in plan.products:
         seconds = max(size.emissions, 1) * (plan.sizes["target"] + 1) * SECONDS["measure path"]
         rows.append(("measure", "loudest path of each kind alone", "verify compares levels", "none", seconds, 0))
     return rows
+
+
+def _signal_to_noise(plan: Plan, size: FrameSize, parts: int) -> Row:
+    """The parts of the sound in the beams of targets, and the echoes of each of several targets alone."""
+    targets, gate = plan.sizes["target"], plan.windows.echo_stop - plan.windows.echo_start
+    seen = size.sensors * gate * plan.scene.sonar.sampling_frequency * SECONDS["transform sensor sample"]
+    seconds = (parts + max(targets, 1)) * seen + (parts + 1) * targets * 30 * size.bins * SECONDS["steer beam bin"]
+    seconds += plan.choices.synthesis.cost(size) if targets > 1 else 0.0
+    return (SIGNAL_TO_NOISE, "each part in the beams of each target", "always", "64 beams of a target", seconds, 0)
 
 
 def _sonar_rows(plan: Plan, size: FrameSize) -> list[Row]:

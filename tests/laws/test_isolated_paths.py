@@ -10,7 +10,8 @@ import xarray as xr
 
 from sonarsynth.evaluation import link_budget_adds_up, link_budget_measured
 from sonarsynth.labels import family
-from sonarsynth.pipeline import TracedFrame, beamform_frame, measure_isolated, range_frame, trace_frame
+from sonarsynth.pipeline import TracedFrame, beamform_frame, range_frame, trace_frame
+from sonarsynth.pipeline.labelling import isolated_levels
 from sonarsynth.planning import Choices, plan
 from sonarsynth.scattering import Kirchhoff
 from sonarsynth.signals import DirectSum, GriddedSynthesis
@@ -117,7 +118,7 @@ def test_a_missing_level_is_a_fault_where_signals_are_stored() -> None:
     assert link_budget_measured(tree, np.array([0])).ok
     assert np.isfinite(tree["link_budget/isolated_level"].values).sum() == 2
     tree["link_budget/measured_level"].values[:] = np.where(
-        np.arange(2)[:, None] > 0, measure_isolated(made, traced), np.nan
+        np.arange(2)[:, None] > 0, isolated_levels(made, traced.frame, traced.budget, traced.truth.snap_level), np.nan
     )
     assert link_budget_measured(tree, np.array([0])).ok is False
     tree.attrs["products"] = ["signals"]

@@ -28,6 +28,7 @@ needs_real_input = pytest.mark.skipif(not REAL.is_dir(), reason="the real cast a
 
 FRAMES = {
     "remus.yaml": range(0, 64, 9),
+    "reef.yaml": (10, 32, 50),
     "thermocline.yaml": (0, 9, 36, 63),
     "grid.yaml": (0, 5, 72, 77, 138, 143),  # ends of the first sequence, of one between, and of the last
     "harbour.yaml": (0, 8),

@@ -43,7 +43,11 @@ def test_the_truth_is_what_the_store_says(store: Path) -> None:
     bow = np.deg2rad(targets["yaw"].values[:, 0])  # level, as the sonar is: the angle to the direction of the sonar
     expected = np.arccos(-np.cos(elevation) * np.cos(bow - azimuth))
     np.testing.assert_allclose(np.deg2rad(found.aspect), expected, atol=1e-6)
+    np.testing.assert_array_equal(found.snr, targets["snr"].values[:, 0])
+    assert found.snr.min() > 3.0
     energy = tree["image/energy"].isel(frame=BUILT).values
+    tree["truth/targets"] = tree["truth/targets"].dataset.drop_vars("snr")  # of a store from before it was stored
+    found = true_objects(tree, np.array(BUILT))
     assert (found.snr <= 10 * np.log10(energy.max(axis=(1, 2)) / np.median(energy, axis=(1, 2))) + 1e-4).all()
     assert found.snr.min() > 3.0
 

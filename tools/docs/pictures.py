@@ -25,6 +25,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FRAMES = {
     "boat": 1,
     "remus": 40,
+    "reef": 40,
     "thermocline": 40,
     "crowd": 0,
     "deep": 8,

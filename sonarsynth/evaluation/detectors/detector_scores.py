@@ -37,7 +37,7 @@ FALSE_ALARMS: Final = (0.01, 0.1, 0.3, 1.0, 3.0)
 EDGES: Final = {
     "range": ("m", (0.0, 5.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0, np.inf)),
     "aspect": ("degree", (0.0, 30.0, 60.0, 120.0, 150.0, 180.0)),
-    "snr": ("dB", (-np.inf, 3.0, 6.0, 10.0, 15.0, 20.0, np.inf)),
+    "snr": ("dB", (-np.inf, -10.0, -5.0, 0.0, 5.0, 10.0, 15.0, 20.0, np.inf)),
     "visible": ("1", (0.0, 0.25, 0.5, 0.75, 1.0)),
 }
 """Limits of the conditions that objects are sorted by."""

@@ -34,7 +34,7 @@ class TrueObjects:
     | `range` | (row,) | m | of `box_centre` from the array centre |
     | `aspect` | (row,) | degree | from the bow to the direction of the sonar: 0 bow, 90 beam, 180 stern |
     | `visible` | (row,) | 1 | `visible_fraction` |
-    | `snr` | (row,) | dB | the brightest beam in the box over the median beam of the image; NaN without image |
+    | `snr` | (row,) | dB | of `/truth/targets`; in a store without, brightest beam in the box over the median |
     """
 
     frame: Ints
@@ -85,12 +85,14 @@ def _some(tree: xr.DataTree, frames: np.ndarray) -> dict[str, np.ndarray]:
         "range": away,
         "aspect": np.rad2deg(np.arccos(np.clip(to_sonar, -1.0, 1.0))),
         "visible": of["visible_fraction"],
-        "snr": _snr(tree, frames, row, of["pixel_box"]),
+        "snr": np.asarray(targets["snr"].values)[row, slot]
+        if "snr" in targets
+        else _over_median(tree, frames, row, of["pixel_box"]),
     }
 
 
-def _snr(tree: xr.DataTree, frames: np.ndarray, row: Ints, box: Floats) -> Floats:
-    """dB of the brightest beam in each box over the median of its image."""
+def _over_median(tree: xr.DataTree, frames: np.ndarray, row: Ints, box: Floats) -> Floats:
+    """dB of the brightest beam in each box over the median of its image; NaN without an image."""
     found = np.full(len(row), np.nan)
     if "image" not in tree.children or not len(row):
         return found

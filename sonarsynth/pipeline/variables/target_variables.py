@@ -197,3 +197,33 @@ TARGETS = group_of(
     ),
 )
 """Poses, boxes, and what the array sees and hears of each target."""
+_PARTS = {
+    "chorus": "snaps of the chorus",
+    "reverberation": "what bottom, surface and water scatter",
+    "noise": "ambient noise, and sources of noise",
+    "electronics": "noise of the electronics",
+}
+_BROUGHT = comment(
+    "10 lg of the energy in the window of the image, re 1 uPa2 s, summed over the beams that /truth/beams gives the "
+    "target (the nearest one where it is between beams) by delay and sum, each part by itself, without errors of "
+    "sensors and converter; -inf: nothing; NaN: no beam points at the target, or the array hears no such window"
+)
+SIGNAL_TO_NOISE = group_of(
+    "/truth/targets",
+    "snr",
+    row(
+        "snr",
+        TARGET,
+        "float64",
+        "dB",
+        "energy of the target's echoes in its beams over that of chorus, reverberation, noise and electronics there",
+        attributes=comment("echoes of other targets and the direct pulse are left out; inf: nothing else is heard"),
+    ),
+    row("echo_energy", TARGET, "float64", "dB", "energy in the target's beams of its echoes", attributes=_BROUGHT),
+    *(
+        row(f"{name}_energy", TARGET, "float64", "dB", f"energy in the target's beams of {what}",
+            attributes=_BROUGHT, product=f"snr {name}")
+        for name, what in _PARTS.items()
+    ),
+)  # fmt: skip
+"""What the array hears of each target, and what else in its beams, where a scene has anything else."""

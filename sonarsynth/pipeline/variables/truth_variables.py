@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sonarsynth.pipeline.variables.target_variables import INSTANT, TARGETS
+from sonarsynth.pipeline.variables.target_variables import INSTANT, SIGNAL_TO_NOISE, TARGETS
 from sonarsynth.pipeline.variables.variable import (
     BEAMS,
     CELL,
@@ -127,7 +127,7 @@ SOUNDSCAPE = group_of(
     ),
 )
 """Of the chorus, where a scene has one."""
-TRUTH = (*_SONAR, *TARGETS, *_EMISSIONS, *_BEAMS)
+TRUTH = (*_SONAR, *TARGETS, *SIGNAL_TO_NOISE, *_EMISSIONS, *_BEAMS)
 """True poses, emissions and beams."""
 HOW_LEVELS_ADD_UP = (
     "received = source - transmission_loss_out + scattering - transmission_loss_in - absorption - boundary. Ratios of "

@@ -1,0 +1,115 @@
+"""The signal-to-noise ratio of a target: each part of the sound made alone, and its beams summed by brute force."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sonarsynth import render
+from sonarsynth.conventions import direction
+from sonarsynth.environment.noise import FlatNoise
+from sonarsynth.environment.reverberation import Reverberation
+from sonarsynth.environment.sea import Environment, Isovelocity
+from sonarsynth.geometry.motion import Still
+from sonarsynth.imaging import FocusedDelayAndSum
+from sonarsynth.imaging.image_window import snapshots_of
+from sonarsynth.pipeline import synthesise, trace_frame
+from sonarsynth.planning import plan
+from sonarsynth.receiver import Band, BandPass, BeamGrid, PlanarLattice, Sonar
+from sonarsynth.receiver.sensor_errors import Electronics
+from sonarsynth.recipe import Recipe
+from sonarsynth.recipe.scene import EchoWindow, Physics, Processing, Scene, Trajectory, World
+from sonarsynth.scattering import Isotropic
+from sonarsynth.sources.chorus import Chorus
+from sonarsynth.sources.shrimp import SnappingShrimp
+from sonarsynth.targets.shapes import Sphere
+from sonarsynth.targets.target import Target
+
+SPEED = 1500.0
+PARTS = ("chorus", "reverberation", "noise", "electronics")
+
+
+def recipe(targets: tuple[str, ...] = ("left", "right"), parts: tuple[str, ...] = PARTS) -> Recipe:
+    """Two balls 12 m ahead, apart from each other, and what is asked for of the sounds that they are heard against."""
+    places = {"left": (12.0, 2.5, -5.0), "right": (12.0, -2.5, -5.0)}
+    bodies = tuple(
+        Target(name=name, shape=Sphere(radius=0.6, edge=0.1), motion=Still(position=places[name])) for name in targets
+    )
+    environment = Environment(depth=10.0, sound_speed=Isovelocity(speed=SPEED))
+    if "noise" in parts:
+        environment = replace(environment, noise=FlatNoise(level=50.0))
+    world = World(
+        environment=environment,
+        targets=bodies,
+        sources=(SnappingShrimp(position=(6.0, 1.0)),),
+        chorus=Chorus(density=0.02) if "chorus" in parts else None,
+        reverberation=Reverberation() if "reverberation" in parts else None,
+    )
+    sonar = Sonar(
+        array=PlanarLattice(columns=12, rows=8, pitch=0.02),
+        band=Band(low=25e3, high=85e3),
+        filter=BandPass(low=25e3, high=85e3),
+        beams=BeamGrid(azimuth_span=np.deg2rad(40), azimuths=41, elevation_span=np.deg2rad(20), elevations=21),
+        electronics=Electronics(level=45.0) if "electronics" in parts else None,
+        assumed_sound_speed=SPEED,
+    )
+    return Recipe(
+        seed=4,
+        scene=Scene(
+            world=world,
+            sonar=sonar,
+            trajectory=Trajectory(frames=1, sonar=Still(position=(0.0, 0.0, -5.0), heading=0.5 * np.pi)),
+            physics=Physics(scattering=Isotropic(strength=1e-2)),
+            processing=Processing(
+                beamforming=FocusedDelayAndSum(focus=None), echo_window=EchoWindow(start=8e-3, stop=13e-3)
+            ),
+        ),
+    )
+
+
+def brute(made: Recipe, silent: Recipe | None, window: tuple[float, float], towards: np.ndarray) -> float:
+    """Energy (Pa2 s) of the pressure of a recipe, less that of another, summed over beams: every sensor in every beam,
+    every bin, in double precision."""
+    sound = plan(made, ("signals",))
+    signals = synthesise(sound, trace_frame(sound, 0))
+    if silent is not None:
+        quiet = plan(silent, ("signals",))
+        without = synthesise(quiet, trace_frame(quiet, 0))
+        assert without.start == signals.start
+        signals = replace(signals, pressure=signals.pressure - without.pressure)
+    seen = snapshots_of(signals, made.scene.sonar, *window)
+    late = -(towards @ sound.elements.position.T) / SPEED  # (beam, sensor): heard before the centre is
+    total = 0.0
+    for n, f in enumerate(seen.frequency):
+        beams = np.exp(2j * np.pi * f * late) @ seen.spectra[:, n].astype(complex) / late.shape[1]
+        total += float(np.sum(np.abs(beams) ** 2))
+    return total * 2.0 * seen.spacing / seen.sampling_frequency**2
+
+
+@pytest.mark.long
+def test_parts_are_those_of_each_sound_alone_in_the_beams_of_the_target() -> None:
+    frame = render(plan(recipe(), ("image", "signals")), 0)
+    truth, image = frame["truth/targets"].dataset, frame["image"].dataset
+    window = float(image.start), float(image.stop)
+    grid = direction(*np.deg2rad(np.meshgrid(image.azimuth, image.elevation)))
+    for n, name in enumerate(("left", "right")):
+        mine = np.asarray(frame["truth/beams/target"]) == n
+        assert 4 < mine.sum() <= 64
+        alone = brute(recipe((name,), ()), None, window, grid[mine])
+        rest = [brute(recipe(parts=(part,)), recipe(parts=()), window, grid[mine]) for part in PARTS]
+        for part, known in zip(("echo", *PARTS), (alone, *rest), strict=True):
+            got = float(truth[f"{part}_energy"][n])
+            assert got == pytest.approx(10.0 * np.log10(known) + 120.0, abs=0.1), (name, part)
+        assert float(truth["snr"][n]) == pytest.approx(10.0 * np.log10(alone / sum(rest)), abs=0.1)
+
+
+def test_without_anything_else_there_is_no_ratio_and_out_of_view_it_is_missing() -> None:
+    silent = render(plan(recipe(("left",), ()), ("image",)), 0)
+    assert not [name for name in silent["truth/targets"].dataset if str(name) == "snr" or str(name).endswith("_energy")]
+    behind = recipe(("left",), ("electronics",))
+    body = replace(behind.scene.world.targets[0], motion=Still(position=(5.0, 9.0, -5.0)))
+    world = replace(behind.scene.world, targets=(body,))
+    truth = render(plan(replace(behind, scene=replace(behind.scene, world=world)), ("image",)), 0)["truth/targets"]
+    assert np.isnan(truth["snr"]).all() and np.isnan(truth["electronics_energy"]).all()
