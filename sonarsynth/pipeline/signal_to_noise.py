@@ -27,6 +27,8 @@ from sonarsynth.recipe.scene import Frame
 
 MOST: Final = 64
 """Beams of a target that are looked at, spread evenly over all of its beams."""
+SILENCE: Final = 1e-32
+"""Pa2 s, -200 dB: what stands for nothing at all, so that every ratio is a number."""
 PATHS: Final = "paths"
 """The part of all paths of the snaps that light."""
 Part = npt.NDArray[np.float32] | None  # (sensor, sample) Pa; None: silence
@@ -82,10 +84,9 @@ def snr_values(
                 energy[name][n] = weight * look.energy(parts.pressure[name], beams[n])
             if scattered is not None:
                 energy["reverberation"][n] += weight * look.energy(scattered, beams[n])
-    rest = np.sum([energy[name] for name in parts.names], axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        level = {f"{name}_energy": 10.0 * np.log10(value) + 120.0 for name, value in energy.items()}
-        snr = 10.0 * (np.log10(energy["echo"]) - np.log10(rest))
+    heard = {name: np.maximum(value, SILENCE) for name, value in energy.items()}
+    level = {f"{name}_energy": 10.0 * np.log10(value) + 120.0 for name, value in heard.items()}
+    snr = 10.0 * np.log10(heard["echo"] / np.sum([heard[name] for name in parts.names], axis=0))
     mark_stage(SIGNAL_TO_NOISE)
     return table("/truth/targets", **level, snr=snr)
 

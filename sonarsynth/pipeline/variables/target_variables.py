@@ -206,7 +206,7 @@ _PARTS = {
 _BROUGHT = comment(
     "10 lg of the energy in the window of the image, re 1 uPa2 s, summed over the beams that /truth/beams gives the "
     "target (the nearest one where it is between beams) by delay and sum, each part by itself, without errors of "
-    "sensors and converter; -inf: nothing; NaN: no beam points at the target, or the array hears no such window"
+    "sensors and converter; -200 dB stands for silence; NaN: no beam points at the target, or nothing is recorded then"
 )
 SIGNAL_TO_NOISE = group_of(
     "/truth/targets",
@@ -217,7 +217,7 @@ SIGNAL_TO_NOISE = group_of(
         "float64",
         "dB",
         "energy of the target's echoes in its beams over that of chorus, reverberation, noise and electronics there",
-        attributes=comment("echoes of other targets and the direct pulse are left out; inf: nothing else is heard"),
+        attributes=comment("echoes of other targets and the direct pulse are left out; silence counts as -200 dB"),
     ),
     row("echo_energy", TARGET, "float64", "dB", "energy in the target's beams of its echoes", attributes=_BROUGHT),
     *(
