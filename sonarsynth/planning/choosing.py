@@ -45,6 +45,8 @@ LARGE_MESH_FACETS = 1_000_000
 """Facets over which errors are measured in one frame only, at half as many hydrophones."""
 WORTHWHILE_GAIN = 0.7
 """Of an error, that must be left for each hydrophone's own view, or the fifth degree, to be taken for it."""
+LESS_FAINT = (0.1,)
+"""Shares of the faint echoes left out that are left out, where those are what errs: before the array is cut."""
 DEGREE_TOLERANCE = 0.03
 """Error of the synthesis that measures, over what is allowed."""
 
@@ -96,7 +98,14 @@ def _choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
     steering, blurred = beamformer(made, indices) if imaged else (choices.beamforming, 0.0)
     return replace(
         made,
-        choices=replace(choices, subarrays=cut.parts, degree=cut.degree, occlusion=cut.occlusion, beamforming=steering),
+        choices=replace(
+            choices,
+            subarrays=cut.parts,
+            degree=cut.degree,
+            occlusion=cut.occlusion,
+            beamforming=steering,
+            negligible=cut.faint * choices.negligible,
+        ),
         errors=Errors(cut.error, cut.whole, by_synthesis, by_rays, blurred),
     )
 
@@ -130,11 +139,12 @@ class _ArrayModel(NamedTuple):
     degree: Degree  # of polynomials over each part
     error: float  # of signals
     whole: float = np.nan  # the same, where the array is not cut and its middle sees for all
+    faint: float = 1.0  # share of the echoes left out that is left out
 
 
 def _subarrays(plan: Plan, indices: Sequence[int]) -> _ArrayModel:
     """The fewest parts of the array that will do; where one will not, each hydrophone's own view of the targets is
-    tried first, and then polynomials of the fifth degree."""
+    tried first, then polynomials of the fifth degree, then fainter echoes."""
     physics, count = plan.scene.physics, plan.elements.count
     seeing: OcclusionPoint = "centre" if physics.occlusion == "auto" else physics.occlusion
     if physics.subarrays == "sensors" or (physics.subarrays == "auto" and plan.recipe.accuracy.exact):
@@ -160,20 +170,28 @@ def _subarrays(plan: Plan, indices: Sequence[int]) -> _ArrayModel:
         return _ArrayModel(1, seeing, degree, error, whole)
     # Cubics err by the fourth power of the width of parts, the square of their number: no fewer will do.
     fewest = max(int(np.log2(error / allowed) / (0.5 * (degree + 1))), 1)
-    for parts in [2**n for n in range(int(np.ceil(np.log2(count))))][fewest:]:
-        error = _worst(measures, parts, seeing, degree, allowed)
+    faint_shares = LESS_FAINT if physics.dynamic_range == "auto" else ()
+    tried = [(1, faint) for faint in faint_shares]
+    tried += [(2**n, f) for n in range(fewest, int(np.ceil(np.log2(count)))) for f in (1.0, *faint_shares)]
+    for parts, faint in tried:
+        error = _worst(measures, parts, seeing, degree, allowed, faint)
         if error <= allowed:
-            return _ArrayModel(parts, seeing, degree, error, whole)
+            return _ArrayModel(parts, seeing, degree, error, whole, faint)
     return _ArrayModel(count, "centre", 3, 0.0, whole)
 
 
 def _worst(
-    measures: Sequence[PerSensorReference], parts: int, occlusion: OcclusionPoint, degree: Degree, allowed: float
+    measures: Sequence[PerSensorReference],
+    parts: int,
+    occlusion: OcclusionPoint,
+    degree: Degree,
+    allowed: float,
+    faint: float = 1.0,
 ) -> float:
     """Largest error of signals in some frames, or the first that is more than is allowed."""
     worst = 0.0
     for measure in measures:
-        worst = max(worst, measure.error(parts, occlusion, degree))
+        worst = max(worst, measure.error(parts, occlusion, degree, faint))
         if worst > allowed:
             break
     return worst
@@ -203,9 +221,12 @@ class PerSensorReference:
             plan, frame, sensor, (np.vstack([r[0] for r in rows]), np.vstack([r[1] for r in rows]))
         )
 
-    def error(self, parts: int, occlusion: OcclusionPoint = "centre", degree: Degree = 3) -> float:
-        """Error of signals, relative, where the array is cut into so many parts: of echoes or direct arrivals."""
-        choices = replace(self.plan.choices, subarrays=parts, degree=degree, occlusion=occlusion)
+    def error(self, parts: int, occlusion: OcclusionPoint = "centre", degree: Degree = 3, faint: float = 1.0) -> float:
+        """Error of signals, relative, where the array is cut into so many parts, and `faint` of the echoes left out is
+        left out: of echoes or direct arrivals."""
+        chosen = self.plan.choices
+        negligible = faint * chosen.negligible
+        choices = replace(chosen, subarrays=parts, degree=degree, occlusion=occlusion, negligible=negligible)
         plan = replace(self.plan, choices=choices)
         found = tuple(np.zeros_like(x) for x in self.exact)
         for part in subarrays(self.plan.elements, parts):

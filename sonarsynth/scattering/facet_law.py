@@ -38,6 +38,12 @@ class FacetLaw:
         return None
 
     @property
+    def longest_facet(self) -> float | None:
+        """Longest facet (m) that may echo from its middle, of a law whose powers add by area: shapes that leave their
+        edge out are cut so far. None: the number of facets counts, or facets add with their phases."""
+        return None
+
+    @property
     def passes_sound(self) -> bool:
         """Whether bodies let sound pass and send a wave of their own that cancels it behind them, by diffraction."""
         return False

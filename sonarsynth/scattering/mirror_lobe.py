@@ -56,6 +56,11 @@ class MirrorLobe(FacetLaw):
             )
         return value
 
+    @property
+    def longest_facet(self) -> float | None:
+        """As `FacetLaw.longest_facet`."""
+        return COARSE if self.phases == "random" else None
+
     def too_small(self, body: Scatterer) -> str | None:
         """As `FacetLaw.too_small`: of a sphere it is that of geometry at every frequency."""
         return size_note(body, geometric)

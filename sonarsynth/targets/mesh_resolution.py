@@ -22,6 +22,8 @@ ROWS: Final = 0.55
 seen along an axis of symmetry, a sphere of 0.5 m so meshed is 0.6 dB off at 90 kHz, though each facet is fine."""
 MOST_FACETS: Final = 2_000_000
 """No shape is refined beyond; what is missing then is reported."""
+MOST_CUT: Final = 100_000
+"""Facets that a shape is cut into, where nobody says how far: a frame then takes a second or two."""
 ERROR: Final = 0.02
 """Expected error that shapes are refined to: rigid spheres of 0.25 m are then within 0.2 dB, of 0.5 m within 0.1 dB."""
 SHADOW: Final = 48
@@ -103,6 +105,32 @@ def frame_mesh(shape: Shape, wavelength: float, error: float = FIVE_PERCENT) -> 
     return _fine(shape, file_stamp(shape), wavelength, error, True)[0]
 
 
+def cut_mesh(shape: Shape, longest: float) -> Mesh:
+    """Mesh of a shape for facets that echo from their middles: where the shape leaves its edge out, facets are cut
+    until none is longer than `longest` (m), or until there are about `MOST_CUT`. Flat facets are cut in their planes.
+
+    Raises MeshError as `mesh_of`. What was cut is said in the mesh's notes.
+    """
+    return _cut(shape, file_stamp(shape), longest)
+
+
+@byte_bounded_cache(16)
+def _cut(shape: Shape, stamp: tuple[int, int] | None, longest: float) -> Mesh:
+    plain = mesh_of(shape)
+    was = longest_edge((plain.vertices, plain.faces))
+    if shape.edge is not None or was <= longest:
+        return plain
+    edge, _ = _limits(plain, shape, longest, np.inf, MOST_CUT)
+    if was <= edge:
+        return plain
+    mesh = refined_mesh(shape, edge)
+    said = (
+        f"{len(plain.faces)} facets up to {_said(was, 2)} long are cut into {len(mesh.faces)} up to {_said(edge, 2)}, "
+        "for each echoes from its middle: `shape.edge` says how far"
+    )
+    return replace(mesh, notes=(*mesh.notes, said))
+
+
 @byte_bounded_cache(16)
 def _fine(
     shape: Shape, stamp: tuple[int, int] | None, wavelength: float, error: float, in_frame: bool
@@ -145,8 +173,8 @@ def _refinable(shape: Shape) -> bool:
     return not (isinstance(shape, (Box, LShape)) or (isinstance(shape, Remus100) and shape.coarse))
 
 
-def _limits(mesh: Mesh, shape: Shape, edge: float, sagitta: float) -> tuple[float, float]:
-    """Longest edge and mean sagitta (m) for the mesh of a shape, so long that about `MOST_FACETS` serve.
+def _limits(mesh: Mesh, shape: Shape, edge: float, sagitta: float, most: int = MOST_FACETS) -> tuple[float, float]:
+    """Longest edge and mean sagitta (m) for the mesh of a shape, so long that about so many facets serve.
 
     Facets of the coarse mesh are cut in as many as their area asks, and as the distance of their plane from the curve
     asks, which falls with the square of the edge.
@@ -156,7 +184,7 @@ def _limits(mesh: Mesh, shape: Shape, edge: float, sagitta: float) -> tuple[floa
     halved = isinstance(shape, MeshFile) or (isinstance(shape, Remus100) and shape.coarse)
     by_length = mesh.area / ((HALVED_AREA if halved else FACET_AREA) * edge**2)
     needed = float(np.sum(np.maximum(1.0, np.maximum(by_length, bend(mesh).sagitta / sagitta))))
-    excess = max(1.0, needed / MOST_FACETS)
+    excess = max(1.0, needed / most)
     return edge * np.sqrt(excess), sagitta * excess
 
 

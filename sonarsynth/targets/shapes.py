@@ -53,7 +53,7 @@ class MeshFile(BodyShape):
     """Turn about x, first."""
     edge: Size | None = None
     """Subdivide facets until no edge is longer; unless smooth, they are cut in their planes, and the surface stays as
-    it is."""
+    it is. Left out: 10 cm where each facet echoes from its middle (`mirror_lobe`), else as the file has them."""
     smooth: bool = False
     """The file stands for a curved surface: facets that are too long are cut along curves through their corners, with
     smooth normals. For Kirchhoff scattering, too long is what the wavelength says."""
@@ -79,7 +79,7 @@ class Sphere(BodyShape):
     radius: Size
     """From its centre, which is the origin."""
     edge: Size | None = None
-    """Longest edge of a facet; left out: an eighth of the radius."""
+    """Longest edge of a facet; left out: an eighth of the radius, at most 10 cm where each echoes from its middle."""
 
 
 @description
@@ -92,7 +92,7 @@ class Cylinder(BodyShape):
     length: Size
     """Along x."""
     edge: Size | None = None
-    """Longest edge of a facet; left out: an eighth of the radius."""
+    """Longest edge of a facet; left out: an eighth of the radius, at most 10 cm where each echoes from its middle."""
 
 
 @description
@@ -103,7 +103,7 @@ class Box(BodyShape):
     size: tuple[Size, Size, Size]
     """Lengths along x, y and z."""
     edge: Size | None = None
-    """Longest edge of a facet; left out: two facets a face."""
+    """Longest edge of a facet; left out: two facets a face, cut to 10 cm where each echoes from its middle."""
 
 
 @description
@@ -123,7 +123,7 @@ class LShape(BodyShape):
     thickness: Size
     """Of both plates, behind and below the inner faces."""
     edge: Size | None = None
-    """Longest edge of a facet; left out: the fewest facets."""
+    """Longest edge of a facet; left out: the fewest facets, cut to 10 cm where each echoes from its middle."""
 
 
 @description
@@ -170,7 +170,7 @@ class Myring(BodyShape):
     tail_offset: NonNegativeMetres = 0.0
     """Length of the tail that is missing."""
     edge: Size | None = None
-    """Longest edge of a facet; left out: a sixteenth of the diameter."""
+    """Longest edge of a facet; left out: a sixteenth of the diameter, at most 10 cm where each echoes from its middle."""
 
     @field_validator("tail_angle")
     @classmethod

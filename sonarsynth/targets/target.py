@@ -12,7 +12,7 @@ from sonarsynth.description import description
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.motion import Motion
 from sonarsynth.scattering import Scattering
-from sonarsynth.targets.mesh_resolution import frame_mesh
+from sonarsynth.targets.mesh_resolution import cut_mesh, frame_mesh
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Shape
 
@@ -51,11 +51,15 @@ class Target:
 
     def base_mesh(self, law: Scattering, wavelength: float) -> Mesh:
         """The same before it is scaled."""
-        return base_mesh(self.shape, law, wavelength / (self.mesh_scale or self.scale))
+        return base_mesh(self.shape, law, wavelength, self.mesh_scale or self.scale)
 
 
-def base_mesh(shape: Shape, law: Scattering, wavelength: float) -> Mesh:
-    """The mesh that a shape is traced with: as described, or fine enough for a law that sums phases, at the shortest
-    wavelength (m) of the band. Raises MeshError as `mesh_of`."""
-    error = law.mesh_tolerance
-    return mesh_of(shape) if error is None else frame_mesh(shape, wavelength, error)
+def base_mesh(shape: Shape, law: Scattering, wavelength: float, scale: float = 1.0) -> Mesh:
+    """The mesh that a shape is traced with, before it is scaled: fine enough, at its scale, for a law that sums phases
+    at the shortest wavelength (m) of the band; else as described, and where the shape leaves its edge out, with facets
+    no longer than may echo from their middles. Raises MeshError as `mesh_of`."""
+    if law.mesh_tolerance is not None:
+        return frame_mesh(shape, wavelength / scale, law.mesh_tolerance)
+    if law.longest_facet is None:
+        return mesh_of(shape)
+    return cut_mesh(shape, law.longest_facet / scale)

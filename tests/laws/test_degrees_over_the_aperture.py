@@ -13,6 +13,7 @@ from sonarsynth.conventions import Floats
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
 from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.geometry import Pose, quaternion
+from sonarsynth.planning import choosing
 from sonarsynth.planning.choosing import PerSensorReference
 from sonarsynth.products import Arrivals
 from sonarsynth.propagation import Refracted
@@ -107,3 +108,16 @@ def test_choices_of_before_are_cubic() -> None:
     assert planning.choices_from(without).degree == 3
     with pytest.raises(ValueError, match="degree"):
         planning.choices_from(without | {"degree": 4})
+
+
+def test_fainter_echoes_are_kept_before_the_array_is_cut(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where what is left out as too faint is what errs, no number of subarrays would help."""
+
+    class Measured:
+        def error(self, parts: int, occlusion: str = "centre", degree: int = 3, faint: float = 1.0) -> float:
+            return float(np.hypot(7e-4 * np.sqrt(faint), 1e-4 / parts**2))
+
+    monkeypatch.setattr(PerSensorReference, "of", staticmethod(lambda plan, index: Measured()))
+    plan = planning.plan(reading.recipe_of(reading.read(TANK)), products=())
+    cut = choosing._subarrays(plan, [0])
+    assert (cut.parts, cut.faint) == (1, choosing.LESS_FAINT[0]) and cut.error < 3e-4

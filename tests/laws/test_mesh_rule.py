@@ -1,15 +1,17 @@
-"""The rule for how fine a mesh must be, against the exact Kirchhoff integral over a sphere."""
+"""How fine a mesh must be: by the exact Kirchhoff integral over a sphere, and for facets that echo from their middles."""
 
 import numpy as np
 import pytest
 
 from sonarsynth.equations.scattering.facet_size import kirchhoff_edge, kirchhoff_error
 from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.geometry.surfaces import split_long_edges
+from sonarsynth.geometry.surfaces import longest_edge, split_long_edges, volume
+from sonarsynth.scattering import Isotropic, MirrorLobe
 from sonarsynth.targets.generated.generation import sphere
-from sonarsynth.targets.mesh_resolution import expected_error
+from sonarsynth.targets.mesh_resolution import MOST_CUT, expected_error
 from sonarsynth.targets.meshes import mesh_of
-from sonarsynth.targets.shapes import Cylinder
+from sonarsynth.targets.shapes import Box, Cylinder
+from sonarsynth.targets.target import base_mesh
 
 
 def triangle_integral(corners: np.ndarray, w: np.ndarray) -> np.ndarray:
@@ -114,3 +116,27 @@ def side_of_a_cylinder(radius: float, length: float, turns: int, rows: int, stag
     mesh = Mesh(vertices, np.concatenate([first, second]).reshape(-1, 3).astype(np.int32))
     outward = np.einsum("fi,fi->f", mesh.normal, mesh.centroid * [0, 1, 1]) > 0
     return Mesh(vertices, np.where(outward[:, None], mesh.faces, mesh.faces[:, ::-1]))
+
+
+@pytest.mark.parametrize("scale", [1.0, 3.0])
+def test_coarse_shapes_are_cut_for_facets_that_echo_from_their_middles(scale):
+    """No edge is over 10 cm at the scale of the body; surface, volume and closedness are those of the shape."""
+    shape = Box(size=(2.0, 0.7, 0.4))
+    coarse, cut = mesh_of(shape), base_mesh(shape, MirrorLobe(), 0.02, scale)
+    assert longest_edge((cut.vertices, cut.faces)) * scale <= 0.1
+    assert cut.area.sum() == pytest.approx(coarse.area.sum(), rel=1e-12)
+    assert volume((cut.vertices, cut.faces)) == pytest.approx(2.0 * 0.7 * 0.4, rel=1e-12)
+    assert any("12 facets up to 2.1 m long are cut" in note for note in cut.notes)
+
+
+def test_meshes_stay_as_described_where_their_edge_is_given_or_the_number_of_facets_counts():
+    described = Box(size=(2.0, 0.7, 0.4), edge=0.5)
+    assert base_mesh(described, MirrorLobe(), 0.02).digest == mesh_of(described).digest
+    plain = Box(size=(2.0, 0.7, 0.4))
+    for law in (Isotropic(), MirrorLobe(phases="alike")):
+        assert len(base_mesh(plain, law, 0.02).faces) == 12
+
+
+def test_a_ship_is_cut_no_further_than_a_frame_can_bear():
+    ship = base_mesh(Box(size=(200.0, 30.0, 20.0)), MirrorLobe(), 0.02)
+    assert 0.3 * MOST_CUT < len(ship.faces) < 1.5 * MOST_CUT

@@ -69,7 +69,7 @@ def _of_model(scene: Scene, place: int, number: int) -> Mesh:
     model = population.models[number]
     law = model.scattering or scene.physics.scattering
     try:
-        return base_mesh(model.shape, law, scene.sonar.shortest_wavelength / model.scale[1])
+        return base_mesh(model.shape, law, scene.sonar.shortest_wavelength, model.scale[1])
     except (ValueError, OSError) as error:
         where = ("scene", "world", "populations", place, "models", number, "shape")
         raise FieldError(where, str(error)) from None
