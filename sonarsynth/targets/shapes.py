@@ -170,7 +170,7 @@ class Myring(BodyShape):
     tail_offset: NonNegativeMetres = 0.0
     """Length of the tail that is missing."""
     edge: Size | None = None
-    """Longest edge of a facet; left out: a sixteenth of the diameter, at most 10 cm where each echoes from its middle."""
+    """Longest edge of a facet; left out: a sixteenth of the diameter, at most 10 cm where it echoes from its middle."""
 
     @field_validator("tail_angle")
     @classmethod

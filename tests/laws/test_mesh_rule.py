@@ -1,4 +1,4 @@
-"""How fine a mesh must be: by the exact Kirchhoff integral over a sphere, and for facets that echo from their middles."""
+"""How fine a mesh must be: by the exact Kirchhoff integral over a sphere; of facets that echo from their middles."""
 
 import numpy as np
 import pytest
