@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, ClassVar, Literal
 
@@ -274,7 +275,7 @@ class Profile:
     notes: tuple[str, ...] = ()
     """Where a formula that made it was used outside its range, one line each."""
 
-    @property
+    @cached_property
     def uniform(self) -> bool:
         """True where the sound speed is the same everywhere."""
         return bool(np.all(self.speed == self.speed[0]))

@@ -217,7 +217,8 @@ class Track:
         turned = self.pose.turn_to_world(offset)
         place = Pose(self.pose.position + turned, self.pose.orientation)
         x, y, z = (np.asarray(self.offset) + offset).tolist()
-        return Track(place, self.velocity + np.cross(self.spin, turned), self.motion, self.time, (x, y, z))
+        turning = np.cross(self.spin, turned) if offset.any() else 0.0
+        return Track(place, self.velocity + turning, self.motion, self.time, (x, y, z))
 
     def later(self, seconds: float) -> Track:
         """The same so many seconds (s) after, or before."""

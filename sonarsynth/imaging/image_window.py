@@ -36,7 +36,7 @@ def snapshots_of(signals: Signals, sonar: Sonar, start: float, stop: float) -> S
 def _lasting(pressure: npt.NDArray[np.floating]) -> int:
     """Samples from where pressures (sensor, sample) have `QUIET` of their energy behind them to where they have so much
     before them."""
-    power = np.einsum("st,st->t", pressure, pressure, dtype=float)
+    power = np.einsum("st,st->t", pressure, pressure).astype(float)
     silence = QUIET * power.sum()
     before, after = np.cumsum(power), np.cumsum(power[::-1])
     return max(len(power) - int(np.searchsorted(before, silence)) - int(np.searchsorted(after, silence)), 0)

@@ -261,7 +261,8 @@ def cloud_of(plan: Plan, frame: Frame, heard: BeamformedFrame) -> PointCloud:
     if not in_record(estimates, signals, plan.windows.echo_start, plan.windows.echo_stop)[:1].any():
         return no_points()
     elements, sonar, choices = known_elements(plan, frame), plan.scene.sonar, plan.choices
-    loudest = float(np.abs(signals.pressure).max(initial=0.0))
+    pressure = signals.pressure
+    loudest = float(max(pressure.max(initial=0.0), -pressure.min(initial=0.0)))
     window = ReceivedWindow(elements, sonar, image, beams, loudest, heard.signals, estimates)
     return point_cloud(window, choices.picking, choices.placing, frame.sonar_pose, plan.profile)
 

@@ -5,6 +5,7 @@ All of it belongs to the instrument, never to the water: a varied sound speed mu
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Annotated, Literal
 
 import numpy as np
@@ -225,14 +226,17 @@ class Sonar:
     @property
     def antialias(self) -> Filter:
         """The filter before sampling."""
-        if self.filter is not None:
-            return self.filter
-        return BandPass(low=self.band.low, high=self.band.high)
+        return self.filter if self.filter is not None else _pass_band(self.band)
 
     @property
     def shortest_wavelength(self) -> float:
         """In the band, by the assumed sound speed (m)."""
         return self.assumed_sound_speed / self.band.high
+
+
+@lru_cache(maxsize=64)
+def _pass_band(band: Band) -> BandPass:
+    return BandPass(low=band.low, high=band.high)
 
 
 def stop_frequency(filter: Filter) -> float:

@@ -79,7 +79,9 @@ class ArrayPaths:
         return self.delay.size
 
     def select(self, keep: Ints) -> ArrayPaths:
-        """The paths of these indices."""
+        """The paths of these indices; the same where these are all, in order."""
+        if len(keep) == self.count and (keep == np.arange(self.count)).all():
+            return self
         rows: dict[str, Any] = {
             name: value[keep] if isinstance(value, np.ndarray) else value for name, value in vars(self).items()
         }

@@ -35,17 +35,17 @@ class ArrayLayout:
     shard: int  # frames in a file
     chunk: int  # frames in a chunk
 
-    @property
+    @cached_property
     def key(self) -> tuple[str, str]:
         """(group, name)."""
         return self.variable.group, self.variable.name
 
-    @property
+    @cached_property
     def path(self) -> str:
         """Path of the array in the store, such as signals/pressure."""
         return f"{self.variable.group}/{self.variable.name}".strip("/")
 
-    @property
+    @cached_property
     def dtype(self) -> np.dtype[Any]:
         """Type of the numbers as stored."""
         return np.dtype(self.variable.dtype)
@@ -129,11 +129,13 @@ class Layout:
         return {a.key: a.cast(values[a.key]) for a in self.arrays}
 
     def block(self, array: ArrayLayout, shard: int, frames: Mapping[int, Values]) -> np.ndarray:
-        """A whole shard of an array: the frames given, the fill value elsewhere."""
-        region = self.region(shard)
+        """A whole shard of an array: the frames given, as `check` returns them, the fill value elsewhere."""
+        region, key = self.region(shard), array.key
+        if len(frames) == len(region):
+            return np.stack([frames[frame][key] for frame in region])
         block = np.full((len(region), *array.shape[1:]), array.variable.fill, array.dtype)
         for frame, values in frames.items():
-            block[frame - region.start] = array.cast(values[array.key])
+            block[frame - region.start] = values[key]
         return block
 
 

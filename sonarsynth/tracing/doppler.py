@@ -167,7 +167,8 @@ def received(legs: ReceivePaths, of: MetPaths, meeting: Meeting, profile: Profil
     seen = legs.radius[:, None] * legs.direction + pose.turn_to_body(image - u * heard[:, None])
     radius = np.sqrt(dot(seen, seen))
     arrival = -pose.turn_to_world(seen) / radius[:, None]
-    seen = seen - np.cross(pose.turn_to_body(meeting.sonar.spin), seen) * heard[:, None]
+    if meeting.sonar.spin.any():
+        seen = seen - np.cross(pose.turn_to_body(meeting.sonar.spin), seen) * heard[:, None]
     return replace(
         legs, point=legs.point + moved, departure=of.departure(legs.length, legs.departure), arrival=arrival,
         direction=seen / np.sqrt(dot(seen, seen))[:, None], radius=radius, length=legs.length + (radius - legs.radius),

@@ -8,6 +8,7 @@ in it where the thin layer would turn it). Method: `rays_layers` (one layer), `r
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -65,7 +66,16 @@ def water(depth: Floats, speed: Floats, bottom_depth: float) -> Water:
     Raises ValueError for nodes that are not finite or not in order, for a speed or a bottom depth that is not positive.
     """
     z, c = np.asarray(depth, float), np.asarray(speed, float)
-    if z.ndim != 1 or z.shape != c.shape or len(z) == 0:
+    if z.ndim == 1 == c.ndim:
+        return _water(z.tobytes(), c.tobytes(), float(bottom_depth))
+    raise ValueError("a profile needs as many speeds as depths, and one at least")
+
+
+@lru_cache(maxsize=64)
+def _water(depth: bytes, speed: bytes, bottom_depth: float) -> Water:
+    """The same, kept: it is asked for with every batch of rays."""
+    z, c = np.frombuffer(depth), np.frombuffer(speed)
+    if z.shape != c.shape or len(z) == 0:
         raise ValueError("a profile needs as many speeds as depths, and one at least")
     if not (np.isfinite(z).all() and np.isfinite(c).all() and np.isfinite(bottom_depth)):
         raise ValueError("a profile and the bottom depth must be finite numbers")
