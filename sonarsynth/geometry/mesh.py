@@ -37,33 +37,36 @@ class Mesh:
         return self.vertices[self.faces[some]]
 
     @cached_property
-    def _sizes(self) -> tuple[Floats, Floats, Floats]:
-        """Area, normal and centroid, by blocks of facets."""
+    def _sides(self) -> tuple[Floats, Floats]:
+        """Area and normal, by blocks of facets."""
         count = len(self.faces)
-        area, normal, centroid = np.empty(count), np.empty((count, 3)), np.empty((count, 3))
+        area, normal = np.empty(count), np.empty((count, 3))
         for some in in_blocks(count):
-            corners = self.corners_of(some)
-            a, b, c = np.moveaxis(corners, 1, 0)
-            cross = np.cross(b - a, c - a)
+            a, b, c = np.moveaxis(self.corners_of(some), 1, 0)
+            (ux, uy, uz), (vx, vy, vz) = (b - a).T, (c - a).T  # a tenth of the time of np.cross
+            cross = np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], axis=1)
             area[some] = 0.5 * np.linalg.norm(cross, axis=1)
             normal[some] = cross / (2.0 * area[some, None])
-            centroid[some] = corners.mean(axis=1)
-        return read_only(area), read_only(normal), read_only(centroid)
+        return read_only(area), read_only(normal)
 
     @property
     def area(self) -> Floats:
         """(facet,) m2."""
-        return self._sizes[0]
+        return self._sides[0]
 
     @property
     def normal(self) -> Floats:
         """(facet, xyz) outward unit normals."""
-        return self._sizes[1]
+        return self._sides[1]
 
-    @property
+    @cached_property
     def centroid(self) -> Floats:
         """(facet, xyz) m."""
-        return self._sizes[2]
+        centroid = np.empty((len(self.faces), 3))
+        for some in in_blocks(len(self.faces)):
+            a, b, c = np.moveaxis(self.corners_of(some), 1, 0)
+            centroid[some] = (a + b + c) / 3.0
+        return read_only(centroid)
 
     @cached_property
     def box(self) -> Floats:

@@ -20,7 +20,7 @@ import numpy as np
 from sonarsynth.conventions import Ints
 from sonarsynth.description import FieldError
 from sonarsynth.randomness import number
-from sonarsynth.recipe.populations.drawn_bodies import populated
+from sonarsynth.recipe.populations.drawn_bodies import Drawn, draw
 from sonarsynth.recipe.renamed_keys import as_drawn
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.recipe.splits import SPLITS, Splits, assign
@@ -150,7 +150,8 @@ class Sequences:
                 old = settings[before + i]
                 changed[before + i] = Setting(old.source, old.name, old.paths, variation.at(part))
                 try:
-                    yield self._populated(with_settings(self.base, self._plain, changed), sequence)
+                    scene = with_settings(self.base, self._plain, changed)
+                    yield self._drawn_in(scene, sequence).put_in(scene)
                 except FieldError:
                     continue
 
@@ -167,14 +168,16 @@ class Sequences:
         point = self.point(sequence)
         return _point(self, point[:-1])[1], point[-1]
 
-    def _populated(self, scene: Scene, sequence: int) -> Scene:
-        return populated(scene, self.seed, self.key(sequence), self.repeat(sequence))
+    def bodies(self, sequence: int) -> Drawn:
+        """The bodies of the populations of a sequence. Raises FieldError where a population has no room."""
+        return _bodies(self, sequence)
+
+    def _drawn_in(self, scene: Scene, sequence: int) -> Drawn:
+        return draw(scene, self.seed, self.key(sequence), self.repeat(sequence))
 
     def described(self, sequence: int) -> Scene:
         """The same before its populations are drawn."""
-        if not self.varied:
-            return self.base
-        return with_settings(self.base, self._plain, self.settings(sequence))
+        return _described(self, sequence) if self.varied else self.base
 
     @cached_property
     def split(self) -> Ints:
@@ -256,7 +259,17 @@ def _meet(a: Where, b: Where) -> bool:
 
 @lru_cache(maxsize=128)
 def _scene(sequences: Sequences, sequence: int) -> Scene:
-    return sequences._populated(sequences.described(sequence), sequence)
+    return sequences.bodies(sequence).put_in(sequences.described(sequence))
+
+
+@lru_cache(maxsize=4)
+def _described(sequences: Sequences, sequence: int) -> Scene:
+    return with_settings(sequences.base, sequences._plain, sequences.settings(sequence))
+
+
+@lru_cache(maxsize=1024)  # as many as a plan looks at
+def _bodies(sequences: Sequences, sequence: int) -> Drawn:
+    return sequences._drawn_in(sequences.described(sequence), sequence)
 
 
 @lru_cache(maxsize=4096)

@@ -9,7 +9,6 @@ import numpy as np
 
 from sonarsynth.conventions import counted
 from sonarsynth.recipe import Recipe
-from sonarsynth.recipe.populations.drawn_bodies import draw
 
 LOOKED_AT = 1000
 """Sequences whose bodies are drawn to say how many there are."""
@@ -26,8 +25,7 @@ def population_notes(recipe: Recipe) -> list[str]:
     numbers, tried = [], 0
     for sequence in some.tolist():
         with recipe.spanned.naming(sequence):
-            spanned = recipe.spanned
-            drawn = draw(spanned.described(sequence), recipe.seed, spanned.key(sequence), spanned.repeat(sequence))
+            drawn = recipe.spanned.bodies(sequence)
         numbers.append(len(drawn.targets))
         tried += drawn.tried
     refused = 100.0 * (1.0 - sum(numbers) / tried) if tried else 0.0

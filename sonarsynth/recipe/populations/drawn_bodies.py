@@ -41,6 +41,13 @@ class Drawn:
     targets: tuple[Target, ...]
     tried: int  # places
 
+    def put_in(self, scene: Scene) -> Scene:
+        """The scene with these among its targets, in place of its populations."""
+        if not scene.world.populations:
+            return scene
+        targets = (*scene.world.targets, *self.targets)
+        return replace(scene, world=replace(scene.world, targets=targets, populations=()))
+
 
 @dataclass(frozen=True, eq=False)
 class _Ball:
@@ -72,19 +79,11 @@ class _MovingBox:
         return apart - other.radius
 
 
-def populated(scene: Scene, seed: int, key: int | str, repeat: tuple[str, int]) -> Scene:
-    """The scene of the sequence of a key, with the bodies of its populations among its targets.
+def draw(scene: Scene, seed: int, key: int | str, repeat: tuple[str, int]) -> Drawn:
+    """The bodies of the populations of a scene, that of the sequence of a key.
 
     repeat: its grid point, and which repeat of that it is. Raises FieldError where a population has no room.
     """
-    if not scene.world.populations:
-        return scene
-    targets = (*scene.world.targets, *draw(scene, seed, key, repeat).targets)
-    return replace(scene, world=replace(scene.world, targets=targets, populations=()))
-
-
-def draw(scene: Scene, seed: int, key: int | str, repeat: tuple[str, int]) -> Drawn:
-    """The bodies of the populations of a scene. Raises FieldError as `populated`."""
     sea = _Sea.of(scene, seed, key)
     found: list[Target] = []
     tried = 0
