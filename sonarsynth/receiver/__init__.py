@@ -186,6 +186,9 @@ class Sonar:
     """The sound speed that the sonar uses to steer and to range."""
     sound_speed_error: Annotated[MetresPerSecond, Ge(0)] = 1.0
     """Standard error that the sonar ascribes to it: enters the predicted errors only."""
+    mesh_sound_speed: WaterSoundSpeed | None = None
+    """Sound speed by which meshes of laws that sum phases are fine enough; left out: the assumed one, the slowest where
+    sequences assume several, so that all have the same meshes."""
     bed_depth_error: NonNegativeMetres = 0.05
     """Standard error of the depth of a snap below the surface, as the sonar knows it."""
 
@@ -230,8 +233,8 @@ class Sonar:
 
     @property
     def shortest_wavelength(self) -> float:
-        """In the band, by the assumed sound speed (m)."""
-        return self.assumed_sound_speed / self.band.high
+        """In the band (m): what meshes are fine enough for."""
+        return (self.mesh_sound_speed or self.assumed_sound_speed) / self.band.high
 
 
 @lru_cache(maxsize=64)

@@ -11,7 +11,7 @@ import json
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -27,7 +27,7 @@ from sonarsynth.recipe.splits import SPLITS, Splits, assign
 from sonarsynth.recipe.variation.grid import Axis, Zip, axes
 from sonarsynth.recipe.variation.random_variations import Choice, Sobol, Variation
 from sonarsynth.recipe.variation.setting import Setting, plain_scene, with_settings
-from sonarsynth.recipe.variation.values import FRAMES, Plain, Where, default_name, where
+from sonarsynth.recipe.variation.values import ASSUMED_SPEED, FRAMES, Plain, Where, default_name, where
 
 MOST_SEQUENCES = 1_000_000
 NOTHING = Plain.of(None)
@@ -159,6 +159,20 @@ class Sequences:
     def _plain(self) -> dict[str, Any]:
         return plain_scene(self.base)
 
+    @cached_property
+    def _mesh_speed(self) -> float | None:
+        """Slowest sound speed (m/s) that any sequence assumes; None where all assume the same."""
+        some = [(place, entry) for place, entry in self.entries if ASSUMED_SPEED in entry.path]
+        if not some or self.base.sonar.mesh_sound_speed is not None:
+            return None
+        ((place, entry),) = some
+        values = entry.taken if isinstance(entry, Axis) else entry.values if isinstance(entry, Choice) else None
+        speeds = [self.base.sonar.assumed_sound_speed] if getattr(entry, "when", None) is not None else []
+        for value in values or [entry.at(0.0)]:
+            set_so = [Setting(place, name_of(entry), (ASSUMED_SPEED,), value)]
+            speeds.append(with_settings(self.base, self._plain, set_so).sonar.assumed_sound_speed)
+        return min(speeds)
+
     def scene(self, sequence: int) -> Scene:
         """Scene of a sequence. Raises FieldError that names the entry and its value where there is none."""
         return _scene(self, sequence) if self.varied or self.base.world.populations else self.base
@@ -264,7 +278,9 @@ def _scene(sequences: Sequences, sequence: int) -> Scene:
 
 @lru_cache(maxsize=4)
 def _described(sequences: Sequences, sequence: int) -> Scene:
-    return with_settings(sequences.base, sequences._plain, sequences.settings(sequence))
+    scene = with_settings(sequences.base, sequences._plain, sequences.settings(sequence))
+    speed = sequences._mesh_speed
+    return scene if speed is None else replace(scene, sonar=replace(scene.sonar, mesh_sound_speed=speed))
 
 
 @lru_cache(maxsize=1024)  # as many as a plan looks at

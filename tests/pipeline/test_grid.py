@@ -15,6 +15,7 @@ from sonarsynth.cli.running import run
 from sonarsynth.pipeline import render
 from sonarsynth.recipe import Axis, reading
 from sonarsynth.recipe.reading import RecipeError
+from sonarsynth.recipe.variation.random_variations import Normal
 
 SPAN = """\
 grid:
@@ -142,6 +143,26 @@ def test_each_sequence_is_located_and_imaged_by_what_its_own_sonar_knows() -> No
         assert ranges[-1] == pytest.approx(float(own["cloud/range"][0]), abs=1e-3)
         assert float(frame.coords["sonar_assumed_sound_speed"]) == (1500.0, 1520.0)[n % 2]
     assert abs(ranges[0] - ranges[1]) > 0.05, "the speed that is assumed moves points"
+
+
+def test_bodies_have_one_mesh_whatever_the_sonar_assumes() -> None:
+    """Meshes of Kirchhoff's law follow the wavelength: that at the slowest speed that any sequence assumes."""
+    recipe = reading.loads(
+        WATCHING.replace("  trajectory:", "  physics: {scattering: {kind: kirchhoff}}\n  trajectory:")
+    )
+    ends = Normal(
+        path="sonar.assumed_sound_speed", mean="1500 m/s", deviation="20 m/s", low="1460 m/s", high="1550 m/s"
+    )
+    slow = replace(recipe.scene.sonar, assumed_sound_speed=1460.0)
+    fine = replace(recipe.scene, sonar=slow).mesh_of(0).digest
+    assert fine != recipe.scene.mesh_of(0).digest
+    varied = replace(recipe, variations=(ends,), repeats=4)
+    scenes = [varied.scene_of(n) for n in range(4)]
+    assert len({scene.sonar.assumed_sound_speed for scene in scenes}) == 4
+    assert {scene.mesh_of(0).digest for scene in scenes} == {fine} == {mesh.digest for mesh in varied.meshes["ball"]}
+    assert {varied.mesh_number(scene, 0) for scene in scenes} == {0}
+    listed = Axis(path="sonar.assumed_sound_speed", values=("1500 m/s", "1460 m/s"))
+    assert [mesh.digest for mesh in replace(recipe, grid=(listed,)).meshes["ball"]] == [fine]
 
 
 def test_sequences_and_frames_are_selected(spanning: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
