@@ -8,12 +8,15 @@ import numpy as np
 
 from sonarsynth.conventions import azimuth_elevation, depth
 from sonarsynth.labels.estimate_labels import Direct, heard_first
+from sonarsynth.pipeline.stage_times import mark_stage
 from sonarsynth.pipeline.stored_values import Values, table
 from sonarsynth.pipeline.synthesis import true_elements
 from sonarsynth.planning import Plan, frame_start, receiver_of
+from sonarsynth.planning.noise_rows import DISTANT_CHORUS
 from sonarsynth.products import Echoes, Signals
-from sonarsynth.randomness import number
+from sonarsynth.randomness import number, stream
 from sonarsynth.recipe.scene import Frame
+from sonarsynth.signals import add_noise
 from sonarsynth.signals.chorus.chorus_arrivals import (
     ChorusArrivals,
     chorus_arrivals,
@@ -48,8 +51,16 @@ def frame_chorus(plan: Plan, frame: Frame) -> ChorusArrivals | None:
 
 def with_chorus(plan: Plan, frame: Frame, signals: Signals, arrivals: ChorusArrivals | None) -> Signals:
     """Signals with the chorus; `plan` is that of the frame's sequence."""
-    chorus = plan.scene.world.chorus
-    if arrivals is None or chorus is None or not len(arrivals.delay):
+    chorus, distant = plan.scene.world.chorus, plan.distant_chorus
+    if arrivals is None or chorus is None:
+        return signals
+    if distant is not None:
+        mark_stage("synthesise")
+        random = stream(frame.seed, "distant chorus", frame.key, frame.step)
+        here, speed = frame.sonar_pose, receiver_of(plan, frame).speed(plan.medium)
+        signals = add_noise(signals, distant, plan.scene.sonar, plan.elements, random, here, speed)
+        mark_stage(DISTANT_CHORUS)
+    if not len(arrivals.delay):
         return signals
     model, samples = chorus.snap.at_depth(plan.medium.depth), signals.pressure.shape[1]
     heard = chorus_pressure(
@@ -62,6 +73,7 @@ def with_chorus(plan: Plan, frame: Frame, signals: Signals, arrivals: ChorusArri
         signals.start,
         samples,
     )
+    mark_stage("synthesise")
     return replace(signals, pressure=signals.pressure + heard)
 
 

@@ -20,7 +20,7 @@ from sonarsynth.sources.noise_source import NoiseRecording
 if TYPE_CHECKING:
     from sonarsynth.planning.plans import Plan
 
-ELECTRONICS, SENSORS = "electronics", "sensors"
+ELECTRONICS, SENSORS, DISTANT_CHORUS = "electronics", "sensors", "distant chorus"
 """Stages beside the parts of the noise."""
 SIGNAL_TO_NOISE = "signal to noise"
 PATH_SECONDS = 150e-9
@@ -59,7 +59,8 @@ def noise_rows(plan: Plan, size: FrameSize) -> list[NoiseRow]:
     here = plan.recipe.frame(plan.recipe.first_frame(plan.sequence))[1].sonar_pose
     sound_speed = float(plan.profile.at(depth(here.position)))
     centre, rows = np.array([scene.sonar.band.centre]), list[NoiseRow]()
-    for name, noise in zip(part_names(noises), noises, strict=True):
+    distant = [] if plan.distant_chorus is None else [(DISTANT_CHORUS, plan.distant_chorus)]
+    for name, noise in [*zip(part_names(noises), noises, strict=True), *distant]:
         level = 10.0 * np.log10(float(noise.density(centre)[0]) / REFERENCE_PRESSURE**2)
         said = f"{level:.1f} dB re 1 uPa2/Hz at {centre[0] / 1e3:.3g} kHz"
         way, error, work = (
@@ -69,7 +70,10 @@ def noise_rows(plan: Plan, size: FrameSize) -> list[NoiseRow]:
         )
         if noise.directions is not None:
             wrong, way = coherence_error(noise.directions, elements, here, scene.sonar, sound_speed)
-            way, error = f"{noise.directions.kind}: {way}", f"{wrong:.2g} of the coherence"
+            way, error = (
+                f"{getattr(noise.directions, 'kind', 'by its directions')}: {way}",
+                f"{wrong:.2g} of the coherence",
+            )
             work = seconds(noise.directions, elements, plan.sizes["sample"])
         elif noise.correlated:
             way = "by its cross spectral density"

@@ -17,6 +17,7 @@ from sonarsynth.imaging.beam_envelopes import envelope_delays
 from sonarsynth.planning.choices import Choices
 from sonarsynth.planning.measured.absorption_error import Passed, mean_absorption, passed_by, shape_error
 from sonarsynth.planning.measured.chorus_reach import band_frequencies, chorus_reach
+from sonarsynth.planning.measured.distant_chorus import DistantChorus, distant_chorus
 from sonarsynth.planning.measured.ray_bending import propagation
 from sonarsynth.planning.measured.thinned_profile import thinned
 from sonarsynth.planning.notes.scene_checks import check_shrimp, read_inputs
@@ -143,6 +144,12 @@ class Plan:
         sonar, first = self.scene.sonar, self.scene.trajectory.time(0)
         where = pose(self.scene.trajectory.sonar, first).position
         return chorus_reach(self.scene, self.profile, where, self.absorption(band_frequencies(sonar)))
+
+    @cached_property
+    def distant_chorus(self) -> DistantChorus | None:
+        """What the chorus of the sequence brings from beyond its reach; none where that is left out."""
+        where = pose(self.scene.trajectory.sonar, self.scene.trajectory.time(0)).position
+        return distant_chorus(self.scene, self.profile, where, self.absorption, self.chorus)
 
     @cached_property
     def _passed(self) -> Passed:

@@ -166,12 +166,13 @@ class Sequences:
         if not some or self.base.sonar.mesh_sound_speed is not None:
             return None
         ((place, entry),) = some
-        values = entry.taken if isinstance(entry, Axis) else entry.values if isinstance(entry, Choice) else None
-        speeds = [self.base.sonar.assumed_sound_speed] if getattr(entry, "when", None) is not None else []
-        for value in values or [entry.at(0.0)]:
-            set_so = [Setting(place, name_of(entry), (ASSUMED_SPEED,), value)]
-            speeds.append(with_settings(self.base, self._plain, set_so).sonar.assumed_sound_speed)
-        return min(speeds)
+        if isinstance(entry, Axis):
+            values = entry.taken
+        else:
+            values = entry.values if isinstance(entry, Choice) else (entry.at(0.0),)
+        made = [[Setting(place, name_of(entry), (ASSUMED_SPEED,), value)] for value in values]
+        scenes = [self.base, *(with_settings(self.base, self._plain, one) for one in made)]
+        return min(scene.sonar.assumed_sound_speed for scene in scenes)
 
     def scene(self, sequence: int) -> Scene:
         """Scene of a sequence. Raises FieldError that names the entry and its value where there is none."""

@@ -138,7 +138,9 @@ def test_a_chorus_is_heard_as_its_model_says() -> None:
     sound = made_sound(plan, first, 0.4)
     got, model = measure(sound), sound_model(plan, first)
     said = predict(model, got)
-    assert plan.chorus is not None and abs(said.root + 120.0 - plan.chorus.level) < 0.3  # by another integration
+    assert plan.chorus is not None and plan.distant_chorus is not None
+    whole = plan.chorus.level - 10.0 * np.log10(1.0 - plan.distant_chorus.share)
+    assert abs(said.root + 120.0 - whole) < 0.3  # by another integration
     assert abs(got.figures.moments[0] - said.root) < 0.3 + 4.0 * said.scatter
     assert said.rates is not None
     near = np.flatnonzero((said.rates * sound.seconds > 5.0) & (said.rates * APART < 0.1))

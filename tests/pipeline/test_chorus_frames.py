@@ -54,7 +54,7 @@ def test_a_chorus_is_added_and_changes_no_other_draw() -> None:
 def test_overlapping_windows_hear_the_same_chorus() -> None:
     """Two frames 2 ms apart hear the same sea: their records agree where they overlap."""
     more = (
-        "scene.world.chorus={density: 0.05, reach: 60 m, images: 1}",
+        "scene.world.chorus={density: 0.05, reach: 60 m, images: 1, distant: false}",
         "scene.world.sources.0.source_level=0 dB",
         "scene.world.environment.noise=null",
         "scene.trajectory.interval=2 ms",
@@ -90,9 +90,11 @@ def test_a_frame_without_a_clock_has_an_image_of_its_record() -> None:
 
 
 def test_plan_says_what_the_chorus_is_and_leaves_out() -> None:
-    text = " ".join(str(plan(reading.load(str(REMUS), [*SMALL, "scene.world.chorus={density: reef}"]))).split())
-    for words in ("an estimate", "excess kurtosis", "echoes of the chorus off targets", "re all of the chorus"):
-        assert words in text, words
+    for more, far in ((", distant: false", "re all of the chorus"), ("", "Gaussian noise of their spectrum")):
+        recipe = reading.load(str(REMUS), [*SMALL, f"scene.world.chorus={{density: reef{more}}}"])
+        text = " ".join(str(plan(recipe)).split())
+        for words in ("an estimate", "excess kurtosis", "echoes of the chorus off targets", far):
+            assert words in text, words
 
 
 def test_a_chorus_whose_recording_is_absent_is_refused() -> None:

@@ -65,7 +65,7 @@ def test_a_recipe_and_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[
     found = json.loads(out)
     assert status == 0 and picture.stat().st_size > 20_000
     assert "NaN" not in out and found["hydrophones"] == 8  # one is dead
-    assert set(found["spectrum"]["parts_db"]) == {"noise flat", "chorus", "rounding"}
+    assert set(found["spectrum"]["parts_db"]) == {"noise flat", "chorus", "distant chorus", "rounding"}
     recorded = found["recording"]
     assert any("48 kHz" in note for note in recorded["notes"])
     passed = 10.0 * np.log10((48.0 - 25.0) / 48.0)  # of white noise

@@ -135,3 +135,6 @@ Directions = Annotated[
     IsotropicDirections | SurfaceDirections | BottomDirections | RingDirections | OneDirection, BY_KIND
 ]
 """Where noise comes from, by `kind`."""
+
+AnyDirections = NoiseDirections | OneDirection
+"""What noise of given directions is drawn from: those that people write, and what planning makes."""

@@ -17,7 +17,7 @@ from sonarsynth.equations.noise.plane_wave_spectra import cross_power, heard_sha
 from sonarsynth.equations.noise.wave_directions import quadrature
 from sonarsynth.evaluation.soundscape.chorus_model import ChorusModel, chorus_model
 from sonarsynth.planning import Plan, receiver_of
-from sonarsynth.planning.noise_rows import part_names
+from sonarsynth.planning.noise_rows import DISTANT_CHORUS, part_names
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.signals.electronics import ElectronicNoise
 from sonarsynth.signals.filtered_pulse import fir
@@ -47,6 +47,9 @@ class SoundModel:
         if (chorus := self.chorus) is not None:
             spread = self._over_band(frequency, self._chorus_sum)
             found["chorus"] = 2.0 * chorus.energy * chorus.pulse_energy(frequency) * spread
+        if (distant := self.plan.distant_chorus) is not None:
+            face = self._over_band(frequency, partial(self._face, distant))
+            found[DISTANT_CHORUS] = passed * distant.density(known) * face
         if sonar.electronics is not None:
             found["electronics"] = passed * ElectronicNoise(sonar.electronics).density(known)
         if sonar.converter is not None:
@@ -105,6 +108,8 @@ class SoundModel:
         named = dict(zip(part_names(noises), noises, strict=True))
         if name in named:
             return self._noise_waves(named[name], frequency, extent)
+        if name == DISTANT_CHORUS and self.plan.distant_chorus is not None:
+            return self._noise_waves(self.plan.distant_chorus, frequency, extent)
         return self._chorus_waves(frequency, extent) if name == "chorus" else None
 
     def _noise_waves(self, noise: NoiseField, frequency: float, extent: float) -> tuple[Floats, Floats] | None:

@@ -81,8 +81,13 @@ def _chorus_left_out(plan: Plan) -> list[Omission]:
     if chorus is None or reach is None:
         return []
     far = f"snaps beyond {reach.reach:.4g} m, and images by more than {reach.images} reflections"
+    way, bound = "the chorus is heard one snap at a time", f"{reach.beyond:.1f} dB re all of the chorus"
+    if (distant := plan.distant_chorus) is not None:
+        far = f"single snaps beyond {reach.reach:.4g} m, and images by more than {reach.images} reflections"
+        way = "Gaussian noise of their spectrum, from their directions"
+        bound = f"no power; excess kurtosis {distant.kurtosis:.2g} of the whole"
     rows = [
-        Omission(far, "the chorus is heard one snap at a time", f"{reach.beyond:.1f} dB re all of the chorus"),
+        Omission(far, way, bound),
         Omission(
             "echoes of the chorus off targets", "its snaps light nothing", "those of a snap of its level and place"
         ),

@@ -41,10 +41,12 @@ def notes(made: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
             f"{made.windows.disturbed} frames: another snap or its echoes fall into the echo window of the loudest snap"
         )
     if scene.world.chorus is not None and made.chorus is not None:
-        reach = made.chorus
+        reach, distant = made.chorus, 0.0 if made.distant_chorus is None else made.distant_chorus.share
+        level = reach.level - 10.0 * np.log10(1.0 - distant)
         found.append(
-            f"chorus: {scene.world.chorus.row()}: predicted {reach.level:.0f} dB re 1 uPa rms in the band, excess "
-            f"kurtosis {reach.kurtosis:.3g}"
+            f"chorus: {scene.world.chorus.row()}: predicted {level:.0f} dB re 1 uPa rms in the band, "
+            f"{100.0 * distant:.2g} % of it from beyond {reach.reach:.4g} m; excess kurtosis of snaps within "
+            f"{reach.kurtosis:.3g}"
         )
     cancelled = scene.processing.cancelling is not None
     if made.propagation.bounces and not cancelled and made.products & OF_BEAMS and made.sizes["emission"]:

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
-from sonarsynth.environment.noise.directions import Directions, OneDirection
+from sonarsynth.environment.noise.directions import AnyDirections, OneDirection
 from sonarsynth.geometry import Pose
 from sonarsynth.receiver import BandPass, Elements, Sonar, stop_frequency
 from sonarsynth.signals.noise import lattice_noise, random_waves
@@ -21,7 +21,7 @@ SMALL = 64
 
 
 def field_on_lattice(
-    directions: Directions, elements: Elements, pose: Pose, sonar: Sonar, sound_speed: float
+    directions: AnyDirections, elements: Elements, pose: Pose, sonar: Sonar, sound_speed: float
 ) -> PeriodicField | None:
     """The periodic field that is drawn, over all that passes the filter of the sonar; None where plane waves are."""
     if isinstance(directions, OneDirection) or not elements.on_lattice or elements.count < SMALL:
@@ -36,7 +36,7 @@ def field_on_lattice(
 
 
 def draw(
-    directions: Directions,
+    directions: AnyDirections,
     elements: Elements,
     pose: Pose,
     sonar: Sonar,
@@ -53,7 +53,7 @@ def draw(
 
 
 def coherence_error(
-    directions: Directions, elements: Elements, pose: Pose, sonar: Sonar, sound_speed: float
+    directions: AnyDirections, elements: Elements, pose: Pose, sonar: Sonar, sound_speed: float
 ) -> tuple[float, str]:
     """What the coherence of what is drawn errs by, at most, and how it is drawn in a few words.
 
@@ -68,7 +68,7 @@ def coherence_error(
     return field.error, f"periodic field of {field.powers.shape[1]} x {field.powers.shape[2]} waves"
 
 
-def seconds(directions: Directions, elements: Elements, samples: int) -> float:
+def seconds(directions: AnyDirections, elements: Elements, samples: int) -> float:
     """Seconds that a frame takes on one core of the machine that costs are measured on."""
     bins = samples // 2
     if isinstance(directions, OneDirection):

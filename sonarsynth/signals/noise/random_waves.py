@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sonarsynth.conventions import Floats
-from sonarsynth.environment.noise.directions import Directions, OneDirection
+from sonarsynth.environment.noise.directions import AnyDirections, OneDirection
 from sonarsynth.equations.arrays.apertures import element_directivity
 from sonarsynth.equations.noise.wave_directions import drawn
 from sonarsynth.geometry import Pose
@@ -26,7 +26,7 @@ def waves(sensors: int) -> int:
 
 
 def draw(
-    directions: Directions,
+    directions: AnyDirections,
     elements: Elements,
     pose: Pose,
     behind: float,

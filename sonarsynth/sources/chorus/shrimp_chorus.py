@@ -57,10 +57,14 @@ class Chorus:
     clusters: Clusters | None = None
     """How snaps come together; left out: each by itself, in place and time (Poisson)."""
     reach: Literal["auto"] | Annotated[PositiveMetres, Le(3000)] = "auto"
-    """Horizontal distance from the array to which snaps are heard; `auto`: where those beyond bring under 2 % of the
-    power, but 1000 m at most."""
+    """Horizontal distance from the array to which snaps are heard one by one; `auto`: where those beyond bring under
+    2 % of the power, but 1000 m at most."""
     images: Literal["auto"] | Annotated[int, Ge(0), Le(200)] = "auto"
     """Reflections at surface and bottom that are followed, in all; `auto`: until more bring under 1 % of the power."""
+
+    distant: bool = True
+    """Whether snaps beyond the reach are heard, as Gaussian noise of their spectrum and directions, where they bring
+    2 % of the power or more."""
 
     @property
     def rate(self) -> float:
