@@ -73,11 +73,11 @@ def export(
 
 def _points(store: str, to: str, out: Path | None, frames: str | None, relative_to: str) -> None:
     from sonarsynth.export import points, write_points
-    from sonarsynth.store import open_store
+    from sonarsynth.store import named_after, open_store
 
     tree = open_store(store)
     some = frame_numbers(frames, tree.sizes["frame"])
-    file = out or _beside(store).with_suffix(f".{to}")
+    file = out or named_after(store).with_suffix(f".{to}")
     try:
         cloud = points(tree, some, relative_to=relative_to)
         written = write_points(cloud, file if file.suffix else file.with_suffix(f".{to}"))
@@ -88,17 +88,19 @@ def _points(store: str, to: str, out: Path | None, frames: str | None, relative_
 
 def _folder(store: str, to: str, out: Path | None, frames: str | None) -> None:
     """A folder of files: images and annotations, or signals and beams."""
+    import numpy as np
+
     from sonarsynth.cli import printing
     from sonarsynth.export import coco_files, sonar_netcdf
-    from sonarsynth.store import built_frames, open_store
+    from sonarsynth.store import built_frames, named_after, open_store
 
     tree = open_store(store)
     some = frame_numbers(frames, tree.sizes["frame"])
     chosen = built_frames(tree)
-    chosen = chosen if some is None else chosen[[frame in some for frame in chosen.tolist()]]
+    chosen = chosen if some is None else np.intersect1d(chosen, some)
     if not len(chosen):
         raise BadOption("--frames: none of these frames has been built" if some else f"{store} has no frames yet")
-    folder = out or _beside(store).with_name(f"{_beside(store).name}.{to}")
+    folder = out or named_after(store).with_name(f"{named_after(store).name}.{to}")
     write, lost = (
         (coco_files.write_coco, coco_files.LOST) if to == COCO else (sonar_netcdf.write_sonar_netcdf, sonar_netcdf.LOST)
     )
@@ -111,10 +113,6 @@ def _folder(store: str, to: str, out: Path | None, frames: str | None) -> None:
         typer.echo(str(file))
     for note in lost:
         typer.echo(f"note: {note}")
-
-
-def _beside(store: str) -> Path:
-    return Path(Path(store).name) if "://" in store else Path(store)
 
 
 def _bellhop(recipe: Path, out: Path | None, frames: str | None, settings: list[str]) -> None:

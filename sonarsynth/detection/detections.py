@@ -16,6 +16,8 @@ MEASURED: Final = ("azimuth", "elevation", "range", "azimuth_error", "elevation_
 """What a detection may say besides its box, by the names of the file."""
 MOST_BYTES: Final = 2**30
 """Of a file."""
+LARGEST: Final = 1e100
+"""Of numbers: the area of a box is finite too."""
 
 
 class DetectionsError(ValueError):
@@ -123,6 +125,8 @@ def _row(entry: object, where: str) -> dict[str, Any]:
     if "category_id" in entry:
         row["category"] = _whole(entry, "category_id", where) - 1
     row |= {name: _number(entry, name, where) for name in MEASURED if entry.get(name) is not None}
+    if row.get("range", 0.0) < 0.0:
+        raise DetectionsError(f"{where}: range must not be negative")
     if entry.get("bbox") is not None:
         box = entry["bbox"]
         if not (isinstance(box, list) and len(box) == 4):
@@ -138,7 +142,7 @@ def _row(entry: object, where: str) -> dict[str, Any]:
 
 def _number(entry: Mapping[str, Any], name: str, where: str) -> float:
     value = entry.get(name)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
         raise DetectionsError(f"{where}: {name} must be a finite number")
     return float(value)
 

@@ -17,7 +17,7 @@ from sonarsynth.detection.sonar_view import SonarView
 class ImagePeaks:
     """Beams brighter than all others within a beam width, with the beams about each that are nearly as bright.
 
-    The score is the level of the peak over the median of the image (dB).
+    The score is the level of the peak over the median of the image (dB), of the beams that hold anything.
     """
 
     kind: Literal["peaks"] = "peaks"
@@ -32,10 +32,11 @@ class ImagePeaks:
         """As `DetectionMethod.regions`."""
         from scipy.ndimage import label, maximum_filter
 
-        energy = np.nan_to_num(view.energy)
-        middle = float(np.median(energy))
+        there = np.isfinite(view.energy)
+        middle = float(np.median(view.energy[there])) if there.any() else 0.0
         if not middle > 0.0:
             return []
+        energy = np.where(there, view.energy, 0.0)
         level = 10.0 * np.log10(np.maximum(energy, np.finfo(float).tiny) / middle)
         highest = maximum_filter(level, 2 * view.reach + 1, mode="nearest")
         least = max(self.threshold, float(level.max()) - self.dynamic_range)

@@ -12,6 +12,7 @@ import numpy as np
 from sonarsynth.description import FieldError
 from sonarsynth.evaluation.detectors import true_objects
 from sonarsynth.evaluation.detectors.true_objects import TrueObjects, category_names
+from sonarsynth.store import splits_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,12 +45,9 @@ def write_coco(
     if "image" not in tree.children:
         raise FieldError(("image",), "the store has no images: it was built without that product")
     (folder / "images").mkdir(parents=True, exist_ok=True)
-    objects, split = true_objects(tree, frames), tree["split"]
-    names = str(split.attrs["flag_meanings"]).split()
-    of_split = np.asarray(split.values)[frames]
-    entries: dict[str, dict[str, Any]] = {}
-    for done, frame in enumerate(frames.tolist(), 1):
-        entry = entries.setdefault(names[of_split[done - 1]], _head(tree))
+    objects, entries = true_objects(tree, frames), dict[str, dict[str, Any]]()
+    for done, (frame, split) in enumerate(zip(frames.tolist(), splits_of(tree, frames), strict=True), 1):
+        entry = entries.setdefault(split, _head(tree))
         entry["images"].append(_write_image(tree, folder, frame))
         whose = np.asarray(tree["truth/beams/target"].isel(frame=frame).values)
         for row in np.flatnonzero(objects.frame == frame):
@@ -86,8 +84,11 @@ def _write_image(tree: xr.DataTree, folder: Path, frame: int) -> dict[str, Any]:
 
 
 def grey(energy: np.ndarray) -> np.ndarray:
-    """Grey values (uint8) of energies, in dB re the brightest."""
-    level = 10.0 * np.log10(np.maximum(energy, np.finfo(float).tiny) / max(float(energy.max()), np.finfo(float).tiny))
+    """Grey values (uint8) of energies, in dB re the brightest; 0 of an image that holds nothing."""
+    brightest = float(energy.max())
+    if not brightest > 0.0:
+        return np.zeros(energy.shape, np.uint8)
+    level = 10.0 * np.log10(np.maximum(energy.astype(float) / brightest, 1e-30))
     return np.asarray(np.rint(255.0 * np.clip(1.0 + level / DECIBELS, 0.0, 1.0)), np.uint8)
 
 

@@ -15,7 +15,7 @@ from sonarsynth.evaluation.point_checks import has_labels, points
 from sonarsynth.geometry import Pose
 from sonarsynth.pictures.figures.frame_figure import Hull
 from sonarsynth.pictures.figures.ghost_rings import Ghost
-from sonarsynth.store import Folder, Mismatch, folder_of, open_store
+from sonarsynth.store import Folder, Mismatch, folder_of, named_after, open_store
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,9 +58,8 @@ def opened(store: str | Folder) -> xr.DataTree:
 
 def pictures_of(store: str | Folder, name: str = "") -> Path:
     """The folder that the pictures of a store go to: beside it, or in the working directory where it is at a URL."""
-    path = folder_of(store)
-    found = f"{name or path.name}.pictures"
-    return path.with_name(found) if isinstance(path, Path) else Path(found)
+    path = named_after(store)
+    return path.with_name(f"{name or path.name}.pictures")
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,12 +9,12 @@ from sonarsynth.store.checking.examining import Findings, Problem, examine, must
 from sonarsynth.store.checking.verifying import Report, verify
 from sonarsynth.store.creating import create, identity, root_attributes
 from sonarsynth.store.files.lock import Ended, Locked, lock, shared_lock
-from sonarsynth.store.files.place import Folder, absolute, beside, folder_of, here, try_writing
+from sonarsynth.store.files.place import Folder, absolute, beside, folder_of, here, named_after, try_writing
 from sonarsynth.store.files.remote import Remote, Unreachable
 from sonarsynth.store.files.within import Mismatch
 from sonarsynth.store.layout import Layout, layout_of
 from sonarsynth.store.marks import Damage, Mark
-from sonarsynth.store.opening import built_frames, chosen_frames, open_store
+from sonarsynth.store.opening import built_frames, chosen_frames, open_store, splits_of
 from sonarsynth.store.writing import frames_there, missing, write_shard
 
 __all__ = [
@@ -44,10 +44,12 @@ __all__ = [
     "lock",
     "missing",
     "must_be_store",
+    "named_after",
     "open_store",
     "ranges",
     "root_attributes",
     "shared_lock",
+    "splits_of",
     "try_writing",
     "verify",
     "write_shard",

@@ -9,6 +9,7 @@ import numpy as np
 
 from sonarsynth.description import FieldError
 from sonarsynth.pipeline.variables import FORMAT_VERSION
+from sonarsynth.recipe import SPLITS
 from sonarsynth.store.files.place import Folder, absolute, opens
 from sonarsynth.store.files.within import Mismatch
 
@@ -57,17 +58,26 @@ def built_frames(tree: xr.DataTree) -> np.ndarray:
 def chosen_frames(tree: xr.DataTree, split: str | None = None) -> np.ndarray:
     """Numbers (frame,) of the frames of a tree that were built, of one split alone where it is named.
 
-    Raises FieldError for a split that the store has not.
+    Raises FieldError for a name that is none of a split, or a split without frames; Mismatch as `splits_of`.
     """
     built = built_frames(tree)
     if split is None:
         return built
-    known = str(tree["split"].attrs["flag_meanings"]).split() if "split" in tree.dataset else []
-    if split not in known:
-        raise FieldError(
-            ("split",), f"must be one of {', '.join(known) or 'none: the store has no splits'}, not {split}"
-        )
-    return np.asarray(built[np.asarray(tree["split"].values)[built] == known.index(split)])
+    if split not in SPLITS:
+        raise FieldError(("split",), f"must be one of {', '.join(SPLITS)}, not {split}")
+    found = np.asarray(built[np.asarray(splits_of(tree, built), str) == split])
+    if not len(found):
+        raise FieldError(("split",), f"no frame of {split} has been built")
+    return found
+
+
+def splits_of(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
+    """Names (frame,) of the splits of some frames of a tree: one of `SPLITS`, whatever the store calls them, since
+    files and pages are made of these. Raises Mismatch for a number that is none of a split."""
+    numbers = np.asarray(tree["split"].values)[frames].tolist()
+    if wrong := [number for number in numbers if number not in range(len(SPLITS))]:
+        raise Mismatch(f"split: {wrong[0]} is no number of a split (0 to {len(SPLITS) - 1})")
+    return [SPLITS[number] for number in numbers]
 
 
 def _decoded(dataset: xr.Dataset) -> xr.Dataset:

@@ -71,6 +71,8 @@ def test_a_middle_that_is_off_by_a_metre_counts_at_one_metre_and_beyond() -> Non
     assert np.isnan(of["ap"]), "it has no box"
     assert of["errors"]["range"]["mean"] == of["errors"]["position"]["rms"] == 1.0
     assert of["errors"]["range"]["share_within_1"] == 0.0 and of["errors"]["range"]["share_within_3"] == 1.0
+    round_the_back = from_rows([{"frame": 0, "score": 1.0, "azimuth": 359.0, "elevation": 0.0}])
+    assert figures(round_the_back, objects([0], [UNIT]))["errors"]["azimuth"]["mean"] == -1.0
     across = from_rows([{"frame": 0, "score": 1.0, "azimuth": np.rad2deg(0.1), "elevation": 0.0}])
     of = figures(across, objects([0], [UNIT]))
     assert of["ap_0.5m"] == 0.0 and of["ap_1m"] == 1.0, "2 sin(0.05) 10 m = 0.9996 m at the range of the object"

@@ -80,7 +80,9 @@ def test_beams_without_energy_are_nothing() -> None:
     seen = view((10.0, 5.0, 1.0))
     holes = seen.energy.copy()
     holes[:, :20] = np.nan
-    cut = SonarView(holes, AZIMUTH, ELEVATION, WIDTH, seen.points)
+    cut = SonarView(holes.copy(), AZIMUTH, ELEVATION, WIDTH, seen.points)
+    holes[:, :60] = np.nan
+    most = SonarView(holes, AZIMUTH, ELEVATION, WIDTH, seen.points)  # the spot is in the other quarter
     for method in (ImagePeaks(), CellAveraging()):
-        assert len(method.regions(cut)) == len(method.regions(seen)) == 1
+        assert len(method.regions(cut)) == len(method.regions(most)) == len(method.regions(seen)) == 1
         assert method.regions(SonarView(np.full((61, 81), np.nan), AZIMUTH, ELEVATION, WIDTH, seen.points)) == []

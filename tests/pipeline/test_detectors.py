@@ -64,7 +64,11 @@ def test_a_ball_alone_is_found(store: Path, method: str, tmp_path: Path) -> None
         np.testing.assert_allclose(getattr(back, name), getattr(found, name), rtol=1e-12, atol=1e-12)
 
 
-def test_the_commands_go_the_whole_way(store: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_commands_go_the_whole_way(
+    store: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(store)
+    assert run(app, ["detect", "."]) == 0 and store.with_name("s.zarr.peaks.json").is_file()
     file = tmp_path / "found.json"
     assert run(app, ["detect", str(store), "--method", "{kind: peaks, threshold: 6 dB}", "--out", str(file)]) == 0
     assert run(app, ["evaluate", str(store), str(file)]) == 0
@@ -86,6 +90,10 @@ def test_the_commands_go_the_whole_way(store: Path, tmp_path: Path, capsys: pyte
         ('[{"image_id": 2, "score": 1, "bbox": [0, 0, 1]}]', "bbox must be [x0, y0, width, height]"),
         ('[{"image_id": 2, "score": 1, "bbox": [0, 0, -1, 1]}]', "must not have a negative width"),
         ('[{"image_id": 2, "score": 1, "range": 10}]', "must have a bbox, or azimuth and elevation"),
+        (f'[{{"image_id": 2, "score": {10**30}0, "bbox": [0, 0, 1e308, 1]}}]', "bbox must be a finite number"),
+        (f'[{{"image_id": 2, "score": {10**300}, "bbox": [0, 0, 1, 1]}}]', "score must be a finite number"),
+        ('[{"image_id": 2, "score": 1, "azimuth": 0, "elevation": 0, "range": -1}]', "range must not be negative"),
+        ('[{"image_id": 2, "score": 1, "bbox": [0, 0, 1, 1], "category_id": 2}]', "which has 1 target"),
         ('[{"image_id": 99, "score": 1, "bbox": [0, 0, 1, 1]}]', "frame 99 is not in the store"),
         ('[{"image_id": 9, "score": 1, "bbox": [0, 0, 1, 1]}]', "frame 9 was not built"),
     ],
@@ -104,6 +112,7 @@ def test_a_bad_file_gets_one_line(
     [
         (["evaluate", "STORE"], "give one file of detections"),
         (["evaluate", "STORE", "nothing.json"], "nothing.json: no such file"),
+        (["detect", "STORE", "--split", "test"], "no frame of test has been built"),
         (["evaluate", "STORE", "truth", "--split", "exam"], "must be one of train, validation, test, not exam"),
         (["detect", "STORE", "--method", "guess"], "must be one of cfar, peaks, not 'guess'"),
         (["detect", "STORE", "--method", "{kind: peaks, treshold: 3}"], "did you mean 'threshold'?"),

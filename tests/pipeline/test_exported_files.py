@@ -15,9 +15,10 @@ import sonarsynth as ss
 from sonarsynth import schedule
 from sonarsynth.cli import app
 from sonarsynth.cli.running import run
-from sonarsynth.export.coco_files import DECIBELS, grey
+from sonarsynth.export.coco_files import DECIBELS, grey, write_coco
 from sonarsynth.export.platform_angles import beam_rotation, heading_pitch_roll
 from sonarsynth.recipe import reading
+from sonarsynth.store import Mismatch
 
 BUILT = [2, 3, 4]
 MANDATORY = {
@@ -98,6 +99,7 @@ def test_images_are_levels_to_half_a_grey_value(store: Path, coco: Path) -> None
         back = DECIBELS * (read / 255.0 - 1.0)
         np.testing.assert_allclose(back[seen], level[seen], atol=0.5 * DECIBELS / 255.0 + 1e-6)
     assert grey(np.array([[1.0, 1e-4, 1e-9, 0.0]])).tolist() == [[255, 0, 0, 0]]
+    assert not grey(np.zeros((1, 2), np.float32)).any(), "nothing is black"
 
 
 def test_what_coco_scores_evaluate_scores(store: Path, coco: Path, tmp_path: Path) -> None:
@@ -108,6 +110,19 @@ def test_what_coco_scores_evaluate_scores(store: Path, coco: Path, tmp_path: Pat
     (tmp_path / "results.json").write_text(json.dumps(results))
     figures = ss.evaluate(store, tmp_path / "results.json").as_json()
     assert figures["ap"] == figures["ap_distance"] == 1.0 and figures["classifies"]
+
+
+def test_no_name_of_a_store_leads_out_of_the_folder(store: Path, tmp_path: Path) -> None:
+    """Names and numbers of splits are a stranger's word."""
+    tree = ss.open(store)
+    numbers = tree["split"].copy(deep=True)
+    meanings = {"flag_meanings": "../../outside <img/src=x> b"}
+    tree.dataset = tree.to_dataset().assign_coords(split=("frame", numbers.values, meanings))
+    (file,) = write_coco(tree, tmp_path / "a" / "b", np.array(BUILT))
+    assert file == tmp_path / "a" / "b" / "train.json" and [f.name for f in tmp_path.iterdir()] == ["a"]
+    tree.dataset = tree.to_dataset().assign_coords(split=("frame", numbers.values + 7))
+    with pytest.raises(Mismatch, match="7 is no number of a split"):
+        write_coco(tree, tmp_path / "c", np.array(BUILT))
 
 
 def test_netcdf_reads_what_the_convention_asks_and_the_same_numbers(store: Path) -> None:

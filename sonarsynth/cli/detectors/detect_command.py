@@ -27,6 +27,7 @@ def detect(
     """Run a baseline detector on the images of a store: boxes, scores, ranges as JSON, the results format of COCO."""
     from sonarsynth import detection
     from sonarsynth.cli import printing
+    from sonarsynth.store import named_after
 
     chosen: detection.DetectionMethod = (
         described(method, "--method", detection.Detector)
@@ -35,6 +36,6 @@ def detect(
     )
     with printing.progress("reading") as progress:
         found = detection.detect(store, chosen, split=split, progress=progress)
-    beside = Path(Path(store).name) if "://" in store else Path(store)
+    beside = named_after(store)
     file = found.write(out or beside.with_name(f"{beside.name}.{chosen.kind}.json"))
     typer.echo(f"{file}: {len(found)} detections")

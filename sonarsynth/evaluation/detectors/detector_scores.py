@@ -165,8 +165,8 @@ def evaluate(
 
     Raises
     ------
-    FieldError for a split that the store has not, or a frame that was not built; DetectionsError for a file that cannot
-    be read.
+    FieldError for a split or a category that the store has not, or a frame that was not built; DetectionsError for a
+    file that cannot be read.
     """
     tree = open_store(store) if isinstance(store, str | Path) else store
     frames = chosen_frames(tree, split)
@@ -178,8 +178,12 @@ def evaluate(
         raise FieldError(("detections",), f"frame {outside[0]} is not in the store, which has frames 0 to {total - 1}")
     if split is None and len(unbuilt := np.setdiff1d(detections.frame, frames)):
         raise FieldError(("detections",), f"frame {unbuilt[0]} was not built")
+    names = tuple(category_names(tree))
+    if len(unknown := detections.category[detections.category >= len(names)]):
+        known = ", ".join(f"{number} {name}" for number, name in enumerate(names, 1))
+        raise FieldError(("detections",), f"category_id {unknown[0] + 1} is not in the store, which has {known}")
     found = _with_angles(tree, detections.take(np.isin(detections.frame, frames)))
-    return DetectorReport(len(frames), tuple(category_names(tree)), found, objects)
+    return DetectorReport(len(frames), names, found, objects)
 
 
 def _with_angles(tree: xr.DataTree, detections: Detections) -> Detections:

@@ -24,6 +24,8 @@ def measurement_errors(detections: Detections, objects: TrueObjects, matched: In
     found: dict[str, Any] = {}
     for name, unit in QUANTITIES.items():
         error = getattr(detections, name)[rows] - getattr(objects, name)[matched[rows]]
+        if name == "azimuth":
+            error = (error + 180.0) % 360.0 - 180.0  # 359 deg is 1 deg from 0
         found[name] = _figures(error, unit) | _calibration(error, getattr(detections, f"{name}_error")[rows])
     ranged = rows[np.isfinite(detections.range[rows])]
     apart = np.array([-nearness(detections, objects, rows[None], matched[rows][None]).item() for rows in ranged])

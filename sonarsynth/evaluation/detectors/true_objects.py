@@ -100,9 +100,9 @@ def _over_median(tree: xr.DataTree, frames: np.ndarray, row: Ints, box: Floats) 
     first = np.floor(box[:, :2]).astype(int)
     stop = np.maximum(np.ceil(box[:, 2:]).astype(int), first + 1)
     for n, (at, (x0, y0), (x1, y1)) in enumerate(zip(row, first, stop, strict=True)):
-        own, middle = energy[at, y0:y1, x0:x1], np.nanmedian(np.append(energy[at].ravel(), np.inf))
-        if own.size and np.isfinite(own).any() and 0.0 < middle < np.inf:
-            found[n] = 10.0 * np.log10(np.nanmax(own) / middle)
+        own, every = (some[np.isfinite(some)] for some in (energy[at, y0:y1, x0:x1], energy[at]))
+        if own.size and np.median(every) > 0.0:
+            found[n] = 10.0 * np.log10(own.max() / np.median(every))
     return found
 
 

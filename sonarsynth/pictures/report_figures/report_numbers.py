@@ -15,7 +15,7 @@ from sonarsynth.evaluation.detectors import DetectorReport, TrueObjects, true_ob
 from sonarsynth.evaluation.detectors.detector_scores import NEAR
 from sonarsynth.evaluation.detectors.true_objects import category_names
 from sonarsynth.evaluation.point_checks import has_labels
-from sonarsynth.store import built_frames
+from sonarsynth.store import built_frames, splits_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,7 +34,7 @@ QUANTITIES: Final = {"range": "m", "aspect": "deg", "snr": "dB", "visible": "sha
 def numbers_of(tree: xr.DataTree, warnings: Sequence[str] = (), progress: Progress | None = None) -> dict[str, Any]:
     """What a report says of a tree some of whose frames are built; warnings: those that are known of it already."""
     built = built_frames(tree)
-    split = _splits(tree, built)
+    split = splits_of(tree, built)
     objects = true_objects(tree, built)
     of_frame = dict(zip(built.tolist(), split, strict=True))
     whose = [of_frame[frame] for frame in objects.frame.tolist()]
@@ -57,11 +57,6 @@ def numbers_of(tree: xr.DataTree, warnings: Sequence[str] = (), progress: Progre
     if "image" in tree.children and len(built):
         _judge(found, tree, built, progress)
     return found
-
-
-def _splits(tree: xr.DataTree, frames: Ints) -> list[str]:
-    names = str(tree["split"].attrs["flag_meanings"]).split()
-    return [names[number] for number in np.asarray(tree["split"].values)[frames]]
 
 
 def _by_category(tree: xr.DataTree, objects: TrueObjects, split: list[str]) -> dict[str, dict[str, int]]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 from sonarsynth.evaluation import warnings as warnings_of
 from sonarsynth.pictures.report_figures.report_numbers import numbers_of
 from sonarsynth.pictures.store_reading import NothingToDraw
-from sonarsynth.store import Folder, Remote, built_frames, folder_of, open_store
+from sonarsynth.store import Folder, built_frames, folder_of, named_after, open_store
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -51,7 +51,7 @@ def report(
     if not len(built_frames(tree)):
         raise NothingToDraw(f"{place}: no frame has been built")
     numbers = numbers_of(tree, warnings_of(place), progress)
-    beside = Path(place.name) if isinstance(place, Remote) else place
+    beside = named_after(place)
     file = Path(out) if out is not None else beside.with_name(f"{beside.name}.report.html")
     from sonarsynth.pictures.report_figures import report_plots as plots
 
@@ -61,7 +61,7 @@ def report(
         ("Errors of ranges against predicted errors", plots.range_errors(numbers)),
         ("Baseline detectors", plots.baselines(numbers)),
     ]
-    title = escape(f"{numbers['title']}: {place.name}")
+    title = escape(f"{numbers['title']}: {beside.name}")
     parts = [f"<h1>{title}</h1>", *_head(numbers)]
     script = True
     for heading, figure in figures:

@@ -57,6 +57,18 @@ def absolute(where: Folder | str) -> Folder:
     return found
 
 
+def named_after(store: Folder | str) -> Path:
+    """The path that what is made of a store is named after, and beside: its own, or of one at a URL its name in the
+    working folder. Raises OSError where it has no name."""
+    folder = folder_of(store)
+    if isinstance(folder, Remote):
+        return Path(folder.name)
+    found = Path(os.path.realpath(folder)) if folder.name in ("", "..") else folder  # such as "."
+    if not found.name:
+        raise OSError(errno.EISDIR, "is no place for a store", str(store))
+    return found
+
+
 def beside(store: Folder | str, suffix: str) -> Folder:
     """A file beside a store: `remus.zarr` -> `remus.zarr.lock`."""
     store = absolute(store)
