@@ -10,7 +10,7 @@ import pytest
 from sonarsynth.conventions import direction
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose, quaternion
-from sonarsynth.imaging import FocusedDelayAndSum
+from sonarsynth.imaging import Clean, FocusedDelayAndSum
 from sonarsynth.planning import plan
 from sonarsynth.planning.measured.lost_echoes import losses
 from sonarsynth.products import SourceEstimates
@@ -66,13 +66,13 @@ def energy(pressure):
     return float(np.sum(np.square(pressure, dtype=float)))
 
 
-def imaged(signals, excess, estimates=None):
+def imaged(signals, excess, estimates=None, method=IMAGE):
     """The image of what is left from `excess` less half a pulse on, NaN where it may hold the direct pulse."""
     left = without(signals, estimates)
     window = CLOCK + excess - 2.5e-4, CLOCK + excess + 6e-4
 
     def imaging(some, start, stop):
-        return IMAGE.image(some, ARRAY, SONAR, start, stop)
+        return method.image(some, ARRAY, SONAR, start, stop)
 
     return trusted(imaging(left, *window), signals, left, SONAR, imaging, CLOCK - LENGTH)
 
@@ -158,6 +158,17 @@ def test_beams_that_may_hold_the_direct_pulse_are_nan(size):
     assert given.all() == (size < 0.1)
     fainter = imaged(with_echo(unlike(direct(), size), excess, amplitude=3e-5 * size), excess, located(direct()))
     assert fainter.remainder > 0.25 and not np.isfinite(fainter.energy).all()
+
+
+def test_beams_that_a_method_leaves_nothing_in_are_numbers_unless_the_direct_pulse_is_left():
+    """`clean` leaves exact silence beside an echo: any remainder is more than that, and none that matters."""
+    excess, method = 0.5e-3, Clean(focus=None)
+    image = imaged(with_echo(direct(), excess), excess, method=method)
+    assert np.isfinite(image.energy).all() and (image.energy == 0.0).any() and 0.0 < image.remainder < 1e-6
+    unsure = imaged(with_echo(unlike(direct(), 0.3), excess, amplitude=1e-3), excess, located(direct()), method)
+    assert (~np.isfinite(unsure.energy)).any()
+    plain = imaged(with_echo(unlike(direct(), 0.3), excess, amplitude=1e-3), excess, located(direct()))
+    assert unsure.remainder == pytest.approx(plain.remainder, rel=1.0)
 
 
 @pytest.mark.parametrize("off", [-0.12e-3, -0.05e-3, 0.0, 0.05e-3, 0.12e-3])

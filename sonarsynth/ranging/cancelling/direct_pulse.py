@@ -27,6 +27,10 @@ ROUNDS: Final = 3
 MOST: Final = 0.25
 """Share of a beam's energy that may be left of the direct pulse (1.2 dB)."""
 
+JUDGED: Final = 1e-5
+"""Energy of a beam over that of the brightest down to which `MOST` is asked for (50 dB): beams that a method leaves
+nothing in, as `clean` does, hold less than that, whatever is left."""
+
 Imaging = Callable[[Signals, float, float], EnergyImage]
 """The energy image of signals from start to stop (s)."""
 
@@ -109,7 +113,7 @@ def trusted(
 
     Before the echo window there are no echoes, so what `left` holds there, from `begin` (s) on, is left of the direct
     pulse. Its beams, times the ratio of what was taken out within the window and before it, are what may be left
-    within: no more than `MOST` of the energy of a beam.
+    within: no more than `MOST` of the energy of a beam, or of `JUDGED` of the brightest.
     """
     taken, start = replace(left, pressure=whole.pressure - left.pressure), max(begin, left.start)
     within = _energy(taken, sonar, image.start, image.stop)
@@ -117,7 +121,8 @@ def trusted(
         return replace(image, remainder=0.0)
     before = _energy(taken, sonar, start, image.start)
     rest = imaging(left, start, image.start).energy.astype(float) * (within / max(before, np.finfo(float).tiny))
-    kept = np.where(rest <= MOST * image.energy, image.energy, np.float32("nan"))
+    judged = np.maximum(image.energy, JUDGED * image.energy.max())
+    kept = np.where(rest <= MOST * judged, image.energy, np.float32("nan"))
     loudest = np.unravel_index(image.energy.argmax(), image.energy.shape)
     share = rest[loudest] / image.energy[loudest] if image.energy[loudest] > 0 else np.nan
     return replace(image, energy=kept.astype(np.float32), remainder=float(share))
