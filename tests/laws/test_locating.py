@@ -283,3 +283,14 @@ def test_uniform_water_of_any_speed_changes_nothing():
     there = locate(signals, ROMANIS, source, profile=Profile(np.array([0.0, 9.0]), np.array([1500.0, 1500.0])))
     for name, value in vars(here).items():
         assert np.array_equal(value, getattr(there, name)), name
+
+
+@pytest.mark.parametrize("off", [(28.0, 12.0), (31.0, 27.0), (40.0, 12.0)])
+def test_the_time_of_a_pulse_is_right_where_the_faces_have_a_null_in_the_band(off):
+    """Bins that no face hears are known as well as the noise allows: the envelope peaks when it does without faces."""
+    source = 14.0 * direction(*np.deg2rad([off[0], -off[1]]))
+    array = elements(PlanarLattice(columns=12, rows=12, pitch=0.05, face=0.05))
+    found = locate(hear_direct(array, source), array, source)
+    assert found.time[0] == pytest.approx(14.0 / C + envelope_late(), abs=3e-9)
+    noisy = locate(hear_direct(array, source, noise=3e-7, random=np.random.default_rng(3)), array, source)
+    assert abs(noisy.time[0] - found.time[0]) < 3.0 * noisy.time_error[0] < 1e-6

@@ -169,6 +169,11 @@ def fit_pulse(
     rms = np.sqrt(pulse.weight @ wave.residual**2 / pulse.weight.sum())
     if not rms < MAX_LAG / sonar.band.centre:
         return UNFIT
+    if pulse.hollow:
+        aligned = pulse_times.align(signals, elements, sonar.band, expected, longer=pulse_times.LONGER)
+        deaf = pulse.noise_to_signal
+        longer = pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time, deaf)
+        pulse = replace(pulse, longer=longer)
     return wave, pulse
 
 

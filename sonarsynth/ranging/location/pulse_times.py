@@ -12,6 +12,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.spatial import cKDTree
 
 from sonarsynth.conventions import Floats, Ints
+from sonarsynth.equations.arrays.correlated_errors import correlated_error_factor
 from sonarsynth.equations.arrays.spherical_wave import Wavefront, wavefront_delays
 from sonarsynth.products import Signals
 from sonarsynth.ranging import ranging_kernels
@@ -25,8 +26,17 @@ LONGEST_HALF = 2e-3
 """The same at most (s): bands whose pulses last longer tell no direct pulse from its echoes."""
 PERIODS = 2.0
 """The same in units of the inverse of the bandwidth, where that is more."""
+HOLLOW = 3e-3
+"""Power of a bin, over the loudest, below which faces have a null in the middle of the band: there the waveform holds
+twenty times as much of what cutting the pulse's tail off adds. Its peak erred by 16 to 76 ns (5 cm, 31 to 40 deg),"""
+MIDDLE = 0.8
+"""Share of the bins that is the middle of a band: at its ends, tapered, a null does nothing."""
+LONGER = 2.0
+"""and by 0.2 ns as measured over a window so many times as long."""
 DEAF = 1e-4
 """Mean square response (of one sensor on its axis) below which a bin counts as not heard at all."""
+DEAFEST = 1e-8
+"""The same where there is no noise: single precision."""
 QUIET = 2.0
 """The mean power while a pulse passes over the array must exceed that of the quiet by this factor."""
 FLOOR = 1e-9
@@ -34,8 +44,6 @@ FLOOR = 1e-9
 curvature at the rim have been seen, which is what independent errors six times as large would leave."""
 BESIDE = 4
 """Sensors that count as the neighbours of one: as many as it has on a lattice."""
-MOST_ALIKE = 0.9
-"""Correlation of neighbours at most: above it the few differences that are left tell little."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +58,20 @@ class Pulse:
     noise: float  # (Pa s)^2: mean power in a bin of what the model does not explain
     power: Floats  # (bin,) sum over sensors of their responses squared: so much less noise is in the template
     share: float  # of the power of the pulse at the sensors: what the model does not explain
+    longer: Pulse | None = None  # the same over a longer window, where the faces have a null in the band
+    deaf: float = DEAF  # as for `waveform`
+
+    @property
+    def hollow(self) -> bool:
+        """Whether the faces have a null in the band."""
+        aside = int(0.5 * (1.0 - MIDDLE) * len(self.power))
+        return bool(float(self.power[aside : len(self.power) - aside].min()) < HOLLOW * self.power.max())
+
+    @property
+    def noise_to_signal(self) -> float:
+        """Noise of the mean of all sensors over the wave, power in a bin: `DEAF` at most, and `DEAFEST` at least."""
+        loud = float(np.mean(np.abs(self.template) ** 2)) * max(int(np.count_nonzero(self.weight)), 1)
+        return float(np.clip(self.noise / max(loud, 1e-300), DEAFEST, DEAF))
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,14 +167,16 @@ class Aligned:
     spacing: float  # Hz
 
 
-def align(signals: Signals, elements: Elements, band: Band, time: Floats, *, whole: bool = False) -> Aligned:
-    """Cut a short window out of each sensor about `time` (sensor,), when its pulse is expected.
+def align(
+    signals: Signals, elements: Elements, band: Band, time: Floats, *, whole: bool = False, longer: float = 1.0
+) -> Aligned:
+    """Cut a window out of each sensor about `time` (sensor,), when its pulse is expected: a short one, times `longer`.
 
     Frequencies of the band, or `whole`: all of them, from which the waveform can be had. The window moves with the
     time, not with the samples, so that every sensor's pulse is cut alike.
     """
     rate = signals.sampling_frequency
-    half = max(int((PULSE_HALF if whole else half_length(band)) * rate), 4)
+    half = max(int(longer * (PULSE_HALF if whole else half_length(band)) * rate), 4)
     place = (time - signals.start) * rate
     cut = ranging_kernels.cut_out(signals.pressure, place, half, elements.gain / rate)
     f = _frequencies(2 * half, rate)
@@ -173,9 +197,15 @@ class Wave:
 
 
 def waveform(
-    aligned: Aligned, elements: Elements, sound_speed: float, direction: Floats, curvature: float, time: float
+    aligned: Aligned,
+    elements: Elements,
+    sound_speed: float,
+    direction: Floats,
+    curvature: float,
+    time: float,
+    deaf: float = DEAF,
 ) -> Wave:
-    """The waveform that a wavefront carries.
+    """The waveform that a wavefront carries; held down where the mean square response is not well over `deaf`.
 
     The wave at the centre, W(f), is unknown. Sensor q hears M = W(f) D(f) R/R_q, D the face directivity towards the
     source, which may well be near zero or negative: W = sum conj(h) P / sum |h|^2 with h = D R/R_q is its maximum
@@ -190,18 +220,24 @@ def waveform(
     shift = time + wavefront_delays(elements.position, direction, curvature, sound_speed) - aligned.time
     heard = ranging_kernels.turned(aligned.spectrum, shift, first, aligned.spacing)
     total, power = ranging_kernels.template_sums(heard, response)
-    return Wave(total / (power + DEAF * elements.count), heard, response, power)
+    return Wave(total / (power + deaf * elements.count), heard, response, power)
 
 
 def measure(
-    aligned: Aligned, elements: Elements, sound_speed: float, direction: Floats, curvature: float, time: float
+    aligned: Aligned,
+    elements: Elements,
+    sound_speed: float,
+    direction: Floats,
+    curvature: float,
+    time: float,
+    deaf: float = DEAF,
 ) -> Pulse:
-    """Each sensor's lag on a wavefront, and the waveform that the wavefront carries.
+    """Each sensor's lag on a wavefront, and the waveform that the wavefront carries; `deaf` as for `waveform`.
 
     The lag of sensor q is the maximum of Re sum_f conj(M) P exp(i 2 pi f lag), M as in `waveform`, by one Newton step:
     lags are small after alignment, and the caller iterates.
     """
-    wave = waveform(aligned, elements, sound_speed, direction, curvature, time)
+    wave = waveform(aligned, elements, sound_speed, direction, curvature, time, deaf)
     omega = 2 * np.pi * aligned.frequency
     slope, weight, rest = ranging_kernels.lag_sums(wave.heard, wave.response, wave.template, omega)
     lag = slope / np.where(weight > 0, weight, np.inf)
@@ -210,39 +246,22 @@ def measure(
     left = float(np.sum(rest[live]))
     held = float(wave.power @ np.abs(wave.template) ** 2)
     share = left / (held + left) if held + left > 0 else 1.0
-    return Pulse(aligned.frequency, wave.template, time, lag, weight, 2 * left / freedom, wave.power, share)
+    return Pulse(aligned.frequency, wave.template, time, lag, weight, 2 * left / freedom, wave.power, share, None, deaf)
 
 
 def lag_variance(wave: Wavefront, pulse: Pulse, elements: Elements, rounding: float) -> float:
     """Variance of a lag of weight one: the larger of what the lags show and of the Cramer-Rao bound for the noise seen.
 
-    What lags show over `FLOOR`, which allows for that, is taken times `correlation_factor`. The noise is not taken
+    What lags show over `FLOOR`, which allows for that, is taken times `correlated_error_factor`. The noise is not taken
     below that of `rounding`, (Pa s)^2 in a bin.
     """
     count = int(np.sum(pulse.weight > 0))
     least = FLOOR**2 * float(np.sum(pulse.weight)) / max(count, 1)
     shown = float(pulse.weight @ wave.residual**2) / max(count - 4, 1)
-    if shown > least:
-        shown += (shown - least) * (correlation_factor(wave, pulse, elements) - 1)
+    if shown > least and np.count_nonzero(elements.gain) > 2:
+        error = np.sqrt(pulse.weight) * wave.residual
+        shown += (shown - least) * (correlated_error_factor(error, *neighbours(elements)) - 1)
     return float(np.max([shown, least, 0.5 * pulse.noise, 0.5 * rounding]))
-
-
-def correlation_factor(wave: Wavefront, pulse: Pulse, elements: Elements) -> float:
-    """Factor on the variance of a fit, at least 1, where the errors of neighbouring sensors are correlated.
-
-    Another wave in the window shifts the lags in waves across the array: neighbours err alike, and the fit takes more
-    of it for direction and curvature than of independent errors. Errors that correlate by r between neighbours on a
-    lattice, and by r^n between the n-th along a row or a column, give means ((1 + r)/(1 - r))^2 times the variance of
-    independent ones (Bartlett 1946, J. R. Stat. Soc. Suppl. 8, 27, in both directions).
-    """
-    error = np.sqrt(pulse.weight) * wave.residual
-    total = float(error @ error)
-    if not total > 0 or np.count_nonzero(elements.gain) < 3:
-        return 1.0
-    here, beside = neighbours(elements)
-    alike = float(np.mean(error[here][:, None] * error[beside])) * len(here) / total
-    alike = min(max(alike, 0.0), MOST_ALIKE)
-    return ((1 + alike) / (1 - alike)) ** 2
 
 
 @lru_cache(maxsize=16)

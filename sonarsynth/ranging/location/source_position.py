@@ -11,7 +11,7 @@ from sonarsynth.conventions import Floats, azimuth_elevation
 from sonarsynth.equations.arrays.spherical_wave import Wavefront, envelope_peak
 from sonarsynth.geometry import Pose
 from sonarsynth.products import REASONS, SourceEstimates
-from sonarsynth.ranging.location.pulse_times import DEAF, Pulse, lag_variance
+from sonarsynth.ranging.location.pulse_times import Pulse, lag_variance
 from sonarsynth.receiver import Elements, Sonar
 
 TIME_FLOOR = 0.002
@@ -129,13 +129,15 @@ def place(wave: Wavefront, pulse: Pulse, known: SonarKnowledge, heard: Wavefront
     reason = RANGE if not np.sqrt(fix.covariance[2, 2]) <= FARTHEST * fix.curvature else ACCEPTED
     if not _in_water(wave, full, slope, by_angle, fall, known):
         reason = OUTSIDE
-    time, time_error = _arrival(pulse, full, timing[3, 3] / max(wave.covariance[3, 3], 1e-300), sonar, known.rounding)
+    time, time_error = _arrival(
+        pulse.longer or pulse, full, timing[3, 3] / max(wave.covariance[3, 3], 1e-300), sonar, known.rounding
+    )
     if not np.isfinite(time):
         reason = BAND
     position, covariance = _position(wave, fix)
     known_place = reason == ACCEPTED
     return SourceFix(
-        time=pulse.time + time,
+        time=time,
         time_error=time_error,
         direction=heard.direction,
         angle_error=np.sqrt([around, spread[1, 1]]),
@@ -218,19 +220,20 @@ def _in_water(
 
 
 def _arrival(pulse: Pulse, full: Floats, unit: float, sonar: Sonar, rounding: float) -> tuple[float, float]:
-    """Where the pulse's envelope peaks, s after the template's time 0, and the standard error of that time (s).
+    """When (s) the pulse's envelope peaks at the array centre, and the standard error of that time (s).
 
     The error is that of the envelope of the mean pulse, and what direction and curvature add at the array centre: of
     the fitted time's variance all but the least, that of the mean of the lags; `unit` is the variance of a lag of
     weight one.
     """
-    whole = np.minimum(1 + DEAF * len(pulse.lag) / np.maximum(pulse.power, 1e-300), 2.0)  # `waveform` holds it down
+    # `waveform` holds it down
+    whole = np.minimum(1 + pulse.deaf * len(pulse.lag) / np.maximum(pulse.power, 1e-300), 2.0)
     noise = max(pulse.noise, rounding) / np.maximum(pulse.power, 1e-300)
     low, high = sonar.band.low, sonar.band.high
     time, error = envelope_peak(pulse.frequency, pulse.template * whole, low, high, noise)
     tilted = max(float(full[3, 3]) - unit / float(np.sum(pulse.weight)), 0.0)
     floor = TIME_FLOOR / (high - low)
-    return time, float(np.sqrt(error**2 + tilted + floor**2))
+    return pulse.time + time, float(np.sqrt(error**2 + tilted + floor**2))
 
 
 def refused(reason: int) -> SourceFix:
