@@ -20,7 +20,7 @@ from sonarsynth.planning.choices import OF_BEAMS, Choices, Degree
 from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.focus_zones import beamformer
 from sonarsynth.planning.measured.ray_bending import ranging_error
-from sonarsynth.planning.measured.sampled_arrivals import arrivals_of
+from sonarsynth.planning.measured.sampled_arrivals import sampled_arrivals
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.plans import Errors, Plan
 from sonarsynth.products import Arrivals
@@ -216,7 +216,7 @@ class PerSensorReference:
         rows = []
         for one in sensor:
             part = subarray(plan.elements, np.array([one]))
-            rows.append(_heard(plan, frame, arrivals_of(every, frame, part), part.elements))
+            rows.append(_heard(plan, frame, sampled_arrivals(every, frame, part), part.elements))
         return PerSensorReference(
             plan, frame, sensor, (np.vstack([r[0] for r in rows]), np.vstack([r[1] for r in rows]))
         )
@@ -233,7 +233,7 @@ class PerSensorReference:
             rows = np.flatnonzero(np.isin(self.sensor, part.sensor))
             if len(rows):
                 own, place = with_rim(part, np.searchsorted(part.sensor, self.sensor[rows]))
-                arrivals = arrivals_of(plan, self.frame, part).for_sensors(place, part.elements.count)
+                arrivals = sampled_arrivals(plan, self.frame, part).for_sensors(place, part.elements.count)
                 for out, made in zip(found, _heard(plan, self.frame, arrivals, own), strict=True):
                     out[rows] = made[: len(rows)]
         sizes = [float(np.linalg.norm(x)) for x in self.exact]

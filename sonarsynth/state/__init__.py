@@ -131,6 +131,8 @@ class Tolerances:
     """From where facets must be seen."""
     degree: int = 3
     """Of polynomials over the aperture."""
+    every: int = 1
+    """Every so manieth facet is traced, to measure errors on some; all of them hide what is behind."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -108,6 +108,8 @@ def facet_paths(context: FrameContext, propagation: Propagation, owners: tuple[i
     seen = 0
     for some in in_blocks(sum(map(len, context.scattering))):
         every = facets_of(context.scattering, some)
+        if tolerances.every > 1:
+            every = every.select(np.flatnonzero(every.facet % tolerances.every == 0))
         if owners is not None and len(owners) < len(context.scattering):
             every = every.select(np.isin(every.owner, owners))
         if propagation.layered:

@@ -238,8 +238,13 @@ def test_a_ray_followed_arc_by_arc_ends_where_the_eigenray_does() -> None:
     np.testing.assert_allclose(z, z2[found.pair], atol=2e-6)
 
 
-def test_mean_slowness_is_the_integral_of_the_slowness() -> None:
+@pytest.mark.parametrize("layers", [0, 800])
+def test_mean_slowness_is_the_integral_of_the_slowness(layers) -> None:
+    """In few layers, and in so many that whole ones are summed beforehand."""
     water = thermocline()
+    if layers:
+        depth = np.linspace(0.0, 20.0, layers + 1)
+        water = ray_solutions.water(depth, np.interp(depth, water.depth, water.speed) + 0.3 * np.sin(9.0 * depth), 20.0)
     nodes = np.linspace(0, 20, 200001)
     total = np.concatenate(
         [[0], np.cumsum(np.diff(nodes) / np.interp(0.5 * (nodes[1:] + nodes[:-1]), water.depth, water.speed))]

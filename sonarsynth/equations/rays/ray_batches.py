@@ -31,6 +31,7 @@ from sonarsynth.equations.rays.ray_vertices import Chain, new_chain
 __all__ = ["FIELDS", "SURFACE", "mean_slowness", "rays_of_pairs"]
 
 SAME_DEPTH = 1e-140  # m: depths that differ by less are equal
+MANY = 64  # layers
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -154,16 +155,31 @@ def rays_of_pairs(
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
+def _down(c1: float, c2: float, dz: float) -> float:
+    """Time (s) straight down a layer: dz over its logarithmic mean speed."""
+    return 2.0 * dz / (c1 + c2) * float(atanhc((c2 - c1) / (c2 + c1)))
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
 def mean_slowness(depth: Floats, speed: Floats, start: Floats, end: Floats, out: Floats) -> None:
     """Mean of 1/c (s/m) over the depths between the ends of each pair: what a straight line takes a metre."""
-    work = np.empty((2, len(depth) + 8))
+    work, down = np.empty((2, len(depth) + 8)), np.zeros(len(depth))
     c, dz = work[0], work[1]
+    for j in range(1, len(depth)):
+        down[j] = down[j - 1] + _down(speed[j - 1], speed[j], depth[j] - depth[j - 1])
     for i in range(len(start)):
         top, bottom = min(start[i], end[i]), max(start[i], end[i])
+        first, last = node_above(depth, top), node_above(depth, bottom)
+        if last - first > MANY:  # whole layers between by what they take from the surface on
+            total = _down(speed_at(depth, speed, first, top), speed[first + 1], depth[first + 1] - top)
+            total += down[last] - down[first + 1]
+            total += _down(speed[last], speed_at(depth, speed, last, bottom), bottom - depth[last])
+            out[i] = total / (bottom - top)
+            continue
         n, _ = lay(depth, speed, top, bottom, c, dz, 0)
         out[i] = 1.0 / c[0]
         if n > 0:
             total = 0.0
             for j in range(n):
-                total += 2.0 * dz[j] / (c[j] + c[j + 1]) * atanhc((c[j + 1] - c[j]) / (c[j + 1] + c[j]))
+                total += _down(c[j], c[j + 1], dz[j])
             out[i] = total / (bottom - top)

@@ -13,7 +13,7 @@ from sonarsynth.equations.arrays.apertures import focus_delay
 from sonarsynth.imaging.delay_and_sum.dense import dense_energies
 from sonarsynth.imaging.image_window import snapshots_of, weights
 from sonarsynth.planning.listening_windows import frame_start
-from sonarsynth.planning.measured.sampled_arrivals import arrivals_of
+from sonarsynth.planning.measured.sampled_arrivals import sampled_arrivals
 from sonarsynth.planning.plans import Plan
 from sonarsynth.products import Signals
 from sonarsynth.signals.auto_synthesis import DEFAULT_ERROR, deposit_for
@@ -63,7 +63,7 @@ def _heard(plan: Plan, index: int) -> tuple[Signals, float, float] | None:
     """Signals of a frame without noise, and its echo window; None where no snap or no echo is heard."""
     plan = plan.at(index)
     frame = plan.recipe.frame(index)[1]
-    arrivals, snaps = arrivals_of(plan, frame), frame.moment.snaps
+    arrivals, snaps = sampled_arrivals(plan, frame), frame.moment.snaps
     if not arrivals.direct.any() or arrivals.direct.all():
         return None
     start, samples = frame_start(plan, frame), plan.windows.samples

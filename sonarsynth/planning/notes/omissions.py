@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from sonarsynth.environment.boundary_numbers import rms_height
 from sonarsynth.environment.casts import profile_of
-from sonarsynth.geometry.mesh import Mesh
-from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.planning.choices import ALL_PRODUCTS
 from sonarsynth.planning.measured.ray_bending import bending_error
 from sonarsynth.planning.plan_tables import Omission
@@ -20,12 +16,11 @@ from sonarsynth.receiver import stop_frequency
 from sonarsynth.recipe.scene import Frame
 from sonarsynth.scattering import MirrorLobe
 from sonarsynth.signals.chorus.chorus_arrivals import FAINT
-from sonarsynth.state import FrameContext, Receiver
+from sonarsynth.state import FrameContext, Receiver, Tolerances
 from sonarsynth.targets.mesh_resolution import expected_error
-from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.tracing.arrivals import trace
 
-ENOUGH = 10_000
+ENOUGH = 2500
 """Facets of a target that its reflections are estimated from."""
 
 
@@ -222,16 +217,17 @@ def _moved(plan: Plan) -> str:
 def reflected_bound(plan: Plan) -> str:
     """Level of what one reflection more would add in the first frame, over the echoes that are kept.
 
-    Of targets as they were described, by a lobe where they are coherent (powers of facets add), and of `ENOUGH` of
-    their facets at most: a level to go by, at little cost.
+    By a lobe where targets are coherent (powers of facets add), and of `ENOUGH` of their facets, about, where there are
+    more: a level to go by, at little cost.
     """
     scene, frame = plan.recipe.frame(0)
     sonar, bounces = scene.sonar, plan.propagation.bounces
     if not frame.moment.snaps or bounces >= MOST_BOUNCES:
         return "not computed"
     laws = tuple(MirrorLobe() if law.coherent else law for law in scene.laws)
-    receiver, bodies = Receiver(frame.sonar_pose, plan.elements, sonar), _rough_bodies(plan, frame)
-    context = FrameContext(frame.time, bodies, frame.moment.snaps, plan.medium, receiver, laws)
+    bodies, receiver = frame.moment.bodies, Receiver(frame.sonar_pose, plan.elements, sonar)
+    fewer = Tolerances(every=max(sum(len(body.mesh.faces) for body in bodies) // ENOUGH, 1))
+    context = FrameContext(frame.time, bodies, frame.moment.snaps, plan.medium, receiver, laws, fewer)
     found = trace(context, plan.propagation.reflected(bounces + 1))
     delay_std = np.exp(-0.5 * (2 * np.pi * sonar.band.centre * found.delay_std) ** 2)
     power, more = (found.amplitude * delay_std) ** 2, found.surface + found.bottom > bounces
@@ -241,19 +237,3 @@ def reflected_bound(plan: Plan) -> str:
         if kept > 0.0 and left > 0.0:
             parts.append(f"{what} {10 * np.log10(left / kept):+.1f} dB")
     return "one reflection more would add, re the paths kept in frame 0: " + (", ".join(parts) or "nothing")
-
-
-def _rough_bodies(plan: Plan, frame: Frame) -> tuple[PlacedTarget, ...]:
-    """The bodies of a frame with few facets."""
-    bodies = []
-    for target, body in zip(plan.scene.world.targets, frame.moment.bodies, strict=True):
-        mesh = mesh_of(target.shape).scaled(target.scale)
-        every = -(-len(mesh.faces) // ENOUGH)
-        bodies.append(replace(body, mesh=mesh if every == 1 else _every(mesh, every)))
-    return tuple(bodies)
-
-
-def _every(mesh: Mesh, step: int) -> Mesh:
-    """Every so manieth facet of a mesh."""
-    used, number = np.unique(mesh.faces[::step], return_inverse=True)
-    return Mesh(mesh.vertices[used], number.reshape(-1, 3).astype(np.int32))
