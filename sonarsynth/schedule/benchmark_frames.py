@@ -19,7 +19,9 @@ import numpy as np
 
 from sonarsynth import store
 from sonarsynth.geometry.mesh import Mesh
+from sonarsynth.labels.odds import NO_ODDS, Odds, odds
 from sonarsynth.pipeline import Values, beamform_frame, range_frame, stage_timer, trace_at, truth_at
+from sonarsynth.pipeline.labelled_estimates import beam_width
 from sonarsynth.pipeline.synthesis import subarray_signals
 from sonarsynth.planning import Plan, check_unsampled_frame
 from sonarsynth.receiver.subarrays import subarrays
@@ -70,6 +72,7 @@ class Trial:
     fixed: Sizes  # of the store without frames
     shard: Sizes  # that a whole shard adds
     failures: tuple[str, ...]  # of frames that could not be made, a line each
+    odds: Odds  # of finding targets in these
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +122,19 @@ def try_frames(plan: Plan, folder: Path | None = None) -> Trial:
         fixed=fixed,
         shard=shard,
         failures=tuple(failures),
+        odds=sum((_odds(plan, one.values) for one in made), NO_ODDS) if every == 1 else NO_ODDS,
     )
+
+
+def _odds(plan: Plan, values: Values) -> Odds:
+    """Of finding targets in a frame that was made."""
+    energy, azimuth = values.get(("/image", "energy")), plan.scene.sonar.beams.azimuth
+    if energy is None or len(azimuth) < 2:
+        return NO_ODDS
+    reach = min(max(round(beam_width(plan) / float(azimuth[1] - azimuth[0])), 1), len(azimuth))
+    clutter = values["/truth/targets", "clutter"] != 0
+    snr = values.get(("/truth/targets", "snr"))
+    return odds(energy, values["/truth/beams", "target"], clutter, snr, reach)
 
 
 Tried = tuple[list[tuple[_Made, _Made]], list[Stages], int]

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sonarsynth import store
+from sonarsynth.labels.odds import NO_ODDS, Odds
 from sonarsynth.planning import Plan, Stage
 from sonarsynth.planning.costs import machine_factor
 from sonarsynth.schedule.benchmark_frames import Sizes, Trial, disk_use, try_frames
@@ -66,6 +67,7 @@ class Prediction:
     sizes: tuple[Sizes, Sizes]  # of the store without frames; that a whole shard adds
     files: int  # and folders, at most
     failures: tuple[str, ...] = ()  # frames that could not be tried, a line each
+    odds: Odds = NO_ODDS  # of finding targets in those that were
 
     def of(self, *, frames: int | None = None, workers: int | None = None) -> Prediction:
         """The prediction for other numbers of frames or workers (never more of these than shards)."""
@@ -161,6 +163,7 @@ class Prediction:
             "predicted_for": {"frames": self.frames, "workers": self.workers, "cores": self.cores},
             "predicted_from": self.how,
             "not_tried": list(self.failures),
+            "odds": {"frames": self.odds.frames, "found": self.odds.found, "snr": list(self.odds.snr)},
         }
 
     def against(self, report: BuildReport) -> dict[str, Any]:
@@ -252,6 +255,7 @@ def _from(made: Prediction, trial: Trial) -> Prediction:
         laying_out=trial.laying_out,
         sizes=(trial.fixed, trial.shard),
         failures=trial.failures,
+        odds=trial.odds,
     )
 
 

@@ -15,6 +15,7 @@ from sonarsynth.environment.sea import Environment, Isovelocity
 from sonarsynth.geometry.motion import Still
 from sonarsynth.imaging import FocusedDelayAndSum
 from sonarsynth.imaging.image_window import snapshots_of
+from sonarsynth.labels.odds import NO_ODDS, odds
 from sonarsynth.pipeline import synthesise, trace_frame
 from sonarsynth.planning import plan
 from sonarsynth.receiver import Band, BandPass, BeamGrid, PlanarLattice, Sonar
@@ -113,3 +114,20 @@ def test_without_anything_else_there_is_no_ratio_and_out_of_view_it_is_missing()
     world = replace(behind.scene.world, targets=(body,))
     truth = render(plan(replace(behind, scene=replace(behind.scene, world=world)), ("image",)), 0)["truth/targets"]
     assert np.isnan(truth["snr"]).all() and np.isnan(truth["electronics_energy"]).all()
+
+
+def test_odds_count_frames_whose_brightest_beam_is_on_a_target_that_is_no_clutter() -> None:
+    beams = np.full((9, 12), -1, np.int16)
+    beams[4, 2], beams[4, 9] = 0, 1
+    image, clutter, snr = np.ones((9, 12)), np.array([False, True]), np.array([3.0, 20.0])
+    found = NO_ODDS
+    for at, hit in (((4, 2), True), ((4, 3), True), ((4, 5), False), ((4, 9), False)):
+        here = image.copy()
+        here[at] = 2.0
+        one = odds(here, beams, clutter, snr, 1)
+        assert (one.frames, one.found, one.snr) == (1, hit, (3.0,))
+        found += one
+    assert (
+        found.line == "of 4 frames with a target, the brightest beam is on it in 2; snr of targets 3 to 3 dB, median 3"
+    )
+    assert odds(image, np.full((9, 12), -1, np.int16), clutter, snr, 1).line == ""

@@ -1,13 +1,15 @@
 """Draws pictures of README and of the pages again: python tools/docs/pictures.py [NAME ...].
 
-Names: cloud, thumbnails, ghosts, images, labels, laws, accuracy; left out: all of them, which takes minutes.
+Names: cloud, thumbnails, ghosts, images, labels, laws, accuracy, odds; left out: all of them, which takes minutes.
 """
 
 from __future__ import annotations
 
+import json
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -141,6 +143,48 @@ def cloud(folder: Path) -> None:
     plt.close(figure)
 
 
+def odds(folder: Path) -> None:
+    """Shares of windows in which the target of the thesis scene is found, by `tools/bench odds`: takes minutes."""
+    sys.path.insert(0, str(ROOT / "tools"))
+    from benchmarks import odds as benchmark
+
+    found = benchmark.bench(16)["rows"]
+    (folder / "odds.json").write_text(json.dumps(found))
+    draw_odds(found)
+
+
+def draw_odds(found: list[dict[str, Any]]) -> None:
+    """By density: for each distance and level the chorus alone, and at 10 m with reverberation and medians."""
+    figure, panels = plt.subplots(1, 2, figsize=(9.0, 3.4), dpi=100, sharey=True, layout="constrained")
+    alone = [row for row in found if row["case"] == "chorus"]
+    styles = dict(zip((5.6, 10.0, 20.0), ("-", "--", ":"), strict=True))
+    colours = dict(zip((194.6, 185.0, 175.0), ("#1f4e79", "#c55a11", "#7f7f7f"), strict=True))
+    for level, distance in sorted({(row["level_db"], row["distance_m"]) for row in alone}, reverse=True):
+        rows = [row for row in alone if (row["level_db"], row["distance_m"]) == (level, distance)]
+        label = f"{level:g} dB, {distance:g} m"
+        axes = [[row[name] for row in rows] for name in ("density", "brightest")]
+        panels[0].plot(*axes, styles[distance], color=colours[level], marker="o", markersize=3, label=label)
+    one = [row for row in found if row["level_db"] == 194.6 and row["distance_m"] == 10.0]
+    for case in dict.fromkeys(row["case"] for row in one):
+        rows = [row for row in one if row["case"] == case]
+        axes = [[row[name] for row in rows] for name in ("density", "brightest")]
+        panels[1].plot(*axes, marker="o", markersize=3, label="chorus alone" if case == "chorus" else case)
+    panels[0].set_title("a snap of this level, so far from the target", fontsize=10, loc="left")
+    panels[1].set_title("194.6 dB at 10 m", fontsize=10, loc="left")
+    for panel in panels:
+        panel.set(
+            xscale="log",
+            xlabel="density of other snaps (1/(m$^2$ s))",
+            ylim=(-0.03, 1.42),
+            yticks=np.arange(0.0, 1.1, 0.2),
+        )
+    panels[0].legend(fontsize=7, frameon=False, handlelength=3.0, ncols=3, loc="upper center")
+    panels[1].legend(fontsize=7, frameon=False, ncols=2, loc="upper center")
+    panels[0].set_ylabel("windows in which it is found")
+    figure.savefig(ROOT / ".github" / "odds.png", metadata={"Software": None})
+    plt.close(figure)
+
+
 DRAWN = {
     "cloud": cloud,
     "thumbnails": thumbnails,
@@ -149,6 +193,7 @@ DRAWN = {
     "labels": labels,
     "laws": laws,
     "accuracy": accuracy,
+    "odds": odds,
 }
 
 

@@ -13,6 +13,7 @@ from sonarsynth.detection import Detections, ImagePeaks, by_kind, detections_of,
 from sonarsynth.evaluation import cloud_scores, points
 from sonarsynth.evaluation.detectors import DetectorReport, TrueObjects, true_objects
 from sonarsynth.evaluation.detectors.detector_scores import NEAR
+from sonarsynth.evaluation.detectors.threshold_baseline import TRIVIAL
 from sonarsynth.evaluation.detectors.true_objects import category_names
 from sonarsynth.evaluation.point_checks import has_labels
 from sonarsynth.store import built_frames, splits_of
@@ -25,8 +26,6 @@ BASELINES: Final = ("peaks", "cfar")
 MOST_JUDGED: Final = 2000
 """Frames that clouds and baselines are judged in; of more, even steps."""
 HARDEST: Final = 10
-TRIVIAL: Final = 0.95
-"""Average precision at 2 m of a threshold, over which there is nothing to learn."""
 BINS: Final = 20
 QUANTITIES: Final = {"range": "m", "aspect": "deg", "snr": "dB", "visible": "share"}
 

@@ -1,0 +1,39 @@
+"""What a threshold without any training finds in a store: whether there is anything to learn."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sonarsynth.detection import by_kind, detections_of, from_rows, views
+from sonarsynth.evaluation.detectors.detector_scores import DetectorReport
+from sonarsynth.evaluation.detectors.true_objects import category_names, true_objects
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+TRIVIAL: Final = 0.95
+"""Average precision at 2 m of a threshold, over which there is nothing to learn."""
+MOST: Final = 200
+"""Frames that are looked at, in even steps."""
+
+
+def threshold_lines(tree: xr.DataTree, frames: np.ndarray) -> list[str]:
+    """What a threshold reaches in frames that were built, in words, with a warning where that is all there is to find;
+    nothing without images or objects."""
+    some = frames[np.linspace(0, len(frames) - 1, min(len(frames), MOST)).astype(int)]
+    objects = true_objects(tree, some)
+    if "image" not in tree.children or not len(objects):
+        return []
+    peaks = by_kind("peaks")
+    rows = [
+        {"frame": frame, **one} for frame, view in views(tree, some) for one in detections_of(view, peaks.regions(view))
+    ]
+    report = DetectorReport(len(some), tuple(category_names(tree)), from_rows(rows), objects)
+    reached = float(report.as_json()["ap_2m"])
+    said = f"a threshold reaches an average precision of {reached:.2f} (at 2 m, {len(objects)} objects"
+    snr = objects.snr[np.isfinite(objects.snr)]
+    known = f", snr {snr.min():.0f} to {snr.max():.0f} dB" if len(snr) else ""
+    lines = [f"{said} in {len(some)} frames{known})"]
+    return [*lines, "warning: there is little to learn from this dataset"] if reached > TRIVIAL else lines
