@@ -7,9 +7,8 @@ from sonarsynth.recipe.sequences import MOST_SEQUENCES, Sequences, name_of
 from sonarsynth.recipe.variation.grid import Axis
 from sonarsynth.recipe.variation.random_variations import Choice, Ranged, Sobol
 from sonarsynth.recipe.variation.sobol_points import OF_VARIATIONS
-from sonarsynth.recipe.variation.values import Where
+from sonarsynth.recipe.variation.values import MOST_FRAMES, Where
 
-MOST_FRAMES = 10_000_000
 RESERVED = ("frame", "trajectory", "step", "time", "split", "repeat")
 """Names of the store that no entry can have."""
 

@@ -27,7 +27,7 @@ from sonarsynth.recipe.splits import SPLITS, Splits, assign
 from sonarsynth.recipe.variation.grid import Axis, Zip, axes
 from sonarsynth.recipe.variation.random_variations import Choice, Sobol, Variation
 from sonarsynth.recipe.variation.setting import Setting, plain_scene, with_settings
-from sonarsynth.recipe.variation.values import ASSUMED_SPEED, FRAMES, Plain, Where, default_name, where
+from sonarsynth.recipe.variation.values import ASSUMED_SPEED, FRAMES, MOST_FRAMES, Plain, Where, default_name, where
 
 MOST_SEQUENCES = 1_000_000
 NOTHING = Plain.of(None)
@@ -76,15 +76,15 @@ class Sequences:
 
     @cached_property
     def steps(self) -> Ints:
-        """Number of frames of each sequence (sequence,). Raises FieldError where that is no whole number from 1."""
+        """Number of frames of each sequence (sequence,). Raises FieldError unless that is 1 to `MOST_FRAMES`."""
         frames = np.full(self.count, self.base.trajectory.frames)
         varying = next((n for n, (_, entry) in enumerate(self.entries) if FRAMES in entry.path), None)
         if varying is not None:
             for sequence in range(self.count):
-                setting = self.settings(sequence)[varying]
-                value = setting.value.value
-                if setting.paths and (type(value) is not int or value < 1):
-                    raise FieldError(setting.source, f"{FRAMES} must be a whole number from 1, not {value}")
+                value = (setting := self.settings(sequence)[varying]).value.value
+                if setting.paths and (type(value) is not int or not 1 <= value <= MOST_FRAMES):
+                    said = f"must be a whole number from 1 to {MOST_FRAMES}, not {value}"
+                    raise FieldError(setting.source, f"{FRAMES} {said}")
                 frames[sequence] = value if setting.paths else frames[sequence]
         return frames
 

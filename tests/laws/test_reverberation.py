@@ -72,8 +72,9 @@ def sent(made: Plan) -> float:
 
 
 def test_energy_is_that_of_the_sonar_equation_and_not_of_the_number_of_scatterers() -> None:
-    """Own snap over a Lambert bottom: mu (h/r)^2 2 pi r (c/2)/r^4 per second, integrated over steps of 3 ms."""
-    edges = np.arange(12e-3, 30e-3, 3e-3)
+    """Own snap over a Lambert bottom: mu (h/r)^2 2 pi r (c/2)/r^4 per second, integrated over steps of 3 ms; and over
+    the last 0.6 ms that are listened for, which cells whose middle comes later share in."""
+    edges = np.append(np.arange(12e-3, 30e-3, 3e-3), [31.15e-3, 31.75e-3])
     fine = np.linspace(edges[0], edges[-1], 60_001)
     rate = lambert_rate(fine, HEIGHT, 10.0 ** (MU / 10.0), SPEED)
     known = np.histogram(fine, edges, weights=rate * (fine[1] - fine[0]))[0]
@@ -83,7 +84,8 @@ def test_energy_is_that_of_the_sonar_equation_and_not_of_the_number_of_scatterer
         found = [(heard(made), sent(made)) for made in drawn]
         counts.append(np.mean([len(a.delay) for a, _ in found]))
         got = np.mean([np.histogram(a.delay, edges, weights=a.energy)[0] / s for a, s in found], axis=0)
-        assert np.abs(10.0 * np.log10(got / known)).max() < (0.6 if speckle == 1.0 else 0.3), speckle
+        off = np.abs(10.0 * np.log10(got / known))
+        assert off[:-1].max() < (0.6 if speckle == 1.0 else 0.3) and (speckle > 0.02 or off[-1] < 0.4), speckle
         assert 10.0 * np.log10(got.sum() / known.sum()) == pytest.approx(0.0, abs=0.15), speckle
     assert counts[2] > 4.0 * counts[1] > 30.0 * counts[0]
 

@@ -259,8 +259,13 @@ WRONG = [
     ),
     (
         f"path: {START}.0, values: [9 m, 1100 cm]",
+        f"path: trajectory.frames, values: [{2**62}, {2**62 + 1}]",  # whose sum would be under 0
+        "18: grid.0.values.0: scene.trajectory.frames must be a whole number from 1 to 10000000, not 46",
+    ),
+    (
+        f"path: {START}.0, values: [9 m, 1100 cm]",
         "path: trajectory.frames, values: [2, 0]",
-        "18: grid.0.values.1: scene.trajectory.frames must be a whole number from 1, not 0",
+        "18: grid.0.values.1: scene.trajectory.frames must be a whole number from 1 to 10000000, not 0",
     ),
 ]
 

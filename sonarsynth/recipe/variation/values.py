@@ -23,6 +23,8 @@ VARYING = ("scene.world.", "scene.trajectory.", "scene.sonar.sensor_errors.", "s
 """What can vary."""
 FRAMES = "scene.trajectory.frames"
 """How long a sequence is: what varies it lists whole numbers, or draws them."""
+MOST_FRAMES = 10_000_000
+"""Of a recipe."""
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,7 @@ def _of_owner(
     receiver: Receiver,
     listening: Listening,
 ) -> Iterator[Family]:
-    spare = 0.5 * cells.size[0] / float(medium.profile.speed.min())
+    spare = spare_time(cells, medium)
     end = end_depths(cells.middle, owner)
     backs = back_ways(medium, receiver, end, described.bounces, owner)
     for i, out in enumerate(out_ways(medium, snap, end, described.bounces, owner)):
@@ -93,6 +93,11 @@ def _of_owner(
             energy[(paths.delay < listening.start - spare) | (paths.delay > listening.stop + spare)] = 0.0
             if energy.any():
                 yield Family(owner, n, i, j, _name(owner, out, back), cells, paths, energy)
+
+
+def spare_time(cells: Cells, medium: Medium) -> float:
+    """s: what a cell scatters arrives within so much of what its middle does: by half a diagonal out, half one back."""
+    return float(np.linalg.norm(cells.size)) / float(medium.profile.speed.min())
 
 
 def end_depths(place: Floats, owner: str) -> Floats:

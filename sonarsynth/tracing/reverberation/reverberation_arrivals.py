@@ -23,6 +23,7 @@ from sonarsynth.tracing.reverberation.families import (
     all_families,
     end_depths,
     expected_counts,
+    spare_time,
     strength,
     time_bins,
 )
@@ -71,16 +72,17 @@ def reverberation_arrivals(
     """What reaches the array of the sound of snaps that light; seed and key: of the sequence.
 
     Scatterers are as many as make the contrast of what a hydrophone hears err by `speckle`, at all times. Their
-    expected energy is that of the strengths, exactly,
-    whatever their number.
+    expected energy is that of the strengths, exactly, whatever their number.
     """
     families = list(all_families(described, snaps, medium, receiver, listening))
-    bins = max(int(np.ceil((listening.stop - listening.start) / STEP)), 1)
+    spare = max((spare_time(f.cells, medium) for f in families), default=0.0)
+    counted = listening._replace(start=listening.start - spare, stop=listening.stop + spare)
+    bins = max(int(np.ceil((counted.stop - counted.start) / STEP)), 1)
 
     def rate(some: list[Family]) -> Floats:
         rates = np.zeros(bins)
         for f in some:
-            np.add.at(rates, time_bins(f.paths.delay, listening, bins), f.energy / STEP)
+            np.add.at(rates, time_bins(f.paths.delay, counted, bins), f.energy / STEP)
         return rates
 
     whole = rate(families)
@@ -93,7 +95,7 @@ def reverberation_arrivals(
             heard += some
         elif own.any():
             left_out.append((name, float(10.0 * np.log10(own.sum() / whole.sum()))))
-    expected = expected_counts(heard, listening, bins)
+    expected = expected_counts(heard, counted, bins)
     total = sum(float(x.sum()) for x in expected)
     if total > MOST:
         raise ValueError(
