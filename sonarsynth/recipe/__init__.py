@@ -73,7 +73,9 @@ class Recipe:
     """
 
     title: str = "sonarsynth dataset"
+    """Of the dataset, in a few words."""
     seed: Annotated[int, Ge(0)] = 0
+    """Of everything that is drawn at random."""
     licence: str = "CC-BY-4.0"
     """Licence of the dataset (not of the software)."""
     dataset: Attribution = Attribution()
@@ -81,6 +83,7 @@ class Recipe:
     accuracy: Accuracy = Accuracy()
     """How much the simulation may err; the planner chooses the cheapest methods that err no more."""
     scene: Scene
+    """World, sonar, trajectory, physics and processing."""
     grid: tuple[Entry, ...] = ()
     """What the sequences span: every combination of the values of the entries, the last entry changing fastest."""
     variations: tuple[Variation, ...] = ()

@@ -30,7 +30,9 @@ def text_of(name: str, file: Path) -> tuple[str, list[Path], list[str]]:
     name = Path(name).stem
     if name not in known:
         raise BadOption(f"--from: '{name}' is none of {', '.join(known) or 'the shipped recipes, which are not there'}")
-    text = re.sub(rf"configs/{name}\.yaml", lambda _: str(file), known[name].read_text(encoding="utf-8"))
+    text = known[name].read_text(encoding="utf-8")
+    text = re.sub(r"\A# yaml-language-server: .*\n", "", text)  # the schema is beside the shipped ones alone
+    text = re.sub(rf"configs/{name}\.yaml", lambda _: str(file), text)
     text = re.sub(rf"\b{name}\.zarr", f"{file.stem}.zarr", text)
     beside = [known[name].parent / path for path in paths(reading.read(known[name]).data)]
     there = [path for path in beside if path.is_file()]

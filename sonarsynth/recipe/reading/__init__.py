@@ -22,13 +22,25 @@ from ruamel.yaml import YAML
 
 from sonarsynth.description import FieldError
 from sonarsynth.recipe import FILE_KINDS, Recipe
-from sonarsynth.recipe.reading.json_schema import schema
+from sonarsynth.recipe.reading.json_schema import schema, schema_text
 from sonarsynth.recipe.reading.messages import explain
 from sonarsynth.recipe.reading.model_tables import with_models
 from sonarsynth.recipe.reading.old_keys import new_setting, with_new_keys
 from sonarsynth.recipe.reading.yaml_source import SET, RecipeError, Source, Where, override, read_file, read_text
 
-__all__ = ["RecipeError", "RenamedKey", "Source", "dump", "load", "loads", "locating", "read", "recipe_of", "schema"]
+__all__ = [
+    "RecipeError",
+    "RenamedKey",
+    "Source",
+    "dump",
+    "load",
+    "loads",
+    "locating",
+    "read",
+    "recipe_of",
+    "schema",
+    "schema_text",
+]
 
 _ADAPTER: Final[TypeAdapter[Recipe]] = TypeAdapter(Recipe)
 

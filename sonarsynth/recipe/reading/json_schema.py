@@ -1,13 +1,90 @@
-"""The JSON schema of recipes, for text editors."""
+"""The JSON schema of recipes, for text editors: each number says its unit, and has an example that may be written."""
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
+from sonarsynth.conventions import Unit
 from sonarsynth.description.schemas import schema_of
 from sonarsynth.recipe import Recipe
 
+_EXAMPLES = {
+    "m": ("1 m", "10 cm", "2 mm", "100 m"),
+    "s": ("0.1 s", "1 s", "50 us", "1 min"),
+    "Hz": ("40 kHz", "250 kHz", "100 Hz"),
+    "rad": ("30 deg", "90 deg", "2 deg"),
+    "rad/s": ("5 deg/s",),
+    "m/s": ("1.5 m/s", "1500 m/s"),
+    "Pa": ("100 Pa",),
+    "dB": ("30 dB", "190 dB", "-30 dB"),
+    "kg/m3": ("1025 kg/m3",),
+    "degC": ("20 degC",),
+    "psu": ("35 psu",),
+}
+"""Numbers as people write them, by unit; of a field the first that its bounds let pass."""
+
 
 def schema() -> dict[str, Any]:
-    """JSON schema of a recipe, for editors: titles, descriptions, kinds, and the unit of each number (`x-unit`)."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema_of(Recipe)}
+    """JSON schema of a recipe, for editors.
+
+    Returns
+    -------
+    dict
+        A schema of draft 2020-12: titles, descriptions, kinds, defaults, bounds, the unit of each number (`x-unit`, and
+        in the text) and an example of it. The same is the file `recipe.schema.json` beside the shipped recipes.
+    """
+    found = schema_of(Recipe)
+    for owner in (found, *found["$defs"].values()):
+        for field in owner.get("properties", {}).values():
+            _exemplify(field)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **found}
+
+
+def schema_text() -> str:
+    """The schema as the text of a file: a line for each description, so that a change of one changes one line."""
+    found = schema()
+    definitions = found.pop("$defs")
+    lines = [f"{json.dumps(name)}:{_packed(value)}" for name, value in definitions.items()]
+    return _packed(found)[:-1] + ',"$defs":{\n' + ",\n".join(lines) + "\n}}\n"
+
+
+def _packed(value: Any) -> str:
+    return json.dumps(value, separators=(",", ":"), ensure_ascii=False)
+
+
+def _exemplify(field: dict[str, Any]) -> None:
+    """Give a field its unit in words, and an example."""
+    number = next((part for part in (field, *field.get("anyOf", ())) if "x-unit" in part), field)
+    parts = field.get("prefixItems", [number | {"default": field.get("default")}])
+    examples = [_example(part) for part in parts]
+    if None in examples:
+        return
+    example: Any = examples if "prefixItems" in field else examples[0]
+    units = ", ".join(part["x-unit"].replace("rad", "deg") for part in parts)
+    shown = f"[{', '.join(map(str, examples))}]" if "prefixItems" in field else example
+    field["description"] = f"{field.get('description', '')} ({units}, such as {shown})".strip()
+    field["examples"] = [example]
+
+
+def _example(field: dict[str, Any]) -> str | None:
+    """A number with its unit that a field takes: its default, or else one of those above. None without a unit."""
+    if "x-unit" not in field:
+        return None
+    unit, default = Unit(field["x-unit"]), field.get("default")
+    if isinstance(default, str):
+        return default
+    if isinstance(default, (int, float)) and default != 0:
+        return f"{default:g} {unit.symbol}"
+    fitting = (text for text in _EXAMPLES[unit.symbol] if _takes(field, unit.parse(text)))
+    return next(fitting, f"0 {unit.symbol}")
+
+
+def _takes(field: dict[str, Any], number: float) -> bool:
+    """Whether a number is within the bounds of a field."""
+    (bounds, *_) = (part for part in (*field.get("anyOf", ()), {}) if part.get("type") != "string")
+    return (
+        bounds.get("minimum", number) <= number <= bounds.get("maximum", number)
+        and number > bounds.get("exclusiveMinimum", float("-inf"))
+        and number < bounds.get("exclusiveMaximum", float("inf"))
+    )
