@@ -39,11 +39,6 @@ QUICK = {"build": ("--frames=0:2", "--workers=0", "--no-predict"), "show": ("--n
 PATHS = r"(?<![\w/~])(?:tools|configs|tests|sonarsynth|\.github|\.ci)/[\w./-]*\w"
 
 
-def blocks(text: str, language: str) -> list[str]:
-    """The fenced blocks of a language."""
-    return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
-
-
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Where examples run: a copy of what the reader has."""
@@ -100,12 +95,13 @@ def type_in(line: str) -> None:
 def test_every_example_of_a_page_runs(page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = page.read_text()
     called = with_a_cluster(monkeypatch) if "dask_jobqueue" in text else None
-    for block in blocks(text, "sh"):
+    names: dict[str, Any] = {"__name__": "__main__"}
+    for language, block in re.findall(r"^```(sh|python)\n(.*?)^```", text, re.DOTALL | re.MULTILINE):
+        if language == "python":
+            exec(compile(block, page.name, "exec"), names)
+            continue
         for line in filter(None, map(str.strip, block.replace("\\\n", " ").splitlines())):
             type_in(line)
-    names: dict[str, Any] = {"__name__": "__main__"}
-    for block in blocks(text, "python"):
-        exec(compile(block, page.name, "exec"), names)
     if called is not None:
         assert called == [_Cluster.scheduler_address]
     if page.stem == "README":
@@ -179,8 +175,3 @@ def test_every_docstring_example_of_a_public_name_gives_what_it_says() -> None:
     results = [doctest.testmod(module) for module in modules.values()]
     assert sum(result.failed for result in results) == 0
     assert sum(result.attempted for result in results) >= 4
-
-
-@pytest.mark.parametrize("text", ["print(ss.plan(recipe))"])
-def test_a_block_of_python_would_be_found(text: str) -> None:
-    assert blocks(f"a\n```python\n{text}\n```\n", "python") == [f"{text}\n"]

@@ -35,7 +35,7 @@ def test_every_shipped_recipe_is_found() -> None:
 def test_a_shipped_recipe_is_copied_with_its_comments_and_works(name: str, empty: Path) -> None:
     assert run(app, ["init", "mine.yaml", "--from", name]) == 0
     written, shipped = Path("mine.yaml").read_text(), shipped_recipes.shipped()[name]
-    assert written.count("#") == shipped.read_text().count("#")
+    assert written.count("#") == shipped.read_text().count("#") - 1 and "$schema" not in written
     assert f"configs/{name}.yaml" not in written
     sets = harbour.written(empty) if name == "harbour" else ()
     assert ss.load("mine.yaml", sets) == ss.load(shipped, sets)

@@ -11,8 +11,8 @@ from tools.page_building.tables import MADE, table
 INTRODUCTION = """# Python
 
 All that `import sonarsynth as ss` has. Numbers are SI, angles radians. `help(ss.NAME)` lists the parameters of each
-with their units, limits and defaults. On the site each has its signature and its text below; without it, the tables say what
-each is.
+with their units, limits and defaults. On the site each has its signature and its text below; without it, the tables
+say what each is.
 """
 
 

@@ -50,7 +50,16 @@ def schema_text() -> str:
 
 
 def _packed(value: Any) -> str:
-    return json.dumps(value, separators=(",", ":"), ensure_ascii=False)
+    return json.dumps(_whole(value), separators=(",", ":"), ensure_ascii=False)
+
+
+def _whole(part: Any) -> Any:
+    """Whole numbers without a point: of equal bounds, 1000 and 1000.0, `Annotated` gives the one that came first."""
+    if isinstance(part, dict):
+        return {key: _whole(value) for key, value in part.items()}
+    if isinstance(part, (list, tuple)):
+        return [_whole(value) for value in part]
+    return int(part) if isinstance(part, float) and part.is_integer() else part
 
 
 def _exemplify(field: dict[str, Any]) -> None:
@@ -83,7 +92,7 @@ def _example(field: dict[str, Any]) -> str | None:
 def _takes(field: dict[str, Any], number: float) -> bool:
     """Whether a number is within the bounds of a field."""
     (bounds, *_) = (part for part in (*field.get("anyOf", ()), {}) if part.get("type") != "string")
-    return (
+    return bool(
         bounds.get("minimum", number) <= number <= bounds.get("maximum", number)
         and number > bounds.get("exclusiveMinimum", float("-inf"))
         and number < bounds.get("exclusiveMaximum", float("inf"))
