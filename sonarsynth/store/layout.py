@@ -50,6 +50,11 @@ class ArrayLayout:
         """Type of the numbers as stored."""
         return np.dtype(self.variable.dtype)
 
+    @cached_property
+    def inner(self) -> tuple[int, ...]:
+        """Shape of a frame."""
+        return self.shape[1:]
+
     @property
     def empty(self) -> bool:
         """True where an axis has no entries (no target, no snap): there is nothing to write."""
@@ -71,8 +76,8 @@ class ArrayLayout:
         """A frame's value in the array's own type (the same array where it has that); raises ValueError where shape or
         type do not fit."""
         value = np.asarray(value)
-        if value.shape != self.shape[1:]:
-            raise ValueError(f"{self.path} has shape {value.shape}, but the store is laid out for {self.shape[1:]}")
+        if value.shape != self.inner:
+            raise ValueError(f"{self.path} has shape {value.shape}, but the store is laid out for {self.inner}")
         if value.dtype == self.dtype:
             return value
         if not np.can_cast(value.dtype, self.dtype, "same_kind"):

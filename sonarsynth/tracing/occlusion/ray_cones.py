@@ -38,6 +38,8 @@ def hidden(
     blocked = np.zeros(len(start), bool)
     if not bodies or not len(start):
         return blocked
+    if medium.profile.uniform and (bounces is None or not bounces.any()):
+        return occluded(bodies, start, end)
     times = np.zeros(len(start), np.int64) if bounces is None else bounces
     bow = _curvature(medium.profile) * length**2 / 8.0
     broken = (bow > SAGITTA_TOLERANCE) | (times > 0)
