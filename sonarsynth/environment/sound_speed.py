@@ -272,8 +272,7 @@ class Profile:
 
     depth: Floats  # (node,) not decreasing
     speed: Floats  # (node,)
-    notes: tuple[str, ...] = ()
-    """Where a formula that made it was used outside its range, one line each."""
+    notes: tuple[str, ...] = ()  # where a formula that made it was used outside its range, one line each
 
     @cached_property
     def uniform(self) -> bool:
