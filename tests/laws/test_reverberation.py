@@ -12,7 +12,7 @@ from scipy.fft import irfft
 from sonarsynth.environment.reverberation import Reverberation
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity
 from sonarsynth.equations.arrays.apertures import element_directivity
-from sonarsynth.equations.reverberation.speckle import contrast, lambert_rate
+from sonarsynth.equations.reverberation.speckle import contrast, lambert_rate, textured
 from sonarsynth.geometry.motion import Still
 from sonarsynth.pipeline import synthesise, trace_at
 from sonarsynth.planning import Plan, frame_start, plan
@@ -24,6 +24,7 @@ from sonarsynth.recipe.tolerance import Accuracy
 from sonarsynth.scattering.boundaries import Lambert
 from sonarsynth.signals.filtered_pulse import pulse_spectrum, snap_gains
 from sonarsynth.sources.shrimp import SnappingShrimp
+from sonarsynth.tracing.reverberation.cells import texture
 from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals
 
 SPEED, DEPTH, HEIGHT, MU = 1500.0, 60.0, 8.0, -15.0
@@ -151,6 +152,28 @@ def test_snap_and_hydrophone_may_be_swapped() -> None:
     there = mean_rate(snap=(6.0, 3.0), source_height=5.0)
     back = mean_rate(snap=(0.0, 0.0), sonar=Still(position=(6.0, 3.0, 5.0 - DEPTH)))
     assert np.abs(10.0 * np.log10(there / back)).max() < 0.3
+
+
+@pytest.mark.parametrize("shape", [1.0, 4.0])
+def test_patches_are_gamma_of_mean_1_and_stay_where_they_are(shape: float) -> None:
+    """So that Gaussian speckle of mean power 1 over them has the contrast 2 (1 + 1/shape)."""
+    draw = np.random.default_rng(2)
+    place = np.column_stack([draw.uniform(-200.0, 200.0, (400_000, 2)), np.full(400_000, -DEPTH)])
+    bright = texture(3, place, 1.0, shape)
+    assert bright.mean() == pytest.approx(1.0, abs=0.02)
+    power = bright * draw.exponential(size=len(bright))
+    assert (power**2).mean() / power.mean() ** 2 == pytest.approx(textured(2.0, shape), rel=0.06)
+    inside = np.floor(place) + draw.uniform(0.0, 1.0, place.shape)
+    assert np.array_equal(texture(3, inside, 1.0, shape), bright)
+    assert not np.array_equal(texture(4, inside, 1.0, shape), bright)
+
+
+def test_patches_change_no_mean_energy() -> None:
+    def energy(shape: float | None) -> float:
+        described = replace(LAMBERT, patchiness=shape, patch=1.0)
+        return float(np.mean([heard(plan(recipe(described, seed=seed))).energy.sum() for seed in (1, 2, 3)]))
+
+    assert 10.0 * np.log10(energy(4.0) / energy(None)) == pytest.approx(0.0, abs=0.4)
 
 
 def test_many_scatterers_make_gaussian_noise_and_few_the_law() -> None:

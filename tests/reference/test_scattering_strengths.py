@@ -98,6 +98,22 @@ def test_facets_give_back_what_the_coherent_reflection_lost(wind: float) -> None
     assert not facets(angles, WAVENUMBER, wind, 0.0).any()
 
 
+@pytest.mark.parametrize("wind", [1.0, 3.0, 5.0, 20.0])
+def test_facets_and_coherent_reflection_give_back_all_and_never_more(wind: float) -> None:
+    """Eckart's coherent power and the albedo of facets; near grazing, waves hide each other and less comes back.
+
+    Below about 3 degrees the lobe gives back up to half as much again: it has steeper ways out than in."""
+    sine, forward, weight = hemisphere()
+    height = 0.00533 * wind**2  # Pierson and Moskowitz
+    for grazing in (5.0, 10.0, 20.0, 45.0, 80.0):
+        down = float(np.sin(np.deg2rad(grazing)))
+        coherent = np.exp(-((2.0 * WAVENUMBER * height * down) ** 2))
+        angles = Angles(np.full(sine.size, down), sine, forward)
+        whole = coherent + albedo(facets(angles, WAVENUMBER, wind, height), sine, weight, down)
+        assert whole < 1.03, grazing
+        assert whole > (0.93 if grazing >= 20.0 else 0.7), grazing
+
+
 def test_no_angle_and_no_wind_makes_a_missing_number() -> None:
     edges = np.array([0.0, 1e-12, 1e-6, 0.5, 1.0 - 1e-12, 1.0])
     angles = Angles(*(a.ravel() for a in np.meshgrid(edges, edges, [-1.0, 0.0, 1.0])))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import erfc
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.reverberation.bottom_strength import Angles
@@ -23,13 +24,27 @@ def facets(angles: Angles, wavenumber: float, wind_speed: float, rms_height: flo
     """Of the facets of waves (...) in 1/sr: the lobe of slopes times 1 - exp(-g^2), g = k h (sin q_i + sin q_s).
 
     What they give back is what the coherent reflection lost (Eckart): exp(-g^2) of the power is left to that. The lobe
-    is that of Barrick (1968), `lobes.slope_lobe`; slopes by `slope_variance`.
+    is that of Barrick (1968), `lobes.slope_lobe`; slopes by `slope_variance`; waves hide each other near grazing, or
+    more would come back than arrives (`unshadowed`).
     """
     level, upright = angles.half
     spread = slope_variance(wind_speed)
     steep = np.maximum(upright, 1e-9)
     lobe = np.exp(-level / (steep**2 * spread)) * ((level + steep**2) / steep**2) ** 2 / (4.0 * np.pi * spread)
+    lobe *= unshadowed(angles, spread)
     return np.asarray(-np.expm1(-((2.0 * wavenumber * rms_height * upright) ** 2)) * lobe)
+
+
+def unshadowed(angles: Angles, spread: float) -> Floats:
+    """Share (...) of the facets that both directions see: 1/(1 + L(q_i) + L(q_s)), spread: `slope_variance`.
+
+    Source: Smith (1967), J. Geophys. Res. 72, 4059; L = (exp(-v^2)/(v sqrt pi) - erfc v)/2, v = tan q/sqrt(spread).
+    """
+    hidden = np.zeros(np.broadcast(*angles).shape)
+    for sine in (angles.sine_in, angles.sine_out):
+        v = np.maximum(sine, 1e-6) / np.sqrt(np.maximum(1.0 - sine**2, 1e-12) * spread)
+        hidden = hidden + 0.5 * (np.exp(-(v**2)) / (v * np.sqrt(np.pi)) - erfc(v))
+    return np.asarray(1.0 / (1.0 + np.maximum(hidden, 0.0)))
 
 
 def small_waves(angles: Angles, wind_speed: float) -> Floats:
