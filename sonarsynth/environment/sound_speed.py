@@ -36,8 +36,7 @@ def _ascending(depth: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def _as_long_as_depth(values: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
-    depth = info.data.get("depth")
-    if depth is not None and len(values) != len(depth):
+    if (depth := info.data.get("depth")) is not None and len(values) != len(depth):
         raise ValueError(f"has {len(values)} entries, but depth has {len(depth)}")
     return values
 

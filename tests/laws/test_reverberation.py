@@ -87,7 +87,8 @@ def test_energy_is_that_of_the_sonar_equation_and_not_of_the_number_of_scatterer
         got = np.mean([np.histogram(a.delay, edges, weights=a.energy)[0] / s for a, s in found], axis=0)
         off = np.abs(10.0 * np.log10(got / known))
         assert off[:-1].max() < (0.6 if speckle == 1.0 else 0.3) and (speckle > 0.02 or off[-1] < 0.4), speckle
-        assert 10.0 * np.log10(got.sum() / known.sum()) == pytest.approx(0.0, abs=0.15), speckle
+        # of some 1000 scatterers in three draws, 0.12 dB rms by chance
+        assert 10.0 * np.log10(got.sum() / known.sum()) == pytest.approx(0.0, abs=0.45 if speckle == 1.0 else 0.15)
     assert counts[2] > 4.0 * counts[1] > 30.0 * counts[0]
 
 
