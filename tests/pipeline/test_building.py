@@ -254,7 +254,7 @@ def test_truth_alone_is_made_without_sound(
     def never(*_: object, **__: object) -> None:
         raise AssertionError("nothing of sound is needed")
 
-    for name in ("tracing.arrivals.trace", "signals.GriddedSynthesis.signals", "planning.choosing.arrivals_of"):
+    for name in ("tracing.arrivals.trace", "signals.GriddedSynthesis.signals", "planning.choosing.sampled_arrivals"):
         monkeypatch.setattr(f"sonarsynth.{name}", never)
     path = tmp_path / "s.zarr"
     assert build(small, path, products="truth", workers=0).ok
