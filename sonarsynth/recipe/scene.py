@@ -10,7 +10,7 @@ from annotated_types import Ge, Gt, Le, MaxLen
 from pydantic import Field, ValidationInfo, field_validator
 
 from sonarsynth.conventions import Decibels, Floats, PositiveSeconds, Seconds
-from sonarsynth.description import description
+from sonarsynth.description import FieldError, description
 from sonarsynth.environment.reverberation import Reverberation
 from sonarsynth.environment.scatterers import ScattererField
 from sonarsynth.environment.sea import Environment
@@ -25,7 +25,7 @@ from sonarsynth.randomness import stream
 from sonarsynth.ranging import AutoPlacing, Cancelling, Locator, Peaks, Picking, Placing, SensorDelays
 from sonarsynth.receiver import Sonar
 from sonarsynth.recipe.populations.population import Population
-from sonarsynth.scattering import MirrorLobe, Scattering
+from sonarsynth.scattering import MirrorLobe, Scatterers, Scattering
 from sonarsynth.signals import AutoSynthesis, Synthesis
 from sonarsynth.sources import Source
 from sonarsynth.sources.chorus import Chorus
@@ -218,9 +218,13 @@ class Scene:
         snaps: list[Emission] = []
         for i, source in enumerate(self.world.sources):
             snaps += source.emissions(bottom, stream(seed, "snap", key, step, i), time)
-        fields = enumerate(self.world.scatterers)
-        loose = tuple(some.scatterers(bottom, stream(seed, "scatterers", key, i)) for i, some in fields)
-        return WorldState(time, bodies, tuple(snaps), scatterers=loose)
+        loose = list[Scatterers]()
+        for i, some in enumerate(self.world.scatterers):
+            try:
+                loose.append(some.scatterers(bottom, stream(seed, "scatterers", key, i)))
+            except ValueError as error:
+                raise FieldError(("scene", "world", "scatterers", i), str(error)) from None
+        return WorldState(time, bodies, tuple(snaps), scatterers=tuple(loose))
 
     def frame(
         self,

@@ -11,7 +11,8 @@ import trimesh
 
 import sonarsynth as ss
 from sonarsynth.conventions import NO_TARGET
-from sonarsynth.environment.scatterers import BottomPatch, Stones
+from sonarsynth.description import FieldError
+from sonarsynth.environment.scatterers import BottomPatch, Net, Stones, Swarm
 from sonarsynth.environment.sea import Absorption, Environment, Isovelocity, Profile
 from sonarsynth.geometry import Pose, quaternion
 from sonarsynth.geometry.mesh import Mesh
@@ -44,7 +45,10 @@ def ball(place: list[float], radius: float = 0.3) -> PlacedTarget:
 
 
 def traced(
-    *fields: BottomPatch | Stones, bodies: tuple[PlacedTarget, ...] = (), speed: float = 0.0, seed: int = 0
+    *fields: BottomPatch | Net | Stones | Swarm,
+    bodies: tuple[PlacedTarget, ...] = (),
+    speed: float = 0.0,
+    seed: int = 0,
 ) -> Arrivals:
     loose = tuple(field.scatterers(BOTTOM, np.random.default_rng(seed)) for field in fields)
     receiver = Receiver(POSE, ARRAY, Sonar(), Track(POSE, np.array([speed, 0.0, 0.0])) if speed else None)
@@ -62,6 +66,40 @@ def test_a_stone_is_heard_as_a_large_sphere() -> None:
     assert one.delay[0] == pytest.approx((out + back) / C, rel=1e-12)
     assert abs(one.amplitude[0]) == pytest.approx(0.1 / (out * back), rel=1e-12)
     np.testing.assert_allclose(POSE.turn_to_world(one.direction)[0], (place - POSE.position) / back, atol=1e-12)
+
+
+def test_a_swarm_sends_the_power_of_its_members_from_within_its_ellipsoid_and_the_water() -> None:
+    swarm = Swarm(centre=(9.0, 2.0, -0.3), axes=(1.0, 2.0, 0.5), members=3000, strength=-45.0)
+    place = swarm.scatterers(BOTTOM, np.random.default_rng(1)).position
+    off = (place - swarm.centre) / swarm.axes
+    assert (np.sum(off**2, axis=1) < 1.0).all() and (place[:, 2] < 0.0).all() and place[:, 2].max() > -0.02
+    below = Swarm(centre=(9.0, 2.0, -6.0), axes=(0.5, 0.5, 0.5), members=3000, strength=-45.0)
+    found = traced(below)
+    assert len(found.delay) - 1 == 3000, "and the direct path"
+    own = found.kind == Kind.REVERBERATION
+    out, back = (np.linalg.norm(np.array(below.centre) - x) for x in (SOURCE, POSE.position))
+    power = (found.amplitude[own] ** 2).sum() * (out * back) ** 2
+    assert 10.0 * np.log10(power) == pytest.approx(-45.0 + 10.0 * np.log10(3000), abs=0.1)
+    assert abs(np.sign(found.amplitude[own]).mean()) < 0.1
+    with pytest.raises(ValueError, match="out of the water"):
+        Swarm(centre=(9.0, 2.0, 2.0)).scatterers(BOTTOM, np.random.default_rng(1))
+
+
+def test_knots_of_a_net_are_where_its_corners_say_and_in_phase() -> None:
+    net = Net(corner=(8.0, -1.0, -2.0), along=(0.0, 2.0, 0.0), down=(0.0, 0.0, -3.0), columns=5, rows=7)
+    place = net.scatterers(BOTTOM, np.random.default_rng(1)).position.reshape(7, 5, 3)
+    np.testing.assert_allclose(
+        place[[0, 0, -1, -1], [0, -1, 0, -1]], [[8, -1, -2], [8, 1, -2], [8, -1, -5], [8, 1, -5]]
+    )
+    np.testing.assert_allclose(place[3, 2], (8.0, 0.0, -3.5))
+    found = traced(net)
+    own = found.kind == Kind.REVERBERATION
+    assert own.sum() == 35 and len(set(np.sign(found.amplitude[own]))) == 1
+    with pytest.raises(ValueError, match="out of the water"):
+        replace(net, down=(0.0, 0.0, -30.0)).scatterers(BOTTOM, np.random.default_rng(1))
+    tank = ss.load(ROOT / "configs" / "tank.yaml", ["scene.world.scatterers=[{kind: net, corner: [1, 0, -5]}]"])
+    with pytest.raises(FieldError, match=r"scatterers.*out of the water"):
+        tank.frame(0)
 
 
 def test_an_array_that_moves_hears_each_scatterer_at_its_retarded_time() -> None:
