@@ -18,6 +18,7 @@ BENCHMARKS = (
     "memory",
     "cloud",
     "odds",
+    "soundscape",
 )
 """Modules beside this one; each has a function `bench`."""
 
