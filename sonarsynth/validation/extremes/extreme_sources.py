@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import xarray as xr
 
 from sonarsynth.conventions import Floats, azimuth_elevation, direction
+from sonarsynth.pipeline import render
+from sonarsynth.planning import Plan, plan
 from sonarsynth.products import REASONS, Signals, SourceEstimates
 from sonarsynth.ranging import SensorDelays
 from sonarsynth.receiver import Band, Elements, PlanarLattice, Sonar, elements
+from sonarsynth.recipe import reading
 from sonarsynth.state import Receiver, Survey
-from sonarsynth.validation.extremes.outcomes import Case, Got, holds, together
+from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, together
 from sonarsynth.validation.extremes.plain_scenes import BOTTOM_DEPTH, POSE, PROFILE, RATE, C, direct
 
 LATTICE = PlanarLattice(columns=16, rows=16, pitch=0.08, face=0.0)
@@ -109,9 +113,55 @@ def _stranger() -> Got:
     return together(parts)
 
 
+CHORUS = """\
+scene:
+  world:
+    environment: {{depth: 40 m, sound_speed: {{kind: isovelocity, speed: 1540 m/s}}}}
+    sources: [{{kind: snapping_shrimp, position: [6, 5], source_level: 0 dB}}]
+    chorus: {{density: {density}, deviation: 2 dB, reach: 400 m, images: 1}}
+  sonar:
+    array: {{kind: position_table, face: 0 m, positions: [[0, 0, 0], [0, 30, 0], [0, -30, 0], [30, 0, 0]]}}
+    beams: {{azimuths: 3, elevations: 3}}
+  trajectory: {{sonar: {{kind: still, position: [0, 0, {height}], heading: 90 deg}}}}
+"""
+
+
+def _chorus(density: float, height: float) -> tuple[Plan, xr.DataTree]:
+    made = plan(reading.loads(CHORUS.format(density=density, height=height)), ("signals",))
+    return made, render(made, 0)
+
+
+def _dense() -> Got:
+    """Of 1e5 snaps a second within 400 m, in water of 40 m: the mean square is Campbell's, within and beyond."""
+    made, tree = _chorus(0.2, -5.0)
+    near, distant = made.chorus, made.distant_chorus
+    snaps, square = int(tree["truth/soundscape/snaps"]), float(np.mean(tree["signals/pressure"].values ** 2))
+    if near is None or distant is None:
+        return holds(False, "a chorus")
+    whole = near.level - 10.0 * np.log10(1.0 - distant.share)
+    return together(
+        holds(snaps > 300, f"{snaps} snaps in the record"),
+        off(10.0 * np.log10(square) + 120.0 - whole, 1.0, "dB", "level"),
+    )
+
+
+def _bounded() -> Got:
+    """Hydrophones at the surface, on the bottom, and where nothing snaps."""
+    parts = []
+    for density, height in ((1e-2, 0.0), (1e-2, -40.0), (0.0, -5.0)):
+        _, tree = _chorus(density, height)
+        level = tree["truth/soundscape/level"].values
+        loudest = float(np.nanmax(level)) if density else -np.inf
+        parts.append(holds(bool(np.isfinite(tree["signals/pressure"].values).all()), f"pressure at {-height:g} m"))
+        parts.append(holds(loudest < 185.0 + 5 * 2.0 + 49.2, f"no snap louder than at its bubble, {loudest:.4g} dB"))
+    return together(parts)
+
+
 CASES = (
     Case("a snap in mid-water, 10 m to 5 km away", "the bearing; the place within its errors, or none", _middle),
     Case("bands of 100 Hz to 60 kHz", "the place within its errors, or none with a reason", _bands),
     Case("1 to 20 snaps at one instant", "each estimate one of them, or none with a reason", _crowd),
     Case("a stranger 20 dB louder", "the louder one first, each within its errors", _stranger),
+    Case("1e5 snaps of a chorus a second", "the mean square of Campbell's theorem", _dense),
+    Case("a chorus at the surface and on the bottom", "finite, no louder than at the bubble", _bounded),
 )
