@@ -135,7 +135,8 @@ def _dense() -> Got:
     """Of 1e5 snaps a second within 400 m, in water of 40 m: the mean square is Campbell's, within and beyond."""
     made, tree = _chorus(0.2, -5.0)
     near, distant = made.chorus, made.distant_chorus
-    snaps, square = int(tree["truth/soundscape/snaps"]), float(np.mean(tree["signals/pressure"].values ** 2))
+    snaps = int(tree["truth/soundscape"].dataset["snaps"])
+    square = float(np.mean(tree["signals"].dataset["pressure"].values ** 2))
     if near is None or distant is None:
         return holds(False, "a chorus")
     whole = near.level - 10.0 * np.log10(1.0 - distant.share)
@@ -150,9 +151,11 @@ def _bounded() -> Got:
     parts = []
     for density, height in ((1e-2, 0.0), (1e-2, -40.0), (0.0, -5.0)):
         _, tree = _chorus(density, height)
-        level = tree["truth/soundscape/level"].values
+        level = tree["truth/soundscape"].dataset["level"].values
         loudest = float(np.nanmax(level)) if density else -np.inf
-        parts.append(holds(bool(np.isfinite(tree["signals/pressure"].values).all()), f"pressure at {-height:g} m"))
+        parts.append(
+            holds(bool(np.isfinite(tree["signals"].dataset["pressure"].values).all()), f"pressure at {-height:g} m")
+        )
         parts.append(holds(loudest < 185.0 + 5 * 2.0 + 49.2, f"no snap louder than at its bubble, {loudest:.4g} dB"))
     return together(parts)
 
