@@ -19,6 +19,7 @@ BENCHMARKS = (
     "cloud",
     "odds",
     "soundscape",
+    "growth",
 )
 """Modules beside this one; each has a function `bench`."""
 

@@ -1,0 +1,78 @@
+"""`tools/bench growth`: how the time of planning and of a frame grows with what there is of everything. A table.
+
+Processor time of one process, warm; a row for each size, of the remus recipe with one thing changed; the exponent is
+that between the last two sizes of each: 1 is in proportion.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from benchmarks.build import gemm, one
+from benchmarks.frame import RECIPE
+from sonarsynth import planning
+from sonarsynth.planning import choosing
+from sonarsynth.recipe import reading
+
+FRAMES = range(30, 35)
+TARGET, SONAR = "scene.world.targets.0.shape", "scene.sonar"
+LATTICE = "{{kind: planar_lattice, columns: {0}, rows: {0}, pitch: 5 cm}}"
+GROWTHS = {
+    "facets": [(f"{TARGET}.edge={edge} mm",) for edge in (28, 18, 9)],
+    "beams": [(f"{SONAR}.beams.azimuths={n}", f"{SONAR}.beams.elevations={n}") for n in (51, 101, 201)],
+    "hydrophones": [(f"{SONAR}.array={LATTICE.format(n)}",) for n in (13, 26, 46, 64)],
+}
+"""What grows, and the settings of each size."""
+
+
+def measured(sets: tuple[str, ...]) -> dict[str, Any]:
+    """Sizes of a recipe, seconds of planning, and ms of each stage of a frame, the median of a few."""
+    recipe = reading.load(RECIPE, list(sets))
+    choosing._CHOSEN.clear()  # what the process remembers of another plan
+    began = time.process_time()
+    plan = planning.plan(recipe, {"image", "cloud"})
+    planned = time.process_time() - began
+    for index in FRAMES:
+        one(plan, index)
+    laps = [one(plan, index)[1] for index in FRAMES]
+    stages = {stage: 1e3 * float(np.median([lap[stage] for lap in laps])) for stage in laps[0]}
+    beams = plan.scene.sonar.beams
+    sizes = {
+        "facets": sum(len(mesh.faces) for mesh in plan.scene.meshes),
+        "beams": beams.azimuths * beams.elevations,
+        "hydrophones": plan.elements.count,
+    }
+    return {"sizes": sizes, "plan_seconds": planned, "stages_ms": stages, "frame_ms": sum(stages.values())}
+
+
+def exponent(rows: list[dict[str, Any]], what: str, name: str) -> float:
+    """Of a time, between the last two sizes of something."""
+    (size, spent), (more, longer) = ((row["sizes"][what], row[name]) for row in rows[-2:])
+    return float(np.log(longer / spent) / np.log(more / size))
+
+
+def bench() -> dict[str, Any]:
+    """Every growth, with exponents of planning and of a frame."""
+    measured(())  # all is loaded
+    found: dict[str, Any] = {"gemm_ms": gemm()}
+    for what, settings in GROWTHS.items():
+        rows = [measured(sets) for sets in settings]
+        names = ("plan_seconds", "frame_ms")
+        found[what] = {"rows": rows, "exponents": {name: exponent(rows, what, name) for name in names}}
+    return found
+
+
+def table(result: dict[str, Any]) -> str:
+    """The result in Markdown."""
+    lines = ["| | size | plan, s | frame, ms | its longest stage, ms |", "|---|---|---|---|---|"]
+    for what in GROWTHS:
+        for row in result[what]["rows"]:
+            stage, longest = max(row["stages_ms"].items(), key=lambda item: item[1])
+            sizes = f"{row['sizes'][what]} | {row['plan_seconds']:.1f} | {row['frame_ms']:.0f}"
+            lines.append(f"| {what} | {sizes} | {stage} {longest:.0f} |")
+        plan, frame = result[what]["exponents"].values()
+        lines.append(f"| exponent | | {plan:.2f} | {frame:.2f} | |")
+    return "\n".join([*lines, "", f"A product of float32 matrices of 1024 by 1024: {result['gemm_ms']:.1f} ms"])
