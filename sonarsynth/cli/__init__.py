@@ -203,7 +203,8 @@ def verify(
     from sonarsynth import store as stores
     from sonarsynth.cli import printing
 
-    report = stores.verify(store, [evaluation.check], quick=quick)
+    with printing.planning("verifying"):
+        report = stores.verify(store, [evaluation.check], quick=quick)
     if as_json:
         _print_json(report.as_json())
     else:
