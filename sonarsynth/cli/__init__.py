@@ -16,6 +16,7 @@ import typer
 
 from sonarsynth.cli.accuracy_command import accuracy
 from sonarsynth.cli.authoring.init_command import init
+from sonarsynth.cli.authoring.notebooks_command import notebooks
 from sonarsynth.cli.authoring.preview_command import preview
 from sonarsynth.cli.card_command import card
 from sonarsynth.cli.detectors.detect_command import detect
@@ -242,7 +243,7 @@ def show(
         typer.echo(str(file))
 
 
-for command in (accuracy, card, detect, evaluate, export, init, preview, rays, repair, report, soundscape):
+for command in (accuracy, card, detect, evaluate, export, init, notebooks, preview, rays, repair, report, soundscape):
     app.command()(command)
 app.command("target-strength")(target_strength)
 

@@ -14,7 +14,16 @@ PACKAGE = Path(sonarsynth.__file__).parent
 
 def shipped() -> dict[str, Path]:
     """The shipped recipes by name: of the clone that runs, else those installed with the package."""
-    found = (sorted(folder.glob("*.yaml")) for folder in (PACKAGE.parent / "configs", PACKAGE / "configs"))
+    return _shipped("configs", "*.yaml", PACKAGE.parent / "configs")
+
+
+def shipped_notebooks() -> dict[str, Path]:
+    """The notebooks by name, as plain Python with cell marks; as `shipped`."""
+    return _shipped("notebooks", "*.py", PACKAGE.parent / "tools" / "notebooks")
+
+
+def _shipped(name: str, pattern: str, in_clone: Path) -> dict[str, Path]:
+    found = (sorted(folder.glob(pattern)) for folder in (in_clone, PACKAGE / name))
     return {file.stem: file for file in next((files for files in found if files), [])}
 
 
