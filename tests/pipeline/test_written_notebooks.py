@@ -1,4 +1,4 @@
-"""`sonarsynth notebooks`: the same code as the sources, in cells, beside the recipes that it reads; nothing is replaced."""
+"""`sonarsynth notebooks`: the code of the sources, in cells, beside the recipes that it reads; nothing is replaced."""
 
 from __future__ import annotations
 

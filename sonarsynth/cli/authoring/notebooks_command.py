@@ -47,7 +47,8 @@ def as_notebook(text: str) -> dict[str, Any]:
         body = body.strip("\n")
         if kind == "markdown":
             body = re.sub(r"^# ?", "", body, flags=re.MULTILINE)
-        cell = {"cell_type": kind, "id": f"cell-{len(cells)}", "metadata": {}, "source": body.splitlines(keepends=True)}
-        cells.append(cell | ({"execution_count": None, "outputs": []} if kind == "code" else {}))
+        lines = body.splitlines(keepends=True)
+        results: dict[str, Any] = {"execution_count": None, "outputs": []} if kind == "code" else {}
+        cells.append({"cell_type": kind, "id": f"cell-{len(cells)}", "metadata": {}, "source": lines} | results)
     kernel = {"kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"}}
     return {"nbformat": 4, "nbformat_minor": 5, "metadata": kernel, "cells": cells}
