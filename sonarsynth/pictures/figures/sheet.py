@@ -142,7 +142,7 @@ def draw_cloud(axes: Axes, onto: Figure, view: View, errors: Errors, space: Wind
     outside = int((~inside).sum())
     counts = f"{counted(int(on.sum()), 'point')} on a target, {int(off.sum())} off target"
     more = f", {outside} outside" if outside else ""
-    axes.set_title(f"point cloud in the true hull, one scale: {counts}{more}", fontsize=10, color=INK, y=1.0)
+    axes.set_title(f"point cloud in the true hull, one scale: {counts}{more}", fontsize=10, color=INK, y=1.05)
 
 
 def draw_beams(panels: list[Axes], beams: list[Beam]) -> None:

@@ -159,7 +159,9 @@ def space_figure(title: str, rays: Sequence[Floats], looks: Sequence[Look], geom
     axes.scatter(*geometry.sensors.T, s=0.6, color=INK, depthshade=False)
     for name, place in geometry.places.items():
         axes.scatter(*place, s=22, color=INK, depthshade=False)
-        axes.text(*place, f"  {name}", fontsize=9, color=INK)
+        over = place if name != "array" else np.append(place[:2], geometry.sensors[:, 2].max())
+        beside = {"ha": "center", "va": "bottom"} if name == "array" else {}
+        axes.text(*over, name if beside else f"  {name}", fontsize=9, color=INK, **beside)
     every = [*rays, *(hull.vertices for hull in geometry.hulls), *geometry.tracks.values(), geometry.view["across"]]
     one_scale(axes, np.concatenate([*every, *(p[None] for p in geometry.places.values())]), geometry.bearing)
     _face(made.add_subplot(parts[0, 1]), geometry)
