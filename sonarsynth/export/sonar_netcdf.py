@@ -26,7 +26,8 @@ METRES_A_DEGREE: Final = 111_195.0
 LOST: Final = (
     "the light is that of snaps: what the convention asks of a transmitter is NaN, and no equation converts to target "
     "strength",
-    "positions are metres east and north of 0 N 0 E; times are counted from the start of the sequence, as 1970-01-01",
+    "positions are metres east and north of 0 N 0 E; times are counted from the start of the motions, or the first "
+    "frame where that is earlier, as 1970-01-01",
     "the truth, points, source estimates, meshes and the link budget are left out",
 )
 """What an export lacks, a line each."""
@@ -188,7 +189,8 @@ def _beam_group(tree: xr.DataTree, group: Any, frames: np.ndarray, beams: _Beams
     names = group.create_variable("beam", ("beam",), h5py.string_dtype())
     names.attrs["long_name"] = "Beam name"
     names[:] = np.array(beams.names, object)
-    time = np.rint(1e9 * np.asarray(tree["time"].values)[frames]).astype(np.uint64)
+    seconds = np.asarray(tree["time"].values)
+    time = np.rint(1e9 * (seconds[frames] - min(float(np.nanmin(seconds)), 0.0))).astype(np.uint64)  # has no sign
     group.create_variable("ping_time", ("ping_time",), np.uint64, data=time).attrs.update(_TIME)
     ragged = group.create_vltype(np.float32, "sample_t")
     samples = group.create_variable("backscatter_r", ("ping_time", "beam", "subbeam"), ragged)

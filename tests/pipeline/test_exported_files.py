@@ -17,6 +17,7 @@ from sonarsynth.cli import app
 from sonarsynth.cli.running import run
 from sonarsynth.export.coco_files import DECIBELS, grey, write_coco
 from sonarsynth.export.platform_angles import beam_rotation, heading_pitch_roll
+from sonarsynth.export.sonar_netcdf import write_sonar_netcdf
 from sonarsynth.recipe import reading
 from sonarsynth.store import Mismatch
 
@@ -123,6 +124,19 @@ def test_no_name_of_a_store_leads_out_of_the_folder(store: Path, tmp_path: Path)
     tree.dataset = tree.to_dataset().assign_coords(split=("frame", numbers.values + 7))
     with pytest.raises(Mismatch, match="7 is no number of a split"):
         write_coco(tree, tmp_path / "c", np.array(BUILT))
+
+
+def test_times_before_the_motions_start_count_from_the_first_frame(store: Path, tmp_path: Path) -> None:
+    """The convention's times have no sign."""
+    import netCDF4
+
+    tree = ss.open(store)
+    seconds = tree["time"].values - 100.0
+    tree.dataset = tree.to_dataset().assign_coords(time=("frame", seconds))
+    (file,) = write_sonar_netcdf(tree, tmp_path, np.array(BUILT))
+    with netCDF4.Dataset(file) as read:
+        found = read["Sonar/Beam_group1/ping_time"][:].astype(float) / 1e9
+    np.testing.assert_allclose(found, seconds[BUILT] - np.nanmin(seconds), atol=1e-9)
 
 
 def test_netcdf_reads_what_the_convention_asks_and_the_same_numbers(store: Path) -> None:

@@ -58,6 +58,7 @@ def without_nan(value: Any) -> Any:
 
 
 def _print(found: dict[str, Any], console: Console) -> None:
+    from rich.markup import escape
     from rich.table import Table
 
     console.print(f"{found['detections']} detections of {found['objects']} objects in {found['frames']} frames")
@@ -66,7 +67,7 @@ def _print(found: dict[str, Any], console: Console) -> None:
     for name in (name for name in found if name.startswith("by_")):
         table.add_section()
         for text, row in found[name].items():
-            table.add_row(text if name == "by_category" else f"{name[3:]} {text}", *_cells(row))
+            table.add_row(escape(text) if name == "by_category" else f"{name[3:]} {text}", *_cells(row))
     console.print(table)
     for rate in found["detection"]:
         console.print(f"found at {rate['false_alarms_a_frame']:g} false alarms a frame: {_share(rate)}")
