@@ -52,7 +52,7 @@ _HOMES = {
         "SensorErrors Sonar"
     ),
     "recipe": "Accuracy Axis Choice Integers LogUniform Normal Recipe Sobol Splits Zip Uniform",
-    "recipe.populations.drawn_tracks": "AnyWay AtRest Hovering StraightAhead Upright Wandering",
+    "recipe.populations.drawn_tracks": "AnyOrientation AtRest Hovering StraightAhead Upright Wandering",
     "recipe.populations.population": "BodyModel Population",
     "recipe.populations.regions": "Annulus BoxRegion FieldOfView PolygonRegion",
     "recipe.variation.random_variations": "Condition",

@@ -112,7 +112,7 @@ from sonarsynth.recipe import (
     Zip as Zip,
 )
 from sonarsynth.recipe.populations.drawn_tracks import (
-    AnyWay as AnyWay,
+    AnyOrientation as AnyOrientation,
     AtRest as AtRest,
     Hovering as Hovering,
     StraightAhead as StraightAhead,

@@ -73,7 +73,7 @@ def _explain(error: Exception, shown: bool) -> int:
     from sonarsynth.description import FieldError
 
     match type(error).__name__:
-        case "Locked" | "Ended" | "Damage":
+        case "StoreLocked" | "BuildEnded" | "Damage":
             return _say(str(error), STORE)
         case "RecipeError" | "Mismatch" | "NothingToDraw" | "TooLarge" | "Unreachable" | "NoScheduler":
             return _say(str(error), INPUT)

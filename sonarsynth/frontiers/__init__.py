@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from sonarsynth.frontiers.exact_frame import Exact, exact_frame, synthesis_check
-from sonarsynth.frontiers.full_frame import Whole, whole_points
+from sonarsynth.frontiers.exact_frame import ExactFrame, exact_frame, synthesis_check
+from sonarsynth.frontiers.full_frame import FullFrame, whole_points
 from sonarsynth.frontiers.image_knobs import image_points, range_points
 from sonarsynth.frontiers.peer_rows import image_peers, synthesis_peers
 from sonarsynth.frontiers.picking_knobs import picking_points
@@ -21,13 +21,13 @@ from sonarsynth.planning import Plan, arrivals_of
 from sonarsynth.planning import plan as plan_of
 from sonarsynth.recipe import Recipe
 
-__all__ = ["Exact", "Measured", "Point", "Verdict", "exact_frame", "measure", "usual_frames"]
+__all__ = ["AccuracyReport", "ExactFrame", "Point", "Verdict", "exact_frame", "measure", "usual_frames"]
 
 Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Measured:
+class AccuracyReport:
     """The rows of a recipe's accuracy."""
 
     title: str
@@ -65,7 +65,7 @@ def measure(
     seed: int | None = None,
     peers: bool = True,
     say: Say = lambda text: None,
-) -> Measured:
+) -> AccuracyReport:
     """Vary each setting of a recipe about the planner's choice, and measure error and run time against exact results.
 
     frames: numbers of the frames (default: `usual_frames`). hydrophones: how many are computed exactly (default: 4 to
@@ -80,17 +80,23 @@ def measure(
         made = replace(plan_of(replace(recipe, seed=seed), choices=made.choices), errors=made.errors)
     chosen = usual_frames(recipe.frames) if frames is None else tuple(frames)
     points: list[Point] = []
-    rests, heard = [], 0
+    rests, hydrophones_computed = [], 0
     for index in chosen:
         found, rest, count = _frame(made, index, hydrophones, say, peers=peers and index == chosen[0])
         points += found
         rests.append(rest)
-        heard = count
+        hydrophones_computed = count
     rows = merged(points)
     rest = sum(rests) / len(rests)
     own = tuple(sorted(set_by_recipe(made.scene)))
-    return Measured(
-        recipe.title, chosen, heard, tuple(rows), tuple(verdicts(rows, made.scene, rest)), made.choices.as_json(), own
+    return AccuracyReport(
+        recipe.title,
+        chosen,
+        hydrophones_computed,
+        tuple(rows),
+        tuple(verdicts(rows, made.scene, rest)),
+        made.choices.as_json(),
+        own,
     )
 
 
@@ -107,15 +113,15 @@ def _frame(made: Plan, index: int, hydrophones: int | None, say: Say, *, peers: 
     points += synthesis_points(traced)
     arrivals = arrivals_of(plan, frame)
     signals = frame_signals(plan, frame, arrivals)
-    whole = Whole.of(exact, signals)
+    whole = FullFrame.of(exact, signals)
     say(f"frame {index}: image and range")
-    points += image_points(plan, whole.heard, peers)
-    points += range_points(plan, frame, whole.heard)
-    points += picking_points(plan, frame, arrivals, whole.heard)
+    points += image_points(plan, whole.beamformed, peers)
+    points += range_points(plan, frame, whole.beamformed)
+    points += picking_points(plan, frame, arrivals, whole.beamformed)
     if peers:
         say(f"frame {index}: peers")
         points += synthesis_peers(plan, frame, arrivals.seen_from_centre)  # peers know no shade
-        points += image_peers(plan, frame, arrivals.seen_from_centre, whole.heard)
+        points += image_peers(plan, frame, arrivals.seen_from_centre, whole.beamformed)
     say(f"frame {index}: everything exact")
     spent = whole.seconds + sum(p.seconds for p in points if p.chosen and p.stage not in ("synthesis", "picking"))
     points += whole_points(whole, traced, spent)

@@ -33,34 +33,34 @@ TRIED = 3
 CHECKED_HYDROPHONES, CHECKED_PATHS = 2, 200
 """What the exact way's synthesis is itself compared with `DirectSum` on."""
 
-Heard = tuple[Floats, Floats]
+Pressures = tuple[Floats, Floats]
 """Echoes, and direct arrivals (hydrophone, sample), Pa."""
 
 
 @dataclass(frozen=True, eq=False)
-class Each:
+class SensorPressures:
     """What hydrophones hear, each traced by itself."""
 
     sensor: Ints  # (heard,) live hydrophones, ascending
-    heard: Heard
+    pressures: Pressures
     seconds: tuple[float, float]  # tracing and synthesis of all live hydrophones; estimated where not all are heard
 
-    def at(self, sensor: Ints) -> Heard:
+    def at(self, sensor: Ints) -> Pressures:
         """What some of them hear."""
         rows = np.searchsorted(self.sensor, sensor)
-        return self.heard[0][rows], self.heard[1][rows]
+        return self.pressures[0][rows], self.pressures[1][rows]
 
 
 @dataclass(frozen=True, eq=False)
-class Exact:
+class ExactFrame:
     """What hydrophones of a frame hear, exactly."""
 
     plan: Plan  # that of the frame's sequence
     frame: Frame
     sensor: Ints  # (heard,) live hydrophones, ascending; some of those of `each`
-    heard: Heard  # from the description alone, where its laws are known there
+    pressures: Pressures  # from the description alone, where its laws are known there
     seconds: float  # of that, of all live hydrophones: estimated
-    each: Each
+    each: SensorPressures
     note: str = ""  # why it is not from the description alone
 
     @property
@@ -78,7 +78,7 @@ class Exact:
     def pressure(self) -> Floats:
         """(sensor, sample) Pa: everything, at all hydrophones, each traced by itself; 0 at dead ones."""
         out = np.zeros((self.plan.elements.count, self.plan.windows.samples))
-        out[self.each.sensor] = self.each.heard[0] + self.each.heard[1]
+        out[self.each.sensor] = self.each.pressures[0] + self.each.pressures[1]
         return out
 
 
@@ -103,16 +103,16 @@ def golden(plan: Plan, finer: float = 1.0) -> GriddedSynthesis:
     return replace(deposit_for(finer * SMALL * plan.recipe.accuracy.signal), precision="float64")
 
 
-def exact_frame(plan: Plan, index: int, hydrophones: int | None = None) -> Exact:
+def exact_frame(plan: Plan, index: int, hydrophones: int | None = None) -> ExactFrame:
     """A frame at so many hydrophones, spread over the array; left out: at all, or those that can be afforded."""
     plan = plan.at(index)
     frame = plan.recipe.frame(index)[1]
     each = each_hydrophone(exact_plan(plan), frame, hydrophones)
     alone = FramePressure(plan.scene, frame, plan.profile)
     if alone.unknown:
-        return Exact(plan, frame, each.sensor, each.heard, sum(each.seconds), each, alone.unknown)
+        return ExactFrame(plan, frame, each.sensor, each.pressures, sum(each.seconds), each, alone.unknown)
     start, samples, live = frame_start(plan, frame), plan.windows.samples, int(np.count_nonzero(plan.elements.gain))
-    rows: dict[int, Heard] = {}
+    rows: dict[int, Pressures] = {}
     began = time.process_time()
     for sensor in spread(each.sensor, min(TRIED, len(each.sensor))):
         rows[int(sensor)] = alone.pressure([int(sensor)], start, samples)
@@ -125,15 +125,17 @@ def exact_frame(plan: Plan, index: int, hydrophones: int | None = None) -> Exact
         if int(sensor) not in rows:
             rows[int(sensor)] = alone.pressure([int(sensor)], start, samples)
     seconds = (time.process_time() - began) / len(rows) * live
-    heard = (np.vstack([rows[int(n)][0] for n in chosen]), np.vstack([rows[int(n)][1] for n in chosen]))
-    return Exact(plan, frame, chosen, heard, seconds, each)
+    received = (np.vstack([rows[int(n)][0] for n in chosen]), np.vstack([rows[int(n)][1] for n in chosen]))
+    return ExactFrame(plan, frame, chosen, received, seconds, each)
 
 
-def each_hydrophone(plan: Plan, frame: Frame, hydrophones: int | None = None, some: Ints | None = None) -> Each:
+def each_hydrophone(
+    plan: Plan, frame: Frame, hydrophones: int | None = None, some: Ints | None = None
+) -> SensorPressures:
     """So many hydrophones of a frame, each traced by itself with the choices of a plan, by the exact synthesis; left
     out: all, or those that can be afforded. some (heard,): these."""
     live = np.flatnonzero(plan.elements.gain)
-    rows: dict[int, tuple[Heard, float, float]] = {}
+    rows: dict[int, tuple[Pressures, float, float]] = {}
 
     def hear(sensor: int) -> None:
         if sensor not in rows:
@@ -156,12 +158,12 @@ def each_hydrophone(plan: Plan, frame: Frame, hydrophones: int | None = None, so
     for sensor in chosen:
         hear(int(sensor))
     found = [rows[int(sensor)] for sensor in chosen]
-    heard = (np.vstack([r[0][0] for r in found]), np.vstack([r[0][1] for r in found]))
+    received = (np.vstack([r[0][0] for r in found]), np.vstack([r[0][1] for r in found]))
     typical = (float(np.median([r[n] for r in found])) * len(live) for n in (1, 2))  # the first may compile
-    return Each(chosen, heard, (next(typical), next(typical)))
+    return SensorPressures(chosen, received, (next(typical), next(typical)))
 
 
-def _mean(rows: dict[int, tuple[Heard, float, float]]) -> float:
+def _mean(rows: dict[int, tuple[Pressures, float, float]]) -> float:
     """Seconds of a hydrophone, without the slowest."""
     seconds = sorted(traced + made for _, traced, made in rows.values())
     return sum(seconds[: max(len(seconds) - 1, 1)]) / max(len(seconds) - 1, 1)
@@ -173,7 +175,7 @@ def spread(live: Ints, count: int) -> Ints:
     return np.unique(live[np.floor(turns * len(live)).astype(int)])
 
 
-def pressures(plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements, method: Synthesis) -> Heard:
+def pressures(plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements, method: Synthesis) -> Pressures:
     """Echoes and direct arrivals (element, sample) in Pa, each by itself."""
     start, samples = frame_start(plan, frame), plan.windows.samples
     sonar, snaps = plan.scene.sonar, frame.moment.snaps
@@ -196,7 +198,7 @@ def differences(found: Sequence[Floats], exact: Sequence[Floats]) -> tuple[float
     return square, largest
 
 
-def synthesis_check(exact: Exact) -> Point:
+def synthesis_check(exact: ExactFrame) -> Point:
     """The exact way's synthesis against `DirectSum`: at a few hydrophones, on the loudest path and some others."""
     plan, frame = exact.plan, exact.frame
     sensor = exact.sensor[:: max(len(exact.sensor) // CHECKED_HYDROPHONES, 1)][:CHECKED_HYDROPHONES]

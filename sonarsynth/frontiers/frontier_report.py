@@ -8,7 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Final
 
-from sonarsynth.frontiers import Measured
+from sonarsynth.frontiers import AccuracyReport
 from sonarsynth.frontiers.rows import Point
 from sonarsynth.pictures.accuracy_figures.frontier_figure import Line, Panel, frontier_figure
 
@@ -21,7 +21,7 @@ TITLES: Final = {
 }
 
 
-def write(measured: Measured, out: Path, name: str = "recipe") -> list[Path]:
+def write(measured: AccuracyReport, out: Path, name: str = "recipe") -> list[Path]:
     """Write <name>.json and <name>.png into a folder; their paths."""
     out.mkdir(parents=True, exist_ok=True)
     files = [out / f"{name}.json", out / f"{name}.png"]

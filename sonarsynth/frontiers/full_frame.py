@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonarsynth.frontiers.exact_frame import Exact, differences, exact_plan, pressures
+from sonarsynth.frontiers.exact_frame import ExactFrame, differences, exact_plan, pressures
 from sonarsynth.frontiers.image_knobs import apart, imaged, off_by
 from sonarsynth.frontiers.rows import Point, timed
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor
@@ -19,29 +19,29 @@ from sonarsynth.products import Signals
 
 
 @dataclass(frozen=True, eq=False)
-class Whole:
+class FullFrame:
     """What the sonar makes of a frame, of the plan's signals and of exact ones."""
 
-    exact: Exact
-    heard: BeamformedFrame  # the plan's way
+    exact: ExactFrame
+    beamformed: BeamformedFrame  # the plan's way
     seconds: float  # CPU of locating and all else that nothing is chosen for
 
     @staticmethod
-    def of(exact: Exact, signals: Signals) -> Whole:
+    def of(exact: ExactFrame, signals: Signals) -> FullFrame:
         """Process the plan's signals (without noise)."""
         plan, frame = exact.plan, exact.frame
         recorded = digitise(plan, frame, signals)
-        heard = locate_and_image(plan, frame, recorded)
+        beamformed = locate_and_image(plan, frame, recorded)
         locating, known, snaps = (
             locator(plan.scene),
             (receiver_of(plan, frame), survey_of(plan, frame)),
             plan.sizes["emission"],
         )
         _, seconds = timed(lambda: locating.locate(recorded, *known, snaps))
-        return Whole(exact, heard, seconds)
+        return FullFrame(exact, beamformed, seconds)
 
 
-def whole_points(whole: Whole, traced: TracedBySensor, seconds: float) -> Iterator[Point]:
+def whole_points(whole: FullFrame, traced: TracedBySensor, seconds: float) -> Iterator[Point]:
     """Signals, image and cloud of the plan against exact ones; seconds: of the plan's whole frame.
 
     Image and cloud are compared with those of every hydrophone traced by itself, where all were. Noise is the same in
@@ -49,7 +49,7 @@ def whole_points(whole: Whole, traced: TracedBySensor, seconds: float) -> Iterat
     """
     exact, plan, accuracy = whole.exact, whole.exact.plan, whole.exact.plan.recipe.accuracy
     found = _signals(exact, traced)
-    error, largest = differences(found, exact.heard)
+    error, largest = differences(found, exact.pressures)
     yield Point(
         stage="frame",
         knob="signals",
@@ -62,7 +62,7 @@ def whole_points(whole: Whole, traced: TracedBySensor, seconds: float) -> Iterat
         also={"largest": largest, "hydrophones": len(exact.sensor)},
         note=exact.partly,
     )
-    if not (exact.whole and imaged(whole.heard)):
+    if not (exact.whole and imaged(whole.beamformed)):
         return
     slow, frame = exact_plan(plan), exact.frame
     rate, start = plan.scene.sonar.sampling_frequency, frame_start(plan, frame)
@@ -74,8 +74,8 @@ def whole_points(whole: Whole, traced: TracedBySensor, seconds: float) -> Iterat
     cloud = cloud_of(slow, frame, best)
     slowest = time.process_time() - began + sum(exact.each.seconds)
     yield Point("frame", "exact", "everything exact", 0.0, "relative", accuracy.signal, slowest)
-    assert whole.heard.image is not None and best.image is not None
-    off = off_by(whole.heard.image.energy, best.image.energy)
+    assert whole.beamformed.image is not None and best.image is not None
+    off = off_by(whole.beamformed.image.energy, best.image.energy)
     yield Point(
         stage="frame",
         knob="image",
@@ -87,7 +87,7 @@ def whole_points(whole: Whole, traced: TracedBySensor, seconds: float) -> Iterat
         chosen=True,
         also={"largest_db": float(np.abs(off).max(initial=0.0)), "beams": len(off)},
     )
-    metres, angle, alone = apart(cloud_of(plan, frame, whole.heard), cloud)
+    metres, angle, alone = apart(cloud_of(plan, frame, whole.beamformed), cloud)
     yield Point(
         stage="frame",
         knob="range",
@@ -107,7 +107,7 @@ def whole_points(whole: Whole, traced: TracedBySensor, seconds: float) -> Iterat
     )
 
 
-def _signals(exact: Exact, traced: TracedBySensor) -> tuple[np.ndarray, np.ndarray]:
+def _signals(exact: ExactFrame, traced: TracedBySensor) -> tuple[np.ndarray, np.ndarray]:
     """Echoes and direct arrivals (heard, sample) by the plan's own synthesis."""
     out = tuple(np.zeros((len(exact.sensor), exact.plan.windows.samples)) for _ in range(2))
     for part, arrivals in traced.pieces:

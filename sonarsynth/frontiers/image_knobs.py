@@ -29,13 +29,13 @@ BESIDE = 0.02
 """rad of direction, and m of path: points of two clouds that are further apart are not one."""
 
 
-def image_points(plan: Plan, heard: BeamformedFrame, peers: bool = True) -> Iterator[Point]:
+def image_points(plan: Plan, beamformed: BeamformedFrame, peers: bool = True) -> Iterator[Point]:
     """Walk the beamformers on the signals of a frame, other images too (`peers`); nothing where it has no image."""
     chosen: Any = plan.choices.beamforming
     slow = exact_plan(plan).choices.beamforming
-    if not imaged(heard):
+    if not imaged(beamformed):
         return
-    exact, slowest = timed(lambda: image_of(plan, heard, slow))
+    exact, slowest = timed(lambda: image_of(plan, beamformed, slow))
     settings: list[tuple[str, str, Any]] = []
     if plan.elements.on_lattice and isinstance(slow, DenseDelayAndSum):
         fast: Any = FocusedDelayAndSum(focus=slow.focus, shading=slow.shading)
@@ -53,12 +53,12 @@ def image_points(plan: Plan, heard: BeamformedFrame, peers: bool = True) -> Iter
         if method == slow:
             made, seconds = exact, slowest
         else:
-            made, seconds = timed(partial(image_of, plan, heard, method))
+            made, seconds = timed(partial(image_of, plan, beamformed, method))
         yield image_point(plan, made.energy, exact.energy, knob, setting, seconds, chosen=knob == "chosen")
     if chosen != slow:
         yield image_point(plan, exact.energy, exact.energy, "exact", "dense", slowest)
     for method in other_images(slow, plan.elements) if peers else ():
-        made, seconds = timed(partial(image_of, plan, heard, method))
+        made, seconds = timed(partial(image_of, plan, beamformed, method))
         point = image_point(plan, made.energy, exact.energy, "another image", method.row(), seconds)
         yield replace(point, role="peer")
 
@@ -76,15 +76,17 @@ def named(method: Any) -> str:
     return f"{method.kind}, {zones} zones" if zones is not None else str(method.kind)
 
 
-def imaged(heard: BeamformedFrame) -> bool:
+def imaged(beamformed: BeamformedFrame) -> bool:
     """Whether a frame has an image."""
-    return heard.image is not None and bool(np.isfinite(heard.image.start))
+    return beamformed.image is not None and bool(np.isfinite(beamformed.image.start))
 
 
-def image_of(plan: Plan, heard: BeamformedFrame, method: Any) -> EnergyImage:
+def image_of(plan: Plan, beamformed: BeamformedFrame, method: Any) -> EnergyImage:
     """The image of what a frame heard, by a method."""
-    assert heard.image is not None and heard.imaged is not None
-    made: EnergyImage = method.image(heard.imaged, plan.elements, plan.scene.sonar, heard.image.start, heard.image.stop)
+    assert beamformed.image is not None and beamformed.imaged is not None
+    made: EnergyImage = method.image(
+        beamformed.imaged, plan.elements, plan.scene.sonar, beamformed.image.start, beamformed.image.stop
+    )
     return made
 
 
@@ -120,23 +122,23 @@ def image_point(
     )
 
 
-def range_points(plan: Plan, frame: Frame, heard: BeamformedFrame) -> Iterator[Point]:
+def range_points(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> Iterator[Point]:
     """Walk the methods of placing on what is picked of a frame; nothing where it has no image."""
     chosen, slow = plan.choices.placing, exact_plan(plan).choices.placing
-    if not imaged(heard):
+    if not imaged(beamformed):
         return
-    exact, slowest = timed(lambda: placed(plan, frame, heard, slow))
+    exact, slowest = timed(lambda: placed(plan, frame, beamformed, slow))
     for method in dict.fromkeys((chosen, IsovelocityPlacing(), slow)):
         if method == slow:
             made, seconds = exact, slowest
         else:
-            made, seconds = timed(partial(placed, plan, frame, heard, method))
+            made, seconds = timed(partial(placed, plan, frame, beamformed, method))
         yield range_point(plan, made, exact, method, seconds, chosen=method == chosen)
 
 
-def placed(plan: Plan, frame: Frame, heard: BeamformedFrame, method: Placing) -> PointCloud:
+def placed(plan: Plan, frame: Frame, beamformed: BeamformedFrame, method: Placing) -> PointCloud:
     """The point cloud of what a frame heard, its echoes placed by a method."""
-    return cloud_of(replace(plan, choices=replace(plan.choices, placing=method)), frame, heard)
+    return cloud_of(replace(plan, choices=replace(plan.choices, placing=method)), frame, beamformed)
 
 
 def range_point(

@@ -72,14 +72,14 @@ def synthesis_peers(plan: Plan, frame: Frame, arrivals: Arrivals) -> Iterator[Po
         yield row("ours, on the same", "chosen", made, seconds)
 
 
-def image_peers(plan: Plan, frame: Frame, arrivals: Arrivals, heard: BeamformedFrame) -> Iterator[Point]:
+def image_peers(plan: Plan, frame: Frame, arrivals: Arrivals, beamformed: BeamformedFrame) -> Iterator[Point]:
     """The thesis's loop, and Acoular: errors whatever the scale of the image."""
-    if not imaged(heard):
+    if not imaged(beamformed):
         return
-    assert heard.image is not None and heard.imaged is not None
+    assert beamformed.image is not None and beamformed.imaged is not None
     sonar, focus = plan.scene.sonar, getattr(plan.choices.beamforming, "focus", None)
     slow = DenseDelayAndSum(focus=focus, shading="uniform")
-    exact = np.asarray(image_of(plan, heard, slow).energy, float)
+    exact = np.asarray(image_of(plan, beamformed, slow).energy, float)
     bright = np.flatnonzero(exact.ravel() >= 0.01 * exact.max())
     beams = bright[np.linspace(0, len(bright) - 1, min(THESIS_BEAMS, len(bright))).astype(int)]
     if len(beams) > 1 and (~arrivals.direct).any():
@@ -92,7 +92,9 @@ def image_peers(plan: Plan, frame: Frame, arrivals: Arrivals, heard: BeamformedF
     if not installed("acoular"):
         yield absent("image", "Acoular")
         return
-    energy, seconds = acoular_image(plan, heard.imaged, heard.image.start, heard.image.stop, focus or 1e6)
+    energy, seconds = acoular_image(
+        plan, beamformed.imaged, beamformed.image.start, beamformed.image.stop, focus or 1e6
+    )
     yield _image_row(plan, "Acoular", likeness(energy, exact), seconds, "whatever the scale")
 
 

@@ -22,25 +22,25 @@ NEAR = 0.05
 """m from the surface: points that lie on it."""
 
 
-def picking_points(plan: Plan, frame: Frame, arrivals: Arrivals, heard: BeamformedFrame) -> Iterator[Point]:
+def picking_points(plan: Plan, frame: Frame, arrivals: Arrivals, beamformed: BeamformedFrame) -> Iterator[Point]:
     """Walk the settings of the chosen way of picking on what a frame heard; nothing where it has no image."""
     chosen = plan.choices.picking
-    if not imaged(heard):
+    if not imaged(beamformed):
         return
-    yield picking_point(plan, frame, arrivals, heard, "chosen", chosen.kind, chosen)
+    yield picking_point(plan, frame, arrivals, beamformed, "chosen", chosen.kind, chosen)
     for name, method in chosen.variants().items():
         if method != chosen:
             knob, _, setting = name.partition(" at ")
-            yield picking_point(plan, frame, arrivals, heard, knob, setting, method)
+            yield picking_point(plan, frame, arrivals, beamformed, knob, setting, method)
 
 
 def picking_point(
-    plan: Plan, frame: Frame, arrivals: Arrivals, heard: BeamformedFrame, knob: str, setting: str, method: Any
+    plan: Plan, frame: Frame, arrivals: Arrivals, beamformed: BeamformedFrame, knob: str, setting: str, method: Any
 ) -> Point:
     """A row of the picking stage: the median distance of points from the targets that made them, exact (m)."""
     made = replace(plan, choices=replace(plan.choices, picking=method))
-    cloud, seconds = timed(partial(cloud_of, made, frame, heard))
-    estimates = heard.estimates
+    cloud, seconds = timed(partial(cloud_of, made, frame, beamformed))
+    estimates = beamformed.estimates
     distance = np.zeros(0)
     if len(cloud) and estimates is not None:
         distance = point_labels(made, frame, arrivals, estimates, cloud).distance.astype(float)

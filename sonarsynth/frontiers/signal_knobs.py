@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonarsynth.frontiers.exact_frame import Heard, differences, golden, pressures
+from sonarsynth.frontiers.exact_frame import Pressures, differences, golden, pressures
 from sonarsynth.frontiers.rows import Point
 from sonarsynth.frontiers.tracing_knobs import TracedBySensor
 from sonarsynth.planning import frame_start
@@ -36,7 +36,7 @@ def synthesis_points(traced: TracedBySensor) -> Iterator[Point]:
     """Walk the knobs of the synthesis on the arrivals that the plan's choices give."""
     plan, chosen = traced.plan, traced.plan.choices.synthesis
     finest = golden(plan, FINER)
-    exact = [_heard(traced, finest, n) for n in range(len(traced.few))]
+    exact = [_synthesised(traced, finest, n) for n in range(len(traced.few))]
     yield _point(traced, exact, chosen, "chosen", chosen=True)
     if isinstance(chosen, GriddedSynthesis):
         for knob, method in _settings(chosen, plan.recipe.accuracy.signal):
@@ -71,14 +71,16 @@ def _rounded(method: GriddedSynthesis, times: float) -> GriddedSynthesis:
     return replace(method, tolerance=float(f"{min(max(wanted, 1e-10), 0.05):.0e}"))
 
 
-def _heard(traced: TracedBySensor, method: Synthesis, n: int) -> Heard:
+def _synthesised(traced: TracedBySensor, method: Synthesis, n: int) -> Pressures:
     part, arrivals = traced.few[n]
     return pressures(traced.plan, traced.frame, arrivals, part.elements, method)
 
 
-def _point(traced: TracedBySensor, exact: list[Heard], method: Synthesis, knob: str, *, chosen: bool = False) -> Point:
+def _point(
+    traced: TracedBySensor, exact: list[Pressures], method: Synthesis, knob: str, *, chosen: bool = False
+) -> Point:
     plan, few = traced.plan, traced.few
-    made = [_heard(traced, method, n) for n in range(len(few))]
+    made = [_synthesised(traced, method, n) for n in range(len(few))]
     error, largest = differences(
         [np.vstack([m[n] for m in made]) for n in (0, 1)], [np.vstack([e[n] for e in exact]) for n in (0, 1)]
     )

@@ -17,9 +17,9 @@ import numpy as np
 
 from sonarsynth.conventions import Ints
 from sonarsynth.frontiers.exact_frame import (
-    Each,
-    Exact,
-    Heard,
+    ExactFrame,
+    Pressures,
+    SensorPressures,
     differences,
     each_hydrophone,
     exact_plan,
@@ -70,7 +70,7 @@ class TracedBySensor:
         of_parts = (time.process_time() - began) / len(needed) * len(parts)
         return TracedBySensor(plan, frame, pieces, len(parts), seconds + of_parts)
 
-    def heard(self, sensor: Ints) -> Heard:
+    def pressures(self, sensor: Ints) -> Pressures:
         """Echoes and direct arrivals at some hydrophones, by the exact way's synthesis."""
         out = tuple(np.zeros((len(sensor), self.plan.windows.samples)) for _ in range(2))
         for part, traced in self.pieces:
@@ -99,7 +99,7 @@ class TracedBySensor:
         return total * self.parts / len(self.few)
 
 
-def trace_points(exact: Exact, traced: TracedBySensor) -> Iterator[Point]:
+def trace_points(exact: ExactFrame, traced: TracedBySensor) -> Iterator[Point]:
     """Walk the knobs of tracing; `traced`: by the plan's own choices."""
     plan = exact.plan
     yield _point(exact, traced, "subarrays", f"{_cut(plan)}, as chosen", chosen=True)
@@ -141,7 +141,7 @@ def _cheaper(plan: Plan) -> Iterator[tuple[str, Plan]]:
         yield "straight rays", replace(plan, propagation=Straight(bounces=plan.propagation.bounces))
 
 
-def _cuts(exact: Exact, traced: TracedBySensor) -> Iterator[Point]:
+def _cuts(exact: ExactFrame, traced: TracedBySensor) -> Iterator[Point]:
     """The array cut into more and more parts, all else exact, and at last into hydrophones."""
     best, spent = exact_plan(exact.plan), 0.0
     for count in _counts(exact.plan)[:-1]:
@@ -155,15 +155,15 @@ def _cuts(exact: Exact, traced: TracedBySensor) -> Iterator[Point]:
     yield _of_each(exact, exact.each, exact.sensor, "subarrays", "each hydrophone, every path")
 
 
-def _each_point(exact: Exact, plan: Plan, knob: str, setting: str) -> Point:
+def _each_point(exact: ExactFrame, plan: Plan, knob: str, setting: str) -> Point:
     """Of a plan that traces each hydrophone by itself: at a few."""
     few = exact.sensor[:: max(len(exact.sensor) // EACH, 1)][:EACH]
     return _of_each(exact, each_hydrophone(plan, exact.frame, some=few), few, knob, setting)
 
 
-def _of_each(exact: Exact, each: Each, sensor: Ints, knob: str, setting: str) -> Point:
+def _of_each(exact: ExactFrame, each: SensorPressures, sensor: Ints, knob: str, setting: str) -> Point:
     rows = np.searchsorted(exact.sensor, sensor)
-    error, largest = differences(each.at(sensor), [part[rows] for part in exact.heard])
+    error, largest = differences(each.at(sensor), [part[rows] for part in exact.pressures])
     few = f"at {len(sensor)} hydrophones" if len(sensor) < len(exact.sensor) else exact.partly
     return Point(
         stage="trace",
@@ -184,7 +184,7 @@ def _counts(plan: Plan) -> list[int]:
     return [*takewhile(lambda n: n < count, (2**n for n in range(count))), count]
 
 
-def exact_point(exact: Exact) -> Point:
+def exact_point(exact: ExactFrame) -> Point:
     """What all are compared with: no error, and what it costs."""
     return Point(
         stage="trace",
@@ -199,8 +199,8 @@ def exact_point(exact: Exact) -> Point:
     )
 
 
-def _point(exact: Exact, traced: TracedBySensor, knob: str, setting: str, *, chosen: bool = False) -> Point:
-    error, largest = differences(traced.heard(exact.sensor), exact.heard)
+def _point(exact: ExactFrame, traced: TracedBySensor, knob: str, setting: str, *, chosen: bool = False) -> Point:
+    error, largest = differences(traced.pressures(exact.sensor), exact.pressures)
     made = traced.synthesis_seconds()
     paths = max(len(arrivals.delay) for _, arrivals in traced.pieces)
     several = f", {len(traced.pieces)} of {traced.parts} parts" if len(traced.pieces) < traced.parts else ""

@@ -86,8 +86,8 @@ class Capon(Steering):
         """Wavenumber (rad/m) and spectrum (sensor,) of each bin, as of plane waves where they come from the focus."""
         speed = sonar.assumed_sound_speed
         late = focus_delay(elements.position, AHEAD, self.focus, speed)[0]
-        for f, heard in zip(snapshots.frequency, snapshots.spectra.T, strict=True):
-            yield 2.0 * np.pi * f / speed, heard * np.exp(2j * np.pi * f * late)
+        for f, received in zip(snapshots.frequency, snapshots.spectra.T, strict=True):
+            yield 2.0 * np.pi * f / speed, received * np.exp(2j * np.pi * f * late)
 
     def _steered_over_bins(
         self, snapshots: Snapshots, elements: Elements, sonar: Sonar, direction: Floats
@@ -97,11 +97,11 @@ class Capon(Steering):
         delay = focus_delay(elements.position[live], direction, self.focus, sonar.assumed_sound_speed)
         beams = np.zeros((len(direction), len(frequency)), np.complex64)
         for some in np.array_split(np.arange(len(frequency)), max(len(frequency) // self.bins, 1)):
-            heard, f = spectra[np.ix_(live, some)].astype(complex), frequency[some]
-            inverse = self._inverse(heard @ heard.conj().T / len(some))
+            received, f = spectra[np.ix_(live, some)].astype(complex), frequency[some]
+            inverse = self._inverse(received @ received.conj().T / len(some))
             if inverse is not None:
                 weight = distortionless(inverse, np.exp(-2j * np.pi * f.mean() * delay))
-                for at, one, x in zip(some, f, heard.T, strict=True):
+                for at, one, x in zip(some, f, received.T, strict=True):
                     beams[:, at] = (weight.conj() * np.exp(2j * np.pi * (one - f.mean()) * delay)) @ x
         return beams
 

@@ -40,8 +40,8 @@ class Subarrays:
 
     def covariance(self, spectrum: Complexes) -> Complexes:
         """Covariance (sensor, sensor) of a block, forward and backward, of a spectrum (all sensors,)."""
-        heard = spectrum[self.members]
-        forward = heard.T @ heard.conj() / len(heard)
+        snapshots = spectrum[self.members]
+        forward = snapshots.T @ snapshots.conj() / len(snapshots)
         return np.asarray(0.5 * (forward + forward[::-1, ::-1].conj()))
 
     def forms(self, matrix: Complexes, wavenumber: float, beams: BeamGrid) -> Floats:

@@ -57,8 +57,8 @@ class SubBand(Steering):
         bins = len(snapshots.frequency)
         parts = [snapshots.select(some) for some in np.array_split(np.arange(bins), min(self.bands, bins))]
         images = np.stack([plain.energies(part, elements, sonar) for part in parts])
-        heard = np.array([part.unit * part.power(gain).sum() for part in parts])
-        return weighted_geometric_mean(images, heard)
+        received = np.array([part.unit * part.power(gain).sum() for part in parts])
+        return weighted_geometric_mean(images, received)
 
 
 def weighted_geometric_mean(energy: Floats, reference: Floats) -> Floats:

@@ -1,6 +1,6 @@
 """Ground truth of a frame: where everything is, and the levels of its paths."""
 
-from sonarsynth.labels.attribution_of_points import Listening
+from sonarsynth.labels.attribution_of_points import SonarTiming
 from sonarsynth.labels.echo_levels import echo_levels
 from sonarsynth.labels.frame_truth import label
 from sonarsynth.labels.level_band import SLICES, Band
@@ -11,8 +11,8 @@ from sonarsynth.labels.point_labels import label_points
 __all__ = [
     "SLICES",
     "Band",
-    "Listening",
     "Powers",
+    "SonarTiming",
     "echo_levels",
     "family",
     "label",

@@ -40,7 +40,7 @@ under echoes of which the loudest 25 dB are picked."""
 
 
 @dataclass(frozen=True, eq=False)
-class Listening:
+class SonarTiming:
     """How the sonar listens and what it knows of the frame's clock."""
 
     elements: Elements
@@ -99,7 +99,7 @@ class Attribution:
 
 
 def attribution(
-    arrivals: Arrivals, band: Band, listening: Listening, beam: Floats, late: Floats, most: Floats
+    arrivals: Arrivals, band: Band, listening: SonarTiming, beam: Floats, late: Floats, most: Floats
 ) -> Attribution:
     """Whose energy beams (point, xyz) hold at delays (point,) s after the clock; most: (point,) Pa2 s in each beam.
 
@@ -198,7 +198,7 @@ def _spectra(paths: Arrivals, elements: Elements, band: Band) -> kernels.Complex
         amplitude = amplitude * (1.0 - hidden / elements.count)
     sine = paths.direction[:, 1:] * (elements.face / paths.sound_speed)
     frequency = band.frequency
-    heard = kernels.path_spectra(
+    spectra = kernels.path_spectra(
         amplitude, paths.phase, paths.delay_std, paths.absorption, sine, frequency, band.relative
     )
     shaped = paths.coherent | paths.corner_delays.any(axis=1) | (paths.coherent_fraction > 0.0)
@@ -207,8 +207,8 @@ def _spectra(paths: Arrivals, elements: Elements, band: Band) -> kernels.Complex
         shape = facet_response(
             frequency, some.coherent, some.corner_delays, some.coherent_fraction, some.height_delay_std, some.centre
         )
-        heard[shaped] *= shape
-    return heard
+        spectra[shaped] *= shape
+    return spectra
 
 
 def _matched(band: Band) -> Floats:

@@ -25,10 +25,10 @@ def echo_levels(arrivals: Arrivals, powers: Powers, targets: int, snap_level: Fl
     total = np.bincount(cell, power * loud, size)
     sums = [np.bincount(cell, component * loud, size) for component in along.T]
     level, azimuth, elevation = np.full(size, np.nan), np.full(size, np.nan), np.full(size, np.nan)
-    heard = total > 0.0
-    level[heard] = 10.0 * np.log10(total[heard])
-    mean = np.stack(sums, axis=1)[heard] / total[heard, None]
+    audible = total > 0.0
+    level[audible] = 10.0 * np.log10(total[audible])
+    mean = np.stack(sums, axis=1)[audible] / total[audible, None]
     one = np.linalg.norm(mean, axis=1) > ONE_SIDE
-    sided = np.flatnonzero(heard)[one]
+    sided = np.flatnonzero(audible)[one]
     azimuth[sided], elevation[sided] = azimuth_elevation(mean[one])
     return Echoes(azimuth.reshape(shape), elevation.reshape(shape), level.reshape(shape))

@@ -66,9 +66,9 @@ def _loudest(arrivals: Arrivals, powers: Powers, band: Band, cell: Ints, size: i
     power = powers.steps[-1]
     most = np.zeros(size)
     np.maximum.at(most, cell, power)
-    heard = (power > QUIET * arrivals.amplitude**2) & (band.energy.sum(axis=1) > 0.0)[arrivals.snap]
+    audible = (power > QUIET * arrivals.amplitude**2) & (band.energy.sum(axis=1) > 0.0)[arrivals.snap]
     best = np.full(size, -1)
-    rows = np.flatnonzero((power == most[cell]) & heard)[::-1]
+    rows = np.flatnonzero((power == most[cell]) & audible)[::-1]
     best[cell[rows]] = rows
     return best
 

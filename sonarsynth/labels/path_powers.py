@@ -42,7 +42,7 @@ def family(arrivals: Arrivals) -> Ints:
     return np.asarray((arrivals.surface > 0) + 2 * (arrivals.bottom > 0))
 
 
-class _Together(NamedTuple):
+class _CoherentPaths(NamedTuple):
     """Coherent paths together, as `Powers` has them."""
 
     whole: Ints = np.zeros(0, np.int64)
@@ -60,7 +60,7 @@ def path_powers(arrivals: Arrivals, band: Band) -> Powers:
     bins = few.frequency, few.relative, few.weight
     # echo: with the facet's own roughness, which is no loss at a boundary
     facet, echo, absorbed, blurred = mean_powers(arrivals.snap, *columns, *blurs, *bins, arrivals.centre)
-    together = _Together()
+    together = _CoherentPaths()
     if arrivals.coherent.any():
         rows = np.flatnonzero(arrivals.coherent)
         mean, together = _coherent(arrivals, rows, band)
@@ -109,7 +109,7 @@ def _runs(sorted_values: Ints) -> zip[tuple[int, int]]:
     return zip([0, *edges.tolist()], [*edges.tolist(), len(sorted_values)], strict=True)
 
 
-def _coherent(arrivals: Arrivals, rows: Ints, band: Band) -> tuple[Floats, _Together]:
+def _coherent(arrivals: Arrivals, rows: Ints, band: Band) -> tuple[Floats, _CoherentPaths]:
     """Mean power (row,) of what each facet does to the pulse, and the powers of the paths of these rows together."""
     apart = band.pulse
     group, part, middle, longest = _groups(arrivals, rows, apart)
@@ -144,7 +144,7 @@ def _coherent(arrivals: Arrivals, rows: Ints, band: Band) -> tuple[Floats, _Toge
     np.add.at(total, owner, sums[:, 0])
     whole_power = (np.abs(total) ** 2 * share).sum(axis=1)
     products = (np.conj(sums[:, :1]) * sums).real @ share[owner][:, :, None]
-    return mean, _Together(rows[representative], whole_power, rows[first], products[:, 0, 0], products[:, 1:, 0])
+    return mean, _CoherentPaths(rows[representative], whole_power, rows[first], products[:, 0, 0], products[:, 1:, 0])
 
 
 def _least(values: Floats, group: Ints) -> Floats:

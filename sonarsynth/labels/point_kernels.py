@@ -61,7 +61,7 @@ def path_spectra(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _tabulated(
-    heard: Complexes, apart: Floats, curvature: float, focus: float, frequency: Floats, pattern: Pattern
+    response: Complexes, apart: Floats, curvature: float, focus: float, frequency: Floats, pattern: Pattern
 ) -> None:
     """Response (bin,) on a lattice: bilinear in tables of the nearest defocus."""
     levels, size = pattern.table.shape[0], pattern.table.shape[1]
@@ -75,7 +75,7 @@ def _tabulated(
         i, j = i % size, j % size
         below, beside = (i + 1) % size, (j + 1) % size
         table = pattern.table[level]
-        heard[k] = (1.0 - y) * ((1.0 - x) * table[i, j] + x * table[i, beside]) + y * (
+        response[k] = (1.0 - y) * ((1.0 - x) * table[i, j] + x * table[i, beside]) + y * (
             (1.0 - x) * table[below, j] + x * table[below, beside]
         )
 
@@ -89,7 +89,7 @@ def _delay(q: Floats, square: float, u: Floats, curvature: float) -> float:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _summed(
-    heard: Complexes,
+    response: Complexes,
     path: Floats,
     curvature: float,
     slowness: float,
@@ -100,7 +100,7 @@ def _summed(
     pattern: Pattern,
 ) -> None:
     """Response (bin,) of sensors anywhere, one by one; curvatures in 1/m, positions over `speed` (m/s)."""
-    heard[:] = 0.0
+    response[:] = 0.0
     spacing = frequency[1] - frequency[0] if len(frequency) > 1 else 0.0
     for q in range(len(pattern.weight)):
         place = pattern.position[q]
@@ -110,7 +110,7 @@ def _summed(
         phasor = complex(math.cos(angle), math.sin(angle)) * pattern.weight[q]
         turned = complex(math.cos(turn), math.sin(turn))
         for k in range(len(frequency)):
-            heard[k] += phasor
+            response[k] += phasor
             phasor *= turned
 
 
@@ -153,7 +153,7 @@ def attribute(
     power, total = np.zeros((len(beam), groups)), np.zeros((len(beam), groups))
     owner, share = np.full(len(beam), -1), np.zeros((len(beam), max(1, (last - first).max())))
     sums, whole = np.empty((groups, bins), np.complex128), np.empty(groups, np.complex128)
-    heard, apart = np.empty(bins, np.complex128), np.empty(3)
+    response, apart = np.empty(bins, np.complex128), np.empty(3)
     spacing = frequency[1] - frequency[0] if bins > 1 else 0.0
     for p in range(len(beam)):
         sums[:], whole[:] = 0.0, 0.0
@@ -165,14 +165,14 @@ def attribute(
             if abs(late) > gate + longer[e] + reach * math.sqrt(away):
                 continue
             if pattern.table.shape[0]:
-                _tabulated(heard, apart, curvature[e], focus, frequency, pattern)
+                _tabulated(response, apart, curvature[e], focus, frequency, pattern)
             else:
-                _summed(heard, direction[e], curvature[e], slowness, beam[p], focus, speed, frequency, pattern)
+                _summed(response, direction[e], curvature[e], slowness, beam[p], focus, speed, frequency, pattern)
             angle, turn = 2.0 * math.pi * frequency[0] * late, 2.0 * math.pi * spacing * late
             phasor, turned = complex(math.cos(angle), math.sin(angle)), complex(math.cos(turn), math.sin(turn))
             peak = 0j
             for k in range(bins):
-                value = spectrum[e, k] * heard[k] * phasor
+                value = spectrum[e, k] * response[k] * phasor
                 sums[group[e], k] += value
                 peak += matched[group[e], k] * value
                 phasor *= turned

@@ -10,7 +10,7 @@ from sonarsynth.casting.ray_casting import casting_mesh
 from sonarsynth.conventions import NO_TARGET, Floats, Ints, direction
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels import point_kernels as kernels
-from sonarsynth.labels.attribution_of_points import MOST_BINS, Attribution, Listening, attribution
+from sonarsynth.labels.attribution_of_points import MOST_BINS, Attribution, SonarTiming, attribution
 from sonarsynth.labels.level_band import Band
 from sonarsynth.products import ORIGINS, Arrivals, Kind, PointCloud, PointLabels
 from sonarsynth.receiver import Elements
@@ -28,7 +28,7 @@ def label_points(
     arrivals: Arrivals,
     band: Band,
     moment: WorldState,
-    listening: Listening,
+    listening: SonarTiming,
 ) -> PointLabels:
     """Labels of the points of a cloud.
 
@@ -61,7 +61,7 @@ def label_points(
     return PointLabels(**labels)
 
 
-def _origins(paths: Arrivals, beam: Floats, listening: Listening, band: Band) -> Ints:
+def _origins(paths: Arrivals, beam: Floats, listening: SonarTiming, band: Band) -> Ints:
     """Index into ORIGINS (point,) of what beams (point, xyz) hear of the paths (point,) that bring most."""
     elements, centre = listening.elements, 0.5 * (band.low + band.high)
     spread = _spread(elements)
@@ -95,16 +95,16 @@ def _spread(elements: Elements) -> Floats:
 
 
 def _from_targets(
-    found: Attribution, points: Ints, places: Floats, moment: WorldState, listening: Listening
+    found: Attribution, points: Ints, places: Floats, moment: WorldState, listening: SonarTiming
 ) -> tuple[Floats, Floats]:
     """Range (point,) of where the echoes of points were made, and distance (point,) of the places (point, xyz) that the
     sonar gives them from the target, where sound met it and the array (m)."""
     paths, share = found.paths, found.share[points]
     row = np.minimum(found.first[points, None] + np.arange(share.shape[1]), len(paths.delay) - 1)
     weight = share / share.sum(axis=1, keepdims=True)
-    heard = np.einsum("pe,pe->p", weight, paths.delay[row])
-    met = heard - np.einsum("pe,pe->p", weight, paths.radius[row]) / paths.sound_speed
-    array = listening.pose.position + heard[:, None] * listening.velocity
+    mean_delay = np.einsum("pe,pe->p", weight, paths.delay[row])
+    met = mean_delay - np.einsum("pe,pe->p", weight, paths.radius[row]) / paths.sound_speed
+    array = listening.pose.position + mean_delay[:, None] * listening.velocity
     place = array + listening.pose.turn_to_world(places)
     made, distance, owner = np.empty(places.shape), np.empty(len(points)), found.owner[points]
     for group in np.unique(owner):

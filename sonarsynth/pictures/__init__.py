@@ -17,7 +17,7 @@ from sonarsynth.pictures.film import Progress, thinned, write_film
 from sonarsynth.pictures.steered_beams import beams
 from sonarsynth.pictures.store_reading import (
     NothingToDraw,
-    Stored,
+    StoredFrame,
     beam_grid,
     built,
     every_stored,
@@ -84,7 +84,7 @@ def show(
     return files
 
 
-def earlier_points(frames: list[Stored]) -> Iterator[Floats]:
+def earlier_points(frames: list[StoredFrame]) -> Iterator[Floats]:
     """For each frame the points (point, xyz) of those before it on targets, carried along with these, in
     its sonar frame."""
     found: dict[int, list[Floats]] = {}
@@ -97,24 +97,24 @@ def earlier_points(frames: list[Stored]) -> Iterator[Floats]:
                 found.setdefault(t, []).append(pose.to_body(frame.sonar.to_world(frame.points[own])))
 
 
-def _interest(frame: Stored) -> tuple[int, int]:
+def _interest(frame: StoredFrame) -> tuple[int, int]:
     """Points on a target, then beams on a target."""
     return int(np.isfinite(frame.range_error).sum()), int((frame.target >= 0).sum())
 
 
-def _reference(frames: list[Stored]) -> float:
+def _reference(frames: list[StoredFrame]) -> float:
     """The brightest beam of frames (Pa2 s); 1 where nothing is heard."""
     energies = [f.energy if f.energy is not None else f.point_energy for f in frames]
     peaks = [float(np.nanmax(e)) for e in energies if np.isfinite(e).any()]
     return max([p for p in peaks if p > 0], default=1.0)
 
 
-def frame_view(tree: xr.DataTree, frame: Stored) -> View:
+def frame_view(tree: xr.DataTree, frame: StoredFrame) -> View:
     """What is drawn of a frame by itself, in dB re its brightest beam."""
     return _view(tree, frame, _reference([frame]))
 
 
-def _view(tree: xr.DataTree, frame: Stored, reference: float) -> View:
+def _view(tree: xr.DataTree, frame: StoredFrame, reference: float) -> View:
     title = tree.attrs.get("title") or "untitled"
     clock = f"   t = {frame.time:.2f} s" if np.isfinite(frame.time) else ""
     count = tree["truth"].sizes["frame"]
@@ -130,7 +130,7 @@ def _view(tree: xr.DataTree, frame: Stored, reference: float) -> View:
     )
 
 
-def _snr(tree: xr.DataTree, frame: Stored) -> str:
+def _snr(tree: xr.DataTree, frame: StoredFrame) -> str:
     """The signal-to-noise ratios of the targets of a frame, for its title: of the loudest three."""
     found = read(tree, "truth/targets/snr")
     if found is None:
@@ -142,19 +142,19 @@ def _snr(tree: xr.DataTree, frame: Stored) -> str:
 
 def _write_sheet(
     tree: xr.DataTree,
-    frame: Stored,
+    frame: StoredFrame,
     folder: Path,
     say: Callable[[str], None],
 ) -> Path:
-    heard = beams(tree, frame)
+    loudest_of_beams = beams(tree, frame)
     missing = [name for name in ("signals", "image", "cloud") if name not in tree.children]
     if missing:
         say(f"sheet: without {', '.join(missing)}, which the store does not hold")
-    elif not heard:
+    elif not loudest_of_beams:
         say("sheet: without beam signals, for no beam of the frame points at a target")
     errors = Errors(points=frame.points, error=frame.range_error)
     view = frame_view(tree, frame)
-    made = sheet(*beam_grid(tree), view, errors, heard, window([view]), "energy re the brightest beam (dB)")
+    made = sheet(*beam_grid(tree), view, errors, loudest_of_beams, window([view]), "energy re the brightest beam (dB)")
     path = folder / "sheet.png"
     made.savefig(path, bbox_inches="tight", pad_inches=0.1)
     return path

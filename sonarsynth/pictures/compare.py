@@ -14,7 +14,7 @@ from sonarsynth.pictures.figures.compared_images import BesidePicture, Column, M
 from sonarsynth.pictures.figures.style import decibels
 from sonarsynth.pictures.film import Progress, thinned, write_film
 from sonarsynth.pictures.recipe_diff import names_of
-from sonarsynth.pictures.scores import LEVEL, EchoEnergies, as_table, heard, scores_of
+from sonarsynth.pictures.scores import LEVEL, EchoEnergies, as_table, echo_energies, scores_of
 from sonarsynth.pictures.store_reading import (
     NothingToDraw,
     beam_grid,
@@ -74,7 +74,7 @@ def show_beside(
         raise NothingToDraw(f"{len(paths)} stores: from 2 to {MOST} fit beside each other")
     trees = [_fit(opened(path), path) for path in paths]
     frames = _common(trees, paths, frame, say)
-    sounds = [heard(tree, frames) for tree in trees]
+    sounds = [echo_energies(tree, frames) for tree in trees]
     references = [sound.reference if scale == "common" else None for sound in sounds]
     names = names_of([str(tree.attrs.get("recipe", "")) for tree in trees], _file_names(paths))
     numbers = [scores_of(t, path, frames, sound) for t, path, sound in zip(trees, paths, sounds, strict=True)]

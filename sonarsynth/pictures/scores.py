@@ -46,7 +46,7 @@ class EchoEnergies:
         return self.peak or 1.0
 
 
-def heard(tree: xr.DataTree, frames: Sequence[int]) -> EchoEnergies:
+def echo_energies(tree: xr.DataTree, frames: Sequence[int]) -> EchoEnergies:
     """What a store with an image hears in frames, read one by one."""
     peaks, means, points, beams = [], [], [], []
     for frame in frames:

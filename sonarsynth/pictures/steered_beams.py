@@ -11,7 +11,7 @@ from sonarsynth.equations.arrays.beams import beam_spectra
 from sonarsynth.equations.arrays.gates import gated_spectra
 from sonarsynth.evaluation import beam_width
 from sonarsynth.pictures.figures.sheet import Beam
-from sonarsynth.pictures.store_reading import Stored, beam_grid, needed, read
+from sonarsynth.pictures.store_reading import StoredFrame, beam_grid, needed, read
 from sonarsynth.recipe.variation.values import ASSUMED_SPEED
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ EXTREME = 0.1
 """The nearest and the farthest tenth of a target are "near" and "far"."""
 
 
-def beams(tree: xr.DataTree, frame: Stored) -> list[Beam]:
+def beams(tree: xr.DataTree, frame: StoredFrame) -> list[Beam]:
     """A close hit, a far hit and a close miss on the far side; none without signals or a target in view."""
     pressure = read(tree, "signals/pressure", frame.index)
     start = read(tree, "signals/start", frame.index)
@@ -37,14 +37,14 @@ def beams(tree: xr.DataTree, frame: Stored) -> list[Beam]:
     where = np.array(list(chosen.values()))
     along = direction(np.deg2rad(azimuth[where[:, 1]]), np.deg2rad(elevation[where[:, 0]]))
     clock = direct_arrival(tree, frame)
-    time, heard = steer(tree, frame, pressure.astype(float), float(start), along)
+    time, found = steer(tree, frame, pressure.astype(float), float(start), along)
     return [
         Beam(
             name=name,
             azimuth=float(azimuth[column]),
             elevation=float(elevation[row]),
             time=time - clock,
-            pressure=heard[i],
+            pressure=found[i],
             expected=_expected(tree, frame, along[i] * frame.true_range[row, column]),
             measured=_measured(frame, azimuth[column], elevation[row], _step(azimuth)),
         )
@@ -52,7 +52,7 @@ def beams(tree: xr.DataTree, frame: Stored) -> list[Beam]:
     ]
 
 
-def choose(frame: Stored, azimuth: Floats, elevation: Floats, width: float) -> dict[str, tuple[int, int]]:
+def choose(frame: StoredFrame, azimuth: Floats, elevation: Floats, width: float) -> dict[str, tuple[int, int]]:
     """Beams (row, column) by name; `width` is the beam width (deg). Empty where no beam points at a target.
 
     Near and far are the brightest beams of the nearest and the farthest tenth of the true ranges; the miss is the beam
@@ -89,11 +89,11 @@ def _step(centres: Floats) -> float:
     return float(centres[1] - centres[0]) if len(centres) > 1 else 1.0
 
 
-def direct_arrival(tree: xr.DataTree, frame: Stored) -> float:
+def direct_arrival(tree: xr.DataTree, frame: StoredFrame) -> float:
     """When the snap was heard at the array centre (s): as located; without source estimates as it truly was."""
-    heard = read(tree, "source_estimates/time", frame.index)
-    if heard is not None and np.isfinite(heard).any():
-        return float(heard[np.isfinite(heard)][0])
+    found = read(tree, "source_estimates/time", frame.index)
+    if found is not None and np.isfinite(found).any():
+        return float(found[np.isfinite(found)][0])
     snap_time = needed(tree, "truth/emissions/time", frame.index)
     return float(snap_time[0] + np.linalg.norm(frame.snap[0]) / assumed_speed(tree, frame.index))
 
@@ -106,14 +106,14 @@ def assumed_speed(tree: xr.DataTree, frame: int) -> float:
     return float(varied[0][frame]) if varied else float(tree.attrs["assumed_sound_speed"])
 
 
-def _measured(frame: Stored, azimuth: float, elevation: float, step: float) -> float:
+def _measured(frame: StoredFrame, azimuth: float, elevation: float, step: float) -> float:
     """Delay (s) of the point nearest to a direction (deg), NaN where there is none within half a step of the grid."""
     apart = np.abs(frame.point_direction - [azimuth, elevation]).max(axis=1)
     near = int(np.argmin(apart)) if len(apart) else 0
     return float(frame.point_delay[near]) if len(apart) and apart[near] <= 0.51 * step else float("nan")
 
 
-def _expected(tree: xr.DataTree, frame: Stored, point: Floats) -> float:
+def _expected(tree: xr.DataTree, frame: StoredFrame, point: Floats) -> float:
     """Delay (s) of the echo from a true point (xyz) after the direct arrival, at the sonar's assumed sound speed."""
     if not np.isfinite(point).all() or not len(frame.snap):
         return float("nan")
@@ -122,7 +122,9 @@ def _expected(tree: xr.DataTree, frame: Stored, point: Floats) -> float:
     return float(path / assumed_speed(tree, frame.index))
 
 
-def steer(tree: xr.DataTree, frame: Stored, pressure: Floats, start: float, along: Floats) -> tuple[Floats, Floats]:
+def steer(
+    tree: xr.DataTree, frame: StoredFrame, pressure: Floats, start: float, along: Floats
+) -> tuple[Floats, Floats]:
     """Time (sample,) in s and pressure (beam, sample) in Pa of beams in the echo window, in the sonar's band.
 
     pressure (sensor, sample) from `start` (s); along (beam, xyz). Focused on the middle of the target.
@@ -134,15 +136,15 @@ def steer(tree: xr.DataTree, frame: Stored, pressure: Floats, start: float, alon
     gain, position = needed(tree, "signals/gain"), needed(tree, "signals/position")
     focus = float(np.median(frame.true_range[frame.target >= 0]))
     speed = assumed_speed(tree, frame.index)
-    heard = beam_spectra(spectra, frequency, position, gain, along, speed, focus)
+    found = beam_spectra(spectra, frequency, position, gain, along, speed, focus)
     samples = round(rate / float(frequency[1] - frequency[0]))
     every = np.zeros((len(along), samples // 2 + 1), complex)
     lowest = round(float(frequency[0]) * samples / rate)
-    every[:, lowest : lowest + len(frequency)] = heard
+    every[:, lowest : lowest + len(frequency)] = found
     return start + (first + np.arange(count)) / rate, np.fft.irfft(every, samples, axis=1)[:, :count]
 
 
-def _echo_window(tree: xr.DataTree, frame: Stored, samples: int, rate: float, start: float) -> tuple[int, int]:
+def _echo_window(tree: xr.DataTree, frame: StoredFrame, samples: int, rate: float, start: float) -> tuple[int, int]:
     """First sample and number of samples of the echo window; without an image, what follows the direct arrival."""
     begin, end = read(tree, "image/start", frame.index), read(tree, "image/stop", frame.index)
     if begin is None or end is None or not np.isfinite(begin) or not np.isfinite(end):

@@ -63,7 +63,7 @@ def pictures_of(store: str | Folder, name: str = "") -> Path:
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class FrameVariables:
     """Variables of some frames of a store, read at once: each by itself takes xarray a millisecond."""
 
     attrs: Mapping[Any, Any]
@@ -71,11 +71,11 @@ class Held:
     by_frame: frozenset[str]  # those with an axis of frames, the first
 
 
-Source: TypeAlias = "xr.DataTree | Held"
+Source: TypeAlias = "xr.DataTree | FrameVariables"
 """What frames are read from; frames of what is held are counted from 0."""
 
 
-def held(tree: xr.DataTree, frames: Sequence[int]) -> Held:
+def held(tree: xr.DataTree, frames: Sequence[int]) -> FrameVariables:
     """What pictures need of some frames."""
     values, by_frame = {}, []
     meshes = [f"{g.path.strip('/')}/{n}" for g in tree.subtree if g.path[:9] == "/targets/" for n in g.dataset]
@@ -84,7 +84,7 @@ def held(tree: xr.DataTree, frames: Sequence[int]) -> Held:
         if data is not None:
             values[name] = np.asarray((data.isel(frame=list(frames)) if "frame" in data.dims else data).values)
             by_frame += [name] if "frame" in data.dims else []
-    return Held(tree.attrs, values, frozenset(by_frame))
+    return FrameVariables(tree.attrs, values, frozenset(by_frame))
 
 
 def _variable(tree: xr.DataTree, name: str) -> xr.DataArray | None:
@@ -97,7 +97,7 @@ def _variable(tree: xr.DataTree, name: str) -> xr.DataArray | None:
 
 def read(source: Source, name: str, frame: int | None = None) -> np.ndarray | None:
     """A variable ("image/energy"), of one frame or whole; None where the store does not hold it."""
-    if isinstance(source, Held):
+    if isinstance(source, FrameVariables):
         values = source.values.get(name)
         return values[frame] if values is not None and frame is not None and name in source.by_frame else values
     data = _variable(source, name)
@@ -125,7 +125,7 @@ def beam_grid(tree: xr.DataTree) -> tuple[Floats, Floats]:
 
 
 @dataclass(frozen=True, eq=False)
-class Stored:
+class StoredFrame:
     """One frame of a store; sonar frame, m."""
 
     index: int
@@ -147,7 +147,7 @@ class Stored:
     lobes: tuple[Floats, ...]  # (frequency, azimuth and elevation) deg: grating lobes over the band
 
 
-def every_stored(tree: xr.DataTree, frames: Sequence[int]) -> list[Stored]:
+def every_stored(tree: xr.DataTree, frames: Sequence[int]) -> list[StoredFrame]:
     """Some frames as stored. A frame that was not built comes back full of NaN."""
     source = held(tree, frames)
     found = points(tree, frames) if has_labels(tree) else None
@@ -162,16 +162,16 @@ def every_stored(tree: xr.DataTree, frames: Sequence[int]) -> list[Stored]:
     return made
 
 
-def stored(tree: xr.DataTree, index: int) -> Stored:
+def stored(tree: xr.DataTree, index: int) -> StoredFrame:
     """One frame as stored."""
     return every_stored(tree, [index])[0]
 
 
-def _stored(tree: Held, row: int, index: int, cloud: Mapping[str, Floats]) -> Stored:
+def _stored(tree: FrameVariables, row: int, index: int, cloud: Mapping[str, Floats]) -> StoredFrame:
     energy = read(tree, "image/energy", row)
     pose = _sonar(tree, row)
     time = read(tree, "time", row)
-    return Stored(
+    return StoredFrame(
         index=index,
         time=float("nan") if time is None else float(time),
         sonar=pose,

@@ -82,14 +82,14 @@ def _ghosts(tree: xr.DataTree, frames: np.ndarray, names: list[str]) -> list[str
     families, each = found[0][1], np.array([level for level, _ in found])  # (frame, target, family)
     lines = []
     for i, name in enumerate(names):
-        heard = [
+        ghosts = [
             f"{family} {np.nanmedian(each[:, i, k]):+.1f} dB"
             for k, family in enumerate(families)
             if family != "direct" and np.isfinite(each[:, i, k]).any()
         ]
         seen = np.isfinite(each[:, i, families.index("direct")]).any()
-        if heard:
-            lines.append(f"  ghosts     {name}: {', '.join(heard)} re its {'direct' if seen else 'strongest'} echo")
+        if ghosts:
+            lines.append(f"  ghosts     {name}: {', '.join(ghosts)} re its {'direct' if seen else 'strongest'} echo")
     return lines
 
 

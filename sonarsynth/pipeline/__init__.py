@@ -153,11 +153,11 @@ def trace_at(plan: Plan, frame: Frame) -> TracedFrame:
     band, targets = band_of(plan, context.snaps), len(context.bodies)
     powers = path_powers(seen, band)
     budget = link_budget(seen, powers, band, targets, levels, expansion_error(plan, seen))
-    heard = echo_levels(seen, powers, targets, levels)
+    levels_of_echoes = echo_levels(seen, powers, targets, levels)
     mark_stage("label")
     others = frame_chorus(plan, frame), frame_reverberation(plan, frame)
     mark_stage("trace")
-    return TracedFrame(frame, arrivals, truth, budget, heard, *others)
+    return TracedFrame(frame, arrivals, truth, budget, levels_of_echoes, *others)
 
 
 def beamform_frame(plan: Plan, index: int, traced: TracedFrame) -> BeamformedFrame:
@@ -170,11 +170,11 @@ def beamform_frame(plan: Plan, index: int, traced: TracedFrame) -> BeamformedFra
     if "signals" in plan.products:
         isolated = isolated_levels(plan, traced.frame, traced.budget, traced.truth.snap_level)
         mark_stage("measure")
-    heard = BeamformedFrame(recorded, None, None)
+    beamformed = BeamformedFrame(recorded, None, None)
     if plan.products & OF_BEAMS:
-        heard = locate_and_image(plan, traced.frame, known_signals(plan, traced.frame, recorded))
-    snr = snr_values(plan, traced.frame, traced.arrivals, traced.truth, parts, heard.image)
-    return replace(heard, isolated=isolated, recorded=recorded, snr=snr)
+        beamformed = locate_and_image(plan, traced.frame, known_signals(plan, traced.frame, recorded))
+    snr = snr_values(plan, traced.frame, traced.arrivals, traced.truth, parts, beamformed.image)
+    return replace(beamformed, isolated=isolated, recorded=recorded, snr=snr)
 
 
 def locate_and_image(plan: Plan, frame: Frame, signals: Signals) -> BeamformedFrame:
@@ -215,47 +215,47 @@ def synthesise(plan: Plan, traced: TracedFrame, hearing: Hearing = told_nothing)
     return digitise(plan, traced.frame, signals, hearing)
 
 
-def range_frame(plan: Plan, index: int, traced: TracedFrame, heard: BeamformedFrame) -> Values:
+def range_frame(plan: Plan, index: int, traced: TracedFrame, beamformed: BeamformedFrame) -> Values:
     """The point cloud, and every stored value of the frame."""
     plan = plan.at(index)
-    values = in_slots(plan, _heard_values(plan, traced, heard) | which_values(plan), VARIABLES)
+    values = in_slots(plan, _beamformed_values(plan, traced, beamformed) | which_values(plan), VARIABLES)
     mark_stage("label")
     return values
 
 
-def _heard_values(plan: Plan, traced: TracedFrame, heard: BeamformedFrame) -> Values:
+def _beamformed_values(plan: Plan, traced: TracedFrame, beamformed: BeamformedFrame) -> Values:
     """The same of the bodies that are there; `plan` is that of the frame's sequence."""
     frame = traced.frame
     values = frame_values(plan, frame) | truth_values(traced.truth) | echo_values(traced.echoes, traced.arrivals)
-    values |= link_budget_values(traced.budget, heard.isolated) | soundscape_values(plan, frame, traced.chorus)
+    values |= link_budget_values(traced.budget, beamformed.isolated) | soundscape_values(plan, frame, traced.chorus)
     direct = heard_directly(plan, traced.arrivals, frame.moment.snaps)
     values |= clear_values(plan, traced.chorus, traced.echoes, direct, frame.moment.snaps)
-    values |= estimate_truth(direct, len(frame.moment.snaps)) | heard.snr
+    values |= estimate_truth(direct, len(frame.moment.snaps)) | beamformed.snr
     if "signals" in plan.products:
         counts = any(v.name == "pressure" and v.dtype == "int16" for v in variables(plan))
-        values |= signal_values(heard.recorded or heard.signals, counts)
-    if heard.image is None or heard.estimates is None:
+        values |= signal_values(beamformed.recorded or beamformed.signals, counts)
+    if beamformed.image is None or beamformed.estimates is None:
         mark_stage("collect")
         return values
-    values |= source_estimate_values(heard.estimates)
-    values |= emission_values(plan, direct, heard.estimates, heard.signals, frame.moment.snaps)
+    values |= source_estimate_values(beamformed.estimates)
+    values |= emission_values(plan, direct, beamformed.estimates, beamformed.signals, frame.moment.snaps)
     if "image" in plan.products:
-        values |= image_values(heard.image, plan.windows.direct_removed)
+        values |= image_values(beamformed.image, plan.windows.direct_removed)
     mark_stage("collect")
     if "beams" in plan.products:
-        values |= beam_values(plan, heard.beams, heard.image)
+        values |= beam_values(plan, beamformed.beams, beamformed.image)
         mark_stage("resolve")
     if "cloud" in plan.products:
-        cloud = cloud_of(plan, frame, heard).loudest(plan.sizes["point"])
+        cloud = cloud_of(plan, frame, beamformed).loudest(plan.sizes["point"])
         mark_stage("range")
-        labels = point_labels(plan, frame, traced.arrivals, heard.estimates, cloud)
+        labels = point_labels(plan, frame, traced.arrivals, beamformed.estimates, cloud)
         values |= cloud_values(cloud, labels, plan.sizes["point"], len(frame.moment.bodies))
     return values
 
 
-def cloud_of(plan: Plan, frame: Frame, heard: BeamformedFrame) -> PointCloud:
+def cloud_of(plan: Plan, frame: Frame, beamformed: BeamformedFrame) -> PointCloud:
     """The points of a frame that has an image; `plan` is that of its sequence."""
-    image, signals, estimates, beams = heard.image, heard.imaged, heard.estimates, heard.beams
+    image, signals, estimates, beams = beamformed.image, beamformed.imaged, beamformed.estimates, beamformed.beams
     if image is None or signals is None or estimates is None or beams is None:
         return no_points()
     if not in_record(estimates, signals, plan.windows.echo_start, plan.windows.echo_stop)[:1].any():
@@ -263,7 +263,7 @@ def cloud_of(plan: Plan, frame: Frame, heard: BeamformedFrame) -> PointCloud:
     elements, sonar, choices = known_elements(plan, frame), plan.scene.sonar, plan.choices
     pressure = signals.pressure
     loudest = float(max(pressure.max(initial=0.0), -pressure.min(initial=0.0)))
-    window = ReceivedWindow(elements, sonar, image, beams, loudest, heard.signals, estimates)
+    window = ReceivedWindow(elements, sonar, image, beams, loudest, beamformed.signals, estimates)
     return point_cloud(window, choices.picking, choices.placing, frame.sonar_pose, plan.profile)
 
 

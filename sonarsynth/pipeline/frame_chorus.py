@@ -63,7 +63,7 @@ def with_chorus(plan: Plan, frame: Frame, signals: Signals, arrivals: ChorusArri
     if not len(arrivals.delay):
         return signals
     model, samples = chorus.snap.at_depth(plan.medium.depth), signals.pressure.shape[1]
-    heard = chorus_pressure(
+    pressure = chorus_pressure(
         arrivals,
         model,
         chorus.widths,
@@ -74,7 +74,7 @@ def with_chorus(plan: Plan, frame: Frame, signals: Signals, arrivals: ChorusArri
         samples,
     )
     mark_stage("synthesise")
-    return replace(signals, pressure=signals.pressure + heard)
+    return replace(signals, pressure=signals.pressure + pressure)
 
 
 def soundscape_values(plan: Plan, frame: Frame, arrivals: ChorusArrivals | None) -> Values:
@@ -102,8 +102,8 @@ def clear_values(
     """
     if arrivals is None:
         return {}
-    heard = heard_first(direct, len(snaps))[0]
-    time = [t for t, snap in zip(heard, snaps, strict=True) if snap.illuminates]
+    first = heard_first(direct, len(snaps))[0]
+    time = [t for t, snap in zip(first, snaps, strict=True) if snap.illuminates]
     echo = np.max(echoes.level, initial=-np.inf, where=np.isfinite(echoes.level))
     clear = -1
     if np.isfinite(echo) and np.isfinite(time).any():

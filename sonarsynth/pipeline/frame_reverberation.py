@@ -29,7 +29,7 @@ def with_reverberation(plan: Plan, frame: Frame, signals: Signals, arrivals: Rev
     if arrivals is None or not len(arrivals.delay):
         return signals
     mark_stage("synthesise")
-    heard = reverberation_pressure(
+    pressure = reverberation_pressure(
         arrivals,
         arrivals.emission,
         frame.moment.snaps,
@@ -40,4 +40,4 @@ def with_reverberation(plan: Plan, frame: Frame, signals: Signals, arrivals: Rev
         signals.pressure.shape[1],
     )
     mark_stage(REVERBERATION)
-    return replace(signals, pressure=np.asarray(signals.pressure + heard))
+    return replace(signals, pressure=np.asarray(signals.pressure + pressure))

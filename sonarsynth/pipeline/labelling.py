@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from sonarsynth.conventions import Floats
-from sonarsynth.labels import SLICES, Band, Listening, label_points
+from sonarsynth.labels import SLICES, Band, SonarTiming, label_points
 from sonarsynth.pipeline.stored_values import Values, of_isolated, sensor_values, table
 from sonarsynth.pipeline.synthesis import errors_of, known_elements
 from sonarsynth.planning import Plan
@@ -51,7 +51,7 @@ def point_labels(
     sonar = plan.scene.sonar
     moves = plan.scene.physics.doppler
     moment = frame.moment if moves else replace(frame.moment, bodies=tuple(body.frozen for body in frame.moment.bodies))
-    listening = Listening(
+    listening = SonarTiming(
         known_elements(plan, frame),
         sonar.assumed_sound_speed,
         plan.choices.beamforming.focus,

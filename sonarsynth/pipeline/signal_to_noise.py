@@ -84,9 +84,9 @@ def snr_values(
                 energy[name][n] = weight * look.energy(parts.pressure[name], beams[n])
             if scattered is not None:
                 energy["reverberation"][n] += weight * look.energy(scattered, beams[n])
-    heard = {name: np.maximum(value, SILENCE) for name, value in energy.items()}
-    level = {f"{name}_energy": 10.0 * np.log10(value) + 120.0 for name, value in heard.items()}
-    snr = 10.0 * np.log10(heard["echo"] / np.sum([heard[name] for name in parts.names], axis=0))
+    audible = {name: np.maximum(value, SILENCE) for name, value in energy.items()}
+    level = {f"{name}_energy": 10.0 * np.log10(value) + 120.0 for name, value in audible.items()}
+    snr = 10.0 * np.log10(audible["echo"] / np.sum([audible[name] for name in parts.names], axis=0))
     mark_stage(SIGNAL_TO_NOISE)
     return table("/truth/targets", **level, snr=snr)
 
@@ -110,8 +110,8 @@ def _window(plan: Plan, frame: Frame, arrivals: Arrivals, image: EnergyImage | N
     if image is not None:
         return image.start, image.stop
     snaps = frame.moment.snaps
-    heard = heard_first(heard_directly(plan, arrivals, snaps), len(snaps))[0]
-    light = next((float(t) for t, snap in zip(heard, snaps, strict=True) if snap.illuminates), float("nan"))
+    first = heard_first(heard_directly(plan, arrivals, snaps), len(snaps))[0]
+    light = next((float(t) for t, snap in zip(first, snaps, strict=True) if snap.illuminates), float("nan"))
     return light + plan.windows.echo_start, light + plan.windows.echo_stop
 
 

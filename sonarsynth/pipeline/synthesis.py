@@ -41,8 +41,8 @@ def frame_signals(plan: Plan, frame: Frame, arrivals: Arrivals) -> Signals:
         return array_signals(plan, frame, arrivals, sensors)
     pressure, outside = np.zeros((sensors.count, samples), np.float32), 0
     for part in subarrays(sensors, plan.choices.subarrays):
-        heard = subarray_signals(plan, frame, part)
-        pressure[part.sensor], outside = heard.pressure, max(outside, heard.outside)
+        signals_of_part = subarray_signals(plan, frame, part)
+        pressure[part.sensor], outside = signals_of_part.pressure, max(outside, signals_of_part.outside)
     return Signals(pressure, start, plan.scene.sonar.sampling_frequency, 0.0, 0, outside)
 
 

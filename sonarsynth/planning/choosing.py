@@ -216,7 +216,7 @@ class PerSensorReference:
         rows = []
         for one in sensor:
             part = subarray(plan.elements, np.array([one]))
-            rows.append(_heard(plan, frame, sampled_arrivals(every, frame, part), part.elements))
+            rows.append(_pressures(plan, frame, sampled_arrivals(every, frame, part), part.elements))
         return PerSensorReference(
             plan, frame, sensor, (np.vstack([r[0] for r in rows]), np.vstack([r[1] for r in rows]))
         )
@@ -234,7 +234,7 @@ class PerSensorReference:
             if len(rows):
                 own, place = with_rim(part, np.searchsorted(part.sensor, self.sensor[rows]))
                 arrivals = sampled_arrivals(plan, self.frame, part).for_sensors(place, part.elements.count)
-                for out, made in zip(found, _heard(plan, self.frame, arrivals, own), strict=True):
+                for out, made in zip(found, _pressures(plan, self.frame, arrivals, own), strict=True):
                     out[rows] = made[: len(rows)]
         sizes = [float(np.linalg.norm(x)) for x in self.exact]
         errors = [float(np.linalg.norm(a - b)) for a, b in zip(found, self.exact, strict=True)]
@@ -248,7 +248,7 @@ def heard_at(elements: Elements) -> Ints:
     return np.unique(live[np.floor(np.mod((np.arange(count) + 0.5) * 0.6180339887498949, 1.0) * len(live)).astype(int)])
 
 
-def _heard(plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements) -> tuple[Floats, Floats]:
+def _pressures(plan: Plan, frame: Frame, arrivals: Arrivals, elements: Elements) -> tuple[Floats, Floats]:
     """Echoes and direct arrivals (sensor, sample) in Pa, each by itself, of given arrivals."""
     method = deposit_for(DEGREE_TOLERANCE * plan.recipe.accuracy.cheap)
     start, samples = frame_start(plan, frame), plan.windows.samples

@@ -205,11 +205,11 @@ def _span(frame: Frame, profile: Profile, bottom_depth: float, bounces: int) -> 
     if bounces:
         late_direct, late_echo = _reflected(frame, profile, bottom_depth, bounces)
     last = np.array([max(d, e) for d, e in zip(late_direct, late_echo, strict=True)])
-    heard = [
+    received_level = [
         level - 20 * np.log10(max(float(np.linalg.norm(s.position - array)), 1e-9))
         for s, level in zip(snaps, snap_levels(snaps), strict=True)
     ]
-    loudest = int(np.argmax(heard))
+    loudest = int(np.argmax(received_level))
     latest = float(np.max(np.asarray(late_echo) - direct)) if echoes else np.nan
     others = tuple((float(direct[n]), float(last[n])) for n in range(len(snaps)) if n != loudest)
     return _ArrivalInterval(

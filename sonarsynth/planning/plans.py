@@ -15,7 +15,7 @@ from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry.motion import pose
 from sonarsynth.imaging.beam_envelopes import envelope_delays
 from sonarsynth.planning.choices import Choices
-from sonarsynth.planning.measured.absorption_error import Passed, mean_absorption, passed_by, shape_error
+from sonarsynth.planning.measured.absorption_error import StraightPaths, mean_absorption, passed_by, shape_error
 from sonarsynth.planning.measured.chorus_reach import band_frequencies, chorus_reach
 from sonarsynth.planning.measured.distant_chorus import DistantChorus, distant_chorus
 from sonarsynth.planning.measured.ray_bending import propagation
@@ -152,7 +152,7 @@ class Plan:
         return distant_chorus(self.scene, self.profile, where, self.absorption, self.chorus)
 
     @cached_property
-    def _passed(self) -> Passed:
+    def _passed(self) -> StraightPaths:
         """The depths of the paths of the sequence, in its first, middle and last frame."""
         first, count = self.recipe.first_frame(self.sequence), self.recipe.steps(self.sequence)
         steps = sorted({0, count // 2, count - 1})

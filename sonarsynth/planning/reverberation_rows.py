@@ -25,9 +25,9 @@ def reverberation_rows(plan: Plan) -> list[NoiseRow]:
     described, levels = plan.scene.world.reverberation, reverberation_levels(plan)
     if described is None or levels is None:
         return []
-    heard = ", ".join(f"{name} {level:.0f} dB" for name, _, level in levels.families if np.isfinite(level))
+    families = ", ".join(f"{name} {level:.0f} dB" for name, _, level in levels.families if np.isfinite(level))
     method = f"{described.row()}; {levels.scatterers} scatterers in the first frame"
-    why = f"{heard or 'nothing'} re 1 uPa in the echo window; noise of a beam {levels.noise:.0f} dB"
+    why = f"{families or 'nothing'} re 1 uPa in the echo window; noise of a beam {levels.noise:.0f} dB"
     error = plan.recipe.accuracy.speckle
     per_pulse = scatterers_per_pulse(error, shape=SINC)
     said = f"{error:.2g} of the contrast at a hydrophone: {per_pulse:.2g} scatterers in 1/bandwidth; 3 % of each path"

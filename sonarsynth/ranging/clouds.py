@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 
 
 def point_cloud(
-    heard: ReceivedWindow, picking: PickingMethod, placing: PlacingMethod, sonar_pose: Pose, profile: Profile
+    window: ReceivedWindow, picking: PickingMethod, placing: PlacingMethod, sonar_pose: Pose, profile: Profile
 ) -> PointCloud:
     """Points lit by the first located snap: the echoes of `picking` where `placing` puts them; none of an echo that
     has no place, and none at all where no snap was located. profile: the sound speed of the water."""
-    if not heard.located:
+    if not window.located:
         return no_points()
-    echoes = picking.picks(heard)
-    beam, source = direction(echoes.azimuth, echoes.elevation), heard.estimates.position[0]
-    solution = placing.place(echoes.delay, beam, source, heard.sonar, sonar_pose, profile)
-    error = range_error(solution, echoes, heard.estimates, heard.sonar)
+    echoes = picking.picks(window)
+    beam, source = direction(echoes.azimuth, echoes.elevation), window.estimates.position[0]
+    solution = placing.place(echoes.delay, beam, source, window.sonar, sonar_pose, profile)
+    error = range_error(solution, echoes, window.estimates, window.sonar)
     cloud = PointCloud(
         position=solution.position.astype(np.float32),
         range=solution.range.astype(np.float32),

@@ -106,7 +106,7 @@ def direct_spectrum(
     return pulse_times.template_spectrum(wave.template, length)
 
 
-def range_profiles(heard: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profiles:
+def range_profiles(received: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profiles:
     """Profiles of the beams (row, column): matched to the direct pulse as this beam would hear it, whitened, tapered.
 
     With W the direct pulse at the array centre and D the face directivity towards the beam, the profile is the envelope
@@ -114,10 +114,10 @@ def range_profiles(heard: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profiles:
     band allows in delay, and sharper in angle than the snap's own falling spectrum. D is divided by its root mean
     square over an echo's spectrum, or an echo would be loudest where the face hears best, nearer to the axis.
     """
-    window, sonar, elements = heard.beams.snapshots, heard.sonar, heard.elements
+    window, sonar, elements = received.beams.snapshots, received.sonar, received.elements
     c, f, spacing = sonar.assumed_sound_speed, window.frequency, window.spacing
     lowest = round(f[0] / spacing)
-    wave = direct_spectrum(heard.direct, heard.estimates, elements, sonar, fast_length(window.samples))
+    wave = direct_spectrum(received.direct, received.estimates, elements, sonar, fast_length(window.samples))
     wave = wave[lowest : lowest + len(f)]
     density = np.abs(wave) ** 2
     taper = np.sin(np.pi * np.clip((f - sonar.band.low) / (sonar.band.high - sonar.band.low), 0.0, 1.0)) ** 2
@@ -127,14 +127,14 @@ def range_profiles(heard: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profiles:
     length = next_fast_len(OVERSAMPLING * len(f))
     step = 1 / (length * spacing)
     row, column = beams
-    u = direction(heard.image.azimuth[column], heard.image.elevation[row])
+    u = direction(received.image.azimuth[column], received.image.elevation[row])
     power = np.empty((len(u), min(int(window.duration / step) + 1, length)), np.float32)
     for part in range(0, len(u), BEAMS_AT_ONCE):
         here = slice(part, part + BEAMS_AT_ONCE)
         sine = u[here] * (elements.face / c)
         face = ranging_kernels.face_responses(sine[:, 1], sine[:, 2], f[0], spacing, len(f))
         face /= np.sqrt(face**2 @ share)[:, None]
-        echo = ifft(heard.beams.spectra(u[here]) * (face * matched).astype(np.complex64), length, axis=1)
+        echo = ifft(received.beams.spectra(u[here]) * (face * matched).astype(np.complex64), length, axis=1)
         power[here] = echo.real[:, : power.shape[1]] ** 2 + echo.imag[:, : power.shape[1]] ** 2
     spread = np.sum(taper**2)
     centre = f @ taper**2 / spread
@@ -144,7 +144,7 @@ def range_profiles(heard: ReceivedWindow, beams: tuple[Ints, Ints]) -> Profiles:
         column=column,
         direction=u,
         power=power,
-        first=window.start - float(heard.estimates.time[0]),
+        first=window.start - float(received.estimates.time[0]),
         step=step,
         width=half_width(elements, centre / c),
         resolution=1 / (2 * np.pi * beta),

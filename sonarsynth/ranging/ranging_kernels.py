@@ -53,14 +53,14 @@ def cut_out(pressure: Any, place: Any, half: int, gain: Any) -> Any:
 def turned(spectrum: Any, delay: Any, first: float, spacing: float) -> Any:
     """spectrum * exp(+i 2 pi f delay): (sensor, bin) at f = first + spacing * bin (Hz), delay (sensor,) s."""
     sensors, bins = spectrum.shape
-    heard = np.empty((sensors, bins), np.complex128)
+    shifted = np.empty((sensors, bins), np.complex128)
     for q in range(sensors):
         phasor = np.exp(2j * np.pi * first * delay[q])
         step = np.exp(2j * np.pi * spacing * delay[q])
         for k in range(bins):
-            heard[q, k] = spectrum[q, k] * phasor
+            shifted[q, k] = spectrum[q, k] * phasor
             phasor *= step
-    return heard
+    return shifted
 
 
 @nb.njit(cache=True, nogil=True)
@@ -90,30 +90,30 @@ def face_responses(across: Any, up: Any, first: float, spacing: float, bins: int
 
 
 @nb.njit(cache=True, nogil=True)
-def template_sums(heard: Any, response: Any) -> Any:
-    """Sums over sensors of response * heard and of response^2: (bin,) each; heard, response (sensor, bin)."""
-    sensors, bins = heard.shape
+def template_sums(spectrum: Any, response: Any) -> Any:
+    """Sums over sensors of response * spectrum and of response^2: (bin,) each; spectrum, response (sensor, bin)."""
+    sensors, bins = spectrum.shape
     total = np.zeros(bins, np.complex128)
     power = np.zeros(bins)
     for q in range(sensors):
         for k in range(bins):
-            total[k] += response[q, k] * heard[q, k]
+            total[k] += response[q, k] * spectrum[q, k]
             power[k] += response[q, k] * response[q, k]
     return total, power
 
 
 @nb.njit(cache=True, nogil=True)
-def lag_sums(heard: Any, response: Any, template: Any, omega: Any) -> Any:
-    """Sums over bins for each sensor (sensor,), with the model M = response * template and the rest R = heard - M:
+def lag_sums(spectrum: Any, response: Any, template: Any, omega: Any) -> Any:
+    """Sums over bins for each sensor (sensor,), with the model M = response * template and the rest R = spectrum - M:
 
-    omega Im(M conj R), |omega M|^2 and |R|^2; heard, response (sensor, bin); template, omega (bin,).
+    omega Im(M conj R), |omega M|^2 and |R|^2; spectrum, response (sensor, bin); template, omega (bin,).
     """
-    sensors, bins = heard.shape
+    sensors, bins = spectrum.shape
     slope, weight, rest = np.zeros(sensors), np.zeros(sensors), np.zeros(sensors)
     for q in range(sensors):
         for k in range(bins):
             m = response[q, k] * template[k]
-            r = heard[q, k] - m
+            r = spectrum[q, k] - m
             slope[q] += omega[k] * (m.imag * r.real - m.real * r.imag)
             weight[q] += omega[k] ** 2 * (m.real**2 + m.imag**2)
             rest[q] += r.real**2 + r.imag**2

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sonarsynth.description import FieldError
 from sonarsynth.recipe.sequences import MOST_SEQUENCES, Sequences, name_of
 from sonarsynth.recipe.variation.grid import Axis
-from sonarsynth.recipe.variation.random_variations import Choice, Ranged, Sobol
+from sonarsynth.recipe.variation.random_variations import Choice, NumberVariation, Sobol
 from sonarsynth.recipe.variation.sobol_points import OF_VARIATIONS
 from sonarsynth.recipe.variation.values import MOST_FRAMES, Where
 
@@ -41,7 +41,7 @@ def check_spanned(spanned: Sequences) -> None:
 
 def _check_dependent(spanned: Sequences) -> None:
     """What goes with another, or only where another has some value: that must be there, and come before."""
-    ranged = {name_of(v): v for v in spanned.variations if isinstance(v, Ranged)}
+    ranged = {name_of(v): v for v in spanned.variations if isinstance(v, NumberVariation)}
     listed = {name_of(entry) for place, entry in spanned.entries if place[0] == "grid"}
     for i, variation in enumerate(spanned.variations):
         if variation.when is not None and variation.when.entry not in listed:
@@ -52,7 +52,7 @@ def _check_dependent(spanned: Sequences) -> None:
             )
         if isinstance(variation, Choice):
             listed.add(name_of(variation))
-        like = variation.like if isinstance(variation, Ranged) else None
+        like = variation.like if isinstance(variation, NumberVariation) else None
         if like is not None and (like not in ranged or ranged[like].like is not None or like == name_of(variation)):
             free = ", ".join(name for name, v in ranged.items() if v.like is None and v is not variation) or "none"
             raise FieldError(("variations", i, "like"), f"'{like}' is no other variation to go with: {free}")

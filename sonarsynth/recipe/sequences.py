@@ -20,7 +20,7 @@ import numpy as np
 from sonarsynth.conventions import Ints
 from sonarsynth.description import FieldError
 from sonarsynth.randomness import number
-from sonarsynth.recipe.populations.drawn_bodies import Drawn, draw
+from sonarsynth.recipe.populations.drawn_bodies import DrawnBodies, draw
 from sonarsynth.recipe.renamed_keys import as_drawn
 from sonarsynth.recipe.scene import Scene
 from sonarsynth.recipe.splits import SPLITS, Splits, assign
@@ -183,11 +183,11 @@ class Sequences:
         point = self.point(sequence)
         return _point(self, point[:-1])[1], point[-1]
 
-    def bodies(self, sequence: int) -> Drawn:
+    def bodies(self, sequence: int) -> DrawnBodies:
         """The bodies of the populations of a sequence. Raises FieldError where a population has no room."""
         return _bodies(self, sequence)
 
-    def _drawn_in(self, scene: Scene, sequence: int) -> Drawn:
+    def _drawn_in(self, scene: Scene, sequence: int) -> DrawnBodies:
         return draw(scene, self.seed, self.key(sequence), self.repeat(sequence))
 
     def described(self, sequence: int) -> Scene:
@@ -285,7 +285,7 @@ def _described(sequences: Sequences, sequence: int) -> Scene:
 
 
 @lru_cache(maxsize=1024)  # as many as a plan looks at
-def _bodies(sequences: Sequences, sequence: int) -> Drawn:
+def _bodies(sequences: Sequences, sequence: int) -> DrawnBodies:
     return sequences._drawn_in(sequences.described(sequence), sequence)
 
 

@@ -16,7 +16,7 @@ from sonarsynth.recipe.reading import Source
 from sonarsynth.schedule import connecting
 from sonarsynth.schedule.build_log import append_lines, read_lines, write_lines
 from sonarsynth.schedule.build_report import BuildProgress, BuildReport, Progress
-from sonarsynth.schedule.disk_space import Room, TooLarge, check_space, told_when_full
+from sonarsynth.schedule.disk_space import DiskRoom, TooLarge, check_space, told_when_full
 from sonarsynth.schedule.making import job_of, make_shards, reachable_by_workers, usable_cores
 from sonarsynth.schedule.predicting import Prediction, predict
 from sonarsynth.schedule.tasks import Failure
@@ -72,9 +72,9 @@ def build(
     for the log and the run times, which are in ~/.local/state/sonarsynth.
 
     Returns counts, times (s) and failures. Raises FieldError for a scene that cannot be, IndexError for frames that are
-    not there, store.Mismatch for a store of something else, store.Locked while another build runs, store.Damage where
-    the store cannot go on, TooLarge where `agreed` is needed, OSError where it cannot be written or the scheduler is
-    gone, store.Unreachable for a URL that cannot be used, RuntimeError where workers do not start, ValueError for
+    not there, store.Mismatch for a store of something else, store.StoreLocked while another build runs, store.Damage
+    where the store cannot go on, TooLarge where `agreed` is needed, OSError where it cannot be written or the scheduler
+    is gone, store.Unreachable for a URL that cannot be used, RuntimeError where workers do not start, ValueError for
     options that cannot be. After any of these, and after an interruption, the same call resumes where it ended.
     """
     made = what if isinstance(what, Plan) else plan(what, chosen_products(products))
@@ -191,10 +191,10 @@ def _check_memory(
         )
 
 
-def _room(made: Plan, frames: int) -> Room:
+def _room(made: Plan, frames: int) -> DiskRoom:
     """What so many frames need at most."""
     bytes_ = made.predicted_bytes * frames / max(made.recipe.frames, 1)
-    return Room(bytes_, store.layout_of(made).files(-(-frames // made.shard_frames)))
+    return DiskRoom(bytes_, store.layout_of(made).files(-(-frames // made.shard_frames)))
 
 
 def _failed(path: Folder) -> dict[int, Failure]:

@@ -76,7 +76,7 @@ class Trial:
 
 
 @dataclass(frozen=True, eq=False)
-class _Made:
+class _TimedFrame:
     """A frame that was made."""
 
     frame: int
@@ -137,7 +137,7 @@ def _odds(plan: Plan, values: Values) -> Odds:
     return odds(energy, values["/truth/beams", "target"], clutter, snr, reach)
 
 
-Tried = tuple[list[tuple[_Made, _Made]], list[Stages], int]
+Tried = tuple[list[tuple[_TimedFrame, _TimedFrame]], list[Stages], int]
 """Frames made for the first and for the second time; cost of each whole; and of how many facets one was there."""
 
 
@@ -149,7 +149,7 @@ def _spread(frames: int) -> list[int]:
 
 def _try_whole(plan: Plan, failures: list[str]) -> Tried:
     """Whole frames, each twice: its first time fills caches, and that of the first one loads what all need."""
-    pairs: list[tuple[_Made, _Made]] = []
+    pairs: list[tuple[_TimedFrame, _TimedFrame]] = []
     for index in _spread(plan.recipe.frames):
         if sum(warm.seconds for _, warm in pairs) > TRIED / 2:
             break
@@ -192,7 +192,7 @@ def _mean(costs: Sequence[Stages]) -> Stages:
     return {name: sum(one.get(name, 0.0) for one in costs) / len(costs) for name in names}
 
 
-def _make(plan: Plan, index: int, every: int = 1) -> _Made:
+def _make(plan: Plan, index: int, every: int = 1) -> _TimedFrame:
     """One frame, with one facet of so many.
 
     Where the array is cut into more than PARTS parts, it is heard as one and by so many of these.
@@ -214,7 +214,7 @@ def _make(plan: Plan, index: int, every: int = 1) -> _Made:
         for part in some:
             subarray_signals(plan, frame, part)
         cpu["synthesise"] += (time.thread_time() - start) * len(every_part) / len(some)
-    return _Made(index, values, dict(cpu), time.perf_counter() - began, time.thread_time() - before, _others())
+    return _TimedFrame(index, values, dict(cpu), time.perf_counter() - began, time.thread_time() - before, _others())
 
 
 def _stages(plan: Plan, frame: Frame) -> Values:

@@ -14,7 +14,7 @@ from sonarsynth import store
 from sonarsynth.planning import Plan
 from sonarsynth.schedule import tasks
 from sonarsynth.schedule.build_log import Log, append_lines
-from sonarsynth.schedule.tasks import Failure, Written
+from sonarsynth.schedule.tasks import Failure, WrittenShard
 from sonarsynth.store import Folder
 
 Progress = Callable[[int, int, int], None]
@@ -51,7 +51,7 @@ class BuildReport:
         """True where no frame failed."""
         return not self.failures
 
-    def add(self, written: Written) -> None:
+    def add(self, written: WrittenShard) -> None:
         """Count a shard in."""
         self.written += len(written.frames)
         self.shards += bool(written.frames)
@@ -99,7 +99,7 @@ class BuildProgress:
         if self.announce is not None and dashboard:
             self.announce(dashboard)
 
-    def done(self, written: Written) -> None:
+    def done(self, written: WrittenShard) -> None:
         """A shard is written."""
         self.report.add(written)
         append_lines(store.here(self.path, "times.jsonl"), written.times)

@@ -17,7 +17,7 @@ from typing import Any, Final
 from distributed import Client, Future, KilledWorker
 
 from sonarsynth.schedule import tasks, worker_status
-from sonarsynth.schedule.tasks import Failure, Job, Step, Written
+from sonarsynth.schedule.tasks import Failure, Job, StageResult, WrittenShard
 
 SHARDS_AHEAD: Final = 3
 """Shards in flight for each worker: one being written, one being rendered, one to come."""
@@ -59,7 +59,7 @@ class _Builder:
         self,
         client: Client,
         job: Job,
-        done: Callable[[Written], None],
+        done: Callable[[WrittenShard], None],
         lost: Callable[[str, str], None] = lambda worker, why: None,
         patience: float = math.inf,
     ) -> None:
@@ -79,7 +79,7 @@ class _Builder:
             last = _Flight(suspect.shard, good, failed=(*suspect.failed, *failed), last=True)
             for again in self._pass([last]):
                 died = [Failure(f, "shard", "its worker died while the shard was written", "") for f in again.frames]
-                self.done(Written(again.shard, (), (*again.failed, *died), (), 0.0, 0, 0))
+                self.done(WrittenShard(again.shard, (), (*again.failed, *died), (), 0.0, 0, 0))
 
     def _pass(self, flights: Sequence[_Flight]) -> list[_Flight]:
         """Run shards through the window. Returns those that lost their workers, raises what went wrong in writing."""
@@ -113,10 +113,10 @@ class _Builder:
             del self.flights[landed]
         return suspects
 
-    def _given_by(self, landed: Future[Any]) -> Written | None:
+    def _given_by(self, landed: Future[Any]) -> WrittenShard | None:
         """What a shard gives; None where its worker is slow, or gone, which the next round sees. Raises what it did."""
         try:
-            written: Written = landed.result(timeout=LANDING)
+            written: WrittenShard = landed.result(timeout=LANDING)
         except TimeoutError:
             if landed.status == "error":
                 raise
@@ -219,7 +219,7 @@ class _Builder:
 
 def _probe(job: Job, frame: int) -> None:
     """Render a frame and forget it."""
-    step: Step = tasks.render_frame(job, frame)
+    step: StageResult = tasks.render_frame(job, frame)
     del step
 
 
@@ -227,7 +227,7 @@ def run(
     client: Client,
     job: Job,
     todo: Mapping[int, tuple[int, ...]],
-    done: Callable[[Written], None],
+    done: Callable[[WrittenShard], None],
     lost: Callable[[str, str], None] = lambda worker, why: None,
     patience: float = math.inf,
 ) -> None:

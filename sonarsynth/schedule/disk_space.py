@@ -29,25 +29,25 @@ class TooLarge(ValueError):
     """A build needs more than is free, or very much, and nobody agreed to it; str() is one line."""
 
 
-class Room(NamedTuple):
+class DiskRoom(NamedTuple):
     """What a store takes of a disk, or a disk has free."""
 
     bytes: float
     files: float  # and folders: inodes
 
 
-def free_room(path: Folder) -> Room:
+def free_room(path: Folder) -> DiskRoom:
     """What is free where a path is, or is to be; nobody knows of an object store, or where files are not counted."""
     if isinstance(path, Remote):
-        return Room(math.inf, math.inf)
+        return DiskRoom(math.inf, math.inf)
     place = path
     while not place.exists() and place != place.parent:
         place = place.parent
     found = os.statvfs(place)
-    return Room(shutil.disk_usage(place).free, found.f_favail if found.f_files else math.inf)
+    return DiskRoom(shutil.disk_usage(place).free, found.f_favail if found.f_files else math.inf)
 
 
-def check_space(path: Folder, needed: Room) -> None:
+def check_space(path: Folder, needed: DiskRoom) -> None:
     """Raise TooLarge where a build that needs so much should not start unasked."""
     free = free_room(path)
     if needed.bytes > free.bytes:
@@ -63,7 +63,7 @@ def check_space(path: Folder, needed: Room) -> None:
 
 
 @contextmanager
-def told_when_full(path: Folder, needed: Callable[[], Room]) -> Iterator[None]:
+def told_when_full(path: Folder, needed: Callable[[], DiskRoom]) -> Iterator[None]:
     """Turn the error of a disk that takes no more into one line with what is still needed and what is free."""
     try:
         yield

@@ -9,7 +9,7 @@ from typing import Final
 
 from sonarsynth.planning import Plan
 from sonarsynth.schedule import cluster, connecting, tasks, worker_status
-from sonarsynth.schedule.tasks import Job, Written
+from sonarsynth.schedule.tasks import Job, WrittenShard
 from sonarsynth.store import Folder, Remote, Unreachable
 
 PATIENCE: Final = 600.0
@@ -45,7 +45,7 @@ def make_shards(
     job: Job,
     made: Plan,
     todo: Mapping[int, tuple[int, ...]],
-    done: Callable[[Written], None],
+    done: Callable[[WrittenShard], None],
     *,
     workers: int | None = None,
     scheduler: str | None = None,

@@ -14,7 +14,7 @@ from sonarsynth.schedule.build_log import append_lines
 from sonarsynth.schedule.build_report import Progress
 from sonarsynth.schedule.connecting import check_address
 from sonarsynth.schedule.making import job_of, make_shards, reachable_by_workers
-from sonarsynth.schedule.tasks import Failure, Written
+from sonarsynth.schedule.tasks import Failure, WrittenShard
 from sonarsynth.store import Findings, Folder, Mismatch, Problem, Remote, cards, provenance
 from sonarsynth.store.checking.examining import shard_of
 from sonarsynth.store.checking.reading_back import read_back
@@ -74,8 +74,8 @@ def repair(
     every number is read back, as `verify` does. Raises Mismatch where there is no store of ours, or where it cannot be
     made again as it was: the version of sonarsynth, its code or its libraries are others (unless `force`), or files
     that the recipe names have changed, are gone, or need `files`; Damage where the recipe cannot be read any more;
-    store.Locked while a build runs; OSError where the store cannot be written; ValueError for a scheduler on another
-    machine without TLS, unless `insecure`.
+    store.StoreLocked while a build runs; OSError where the store cannot be written; ValueError for a scheduler on
+    another machine without TLS, unless `insecure`.
     """
     if scheduler is not None:
         check_address(scheduler, insecure)
@@ -190,11 +190,11 @@ def _in_the_way(path: Folder, found: Findings, made: Plan, todo: Mapping[int, tu
 
 def _counter(
     path: Folder, written: Mapping[int, Mark], report: RepairReport, progress: Progress | None
-) -> Callable[[Written], None]:
+) -> Callable[[WrittenShard], None]:
     """What is done with a shard that is made again: compared with what its mark said, its failures kept."""
     done_frames = 0
 
-    def done(again: Written) -> None:
+    def done(again: WrittenShard) -> None:
         nonlocal done_frames
         done_frames += len(again.frames)
         report.failures.extend(again.failures)

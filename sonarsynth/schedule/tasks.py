@@ -63,7 +63,7 @@ class Failure:
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class StageResult:
     """A stage of a frame: what it made, or the failure of this or an earlier stage; and what all stages so far cost."""
 
     frame: int
@@ -75,7 +75,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Written:
+class WrittenShard:
     """A shard that is in the store."""
 
     shard: int
@@ -87,54 +87,56 @@ class Written:
     peak_bytes: int  # of memory of this process so far
 
 
-def trace(job: Job, frames: Sequence[int]) -> list[Step]:
+def trace(job: Job, frames: Sequence[int]) -> list[StageResult]:
     """Task trace-<token>-<first frame>. Gives what was traced; truth where nothing else is wanted."""
 
-    def work(before: Step) -> Any:
+    def work(before: StageResult) -> Any:
         made = plan_of(job)
         if job.products:
             return pipeline.trace_frame(made, before.frame)
         return layout_of(made).check(pipeline.truth_frame(made, before.frame))
 
-    return [_stage(job, "trace", Step(frame), work) for frame in frames]
+    return [_stage(job, "trace", StageResult(frame), work) for frame in frames]
 
 
-def beamform(job: Job, traced: Sequence[Step]) -> list[Step]:
+def beamform(job: Job, traced: Sequence[StageResult]) -> list[StageResult]:
     """Task beamform-<token>-<first frame>. Gives what was heard with what was traced; values without a cloud."""
 
-    def work(before: Step) -> Any:
-        heard = pipeline.beamform_frame(plan_of(job), before.frame, before.made)
+    def work(before: StageResult) -> Any:
+        beamformed = pipeline.beamform_frame(plan_of(job), before.frame, before.made)
         if len(tasks_of(job.products)) == 3:
-            return before.made, heard
-        return _values(job, before.frame, before.made, heard)
+            return before.made, beamformed
+        return _values(job, before.frame, before.made, beamformed)
 
     return [_stage(job, "beamform", before, work) for before in traced]
 
 
-def range_(job: Job, heard: Sequence[Step]) -> list[Step]:
+def range_(job: Job, beamformed: Sequence[StageResult]) -> list[StageResult]:
     """Task range-<token>-<first frame>: the values of the frames, in the types of the store."""
-    return [_stage(job, "range", before, lambda step: _values(job, step.frame, *step.made)) for before in heard]
+    return [_stage(job, "range", before, lambda step: _values(job, step.frame, *step.made)) for before in beamformed]
 
 
-def _values(job: Job, frame: int, traced: pipeline.TracedFrame, heard: pipeline.BeamformedFrame) -> pipeline.Values:
+def _values(
+    job: Job, frame: int, traced: pipeline.TracedFrame, beamformed: pipeline.BeamformedFrame
+) -> pipeline.Values:
     made = plan_of(job)
-    return layout_of(made).check(pipeline.range_frame(made, frame, traced, heard))
+    return layout_of(made).check(pipeline.range_frame(made, frame, traced, beamformed))
 
 
-RUN: Mapping[str, Callable[[Job, Any], list[Step]]] = {"trace": trace, "beamform": beamform, "range": range_}
+RUN: Mapping[str, Callable[[Job, Any], list[StageResult]]] = {"trace": trace, "beamform": beamform, "range": range_}
 """What each task runs: the first of a block is given the numbers of its frames, each other what the one before made."""
 
 
-def render_frame(job: Job, frame: int) -> Step:
+def render_frame(job: Job, frame: int) -> StageResult:
     """All stages of a frame, here and now."""
     made: Any = [frame]
     for name in tasks_of(job.products):
         made = RUN[name](job, made)
-    step: Step = made[0]
+    step: StageResult = made[0]
     return step
 
 
-def write(job: Job, shard: int, blocks: Sequence[Sequence[Step]]) -> Written:
+def write(job: Job, shard: int, blocks: Sequence[Sequence[StageResult]]) -> WrittenShard:
     """Task shard-<token>-<shard>: one whole shard of every array, from the frames that came out well."""
     start = time.perf_counter()
     steps = [step for block in blocks for step in block]
@@ -144,7 +146,7 @@ def write(job: Job, shard: int, blocks: Sequence[Sequence[Step]]) -> Written:
         with store.shared_lock(job.path, job.build) if job.build else nullcontext(lambda: None) as still:
             mark = store.write_shard(job.path, plan_of(job), shard, good, still)
         size = sum(max(size, 0) for size, _ in mark.files.values())
-    return Written(
+    return WrittenShard(
         shard=shard,
         frames=tuple(sorted(good)),
         failures=tuple(step.failure for step in steps if step.failure is not None),
@@ -195,7 +197,7 @@ def peak_memory() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-def _stage(job: Job, name: str, before: Step, work: Callable[[Step], Any]) -> Step:
+def _stage(job: Job, name: str, before: StageResult, work: Callable[[StageResult], Any]) -> StageResult:
     if before.failure is not None:
         return before
     wall, cpu = time.perf_counter(), time.thread_time()
@@ -209,7 +211,7 @@ def _stage(job: Job, name: str, before: Step, work: Callable[[Step], Any]) -> St
     seconds = {**before.seconds, name: time.perf_counter() - wall}
     spent = {**before.cpu, name: time.thread_time() - cpu}
     parts = {n: before.parts.get(n, 0.0) + parts.get(n, 0.0) for n in {**before.parts, **parts}}  # labels come twice
-    return Step(before.frame, made, failure, seconds, spent, parts)
+    return StageResult(before.frame, made, failure, seconds, spent, parts)
 
 
 _warm: set[str] = set()

@@ -23,10 +23,10 @@ TAPS, SHAPE = 64, 10.0
 def respond(signals: Signals, drawn: DrawnErrors, sound_speed: float) -> Signals:
     """Signals after gain, phase and delay of each channel; dead ones are silent. Windows are taken for periodic: the
     ends are wrong for as long as the delay."""
-    heard = np.where(drawn.state == SensorState.DEAD, 0.0, 1.0)
+    alive = np.where(drawn.state == SensorState.DEAD, 0.0, 1.0)
     spectrum, samples = _spectrum(signals)
     response = _response(drawn, samples, signals.sampling_frequency, sound_speed)
-    return _filtered(signals, spectrum * response * heard[:, None], samples)
+    return _filtered(signals, spectrum * response * alive[:, None], samples)
 
 
 def corrected(signals: Signals, errors: SensorErrors, drawn: DrawnErrors, sound_speed: float) -> Signals:

@@ -58,8 +58,8 @@ def exact_spectra(
             )
         if one.phase_terms.any() or one.delay_variance_terms.any():
             shape = shape * changed(one, elements.position, frequency)
-        heard = elements.gain * ~one.occluded[0] if one.occluded.shape[1] else elements.gain
-        total += (one.amplitude[0] * gain[0] * heard)[:, None] * (
+        gain_of_sensors = elements.gain * ~one.occluded[0] if one.occluded.shape[1] else elements.gain
+        total += (one.amplitude[0] * gain[0] * gain_of_sensors)[:, None] * (
             face * loss * shape * np.exp(-2j * np.pi * late[:, None] * frequency)
         )
     return total
@@ -130,7 +130,7 @@ def exact_signals(
     pressure = np.zeros((elements.count, samples))
     waveforms = [s.waveform for s in snaps]
     for waveform in dict.fromkeys(waveforms):
-        rows = np.flatnonzero(np.array([w == waveform for w in waveforms])[arrivals.snap] & plan.heard)
+        rows = np.flatnonzero(np.array([w == waveform for w in waveforms])[arrivals.snap] & plan.audible)
         if not rows.size:
             continue
         pad = int(np.ceil(plan.support[:, rows].sum(axis=0).max() * fs)) + 2

@@ -36,11 +36,11 @@ def _noise_size(
     f = _frequencies(1, length // 2, sampling_frequency, length)
     passed = response(f, fir(antialias)) ** 2
     power = noise.density(f) * passed
-    heard = np.flatnonzero(power > QUIETEST * power.max())
+    bins = np.flatnonzero(power > QUIETEST * power.max())
     # half of the power of a bin in each part; irfft divides by the length
     size, gain = (np.sqrt(x * sampling_frequency * length) / 2.0 for x in (power, passed))
-    drawn = slice(heard[0], heard[-1] + 1)
-    return 1 + int(heard[0]), size[drawn].astype(np.float32), gain[drawn]
+    drawn = slice(bins[0], bins[-1] + 1)
+    return 1 + int(bins[0]), size[drawn].astype(np.float32), gain[drawn]
 
 
 def _frequencies(first: int, end: int, sampling_frequency: float, length: int) -> Floats:

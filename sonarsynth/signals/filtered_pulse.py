@@ -44,7 +44,7 @@ def fir(chosen: Filter) -> Fir:
     return Fir(low, high, chosen.transition, chosen.attenuation)
 
 
-class Reshaped(NamedTuple):
+class PulseChanges(NamedTuple):
     """What paths do to a pulse that changes how long it lasts, beside making it longer."""
 
     turned: bool = False  # at any constant phase
@@ -69,29 +69,29 @@ def pulse_support(
     LONGEST_TAIL: `cut_tail` says what is left there. sloped: differentiated, as a smooth facet does. rough: from rough
     facets with a `height_delay_std` (s) up to this, of any share. Facets make it longer by their corners, at both ends.
     """
-    return support_of(waveform, chosen, Reshaped(turned, sloped, rough), tolerance)
+    return support_of(waveform, chosen, PulseChanges(turned, sloped, rough), tolerance)
 
 
 def support_of(
-    waveform: Waveform, chosen: Filter, shape: Reshaped, tolerance: float = filters.SUPPORT_TOLERANCE
+    waveform: Waveform, chosen: Filter, shape: PulseChanges, tolerance: float = filters.SUPPORT_TOLERANCE
 ) -> tuple[float, float]:
     """As `pulse_support`."""
     turned, sloped, rough = shape
     supports = [] if sloped else [_plain_support(waveform, chosen, tolerance)]
     if turned or sloped:
-        supports.append(_shaped_support(waveform, chosen, tolerance, Reshaped(turned, sloped))[:2])
+        supports.append(_shaped_support(waveform, chosen, tolerance, PulseChanges(turned, sloped))[:2])
     # a rough one lasts longest where what is missing has just not fallen silent: looked for within a factor of two
     shortest = 1e-11  # shorter ones are quieter only
     longest = rounded_up(max(min(rough, silencing_blur(waveform, chosen)), shortest), 2.0) if rough > 0.0 else 0.0
     for delay in [longest / 2.0**n for n in range(4)] if rough > 0.0 else []:
-        supports.append(_shaped_support(waveform, chosen, tolerance, Reshaped(turned, sloped, delay))[:2])
+        supports.append(_shaped_support(waveform, chosen, tolerance, PulseChanges(turned, sloped, delay))[:2])
     before, after = zip(*supports, strict=True)
     return max(before), max(after)
 
 
 def cut_tail(waveform: Waveform, chosen: Filter, tolerance: float = filters.SUPPORT_TOLERANCE) -> float:
     """What a turned snap may be outside of its support, relative to its peak: `tolerance`, or more where it is cut."""
-    return max(_shaped_support(waveform, chosen, tolerance, Reshaped(turned=True))[2], tolerance)
+    return max(_shaped_support(waveform, chosen, tolerance, PulseChanges(turned=True))[2], tolerance)
 
 
 def at_longest(waveform: Waveform) -> Waveform:
@@ -119,7 +119,7 @@ def _tapered(waveform: Waveform, chosen: Filter, window: float) -> tuple[Floats,
 
 @lru_cache(maxsize=256)
 def _shaped_support(
-    waveform: Waveform, chosen: Filter, tolerance: float, shape: Reshaped
+    waveform: Waveform, chosen: Filter, tolerance: float, shape: PulseChanges
 ) -> tuple[float, float, float]:
     """As `pulse_support`, of one shape; and what is left of it outside. At any phase, that is of the envelope: the
     modulus of the pulse and i times its Hilbert transform."""
@@ -144,7 +144,7 @@ def _shaped_support(
     return before, after, left
 
 
-def _shaped(wave: Floats, step: float, shape: Reshaped) -> Floats:
+def _shaped(wave: Floats, step: float, shape: PulseChanges) -> Floats:
     """Modulus (sample,) of a wave in that shape; half of its envelope, if it may be turned."""
     spectrum = rfft(wave)
     f = np.arange(spectrum.size) / (wave.size * step)
@@ -267,18 +267,18 @@ def _peak(waveform: Waveform) -> float:
     return _made(waveform.model, waveform.stamp, 0.0).peak
 
 
-def snap_levels(heard: tuple[Emission, ...]) -> Floats:
+def snap_levels(emissions: tuple[Emission, ...]) -> Floats:
     """(snap,) peak source level of each snap (dB re 1 uPa at 1 m), as its model's level is taken."""
     with np.errstate(divide="ignore"):
-        own = [20.0 * np.log10(_peak(s.waveform) / REFERENCE_PRESSURE) for s in heard]
-    level = [o if s.source_level is None else s.source_level for s, o in zip(heard, own, strict=True)]
-    return np.array([v + 20.0 * np.log10(s.gain) for s, v in zip(heard, level, strict=True)])
+        own = [20.0 * np.log10(_peak(s.waveform) / REFERENCE_PRESSURE) for s in emissions]
+    level = [o if s.source_level is None else s.source_level for s, o in zip(emissions, own, strict=True)]
+    return np.array([v + 20.0 * np.log10(s.gain) for s, v in zip(emissions, level, strict=True)])
 
 
-def snap_gains(heard: tuple[Emission, ...]) -> Floats:
+def snap_gains(emissions: tuple[Emission, ...]) -> Floats:
     """(snap,) factor on the pulse of each snap's waveform."""
     return np.array(
-        [s.gain * pulses.gain_for_level(_made(s.model, s.waveform.stamp, 0.0), s.source_level) for s in heard]
+        [s.gain * pulses.gain_for_level(_made(s.model, s.waveform.stamp, 0.0), s.source_level) for s in emissions]
     )
 
 

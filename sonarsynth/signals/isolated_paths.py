@@ -94,9 +94,9 @@ def measured_levels(
         gain[s] ** 2 * (np.abs(_sent(snaps[s].waveform, sonar, slot, float(d))) ** 2 @ inside)
         for s, d in zip(paths.snap, paths.doppler, strict=True)
     ])  # fmt: skip
-    heard = np.abs(spectrum) ** 2 @ inside
+    received = np.abs(spectrum) ** 2 @ inside
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(10.0 * np.log10(heard / sent) + 20.0 * np.log10(2.0) * exponent)
+        return np.asarray(10.0 * np.log10(received / sent) + 20.0 * np.log10(2.0) * exponent)
 
 
 def _sent(waveform: Waveform, sonar: Sonar, samples: int, doppler: float) -> np.ndarray:

@@ -75,28 +75,28 @@ def reduction(weight: Floats, spectrum: ComplexArray, loudness: Floats, toleranc
     some = spectrum[:, :: max(1, spectrum.shape[1] // 128)]
     u, s, _ = np.linalg.svd(np.concatenate([some.real, some.imag], axis=1), full_matrices=False)
     loud = np.multiply(weight.T, loudness, order="C")
-    heard = np.linalg.qr(loud.T, mode="r")
-    left, size, v = np.linalg.svd(heard @ (u * s), full_matrices=False)
+    weighted = np.linalg.qr(loud.T, mode="r")
+    left, size, v = np.linalg.svd(weighted @ (u * s), full_matrices=False)
     onto = (u * s) @ v.T
     keep = _sizes(np.abs(onto.T @ loud)) > tolerance
     onto, size = onto[:, keep], size[keep]
-    back = left[:, keep].T @ heard / size[:, None]
+    back = left[:, keep].T @ weighted / size[:, None]
     scale = size[0] / np.linalg.norm(loudness)  # makes the weights of the first about 1
     return Reduction(onto / scale, back * scale)
 
 
-def _sizes(heard: Floats) -> Floats:
+def _sizes(weighted: Floats) -> Floats:
     """Sizes (mode,) over the first, of moduli (mode, path): of root mean squares, and of the largest."""
-    mean, most = np.sqrt(np.einsum("mp,mp->m", heard, heard)), heard.max(axis=1)
+    mean, most = np.sqrt(np.einsum("mp,mp->m", weighted, weighted)), weighted.max(axis=1)
     return np.asarray(np.maximum(mean / mean[0], most / most[0]))
 
 
 def main_modes(weight: Floats, loudness: Floats) -> tuple[Floats, tuple[float, ...]]:
     """Turn (mode, mode) of orthogonal modes with weights (path, mode) that puts the largest first, and their sizes over
     that of the first, rounded up by at most a fifth, so that choices are kept from frame to frame."""
-    heard = np.multiply(weight.T, loudness, order="C")
-    turn = np.linalg.eigh(heard @ heard.T)[1][:, ::-1]  # a turn whatever rounds: sizes are those of what it gives
-    sizes = _sizes(np.abs(turn.T @ heard))
+    weighted = np.multiply(weight.T, loudness, order="C")
+    turn = np.linalg.eigh(weighted @ weighted.T)[1][:, ::-1]  # a turn whatever rounds: sizes are those of what it gives
+    sizes = _sizes(np.abs(turn.T @ weighted))
     return turn, (1.0, *(min(rounded_up(s, 1.2), 1.0) for s in sizes[1:].tolist()))
 
 

@@ -149,7 +149,7 @@ def changes(front: ArrayPaths, frequency: Floats, spectrum: ComplexArray) -> Pul
     return PulseVariation(tuple(kinds), np.array(found), rate)
 
 
-class Rest(NamedTuple):
+class ResidualVariation(NamedTuple):
     """What pulses of a tile change by beside the reference, which the whole field of the tile changes with."""
 
     phase_terms: Floats  # (term,) rad of the reference; none where it does not change
@@ -160,7 +160,7 @@ class Rest(NamedTuple):
     paths: Ints  # (path,) those
 
 
-def rest(front: ArrayPaths, paths: Ints, found: PulseVariation, tolerance: float) -> Rest:
+def rest(front: ArrayPaths, paths: Ints, found: PulseVariation, tolerance: float) -> ResidualVariation:
     """Of the tile of these paths; changes that add less than `tolerance` are left out, to all together or to the
     loudest."""
     none = np.zeros(0)
@@ -168,14 +168,14 @@ def rest(front: ArrayPaths, paths: Ints, found: PulseVariation, tolerance: float
     loud, weight = np.abs(front.amplitude[some]), front.modes[some]
     bent = front.bends.shape[1] > 0 and _counts(_bent(front, some), loud * np.linalg.norm(weight, axis=1), tolerance)
     if not found.kinds:
-        return Rest(none, none, np.zeros(0, int), np.zeros((0, some.size)), bent, some)
+        return ResidualVariation(none, none, np.zeros(0, int), np.zeros((0, some.size)), bent, some)
     turn, turned = _middle(front.phase_terms, some)
     spread, softer = _middle(front.delay_variance_terms, some)
     share = np.array([np.minimum(turned, 1.0) ** a * (softer * found.rate) ** p for p, a in found.kinds])
     size = np.sqrt((np.tensordot(weight, found.onto, (1, 1)) ** 2).sum(axis=2)).T * share * loud
     mean = np.sqrt((size**2).sum(axis=1) / (loud**2).sum())
     which = np.flatnonzero(np.maximum(mean, size.max(axis=1) / loud.max()) > tolerance)
-    return Rest(turn, spread, which, share[which], bent, some)
+    return ResidualVariation(turn, spread, which, share[which], bent, some)
 
 
 def _bent(front: ArrayPaths, some: Ints) -> Floats:
@@ -190,7 +190,7 @@ def _counts(size: Floats, loud: Floats, tolerance: float) -> bool:
     return bool(max(mean, size.max(initial=0.0) / max(float(loud.max(initial=0.0)), 1e-300)) > tolerance)
 
 
-def pulses(front: ArrayPaths, paths: Ints, over: Rest, found: PulseVariation) -> tuple[Floats, Floats]:
+def pulses(front: ArrayPaths, paths: Ints, over: ResidualVariation, found: PulseVariation) -> tuple[Floats, Floats]:
     """Weights (pulse, mode) of the pulses of paths, with what some of them change by, and how loud (pulse,) each is."""
     weight, loud = [front.modes[paths]], [np.abs(front.amplitude[paths])]
     for change, size in zip(over.which, over.size, strict=True):

@@ -13,7 +13,7 @@ from sonarsynth.equations.scattering.facet_pulses import rough_factor
 from sonarsynth.products import Arrivals, Kind
 from sonarsynth.receiver import Elements, Sonar, stop_frequency
 from sonarsynth.signals.array_paths import ArrayPaths, delay_and_gain, reach
-from sonarsynth.signals.filtered_pulse import PULSE_FEET, Reshaped, at_longest, silencing_blur, support_of
+from sonarsynth.signals.filtered_pulse import PULSE_FEET, PulseChanges, at_longest, silencing_blur, support_of
 from sonarsynth.signals.pulse_variation import widest_spread
 from sonarsynth.sources.snap_pulses import Waveform
 from sonarsynth.state import Emission
@@ -39,7 +39,7 @@ class Layout:
     """What of the arrivals is heard in the window."""
 
     stretches: tuple[Segment, ...]
-    heard: Bools  # (path,) some of the pulse is in the window at some hydrophone
+    audible: Bools  # (path,) some of the pulse is in the window at some hydrophone
     outside: int  # paths but reverberation whose pulse is not wholly in the window at every hydrophone
     support: Floats  # (before or after, path) s: how far a pulse reaches from its arrival
 
@@ -70,18 +70,18 @@ def layout(
     before, after = support
     early, late = _extent(front, elements, before, after, start, start + (samples - 1) / fs)
     cut = ~silent & ((early < start) | (late > start + (samples - 1) / fs))
-    heard = ~silent & (late > start) & (early < start + (samples - 1) / fs)
+    audible = ~silent & (late > start) & (early < start + (samples - 1) / fs)
     stretches: list[Segment] = []
     waveforms = [s.waveform for s in snaps]
     for waveform in dict.fromkeys(waveforms):
-        same = np.array([w == waveform for w in waveforms])[arrivals.snap] & heard
+        same = np.array([w == waveform for w in waveforms])[arrivals.snap] & audible
         for coherent, direct in ((False, True), (False, False), (True, True), (True, False)):
             rows = np.flatnonzero(same & (front.coherent == coherent) & (arrivals.direct == direct))
             for chosen in _runs(rows, early + before - plain[0], late - after + plain[1]):
                 first = int(np.floor((early[chosen].min() - start) * fs)) - 1
                 last = int(np.ceil((late[chosen].max() - start) * fs)) + 1
                 stretches.append(Segment(chosen, waveform, coherent, first, fast_length(last - first + 1)))
-    return Layout(tuple(stretches), heard, int((cut & (arrivals.kind != Kind.REVERBERATION)).sum()), support)
+    return Layout(tuple(stretches), audible, int((cut & (arrivals.kind != Kind.REVERBERATION)).sum()), support)
 
 
 def _supports(
@@ -103,7 +103,7 @@ def _supports(
         for kind in range(8):
             rows = kinds == kind
             if rows.any():
-                shape = Reshaped(turned=kind & 2 > 0, sloped=kind % 2 == 1, rough=roughest * (kind >= 4))
+                shape = PulseChanges(turned=kind & 2 > 0, sloped=kind % 2 == 1, rough=roughest * (kind >= 4))
                 out[:, rows] = np.array([support_of(w, chosen, shape) for w in longest])[arrivals.snap[rows]].T
         return out
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from sonarsynth.store.checking.examining import Findings, Problem, examine, must_be_store, ranges
 from sonarsynth.store.checking.verifying import Report, verify
 from sonarsynth.store.creating import create, identity, root_attributes
-from sonarsynth.store.files.lock import Ended, Locked, lock, shared_lock
+from sonarsynth.store.files.lock import BuildEnded, StoreLocked, lock, shared_lock
 from sonarsynth.store.files.place import Folder, absolute, beside, folder_of, here, named_after, try_writing
 from sonarsynth.store.files.remote import Remote, Unreachable
 from sonarsynth.store.files.within import Mismatch
@@ -18,17 +18,17 @@ from sonarsynth.store.opening import built_frames, chosen_frames, open_store, sp
 from sonarsynth.store.writing import frames_there, missing, write_shard
 
 __all__ = [
+    "BuildEnded",
     "Damage",
-    "Ended",
     "Findings",
     "Folder",
     "Layout",
-    "Locked",
     "Mark",
     "Mismatch",
     "Problem",
     "Remote",
     "Report",
+    "StoreLocked",
     "Unreachable",
     "absolute",
     "beside",

@@ -19,7 +19,7 @@ from sonarsynth.store.encoding import encoded
 from sonarsynth.store.files import within
 from sonarsynth.store.files.place import FileRecord, Folder, Opened, absolute, folder_of, held, remove, write_new
 from sonarsynth.store.files.remote import Remote
-from sonarsynth.store.files.within import Held
+from sonarsynth.store.files.within import OpenedFolder
 from sonarsynth.store.layout import ArrayLayout, Layout, layout_of
 from sonarsynth.store.marks import ABSENT, Damage, Mark, add_to_digest, drop_mark, load_marks, marked, save_mark
 from sonarsynth.store.provenance import other_versions
@@ -82,7 +82,7 @@ def _write(store: Opened, plan: Plan, shard: int, frames: Mapping[int, Values], 
             packed = _content(layout, array, region.start, block)  # here: threads keep the memory that they allocate
             under_way.append((array.file(shard), writers.submit(_put, store, array.file(shard), packed)))
         files |= {name: rest.result() for name, rest in under_way}
-    if isinstance(store, Held) and not store.in_its_place():
+    if isinstance(store, OpenedFolder) and not store.in_its_place():
         raise Damage(f"{store}: {GONE}")
     still()
     mark = Mark(str(shard), tuple(checked), content.hexdigest(), files, {"versions": versions} if versions else {})

@@ -14,7 +14,7 @@ from sonarsynth.geometry.motion import Track
 from sonarsynth.products import Arrivals, Kind
 from sonarsynth.scattering.facet_geometry import PulseResponse
 from sonarsynth.state import Emission, FrameContext
-from sonarsynth.tracing.doppler import Meeting, MetPaths, apply_doppler, received
+from sonarsynth.tracing.doppler import Meeting, MotionTerms, apply_doppler, received
 from sonarsynth.tracing.echoes import echoes
 from sonarsynth.tracing.expansion.amplitude_polynomials import fitted
 from sonarsynth.tracing.expansion.array_expansion import array_expansion
@@ -59,10 +59,10 @@ def trace(context: FrameContext, propagation: Propagation) -> Arrivals:
 def _hearing(array: FacetPaths, snap: Emission, sonar: Track) -> FacetPaths:
     """The array where it hears a snap itself."""
     speed = float(array.context.medium.profile.at(depth(sonar.pose.position)))
-    heard = float(hearing_times(snap.position, np.asarray(snap.time), sonar, speed))
-    there = sonar.later(heard)
+    arrival_time = float(hearing_times(snap.position, np.asarray(snap.time), sonar, speed))
+    there = sonar.later(arrival_time)
     context = replace(array.context, receiver=replace(array.context.receiver, pose=there.pose))
-    return replace(array, context=context, meeting=Meeting(np.zeros(0), heard, there))
+    return replace(array, context=context, meeting=Meeting(np.zeros(0), arrival_time, there))
 
 
 def arrivals(array: FacetPaths) -> Arrivals:
@@ -99,7 +99,7 @@ def _direct(array: FacetPaths, index: int) -> Arrivals:
     over = array_expansion(legs, np.zeros(count, int), array.bending, receiver, array.propagation, degree)
     one, none, none_out = np.ones(count), np.full(count, NO_TARGET), TransmitPaths.none(count)
     rows, (loud, turned) = np.arange(count), directed(snap, legs.departure)
-    gain, met = over.gain(rows), MetPaths.direct(count, snap)
+    gain, met = over.gain(rows), MotionTerms.direct(count, snap)
     if snap.directivity is not None:  # seen from the source, hydrophones are in other directions than the centre
         gain = gain * (snap.directivity(over.departure(rows)) / snap.directivity(legs.departure)[:, None])
     variation = fitted(array, gain, legs.spreading)

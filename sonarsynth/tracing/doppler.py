@@ -50,12 +50,12 @@ class Meeting:
     """When what was traced is where it was traced."""
 
     met: Floats  # (body,) s of the frame: each body is where it is then
-    heard: float  # s: the array is
-    sonar: Track  # of the array, at `heard`
+    arrival_time: float  # s: the array is
+    sonar: Track  # of the array, at `arrival_time`
 
 
 @dataclass(frozen=True, eq=False)
-class MetPaths:
+class MotionTerms:
     """How paths (path,) differ from those that were traced, by the remainder of the motion."""
 
     met: Floats  # s: of the poses of bodies
@@ -64,15 +64,15 @@ class MetPaths:
     spin: Floats  # (path, xyz) rad/s of its body
     apart: Floats  # (path, xyz) m: by what the array, or its image, is farther from the facet
 
-    def select(self, rows: Bools | Ints) -> MetPaths:
+    def select(self, rows: Bools | Ints) -> MotionTerms:
         """The paths picked by a mask or by indices."""
-        return MetPaths(**{name: value[rows] for name, value in vars(self).items()})
+        return MotionTerms(**{name: value[rows] for name, value in vars(self).items()})
 
     @staticmethod
-    def direct(count: int, snap: Emission) -> MetPaths:
+    def direct(count: int, snap: Emission) -> MotionTerms:
         """Paths from a snap itself, which is where it is when it sounds."""
         zero, none = np.zeros(count), np.zeros((count, 3))
-        return MetPaths(zero + snap.time, zero, none + snap.velocity, none, none)
+        return MotionTerms(zero + snap.time, zero, none + snap.velocity, none, none)
 
     def departure(self, length: Floats, away: Floats) -> Floats:
         """Directions (path, ..., xyz) to the array or probes of it, of rays of some length (path,) m that left in
@@ -142,37 +142,37 @@ def mirrored(velocity: Floats, bounces: Ints) -> Floats:
 
 def met_paths(
     legs: ReceivePaths, leg: Ints, met: Floats, late: Floats, velocity: Floats, spin: Floats, meeting: Meeting
-) -> MetPaths:
+) -> MotionTerms:
     """The remainder of paths (path,) that go on by a leg each; `late` s after `met` their facets are met."""
     apart = -velocity * late[:, None]
     if not meeting.sonar.still:
-        heard = met + late + legs.travel_time[leg] - meeting.heard
-        apart += mirrored(meeting.sonar.velocity * heard[:, None], legs.bounces[leg])
-    return MetPaths(met, late, velocity, spin, apart)
+        arrival_time = met + late + legs.travel_time[leg] - meeting.arrival_time
+        apart += mirrored(meeting.sonar.velocity * arrival_time[:, None], legs.bounces[leg])
+    return MotionTerms(met, late, velocity, spin, apart)
 
 
-def received(legs: ReceivePaths, of: MetPaths, meeting: Meeting, profile: Profile) -> ReceivePaths:
+def received(legs: ReceivePaths, of: MotionTerms, meeting: Meeting, profile: Profile) -> ReceivePaths:
     """Legs from facets that move to an array that does: from where they are met to where they are heard."""
     pose, u = meeting.sonar.pose, meeting.sonar.velocity
     c_facet, c_array = profile.at(depth(legs.point)), float(profile.at(depth(pose.position)))
     moved, of_array = of.velocity * of.late[:, None], dot(legs.arrival, u) / c_array
     begun = of.met + of.late
-    gone = begun - meeting.heard + legs.travel_time - dot(moved, legs.departure) / c_facet
+    gone = begun - meeting.arrival_time + legs.travel_time - dot(moved, legs.departure) / c_facet
     image = mirrored(moved, legs.bounces)
-    heard = gone
+    arrival_time = gone
     for _ in range(ROUNDS):
-        heard = (gone + path_elongation(legs.length, legs.arrival, u * heard[:, None] - image) / c_array) / (
-            1.0 - of_array
-        )
-    seen = legs.radius[:, None] * legs.direction + pose.turn_to_body(image - u * heard[:, None])
+        arrival_time = (
+            gone + path_elongation(legs.length, legs.arrival, u * arrival_time[:, None] - image) / c_array
+        ) / (1.0 - of_array)
+    seen = legs.radius[:, None] * legs.direction + pose.turn_to_body(image - u * arrival_time[:, None])
     radius = np.sqrt(dot(seen, seen))
     arrival = -pose.turn_to_world(seen) / radius[:, None]
     if meeting.sonar.spin.any():
-        seen = seen - np.cross(pose.turn_to_body(meeting.sonar.spin), seen) * heard[:, None]
+        seen = seen - np.cross(pose.turn_to_body(meeting.sonar.spin), seen) * arrival_time[:, None]
     return replace(
         legs, point=legs.point + moved, departure=of.departure(legs.length, legs.departure), arrival=arrival,
         direction=seen / np.sqrt(dot(seen, seen))[:, None], radius=radius, length=legs.length + (radius - legs.radius),
-        spreading=legs.spreading * (legs.radius / radius), travel_time=meeting.heard - begun + heard,
+        spreading=legs.spreading * (legs.radius / radius), travel_time=meeting.arrival_time - begun + arrival_time,
     )  # fmt: skip
 
 
@@ -246,7 +246,7 @@ def apply_doppler(
     made: Arrivals,
     legs: ReceivePaths,
     out: TransmitPaths,
-    of: MetPaths,
+    of: MotionTerms,
     meeting: Meeting,
     profile: Profile,
     *,

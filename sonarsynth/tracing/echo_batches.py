@@ -12,7 +12,7 @@ from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.scattering import Component, Scatterers
 from sonarsynth.scattering.components import CoherentKirchhoff, DiffuseKirchhoff, Lobe, Shadow
 from sonarsynth.scattering.facet_geometry import FacetGeometry, PulseResponse
-from sonarsynth.tracing.doppler import MetPaths
+from sonarsynth.tracing.doppler import MotionTerms
 from sonarsynth.tracing.transmit_paths import TransmitPaths
 
 if TYPE_CHECKING:
@@ -135,7 +135,11 @@ class EchoBatch:
 
 
 def echo_batches(
-    array: FacetPaths, out: TransmitPaths, leg: Ints, parts: tuple[tuple[Component, ...], ...], carried: MetPaths | None
+    array: FacetPaths,
+    out: TransmitPaths,
+    leg: Ints,
+    parts: tuple[tuple[Component, ...], ...],
+    carried: MotionTerms | None,
 ) -> list[EchoBatch]:
     """Echoes of pairs of a way and a leg (pair,), by owner and part; those that are nothing are left out; carried: by
     how much pairs differ from those that were traced, where anything moves."""

@@ -16,7 +16,7 @@ from sonarsynth.propagation.reflections import reflections
 from sonarsynth.scattering import Component
 from sonarsynth.scattering.facet_geometry import PulseResponse
 from sonarsynth.state import Emission
-from sonarsynth.tracing.doppler import MetPaths, apply_doppler, meets, met_paths, received, velocities
+from sonarsynth.tracing.doppler import MotionTerms, apply_doppler, meets, met_paths, received, velocities
 from sonarsynth.tracing.echo_batches import EchoBatch, echo_batches, in_band
 from sonarsynth.tracing.expansion.amplitude_polynomials import variations
 from sonarsynth.tracing.expansion.scattering_points import delay_to_scattering_points, shift_to_scattering_points
@@ -50,7 +50,7 @@ class _EchoBlock:
     gain: Floats  # (echo, FEW) of the legs there
     terms: ExpansionTerms  # (echo,) of the wavefronts
     pulses: PulseResponse  # (echo,)
-    carried: MetPaths | None  # (pair,); None: nothing moves
+    carried: MotionTerms | None  # (pair,); None: nothing moves
 
     def select(self, loud: Bools) -> _EchoBlock:
         """The echoes picked by a mask, each with a pair of its own."""
@@ -188,7 +188,7 @@ def _found(array: FacetPaths, snap: Emission, parts: tuple[tuple[Component, ...]
     return _EchoBlock(array, groups, out, leg, factor, few, gain, over, pulses, carried)
 
 
-def _carried(array: FacetPaths, snap: Emission, out: TransmitPaths, leg: Ints) -> tuple[TransmitPaths, MetPaths]:
+def _carried(array: FacetPaths, snap: Emission, out: TransmitPaths, leg: Ints) -> tuple[TransmitPaths, MotionTerms]:
     """Ways (pair,) when and where the sound meets what moves, and the remainder of the motion."""
     meeting, facets = array.meeting, array.facets
     assert meeting is not None
@@ -199,7 +199,7 @@ def _carried(array: FacetPaths, snap: Emission, out: TransmitPaths, leg: Ints) -
     return there, met_paths(array.legs, leg, met, late, velocity, spin, meeting)
 
 
-def _departure(array: FacetPaths, leg: Ints, carried: MetPaths | None, few: int | None) -> Floats:
+def _departure(array: FacetPaths, leg: Ints, carried: MotionTerms | None, few: int | None) -> Floats:
     """Where each probe, or the first few, is seen from facets (row, probe, xyz): world, in axes that turn with what
     turns."""
     away = array.fronts.departure(leg, few)
@@ -208,7 +208,7 @@ def _departure(array: FacetPaths, leg: Ints, carried: MetPaths | None, few: int 
     return carried.turned_back(carried.departure(array.legs.length[leg], away))
 
 
-def _away(array: FacetPaths, legs: ReceivePaths, leg: Ints, carried: MetPaths | None) -> Floats:
+def _away(array: FacetPaths, legs: ReceivePaths, leg: Ints, carried: MotionTerms | None) -> Floats:
     """Where the first few probes are seen from facets (row, probe, xyz): world."""
     away = array.fronts.departure(leg, QUADRATIC_PROBES)
     return away if carried is None else carried.departure(legs.length, away)

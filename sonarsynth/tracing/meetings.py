@@ -18,7 +18,7 @@ from sonarsynth.tracing.doppler import Meeting
 
 
 @dataclass(frozen=True, eq=False)
-class Occasion:
+class TracingGroup:
     """What is traced together: some snaps, and what scatters whose echoes of them are heard at about one place."""
 
     snaps: tuple[int, ...]
@@ -28,35 +28,35 @@ class Occasion:
 
 
 @dataclass(frozen=True, eq=False)
-class _Times:
+class _MeetingTimes:
     """When the sound of each snap meets the middle of what scatters, and when the array hears that."""
 
     bodies: tuple[PlacedTarget, ...]
     sonar: Track
     met: Floats  # (snap, owner) s
-    heard: Floats  # (snap, owner) s
+    arrival_time: Floats  # (snap, owner) s
     shared: float
     wavenumber: float  # rad/m at the highest frequency
     aperture: float  # m
 
     def classes(self, snap: int) -> list[tuple[int, ...]]:
         """Owners, ascending, whose echoes of a snap the array hears at about one place."""
-        left, found = np.argsort(self.heard[snap], kind="stable").tolist(), []
+        left, found = np.argsort(self.arrival_time[snap], kind="stable").tolist(), []
         while left:
-            first = float(self.heard[snap, left[0]])
+            first = float(self.arrival_time[snap, left[0]])
             there = self.sonar.later(first)
-            near = [n for n in left if self._array_near(there, float(self.heard[snap, n]) - first)]
+            near = [n for n in left if self._array_near(there, float(self.arrival_time[snap, n]) - first)]
             found.append(tuple(sorted(near)))
             left = [n for n in left if n not in near]
         return found or [()]
 
-    def serves(self, occasion: Occasion, snap: int) -> bool:
+    def serves(self, occasion: TracingGroup, snap: int) -> bool:
         """Whether what is traced on an occasion serves another snap as well."""
         met = (self.met[snap] - occasion.meeting.met)[: len(occasion.bodies)]  # the others are at rest
         for body, late in zip(occasion.bodies, met.tolist(), strict=True):
             if not self._near(body.track, late, body.mesh.radius, body.mesh.radius):
                 return False
-        late = self.heard[snap, list(occasion.owners)] - occasion.meeting.heard
+        late = self.arrival_time[snap, list(occasion.owners)] - occasion.meeting.arrival_time
         return all(self._array_near(occasion.meeting.sonar, seconds) for seconds in late.tolist())
 
     def _array_near(self, sonar: Track, seconds: float) -> bool:
@@ -76,17 +76,19 @@ class _Times:
         return bool((off + size * np.linalg.norm(then.rotation.T - turned)) * self.wavenumber <= self.shared)
 
 
-def occasions(context: FrameContext, sonar: Track) -> list[Occasion]:
+def occasions(context: FrameContext, sonar: Track) -> list[TracingGroup]:
     """Poses to trace the echoes of each snap from each body between, by the times of straight lines; sonar: of the
     array."""
     bodies, snaps, receiver = context.bodies, context.snaps, context.receiver
     speed = float(context.medium.profile.at(depth(sonar.pose.position)))
     tracks = [surface.track.part(surface.middle) for surface in context.scattering]
     met = meeting_times(tracks, snaps, lambda start, end: np.linalg.norm(end - start, axis=1) / speed)
-    heard = hearing_times(positions(tracks, met), met, sonar, speed)
+    arrival_time = hearing_times(positions(tracks, met), met, sonar, speed)
     wavenumber = 2.0 * np.pi * receiver.band[1] / speed
-    times = _Times(bodies, sonar, met, heard, context.tolerances.shared, wavenumber, receiver.elements.aperture)
-    found: list[Occasion] = []
+    times = _MeetingTimes(
+        bodies, sonar, met, arrival_time, context.tolerances.shared, wavenumber, receiver.elements.aperture
+    )
+    found: list[TracingGroup] = []
     for snap in range(len(snaps)):
         for owners in times.classes(snap):
             for number, other in enumerate(found):
@@ -95,14 +97,14 @@ def occasions(context: FrameContext, sonar: Track) -> list[Occasion]:
                     break
             else:
                 there = tuple(body.later(late) for body, late in zip(bodies, met[snap].tolist(), strict=False))
-                late = float(heard[snap, list(owners)].mean()) if owners else 0.0
-                found.append(Occasion((snap,), owners, there, Meeting(met[snap], late, sonar.later(late))))
+                late = float(arrival_time[snap, list(owners)].mean()) if owners else 0.0
+                found.append(TracingGroup((snap,), owners, there, Meeting(met[snap], late, sonar.later(late))))
     return found
 
 
 def hearing_times(place: Floats, sent: Floats, sonar: Track, speed: float) -> Floats:
     """When an array on a track hears what was sent from places (..., xyz) m at times (...) s, by straight lines."""
-    heard = sent
+    arrival_time = sent
     for _ in range(1 if sonar.still else 6):
-        heard = sent + np.linalg.norm(sonar.positions(heard) - place, axis=-1) / speed
-    return np.asarray(heard)
+        arrival_time = sent + np.linalg.norm(sonar.positions(arrival_time) - place, axis=-1) / speed
+    return np.asarray(arrival_time)

@@ -70,7 +70,7 @@ def fan(
     zero = np.zeros(len(start))
     rays = launch(layers, np.arange(len(start)), start, heading, zero, zero, zero + duration)
     points = [_points(rays, LAUNCH)]
-    landed: list[_Landed] = []
+    landed: list[_FirstHits] = []
     points += _follow(layers, bodies, rays, bounces, spacing, sagitta, None if towards is None else landed)
     coefficient = np.full(len(start), np.nan)
     if towards is not None:
@@ -95,7 +95,7 @@ def fan(
 
 
 @dataclass(frozen=True, eq=False)
-class _Landed:
+class _FirstHits:
     """Rays where they met their first facet."""
 
     rays: Rays  # reflected
@@ -119,7 +119,7 @@ def _follow(
     bounces: int,
     spacing: float,
     sagitta: float,
-    landed: list[_Landed] | None,
+    landed: list[_FirstHits] | None,
     last: int = END,
 ) -> list[list[np.ndarray]]:
     """Points of rays until they end, which is called `last`; with landed given, they land on their first facet."""
@@ -131,7 +131,7 @@ def _follow(
         points.append(_points(rays, why if last == END else np.where(over, last, why), target, facet))
         met = why == FACET
         if landed is not None and met.any():
-            landed.append(_Landed(rays.select(met), arrived.direction[met], target[met], facet[met]))
+            landed.append(_FirstHits(rays.select(met), arrived.direction[met], target[met], facet[met]))
             over = over | met
         rays = rays.select(~over)
     return points
@@ -141,7 +141,7 @@ def _send_on(
     medium: Medium,
     layers: Water,
     bodies: tuple[PlacedTarget, ...],
-    landed: _Landed,
+    landed: _FirstHits,
     towards: Floats,
     *,
     laws: tuple[FacetLaw, ...],

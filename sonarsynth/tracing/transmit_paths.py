@@ -172,9 +172,9 @@ def join(parts: list[Arrivals], sound_speed: float, centre: float) -> Arrivals:
     """
     parts.sort(key=lambda part: [*part.snap[:1], *part.kind[:1]])
     order = np.lexsort([np.concatenate([getattr(part, name) for part in parts]) for name in ("target", "kind", "snap")])
-    heard = order[np.concatenate([part.amplitude for part in parts])[order] != 0.0]
-    every = len(heard) == len(order) and bool((np.diff(heard) == 1).all())
-    return replace(_stacked(parts, None if every else heard), sound_speed=sound_speed, centre=centre)
+    audible = order[np.concatenate([part.amplitude for part in parts])[order] != 0.0]
+    every = len(audible) == len(order) and bool((np.diff(audible) == 1).all())
+    return replace(_stacked(parts, None if every else audible), sound_speed=sound_speed, centre=centre)
 
 
 def ordered(parts: list[Arrivals], group: list[Ints]) -> Arrivals:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from sonarsynth.pictures.accuracy_figures.accuracy_figure import Line, Mark, error_and_time_figure
-from sonarsynth.pictures.accuracy_figures.bodies_figure import Trade, bodies_figure
+from sonarsynth.pictures.accuracy_figures.bodies_figure import RefinementCurve, bodies_figure
 from sonarsynth.validation.bodies.level_curves import cylinder_panels, plate_panels, sphere_panels
 from sonarsynth.validation.bubbles.bubbles_solvers import solver_picture
 from sonarsynth.validation.validation_rows import Row
@@ -16,7 +16,7 @@ from sonarsynth.validation.validation_rows import Row
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from sonarsynth.pictures.accuracy_figures.bodies_figure import Trade
+    from sonarsynth.pictures.accuracy_figures.bodies_figure import RefinementCurve
 
 RELATIVE: Final = "relative error at 110 kHz, rms over ways"
 
@@ -51,12 +51,12 @@ def _knobs(rows: Sequence[Row]) -> dict[str, list[Row]]:
     return {name: [row for row in rows if row.knob == name] for name in names}
 
 
-def _trades(rows: Sequence[Row], quantity: str) -> list[Trade]:
+def _trades(rows: Sequence[Row], quantity: str) -> list[RefinementCurve]:
     """Those of one quantity."""
     made = []
     for name, of in _knobs([row for row in rows if row.quantity == quantity]).items():
         columns = [r.counts["facets"] for r in of], [r.cost for r in of], [r.got for r in of], [r.expected for r in of]
-        made.append(Trade(name, *columns))
+        made.append(RefinementCurve(name, *columns))
     return made
 
 

@@ -26,7 +26,7 @@ SURFACE = [
     "Absorption",
     "Accuracy",
     "Annulus",
-    "AnyWay",
+    "AnyOrientation",
     "AtRest",
     "AutoPlacing",
     "AutoSynthesis",

@@ -13,7 +13,7 @@ from sonarsynth.cli import app
 from sonarsynth.cli.running import run
 from sonarsynth.validation import extremes
 from sonarsynth.validation.extremes import Case, groups, outcome
-from sonarsynth.validation.extremes.outcomes import Got, holds, off, refused, relative, together
+from sonarsynth.validation.extremes.outcomes import CaseResult, holds, off, refused, relative, together
 
 QUICK = [(group, case) for group, cases in groups().items() for case in cases if not case.slow]
 
@@ -66,7 +66,7 @@ def test_a_warning_and_an_error_are_failures(check: object) -> None:
 def test_the_command_prints_rows_and_tells_by_its_status(
     ok: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    cases = Case("one", "1", lambda: Got("1", True)), Case("two", "2", lambda: Got("2", ok))
+    cases = Case("one", "1", lambda: CaseResult("1", True)), Case("two", "2", lambda: CaseResult("2", ok))
     monkeypatch.setattr(extremes, "groups", lambda: {"few": cases})
     assert run(app, ["accuracy", "--extremes", "--json", "--out", str(tmp_path)]) == (0 if ok else 1)
     rows = json.loads(capsys.readouterr().out)

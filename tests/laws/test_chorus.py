@@ -26,7 +26,7 @@ from sonarsynth.receiver import Band, PlanarLattice, Sonar, elements
 from sonarsynth.signals.chorus.chorus_arrivals import ChorusArrivals, no_chorus
 from sonarsynth.signals.chorus.chorus_synthesis import chorus_pressure
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
-from sonarsynth.sources.chorus import Chorus, Clusters, Listening, draw_snaps
+from sonarsynth.sources.chorus import Chorus, Clusters, ListeningWindow, draw_snaps
 from sonarsynth.sources.snap_pulses import waveform
 
 SPEED = 1540.0
@@ -107,9 +107,11 @@ def test_pressure_is_the_sum_of_the_snaps() -> None:
     assert np.sqrt(np.mean((both - exact) ** 2) / np.mean(exact**2)) < 5e-3
 
 
-def heard_by(density: float, start: float, stop: float, seed: int = 5, **more: object) -> tuple[Chorus, Listening]:
+def heard_by(
+    density: float, start: float, stop: float, seed: int = 5, **more: object
+) -> tuple[Chorus, ListeningWindow]:
     """A chorus, and who hears all of it that sounds on a disc of 50 m, at once."""
-    return Chorus(density=density, **more), Listening(np.zeros(2), start, stop, 50.0, 0.0, 1e9, 1e9)
+    return Chorus(density=density, **more), ListeningWindow(np.zeros(2), start, stop, 50.0, 0.0, 1e9, 1e9)
 
 
 def counts(windows: int, length: float, **more: object) -> np.ndarray:
@@ -119,7 +121,7 @@ def counts(windows: int, length: float, **more: object) -> np.ndarray:
     ])  # fmt: skip
 
 
-def _draw(who: tuple[Chorus, Listening]) -> tuple[Chorus, int, Listening]:
+def _draw(who: tuple[Chorus, ListeningWindow]) -> tuple[Chorus, int, ListeningWindow]:
     return who[0], number(1, "chorus", 0), who[1]
 
 
@@ -156,7 +158,7 @@ def test_clusters_have_their_fano_factor() -> None:
 def test_windows_that_overlap_hear_the_same_snaps(clusters: Clusters | None) -> None:
     chorus, seed = Chorus(density=3e-2, clusters=clusters), number(2, "chorus", 0)
     one, other, whole = (
-        draw_snaps(chorus, seed, Listening(np.array(place), *span, 80.0, 40.0, 1500.0, 1550.0))
+        draw_snaps(chorus, seed, ListeningWindow(np.array(place), *span, 80.0, 40.0, 1500.0, 1550.0))
         for place, span in (((0.0, 0.0), (1.0, 1.1)), ((30.0, -20.0), (1.05, 1.2)), ((0.0, 0.0), (0.5, 2.0)))
     )
     for part, against in ((one, whole), (one, other)):

@@ -13,7 +13,7 @@ from sonarsynth.conventions import azimuth_elevation, direction
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.motion import ConstantVelocity, Still
 from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.labels import Band, Listening, label_points
+from sonarsynth.labels import Band, SonarTiming, label_points
 from sonarsynth.labels.attribution_of_points import attribution
 from sonarsynth.labels.point_labels import surface_distances
 from sonarsynth.pipeline import trace_frame
@@ -44,7 +44,7 @@ class Made(NamedTuple):
     frame: Frame
     arrivals: Arrivals
     band: Band
-    listening: Listening
+    listening: SonarTiming
 
 
 def made(recipe: Recipe, focus: float | None = 20.0, snap: int = 0) -> Made:
@@ -53,7 +53,7 @@ def made(recipe: Recipe, focus: float | None = 20.0, snap: int = 0) -> Made:
     arrivals, sonar = traced.arrivals, resolved.scene.sonar
     clock = arrivals.delay[arrivals.direct & (arrivals.snap == snap)].min()
     pose, velocity = traced.frame.sonar_pose, traced.frame.sonar_velocity
-    listening = Listening(resolved.elements, sonar.assumed_sound_speed, focus, float(clock), pose, velocity)
+    listening = SonarTiming(resolved.elements, sonar.assumed_sound_speed, focus, float(clock), pose, velocity)
     return Made(resolved, traced.frame, arrivals, band_of(resolved, traced.frame.moment.snaps), listening)
 
 

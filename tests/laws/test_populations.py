@@ -20,7 +20,7 @@ from sonarsynth.pipeline import render
 from sonarsynth.planning.notes.population_notes import population_notes
 from sonarsynth.receiver import BeamGrid, PlanarLattice, Sonar
 from sonarsynth.recipe import Axis, Recipe, reading
-from sonarsynth.recipe.populations.drawn_tracks import AnyWay, Hovering, StraightAhead, Upright, Wandering
+from sonarsynth.recipe.populations.drawn_tracks import AnyOrientation, Hovering, StraightAhead, Upright, Wandering
 from sonarsynth.recipe.populations.population import BodyModel, Population
 from sonarsynth.recipe.populations.regions import Annulus, BoxRegion, FieldOfView, PolygonRegion
 from sonarsynth.recipe.scene import Scene, Trajectory, World
@@ -150,7 +150,7 @@ def test_bodies_are_in_the_water_and_apart_in_every_frame(track: Any) -> None:
 
 
 def test_what_lies_on_the_bottom_touches_it_however_it_lies() -> None:
-    made = recipe(some(on_bottom=True, orientation=AnyWay(), least=2, most=2), repeats=20)
+    made = recipe(some(on_bottom=True, orientation=AnyOrientation(), least=2, most=2), repeats=20)
     for n in range(20):
         for body in made.frame(4 * n)[1].moment.bodies:
             assert body.pose.to_world(body.mesh.vertices)[:, 2].min() == pytest.approx(-DEPTH + 1e-3, abs=1e-9)
@@ -159,7 +159,7 @@ def test_what_lies_on_the_bottom_touches_it_however_it_lies() -> None:
 def test_any_orientation_is_even_over_rotations() -> None:
     """The body's axes then point evenly over the sphere: each coordinate is even from -1 to 1 (Archimedes)."""
     models = (BodyModel(shape=Sphere(radius=0.01)),)
-    bodies = drawn(recipe(some(orientation=AnyWay(), models=models, least=1, most=1), repeats=300))
+    bodies = drawn(recipe(some(orientation=AnyOrientation(), models=models, least=1, most=1), repeats=300))
     axes = np.array([pose(of[0].motion, 0.0).rotation for of in bodies])
     for axis in (0, 1, 2):
         for coordinate in (0, 1, 2):

@@ -17,7 +17,7 @@ from scipy.special import j1
 from sonarsynth.cli.accuracy_command import HELP, accuracy
 from sonarsynth.cli.running import run
 from sonarsynth.equations.scattering.modal_series import Fluid, cylinder_amplitude, sphere_amplitude
-from sonarsynth.pictures.accuracy_figures.bodies_figure import Curve, Panel, Trade, bodies_figure
+from sonarsynth.pictures.accuracy_figures.bodies_figure import Curve, Panel, RefinementCurve, bodies_figure
 from sonarsynth.validation import REFERENCES, Row
 from sonarsynth.validation.bodies.body_cases import BAND, SOUND_SPEED, Point, order, trade_rows, wavenumber
 from sonarsynth.validation.bodies.facet_integral import triangle_rows
@@ -153,7 +153,7 @@ def test_a_wrong_integral_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_picture_shows_every_trade_and_curve() -> None:
     x = np.linspace(0.0, 1.0, 5)
-    trade = Trade("a body", [10, 100], [0.1, 1.0], [1e-2, 0.0], [1e-1, 1e-3])
+    trade = RefinementCurve("a body", [10, 100], [0.1, 1.0], [1e-2, 0.0], [1e-1, 1e-3])
     panels = [
         Panel("over x", "x", "dB", (Curve("exact", x, x, "exact", 0), Curve("facets", x, x, "facets", 1)), -1.0, 2.0)
     ]

@@ -15,7 +15,7 @@ from sonarsynth.cli import app
 from sonarsynth.cli.accuracy_tables.frontier_table import show
 from sonarsynth.cli.running import run
 from sonarsynth.environment.boundaries import SeaBottom, Sediment
-from sonarsynth.frontiers import Measured, Point, exact_frame, measure, usual_frames
+from sonarsynth.frontiers import AccuracyReport, Point, exact_frame, measure, usual_frames
 from sonarsynth.frontiers.exact_frame import differences, each_hydrophone, exact_plan, spread
 from sonarsynth.frontiers.frontier_report import write
 from sonarsynth.frontiers.image_knobs import off_by
@@ -49,15 +49,15 @@ def alone() -> pytest.MonkeyPatch:
 
 
 @pytest.fixture(scope="module")
-def measured(alone: pytest.MonkeyPatch) -> Measured:
+def measured(alone: pytest.MonkeyPatch) -> AccuracyReport:
     return measure(small(), [1])
 
 
-def rows(measured: Measured, stage: str, knob: str = "") -> list[Point]:
+def rows(measured: AccuracyReport, stage: str, knob: str = "") -> list[Point]:
     return [p for p in measured.points if p.stage == stage and (p.knob == knob or not knob)]
 
 
-def test_the_exact_way_errs_by_nothing_and_is_itself_checked(measured: Measured) -> None:
+def test_the_exact_way_errs_by_nothing_and_is_itself_checked(measured: AccuracyReport) -> None:
     for stage in ("trace", "image", "frame"):
         (exact,) = rows(measured, stage, "exact")
         assert exact.error == 0.0
@@ -66,7 +66,7 @@ def test_the_exact_way_errs_by_nothing_and_is_itself_checked(measured: Measured)
     assert 0.0 < check.error <= check.allowed < 1e-2
 
 
-def test_every_curve_tends_to_nothing_as_its_knob_goes_to_exact(measured: Measured) -> None:
+def test_every_curve_tends_to_nothing_as_its_knob_goes_to_exact(measured: AccuracyReport) -> None:
     """With all else exact, what is left is how far two computations differ that share nothing: of a moving target."""
     curves = {knob: [p.error for p in rows(measured, "trace", knob)] for knob in ("subarrays", "dynamic range")}
     curves["subarrays"] = [p.error for p in rows(measured, "trace", "subarrays") if not p.chosen]
@@ -86,19 +86,19 @@ def test_every_curve_tends_to_nothing_as_its_knob_goes_to_exact(measured: Measur
     assert plane.error <= plane.also["largest_db"]
 
 
-def test_what_all_fast_ways_would_share_is_seen(measured: Measured) -> None:
+def test_what_all_fast_ways_would_share_is_seen(measured: AccuracyReport) -> None:
     """A frame traced as if nothing moved differs from the exact way, which no tracing serves."""
     made = plan(small(), ("signals",), Choices())
     exact = exact_frame(made, 1, 2)
     scene = replace(made.scene, physics=replace(made.scene.physics, doppler=False))
     frozen = replace(made, recipe=replace(made.recipe, scene=scene))
     still = each_hydrophone(exact_plan(frozen), exact.frame, some=exact.sensor)
-    assert differences(still.heard, exact.heard)[0] > 1e-2
-    assert differences(exact.each.at(exact.sensor), exact.heard)[0] < 1e-4
+    assert differences(still.pressures, exact.pressures)[0] > 1e-2
+    assert differences(exact.each.at(exact.sensor), exact.pressures)[0] < 1e-4
 
 
 def test_the_table_fits_120_columns(
-    measured: Measured, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    measured: AccuracyReport, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whatever it is printed on: not a terminal, or one of a hundred thousand columns."""
     for columns in ("40", "100000"):
@@ -109,7 +109,7 @@ def test_the_table_fits_120_columns(
         assert sum("chosen" in line for line in lines) >= 4
 
 
-def test_one_setting_of_each_stage_is_the_plans(measured: Measured) -> None:
+def test_one_setting_of_each_stage_is_the_plans(measured: AccuracyReport) -> None:
     made = plan(small())
     assert measured.choices == made.choices.as_json()
     for stage in STAGES - {"frame"}:
@@ -119,14 +119,14 @@ def test_one_setting_of_each_stage_is_the_plans(measured: Measured) -> None:
     assert 4 <= measured.hydrophones <= 24
 
 
-def test_the_plan_keeps_within_the_accuracy_of_signals(measured: Measured) -> None:
+def test_the_plan_keeps_within_the_accuracy_of_signals(measured: AccuracyReport) -> None:
     (signals,) = rows(measured, "frame", "signals")
     assert 0.0 < signals.error <= signals.allowed == 1e-2
     tracing = next(p for p in rows(measured, "trace") if p.chosen)
     assert signals.error == pytest.approx(tracing.error, abs=0.5e-2)
 
 
-def test_json_has_no_number_that_is_none(measured: Measured) -> None:
+def test_json_has_no_number_that_is_none(measured: AccuracyReport) -> None:
     answer = json.loads(json.dumps(measured.as_json(), allow_nan=False))
     assert {row["stage"] for row in answer} == STAGES | {"picking"}
     assert {row["row"] for row in answer} == {"point", "peer", "check", "verdict"}
@@ -141,7 +141,7 @@ def test_json_has_no_number_that_is_none(measured: Measured) -> None:
     assert next(row for row in answer if row["stage"] == "range" and row["row"] == "point")["direction_rad"] >= 0.0
 
 
-def test_rows_and_picture_are_written(measured: Measured, tmp_path: Path) -> None:
+def test_rows_and_picture_are_written(measured: AccuracyReport, tmp_path: Path) -> None:
     files = write(measured, tmp_path / "new", "scene")
     assert [file.name for file in files] == ["scene.json", "scene.png"]
     assert len(json.loads(files[0].read_text())) == len(measured.points) + len(measured.verdicts)
@@ -154,9 +154,9 @@ def test_a_few_hydrophones_say_so() -> None:
     assert len(exact.sensor) == 5 and not exact.whole
     everything = exact_frame(made, 1)
     assert everything.whole and len(everything.each.sensor) == 24
-    for few, every in zip(exact.each.heard, everything.each.at(exact.sensor), strict=True):
+    for few, every in zip(exact.each.pressures, everything.each.at(exact.sensor), strict=True):
         np.testing.assert_array_equal(few, every)
-    assert np.array_equal(everything.pressure, everything.each.heard[0] + everything.each.heard[1])
+    assert np.array_equal(everything.pressure, everything.each.pressures[0] + everything.each.pressures[1])
     assert spread(np.arange(508), 24).size == 24
 
 
@@ -244,13 +244,13 @@ def test_finufft_and_ours_agree(bounces: int, monkeypatch: pytest.MonkeyPatch) -
 
 @pytest.mark.long
 def test_the_command(
-    alone: pytest.MonkeyPatch, measured: Measured, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    alone: pytest.MonkeyPatch, measured: AccuracyReport, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "scene.yaml"
     file.write_text(reading.dump(small()))
     asked: list[object] = []
 
-    def measures(recipe: Recipe, frames: object = None, **more: object) -> Measured:
+    def measures(recipe: Recipe, frames: object = None, **more: object) -> AccuracyReport:
         asked.extend([recipe.accuracy.signal, frames, more["hydrophones"], more["seed"], more["peers"]])
         return replace(measured, verdicts=tuple(replace(v, ok=True) for v in measured.verdicts))
 

@@ -229,7 +229,7 @@ def test_a_shard_with_no_good_frame_is_not_marked(
 
 
 def test_a_build_is_refused_while_another_runs(tmp_path: Path, small_plan: Plan) -> None:
-    with store.lock(tmp_path / "s.zarr"), pytest.raises(store.Locked):
+    with store.lock(tmp_path / "s.zarr"), pytest.raises(store.StoreLocked):
         build(small_plan, tmp_path / "s.zarr", workers=0)
     assert not (tmp_path / "s.zarr").exists()
 

@@ -199,9 +199,9 @@ def test_a_link_to_a_store_is_the_store(path: Path, tmp_path: Path, made: Plan, 
     shards = {name: text for name, text in contents(path).items() if "/c." in name}
     assert shards == {name: text for name, text in contents(whole).items() if "/c." in name}
     assert {file.name for file in link.parent.iterdir()} == {"link.zarr"}
-    with store.lock(link), pytest.raises(store.Locked), store.lock(path):
+    with store.lock(link), pytest.raises(store.StoreLocked), store.lock(path):
         pass
-    with store.lock(path), pytest.raises(store.Locked):
+    with store.lock(path), pytest.raises(store.StoreLocked):
         build(made, link, workers=0)
 
 

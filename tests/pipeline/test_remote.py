@@ -159,7 +159,7 @@ def test_failed_frames_are_known_the_next_time(
 def test_a_second_build_is_refused_while_the_first_runs(small_plan: Plan, place: Remote) -> None:
     file = store.beside(place, "lock")
     assert isinstance(file, Remote)
-    with lease.leased(file, renewed=0.05), pytest.raises(store.Locked, match=r"is being built by process \d+ on"):
+    with lease.leased(file, renewed=0.05), pytest.raises(store.StoreLocked, match=r"is being built by process \d+ on"):
         schedule.build(small_plan, place, frames=FRAMES, workers=0)
     assert not place.exists()
     assert not file.exists()
@@ -190,7 +190,7 @@ def test_a_lock_that_is_renewed_is_not_taken(place: Remote) -> None:
     lock_of(place)
     renewing = threading.Timer(0.3, lambda: lock_of(place, renewed=1))
     renewing.start()
-    with pytest.raises(lease.Taken, match="process 1 on there"), lease.leased(place, lease=HANGING):
+    with pytest.raises(lease.LeaseHeld, match="process 1 on there"), lease.leased(place, lease=HANGING):
         pass
     renewing.join()
     assert lease.holder(place) == "other"
@@ -241,11 +241,11 @@ def test_a_writer_that_outlived_its_build_writes_no_mark(
 ) -> None:
     store.create(place, small_plan)
     frames = {0: made_up(small_plan, 0)}
-    with pytest.raises(store.Ended), store.shared_lock(place, "gone"):
+    with pytest.raises(store.BuildEnded), store.shared_lock(place, "gone"):
         raise AssertionError
     with store.lock(place) as build, store.shared_lock(place, build) as still:
         lock_of(Remote(f"{place}.lock"))
-        with pytest.raises(store.Ended):
+        with pytest.raises(store.BuildEnded):
             store.write_shard(place, small_plan, 0, frames, still)  # type: ignore[arg-type]
     assert store.frames_there(place) == []
 

@@ -182,12 +182,12 @@ def test_a_damaged_layout_is_not_built_on(laid_out: Path, small_plan: Plan) -> N
 
 OTHER = """\
 import os, sys
-from sonarsynth.store import Locked
+from sonarsynth.store import StoreLocked
 from sonarsynth.store.files.lock import lock
 try:
     with lock(sys.argv[1]):
         pass
-except Locked as locked:
+except StoreLocked as locked:
     print(locked, flush=True)
 with lock(sys.argv[1] + ".dies"):
     os._exit(9)
@@ -198,7 +198,7 @@ with lock(sys.argv[1] + ".dies"):
 def test_two_builders_exclude_each_other_and_one_that_dies_leaves_no_lock(tmp_path: Path) -> None:
     path = tmp_path / "s.zarr"
     with store.lock(path):
-        with pytest.raises(store.Locked, match=r"s\.zarr is being built by process \d+ on "), store.lock(path):
+        with pytest.raises(store.StoreLocked, match=r"s\.zarr is being built by process \d+ on "), store.lock(path):
             raise AssertionError
         done = subprocess.run([sys.executable, "-c", OTHER, path], capture_output=True, text=True, check=False)
         assert "is being built by process" in done.stdout

@@ -276,7 +276,7 @@ def test_the_next_build_waits_for_a_writer_that_outlived_its_own_and_that_writer
     with store.lock(path) as name:
         held = store.shared_lock(path, name)
         held.__enter__()
-    with pytest.raises(store.Locked, match="still writing"), store.lock(path, wait=0.1):
+    with pytest.raises(store.StoreLocked, match="still writing"), store.lock(path, wait=0.1):
         pass
     ended: list[bool] = []
 
@@ -287,11 +287,11 @@ def test_the_next_build_waits_for_a_writer_that_outlived_its_own_and_that_writer
     threading.Timer(0.3, end).start()
     with store.lock(path, wait=600.0) as now:
         assert ended
-        with pytest.raises(store.Ended, match="has ended"), store.shared_lock(path, name):
+        with pytest.raises(store.BuildEnded, match="has ended"), store.shared_lock(path, name):
             pass
         with store.shared_lock(path, now):
             pass
-    with pytest.raises(store.Ended), store.shared_lock(path, now):
+    with pytest.raises(store.BuildEnded), store.shared_lock(path, now):
         pass
 
 
@@ -322,21 +322,21 @@ def test_another_code_is_shown_and_refused(tmp_path: Path, small: Recipe, monkey
 def test_a_disk_error_that_is_not_about_room_stays_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with (
         pytest.raises(OSError, match="I/O") as raised,
-        disk_space.told_when_full(tmp_path, lambda: disk_space.Room(1.0, 1)),
+        disk_space.told_when_full(tmp_path, lambda: disk_space.DiskRoom(1.0, 1)),
     ):
         raise OSError(errno.EIO, "I/O error")
     assert raised.value.errno == errno.EIO
     for number in disk_space.FULL:
         with (
             pytest.raises(OSError, match=r"up to 5 GB more are needed, .* are free"),
-            disk_space.told_when_full(tmp_path, lambda: disk_space.Room(5e9, 1)),
+            disk_space.told_when_full(tmp_path, lambda: disk_space.DiskRoom(5e9, 1)),
         ):
             raise OSError(number, os.strerror(number))
     monkeypatch.setattr(disk_space.shutil, "disk_usage", lambda place: shutil._ntuple_diskusage(10**15, 0, 10**15))
     monkeypatch.setattr(disk_space.os, "statvfs", lambda place: SimpleNamespace(f_files=100, f_favail=3))
     with (
         pytest.raises(OSError, match="up to 80 more files and folders are needed, 3 more fit"),
-        disk_space.told_when_full(tmp_path, lambda: disk_space.Room(1.0, 80)),
+        disk_space.told_when_full(tmp_path, lambda: disk_space.DiskRoom(1.0, 80)),
     ):
         raise OSError(errno.ENOSPC, "No space left")
 

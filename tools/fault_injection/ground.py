@@ -25,7 +25,7 @@ from .watching import watched
 FRAMES = range(12)
 """What is built: a whole shard and half of another."""
 
-SAID = (store.Mismatch, store.Damage, store.Locked, FieldError, reading.RecipeError, OSError)
+SAID = (store.Mismatch, store.Damage, store.StoreLocked, FieldError, reading.RecipeError, OSError)
 """What the command line says in one line."""
 
 

@@ -20,7 +20,7 @@ from sonarsynth.frontiers.frontier_report import write
 from sonarsynth.recipe import reading
 
 if TYPE_CHECKING:
-    from sonarsynth.frontiers import Measured, Point, Verdict
+    from sonarsynth.frontiers import AccuracyReport, Point, Verdict
 
 
 SECOND = (
@@ -86,7 +86,7 @@ def _say(text: str) -> None:
         sys.stderr.flush()
 
 
-def show(measured: Measured) -> None:
+def show(measured: AccuracyReport) -> None:
     """A section a stage, then the verdicts."""
     table = Table(title=measured.title, title_justify="left")
     table.add_column("stage", no_wrap=True)

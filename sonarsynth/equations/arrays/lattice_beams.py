@@ -108,13 +108,13 @@ def lattice_sums(
     odd number.
     """
     sensors, bins = spectra.shape
-    heard = padded_bins(spectra, sensors + 1, LANES)
+    padded = padded_bins(spectra, sensors + 1, LANES)
     order = np.argsort(rise, kind="stable")
     levels, first = np.unique(rise[order], return_index=True)
-    beams = np.empty((len(rise), heard.shape[1]), np.complex64)
+    beams = np.empty((len(rise), padded.shape[1]), np.complex64)
     _lattice_sums(
-        heard.view(np.float32).ravel(),
-        heard.shape[1],
+        padded.view(np.float32).ravel(),
+        padded.shape[1],
         places,
         np.append(weight, 0.0).astype(np.float32),
         delay,

@@ -119,9 +119,9 @@ def peak_below(found: Collapse, frequency: float, fade: float = 0.5) -> float:
     low_pass = Fir(0.0, frequency, TRANSITION * frequency, ATTENUATION)
     made = pulse(found, reach(low_pass), fade)
 
-    def heard(time: Floats) -> Floats:
+    def filtered_pressure(time: Floats) -> Floats:
         return filtered(time, made, low_pass)
 
     time, step = peak(found)[0] + np.linspace(-1.0, 1.0, 33) / frequency, 1.0 / (16.0 * frequency)
-    around = time[np.argmax(heard(time))] + np.linspace(-step, step, 33)
-    return float(heard(around).max())
+    around = time[np.argmax(filtered_pressure(time))] + np.linspace(-step, step, 33)
+    return float(filtered_pressure(around).max())

@@ -153,15 +153,15 @@ def steered_sums(spectra: Spectra, delay: Floats, weight: Floats, frequency: flo
     """
     live = np.flatnonzero(weight)
     bins = spectra.shape[1]
-    heard = padded_bins(spectra[live], len(live), CHUNK)
-    beams = np.empty((len(delay), heard.shape[1]), np.complex64)
+    padded_spectra = padded_bins(spectra[live], len(live), CHUNK)
+    beams = np.empty((len(delay), padded_spectra.shape[1]), np.complex64)
     _steered_sums(
-        heard.view(np.float32).ravel(),
+        padded_spectra.view(np.float32).ravel(),
         np.ascontiguousarray(delay[:, live]),
         weight[live].astype(np.float32),
         frequency,
         spacing,
-        heard.shape[1],
+        padded_spectra.shape[1],
         beams.view(np.float32).ravel(),
     )
     return beams[:, :bins]

@@ -85,14 +85,14 @@ class ChorusModel:
         """The integral of the intensity over sines from low to high, without faces; behind: what the baffle leaves of
         the energy of sound from behind the array."""
 
-        def heard(sine: Floats) -> Floats:
+        def received(sine: Floats) -> Floats:
             front = self.in_front(sine)
             return self.intensity(sine, absorption) * (front + (1.0 - front) * behind)
 
         node, weight = np.polynomial.legendre.leggauss(PANELS)
         inner = [low, *(edge for edge in self.edges if low < edge < high), high]
         return sum(
-            0.5 * (b - a) * float(weight @ heard(0.5 * (a + b) + 0.5 * (b - a) * node)) for a, b in pairwise(inner)
+            0.5 * (b - a) * float(weight @ received(0.5 * (a + b) + 0.5 * (b - a) * node)) for a, b in pairwise(inner)
         )
 
     def pulse_energy(self, frequency: Floats) -> Floats:
@@ -141,9 +141,9 @@ class ChorusModel:
         face = element_directivity(f[used], towards, elements.face, self.receiver.speed(self.plan.medium))
         table = np.empty((LENGTHS, turns, turns))
         for number, length in enumerate(lengths.tolist()):
-            heard = np.zeros((turns, turns, FINER * self.samples // 2 + 1), complex)
-            heard[..., used] = spectrum[used] * face * 10.0 ** (-lost * length / 20.0)
-            wave = np.abs(np.fft.irfft(heard, axis=-1)) * FINER * sonar.sampling_frequency
+            received = np.zeros((turns, turns, FINER * self.samples // 2 + 1), complex)
+            received[..., used] = spectrum[used] * face * 10.0 ** (-lost * length / 20.0)
+            wave = np.abs(np.fft.irfft(received, axis=-1)) * FINER * sonar.sampling_frequency
             largest = wave.reshape(turns, turns, -1, FINER).max(axis=2)
             table[number] = (20.0 * np.log10(np.maximum(largest, 1e-300))).mean(axis=-1)
         table -= 20.0 * np.log10(self.model.pulse(0.0, 0.0).peak)
@@ -171,7 +171,7 @@ class ChorusModel:
         return float(20.0 * np.log10(max(self.receiver.sonar.behind, 1e-15)))
 
     @cached_property
-    def _heard(self) -> tuple[Floats, Floats, Floats]:
+    def _received(self) -> tuple[Floats, Floats, Floats]:
         """Of snaps in all directions: gain (place, path) in dB from the source level to the largest sample at a
         hydrophone, delay (place, path) in s, and snaps/s (place,)."""
         away, rate, gain = self._places
@@ -184,16 +184,16 @@ class ChorusModel:
         towards = self.receiver.pose.turn_to_body(towards)
         long = np.broadcast_to(length[:, None, :], up.shape)
         sizes = np.abs(towards[..., 1:])
-        heard = gain[:, None, :] + self._peaks(np.stack([long, sizes[..., 0], sizes[..., 1]], axis=-1))
-        heard = heard + np.where(towards[..., 0] < 0.0, self._behind, 0.0)
-        delay = np.broadcast_to((length * self.heights.slowness)[:, None, :], heard.shape)
+        received = gain[:, None, :] + self._peaks(np.stack([long, sizes[..., 0], sizes[..., 1]], axis=-1))
+        received = received + np.where(towards[..., 0] < 0.0, self._behind, 0.0)
+        delay = np.broadcast_to((length * self.heights.slowness)[:, None, :], received.shape)
         paths = len(self.climb)
-        return heard.reshape(-1, paths), delay.reshape(-1, paths), np.repeat(rate / AZIMUTHS, AZIMUTHS)
+        return received.reshape(-1, paths), delay.reshape(-1, paths), np.repeat(rate / AZIMUTHS, AZIMUTHS)
 
     def loud(self, levels: Floats) -> list[CountMoments]:
         """Arrivals whose largest sample is above each level (level,) in dB re 1 uPa. Snaps of a cluster are taken as
         one by one."""
-        gain, delay, rate = self._heard
+        gain, delay, rate = self._received
         wide = float(np.hypot(self.chorus.deviation, 20.0 / np.log(10.0) * self.chorus.width))
         return path_counts(gain, delay, rate, (self.chorus.level, wide), levels)
 

@@ -67,8 +67,8 @@ class SoundModel:
             alone += float(density[0])
             if waves is not None:
                 toward, weight = waves
-                heard = weight * self._share(toward, frequency)
-                cross = cross_power(toward, heard, whole, 2.0 * np.pi * frequency / self._speed)
+                received = weight * self._share(toward, frequency)
+                cross = cross_power(toward, received, whole, 2.0 * np.pi * frequency / self._speed)
                 total += float(density[0]) * cross[1:] / cross[0].real
         return np.asarray((total / alone).real)
 

@@ -60,10 +60,10 @@ def recorded_sound(recording: SeaRecording, sonar: Sonar) -> Sound:
         raise RecordingError(f"{path}: is sampled at {rate:g} Hz: it holds nothing of the band of the sonar")
     if 0.5 * rate < sonar.band.high:
         notes.append(f"the recording ends at {0.5e-3 * rate:g} kHz, within the band of the sonar: its levels are lower")
-    heard = _filtered(values * (pascals or 1.0), rate, sonar)
-    if not np.abs(heard).max() > 1e-12 * np.abs(values).max() * (pascals or 1.0):
+    filtered = _filtered(values * (pascals or 1.0), rate, sonar)
+    if not np.abs(filtered).max() > 1e-12 * np.abs(values).max() * (pascals or 1.0):
         raise RecordingError(f"{path}: is silent in the band of the sonar")
-    blocks = heard[: len(heard) // size * size].reshape(-1, 1, size).astype(np.float32)
+    blocks = filtered[: len(filtered) // size * size].reshape(-1, 1, size).astype(np.float32)
     band = (sonar.band.low, min(sonar.band.high, 0.5 * rate))
     return Sound(blocks, rate, np.zeros((1, 3)), True, band, calibrated=pascals is not None, notes=tuple(notes))
 

@@ -57,14 +57,14 @@ def dense_energies(
     phasors are those of the bin before, turned on (1e-16 a bin).
     """
     live = np.flatnonzero(weight)
-    heard = np.conj((weight[live, None] * spectra[live]).T)
+    weighted = np.conj((weight[live, None] * spectra[live]).T)
     first, spacing = first_and_spacing(frequencies)
     energy = np.zeros(len(delay))
     for start in range(0, len(delay), BEAMS_AT_ONCE):
         block = slice(start, start + BEAMS_AT_ONCE)
         turn = np.exp(2j * np.pi * spacing * delay[block][:, live])
         phasor = np.exp(2j * np.pi * first * delay[block][:, live])
-        for spectrum in heard:
+        for spectrum in weighted:
             energy[block] += np.abs(np.vecdot(spectrum, phasor)) ** 2  # row by row: threads would wait for each other
             phasor *= turn
     return energy

@@ -58,15 +58,15 @@ def focus_error(
     """
     if focus is None:
         return 0.0
-    glass, heard = lens(elements, focus, sound_speed), for_sensors(elements, weight, band)
-    cut = zones_of(glass, heard, beams, zones)
+    glass, moments = lens(elements, focus, sound_speed), for_sensors(elements, weight, band)
+    cut = zones_of(glass, moments, beams, zones)
     u = quadrant(beams)
 
     def left_out(zone: Zone, at: tuple[int, int]) -> float:
         if within == 0.0:
-            even, odd = zone.variances(glass, heard, u[at][None])
+            even, odd = zone.variances(glass, moments, u[at][None])
             return float(even[0] + odd[0])
-        return zone.estimate(glass, heard, u[at][None])
+        return zone.estimate(glass, moments, u[at][None])
 
     tried = [(zone, at, left_out(zone, at)) for zone in cut for at in corners(zone)]
     tried.sort(key=lambda one: -one[2])

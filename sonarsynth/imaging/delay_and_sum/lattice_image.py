@@ -58,11 +58,11 @@ def focused_energies(
     from sonarsynth.imaging.delay_and_sum.lattice_kernel import lattice_energies
 
     places, heights = fold(elements)
-    heard = padded_bins(spectra, elements.count + 1, LANES)
+    padded = padded_bins(spectra, elements.count + 1, LANES)
     return np.asarray(
         lattice_energies(
-            heard.view(np.float32).ravel(),
-            heard.shape[1],
+            padded.view(np.float32).ravel(),
+            padded.shape[1],
             places,
             np.append(weight, 0.0).astype(np.float32),
             axial_focus_delay(elements.columns, elements.rows, elements.pitch, focus, sound_speed),
@@ -141,8 +141,8 @@ def zoned_energies(
     from sonarsynth.imaging.delay_and_sum.zone_kernel import zone_energies
 
     places, heights = fold(elements)
-    heard = padded_bins(spectra, elements.count + 1, LANES)
-    array = heard.view(np.float32).ravel(), heard.shape[1], places, np.append(weight, 0.0).astype(np.float32)
+    padded = padded_bins(spectra, elements.count + 1, LANES)
+    array = padded.view(np.float32).ravel(), padded.shape[1], places, np.append(weight, 0.0).astype(np.float32)
     odd = elements.rows % 2 == 1, elements.columns % 2 == 1
     band = first_and_spacing(frequencies)
     image = np.empty((beams.elevations, beams.azimuths))

@@ -74,7 +74,7 @@ class Lens:
 
 
 @dataclass(frozen=True, eq=False)
-class Heard:
+class ArrayMoments:
     """An array and a band, as far as estimates need them."""
 
     y: Floats  # (cell,) m
@@ -125,19 +125,19 @@ class Zone:
         kept = glass.bulge(y, z, self.centre) + z * glass.slope_along_z(y, level, self.centre)
         return exact - kept - y * glass.slope_along_y(u, level)
 
-    def variances(self, glass: Lens, heard: Heard, u: Floats) -> tuple[Floats, Floats]:
+    def variances(self, glass: Lens, moments: ArrayMoments, u: Floats) -> tuple[Floats, Floats]:
         """Variance over the array (beam,) in rad2 of what is left out in beams u (beam, yz): even and odd part."""
-        y, z = (np.concatenate([q, -q]) for q in (heard.y, heard.z))
+        y, z = (np.concatenate([q, -q]) for q in (moments.y, moments.z))
         one, other = np.split(self.left_out(glass, y, z, u), 2, axis=1)
-        even, odd = 0.5 * heard.angular * (one + other), 0.5 * heard.angular * (one - other)
-        return np.square(even) @ heard.weight - np.square(even @ heard.weight), np.square(odd) @ heard.weight
+        even, odd = 0.5 * moments.angular * (one + other), 0.5 * moments.angular * (one - other)
+        return np.square(even) @ moments.weight - np.square(even @ moments.weight), np.square(odd) @ moments.weight
 
-    def estimate(self, glass: Lens, heard: Heard, u: Floats) -> float:
+    def estimate(self, glass: Lens, moments: ArrayMoments, u: Floats) -> float:
         """About how much (dB) what is left out changes beams u (beam, yz) of the zone within 20 dB of the peak.
 
         A phase that is even over the array changes energy by its square, an odd one, which shifts beams, in proportion.
         """
-        even, odd = self.variances(glass, heard, u)
+        even, odd = self.variances(glass, moments, u)
         return float(np.max(EVEN * even + ODD * np.sqrt(odd)))
 
 
@@ -152,7 +152,7 @@ def lens(elements: Elements, focus: float, sound_speed: float) -> Lens:
     return Lens(focus, sound_speed, reach * elements.columns, reach * elements.rows)
 
 
-def for_sensors(elements: Elements, weight: Floats, band: Band) -> Heard:
+def for_sensors(elements: Elements, weight: Floats, band: Band) -> ArrayMoments:
     """The array with its weights (sensor,), neighbours on the lattice gathered into cells, and the band."""
     places = [elements.row // -(-elements.rows // CELLS), elements.column // -(-elements.columns // CELLS)]
     cell = np.unique(np.stack(places)[:, weight > 0], axis=1, return_inverse=True)[1].ravel()
@@ -160,7 +160,7 @@ def for_sensors(elements: Elements, weight: Floats, band: Band) -> Heard:
     total = np.asarray(np.bincount(cell, live), float)
     y, z = (np.bincount(cell, live * position[:, axis]) / total for axis in (1, 2))
     squares = (band.low**2 + band.low * band.high + band.high**2) / 3.0
-    return Heard(y, z, total, 2.0 * np.pi * float(np.sqrt(squares)))
+    return ArrayMoments(y, z, total, 2.0 * np.pi * float(np.sqrt(squares)))
 
 
 def quadrant(beams: BeamGrid) -> Floats:
@@ -170,7 +170,7 @@ def quadrant(beams: BeamGrid) -> Floats:
     return np.stack(np.broadcast_arrays(across, np.sin(elevation)[:, None]), axis=-1)
 
 
-def zones_of(glass: Lens, heard: Heard, beams: BeamGrid, zones: int) -> list[Zone]:
+def zones_of(glass: Lens, moments: ArrayMoments, beams: BeamGrid, zones: int) -> list[Zone]:
     """The zones of a beam grid: `zones` across where most is left out, at its upper and lower edge.
 
     There are half as many bands of rows, narrower away from the middle. From the middle outwards each zone of a band is
@@ -186,7 +186,7 @@ def zones_of(glass: Lens, heard: Heard, beams: BeamGrid, zones: int) -> list[Zon
 
     def estimate(zone: Zone) -> float:
         rows, columns = zip(*corners(zone), strict=True)
-        return zone.estimate(glass, heard, u[list(rows), list(columns)])
+        return zone.estimate(glass, moments, u[list(rows), list(columns)])
 
     def widest(low: int, high: int, near: int, shared: bool) -> Zone | None:
         chosen, stop = None, u.shape[1] + 1

@@ -19,7 +19,7 @@ FLOOR = 1e-17
 
 
 @dataclass(frozen=True)
-class Trade:
+class RefinementCurve:
     """One body or method, from coarse to fine."""
 
     name: str
@@ -57,7 +57,7 @@ class Panel:
     """dB: lines along x."""
 
 
-def bodies_figure(title: str, trades: Mapping[str, Sequence[Trade]], panels: Sequence[Panel]) -> Figure:
+def bodies_figure(title: str, trades: Mapping[str, Sequence[RefinementCurve]], panels: Sequence[Panel]) -> Figure:
     """Errors of ever finer meshes over facets and over CPU time, logarithmic; then levels, two panels a row.
 
     trades: a row for each kind of error, under its name and unit.
@@ -76,7 +76,9 @@ def bodies_figure(title: str, trades: Mapping[str, Sequence[Trade]], panels: Seq
     return made
 
 
-def _trades(axes: Axes, trades: Sequence[Trade], costs: Sequence[Sequence[float]], name: str, error: str) -> None:
+def _trades(
+    axes: Axes, trades: Sequence[RefinementCurve], costs: Sequence[Sequence[float]], name: str, error: str
+) -> None:
     grid(axes)
     axes.set_xscale("log")
     axes.set_yscale("log")

@@ -40,17 +40,17 @@ def snap_figure(
     pulse: gives it for waves up to a frequency (Hz). Drawn for 200 us about the collapse, up to `highest` (Hz), with
     level, width and bandwidth; under it, where there is one, a comparison with a measured snap.
     """
-    fine, heard = pulse(reach(AS_MADE)), pulse(max(reach(fir), highest))
+    fine, received = pulse(reach(AS_MADE)), pulse(max(reach(fir), highest))
     gain = gain_for_level(fine, source_level)
     time = np.linspace(-AROUND, AROUND, 4001)
     frequency = np.linspace(highest / 800, highest, 800)
     passed = response(frequency, fir)
-    density = gain * spectrum(frequency, heard)
+    density = gain * spectrum(frequency, received)
     rows = 1 if comparison is None else 2
     made = figure(12.0, 4.2 * rows, dpi=110)
     parts = made.add_gridspec(rows, 3)
     panels = [made.add_subplot(parts[0, i]) for i in range(3)]
-    snaps = {"snap": (fine, AS_MADE), "filtered": (heard, fir)}
+    snaps = {"snap": (fine, AS_MADE), "filtered": (received, fir)}
     waves = {name: gain * filtered(time, *one) for name, one in snaps.items()}
     decibels = {name: 20.0 * np.log10(gain) + np.array(levels(*one)) for name, one in snaps.items()}
     _waveforms(panels[0], time, waves, decibels)

@@ -9,7 +9,7 @@ from sonarsynth.pictures.figures.frame_figure import View, window
 from sonarsynth.pictures.figures.ghost_rings import GhostMarks
 from sonarsynth.pictures.figures.sheet import Errors, draw_cloud, draw_image
 from sonarsynth.pictures.figures.style import INK, figure, settle
-from sonarsynth.pictures.store_reading import NothingToDraw, Stored, beam_grid, built, stored
+from sonarsynth.pictures.store_reading import NothingToDraw, StoredFrame, beam_grid, built, stored
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,7 +40,7 @@ def cloud_picture(tree: xr.DataTree, frame: int) -> Figure:
     return made
 
 
-def _read(tree: xr.DataTree, frame: int) -> tuple[Stored, View]:
+def _read(tree: xr.DataTree, frame: int) -> tuple[StoredFrame, View]:
     if frame not in built(tree):
         raise NothingToDraw(f"frame {frame} has not been built")
     found = stored(tree, frame)

@@ -18,14 +18,14 @@ FREQUENCIES = 17
 """Of a band, at which an error is looked for."""
 
 
-class Passed(NamedTuple):
+class StraightPaths(NamedTuple):
     """Straight paths: source to array, and source to each target to array."""
 
     depth: Floats  # (path, sample) m
     length: Floats  # (path, sample) m: of the path, near each
 
 
-def passed_by(frames: Sequence[Frame]) -> Passed:
+def passed_by(frames: Sequence[Frame]) -> StraightPaths:
     """The depths that straight paths of some frames pass; of a frame without a source, that of the array."""
     rows: list[tuple[Floats, Floats]] = []
     for frame in frames:
@@ -36,7 +36,7 @@ def passed_by(frames: Sequence[Frame]) -> Passed:
         if not frame.moment.snaps:
             rows.append(_leg(array, array, array))
     where, length = (np.array(column) for column in zip(*rows, strict=True))
-    return Passed(where, length if length.any() else length + 1.0)
+    return StraightPaths(where, length if length.any() else length + 1.0)
 
 
 def _leg(start: Floats, middle: Floats, end: Floats) -> tuple[Floats, Floats]:
@@ -47,7 +47,7 @@ def _leg(start: Floats, middle: Floats, end: Floats) -> tuple[Floats, Floats]:
     return np.maximum(depth(np.concatenate(where)), 0.0), np.concatenate(length)
 
 
-def mean_absorption(absorption: Absorption, passed: Passed, frequency: np.ndarray | float) -> Floats:
+def mean_absorption(absorption: Absorption, passed: StraightPaths, frequency: np.ndarray | float) -> Floats:
     """Mean (...) in dB/m at frequencies (...) (Hz) over all that the paths pass, by their lengths."""
     f = np.asarray(frequency, float)
     return _mean(absorption, passed.depth.tobytes(), passed.length.tobytes(), f.tobytes()).reshape(f.shape)
@@ -65,7 +65,7 @@ def _mean(absorption: Absorption, depths: bytes, lengths: bytes, frequencies: by
 
 
 def shape_error(
-    absorption: Absorption, passed: Passed, band: tuple[float, float], bottom: float, bounces: int = 0
+    absorption: Absorption, passed: StraightPaths, band: tuple[float, float], bottom: float, bounces: int = 0
 ) -> float:
     """Largest error (dB) in a band (Hz) of any path: its loss at the centre is its own, its spectrum that of the mean.
 

@@ -29,12 +29,14 @@ SAFETY = 1.25
 
 def beamformer(plan: Plan, indices: Sequence[int]) -> tuple[Any, float]:
     """The beamformer of a plan, and its error: root mean square in dB, over beams within 20 dB of the brightest."""
-    accuracy, heard = plan.recipe.accuracy, list[tuple[Signals, float, float]]()
+    accuracy, sampled = plan.recipe.accuracy, list[tuple[Signals, float, float]]()
 
     def error(method: Any) -> float:
-        if not heard:
-            heard.extend(found for found in (_heard(plan, index) for index in indices) if found is not None)
-        return max((image_error(plan, method, *one) for one in heard), default=0.0)
+        if not sampled:
+            sampled.extend(
+                found for found in (_signals_of_frame(plan, index) for index in indices) if found is not None
+            )
+        return max((image_error(plan, method, *one) for one in sampled), default=0.0)
 
     demand = Demand(accuracy.image_db / SAFETY, accuracy.exact, error, plan.elements)
     return plan.scene.processing.beamforming.resolve(demand)
@@ -51,15 +53,17 @@ def image_error(plan: Plan, method: Any, signals: Signals, start: float, stop: f
     row, column = np.nonzero(energy >= energy.max() * 10.0 ** (-WITHIN / 10.0))
     every = -(-len(row) // COMPARED)
     row, column = row[::every], column[::every]
-    heard = snapshots_of(signals, sonar, start, stop)
+    snapshots = snapshots_of(signals, sonar, start, stop)
     beams = direction(sonar.beams.azimuth[column], sonar.beams.elevation[row])
     delay = focus_delay(elements.position, beams, slow.focus, sonar.assumed_sound_speed)
-    exact = heard.unit * dense_energies(heard.spectra, delay, weights(elements, slow.shading), heard.frequency)
+    exact = snapshots.unit * dense_energies(
+        snapshots.spectra, delay, weights(elements, slow.shading), snapshots.frequency
+    )
     wrong = 10.0 * np.log10(energy[row, column] / exact)
     return float(np.sqrt(np.mean(wrong**2)))
 
 
-def _heard(plan: Plan, index: int) -> tuple[Signals, float, float] | None:
+def _signals_of_frame(plan: Plan, index: int) -> tuple[Signals, float, float] | None:
     """Signals of a frame without noise, and its echo window; None where no snap or no echo is heard."""
     plan = plan.at(index)
     frame = plan.recipe.frame(index)[1]
@@ -76,5 +80,5 @@ def _heard(plan: Plan, index: int) -> tuple[Signals, float, float] | None:
     clock = float(direct.delay[loudest])
     end = signals.start + samples / sonar.sampling_frequency
     begin, stop = clock + plan.windows.echo_start, min(clock + plan.windows.echo_stop, end)
-    heard = signals.pressure[:, int(np.ceil((begin - start) * sonar.sampling_frequency)) :]
-    return (signals, begin, stop) if begin < stop and heard.any() else None
+    sampled = signals.pressure[:, int(np.ceil((begin - start) * sonar.sampling_frequency)) :]
+    return (signals, begin, stop) if begin < stop and sampled.any() else None

@@ -25,7 +25,7 @@ FAINTEST = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Losses:
+class EchoLosses:
     """Of one frame, by the light of its loudest snap."""
 
     frame: int
@@ -61,7 +61,7 @@ def lost_echoes(made: Plan) -> list[str]:
     return found
 
 
-def losses(plan: Plan, index: int) -> Losses | None:
+def losses(plan: Plan, index: int) -> EchoLosses | None:
     """What is lost in a frame, by the signals of its direct pulse and of each echo alone; None without both.
 
     `plan` is that of the frame's sequence. What is removed depends on all that is heard, so an echo keeps what signals
@@ -85,8 +85,8 @@ def losses(plan: Plan, index: int) -> Losses | None:
     whole = np.array([_energy(echo.pressure) for echo in echoes])
     if not whole.sum() > 0:
         return None
-    heard = replace(direct, pressure=direct.pressure + sum(echo.pressure for echo in echoes))
-    estimates = locator(plan.scene).locate(heard, receiver_of(plan, frame), survey_of(plan, frame), 1)
+    total = replace(direct, pressure=direct.pressure + sum(echo.pressure for echo in echoes))
+    estimates = locator(plan.scene).locate(total, receiver_of(plan, frame), survey_of(plan, frame), 1)
     clock = float(estimates.time[0]) if np.isfinite(estimates.time[0]) else float(arrivals.delay[first])
     ends = ((clock + edge - start) * sonar.sampling_frequency for edge in (windows.echo_start, windows.echo_stop))
     window = slice(*(max(int(np.ceil(end)), 0) for end in ends))
@@ -100,7 +100,7 @@ def losses(plan: Plan, index: int) -> Losses | None:
         fall = 10 * float(np.log10(_energy(direct.pressure) / _energy(alone)))
         below = 10 * float(np.log10(kept.sum() / _energy(alone[:, window])))
     names = [body.name for body in frame.moment.bodies]
-    return Losses(index, dict(zip(names, np.clip(lost, 0.0, 1.0).tolist(), strict=True)), fall, below)
+    return EchoLosses(index, dict(zip(names, np.clip(lost, 0.0, 1.0).tolist(), strict=True)), fall, below)
 
 
 def _without(plan: Plan, signals: Signals, estimates: SourceEstimates) -> np.ndarray:

@@ -18,7 +18,7 @@ from sonarsynth.signals.filtered_pulse import snap_gains
 from sonarsynth.signals.isolated_paths import energy_in_slices
 from sonarsynth.signals.pulse_sums.reverberation_synthesis import spare_times
 from sonarsynth.state import Emission
-from sonarsynth.tracing.reverberation.families import Listening, site_of
+from sonarsynth.tracing.reverberation.families import ReverberationWindow, site_of
 from sonarsynth.tracing.reverberation.reverberation_arrivals import ReverberationArrivals, reverberation_arrivals
 
 if TYPE_CHECKING:
@@ -59,8 +59,8 @@ def reverberation_levels(plan: Plan) -> ReverberationLevels | None:
     count = np.bincount(found.family, minlength=len(found.families))
     with np.errstate(divide="ignore"):
         level = 10.0 * np.log10(np.append(power, noise_power(scene) / plan.elements.count)) + 120.0
-    heard = zip(found.families, count.tolist(), level[:-1].tolist(), strict=True)
-    some = tuple(one for one in heard if one[1])
+    counted = zip(found.families, count.tolist(), level[:-1].tolist(), strict=True)
+    some = tuple(one for one in counted if one[1])
     edges = _changes_within_band(plan)
     return ReverberationLevels(some, found.left_out, float(level[-1]), edges, len(found.delay))
 
@@ -102,7 +102,7 @@ def frame_scatterers(plan: Plan, frame: Frame, start: float) -> ReverberationArr
     assert described is not None
     receiver, sonar = receiver_of(plan, frame), scene.sonar
     before, after = spare_times(plan.elements, sonar, receiver.speed(plan.medium), snaps)
-    listening = Listening(
+    listening = ReverberationWindow(
         start - before,
         start + plan.windows.samples / sonar.sampling_frequency + after,
         sonar.band.high - sonar.band.low,

@@ -98,8 +98,8 @@ def deviations(signals: Signals, elements: Elements, sonar: Sonar, front: PlaneW
     live = elements.gain != 0
     power, slope = (np.sum(np.abs(m) ** 2, axis=1) for m in (model, omega * model))
     for _ in range(ROUNDS):
-        heard = ranging_kernels.turned(wave.heard, lag, aligned.frequency[0], aligned.spacing)
-        rest = heard - gain[:, None] * model
+        aligned_spectrum = ranging_kernels.turned(wave.spectrum, lag, aligned.frequency[0], aligned.spacing)
+        rest = aligned_spectrum - gain[:, None] * model
         known = 0.5 * float(np.mean(np.abs(rest[live]) ** 2)) / UNLIKE**2
         late = np.sum(omega * (model * rest.conj()).imag, axis=1) / (slope + known * (2 * np.pi * band.centre) ** 2)
         lag, gain = lag + late, gain + np.sum((model.conj() * rest).real, axis=1) / (power + known)

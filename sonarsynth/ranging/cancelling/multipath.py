@@ -59,7 +59,7 @@ class Limits:
 
 
 @dataclass(frozen=True, eq=False)
-class Expected:
+class ExpectedArrival:
     """An arrival as straight paths, and reflections without loss, would bring it."""
 
     surface: int  # reflections
@@ -72,14 +72,14 @@ class Expected:
 class Outcome:
     """What became of an expected arrival."""
 
-    expected: Expected
+    expected: ExpectedArrival
     reason: int  # index into REASONS
     found: PlaneWaveFit | None = None  # as fitted, where it was
     excess: float = float("nan")  # dB: of a beam on it over all else in its window; NaN where it was not fitted
 
 
 @dataclass(frozen=True, eq=False)
-class Cancelled:
+class CancelledSignals:
     """Signals without the arrivals that were found, and what became of each that was expected."""
 
     signals: Signals  # the same object where nothing was taken out
@@ -109,14 +109,14 @@ def cancel(
     bottom: float,
     window: tuple[float, float],
     limits: Limits,
-) -> Cancelled:
+) -> CancelledSignals:
     """Signals without the located snaps' reflections in the echo `window` (start, stop), in s; bottom: its depth (m).
 
     See `WavefrontCancelling`. Loudest first, so that each is looked for with the louder ones gone.
     """
     elements, sonar = receiver.elements, receiver.sonar
     if np.sum(elements.gain != 0) < SENSORS:
-        return Cancelled(signals, ())
+        return CancelledSignals(signals, ())
     expected = expect(signals, estimates, receiver, bottom, limits.bounces)
     left, outcomes, taken = signals, [], []
     for each in sorted(expected, key=lambda e: -e.energy):
@@ -126,12 +126,12 @@ def cancel(
         if outcome.reason == CANCELLED and outcome.found is not None:
             taken.append(part_of(left, elements, sonar, outcome.found))
             left, _ = subtract(left, taken[-1])
-    return Cancelled(_settle(left, elements, sonar, taken), tuple(outcomes))
+    return CancelledSignals(_settle(left, elements, sonar, taken), tuple(outcomes))
 
 
 def expect(
     signals: Signals, estimates: SourceEstimates, receiver: Receiver, bottom_depth: float, bounces: int
-) -> list[Expected]:
+) -> list[ExpectedArrival]:
     """Every reflected path of every located snap, by image sources and at the assumed sound speed."""
     elements, sonar, found = receiver.elements, receiver.sonar, []
     c = sonar.assumed_sound_speed
@@ -148,7 +148,7 @@ def expect(
             front = PlaneWaveFit(place / r, 1 / r, float(time) + (r - distance) / c)
             across, up = front.direction[1:, None] * (elements.face / c)
             face = ranging_kernels.face_responses(across, up, aligned.frequency[0], aligned.spacing, len(density))[0]
-            found.append(Expected(surface, bottom, front, float(density @ face**2) * (distance / r) ** 2))
+            found.append(ExpectedArrival(surface, bottom, front, float(density @ face**2) * (distance / r) ** 2))
     return found
 
 
@@ -177,7 +177,7 @@ def in_view(direction: Floats, elements: Elements, sonar: Sonar) -> bool:
     return all(grid[0] - beam <= angle <= grid[-1] + beam for angle, grid in angles)
 
 
-def find(signals: Signals, elements: Elements, sonar: Sonar, expected: Expected, limits: Limits) -> Outcome:
+def find(signals: Signals, elements: Elements, sonar: Sonar, expected: ExpectedArrival, limits: Limits) -> Outcome:
     """The arrival's wavefront as the sensors hear it, and whether it is what was expected."""
     fitted = refine(signals, elements, sonar, look(signals, elements, sonar, expected.front, limits.search))
     if fitted is None:

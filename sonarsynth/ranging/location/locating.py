@@ -102,22 +102,22 @@ def locate(
     rounding = pulse_times.rounding(signals, loud.peak, pulse_times.half_length(sonar.band))
     quiet = pulse_times.quiet_bin(loud.quiet, int(live.sum()), sonar.band, pulse_times.half_length(sonar.band))
     known = SonarKnowledge(elements, sonar, receiver.pose, bottom, gradient, rounding, quiet, on_bottom, kink)
-    track, heard = loud.track.copy(), Candidates(known)
+    track, candidates = loud.track.copy(), Candidates(known)
     for _ in range(4 * snaps):
-        top = _loudest(track, heard, signals, snaps)
+        top = _loudest(track, candidates, signals, snaps)
         if top is None or not track[top] > pulse_times.QUIET * loud.quiet:
             break
         centre = signals.start + top / signals.sampling_frequency
-        heard.found.append(Candidate(centre, float(track[top]), candidate(signals, known, centre, half, bend)))
+        candidates.found.append(Candidate(centre, float(track[top]), candidate(signals, known, centre, half, bend)))
         track[max(top - width, 0) : top + width + 1] = 0.0
-    return as_estimates(heard.rows, snaps)
+    return as_estimates(candidates.rows, snaps)
 
 
-def _loudest(track: Floats, heard: Candidates, signals: Signals, snaps: int) -> int | None:
+def _loudest(track: Floats, candidates: Candidates, signals: Signals, snaps: int) -> int | None:
     """Where the signals are loudest; once enough snaps are found, before the first of them: it may be an echo."""
-    if heard.accepted < snaps:
+    if candidates.accepted < snaps:
         return int(track.argmax())
-    first = min(each.centre for each in heard.found if each.row.reason in (ACCEPTED, RANGE))
+    first = min(each.centre for each in candidates.found if each.row.reason in (ACCEPTED, RANGE))
     before = track[: max(round((first - signals.start) * signals.sampling_frequency), 0)]
     return int(before.argmax()) if before.any() else None
 
@@ -133,13 +133,13 @@ def candidate(signals: Signals, known: SonarKnowledge, centre: float, half: floa
         return refused(UNRESOLVED)
     if bend is None:
         return place(wave, pulse, known)
-    heard = _refit(pulse, wave, elements, bend.sound_speed, 0.0, sonar.assumed_sound_speed)
-    row = place(wave, pulse, replace(known, gradient=bend.gradient), heard)
+    bent = _refit(pulse, wave, elements, bend.sound_speed, 0.0, sonar.assumed_sound_speed)
+    row = place(wave, pulse, replace(known, gradient=bend.gradient), bent)
     for _ in range(3):  # delays beyond straight ones change little with the place: this settles at once
         extra = bend.delays(row.position)
         if not np.all(np.isfinite(extra)):
             break
-        row = place(_refit(pulse, wave, elements, sonar.assumed_sound_speed, extra), pulse, known, heard)
+        row = place(_refit(pulse, wave, elements, sonar.assumed_sound_speed, extra), pulse, known, bent)
     return row
 
 

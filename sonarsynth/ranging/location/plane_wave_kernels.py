@@ -11,13 +11,13 @@ from sonarsynth.ranging.ranging_kernels import template_sums
 
 
 @nb.njit(cache=True, error_model="numpy", nogil=True)
-def tilted_energies(heard: Any, response: Any, late: Any, first: float, spacing: float, steps: int) -> Any:
+def tilted_energies(spectrum: Any, response: Any, late: Any, first: float, spacing: float, steps: int) -> Any:
     """Energy of beams tilted by -steps..steps of two tilts (tilt, tilt): sum over bins of |sum over sensors|^2.
 
-    heard, response (sensor, bin) at f = first + spacing * bin (Hz); late (2, sensor) s: by how much the wave of one
+    spectrum, response (sensor, bin) at f = first + spacing * bin (Hz); late (2, sensor) s: by how much the wave of one
     step of each tilt is later. Each bin is divided by its sum of response^2.
     """
-    sensors, bins = heard.shape
+    sensors, bins = spectrum.shape
     n = 2 * steps + 1
     beam = np.zeros((bins, n, n), np.complex128)
     power = np.zeros(bins)
@@ -28,7 +28,7 @@ def tilted_energies(heard: Any, response: Any, late: Any, first: float, spacing:
         for k in range(bins):
             h = response[q, k]
             power[k] += h * h
-            row = h * heard[q, k] * corner
+            row = h * spectrum[q, k] * corner
             for i in range(n):
                 value = row
                 for j in range(n):
@@ -44,17 +44,17 @@ def tilted_energies(heard: Any, response: Any, late: Any, first: float, spacing:
 
 
 @nb.njit(cache=True, error_model="numpy", nogil=True)
-def shares(heard: Any, response: Any) -> Any:
+def shares(spectrum: Any, response: Any) -> Any:
     """Of each bin (bin,): energy that the best common wave explains, energy of all, and the power of the response.
 
-    heard, response (sensor, bin). The best wave is sum(h x)/sum(h^2).
+    spectrum, response (sensor, bin). The best wave is sum(h x)/sum(h^2).
     """
-    sensors, bins = heard.shape
+    sensors, bins = spectrum.shape
     total = np.zeros(bins, np.complex128)
     power, whole = np.zeros(bins), np.zeros(bins)
     for q in range(sensors):
         for k in range(bins):
-            h, x = response[q, k], heard[q, k]
+            h, x = response[q, k], spectrum[q, k]
             total[k] += h * x
             power[k] += h * h
             whole[k] += x.real**2 + x.imag**2
@@ -63,10 +63,10 @@ def shares(heard: Any, response: Any) -> Any:
 
 
 @nb.njit(cache=True, error_model="numpy", nogil=True)
-def explained(heard: Any, response: Any) -> Any:
+def explained(spectrum: Any, response: Any) -> Any:
     """What the best common wave makes each sensor hear (sensor, bin): an orthogonal projection, bin by bin."""
-    sensors, bins = heard.shape
-    total, power = template_sums(heard, response)
+    sensors, bins = spectrum.shape
+    total, power = template_sums(spectrum, response)
     for k in range(bins):
         total[k] = total[k] / power[k] if power[k] > 0 else 0.0
     part = np.empty((sensors, bins), np.complex128)

@@ -15,7 +15,7 @@ from sonarsynth.products import Signals, SourceEstimates
 from sonarsynth.ranging import ranging_kernels
 from sonarsynth.ranging.location import plane_wave_kernels, pulse_times
 from sonarsynth.ranging.location.locating import fit_wave
-from sonarsynth.ranging.location.pulse_times import Aligned
+from sonarsynth.ranging.location.pulse_times import AlignedPulse
 from sonarsynth.receiver import Band, Elements, Sonar
 
 EARLY: Final = 160e-6
@@ -61,7 +61,7 @@ class WindowSegment:
     wave: Floats  # (sensor, 2 half) Pa, about `place`, before the second window
 
 
-def cut(signals: Signals, elements: Elements, time: Floats, half: float, band: Band | None) -> Aligned:
+def cut(signals: Signals, elements: Elements, time: Floats, half: float, band: Band | None) -> AlignedPulse:
     """As `pulse_times.align`, for a window of `half` (s) to either side; without a band: all frequencies."""
     rate = signals.sampling_frequency
     samples = max(int(half * rate), 4)
@@ -70,7 +70,7 @@ def cut(signals: Signals, elements: Elements, time: Floats, half: float, band: B
     f = np.asarray(np.arange(samples + 1) * (0.5 * rate / samples), np.float64)
     kept = slice(None) if band is None else pulse_times.in_band(f, band)
     spectrum = np.ascontiguousarray(rfft(window, axis=1)[:, kept])
-    return Aligned(
+    return AlignedPulse(
         f[kept], ranging_kernels.turned(spectrum, _since(place, samples) / rate, f[kept][0], f[1]), time, float(f[1])
     )
 
@@ -90,10 +90,10 @@ def look(signals: Signals, elements: Elements, sonar: Sonar, expected: PlaneWave
     tangents = tangent_plane(u) * step
     late = -(tangents @ elements.position.T) / c
     first, spacing = aligned.frequency[0], aligned.spacing
-    energy = plane_wave_kernels.tilted_energies(wave.heard, wave.response, late, first, spacing, steps)
+    energy = plane_wave_kernels.tilted_energies(wave.spectrum, wave.response, late, first, spacing, steps)
     tilt = np.array(np.unravel_index(energy.argmax(), energy.shape)) - steps
     beam, power = ranging_kernels.template_sums(
-        ranging_kernels.turned(wave.heard, tilt @ late, first, spacing), wave.response
+        ranging_kernels.turned(wave.spectrum, tilt @ late, first, spacing), wave.response
     )
     count = next_fast_len(16 * len(beam))
     envelope = np.abs(ifft(beam / np.sqrt(power + pulse_times.DEAF * elements.count), count))
@@ -128,7 +128,7 @@ def beam_contrast(signals: Signals, elements: Elements, sonar: Sonar, front: Pla
     c = sonar.assumed_sound_speed
     aligned = cut(signals, elements, front.delays(elements, c), pulse_times.PULSE_HALF, sonar.band)
     wave = pulse_times.waveform(aligned, elements, c, front.direction, front.curvature, front.time)
-    own, whole, power = plane_wave_kernels.shares(wave.heard, wave.response)
+    own, whole, power = plane_wave_kernels.shares(wave.spectrum, wave.response)
     count = int(np.sum(elements.gain != 0))
     rest = np.maximum(whole - own, np.finfo(float).eps * whole)
     ratio = own * (count - 1) / np.where(rest > 0, rest, np.inf)
@@ -162,11 +162,11 @@ def part_of(
     sine = toward * (elements.face / (c * distance))[:, None]
     response = ranging_kernels.face_responses(sine[:, 1], sine[:, 2], 0.0, aligned.spacing, len(aligned.frequency))
     response *= (gain * elements.gain / distance)[:, None]
-    heard = plane_wave_kernels.explained(aligned.spectrum, response) * rate
-    heard[:, -1] = 0.0  # half the sampling frequency cannot be moved by parts of a sample
-    samples = heard.shape[1] - 1
+    explained = plane_wave_kernels.explained(aligned.spectrum, response) * rate
+    explained[:, -1] = 0.0  # half the sampling frequency cannot be moved by parts of a sample
+    samples = explained.shape[1] - 1
     place = (time - signals.start) * rate
-    back = ranging_kernels.turned(heard, -_since(place, samples) / rate, 0.0, aligned.spacing)
+    back = ranging_kernels.turned(explained, -_since(place, samples) / rate, 0.0, aligned.spacing)
     return WindowSegment(front, place, irfft(back, 2 * samples, axis=1))
 
 

@@ -75,7 +75,7 @@ class Pulse:
 
 
 @dataclass(frozen=True, eq=False)
-class Loudness:
+class PowerTrack:
     """How loud the signals are, all live sensors together."""
 
     track: Floats  # (sample,) Pa2: mean power, summed over sensors, in a window about the sample
@@ -83,7 +83,7 @@ class Loudness:
     peak: float  # Pa: the largest |pressure|
 
 
-def loudness(signals: Signals, live: npt.NDArray[np.bool_], length: int) -> Loudness:
+def loudness(signals: Signals, live: npt.NDArray[np.bool_], length: int) -> PowerTrack:
     """Power in a sliding window of `length` samples, in quiet, and the peak.
 
     The quiet power is the tenth part from below of short means: a snap and its echoes fill no more of the signals.
@@ -92,7 +92,7 @@ def loudness(signals: Signals, live: npt.NDArray[np.bool_], length: int) -> Loud
     track = uniform_filter1d(power, min(length, len(power)), mode="constant")
     tenth = len(power) // 10
     quiet = np.partition(uniform_filter1d(power, min(16, len(power))), tenth)[tenth]
-    return Loudness(np.maximum(track, 0.0), float(max(quiet, 0.0)), peak)
+    return PowerTrack(np.maximum(track, 0.0), float(max(quiet, 0.0)), peak)
 
 
 def quiet_bin(quiet: float, live: int, band: Band, half: float) -> float:
@@ -158,7 +158,7 @@ def parabola(left: npt.ArrayLike, middle: npt.ArrayLike, right: npt.ArrayLike) -
 
 
 @dataclass(frozen=True, eq=False)
-class Aligned:
+class AlignedPulse:
     """Spectra of a pulse at the sensors, each about its own time, everything else cut away."""
 
     frequency: Floats  # (bin,) Hz, evenly spaced: those of the band, or all up to half the sampling frequency
@@ -169,7 +169,7 @@ class Aligned:
 
 def align(
     signals: Signals, elements: Elements, band: Band, time: Floats, *, whole: bool = False, longer: float = 1.0
-) -> Aligned:
+) -> AlignedPulse:
     """Cut a window out of each sensor about `time` (sensor,), when its pulse is expected: a short one, times `longer`.
 
     Frequencies of the band, or `whole`: all of them, from which the waveform can be had. The window moves with the
@@ -183,7 +183,7 @@ def align(
     kept = slice(None) if whole else in_band(f, band)
     since = (place - np.floor(place) + half) / rate
     spectrum = ranging_kernels.turned(np.ascontiguousarray(rfft(cut, axis=1)[:, kept]), since, f[kept][0], f[1])
-    return Aligned(f[kept], spectrum, time, float(f[1]))
+    return AlignedPulse(f[kept], spectrum, time, float(f[1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,13 +191,13 @@ class Wave:
     """What a wavefront brings, and what of it each sensor hears."""
 
     template: Complexes  # (bin,) Pa s: the wave at the array centre, face directivity removed
-    heard: Complexes  # (sensor, bin) Pa s, moved to the centre
+    spectrum: Complexes  # (sensor, bin) Pa s, moved to the centre
     response: Floats  # (sensor, bin) of a sensor to the wave at the centre
     power: Floats  # (bin,) sum over sensors of the response squared
 
 
 def waveform(
-    aligned: Aligned,
+    aligned: AlignedPulse,
     elements: Elements,
     sound_speed: float,
     direction: Floats,
@@ -218,13 +218,13 @@ def waveform(
     response = ranging_kernels.face_responses(sine[:, 1], sine[:, 2], first, aligned.spacing, bins)
     response *= (elements.gain / distance)[:, None]
     shift = time + wavefront_delays(elements.position, direction, curvature, sound_speed) - aligned.time
-    heard = ranging_kernels.turned(aligned.spectrum, shift, first, aligned.spacing)
-    total, power = ranging_kernels.template_sums(heard, response)
-    return Wave(total / (power + deaf * elements.count), heard, response, power)
+    spectrum = ranging_kernels.turned(aligned.spectrum, shift, first, aligned.spacing)
+    total, power = ranging_kernels.template_sums(spectrum, response)
+    return Wave(total / (power + deaf * elements.count), spectrum, response, power)
 
 
 def measure(
-    aligned: Aligned,
+    aligned: AlignedPulse,
     elements: Elements,
     sound_speed: float,
     direction: Floats,
@@ -239,7 +239,7 @@ def measure(
     """
     wave = waveform(aligned, elements, sound_speed, direction, curvature, time, deaf)
     omega = 2 * np.pi * aligned.frequency
-    slope, weight, rest = ranging_kernels.lag_sums(wave.heard, wave.response, wave.template, omega)
+    slope, weight, rest = ranging_kernels.lag_sums(wave.spectrum, wave.response, wave.template, omega)
     lag = slope / np.where(weight > 0, weight, np.inf)
     live = elements.gain != 0
     freedom = max(2 * (np.sum(live) - 1) * len(omega) - np.sum(live), 1)

@@ -79,10 +79,10 @@ def refracted_solution(
     local = float(profile.at(-pose.position[2]))
     sideways = beam[:, 1:] * (local / sound_speed)
     ahead = np.sqrt(np.maximum(1 - np.sum(sideways**2, axis=1), 0.0)) * np.where(beam[:, 0] < 0, -1.0, 1.0)
-    heard = unit(np.column_stack([ahead, sideways]))
-    closed = bistatic_range(local * delay, heard, source)
+    direction = unit(np.column_stack([ahead, sideways]))
+    closed = bistatic_range(local * delay, direction, source)
     array, snap = pose.position[None], pose.to_world(source)[None]
-    wanted = pose.turn_to_world(heard)
+    wanted = pose.turn_to_world(direction)
     v, r = wanted, closed.range
     direct = first_rays(profile, snap, array).travel_time[0]
     for _ in range(STEPS):

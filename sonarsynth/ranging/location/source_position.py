@@ -96,14 +96,14 @@ def bending_covariance(
     return covariance
 
 
-def place(wave: Wavefront, pulse: Pulse, known: SonarKnowledge, heard: Wavefront | None = None) -> SourceFix:
+def place(wave: Wavefront, pulse: Pulse, known: SonarKnowledge, bent: Wavefront | None = None) -> SourceFix:
     """Ranges and position from a wavefront, and the depth of the bottom where it agrees; errors through the Jacobians.
 
-    heard: the wave as the array hears it, where `wave` is the straight one that is left without bending. The direction
+    bent: the wave as the array hears it, where `wave` is the straight one that is left without bending. The direction
     is always that of the wave as heard.
     """
     elements, sonar, pose = known.elements, known.sonar, known.pose
-    heard = heard or wave
+    bent = bent or wave
     timing = lag_variance(wave, pulse, elements, known.rounding) * wave.covariance
     full = timing + np.outer(wave.by_sound_speed, wave.by_sound_speed) * sonar.sound_speed_error**2
     if not np.isfinite(full[2, 2]):  # too few sensors to tell the curvature: anything outside the array
@@ -113,7 +113,7 @@ def place(wave: Wavefront, pulse: Pulse, known: SonarKnowledge, heard: Wavefront
     from_depth = fall / slope if slope * fall > 0 else np.nan
     tilt = by_angle * (KINKED * known.kink * elements.aperture / sonar.assumed_sound_speed)
     straight, spread = full, full[:2, :2] + np.outer(tilt, tilt)
-    around = spread[0, 0] / max(1 - heard.direction[2] ** 2, 1e-300)
+    around = spread[0, 0] / max(1 - bent.direction[2] ** 2, 1e-300)
     fix = _fuse(wave, straight, fall, known)
     for _ in range(2 * (known.gradient > 0)):  # what bending does depends on the distance, and that a little on bending
         likely = [1 / fix.curvature if fix.curvature > 0 else np.nan, from_depth, elements.aperture]
@@ -139,7 +139,7 @@ def place(wave: Wavefront, pulse: Pulse, known: SonarKnowledge, heard: Wavefront
     return SourceFix(
         time=time,
         time_error=time_error,
-        direction=heard.direction,
+        direction=bent.direction,
         angle_error=np.sqrt([around, spread[1, 1]]),
         range_from_depth=(from_depth, float(depth_error) / abs(slope) if np.isfinite(from_depth) else np.nan),
         range_from_curvature=(from_curvature, curvature_error),

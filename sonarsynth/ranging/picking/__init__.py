@@ -17,7 +17,7 @@ __all__ = ["BeamAxis", "FirstEcho", "Peaks", "PickedEchoes", "Picking", "Picking
 class PickingMethod(Protocol):
     """Finds echoes in the beams of the echo window."""
 
-    def picks(self, heard: ReceivedWindow) -> PickedEchoes:
+    def picks(self, window: ReceivedWindow) -> PickedEchoes:
         """The echoes by the light of the first located snap, `heard.estimates[0]`, which there is."""
 
 

@@ -42,29 +42,29 @@ class AxisEchoes:
 
 
 def axis_echoes(
-    heard: ReceivedWindow,
+    window: ReceivedWindow,
     threshold: float,
     locality: float,
     change: Callable[[Profiles, AxisEchoes], AxisEchoes] = lambda _, echoes: echoes,
 ) -> PickedEchoes:
     """The loudest echo of each beam within `threshold` dB of the loudest beam, on its axis; `change`: of what is
     picked, before it is taken."""
-    beams, left_out = loudest_beams(heard.image, over_threshold(heard.image, threshold, heard.loudest))
+    beams, left_out = loudest_beams(window.image, over_threshold(window.image, threshold, window.loudest))
     if not len(beams[0]):
-        return no_echoes(heard.image, left_out)
-    profiles = range_profiles(heard, beams)
-    echoes = change(profiles, pick(profiles, heard.image, locality))
+        return no_echoes(window.image, left_out)
+    profiles = range_profiles(window, beams)
+    echoes = change(profiles, pick(profiles, window.image, locality))
     own = np.isfinite(echoes.delay)
     row, column = profiles.row[own], profiles.column[own]
     angle = echoes.angle_error[own]
     return PickedEchoes(
-        azimuth=heard.image.azimuth[column],
-        elevation=heard.image.elevation[row],
-        azimuth_error=angle / np.maximum(np.cos(heard.image.elevation[row]), 0.1),
+        azimuth=window.image.azimuth[column],
+        elevation=window.image.elevation[row],
+        azimuth_error=angle / np.maximum(np.cos(window.image.elevation[row]), 0.1),
         elevation_error=angle,
         delay=echoes.delay[own],
         delay_error=echoes.delay_error[own],
-        energy=heard.image.energy[row, column],
+        energy=window.image.energy[row, column],
         snr=echoes.snr[own],
         slope=np.full(len(angle), SLOPE),
         overflow=left_out,

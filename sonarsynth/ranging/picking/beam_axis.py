@@ -38,8 +38,8 @@ class BeamAxis(Method):
     locality: Annotated[Decibels, Ge(0)] = 3.0
     """A beam gives no point where one within a beam width holds this much more at the same delay: the echo is its."""
 
-    def picks(self, heard: ReceivedWindow) -> PickedEchoes:
+    def picks(self, window: ReceivedWindow) -> PickedEchoes:
         """See `PickingMethod`."""
         from sonarsynth.ranging.picking.axis_echoes import axis_echoes
 
-        return axis_echoes(heard, self.threshold, self.locality)
+        return axis_echoes(window, self.threshold, self.locality)

@@ -31,11 +31,11 @@ class FirstEcho(Method):
     share: Annotated[Number, Gt(0), Lt(1)] = 0.5
     """Of the power of the loudest echo in a beam, that is an echo too."""
 
-    def picks(self, heard: ReceivedWindow) -> PickedEchoes:
+    def picks(self, window: ReceivedWindow) -> PickedEchoes:
         """See `PickingMethod`."""
         from sonarsynth.ranging.picking.axis_echoes import axis_echoes
 
-        return axis_echoes(heard, self.threshold, self.locality, self._first)
+        return axis_echoes(window, self.threshold, self.locality, self._first)
 
     def _first(self, profiles: Profiles, loudest: AxisEchoes) -> AxisEchoes:
         """The first delay of each profile over the share, where the beam has an echo of its own at all."""

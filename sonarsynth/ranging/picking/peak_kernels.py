@@ -80,17 +80,17 @@ def _brought(
         late = delay[i] - delay[j]
         if far <= near or abs(late) > reach * far + lasting:
             continue
-        heard = np.zeros(bins, np.complex128)
+        response = np.zeros(bins, np.complex128)
         for q in range(sensors):
             x = position[q, 0] * apart[0] + position[q, 1] * apart[1] + position[q, 2] * apart[2] + late
             phasor = weight[q] * np.exp(2j * np.pi * frequency[0] * x)
             turn = np.exp(2j * np.pi * spacing * x)
             for k in range(bins):
-                heard[k] += phasor
+                response[k] += phasor
                 phasor *= turn
         total = 0j
         for k in range(bins):
-            total += taper[k] * heard[k]
+            total += taper[k] * response[k]
         brought += power[j] * (total.real**2 + total.imag**2) / whole**2
     return brought
 

@@ -55,17 +55,17 @@ UNKNOWN = 0.5
 
 
 def peak_echoes(
-    heard: ReceivedWindow, threshold: float, dynamic_range: float, false_alarms: float, side_lobes: float
+    window: ReceivedWindow, threshold: float, dynamic_range: float, false_alarms: float, side_lobes: float
 ) -> PickedEchoes:
     """The peaks of the beams about those over threshold that are echoes, see `Peaks`."""
-    image = heard.image
-    some = over_threshold(image, threshold, heard.loudest)
+    image = window.image
+    some = over_threshold(image, threshold, window.loudest)
     wide = maximum_filter(some, 2 * BESIDE + 1, mode="constant") & np.isfinite(image.energy)
     beams, left_out = loudest_beams(image, wide)
     if not len(beams[0]):
         return no_echoes(image, left_out)
-    profiles = range_profiles(heard, beams)
-    axes = Axes.of(heard, profiles)
+    profiles = range_profiles(window, beams)
+    axes = Axes.of(window, profiles)
     noise = noise_power(profiles, image)
     least = noise * peak_level(false_alarms, axes.sizes(profiles))
     power, index = profiles.power, np.full(image.energy.shape, -1)
@@ -73,9 +73,9 @@ def peak_echoes(
     b, t = _maxima(profiles, axes, index, least, dynamic_range, side_lobes)
     place, gain = _tops(power, index, beams, axes.resolved, b, t)
     height = power[b, t] * gain**2
-    energy = _energies(heard, profiles, axes, b, height)
-    keep = (height >= least[b]) & (energy > residue(image, heard.loudest))
-    keep[keep] = _own(heard, profiles, b[keep], t[keep], height[keep], noise[b[keep]])
+    energy = _energies(window, profiles, axes, b, height)
+    keep = (height >= least[b]) & (energy > residue(image, window.loudest))
+    keep[keep] = _own(window, profiles, b[keep], t[keep], height[keep], noise[b[keep]])
     b, t, place, height, energy = b[keep], t[keep], place[keep], height[keep], energy[keep]
     centre = power_centres(
         power, index, *beams, b, t, place, axes.step * axes.sharpness, CENTRE_WINDOW, NOISE_CLEAR * noise
@@ -112,11 +112,11 @@ def _maxima(
     return b[good], t[good]
 
 
-def _energies(heard: ReceivedWindow, profiles: Profiles, axes: Axes, b: Ints, height: Floats) -> Floats:
+def _energies(window: ReceivedWindow, profiles: Profiles, axes: Axes, b: Ints, height: Floats) -> Floats:
     """Energies (peak,) in Pa2 s: of a peak h exp(-(sharpness t)^2), as a share of all that is in its beam."""
     whole = profiles.step * profiles.power[b].sum(axis=1, dtype=float)
     share = height * np.sqrt(np.pi) / axes.sharpness[2] / whole
-    return np.asarray(np.minimum(share, 1.0) * heard.image.energy[profiles.row[b], profiles.column[b]])
+    return np.asarray(np.minimum(share, 1.0) * window.image.energy[profiles.row[b], profiles.column[b]])
 
 
 def _cut(power: npt.NDArray[np.float32], b: Ints, t: Ints, end: int) -> Bools:
@@ -137,13 +137,13 @@ class Axes:
     roughness: Floats  # (3,) standard deviation of the derivative of noise over that of noise, where an echo is
 
     @staticmethod
-    def of(heard: ReceivedWindow, profiles: Profiles) -> Axes:
+    def of(window: ReceivedWindow, profiles: Profiles) -> Axes:
         """Of the beams of an image."""
-        image, moments = heard.image, profiles.moments
+        image, moments = window.image, profiles.moments
         middle = float(np.mean(image.elevation[profiles.row])), float(np.mean(image.azimuth[profiles.column]))
         across = _tangents(*middle)
-        aperture = np.sqrt(np.einsum("ax,xy,ay->a", across, aperture_moments(heard.elements), across))  # m, rms
-        k = 2 * np.pi / heard.sonar.assumed_sound_speed
+        aperture = np.sqrt(np.einsum("ax,xy,ay->a", across, aperture_moments(window.elements), across))  # m, rms
+        k = 2 * np.pi / window.sonar.assumed_sound_speed
         return Axes(
             step=np.array([*_steps(image), profiles.step]),
             cells=np.array([*image.energy.shape, profiles.power.shape[1]]),
@@ -232,13 +232,13 @@ def _tops(
     return place, gain
 
 
-def _own(heard: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: Floats, noise: Floats) -> Bools:
+def _own(window: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: Floats, noise: Floats) -> Bools:
     """Whether peaks (peak,) are more than what the lobes of the array bring of louder ones."""
     loud = np.argsort(-height, kind="stable")
-    band, live = heard.sonar.band, np.flatnonzero(heard.elements.gain)
+    band, live = window.sonar.band, np.flatnonzero(window.elements.gain)
     taper = np.sin(np.pi * (np.arange(LOBE_BINS) + 0.5) / LOBE_BINS) ** 2
-    c = heard.sonar.assumed_sound_speed
-    position, rate = heard.elements.position[live], LOBE_STEPS * band.high
+    c = window.sonar.assumed_sound_speed
+    position, rate = window.elements.position[live], LOBE_STEPS * band.high
     steps = int(np.ceil((4.0 * farthest(position) / c + 2.0 / (band.high - band.low)) * rate)) + 2
     least = np.maximum(np.sqrt(height) - NOISE_ADDED * np.sqrt(noise), 0.0) ** 2  # without what noise may add
     own = np.empty(len(b), bool)
@@ -247,7 +247,7 @@ def _own(heard: ReceivedWindow, profiles: Profiles, b: Ints, t: Ints, height: Fl
         profiles.step * t[loud],
         height[loud],
         position,
-        live_gain(heard.elements.gain)[live],
+        live_gain(window.elements.gain)[live],
         np.linspace(band.low, band.high, LOBE_BINS),
         taper,
         2.0 * profiles.width / c,
@@ -264,5 +264,5 @@ def _lobe_table(low: float, high: float, rate: float, steps: int) -> Floats:
     """Sum (2, delay) over the band low to high (Hz), tapered, at delays in steps of 1/rate (Hz), `steps` either way."""
     taper = np.sin(np.pi * (np.arange(LOBE_BINS) + 0.5) / LOBE_BINS) ** 2
     turns = np.arange(-steps, steps + 1) / rate
-    heard = np.exp(2j * np.pi * np.outer(np.linspace(low, high, LOBE_BINS), turns)).T @ (taper / taper.sum())
-    return np.ascontiguousarray([heard.real, heard.imag])
+    response = np.exp(2j * np.pi * np.outer(np.linspace(low, high, LOBE_BINS), turns)).T @ (taper / taper.sum())
+    return np.ascontiguousarray([response.real, response.imag])

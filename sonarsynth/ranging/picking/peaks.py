@@ -51,8 +51,8 @@ class Peaks(Method):
         """As `Method.cost`: beams about one glint."""
         return RANGED_BEAMS * 70e-6
 
-    def picks(self, heard: ReceivedWindow) -> PickedEchoes:
+    def picks(self, window: ReceivedWindow) -> PickedEchoes:
         """See `PickingMethod`."""
         from sonarsynth.ranging.picking.peak_picking import peak_echoes
 
-        return peak_echoes(heard, self.threshold, self.dynamic_range, self.false_alarms, self.side_lobes)
+        return peak_echoes(window, self.threshold, self.dynamic_range, self.false_alarms, self.side_lobes)

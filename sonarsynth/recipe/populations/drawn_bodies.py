@@ -15,7 +15,7 @@ from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.motion import pose
 from sonarsynth.randomness import number, share, stream, uniforms
 from sonarsynth.receiver import elements
-from sonarsynth.recipe.populations.drawn_tracks import DRAWS, Span
+from sonarsynth.recipe.populations.drawn_tracks import DRAWS, SequenceTimes
 from sonarsynth.recipe.populations.population import Population
 from sonarsynth.recipe.populations.regions import SonarView
 from sonarsynth.recipe.variation.sobol_points import OF_VARIATIONS, sobol_shares
@@ -35,7 +35,7 @@ ABOVE_BOTTOM = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
+class DrawnBodies:
     """The bodies of a sequence."""
 
     targets: tuple[Target, ...]
@@ -79,7 +79,7 @@ class _MovingBox:
         return apart - other.radius
 
 
-def draw(scene: Scene, seed: int, key: int | str, repeat: tuple[str, int]) -> Drawn:
+def draw(scene: Scene, seed: int, key: int | str, repeat: tuple[str, int]) -> DrawnBodies:
     """The bodies of the populations of a scene, that of the sequence of a key.
 
     repeat: its grid point, and which repeat of that it is. Raises FieldError where a population has no room.
@@ -108,7 +108,7 @@ def draw(scene: Scene, seed: int, key: int | str, repeat: tuple[str, int]) -> Dr
                     f"no room for body {slot + 1} of {count} in {TRIES} tries: it needs a larger region, or fewer or "
                     "smaller bodies",
                 )
-    return Drawn(tuple(found), tried)
+    return DrawnBodies(tuple(found), tried)
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ class _Sea:
 
     def __init__(self, scene: Scene, times: Floats, others: list[_Ball | _MovingBox]) -> None:
         self.scene, self.times, self.others = scene, times, others
-        self.span = Span(float(times[0]), float(times[-1]))
+        self.span = SequenceTimes(float(times[0]), float(times[-1]))
         beams = scene.sonar.beams
         middle = pose(scene.trajectory.sonar, self.span.middle)
         self.view = SonarView(middle, beams.azimuth_span, beams.elevation_span)

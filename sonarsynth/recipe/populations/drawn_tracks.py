@@ -28,7 +28,7 @@ class Attitude:
 
 
 @dataclass(frozen=True)
-class Span:
+class SequenceTimes:
     """The times (s) of a sequence."""
 
     first: float
@@ -78,7 +78,7 @@ class Upright(_Ranges):
 
 
 @description
-class AnyWay:
+class AnyOrientation:
     """All orientations alike: evenly over rotations in space."""
 
     kind: Literal["any"] = "any"
@@ -90,7 +90,7 @@ class AnyWay:
         )
 
 
-Orientation = Annotated[Upright | AnyWay, BY_KIND]
+Orientation = Annotated[Upright | AnyOrientation, BY_KIND]
 
 
 @description
@@ -99,7 +99,7 @@ class AtRest:
 
     kind: Literal["at_rest"] = "at_rest"
 
-    def motion(self, place: Floats, attitude: Attitude, span: Span, draws: Floats) -> Motion:
+    def motion(self, place: Floats, attitude: Attitude, span: SequenceTimes, draws: Floats) -> Motion:
         """Through a place (xyz) m, in the middle of the sequence; draws: (`DRAWS`,) 0 to 1."""
         return Still(position=_position(place), **vars(attitude))
 
@@ -114,7 +114,7 @@ class StraightAhead(_Ranges):
     climb: tuple[MetresPerSecond, MetresPerSecond] = (0.0, 0.0)
     """How fast they rise; they stay level."""
 
-    def motion(self, place: Floats, attitude: Attitude, span: Span, draws: Floats) -> Motion:
+    def motion(self, place: Floats, attitude: Attitude, span: SequenceTimes, draws: Floats) -> Motion:
         """As `AtRest.motion`."""
         speed, climb = between(self.speed, draws[0]), between(self.climb, draws[1])
         course = ConstantVelocity(start=(0.0, 0.0, 0.0), speed=speed, climb=climb, **vars(attitude))
@@ -137,7 +137,7 @@ class Hovering(_Ranges):
     period: tuple[PositiveSeconds, PositiveSeconds] = (5.0, 10.0)
     """Of the swing, the same for all of a body's."""
 
-    def motion(self, place: Floats, attitude: Attitude, span: Span, draws: Floats) -> Motion:
+    def motion(self, place: Floats, attitude: Attitude, span: SequenceTimes, draws: Floats) -> Motion:
         """As `AtRest.motion`, about the place."""
         return Hover(
             position=_position(place),
@@ -165,7 +165,7 @@ class Wandering(_Ranges):
     turn: Annotated[Radians, Ge(0), Le(np.pi)]
     """By how much headings change from leg to leg, at most, to either side."""
 
-    def motion(self, place: Floats, attitude: Attitude, span: Span, draws: Floats) -> Motion:
+    def motion(self, place: Floats, attitude: Attitude, span: SequenceTimes, draws: Floats) -> Motion:
         """As `AtRest.motion`."""
         speed = between(self.speed, draws[0])
         legs = int(min(max(np.ceil((span.last - span.first) / self.leg), 1), 1000))

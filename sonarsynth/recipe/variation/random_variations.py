@@ -41,7 +41,7 @@ class Condition:
 
 
 @description
-class Drawn:
+class RandomVariation:
     """What every variation says."""
 
     path: Paths
@@ -54,7 +54,7 @@ class Drawn:
 
 
 @description
-class Ranged(Drawn):
+class NumberVariation(RandomVariation):
     """What every variation says that is a number."""
 
     like: Name | None = None
@@ -79,7 +79,7 @@ class Ranged(Drawn):
 
 
 @description
-class Uniform(Ranged):
+class Uniform(NumberVariation):
     """Evenly between two bounds."""
 
     kind: Literal["uniform"] = "uniform"
@@ -99,7 +99,7 @@ class Uniform(Ranged):
 
 
 @description
-class LogUniform(Ranged):
+class LogUniform(NumberVariation):
     """Between two bounds, evenly in the logarithm."""
 
     kind: Literal["log_uniform"] = "log_uniform"
@@ -116,13 +116,13 @@ class LogUniform(Ranged):
         return self
 
     def at(self, part: float) -> Plain:
-        """As `Ranged.at`."""
+        """As `NumberVariation.at`."""
         (low, unit), (high, _) = number_and_unit(self.low), number_and_unit(self.high)
         return with_unit(min(max(low * (high / low) ** part, low), high), unit)
 
 
 @description
-class Integers(Ranged):
+class Integers(NumberVariation):
     """Whole numbers, each equally often, both bounds included."""
 
     kind: Literal["integers"] = "integers"
@@ -138,12 +138,12 @@ class Integers(Ranged):
         return self
 
     def at(self, part: float) -> Plain:
-        """As `Ranged.at`."""
+        """As `NumberVariation.at`."""
         return Plain.of(min(self.low + int(part * (self.high - self.low + 1)), self.high))
 
 
 @description
-class Normal(Ranged):
+class Normal(NumberVariation):
     """A normal distribution, cut off at bounds where these are given (truncated: no draw lies outside)."""
 
     kind: Literal["normal"] = "normal"
@@ -199,12 +199,12 @@ class Normal(Ranged):
         return with_unit(value if high is None else min(high, value), unit)
 
     def share(self, seed: int, key: int | str, other: str | None) -> float:
-        """As `Ranged.share`; never 0, which has no score."""
+        """As `NumberVariation.share`; never 0, which has no score."""
         return super().share(seed, key, other) + (2.0**-54 if other is None else 0.0)
 
 
 @description
-class Choice(Drawn):
+class Choice(RandomVariation):
     """One of several values."""
 
     kind: Literal["choice"] = "choice"
@@ -236,7 +236,7 @@ class Choice(Drawn):
 
 
 @description
-class Sobol(Drawn):
+class Sobol(RandomVariation):
     """Evenly between two bounds, and more evenly than by chance: the repeats of a grid point share one Sobol sequence
     (Sobol 1967, directions of Joe and Kuo 2008), with a dimension for each variation of this kind, shifted at random
     (digital shift) for each grid point.

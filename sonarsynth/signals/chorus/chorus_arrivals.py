@@ -15,7 +15,7 @@ from sonarsynth.products.pulse_arrivals import PulseArrivals
 from sonarsynth.propagation.images import images
 from sonarsynth.propagation.reflections import Reflections, at_boundaries
 from sonarsynth.signals.pulse_sums.adding_pulses import CAVITY
-from sonarsynth.sources.chorus import ChorusSnaps, Listening
+from sonarsynth.sources.chorus import ChorusSnaps, ListeningWindow
 from sonarsynth.state import Medium, Receiver
 
 FAINT = 40.0
@@ -124,10 +124,10 @@ def image_heights(profile: Profile, bottom_depth: float, end: float, bounces: in
     return ImageHeights(height, mean, surface, bottom, turns)
 
 
-def listening(heights: ImageHeights, receiver: Receiver, window: tuple[float, float], reach: float) -> Listening:
+def listening(heights: ImageHeights, receiver: Receiver, window: tuple[float, float], reach: float) -> ListeningWindow:
     """What `draw_snaps` needs of an array and a window (s, since the start of the motions)."""
     slow, fast = 1.0 / float(heights.slowness.max()), 1.0 / float(heights.slowness.min())
-    return Listening(receiver.pose.position[:2], *window, reach, float(heights.climb.max()), slow, fast)
+    return ListeningWindow(receiver.pose.position[:2], *window, reach, float(heights.climb.max()), slow, fast)
 
 
 def reflected(

@@ -95,9 +95,9 @@ def chorus_pressure(
         )
     spectrum = rfft(out, axis=1)[:, : length // times // 2 + 1]
     spectrum *= _rest(sonar, length // times) / np.float32(times)
-    heard = irfft(spectrum, length // times, axis=1)[:, early : early + samples]
+    sound = irfft(spectrum, length // times, axis=1)[:, early : early + samples]
     pressure = np.empty((elements.count, samples), np.float32)
-    pressure[order] = heard
+    pressure[order] = sound
     return pressure * elements.gain[:, None].astype(np.float32)
 
 

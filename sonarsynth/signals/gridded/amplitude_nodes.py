@@ -25,8 +25,8 @@ def _basis(elements: Elements, aperture: float, terms: int) -> tuple[tuple[int, 
     value = aperture_terms(box_nodes(elements, (x, y, z)), aperture, terms).reshape(x, y, z, -1)
     for axis, n in enumerate((x, y, z)):
         value = np.moveaxis(np.tensordot(analysis(n), value, (1, axis)), 0, axis)
-    heard = np.linalg.qr(aperture_terms(elements.position, aperture, terms), mode="r") / np.sqrt(elements.count)
-    return (x, y, z), value.reshape(x * y * z, -1), heard
+    triangle = np.linalg.qr(aperture_terms(elements.position, aperture, terms), mode="r") / np.sqrt(elements.count)
+    return (x, y, z), value.reshape(x * y * z, -1), triangle
 
 
 def variation(front: ArrayPaths, elements: Elements) -> Floats:
@@ -37,11 +37,11 @@ def variation(front: ArrayPaths, elements: Elements) -> Floats:
     """
     if not front.amplitude_terms.shape[1]:
         return np.zeros((0, front.count))
-    shape, basis, heard = _basis(elements, front.aperture, front.amplitude_terms.shape[1])
+    shape, basis, triangle = _basis(elements, front.aperture, front.amplitude_terms.shape[1])
     terms = front.amplitude_terms.T.copy()
     terms[0] += 1.0
     rows = np.zeros((1 + 3 * DEGREES, front.count))
-    rows[0] = np.sqrt(((heard @ terms) ** 2).sum(axis=0))
+    rows[0] = np.sqrt(((triangle @ terms) ** 2).sum(axis=0))
     size = np.abs(basis @ terms).reshape(*shape, -1)
     for axis, n in enumerate(shape):
         others = tuple(a for a in range(3) if a != axis)

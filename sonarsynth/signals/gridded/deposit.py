@@ -107,9 +107,9 @@ def add_segment(
     )
     stage = Stage(aim, bins, origin, grid, samples * bins.step, dtype)
     spectra = np.zeros((elements.count, samples // 2 + 1), np.result_type(dtype, np.complex64))
-    heard = spectra.view(dtype)[:, 2 * bins.first : 2 * (bins.first + used)]
+    sensor_spectra = spectra.view(dtype)[:, 2 * bins.first : 2 * (bins.first + used)]
     for tile in tiles(front, aim):
-        _add_tile(heard, tile, front.select(tile.paths), stage)
+        _add_tile(sensor_spectra, tile, front.select(tile.paths), stage)
     begin, end = max(first, 0), min(first + samples, out.shape[1])
     piece = irfft(spectra, samples, axis=1, overwrite_x=True)[:, begin - first : end - first]
     if fresh:
@@ -118,11 +118,11 @@ def add_segment(
         out[:, begin:end] += piece
 
 
-def _add_tile(heard: npt.NDArray[Any], tile: Tile, part: ArrayPaths, stage: Stage) -> None:
-    """Add the spectra of a tile at the hydrophones to heard (sensor, re and im of bins)."""
+def _add_tile(sensor_spectra: npt.NDArray[Any], tile: Tile, part: ArrayPaths, stage: Stage) -> None:
+    """Add the spectra of a tile at the hydrophones to sensor_spectra (sensor, re and im of bins)."""
     from sonarsynth.signals.gridded.deposit_kernels import steer_back
 
-    elements, bins, dtype = stage.aim.elements, stage.bins, heard.dtype
+    elements, bins, dtype = stage.aim.elements, stage.bins, sensor_spectra.dtype
     points = tile.nodes(elements)
     alone = part.count == 1
     field = _alone(tile, part, points, stage) if alone else _deposited(tile, part, points, stage)
@@ -138,7 +138,7 @@ def _add_tile(heard: npt.NDArray[Any], tile: Tile, part: ArrayPaths, stage: Stag
     if onto is not None:
         field = onto @ field
     field = field.reshape(len(field), weight.shape[1], -1)
-    steer_back(field, column, weight, late * bins.step, gain, bins.first, heard)
+    steer_back(field, column, weight, late * bins.step, gain, bins.first, sensor_spectra)
 
 
 def _alone(tile: Tile, part: ArrayPaths, points: Floats, stage: Stage) -> npt.NDArray[Any]:

@@ -55,12 +55,12 @@ def draw(
         each = [(random.random((count, 2)), random.standard_normal((count, 2))) for _ in frequency[some]]
         even, normal = (np.stack(part) for part in zip(*each, strict=True))
         toward = pose.turn_to_body(drawn(directions.intensity, directions.edges, even))  # (bin, wave, xyz)
-        heard = (normal[..., 0] + 1j * normal[..., 1]) / np.sqrt(count)
-        heard *= element_directivity(frequency[some, None], toward, elements.face, sound_speed)
-        heard *= np.where(toward[..., 0] < 0.0, behind, 1.0)
+        amplitude = (normal[..., 0] + 1j * normal[..., 1]) / np.sqrt(count)
+        amplitude *= element_directivity(frequency[some, None], toward, elements.face, sound_speed)
+        amplitude *= np.where(toward[..., 0] < 0.0, behind, 1.0)
         along = np.swapaxes(toward @ elements.position.T, 1, 2)  # (bin, sensor, wave)
         turns = (wave_number[some, None, None] * along).astype(np.float32)
         phasors = np.empty(turns.shape, np.complex64)
         phasors.real, phasors.imag = np.cos(turns), np.sin(turns)  # the exponential takes ten times as long
-        out[:, some] = (phasors @ heard.astype(np.complex64)[..., None])[..., 0].T
+        out[:, some] = (phasors @ amplitude.astype(np.complex64)[..., None])[..., 0].T
     return out

@@ -86,7 +86,7 @@ def reverberation_pressure(
     order, _ = sensor_blocks(elements)
     lost = tuple(absorption(node_frequencies(sonar, FEWER)).tolist())
     modes = impulse_modes(sonar, elements.face, arrivals.sound_speed, lost)
-    heard = np.zeros((elements.count, count // 2 + 1), np.complex64)
+    total = np.zeros((elements.count, count // 2 + 1), np.complex64)
     for number in np.unique(emission):
         length = times * count
         flat = np.zeros(elements.count * (length + 1), np.float32)
@@ -98,9 +98,9 @@ def reverberation_pressure(
         )  # fmt: skip
         spectrum = rfft(flat.reshape(elements.count, -1)[:, :length], axis=1)[:, : count // 2 + 1]
         _, pulse = pulse_spectrum(snaps[number].waveform, sonar.antialias, rate, count)
-        heard += spectrum * (pulse * rate / _response(sonar, count)).astype(np.complex64)
+        total += spectrum * (pulse * rate / _response(sonar, count)).astype(np.complex64)
     pressure = np.empty((elements.count, samples), np.float32)
-    pressure[order] = irfft(heard, count, axis=1)[:, early : early + samples]
+    pressure[order] = irfft(total, count, axis=1)[:, early : early + samples]
     return pressure * elements.gain[:, None].astype(np.float32)
 
 

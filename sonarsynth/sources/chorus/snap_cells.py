@@ -39,7 +39,7 @@ class Draw(IntEnum):
     CLUSTER_TIME = 11
 
 
-class Listening(NamedTuple):
+class ListeningWindow(NamedTuple):
     """Who hears what."""
 
     place: Floats  # (xy) m of the array, world
@@ -77,7 +77,7 @@ class ChorusSnaps:
         return ChorusSnaps(**{name: value[keep] for name, value in vars(self).items()})
 
 
-def draw_snaps(chorus: Chorus, seed: int, listening: Listening) -> ChorusSnaps:
+def draw_snaps(chorus: Chorus, seed: int, listening: ListeningWindow) -> ChorusSnaps:
     """The snaps that may be heard; seed: `randomness.number` of the sequence.
 
     All that are within reach and sound between the earliest and the latest time that the window can hear them from
@@ -104,8 +104,8 @@ def draw_snaps(chorus: Chorus, seed: int, listening: Listening) -> ChorusSnaps:
         time = time + clusters.duration * drawn(Draw.CLUSTER_TIME)
     away = np.hypot(*(place - listening.place).T)
     early = listening.start - np.hypot(away, listening.longer) / listening.slowest
-    heard = (away <= listening.reach) & (time >= early) & (time <= listening.stop - away / listening.fastest)
-    key, place, time = key[heard], place[heard], time[heard]
+    audible = (away <= listening.reach) & (time >= early) & (time <= listening.stop - away / listening.fastest)
+    key, place, time = key[audible], place[audible], time[audible]
     return ChorusSnaps(
         place=place,
         time=time,
@@ -117,7 +117,7 @@ def draw_snaps(chorus: Chorus, seed: int, listening: Listening) -> ChorusSnaps:
     )
 
 
-def _cells(chorus: Chorus, listening: Listening) -> Ints:
+def _cells(chorus: Chorus, listening: ListeningWindow) -> Ints:
     """Cells (cell, xyt) that may hold what is heard, in order."""
     spread, lasts = (0.0, 0.0) if chorus.clusters is None else (chorus.clusters.radius, chorus.clusters.duration)
     reach = listening.reach + spread

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from zarr.core.buffer import Buffer, BufferPrototype
 
 
-class Guarded(LocalStore):
+class GuardedReads(LocalStore):
     """Reads what is within its root."""
 
     async def get(

@@ -29,13 +29,13 @@ LEASE: Final = 60.0
 """Seconds without a renewal after which a lock is nobody's."""
 
 
-class Taken(RuntimeError):
+class LeaseHeld(RuntimeError):
     """Someone else holds the lock; str() names the holder."""
 
 
 @contextmanager
 def leased(file: Remote, lease: float = LEASE, renewed: float = RENEWED) -> Iterator[str]:
-    """Hold a lock; gives the name of this build. Raises Taken, and Unreachable where it cannot be written."""
+    """Hold a lock; gives the name of this build. Raises LeaseHeld, and Unreachable where it cannot be written."""
     name = uuid.uuid4().hex
     _take(file, name, lease)
     ended = threading.Event()
@@ -73,11 +73,11 @@ def _take(file: Remote, name: str, lease: float) -> None:
             _wait_out(file, found, lease)
         file.unlink(missing_ok=True)
     if holder(file) != name:  # two took over at once
-        raise Taken("another process")
+        raise LeaseHeld("another process")
 
 
 def _wait_out(file: Remote, found: dict[str, Any], lease: float) -> None:
-    """Wait until a lock is not renewed any more. Raises Taken as soon as it is."""
+    """Wait until a lock is not renewed any more. Raises LeaseHeld as soon as it is."""
     until = time.monotonic() + lease
     while time.monotonic() < until:
         time.sleep(min(1.0, lease / 10))
@@ -85,7 +85,7 @@ def _wait_out(file: Remote, found: dict[str, Any], lease: float) -> None:
         if not now:
             return
         if now != found:
-            raise Taken(_named(now))
+            raise LeaseHeld(_named(now))
 
 
 def _keep(file: Remote, name: str, renewed: float, ended: threading.Event) -> None:

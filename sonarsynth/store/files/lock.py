@@ -26,11 +26,11 @@ WAIT: Final = 60.0
 """Seconds that a build waits for a writer of an earlier one."""
 
 
-class Locked(RuntimeError):
+class StoreLocked(RuntimeError):
     """Another build holds the store; str() is one line."""
 
 
-class Ended(RuntimeError):
+class BuildEnded(RuntimeError):
     """The build that a shard was to be written for has ended; str() is one line."""
 
 
@@ -38,7 +38,7 @@ class Ended(RuntimeError):
 def lock(store: Folder | str, *, wait: float = WAIT) -> Iterator[str]:
     """Hold a store for building; gives the name of this build, which its writers must know.
 
-    Raises Locked when someone else does, or when a writer of an earlier build has not ended after `wait` seconds;
+    Raises StoreLocked when someone else does, or when a writer of an earlier build has not ended after `wait` seconds;
     Mismatch where a link or no plain file is in the place of the lock, OSError when the folder cannot be written,
     Unreachable where a URL cannot.
     """
@@ -48,8 +48,8 @@ def lock(store: Folder | str, *, wait: float = WAIT) -> Iterator[str]:
         try:
             with lease.leased(file) as name:
                 yield name
-        except lease.Taken as taken:
-            raise Locked(f"{store} is being built by {taken}") from None
+        except lease.LeaseHeld as taken:
+            raise StoreLocked(f"{store} is being built by {taken}") from None
         return
     file.parent.mkdir(parents=True, exist_ok=True)
     handle = _take(file)
@@ -86,7 +86,7 @@ def held_by(store: Folder | str) -> str:
 
 @contextmanager
 def shared_lock(store: Folder | str, build: str) -> Iterator[Callable[[], None]]:
-    """Keep the next build waiting while a shard is written for this one. Raises Ended where this one has ended.
+    """Keep the next build waiting while a shard is written for this one. Raises BuildEnded where this one has ended.
 
     Gives what is to be called before the mark is written, which raises Ended where it has ended meanwhile.
     """
@@ -94,7 +94,7 @@ def shared_lock(store: Folder | str, build: str) -> Iterator[Callable[[], None]]
 
     def still() -> None:
         if _holder(store) != build:
-            raise Ended(f"{store}: the build that this shard is for has ended")
+            raise BuildEnded(f"{store}: the build that this shard is for has ended")
 
     file = beside(store, "writers")
     if isinstance(file, Remote):
@@ -125,9 +125,9 @@ def _wait_for_writers(held: Path, wait: float) -> None:
     while file.exists():
         try:
             handle = _take(file)
-        except Locked:
+        except StoreLocked:
             if time.monotonic() > until:
-                raise Locked(
+                raise StoreLocked(
                     f"{held.with_suffix('')}: a worker of an earlier build is still writing: end it first"
                 ) from None
             time.sleep(0.05)
@@ -140,7 +140,7 @@ def _drop_writers(held: Path) -> None:
     """Remove the file of the writers, if none is left."""
     file = held.with_suffix(".writers")
     if file.exists():
-        with suppress(Locked):
+        with suppress(StoreLocked):
             handle = _take(file)
             file.unlink(missing_ok=True)
             os.close(handle)
@@ -155,7 +155,7 @@ def _take(file: Path, how: int = fcntl.LOCK_EX | fcntl.LOCK_NB) -> int:
         except BlockingIOError:
             holder = _who(handle)
             os.close(handle)
-            raise Locked(f"{file.with_suffix('')} is being built by {holder}") from None
+            raise StoreLocked(f"{file.with_suffix('')} is being built by {holder}") from None
         except BaseException:
             os.close(handle)
             raise

@@ -17,14 +17,14 @@ from pathlib import Path
 from typing import Any, Final
 
 from sonarsynth.store.files import within
-from sonarsynth.store.files.guarded import Guarded
+from sonarsynth.store.files.guarded import GuardedReads
 from sonarsynth.store.files.remote import Remote
-from sonarsynth.store.files.within import Held
+from sonarsynth.store.files.within import OpenedFolder
 
 Folder = Path | Remote
 """A place of a store, or of something in it."""
 
-Opened = Path | Held | Remote
+Opened = Path | OpenedFolder | Remote
 """A store that is read or written, by its name or held."""
 
 FileRecord = tuple[int, str]
@@ -113,7 +113,7 @@ def opens(folder: Folder) -> Any:
     """What zarr and xarray open, to read: Zarr 3 alone, and of a disk no link."""
     if isinstance(folder, Remote):
         return folder.zarr_store()
-    return Guarded(folder, read_only=True)
+    return GuardedReads(folder, read_only=True)
 
 
 def read(folder: Opened, name: str) -> bytes:

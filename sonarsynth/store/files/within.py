@@ -28,7 +28,7 @@ class Mismatch(ValueError):
 
 
 @dataclass(frozen=True)
-class Held:
+class OpenedFolder:
     """A folder that was opened: it stays the same one wherever it is moved, and whatever takes its name."""
 
     path: Path
@@ -45,16 +45,16 @@ class Held:
             return False
 
 
-Root = Path | Held
+Root = Path | OpenedFolder
 """Where files are: by the name of a folder, or a folder that is held."""
 
 
 @contextmanager
-def held(root: Path) -> Iterator[Held]:
+def held(root: Path) -> Iterator[OpenedFolder]:
     """Hold a folder: what is read and written in it meanwhile is all in the same one. Raises OSError."""
     handle = _open(None, str(root), _FOLDER, str(root))
     try:
-        yield Held(root, handle)
+        yield OpenedFolder(root, handle)
     finally:
         os.close(handle)
 
@@ -170,7 +170,7 @@ def folder_of(root: Root, name: str, *, make: bool = False) -> Iterator[tuple[in
 @contextmanager
 def _walked(root: Root, folders: Sequence[str], make: bool = False) -> Iterator[int]:
     """A handle of a folder in `root`, made where it is to be."""
-    handle = os.dup(root.handle) if isinstance(root, Held) else _open(None, str(root), _FOLDER, str(root))
+    handle = os.dup(root.handle) if isinstance(root, OpenedFolder) else _open(None, str(root), _FOLDER, str(root))
     where = str(root)
     try:
         for part in folders:

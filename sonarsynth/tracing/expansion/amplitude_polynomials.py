@@ -18,7 +18,7 @@ SILENT = 1e-20
 """Amplitude under which an echo is none: of the loudest snap, 100 dB under 1 uPa. Errors are not relative to less."""
 
 
-class Varying(Protocol):
+class FacetBlock(Protocol):
     """Echoes of a block of facets."""
 
     @property
@@ -46,7 +46,7 @@ class Varying(Protocol):
         ...
 
 
-def variations(blocks: Sequence[Varying]) -> tuple[list[Floats], float]:
+def variations(blocks: Sequence[FacetBlock]) -> tuple[list[Floats], float]:
     """Polynomials (echo, term) of the amplitude over the aperture for echoes of each block, and the error of all.
 
     The second degree serves where it errs by no more than `Tolerances.quadratic`.
@@ -57,7 +57,7 @@ def variations(blocks: Sequence[Varying]) -> tuple[list[Floats], float]:
     )
 
 
-def _fitted(blocks: Sequence[Varying], few: int | None) -> tuple[list[Floats], float]:
+def _fitted(blocks: Sequence[FacetBlock], few: int | None) -> tuple[list[Floats], float]:
     terms, worst, loudest = [], 0.0, 0.0
     for block in blocks:
         law, gain = block.over(few)

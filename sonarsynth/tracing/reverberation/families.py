@@ -17,7 +17,7 @@ from sonarsynth.sources.sound_source import Emission
 from sonarsynth.state import Medium, Receiver
 from sonarsynth.tracing.reverberation.cells import Cells, cells_about, side_for
 from sonarsynth.tracing.reverberation.geometry_of_paths import ScatteredPaths, back_ways, out_ways, scattered_paths
-from sonarsynth.tracing.reverberation.ways import Way
+from sonarsynth.tracing.reverberation.ways import UnfoldedPaths
 
 STEP = 0.5e-3
 """s: time in which what arrives is counted."""
@@ -26,7 +26,7 @@ FAINT, UNDER_NOISE = 40.0, 10.0
 beam, even if all of it came from one direction."""
 
 
-class Listening(NamedTuple):
+class ReverberationWindow(NamedTuple):
     """What is listened for."""
 
     start: float  # s: of the record, after the instant of the frame
@@ -51,7 +51,11 @@ class Family(NamedTuple):
 
 
 def all_families(
-    described: Reverberation, snaps: tuple[Emission, ...], medium: Medium, receiver: Receiver, listening: Listening
+    described: Reverberation,
+    snaps: tuple[Emission, ...],
+    medium: Medium,
+    receiver: Receiver,
+    listening: ReverberationWindow,
 ) -> Iterator[Family]:
     """Of all snaps that light, by everything that scatters: those that send anything within the record."""
     fastest = float(medium.profile.speed.max())
@@ -76,7 +80,7 @@ def _of_owner(
     cells: Cells,
     medium: Medium,
     receiver: Receiver,
-    listening: Listening,
+    listening: ReverberationWindow,
 ) -> Iterator[Family]:
     spare = spare_time(cells, medium)
     end = end_depths(cells.middle, owner)
@@ -105,10 +109,10 @@ def end_depths(place: Floats, owner: str) -> Floats:
     return np.asarray(depth(place if owner == "volume" else place[:1]), float)
 
 
-def _name(owner: str, out: Way, back: Way) -> str:
+def _name(owner: str, out: UnfoldedPaths, back: UnfoldedPaths) -> str:
     """A family in words."""
 
-    def by(way: Way) -> str:
+    def by(way: UnfoldedPaths) -> str:
         many = {"surface": way.surface, "bottom": way.bottom}
         return " and ".join(f"{name} {count}" if count > 1 else name for name, count in many.items() if count)
 
@@ -142,22 +146,22 @@ def site_of(owner: str, medium: Medium, frequency: float) -> BoundarySite:
     )
 
 
-def expected_counts(heard: list[Family], listening: Listening, bins: int) -> list[Floats]:
+def expected_counts(families: list[Family], listening: ReverberationWindow, bins: int) -> list[Floats]:
     """How many scatterers each cell of each family has, on average.
 
     As the root of what it sends, so that those of quiet directions are quiet too. Of so many (i) with energies e the
     spread of intensities is sum e^1.5 sum e^0.5/(sum e)^2: those that arrive together are as many as that takes.
     """
     many = scatterers_per_pulse(listening.speckle) * listening.bandwidth * STEP
-    which = [time_bins(f.paths.delay, listening, bins) for f in heard]
+    which = [time_bins(f.paths.delay, listening, bins) for f in families]
     whole, steep = np.zeros(bins), np.zeros(bins)
-    for f, b in zip(heard, which, strict=True):
+    for f, b in zip(families, which, strict=True):
         np.add.at(whole, b, f.energy)
         np.add.at(steep, b, f.energy**1.5)
     each = many * np.divide(steep, whole**2, out=np.zeros(bins), where=whole > 0.0)
-    return [each[b] * np.sqrt(f.energy) for f, b in zip(heard, which, strict=True)]
+    return [each[b] * np.sqrt(f.energy) for f, b in zip(families, which, strict=True)]
 
 
-def time_bins(delay: Floats, listening: Listening, bins: int) -> Ints:
+def time_bins(delay: Floats, listening: ReverberationWindow, bins: int) -> Ints:
     """Numbers (...) of the steps of time that delays (...) fall in; those outside in the first or the last."""
     return np.clip(((delay - listening.start) / STEP).astype(np.int64), 0, bins - 1)

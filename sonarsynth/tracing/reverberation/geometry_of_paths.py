@@ -11,7 +11,7 @@ from sonarsynth.environment.boundary_numbers import coefficient
 from sonarsynth.equations.reverberation.bottom_strength import Angles
 from sonarsynth.sources.sound_source import Emission
 from sonarsynth.state import Medium, Receiver
-from sonarsynth.tracing.reverberation.ways import Way, ways
+from sonarsynth.tracing.reverberation.ways import UnfoldedPaths, ways
 
 NEAREST = 0.1
 """m: scatterers nearer than this to source or array are as loud as there."""
@@ -43,18 +43,18 @@ class ScatteredPaths:
         return np.asarray(self.amplitude**2 * self.absorbed)
 
 
-def out_ways(medium: Medium, emission: Emission, end: Floats, bounces: int, owner: str) -> list[Way]:
+def out_ways(medium: Medium, emission: Emission, end: Floats, bounces: int, owner: str) -> list[UnfoldedPaths]:
     """From an emission to depths end (point,)."""
     return ways(medium.profile, medium.depth, float(depth(emission.position)), end, bounces, owner)
 
 
-def back_ways(medium: Medium, receiver: Receiver, end: Floats, bounces: int, owner: str) -> list[Way]:
+def back_ways(medium: Medium, receiver: Receiver, end: Floats, bounces: int, owner: str) -> list[UnfoldedPaths]:
     """From the array to the same."""
     return ways(medium.profile, medium.depth, float(depth(receiver.pose.position)), end, bounces, owner)
 
 
 def scattered_paths(
-    place: Floats, emission: Emission, medium: Medium, receiver: Receiver, out: Way, back: Way
+    place: Floats, emission: Emission, medium: Medium, receiver: Receiver, out: UnfoldedPaths, back: UnfoldedPaths
 ) -> ScatteredPaths:
     """Paths by places (point, xyz) m. The array is where it is when they arrive."""
     velocity = np.zeros(3) if receiver.track is None else receiver.track.velocity
@@ -93,7 +93,7 @@ def scattered_paths(
     )
 
 
-def _reflected(medium: Medium, way: Way, sine: Floats, frequency: float) -> Floats | float:
+def _reflected(medium: Medium, way: UnfoldedPaths, sine: Floats, frequency: float) -> Floats | float:
     """Modulus (point,) of the mirror reflections on a way: what roughness takes from them still comes, from about the
     mirror point."""
     if not way.bounces:

@@ -19,7 +19,7 @@ from sonarsynth.tracing.reverberation.families import (
     STEP,
     UNDER_NOISE,
     Family,
-    Listening,
+    ReverberationWindow,
     all_families,
     end_depths,
     expected_counts,
@@ -65,7 +65,7 @@ def reverberation_arrivals(
     snaps: tuple[Emission, ...],
     medium: Medium,
     receiver: Receiver,
-    listening: Listening,
+    listening: ReverberationWindow,
     seed: int,
     key: int | str,
 ) -> ReverberationArrivals:
@@ -86,27 +86,27 @@ def reverberation_arrivals(
         return rates
 
     whole = rate(families)
-    heard, left_out = list[Family](), list[tuple[str, float]]()
+    audible, left_out = list[Family](), list[tuple[str, float]]()
     names = tuple(dict.fromkeys(f.name for f in families))
     for name in names:
         some = [f for f in families if f.name == name]
         own = rate(some)
         if (own > np.maximum(10.0 ** (-FAINT / 10.0) * whole, 10.0 ** (-UNDER_NOISE / 10.0) * listening.noise)).any():
-            heard += some
+            audible += some
         elif own.any():
             left_out.append((name, float(10.0 * np.log10(own.sum() / whole.sum()))))
-    expected = expected_counts(heard, counted, bins)
+    expected = expected_counts(audible, counted, bins)
     total = sum(float(x.sum()) for x in expected)
     if total > MOST:
         raise ValueError(
             f"reverberation needs {total:.2g} scatterers a frame, more than {MOST}: raise accuracy.speckle"
         )
     parts = [_drawn(described, f, x, snaps, medium, receiver, listening, number(seed, f.owner, key))
-             for f, x in zip(heard, expected, strict=True)]  # fmt: skip
-    return _joined(parts, heard, names, tuple(left_out), receiver.pose.rotation, receiver.speed(medium))
+             for f, x in zip(audible, expected, strict=True)]  # fmt: skip
+    return _joined(parts, audible, names, tuple(left_out), receiver.pose.rotation, receiver.speed(medium))
 
 
-class _Drawn(NamedTuple):
+class _DrawnScatterers(NamedTuple):
     """Scatterers of a family."""
 
     paths: ScatteredPaths
@@ -122,9 +122,9 @@ def _drawn(
     snaps: tuple[Emission, ...],
     medium: Medium,
     receiver: Receiver,
-    listening: Listening,
+    listening: ReverberationWindow,
     seed: int,
-) -> _Drawn:
+) -> _DrawnScatterers:
     some = np.flatnonzero(expected > 0.0)
     cells = Cells(family.cells.key[some], family.cells.low[some], family.cells.size)
     count = counts(seed, cells, expected[some])
@@ -138,12 +138,12 @@ def _drawn(
     turn = np.where(np.floor(sign * 2.0 ** (4 + 5 * family.out + family.back)) % 2.0, -1.0, 1.0)
     energy = cross * paths.flux * listening.sent[family.emission]
     keep = np.flatnonzero((energy > 0.0) & (paths.delay > listening.start) & (paths.delay < listening.stop))
-    return _Drawn(paths, turn * np.sqrt(cross) * paths.amplitude, energy, keep)
+    return _DrawnScatterers(paths, turn * np.sqrt(cross) * paths.amplitude, energy, keep)
 
 
 def _joined(
-    parts: list[_Drawn],
-    heard: list[Family],
+    parts: list[_DrawnScatterers],
+    families: list[Family],
     names: tuple[str, ...],
     left_out: tuple[tuple[str, float], ...],
     rotation: Floats,
@@ -164,8 +164,8 @@ def _joined(
         delay_std=none,
         sound_speed=sound_speed,
         lit_from=joined([p.out for p in paths]),
-        emission=np.repeat([f.emission for f in heard], count).astype(np.int64),
-        family=np.repeat([names.index(f.name) for f in heard], count).astype(np.int64),
+        emission=np.repeat([f.emission for f in families], count).astype(np.int64),
+        family=np.repeat([names.index(f.name) for f in families], count).astype(np.int64),
         energy=joined([p.energy for p in parts]),
         families=names,
         left_out=left_out,

@@ -14,7 +14,7 @@ from sonarsynth.propagation.images import images
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class UnfoldedPaths:
     """From a point to points (point,), unfolded; a single value stands for all of them."""
 
     surface: int  # reflections
@@ -33,7 +33,9 @@ def _water(profile: Profile, bottom_depth: float) -> Water:
     return water(profile.depth, profile.speed, bottom_depth)
 
 
-def ways(profile: Profile, bottom_depth: float, start: float, end: Floats, bounces: int, owner: str) -> list[Way]:
+def ways(
+    profile: Profile, bottom_depth: float, start: float, end: Floats, bounces: int, owner: str
+) -> list[UnfoldedPaths]:
     """All ways from depth start (m) to depths end (point,) by at most so many reflections, the straight one first.
 
     To the bottom those that arrive from above, to the surface from below: a reflection there is none before it.
@@ -56,5 +58,5 @@ def ways(profile: Profile, bottom_depth: float, start: float, end: Floats, bounc
         crossed = image.above * above + image.between * between + image.below * below
         all_of_it = image.above + image.between + image.below
         slowness = np.where(all_of_it > 1e-9, crossed / np.maximum(all_of_it, 1e-9), between)
-        found.append(Way(image.surface, image.bottom, image.climb, slowness))
+        found.append(UnfoldedPaths(image.surface, image.bottom, image.climb, slowness))
     return found

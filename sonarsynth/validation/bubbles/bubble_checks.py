@@ -17,7 +17,7 @@ import numpy as np
 from sonarsynth.conventions import REFERENCE_PRESSURE, Floats
 from sonarsynth.equations.bubble import bubble_collapse, bubble_pulse, pulses
 from sonarsynth.equations.bubble.bubble_collapse import Cavity, Collapse
-from sonarsynth.validation.references.bubble_series import Exact, exact_bubble
+from sonarsynth.validation.references.bubble_series import ExactCollapse, exact_bubble
 from sonarsynth.validation.validation_rows import Row
 
 RADIUS, DEPTH = 3.5e-3, 5.0  # m
@@ -59,7 +59,7 @@ def described(gas: float, depth: float = DEPTH, *, compressible: bool = True, co
 
 
 @cache
-def exact(cavity: Cavity) -> Exact:
+def exact(cavity: Cavity) -> ExactCollapse:
     """A bubble and its rebound to many digits, kept: a second each."""
     return exact_bubble(cavity)
 
@@ -118,12 +118,12 @@ def series_rows(case: str, found: Collapse, cost: float) -> Iterator[Row]:
     yield row(case, SERIES, "collapse time", "1", 0.1 * TOLERANCE, found.collapse_time / first - 1.0, cost, found)
     got = (again.time + found.collapse_time, again.radius)
     yield row(case, SERIES, "rebound", "1", TOLERANCE, worst(got, (last, high)), cost, found)
-    heard, own = waveform(exact_spectrum(best)), waveform(spectrum(found))
-    miss = np.abs(heard - own).max() / np.abs(heard).max()
+    expected, own = waveform(exact_spectrum(best)), waveform(spectrum(found))
+    miss = np.abs(expected - own).max() / np.abs(expected).max()
     yield row(case, SERIES, "waveform below 200 kHz", "of peak", 1e-8, miss, cost, found)
 
 
-def exact_spectrum(best: Exact) -> np.ndarray:
+def exact_spectrum(best: ExactCollapse) -> np.ndarray:
     """Spectrum (Pa s) of a bubble and its rebound at HERTZ, from the collapse on: a sum over the series' nodes."""
     time = best.node - best.times[0]
     return np.asarray(np.exp(-2j * np.pi * np.outer(HERTZ, time)) @ (best.weight * best.pressure))

@@ -75,9 +75,9 @@ def _solved_or_refused(gas: float, depth: float) -> Iterator[Row]:
     yield row(case, SERIES, "smallest radius", "1", TOLERANCE, found.minimum_radius / best.radii[0] - 1.0, cost, found)
     miss = found.collapse_time / best.times[0] - 1.0
     yield row(case, SERIES, "collapse time", "1", 0.1 * TOLERANCE, miss, cost, found)
-    heard, own = waveform(exact_spectrum(best)), waveform(spectrum(found))
+    expected, own = waveform(exact_spectrum(best)), waveform(spectrum(found))
     for quantity, bound, error in (
-        ("waveform below 200 kHz", 1e-8, np.abs(heard - own).max()),
-        ("peak below 200 kHz", 1e-8, heard.max() - own.max()),
+        ("waveform below 200 kHz", 1e-8, np.abs(expected - own).max()),
+        ("peak below 200 kHz", 1e-8, expected.max() - own.max()),
     ):
-        yield row(case, SERIES, quantity, "of peak", bound, error / np.abs(heard).max(), cost, found)
+        yield row(case, SERIES, quantity, "of peak", bound, error / np.abs(expected).max(), cost, found)

@@ -20,7 +20,7 @@ from sonarsynth.state import FrameContext, Medium, Receiver
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.targets.target import base_mesh
-from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, together
+from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off, together
 from sonarsynth.validation.extremes.plain_scenes import POSE, PROFILE, WATER, C, body, snap, traced, transfer
 
 ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
@@ -50,7 +50,7 @@ def echo(law: FacetLaw, mesh: Mesh, radius: float, frequency: Floats) -> Floats:
     return np.full(len(frequency), 10.0 * np.log10(float((found.amplitude**2).sum()) * far**4))
 
 
-def _law(law: MirrorLobe | Kirchhoff) -> Got:
+def _law(law: MirrorLobe | Kirchhoff) -> CaseResult:
     """Each sphere is as exact as the law says without a word, or as far off as its note says."""
     soft = isinstance(law, Kirchhoff) and law.surface == "soft"
     boundary: Literal["rigid", "soft"] = "soft" if soft else "rigid"
@@ -71,7 +71,7 @@ def _law(law: MirrorLobe | Kirchhoff) -> Got:
     return together(*parts)
 
 
-def _isotropic() -> Got:
+def _isotropic() -> CaseResult:
     """Whatever the size: a strength for each facet that is lit and seen, and a note that it is no body's."""
     law, parts = Isotropic(strength=0.01), []
     for radius, low in SPHERES:
@@ -84,7 +84,7 @@ def _isotropic() -> Got:
     return together(parts)
 
 
-def _bearings() -> Got:
+def _bearings() -> CaseResult:
     """Bounds within the view, mirrored with the bearing, none exactly where a flag says so."""
     beams, mesh = BeamGrid(azimuths=3, elevations=3), mesh_of(Box(size=(0.5, 3.0, 1.0)))
     receiver = Receiver(POSE, elements(Romanis()), Sonar(beams=beams))

@@ -11,7 +11,7 @@ from scipy.special import betaincinv, boxcox
 from sonarsynth.equations.bubble import bubble_collapse
 from sonarsynth.equations.bubble.bubble_collapse import Cavity
 from sonarsynth.sources.snap_models import KellerMiksis
-from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, refused, together
+from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off, refused, together
 
 RADIUS = 3.5e-3
 EMPTY = Cavity(RADIUS, 0.0, 1e5, 0.0, 0.0, 0.0, 1000.0, compressible=False)
@@ -19,7 +19,7 @@ UNIT = RADIUS * np.sqrt(EMPTY.density / EMPTY.ambient_pressure)  # s
 WHOLE = float(np.sqrt(np.pi / 6.0) * gamma(5.0 / 6.0) / gamma(4.0 / 3.0))
 
 
-def _rayleigh() -> Got:
+def _rayleigh() -> CaseResult:
     """To the last billionth of the time: the radius over R0 is that of the incomplete beta function."""
     found = bubble_collapse.collapse(EMPTY, 0, 1e-13)
     before = np.geomspace(1e-9, 0.9, 30)
@@ -33,7 +33,7 @@ def _rayleigh() -> Got:
     )
 
 
-def _energy() -> Got:
+def _energy() -> CaseResult:
     """Without friction and tension the work of the drive is in the gas where the wall turns."""
     parts = []
     for gas in (1e-3, 1.0, 1e3, 1e4, 5e4):
@@ -53,7 +53,7 @@ def _energy() -> Got:
     return together(*parts)
 
 
-def _impulse() -> Got:
+def _impulse() -> CaseResult:
     """The pressure is the slope of rho R^2 R', through the collapse: its integral, by the wall's own speed."""
     found = bubble_collapse.collapse(
         EMPTY._replace(gas_pressure=10.0, vapour_pressure=0.0, compressible=True), 0, 1e-11
@@ -71,7 +71,7 @@ def _impulse() -> Got:
     )
 
 
-def _gas_free() -> Got:
+def _gas_free() -> CaseResult:
     return together(
         refused(lambda: KellerMiksis(gas_pressure=0.0).pulse(5.0, 110e3), "nothing stops"),
         refused(lambda: KellerMiksis(gas_pressure=0.01).collapse(5.0), "largest_mach"),
@@ -81,7 +81,7 @@ def _gas_free() -> Got:
     )
 
 
-def _any_size() -> Got:
+def _any_size() -> CaseResult:
     """Times and radii scale with the radius where friction and tension are nothing."""
     base, parts = EMPTY._replace(gas_pressure=1e3), []
     one = bubble_collapse.collapse(base)

@@ -21,7 +21,7 @@ from sonarsynth.recipe.scene import Processing, Scene, World
 from sonarsynth.sources.shrimp import SnappingShrimp
 from sonarsynth.targets.shapes import Box, Shape, Sphere
 from sonarsynth.targets.target import Target
-from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, together
+from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off, together
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,7 +83,7 @@ ELSEWHERE = (
 """Where the reason is another: no snap was found, no point; echoes from no side, or several."""
 
 
-def reasoned(tree: xr.DataTree) -> Got:
+def reasoned(tree: xr.DataTree) -> CaseResult:
     """No infinity; NaN only where something beside it says why."""
     wrong: list[str] = []
     for node in tree.subtree:
@@ -117,7 +117,7 @@ def _explained(path: str, values: Any, node: xr.DataTree) -> bool:
     return not none.any() or path in REASONS or path.startswith(ELSEWHERE)
 
 
-def _wall() -> Got:
+def _wall() -> CaseResult:
     """A wall 1 m ahead, wider than the view: every beam meets it, at 1/cos of both angles."""
     tree = frame(recipe(((Box(size=(0.1, 8.0, 8.0)), (1.05, 0.0, 0.0)),), (-3.0, 3.0, -5.0)))
     truth = tree["truth/beams"]
@@ -130,7 +130,7 @@ def _wall() -> Got:
     )
 
 
-def _beside_view() -> Got:
+def _beside_view() -> CaseResult:
     """Its edge at the last beam, a millionth of its distance inside or outside of it."""
     near, far, parts = 10.0, 10.1, []
     for step in (1e-6, -1e-6):
@@ -144,7 +144,7 @@ def _beside_view() -> Got:
     return together(*parts)
 
 
-def _behind() -> Got:
+def _behind() -> CaseResult:
     """The body stands before the snap: nothing direct is heard, so no bearing, an empty image and no cloud."""
     tree = frame(recipe(((Sphere(radius=0.6, edge=0.1), (7.0, 0.0, 0.0)),), (14.0, 0.0, -5.0)))
     silent = not tree["signals"].pressure.values.any()
@@ -158,7 +158,7 @@ def _behind() -> Got:
     )
 
 
-def _beyond() -> Got:
+def _beyond() -> CaseResult:
     """The snap stands before the target, on its line: heard, imaged, and its echo ranged as x/2 beyond the snap."""
     tree = frame(recipe(((Sphere(radius=0.6, edge=0.1), (17.0, 0.0, 0.0)),), (9.0, 0.0, -5.0)))
     return together(
@@ -168,7 +168,7 @@ def _beyond() -> Got:
     )
 
 
-def _on_line() -> Got:
+def _on_line() -> CaseResult:
     """A small target half way to the snap, off the line by a tenth of a metre: its range is ill-conditioned."""
     ahead = np.array([1.0, 0.0, 0.0])
     on = bistatic_range(0.0, ahead, 20.0 * ahead)
@@ -182,7 +182,7 @@ def _on_line() -> Got:
     )
 
 
-def _shadow_zone() -> Got:
+def _shadow_zone() -> CaseResult:
     """Speed falls by 0.5 /s: nothing reaches 5 m from 2 km away; paths are 0, levels NaN, and the sonar hears none."""
     water = Tabulated(depth=(0.0, 40.0), speed=(1540.0, 1520.0))
     tree = frame(recipe((), (2000.0, 0.0, -10.0), water))
@@ -195,7 +195,7 @@ def _shadow_zone() -> Got:
     )
 
 
-def _link_budget() -> Got:
+def _link_budget() -> CaseResult:
     """Two targets 100 dB apart and one that is hidden: levels add up to rounding, NaN where there is no path."""
     far = (Sphere(radius=0.5, edge=0.1), (9.0, 1.0, 0.0)), (Sphere(radius=2e-5), (30.0, -2.0, 0.0))
     hidden = ((Sphere(radius=0.05), (12.0, 1.3, 0.0)),)
@@ -215,7 +215,7 @@ def _link_budget() -> Got:
     )
 
 
-def _arrays() -> Got:
+def _arrays() -> CaseResult:
     parts = []
     for positions in (((0.0, 0.0, 0.0),), ((0.0, 0.1, 0.0),) * 2):
         dense = Processing(beamforming=DenseDelayAndSum())

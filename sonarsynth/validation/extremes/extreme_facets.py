@@ -18,14 +18,14 @@ from sonarsynth.targets.generated.smoothing import curved
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Box, Sphere
 from sonarsynth.targets.target_strength import target_strength
-from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, refused, together
-from sonarsynth.validation.extremes.plain_scenes import C, body, heard, snap, traced, transfer
+from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off, refused, together
+from sonarsynth.validation.extremes.plain_scenes import C, body, snap, synthesised, traced, transfer
 
 ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
 TRIANGLE = np.array([[0.2, -0.1, 0.0], [-0.15, 0.25, 0.0], [-0.05, -0.15, 0.0]])
 
 
-def _waves() -> Got:
+def _waves() -> CaseResult:
     """In the mirror direction f is k A/2 pi at any k; elsewhere it falls; none at backscatter along the facet."""
     down, up, along = np.array([0.0, 0, -1.0]), np.array([0.0, 0, 1.0]), np.array([1.0, 0.0, 0.0])
     k = 10.0 ** np.arange(-12.0, 10.0)
@@ -42,7 +42,7 @@ def _waves() -> Got:
     )
 
 
-def _mirror() -> Got:
+def _mirror() -> CaseResult:
     """Through the mirror direction, from 1e-18 to 0.1 rad off it: the sinc of a square, no step anywhere."""
     square = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]])[[[0, 1, 2], [0, 2, 3]]]
     parts, k = [], np.array([300.0])
@@ -55,7 +55,7 @@ def _mirror() -> Got:
     return together(parts)
 
 
-def _rough() -> Got:
+def _rough() -> CaseResult:
     """No height: the smooth echo. Any height: the coherent and the incoherent share of the power are all of it."""
     mesh, band = mesh_of(Box(size=(0.1, 0.3, 0.3), edge=0.02)), (40e3, 80e3)
     f = np.array(band)
@@ -73,7 +73,7 @@ def _rough() -> Got:
     )
 
 
-def _rough_frame() -> Got:
+def _rough_frame() -> CaseResult:
     """So rough that nothing is coherent: the powers of the facets are the lobe of the slopes, times their area."""
     mesh, at = mesh_of(Box(size=(0.1, 0.2, 0.2), edge=0.02)), 30.0
     law = Kirchhoff(roughness=0.3, slope=0.2)
@@ -84,7 +84,7 @@ def _rough_frame() -> Got:
     return off(10.0 * np.log10(power / exact), 0.01, "dB")
 
 
-def _fock() -> Got:
+def _fock() -> CaseResult:
     """Limits, and spheres of k a 20 to 300 at all angles against the exact series."""
     lit, dark = surface_field(np.array([-1e9, -1e3, -30.0]), "rigid"), surface_field(np.array([11.9]), "rigid")
     parts = [
@@ -103,12 +103,12 @@ def _fock() -> Got:
     return together(*parts)
 
 
-def _large() -> Got:
+def _large() -> CaseResult:
     """Facets too long for their echo to be a pulse in a window are refused; and a body of one huge facet a side."""
     plate = mesh_of(Box(size=(1.0, 2e3, 2e3)))
     snaps = [snap((1.0, 900.0, 0.0))]
     found = traced(snaps, ONE, [body(plate, (3e3, 0.0, 0.0))], [Kirchhoff()])
-    return refused(lambda: heard(GriddedSynthesis(), found, snaps, ONE, 3.9, 100), "corners that are not within")
+    return refused(lambda: synthesised(GriddedSynthesis(), found, snaps, ONE, 3.9, 100), "corners that are not within")
 
 
 def _icosahedron() -> tuple[Floats, np.ndarray]:
@@ -125,7 +125,7 @@ def _icosahedron() -> tuple[Floats, np.ndarray]:
     return vertices, faces
 
 
-def _smoothing() -> Got:
+def _smoothing() -> CaseResult:
     """Twenty facets become a sphere; a cube stays a cube; needles and far places change nothing."""
     parts = []
     for scale, away in ((1.0, 0.0), (1e-3, 0.0), (1e3, 0.0), (1.0, 100.0)):

@@ -15,7 +15,7 @@ from sonarsynth.recipe.populations.population import BodyModel, Population
 from sonarsynth.recipe.populations.regions import BoxRegion
 from sonarsynth.targets.shapes import Sphere
 from sonarsynth.validation.extremes.extreme_chains import recipe
-from sonarsynth.validation.extremes.outcomes import Case, Got, holds, refused, together
+from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, refused, together
 
 BALLS = (BodyModel(shape=Sphere(radius=0.1, edge=0.1)),)
 SEA = BoxRegion(low=(5.0, -30.0, -39.0), high=(65.0, 30.0, -1.0))
@@ -26,7 +26,7 @@ def _with(population: Population) -> Recipe:
     return replace(recipe(), scene=replace(scene, world=replace(scene.world, populations=(population,))))
 
 
-def _none_and_many() -> Got:
+def _none_and_many() -> CaseResult:
     """A frame of no body, where there is room for 500, and a sequence of all of them."""
     none = _with(Population(name="ball", models=BALLS, most=500, region=SEA, weights=(1.0, *[0.0] * 500)))
     tree = render(plan(none, ("image",)), 0)
@@ -46,13 +46,13 @@ def _none_and_many() -> Got:
     )
 
 
-def _no_room() -> Got:
+def _no_room() -> CaseResult:
     small = BoxRegion(low=(10.0, 0.0, -10.0), high=(10.3, 0.3, -9.7))
     crowd = _with(Population(name="ball", models=BALLS, least=50, most=50, region=small))
     return refused(lambda: plan(crowd), "no room for body")
 
 
-def _broken() -> Got:
+def _broken() -> CaseResult:
     """Of a folder of meshes one is empty, one is no mesh, one is missing; and a table that is none."""
     yaml = reading.dump(_with(Population(name="ball", models=BALLS, most=1, region=SEA)))
     head, _, rest = yaml.partition("models:")

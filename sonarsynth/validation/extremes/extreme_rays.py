@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.rays import ray_solutions
-from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, relative, together
+from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off, relative, together
 
 if TYPE_CHECKING:
     from sonarsynth.equations.rays.ray_solutions import Eigenrays
@@ -43,7 +43,7 @@ def circle(g: float, one: float, other: float, distance: float) -> tuple[float, 
     return float(time), float(g / (mean * np.sinh(2.0 * half)) if g else 1.0 / (mean * time))
 
 
-def _gradients() -> Got:
+def _gradients() -> CaseResult:
     parts = []
     for g in (0.0, *(sign * 10.0**k for k in range(-12, 5) for sign in (1.0, -1.0))):
         bottom = min(1e3, 800.0 / abs(g)) if g else 1e3
@@ -52,7 +52,7 @@ def _gradients() -> Got:
             got = found((0.0, bottom), (C, C + g * bottom), ends)
             exact = circle(g, C + g * ends[0], C + g * ends[1], float(np.hypot(ends[2], ends[1] - ends[0])))
             if not len(got.pair):
-                return Got(f"no ray for {g:g} /s", False)
+                return CaseResult(f"no ray for {g:g} /s", False)
             errors = got.travel_time[0] / exact[0] - 1.0, got.amplitude[0] / exact[1] - 1.0
             parts.append((off(errors[0], 1e-14, what="time"), off(errors[1], 1e-11, what="amplitude")))
     return together(*(tuple(part[i] for part in parts) for i in (0, 1)))
@@ -69,8 +69,8 @@ def _snell(heights: Floats, speeds: Floats, distance: float) -> float:
     return float(p * distance + (heights * np.sqrt((1.0 - p * speeds) * (1.0 + p * speeds)) / speeds).sum())
 
 
-def _layers() -> Got:
-    def errors(speeds: Floats) -> list[Got]:
+def _layers() -> CaseResult:
+    def errors(speeds: Floats) -> list[CaseResult]:
         out = []
         for thick in (1e-6, 1e-3, 1.0, 1e3, 1e4):
             top, below = 200.0, 300.0
@@ -97,7 +97,7 @@ def _fermat(z: float, bottom: float, speeds: tuple[float, float, float], ends: t
     return float(minimize_scalar(time, bounds=(0.0, ends[2]), method="bounded", options={"xatol": 1e-9}).fun)
 
 
-def _kinks() -> Got:
+def _kinks() -> CaseResult:
     parts = []
     for speeds in ((1540.0, 1500.0, 1530.0), (1480.0, 1520.0, 1490.0), (1500.0, 1500.0, 1900.0)):
         for distance in (1.0, 30.0, 90.0):
@@ -107,7 +107,7 @@ def _kinks() -> Got:
     return together(parts)
 
 
-def _interfaces() -> Got:
+def _interfaces() -> CaseResult:
     z, parts = (0.0, 30.0, 30.0, 80.0), []
     for speeds in ((C, C, 1540.0, 1540.0), (1540.0, 1540.0, C, C)):
         for start, end in ((30.0, 60.0), (60.0, 30.0), (30.0, 10.0), (10.0, 30.0), (0.0, 30.0), (30.0, 80.0)):
@@ -119,7 +119,7 @@ def _interfaces() -> Got:
     return together(parts)
 
 
-def _vertical() -> Got:
+def _vertical() -> CaseResult:
     got = found((0.0, 100.0, 300.0), (1540.0, C, 1560.0), (10.0, 250.0, 0.0), 3, 3)
     whole = 90.0 / 40.0 * np.log(1536.0 / C) * 100.0 / 90.0 + 200.0 / 60.0 * np.log(1545.0 / C)
     straight = np.all(got.slowness == 0.0) and np.all(np.abs(got.start_sine) == 1.0)
@@ -129,7 +129,7 @@ def _vertical() -> Got:
     )
 
 
-def _horizontal() -> Got:
+def _horizontal() -> CaseResult:
     level = found((0.0, 100.0), (C, C), (40.0, 40.0, 700.0))
     axis = found((0.0, 40.0, 100.0), (1520.0, C, 1530.0), (40.0, 40.0, 7.0))
     arcs = [circle(g, C, C, 7.0)[0] for g in (-0.5, 0.5)]
@@ -140,7 +140,7 @@ def _horizontal() -> Got:
     )
 
 
-def _turning() -> Got:
+def _turning() -> CaseResult:
     """Speed falls with depth: the circle that touches the surface is centred where it would be 0, R down."""
     g, bottom, z = 0.3, 100.0, 40.0
     R = C / g
@@ -157,7 +157,7 @@ def _turning() -> Got:
     return together(holds(sane, f"{counts} rays by the surface"), times)
 
 
-def _coincident() -> Got:
+def _coincident() -> CaseResult:
     parts = []
     for z in (0.0, 20.0, 50.0):
         got = found((0.0, 50.0), (C, C), (z, z, 0.0), 2, 2)
@@ -174,7 +174,7 @@ def _coincident() -> Got:
     return together(parts)
 
 
-def _ranges() -> Got:
+def _ranges() -> CaseResult:
     parts = []
     for depth, a, b in ((100.0, 31.0, 62.0), (5000.0, 800.0, 4200.0)):
         for distance in (0.0, 1e-3, 1.0, 1e3, 1e5):
@@ -193,7 +193,7 @@ FOLD = 30.0, 10.0, 18.0, 0.5
 """Depth (m) of the foot of a uniform layer, two points in it, and the gradient below (1/s)."""
 
 
-def _caustic() -> Got:
+def _caustic() -> CaseResult:
     """Down through the uniform layer and back: X = H/u + 2 (c/g) u, u the tangent of the angle; least at a fold."""
     foot, a, b, g = FOLD
     H, bend = 2.0 * foot - a - b, 2.0 * C / g
@@ -218,7 +218,7 @@ def _caustic() -> Got:
     return together(parts, named, off(np.diff(np.log10(loud)) - [0.5, 1.0], 0.03, "decades", "growth as step^-1/4"))
 
 
-def _shadow() -> Got:
+def _shadow() -> CaseResult:
     """The last ray into depth touches the surface: two arcs of the same circle; beyond, none."""
     g, bottom, a, b = 0.3, 100.0, 40.0, 30.0
     limit = sum(np.sqrt(z * (2.0 * C / g - z)) for z in (a, b))
@@ -228,7 +228,7 @@ def _shadow() -> Got:
     return together(near, holds(len(dark.pair) == 0, "no ray 1e-7 beyond"))
 
 
-def _deep() -> Got:
+def _deep() -> CaseResult:
     g, bottom, parts = 0.0163, 11e3, []
     for a, b, distance in ((0.0, bottom, 0.0), (0.0, bottom, 100.0), (10.0, 10.9e3, 8e3), (bottom, 0.0, 1e4)):
         got = found((0.0, bottom), (C, C + g * bottom), (a, b, distance))

@@ -22,7 +22,7 @@ from sonarsynth.sources.snap_models import Gabor, Ricker
 from sonarsynth.state import Receiver, Survey
 from sonarsynth.targets.meshes import mesh_of
 from sonarsynth.targets.shapes import Sphere
-from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, refused, together
+from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off, refused, together
 from sonarsynth.validation.extremes.plain_scenes import (
     POSE,
     PROFILE,
@@ -32,9 +32,9 @@ from sonarsynth.validation.extremes.plain_scenes import (
     C,
     body,
     direct,
-    heard,
     ricker,
     snap,
+    synthesised,
     times,
     traced,
 )
@@ -55,13 +55,13 @@ def methods() -> tuple[SignalSynthesis, ...]:
     return GriddedSynthesis(), DirectSum()
 
 
-def _against(got: Signals, exact: Floats, allowed: float = FINE) -> Got:
+def _against(got: Signals, exact: Floats, allowed: float = FINE) -> CaseResult:
     """Signals against what they must be, of its peak; none may be outside."""
     error = off(np.abs(got.pressure - exact).max() / np.abs(exact).max(), allowed, "of peak")
-    return Got(error.text, error.ok and got.outside == 0)
+    return CaseResult(error.text, error.ok and got.outside == 0)
 
 
-def _delays() -> Got:
+def _delays() -> CaseResult:
     parts = []
     for delay in (1e-6, 1e-3, 1.0, 100.0):
         place = (delay * C, 0.0, 0.0)
@@ -69,16 +69,16 @@ def _delays() -> Got:
         start, samples = delay - 4e-4, 200
         found = traced(snaps, ONE)
         exact = direct(ONE, place, times(start, samples))
-        parts += [_against(heard(m, found, snaps, ONE, start, samples), exact) for m in methods()]
+        parts += [_against(synthesised(m, found, snaps, ONE, start, samples), exact) for m in methods()]
     return together(parts)
 
 
-def _long() -> Got:
+def _long() -> CaseResult:
     """One window that holds both."""
     places = (1e-6 * C, 0.0, 0.0), (0.0, 100.0 * C, 0.0)
     snaps = tuple(snap(p, gain=float(np.linalg.norm(p))) for p in places)
     start, samples = -4e-4, round((100.0 + 8e-4) * RATE)
-    got = heard(methods()[0], traced(snaps, ONE), snaps, ONE, start, samples)
+    got = synthesised(methods()[0], traced(snaps, ONE), snaps, ONE, start, samples)
     parts = []
     for delay in (1e-6, 100.0):
         first = max(round((delay - 4e-4 - start) * RATE), 0)
@@ -89,7 +89,7 @@ def _long() -> Got:
     return together(parts, off(np.abs(got.pressure).max(), FINE, "of peak", "elsewhere"))
 
 
-def _one_sample() -> Got:
+def _one_sample() -> CaseResult:
     place = (9.0, 2.0, -3.0)
     snaps = (snap(place),)
     found, parts, peak = traced(snaps, FEW), [], 1.0 / float(np.linalg.norm(place))
@@ -99,12 +99,12 @@ def _one_sample() -> Got:
         for method in methods():
             got = method.signals(found, snaps, FEW, SONAR, None, start, 1)
             parts.append(off(np.abs(got.pressure - exact).max() / peak, FINE, "of peak"))
-    short = heard(methods()[0], found, snaps, FEW, start, 1)
+    short = synthesised(methods()[0], found, snaps, FEW, start, 1)
     image = refused(lambda: FocusedDelayAndSum().image(short, FEW, SONAR, start, start), "window")
     return together(parts, image)
 
 
-def _bands() -> Got:
+def _bands() -> CaseResult:
     parts = []
     for frequency, rate, stop in ((50.0, 2e5, 9e4), (5e3, 2e5, 9e4), (2e5, 1e7, 2e6), (1e7, 1e8, 40e6)):
         sonar = Sonar(sampling_frequency=rate, filter=LowPass(cutoff=stop, transition=0.1 * stop))
@@ -114,24 +114,24 @@ def _bands() -> Got:
         samples = round(2.0 * half * rate)
         start = float(np.linalg.norm(place)) / C - half
         exact = direct(FEW, place, times(start, samples, rate), frequency)
-        got = heard(methods()[0], traced(snaps, FEW), snaps, FEW, start, samples, sonar)
+        got = synthesised(methods()[0], traced(snaps, FEW), snaps, FEW, start, samples, sonar)
         parts.append(_against(got, exact))
     return together(parts)
 
 
-def _narrow() -> Got:
+def _narrow() -> CaseResult:
     """A thousand cycles: the tone in its Gaussian, whose width at half its height is theirs."""
     f, cycles, place = 50e3, 1000.0, (9.0, 2.0, -3.0)
     snaps = (snap(place, model=Gabor(frequency=f, cycles=cycles)),)
     r, samples = float(np.linalg.norm(place)), 60_000
     start = r / C - 0.5 * samples / RATE
-    got = heard(methods()[0], traced(snaps, ONE), snaps, ONE, start, samples)
+    got = synthesised(methods()[0], traced(snaps, ONE), snaps, ONE, start, samples)
     t = times(start, samples) - r / C
     exact = np.exp(-4.0 * np.log(2.0) * (t * f / cycles) ** 2) * np.cos(2.0 * np.pi * f * t) / r
     return _against(got, exact)
 
 
-def _loud_and_faint() -> Got:
+def _loud_and_faint() -> CaseResult:
     """100 dB: a strength of 1 and of 1e-5, at places heard apart; each against what is heard of it alone."""
     source = np.array([6.0, -4.0, -3.0])
     snaps, parts = (snap(source),), []
@@ -142,15 +142,15 @@ def _loud_and_faint() -> Got:
     both, alone = (x.select(~x.direct) for x in (both, alone))
     late = float(alone.delay.mean())
     for method in methods():
-        got, exact = (heard(method, x, snaps, FEW, late - 4e-4, 200) for x in (both, alone))
+        got, exact = (synthesised(method, x, snaps, FEW, late - 4e-4, 200) for x in (both, alone))
         error = np.abs(got.pressure - exact.pressure).max() / np.abs(exact.pressure).max()
         parts.append(off(error, 1e-3, "of peak"))
     counts = [int((both.target == n).sum()) for n in (0, 1)]
     return together(holds(min(counts) > 0, f"{counts} paths"), parts)
 
 
-def _silence() -> Got:
-    quiet = heard(methods()[0], traced((), FEW), (), FEW, 0.0, 2000)
+def _silence() -> CaseResult:
+    quiet = synthesised(methods()[0], traced((), FEW), (), FEW, 0.0, 2000)
     sonar = Sonar(array=PlanarLattice(columns=4, rows=4, pitch=0.1, face=0.0), beams=BeamGrid(azimuths=5, elevations=5))
     found = SensorDelays().locate(quiet, Receiver(POSE, FEW, sonar), Survey(100.0, PROFILE), 1)
     image = FocusedDelayAndSum().image(quiet, FEW, sonar, 1e-3, 6e-3)
@@ -165,11 +165,11 @@ def _silence() -> Got:
     )
 
 
-def _few_sensors() -> Got:
+def _few_sensors() -> CaseResult:
     place, parts = (9.0, 2.0, -3.0), []
     snaps, start = (snap(place),), 0.004
     for array, reason in ((ONE, "1 live sensor"), (TWO, "2 live sensors")):
-        got = heard(methods()[0], traced(snaps, array), snaps, array, start, 1000)
+        got = synthesised(methods()[0], traced(snaps, array), snaps, array, start, 1000)
         parts.append(_against(got, direct(array, place, times(start, 1000))))
         found = SensorDelays().locate(got, Receiver(POSE, array, SONAR), Survey(100.0, PROFILE), 1)
         said = unlocatable(array) or ""
@@ -179,7 +179,7 @@ def _few_sensors() -> Got:
     return together(*parts)
 
 
-def _ten_thousand() -> Got:
+def _ten_thousand() -> CaseResult:
     """Every hydrophone; and the beam that is focused at the snap, whose energy in the band is the pulse's over r^2."""
     from scipy.integrate import quad
 
@@ -191,7 +191,7 @@ def _ten_thousand() -> Got:
     )  # fmt: skip
     many, place = elements(array), (15.0, 0.0, 0.0)
     snaps, start, samples = (snap(place),), 15.0 / C - 1e-3, 500
-    got = heard(methods()[0], traced(snaps, many), snaps, many, start, samples, sonar)
+    got = synthesised(methods()[0], traced(snaps, many), snaps, many, start, samples, sonar)
     exact = _against(got, direct(many, place, times(start, samples)))
     image = FocusedDelayAndSum(focus=15.0).image(got, many, sonar, start, start + (samples - 1) / RATE)
     f0 = PULSE.frequency
@@ -208,7 +208,7 @@ def _ten_thousand() -> Got:
     )
 
 
-def _strengths() -> Got:
+def _strengths() -> CaseResult:
     """Of every sediment, and of surfaces from calm to 60 m/s, along the boundary, straight up, and between."""
     edges = np.array([0.0, 1e-12, 1e-6, 0.5, 1.0 - 1e-12, 1.0])
     angles = Angles(*(a.ravel() for a in np.meshgrid(edges, edges, [-1.0, 0.0, 1.0])))

@@ -15,7 +15,7 @@ from sonarsynth.ranging import SensorDelays
 from sonarsynth.receiver import Band, Elements, PlanarLattice, Sonar, elements
 from sonarsynth.recipe import reading
 from sonarsynth.state import Receiver, Survey
-from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, together
+from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off, together
 from sonarsynth.validation.extremes.plain_scenes import BOTTOM_DEPTH, POSE, PROFILE, RATE, C, direct
 
 LATTICE = PlanarLattice(columns=16, rows=16, pitch=0.08, face=0.0)
@@ -24,7 +24,9 @@ TONE = 40e3
 """Hz: the centre of the narrow bands."""
 
 
-def _heard(array: Elements, places: Sequence[Floats], gains: Sequence[float], noise: float, seed: int) -> Signals:
+def _noisy_signals(
+    array: Elements, places: Sequence[Floats], gains: Sequence[float], noise: float, seed: int
+) -> Signals:
     """Snaps at one instant at places (xyz) in the sonar frame, with noise (Pa) at each hydrophone."""
     away = np.linalg.norm(places, axis=1)
     start = float(away.min()) / C - 2e-3
@@ -43,10 +45,10 @@ def _located(
     )
 
 
-def _honest(found: SourceEstimates, places: Sequence[Floats]) -> Got:
+def _honest(found: SourceEstimates, places: Sequence[Floats]) -> CaseResult:
     """Each row that says something is right within four errors about one of the places; others have a reason."""
-    good, heard = True, np.flatnonzero(np.isfinite(found.time))
-    for row in heard:
+    good, located = True, np.flatnonzero(np.isfinite(found.time))
+    for row in located:
         azimuth, elevation = azimuth_elevation(np.array(places))
         off = np.hypot(
             (found.azimuth[row] - azimuth) / found.azimuth_error[row],
@@ -60,17 +62,17 @@ def _honest(found: SourceEstimates, places: Sequence[Floats]) -> Got:
     count = int(np.isfinite(found.position).all(axis=1).sum())
     reasons = sorted({REASONS[n] for n in found.reason if n})
     return holds(
-        good, f"{len(heard)} of {len(places)} heard, {count} placed" + (f" ({', '.join(reasons)})" * any(reasons))
+        good, f"{len(located)} of {len(places)} heard, {count} placed" + (f" ({', '.join(reasons)})" * any(reasons))
     )
 
 
-def _middle() -> Got:
+def _middle() -> CaseResult:
     """Half way between surface and bottom, 10 m to 5 km away, by straight and by bent rays; quiet, and with noise."""
     array, parts = elements(LATTICE), []
     for distance in (10.0, 30.0, 100.0, 300.0, 1e3, 5e3):
         place = distance * direction(0.3, -0.2)
         for noise in (0.0, 1e-2 / distance):
-            signals = _heard(array, [place], [1.0], noise, 1)
+            signals = _noisy_signals(array, [place], [1.0], noise, 1)
             for refraction in (False, True):
                 found = _located(signals, array, 1, refraction=refraction)
                 near = holds(bool(np.isfinite(found.time[0])), f"heard at {distance:g} m")
@@ -78,10 +80,10 @@ def _middle() -> Got:
     return together(parts)
 
 
-def _bands() -> Got:
+def _bands() -> CaseResult:
     """100 Hz to 60 kHz about 40 kHz, or above 25 kHz: a place within its errors, or none with a reason."""
     array, place, parts = elements(LATTICE), 20.0 * direction(0.3, -0.2), []
-    signals = _heard(array, [place], [1.0], 1e-5, 2)
+    signals = _noisy_signals(array, [place], [1.0], 1e-5, 2)
     for width in (100.0, 300.0, 1e3, 3e3, 10e3, 30e3, 60e3):
         low = TONE - 0.5 * width if width <= 30e3 else 25e3
         found = _located(signals, array, 1, Band(low=low, high=low + width))
@@ -90,24 +92,24 @@ def _bands() -> Got:
     return together(parts)
 
 
-def _crowd() -> Got:
+def _crowd() -> CaseResult:
     """1, 2, 5, 10 and 20 snaps at one instant: none that is accepted is anything but one of them."""
     array, parts = elements(LATTICE), []
     for count in (1, 2, 5, 10, 20):
         random = np.random.default_rng(count)
         angles = random.uniform([-0.6, -0.5], [0.6, 0.3], (count, 2))
         places = [r * direction(*each) for r, each in zip(np.linspace(8.0, 40.0, count), angles, strict=True)]
-        found = _located(_heard(array, places, [1.0] * count, 1e-5, count), array, count)
+        found = _located(_noisy_signals(array, places, [1.0] * count, 1e-5, count), array, count)
         parts.append(_honest(found, places))
     return together(parts)
 
 
-def _stranger() -> Got:
+def _stranger() -> CaseResult:
     """20 dB louder than the other, before it and after it: the clock is the louder one's."""
     array, parts = elements(LATTICE), []
     for far in (14.0, 30.0):
         places = [20.0 * direction(-0.3, -0.2), far * direction(0.4, -0.1)]
-        found = _located(_heard(array, places, [1.0, 10.0], 1e-5, 3), array, 2)
+        found = _located(_noisy_signals(array, places, [1.0, 10.0], 1e-5, 3), array, 2)
         off = float(np.abs(found.azimuth[0] - azimuth_elevation(places[1])[0]))
         parts += [holds(off < 4 * found.azimuth_error[0], "the louder one first"), _honest(found, places)]
     return together(parts)
@@ -131,7 +133,7 @@ def _chorus(density: float, height: float) -> tuple[Plan, xr.DataTree]:
     return made, render(made, 0)
 
 
-def _dense() -> Got:
+def _dense() -> CaseResult:
     """Of 1e5 snaps a second within 400 m, in water of 40 m: the mean square is Campbell's, within and beyond."""
     made, tree = _chorus(0.2, -5.0)
     near, distant = made.chorus, made.distant_chorus
@@ -146,7 +148,7 @@ def _dense() -> Got:
     )
 
 
-def _bounded() -> Got:
+def _bounded() -> CaseResult:
     """Hydrophones at the surface, on the bottom, and where nothing snaps."""
     parts = []
     for density, height in ((1e-2, 0.0), (1e-2, -40.0), (0.0, -5.0)):

@@ -18,7 +18,7 @@ from sonarsynth.targets.meshes import mesh_of, refined_mesh
 from sonarsynth.targets.shapes import Box, Shape, Sphere
 from sonarsynth.targets.target import base_mesh
 from sonarsynth.targets.target_strength import target_strength
-from sonarsynth.validation.extremes.outcomes import Case, Got, holds, off, together
+from sonarsynth.validation.extremes.outcomes import Case, CaseResult, holds, off, together
 from sonarsynth.validation.extremes.plain_scenes import C, body, snap, traced, transfer
 
 ONE = elements(PositionTable(positions=((0.0, 0.0, 0.0),)))
@@ -49,16 +49,16 @@ def mirrored(radius: float, distance: float, band: tuple[float, float]) -> Float
     return np.asarray(lit / distance**2 * np.exp(-2j * k * distance))
 
 
-def _sphere(radius: float, distance: float, band: tuple[float, float], allowed: float) -> Got:
+def _sphere(radius: float, distance: float, band: tuple[float, float], allowed: float) -> CaseResult:
     got, exact = echo(Sphere(radius=radius), distance, band), mirrored(radius, distance, band)
     return off(np.abs(got / exact - 1.0), allowed, what=f"{2 * radius:g} m at {distance:g} m:")
 
 
-def _distances() -> Got:
+def _distances() -> CaseResult:
     return together(*(_sphere(0.25, far, (40e3, 80e3), 0.05) for far in (1.0, 100.0, 1e4)))
 
 
-def _sizes() -> Got:
+def _sizes() -> CaseResult:
     """In a frame, in bands that suit them; and far away, where all sizes are alike at one k a."""
     parts = [
         _sphere(0.5e-6, 1.0, (40e3, 80e3), 0.03),
@@ -84,7 +84,7 @@ def needles(count: int) -> Floats:
     return np.stack([apex, rim[:-1], rim[1:]], axis=1)
 
 
-def _needles() -> Got:
+def _needles() -> CaseResult:
     corners = needles(400)
     parts = []
     for tilt, turn in ((0.0, 0.0), (0.01, 0.3), (0.7, 0.0), (1.2, 2.0)):
@@ -97,7 +97,7 @@ def _needles() -> Got:
     return together(parts)
 
 
-def _degenerate() -> Got:
+def _degenerate() -> CaseResult:
     """A cube with points and lines for facets, and its corners twice."""
     cube = mesh_of(Box(size=(1.0, 1.0, 1.0)))
     extra = np.array([[0, 0, 0], [0, 1, 1], [2, 3, 2]], np.int64)
@@ -114,7 +114,7 @@ def _degenerate() -> Got:
     )
 
 
-def _many(facets: int, *, framed: bool) -> Got:
+def _many(facets: int, *, framed: bool) -> CaseResult:
     """A sphere of that many: its area, and Kirchhoff's integral over its lit half; framed: and its echo in a frame."""
     import resource
 
@@ -145,7 +145,7 @@ def _many(facets: int, *, framed: bool) -> Got:
     return together(*parts, holds(peak < 6.0, f"at most {peak:.2g} GB"))
 
 
-def _between() -> Got:
+def _between() -> CaseResult:
     """A plate half way: blocked without a word too many; or scattered forward, by Fresnel's integrals."""
     plate, half, f = Box(size=(0.01, 0.6, 0.6), edge=0.02), 0.3, np.linspace(40e3, 80e3, 5)
     mesh, source = mesh_of(plate), (20.0, 0.0, 0.0)
@@ -165,7 +165,7 @@ def _between() -> Got:
     return together(*parts)
 
 
-def _isotropic() -> Got:
+def _isotropic() -> CaseResult:
     """Ranges of an echo: a ball of a millimetre from 1 m to 10 km, its delay and power as of a point."""
     parts, ball = [], mesh_of(Sphere(radius=1e-3))
     for far in (1.0, 30.0, 1e3, 1e4):

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 
-class Got(NamedTuple):
+class CaseResult(NamedTuple):
     """What came out of a case, in words, and whether it is what must."""
 
     text: str
@@ -25,7 +25,7 @@ class Case:
 
     name: str
     expected: str
-    check: Callable[[], Got]
+    check: Callable[[], CaseResult]
     slow: bool = False
     """Large: minutes, or gigabytes; in the command alone."""
 
@@ -47,48 +47,48 @@ class Extreme:
         return asdict(self)
 
 
-def off(error: npt.ArrayLike, allowed: float, unit: str = "", what: str = "") -> Got:
+def off(error: npt.ArrayLike, allowed: float, unit: str = "", what: str = "") -> CaseResult:
     """The largest of some errors against what is allowed; an error that is not a number is not within it."""
     errors = np.abs(np.atleast_1d(np.asarray(error, float)))
     largest = float(errors.max()) if errors.size and not np.isnan(errors).any() else float("nan")
     head = f"{what} " if what else ""
-    return Got(f"{head}{largest:.2g}{unit and ' '}{unit} off ({allowed:g} allowed)", largest <= allowed)
+    return CaseResult(f"{head}{largest:.2g}{unit and ' '}{unit} off ({allowed:g} allowed)", largest <= allowed)
 
 
-def relative(got: npt.ArrayLike, exact: npt.ArrayLike, allowed: float, what: str = "") -> Got:
+def relative(got: npt.ArrayLike, exact: npt.ArrayLike, allowed: float, what: str = "") -> CaseResult:
     """The largest relative error; of arrays that differ in shape none is right."""
     one, other = np.asarray(got, float), np.asarray(exact, float)
     if one.shape != other.shape:
-        return Got(f"{what or 'values'}: shape {one.shape} where {other.shape} belongs", False)
+        return CaseResult(f"{what or 'values'}: shape {one.shape} where {other.shape} belongs", False)
     return off(one / other - 1.0, allowed, what=what)
 
 
-def holds(ok: bool | np.bool_, text: str) -> Got:
+def holds(ok: bool | np.bool_, text: str) -> CaseResult:
     """A fact that is so, or is not."""
-    return Got(text if ok else f"NOT SO: {text}", bool(ok))
+    return CaseResult(text if ok else f"NOT SO: {text}", bool(ok))
 
 
-def refused(call: Callable[[], object], words: str) -> Got:
+def refused(call: Callable[[], object], words: str) -> CaseResult:
     """Whether a call is refused with a ValueError in one line that has these words."""
     try:
         call()
     except ValueError as error:
         said = str(error)
-        return Got(f"refused: {said}", words in said and "\n" not in said)
-    return Got("not refused", False)
+        return CaseResult(f"refused: {said}", words in said and "\n" not in said)
+    return CaseResult("not refused", False)
 
 
-def together(*parts: Got | Iterable[Got]) -> Got:
+def together(*parts: CaseResult | Iterable[CaseResult]) -> CaseResult:
     """All of several; of an iterable the first that fails, or how many there are and the last."""
-    every = [part if isinstance(part, Got) else _all_of(list(part)) for part in parts]
-    return Got("; ".join(part.text for part in every), all(part.ok for part in every))
+    every = [part if isinstance(part, CaseResult) else _all_of(list(part)) for part in parts]
+    return CaseResult("; ".join(part.text for part in every), all(part.ok for part in every))
 
 
-def _all_of(some: list[Got]) -> Got:
+def _all_of(some: list[CaseResult]) -> CaseResult:
     wrong = [one for one in some if not one.ok]
     if wrong or not some:
-        return wrong[0] if wrong else Got("nothing was checked", False)
-    return Got(f"{len(some)} of {len(some)} right, the last {some[-1].text}", True)
+        return wrong[0] if wrong else CaseResult("nothing was checked", False)
+    return CaseResult(f"{len(some)} of {len(some)} right, the last {some[-1].text}", True)
 
 
 def outcome(group: str, case: Case) -> Extreme:
@@ -99,7 +99,7 @@ def outcome(group: str, case: Case) -> Extreme:
             warnings.simplefilter("error")
             got = case.check()
     except Exception as error:
-        got = Got(f"{type(error).__name__}: {' '.join(str(error).split())}", False)
+        got = CaseResult(f"{type(error).__name__}: {' '.join(str(error).split())}", False)
     return Extreme(group, case.name, case.expected, got.text, got.ok, time.process_time() - began)
 
 

@@ -63,7 +63,7 @@ def traced(
     return found
 
 
-def heard(
+def synthesised(
     method: SignalSynthesis,
     found: Arrivals,
     snaps: Sequence[Emission],

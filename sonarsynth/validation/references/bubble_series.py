@@ -27,7 +27,7 @@ NODES, PANEL = 20, 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Exact:
+class ExactCollapse:
     """A bubble from rest to the top of its last rebound. Times are from rest."""
 
     times: tuple[float, ...]  # s, where the wall stands still: smallest, largest, smallest, ...
@@ -40,7 +40,7 @@ class Exact:
     steps: int
 
 
-def exact_bubble(cavity: Cavity, rebounds: int = 0) -> Exact:
+def exact_bubble(cavity: Cavity, rebounds: int = 0) -> ExactCollapse:
     """A bubble to 1e-17 through its first collapse and so many more. Raises ModuleNotFoundError without mpmath."""
     import mpmath as mp
 
@@ -158,7 +158,9 @@ def _product(a: list[Any], b: list[Any], k: int) -> Any:
     return mp.fdot(a[: k + 1], b[k::-1])
 
 
-def _as_floats(turns: list[tuple[Any, Any, Any]], pieces: list[tuple[Any, Any, list[Any]]], density: float) -> Exact:
+def _as_floats(
+    turns: list[tuple[Any, Any, Any]], pieces: list[tuple[Any, Any, list[Any]]], density: float
+) -> ExactCollapse:
     """Turns and a quadrature in float64: pressures from the series of each step."""
     node, weight = np.polynomial.legendre.leggauss(NODES)
     times, pressures, weights = [], [], []
@@ -175,4 +177,4 @@ def _as_floats(turns: list[tuple[Any, Any, Any]], pieces: list[tuple[Any, Any, l
         fastest = max(fastest, float(np.abs(R1).max()))
     times_of, radii, pressures_of = (tuple(map(float, column)) for column in zip(*turns, strict=True))
     node_of, pressure, weight_of = (np.concatenate(part) for part in (times, pressures, weights))
-    return Exact(times_of, radii, pressures_of, node_of, pressure, weight_of, fastest, len(pieces))
+    return ExactCollapse(times_of, radii, pressures_of, node_of, pressure, weight_of, fastest, len(pieces))

@@ -32,7 +32,7 @@ from sonarsynth.validation.references.frames.line_of_sight import Surface
 from sonarsynth.validation.references.frames.moving_points import Mover
 from sonarsynth.validation.references.frames.path_sum import Contributions, stretches, transfer
 from sonarsynth.validation.references.frames.snap_spectrum import absorption, duration, filter_response, spectrum
-from sonarsynth.validation.references.frames.sound_paths import Solid, depths, heard, hidden, met
+from sonarsynth.validation.references.frames.sound_paths import Solid, arrival_times, depths, hidden, met
 from sonarsynth.validation.references.rays.boundaries_met import reflected
 from sonarsynth.validation.references.rays.layered_rays import Family, Rays, families
 from sonarsynth.validation.references.rays.layers_crossed import Water
@@ -125,7 +125,7 @@ class FramePressure:
         """Most reflections of a path."""
         return self.scene.physics.tracing.bounces
 
-    def _lit(self, snap: Emission, body: Body) -> list[_Lit]:
+    def _lit(self, snap: Emission, body: Body) -> list[_LitFacets]:
         """The facets of a body that a snap lights, by each family."""
         found = []
         for family in families(self.bounces):
@@ -142,7 +142,7 @@ class FramePressure:
             end = np.broadcast_to(snap.position, clear.shape)
             free = np.flatnonzero(~hidden(self.solids, self.water, clear, end, back, time))
             counted = family.bounces - family.ends_at(-snap.position[2], self.water.bottom)
-            found.append(_Lit(body, rows[free], time[free], back.select(free), normal[free], family, counted))
+            found.append(_LitFacets(body, rows[free], time[free], back.select(free), normal[free], family, counted))
         return found
 
     def _towards(self, body: Body, rows: np.ndarray, time: Floats, place: Floats, family: Family) -> np.ndarray:
@@ -154,7 +154,7 @@ class FramePressure:
         margin = SLANT if np.ptp(self.water.speed) > 0.0 else 0.05
         return np.asarray(rows[np.einsum("nx,nx->n", normal, away) > -margin * np.linalg.norm(away, axis=1)])
 
-    def _echoes(self, lit: list[_Lit], place: Floats) -> list[Contributions]:
+    def _echoes(self, lit: list[_LitFacets], place: Floats) -> list[Contributions]:
         """What one hydrophone hears of the facets."""
         found = []
         for part in lit:
@@ -162,13 +162,13 @@ class FramePressure:
                 found += self._echo(part, place, family)
         return found
 
-    def _echo(self, part: _Lit, place: Floats, family: Family) -> list[Contributions]:
+    def _echo(self, part: _LitFacets, place: Floats, family: Family) -> list[Contributions]:
         body, mover = part.body, part.body.solid.mover
         centre = self.sonar.points(place[None], np.zeros(1))[0]
         some = np.isin(part.row, self._towards(body, part.row, part.time, centre, family))
         one = part.select(np.flatnonzero(some))
         point = mover.points(body.centre[one.row], one.time)
-        late, way = heard(self.water, point, one.time, self.sonar, place, family)
+        late, way = arrival_times(self.water, point, one.time, self.sonar, place, family)
         seen = np.flatnonzero(np.einsum("nx,nx->n", one.normal, way.departure) > 0.0)
         if not len(seen):
             return []
@@ -189,7 +189,7 @@ class FramePressure:
         """What one hydrophone hears without a target."""
         found, sent = [], np.array([snap.time])
         for family in families(self.bounces):
-            late, way = heard(self.water, snap.position[None], sent, self.sonar, place, family)
+            late, way = arrival_times(self.water, snap.position[None], sent, self.sonar, place, family)
             end = self.sonar.points(place[None], late)
             if not hidden(self.solids, self.water, snap.position[None], end, way, sent)[0]:
                 found.append(self._arriving(place, late, way.spreading, np.ones(1), (way, family)))
@@ -250,7 +250,7 @@ class FramePressure:
 
 
 @dataclass(frozen=True, eq=False)
-class _Lit:
+class _LitFacets:
     """Facets of a body that a snap lights by one family of rays."""
 
     body: Body
@@ -261,7 +261,7 @@ class _Lit:
     family: Family  # of the rays back
     counted: int  # reflections, but for one at the very place of a snap that lies on the bottom
 
-    def select(self, rows: np.ndarray) -> _Lit:
+    def select(self, rows: np.ndarray) -> _LitFacets:
         """Some of them."""
         of = self.row[rows], self.time[rows], self.back.select(rows), self.normal[rows]
-        return _Lit(self.body, *of, self.family, self.counted)
+        return _LitFacets(self.body, *of, self.family, self.counted)

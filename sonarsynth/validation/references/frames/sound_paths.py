@@ -53,7 +53,7 @@ def met(water: Water, snap: Floats, sent: float, mover: Mover, body: Floats, fam
     return time, found
 
 
-def heard(
+def arrival_times(
     water: Water, point: Floats, time: Floats, sonar: Mover, hydrophone: Floats, family: Family
 ) -> tuple[Floats, Rays]:
     """When (point,) s sound that leaves points of the world (point, xyz) at times (point,) is heard by a hydrophone at
