@@ -68,11 +68,22 @@ def measure(
 ) -> AccuracyReport:
     """Vary each setting of a recipe about the planner's choice, and measure error and run time against exact results.
 
-    frames: numbers of the frames (default: `usual_frames`). hydrophones: how many are computed exactly (default: 4 to
-    24, by how long one takes). seed: redraws the random frames, with the planner's choices kept. peers: whether other
-    programs are measured too, in the first frame. say: is called with a line of text as each part begins.
+    Parameters
+    ----------
+    recipe: whose settings are varied.
+    frames: numbers of the frames that are measured (default: `usual_frames`).
+    hydrophones: how many are computed exactly (default: 4 to 24, by how long one takes).
+    seed: redraws the random frames; the planner's choices stay.
+    peers: whether other programs are measured too, in the first frame.
+    say: called with a line of text as each part begins.
 
-    Returns the points (error, CPU seconds of one core) and the verdicts. Raises FieldError as `plan` does.
+    Returns
+    -------
+    The points (error, CPU seconds of one core) and the verdict on each choice.
+
+    Raises
+    ------
+    FieldError as `plan` does.
     """
     say("planning")
     made = plan_of(recipe)

@@ -19,9 +19,17 @@ def open(path: Folder | Path | str) -> xr.DataTree:
     """A store as a DataTree, read lazily: what `xarray.open_datatree(path, engine="zarr")` gives, but no link in the
     store is followed, and counts of the converter decode to float32 (plain xarray: float64).
 
-    path: a folder or a URL. Returns the tree. It is xarray's own: `tree["truth/targets"].sel(target="remus")`. Its
-    `.sonar` has tables and pictures (see `SonarAccessor`): `tree.sonar.points(7)`, `tree.sonar.table("truth/targets")`,
-    `tree.sonar.image(7).savefig("image.png")`. Raises Mismatch where there is no store that xarray can open, or one of
-    another format.
+    Parameters
+    ----------
+    path: a folder or a URL.
+
+    Returns
+    -------
+    xarray's own tree: `tree["truth/targets"].sel(target="remus")`. Its `.sonar` has tables and pictures (see
+    `SonarAccessor`): `tree.sonar.points(7)`, `tree.sonar.table("truth/targets")`, `tree.sonar.image(7)`.
+
+    Raises
+    ------
+    Mismatch where there is no store that xarray can open, or one of another format.
     """
     return open_store(path)

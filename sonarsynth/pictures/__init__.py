@@ -44,12 +44,29 @@ def show(
     say: Callable[[str], None] = print,
     progress: Progress | None = None,
 ) -> list[Path]:
-    """Draw a store into the folder `out` (left out: `<store>.pictures`), say a summary, return the files written.
+    """Draw a store, and say a summary.
 
-    film.mp4 (film.gif without ffmpeg): every frame that was built, at `frames_per_second`, in dB re the brightest beam
-    of all (scale "common") or of each frame ("frame"); `progress` is told of each. sheet.png: frame number
-    `frame` (left out: the one with most points on a target). What the store does not hold is left out of the pictures
-    and said. Raises NothingToDraw, a ValueError, where there is no store, or not that frame.
+    film.mp4 (film.gif without ffmpeg) has every frame that was built, sheet.png one. What the store does not hold is
+    left out of the pictures and said.
+
+    Parameters
+    ----------
+    store: a folder or a URL.
+    out: folder of the pictures (default: `<store>.pictures`).
+    frame: number of the frame of the sheet (default: the one with most points on a target).
+    film: whether the film is written.
+    scale: dB re the brightest beam of all frames ("common"), or of each ("frame").
+    frames_per_second: of the film.
+    say: called with lines of the summary.
+    progress: called with the numbers of frames drawn and wanted.
+
+    Returns
+    -------
+    The files written.
+
+    Raises
+    ------
+    NothingToDraw, a ValueError, where there is no store, or not that frame.
     """
     path = folder_of(store)
     tree = opened(path)

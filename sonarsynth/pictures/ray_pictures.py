@@ -47,9 +47,21 @@ UNITS = "SI; angles in rad, up positive; positions (east, north, up) with z = 0 
 
 
 def rays(recipe: Recipe, frame: int = 0, out: Path | str = "rays") -> list[Path]:
-    """Draw the rays of frame number `frame` of a recipe into the folder `out`, as `show_rays` does.
+    """Draw the rays of a frame of a recipe, as `show_rays` does.
 
-    Returns the files written. Raises FieldError for a scene that cannot be, IndexError for a frame that is not there.
+    Parameters
+    ----------
+    recipe: whose rays are drawn.
+    frame: number of the frame.
+    out: folder of the pictures.
+
+    Returns
+    -------
+    The files written.
+
+    Raises
+    ------
+    FieldError for a scene that cannot be, IndexError for a frame that is not there.
     """
     return show_rays(plan_of(recipe), frame, Path(out))[0]
 

@@ -18,10 +18,22 @@ FADE = 0.05
 
 
 def snap(recipe: Recipe, out: Path | str = "snap.png", compare: Path | str | None = None) -> Path:
-    """Draw the first shrimp's snap, unvaried, before and after the sonar's filter. Returns the file written.
+    """Draw the first shrimp's snap, unvaried, before and after the sonar's filter.
 
-    compare: a recording (WAV, CSV, text) of a snap to draw beside it. Raises FieldError without a shrimp, or where its
-    snap cannot be made, RecordingError where the recording cannot be read or compared.
+    Parameters
+    ----------
+    recipe: whose shrimp it is.
+    out: file of the picture.
+    compare: a recording (WAV, CSV, text) of a snap that is drawn beside it.
+
+    Returns
+    -------
+    The file written.
+
+    Raises
+    ------
+    FieldError without a shrimp, or where its snap cannot be made, RecordingError where the recording cannot be read or
+    compared.
     """
     return draw_snap(recipe, Path(out), compare)[0]
 

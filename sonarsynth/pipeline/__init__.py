@@ -12,8 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from sonarsynth.conventions import Floats
 from sonarsynth.labels import echo_levels, label, link_budget, path_powers
 from sonarsynth.pipeline.echo_image import image_of, image_without_clock
@@ -37,7 +35,7 @@ from sonarsynth.pipeline.stored_values import (
     truth_values,
 )
 from sonarsynth.pipeline.synthesis import Hearing, digitise, frame_signals, known_elements, known_signals, told_nothing
-from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, variables
+from sonarsynth.pipeline.variables import VARIABLES, Variable, attributes, coordinates, frame_tree, variables
 from sonarsynth.planning import OF_BEAMS, Plan, check_unsampled_frame, context_of, plan, receiver_of, survey_of
 from sonarsynth.planning.notes.source_notes import locator
 from sonarsynth.products import (
@@ -276,23 +274,20 @@ def _values(plan: Plan, index: int) -> Values:
 
 
 def render(recipe: Recipe | Plan, index: int) -> xr.DataTree:
-    """Compute frame number `index` of a recipe, from 0. Pure: the same frame is the same, bit for bit.
+    """Compute a frame of a recipe. Pure: the same frame is the same, bit for bit.
 
-    Returns a labelled DataTree: groups, names and units (attributes) as in a store, without the frame axis. Raises
+    Parameters
+    ----------
+    recipe: a recipe, or the plan of one, which saves planning it again.
+    index: number of the frame, from 0.
+
+    Returns
+    -------
+    A labelled DataTree: groups, names and units (attributes) as in a store, without the frame axis.
+
+    Raises
+    ------
     FieldError as `plan` does, IndexError for a frame that is not there.
     """
-    import xarray as xr
-
     made = plan(recipe) if isinstance(recipe, Recipe) else recipe
-    values, groups = _values(made, index), {"/": xr.Dataset(attrs=attributes(made))}
-    for (group, name), (dims, array, attrs) in coordinates(made).items():
-        one = (dims[1:], array[index], attrs) if "frame" in dims else (dims, array, attrs)
-        groups.setdefault(group, xr.Dataset()).coords[name] = one
-    for v in variables(made):
-        attrs = {"units": v.units, "long_name": v.long_name, **dict(v.attributes)}
-        data = values[v.group, v.name]
-        if "scale_factor" in attrs:
-            packed = data * attrs.pop("scale_factor")
-            data = np.where(data == v.fill, np.nan, packed).astype(np.float32)
-        groups.setdefault(v.group, xr.Dataset())[v.name] = (v.dims[1:], data, attrs)
-    return xr.DataTree.from_dict(groups)
+    return frame_tree(made, index, _values(made, index))

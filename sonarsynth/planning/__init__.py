@@ -66,15 +66,24 @@ COSTED = 5
 def plan(recipe: Recipe, products: Iterable[str] = PRODUCTS, choices: Choices | None = None) -> Plan:
     """Resolve a recipe: check the scene at every frame, make every choice, and predict sizes and cost.
 
-    `products`: what is stored besides the truth, of signals, image and cloud. Of a dataset of more than
-    sampled_frames.MAX_SAMPLED_FRAMES frames, so many are looked at; each other one is checked when it is rendered.
-    `choices`: those that another plan of the same recipe made; left out: the cheapest that keep within the accuracy of
-    the recipe.
+    No frame is rendered. Of a dataset of more than sampled_frames.MAX_SAMPLED_FRAMES frames, so many are looked at;
+    each other one is checked when it is rendered.
 
-    Returns the plan; printed, it is a table. No frame is rendered.
-    Raises FieldError, naming the field, for a body above the surface or in the bottom, a sonar or shrimp out of the
-    water, a snap that cannot be made, a missing or broken file, or methods that cannot serve the scene; ValueError for
-    an unknown product.
+    Parameters
+    ----------
+    recipe: what is resolved.
+    products: what is stored besides the truth, of signals, image and cloud.
+    choices: those that another plan of the same recipe made (default: the cheapest that keep within its accuracy).
+
+    Returns
+    -------
+    The plan; printed, it is a table.
+
+    Raises
+    ------
+    FieldError, naming the field, for a body above the surface or in the bottom, a sonar or shrimp out of the water, a
+    snap that cannot be made, a missing or broken file, or methods that cannot serve the scene; ValueError for an
+    unknown product.
     """
     if not isinstance(recipe, Recipe):
         raise TypeError(f"a recipe is planned, not a {type(recipe).__name__}: sonarsynth.load reads one from a file")

@@ -93,17 +93,31 @@ def eigenrays(
 ) -> RayArrivals:
     """Every ray with at most `vertices` vertices (surface and bottom reflections and turning points) between points.
 
-    bottom_depth, source_depth, receiver_depth and horizontal_range are in m. sound_speed is a description:
-    `Isovelocity`, `Linear`, `Tabulated`, `TemperatureSalinity`, `Cast`, `Thermocline`, `Munk`, `Catenary`. Depths are
-    positive down; depths and ranges are numbers or arrays of any shapes that broadcast. Surface and bottom are flat and
-    perfect: losses are for the caller. None is missed, none comes twice: the search is exact for piecewise linear
-    profiles. Smooth ones have travel times to their tolerance; what layers do to amplitudes and near foci is said in
-    `Munk`. Directions lie in the x-z plane, from source to receiver along x.
+    Surface and bottom are flat and perfect: losses are for the caller. None is missed, none comes twice: the search is
+    exact for piecewise linear profiles. Smooth ones have travel times to their tolerance; what layers do to amplitudes
+    and near foci is said in `Munk`. Directions lie in the x-z plane, from source to receiver along x.
 
-    Returns times (s), directions, counts, caustics and losses (dB) of the rays of each pair, the first to arrive first;
-    printed, they are a table. Raises ValueError in one line that names the argument and the pair: for a point outside
-    the water, a negative range, a number that is not finite, a formula that ends above the bottom; `CastError` for a
-    cast that cannot be read.
+    Parameters
+    ----------
+    sound_speed: a description, such as `Isovelocity`, `Linear`, `Tabulated`, `Cast`, `Thermocline`, `Munk`.
+    bottom_depth: m, positive down; this and the next three are numbers or arrays of any shapes that broadcast.
+    source_depth: m, positive down.
+    receiver_depth: m, positive down.
+    horizontal_range: m.
+    vertices: the most that a ray may have.
+
+    Returns
+    -------
+    Times (s), directions, counts, caustics and losses (dB) of the rays of each pair, the first to arrive first;
+    printed, they are a table.
+
+    Raises
+    ------
+    ValueError in one line that names the argument and the pair: for a point outside the water, a negative range, a
+    number that is not finite, a formula that ends above the bottom; `CastError` for a cast that cannot be read.
+
+    Examples
+    --------
 
     >>> import sonarsynth as ss
     >>> ss.eigenrays(ss.Isovelocity(speed=1500.0), 20.0, 5.0, 10.0, 100.0, vertices=1)
@@ -131,11 +145,24 @@ def eigenrays_between(
 ) -> RayArrivals:
     """Every ray between positions in 3-D.
 
-    sound_speed, bottom_depth (m, positive down) and vertices are those of `eigenrays`; source and receiver are
-    positions (..., xyz) in the world, in m: z is up, and the water is at z < 0.
+    Parameters
+    ----------
+    sound_speed: a description, as of `eigenrays`.
+    bottom_depth: m, positive down.
+    source: positions (..., xyz) in the world, m: z is up, and the water is at z < 0.
+    receiver: positions (..., xyz), likewise; the two broadcast.
+    vertices: the most that a ray may have.
 
-    Returns what `eigenrays` does; departure and arrival are in world axes, those of a vertical ray (0, 0, +-1). Raises
+    Returns
+    -------
+    What `eigenrays` does; departure and arrival are in world axes, those of a vertical ray (0, 0, +-1).
+
+    Raises
+    ------
     ValueError and CastError as `eigenrays` does.
+
+    Examples
+    --------
 
     >>> import sonarsynth as ss
     >>> rays = ss.eigenrays_between(ss.Isovelocity(speed=1500.0), 20.0, (0, 0, -10), (3, 4, -10), vertices=0)

@@ -50,32 +50,46 @@ def build(
     prediction: Prediction | None = None,
     source: Source | None = None,
 ) -> BuildReport:
-    """Build the frames (left out: all) of a recipe that a store lacks, laying it out if it is not there.
+    """Build the frames of a recipe that a store lacks, laying the store out if it is not there.
 
-    On `workers` processes of this machine (left out: one a usable core; 0: in this process), or on the workers of a
-    running Dask scheduler. `products` counts where a recipe is given; a Plan has its own. The arrays are the same
-    whatever the number of workers, the order, the interruptions. Beside the store: a log in `<store>.log.jsonl`, run
-    times in `<store>.times.jsonl`, frames that failed in `<store>.failed.jsonl`, a card in `<store>.card.md`, Croissant
-    metadata in `<store>.croissant.json`. `restart` replaces a store of something else. From a script, call it under
-    `if __name__ == "__main__":`, as all multiprocessing needs.
+    The arrays are the same whatever the number of workers, the order, the interruptions. Beside the store: a log in
+    `<store>.log.jsonl`, run times in `<store>.times.jsonl`, frames that failed in `<store>.failed.jsonl`, a card in
+    `<store>.card.md`, Croissant metadata in `<store>.croissant.json`; of a store at a URL, log and run times are in
+    ~/.local/state/sonarsynth. From a script, call it under `if __name__ == "__main__":`, as all multiprocessing needs.
+    A frame that raises fails and is skipped; on worker processes also one that crashes or takes too long.
 
-    A frame fails and is skipped if it raises; on worker processes also if it crashes, takes `frame_timeout` seconds for
-    a stage (left out: by the plan; 0: no limit), or if its worker takes more than `worker_memory` bytes (left out: its
-    share of the machine's); `retry_failed` tries those of earlier builds again. `agreed` builds what needs more than is
-    free, or over 1 TB; `insecure` uses a scheduler on another machine without TLS; `mixed_versions` goes on with other
-    versions of libraries that touch numbers than the store was begun with, and marks those frames. `dashboard` starts
-    that of Dask on 127.0.0.1, where every user of this machine can read it; `announce` gets its address. A `prediction`
-    of `predicting.predict` is compared with what is measured. `progress` gets the numbers of frames done, wanted and
-    failed. The text of the recipe is kept where its `source` is given (`reading.read`).
+    Parameters
+    ----------
+    what: a recipe, or the plan of one.
+    path: folder of the store, or a URL that fsspec knows, such as s3://bucket/remus.zarr.
+    frames: numbers of the frames (default: all).
+    products: of signals, image and cloud, those that are stored; a plan has its own.
+    workers: processes on this machine (default: one a usable core; 0: in this process).
+    scheduler: address of a running Dask scheduler, whose workers are used instead.
+    restart: whether a store of something else is replaced.
+    retry_failed: whether frames that failed in earlier builds are tried again.
+    frame_timeout: seconds that a stage may take (default: by the plan; 0: no limit).
+    worker_memory: bytes that a worker may take (default: its share of the machine's).
+    agreed: whether to build what needs more disk than is free, or over 1 TB.
+    insecure: whether a scheduler on another machine may be used without TLS.
+    mixed_versions: whether to go on with other versions of libraries than the store was begun with; frames are marked.
+    dashboard: whether Dask's is started, on 127.0.0.1, where every user of this machine can read it.
+    progress: called with the numbers of frames done, wanted and failed.
+    announce: called with lines for people, such as the address of the dashboard.
+    prediction: of `predicting.predict`, compared with what is measured.
+    source: the text of the recipe (`reading.read`), kept in the store.
 
-    `path` may be a URL that fsspec knows, such as s3://bucket/remus.zarr: the files beside it are objects there, but
-    for the log and the run times, which are in ~/.local/state/sonarsynth.
+    Returns
+    -------
+    Numbers of frames, times (s) and failures.
 
-    Returns counts, times (s) and failures. Raises FieldError for a scene that cannot be, IndexError for frames that are
-    not there, store.Mismatch for a store of something else, store.StoreLocked while another build runs, store.Damage
-    where the store cannot go on, TooLarge where `agreed` is needed, OSError where it cannot be written or the scheduler
-    is gone, store.Unreachable for a URL that cannot be used, RuntimeError where workers do not start, ValueError for
-    options that cannot be. After any of these, and after an interruption, the same call resumes where it ended.
+    Raises
+    ------
+    FieldError for a scene that cannot be, IndexError for frames that are not there, store.Mismatch for a store of
+    something else, store.StoreLocked while another build runs, store.Damage where the store cannot go on, TooLarge
+    where `agreed` is needed, OSError where it cannot be written or the scheduler is gone, store.Unreachable for a URL
+    that cannot be used, RuntimeError where workers do not start, ValueError for options that cannot be. After any of
+    these, and after an interruption, the same call resumes where it ended.
     """
     made = what if isinstance(what, Plan) else plan(what, chosen_products(products))
     _check(workers, scheduler, frame_timeout, worker_memory, insecure)

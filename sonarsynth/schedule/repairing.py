@@ -64,17 +64,30 @@ def repair(
 ) -> RepairReport:
     """Make what is damaged in a store again, from the recipe in it, so that it is what it was, bit for bit.
 
-    Metadata and fixed arrays are laid out again; damaged shards are computed again, those frames that they had, on
-    `workers` processes as in `build`; files that do not belong there move to `<store>.foreign`. What failed when the
-    store was built is not tried. Ended in whatever way, the same call goes on. Where the recipe names files, they are
-    looked for in the folder `files`, and opened nowhere else. `path` is a folder or a URL; `progress` is that of
-    `build`.
+    Metadata and fixed arrays are laid out again; damaged shards are computed again, those frames that they had; files
+    that do not belong there move to `<store>.foreign`. What failed when the store was built is not tried. Ended in
+    whatever way, the same call goes on.
 
-    Returns what was restored, computed again and moved. `quick` trusts files that have the digest of their mark; else
-    every number is read back, as `verify` does. Raises Mismatch where there is no store of ours, or where it cannot be
-    made again as it was: the version of sonarsynth, its code or its libraries are others (unless `force`), or files
-    that the recipe names have changed, are gone, or need `files`; Damage where the recipe cannot be read any more;
-    store.StoreLocked while a build runs; OSError where the store cannot be written; ValueError for a scheduler on
+    Parameters
+    ----------
+    path: a folder or a URL.
+    workers: processes, as in `build`.
+    scheduler: address of a running Dask scheduler, as in `build`.
+    force: whether to go on where the version of sonarsynth, its code or its libraries are others.
+    quick: whether files are trusted that have the digest of their mark; else every number is read back, as in `verify`.
+    insecure: whether a scheduler on another machine may be used without TLS.
+    files: folder of the files that the recipe names; they are opened nowhere else.
+    progress: as in `build`.
+
+    Returns
+    -------
+    What was restored, computed again and moved.
+
+    Raises
+    ------
+    Mismatch where there is no store of ours, or where it cannot be made again as it was: other code (unless `force`),
+    or files that the recipe names have changed, are gone, or need `files`; Damage where the recipe cannot be read any
+    more; store.StoreLocked while a build runs; OSError where the store cannot be written; ValueError for a scheduler on
     another machine without TLS, unless `insecure`.
     """
     if scheduler is not None:

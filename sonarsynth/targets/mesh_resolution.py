@@ -141,7 +141,7 @@ def _fine(
         if isinstance(shape, LShape) and shape.edge is None:
             mesh = mesh_of(replace(shape, edge=max(shape.height, shape.length, shape.width) / SHADOW))
         return mesh, None
-    edge, sagitta = _limits(mesh, shape, ROWS * wavelength, 0.25 * error * wavelength / np.pi)
+    edge, sagitta = _limits(mesh, shape, ROWS * wavelength, 0.25 * error * wavelength / np.pi, MOST_FACETS)
     mesh = refined_mesh(shape, edge, sagitta)
     ratio = expected_error(mesh, wavelength) / error
     while ratio > 1.1 and len(mesh.faces) * ratio < MOST_FACETS and np.isfinite(sagitta):
@@ -173,7 +173,7 @@ def _refinable(shape: Shape) -> bool:
     return not (isinstance(shape, (Box, LShape)) or (isinstance(shape, Remus100) and shape.coarse))
 
 
-def _limits(mesh: Mesh, shape: Shape, edge: float, sagitta: float, most: int = MOST_FACETS) -> tuple[float, float]:
+def _limits(mesh: Mesh, shape: Shape, edge: float, sagitta: float, most: int) -> tuple[float, float]:
     """Longest edge and mean sagitta (m) for the mesh of a shape, so long that about so many facets serve.
 
     Facets of the coarse mesh are cut in as many as their area asks, and as the distance of their plane from the curve

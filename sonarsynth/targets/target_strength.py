@@ -36,10 +36,7 @@ def target_strength(
 ) -> Floats:
     """Target strength (...) in dB re 1 m2: 20 log10 of the far-field amplitude in m (pressure f/r for unit pressure).
 
-    frequency (...) Hz, incident and scattered (..., xyz) unit vectors of propagation, in and away, in the target's own
-    frame (x forward, y port, z up), sound_speed (...) m/s: broadcast together. Backscatter is scattered = -incident.
-    scattering: `Kirchhoff()` where left out; of a lobe, and of the incoherent part of rough facets, powers are summed.
-    -inf where no facet is both lit and seen: nothing comes back by this law. Bodies shade themselves, facet by facet.
+    Bodies shade themselves, facet by facet. Of a lobe, and of the incoherent part of rough facets, powers are summed.
     Of a closed convex body, curved everywhere and without creases, as a sphere is, Kirchhoff has all that it adds to
     the wave, with what creeps round it and what makes its shadow; of others, the echo alone.
 
@@ -49,7 +46,22 @@ def target_strength(
     m or more from 25 to 110 kHz are within 0.25 dB of the exact series up to 120 degrees off backscatter, within 0.9 dB
     beyond.
 
-    Raises ValueError (MeshError for a mesh) in one line for what is no target, frequency, direction or sound speed.
+    Parameters
+    ----------
+    target: a mesh, a shape, or the target of a recipe.
+    frequency: (...) Hz; this and the next three broadcast together.
+    incident: (..., xyz) unit vectors of propagation towards it, in its own frame (x forward, y port, z up).
+    scattered: (..., xyz) unit vectors away from it; backscatter is -incident.
+    sound_speed: (...) m/s.
+    scattering: the law of its surface (default: `Kirchhoff()`).
+
+    Returns
+    -------
+    (...) dB; -inf where no facet is both lit and seen: nothing comes back by this law.
+
+    Raises
+    ------
+    ValueError (MeshError for a mesh) in one line for what is no target, frequency, direction or sound speed.
     """
     law = Kirchhoff() if scattering is None else scattering
     k, going, away = _checked(frequency, incident, scattered, sound_speed)

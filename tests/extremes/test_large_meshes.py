@@ -122,6 +122,7 @@ def test_sizes_count_arrays_once() -> None:
     plain = mesh_of(Sphere(radius=0.5))
     mesh = Mesh(plain.vertices.copy(), plain.faces.copy())
     assert size_of(mesh) == mesh.vertices.nbytes + mesh.faces.nbytes
+    assert mesh.area.shape == mesh.centroid.shape[:1]  # each is made where it is asked for
     assert (
         size_of((mesh, mesh.normal))
         == size_of(mesh)

@@ -23,7 +23,7 @@ from sonarsynth.receiver import PlanarLattice, Sonar, elements
 from sonarsynth.signals import add_noise
 from sonarsynth.signals.filtered_pulse import fir
 
-PAGE = (Path(__file__).resolve().parents[2] / "tools" / "docs" / "extending.md").read_text()
+PAGE = (Path(__file__).resolve().parents[2] / "tools" / "docs" / "how-to" / "extending.md").read_text()
 SONAR = Sonar()
 ARRAY = elements(PlanarLattice(columns=3, rows=2, pitch=0.007))
 DRAWS, SAMPLES = 600, 256

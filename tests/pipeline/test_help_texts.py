@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 
 import pytest
 
@@ -27,6 +28,26 @@ def test_help_gives_parameters_with_bounds_units_and_defaults() -> None:
     assert "surface_speed : number from 100 to 10000 in m/s, default 1541" in text
     assert "kind :" not in text
     assert "Parameters\n----------" not in DESCRIBED["Thermocline"]["description"]
+
+
+FUNCTIONS = [name for name in ss.__all__ if inspect.isfunction(getattr(ss, name))]
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_no_parameter_of_a_function_is_without_a_word(name: str) -> None:
+    function = getattr(ss, name)
+    sections = re.split(r"\n(\w+)\n-+\n", inspect.getdoc(function) or "")
+    of = dict(zip(sections[1::2], sections[2::2], strict=True))
+    explained = re.findall(r"^(\w+): .", of.get("Parameters", ""), re.MULTILINE)
+    assert explained == list(inspect.signature(function).parameters) and of["Returns"].strip()
+
+
+def test_a_class_explains_itself_and_so_do_its_methods() -> None:
+    classes = [getattr(ss, name) for name in ss.__all__ if inspect.isclass(getattr(ss, name))]
+    assert len(classes) > 60
+    for one in classes:
+        own = [value for key, value in vars(one).items() if inspect.isfunction(value) and not key.startswith("_")]
+        assert inspect.getdoc(one) and all(value.__doc__ for value in own), one
 
 
 def test_the_stricter_of_two_bounds_is_shown() -> None:

@@ -17,7 +17,7 @@ from sonarsynth.evaluation import range_errors
 from sonarsynth.pictures.compare import moment, show_beside
 from sonarsynth.pictures.figures.compared_images import BesidePicture, Column, Moment, Panel
 from sonarsynth.pictures.recipe_diff import names_of
-from sonarsynth.pictures.scores import as_table, heard, scores_of
+from sonarsynth.pictures.scores import as_table, echo_energies, scores_of
 from sonarsynth.pictures.store_reading import opened
 from sonarsynth.planning import plan
 from sonarsynth.recipe import reading
@@ -118,7 +118,7 @@ def test_only_a_few_of_many_differences_are_said(small_text: str) -> None:
 def test_numbers_are_those_of_the_arrays(stores: dict[str, Path]) -> None:
     tree = opened(stores["mirrors"])
     frames = [1, 2, 3, 4]
-    sound = heard(tree, frames)
+    sound = echo_energies(tree, frames)
     rows = scores_of(tree, stores["mirrors"], frames, sound)
     energy, target = tree["image/energy"].values[1:5].astype(float), tree["truth/beams/target"].values[1:5]
     each = [energy[i][target[i] >= 0].mean() for i in range(4)]
@@ -150,11 +150,11 @@ def test_the_cost_is_the_median_of_the_frames_as_last_built(stores: dict[str, Pa
     ]
     lines = [json.dumps(row | {"seconds": {}}) for row in rows]
     (tmp_path / "s.zarr.times.jsonl").write_text("\n".join([*lines, '{"frame": 2, "cpu": {"tra']))
-    found = scores_of(tree, tmp_path / "s.zarr", [0, 1, 2, 3], heard(tree, [0, 1, 2, 3]))
+    found = scores_of(tree, tmp_path / "s.zarr", [0, 1, 2, 3], echo_energies(tree, [0, 1, 2, 3]))
     costs = {name: value for name, value in found.items() if name.startswith(("CPU", "frames per second"))}
     assert list(costs.values()) == ["3 ms", "20 ms", "2 ms", "25 ms", "40"]
     assert list(costs)[-2:] == ["CPU per frame: all", "frames per second, one core"]
-    without = scores_of(tree, tmp_path / "none.zarr", [0], heard(tree, [0]))
+    without = scores_of(tree, tmp_path / "none.zarr", [0], echo_energies(tree, [0]))
     assert {without[name] for name in costs} == {"-"}
 
 
@@ -174,7 +174,7 @@ def test_a_film_and_a_picture_of_the_frames_that_all_have(
     head, *rows = said[1].splitlines()
     assert head.split("  ")[-1].strip() == "kirchhoff, roughness 2 mm"
     shared = scores_of(
-        opened(stores["lobe"]), stores["lobe"], [1, 2, 3, 4], heard(opened(stores["lobe"]), [1, 2, 3, 4])
+        opened(stores["lobe"]), stores["lobe"], [1, 2, 3, 4], echo_energies(opened(stores["lobe"]), [1, 2, 3, 4])
     )
     assert [row[: len(name)] for row, name in zip(rows, shared, strict=True)] == list(shared)
     assert all(value in row for row, value in zip(rows, shared.values(), strict=True))
@@ -182,7 +182,7 @@ def test_a_film_and_a_picture_of_the_frames_that_all_have(
 
 def test_every_film_is_drawn_re_its_own_brightest_beam(stores: dict[str, Path]) -> None:
     trees = [opened(path) for path in stores.values()]
-    peaks = [heard(tree, range(1, 5)).peak for tree in trees]
+    peaks = [echo_energies(tree, range(1, 5)).peak for tree in trees]
     assert len(set(peaks)) == 3
     seen = [moment(trees, peaks, frame) for frame in range(1, 5)]
     highest = [[np.max(panel.level) for panel in one.panels if panel.level is not None] for one in seen]
@@ -225,7 +225,7 @@ def test_a_silent_store_without_a_cloud_is_drawn(stores: dict[str, Path], tmp_pa
     said: list[str] = []
     assert len(show_beside([stores["lobe"], quiet], tmp_path / "out", say=said.append, film=False)) == 1
     assert "silent" in said[0]
-    rows = scores_of(xr.open_datatree(quiet, engine="zarr"), quiet, [0], heard(opened(quiet), [0]))
+    rows = scores_of(xr.open_datatree(quiet, engine="zarr"), quiet, [0], echo_energies(opened(quiet), [0]))
     assert rows["median range error"] == rows["points on target"] == "-"
     assert as_table(["a"], [rows]).count("silent") == 3
 

@@ -28,10 +28,23 @@ SNAP_STEPS = 16
 
 
 def preview(recipe: Recipe, out: Path | str = "preview", sequences: int = SEQUENCES) -> list[Path]:
-    """Draw what a recipe would make into the folder `out`: scenes of some sequences, and the distributions of ranges,
-    angles and views over up to `sequences` sequences. No sound is simulated.
+    """Draw what a recipe would make: scenes of some sequences, and distributions of ranges, angles and views.
 
-    Returns the files written. Raises FieldError for a scene that cannot be.
+    No sound is simulated.
+
+    Parameters
+    ----------
+    recipe: what is drawn.
+    out: folder of the pictures.
+    sequences: the most that the distributions are drawn from.
+
+    Returns
+    -------
+    The files written.
+
+    Raises
+    ------
+    FieldError for a scene that cannot be.
     """
     return draw_preview(recipe, Path(out), sequences)[0]
 

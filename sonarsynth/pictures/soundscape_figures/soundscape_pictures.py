@@ -119,14 +119,27 @@ def soundscape(
     sampling_frequency: float | None = None,
     files: Path | str | None = None,
 ) -> Soundscape:
-    """Measure what hydrophones hear of the sea of a recipe, or of a store (a folder or a URL), beside its model, and
-    draw it into the file `out`.
+    """Measure what hydrophones hear of the sea of a recipe or a store beside its model, and draw it.
 
-    seconds: of a recipe's sound to make; compare: a recording (WAV or HDF5) whose figures are put beside them; pascals:
-    pressure (Pa) of the number 1 in it, the full scale of a WAV of whole numbers; channel: of it, from 0; dataset,
-    sampling_frequency (Hz): of an HDF5 of several datasets, and of one that does not say it; files: folder of the files
-    that a store's recipe names. Raises FieldError, NothingToDraw (a ValueError) where there is no sound,
-    RecordingError, Mismatch.
+    Parameters
+    ----------
+    source: a recipe, or a store (a folder or a URL).
+    out: file of the picture.
+    seconds: of a recipe's sound to make.
+    compare: a recording (WAV or HDF5) whose figures are put beside them.
+    pascals: pressure (Pa) of the number 1 in it, the full scale of a WAV of whole numbers.
+    channel: of the recording, from 0.
+    dataset: of an HDF5 that has several.
+    sampling_frequency: Hz, of an HDF5 that does not say it.
+    files: folder of the files that a store's recipe names.
+
+    Returns
+    -------
+    The figures: measured, of the model, and of the recording.
+
+    Raises
+    ------
+    FieldError, NothingToDraw (a ValueError) where there is no sound, RecordingError, Mismatch.
     """
     beside = None if compare is None else SeaRecording(compare, pascals, channel, dataset, sampling_frequency)
     if isinstance(source, Recipe):

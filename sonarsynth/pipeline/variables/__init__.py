@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
 
 from sonarsynth.pipeline.variables.static_variables import coordinates
 from sonarsynth.pipeline.variables.truth_variables import HOW_LEVELS_ADD_UP
@@ -12,7 +16,19 @@ from sonarsynth.pipeline.variables.variable_groups import VARIABLES
 from sonarsynth.planning import OF_BEAMS, Plan
 from sonarsynth.planning.noise_rows import sound_parts
 
-__all__ = ["FORMAT_VERSION", "HOW_LEVELS_ADD_UP", "VARIABLES", "Variable", "attributes", "coordinates", "variables"]
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "FORMAT_VERSION",
+    "HOW_LEVELS_ADD_UP",
+    "VARIABLES",
+    "Variable",
+    "attributes",
+    "coordinates",
+    "frame_tree",
+    "variables",
+]
 
 FORMAT_VERSION = "3"
 """Version of the layout of a store."""
@@ -52,6 +68,7 @@ def attributes(plan: Plan) -> dict[str, Any]:
     recipe, world = plan.recipe, plan.scene.world
     chorus = world.chorus is not None and world.chorus.rate > 0.0
     besides = {"chorus": chorus, "noise_sources": world.noise_sources, "scatterers": world.scatterers}
+    besides["reverberation"] = world.reverberation is not None
     others = [name for name, value in besides.items() if value]
     also: dict[str, Any] = {"other_sounds": others} if others else {}
     return also | {
@@ -72,3 +89,24 @@ def attributes(plan: Plan) -> dict[str, Any]:
             "Quaternions (w, x, y, z) from body to world. Levels re 1 uPa, source levels at 1 m."
         ),
     }
+
+
+def frame_tree(plan: Plan, index: int, values: Mapping[tuple[str, str], npt.NDArray[Any]]) -> xr.DataTree:
+    """A frame as a labelled tree: groups, names and units (attributes) as in a store, without the frame axis.
+
+    values: every stored value of frame number `index`, by group and name.
+    """
+    import xarray as xr
+
+    groups = {"/": xr.Dataset(attrs=attributes(plan))}
+    for (group, name), (dims, array, attrs) in coordinates(plan).items():
+        one = (dims[1:], array[index], attrs) if "frame" in dims else (dims, array, attrs)
+        groups.setdefault(group, xr.Dataset()).coords[name] = one
+    for v in variables(plan):
+        attrs = {"units": v.units, "long_name": v.long_name, **dict(v.attributes)}
+        data = values[v.group, v.name]
+        if "scale_factor" in attrs:
+            packed = data * attrs.pop("scale_factor")
+            data = np.where(data == v.fill, np.nan, packed).astype(np.float32)
+        groups.setdefault(v.group, xr.Dataset())[v.name] = (v.dims[1:], data, attrs)
+    return xr.DataTree.from_dict(groups)

@@ -50,19 +50,41 @@ class RenamedKey(FutureWarning):
 
 
 def load(path: Path | str, sets: Sequence[str] = ()) -> Recipe:
-    """Read a recipe from a YAML file; `sets` are settings `path=value` that replace fields, such as
-    `scene.trajectory.frames=8`.
+    """Read a recipe from a YAML file.
 
-    Returns the checked recipe. Raises RecipeError, which names file, line and field.
+    Parameters
+    ----------
+    path: the file.
+    sets: settings `path=value` that replace fields, such as `scene.trajectory.frames=8`.
+
+    Returns
+    -------
+    The checked recipe.
+
+    Raises
+    ------
+    RecipeError, one line that names file, line and field.
     """
     return recipe_of(read(path, sets))
 
 
 def loads(text: str, name: str = "recipe", folder: Path | str = ".", *, resolved: bool = False) -> Recipe:
-    """Read a recipe from a YAML text; `name` stands for the file in messages, paths are relative to `folder`.
+    """Read a recipe from a YAML text.
 
-    Returns the checked recipe. `resolved` says that `dump` wrote the text, maybe before it gave angles their unit: bare
-    ones are then in rad. Raises RecipeError.
+    Parameters
+    ----------
+    text: the recipe.
+    name: stands for the file in messages.
+    folder: paths of files in the recipe are relative to it.
+    resolved: whether `dump` wrote the text, maybe before it gave angles their unit: bare ones are then in rad.
+
+    Returns
+    -------
+    The checked recipe.
+
+    Raises
+    ------
+    RecipeError, one line that names text, line and field.
     """
     source = with_new_keys(read_text(text, name, Path(folder).absolute()))
     return recipe_of(source, check_files=False, resolved=resolved)
@@ -104,7 +126,16 @@ def locating(source: Source) -> Iterator[None]:
 
 
 def dump(recipe: Recipe) -> str:
-    """Returns the YAML text of a recipe, every default written out; `loads` gives an equal recipe."""
+    """The YAML text of a recipe, every default written out.
+
+    Parameters
+    ----------
+    recipe: what is written.
+
+    Returns
+    -------
+    Text of which `loads` makes an equal recipe.
+    """
     text = io.StringIO()
     yaml: Any = YAML(typ="safe", pure=True)
     yaml.default_flow_style = None  # mappings and lists of plain values in one line, the rest as blocks

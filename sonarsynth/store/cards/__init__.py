@@ -18,11 +18,21 @@ __all__ = ["Facts", "croissant", "facts_of", "markdown", "write"]
 
 
 def write(store: Folder | str, folder: Folder | str | None = None) -> tuple[Folder, Folder]:
-    """Write `<store>.card.md`, the card, and `<store>.croissant.json`, the Croissant metadata: beside the store, or in
-    another folder. Returns the two files.
+    """Write `<store>.card.md`, the card, and `<store>.croissant.json`, the Croissant metadata.
 
-    Raises store.Mismatch where there is no store of ours, store.Damage where its metadata cannot be read, OSError where
-    the files cannot be written.
+    Parameters
+    ----------
+    store: folder or URL of a store.
+    folder: where the files go (default: beside the store).
+
+    Returns
+    -------
+    The two files.
+
+    Raises
+    ------
+    store.Mismatch where there is no store of ours, store.Damage where its metadata cannot be read, OSError where the
+    files cannot be written.
     """
     store = absolute(store)
     facts = facts_of(store)

@@ -114,8 +114,20 @@ class Report:
 def verify(path: Folder | str, checks: Sequence[Check] = (), *, quick: bool = False) -> Report:
     """Compare marks, digests and files of a store, read every number back, and run checks on what it says.
 
-    `quick` compares files with their digests and no more. Of a store that is being built, what is complete is looked
-    at, and no checks are run. `path` is a folder or a URL. Returns problems, the results of checks, and frames. Raises
+    Of a store that is being built, what is complete is looked at, and no checks are run.
+
+    Parameters
+    ----------
+    path: a folder or a URL.
+    checks: functions that each compare something that the store says twice.
+    quick: whether files are compared with their digests and no more.
+
+    Returns
+    -------
+    Problems, the results of checks, and frames.
+
+    Raises
+    ------
     Mismatch where there is no store of ours.
     """
     path = absolute(path)
