@@ -24,9 +24,9 @@ __all__ = ["MeshError", "file_stamp", "mesh_of", "refined_mesh"]
 
 LARGEST_IN_METRES: Final = 300.0
 """Size (m) over which a file without a unit is taken to be in millimetres."""
-NANOMETRES: Final = 9
-"""Decimals of a vertex (m). Processors differ in the last bit of sines and powers: unrounded, a shape would have
-another digest on each, and with it other random signs of its facets, another speckle."""
+DIGITS: Final = 9
+"""Decimals of a vertex over the size of the mesh. Processors differ in the last bit of sines and powers: unrounded, a
+shape would have another digest on each, and with it other random signs of its facets, another speckle."""
 SHARP: Final = MeshFile(path="").crease
 """The crease of shapes that leave it out."""
 
@@ -43,6 +43,13 @@ def mesh_of(shape: Shape) -> Mesh:
 @byte_bounded_cache(32)
 def _mesh_of(shape: Shape, stamp: tuple[int, int] | None) -> Mesh:
     return refined_mesh(shape)
+
+
+def _rounded(vertices: Floats) -> Floats:
+    """Vertices (vertex, xyz) in whole parts of about 1e-9 of the largest of their coordinates: of 1 m, nanometres."""
+    size = 1.1 * np.abs(vertices).max(initial=0.0)  # sizes of shapes are often powers of ten, this is not
+    decimals = DIGITS - int(np.floor(np.log10(size))) if size > 0.0 else DIGITS
+    return np.round(vertices, decimals) + 0.0  # no -0.0, which has other bits
 
 
 def file_stamp(shape: Shape) -> tuple[int, int] | None:
@@ -72,7 +79,7 @@ def refined_mesh(shape: Shape, edge: float = np.inf, sagitta: float = np.inf) ->
     if isinstance(shape, MeshFile) and shape.sides == "both":
         (vertices, numbers), sheets = with_backs((vertices, numbers))
         notes = (*notes, f"{sheets} facets of sheets scatter from both sides") if sheets else notes
-    vertices = np.round(vertices, NANOMETRES) + 0.0  # no -0.0, which has other bits
+    vertices = _rounded(vertices)
     faces = np.ascontiguousarray(numbers, np.int32)
     flat = None
     if isinstance(shape, (Cylinder, Myring, Remus100)):  # their ends

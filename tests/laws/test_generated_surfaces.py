@@ -117,7 +117,7 @@ def test_vertices_of_a_hull_lie_on_its_true_surface(shape):
     assert mesh.box[1, 0] == pytest.approx(half, abs=1e-12)
     side = np.abs(x) < half - 1e-6  # not on the flat ends
     about = np.stack([hull_radius(shape, half - x[side] + shift) for shift in (-1e-9, 0.0, 1e-9)])
-    assert np.all(r[side] > about.min(axis=0) - 1e-8)  # vertices are in whole nanometres
+    assert np.all(r[side] > about.min(axis=0) - 1e-8)  # vertices are rounded
     assert np.all(r[side] < about.max(axis=0) + 1e-8)
 
 
