@@ -105,7 +105,7 @@ def test_a_target_is_chosen_by_name_and_a_frame_is_a_picture(tree: xr.DataTree) 
     assert tree["truth/targets"].sel(target="box")["position"].dims == ("frame", "xyz")
     image = tree.sonar.image(3)
     drawn = next(axes for axes in image.axes if axes.images).images[0].get_array()
-    energy = tree["image/energy"].isel(frame=3).values
+    energy = tree["image/energy"].isel(frame=3).values.astype(float)
     assert drawn is not None and drawn[:, ::-1].filled() == pytest.approx(10 * np.log10(energy / energy.max()))
     shown = tree.sonar.cloud(3).axes[0].get_title()
     assert "points on a target" in shown or "point on a target" in shown
