@@ -98,6 +98,9 @@ def test_the_band_holds_the_truth_as_often_as_it_says() -> None:
         outcomes = np.arange(trials + 1)
         inside = [low <= p <= high for low, high in (binomial_band(int(n), trials) for n in outcomes)]
         assert 0.92 < binom.pmf(outcomes, trials, p)[inside].sum() < 0.98
+    for trials in range(1, 40):  # exactly, also where all or none are hits
+        bands = [(binomial_band(hits, trials), hits / trials) for hits in range(trials + 1)]
+        assert all(low <= share <= high for (low, high), share in bands)
 
 
 def test_only_the_order_of_scores_counts_and_no_order_of_rows() -> None:

@@ -44,4 +44,6 @@ def binomial_band(hits: int, trials: int) -> tuple[float, float]:
     p, z2 = hits / trials, CONFIDENCE**2
     middle = (p + 0.5 * z2 / trials) / (1.0 + z2 / trials)
     half = CONFIDENCE * np.sqrt(p * (1.0 - p) / trials + 0.25 * z2 / trials**2) / (1.0 + z2 / trials)
-    return float(max(middle - half, 0.0)), float(min(middle + half, 1.0))
+    return float(min(max(middle - half, 0.0), p)), float(
+        max(min(middle + half, 1.0), p)
+    )  # whatever rounds, p is inside
