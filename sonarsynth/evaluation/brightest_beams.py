@@ -39,7 +39,8 @@ def refused(some: SmallVariables, frame: int) -> bool:
 
 GLINT = 10.0
 """dB: a beam on a glint holds so much more of its echo than one on a hull that is seen aside (9 dB in
-thermocline.yaml), so a ghost may be brightest though its echoes are together fainter by this."""
+thermocline.yaml, by the signs of its facets), so a ghost may be brightest though its echoes are together fainter by
+this."""
 
 
 STANDS_OUT = 2.0
