@@ -87,7 +87,6 @@ def exact_plan(plan: Plan) -> Plan:
     paths = plan.propagation if plan.profile.uniform else plan.propagation.exact()
     choices = Choices(
         subarrays=plan.elements.count,
-        degree=5,
         occlusion="sensors",
         negligible=0.0,
         synthesis=golden(plan),

@@ -123,7 +123,6 @@ def plain(arrivals: Arrivals, plan: Plan, frame: Frame) -> Arrivals:
         delay_std=nought,
         echo_delay_std=nought,
         doppler=nought,
-        doppler_terms=np.zeros((len(nought), 0)),
         coherent=np.zeros(len(nought), bool),
         corner_delays=np.zeros((len(nought), 3)),
         coherent_fraction=nought,

@@ -109,10 +109,9 @@ def trace_points(exact: ExactFrame, traced: TracedBySensor) -> Iterator[Point]:
     best = exact_plan(plan)
     usual = replace(best, choices=replace(best.choices, subarrays=plan.choices.subarrays))
     if plan.choices.subarrays < plan.elements.count:
-        degree, view = replace(usual.choices, degree=3), replace(usual.choices, occlusion="centre")
-        for knob, choices, setting in (("degree", degree, "of degree 3"), ("occlusion", view, "from the centre")):
-            of = TracedBySensor.of(replace(usual, choices=choices), exact.frame, exact.sensor)
-            yield _point(exact, of, knob, f"{setting}, {_cut(plan)}")
+        view = replace(usual, choices=replace(usual.choices, occlusion="centre"))
+        of = TracedBySensor.of(view, exact.frame, exact.sensor)
+        yield _point(exact, of, "occlusion", f"from the centre, {_cut(plan)}")
     for level in DYNAMIC_RANGES:
         share = 10.0 ** (-level / 10.0)
         some = replace(best, choices=replace(best.choices, negligible=share))
@@ -131,8 +130,6 @@ def _cheaper(plan: Plan) -> Iterator[tuple[str, Plan]]:
             yield f"{count} part{'s' if count > 1 else ''}", replace(plan, choices=replace(choices, subarrays=count))
     if choices.occlusion == "sensors":
         yield "seen from the centre", replace(plan, choices=replace(choices, occlusion="centre"))
-    if choices.degree == 5:
-        yield "of degree 3", replace(plan, choices=replace(choices, degree=3))
     for level in DYNAMIC_RANGES:
         share = 10.0 ** (-level / 10.0)
         if share > 1.001 * choices.negligible:

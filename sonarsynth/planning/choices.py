@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from annotated_types import Ge, Lt
 from pydantic import TypeAdapter
@@ -22,8 +22,6 @@ ALL_PRODUCTS = (*PRODUCTS, "beams")
 OF_BEAMS = frozenset({"image", "cloud", "beams"})
 """Products that the signals are steered for."""
 
-Degree = Literal[3, 5]
-
 
 @description
 class Choices:
@@ -32,8 +30,6 @@ class Choices:
 
     subarrays: Annotated[int, Ge(1)] = 1
     """Parts that the array is cut into; as many as it has hydrophones: each is traced by itself."""
-    degree: Degree = 3
-    """Of the polynomials that paths are expanded in over the array, or a part of it."""
     occlusion: OcclusionPoint = "centre"
     """From where facets must be seen to be heard: from the middle of the array or part, or from each hydrophone."""
     negligible: Annotated[Number, Ge(0), Lt(1)] = 1e-7
@@ -54,4 +50,6 @@ _CHOICES: TypeAdapter[Choices] = TypeAdapter(Choices)
 
 def choices_from(value: object) -> Choices:
     """Choices from JSON values, as `Choices.as_json` gives them. Raises ValueError where they are none."""
+    if isinstance(value, dict) and value.get("degree") == 3:  # of stores from before cubics were all that there is
+        value = {k: v for k, v in value.items() if k != "degree"}
     return _CHOICES.validate_python(value)

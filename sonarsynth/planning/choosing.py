@@ -16,7 +16,7 @@ import numpy as np
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.description.method import Demand
-from sonarsynth.planning.choices import OF_BEAMS, Choices, Degree
+from sonarsynth.planning.choices import OF_BEAMS, Choices
 from sonarsynth.planning.listening_windows import frame_start
 from sonarsynth.planning.measured.focus_zones import beamformer
 from sonarsynth.planning.measured.ray_bending import ranging_error
@@ -44,7 +44,7 @@ PER_SENSOR_TOLERANCE = 1e-3
 LARGE_MESH_FACETS = 1_000_000
 """Facets over which errors are measured in one frame only, at half as many hydrophones."""
 WORTHWHILE_GAIN = 0.7
-"""Of an error, that must be left for each hydrophone's own view, or the fifth degree, to be taken for it."""
+"""Of an error, that must be left for each hydrophone's own view to be taken for it."""
 LESS_FAINT = (0.1,)
 """Shares of the faint echoes left out that are left out, where those are what errs: before the array is cut."""
 DEGREE_TOLERANCE = 0.03
@@ -101,7 +101,6 @@ def _choose(plan: Plan, looks: Sequence[SampledScene]) -> Plan:
         choices=replace(
             choices,
             subarrays=cut.parts,
-            degree=cut.degree,
             occlusion=cut.occlusion,
             beamforming=steering,
             negligible=cut.faint * choices.negligible,
@@ -136,7 +135,6 @@ class _ArrayModel(NamedTuple):
 
     parts: int  # that the array is cut into
     occlusion: OcclusionPoint
-    degree: Degree  # of polynomials over each part
     error: float  # of signals
     whole: float = np.nan  # the same, where the array is not cut and its middle sees for all
     faint: float = 1.0  # share of the echoes left out that is left out
@@ -144,54 +142,48 @@ class _ArrayModel(NamedTuple):
 
 def _subarrays(plan: Plan, indices: Sequence[int]) -> _ArrayModel:
     """The fewest parts of the array that will do; where one will not, each hydrophone's own view of the targets is
-    tried first, then polynomials of the fifth degree, then fainter echoes."""
+    tried first, then fainter echoes."""
     physics, count = plan.scene.physics, plan.elements.count
     seeing: OcclusionPoint = "centre" if physics.occlusion == "auto" else physics.occlusion
     if physics.subarrays == "sensors" or (physics.subarrays == "auto" and plan.recipe.accuracy.exact):
-        return _ArrayModel(count, "centre", 3, 0.0)
+        return _ArrayModel(count, "centre", 0.0)
     measures = [PerSensorReference.of(plan, index) for index in indices]
     allowed = np.sqrt(EXPANSION) * plan.recipe.accuracy.signal / SAFETY
     given = physics.subarrays != "auto"
     first = min(physics.subarrays, count) if physics.subarrays != "auto" else 1
-    degree: Degree = 3
     enough = np.inf if given else allowed
-    whole = error = _worst(measures, first, seeing, degree, enough)
+    whole = error = _worst(measures, first, seeing, enough)
     if error > allowed and physics.occlusion == "auto":
-        better = _worst(measures, first, "sensors", degree, enough)
+        better = _worst(measures, first, "sensors", enough)
         if better < WORTHWHILE_GAIN * error:
             seeing, error = "sensors", better
-    if error > allowed and first < count:
-        better = _worst(measures, first, seeing, 5, enough)
-        if better < WORTHWHILE_GAIN * error:
-            degree, error = 5, better
     if given:
-        return _ArrayModel(first, seeing, degree, error)
+        return _ArrayModel(first, seeing, error)
     if error <= allowed:
-        return _ArrayModel(1, seeing, degree, error, whole)
+        return _ArrayModel(1, seeing, error, whole)
     # Cubics err by the fourth power of the width of parts, the square of their number: no fewer will do.
-    fewest = max(int(np.log2(error / allowed) / (0.5 * (degree + 1))), 1)
+    fewest = max(int(np.log2(error / allowed) / 2.0), 1)
     faint_shares = LESS_FAINT if physics.dynamic_range == "auto" else ()
     tried = [(1, faint) for faint in faint_shares]
     tried += [(2**n, f) for n in range(fewest, int(np.ceil(np.log2(count)))) for f in (1.0, *faint_shares)]
     for parts, faint in tried:
-        error = _worst(measures, parts, seeing, degree, allowed, faint)
+        error = _worst(measures, parts, seeing, allowed, faint)
         if error <= allowed:
-            return _ArrayModel(parts, seeing, degree, error, whole, faint)
-    return _ArrayModel(count, "centre", 3, 0.0, whole)
+            return _ArrayModel(parts, seeing, error, whole, faint)
+    return _ArrayModel(count, "centre", 0.0, whole)
 
 
 def _worst(
     measures: Sequence[PerSensorReference],
     parts: int,
     occlusion: OcclusionPoint,
-    degree: Degree,
     allowed: float,
     faint: float = 1.0,
 ) -> float:
     """Largest error of signals in some frames, or the first that is more than is allowed."""
     worst = 0.0
     for measure in measures:
-        worst = max(worst, measure.error(parts, occlusion, degree, faint))
+        worst = max(worst, measure.error(parts, occlusion, faint))
         if worst > allowed:
             break
     return worst
@@ -221,12 +213,12 @@ class PerSensorReference:
             plan, frame, sensor, (np.vstack([r[0] for r in rows]), np.vstack([r[1] for r in rows]))
         )
 
-    def error(self, parts: int, occlusion: OcclusionPoint = "centre", degree: Degree = 3, faint: float = 1.0) -> float:
+    def error(self, parts: int, occlusion: OcclusionPoint = "centre", faint: float = 1.0) -> float:
         """Error of signals, relative, where the array is cut into so many parts, and `faint` of the echoes left out is
         left out: of echoes or direct arrivals."""
         chosen = self.plan.choices
         negligible = faint * chosen.negligible
-        choices = replace(chosen, subarrays=parts, degree=degree, occlusion=occlusion, negligible=negligible)
+        choices = replace(chosen, subarrays=parts, occlusion=occlusion, negligible=negligible)
         plan = replace(self.plan, choices=choices)
         found = tuple(np.zeros_like(x) for x in self.exact)
         for part in subarrays(self.plan.elements, parts):

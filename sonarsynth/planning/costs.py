@@ -57,9 +57,6 @@ def machine_factor() -> float:
 
 NOT_STATED = "not stated by the method"
 
-QUINTIC_COST = 1.6
-"""Times what cubics over the array take, polynomials of the fifth degree take to trace."""
-
 
 def _paths(plan: Plan) -> float:
     """Paths of one snap and family, each with the weight of its cost in the synthesis."""
@@ -79,7 +76,7 @@ def _tracing(plan: Plan, size: FrameSize) -> float:
     each = {law: SECONDS["trace coherent facet" if law else "trace facet"] for law in (False, True)}
     whole = sum(len(mesh.faces) * each[law.coherent] for law, mesh in pairs) + plan.propagation.cost(size)
     whole += _loose(plan) * each[False]
-    return whole * (QUINTIC_COST if plan.choices.degree > 3 else 1.0)
+    return whole
 
 
 def _ways(plan: Plan) -> int:
@@ -152,8 +149,6 @@ def _traced(plan: Plan) -> str:
     to = "the array" if parts == 1 else f"each of {parts} subarrays"
     if parts == plan.elements.count > 1:
         to = "each hydrophone separately"
-    if plan.choices.degree > 3 and parts < plan.elements.count:
-        to += f", degree {plan.choices.degree}"
     if plan.choices.occlusion == "sensors":
         to += ", occlusion from each hydrophone"
     sources = ", ".join(dict.fromkeys(source.row() for source in plan.scene.world.sources))

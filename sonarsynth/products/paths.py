@@ -84,7 +84,6 @@ class Arrivals:
                 amplitude_terms (path, term)      1    A(q) = A R/|R d - q| (1 + amplitude_terms b(q))
                 phase_terms (path, term)          rad  phi(q) = phi + phase_terms b(q)
                 delay_variance_terms (path, term) s2   sigma(q)^2 = sigma^2 + delay_variance_terms b(q)
-                doppler_terms (path, term)        1    delta(q) = delta + doppler_terms b(q)
     provenance
                 kind (path,)                           `Kind`
                 snap (path,)                           index of the emission
@@ -126,7 +125,6 @@ class Arrivals:
     amplitude_terms: Floats
     phase_terms: Floats
     delay_variance_terms: Floats
-    doppler_terms: Floats
     kind: npt.NDArray[np.int8]
     snap: Ints
     target: Ints

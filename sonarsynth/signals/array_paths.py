@@ -39,7 +39,7 @@ FINITE = (
         "delay_std",
         "doppler",
     ),
-    *("phase_terms", "delay_variance_terms", "doppler_terms", "corner_delays", "coherent_fraction", "height_delay_std"),
+    *("phase_terms", "delay_variance_terms", "corner_delays", "coherent_fraction", "height_delay_std"),
 )
 """What of the arrivals must be finite."""
 
@@ -57,7 +57,6 @@ class ArrayPaths:
     amplitude_terms: Floats  # (path, term)
     phase_terms: Floats  # (path, term) rad: phase over that at the centre
     delay_variance_terms: Floats  # (path, term) s2: variance over that at the centre
-    doppler_terms: Floats  # (path, term) doppler over that at the centre
     sound_speed: float  # m/s
     aperture: float  # m: scale of the terms
     phase: Floats  # (path,) rad, -pi/2 to pi/2: whole half turns are signs of the amplitude
@@ -69,7 +68,6 @@ class ArrayPaths:
     height_delay_std: Floats  # (path,) s: of `facet_pulses.rough_factor`
     occluded: Bools  # (path, sensor) hydrophones that a path does not reach; (path, 0): it reaches all
     modes: Floats  # (path, mode) weights of the modes of a stretch of time (`shapes`); none as yet
-    bends: Floats  # (path, mode) what they change by for each unit of doppler more; none as yet
     centre: float  # Hz, where the amplitudes hold
     attenuation: float = 0.0  # dB/m there: absorption of what the way to a hydrophone is longer than to the centre
 
@@ -103,7 +101,7 @@ def array_paths(
         raise ValueError(f"arrival {np.flatnonzero(arrivals.amplitude == 0.0)[0]} has no amplitude")
     if count and not (arrivals.radius > 0.0).all():
         raise ValueError(f"arrival {np.flatnonzero(~(arrivals.radius > 0.0))[0]} has a radius that is not positive")
-    _check_shapes(arrivals, elements)
+    _check_shapes(arrivals)
     if arrivals.occluded.shape[1] not in (0, 1 + elements.count // 8):
         raise ValueError(f"arrivals are hidden from hydrophones of another array, not of one of {elements.count}")
     if count and not (arrivals.snap.min() >= 0 and arrivals.snap.max() < len(snaps)):
@@ -126,7 +124,6 @@ def array_paths(
         amplitude_terms=arrivals.amplitude_terms,
         phase_terms=arrivals.phase_terms,
         delay_variance_terms=arrivals.delay_variance_terms,
-        doppler_terms=arrivals.doppler_terms,
         sound_speed=arrivals.sound_speed,
         aperture=elements.aperture or 1.0,
         phase=phase,
@@ -138,7 +135,6 @@ def array_paths(
         height_delay_std=np.minimum(arrivals.height_delay_std, LONGEST_BLUR),
         occluded=arrivals.hidden(elements.count),
         modes=np.zeros((count, 0)),
-        bends=np.zeros((count, 0)),
         centre=arrivals.centre,
         attenuation=attenuation,
     )
@@ -152,15 +148,11 @@ def _centred(arrivals: Arrivals) -> tuple[Floats, Floats]:
     return arrivals.delay + middle, arrivals.corner_delays - middle[:, None]
 
 
-def _check_shapes(arrivals: Arrivals, elements: Elements) -> None:
+def _check_shapes(arrivals: Arrivals) -> None:
     """Raise ValueError for a path whose pulse has no shape."""
-    doppler = np.abs(arrivals.doppler)
-    if (terms := arrivals.doppler_terms).shape[1]:  # each at its largest at a hydrophone: a thin array excites few
-        values = aperture_terms(elements.position, elements.aperture or 1.0, terms.shape[1])
-        doppler = doppler + np.abs(terms) @ np.abs(values).max(axis=0)
     for wrong, what in (
         (arrivals.delay_std < 0.0, "a negative delay_std"),
-        (doppler >= MAX_DOPPLER, f"a Doppler factor that is not within +-{MAX_DOPPLER:g}"),
+        (np.abs(arrivals.doppler) >= MAX_DOPPLER, f"a Doppler factor that is not within +-{MAX_DOPPLER:g}"),
         (np.abs(arrivals.corner_delays.T) >= LONGEST_CORNER, f"corners that are not within {LONGEST_CORNER:g} s"),
         (
             (arrivals.coherent_fraction < 0.0) | (arrivals.coherent_fraction > 1.0),
@@ -271,7 +263,6 @@ def reference_of(front: ArrayPaths, middle: Floats, phase_terms: Floats, delay_v
         amplitude_terms=np.zeros((1, 0)),
         phase_terms=phase_terms[None],
         delay_variance_terms=delay_variance_terms[None],
-        doppler_terms=np.zeros((1, 0)),
         sound_speed=front.sound_speed,
         aperture=front.aperture,
         phase=np.zeros(1),
@@ -283,7 +274,6 @@ def reference_of(front: ArrayPaths, middle: Floats, phase_terms: Floats, delay_v
         height_delay_std=np.zeros(1),
         occluded=np.zeros((1, 0), bool),
         modes=np.zeros((1, 0)),
-        bends=np.zeros((1, 0)),
         centre=front.centre,
         attenuation=front.attenuation,
     )

@@ -16,7 +16,7 @@ from sonarsynth.products import Arrivals, Signals
 from sonarsynth.receiver import Elements, Sonar
 from sonarsynth.signals.array_paths import ArrayPaths, array_paths, arrival_directions, delay_and_gain, lost, reach
 from sonarsynth.signals.filtered_pulse import pulse_spectrum
-from sonarsynth.signals.pulse_variation import bend, changed
+from sonarsynth.signals.pulse_variation import changed
 from sonarsynth.signals.segments import fast_length, layout
 from sonarsynth.state import Emission
 
@@ -63,12 +63,6 @@ def exact_spectra(
             face * loss * shape * np.exp(-2j * np.pi * late[:, None] * frequency)
         )
     return total
-
-
-def through(before: np.ndarray, at: np.ndarray, after: np.ndarray, x: Floats) -> np.ndarray:
-    """The parabola (sensor, bin) through values (bin,) at -1, 0 and 1, at x (sensor,)."""
-    slope, curve = 0.5 * (after - before), 0.5 * (after - 2.0 * at + before)
-    return np.asarray(at + np.multiply.outer(x, slope) + np.multiply.outer(x * x, curve))
 
 
 @description
@@ -141,19 +135,6 @@ def exact_signals(
             frequency, spectrum = pulse_spectrum(waveform, sonar.antialias, fs, length, float(doppler))
             relative = relative_absorption(absorption, frequency, sonar.band.centre)
             some = front.select(rows[front.doppler[rows] == doppler])
-            if not some.doppler_terms.any():
-                transfer = exact_spectra(some, elements, frequency, relative, start - spread / fs)
-                pressure += np.fft.irfft(transfer * spectrum, length)[:, spread : spread + samples] * fs
-                continue
-            for e in range(some.count):
-                one = some.select(np.array([e]))
-                more = bend(one, elements.position)[0]
-                widest = float(np.abs(more).max(initial=1e-12))
-                ends = [
-                    pulse_spectrum(waveform, sonar.antialias, fs, length, float(doppler) + way * widest)[1]
-                    for way in (-1.0, 1.0)
-                ]
-                each = through(ends[0], spectrum, ends[1], more / widest)
-                transfer = exact_spectra(one, elements, frequency, relative, start - spread / fs)
-                pressure += np.fft.irfft(transfer * each, length)[:, spread : spread + samples] * fs
+            transfer = exact_spectra(some, elements, frequency, relative, start - spread / fs)
+            pressure += np.fft.irfft(transfer * spectrum, length)[:, spread : spread + samples] * fs
     return pressure, Signals(pressure.astype(np.float32), start, fs, 0.0, 0, plan.outside)

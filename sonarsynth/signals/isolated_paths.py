@@ -74,9 +74,7 @@ def measured_levels(
     if not count:
         return np.zeros(0)
     hydrophone, none = ideal_hydrophone(), np.empty((count, 0))
-    paths = replace(
-        paths, phase_terms=none, delay_variance_terms=none, doppler_terms=none
-    )  # that of the centre is heard
+    paths = replace(paths, phase_terms=none, delay_variance_terms=none)  # that of the centre is heard
     front = array_paths(paths, snaps, hydrophone)
     before, after = layout(paths, front, snaps, hydrophone, sonar, 0.0, 1).support + reach(front)
     lead = int(np.ceil(before.max() * fs)) + GUARD

@@ -39,7 +39,6 @@ class Modes(NamedTuple):
 
     weight: Floats  # (path, mode)
     spectrum: ComplexArray  # (mode, bin)
-    bend: Floats  # (path, mode) change of weight for each unit of doppler more; no columns where that is not asked for
 
 
 class Reduction(NamedTuple):
@@ -57,16 +56,6 @@ def blur_exponent(frequency: Floats) -> Floats:
 def stretched(series: ComplexArray, doppler: Floats) -> Floats:
     """Chebyshev polynomials (path, degree) at doppler (path,), -1 to 1, as many as the series (degree, bin) has."""
     return np.asarray(np.cos(np.outer(np.arccos(np.clip(doppler, -1.0, 1.0)), np.arange(len(series)))))
-
-
-def bending(series: ComplexArray, doppler: Floats) -> Floats:
-    """Slopes (path, degree) of `stretched` in doppler (path,)."""
-    degree, x = np.arange(len(series)), np.clip(doppler, -1.0, 1.0)
-    angle = np.arccos(x)
-    sine = np.sin(angle)[:, None]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        slope = degree * np.sin(np.outer(angle, degree)) / sine
-    return np.asarray(np.where(sine > 1e-6, slope, degree**2 * np.sign(x)[:, None] ** (degree + 1)))
 
 
 def reduction(weight: Floats, spectrum: ComplexArray, loudness: Floats, tolerance: float) -> Reduction:
@@ -108,13 +97,11 @@ def shape_modes(
     series: ComplexArray,
     widest: float,
     tolerance: float,
-    bent: int = 0,
 ) -> Modes:
     """The modes of pulses: of phase, of blur, of absorption, of facets, and of Doppler where there is a series (degree,
     bin) in Doppler/widest.
 
-    spectrum (bin,) is of the pulse without them; decay (bin,) is in Np for each dB of the paths' loss; bent: of how
-    many paths, the first ones, the change with Doppler is wanted.
+    spectrum (bin,) is of the pulse without them; decay (bin,) is in Np for each dB of the paths' loss.
     """
     loudness = np.abs(front.amplitude) / np.abs(front.amplitude).max()
     weight: Floats = np.ones((front.count, 1))
@@ -129,22 +116,17 @@ def shape_modes(
         powers, waves = powers @ fewer.onto, fewer.back @ waves
         weight = (weight[:, :, None] * powers[:, None, :]).reshape(front.count, -1)
         factor = (factor[:, None, :] * waves).reshape(-1, frequency.size)
-    spectra, slope = factor * spectrum, weight[:0]
+    spectra = factor * spectrum
     if len(series):
-        bend = stretched(series, front.doppler / widest)
-        if bent:
-            more = bending(series, front.doppler[:bent] / widest) / widest
-            slope = (weight[:bent, :, None] * more[:, None, :]).reshape(bent, -1)
-        weight = (weight[:, :, None] * bend[:, None, :]).reshape(front.count, -1)
+        doppler = stretched(series, front.doppler / widest)
+        weight = (weight[:, :, None] * doppler[:, None, :]).reshape(front.count, -1)
         spectra = (factor[:, None, :] * series).reshape(-1, frequency.size)
     if front.phase.any():
         turn = front.phase[:, None]
         weight = np.concatenate([weight * np.cos(turn), weight * np.sin(turn)], axis=1)
-        slope = np.concatenate([slope * np.cos(turn[: len(slope)]), slope * np.sin(turn[: len(slope)])], axis=1)
         spectra = np.concatenate([spectra, 1j * spectra])
     fewer = reduction(weight, spectra, loudness, tolerance)
-    bends = slope @ fewer.onto if len(slope) else np.zeros((front.count, 0))
-    return Modes(weight @ fewer.onto, fewer.back @ spectra, bends)
+    return Modes(weight @ fewer.onto, fewer.back @ spectra)
 
 
 def _powers(

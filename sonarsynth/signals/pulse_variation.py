@@ -5,7 +5,6 @@ At a point of the aperture a path has the phase and the variance of its blur
 both polynomials (`apertures.aperture_terms`). The modes of its pulse (`shapes`) change with them: by the cosine
 and the sine of turn, times its modes and those of the pulse a quarter of a period ahead; and by powers of spread, times
 those of the pulse times powers of -(2 pi f)^2/2. What all paths of a tile share of it the field of the tile takes.
-Doppler is seen from another side too: of doppler + bend, the first power of bend counts, with weights of their own.
 """
 
 from __future__ import annotations
@@ -51,16 +50,6 @@ def widest_spread(front: ArrayPaths) -> Floats:
     return np.asarray(np.abs(front.delay_variance_terms).sum(axis=1))
 
 
-def widest_bend(front: ArrayPaths) -> Floats:
-    """Bound (path,) on |bend| over the aperture."""
-    return np.asarray(np.abs(front.doppler_terms).sum(axis=1))
-
-
-def bend(front: ArrayPaths, points: Floats) -> Floats:
-    """Doppler (path, point) at points (point, xyz), over that at the centre."""
-    return over(front.doppler_terms, points, front.aperture)
-
-
 def turn_and_spread(front: ArrayPaths, points: Floats) -> tuple[Floats, Floats]:
     """Turn (rad) and spread (s2), (path, point) each, at points (point, xyz)."""
     return over(front.phase_terms, points, front.aperture), over(front.delay_variance_terms, points, front.aperture)
@@ -75,7 +64,7 @@ def changed(front: ArrayPaths, points: Floats, frequency: Floats) -> ComplexArra
 
 def aperture_gradient(front: ArrayPaths, points: Floats) -> Floats:
     """Gradient (xyz, point, term) of the aperture terms at points (point, xyz); empty where no front has such terms."""
-    every = front.delay_terms, front.phase_terms, front.delay_variance_terms, front.doppler_terms
+    every = front.delay_terms, front.phase_terms, front.delay_variance_terms
     widest = max(terms.shape[1] for terms in every)
     if not widest:
         return np.zeros((3, 0, 0))
@@ -95,34 +84,26 @@ def slopes(front: ArrayPaths, gradient: Floats, lowest: float, highest: float) -
     ):
         if terms.shape[1]:
             total += scale * np.abs(np.einsum("et,ipt->ipe", terms, gradient[:, :, : terms.shape[1]])).max(axis=1)
-    if front.bends.shape[1]:
-        share = np.linalg.norm(front.bends, axis=1) / np.maximum(np.linalg.norm(front.modes, axis=1), 1e-300)
-        steep = np.abs(
-            np.einsum("et,ipt->ipe", front.doppler_terms, gradient[:, :, : front.doppler_terms.shape[1]])
-        ).max(axis=1)
-        total += highest / lowest * share * steep
     return total
 
 
 def with_changes(front: ArrayPaths) -> ArrayPaths:
     """Paths, and after them the loudest of those that change, as they are elsewhere on the aperture: more and less
-    blurred, more and less stretched, and as loud as what turns, a quarter of a period ahead."""
-    turn, spread, longer = widest_turn(front), widest_spread(front), widest_bend(front)
+    blurred, and as loud as what turns, a quarter of a period ahead."""
+    turn, spread = widest_turn(front), widest_spread(front)
     loud = np.abs(front.amplitude)
     parts = [np.arange(front.count)]
-    parts += [_loudest(loud * (spread > 0.0))] * 2 + [_loudest(loud * turn)] + [_loudest(loud * (longer > 0.0))] * 2
+    parts += [_loudest(loud * (spread > 0.0))] * 2 + [_loudest(loud * turn)]
     count = [part.size for part in parts]
     every = front.select(np.concatenate(parts))
-    way = np.repeat([0.0, 1.0, -1.0, 0.0, 0.0, 0.0], count)
-    ahead = np.repeat([0.0, 0.0, 0.0, 1.0, 0.0, 0.0], count)
-    bent = np.repeat([0.0, 0.0, 0.0, 0.0, 1.0, -1.0], count)
+    way = np.repeat([0.0, 1.0, -1.0, 0.0], count)
+    ahead = np.repeat([0.0, 0.0, 0.0, 1.0], count)
     size = np.where(ahead > 0.0, np.minimum(widest_turn(every), 1.0), 1.0)
     return replace(
         every,
         amplitude=every.amplitude * size,
         variance=every.variance + way * widest_spread(every),
         phase=every.phase + 0.5 * np.pi * ahead,
-        doppler=every.doppler + bent * widest_bend(every),
     )
 
 
@@ -156,7 +137,6 @@ class ResidualVariation(NamedTuple):
     delay_variance_terms: Floats  # (term,) s2
     which: Ints  # (some,) changes that count
     size: Floats  # (some, path) bounds on how much there is of each in some paths of the tile
-    bent: bool  # whether their Doppler's change counts
     paths: Ints  # (path,) those
 
 
@@ -166,28 +146,15 @@ def rest(front: ArrayPaths, paths: Ints, found: PulseVariation, tolerance: float
     none = np.zeros(0)
     some = paths[:: max(1, paths.size // LOUDEST)]
     loud, weight = np.abs(front.amplitude[some]), front.modes[some]
-    bent = front.bends.shape[1] > 0 and _counts(_bent(front, some), loud * np.linalg.norm(weight, axis=1), tolerance)
     if not found.kinds:
-        return ResidualVariation(none, none, np.zeros(0, int), np.zeros((0, some.size)), bent, some)
+        return ResidualVariation(none, none, np.zeros(0, int), np.zeros((0, some.size)), some)
     turn, turned = _middle(front.phase_terms, some)
     spread, softer = _middle(front.delay_variance_terms, some)
     share = np.array([np.minimum(turned, 1.0) ** a * (softer * found.rate) ** p for p, a in found.kinds])
     size = np.sqrt((np.tensordot(weight, found.onto, (1, 1)) ** 2).sum(axis=2)).T * share * loud
     mean = np.sqrt((size**2).sum(axis=1) / (loud**2).sum())
     which = np.flatnonzero(np.maximum(mean, size.max(axis=1) / loud.max()) > tolerance)
-    return ResidualVariation(turn, spread, which, share[which], bent, some)
-
-
-def _bent(front: ArrayPaths, some: Ints) -> Floats:
-    """Bounds (path,) on what Doppler's change over the aperture adds to some paths."""
-    size = np.linalg.norm(front.bends[some], axis=1) * np.abs(front.amplitude[some])
-    return np.asarray(size * np.abs(front.doppler_terms[some]).sum(axis=1))
-
-
-def _counts(size: Floats, loud: Floats, tolerance: float) -> bool:
-    """Whether what adds up to `size` (path,) is more than `tolerance` of all together, or of the loudest."""
-    mean = np.linalg.norm(size) / max(float(np.linalg.norm(loud)), 1e-300)
-    return bool(max(mean, size.max(initial=0.0) / max(float(loud.max(initial=0.0)), 1e-300)) > tolerance)
+    return ResidualVariation(turn, spread, which, share[which], some)
 
 
 def pulses(front: ArrayPaths, paths: Ints, over: ResidualVariation, found: PulseVariation) -> tuple[Floats, Floats]:
@@ -196,9 +163,6 @@ def pulses(front: ArrayPaths, paths: Ints, over: ResidualVariation, found: Pulse
     for change, size in zip(over.which, over.size, strict=True):
         weight.append(front.modes[over.paths] @ found.onto[change])
         loud.append(np.abs(front.amplitude[over.paths]) * size)
-    if over.bent:
-        weight.append(front.bends[over.paths])
-        loud.append(np.abs(front.amplitude[over.paths]) * widest_bend(front)[over.paths])
     return np.concatenate(weight), np.concatenate(loud)
 
 
@@ -212,13 +176,11 @@ def _middle(terms: Floats, some: Ints) -> tuple[Floats, Floats]:
 
 
 def shares(
-    front: ArrayPaths, reference: ArrayPaths, which: Ints, bent: bool, found: PulseVariation, points: Floats, dtype: str
+    front: ArrayPaths, reference: ArrayPaths, which: Ints, found: PulseVariation, points: Floats, dtype: str
 ) -> Floats:
-    """How much there is of pulses and of each change that counts, (1 + some, point, path), beside the reference; the
-    change of Doppler comes last, if it is `bent`."""
-    longer = [bend(front, points).T.astype(dtype)] if bent else []
+    """How much there is of pulses and of each change that counts, (1 + some, point, path), beside the reference."""
     if not which.size:
-        return np.array([np.ones_like(longer[0]), *longer]) if bent else np.zeros((0, 0, 0), dtype)
+        return np.zeros((0, 0, 0), dtype)
     turn, spread = (value.T for value in turn_and_spread(front, points))
     own, softer = turn_and_spread(reference, points)
     turn, spread = (turn - own[0][:, None]).astype(dtype), ((spread - softer[0][:, None]) * found.rate).astype(dtype)
@@ -227,5 +189,4 @@ def shares(
         quarter = np.cos(turn), np.sin(turn)
     else:
         quarter = np.ones_like(turn), turn
-    found_shares = [quarter[ahead] * spread**power if power else quarter[ahead] for power, ahead in kinds]
-    return np.array(found_shares + longer)
+    return np.array([quarter[ahead] * spread**power if power else quarter[ahead] for power, ahead in kinds])

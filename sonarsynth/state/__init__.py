@@ -129,8 +129,6 @@ class Tolerances:
     its velocity and spin say, in radians of the highest frequency, is traced for both together."""
     occlusion: OcclusionPoint = "centre"
     """From where facets must be seen."""
-    degree: int = 3
-    """Of polynomials over the aperture."""
     every: int = 1
     """Every so manieth facet is traced, to measure errors on some; all of them hide what is behind."""
 

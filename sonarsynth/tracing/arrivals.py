@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +17,6 @@ from sonarsynth.tracing.doppler import Meeting, MotionTerms, apply_doppler, rece
 from sonarsynth.tracing.echoes import echoes
 from sonarsynth.tracing.expansion.amplitude_polynomials import fitted
 from sonarsynth.tracing.expansion.array_expansion import array_expansion
-from sonarsynth.tracing.expansion.wavefront_polynomials import QUADRATIC_PROBES
 from sonarsynth.tracing.facet_paths import FacetPaths, facet_paths
 from sonarsynth.tracing.meetings import hearing_times, occasions
 from sonarsynth.tracing.occlusion.forward_scattering import blocking_bodies, forward_paths, shadow_parts
@@ -95,15 +93,13 @@ def _direct(array: FacetPaths, index: int) -> Arrivals:
     legs = view.visible(legs, legs.point, None)
     legs = view.settled(legs, legs.point, None)
     count = len(legs.row)
-    degree = context.tolerances.degree
-    over = array_expansion(legs, np.zeros(count, int), array.bending, receiver, array.propagation, degree)
+    over = array_expansion(legs, np.zeros(count, int), array.bending, receiver, array.propagation)
     one, none, none_out = np.ones(count), np.full(count, NO_TARGET), TransmitPaths.none(count)
     rows, (loud, turned) = np.arange(count), directed(snap, legs.departure)
     gain, met = over.gain(rows), MotionTerms.direct(count, snap)
     if snap.directivity is not None:  # seen from the source, hydrophones are in other directions than the centre
         gain = gain * (snap.directivity(over.departure(rows)) / snap.directivity(legs.departure)[:, None])
     variation = fitted(array, gain, legs.spreading)
-    away = partial(over.departure, rows, QUADRATIC_PROBES) if snap.velocity.any() else None
     legs = replace(legs, spreading=legs.spreading * loud, phase=legs.phase + turned)
     legs = legs if meeting is None else received(legs, met, meeting, medium.profile)
     made = assemble(
@@ -113,7 +109,4 @@ def _direct(array: FacetPaths, index: int) -> Arrivals:
     )  # fmt: skip
     if meeting is None:
         return made
-    return apply_doppler(
-        made, legs, none_out, met, meeting, medium.profile, elements=receiver.elements, departure=away,
-        enough=context.tolerances.quadratic,
-    )  # fmt: skip
+    return apply_doppler(made, legs, none_out, met, meeting, medium.profile, receiver.elements.aperture)

@@ -13,14 +13,14 @@ in uniform water. Directions at facet and array, and spreading, are those of the
 is the velocity of the facet: its body may turn, by omega tau_1 till then, and with it all that its law asks for. The
 pulse is longer by dt_2/dt_s; of a source that moves at w by 1 - w.n/c times as much, n the direction in which the ray
 leaves it. Of direct sound the source is the facet. Left out in bent water: how much more or less than straight rays the
-rays turn and spread for the remainder v tau_1; of a moving array, u/c of the curvature of the wavefront.
+rays turn and spread for the remainder v tau_1; of a moving array, u/c of the curvature of the wavefront; that what
+moves is seen from another side at each sensor, v/c of the angle that the array takes up there: parts of the array see
+it from their own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,20 +29,14 @@ from sonarsynth.environment.sea import Profile
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.motion import Track
 from sonarsynth.products import Arrivals
-from sonarsynth.receiver import Elements
 from sonarsynth.scattering import Scatterers
 from sonarsynth.state import Emission
 from sonarsynth.tracing.expansion.probe_paths import TERMS
-from sonarsynth.tracing.expansion.wavefront_polynomials import QUADRATIC_PROBES, SECOND_DEGREE, probes, sphere
 from sonarsynth.tracing.receive_paths import ReceivePaths
 from sonarsynth.tracing.transmit_paths import TransmitPaths
 
 ROUNDS = 3
 """Of solving for times that depend on themselves: each leaves v/c of the error, or v t/r of that."""
-
-
-MAX_CHANGE = 2.0
-"""What a snap changes by, of itself, for each unit of Doppler: one of few periods, in whose band it is heard."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,103 +170,22 @@ def received(legs: ReceivePaths, of: MotionTerms, meeting: Meeting, profile: Pro
     )  # fmt: skip
 
 
-class _Doppler(NamedTuple):
-    """Of paths, at the array centre."""
-
-    velocity: Floats  # (path, xyz) m/s of the facet, world
-    mirrored: Floats  # (path, xyz) m/s of where it seems to be
-    approach: Floats  # (path,) of the source to the facet,
-    rate_out: Floats  # (path,) of the way to it,
-    rate_in: Floats  # (path,) and from there
-    of_array: Floats  # (path,) by the motion of the array
-    doppler: Floats  # (path,)
-
-    def select(self, rows: Ints) -> _Doppler:
-        """The paths picked by indices."""
-        columns: Any = (value[rows] for value in self)
-        return _Doppler(*columns)
-
-
-def turned(legs: ReceivePaths, points: Floats, slow: Floats) -> Floats:
-    """What (path, point, xyz) the unit vectors towards where legs come from turn by, from the array centre to points
-    (point, xyz) of an array that moves at `slow` (xyz) of the sound speed, when sound comes there; sonar frame."""
-    farther = sphere(legs.direction, legs.radius, points)
-    v = legs.direction[:, None] - (points + farther[..., None] * slow) / legs.radius[:, None, None]
-    return np.asarray(v / np.sqrt(dot(v, v))[..., None] - legs.direction[:, None])
-
-
-def _over_aperture(
-    of: _Doppler, legs: ReceivePaths, array: Track, profile: Profile, elements: Elements,
-    departure: Callable[[], Floats] | None, enough: float,
-) -> tuple[Floats, Floats]:  # fmt: skip
-    """Polynomials (path, term) of the second degree over the aperture: of Doppler; and of what bent rays change faster
-    than straight ones to a place that moves (s a second). None of paths where that errs less, whatever the others."""
-    sonar, pose = array.velocity, array.pose
-    c_array = float(profile.at(depth(pose.position)))
-    turning = np.sqrt(dot(of.velocity, of.velocity)) / legs.length + np.sqrt(sonar @ sonar) / legs.radius  # rad/s
-    some = np.flatnonzero(MAX_CHANGE * turning * elements.aperture / c_array > enough)
-    if not len(some):
-        return np.empty((len(of.doppler), 0)), np.empty((len(of.doppler), 0))
-    probe, rates, leg = probes(elements), of.select(some), legs.select(some)
-    turn = turned(leg, probe.position[:QUADRATIC_PROBES], pose.turn_to_body(sonar) / c_array)
-    of_array = -dot(turn, pose.turn_to_body(sonar)) / c_array + rates.of_array[:, None]
-    rate_in = rates.rate_in[:, None]
-    if departure is not None:
-        away = departure()[some]
-        rate_in = -np.einsum("px,pqx->pq", rates.velocity, away) / profile.at(depth(leg.point))[:, None]
-    there = (1.0 - rates.approach[:, None]) * (1.0 + rate_in) / (
-        (1.0 - rates.rate_out[:, None]) * (1.0 - of_array)
-    ) - 1.0
-    straight = np.einsum("px,pqx->pq", pose.turn_to_body(rates.mirrored), turn) / c_array
-    both = there - rates.doppler[:, None], rate_in - rates.rate_in[:, None] - straight
-    found = np.zeros((2, len(of.doppler), SECOND_DEGREE))
-    for terms, values in zip(found, both, strict=True):
-        terms[some] = probe.fit_few(values)[0][:, :SECOND_DEGREE]
-    return found[0], found[1]
-
-
-def _later(terms: Floats, late: Floats, along: Floats | None) -> Floats:
-    """Delay terms (path, term) of bent rays, if there are any, with what is late, and without what is along the motion
-    of the array (path, xyz)."""
-    if terms.shape[1] and late.shape[1]:
-        terms = np.concatenate([terms[:, : late.shape[1]] + late, terms[:, late.shape[1] :]], axis=1)
-    if along is not None:
-        terms = terms.copy() if terms.shape[1] else np.zeros((len(terms), TERMS))
-        terms[:, 1:4] -= along
-    return terms
-
-
 def apply_doppler(
-    made: Arrivals,
-    legs: ReceivePaths,
-    out: TransmitPaths,
-    of: MotionTerms,
-    meeting: Meeting,
-    profile: Profile,
-    *,
-    elements: Elements,
-    departure: Callable[[], Floats] | None = None,
-    enough: float = 0.0,
-) -> Arrivals:
-    """Arrivals with their Doppler; legs and ways: those of `received` and `meets`.
+    made: Arrivals, legs: ReceivePaths, out: TransmitPaths, of: MotionTerms, meeting: Meeting, profile: Profile,
+    aperture: float,
+) -> Arrivals:  # fmt: skip
+    """Arrivals with their Doppler, that of the array centre; legs and ways: those of `received` and `meets`.
 
     An array that moves meets a wavefront later, or sooner, the farther it has still to go: delays over the aperture (m)
-    are longer by u.b/c, which goes into their linear terms. departure: makes the directions (path, FEW, xyz) in which
-    the first probes are seen from the facets, or the source, world; None of a source at rest; enough: error of signals
-    that is left, of Doppler over the aperture.
+    are longer by u.b/c, which goes into their linear terms.
     """
-    if not len(made.delay):
-        return made
     array = meeting.sonar
     c, c_array = profile.at(depth(legs.point)), float(profile.at(depth(array.pose.position)))
     rate_out, rate_in = dot(of.velocity, out.arrival) / c, -dot(of.velocity, legs.departure) / c
     of_array = dot(legs.arrival, array.velocity) / c_array
     doppler = (1.0 - out.approach) * (1.0 + rate_in) / ((1.0 - rate_out) * (1.0 - of_array)) - 1.0
-    rates = _Doppler(
-        of.velocity, mirrored(of.velocity, legs.bounces), out.approach, rate_out, rate_in, of_array, doppler
-    )
-    over, faster = _over_aperture(rates, legs, array, profile, elements, departure, enough)
-    along = (of_array / (1.0 - of_array) * elements.aperture / c_array)[:, None] * legs.direction
-    moves = array.velocity.any() and elements.aperture > 0.0
-    terms = _later(made.delay_terms, of.late[:, None] * faster, along if moves else None)
-    return replace(made, doppler=doppler, doppler_terms=over, delay_terms=terms)
+    if not array.velocity.any() or not aperture:
+        return replace(made, doppler=doppler)
+    terms = made.delay_terms.copy() if made.delay_terms.shape[1] else np.zeros((len(doppler), TERMS))
+    terms[:, 1:4] -= (of_array / (1.0 - of_array) * aperture / c_array)[:, None] * legs.direction
+    return replace(made, doppler=doppler, delay_terms=terms)

@@ -24,7 +24,7 @@ from sonarsynth.tracing.expansion.wavefront_polynomials import QUADRATIC_PROBES,
 from sonarsynth.tracing.occlusion.ray_cones import hidden, overlapping
 from sonarsynth.tracing.path_absorption import path_loss
 from sonarsynth.tracing.pruning import EchoLevels, loud_of_all, loud_ones
-from sonarsynth.tracing.receive_paths import ReceivePaths, may_face_receiver, path_pairs, usable
+from sonarsynth.tracing.receive_paths import may_face_receiver, path_pairs, usable
 from sonarsynth.tracing.transmit_paths import TransmitPaths, assemble, no_arrivals, ordered
 
 if TYPE_CHECKING:
@@ -124,7 +124,6 @@ def echoes(array: FacetPaths, index: int, parts: tuple[tuple[Component, ...], ..
         if spot.any() and not some.array.bending.profile.uniform:
             over = delay_to_scattering_points(over, some.array, some.leg, spot)
         array, out, legs, meeting = some.array, some.out, some.array.settled(some.leg), some.array.meeting
-        view = partial(_away, array, legs, some.leg, some.carried)
         if meeting is not None and some.carried is not None:
             legs = received(legs, some.carried, meeting, profile)
         what, target, facet = array.met(out.facet, kind)
@@ -135,9 +134,7 @@ def echoes(array: FacetPaths, index: int, parts: tuple[tuple[Component, ...], ..
             kind=what, target=target, facet=facet, scattering=scattered, variation=vary, pulses=some.pulses,
         )  # fmt: skip
         if meeting is not None and some.carried is not None:
-            enough = array.context.tolerances.quadratic
-            moving = partial(apply_doppler, elements=receiver.elements, departure=view, enough=enough)
-            one = moving(one, legs, out, some.carried, meeting, profile)
+            one = apply_doppler(one, legs, out, some.carried, meeting, profile, receiver.elements.aperture)
         if spot.any() and array.bending.profile.uniform:
             one = shift_to_scattering_points(one, legs, spot, receiver.pose)
         made.append(replace(one, delay=one.delay + some.pulses.late))
@@ -208,12 +205,6 @@ def _departure(array: FacetPaths, leg: Ints, carried: MotionTerms | None, few: i
     return carried.turned_back(carried.departure(array.legs.length[leg], away))
 
 
-def _away(array: FacetPaths, legs: ReceivePaths, leg: Ints, carried: MotionTerms | None) -> Floats:
-    """Where the first few probes are seen from facets (row, probe, xyz): world."""
-    away = array.fronts.departure(leg, QUADRATIC_PROBES)
-    return away if carried is None else carried.departure(legs.length, away)
-
-
 def _columns(groups: list[EchoBatch], *names: str) -> list[np.ndarray]:
     """Columns (echo,) of all groups, in order."""
     return [np.concatenate([getattr(g, name) for g in groups]) for name in names]
@@ -264,7 +255,7 @@ def _turned(found: _EchoBlock, most: float) -> ExpansionTerms:
     leaps = np.abs(shift).max(axis=1, initial=0.0) > MAX_PHASE_CHANGE
     if not shift.any():
         return over
-    probe = probes(array.context.receiver.elements, array.context.tolerances.degree)
+    probe = probes(array.context.receiver.elements)
     terms = probe.fit(np.where(leaps[:, None], 0.0, shift))
     share = np.abs(found.strength) / max(most, 1e-300)
     error = over.error + share * np.where(leaps, 0.0, probe.misfit(shift, terms)) / (
@@ -295,6 +286,6 @@ def _spread(found: _EchoBlock, over: ExpansionTerms, most: float) -> ExpansionTe
     """
     receiver, share = found.array.context.receiver, np.abs(found.strength) / max(most, 1e-300)
     more = np.concatenate([g.spread(found.departure(g.row, QUADRATIC_PROBES), receiver.centre) for g in found.groups])
-    terms, misfit = probes(receiver.elements, found.array.context.tolerances.degree).fit_few(more)
+    terms, misfit = probes(receiver.elements).fit_few(more)
     delay_std = over.delay_std + terms if over.delay_std.shape[1] else terms
     return over._replace(delay_std=delay_std, error=over.error + share * np.pi * receiver.band[1] * misfit)

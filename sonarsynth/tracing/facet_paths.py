@@ -121,7 +121,7 @@ def facet_paths(context: FrameContext, propagation: Propagation, owners: tuple[i
         found[1].append(every.select(kept))
         seen += len(kept)
     legs, facets = concatenate(found[0]), concatenate(found[1])
-    over = expansion_source(legs, facets.owner[legs.row], bent, receiver, propagation, tolerances.degree)
+    over = expansion_source(legs, facets.owner[legs.row], bent, receiver, propagation)
     return FacetPaths(legs, over, facets, context, propagation, owners=owners)
 
 

@@ -132,7 +132,6 @@ def assemble(
         delay_std=np.hypot(np.hypot(out.delay_std, legs.delay_std), pulses.delay_std),
         echo_delay_std=pulses.delay_std,
         doppler=np.zeros(len(length)),
-        doppler_terms=np.empty((len(length), 0)),
         coherent=pulses.coherent,
         corner_delays=pulses.corner_delays,
         coherent_fraction=pulses.coherent_fraction,

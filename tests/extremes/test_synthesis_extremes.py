@@ -38,7 +38,6 @@ def arrivals(delay: Floats, direction: Floats, radius: Floats, amplitude: Floats
         amplitude_terms=none,
         phase_terms=none,
         delay_variance_terms=none,
-        doppler_terms=none,
         amplitude=np.asarray(amplitude, float),
         spreading_out=one,
         spreading_in=one,
@@ -188,10 +187,6 @@ def test_no_paths_are_silence(method: DirectSum | GriddedSynthesis) -> None:
         ({"doppler": np.array([np.nan, 0.0])}, "arrival 0 has doppler that is not a finite number"),
         ({"doppler": np.array([0.0, -0.1])}, r"arrival 1 has a Doppler factor that is not within \+-0\.1"),
         (
-            {"doppler_terms": np.outer([0.0, 0.1], np.eye(4)[3])},  # along z, in which the array lies
-            r"arrival 1 has a Doppler factor that is not within \+-0\.1",
-        ),
-        (
             {"radius": np.array([0.2, 2.0]), "direction": np.array([[0.0, 0.0, 1.0]] * 2)},
             "arrival 0 comes from a hydrophone",
         ),
@@ -204,14 +199,6 @@ def test_what_cannot_be_synthesised_is_refused(
     of = replace(arrivals([0.0, 1e-4], [[1.0, 0.0, 0.0]] * 2, [2.0, 2.0], [1.0, 1.0]), **change)
     with pytest.raises(ValueError, match=message):
         method.signals(of, SNAPS, array, SONAR, None, -0.01, 4000)
-
-
-def test_doppler_terms_that_no_hydrophone_hears_change_nothing() -> None:
-    array = elements(PositionTable(positions=((0.0, 0.0, 0.2), (0.0, 0.0, -0.2))))
-    of = replace(arrivals([0.0], [[1.0, 0.0, 0.0]], [2.0], [1.0]), doppler_terms=0.0 * np.eye(4)[:1])
-    across = replace(of, doppler_terms=15.0 * np.eye(4)[2:3])  # along y, in which the array has no extent
-    both = [DirectSum().signals(some, SNAPS, array, SONAR, None, -0.01, 4000).pressure for some in (of, across)]
-    assert both[0].any() and np.array_equal(*both)
 
 
 def shaped(of: Arrivals, phase: object, delay_std: object, doppler: object) -> Arrivals:

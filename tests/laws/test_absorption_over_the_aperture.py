@@ -39,7 +39,6 @@ def from_points(points: Floats, place: Floats, loss: float) -> Arrivals:
         amplitude_terms=none,
         phase_terms=none,
         delay_variance_terms=none,
-        doppler_terms=none,
         amplitude=10.0 ** (-loss * distance / 20.0) / distance,
         spreading_out=1.0 / distance,
         spreading_in=one,

@@ -61,7 +61,6 @@ def arrivals(
         amplitude_terms=np.zeros((n, 0)) if amplitude_terms is None else amplitude_terms,
         phase_terms=np.zeros((n, 0)),
         delay_variance_terms=np.zeros((n, 0)),
-        doppler_terms=np.zeros((n, 0)),
         amplitude=np.asarray(amplitude, float),
         spreading_out=one,
         spreading_in=one,

@@ -20,6 +20,7 @@ BENCHMARKS = (
     "odds",
     "soundscape",
     "growth",
+    "ablation",
 )
 """Modules beside this one; each has a function `bench`."""
 

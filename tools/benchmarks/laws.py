@@ -42,7 +42,6 @@ def plain(arrivals: Arrivals) -> Arrivals:
         phase=none,
         phase_terms=terms,
         delay_variance_terms=terms,
-        doppler_terms=terms,
     )
 
 

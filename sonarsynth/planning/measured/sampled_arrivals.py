@@ -54,7 +54,6 @@ def context_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> FrameC
         facet_mean=FACETS * accuracy.signal,
         shared=accuracy.signal,
         occlusion=choices.occlusion if part is not None or choices.subarrays == 1 else "centre",
-        degree=choices.degree,
     )
     world = frame.moment
     everything = world.time, world.bodies, world.snaps, plan.medium, receiver, plan.scene.laws, tolerances

@@ -16,12 +16,11 @@ from sonarsynth.signals.array_paths import ArrayPaths
 from sonarsynth.signals.direct_sum import relative_absorption
 from sonarsynth.signals.filtered_pulse import at_longest, pulse_spectrum, stretch_sizes, stretched_spectra
 from sonarsynth.signals.gridded.nodes import rounded_up
-from sonarsynth.signals.pulse_shapes import MOST_PHASE, bending, blur_exponent, shape_modes, stretched
+from sonarsynth.signals.pulse_shapes import MOST_PHASE, blur_exponent, shape_modes, stretched
 from sonarsynth.signals.pulse_variation import (
     UNCHANGING,
     PulseVariation,
     changes,
-    widest_bend,
     widest_spread,
     widest_turn,
     with_changes,
@@ -73,14 +72,13 @@ def bins_of(
     frequency, spectrum = pulse_spectrum(part.waveform, sonar.antialias, fs, part.samples)
     slope = np.asarray(1j * frequency / front.centre if part.coherent else 1.0)
     spectrum = spectrum * slope
-    widest = rounded_up(float((np.abs(front.doppler) + widest_bend(front)).max()), 2.0)
+    widest = rounded_up(float(np.abs(front.doppler).max()), 2.0)
     series = np.zeros((0, spectrum.size), complex)
     if widest > 0.0:
         sizes = np.array(stretch_sizes(at_longest(part.waveform), sonar.antialias, widest, part.coherent))
         left = np.append(np.cumsum(sizes[::-1])[::-1], 0.0)
         count = int(np.flatnonzero(left <= SHAPES * tolerance)[0])
         series = slope * stretched_spectra(part.waveform, sonar.antialias, fs, part.samples, widest, count)
-        front = _bent(front, spectrum, series, widest, tolerance)
     if len(series) or _shaped(front):
         front, spectrum, series = _shared(front, frequency, spectrum, series, widest, tolerance)
     some = audible(spectrum, tolerance)
@@ -121,19 +119,6 @@ def _changing(front: ArrayPaths, highest: Floats, tolerance: float) -> ArrayPath
     return replace(front, phase_terms=phase_terms, delay_variance_terms=delay_variance_terms)
 
 
-def _bent(
-    front: ArrayPaths, spectrum: ComplexArray, series: ComplexArray, widest: float, tolerance: float
-) -> ArrayPaths:
-    """Paths without what their Doppler changes by over the aperture, where that is nothing beside the loudest."""
-    if not front.doppler_terms.shape[1]:
-        return front
-    loud, longer = np.abs(front.amplitude), widest_bend(front)
-    slope = bending(series, front.doppler[:1] / widest) @ series / widest
-    rate = float(np.abs(slope).sum() / np.abs(spectrum).sum())
-    size = max(np.linalg.norm(loud * longer) / np.linalg.norm(loud), (loud * longer).max() / loud.max())
-    return front if rate * size > SHAPES * tolerance else replace(front, doppler_terms=front.doppler_terms[:, :0])
-
-
 def _check_corners(front: ArrayPaths, highest: float) -> None:
     """Raise ValueError where a facet is too large for the series in its corners."""
     longest = MOST_PHASE / (2.0 * np.pi * highest)
@@ -163,13 +148,12 @@ def _with_modes(
         front, spectrum, series = replace(front, loss=front.loss - middle), spectrum * lost, series * lost
     else:
         decay = np.zeros(frequency.size)
-    bent = front.count if len(series) and front.doppler_terms.shape[1] else 0
-    every = with_changes(front) if front.count > 1 or bent else front
-    weight, modes, bends = shape_modes(every, frequency, spectrum, decay, series, widest, SHAPES * tolerance, bent)
-    weight, bends = weight[: front.count], bends[: front.count]
+    every = with_changes(front) if front.count > 1 else front
+    weight, modes = shape_modes(every, frequency, spectrum, decay, series, widest, SHAPES * tolerance)
+    weight = weight[: front.count]
     if front.corner_delays.any() or front.coherent_fraction.any():
         spectrum = modes[0]  # what paths mostly send: the spectrum of the errors
-    return replace(front, modes=weight, bends=bends, loss=np.zeros(front.count) if few else front.loss), spectrum, modes
+    return replace(front, modes=weight, loss=np.zeros(front.count) if few else front.loss), spectrum, modes
 
 
 def _shared(
@@ -178,13 +162,12 @@ def _shared(
     """Paths without the shape that all share, and the spectrum with it; and the series in Doppler, empty where all
     share that."""
     if len(series):
-        longer = widest_bend(front)
-        low, high = float((front.doppler - longer).min()), float((front.doppler + longer).max())
+        low, high = float(front.doppler.min()), float(front.doppler.max())
         spectrum = (stretched(series, np.array([0.5 * (low + high) / widest])) @ series)[0]
         # the ends of a smooth series differ most
         bend = stretched(series, np.array([low, high]) / widest) @ series
         if np.abs(bend[1] - bend[0]).sum() <= SHAPES * tolerance * np.abs(spectrum).sum():
-            series, front = series[:0], replace(front, doppler_terms=front.doppler_terms[:, :0])
+            series = series[:0]
     least = float(front.variance.min())
     spread = float(front.variance.max()) - least
     if least > 0.0:

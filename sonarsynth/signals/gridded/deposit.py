@@ -28,7 +28,7 @@ from sonarsynth.signals.gridded.interpolation import to_sensors
 from sonarsynth.signals.gridded.low_rank import face_pairs, sinc_polynomials, spectral_quantiles, term_products
 from sonarsynth.signals.gridded.nodes import DEGREES, Axis, chebyshev, interpolation, nodes_for, polynomials_for
 from sonarsynth.signals.gridded.tiles import Tile, TileSettings, tiles
-from sonarsynth.signals.pulse_variation import PulseVariation, bend, changed, shares
+from sonarsynth.signals.pulse_variation import PulseVariation, changed, shares
 
 RELAXING = np.log(4.0)
 """Chebyshev coefficients of absorption over the band fall by this (Np) from each degree to the next, or by more."""
@@ -144,10 +144,7 @@ def _add_tile(sensor_spectra: npt.NDArray[Any], tile: Tile, part: ArrayPaths, st
 def _alone(tile: Tile, part: ArrayPaths, points: Floats, stage: Stage) -> npt.NDArray[Any]:
     """The field (node, 2, bin) of one path that everything is steered to: that of the snap, through its face."""
     faces = _faces(tile, points, stage)
-    weight = part.modes
-    if part.bends.shape[1]:
-        weight = weight + bend(part, points).T * part.bends
-    response = _responses(weight, stage)
+    response = _responses(part.modes, stage)
     return np.asarray(faces * _power(tile, stage, np.ones(1)) * response)
 
 
@@ -190,7 +187,7 @@ def _deposits(
     steer, _ = delay_and_gain(reference, points)
     middle, level = arrival_directions(reference, points), towards(reference, points)[1]
     late, louder, lean = np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0, 0))
-    share = shares(part, reference, tile.changes, tile.bent, stage.bins.changes, points, stage.dtype)
+    share = shares(part, reference, tile.changes, stage.bins.changes, points, stage.dtype)
     if part.delay_terms.shape[1]:
         late = over(part.delay_terms, points, part.aperture).T * rate
         if stage.aim.elements.face > 0.0:
@@ -235,8 +232,7 @@ def _packed(part: ArrayPaths, tile: Tile, found: PulseVariation, position: Float
     loss = (part.loss - tile.reference.loss) / (tile.deviation[2] or 1.0)
     onto = tile.modes[:, : max(term[3] for term in tile.terms) + 1]
     modes = np.concatenate([onto, *(found.onto[change] @ onto for change in tile.changes)], axis=1)
-    bent = (part.bends @ onto).T if tile.bent else ()
-    values = (*part.direction.T, part.curvature, position, part.amplitude, loss, *(part.modes @ modes).T, *bent)
+    values = (*part.direction.T, part.curvature, position, part.amplitude, loss, *(part.modes @ modes).T)
     blocks = -(-part.count // BLOCK)
     rows = np.zeros((len(values), blocks * BLOCK))
     rows[0] = 1.0

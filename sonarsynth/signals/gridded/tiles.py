@@ -47,7 +47,6 @@ class Tile:
     terms: tuple[Term, ...]
     deviation: tuple[float, float, float]  # half range of direction y and z, and of absorption (dB)
     changes: Ints  # (some,) which of the changes of pulses over the aperture count, beside the reference
-    bent: bool  # whether that of their Doppler does
     modes: Floats  # (mode, mode) turn of the modes of all paths to those of the tile; (0, 0) where there are none
     cost: float  # ns, predicted
 
@@ -171,9 +170,7 @@ def _try(paths: Ints, views: _Views, aim: TileSettings) -> _Trial:
         modes=sizes,
     )
     axes, terms, cost = _cheapest(extent, aim)
-    return _Trial(
-        Tile(paths, reference, axes, terms, (dy, dz, loss + farther), over.which, over.bent, modes, cost), extent
-    )
+    return _Trial(Tile(paths, reference, axes, terms, (dy, dz, loss + farther), over.which, modes, cost), extent)
 
 
 def _drift(front: ArrayPaths, aim: TileSettings) -> tuple[float, ...]:
@@ -278,7 +275,7 @@ def _alone(paths: Ints, front: ArrayPaths, aim: TileSettings, gradient: Floats |
     )
     axes = (x, y, z) if 2 * x.nodes * y.nodes * z.nodes < aim.elements.count else None
     cost, modes = 2e5 + 4.0 * aim.elements.count * aim.bins, np.eye(reference.modes.shape[1])
-    return Tile(paths, reference, axes, ((0, 0, 0, 0),), (0.0, 0.0, 0.0), np.zeros(0, int), False, modes, cost)
+    return Tile(paths, reference, axes, ((0, 0, 0, 0),), (0.0, 0.0, 0.0), np.zeros(0, int), modes, cost)
 
 
 def _best(trial: _Trial, views: _Views, aim: TileSettings, patient: bool) -> list[Tile]:

@@ -91,7 +91,7 @@ def _fit(array: FacetPaths, gain: Floats, strength: Floats, few: int | None) -> 
     loudest = float(np.nanmax(np.abs(strength)[:, None] * np.abs(gain), initial=0.0))
     if (gain == 1.0).all():
         return np.empty((len(gain), 0)), 0.0, loudest
-    probe = probes(array.context.receiver.elements, array.context.tolerances.degree)
+    probe = probes(array.context.receiver.elements)
     left = gain - 1.0
     if few is None or len(probe.sensor) < QUADRATIC_PROBES:
         terms = probe.fit(left)

@@ -98,21 +98,21 @@ class ExpansionSource:
 
 
 def array_expansion(
-    legs: ReceivePaths, group: Ints, medium: Medium, receiver: Receiver, propagation: Propagation, degree: int = 3
+    legs: ReceivePaths, group: Ints, medium: Medium, receiver: Receiver, propagation: Propagation
 ) -> ArrayExpansion:
     """Wavefronts of all legs, as `expansion_source`."""
-    return expansion_source(legs, group, medium, receiver, propagation, degree).of(slice(0, len(legs.row)))
+    return expansion_source(legs, group, medium, receiver, propagation).of(slice(0, len(legs.row)))
 
 
 def expansion_source(
-    legs: ReceivePaths, group: Ints, medium: Medium, receiver: Receiver, propagation: Propagation, degree: int = 3
+    legs: ReceivePaths, group: Ints, medium: Medium, receiver: Receiver, propagation: Propagation
 ) -> ExpansionSource:
-    """Wavefronts of legs. group (leg,): legs of one body; medium: what bends them; degree: of their polynomials.
+    """Wavefronts of legs. group (leg,): legs of one body; medium: what bends them.
 
     Reflections turn and blur the pulse by the grazing angle, which varies over the aperture. What the polynomials in
     that miss is in `error`, as delays that are as much at the upper edge of the band.
     """
-    place = ReceiverGeometry(medium, receiver, probes(receiver.elements, degree), propagation)
+    place = ReceiverGeometry(medium, receiver, probes(receiver.elements), propagation)
     straight = propagation.straight(medium.profile)
     if straight and not legs.bounces.any():
         return ExpansionSource(legs, place, (), True)

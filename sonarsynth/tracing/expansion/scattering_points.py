@@ -44,5 +44,5 @@ def delay_to_scattering_points(over: ExpansionTerms, array: FacetPaths, leg: Int
     speed = array.context.medium.profile.at(depth(array.legs.point[leg[some]]))
     late = -dot(spot[some, None], away) / speed[:, None]
     delay = over.delay.copy()
-    delay[some] += probes(array.context.receiver.elements, array.context.tolerances.degree).fit(late)
+    delay[some] += probes(array.context.receiver.elements).fit(late)
     return over._replace(delay=delay)

@@ -84,19 +84,13 @@ class ExpansionTerms(NamedTuple):
         return ExpansionTerms(*(value[rows] for value in self))
 
 
-def terms_of(degree: int) -> int:
-    """How many aperture terms there are up to a degree."""
-    return (degree + 1) * (degree + 2) * (degree + 3) // 6
-
-
 @lru_cache(maxsize=1024)
-def probes(elements: Elements, degree: int = 3) -> Probes:
-    """Probe sensors of an array for polynomials of a degree: each the one farthest from those before it, from the
+def probes(elements: Elements) -> Probes:
+    """Probe sensors of an array for cubics: each the one farthest from those before it, from the
     element farthest out."""
     position = elements.position
     scale = elements.aperture or 1.0  # one element at the centre has no aperture, and no terms but 0
-    terms = terms_of(degree)
-    rank = int(np.linalg.matrix_rank(aperture_terms(position, scale, terms)[:, 1:]))
+    rank = int(np.linalg.matrix_rank(aperture_terms(position, scale)[:, 1:]))
     wanted = int(np.ceil(1.3 * rank)) + HELD_OUT
     chosen = [int(np.argmax(np.linalg.norm(position, axis=1)))]
     nearest = np.full(len(position), np.inf)
@@ -105,7 +99,7 @@ def probes(elements: Elements, degree: int = 3) -> Probes:
         chosen.append(int(np.argmax(nearest)))
     sensor = np.array(chosen)
     fitted = max(len(sensor) - HELD_OUT, min(rank, len(sensor)), 1)
-    basis = aperture_terms(position[sensor], scale, terms)
+    basis = aperture_terms(position[sensor], scale)
     solve = np.vstack([np.zeros(fitted), np.linalg.pinv(basis[:fitted, 1:], rcond=1e-10)])
     few = len(sensor) if len(sensor) < QUADRATIC_PROBES else QUADRATIC_PROBES - HELD_OUT  # of a small array, all
     second = np.linalg.pinv(basis[:few, 1:SECOND_DEGREE], rcond=1e-10)

@@ -15,7 +15,7 @@ from sonarsynth.equations.arrays.apertures import aperture_terms
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.state import Medium, Receiver
 from sonarsynth.tracing.expansion.probe_paths import ReceiverGeometry, rays_to_probes
-from sonarsynth.tracing.expansion.wavefront_polynomials import probes, terms_of
+from sonarsynth.tracing.expansion.wavefront_polynomials import probes
 from sonarsynth.tracing.receive_paths import ReceivePaths
 
 if TYPE_CHECKING:
@@ -26,15 +26,15 @@ SAME = 1e-9
 
 
 def launch_deviation(
-    legs: ReceivePaths, points: Floats, medium: Medium, receiver: Receiver, propagation: Propagation, degree: int
+    legs: ReceivePaths, points: Floats, medium: Medium, receiver: Receiver, propagation: Propagation
 ) -> Floats:
     """(leg, point, xyz) what is between the directions in which rays leave for points (point, xyz) m of the sonar
     frame, on the aperture, and those towards their images; medium: what bends them.
 
-    Polynomials of a degree through rays to the probes of the aperture: arcs where these do not leave a layer of
+    Cubics through rays to the probes of the aperture: arcs where these do not leave a layer of
     constant gradient, others traced. Where a probe has no ray, it is taken to be where straight ones are.
     """
-    place = ReceiverGeometry(medium, receiver, probes(receiver.elements, degree), propagation)
+    place = ReceiverGeometry(medium, receiver, probes(receiver.elements), propagation)
     probe, offset = place.probe, receiver.pose.turn_to_world(place.probe.position)
     away, arc = _arcs(legs, receiver.pose.position, offset, medium)
     image = towards(legs, offset)
@@ -43,7 +43,7 @@ def launch_deviation(
         left, _, bent = rays_to_probes(legs.select(rest), place)
         away[rest] = np.where(np.isnan(left)[..., None], image[rest], bent)
     away -= image
-    basis = aperture_terms(points, probe.aperture, terms_of(degree))
+    basis = aperture_terms(points, probe.aperture)
     coefficients = np.einsum("tp,lpx->ltx", probe.solve, away[:, : probe.fitted], optimize=True)
     return np.asarray(np.matmul(basis, coefficients))
 

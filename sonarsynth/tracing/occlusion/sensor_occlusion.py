@@ -174,8 +174,7 @@ class Occlusion:
         straight."""
         if self.propagation.straight(self.bending.profile) or self.elements is None:
             return None
-        points, degree = self._points[point], self.tolerances.degree
-        return launch_deviation(legs, points, self.bending, self.receiver, self.propagation, degree)
+        return launch_deviation(legs, self._points[point], self.bending, self.receiver, self.propagation)
 
     def _unseen(
         self, legs: ReceivePaths, start: Floats, normal: Floats | None, leg: Ints, point: Ints, swerve: Floats | None
