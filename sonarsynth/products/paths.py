@@ -95,10 +95,8 @@ class Arrivals:
                 arrives_by (path,)                     index into FAMILIES: boundaries touched on the way to the array
 
     Water absorbs on what the way to a sensor is longer by, its delay times c, as it does on the way to the array
-    centre: synthesis takes that off at each frequency. delay_variance_terms may be below 0: the delays over a facet,
-    whose mean `corner_delays` is that at the centre, have another variance elsewhere, and heights of a rough facet
-    another echo: what sigma and A together nearly say over the band. The modulus of `facet_pulses.facet_response` is 1
-    at f_c for a coherent facet that is small.
+    centre: synthesis takes that off at each frequency. What a facet makes of the pulse is that at the centre. The
+    modulus of `facet_pulses.facet_response` is 1 at f_c for a coherent facet that is small.
     """
 
     delay: Floats

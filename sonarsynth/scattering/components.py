@@ -113,11 +113,6 @@ class CoherentKirchhoff:
         delay_std = self.law.roughness * np.abs(dot(patch.normal, scattered - incident)) / sound_speed
         return PulseResponse(np.ones(count, bool), corners, zero, zero, zero, phase, delay_std)
 
-    def spread(self, incident: Floats, scattered: Floats, patch: FacetGeometry, sound_speed: Floats) -> Floats:
-        """Variance (...) of the delays of an echo in s2, over the facet and the heights of its surface."""
-        rough = self.law.roughness * dot(patch.normal, scattered - incident) / sound_speed
-        return np.asarray(over_facet(incident, scattered, patch, sound_speed) + rough * rough)
-
     def phase(self, incident: Floats, scattered: Floats) -> Floats:
         """Phase (...) of the reflection coefficient in rad, which directions change where `turns`."""
         return np.asarray(np.angle(reflection(self.law, incident, scattered)))
@@ -162,42 +157,22 @@ class DiffuseKirchhoff:
         lobe, floor = self._powers(incident, scattered, patch)
         return np.sqrt(patch.area * (lobe + floor))
 
-    def _sent(
-        self, incident: Floats, scattered: Floats, patch: FacetGeometry, sound_speed: Floats, frequency: Floats
+    def gain(
+        self, incident: Floats, scattered: Floats, away: Floats, patch: FacetGeometry, wavenumber: Floats
     ) -> Floats:
-        """Power (frequency, ...) in m2 that is sent without phase in common."""
+        """Amplitude (path, direction) of what is sent in directions `away` (path, direction, xyz) over that in
+        `scattered` (path, xyz), at a wavenumber (path,) (rad/m): low heights send more where they are seen more
+        squarely, great ones do not."""
+        there = self._sent(incident[:, None], away, patch.over(), wavenumber[:, None])
+        here = self._sent(incident, scattered, patch, wavenumber)[:, None]
+        both = (there > 0.0) & (here > 0.0)
+        return np.where(both, np.sqrt(np.divide(there, here, out=np.ones_like(there), where=both)), there > 0.0)
+
+    def _sent(self, incident: Floats, scattered: Floats, patch: FacetGeometry, wavenumber: Floats) -> Floats:
+        """Power (...) in m2 that is sent without phase in common."""
         lobe, floor = self._powers(incident, scattered, patch)
-        late = self.law.roughness * dot(patch.normal, scattered - incident) / sound_speed
-        g = 2.0 * np.pi * np.multiply.outer(frequency, late)
+        g = wavenumber * self.law.roughness * dot(patch.normal, scattered - incident)
         return np.asarray(patch.area * (floor - lobe * np.expm1(-g * g)))
-
-    def elsewhere(
-        self,
-        incident: Floats,
-        scattered: Floats,
-        away: Floats,
-        patch: FacetGeometry,
-        sound_speed: Floats,
-        band: tuple[float, float],
-    ) -> tuple[Floats, Floats]:
-        """What is sent in directions `away` (path, direction, xyz) over that in `scattered` (path, xyz), nearly
-        gain exp(-spread (2 pi f)^2/2): gain and spread (s2) (path, direction).
-
-        Exact at two frequencies, Chebyshev's over the band (Hz). Where n.(ks - ki) changes by a small part, the factor
-        sqrt(1 - exp(-g^2)) does by x/(e^x - 1) of that, x = g^2: by all of it for low heights, by nothing for great
-        ones, and nearly linearly in f^2 in between. This leaves at most 0.12 of it, for g of 1.5 to 2.5 in mid-band.
-        """
-        middle, half = 0.5 * (band[1] + band[0]), np.sqrt(0.125) * (band[1] - band[0])
-        frequency = middle + half * np.array([-1.0, 1.0])
-        square = frequency**2
-        at = patch, sound_speed, frequency
-        there = self._sent(incident[:, None], away, patch.over(), sound_speed[:, None], at[2])
-        here = self._sent(incident, scattered, *at)[:, :, None]
-        both = (there > 0.0).all(axis=0) & (here > 0.0).all(axis=0)
-        first, last = 0.5 * np.log(np.divide(there, here, out=np.ones_like(there), where=both))
-        slope = (last - first) / (square[1] - square[0])
-        gain = np.where(both, np.exp(first - slope * square[0]), (there[1] > 0.0) * 1.0)
-        return gain, -slope / (2.0 * np.pi**2)
 
     def pulses(self, incident: Floats, scattered: Floats, patch: FacetGeometry, sound_speed: Floats) -> PulseResponse:
         """As `Component.pulses`: without the share of the power that is coherent still."""
@@ -235,16 +210,6 @@ class Shadow:
     def polarity(self, mesh: Mesh) -> Floats:
         """All alike: the amplitude has the sign."""
         return np.ones(len(mesh.faces))
-
-    def spread(self, incident: Floats, scattered: Floats, patch: FacetGeometry, sound_speed: Floats) -> Floats:
-        """Variance (...) of the delays over the facet in s2."""
-        return over_facet(incident, scattered, patch, sound_speed)
-
-
-def over_facet(incident: Floats, scattered: Floats, patch: FacetGeometry, sound_speed: Floats) -> Floats:
-    """Variance (...) of the delays over facets in s2: a twelfth of the sum of squares of those of the corners."""
-    late = dot(patch.corners, (incident - scattered)[..., None, :]) / sound_speed[..., None]
-    return np.asarray(dot(late, late) / 12.0)
 
 
 def size_at(

@@ -122,8 +122,6 @@ class Tolerances:
     part of that of the largest."""
     quadratic: float = 1e-4
     """Error of amplitudes over the aperture, of the strongest echo's, at which polynomials of the second degree do."""
-    facet_mean: float = 1e-3
-    """Change of an echo over the aperture by the mean over its facet, over the strongest echo, that is left out."""
     shared: float = 1e-2
     """What moves by less than this part of the radius of a body from one snap to another, and keeps as near to what
     its velocity and spin say, in radians of the highest frequency, is traced for both together."""

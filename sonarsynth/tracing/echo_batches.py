@@ -8,20 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints, depth
-from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.scattering import Component, Scatterers
-from sonarsynth.scattering.components import CoherentKirchhoff, DiffuseKirchhoff, Lobe, Shadow
+from sonarsynth.scattering.components import CoherentKirchhoff, DiffuseKirchhoff, Lobe
 from sonarsynth.scattering.facet_geometry import FacetGeometry, PulseResponse
 from sonarsynth.tracing.doppler import MotionTerms
 from sonarsynth.tracing.transmit_paths import TransmitPaths
 
 if TYPE_CHECKING:
     from sonarsynth.tracing.facet_paths import FacetPaths
-
-
-SAME_FACET_CHANGE = 10.0
-"""How much more what heights take from echoes counts, where it changes over the aperture, than means over facets do: it
-is alike on all facets, where these make up for each other (`Tolerances.facet_mean`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +29,6 @@ class EchoBatch:
     incident: Floats  # (echo, xyz)
     scattered: Floats  # (echo, xyz)
     wavenumber: Floats  # (echo,) rad/m at the centre of the band
-    band: tuple[float, float]  # Hz
     amplitude: Floats  # (echo,) m
     sign: Floats  # (echo,)
 
@@ -46,20 +39,11 @@ class EchoBatch:
 
     def over(self, departure: Floats) -> Floats:
         """Amplitudes (echo, probe) in directions (echo, probe, xyz) of the world."""
-        if (heights := self._heights) is not None:
-            return np.asarray(self.amplitude[:, None] * self._elsewhere(heights, departure)[0])
         away = self.surface.pose.turn_to_body(departure)
+        if isinstance(self.part, DiffuseKirchhoff) and self.part.law.roughness > 0.0:
+            gain = self.part.gain(self.incident, self.scattered, away, self.patch, self.wavenumber)
+            return np.asarray(self.amplitude[:, None] * gain)
         return self.part.amplitude(self.incident[:, None, :], away, self.patch.over(), self.wavenumber[:, None])
-
-    @property
-    def _heights(self) -> DiffuseKirchhoff | None:
-        """The part, where it is what heights scatter without phase in common."""
-        return self.part if isinstance(self.part, DiffuseKirchhoff) and self.part.law.roughness > 0.0 else None
-
-    def _elsewhere(self, heights: DiffuseKirchhoff, departure: Floats) -> tuple[Floats, Floats]:
-        """As `DiffuseKirchhoff.elsewhere`, in directions (echo, probe, xyz) of the world."""
-        away, speed = self.surface.pose.turn_to_body(departure), np.pi * sum(self.band) / self.wavenumber
-        return heights.elsewhere(self.incident, self.scattered, away, self.patch, speed, self.band)
 
     @property
     def tapered(self) -> Bools:
@@ -81,45 +65,6 @@ class EchoBatch:
         seen_from_centre = self.part.phase(self.incident, self.scattered)[:, None]
         more = self.part.phase(self.incident[:, None, :], away) - seen_from_centre
         return np.asarray(more - 2.0 * np.pi * np.rint(more / (2.0 * np.pi)))
-
-    @property
-    def spreads(self) -> bool:
-        """Whether directions change what echoes are blurred by: means over facets, or what heights scatter."""
-        return isinstance(self.part, CoherentKirchhoff | Shadow) or self._heights is not None
-
-    def most_spread(self, late: Floats, turn: Floats, centre: float) -> Floats:
-        """Bound (echo,) on |spread|, of directions that differ by no more than `turn` (echo,); `SAME_FACET_CHANGE`
-        times that of heights.
-
-        late (echo, 3) s: of the corners in that of the array centre; centre (Hz).
-        """
-        if (heights := self._heights) is not None:
-            low, high = (2.0 * np.pi * f for f in self.band)
-            across = dot(self.patch.normal, self.scattered - self.incident)
-            square = (heights.law.roughness * across * self.wavenumber / (2.0 * np.pi * centre)) ** 2
-            left = np.minimum(square * np.exp(-0.3 * low**2 * square), 2.0 / high**2)
-            relative = turn * (1.0 / across + (heights.law.diffuse > 0.0) / heights.law.slope**2)
-            return np.asarray(SAME_FACET_CHANGE * left * np.minimum(relative, 1.0))
-        if not isinstance(self.part, CoherentKirchhoff | Shadow):
-            return np.zeros(len(self.row))
-        speed = 2.0 * np.pi * centre / self.wavenumber
-        more = np.sqrt(dot(self.patch.corners, self.patch.corners)) * (turn / speed)[:, None]
-        rough = self.part.law.roughness / speed if isinstance(self.part, CoherentKirchhoff) else 0.0
-        return np.asarray(
-            ((2.0 * np.abs(late) + more) * more).sum(axis=1) / 12.0 + SAME_FACET_CHANGE * rough**2 * turn * (4.0 + turn)
-        )
-
-    def spread(self, departure: Floats, centre: float) -> Floats:
-        """Variance (echo, probe) in s2 of the delays of each echo in directions (echo, probe, xyz) of the world more
-        than in that of the array centre; centre (Hz)."""
-        if (heights := self._heights) is not None:
-            return self._elsewhere(heights, departure)[1]
-        if not isinstance(self.part, CoherentKirchhoff | Shadow):
-            return np.zeros(departure.shape[:2])
-        away, speed = self.surface.pose.turn_to_body(departure), 2.0 * np.pi * centre / self.wavenumber
-        seen_from_centre = self.part.spread(self.incident, self.scattered, self.patch, speed)
-        over = self.part.spread(self.incident[:, None, :], away, self.patch.over(), speed[:, None])
-        return np.asarray(over - seen_from_centre[:, None])
 
     @property
     def spot(self) -> Floats:
@@ -164,9 +109,7 @@ def echo_batches(
             patch = surface.geometry(not isinstance(part, Lobe)).select(facet)
             amplitude = part.amplitude(incident, scattered, patch, wavenumber)
             sign = surface.polarity(part)[facet]
-            group = EchoBatch(
-                surface, part, row, patch, incident, scattered, wavenumber, receiver.band, amplitude, sign
-            )
+            group = EchoBatch(surface, part, row, patch, incident, scattered, wavenumber, amplitude, sign)
             found.append(group.select(np.flatnonzero(amplitude)))
     return found
 

@@ -113,13 +113,11 @@ def echoes(array: FacetPaths, index: int, parts: tuple[tuple[Component, ...], ..
     found = _loudest(array, snap, parts)
     terms, error = variations(found)
     most = max(float(np.abs(some.strength).max(initial=0.0)) for some in found)
-    spread = any(_spreads(some, most) for some in found)
     group, made = [some.seen().group for some in found], []
     found.reverse()
     for variation in terms:
         some = found.pop()
         over = _turned(some, most)
-        over = _spread(some, over, most) if spread else over
         spot = np.concatenate([g.spot for g in some.groups])
         if spot.any() and not some.array.bending.profile.uniform:
             over = delay_to_scattering_points(over, some.array, some.leg, spot)
@@ -262,30 +260,3 @@ def _turned(found: _EchoBlock, most: float) -> ExpansionTerms:
         2.0 * np.pi * array.context.receiver.band[1]
     )
     return over._replace(phase=over.phase + terms if over.phase.shape[1] else terms, error=error)
-
-
-def _spreads(found: _EchoBlock, most: float) -> bool:
-    """Whether what facets spread echoes by in time changes any of them over the array by more than
-    `Tolerances.facet_mean` of the strongest of all."""
-    array, receiver = found.array, found.array.context.receiver
-    rate = 2.0 * np.pi * receiver.band[1]
-    if not any(g.spreads for g in found.groups):
-        return False
-    share, turn = np.abs(found.strength) / max(most, 1e-300), receiver.elements.aperture / array.legs.length[found.leg]
-    late = np.split(found.pulses.corner_delays, np.cumsum([len(g.row) for g in found.groups])[:-1])
-    of = zip(found.groups, late, strict=True)
-    bound = np.concatenate([g.most_spread(corners, turn[g.row], receiver.centre) for g, corners in of])
-    return bool(0.5 * rate**2 * (share * bound).max(initial=0.0) > array.context.tolerances.facet_mean)
-
-
-def _spread(found: _EchoBlock, over: ExpansionTerms, most: float) -> ExpansionTerms:
-    """Wavefronts (path,) of echoes, with what facets spread them by in time more at a hydrophone than at the centre.
-
-    Their delays over a facet have another variance there; the mean over a facet is that of the centre, blurred by what
-    it is more.
-    """
-    receiver, share = found.array.context.receiver, np.abs(found.strength) / max(most, 1e-300)
-    more = np.concatenate([g.spread(found.departure(g.row, QUADRATIC_PROBES), receiver.centre) for g in found.groups])
-    terms, misfit = probes(receiver.elements).fit_few(more)
-    delay_std = over.delay_std + terms if over.delay_std.shape[1] else terms
-    return over._replace(delay_std=delay_std, error=over.error + share * np.pi * receiver.band[1] * misfit)

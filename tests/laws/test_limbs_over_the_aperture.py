@@ -44,7 +44,7 @@ def traced(law: Kirchhoff, place: Floats, array: Elements, occlusion: OcclusionP
     """Coherent echoes of a ball 8 m ahead, lit from the side."""
     ball = PlacedTarget("ball", BALL, Pose(PLACE + [8.0, 0.3, 0.2], EAST), np.zeros(3))
     receiver = Receiver(Pose(place, EAST), array, SONAR)
-    none = Tolerances(negligible=0.0, quadratic=0.0, facet_mean=0.0, occlusion=occlusion)
+    none = Tolerances(negligible=0.0, quadratic=0.0, occlusion=occlusion)
     context = FrameContext(0.0, (ball,), (SNAP,), Medium(WATER, PROFILE), receiver, (law,), none)
     found = trace(context, AutoTracing())
     return found.select(found.coherent)

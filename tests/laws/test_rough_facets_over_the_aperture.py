@@ -17,7 +17,6 @@ from sonarsynth.products import Arrivals
 from sonarsynth.propagation import AutoTracing
 from sonarsynth.receiver import Elements, PositionTable, Romanis, Sonar, elements
 from sonarsynth.scattering import Kirchhoff
-from sonarsynth.signals import GriddedSynthesis
 from sonarsynth.signals.direct_sum import exact_signals
 from sonarsynth.sources.shrimp import LogarithmicBubble
 from sonarsynth.state import Emission, FrameContext, Medium, Receiver, Tolerances
@@ -69,7 +68,7 @@ def traced(
     panel = PlacedTarget("panel", PANEL, Pose(PLACE + view.place, quaternion(view.heading)), np.zeros(3))
     snap = Emission(PLACE + view.snap, 0.0, LogarithmicBubble(), None)
     receiver = Receiver(Pose(place, EAST), array, SONAR)
-    none = Tolerances(negligible=0.0, quadratic=0.0, facet_mean=0.0)
+    none = Tolerances(negligible=0.0, quadratic=0.0)
     context = FrameContext(0.0, (panel,), (snap,), Medium(WATER, profile), receiver, (law,), none)
     found = trace(context, AutoTracing(bounces=bounces))
     front = np.isin(found.facet, np.flatnonzero(PANEL.normal[:, 0] > 0.9))
@@ -98,7 +97,7 @@ def errors(
     place = Pose(PLACE, EAST).to_world(array.position[FAR])
     alone = [bounced(traced(law, view, at, SINGLE, profile, bounces), bounces) for at in place]
     exact = np.vstack([heard(x, SINGLE, start) for x in alone])
-    shared = replace(found, amplitude_terms=plain.amplitude_terms, delay_variance_terms=np.zeros((len(found.delay), 0)))
+    shared = replace(found, amplitude_terms=plain.amplitude_terms)
     one, two = (float(np.linalg.norm(heard(x, part, start) - exact)) for x in (found, shared))
     size = float(np.linalg.norm(exact))
     return one / size, two / size
@@ -108,50 +107,28 @@ VIEWS = pytest.mark.parametrize("view", [NORMAL, GRAZING], ids=["normal", "grazi
 
 
 @VIEWS
-@pytest.mark.parametrize("height", [0.0003, 0.002])
-def test_one_expansion_hears_what_each_hydrophone_hears_alone(view: View, height: float) -> None:
-    """Facets in full view change little by their heights over the array; grazed ones change by 8 %."""
-    mine, shared = errors(Kirchhoff(roughness=height, slope=0.2), view, array_of(1.0))
-    assert mine < 5e-4
-    assert 10.0 * mine < shared  # by 10 to 90, by where the points of facets are drawn
-
-
-@VIEWS
-@pytest.mark.parametrize("height", [0.004, 0.01])
-def test_of_heights_about_a_wavelength_little_is_left(view: View, height: float) -> None:
-    """Where heights change some frequencies and not others, as the law is nearly, but not quite, a blur.
-
-    Those that are great for the waves that come down on the facet, but for few that graze it.
-    """
-    mine, shared = errors(Kirchhoff(roughness=height, slope=0.2), view, array_of(0.5))
-    assert mine < 1e-3
-    assert 2.0 * mine < shared or shared < 1e-4  # either is little: what is left is what all expansions leave out
-
-
-@VIEWS
-def test_the_error_falls_with_the_square_of_the_aperture(view: View) -> None:
-    """Heights well below the wavelength change all frequencies alike; without, it falls with the aperture."""
-    law = Kirchhoff(roughness=0.0003, slope=0.2)
-    (one, flat), (half, flat_half), (quarter, _) = (errors(law, view, array_of(scale)) for scale in (1.0, 0.5, 0.25))
-    if view is GRAZING:  # in full view the error is at what all expansions leave out, which falls more slowly
-        assert one > 4.0 * half
-        assert half > 3.3 * quarter
-        assert flat == pytest.approx(2.0 * flat_half, rel=0.1)
-    assert one > 1.7 * half > 1.7**2 * quarter
-    assert flat > 1.3 * flat_half
+@pytest.mark.parametrize("height", [0.0003, 0.002, 0.01])
+def test_one_expansion_hears_nearly_what_each_hydrophone_hears_alone(view: View, height: float) -> None:
+    """Facets in full view change little by their heights over the array; grazed ones change by 7 %. What heights change
+    at other frequencies than the middle one of the band is left out: parts of an array leave out less."""
+    law = Kirchhoff(roughness=height, slope=0.2)
+    (mine, shared), (half, _) = (errors(law, view, array_of(scale)) for scale in (1.0, 0.5))
+    assert mine < 0.4 * shared or shared < 1e-4
+    assert mine < 0.02
+    assert half < 0.8 * mine
 
 
 @pytest.mark.parametrize(("profile", "bounces"), [(BENT, 0), (EVEN, 1)], ids=["bent", "mirrored"])
 def test_bent_and_mirrored_waves_too(profile: Profile, bounces: int) -> None:
     mine, shared = errors(Kirchhoff(roughness=0.002, slope=0.2), NORMAL, array_of(1.0), profile, bounces)
-    assert mine < 1e-4
-    assert 8.0 * mine < shared
+    assert mine < 5e-4
+    assert 2.0 * mine < shared
 
 
 def test_a_floor_does_not_lose_to_heights() -> None:
     """The share of the lobe in what is sent changes with direction."""
     mine, shared = errors(Kirchhoff(roughness=0.002, slope=0.2, diffuse=0.3), GRAZING, array_of(0.5))
-    assert 10.0 * mine < shared
+    assert 5.0 * mine < shared
 
 
 @pytest.mark.parametrize(
@@ -173,23 +150,3 @@ def test_echoes_come_from_their_points(profile: Profile, bounces: int) -> None:
             late = late + found.delay_terms @ aperture_terms(q, array.aperture)
         error = late[a] - alone.delay[b]
         assert np.abs(error).max() < 1e-10
-
-
-def test_the_fast_synthesis_follows_rough_facets_over_the_array() -> None:
-    found, array = traced(ROUGH, GRAZING, PLACE, array_of(1.0)), array_of(1.0)
-    assert found.delay_variance_terms.any()
-    start, snap = found.delay.min() - 2e-4, Emission(PLACE, 0.0, LogarithmicBubble(), None)
-    exact = heard(found, array, start)
-    for tolerance, most in ((1.5e-4, 2e-4), (1e-6, 3e-6)):
-        method = GriddedSynthesis(width=10, precision="float64", tolerance=tolerance)
-        got, _ = method.pressure(found, (snap,), array, SONAR, None, start, 512)
-        assert np.abs(got - exact).max() < most * np.abs(exact).max()
-
-
-def test_surfaces_that_are_not_rough_have_no_such_terms() -> None:
-    """What is diffuse alone, or so rough that heights lose nothing, is as it was; nor is it asked for where it is
-    little."""
-    for law in (Kirchhoff(diffuse=1.0), Kirchhoff(roughness=0.3, slope=0.2)):
-        found = traced(law, NORMAL, PLACE, array_of(1.0))
-        assert len(found.delay) > 50
-        assert not found.delay_variance_terms.any()

@@ -13,9 +13,6 @@ from sonarsynth.recipe.scene import Frame
 from sonarsynth.state import FrameContext, Receiver, Survey, Tolerances
 from sonarsynth.tracing.arrivals import trace
 
-FACETS = 10.0
-"""Change of an echo by the mean over its facet, over the array, that is left out, over the error of signals: the whole
-of the echoes of cylinders, spheres and a REMUS-100 erred by a tenth to a fiftieth of it."""
 AMPLITUDES = 0.1
 """Share of the error of signals that amplitudes over the aperture may err by, for a lower degree to do."""
 
@@ -51,7 +48,6 @@ def context_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> FrameC
     tolerances = Tolerances(
         negligible=choices.negligible,
         quadratic=AMPLITUDES * accuracy.cheap,
-        facet_mean=FACETS * accuracy.signal,
         shared=accuracy.signal,
         occlusion=choices.occlusion if part is not None or choices.subarrays == 1 else "centre",
     )
