@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import json
 import time
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -30,6 +31,9 @@ from sonarsynth.cli.selecting import chosen_frames, product_names
 from sonarsynth.cli.soundscape_command import soundscape
 from sonarsynth.cli.target_strength_command import target_strength
 from sonarsynth.cli.worker_options import worker_bounds
+
+if TYPE_CHECKING:
+    from xarray import DataTree
 
 __all__ = ["app", "main"]
 
@@ -204,8 +208,14 @@ def verify(
     from sonarsynth import store as stores
     from sonarsynth.cli import printing
 
-    with printing.planning("verifying"):
-        report = stores.verify(store, [evaluation.check], quick=quick)
+    def check(tree: DataTree) -> list[evaluation.Check]:
+        reading.close()
+        with printing.planning("checking truth against data"):
+            return evaluation.check(tree)
+
+    with ExitStack() as reading:
+        progress = reading.enter_context(printing.progress("comparing files"))
+        report = stores.verify(store, [check], quick=quick, progress=progress)
     if as_json:
         _print_json(report.as_json())
     else:

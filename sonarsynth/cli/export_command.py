@@ -100,7 +100,7 @@ def _folder(store: str, to: str, out: Path | None, frames: str | None) -> None:
     chosen = chosen if some is None else np.intersect1d(chosen, some)
     if not len(chosen):
         raise BadOption("--frames: none of these frames has been built" if some else f"{store} has no frames yet")
-    folder = out or named_after(store).with_name(f"{named_after(store).name}.{to}")
+    folder = _new(out or named_after(store).with_name(f"{named_after(store).name}.{to}"))
     write, lost = (
         (coco_files.write_coco, coco_files.LOST) if to == COCO else (sonar_netcdf.write_sonar_netcdf, sonar_netcdf.LOST)
     )
@@ -115,6 +115,13 @@ def _folder(store: str, to: str, out: Path | None, frames: str | None) -> None:
         typer.echo(f"note: {note}")
 
 
+def _new(folder: Path) -> Path:
+    """A folder for an export, which holds nothing yet: files of two exports would be taken for one dataset."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise BadOption(f"{folder} exists already and is not an empty folder: remove it, or name another by --out")
+    return folder
+
+
 def _bellhop(recipe: Path, out: Path | None, frames: str | None, settings: list[str]) -> None:
     from sonarsynth import planning
     from sonarsynth.export import write_bellhop
@@ -122,7 +129,7 @@ def _bellhop(recipe: Path, out: Path | None, frames: str | None, settings: list[
 
     source = reading.read(recipe, settings)
     made_from = reading.recipe_of(source)
-    folder, notes = out or Path(f"{recipe.stem}.bellhop"), dict[str, None]()
+    folder, notes = _new(out or Path(f"{recipe.stem}.bellhop")), dict[str, None]()
     with reading.locating(source):
         some = frame_numbers(frames or "0:1", made_from.frames) or ()
         plan = planning.plan(made_from)

@@ -6,6 +6,7 @@ import ast
 import inspect
 import textwrap
 from contextvars import ContextVar
+from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -108,6 +109,8 @@ def shown(default: Any) -> str:
         return "none"
     if isinstance(default, dict):
         return str(default["kind"]) if "kind" in default else "its own defaults"
+    if isinstance(default, list):
+        return f"[{', '.join(map(shown, default))}]"
     return f"{default:g}" if isinstance(default, float) else str(default)
 
 
@@ -121,8 +124,17 @@ def _write_defaults(part: Any) -> str | None:
     unit = part.get("x-unit") or inner.get("anyOf")
     value = part.get("default")
     if unit in ("rad", "rad/s") and isinstance(value, float) and value != 0:
-        part["default"] = f"{round(float(np.rad2deg(value)), 10):.12g} {unit.replace('rad', 'deg')}"
+        part["default"] = _in_degrees(value, unit)
+    elif isinstance(value, list):
+        units = [one.get("x-unit") for one in part.get("prefixItems", ())]
+        of_angles = zip(value, units, strict=False)
+        part["default"] = [_in_degrees(x, u) if x and u in ("rad", "rad/s") else x for x, u in of_angles] or value
     return unit
+
+
+def _in_degrees(value: float, unit: str) -> str:
+    """An angle, or a rate of one, as people write it."""
+    return f"{round(float(np.rad2deg(value)), 10):.12g} {unit.replace('rad', 'deg')}"
 
 
 class _Schema(GenerateJsonSchema):
@@ -143,6 +155,7 @@ class _Schema(GenerateJsonSchema):
         return found
 
 
+@cache
 def _field_texts(cls: type) -> dict[str, str]:
     """The text under each field that a class declares, by name; none of a class whose source is not at hand."""
     try:

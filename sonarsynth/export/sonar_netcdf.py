@@ -105,7 +105,9 @@ def _groups(tree: xr.DataTree) -> Iterator[_Beams]:
     names = [f"azimuth {a:.6g} elevation {e:.6g}" for a, e in zip(azimuth.ravel(), elevation.ravel(), strict=True)]
     interval, units, meaning = float("nan"), "Pa2 s", "Energy in the echo window"
     if "delay" in steered.dims:
-        interval, units, meaning = float(np.diff(steered["delay"].values[:2])[0]), "dB", "Level of the beam re 1 uPa"
+        units, meaning = "dB", "Level of the beam re 1 uPa"
+        if steered.sizes["delay"] > 1:
+            interval = float(np.diff(steered["delay"].values[:2])[0])
 
     def values(frame: int) -> tuple[np.ndarray, float]:
         one = steered.isel(frame=frame)

@@ -25,7 +25,7 @@ class Still:
     position: Position
     """(x, y, z)."""
     heading: Radians = 0.0
-    """Clockwise from north."""
+    """Clockwise from north; left out, it looks north (a sonar too: its beams are about its heading)."""
     pitch: Radians = 0.0
     """Nose up."""
     roll: Radians = 0.0
@@ -111,7 +111,7 @@ class ConstantVelocity:
     start: Position
     """Where the body is at time 0."""
     heading: Radians = 0.0
-    """Compass heading of the body and of its way."""
+    """Compass heading of the body and of its way; left out: north (a sonar looks there too)."""
     speed: MetresPerSecond = 0.0
     """Negative is astern."""
     climb: MetresPerSecond = 0.0

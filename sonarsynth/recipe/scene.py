@@ -111,7 +111,8 @@ class Trajectory:
     start: Seconds = 0.0
     """Time of the first frame since the start of the motions."""
     sonar: Motion = Still(position=(0.0, 0.0, -5.0), heading=0.5 * np.pi)
-    """How the sonar moves."""
+    """How the sonar moves, and where it looks: its heading, pitch and roll. Left out: at rest 5 m deep, looking east; a
+    motion that is given without a heading looks north."""
 
     def time(self, step: int) -> float:
         """Time (s) of a frame since the start of the motions."""

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from sonarsynth.conventions import UNITS
@@ -48,6 +49,14 @@ def test_every_number_with_a_unit_has_an_example_that_is_one() -> None:
     assert len(fields) > 150 and units >= {"m", "s", "Hz", "rad", "dB", "m/s", "Pa"}
     for field in fields:
         jsonschema.Draft202012Validator({"$defs": found["$defs"], **field}).validate(field["examples"][0])
+
+
+def test_defaults_that_are_angles_have_a_unit_as_people_write_it() -> None:
+    """A bare angle but 0 is refused in a recipe: the schema shows none, in tuples neither."""
+    found = json.loads(schema_text())
+    bare = [f for f in numbers(found) if any(isinstance(x, float) and x for x in np.atleast_1d(f.get("default", 0)))]
+    assert not [field for field in bare if "(deg" in field["description"]]
+    assert found["$defs"]["Upright"]["properties"]["heading"]["default"] == [0, "360 deg"]
 
 
 def test_links_to_pictures_lead_to_where_the_site_has_them(tmp_path: Path) -> None:

@@ -66,6 +66,10 @@ def test_build_verify_and_build_again(command: Command, small_file: Path, tmp_pa
     other = command("build", small_file, path, "--workers", "0", "--set", "seed=4")
     assert other.status == 2
     assert "(seed: 3, now 4)" in one_line(other)
+    for quick in (False, True):  # in frames, shard by shard
+        seen: list[tuple[int, int, int]] = []
+        store.verify(path, quick=quick, progress=lambda *counts, seen=seen: seen.append(counts))
+        assert seen[-1] == (8, 8, 0) and seen == sorted(seen)
     (path / "image/energy/c.0.0.0").unlink()
     damaged = command("verify", path)
     assert damaged.status == 4

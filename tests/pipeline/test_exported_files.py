@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.spatial.transform import Rotation
 
 import sonarsynth as ss
@@ -172,6 +173,26 @@ def test_netcdf_reads_what_the_convention_asks_and_the_same_numbers(store: Path)
         ours = [np.cos(elevation) * np.cos(azimuth), -np.cos(elevation) * np.sin(azimuth), -np.sin(elevation)]
         np.testing.assert_allclose(axes, np.stack(ours, axis=-1).reshape(-1, 3), atol=1e-6)
         assert str(steered["beam"][0]).startswith("azimuth -15")
+
+
+def test_beams_of_one_delay_have_no_interval(store: Path, tmp_path: Path) -> None:
+    import netCDF4
+
+    tree = ss.open(store)
+    image = tree["image"].to_dataset()
+    level = image["energy"].expand_dims(delay=[0.02], axis=-1)
+    tree["beams"] = xr.DataTree(image.drop_vars("energy").assign(level=level))
+    (file,) = write_sonar_netcdf(tree, tmp_path, np.array(BUILT))
+    with netCDF4.Dataset(file) as read:
+        steered = read["Sonar/Beam_group2"]
+        assert np.isnan(steered["sample_interval"][:]).all() and len(steered["backscatter_r"][0, 0, 0]) == 1
+
+
+def test_two_exports_do_not_mix(store: Path, coco: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = sorted(file.name for file in coco.rglob("*"))
+    assert run(app, ["export", str(store), "--to", "sonar-netcdf", "--out", str(coco)]) == 2
+    assert "exists already and is not an empty folder" in capsys.readouterr().err
+    assert sorted(file.name for file in coco.rglob("*")) == before
 
 
 def test_turns_of_ships_are_those_of_the_attitude() -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 import sonarsynth as ss
@@ -21,6 +24,15 @@ def warnings(distance: float, law: ss.Kirchhoff | ss.MirrorLobe) -> str:
     )
     quick = ss.Accuracy(signal=0.02)
     return "\n".join(ss.plan(ss.Recipe(scene=ss.Scene(world=world), accuracy=quick)).warnings)
+
+
+@pytest.mark.parametrize(("heading", "noted"), [(0.0, True), (90.0, False)])
+def test_a_sonar_that_looks_past_its_targets_is_told(small: ss.Recipe, heading: float, noted: bool) -> None:
+    """Left out, a heading is north; the target of this recipe is in the east."""
+    sonar = replace(small.scene.trajectory.sonar, heading=np.deg2rad(heading))
+    trajectory = replace(small.scene.trajectory, sonar=sonar)
+    said = ss.plan(replace(small, scene=replace(small.scene, trajectory=trajectory))).warnings
+    assert any("the sonar looks to 0 deg (0 is north, 90 east" in line for line in said) == noted
 
 
 @pytest.mark.long

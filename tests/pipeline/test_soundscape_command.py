@@ -61,7 +61,9 @@ def test_a_recipe_and_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[
         made["other"] = np.zeros(9)
         made["pressure"] = np.random.default_rng(1).standard_normal(40_000) * 3000 / 32768
     of = ("--dataset", "pressure", "--sampling-frequency", 96_000, "--sensitivity", -180)
-    status, out, _ = said(capsys, sea, "--seconds", 0.1, "--out", picture, "--compare", file, *of, "--json")
+    status, out, _ = said(
+        capsys, sea, "--seconds", 0.1, "--out", picture, "--compare", file, *of, "--set", SHIP, "--json"
+    )
     found = json.loads(out)
     assert status == 0 and picture.stat().st_size > 20_000
     assert "NaN" not in out and found["hydrophones"] == 8  # one is dead

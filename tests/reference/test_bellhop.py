@@ -204,6 +204,7 @@ def test_the_command_writes_environments_and_tables_of_reflection(tmp_path, caps
     given = ["export", str(HERE / "uniform.yaml"), "--to", "bellhop", "--out", str(tmp_path), "--set", sets[0]]
     assert run(app, given) == 0
     printed = capsys.readouterr().out
+    assert run(app, given) == 2 and "is not an empty folder" in capsys.readouterr().err
     assert "uniform_frame0_snap0.brc" in printed and "a roughness of 0.02 m rms takes nothing" in printed
     angle, modulus, phase = np.loadtxt(tmp_path / "uniform_frame0_snap0.brc", skiprows=1).T
     np.testing.assert_allclose(-20 * np.log10(modulus), np.interp(angle, [0, 30, 90], [0, 3, 20]), atol=1e-6)

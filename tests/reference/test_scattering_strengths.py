@@ -7,7 +7,7 @@ import pytest
 
 from sonarsynth.equations.reverberation.bottom_strength import GRAIN_SIZE, Angles, albedo, lambert, sediment
 from sonarsynth.equations.reverberation.surface_strength import facets
-from sonarsynth.scattering.boundaries import BoundarySite, RoughSediment, WindySurface
+from sonarsynth.scattering.boundaries import BoundarySite, RoughSediment, StrengthTable, WindySurface
 
 WAVENUMBER = 2.0 * np.pi * 50e3 / 1528.0
 GRAZING = np.deg2rad([5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 90.0])
@@ -83,6 +83,27 @@ def test_lambert_gives_back_pi_mu() -> None:
     sine, forward, weight = hemisphere()
     out = lambert(Angles(np.full(sine.size, 0.3), sine, forward), 0.1)
     assert albedo(out, sine, weight, 0.3) == pytest.approx(0.1 * np.pi, rel=1e-6)
+
+
+@pytest.mark.parametrize("grazing", [0.0, 10.0, 90.0])
+def test_a_table_gives_back_no_more_than_arrives(grazing: float) -> None:
+    """Integrated here in all directions: the strongest table that is taken gives back all."""
+
+    def table(level: float) -> StrengthTable:
+        return StrengthTable(grazing=(np.deg2rad(grazing),), strength_db=(level,))
+
+    sine, forward, weight = hemisphere()
+    site, given = BoundarySite(50e3, WAVENUMBER, np.ones_like), np.sin(np.deg2rad(max(grazing, 1.0)))
+    low, high = -60.0, 10.0
+    while high - low > 0.01:
+        middle = 0.5 * (low + high)
+        try:
+            strength = table(middle).strength(Angles(np.full(sine.size, given), sine, forward), site)
+            share, low = albedo(strength, sine, weight, float(given)), middle
+        except ValueError as refused:
+            assert "what arrives at a grazing angle of" in str(refused)
+            high = middle
+    assert share == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize("wind", [0.0, 0.5, 3.0, 10.0])

@@ -52,7 +52,7 @@ def listening_plan(recipe: Recipe, seconds: float = 1.0) -> Plan:
             f"{seconds:g} s at {len(some)} hydrophones are {whole:.3g} samples, more than {MOST_SAMPLES:.3g}: make less"
         )
     table = PositionTable(positions=tuple(map(tuple, array.position[some].tolist())), face=array.face)
-    scene = replace(scene, sonar=replace(sonar, array=table, sensor_errors=None))
+    scene = replace(scene, sonar=replace(sonar, array=table, sensor_errors=None), world=replace(world, targets=()))
     alone = Recipe(seed=recipe.seed, accuracy=recipe.accuracy, scene=scene)
     profile = read_inputs(scene)
     check_shrimp(scene)

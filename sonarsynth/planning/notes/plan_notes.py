@@ -13,7 +13,7 @@ from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.planning.notes.formula_validity import validity
 from sonarsynth.planning.notes.population_notes import once, population_notes
 from sonarsynth.planning.notes.source_notes import assumed_speed_notes, off_the_bottom
-from sonarsynth.planning.notes.target_notes import held, law_notes, mirror_notes, overlap_notes
+from sonarsynth.planning.notes.target_notes import held, law_notes, mirror_notes, overlap_notes, view_notes
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.pulse_durations import SUPPORT, extreme_waveforms
 from sonarsynth.recipe import Recipe
@@ -51,6 +51,8 @@ def notes(made: Plan, looks: Sequence[SampledScene]) -> tuple[str, ...]:
     cancelled = scene.processing.cancelling is not None
     if made.propagation.bounces and not cancelled and made.products & OF_BEAMS and made.sizes["emission"]:
         found.append("reflections of the snap itself enter the image: processing.cancelling removes them")
+    if made.products & OF_BEAMS:
+        found += view_notes(noted(looks))
     found += lost_echoes(made) + _accuracy(made, looks) + off_the_bottom(scene)
     if made.sizes["emission"] and made.products & OF_BEAMS:
         found += assumed_speed_notes(noted(looks))

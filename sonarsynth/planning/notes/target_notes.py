@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels.views import View, box_in_view
 from sonarsynth.planning.measured.sampled_frames import SampledScene
 from sonarsynth.receiver import elements
@@ -110,6 +111,34 @@ def _near(frame: Frame) -> Iterator[tuple[int, int]]:
             yield one, one + 1 + other
 
 
+def view_notes(looks: Sequence[SampledScene]) -> list[str]:
+    """That the beams look past all targets, in every frame of the looks: mostly a sonar without a heading."""
+    examined = [(look, frame) for look in looks if look.scene.world.targets for frame in chosen(look)]
+    if not examined or any(_in_view(look, frame) for look, frame in examined):
+        return []
+    ahead = examined[0][1].sonar_pose.turn_to_world(np.array([1.0, 0.0, 0.0]))
+    heading = round(float(np.rad2deg(np.arctan2(ahead[0], ahead[1])))) % 360
+    return [
+        f"no target is in the view of the beams in any frame examined: the sonar looks to {heading} deg (0 is north, "
+        "90 east: the heading in scene.trajectory.sonar)"
+    ]
+
+
+def _in_view(look: SampledScene, frame: Frame) -> bool:
+    """Whether the box of a target is in the view of the beams, in part at least."""
+    for body in frame.moment.bodies:
+        corners = frame.sonar_pose.to_body(body.pose.to_world(_corners(body)))
+        if box_in_view(corners, UNIT_BOX.faces, look.scene.sonar.beams).view <= View.PARTLY_IN_VIEW:
+            return True
+    return False
+
+
+def _corners(body: PlacedTarget) -> Floats:
+    """Corners (8, xyz) of the box of a body, in its own frame."""
+    low, high = body.mesh.box
+    return np.asarray(0.5 * (low + high) + UNIT_BOX.vertices * (high - low))
+
+
 def mirror_notes(look: SampledScene) -> list[str]:
     """Which snaps and targets an array that cannot tell front from back hears as if in front, in which frames."""
     sonar = look.scene.sonar
@@ -124,9 +153,7 @@ def mirror_notes(look: SampledScene) -> list[str]:
         if any(float(frame.sonar_pose.to_body(snap.position) @ normal) < 0.0 for snap in frame.moment.snaps):
             snaps.append(frame.index)
         for target, body in zip(look.scene.world.targets, frame.moment.bodies, strict=True):
-            low, high = body.mesh.box
-            corners = body.pose.to_world(0.5 * (low + high) + UNIT_BOX.vertices * (high - low))
-            seen = frame.sonar_pose.to_body(corners)
+            seen = frame.sonar_pose.to_body(body.pose.to_world(_corners(body)))
             if (seen @ normal >= 0.0).all():
                 continue
             behind = UNIT_BOX.faces[(seen @ normal)[UNIT_BOX.faces].min(axis=1) < 0.0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
@@ -27,6 +27,8 @@ from sonarsynth.store.marks import (
 )
 from sonarsynth.store.opening import check_format
 
+Progress = Callable[[int, int, int], None]
+"""What is told of frames: how many are done, of how many, and how many failed."""
 MOST_FRAMES: Final = 1_000_000
 """Frames of a shard that are counted, whatever a store says of itself."""
 
@@ -64,7 +66,17 @@ class Findings:
         return {} if self.layout is None else self.layout.attributes
 
 
-def examine(path: Folder) -> Findings:
+def by_shard(marks: Mapping[int, Mark], progress: Progress | None) -> Iterator[tuple[int, Mark]]:
+    """Shards in order, each followed by how many frames are done."""
+    done, total = 0, sum(len(mark.frames) for mark in marks.values())
+    for number in sorted(marks):
+        yield number, marks[number]
+        done += len(marks[number].frames)
+        if progress is not None:
+            progress(done, total, 0)
+
+
+def examine(path: Folder, progress: Progress | None = None) -> Findings:
     """Compare every file of a store with its record. Raises Mismatch where there is no store of ours."""
     must_be_store(path)
     problems: list[Problem] = []
@@ -73,7 +85,7 @@ def examine(path: Folder) -> Findings:
     region = _regions(path, layout)
     marks, shards = _marks(path, region, problems)
     fixed = set() if layout is None else _compare(path, layout, problems)
-    for number, mark in marks.items():
+    for number, mark in by_shard(marks, progress):
         if _compare(path, mark, problems):
             shards.add(number)
     known = Findings(layout, marks, (), manifests, frozenset(fixed), frozenset(shards), frozenset())

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
-from sonarsynth.store.checking.examining import Findings, Problem, examine, frame_count, ranges
+from sonarsynth.store.checking.examining import Findings, Problem, Progress, by_shard, examine, frame_count, ranges
 from sonarsynth.store.checking.reading_back import read_back, structure
 from sonarsynth.store.files.lock import held_by
 from sonarsynth.store.files.place import Folder, absolute, opens, stamps
@@ -111,7 +111,9 @@ class Report:
         return [rows[frame] for frame in sorted(rows)]
 
 
-def verify(path: Folder | str, checks: Sequence[Check] = (), *, quick: bool = False) -> Report:
+def verify(
+    path: Folder | str, checks: Sequence[Check] = (), *, quick: bool = False, progress: Progress | None = None
+) -> Report:
     """Compare marks, digests and files of a store, read every number back, and run checks on what it says.
 
     Of a store that is being built, what is complete is looked at, and no checks are run.
@@ -121,6 +123,7 @@ def verify(path: Folder | str, checks: Sequence[Check] = (), *, quick: bool = Fa
     path: a folder or a URL.
     checks: functions that each compare something that the store says twice.
     quick: whether files are compared with their digests and no more.
+    progress: is called with the frames done, their total, and 0, as they are read.
 
     Returns
     -------
@@ -132,13 +135,13 @@ def verify(path: Folder | str, checks: Sequence[Check] = (), *, quick: bool = Fa
     """
     path = absolute(path)
     building, stamped = held_by(path), stamps(path, MARKS)
-    found, problems = _look(path, quick)
+    found, problems = _look(path, quick, progress)
     building = building or held_by(path)
     if problems and (
         building or stamped != stamps(path, MARKS)
     ):  # a build's own doing is over, or has another mark, by now
         before = {problem.where for problem in problems}
-        found, problems = _look(path, quick)
+        found, problems = _look(path, quick, progress)
         changed = {name for name, _ in stamped.items() ^ stamps(path, MARKS).items()}
         problems = [p for p in problems if p.where in before and _lasting(p, found, changed)]
     rows = [] if problems or building or quick else _run(path, checks)
@@ -151,13 +154,14 @@ def verify(path: Folder | str, checks: Sequence[Check] = (), *, quick: bool = Fa
     )
 
 
-def _look(path: Folder, quick: bool) -> tuple[Findings, list[Problem]]:
+def _look(path: Folder, quick: bool, progress: Progress | None) -> tuple[Findings, list[Problem]]:
     """What there is in a store, and everything that is wrong with it."""
-    found = examine(path)
+    found = examine(path, progress if quick else None)
     problems = list(found.problems)
     if not quick and found.layout is not None and not found.fixed:
-        for number in sorted(found.marks.keys() - found.shards):
-            problems.extend(read_back(path, found.marks[number]))
+        whole = {number: mark for number, mark in found.marks.items() if number not in found.shards}
+        for _, mark in by_shard(whole, progress):
+            problems.extend(read_back(path, mark))
         problems.extend(structure(path))
     return found, problems
 
