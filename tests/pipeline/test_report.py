@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
+import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -20,6 +22,8 @@ from sonarsynth.evaluation import cloud_scores
 from sonarsynth.pictures.report_figures import numbers_of
 from sonarsynth.pictures.report_figures.report_numbers import leakage
 from sonarsynth.recipe import reading
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
 
 
 @pytest.fixture(scope="module")
@@ -149,3 +153,24 @@ def test_a_store_without_images_or_frames(small_text: str, tmp_path: Path, capsy
     capsys.readouterr()
     assert run(app, ["report", str(empty)]) == 2
     assert "no frame has been built" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
+def test_a_browser_without_a_network_draws_the_page(store: Path, page: Page, tmp_path: Path) -> None:
+    """Every figure is drawn, with the numbers of the page in it, and nothing is asked of a network or goes wrong."""
+    assert CHROMIUM is not None
+    options = ["--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'browser'}"]
+    options += ["--enable-logging=stderr", "--virtual-time-budget=20000", "--dump-dom"]
+    nowhere = "--host-resolver-rules=MAP * ~NOTFOUND"
+    file = store.with_name("s.zarr.report.html").resolve().as_uri()
+    done = subprocess.run([CHROMIUM, *options, nowhere, file], capture_output=True, text=True, timeout=120, check=True)
+    drawn = Page(done.stdout)
+    classes = [str(attributes.get("class")) for _, attributes in drawn.elements]
+    figures = sum("js-plotly-plot" in name.split() for name in classes)
+    written = sum("plotly-graph-div" in str(attributes.get("class")) for _, attributes in page.elements)
+    assert figures == written >= 4
+    assert sum(name == "main-svg" for name in classes) >= figures
+    assert json.loads(drawn.numbers) == json.loads(page.numbers) and drawn.rows[: len(page.rows)] == page.rows
+    bars = sum(name == "point" for name in classes)
+    assert bars > 10, "the histograms have no bars"
+    assert not re.findall(r"CONSOLE.*(?:Uncaught|error|Failed to load)", done.stderr)
