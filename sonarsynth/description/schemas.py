@@ -6,7 +6,7 @@ import ast
 import inspect
 import textwrap
 from contextvars import ContextVar
-from functools import cache
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -155,7 +155,7 @@ class _Schema(GenerateJsonSchema):
         return found
 
 
-@cache
+@lru_cache(maxsize=512)
 def _field_texts(cls: type) -> dict[str, str]:
     """The text under each field that a class declares, by name; none of a class whose source is not at hand."""
     try:

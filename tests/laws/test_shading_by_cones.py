@@ -53,7 +53,7 @@ def seen_alone(view: Occlusion, legs: ReceivePaths, start: Floats, normal: Float
     length = np.linalg.norm(ahead, axis=1)
     ahead /= length[:, None]
     if not view.bending.profile.uniform:
-        where = view.bending, view.receiver, view.propagation, view.tolerances.degree
+        where = view.bending, view.receiver, view.propagation
         ahead += launch_deviation(legs, array[[sensor]], *where)[:, 0]
         ahead /= np.linalg.norm(ahead, axis=1)[:, None]
     end = np.broadcast_to(view.receiver.pose.position + offset, start.shape)
