@@ -194,6 +194,12 @@ def depth(position: npt.ArrayLike) -> Floats:
     return -np.asarray(position, float)[..., 2]
 
 
+def picked(mask: Bools) -> Ints | slice:
+    """The rows that a mask (row,) picks; where it picks all, a slice, which copies nothing."""
+    rows = np.flatnonzero(mask)
+    return slice(None) if len(rows) == len(mask) else rows
+
+
 def level(pressure: npt.ArrayLike) -> Floats:
     """Level in dB re 1 uPa of a pressure in Pa (-inf for silence)."""
     with np.errstate(divide="ignore"):

@@ -24,13 +24,20 @@ class FacetGeometry:
     corners: Floats  # (..., 3, xyz) m from the middle of the facet
     spot: Floats  # (..., xyz) m from the middle: a point of the facet drawn once
 
-    def select(self, rows: Ints) -> FacetGeometry:
-        """The facets picked by indices."""
-        return FacetGeometry(**{name: value[rows] for name, value in vars(self).items()})
+    def select(self, rows: Ints | slice) -> FacetGeometry:
+        """The facets picked by indices; columns that are one value for all stay that."""
+        columns: Any = {name: _rows(value, rows) for name, value in vars(self).items()}
+        return FacetGeometry(**columns)
 
     def over(self) -> FacetGeometry:
         """With an axis after the first, for the directions in which each facet is seen."""
         return FacetGeometry(**{name: value[:, None] for name, value in vars(self).items()})
+
+
+def _rows(column: Floats, rows: Ints | slice) -> Floats:
+    if isinstance(rows, slice) or column.strides[0] or not len(column):
+        return column[rows]
+    return np.broadcast_to(column[0], (len(rows), *column.shape[1:]))
 
 
 @byte_bounded_cache(32)

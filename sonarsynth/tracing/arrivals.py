@@ -41,12 +41,13 @@ def trace(context: FrameContext, propagation: Propagation) -> Arrivals:
     moving = receiver.track
     still = all(body.track.still for body in context.bodies) and not any(snap.velocity.any() for snap in snaps)
     if moving is None or (moving.still and still) or not snaps:
-        return arrivals(facet_paths(context, propagation))
+        return arrivals(facet_paths(context, propagation, snaps=snaps))
     parts: list[Arrivals] = []
     begun = set[int]()
     for some in occasions(context, moving):
         there = replace(receiver, pose=some.meeting.sonar.pose)
-        met = facet_paths(replace(context, bodies=some.bodies, receiver=there), propagation, some.owners)
+        lights = tuple(snaps[index] for index in some.snaps)
+        met = facet_paths(replace(context, bodies=some.bodies, receiver=there), propagation, some.owners, lights)
         array = replace(met, meeting=some.meeting)
         parts += [_direct(_hearing(array, snaps[index], moving), index) for index in set(some.snaps) - begun]
         parts += _echoes(array, some.snaps)

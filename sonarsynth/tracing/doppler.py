@@ -58,7 +58,7 @@ class MotionTerms:
     spin: Floats  # (path, xyz) rad/s of its body
     apart: Floats  # (path, xyz) m: by what the array, or its image, is farther from the facet
 
-    def select(self, rows: Bools | Ints) -> MotionTerms:
+    def select(self, rows: Bools | Ints | slice) -> MotionTerms:
         """The paths picked by a mask or by indices."""
         return MotionTerms(**{name: value[rows] for name, value in vars(self).items()})
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats, Ints, depth
+from sonarsynth.conventions import Bools, Floats, Ints, depth, picked
 from sonarsynth.scattering import Component, Scatterers
 from sonarsynth.scattering.components import CoherentKirchhoff, DiffuseKirchhoff, Lobe
 from sonarsynth.scattering.facet_geometry import FacetGeometry, PulseResponse
@@ -32,7 +32,7 @@ class EchoBatch:
     amplitude: Floats  # (echo,) m
     sign: Floats  # (echo,)
 
-    def select(self, keep: Ints) -> EchoBatch:
+    def select(self, keep: Ints | slice) -> EchoBatch:
         """The echoes picked by indices."""
         rows: dict[str, Any] = {k: v[keep] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
         return replace(self, patch=self.patch.select(keep), **rows)
@@ -92,15 +92,15 @@ def echo_batches(
     looked_for = context.tolerances.occlusion == "sensors" and receiver.elements.count > 1
     owner = facets.owner[out.facet]
     for number, (surface, of_law) in enumerate(zip(context.scattering, parts, strict=True)):
-        row = np.flatnonzero(owner == number)
-        facet = facets.facet[out.facet[row]]
-        arrival, departure = out.arrival[row], array.legs.departure[leg[row]]
+        mine = picked(owner == number)
+        row, legs, facet = np.arange(len(owner))[mine], leg[mine], facets.facet[out.facet[mine]]
+        arrival, departure = out.arrival[mine], array.legs.departure[legs]
         if carried is not None:
-            mine = carried.select(row)
-            arrival = mine.turned_back(arrival)
-            departure = mine.turned_back(mine.departure(array.legs.length[leg[row]], departure))
+            moved = carried.select(mine)
+            arrival = moved.turned_back(arrival)
+            departure = moved.turned_back(moved.departure(array.legs.length[legs], departure))
         incident, scattered = surface.pose.turn_to_body(arrival), surface.pose.turn_to_body(departure)
-        speed = context.medium.profile.at(depth(array.legs.point[leg[row]]))
+        speed = context.medium.profile.at(depth(array.legs.point[legs]))
         wavenumber = 2.0 * np.pi * receiver.centre / speed
         for part in (
             replace(p, beyond=True) if looked_for and isinstance(p, Lobe | CoherentKirchhoff | DiffuseKirchhoff) else p
@@ -110,7 +110,7 @@ def echo_batches(
             amplitude = part.amplitude(incident, scattered, patch, wavenumber)
             sign = surface.polarity(part)[facet]
             group = EchoBatch(surface, part, row, patch, incident, scattered, wavenumber, amplitude, sign)
-            found.append(group.select(np.flatnonzero(amplitude)))
+            found.append(group.select(picked(amplitude != 0.0)))
     return found
 
 

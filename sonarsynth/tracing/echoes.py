@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import Bools, Floats, Ints, depth
+from sonarsynth.conventions import Bools, Floats, Ints, depth, picked
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Arrivals, Kind
@@ -169,7 +169,7 @@ def _found(array: FacetPaths, snap: Emission, parts: tuple[tuple[Component, ...]
     """All echoes of a snap from the facets of the legs."""
     out, fronts = _ways(array, snap), array.fronts
     way, leg = path_pairs(out.facet, array.legs.row, len(array.facets.facet))
-    kept = np.flatnonzero(out.bounces[way] + array.legs.bounces[leg] <= array.propagation.bounces)
+    kept = picked(out.bounces[way] + array.legs.bounces[leg] <= array.propagation.bounces)
     out, leg, carried = out.select(way[kept]), leg[kept], None
     if array.meeting is not None:
         out, carried = _carried(array, snap, out, leg)
@@ -219,8 +219,8 @@ def _ways(array: FacetPaths, snap: Emission) -> TransmitPaths:
     bounced = reflections(medium.environment, medium.profile, paths, array.context.receiver.centre)
     speed = float(medium.profile.at(depth(snap.position)))
     out = TransmitPaths.of(paths, bounced, facet, snap, speed)
-    out = out.select(np.flatnonzero(lit & (out.spreading != 0.0)))
-    out = out.select(~_hides(array, bodies, snap, out, facets.clear[out.facet]))
+    out = out.select(picked(lit & (out.spreading != 0.0)))
+    out = out.select(picked(~_hides(array, bodies, snap, out, facets.clear[out.facet])))
     for number, before in overlapping(bodies):
         mine = np.flatnonzero(facets.owner[out.facet] == number)
         of = out.facet[mine]

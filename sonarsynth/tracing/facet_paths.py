@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import NO_TARGET, Ints
+from sonarsynth.conventions import NO_TARGET, Ints, picked
 from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Kind
-from sonarsynth.state import FrameContext, Medium, Receiver
+from sonarsynth.state import Emission, FrameContext, Medium, Receiver
 from sonarsynth.tracing.doppler import Meeting
 from sonarsynth.tracing.expansion.array_expansion import ArrayExpansion, ExpansionSource, expansion_source
 from sonarsynth.tracing.occlusion.sensor_occlusion import Occlusion
@@ -22,6 +22,7 @@ from sonarsynth.tracing.receive_paths import (
     ReceivePaths,
     concatenate,
     facets_of,
+    may_be_lit,
     may_face_receiver,
     receive_paths,
     require_in_water,
@@ -93,9 +94,14 @@ class FacetPaths:
         return legs.seen(occluded, np.zeros(len(leg), bool))
 
 
-def facet_paths(context: FrameContext, propagation: Propagation, owners: tuple[int, ...] | None = None) -> FacetPaths:
+def facet_paths(
+    context: FrameContext,
+    propagation: Propagation,
+    owners: tuple[int, ...] | None = None,
+    snaps: tuple[Emission, ...] | None = None,
+) -> FacetPaths:
     """Facet to array, for every surface element, or those of some owners, that leaves a ray for the array that no body
-    hides.
+    hides. Of no others than some `snaps` may light (None: any), where that is known of straight, unreflected rays.
 
     Raises ValueError for a body or an array that reaches out of the water.
     """
@@ -113,7 +119,10 @@ def facet_paths(context: FrameContext, propagation: Propagation, owners: tuple[i
         if owners is not None and len(owners) < len(context.scattering):
             every = every.select(np.isin(every.owner, owners))
         if propagation.layered:
-            every = every.select(may_face_receiver(every, receiver.pose.position, propagation.bounces, medium, slack))
+            facing = may_face_receiver(every, receiver.pose.position, propagation.bounces, medium, slack)
+            if snaps is not None and not propagation.bounces and medium.profile.uniform:
+                facing &= may_be_lit(every, snaps)
+            every = every.select(picked(facing))
         part = receive_paths(every, medium, receiver, propagation, slack)
         part = view.visible(part, *every.side(part.row, part.departure))
         kept, row = np.unique(part.row, return_inverse=True)

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from sonarsynth.casting.ray_casting import OFFSET
-from sonarsynth.conventions import Bools, Bytes, Floats, Ints, depth
+from sonarsynth.conventions import Bools, Bytes, Floats, Ints, depth, picked
 from sonarsynth.equations.rays.ray_solutions import COINCIDENT, TOLERANCE
+from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.mesh import in_blocks
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.products import Paths
 from sonarsynth.propagation.reflections import Reflections, reflections
 from sonarsynth.scattering import Scatterers
-from sonarsynth.state import Medium, Receiver
+from sonarsynth.state import Emission, Medium, Receiver
 from sonarsynth.tracing.occlusion.ray_cones import max_launch_deviation
 
 if TYPE_CHECKING:
@@ -95,16 +96,18 @@ class Facets:
         """Where legs (leg, xyz) start clear of facets (row of each), and the normal of the side that they leave on:
         where a facet has none, their departure (leg, xyz)."""
         normal = self.normal[row]
-        return self.clear[row], np.where(normal.any(axis=1, keepdims=True), normal, departure)
+        sideless = self.sideless
+        return self.clear[row], np.where(sideless[row, None], departure, normal) if sideless.any() else normal
 
     def lit(self, row: Ints, arrival: Floats) -> Bools:
         """Whether paths that arrive along (path, xyz) light facets (row of each): from their side, if they have one."""
-        return np.asarray((np.einsum("ij,ij->i", self.normal[row], arrival) < 0) | self.sideless[row])
+        return np.asarray((dot(self.normal[row], arrival) < 0) | self.sideless[row])
 
     @property
     def sideless(self) -> Bools:
         """(facet,) which scatter all round: they have no normal."""
-        return np.asarray(~self.normal.any(axis=1))
+        x, y, z = self.normal.T
+        return np.asarray((x == 0.0) & (y == 0.0) & (z == 0.0))
 
     def select(self, keep: Bools | Ints | slice) -> Facets:
         """The facets picked by a mask, by indices, or by a slice, which copies nothing."""
@@ -132,7 +135,7 @@ def rays_to_centre(medium: Medium, point: Floats, receiver: Receiver, propagatio
     """All rays from points (point, xyz) in the world to the array centre, sorted by point."""
     end = np.broadcast_to(receiver.pose.position, point.shape)
     paths = propagation.connect(medium.profile, medium.depth, point, end)
-    keep = np.flatnonzero(usable(paths))
+    keep = picked(usable(paths))
     start = point[paths.pair[keep]]
     bounced: Reflections = reflections(medium.environment, medium.profile, paths, receiver.centre)
     return ReceivePaths(
@@ -152,8 +155,8 @@ def rays_to_centre(medium: Medium, point: Floats, receiver: Receiver, propagatio
         boundary=bounced.modulus[keep],
         phase=bounced.phase[keep],
         delay_std=bounced.delay_std[keep],
-        occluded=np.zeros((len(keep), 0), np.uint8),
-        open=np.zeros(len(keep), bool),
+        occluded=np.zeros((len(start), 0), np.uint8),
+        open=np.zeros(len(start), bool),
     )
 
 
@@ -177,7 +180,8 @@ def facets_of(scattering: tuple[Scatterers, ...], some: slice) -> Facets:
     none, mine = np.empty((0, 3)), list(zip(scattering, of, strict=True))
     point = np.concatenate([none, *(s.pose.to_world(s.position[part]) for s, part in mine)])
     normal = np.concatenate([none, *(s.pose.turn_to_world(s.normal[part]) for s, part in mine)])
-    rounding = 8.0 * np.finfo(float).eps * np.abs(point).max(axis=1, initial=0.0)  # of places in the world
+    x, y, z = np.abs(point.T)
+    rounding = 8.0 * np.finfo(float).eps * np.maximum(np.maximum(x, y), z)  # of places in the world
     offset = np.maximum(OFFSET * np.array([s.offset for s in scattering])[owner], rounding)
     return Facets(
         owner=owner,
@@ -197,10 +201,10 @@ def receive_paths(
     Or that may on their way to a point within `slack` (m) of the array centre.
     """
     legs = rays_to_centre(medium, facets.point, receiver, propagation)
-    ahead = np.einsum("ij,ij->i", facets.normal[legs.row], legs.departure) * legs.length
+    ahead = dot(facets.normal[legs.row], legs.departure) * legs.length
     if slack and propagation.bends:
         ahead += legs.swerve(medium, receiver, slack) * (legs.length + slack)
-    return legs.select(np.flatnonzero((ahead > -slack) | facets.sideless[legs.row]))
+    return legs.select(picked((ahead > -slack) | facets.sideless[legs.row]))
 
 
 def may_face_receiver(facets: Facets, position: Floats, bounces: int, medium: Medium, slack: float = 0.0) -> Bools:
@@ -211,7 +215,7 @@ def may_face_receiver(facets: Facets, position: Floats, bounces: int, medium: Me
     less, and by Snell's law its cosine is nowhere less than there times the ratio of the extreme sound speeds.
     """
     if not bounces and medium.profile.uniform:
-        return np.asarray((np.einsum("ij,ij->i", facets.normal, position - facets.point) > -slack) | facets.sideless)
+        return np.asarray((dot(facets.normal, position - facets.point) > -slack) | facets.sideless)
     level = position[:2] - facets.point[:, :2]
     distance = np.hypot(level[:, 0], level[:, 1])
     flattest = distance / np.hypot(distance, (bounces + 2) * medium.depth)
@@ -220,6 +224,15 @@ def may_face_receiver(facets: Facets, position: Floats, bounces: int, medium: Me
     steepest = np.abs(facets.normal[:, 2]) * np.sqrt((1.0 - cosine) * (1.0 + cosine))
     margin = 1e-9 + slack / np.maximum(distance, 1e-300)
     return np.asarray((ahead >= -margin) | (ahead * cosine + steepest > -margin))
+
+
+def may_be_lit(facets: Facets, snaps: tuple[Emission, ...]) -> Bools:
+    """(facet,) which some of the snaps that light anything are on the outer side of."""
+    lit = facets.sideless
+    for snap in snaps:
+        if snap.illuminates:
+            lit |= dot(facets.normal, snap.position - facets.point) > 0.0
+    return lit
 
 
 def path_pairs(facet: Ints, row: Ints, facets: int) -> tuple[Ints, Ints]:

@@ -55,7 +55,7 @@ class TransmitPaths:
             none, np.zeros((count, 3)), zero, zero, zero + 1.0, none, none, none, none, zero + 1.0, zero, zero, zero
         )
 
-    def select(self, keep: Bools | Ints) -> TransmitPaths:
+    def select(self, keep: Bools | Ints | slice) -> TransmitPaths:
         """The ways picked by a mask or by indices."""
         return TransmitPaths(**{name: value[keep] for name, value in vars(self).items()})
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sonarsynth.casting.cones import CLOSED, UNKNOWN, classify_cones
-from sonarsynth.conventions import Bools, Floats, Ints
+from sonarsynth.conventions import Bools, Floats, Ints, picked
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.receiver import Elements
@@ -62,9 +62,8 @@ class Occlusion:
         """
         if self.elements is None or self.elements.count == 1 or not self.bodies:
             end = np.broadcast_to(self.receiver.pose.position, start.shape)
-            return legs.select(
-                ~self._hides(start, end, legs.departure, legs.length, bounces=legs.bounces, turning=legs.turning)
-            )
+            hides = self._hides(start, end, legs.departure, legs.length, bounces=legs.bounces, turning=legs.turning)
+            return legs.select(picked(~hides))
         certain = self._certain(legs, start, normal)
         kept, mixed = certain != CLOSED, certain == UNKNOWN
         first = np.append(0, 1 + rim(self.elements))
