@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import hashlib
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
@@ -21,7 +20,7 @@ from sonarsynth.store.files.place import FileRecord, Folder, Opened, absolute, f
 from sonarsynth.store.files.remote import Remote
 from sonarsynth.store.files.within import OpenedFolder
 from sonarsynth.store.layout import ArrayLayout, Layout, layout_of
-from sonarsynth.store.marks import ABSENT, Damage, Mark, add_to_digest, drop_mark, load_marks, marked, save_mark
+from sonarsynth.store.marks import ABSENT, ContentDigest, Damage, Mark, drop_mark, load_marks, marked, save_mark
 from sonarsynth.store.provenance import other_versions
 
 if TYPE_CHECKING:
@@ -69,7 +68,7 @@ def _write(store: Opened, plan: Plan, shard: int, frames: Mapping[int, Values], 
         raise ValueError(f"frame {outside[0]} is not in shard {shard} (frames {region.start} to {region.stop - 1})")
     checked = {frame: layout.check(values) for frame, values in sorted(frames.items())}
     drop_mark(store, shard)
-    content = hashlib.sha256()
+    content = ContentDigest()
     files: dict[str, FileRecord] = {}
     under_way: deque[tuple[str, Future[FileRecord]]] = deque()
     with ThreadPoolExecutor(AT_ONCE) as writers:
@@ -78,14 +77,14 @@ def _write(store: Opened, plan: Plan, shard: int, frames: Mapping[int, Values], 
                 name, first = under_way.popleft()
                 files[name] = first.result()
             block = layout.block(array, shard, checked)
-            add_to_digest(content, array.path, block)
+            content.add(array.path, block)
             packed = _content(layout, array, region.start, block)  # here: threads keep the memory that they allocate
             under_way.append((array.file(shard), writers.submit(_put, store, array.file(shard), packed)))
         files |= {name: rest.result() for name, rest in under_way}
     if isinstance(store, OpenedFolder) and not store.in_its_place():
         raise Damage(f"{store}: {GONE}")
     still()
-    mark = Mark(str(shard), tuple(checked), content.hexdigest(), files, {"versions": versions} if versions else {})
+    mark = Mark(str(shard), tuple(checked), str(content), files, {"versions": versions} if versions else {})
     save_mark(store, mark)
     return mark
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
@@ -11,7 +10,7 @@ import numpy as np
 from sonarsynth.store.checking.examining import Problem
 from sonarsynth.store.creating import root_attributes
 from sonarsynth.store.files.place import Folder, opens
-from sonarsynth.store.marks import Mark, add_to_digest
+from sonarsynth.store.marks import ContentDigest, Mark
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,7 +32,7 @@ def read_back(path: Folder, mark: Mark) -> Iterator[Problem]:
     if not isinstance(step, int) or step < 1:
         yield Problem(f"shard {shard}", "the store does not say how many frames are in one", mark.frames)
         return
-    digest = hashlib.sha256()
+    digest = ContentDigest(mark.content)
     for name in sorted({file.rpartition("/")[0] for file in mark.files}):
         try:
             array = root[name]
@@ -42,9 +41,9 @@ def read_back(path: Folder, mark: Mark) -> Iterator[Problem]:
         except Exception as error:  # whatever a codec raises on what it cannot decode
             yield Problem(f"{name}, shard {shard}", f"cannot be decoded: {error}", mark.frames)
             return
-        add_to_digest(digest, name, block)
+        digest.add(name, block)
         yield from _finite(name, block, mark.frames, shard * step)
-    if digest.hexdigest() != mark.content:
+    if str(digest) != mark.content:
         yield Problem(f"shard {shard}", "its data are not those that were written", mark.frames)
 
 
