@@ -36,6 +36,12 @@ REFERENCE_PRESSURE: Final = 1e-6  # Pa: levels are dB re 1 uPa
 SLOWEST, FASTEST = 100.0, 10e3
 """Sound speeds (m/s) outside are not those of water: another unit, or a mark for "missing"."""
 
+FORMAT_VERSION: Final = "3"
+"""Version of the layout of a store."""
+
+ASSUMED_SPEED: Final = "scene.sonar.assumed_sound_speed"
+"""Where a recipe has the sound speed that the sonar assumes: the name of its coordinate where it varies."""
+
 NO_TARGET: Final = -1
 """Index of "no target", "no facet": never 0, which is a target."""
 

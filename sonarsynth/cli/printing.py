@@ -13,8 +13,6 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from sonarsynth.conventions import counted, format_bytes
-from sonarsynth.planning.plan_tables import as_tables
-from sonarsynth.store import ranges
 
 if TYPE_CHECKING:
     from sonarsynth.planning import Plan
@@ -162,6 +160,8 @@ def _compared(found: dict[str, Any]) -> Iterator[str]:
 
 def plan_report(plan: Plan, prediction: Prediction) -> None:
     """Stages, what is left out, sizes and predicted cost."""
+    from sonarsynth.planning.plan_tables import as_tables
+
     out = console()
     for table in as_tables(plan.recipe.title, plan.stages, plan.left_out):
         out.print(table)
@@ -201,6 +201,8 @@ def _spanned(plan: dict[str, Any]) -> Iterator[str]:
 
 def verify_report(report: StoreReport) -> None:
     """Damage and checks, one line each."""
+    from sonarsynth.store import ranges
+
     out = console()
     out.print(
         f"{report.store}: {len(report.complete)} of {report.frames} frames, {report.files} files, "

@@ -8,7 +8,7 @@ import xarray as xr
 from sonarsynth.detection import beam_width
 from sonarsynth.evaluation.checks import Check, SmallVariables, blocks, every, numbered, of_frame, other_sounds
 from sonarsynth.evaluation.level_checks import echoes_heard, snaps_heard
-from sonarsynth.labels.views import View
+from sonarsynth.products import View
 
 
 def _grid_step(tree: xr.DataTree) -> float:

@@ -38,7 +38,7 @@ def every(tree: xr.DataTree, name: str) -> np.ndarray:
 
 def of_frame(tree: xr.DataTree, name: str, index: int) -> np.ndarray:
     """Values of a variable in one frame."""
-    return np.asarray(tree[name].isel(frame=index).values)
+    return np.asarray(tree[name].variable.isel(frame=index).values)
 
 
 BLOCK = 1000
@@ -52,16 +52,16 @@ class SmallVariables:
         self.tree, self.frames = tree, frames
         self._row = {int(frame): row for row, frame in enumerate(frames)}
         self._read: dict[str, np.ndarray] = {}
+        self._names = {f"{g.path}/{name}".strip("/") for g in tree.subtree for name in ("", *g.dataset.variables)}
 
     def has(self, name: str) -> bool:
         """Whether the store has a group, or a variable of one."""
-        group, _, variable = f"/{name}".rpartition("/")
-        return f"/{name}" in self.tree.groups or (group in self.tree.groups and variable in self.tree[group].dataset)
+        return name in self._names
 
     def of(self, name: str, frame: int) -> np.ndarray:
         """Values of a variable in one of the frames."""
         if name not in self._read:
-            self._read[name] = np.asarray(self.tree[name].isel(frame=self.frames).values)
+            self._read[name] = np.asarray(self.tree[name].variable.isel(frame=self.frames).values)
         return np.asarray(self._read[name][self._row[int(frame)]])
 
 

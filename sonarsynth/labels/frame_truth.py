@@ -14,9 +14,9 @@ from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels.oriented_box import oriented_box
 from sonarsynth.labels.views.appearance import Appearance, Connect, appearance, finite, lit_fraction
-from sonarsynth.labels.views.box_in_view import View, box_in_view, pixel_box, truncation, whole_box
+from sonarsynth.labels.views.box_in_view import box_in_view, pixel_box, truncation, whole_box
 from sonarsynth.labels.views.coverage import coverage
-from sonarsynth.products import Truth
+from sonarsynth.products import Truth, View
 from sonarsynth.propagation import Propagation
 from sonarsynth.receiver import BeamGrid
 from sonarsynth.state import FrameContext, meeting_times, positions

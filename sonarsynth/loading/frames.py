@@ -11,8 +11,9 @@ from sonarsynth.description import FieldError
 from sonarsynth.loading.training_samples import Sample, SampleForm, collate
 from sonarsynth.pipeline import render
 from sonarsynth.planning import plan
+from sonarsynth.products import SPLITS
 from sonarsynth.randomness import stream
-from sonarsynth.recipe import SPLITS, Recipe
+from sonarsynth.recipe import Recipe
 from sonarsynth.store.frame_reading import FrameReader
 
 

@@ -8,7 +8,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 
 from sonarsynth.description import FieldError
-from sonarsynth.labels.views import View
+from sonarsynth.products import View
 
 Sample = dict[str, Any]
 """Arrays by name, and `frame`, the number of the frame."""

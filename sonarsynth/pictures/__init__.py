@@ -137,7 +137,8 @@ def _view(tree: xr.DataTree, frame: StoredFrame, reference: float) -> View:
     count = tree["truth"].sizes["frame"]
     of = f" (0 to {count - 1})" if count > 1 else ""
     return View(
-        title=f"{title}   frame {frame.index}{of}{clock}{_snr(tree, frame)}",
+        title=title,
+        moment=f"frame {frame.index}{of}{clock}{_snr(tree, frame)}",
         level=None if frame.energy is None else decibels(frame.energy, reference),
         points=frame.points,
         point_level=decibels(frame.point_energy, reference),

@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, direction
+from sonarsynth.conventions import ASSUMED_SPEED, Floats, direction
 from sonarsynth.equations.arrays.beams import beam_spectra
 from sonarsynth.equations.arrays.gates import gated_spectra
 from sonarsynth.evaluation import beam_width
 from sonarsynth.pictures.figures.sheet import Beam
 from sonarsynth.pictures.store_reading import StoredFrame, beam_grid, needed, read
-from sonarsynth.recipe.variation.values import ASSUMED_SPEED
 
 if TYPE_CHECKING:
     import xarray as xr

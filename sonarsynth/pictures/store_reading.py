@@ -16,6 +16,7 @@ from sonarsynth.geometry import Pose
 from sonarsynth.pictures.figures.frame_figure import Hull
 from sonarsynth.pictures.figures.ghost_rings import Ghost
 from sonarsynth.store import Folder, Mismatch, folder_of, named_after, open_store
+from sonarsynth.store.frame_reading import hold
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,6 +50,7 @@ def opened(store: str | Folder) -> xr.DataTree:
         raise NothingToDraw(f"{path}: there is no such store")
     try:
         tree = open_store(path)
+        hold(tree, path)
     except Mismatch as problem:
         raise NothingToDraw(str(problem)) from None
     if "truth" not in tree.children or "frame" not in tree["truth"].sizes:
@@ -87,10 +89,10 @@ def held(tree: xr.DataTree, frames: Sequence[int]) -> FrameVariables:
     return FrameVariables(tree.attrs, values, frozenset(by_frame))
 
 
-def _variable(tree: xr.DataTree, name: str) -> xr.DataArray | None:
+def _variable(tree: xr.DataTree, name: str) -> xr.Variable | None:
     group, _, variable = name.rpartition("/")
     try:
-        return (tree[group] if group else tree).dataset[variable]
+        return (tree[group] if group else tree).dataset.variables[variable]
     except KeyError:
         return None
 
@@ -108,8 +110,7 @@ def read(source: Source, name: str, frame: int | None = None) -> np.ndarray | No
 
 def needed(tree: Source, name: str, frame: int | None = None) -> np.ndarray:
     """As `read`, for what pictures cannot do without. Raises NothingToDraw."""
-    values = read(tree, name, frame)
-    if values is None:
+    if (values := read(tree, name, frame)) is None:
         raise NothingToDraw(f"the store has no variable {name}")
     return values
 

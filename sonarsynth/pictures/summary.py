@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.evaluation import bounds, brightest_beam_on_target, range_errors
-from sonarsynth.labels.views import View
 from sonarsynth.pictures.store_reading import built, echo_levels, mesh_group, needed, read
+from sonarsynth.products import View
 from sonarsynth.store import Folder, Remote
 
 if TYPE_CHECKING:

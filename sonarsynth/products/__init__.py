@@ -6,7 +6,7 @@ Unless said otherwise arrays are float64, positions in m in the sonar frame, tim
 the instant of the frame; a snap at `Emission.time` is heard a travel time later).
 """
 
-from sonarsynth.products.labels import LINK_BUDGET, ORIGINS, Echoes, LinkBudget, PointLabels, Truth
+from sonarsynth.products.labels import LINK_BUDGET, ORIGINS, SPLITS, VIEWS, Echoes, LinkBudget, PointLabels, Truth, View
 from sonarsynth.products.paths import DIRECT, FAMILIES, Arrivals, Kind, Paths
 from sonarsynth.products.results import REASONS, EnergyImage, PointCloud, Signals, SourceEstimates, no_points
 from sonarsynth.products.steered_spectra import BeamSpectra, Snapshots
@@ -17,6 +17,8 @@ __all__ = [
     "LINK_BUDGET",
     "ORIGINS",
     "REASONS",
+    "SPLITS",
+    "VIEWS",
     "Arrivals",
     "BeamSpectra",
     "Echoes",
@@ -30,5 +32,6 @@ __all__ = [
     "Snapshots",
     "SourceEstimates",
     "Truth",
+    "View",
     "no_points",
 ]

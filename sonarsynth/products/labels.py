@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,24 @@ ORIGINS = ("main lobe", "side lobe", "grating lobe", "mirror image", "snap itsel
 """How the array came to hear what made a point: in the beam, beside it, through a lobe that a lattice has in other
 directions, from behind a planar array, from no target but the snap (its direct pulse, or one that surface or bottom
 reflects), or from no path of the frame: noise, or what cancelling leaves."""
+
+
+SPLITS = ("train", "validation", "test")
+"""Names of the splits, in the order of their numbers in the store."""
+
+
+class View(IntEnum):
+    """How much of what the array sees of a body lies between the first and the last beam, each way."""
+
+    IN_VIEW = 0
+    PARTLY_IN_VIEW = 1
+    OUTSIDE_VIEW = 2
+    BEHIND = 3
+    HIDDEN = 4
+
+
+VIEWS = " ".join(view.name.lower() for view in View)
+"""Words of the flags of a `View`, in the order of their values."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from sonarsynth.propagation.ray_request import RayRequest
 from sonarsynth.recipe.citation import Attribution, Creator
 from sonarsynth.recipe.scene import Frame, Scene
 from sonarsynth.recipe.sequences import MOST_SEQUENCES, Sequences
-from sonarsynth.recipe.splits import SPLITS, Splits
+from sonarsynth.recipe.splits import Splits
 from sonarsynth.recipe.tolerance import Accuracy
 from sonarsynth.recipe.variation.grid import Axis, Zip, entry_tag
 from sonarsynth.recipe.variation.mesh_variants import mesh_number, target_meshes
@@ -41,7 +41,6 @@ from sonarsynth.targets.shapes import MeshFile
 
 __all__ = [
     "FILE_KINDS",
-    "SPLITS",
     "Accuracy",
     "Attribution",
     "Axis",

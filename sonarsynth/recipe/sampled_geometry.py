@@ -16,11 +16,11 @@ from sonarsynth.conventions import Bools, Floats, Ints, azimuth_elevation, count
 from sonarsynth.description import FieldError
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.placed_target import PlacedTarget
+from sonarsynth.products import SPLITS
 from sonarsynth.randomness import share
 from sonarsynth.receiver import BeamGrid
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Frame, Scene
-from sonarsynth.recipe.splits import SPLITS
 from sonarsynth.targets.target import NO_CATEGORY, Target
 
 SEQUENCES = 1000

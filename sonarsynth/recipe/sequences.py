@@ -17,17 +17,18 @@ from typing import Any
 
 import numpy as np
 
-from sonarsynth.conventions import Ints
+from sonarsynth.conventions import ASSUMED_SPEED, Ints
 from sonarsynth.description import FieldError
+from sonarsynth.products import SPLITS
 from sonarsynth.randomness import number
 from sonarsynth.recipe.populations.drawn_bodies import DrawnBodies, draw
 from sonarsynth.recipe.renamed_keys import as_drawn
 from sonarsynth.recipe.scene import Scene
-from sonarsynth.recipe.splits import SPLITS, Splits, assign
+from sonarsynth.recipe.splits import Splits, assign
 from sonarsynth.recipe.variation.grid import Axis, Zip, axes
 from sonarsynth.recipe.variation.random_variations import Choice, Sobol, Variation
 from sonarsynth.recipe.variation.setting import Setting, plain_scene, with_settings
-from sonarsynth.recipe.variation.values import ASSUMED_SPEED, FRAMES, MOST_FRAMES, Plain, Where, default_name, where
+from sonarsynth.recipe.variation.values import FRAMES, MOST_FRAMES, Plain, Where, default_name, where
 
 MOST_SEQUENCES = 1_000_000
 NOTHING = Plain.of(None)
@@ -220,8 +221,7 @@ class Sequences:
 
     def as_json(self) -> dict[str, Any]:
         """What is spanned, for a program."""
-        counts = np.bincount(self.split, minlength=len(SPLITS))
-        frames = np.bincount(self.split, self.steps, minlength=len(SPLITS))
+        counts, frames = (np.bincount(self.split, weight, len(SPLITS)) for weight in (None, self.steps))
         return {
             "sequences": self.count,
             "frames_of_a_sequence": [int(self.steps.min()), int(self.steps.max())],

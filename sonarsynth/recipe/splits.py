@@ -13,9 +13,6 @@ from sonarsynth.conventions import Ints, Number
 from sonarsynth.description import description
 from sonarsynth.recipe.variation.values import Name
 
-SPLITS = ("train", "validation", "test")
-"""Names of the splits, in the order of their numbers in the store."""
-
 _Share = Annotated[Number, Ge(0), Le(1)]
 
 

@@ -5,13 +5,14 @@ zarr takes about 1 ms of Python a file, whatever its size; a shard has some sixt
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import google_crc32c
 import numpy as np
 from numcodecs import blosc
 
-from sonarsynth.store.layout import ArrayLayout
+if TYPE_CHECKING:
+    from sonarsynth.store.layout import ArrayLayout
 
 CODEC: Final = "zstd"
 """What blosc compresses with."""

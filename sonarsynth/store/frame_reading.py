@@ -9,11 +9,12 @@ import json
 import os
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, partial
 from math import prod
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import google_crc32c
 import numpy as np
@@ -27,6 +28,9 @@ from sonarsynth.store.files.within import Mismatch
 from sonarsynth.store.marks import Damage
 from sonarsynth.store.opening import check_format
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 MOST_FILES: Final = 64
 """That are kept open."""
 MOST_CHUNKS: Final = 8
@@ -35,6 +39,8 @@ MOST_BYTES: Final = 2**31
 """Of a chunk: a store may say what it likes."""
 LARGE: Final = 2**18
 """Bytes of a chunk over which the best decoder is worth its import."""
+HELD_BYTES: Final = 2**22
+"""Of a variable that `hold` reads whole, at most."""
 _CRC: Final = 4
 _HEADER: Final = 16
 """Bytes of what blosc says of a chunk (c-blosc, README_CHUNK_FORMAT)."""
@@ -248,6 +254,22 @@ class FrameReader:
         return found
 
 
+def hold(tree: xr.DataTree, path: Folder) -> None:
+    """Read the variables of frames of a tree that take at most `HELD_BYTES` each into memory, and nothing else.
+
+    path: the store of the tree. What does not lie as this version lays it, is damaged or is at a URL stays as it is.
+    """
+    if isinstance(path, Remote):
+        return
+    reader = FrameReader(path)
+    for group in tree.subtree:
+        for name, variable in group.dataset.variables.items():
+            stored = f"{group.path}/{name}".strip("/")
+            if variable.dims[:1] == ("frame",) != (name,) and stored in reader and variable.nbytes <= HELD_BYTES:
+                with suppress(Mismatch, Damage):  # xarray's own setter imports dask.array: 0.3 s
+                    variable._data = reader.array(stored).every()
+
+
 def _content(reader: FrameReader, name: str) -> _File | None:
     return reader.file(name)
 
@@ -268,7 +290,8 @@ def _chunks(path: str, found: Mapping[str, Any]) -> _Chunks:
         made = _Chunks(path, shape, dtype, shard, chunk, fill, None if scale is None else np.float32(scale))
     except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
         raise Mismatch(f"{path}: its metadata cannot be read ({type(error).__name__}: {error})") from None
-    whole = 0 < chunk <= shard and shard % chunk == 0 and min(shape, default=0) >= 0
+    named = found.get("chunk_key_encoding") == {"name": "default", "configuration": {"separator": "."}}
+    whole = named and 0 < chunk <= shard and shard % chunk == 0 and min(shape, default=0) >= 0
     if not (known and whole and made.chunk_bytes <= MOST_BYTES):
         raise Mismatch(f"{path}: does not lie as sonarsynth writes it: read it with xarray")
     return made

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sonarsynth.conventions import FORMAT_VERSION
 from sonarsynth.description import FieldError
-from sonarsynth.pipeline.variables import FORMAT_VERSION
-from sonarsynth.recipe import SPLITS
+from sonarsynth.products import SPLITS
 from sonarsynth.store.files.place import Folder, absolute, opens
 from sonarsynth.store.files.within import Mismatch
 

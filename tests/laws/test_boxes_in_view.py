@@ -11,8 +11,8 @@ from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
 from sonarsynth.labels import label
-from sonarsynth.labels.views import MEANINGS, View, box_in_view
-from sonarsynth.products import Truth
+from sonarsynth.labels.views import box_in_view
+from sonarsynth.products import VIEWS, Truth, View
 from sonarsynth.propagation import Straight
 from sonarsynth.receiver import BeamGrid, Romanis, Sonar, elements
 from sonarsynth.state import FrameContext, Medium, Receiver
@@ -112,4 +112,4 @@ def test_what_hides_a_body_is_another_reason_than_where_it_is() -> None:
     found = truth((wall, np.array([5.0, 0.0, 0.0])), (ball, np.array([10.0, 0.0, 0.0])))
     assert found.view.tolist() == [View.PARTLY_IN_VIEW, View.HIDDEN]
     assert np.isnan(found.image_box[1]).all() and found.visible_fraction[1] == 0.0
-    assert MEANINGS.split()[found.view[1]] == "hidden"
+    assert VIEWS.split()[found.view[1]] == "hidden"

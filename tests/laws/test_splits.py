@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sonarsynth.planning import plan
-from sonarsynth.recipe import SPLITS, Axis, Choice, Recipe, Splits, Uniform
+from sonarsynth.products import SPLITS
+from sonarsynth.recipe import Axis, Choice, Recipe, Splits, Uniform
 from sonarsynth.recipe.splits import assign
 from tests.laws.test_sequences import MOTION, SHRIMP, recipe
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from itertools import groupby
 
+from sonarsynth.conventions import FORMAT_VERSION
 from sonarsynth.pipeline import VARIABLES
-from sonarsynth.pipeline.variables import FORMAT_VERSION, Variable
+from sonarsynth.pipeline.variables import Variable
 from tools.page_building.tables import MADE, table
 
 INTRODUCTION = f"""# Stored variables

@@ -10,7 +10,7 @@ import numpy as np
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.detection import Detections, from_rows
 from sonarsynth.geometry import Pose
-from sonarsynth.labels.views import View
+from sonarsynth.products import View
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -2,28 +2,14 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.labels.views import view_kernels
+from sonarsynth.products import View
 from sonarsynth.receiver import BeamGrid
-
-
-class View(IntEnum):
-    """How much of what the array sees of a body lies between the first and the last beam, each way."""
-
-    IN_VIEW = 0
-    PARTLY_IN_VIEW = 1
-    OUTSIDE_VIEW = 2
-    BEHIND = 3
-    HIDDEN = 4
-
-
-MEANINGS = " ".join(view.name.lower() for view in View)
-"""Words of the flags, in the order of their values."""
 
 
 class BoxInView(NamedTuple):

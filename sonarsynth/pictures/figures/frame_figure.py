@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonarsynth.conventions import Floats, counted
+from sonarsynth.conventions import Floats, Ints, counted
+from sonarsynth.pictures.figures.blitting import Blitting
 from sonarsynth.pictures.figures.ghost_rings import Ghost, GhostMarks, legend
-from sonarsynth.pictures.figures.outlines import union_outline, view_outline
+from sonarsynth.pictures.figures.outlines import FILM_CELLS, union_outline, view_outline
 from sonarsynth.pictures.figures.style import BACKDROP, DYNAMIC_RANGE, ENERGY_MAP, INK, OUTLINES, figure, label, settle
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import PathCollection, PolyCollection
     from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
     from matplotlib.text import Text
 
-    from sonarsynth.conventions import Ints
 
 ABSENT = "#9b9b9b"
 """Beams without a number."""
@@ -47,13 +46,14 @@ class Hull:
 class View:
     """What is drawn of one frame. An image or cloud that is not there is None or empty."""
 
-    title: str
+    title: str  # of the store
     level: Floats | None  # (elevation, azimuth) dB re the reference of the film
     points: Floats  # (point, xyz) m, sonar frame
     point_level: Floats  # (point,) dB re the same
     hulls: tuple[Hull, ...]
     ghosts: tuple[Ghost, ...] = ()
     lobes: tuple[Floats, ...] = ()  # (point, azimuth and elevation) deg: grating lobes
+    moment: str = ""  # which frame it is, and when
     earlier: Floats = field(default_factory=lambda: np.zeros((0, 3)))  # (point, xyz) m: points of frames before
 
 
@@ -94,6 +94,7 @@ class FramePicture:
         self.window = space
         parts = self.figure.add_gridspec(2, 2, width_ratios=[1.2, 1.0])
         self._title: Text = self.figure.suptitle(" ", x=0.01, ha="left", fontsize=11, color=INK)
+        self._moment: Text = self.figure.text(0.0, 0.0, "", fontsize=11, color=INK, va="top")
         sky = self.figure.add_subplot(parts[:, 0])
         self._image: AxesImage = image_axes(sky, azimuth, elevation)
         self._outlines: PolyCollection = outline_artist(sky)
@@ -104,12 +105,11 @@ class FramePicture:
             CloudPanel(self.figure.add_subplot(parts[0, 1]), PLAN, "from above"),
             CloudPanel(self.figure.add_subplot(parts[1, 1]), SIDE, "from starboard"),
         ]
-        self._behind: Any = None
-        """The figure without what changes from frame to frame."""
+        self._blitting: Blitting | None = None
 
     def show(self, view: View) -> None:
         """Draw a frame in place of the last."""
-        self._title.set_text(view.title)
+        self._moment.set_text(view.moment)
         shape = self._image.get_array()
         if view.level is not None:
             self._image.set_data(np.ma.masked_invalid(clipped(view.level))[:, ::-1])
@@ -118,50 +118,22 @@ class FramePicture:
         outlines = set_outlines(self._outlines, view.hulls)
         for panel in self._clouds:
             panel.show(view, self.window)
-        if self._behind is None:
-            self._lay_out()
+        if self._blitting is None:  # arranged once, for axes that move from frame to frame are hard to watch
+            self._title.set_text(view.title)
+            settle(self.figure)
+            self._moment.set_position(end_of(self._title))
+            self._blitting = Blitting(self.figure, [self._image], self._changing())
         self._ghosts.show(view.ghosts, view.lobes, outlines)
 
-    def _lay_out(self) -> None:
-        """Arrange once, for axes that move from frame to frame are hard to watch, and draw what stays."""
-        settle(self.figure)
-        changing = self._changing()
-        edges = [spine for axes in self.figure.axes for spine in axes.spines.values()]
-        for artist in (*changing, *edges):
-            artist.set_visible(False)
-        self.figure.canvas.draw()
-        canvas = self._canvas()
-        self._behind = canvas.copy_from_bbox(self.figure.bbox)
-        bare = np.asarray(canvas.buffer_rgba())[..., :3].copy()
-        for spine in edges:  # images lie on the edges of axes, which are put back as they were drawn
-            spine.set_visible(True)
-            self.figure.draw_artist(spine)
-        framed = np.asarray(canvas.buffer_rgba())[..., :3]
-        self._edges = np.nonzero((framed != bare).any(axis=2))
-        self._edge_colours = framed[self._edges]
-        for artist in changing:
-            artist.set_visible(True)
+    def pixels(self) -> np.ndarray:
+        """The figure as drawn: (row, column, rgb) uint8."""
+        assert self._blitting is not None
+        return self._blitting.pixels(self._changing())
 
     def _changing(self) -> list[Artist]:
         """What is drawn anew in each frame, the rearmost first."""
         clouds = [artist for panel in self._clouds for artist in panel.changing]
-        return [self._title, self._image, self._outlines, *self._ghosts.drawn, *clouds]
-
-    def _canvas(self) -> FigureCanvasAgg:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-        assert isinstance(self.figure.canvas, FigureCanvasAgg)
-        return self.figure.canvas
-
-    def pixels(self) -> np.ndarray:
-        """The figure as drawn: (row, column, rgb) uint8."""
-        canvas = self._canvas()
-        canvas.restore_region(self._behind)
-        for artist in self._changing():
-            self.figure.draw_artist(artist)
-        drawn = np.asarray(canvas.buffer_rgba())[..., :3].copy()
-        drawn[self._edges] = self._edge_colours
-        return drawn
+        return [self._moment, self._outlines, *self._ghosts.drawn, *clouds]
 
 
 class CloudPanel:
@@ -178,6 +150,7 @@ class CloudPanel:
         label(axes, names[plane[0]], names[plane[1]], f"point cloud {name}")
         self._hulls: PolyCollection = PolyCollection([], linewidths=1.0)
         axes.add_collection(self._hulls, autolim=False)
+        self._bodies: list[Floats] = []  # hulls (vertex, 2) as they are drawn
         self._earlier: PathCollection = axes.scatter([], [], s=4, linewidths=0, color=EARLIER)
         self._points: PathCollection = axes.scatter(
             [], [], c=[], s=9, linewidths=0, cmap=ENERGY_MAP, vmin=-DYNAMIC_RANGE, vmax=0
@@ -197,7 +170,10 @@ class CloudPanel:
         sign = -1.0 if across == 1 else 1.0  # port on the left
         self.axes.set_xlim(-sign * reach, sign * reach)
         self.axes.set_ylim(-reach / 1.6, reach / 1.6)
-        fill_hulls(self._hulls, view.hulls, self.plane, centre)
+        bodies = [(hull.vertices - centre)[:, self.plane] for hull in view.hulls]
+        if len(bodies) != len(self._bodies) or not all(map(_alike, bodies, self._bodies)):
+            fill_hulls(self._hulls, bodies, [hull.faces for hull in view.hulls])
+            self._bodies = bodies
         self._earlier.set_offsets((view.earlier - centre)[:, self.plane])
         at = (view.points - centre)[:, self.plane]
         self._points.set_offsets(at)
@@ -261,7 +237,7 @@ def set_outlines(artist: PolyCollection, hulls: tuple[Hull, ...]) -> list[Floats
     lines: list[Floats] = []
     colours: list[str] = []
     for i, hull in enumerate(hulls):
-        seen = view_outline(hull.vertices, hull.faces)
+        seen = view_outline(hull.vertices, hull.faces, FILM_CELLS)
         lines += [np.asarray(np.rad2deg(line)) for line in seen]
         colours += [OUTLINES[i % len(OUTLINES)]] * len(seen)
     artist.set_verts(lines)
@@ -269,15 +245,27 @@ def set_outlines(artist: PolyCollection, hulls: tuple[Hull, ...]) -> list[Floats
     return lines
 
 
-def fill_hulls(artist: PolyCollection, hulls: tuple[Hull, ...], plane: tuple[int, int], centre: Floats) -> None:
-    """Draw the hulls of targets projected on a plane of the sonar frame (m), from `centre` (xyz)."""
+def fill_hulls(artist: PolyCollection, bodies: list[Floats], faces: list[Ints]) -> None:
+    """Draw hulls: points (vertex, 2) in a plane and facets (facet, 3) of each."""
     from matplotlib.colors import to_rgba
 
     lines, colours = [], []
-    for i, hull in enumerate(hulls):
-        seen = union_outline((hull.vertices - centre)[:, plane], hull.faces)
+    for i, (points, facets) in enumerate(zip(bodies, faces, strict=True)):
+        seen = union_outline(points, facets, FILM_CELLS)
         lines += seen
         colours += [OUTLINES[i % len(OUTLINES)]] * len(seen)
     artist.set_verts(lines)
     artist.set_edgecolor(colours)
     artist.set_facecolor([to_rgba(colour, 0.18) for colour in colours])
+
+
+def _alike(points: Floats, others: Floats) -> bool:
+    """Whether points are where others are, but for a thousandth of their extent: a body that only moves on."""
+    return points.shape == others.shape and bool(np.abs(points - others).max() < 1e-3 * np.ptp(others))
+
+
+def end_of(text: Text) -> tuple[float, float]:
+    """Where a line of text goes on after its end and three spaces (shares of the figure)."""
+    assert text.figure is not None
+    spaces = 0.95 * float(text.get_fontsize()) * text.figure.dpi / 72.0
+    return float((text.get_window_extent().x1 + spaces) / text.figure.bbox.width), float(text.get_position()[1])

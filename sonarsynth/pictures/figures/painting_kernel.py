@@ -12,16 +12,19 @@ WITHIN = 0.5
 
 
 @nb.njit(cache=True, nogil=True)
-def paint(triangles: Any, mask: Any) -> None:
-    """Set cells of mask (row, column) to 1 whose middle is in a triangle (triangle, corner, column and row), or within
-    `WITHIN` cells of its sides and in its box."""
+def paint(points: Any, faces: Any, mask: Any) -> None:
+    """Set cells of mask (row, column) to 1 whose middle is in a triangle of faces (facet, 3) between points (point,
+    column and row), or within `WITHIN` cells of its sides and in its box. Triangles with a NaN corner are left out."""
     rows, columns = mask.shape
     side, offset = np.empty((3, 2)), np.empty(3)
-    for n in range(len(triangles)):
-        a, b, c = triangles[n]
-        turn = 1.0 if (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) >= 0.0 else -1.0
+    for n in range(len(faces)):
+        a, b, c = points[faces[n, 0]], points[faces[n, 1]], points[faces[n, 2]]
+        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        if not np.isfinite(area):
+            continue
+        turn = 1.0 if area >= 0.0 else -1.0
         for k in range(3):
-            start, end = triangles[n, k], triangles[n, (k + 1) % 3]
+            start, end = points[faces[n, k]], points[faces[n, (k + 1) % 3]]
             across, along = end[0] - start[0], end[1] - start[1]
             length = np.sqrt(across**2 + along**2)
             side[k, 0] = -turn * along / length if length > 0.0 else 0.0

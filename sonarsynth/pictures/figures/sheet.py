@@ -63,7 +63,7 @@ def sheet(
 ) -> Figure:
     """The sheet as a figure. azimuth, elevation: the beam grid (deg). Without beams the last row is left out."""
     made = figure(12.0, 8.6 if beams else 5.4, dpi=110)
-    made.suptitle(view.title, x=0.01, ha="left", fontsize=12, color=INK)
+    made.suptitle(f"{view.title}   {view.moment}", x=0.01, ha="left", fontsize=12, color=INK)
     rows = made.add_gridspec(2 if beams else 1, 1, height_ratios=[1.75, 1.0] if beams else [1.0])
     top = rows[0].subgridspec(1, 3, width_ratios=[1.12, 0.12, 1.0])
     sky = made.add_subplot(top[0])

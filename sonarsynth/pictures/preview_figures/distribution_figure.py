@@ -9,8 +9,8 @@ import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints
 from sonarsynth.pictures.figures.style import INK, PALE, RAYS, figure, grid, label
+from sonarsynth.products import SPLITS
 from sonarsynth.recipe.sampled_geometry import SampledGeometry
-from sonarsynth.recipe.splits import SPLITS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -16,10 +16,10 @@ from sonarsynth.pictures.preview_figures.distribution_figure import distribution
 from sonarsynth.pictures.preview_figures.overview_figure import Overview, overview_figure
 from sonarsynth.pictures.ray_figures.scene_geometry import scene_geometry
 from sonarsynth.planning.notes.scene_checks import read_inputs
+from sonarsynth.products import SPLITS
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.sampled_geometry import SEQUENCES, frame_of, sample_geometry
 from sonarsynth.recipe.scene import Frame
-from sonarsynth.recipe.splits import SPLITS
 
 MOST_DRAWN = 3
 """Scenes that are drawn, if there are more sequences."""

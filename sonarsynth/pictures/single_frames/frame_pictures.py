@@ -22,7 +22,7 @@ def image_picture(tree: xr.DataTree, frame: int) -> Figure:
     if view.level is None:
         raise NothingToDraw(f"frame {frame} has no image")
     made = figure(7.6, 6.0, dpi=110)
-    made.suptitle(view.title, x=0.01, ha="left", fontsize=11, color=INK)
+    made.suptitle(f"{view.title}   {view.moment}", x=0.01, ha="left", fontsize=11, color=INK)
     axes = made.add_subplot()
     outlines = draw_image(axes, *beam_grid(tree), view, "energy re the brightest beam (dB)")
     settle(made)
@@ -34,7 +34,7 @@ def cloud_picture(tree: xr.DataTree, frame: int) -> Figure:
     """The points in the true hulls, in 3-D, coloured by range error. Raises NothingToDraw."""
     found, view = _read(tree, frame)
     made = figure(7.6, 6.0, dpi=110)
-    made.suptitle(view.title, x=0.01, ha="left", fontsize=11, color=INK)
+    made.suptitle(f"{view.title}   {view.moment}", x=0.01, ha="left", fontsize=11, color=INK)
     axes = made.add_subplot(projection="3d")
     draw_cloud(axes, made, view, Errors(found.points, found.range_error), window([view]))
     return made

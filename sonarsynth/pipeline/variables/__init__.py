@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from sonarsynth.conventions import FORMAT_VERSION
 from sonarsynth.pipeline.variables.static_variables import coordinates
 from sonarsynth.pipeline.variables.truth_variables import HOW_LEVELS_ADD_UP
 from sonarsynth.pipeline.variables.variable import Variable, flags
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "FORMAT_VERSION",
     "HOW_LEVELS_ADD_UP",
     "VARIABLES",
     "Variable",
@@ -29,9 +29,6 @@ __all__ = [
     "frame_tree",
     "variables",
 ]
-
-FORMAT_VERSION = "3"
-"""Version of the layout of a store."""
 
 
 def variables(plan: Plan) -> tuple[Variable, ...]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from sonarsynth.labels.views import MEANINGS, View
 from sonarsynth.pipeline.variables.variable import ECHO, EMISSION, TARGET, comment, group_of, row
+from sonarsynth.products import VIEWS, View
 
 INSTANT = comment("at the instant of the frame; what is heard is of when sound met the target: position_at_echo")
 """Of what is where it is then."""
@@ -126,7 +126,7 @@ TARGETS = group_of(
         "int8",
         "1",
         "how much of the visible part is in the view of the beams",
-        attributes=(("flag_values", [int(v) for v in View]), ("flag_meanings", MEANINGS)),
+        attributes=(("flag_values", [int(v) for v in View]), ("flag_meanings", VIEWS)),
     ),
     row(
         "in_view",

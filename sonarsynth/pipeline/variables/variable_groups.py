@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from sonarsynth.pipeline.variables.truth_variables import LEVELS, SENSORS, SOUNDSCAPE, TRUTH
 from sonarsynth.pipeline.variables.variable import BEAMS, ESTIMATE, NONE, POINT, Variable, comment, flags, group_of, row
-from sonarsynth.products import FAMILIES, ORIGINS, REASONS
-from sonarsynth.recipe import SPLITS
+from sonarsynth.products import FAMILIES, ORIGINS, REASONS, SPLITS
 
 _ROOT = group_of(
     "/",

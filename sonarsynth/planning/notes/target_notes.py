@@ -8,8 +8,9 @@ import numpy as np
 
 from sonarsynth.conventions import Floats
 from sonarsynth.geometry.placed_target import PlacedTarget
-from sonarsynth.labels.views import View, box_in_view
+from sonarsynth.labels.views import box_in_view
 from sonarsynth.planning.measured.sampled_frames import SampledScene
+from sonarsynth.products import View
 from sonarsynth.receiver import elements
 from sonarsynth.receiver.mirror_images import mirror_image, mirror_normal
 from sonarsynth.recipe.scene import Frame

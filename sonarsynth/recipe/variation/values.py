@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import PlainSerializer, PlainValidator, TypeAdapter, WithJsonSchema
 
-from sonarsynth.conventions import bounded
+from sonarsynth.conventions import ASSUMED_SPEED, bounded
 
 Where = tuple[str | int, ...]
 """A path into a recipe: field names and indices from the top."""
@@ -18,7 +18,6 @@ Where = tuple[str | int, ...]
 WORLD = ("environment", "targets", "sources", "populations", "noise_sources", "scatterers", "chorus")
 SHORT = dict.fromkeys(WORLD, "scene.world.") | {"trajectory": "scene.", "sonar": "scene."}
 """What may be left out before a path that begins so."""
-ASSUMED_SPEED = "scene.sonar.assumed_sound_speed"
 VARYING = ("scene.world.", "scene.trajectory.", "scene.sonar.sensor_errors.", "scene.sonar.electronics.", ASSUMED_SPEED)
 """What can vary."""
 FRAMES = "scene.trajectory.frames"

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from sonarsynth.recipe import SPLITS
+from sonarsynth.products import SPLITS
 from sonarsynth.store.cards.facts import Array, Facts
 
 CONTEXT: Final[Mapping[str, Any]] = {

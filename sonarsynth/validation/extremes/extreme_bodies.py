@@ -11,7 +11,7 @@ from sonarsynth.conventions import Floats, direction
 from sonarsynth.equations.scattering.modal_series import sphere_amplitude
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.labels import label
-from sonarsynth.labels.views import View
+from sonarsynth.products import View
 from sonarsynth.propagation import Straight
 from sonarsynth.receiver import BeamGrid, PositionTable, Romanis, Sonar, elements
 from sonarsynth.scattering import FacetLaw, Isotropic, Kirchhoff, MirrorLobe, Scatterer

@@ -11,10 +11,9 @@ from sonarsynth.environment.sea import Environment, Isovelocity, Tabulated
 from sonarsynth.equations.arrays.bistatic_range import bistatic_range
 from sonarsynth.geometry.motion import Still
 from sonarsynth.imaging import DenseDelayAndSum
-from sonarsynth.labels.views import View
 from sonarsynth.pipeline import render
 from sonarsynth.planning import plan
-from sonarsynth.products import LINK_BUDGET
+from sonarsynth.products import LINK_BUDGET, View
 from sonarsynth.receiver import BeamGrid, PlanarLattice, PositionTable, Sonar
 from sonarsynth.recipe import Recipe
 from sonarsynth.recipe.scene import Processing, Scene, World
