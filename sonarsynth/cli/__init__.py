@@ -157,7 +157,8 @@ def build(
     stores.try_writing(stores.folder_of(store))
     prediction = None
     if predicting and scheduler is None and (restart or stores.missing(store, plan, wanted)):
-        prediction = schedule.predict(plan, prepared=time.process_time())
+        with printing.planning("timing frames"):
+            prediction = schedule.predict(plan, prepared=time.process_time())
     with printing.progress() as progress:
         report = schedule.build(
             plan, store, frames=wanted, workers=workers, scheduler=scheduler, restart=restart,
@@ -189,7 +190,8 @@ def plan(recipe: RecipeFile, settings: Settings = [], products: Products = ALL_P
     made_from = reading.recipe_of(source)
     with reading.locating(source), printing.planning():
         made = planning.plan(made_from, chosen)
-    prediction = schedule.predict(made, prepared=time.process_time())
+    with printing.planning("timing frames"):
+        prediction = schedule.predict(made, prepared=time.process_time())
     made = replace(made, stages=prediction.rows(made))
     if as_json:
         _print_json({**made.as_json(), **prediction.as_json()})

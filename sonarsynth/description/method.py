@@ -34,6 +34,7 @@ class FrameSize:
     paths: float  # by counts: each with the weight of its pulse, which some facets reshape
     solid_angle: float = 0.0  # sr: of the largest target, as the array sees it
     on_lattice: bool = True  # the sensors
+    layers: int = 1  # of the sound speed
 
 
 class Method:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -45,8 +44,13 @@ LARGE_MESH_FACETS = 1_000_000
 """Facets over which errors are measured in one frame only, at half as many hydrophones."""
 WORTHWHILE_GAIN = 0.7
 """Of an error, that must be left for each hydrophone's own view to be taken for it."""
-LESS_FAINT = (0.1,)
-"""Shares of the faint echoes left out that are left out, where those are what errs: before the array is cut."""
+LESS_FAINT = 0.1
+"""Share of the faint echoes left out that is left out, where those are what errs: before the array is cut."""
+FAINT_REACH = 2.0
+"""Times its bound on the mean that what faint echoes add to an error comes to, at most."""
+FEWEST_SENSORS = 4
+"""Hydrophones of a part, at most, that is tried next and last where halving the array twice was no gain: in water whose
+layers are finer than the array an error falls only where parts are."""
 DEGREE_TOLERANCE = 0.03
 """Error of the synthesis that measures, over what is allowed."""
 
@@ -130,7 +134,8 @@ def _negligible(scene: Scene, accuracy: Accuracy) -> float:
     return 0.0 if accuracy.exact else FAINT * accuracy.cheap**2
 
 
-class _ArrayModel(NamedTuple):
+@dataclass(frozen=True)
+class _ArrayModel:
     """How paths reach the hydrophones."""
 
     parts: int  # that the array is cut into
@@ -161,16 +166,29 @@ def _subarrays(plan: Plan, indices: Sequence[int]) -> _ArrayModel:
         return _ArrayModel(first, seeing, error)
     if error <= allowed:
         return _ArrayModel(1, seeing, error, whole)
+    return replace(_finer(plan, measures, seeing, error, allowed), whole=whole)
+
+
+def _finer(
+    plan: Plan, measures: Sequence[PerSensorReference], seeing: OcclusionPoint, error: float, allowed: float
+) -> _ArrayModel:
+    """The fewest parts that err by no more than is allowed, of an array that errs by more as a whole."""
+    count, auto = plan.elements.count, plan.scene.physics.dynamic_range == "auto"
+    faintest = FAINT_REACH * np.sqrt(FAINT) * plan.recipe.accuracy.cheap if auto else 0.0
     # Cubics err by the fourth power of the width of parts, the square of their number: no fewer will do.
-    fewest = max(int(np.log2(error / allowed) / 2.0), 1)
-    faint_shares = LESS_FAINT if physics.dynamic_range == "auto" else ()
-    tried = [(1, faint) for faint in faint_shares]
-    tried += [(2**n, f) for n in range(fewest, int(np.ceil(np.log2(count)))) for f in (1.0, *faint_shares)]
-    for parts, faint in tried:
-        error = _worst(measures, parts, seeing, allowed, faint)
+    n, fewest, stuck = 0, max(int(np.log2(error / allowed) / 2.0), 1), 0
+    while 2**n < count and stuck < 3:
+        if n:
+            before, error = error, _worst(measures, 2**n, seeing, allowed)
+            stuck = stuck + 1 if stuck == 2 or error > WORTHWHILE_GAIN * before else 0
         if error <= allowed:
-            return _ArrayModel(parts, seeing, error, whole, faint)
-    return _ArrayModel(count, "centre", 0.0, whole)
+            return _ArrayModel(2**n, seeing, error)
+        if error <= allowed + faintest and auto:
+            less = _worst(measures, 2**n, seeing, allowed, LESS_FAINT)
+            if less <= allowed:
+                return _ArrayModel(2**n, seeing, less, faint=LESS_FAINT)
+        n = max(n + 1 if n else fewest, int(np.ceil(np.log2(count / FEWEST_SENSORS))) if stuck == 2 else 0)
+    return _ArrayModel(count, "centre", 0.0)
 
 
 def _worst(

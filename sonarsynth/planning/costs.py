@@ -110,6 +110,7 @@ def frame_size(plan: Plan) -> FrameSize:
         paths=_paths(plan) * max(sizes["emission"], 1) * _ways(plan),
         solid_angle=_solid_angle(plan),
         on_lattice=plan.elements.on_lattice,
+        layers=len(plan.profile.depth),
     )
 
 

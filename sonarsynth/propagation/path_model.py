@@ -73,8 +73,8 @@ class PathModel(Method):
 
     def cost(self, size: FrameSize) -> float:
         """As `Method.cost`, of the paths to all facets: what they take more than straight lines, once an emission and
-        pair of families."""
-        return 1.6e-6 * size.facets
+        pair of families; ever more in water of many layers."""
+        return 1.6e-6 * size.facets * (1.0 + max(size.layers - 50, 0) / 40)
 
     def row(self) -> str:
         """As `Method.row`."""

@@ -90,4 +90,4 @@ def test_fainter_echoes_are_kept_before_the_array_is_cut(monkeypatch: pytest.Mon
     monkeypatch.setattr(PerSensorReference, "of", staticmethod(lambda plan, index: Measured()))
     plan = planning.plan(reading.recipe_of(reading.read(TANK)), products=())
     cut = choosing._subarrays(plan, [0])
-    assert (cut.parts, cut.faint) == (1, choosing.LESS_FAINT[0]) and cut.error < 3e-4
+    assert (cut.parts, cut.faint) == (1, choosing.LESS_FAINT) and cut.error < 3e-4

@@ -1,13 +1,17 @@
-"""Errors of a plan are measured on some facets of large meshes: their echoes are those that all facets have."""
+"""Errors of a plan are measured on some facets of large meshes, whose echoes are those that all facets have, and the
+array is cut into no more parts than errors ask for."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from sonarsynth import planning
-from sonarsynth.planning import context_of
+from sonarsynth.planning import choosing, context_of
 from sonarsynth.planning.measured import sampled_arrivals
 from sonarsynth.targets.shapes import Sphere
 from sonarsynth.tracing.arrivals import trace
@@ -43,3 +47,41 @@ def test_errors_of_some_facets_are_those_of_all(monkeypatch):
     whole = planning.plan(recipe, {"signals"}).errors
     assert some.whole != whole.whole
     np.testing.assert_allclose(some.whole, whole.whole, rtol=0.33)
+
+
+@dataclass(frozen=True)
+class Falling:
+    """Errors that fall with the number of parts as they are told."""
+
+    of: Callable[[int], float]
+    tried: list[int] = field(default_factory=list)
+
+    def error(self, parts, occlusion, faint=1.0):
+        self.tried.append(parts)
+        return self.of(parts)
+
+
+def parts_for(errors, count=508, allowed=1.0):
+    made = SimpleNamespace(
+        elements=SimpleNamespace(count=count),
+        scene=SimpleNamespace(physics=SimpleNamespace(dynamic_range="auto")),
+        recipe=SimpleNamespace(accuracy=SimpleNamespace(cheap=0.1 * allowed)),
+    )
+    return choosing._finer(made, [errors], "centre", errors.of(1), allowed).parts
+
+
+@pytest.mark.parametrize("count", [2, 9, 64, 508])
+@pytest.mark.parametrize("whole", [1.5, 7.0, 90.0, 3e3])
+@pytest.mark.parametrize("power", [1.0, 2.0])
+def test_an_array_is_cut_into_the_fewest_parts_that_do(count, whole, power):
+    """Of powers of two, by trying them all: where errors fall as a power of the number of parts, 2 at most."""
+    enough = [2**n for n in range(10) if 2**n < count and whole * 2.0 ** (-power * n) <= 1.0]
+    assert parts_for(Falling(lambda parts: whole * parts**-power), count) == min(enough, default=count)
+
+
+def test_in_water_of_fine_layers_few_cuts_are_tried():
+    """Where halving is no gain until parts are of a few hydrophones, six numbers at most are tried, not sixteen."""
+    fine = Falling(lambda parts: 5.0 if parts < 100 else 0.5)
+    assert parts_for(fine) == 128 and len(set(fine.tried)) <= 3
+    never = Falling(lambda parts: 5.0)
+    assert parts_for(never) == 508 and len(never.tried) <= 6

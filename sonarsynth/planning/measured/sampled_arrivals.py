@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from sonarsynth.environment.sea import Profile
 from sonarsynth.geometry import Pose
 from sonarsynth.planning.plans import Plan
 from sonarsynth.products import Arrivals
@@ -19,6 +20,9 @@ AMPLITUDES = 0.1
 
 SAMPLE = 2500
 """Facets that errors are measured on, about, where there are over four times as many."""
+FEW_LAYERS = 1000
+"""Layers of the sea up to which so many are: a ray costs as many steps as it crosses layers, and with more layers there
+are as many fewer facets."""
 
 
 def arrivals_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> Arrivals:
@@ -34,9 +38,14 @@ def sampled_arrivals(plan: Plan, frame: Frame, part: Subarray | None = None) -> 
     phases, by way of all: of these the sum is smaller than its parts, and what they err by is not."""
     context = context_of(plan, frame, part)
     adds = not any(law.coherent or law.passes_sound for law in plan.scene.laws)
-    every = sum(len(mesh.faces) for mesh in plan.scene.meshes) // SAMPLE
+    every = one_facet_in(plan.profile, sum(len(mesh.faces) for mesh in plan.scene.meshes), SAMPLE)
     some = replace(context.tolerances, every=every if adds and every > 4 else 1)
     return trace(replace(context, tolerances=some), plan.propagation)
+
+
+def one_facet_in(profile: Profile, facets: int, sample: int) -> int:
+    """One of how many facets to look at, for about `sample` in all; for fewer in water of many layers."""
+    return max(int(facets * max(len(profile.depth) / FEW_LAYERS, 1.0) / sample), 1)
 
 
 def context_of(plan: Plan, frame: Frame, part: Subarray | None = None) -> FrameContext:

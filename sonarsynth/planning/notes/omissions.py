@@ -8,6 +8,7 @@ from sonarsynth.environment.boundary_numbers import rms_height
 from sonarsynth.environment.casts import profile_of
 from sonarsynth.planning.choices import ALL_PRODUCTS
 from sonarsynth.planning.measured.ray_bending import bending_error
+from sonarsynth.planning.measured.sampled_arrivals import one_facet_in
 from sonarsynth.planning.plan_tables import Omission
 from sonarsynth.planning.plans import Plan
 from sonarsynth.planning.reverberation_rows import reverberation_left_out
@@ -226,7 +227,7 @@ def reflected_bound(plan: Plan) -> str:
         return "not computed"
     laws = tuple(MirrorLobe() if law.coherent else law for law in scene.laws)
     bodies, receiver = frame.moment.bodies, Receiver(frame.sonar_pose, plan.elements, sonar)
-    fewer = Tolerances(every=max(sum(len(body.mesh.faces) for body in bodies) // ENOUGH, 1))
+    fewer = Tolerances(every=one_facet_in(plan.profile, sum(len(body.mesh.faces) for body in bodies), ENOUGH))
     context = FrameContext(frame.time, bodies, frame.moment.snaps, plan.medium, receiver, laws, fewer)
     found = trace(context, plan.propagation.reflected(bounces + 1))
     delay_std = np.exp(-0.5 * (2 * np.pi * sonar.band.centre * found.delay_std) ** 2)
