@@ -245,12 +245,17 @@ def show(
     With several stores: films side by side, each with its range error, levels and cost.
     """
     from sonarsynth.cli import printing
-    from sonarsynth.pictures import show as draw
-    from sonarsynth.pictures.compare import show_beside
 
     with printing.progress("reading") as drawn:
         more: Any = {"frame": frame, "film": film, "scale": scale, "say": typer.echo, "progress": drawn}
-        files = draw(stores[0], out, **more) if len(stores) == 1 else show_beside(stores, out, **more)
+        if len(stores) == 1:
+            from sonarsynth.pictures import show as draw
+
+            files = draw(stores[0], out, **more)
+        else:
+            from sonarsynth.pictures.compare import show_beside
+
+            files = show_beside(stores, out, **more)
     for file in files:
         typer.echo(str(file))
 

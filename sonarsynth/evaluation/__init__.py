@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from sonarsynth.detection import beam_width
-from sonarsynth.evaluation.brightest_beams import brightest_beam_on_target, near_target
+from sonarsynth.evaluation.brightest_beams import brightest_beam_on_target
 from sonarsynth.evaluation.checks import Check, every, numbered
 from sonarsynth.evaluation.cloud_scores import cloud_scores
 from sonarsynth.evaluation.detectors import TRUTH, DetectorReport, evaluate
@@ -42,7 +42,6 @@ __all__ = [
     "labels_of_targets",
     "link_budget_adds_up",
     "link_budget_measured",
-    "near_target",
     "nothing_outside",
     "points",
     "range_errors",

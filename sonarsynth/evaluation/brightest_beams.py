@@ -20,13 +20,10 @@ def _grid_step(tree: xr.DataTree) -> float:
     return float("inf")
 
 
-def near_target(tree: xr.DataTree, truth: np.ndarray) -> np.ndarray:
-    """(elevation, azimuth) true on a target and within one beam width of its outline."""
-    from scipy.ndimage import binary_dilation
-
-    steps = max(1, round(min(beam_width(tree) / _grid_step(tree), max(truth.shape))))
-    y, x = np.mgrid[-steps : steps + 1, -steps : steps + 1]
-    return np.asarray(binary_dilation(truth >= 0, x * x + y * y <= steps * steps))
+def near_target(truth: np.ndarray, row: int, column: int, reach: int) -> bool:
+    """Whether a beam is on a target, or within `reach` beams of one; truth (elevation, azimuth)."""
+    rows, columns = np.nonzero(truth >= 0)
+    return bool(((rows - row) ** 2 + (columns - column) ** 2 <= reach**2).any())
 
 
 def refused(some: SmallVariables, frame: int) -> bool:
@@ -91,6 +88,7 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
     """
     name, expected = "brightest beam on target", "every frame, or on a ghost by surface or bottom"
     azimuth, elevation = (np.deg2rad(every(tree, f"truth/beams/{axis}")) for axis in ("azimuth", "elevation"))
+    reach = max(1, round(min(beam_width(tree) / _grid_step(tree), max(len(azimuth), len(elevation)))))
     hits, ghosts, seen, missed = 0, 0, 0, []
     for some, i in ((block, i) for block in blocks(tree, frames) for i in block.frames):
         energy, truth = of_frame(tree, "image/energy", i), of_frame(tree, "truth/beams/target", i)
@@ -101,8 +99,8 @@ def brightest_beam_on_target(tree: xr.DataTree, frames: np.ndarray) -> Check:
             hit = ghost = False
             counts = bool(snaps_heard(some, i).any()) and not refused(some, i)
         else:
-            row, column = np.unravel_index(np.nanargmax(energy), energy.shape)
-            hit = bool(near_target(tree, truth)[row, column]) or in_box(some, i, azimuth[column], elevation[row])
+            row, column = map(int, np.unravel_index(np.nanargmax(energy), energy.shape))
+            hit = near_target(truth, row, column, reach) or in_box(some, i, azimuth[column], elevation[row])
             counts = hit or bool(energy[row, column] > STANDS_OUT * np.nanmedian(energy))
             ghost = not hit and on_ghost(some, i, azimuth[column], elevation[row])
         seen += counts

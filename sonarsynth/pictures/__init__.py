@@ -135,10 +135,10 @@ def _view(tree: xr.DataTree, frame: StoredFrame, reference: float) -> View:
     title = tree.attrs.get("title") or "untitled"
     clock = f"   t = {frame.time:.2f} s" if np.isfinite(frame.time) else ""
     count = tree["truth"].sizes["frame"]
-    of = f" (0 to {count - 1})" if count > 1 else ""
+    of = f", frames 0 to {count - 1}" if count > 1 else ""
     return View(
-        title=title,
-        moment=f"frame {frame.index}{of}{clock}{_snr(tree, frame)}",
+        title=f"{title}{of}",
+        moment=f"frame {frame.index}{clock}{_snr(tree, frame)}",
         level=None if frame.energy is None else decibels(frame.energy, reference),
         points=frame.points,
         point_level=decibels(frame.point_energy, reference),
@@ -174,5 +174,5 @@ def _write_sheet(
     view = frame_view(tree, frame)
     made = sheet(*beam_grid(tree), view, errors, loudest_of_beams, window([view]), "energy re the brightest beam (dB)")
     path = folder / "sheet.png"
-    made.savefig(path, bbox_inches="tight", pad_inches=0.1)
+    made.savefig(path)
     return path

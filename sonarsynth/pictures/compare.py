@@ -116,7 +116,7 @@ class BesideFilm:
         self.picture.show(moment(self.trees, self.references, frame))
 
     def pixels(self) -> np.ndarray:
-        """The figure as drawn: (row, column, rgb) uint8."""
+        """The figure as drawn: (row, column, rgba) uint8."""
         return self.picture.pixels()
 
 

@@ -37,7 +37,7 @@ class Picture(Protocol[View_contra]):
         ...
 
     def pixels(self) -> np.ndarray:
-        """The figure as drawn: (row, column, rgb) uint8."""
+        """The figure as drawn: (row, column, rgba) uint8."""
         ...
 
 
@@ -69,7 +69,7 @@ def write_film(
 def _drawn(
     picture: Picture[View_contra], views: Sequence[View_contra], progress: Progress | None
 ) -> Iterator[np.ndarray]:
-    """Pixels (row, column, rgb) of one view after another."""
+    """Pixels (row, column, rgba) of one view after another."""
     for n, view in enumerate(views, 1):
         picture.show(view)
         yield picture.pixels()
@@ -84,7 +84,7 @@ def _mp4(shots: Iterator[np.ndarray], path: Path, frames_per_second: float) -> b
         for shot in shots:
             if maker is None:
                 size = f"{shot.shape[1]}x{shot.shape[0]}"
-                raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(frames_per_second), "-i", "-"]
+                raw = ["-f", "rawvideo", "-pix_fmt", "rgba", "-s", size, "-r", str(frames_per_second), "-i", "-"]
                 even = ["-vf", "crop=trunc(iw/2)*2:trunc(ih/2)*2", "-pix_fmt", "yuv420p"]  # what players take
                 command = ["ffmpeg", "-y", "-loglevel", "error", *raw, *even, str(path)]
                 maker = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL)
@@ -103,7 +103,8 @@ def _gif(shots: Iterator[np.ndarray], path: Path, frames_per_second: float) -> P
     from PIL import Image
 
     colours = _palette()
-    frames = [Image.fromarray(shot).quantize(palette=colours, dither=Image.Dither.NONE) for shot in shots]
+    plain = (Image.fromarray(shot).convert("RGB") for shot in shots)
+    frames = [shot.quantize(palette=colours, dither=Image.Dither.NONE) for shot in plain]
     milliseconds = max(20, round(1000 / frames_per_second))
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=milliseconds, loop=0, optimize=False)
     return path

@@ -57,8 +57,6 @@ def choose(frame: StoredFrame, azimuth: Floats, elevation: Floats, width: float)
     Near and far are the brightest beams of the nearest and the farthest tenth of the true ranges; the miss is the beam
     next to the far hit that is `CLEAR` beam widths off every target.
     """
-    from scipy.ndimage import distance_transform_edt
-
     on = (frame.target >= 0) & np.isfinite(frame.true_range)
     if not on.any():
         return {}
@@ -67,16 +65,24 @@ def choose(frame: StoredFrame, azimuth: Floats, elevation: Floats, width: float)
     hit = _brightest(bright, on & (frame.true_range <= near))
     far_hit = _brightest(bright, on & (frame.true_range >= far))
     step = (_step(elevation), _step(azimuth))
-    off = distance_transform_edt(~on, sampling=step) >= CLEAR * width
+    row, column = np.indices(on.shape)
+    off = ~on
+    for r, c in zip(*np.nonzero(on & ~_surrounded(on)), strict=True):
+        off &= np.hypot((row - r) * step[0], (column - c) * step[1]) >= CLEAR * width
     chosen = {"close hit": hit, "far hit": far_hit}
     if off.any():
-        row, column = np.indices(on.shape)
         distance = np.hypot((row - far_hit[0]) * step[0], (column - far_hit[1]) * step[1])
         towards_hit = (row - far_hit[0]) * (hit[0] - far_hit[0]) + (column - far_hit[1]) * (hit[1] - far_hit[1]) > 0
         distance = np.where(off, distance + 1e3 * towards_hit, np.inf)
         miss = np.unravel_index(np.argmin(distance), on.shape)
         chosen["far miss"] = (int(miss[0]), int(miss[1]))
     return chosen
+
+
+def _surrounded(on: np.ndarray) -> np.ndarray:
+    """Beams (elevation, azimuth) whose four neighbours are all on a target."""
+    wide = np.pad(on, 1)
+    return np.asarray(wide[:-2, 1:-1] & wide[2:, 1:-1] & wide[1:-1, :-2] & wide[1:-1, 2:])
 
 
 def _brightest(energy: Floats, among: np.ndarray) -> tuple[int, int]:

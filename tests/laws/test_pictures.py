@@ -86,7 +86,7 @@ def test_a_bright_beam_to_port_and_up_is_drawn_to_the_left_and_up() -> None:
     level[15, 19] = 0.0  # elevation 17.5, azimuth 22.5
     picture = FramePicture(azimuth, elevation, Window(half=np.ones(3)), "dB")
     picture.show(View(title="", level=level, points=np.zeros((0, 3)), point_level=np.zeros(0), hulls=()))
-    shot = picture.pixels().astype(int)
+    shot = picture.pixels()[..., :3].astype(int)
     axes = picture.figure.axes[0]
     height = shot.shape[0]
     x, y = axes.transData.transform((22.5, 17.5))

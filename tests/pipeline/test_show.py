@@ -321,7 +321,7 @@ def test_ffmpeg_gets_every_frame_whole(store: Path, tmp_path: Path, monkeypatch:
     monkeypatch.setenv("PATH", f"{fake.parent}:/usr/bin:/bin")
     files = show(store, tmp_path, say=lambda _: None)
     assert files[1].name == "film.mp4"
-    assert int(files[1].read_text()) == 2 * 1100 * 560 * 3  # frames, columns, rows, rgb
+    assert int(files[1].read_text()) == 2 * 1100 * 560 * 4  # frames, columns, rows, rgba
 
 
 def test_a_broken_ffmpeg_leaves_a_gif(store: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

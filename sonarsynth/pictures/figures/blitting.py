@@ -43,16 +43,17 @@ class Blitting:
             artist.set_visible(True)
 
     def _shot(self) -> Bytes:
-        return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
+        return np.array(self._canvas.buffer_rgba())
 
     def pixels(self, changing: Iterable[Artist]) -> Bytes:
-        """The figure (row, column, rgb) with its images as they are now, and artists on them, the rearmost first."""
+        """The figure (row, column, rgba) with its images as they are now, and artists on them, the rearmost first."""
         self._canvas.restore_region(self._behind)
-        buffer = np.asarray(self._canvas.buffer_rgba())
+        buffer = np.asarray(self._canvas.buffer_rgba()).view(np.uint32)[..., 0]  # four bytes at once
         for image, (there, rows, columns) in self._images:
             shown = image.get_array()
             assert shown is not None
-            buffer[there] = image.to_rgba(shown, bytes=True)[rows][:, columns]
+            colours = image.to_rgba(shown, bytes=True).view(np.uint32)[..., 0]
+            buffer[there] = colours[rows[:, None], columns]
         for artist in changing:
             self._figure.draw_artist(artist)
         drawn = self._shot()

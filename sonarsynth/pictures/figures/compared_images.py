@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Floats
+from sonarsynth.pictures.figures.blitting import Blitting
 from sonarsynth.pictures.figures.frame_figure import Hull, clipped, edges, image_axes, outline_artist, set_outlines
 from sonarsynth.pictures.figures.ghost_rings import Ghost, GhostMarks
 from sonarsynth.pictures.figures.style import INK, PALE, figure
@@ -102,6 +103,7 @@ class BesidePicture:
             self._text(self._left(c), top + 0.1, title, fontsize=10.5, fontweight="bold", linespacing=1.15)
         self._table(columns, table, note)
         self._bar(top, below, of)
+        self._blitting: Blitting | None = None
 
     def show(self, *moments: Moment) -> None:
         """Draw moments, a row each, in place of the last."""
@@ -117,13 +119,12 @@ class BesidePicture:
                 marks.show(panel.ghosts, panel.lobes, around)
 
     def pixels(self) -> np.ndarray:
-        """The figure as drawn: (row, column, rgb) uint8."""
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-        canvas = self.figure.canvas
-        assert isinstance(canvas, FigureCanvasAgg)
-        canvas.draw()
-        return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+        """The figure as drawn: (row, column, rgba) uint8."""
+        marks = [artist for row in self._ghosts for ghosts in row for artist in ghosts.drawn]
+        changing = [*self._names, *(lines for row in self._outlines for lines in row), *marks]
+        if self._blitting is None:
+            self._blitting = Blitting(self.figure, [image for row in self._images for image in row], changing)
+        return self._blitting.pixels(changing)
 
     def _text(self, x: float, y: float, text: str, **style: object) -> Text:
         """A text at inches from the lower left corner."""

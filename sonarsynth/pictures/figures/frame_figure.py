@@ -11,7 +11,17 @@ from sonarsynth.conventions import Floats, Ints, counted
 from sonarsynth.pictures.figures.blitting import Blitting
 from sonarsynth.pictures.figures.ghost_rings import Ghost, GhostMarks, legend
 from sonarsynth.pictures.figures.outlines import FILM_CELLS, union_outline, view_outline
-from sonarsynth.pictures.figures.style import BACKDROP, DYNAMIC_RANGE, ENERGY_MAP, INK, OUTLINES, figure, label, settle
+from sonarsynth.pictures.figures.style import (
+    BACKDROP,
+    DYNAMIC_RANGE,
+    ENERGY_MAP,
+    INK,
+    OUTLINES,
+    figure,
+    label,
+    placed,
+    settle,
+)
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -90,20 +100,19 @@ class FramePicture:
 
     def __init__(self, azimuth: Floats, elevation: Floats, space: Window, unit: str) -> None:
         """Lay out for a beam grid (deg, ascending); `unit` says what levels are relative to."""
-        self.figure: Figure = figure(11.0, 5.6, dpi=100)
+        self.figure: Figure = figure(11.0, 5.6, "none", dpi=100)
         self.window = space
-        parts = self.figure.add_gridspec(2, 2, width_ratios=[1.2, 1.0])
-        self._title: Text = self.figure.suptitle(" ", x=0.01, ha="left", fontsize=11, color=INK)
+        self._title: Text = self.figure.suptitle(" ", x=0.01, y=0.99, ha="left", fontsize=11, color=INK)
         self._moment: Text = self.figure.text(0.0, 0.0, "", fontsize=11, color=INK, va="top")
-        sky = self.figure.add_subplot(parts[:, 0])
+        sky = placed(self.figure, 0.77, 0.45, 4.6, 4.6)
         self._image: AxesImage = image_axes(sky, azimuth, elevation)
         self._outlines: PolyCollection = outline_artist(sky)
         self._ghosts = GhostMarks(sky)
         legend(sky)
         colour_bar(sky, self._image, unit)
         self._clouds = [
-            CloudPanel(self.figure.add_subplot(parts[0, 1]), PLAN, "from above"),
-            CloudPanel(self.figure.add_subplot(parts[1, 1]), SIDE, "from starboard"),
+            CloudPanel(placed(self.figure, 7.17, 3.1, 3.13, 1.95), PLAN, "from above"),
+            CloudPanel(placed(self.figure, 7.17, 0.45, 3.13, 1.95), SIDE, "from starboard"),
         ]
         self._blitting: Blitting | None = None
 
@@ -126,7 +135,7 @@ class FramePicture:
         self._ghosts.show(view.ghosts, view.lobes, outlines)
 
     def pixels(self) -> np.ndarray:
-        """The figure as drawn: (row, column, rgb) uint8."""
+        """The figure as drawn: (row, column, rgba) uint8."""
         assert self._blitting is not None
         return self._blitting.pixels(self._changing())
 
@@ -180,7 +189,8 @@ class CloudPanel:
         self._points.set_array(clipped(view.point_level))
         outside = int((np.abs(at) > [reach, reach / 1.6]).any(axis=1).sum())
         before = f", grey: {len(view.earlier)} of earlier frames" if len(view.earlier) else ""
-        self._note.set_text(counted(len(at), "point") + (f", {outside} of them outside" if outside else "") + before)
+        hidden = f", {outside} of them outside" if outside else ""
+        self._note.set_text(counted(len(at), "point") + hidden + before if hidden or self.plane == PLAN else "")
 
 
 def clipped(level: Floats) -> Floats:

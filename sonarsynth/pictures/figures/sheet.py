@@ -18,7 +18,7 @@ from sonarsynth.pictures.figures.frame_figure import (
     set_outlines,
 )
 from sonarsynth.pictures.figures.ghost_rings import GhostMarks, box_of, legend, place
-from sonarsynth.pictures.figures.style import ERROR_MAP, INK, MARKS, OUTLINES, PALE, figure, grid, label, settle
+from sonarsynth.pictures.figures.style import ERROR_MAP, INK, MARKS, OUTLINES, PALE, figure, grid, label, placed, settle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,16 +62,16 @@ def sheet(
     azimuth: Floats, elevation: Floats, view: View, errors: Errors, beams: list[Beam], space: Window, unit: str
 ) -> Figure:
     """The sheet as a figure. azimuth, elevation: the beam grid (deg). Without beams the last row is left out."""
-    made = figure(12.0, 8.6 if beams else 5.4, dpi=110)
-    made.suptitle(f"{view.title}   {view.moment}", x=0.01, ha="left", fontsize=12, color=INK)
-    rows = made.add_gridspec(2 if beams else 1, 1, height_ratios=[1.75, 1.0] if beams else [1.0])
-    top = rows[0].subgridspec(1, 3, width_ratios=[1.12, 0.12, 1.0])
-    sky = made.add_subplot(top[0])
+    top = 8.6 if beams else 5.4
+    made = figure(12.0, top, "none", dpi=110)
+    made.suptitle(f"{view.title}   {view.moment}", x=0.01, y=0.99, ha="left", fontsize=12, color=INK)
+    sky = placed(made, 0.65, top - 4.85, 4.25, 4.25)
     outlines = draw_image(sky, azimuth, elevation, view, unit)
-    draw_cloud(made.add_subplot(top[2], projection="3d"), made, view, errors, space)
+    bar = placed(made, 11.3, top - 3.9, 0.14, 2.4)
+    draw_cloud(placed(made, 6.2, top - 4.85, 4.8, 4.2, projection="3d"), made, view, errors, space, bar)
     if beams:
-        below = rows[1].subgridspec(1, len(beams))
-        draw_beams([made.add_subplot(below[i]) for i in range(len(beams))], beams)
+        width = 11.1 / len(beams)
+        draw_beams([placed(made, 0.75 + i * width, 0.85, width - 0.55, 2.1) for i in range(len(beams))], beams)
     settle(made)
     GhostMarks(sky).show(view.ghosts, view.lobes, outlines, BADGES if beams else 0.0)
     mark_beams(sky, beams, outlines)
@@ -107,8 +107,10 @@ def mark_beams(axes: Axes, beams: list[Beam], outlines: list[Floats]) -> None:
         axes.annotate(number, at, (middle - pixel) / point, textcoords="offset points", **middling)
 
 
-def draw_cloud(axes: Axes, onto: Figure, view: View, errors: Errors, space: Window) -> None:
-    """The cloud in three dimensions, coloured by its range error, in the true hulls (figure 19 of the thesis)."""
+def draw_cloud(axes: Axes, onto: Figure, view: View, errors: Errors, space: Window, scale: Axes | None = None) -> None:
+    """The cloud in three dimensions, coloured by its range error, in the true hulls (figure 19 of the thesis).
+
+    scale: axes of the scale of colours; left out: beside the cloud."""
     from mpl_toolkits.mplot3d import Axes3D
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
@@ -127,7 +129,8 @@ def draw_cloud(axes: Axes, onto: Figure, view: View, errors: Errors, space: Wind
     drawn = axes.scatter(
         *errors.points[on].T, s=10, c=colour, cmap=ERROR_MAP, vmin=0, vmax=WORST_SHOWN, depthshade=False
     )
-    bar = onto.colorbar(drawn, ax=axes, shrink=0.62, pad=0.12, extend="max")
+    room: dict[str, Any] = {"ax": axes, "shrink": 0.62, "pad": 0.12} if scale is None else {"cax": scale}
+    bar = onto.colorbar(drawn, extend="max", **room)
     bar.set_label("range error against the truth (cm)", fontsize=9, color=INK)
     bar.ax.tick_params(labelsize=8)
     low, high = centre - half, centre + half
@@ -175,7 +178,7 @@ def _beam_legend(panels: list[Axes]) -> None:
     """One legend of the lines at delays, under the figure."""
     named = {name: line for axes in panels for line, name in zip(*axes.get_legend_handles_labels(), strict=True)}
     if named:
-        panels[0].figure.legend(named.values(), named, loc="outside lower center", ncols=2, fontsize=8, frameon=False)
+        panels[0].figure.legend(named.values(), named, loc="lower center", ncols=2, fontsize=8, frameon=False)
 
 
 def _span(beams: list[Beam]) -> tuple[float, float]:

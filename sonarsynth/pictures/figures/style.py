@@ -48,12 +48,13 @@ def compass(bearing: float) -> str:
     return f"{WINDS[round(degrees / 22.5) % 16]} ({round(degrees) % 360:03d} deg)"
 
 
-def figure(width: float, height: float, **layout: Any) -> Figure:
-    """An empty figure (inches) on its own Agg canvas: no window, no state shared with other figures."""
+def figure(width: float, height: float, layout: str = "constrained", **more: Any) -> Figure:
+    """An empty figure (inches) on its own Agg canvas: no window, no state shared with other figures. Where axes have
+    places of their own, `layout` is "none", which spares a quarter of a second."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    made = Figure(figsize=(width, height), layout="constrained", **layout)
+    made = Figure(figsize=(width, height), layout=layout, **more)  # type: ignore[arg-type]
     FigureCanvasAgg(made)
     return made
 
@@ -64,6 +65,14 @@ def settle(made: Figure) -> None:
     if engine is not None:
         engine.execute(made)
         made.set_layout_engine("none")
+    for axes in made.axes:
+        axes.apply_aspect()
+
+
+def placed(onto: Figure, left: float, bottom: float, width: float, height: float, **more: Any) -> Any:
+    """New axes in a place of a figure, in inches from its lower left corner."""
+    w, h = onto.get_size_inches()
+    return onto.add_axes((left / w, bottom / h, width / w, height / h), **more)
 
 
 def label(axes: Axes, x: str, y: str, title: str = "") -> None:
