@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import socket
@@ -11,13 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from ruamel.yaml import YAML
 
 from sonarsynth.description import named_files
 from sonarsynth.description.memory import MAX_FACETS
 from sonarsynth.environment.casts import CastError, profile_of
 from sonarsynth.environment.sound_speed import Cast
 from sonarsynth.recipe import reading
-from sonarsynth.recipe.reading import RecipeError
+from sonarsynth.recipe.reading import RecipeError, json_schema
 from sonarsynth.sources.recordings import RecordingError, read_recording
 from sonarsynth.sources.snap_models import RecordedSnap
 from sonarsynth.targets.mesh_readers.mesh_files import MAX_BYTES, read_surface
@@ -118,6 +120,70 @@ def test_what_varies_opens_no_other_file_either(home: Path) -> None:
         (home / "recipe.yaml").write_text(text + entry)
         with pytest.raises(RecipeError, match=message):
             reading.load(home / "recipe.yaml")
+
+
+FILES = {
+    "mesh_file": "scene.world.targets.0.shape",
+    "cast": "scene.world.environment.sound_speed",
+    "recording": "scene.world.environment.noise",
+    "track": "scene.world.targets.0.motion",
+    "noise_recording": "scene.world.noise_sources.0.sound",
+    "recorded_snap": "scene.world.sources.0.snap",
+}
+"""Where a recipe names files: the field of each kind of description that has the path of one."""
+
+
+def test_every_path_of_a_file_is_looked_at_here() -> None:
+    """By the schema: each kind with a `path` that is one word (what varies has several) is in the list above."""
+    kinds = set()
+    for each in json_schema.schema()["$defs"].values():
+        fields = each.get("properties", {})
+        if fields.get("path", {}).get("type") == "string":
+            kinds.add(fields["kind"]["const"])
+    assert kinds == set(FILES)
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_a_path_means_one_thing(
+    home: Path, small_text: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kind: str
+) -> None:
+    """In the recipe's file it starts at the recipe's folder, in `--set` at the shell's: the name is taken there and
+    nowhere else, and where there is none the message names that folder. A recipe's stays in its own folder."""
+    shell, file, place = tmp_path / "shell", home / "recipe.yaml", FILES[kind]
+    shell.mkdir()
+    monkeypatch.chdir(shell)
+    extra = "[{name: ship, motion: {kind: still, position: [30, 0, -1]}, sound: {kind: thermal}}]"
+    file.write_text(small_text)
+    base = [f"scene.world.noise_sources={extra}"] if kind == "noise_recording" else []
+    held = reading.dump(reading.load(file, base))
+    file.write_text(held)
+    data = YAML(typ="safe").load(held)
+    inner = data
+    for part in place.split("."):
+        outer, key = inner, int(part) if part.isdigit() else part
+        inner = inner[key]
+    for path, message in (
+        ("there.x", rf"{place}\.path: no such file: there\.x, in {home}$"),
+        ("../outside/good.stl", r"\.path: leaves the folder of the recipe"),
+        ("link.stl", r"\.path: is a link out of the folder of the recipe"),
+        ("/etc/passwd", r"\.path: is an absolute path"),
+    ):
+        outer[key] = {"kind": kind, "path": path}
+        file.write_text(yaml_text(data))
+        (shell / "there.x").write_text("not looked at")
+        with pytest.raises(RecipeError, match=message):
+            reading.load(file)
+    file.write_text(held)
+    (shell / "there.x").unlink()
+    (home / "there.x").write_text("not looked at")
+    with pytest.raises(RecipeError, match=rf"--set: {place}\.path: no such file: there\.x, in {shell}$"):
+        reading.load(file, [f"{place}={{kind: {kind}, path: there.x}}"])
+
+
+def yaml_text(data: object) -> str:
+    out = io.StringIO()
+    YAML(typ="safe").dump(data, out)
+    return out.getvalue()
 
 
 @pytest.mark.parametrize("ending", ["stl", "obj", "ply", "off", "glb", "csv", "wav"])

@@ -74,7 +74,7 @@ def _text(source: Source, at: Where, name: str) -> str:
     except UnicodeDecodeError:
         raise source.error(at, f"{name}: is not UTF-8 text") from None
     except (named_files.FileError, OSError, RuntimeError) as error:
-        raise source.error(at, f"{name}: {error}") from None
+        raise source.error(at, f"{name}: {error}, in {source.folder}") from None
 
 
 def _model(folder: PurePosixPath, row: dict[str, str]) -> dict[str, Any]:
