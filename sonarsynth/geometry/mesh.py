@@ -78,6 +78,17 @@ class Mesh:
         """Largest distance of a vertex from the body's origin (m)."""
         return float(np.linalg.norm(self.vertices, axis=1).max())
 
+    @cached_property
+    def closed(self) -> bool:
+        """Whether each side of a facet is one of another the other way round, so that no ray gets in unseen; of large
+        meshes that is not looked into."""
+        if len(self.faces) > BLOCK:
+            return False
+        start = self.faces.astype(np.int64)
+        end, count = np.roll(start, -1, axis=1), len(self.vertices)
+        sides, others = (np.sort((a * count + b).ravel()) for a, b in ((start, end), (end, start)))
+        return bool((sides == others).all() and (np.diff(sides) > 0).all())
+
     def scaled(self, factor: float) -> Mesh:
         """The same body so many times as large, about its origin."""
         return self if factor == 1.0 else Mesh(read_only(self.vertices * factor), self.faces, self.notes, self.flat)

@@ -9,6 +9,7 @@ import numpy as np
 
 from sonarsynth.casting.ray_casting import first_hit
 from sonarsynth.conventions import NO_TARGET, Floats, direction
+from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry import Pose
 from sonarsynth.geometry.mesh import Mesh
 from sonarsynth.geometry.placed_target import PlacedTarget
@@ -62,7 +63,7 @@ def label(context: FrameContext, propagation: Propagation, snap_level: Floats) -
         beam_facet=facet,
         beam_range=distance,
         beam_coverage=coverage(
-            [(one.corners, b.mesh.faces, one.boxes) for b, one in zip(bodies, seen, strict=True)], beams
+            [(one.corners, b.mesh.faces, one.boxes, b.mesh.closed) for b, one in zip(bodies, seen, strict=True)], beams
         ),
     )
 
@@ -158,8 +159,8 @@ def _label_beams(
 
 def _beams_near(points: Floats, rays: Floats) -> tuple[np.ndarray, np.ndarray]:
     """Rows and columns of the rays inside the cone, about the mean direction of the points, that holds them all."""
-    towards = points / np.linalg.norm(points, axis=1, keepdims=True)
-    axis = towards.mean(axis=0)
+    towards = points / np.sqrt(dot(points, points))[:, None]
+    axis = np.full(len(towards), 1.0 / len(towards)) @ towards
     if np.linalg.norm(axis) < 0.5:  # the array is within the body, or close to it: every ray may hit
         every = np.indices(rays.shape[:2]).reshape(2, -1)
         return every[0], every[1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonarsynth.conventions import NO_TARGET, Floats
+from sonarsynth.equations.kernels.rounding import multiples
 from sonarsynth.imaging.beam_envelopes import envelope_levels
 from sonarsynth.pipeline.variables.variable_groups import LEVEL_STEP, NO_LEVEL
 from sonarsynth.planning import Plan
@@ -92,7 +93,7 @@ def sensor_values(drawn: DrawnErrors) -> Values:
 
 def signal_values(signals: Signals, counts: bool) -> Values:
     """Signals, as counts of the converter or in Pa."""
-    pressure = np.rint(signals.pressure / signals.quantum).astype(np.int16) if counts else signals.pressure
+    pressure = multiples(signals.pressure, signals.quantum) if counts else signals.pressure
     return table("/signals", pressure=pressure, start=signals.start, clipped=signals.clipped, outside=signals.outside)
 
 

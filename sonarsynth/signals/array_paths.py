@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints
-from sonarsynth.equations.arrays.apertures import aperture_terms
+from sonarsynth.equations.arrays.apertures import kept_aperture_terms
 from sonarsynth.products import Arrivals
 from sonarsynth.receiver import Elements
 from sonarsynth.signals.filtered_pulse import snap_gains
@@ -210,7 +210,7 @@ def arrival_directions(front: ArrayPaths, points: Floats) -> Floats:
 def terms_gradient(points: Floats, aperture: float, terms: int) -> Floats:
     """Gradient (xyz, point, term) in 1/m of so many aperture terms at points (point, xyz)."""
     steps = 1e-4 * aperture * np.eye(3)
-    sides = [[aperture_terms(points + way * step, aperture, terms) for way in (1, -1)] for step in steps]
+    sides = [[kept_aperture_terms(points + way * step, aperture, terms) for way in (1, -1)] for step in steps]
     return np.array([(ahead - behind) / (2e-4 * aperture) for ahead, behind in sides])
 
 
@@ -218,7 +218,7 @@ def over(terms: Floats, points: Floats, aperture: float) -> Floats:
     """Polynomials with coefficients terms (path, term) at points (point, xyz): (path, point); 0 without terms."""
     if not terms.shape[1]:
         return np.zeros((len(terms), len(points)))
-    return np.asarray(terms @ aperture_terms(points, aperture, terms.shape[1]).T)
+    return np.asarray(terms @ kept_aperture_terms(points, aperture, terms.shape[1]).T)
 
 
 def delay_and_gain(front: ArrayPaths, points: Floats) -> tuple[Floats, Floats]:

@@ -141,17 +141,13 @@ def convert(signals: Signals, converter: Converter | None) -> Signals:
     """
     if converter is None:
         return signals
+    from sonarsynth.equations.kernels.rounding import round_off
+
     largest = 2 ** (converter.bits - 1) - 1
     exact = np.float32 if converter.bits <= 16 else np.float64  # in which every count and its half are numbers
-    counts = signals.pressure / exact(converter.quantum)
-    np.rint(counts, out=counts)
-    highest, lowest = counts.max(initial=0.0), counts.min(initial=0.0)
-    if np.isnan(highest):
+    analog = signals.pressure.astype(exact, copy=False)
+    pressure = np.empty(analog.shape, np.float32)
+    clipped, unknown = round_off(analog, exact(converter.quantum), exact(largest), pressure)
+    if unknown:
         raise ValueError("the signals hold NaN: they cannot be converted")
-    clipped = 0
-    if max(highest, -lowest) > largest:
-        clipped = int(np.count_nonzero(np.abs(counts) > largest))
-        np.clip(counts, -largest, largest, out=counts)
-    counts *= exact(converter.quantum)
-    pressure = counts.astype(np.float32, copy=False)
     return replace(signals, pressure=pressure, quantum=converter.quantum, clipped=signals.clipped + clipped)

@@ -153,7 +153,7 @@ def _softened(front: ArrayPaths, frequency: Floats, decay: Floats, tolerance: fl
     span = max(float(np.log(high / low)), 1e-3)
     place = 2.0 * np.log(np.maximum(frequency, low) / high) / span + 1.0
     steepest = float(front.variance.max() * blur_exponent(frequency)[-1])
-    rate = CubicSpline(frequency, decay)
+    rate = _spline(frequency.tobytes(), decay.tobytes())
 
     def at(count: int) -> Floats:
         return np.asarray(high * np.exp(0.5 * span * (chebyshev(count) - 1.0)))
@@ -178,6 +178,11 @@ def _softened(front: ArrayPaths, frequency: Floats, decay: Floats, tolerance: fl
     if front.coherent_fraction.any():
         left *= rough_factor(at(count), front.coherent_fraction, front.height_delay_std)
     return left, np.asarray(interpolation(place, Axis(count)).T)
+
+
+@lru_cache(maxsize=64)
+def _spline(frequency: bytes, decay: bytes) -> CubicSpline:
+    return CubicSpline(np.frombuffer(frequency), np.frombuffer(decay))
 
 
 @lru_cache(maxsize=256)

@@ -26,6 +26,7 @@ import numpy as np
 
 from sonarsynth.conventions import Bools, Floats, Ints, depth
 from sonarsynth.environment.sea import Profile
+from sonarsynth.equations.kernels.unit_vectors import moved
 from sonarsynth.equations.scattering.lobes import dot
 from sonarsynth.geometry.motion import Track
 from sonarsynth.products import Arrivals
@@ -71,9 +72,8 @@ class MotionTerms:
     def departure(self, length: Floats, away: Floats) -> Floats:
         """Directions (path, ..., xyz) to the array or probes of it, of rays of some length (path,) m that left in
         directions `away`; world."""
-        some = (slice(None), *(None for _ in away.shape[2:]))
-        seen = length[(*some, None)] * away + self.apart[some]
-        return np.asarray(seen / np.sqrt(dot(seen, seen))[..., None])
+        probes = away if away.ndim == 3 else away[:, None]
+        return np.asarray(moved(length, probes, self.apart).reshape(away.shape))
 
     def turned_back(self, way: Floats) -> Floats:
         """Directions (path, ..., xyz) as the body that has turned sees them, in the axes that it was traced in."""

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -58,28 +59,32 @@ def one(plan: Plan, index: int) -> tuple[pipeline.Values, dict[str, float]]:
     return values, dict(seconds)
 
 
-def stages(plan: Plan, path: Path) -> dict[str, float]:
-    """Processor time (ms) of each stage of a frame, the median of frames; of writing a shard, the mean."""
+def stages(plan: Plan, folder: Path) -> tuple[dict[str, float], float]:
+    """Processor time (ms) of each stage of a frame, the median of frames, of writing it, the mean; and of compressing
+    and writing it in shards of `FRAMES`, as large datasets have them."""
+    made = [one(plan, index) for index in range(WARM + FRAMES)][WARM:]
+    laps, values = [seconds for _, seconds in made], [found for found, _ in made]
+    ms = {stage: 1e3 * float(np.median([lap[stage] for lap in laps])) for stage in pipeline.STAGES if stage in laps[0]}
+    compressing, writing = written(plan, folder / "few.zarr", values)
+    many = written(replace(plan, shard_frames=FRAMES), folder / "many.zarr", values)
+    return ms | {"compress": compressing, "digest and write": writing}, sum(many)
+
+
+def written(plan: Plan, path: Path, values: list[pipeline.Values]) -> tuple[float, float]:
+    """Processor time (ms) a frame to compress some frames, as if they were the first, and to write them besides."""
     store.create(path, plan)
     layout, step = store.layout_of(plan), plan.shard_frames
-    for index in range(WARM):
-        one(plan, index)
-    laps: list[dict[str, float]] = []
     writing = compressing = 0.0
-    for first in range(WARM, WARM + FRAMES, step):
-        made = {index: one(plan, index) for index in range(first, first + step)}
-        laps += [seconds for _, seconds in made.values()]
+    for first in range(0, len(values), step):
         began = time.process_time()
-        frames = {index: layout.check(values) for index, (values, _) in made.items()}
+        frames = {index: layout.check(values[index]) for index in range(first, first + step)}
         store.write_shard(path, plan, first // step, frames)
-        written = time.process_time()
+        done = time.process_time()
         for array in (a for a in layout.arrays if not a.empty):
             encoded(array, layout.block(array, first // step, frames))
-        compressing += time.process_time() - written
-        writing += written - began
-    ms = {stage: 1e3 * float(np.median([lap[stage] for lap in laps])) for stage in pipeline.STAGES if stage in laps[0]}
-    each = 1e3 / FRAMES
-    return ms | {"compress": each * compressing, "digest and write": each * (writing - compressing)}
+        compressing += time.process_time() - done
+        writing += done - began
+    return 1e3 * compressing / len(values), 1e3 * (writing - compressing) / len(values)
 
 
 def built(plan: Plan, path: Path, workers: int) -> dict[str, Any]:
@@ -110,8 +115,8 @@ def bench() -> dict[str, Any]:
     """Stages; the dataset by 1 and by 2 workers, compared; start-up."""
     plan = planning.plan(reading.load(RECIPE))
     with tempfile.TemporaryDirectory() as folder:
-        by_stage = stages(plan, Path(folder) / "stages.zarr")
-        few = stages(planning.plan(plan.recipe, FEW), Path(folder) / "few.zarr")
+        by_stage, many = stages(plan, Path(folder) / "stages")
+        few, few_many = stages(planning.plan(plan.recipe, FEW), Path(folder) / "few")
         paths = {workers: Path(folder) / f"{workers}.zarr" for workers in (1, 2)}
         alone = built(plan, paths[1], 1)
         runs = [built(plan, paths[2], 2) for _ in range(BUILDS)]
@@ -122,6 +127,7 @@ def bench() -> dict[str, Any]:
             "gemm_ms": gemm(),
             "stages_ms": by_stage,
             "stages_ms of image and cloud": few,
+            "large_shards_ms": [many, few_many],
             "1 worker": alone,
             "2 workers": max(runs, key=lambda run: run["frames_per_second"]),
             "start_up_seconds": min(run["start_up_seconds"] for run in runs),
@@ -139,6 +145,7 @@ def table(result: dict[str, Any]) -> str:
     rows += [(name, f"{ms:.1f}", f"{few[name]:.1f}" if name in few else "") for name, ms in stages.items()]
     whole = [sum(some.values()) for some in (stages, few)]
     rows.append(("all", *(f"{ms:.1f}" for ms in whole)))
+    rows.append((f"compress and write, shards of {FRAMES} frames", *(f"{ms:.1f}" for ms in result["large_shards_ms"])))
     rows.append(
         (
             f"over a product of matrices of 1024 ({result['gemm_ms']:.1f} ms)",

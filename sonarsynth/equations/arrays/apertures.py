@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import numpy.typing as npt
 
@@ -22,6 +24,18 @@ def aperture_terms(position: npt.ArrayLike, aperture: float, terms: int = 20) ->
         found += [value for _, value in degree]
         degree = [(axis, value * axes[axis]) for last, value in degree for axis in range(last, 3)]
     return np.stack(found[:terms], axis=-1)
+
+
+def kept_aperture_terms(position: Floats, aperture: float, terms: int) -> Floats:
+    """`aperture_terms` at positions (point, xyz) that are asked for in every frame: hydrophones, nodes between them."""
+    return _kept_terms(position.tobytes(), aperture, terms)
+
+
+@lru_cache(maxsize=256)
+def _kept_terms(position: bytes, aperture: float, terms: int) -> Floats:
+    found = aperture_terms(np.frombuffer(position).reshape(-1, 3), aperture, terms)
+    found.setflags(write=False)
+    return found
 
 
 def element_directivity(frequency: npt.ArrayLike, direction: npt.ArrayLike, face: float, sound_speed: float) -> Floats:

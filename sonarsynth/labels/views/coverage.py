@@ -53,18 +53,21 @@ def cells_of(beams: BeamGrid) -> Cells:
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _planes(corners: tuple[Floats, Floats, Floats], planes: Floats) -> None:
-    """Write inward normals (3, xyz) of the planes through the origin and each side of a triangle."""
+def _planes(corners: tuple[Floats, Floats, Floats], planes: Floats) -> bool:
+    """Write inward normals (3, xyz) of the planes through the origin and each side of a triangle; returns whether its
+    outer side, from which its corners are counter-clockwise, is seen."""
     for i in range(3):
         a, b = corners[i], corners[(i + 1) % 3]
         planes[i, 0] = a[1] * b[2] - a[2] * b[1]
         planes[i, 1] = a[2] * b[0] - a[0] * b[2]
         planes[i, 2] = a[0] * b[1] - a[1] * b[0]
     c = corners[2]
-    if c[0] * planes[0, 0] + c[1] * planes[0, 1] + c[2] * planes[0, 2] < 0.0:
+    outer = c[0] * planes[0, 0] + c[1] * planes[0, 1] + c[2] * planes[0, 2] < 0.0
+    if outer:
         for i in range(3):
             for j in range(3):
                 planes[i, j] = -planes[i, j]
+    return bool(outer)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -92,10 +95,12 @@ def _mark(
 @njit(cache=True, error_model="numpy", nogil=True)
 def _cover(
     seen: Floats, faces: npt.NDArray[np.int32], boxes: Floats, first: tuple[float, float], step: tuple[float, float],
-    azimuth: Floats, level: Floats, sine: Floats, cosine: Floats, covered: Words, count: npt.NDArray[np.int16],
+    azimuth: Floats, level: Floats, sine: Floats, cosine: Floats, outside: bool, covered: Words,
+    count: npt.NDArray[np.int16],
 ) -> None:  # fmt: skip
     """Mark the directions that meet triangles (facet, 3) of points (vertex, xyz) with boxes (facet, 4) rad in bits
-    (row, column, word), and count them (row, column)."""
+    (row, column, word), and count them (row, column); `outside` a closed surface those that show their outer side
+    do."""
     rows, columns, directions = len(sine), len(azimuth), sine.shape[1]
     planes = np.empty((3, 3))
     for f in range(len(faces)):
@@ -108,7 +113,8 @@ def _cover(
         top = min(math.floor((box[3] - first[1]) / step[1]), rows - 1)
         if left > right or bottom > top:
             continue
-        _planes((seen[faces[f, 0]], seen[faces[f, 1]], seen[faces[f, 2]]), planes)
+        if not _planes((seen[faces[f, 0]], seen[faces[f, 1]], seen[faces[f, 2]]), planes) and outside:
+            continue
         for row in range(bottom, top + 1):
             for column in range(left, right + 1):
                 if count[row, column] < directions:
@@ -117,14 +123,16 @@ def _cover(
                     )
 
 
-def coverage(bodies: list[tuple[Floats, np.ndarray, Floats]], beams: BeamGrid) -> npt.NDArray[np.float32]:
+def coverage(bodies: list[tuple[Floats, np.ndarray, Floats, bool]], beams: BeamGrid) -> npt.NDArray[np.float32]:
     """Share (elevation, azimuth) of the solid angle of the cell of each beam that bodies cover: 0.002 rms at one edge.
 
-    bodies: corners seen (vertex, xyz), sonar frame, facets (facet, 3) of them, and their `facet_boxes`.
+    bodies: corners seen (vertex, xyz), sonar frame, facets (facet, 3) of them, their `facet_boxes`, and whether they
+    are a closed surface.
     """
     cells = cells_of(beams)
     covered = np.zeros((beams.elevations, beams.azimuths, (DIRECTIONS + 63) // 64), np.uint64)
     count = np.zeros(covered.shape[:2], np.int16)
-    for seen, faces, boxes in bodies:
-        _cover(np.ascontiguousarray(seen, float), faces, boxes, *cells, covered, count)
+    for seen, faces, boxes, closed in bodies:
+        outside = closed and bool(np.isfinite(seen).all() and not ((seen.T.min(1) < 0.0) & (seen.T.max(1) > 0.0)).all())
+        _cover(np.ascontiguousarray(seen, float), faces, boxes, *cells, outside, covered, count)
     return (count / DIRECTIONS).astype(np.float32)

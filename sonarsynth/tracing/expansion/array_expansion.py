@@ -51,7 +51,7 @@ class ArrayExpansion:
         """Where each probe, or the first few, is seen from the points of some legs: (row, probe, xyz), world."""
         if self.probe_departure is not None:
             return self.probe_departure[:, :few][rows]
-        return image(self.legs.select(rows), self.place.probe, self.place.receiver.pose, few)
+        return image(self.legs, self.place.probe, self.place.receiver.pose, few, rows)
 
     def gain(self, rows: Ints, few: int | None = None) -> Floats:
         """Amplitude at each probe, or the first few, over that of the sphere (row, probe); 1 in uniform water."""

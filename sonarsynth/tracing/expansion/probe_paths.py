@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonarsynth.conventions import Floats, Ints, depth
-from sonarsynth.equations.scattering.lobes import dot
+from sonarsynth.equations.kernels.unit_vectors import to_images
 from sonarsynth.geometry import Pose
 from sonarsynth.propagation.path_model import KnownRays
 from sonarsynth.propagation.reflections import at_boundaries
@@ -78,13 +78,15 @@ def traced(legs: ReceivePaths, place: ReceiverGeometry) -> ApertureSamples:
     return ApertureSamples(terms, phase, delay_std, gain * loss, departure, error)
 
 
-def image(legs: ReceivePaths, probe: Probes, sonar_pose: Pose, few: int | None = None) -> Floats:
-    """Unit vectors (leg, probe, xyz) from each point to the image of each probe, as far as the ray is long."""
+def image(
+    legs: ReceivePaths, probe: Probes, sonar_pose: Pose, few: int | None = None, rows: Ints | None = None
+) -> Floats:
+    """Unit vectors (leg, probe, xyz) from each point to the image of each probe, or the first few, as far as the ray is
+    long; of all legs, or some rows of them."""
+    some = slice(None) if rows is None else rows
+    mirrored = (legs.surface[some] + legs.bottom[some]) % 2 == 1
     offset = sonar_pose.turn_to_world(probe.position)[:few]
-    mirror = np.where(legs.bounces % 2 == 1, -1.0, 1.0)
-    span = (legs.length[:, None] * legs.departure)[:, None, :] + offset
-    span[:, :, 2] += (mirror - 1.0)[:, None] * offset[:, 2]
-    return np.asarray(span / np.sqrt(dot(span, span))[..., None])
+    return np.asarray(to_images(legs.length[some], legs.departure[some], mirrored, offset))
 
 
 def _boundaries(legs: ReceivePaths, departure: Floats, medium: Medium, centre: float) -> tuple[Floats, Floats, Floats]:

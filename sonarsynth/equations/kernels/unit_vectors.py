@@ -1,0 +1,40 @@
+"""Directions to the places of an array from many points, compiled: unit vectors of sums of two ways."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from sonarsynth.conventions import Bools, Floats
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def to_images(length: Floats, departure: Floats, mirrored: Bools, offset: Floats) -> Floats:
+    """Unit vectors (leg, place, xyz) from where legs of some length (leg,) in directions (leg, xyz) start to places
+    beside their ends (place, xyz), or beside what a level surface mirrors them to."""
+    out = np.empty((len(length), len(offset), 3))
+    for i in range(len(length)):
+        for j in range(len(offset)):
+            up = -offset[j, 2] if mirrored[i] else offset[j, 2]
+            x = length[i] * departure[i, 0] + offset[j, 0]
+            y = length[i] * departure[i, 1] + offset[j, 1]
+            z = length[i] * departure[i, 2] + up
+            far = math.sqrt(x * x + y * y + z * z)
+            out[i, j, 0], out[i, j, 1], out[i, j, 2] = x / far, y / far, z / far
+    return out
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def moved(length: Floats, away: Floats, apart: Floats) -> Floats:
+    """Unit vectors (leg, place, xyz) of length (leg,) times away (leg, place, xyz) plus apart (leg, xyz)."""
+    out = np.empty(away.shape)
+    for i in range(away.shape[0]):
+        for j in range(away.shape[1]):
+            x = length[i] * away[i, j, 0] + apart[i, 0]
+            y = length[i] * away[i, j, 1] + apart[i, 1]
+            z = length[i] * away[i, j, 2] + apart[i, 2]
+            far = math.sqrt(x * x + y * y + z * z)
+            out[i, j, 0], out[i, j, 1], out[i, j, 2] = x / far, y / far, z / far
+    return out
