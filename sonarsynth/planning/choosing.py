@@ -146,8 +146,8 @@ class _ArrayModel:
 
 
 def _subarrays(plan: Plan, indices: Sequence[int]) -> _ArrayModel:
-    """The fewest parts of the array that will do; where one will not, each hydrophone's own view of the targets is
-    tried first, then fainter echoes."""
+    """The fewest parts of the array that will do; where one will not, or sequences are more than are measured in, each
+    hydrophone's own view of the targets is tried first, then fainter echoes."""
     physics, count = plan.scene.physics, plan.elements.count
     seeing: OcclusionPoint = "centre" if physics.occlusion == "auto" else physics.occlusion
     if physics.subarrays == "sensors" or (physics.subarrays == "auto" and plan.recipe.accuracy.exact):
@@ -158,7 +158,8 @@ def _subarrays(plan: Plan, indices: Sequence[int]) -> _ArrayModel:
     first = min(physics.subarrays, count) if physics.subarrays != "auto" else 1
     enough = np.inf if given else allowed
     whole = error = _worst(measures, first, seeing, enough)
-    if error > allowed and physics.occlusion == "auto":
+    unseen = plan.recipe.sequences > len(measures)  # in which another body may stand in the way
+    if physics.occlusion == "auto" and (error > allowed or unseen):
         better = _worst(measures, first, "sensors", enough)
         if better < WORTHWHILE_GAIN * error:
             seeing, error = "sensors", better
@@ -172,7 +173,8 @@ def _subarrays(plan: Plan, indices: Sequence[int]) -> _ArrayModel:
 def _finer(
     plan: Plan, measures: Sequence[PerSensorReference], seeing: OcclusionPoint, error: float, allowed: float
 ) -> _ArrayModel:
-    """The fewest parts that err by no more than is allowed, of an array that errs by more as a whole."""
+    """The fewest parts that err by no more than is allowed, of an array that errs by more as a whole; where more parts
+    are no gain, each hydrophone's own view of the targets may be one."""
     count, auto = plan.elements.count, plan.scene.physics.dynamic_range == "auto"
     faintest = FAINT_REACH * np.sqrt(FAINT) * plan.recipe.accuracy.cheap if auto else 0.0
     # Cubics err by the fourth power of the width of parts, the square of their number: no fewer will do.
@@ -181,6 +183,10 @@ def _finer(
         if n:
             before, error = error, _worst(measures, 2**n, seeing, allowed)
             stuck = stuck + 1 if stuck == 2 or error > WORTHWHILE_GAIN * before else 0
+            if stuck and error > allowed and seeing == "centre" and plan.scene.physics.occlusion == "auto":
+                own = _worst(measures, 2**n, "sensors", allowed)
+                if own < WORTHWHILE_GAIN * error:
+                    seeing, error, stuck = "sensors", own, 0
         if error <= allowed:
             return _ArrayModel(2**n, seeing, error)
         if error <= allowed + faintest and auto:

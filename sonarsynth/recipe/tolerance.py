@@ -19,7 +19,7 @@ class Accuracy:
     taken at its word: its facets, its band and its beams are not errors.
     """
 
-    signal: Annotated[Number, Ge(1e-7), Le(0.3)] = 1e-3
+    signal: Annotated[Number, Ge(1e-7), Le(0.3)] = 1e-2
     """Error of the echoes, and of the direct arrivals, relative: root of the summed squares, over the array."""
     range_m: Annotated[Number, Gt(0)] = 0.01
     """Error of ranges by the method that turns delays into places, in m."""
@@ -33,5 +33,5 @@ class Accuracy:
 
     @property
     def cheap(self) -> float:
-        """Error of signals that is allowed to what costs little to do better: never more than 3e-3."""
-        return min(self.signal, 3e-3)
+        """Error of signals that is allowed to what costs nothing to do better: never more than 1e-3."""
+        return min(self.signal, 1e-3)

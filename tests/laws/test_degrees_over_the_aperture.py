@@ -88,6 +88,21 @@ def test_fainter_echoes_are_kept_before_the_array_is_cut(monkeypatch: pytest.Mon
             return float(np.hypot(7e-4 * np.sqrt(faint), 1e-4 / parts**2))
 
     monkeypatch.setattr(PerSensorReference, "of", staticmethod(lambda plan, index: Measured()))
-    plan = planning.plan(reading.recipe_of(reading.read(TANK)), products=())
+    plan = planning.plan(reading.recipe_of(reading.read(TANK, ["accuracy.signal=1e-3"])), products=())
     cut = choosing._subarrays(plan, [0])
     assert (cut.parts, cut.faint) == (1, choosing.LESS_FAINT) and cut.error < 3e-4
+
+
+@pytest.mark.parametrize(("sequences", "occlusion"), [(1, "centre"), (2, "sensors")])
+def test_occlusion_that_matters_where_it_was_measured_is_followed_where_it_was_not(
+    monkeypatch: pytest.MonkeyPatch, sequences: int, occlusion: str
+) -> None:
+    """Within the tolerance in one sequence, it may be beyond in the next, where another body stands in the way."""
+
+    class Measured:
+        def error(self, parts: int, occlusion: str = "centre", faint: float = 1.0) -> float:
+            return {"centre": 6e-4, "sensors": 3e-4}[occlusion]
+
+    monkeypatch.setattr(PerSensorReference, "of", staticmethod(lambda plan, index: Measured()))
+    plan = planning.plan(reading.recipe_of(reading.read(TANK, [f"repeats={sequences}"])), products=())
+    assert choosing._subarrays(plan, [0]).occlusion == occlusion

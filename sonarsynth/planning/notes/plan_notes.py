@@ -133,9 +133,10 @@ def _accuracy(made: Plan, looks: Sequence[SampledScene]) -> list[str]:
             f"{errors.whole:.2g}"
         )
     if made.choices.occlusion == "sensors" and made.scene.physics.occlusion == "auto":
+        unseen = "" if errors.whole > allowed.signal else ", and may be more in sequences that were not measured in"
         found.append(
             f"accuracy.signal {allowed.signal:g} needs the targets' occlusion from each hydrophone: with that from "
-            f"the array centre the error is {errors.whole:.2g}"
+            f"the array centre the error is {errors.whole:.2g}{unseen}"
         )
     if np.hypot(np.nan_to_num(errors.expansion), np.nan_to_num(errors.synthesis)) > allowed.signal:
         found.append(
