@@ -11,7 +11,7 @@ import pytest
 
 from sonarsynth.conventions import Floats
 from sonarsynth.equations.rays import ray_solutions
-from tests.following import families, family, follow, images, nodes, range_only, solve_again, textbook
+from tests.following import families, family, follow, images, nodes, solve_again, textbook
 from tests.waiting import HANGING
 
 CHANNEL = ray_solutions.water(np.array([0.0, 20.0, 50.0]), np.array([1510.0, 1500.0, 1515.0]), 50.0)
@@ -270,76 +270,6 @@ def test_turning_exactly_at_a_node_is_one_ray() -> None:
         mine = (found.turning == 1) & (abs(found.lower - 30.0) < 1e-3)
         assert mine.sum() == 1
         assert found.lower[mine][0] == pytest.approx(30.0, abs=1e-7 + 1e3 * abs(step))
-
-
-@pytest.mark.parametrize("step", [0.0, 1e-12, 1e-9, 1e-6])
-def test_a_ray_that_just_touches_the_surface_turns_and_reflects(step: float) -> None:
-    """In falling speed it comes farthest of all: short of there one turns and one reflects, beyond there is none."""
-    limit = reach(FALLING, 40.0, 70.0, 1530.0, (1, 0, 0, 1))
-    found, beyond = (one(FALLING, 40.0, 70.0, limit * (1 + s), 1, 1) for s in (-step, step))
-    if step:
-        assert names(found) == [(0, 0, 1), (1, 0, 0)]
-        assert (found.upper < 1e-3).sum() == 2
-        assert len(beyond.pair) == 0
-        close = found.upper < 1e-3
-        np.testing.assert_allclose(found.start_speed[close] * found.slowness[close], 1518.0 / 1530.0, rtol=1e-5)
-    else:
-        assert (found.upper < 1e-3).sum() in (0, 1, 2)
-
-
-@pytest.mark.parametrize("gap", [1e-3, 1e-5, 1e-7])
-def test_the_edge_of_a_shadow(gap: float) -> None:
-    """Speed falls with depth: the ray that touches the surface is the last that comes; beyond, none does."""
-    limit = reach(FALLING, 40.0, 30.0, 1530.0, (1, 0, 0, 1))
-    near, far = (one(FALLING, 40.0, 30.0, limit * (1 + s), 3, 0) for s in (-gap, gap))
-    assert len(near.pair) >= 1
-    assert near.upper[-1] < 20 * gap**0.5
-    assert len(far.pair) == 0
-    lit = one(FALLING, 40.0, 30.0, limit * (1 + gap), 3, 3)
-    assert (lit.bottom > 0).all()
-    assert len(lit.pair) > 0
-
-
-def fold() -> tuple[ray_solutions.Water, float, float, float, tuple[int, int, int, int]]:
-    """Rays that turn below a uniform layer over rising speed: their range has a minimum. Water, ends, range, family."""
-    water = ray_solutions.water(np.array([0.0, 30.0, 100.0]), np.array([1500.0, 1500.0, 1535.0]), 100.0)
-    start, end, name = 10.0, 18.0, (-1, 0, 0, 1)
-    z, c = nodes(water, (start, end), np.longdouble)
-    low, high = 1 / np.longdouble(1535.0), 1 / np.longdouble(1500.0)
-    for _ in range(12):
-        p = np.linspace(low, high, 403, dtype=np.longdouble)[1:-1]
-        visits = follow(z, c, (np.longdouble(start), np.longdouble(end)), p, -1, 1, 0, range_only)
-        x = next(v.sums for v in visits if v.turning == 1)
-        i = int(np.argmin(x))
-        low, high = p[max(i - 1, 0)], p[min(i + 1, len(p) - 1)]
-    return water, start, end, float(x[i]), name
-
-
-def test_a_fold_has_two_rays_on_one_side_and_none_on_the_other() -> None:
-    water, start, end, limit, _ = fold()
-    steps = 10.0 ** -np.arange(2, 8.0)
-    for step in steps:
-        lit, dark = (one(water, start, end, limit * (1 + s * step), 1, 0) for s in (1, -1))
-        assert (dark.turning > 0).sum() == 0
-        pair = np.flatnonzero(lit.turning > 0)
-        assert len(pair) == 2
-        assert sorted(lit.caustics[pair]) == [0, 1]
-
-
-def test_near_a_fold_amplitudes_grow_as_the_fourth_root_and_are_flagged() -> None:
-    water, start, end, limit, _ = fold()
-    steps = 10.0 ** -np.arange(4, 8.0)
-    found = [one(water, start, end, limit * (1 + s), 1, 0) for s in steps]
-    loud = np.array([f.amplitude[f.turning > 0].mean() for f in found])
-    growth = np.diff(np.log10(loud))
-    np.testing.assert_allclose(growth, 0.25, atol=5e-3)
-    gap = np.array([np.ptp(f.slowness[f.turning > 0]) for f in found])
-    np.testing.assert_allclose(np.diff(np.log10(gap)), -0.5, atol=5e-3)
-    assert (found[-1].flag[found[-1].turning > 0] == ray_solutions.CAUSTIC).all()
-    near = one(water, start, end, limit * (1 + 1e-13), 1, 0)
-    assert np.isfinite(near.amplitude).all()
-    exact = one(water, start, end, limit, 1, 0)
-    assert (exact.flag[exact.turning > 0] == ray_solutions.CAUSTIC).all()
 
 
 def test_no_vertices_and_no_reflections() -> None:

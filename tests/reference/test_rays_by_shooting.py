@@ -2,117 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from sonarsynth.conventions import Floats, Ints
 from sonarsynth.equations.rays import ray_solutions
 from tests.following import random_water
-
-
-def munk(depth: Floats) -> Floats:
-    """Munk (1974): the canonical deep channel."""
-    scaled = 2 * (depth - 1300.0) / 1300.0
-    return 1500.0 * (1 + 0.00737 * (scaled - 1 + np.exp(-scaled)))
-
-
-def thermocline(depth: Floats) -> Floats:
-    return 1540.0 - 2.5 * (1 + np.tanh((depth - 12.0) / 2.0)) + 0.016 * depth
-
-
-def duct(depth: Floats) -> Floats:
-    return 1500.0 + 0.02 * depth - 4.0 * np.exp(-(((depth - 60.0) / 15.0) ** 2))
-
-
-def tabulated(profile: Callable[[Floats], Floats], bottom_depth: float, count: int) -> ray_solutions.Water:
-    depth = np.linspace(0, bottom_depth, count)
-    return ray_solutions.water(depth, profile(depth), bottom_depth)
-
-
-def event(of: Callable[[Floats], float], direction: int, terminal: bool) -> Callable[[float, Floats], float]:
-    def watch(_: float, y: Floats) -> float:
-        return of(y)
-
-    watch.direction, watch.terminal = direction, terminal  # type: ignore[attr-defined]
-    return watch
-
-
-def within_layer(
-    state: Floats, top: float, low: float, c1: float, c2: float, end: float, final: bool, turns: bool
-) -> tuple[int, Floats]:
-    """Integrate x, z, angle (down positive), time, length to the next event: 0 top, 1 low, 2 turned, 3 at the end."""
-    gradient = (c2 - c1) / (low - top)
-
-    def motion(_: float, y: Floats) -> list[float]:
-        c, cosine, sine = c1 + gradient * (y[1] - top), np.cos(y[2]), np.sin(y[2])
-        return [cosine, sine, -gradient * cosine / c, 1 / c]
-
-    watched = [event(lambda y: y[1] - top, -1, True), event(lambda y: y[1] - low, 1, True)]
-    watched += [event(lambda y: y[2], 0, True)] if turns else [event(lambda _: 1.0, 0, False)]
-    watched += [event(lambda y: y[1] - end, 0, True)] if final and state[1] != end else []
-    scale = 0.2 * (low - top) / max(abs(np.sin(state[2])), 0.02)
-    run = solve_ivp(motion, (0.0, 1e7), state, "DOP853", events=watched, rtol=3e-14, atol=1e-13, max_step=scale)
-    which = next(i for i, t in enumerate(run.t_events) if len(t))
-    assert which in (0, 1, 2, 3)
-    state = run.y_events[which][0].copy()
-    if which < 3:
-        k, value = ((1, top), (1, low), (2, 0.0))[which]
-        state[k] = value
-    return which, np.append(state, run.t_events[which][0])
-
-
-def shot(water: ray_solutions.Water, start: float, angle: float, counts: list[int], end: float) -> Floats:
-    """Range, depth, angle, time and length where a ray passes the depth `end` after these reflections and turns."""
-    state, length, seen, turns = np.array([0.0, start, angle, 0.0]), 0.0, [0, 0, 0], True
-    layer = int(np.searchsorted(water.depth, start, "right" if angle > 0 else "left")) - 1
-    while True:
-        layer = min(max(layer, 0), len(water.depth) - 2)
-        bounds = *water.depth[layer : layer + 2], *water.speed[layer : layer + 2]
-        which, moved = within_layer(state, *bounds, end, seen == counts, turns)
-        state, length, turns = moved[:4], length + moved[4], which != 2
-        if which == 3 or (seen == counts and state[1] == end):
-            return np.append(state, length)
-        layer += (-1, 1, 0)[which]
-        if which == 2:
-            seen[2] += 1
-        elif not 0 <= layer < len(water.depth) - 1:
-            seen[which] += 1
-            state[2] = -state[2]
-        assert all(a <= b for a, b in zip(seen, counts, strict=True))
-
-
-@pytest.mark.parametrize(
-    ("profile", "bottom_depth", "count", "start", "end", "distance", "vertices"),
-    [
-        (thermocline, 25.0, 21, 9.0, 14.0, 300.0, 3),
-        (duct, 150.0, 26, 55.0, 70.0, 2e3, 3),
-        (munk, 5000.0, 21, 1000.0, 1300.0, 40e3, 3),
-    ],
-)
-def test_an_integrator_shoots_to_the_same_end(
-    profile: Callable[[Floats], Floats],
-    bottom_depth: float,
-    count: int,
-    start: float,
-    end: float,
-    distance: float,
-    vertices: int,
-) -> None:
-    water = tabulated(profile, bottom_depth, count)
-    found = ray_solutions.eigenrays(water, np.array([start]), np.array([end]), np.array([distance]), vertices, vertices)
-    assert len(found.pair) >= 2 * vertices
-    for i in range(len(found.pair)):
-        p = found.slowness[i]
-        counts = [int(found.surface[i]), int(found.bottom[i]), int(found.turning[i])]
-        angle = -np.arctan2(found.start_sine[i], p * found.start_speed[i])
-        x, _, arrives, time, length = shot(water, start, angle, counts, end)
-        assert abs(x - distance) < 1e-8 * distance
-        assert abs(found.travel_time[i] - (time + p * (distance - x))) < 1e-11 * time
-        assert abs(found.length[i] / length - 1) < 1e-8
-        assert abs(arrives + np.arctan2(found.end_sine[i], p * found.end_speed[i])) < 1e-8
 
 
 def along(
