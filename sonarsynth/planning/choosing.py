@@ -183,7 +183,7 @@ def _finer(
         if n:
             before, error = error, _worst(measures, 2**n, seeing, allowed)
             stuck = stuck + 1 if stuck == 2 or error > WORTHWHILE_GAIN * before else 0
-            if stuck and error > allowed and seeing == "centre" and plan.scene.physics.occlusion == "auto":
+            if stuck == 2 and error > allowed and plan.scene.physics.occlusion == "auto":
                 own = _worst(measures, 2**n, "sensors", allowed)
                 if own < WORTHWHILE_GAIN * error:
                     seeing, error, stuck = "sensors", own, 0
