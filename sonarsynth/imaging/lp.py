@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import gamma, pi, sqrt
 from typing import Annotated, Literal
 
 import numpy as np
@@ -25,8 +26,8 @@ class LpMean(TimeStatistic):
         1.8       1.12   5.01   8.53   7.33
         2.0       12.0   11.3   10.0   7.67
 
-    (40 000 draws.) p below alpha/2 is wanted, where |y|^p has a variance. For p = 0 the index of independent samples is
-    `log_detection_index`. With p = 2 it is delay and sum, but for the rounding of the window's ends.
+    (40 000 draws.) p below alpha/2 is wanted: only there |y|^p has a variance, and the index grows as the root of the
+    number of samples (`detection_index`). With p = 2 it is delay and sum, but for the rounding of the window's ends.
     """
 
     kind: Literal["lp"] = "lp"
@@ -55,12 +56,27 @@ def power_mean(magnitude: Floats, p: float) -> Floats:
         return np.asarray(np.exp(np.log1p(np.mean(np.expm1(p * logarithm), axis=-1)) / p))
 
 
-def log_detection_index(ratio: float, alpha: float, samples: int) -> float:
-    """Index of the log mean (p = 0) for a beam whose level is higher by `ratio` (dB), of independent samples.
+def detection_index(ratio: float, alpha: float, samples: int, p: float = 0.0) -> float:
+    """Index by which a beam is told whose level is higher by `ratio` (dB), of independent samples of symmetric
+    alpha-stable noise: standard deviations of the mean of |y|^p, for p = 0 of ln |y|, as many samples make it.
 
-    Standard deviations of the mean of ln |y| by which the brighter beam is told, for symmetric alpha-stable noise,
-    0 < alpha <= 2: ln(10^(ratio/20))/sqrt(pi^2/6 (1/alpha^2 + 1/2)/n).
-    Source: variance of ln |y| from Nikias & Shao (1995), Signal Processing with Alpha-Stable Distributions, ch. 5.
+    p ln(10^(ratio/20)) sqrt(n/(E|y|^2p/(E|y|^p)^2 - 1)), and ln(10^(ratio/20))/sqrt(pi^2/6 (1/alpha^2 + 1/2)/n). With p
+    from alpha/2 on |y|^p has no variance, however many samples there are: the index of a mean is then that of its
+    loudest sample.
+    Source: fractional moments and variance of ln |y| from Nikias & Shao (1995), Signal Processing with Alpha-Stable
+    Distributions, ch. 2 and 5. Raises ValueError for p from alpha/2 on, but where alpha is 2.
     """
-    variance = np.pi**2 / 6.0 * (1.0 / alpha**2 + 0.5)
-    return float(ratio / 20.0 * np.log(10.0) / np.sqrt(variance / samples))
+    higher = ratio / 20.0 * np.log(10.0)
+    if p == 0.0:
+        return float(higher * np.sqrt(samples / (np.pi**2 / 6.0 * (1.0 / alpha**2 + 0.5))))
+    if p >= 0.5 * alpha and alpha < 2.0:
+        raise ValueError(
+            f"|y|^{p:g} of alpha-stable noise of alpha {alpha:g} has no variance: p is under {alpha / 2:g}"
+        )
+    return float(p * higher * np.sqrt(samples / (_moment(2.0 * p, alpha) / _moment(p, alpha) ** 2 - 1.0)))
+
+
+def _moment(p: float, alpha: float) -> float:
+    """E|y|^p of symmetric alpha-stable noise of unit scale, 0 < p < alpha; of alpha 2, Gaussian of variance 2, any."""
+    whole = 2.0**p * gamma(0.5 * (1.0 + p)) / sqrt(pi)
+    return float(whole if alpha == 2.0 else whole * gamma(1.0 - p / alpha) / gamma(1.0 - 0.5 * p))

@@ -1,4 +1,4 @@
-"""`.sonar` of the tree of a store: its points and groups as tables, a frame as a picture."""
+"""`.sonar` of the tree of a store: its points and groups as tables, frames stacked, a frame as a picture."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
+from sonarsynth.loading.stacking import stack
 from sonarsynth.loading.tables import as_table, points_table
 from sonarsynth.store import built_frames
 
@@ -50,6 +51,12 @@ class SonarAccessor:
         rows.
         """
         return as_table(self._tree, group, rows, frames)
+
+    def stack(self, frames: Iterable[int] | None = None) -> xr.DataArray:
+        """Median energy (elevation, azimuth) in Pa2 s over frames (left out: all) of a scene at rest, for faint echoes
+        among loud strangers: see `loading.stacking`. Raises ValueError where there is no image or a target moves.
+        """
+        return stack(self._tree, frames)
 
     def image(self, frame: int) -> Figure:
         """The energy image of a frame with the outlines of targets and the rings of ghosts, in dB re its brightest

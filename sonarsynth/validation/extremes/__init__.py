@@ -9,7 +9,7 @@ from sonarsynth.validation.extremes import (
     extreme_bubbles,
     extreme_chains,
     extreme_facets,
-    extreme_populations,
+    extreme_images,
     extreme_rays,
     extreme_signals,
     extreme_sources,
@@ -27,10 +27,10 @@ def groups() -> dict[str, tuple[Case, ...]]:
         "signals": extreme_signals.CASES,
         "sources": extreme_sources.CASES,
         "targets": extreme_targets.CASES,
-        "populations": extreme_populations.CASES,
         "bodies": extreme_bodies.CASES,
         "facets": extreme_facets.CASES,
         "bubbles": extreme_bubbles.CASES,
+        "images": extreme_images.CASES,
         "chain": extreme_chains.CASES,
     }
 
