@@ -29,7 +29,15 @@ PAGES = [
     *sorted((ROOT / ".github").glob("*.md")),
     *sorted((ROOT / "tools" / "docs").rglob("*.md")),
 ]
-LONG = {"training_a_detector", "eigenrays_and_ghosts", "beams_lobes_and_focus", "target_strength"}
+LONG = {
+    "authoring_a_scene",
+    "beams_lobes_and_focus",
+    "eigenrays_and_ghosts",
+    "hull_from_clouds",
+    "recipe_to_cluster",
+    "target_strength",
+    "training_a_detector",
+}
 NOTEBOOKS = [
     pytest.param(file, marks=[pytest.mark.long] if file.stem in LONG else [], id=file.stem)
     for file in sorted((ROOT / "tools" / "notebooks").glob("*.py"))

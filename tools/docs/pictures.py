@@ -34,7 +34,7 @@ FRAMES = {
     "tank": 0,
     "l_shape": 0,
     "grid": 3,
-    "survey": 32,
+    "survey": 24,
     "harbour": 8,
 }
 """The frame of each shipped recipe that is drawn."""
